@@ -1,0 +1,69 @@
+# Helpers that give every target the same language level, warnings and include root.
+
+set(CMAKE_CXX_STANDARD 20)
+set(CMAKE_CXX_STANDARD_REQUIRED ON)
+set(CMAKE_CXX_EXTENSIONS OFF)
+set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
+set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${CMAKE_BINARY_DIR}/bin)
+
+find_program(SCANRIG_CCACHE ccache)
+if(SCANRIG_CCACHE)
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${SCANRIG_CCACHE})
+endif()
+
+set(SCANRIG_SANITIZE "" CACHE STRING "Value for -fsanitize=, or empty")
+
+add_library(scanrig_warnings INTERFACE)
+target_compile_options(scanrig_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
+                                                  -Wnon-virtual-dtor -Wold-style-cast)
+# Same bits on every dispatch level: no contraction of a*b+c behind our back.
+target_compile_options(scanrig_warnings INTERFACE -ffp-contract=off)
+if(SCANRIG_SANITIZE)
+  add_compile_options(-fsanitize=${SCANRIG_SANITIZE} -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${SCANRIG_SANITIZE})
+endif()
+
+# scanrig_library(NAME SOURCES a.cpp ... [LINK public libs] [PRIVATE private libs])
+# Makes the static library `scanrig_NAME` (or an INTERFACE library when it has no sources), alias `scanrig::NAME`.
+function(scanrig_library name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK;PRIVATE" ${ARGN})
+  if(ARG_SOURCES)
+    add_library(scanrig_${name} STATIC ${ARG_SOURCES})
+    target_include_directories(scanrig_${name} PUBLIC ${CMAKE_SOURCE_DIR})
+    target_link_libraries(scanrig_${name} PUBLIC ${ARG_LINK} PRIVATE ${ARG_PRIVATE} scanrig_warnings)
+  else()
+    add_library(scanrig_${name} INTERFACE)
+    target_include_directories(scanrig_${name} INTERFACE ${CMAKE_SOURCE_DIR})
+    target_link_libraries(scanrig_${name} INTERFACE ${ARG_LINK})
+  endif()
+  add_library(scanrig::${name} ALIAS scanrig_${name})
+endfunction()
+
+# scanrig_program(NAME SOURCES main.cpp ... LINK libs)
+function(scanrig_program name)
+  cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_LINK} scanrig_warnings)
+endfunction()
+
+# scanrig_test(NAME LABEL unit|component|system SOURCES a_test.cpp ... LINK libs [TIMEOUT seconds])
+function(scanrig_test name)
+  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;LINK" ${ARGN})
+  if(NOT ARG_TIMEOUT)
+    set(ARG_TIMEOUT 120)
+  endif()
+  add_executable(${name} ${ARG_SOURCES})
+  target_link_libraries(${name} PRIVATE ${ARG_LINK} GTest::gtest GTest::gmock GTest::gtest_main scanrig_warnings)
+  target_compile_definitions(${name} PRIVATE SCANRIG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
+  add_test(NAME ${name} COMMAND ${name})
+  set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
+endfunction()
+
+# Adds every folder below the current one that has a CMakeLists.txt, in the order given, the rest by name.
+function(scanrig_add_folders)
+  file(GLOB lists RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS */CMakeLists.txt)
+  foreach(list ${lists})
+    get_filename_component(folder ${list} DIRECTORY)
+    add_subdirectory(${folder})
+  endforeach()
+endfunction()

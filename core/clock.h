@@ -1,0 +1,57 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+
+namespace scanrig {
+
+/// Time as the rig sees it. Everything that waits does so through a Clock, so that tests can run on a virtual one.
+/// Threads: every function may be called from any thread.
+class Clock {
+ public:
+  using Duration = std::chrono::nanoseconds;
+  using TimePoint = std::chrono::time_point<std::chrono::steady_clock, Duration>;
+
+  virtual ~Clock() = default;
+  [[nodiscard]] virtual TimePoint now() const = 0;
+
+  /// Waits, with `lock` held, until `ready()` or `until`; returns `ready()`.
+  /// Whoever makes `ready()` true must call `notify_all(changed)` of the same clock.
+  virtual bool wait_until(std::unique_lock<std::mutex>& lock, std::condition_variable& changed, TimePoint until,
+                          const std::function<bool()>& ready) = 0;
+
+  virtual void notify_all(std::condition_variable& changed) = 0;
+
+  /// Sleeps; for devices' physics, never to wait for somebody else's result.
+  void sleep_until(TimePoint until);
+  void sleep_for(Duration duration) { sleep_until(now() + duration); }
+};
+
+class RealClock final : public Clock {
+ public:
+  [[nodiscard]] TimePoint now() const override;
+  bool wait_until(std::unique_lock<std::mutex>& lock, std::condition_variable& changed, TimePoint until,
+                  const std::function<bool()>& ready) override;
+  void notify_all(std::condition_variable& changed) override { changed.notify_all(); }
+};
+
+/// The moment by which something must have happened.
+struct Deadline {
+  Clock::TimePoint at;
+
+  static Deadline after(const Clock& clock, Clock::Duration duration) { return {clock.now() + duration}; }
+  [[nodiscard]] bool expired(const Clock& clock) const { return clock.now() >= at; }
+  [[nodiscard]] Clock::Duration left(const Clock& clock) const {
+    const auto now = clock.now();
+    return now >= at ? Clock::Duration::zero() : at - now;
+  }
+  /// The earlier of this deadline and `duration` from now.
+  [[nodiscard]] Deadline at_most(const Clock& clock, Clock::Duration duration) const {
+    const auto then = clock.now() + duration;
+    return {then < at ? then : at};
+  }
+};
+
+}  // namespace scanrig

@@ -1,0 +1,96 @@
+#include "core/files.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+#include <vector>
+
+namespace scanrig {
+namespace {
+
+class Descriptor {
+ public:
+  explicit Descriptor(int fd) : fd_(fd) {}
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() {
+    if (fd_ >= 0) ::close(fd_);
+  }
+  [[nodiscard]] int get() const { return fd_; }
+
+ private:
+  int fd_;
+};
+
+tl::unexpected<Error> fail_errno(const char* doing, const std::filesystem::path& path) {
+  return fail(ErrorCode::io, "{} {}: {}", doing, path.string(), std::strerror(errno));
+}
+
+Result<void> sync_folder(const std::filesystem::path& folder) {
+  const Descriptor fd(::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+  if (fd.get() < 0 || ::fsync(fd.get()) != 0) return fail_errno("cannot sync the folder", folder);
+  return {};
+}
+
+Result<void> write_and_sync(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  const Descriptor fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+  if (fd.get() < 0) return fail_errno("cannot create", path);
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(fd.get(), bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) return fail_errno("cannot write", path);
+    bytes = bytes.subspan(static_cast<std::size_t>(written));
+  }
+  if (::fsync(fd.get()) != 0) return fail_errno("cannot sync", path);
+  return {};
+}
+
+}  // namespace
+
+Result<std::string> read_file(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) return fail(ErrorCode::not_found, "no such file: {}", path.string());
+  if (std::filesystem::is_directory(path, error)) return fail(ErrorCode::io, "{} is a folder, not a file", path.string());
+  std::ifstream stream(path, std::ios::binary);
+  std::ostringstream text;
+  if (stream) text << stream.rdbuf();
+  if (!stream) return fail(ErrorCode::io, "cannot read {}", path.string());
+  return std::move(text).str();
+}
+
+Result<void> write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  std::filesystem::path temporary = path;
+  temporary += fmt::format(".tmp{}", ::getpid());
+  auto written = write_and_sync(temporary, bytes);
+  if (written && ::rename(temporary.c_str(), path.c_str()) != 0) {
+    written = Result<void>(fail_errno("cannot rename to", path));
+  }
+  if (!written) {
+    ::unlink(temporary.c_str());
+    return written;
+  }
+  return sync_folder(path.parent_path());
+}
+
+Result<void> write_file_atomically(const std::filesystem::path& path, std::string_view text) {
+  return write_file_atomically(path, std::as_bytes(std::span(text.data(), text.size())));
+}
+
+Result<void> create_directories_synced(const std::filesystem::path& path) {
+  std::error_code error;
+  std::vector<std::filesystem::path> missing;
+  for (auto p = path; !p.empty() && !std::filesystem::exists(p, error); p = p.parent_path()) missing.push_back(p);
+  for (auto p = missing.rbegin(); p != missing.rend(); ++p) {
+    if (!std::filesystem::create_directory(*p, error) && error) {
+      return fail(ErrorCode::io, "cannot create the folder {}: {}", p->string(), error.message());
+    }
+    if (auto synced = sync_folder(p->parent_path()); !synced) return synced;
+  }
+  return {};
+}
+
+}  // namespace scanrig

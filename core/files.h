@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <string_view>
+
+#include "core/result.h"
+
+namespace scanrig {
+
+/// The whole file. Fails with `not_found` or `io`, naming the file.
+Result<std::string> read_file(const std::filesystem::path& path);
+
+/// Writes a file so that a crash or a power cut leaves either the old one or the new one: temporary name in the same
+/// folder, fsync, rename, fsync of the folder. Fails with `io`; the temporary file is removed then.
+Result<void> write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
+Result<void> write_file_atomically(const std::filesystem::path& path, std::string_view text);
+
+/// Creates `path` and its parents and syncs each new entry's folder. Fails with `io`.
+Result<void> create_directories_synced(const std::filesystem::path& path);
+
+}  // namespace scanrig

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <fmt/format.h>
+
+#include <string>
+#include <string_view>
+#include <tl/expected.hpp>
+#include <utility>
+
+namespace scanrig {
+
+/// What went wrong, for programs. The message beside it is for the person at the rig.
+enum class ErrorCode {
+  invalid_input,  ///< a file, an option or a request that cannot be used as it is
+  not_found,      ///< a named thing does not exist
+  exists,         ///< the result would overwrite something
+  io,             ///< the operating system refused: disk, port, socket
+  timeout,        ///< no positive evidence before the deadline
+  protocol,       ///< an answer that is not one: checksum, length, wrong request
+  out_of_range,   ///< a value outside what the device or the rig allows
+  device_alarm,   ///< the device itself reports a fault
+  stalled,        ///< told to move, does not move
+  not_homed,      ///< no known zero
+  stopped,        ///< someone asked to stop
+  busy,           ///< something else is being done
+  refused,        ///< a rule of the station forbids it now
+  unsupported,    ///< this version or this device cannot do it
+  not_closed,     ///< a surface that should bound a solid does not
+  degenerate,     ///< geometry without enough content to decide
+  no_overlap,     ///< two data sets share no surface
+  ambiguous,      ///< more than one answer fits the data
+  same_rest,      ///< the object was not turned over
+  internal,       ///< a bug
+};
+
+std::string_view to_string(ErrorCode code);
+
+struct Error {
+  ErrorCode code = ErrorCode::internal;
+  std::string message;  ///< who, doing what, what happened, what to do
+
+  /// The same error seen from one level further out: "who: message".
+  [[nodiscard]] Error in(std::string_view who) const;
+};
+
+template <class T>
+using Result = tl::expected<T, Error>;
+
+/// `return fail(ErrorCode::io, "cannot open {}: {}", path, reason);`
+template <class... Args>
+[[nodiscard]] tl::unexpected<Error> fail(ErrorCode code, fmt::format_string<Args...> text, Args&&... args) {
+  return tl::unexpected<Error>(Error{code, fmt::format(text, std::forward<Args>(args)...)});
+}
+
+/// Passes an error on unchanged: `return pass_on(result);`
+template <class T>
+[[nodiscard]] tl::unexpected<Error> pass_on(const Result<T>& result) {
+  return tl::unexpected<Error>(result.error());
+}
+
+/// Passes an error on, saying who met it: `return pass_on(result, "turntable");`
+template <class T>
+[[nodiscard]] tl::unexpected<Error> pass_on(const Result<T>& result, std::string_view who) {
+  return tl::unexpected<Error>(result.error().in(who));
+}
+
+/// Exit codes of every scanrig program, documented in docs/exit-codes.md.
+enum class ExitCode : int {
+  ok = 0,
+  internal = 1,
+  usage = 2,
+  bad_input = 3,
+  disk = 4,
+  device = 5,
+  refused = 6,
+  no_model = 7,
+  below_limits = 8,
+  unreachable = 9,
+  stopped = 10,
+};
+
+ExitCode exit_code(ErrorCode code);
+
+}  // namespace scanrig

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "core/clock.h"
+#include "core/result.h"
+
+namespace scanrig {
+
+/// How the bytes of a frame are to be read. `bayer_rggb8`: one byte a pixel, red at (0,0).
+enum class PixelFormat { mono8, bayer_rggb8, bgr8 };
+
+/// The name used in manifests: "Mono8", "BayerRG8", "BGR8" (GenICam PFNC).
+std::string to_string(PixelFormat format);
+
+/// Two images of one moment, as the sensors delivered them.
+struct StereoFrame {
+  cv::Mat left;   ///< 8 bit; 1 channel for mono8 and bayer_rggb8, 3 for bgr8
+  cv::Mat right;  ///< same size and type as `left`
+  PixelFormat format = PixelFormat::mono8;
+  std::uint64_t trigger = 0;  ///< how many triggers since arm(), this one included
+  Clock::TimePoint taken;
+};
+
+/// Two synchronised sensors, bound by serial number, triggered by the projector's edge.
+/// One arm(), one edge, one collect(): nothing older than the trigger is ever returned.
+/// Threads: one owner.
+class StereoCamera {
+ public:
+  virtual ~StereoCamera() = default;
+
+  /// Makes both sensors wait for the next edge; frames still in flight are thrown away.
+  /// Fails with `timeout`, `protocol`, `io`.
+  virtual Result<void> arm(Deadline deadline) = 0;
+
+  /// The pair that belongs to the edge after arm(). Fails with `timeout` (a frame is missing), `protocol` (torn, or the
+  /// two frames do not belong together), `io`. After a failure arm() again and redo the exposure.
+  virtual Result<StereoFrame> collect(Deadline deadline) = 0;
+};
+
+}  // namespace scanrig

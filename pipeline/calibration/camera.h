@@ -1,0 +1,61 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <string>
+
+#include "core/transform.h"
+
+namespace scanrig {
+
+/// How a distortion-free image maps points of its camera frame (OpenCV axes: x right, y down, z into the scene; mm) to
+/// pixels; pixel centres are at integer coordinates. Orthographic grids come from imported range scans.
+struct Projection {
+  enum class Kind { pinhole, orthographic };
+  Kind kind = Kind::pinhole;
+  int width = 0;
+  int height = 0;
+  double fx = 0.0;  ///< pixels (pinhole) or pixels a millimetre (orthographic)
+  double fy = 0.0;
+  double cx = 0.0;  ///< pixels
+  double cy = 0.0;
+
+  /// Pixel (u, v) of a point in the camera frame. A pinhole point must have z > 0.
+  [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& p) const {
+    const double scale = kind == Kind::pinhole ? 1.0 / p.z() : 1.0;
+    return {fx * p.x() * scale + cx, fy * p.y() * scale + cy};
+  }
+  /// The point at `depth` (z, mm) seen in pixel (u, v).
+  [[nodiscard]] Eigen::Vector3d unproject(double u, double v, double depth) const {
+    const double scale = kind == Kind::pinhole ? depth : 1.0;
+    return {(u - cx) / fx * scale, (v - cy) / fy * scale, depth};
+  }
+  /// Millimetres on the object that one pixel spans at `depth`.
+  [[nodiscard]] double mm_per_pixel(double depth) const { return (kind == Kind::pinhole ? depth : 1.0) / fx; }
+  [[nodiscard]] bool contains(const Eigen::Vector2d& pixel, double margin = 0.0) const {
+    return pixel.x() >= margin && pixel.y() >= margin && pixel.x() <= width - 1 - margin &&
+           pixel.y() <= height - 1 - margin;
+  }
+};
+
+/// A calibrated sensor. Brown-Conrady distortion as in OpenCV: k1, k2, p1, p2, k3.
+struct Camera {
+  Projection projection;  ///< pinhole
+  std::array<double, 5> distortion{};
+  Transform camera_from_turntable = Transform::Identity();
+  std::string serial;
+
+  /// Pixel, distortion included, of a point in the turntable frame; it must lie in front of the camera.
+  [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& point_in_turntable) const;
+};
+
+/// The rig as reconstruction needs it. The turntable frame is defined by it: +Y is the axis, y = 0 the table top.
+struct Calibration {
+  Camera left;
+  Camera right;
+  double table_radius_mm = 0.0;
+  std::string date;    ///< ISO 8601
+  std::string sha256;  ///< of the file it was read from
+};
+
+}  // namespace scanrig

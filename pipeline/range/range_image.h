@@ -1,0 +1,31 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "core/transform.h"
+#include "pipeline/calibration/camera.h"
+#include "pipeline/silhouette/silhouette.h"
+
+namespace scanrig {
+
+/// The surface measured from one view, on a regular grid. All matrices have the projection's size.
+struct RangeImage {
+  Projection projection;
+  Transform camera_from_pose = Transform::Identity();  ///< the pose's turntable frame at table angle 0 -> this camera
+  cv::Mat1f depth;   ///< z in the camera frame, mm; NaN where nothing was measured
+  cv::Mat1f sigma;   ///< standard deviation of depth, mm; NaN where depth is
+  cv::Mat3f normal;  ///< unit, camera frame, towards the camera (z < 0); NaN where depth is
+  /// 255 where a NaN pixel is known to show background (free space all along its ray); empty: nothing is known so.
+  cv::Mat1b background;
+};
+
+/// One table angle of one pose, as registration and volume need it.
+struct View {
+  int index = 0;
+  double angle_rad = 0.0;  ///< table angle as measured
+  RangeImage range;
+  std::vector<Silhouette> silhouettes;  ///< of the left and the right camera; empty without a blue screen
+};
+
+}  // namespace scanrig

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+
+#include "core/context.h"
+#include "core/result.h"
+#include "pipeline/calibration/camera.h"
+#include "pipeline/mesh/mesh.h"
+#include "pipeline/scan/scan_folder.h"
+
+namespace scanrig {
+
+struct ReconstructOptions {
+  double voxel_mm = 0.25;
+  int threads = 0;                 ///< 0: all of the machine's; the result is the same for any number
+  std::string fusion = "evidence";  ///< `evidence`, or `paper` for the class table as published
+  std::string poses = "hull";       ///< `hull`, or `egi` for the paper's tessellated sphere
+  bool texture = true;
+};
+
+/// What a scan becomes.
+struct Model {
+  TexturedMesh mesh;  ///< pose 1's turntable frame; atlas empty when there is no colour
+  /// report.json: versions, options, hashes, seconds and peak memory a stage, residuals, counts, alarms, shares.
+  std::shared_ptr<const nlohmann::json> report;
+};
+
+/// One scan on its way to a model: views are added while the table turns, a pose is closed after its last view.
+/// Threads: one user at a time; work inside is spread over `options.threads`.
+class Reconstruction {
+ public:
+  /// A stereo scan.
+  Reconstruction(Calibration calibration, ReconstructOptions options);
+  ~Reconstruction();
+  Reconstruction(Reconstruction&&) noexcept;
+  Reconstruction& operator=(Reconstruction&&) noexcept;
+
+  /// Range image and silhouettes of one view. `pose` is 0 or 1. Fails with `invalid_input`, `degenerate` (nothing seen),
+  /// `out_of_range` (the object is larger than the working volume), `stopped`.
+  Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context);
+  /// An imported range image.
+  Result<void> add_range_view(std::size_t pose, const ViewRecord& record, RangeImage range, const Context& context);
+
+  /// Registers the pose's views and makes its partial model. Fails with `degenerate`, `no_overlap`, `stopped`.
+  Result<void> finish_pose(std::size_t pose, const Context& context);
+
+  /// Pose 2 into pose 1, integration, texture. Fails with `same_rest`, `ambiguous`, `no_overlap`, `degenerate`, `stopped`.
+  Result<Model> finish(const Context& context);
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+/// The whole of a scan folder, from the files. Same input and options, same bits.
+Result<Model> reconstruct(const ScanFolder& scan, const ReconstructOptions& options, const Context& context);
+
+}  // namespace scanrig
