@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "core/clock.h"
+#include "core/result.h"
+#include "drivers/camera/stereo_camera.h"
+#include "drivers/panel/panel.h"
+#include "drivers/projector/projector.h"
+#include "drivers/turntable/turntable.h"
+
+namespace scanrig::sim {
+
+struct SimRigOptions {
+  std::filesystem::path object;  ///< OBJ, PLY or GLB; empty: the built-in figurine
+  double height_mm = 100.0;      ///< the object is scaled so that its bounding cylinder is this high in its own up axis
+  std::uint64_t seed = 1;        ///< placements, sensor noise, table errors
+  int poses = 2;
+  double image_scale = 1.0;      ///< 0.25 gives 320x240 with the same field of view, for fast tests
+  bool same_rest_twice = false;  ///< the operator forgets to turn the object over
+  bool noise = true;
+};
+
+/// The default rig in this process: turntable, projector, cameras and panel over one rendered scene.
+/// Threads: each device as its interface says; the operator's functions may be called from any thread.
+class SimRig {
+ public:
+  /// Fails with `invalid_input` (the mesh cannot be used, or is larger than the working volume), `not_found`.
+  static Result<std::unique_ptr<SimRig>> create(const SimRigOptions& options, Clock& clock);
+  virtual ~SimRig() = default;
+
+  virtual Turntable& turntable() = 0;
+  virtual Projector& projector() = 0;
+  virtual StereoCamera& camera() = 0;
+  virtual Panel& panel() = 0;
+
+  // What the operator does at the rig.
+  virtual void press_start() = 0;
+  virtual void press_stop() = 0;
+  virtual void press_reset() = 0;
+  virtual void set_estop(bool ok) = 0;
+  virtual void turn_over() = 0;         ///< puts the object on its next rest
+  virtual PanelOutputs lamps() const = 0;
+
+  // Faults, for tests.
+  virtual void stall_turntable(bool stalled) = 0;
+  virtual void lose_frames(int count) = 0;  ///< the next `count` frame pairs never arrive
+
+  /// The calibration of docs/scan-folder.md, exact.
+  virtual Result<void> write_calibration(const std::filesystem::path& file) const = 0;
+  /// truth.json and truth.ply for the exposures taken since create(); into a scan folder.
+  virtual Result<void> write_truth(const std::filesystem::path& folder) const = 0;
+  virtual std::string profile_sha256() const = 0;
+};
+
+}  // namespace scanrig::sim
