@@ -26,7 +26,7 @@ ALLOWED = {
 }
 # Leaves of the pipeline, lowest first: a leaf may include those before it.
 PIPELINE_ORDER = ["calibration", "silhouette", "range", "registration", "mesh", "volume", "pose", "texture", "scan",
-                  "reconstruct"]
+                  "reconstruct", "evaluate"]
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"')
 
 
