@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <sstream>
@@ -54,7 +55,8 @@ Result<void> write_and_sync(const std::filesystem::path& path, std::span<const s
 Result<std::string> read_file(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) return fail(ErrorCode::not_found, "no such file: {}", path.string());
-  if (std::filesystem::is_directory(path, error)) return fail(ErrorCode::io, "{} is a folder, not a file", path.string());
+  if (std::filesystem::is_directory(path, error))
+    return fail(ErrorCode::io, "{} is a folder, not a file", path.string());
   std::ifstream stream(path, std::ios::binary);
   std::ostringstream text;
   if (stream) text << stream.rdbuf();
@@ -90,6 +92,29 @@ Result<void> create_directories_synced(const std::filesystem::path& path) {
     }
     if (auto synced = sync_folder(p->parent_path()); !synced) return synced;
   }
+  return {};
+}
+
+Result<void> replace_folder(const std::filesystem::path& prepared, const std::filesystem::path& target) {
+  std::error_code error;
+  if (!std::filesystem::exists(target, error)) {
+    if (::rename(prepared.c_str(), target.c_str()) != 0) return fail_errno("cannot rename to", target);
+    return sync_folder(target.parent_path());
+  }
+  std::filesystem::path old = prepared;
+  if (::renameat2(AT_FDCWD, prepared.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) != 0) {
+    if (errno != EINVAL && errno != ENOSYS) return fail_errno("cannot exchange", target);
+    old += ".old";
+    if (::rename(target.c_str(), old.c_str()) != 0) return fail_errno("cannot move away", target);
+    if (::rename(prepared.c_str(), target.c_str()) != 0) {
+      auto failed = fail_errno("cannot rename to", target);
+      ::rename(old.c_str(), target.c_str());
+      return failed;
+    }
+  }
+  if (auto synced = sync_folder(target.parent_path()); !synced) return synced;
+  std::filesystem::remove_all(old, error);
+  if (error) return fail(ErrorCode::io, "cannot remove the replaced folder {}: {}", old.string(), error.message());
   return {};
 }
 

@@ -82,7 +82,8 @@ Photo PaintedScene::photo(const Camera& camera, double angle_rad) const {
         const auto row = y * kRays + static_cast<std::size_t>(k / kRays);
         const cv::Point2d& ray = rays[row * static_cast<std::size_t>(photo.image.cols * kRays) +
                                       static_cast<std::size_t>(x * kRays + k % kRays)];
-        const Eigen::Vector3d direction = (model_from_camera.linear() * Eigen::Vector3d(ray.x, ray.y, 1.0)).normalized();
+        const Eigen::Vector3d direction =
+            (model_from_camera.linear() * Eigen::Vector3d(ray.x, ray.y, 1.0)).normalized();
         double nearest = std::numeric_limits<double>::infinity();
         Eigen::Vector3d colour = backdrop;
         for (std::size_t i = 0; i < balls.size(); ++i) {

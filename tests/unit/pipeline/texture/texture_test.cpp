@@ -29,7 +29,9 @@ TEST(TextureTest, aModelLooksTheSameFromACameraThatTookNoPhoto) {
   const auto start = std::chrono::steady_clock::now();
   auto model = texture_mesh(scene.mesh(0.5), photos, {}, {});
   ASSERT_TRUE(model) << model.error().message;
-  printf("%.2f s charts %zu scale %.2f seen %.3f gain %.3f\n", std::chrono::duration<double>(std::chrono::steady_clock::now()-start).count(), model->charts, model->texels_per_px, model->seen_share, model->exposure_gain);
+  printf("%.2f s charts %zu scale %.2f seen %.3f gain %.3f\n",
+         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count(), model->charts,
+         model->texels_per_px, model->seen_share, model->exposure_gain);
   const auto truth = scene.photo(rig_camera(0.3, kElevation + 0.1, 0.5), 0.2);
   const auto renderer = MeshRenderer::create(model->mesh);
   const auto seen = renderer->render(truth.camera, truth.turntable_from_model,
@@ -37,7 +39,9 @@ TEST(TextureTest, aModelLooksTheSameFromACameraThatTookNoPhoto) {
   ASSERT_TRUE(seen);
   const auto c = compare_images(seen->image, truth.image, seen->mask);
   printf("psnr %.2f offset %.3f p95 %.3f n %d\n", c->psnr_db, c->median_offset_px, c->p95_offset_px, c->patches);
-  cv::imwrite("/tmp/tx_render.png", seen->image); cv::imwrite("/tmp/tx_truth.png", truth.image); cv::imwrite("/tmp/tx_atlas.png", model->mesh.atlas);
+  cv::imwrite("/tmp/tx_render.png", seen->image);
+  cv::imwrite("/tmp/tx_truth.png", truth.image);
+  cv::imwrite("/tmp/tx_atlas.png", model->mesh.atlas);
 }
 
 }  // namespace
