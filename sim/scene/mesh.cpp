@@ -25,7 +25,31 @@ Circle through(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
   return {a + centre, centre.norm()};
 }
 
+/// The i-th of `count` directions spread evenly over the sphere by the golden angle.
+Vector3d spread_direction(int i, int count) {
+  const double y = 1.0 - (2.0 * i + 1.0) / count, r = std::sqrt(1.0 - y * y);
+  const double phi = i * std::numbers::pi * (3.0 - std::sqrt(5.0));
+  return {r * std::cos(phi), y, r * std::sin(phi)};
+}
+
 bool contains(const Circle& circle, const Vector2d& p) { return (p - circle.centre).norm() <= circle.radius + 1e-9; }
+
+/// Welzl's algorithm, iterative form.
+Circle circle_of_few(const std::vector<Vector2d>& points) {
+  Circle circle{points[0], 0.0};
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    if (contains(circle, points[i])) continue;
+    circle = {points[i], 0.0};
+    for (std::size_t j = 0; j < i; ++j) {
+      if (contains(circle, points[j])) continue;
+      circle = through(points[i], points[j]);
+      for (std::size_t k = 0; k < j; ++k) {
+        if (!contains(circle, points[k])) circle = through(points[i], points[j], points[k]);
+      }
+    }
+  }
+  return circle;
+}
 
 }  // namespace
 
@@ -77,26 +101,46 @@ std::vector<Vector3d> vertex_normals(const TriangleMesh& mesh) {
 }
 
 std::vector<Vector3d> extreme_vertices(const std::vector<Vector3d>& vertices) {
-  // Directions spread evenly by the golden angle. A first pass keeps the farthest vertex of each; that is exact for
-  // every facet of the hull wider than the spacing of the directions (0.8 deg).
-  constexpr int kDirections = 20000, kBlocks = 64;
-  std::vector<std::size_t> best(kDirections);
-  parallel_for(kBlocks, [&](std::size_t block) {
-    for (int i = static_cast<int>(block); i < kDirections; i += kBlocks) {
-      const double y = 1.0 - (2.0 * i + 1.0) / kDirections, r = std::sqrt(1.0 - y * y);
-      const double phi = i * std::numbers::pi * (3.0 - std::sqrt(5.0));
-      const Vector3d direction(r * std::cos(phi), y, r * std::sin(phi));
-      double far = -1e300;
-      for (std::size_t v = 0; v < vertices.size(); ++v) {
-        const double d = direction.dot(vertices[v]);
-        if (d > far) far = d, best[i] = v;
-      }
+  // A few directions first: what is farthest in a direction near one of them is nearly farthest in that one, by at most
+  // the size of the mesh times the angle between the two. Only such vertices are looked at again.
+  constexpr int kCones = 1000, kDirections = 20000;
+  Vector3d middle = Vector3d::Zero();
+  for (const auto& v : vertices) middle += v / static_cast<double>(vertices.size());
+  double reach = 0.0;
+  for (const auto& v : vertices) reach = std::max(reach, (v - middle).norm());
+  std::vector<std::vector<int>> members(kCones);
+  for (int i = 0; i < kDirections; ++i) {
+    const Vector3d d = spread_direction(i, kDirections);
+    int nearest = 0;
+    for (int c = 1; c < kCones; ++c) {
+      if (d.dot(spread_direction(c, kCones)) > d.dot(spread_direction(nearest, kCones))) nearest = c;
+    }
+    members[nearest].push_back(i);
+  }
+  std::vector<std::vector<int>> best(kCones);
+  parallel_for(kCones, [&](std::size_t c) {
+    const Vector3d axis = spread_direction(static_cast<int>(c), kCones);
+    double chord = 0.0;
+    for (const int i : members[c]) chord = std::max(chord, (axis - spread_direction(i, kDirections)).norm());
+    std::vector<double> along(vertices.size());
+    double far = -1e300;
+    for (std::size_t v = 0; v < vertices.size(); ++v) far = std::max(far, along[v] = axis.dot(vertices[v]));
+    std::vector<int> near;
+    for (std::size_t v = 0; v < vertices.size(); ++v) {
+      if (along[v] >= far - 2.0 * reach * chord) near.push_back(static_cast<int>(v));
+    }
+    for (const int i : members[c]) {
+      const Vector3d d = spread_direction(i, kDirections);
+      const auto lower = [&](int a, int b) { return d.dot(vertices[a]) < d.dot(vertices[b]); };
+      best[c].push_back(*std::max_element(near.begin(), near.end(), lower));
     }
   });
-  std::sort(best.begin(), best.end());
-  best.erase(std::unique(best.begin(), best.end()), best.end());
+  std::vector<int> kept;
+  for (const auto& b : best) kept.insert(kept.end(), b.begin(), b.end());
+  std::sort(kept.begin(), kept.end());
+  kept.erase(std::unique(kept.begin(), kept.end()), kept.end());
   std::vector<Vector3d> extremes;
-  for (const std::size_t v : best) extremes.push_back(vertices[v]);
+  for (const int v : kept) extremes.push_back(vertices[v]);
   return extremes;
 }
 
@@ -109,20 +153,18 @@ double largest_extent(const std::vector<Vector3d>& vertices) {
 }
 
 Circle smallest_circle(const std::vector<Vector2d>& points) {
-  // Welzl's algorithm, iterative form; the order does not change the answer, only the time.
-  Circle circle = points.empty() ? Circle{} : Circle{points[0], 0.0};
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    if (contains(circle, points[i])) continue;
-    circle = {points[i], 0.0};
-    for (std::size_t j = 0; j < i; ++j) {
-      if (contains(circle, points[j])) continue;
-      circle = through(points[i], points[j]);
-      for (std::size_t k = 0; k < j; ++k) {
-        if (!contains(circle, points[k])) circle = through(points[i], points[j], points[k]);
-      }
-    }
+  // The circle of a few points, the farthest of all others added until none is outside: exact, and a few rounds do.
+  if (points.empty()) return {};
+  std::vector<Vector2d> chosen = {points[0]};
+  for (;;) {
+    const Circle circle = circle_of_few(chosen);
+    const auto nearer = [&](const Vector2d& a, const Vector2d& b) {
+      return (a - circle.centre).squaredNorm() < (b - circle.centre).squaredNorm();
+    };
+    const Vector2d& farthest = *std::max_element(points.begin(), points.end(), nearer);
+    if (contains(circle, farthest)) return circle;
+    chosen.push_back(farthest);
   }
-  return circle;
 }
 
 }  // namespace scanrig::sim
