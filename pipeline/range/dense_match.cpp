@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "core/parallel.h"
@@ -16,6 +18,23 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr std::array<std::uint8_t, 3> kRadii = {7, 10, 15};
+// Noise of neighbouring pixels is correlated (demosaicing, resampling), so that the residual shows too little of it:
+// found from known truth, see README.md. The smoothing's own share is sqrt(4 pi) times its width.
+constexpr float kSharpInflation = 2.0f;
+constexpr float kSmoothInflation = 2.5f;
+constexpr double kSmoothing = 0.7;  // px, of the larger windows' images
+
+cv::Mat1f smoothed(const cv::Mat1f& image) {
+  cv::Mat1f out;
+  cv::GaussianBlur(image, out, {7, 7}, kSmoothing, kSmoothing, cv::BORDER_REPLICATE);
+  return out;
+}
+
+/// One image of the pair, as it is for windows of good signal, smoothed for large windows where noise rules.
+struct LayeredImage {
+  explicit LayeredImage(const cv::Mat1f& image) : sharp(image), smooth(smoothed(image)) {}
+  MatchImage sharp, smooth;
+};
 
 /// Patches on a coarse grid of pixels.
 struct Nodes {
@@ -72,8 +91,8 @@ DisparityPatch plane_patch(const cv::Mat1f& coarse, int u, int v) {
 
 /// One direction of matching.
 struct Side {
-  const MatchImage& here;
-  const MatchImage& there;
+  const LayeredImage& here;
+  const LayeredImage& there;
   const MatchMask& mask;
   const StereoOptions& options;
 
@@ -91,7 +110,10 @@ struct Side {
       if (radius < start.radius) continue;
       DisparityPatch patch = start;
       patch.radius = radius;
-      patch = match_window(here, there, mask, u, v, patch, window);
+      const bool sharp = radius == kRadii.front();
+      if (!sharp) window.curvature_prior = 0.1f;
+      patch = match_window(sharp ? here.sharp : here.smooth, sharp ? there.sharp : there.smooth, mask, u, v, patch, window);
+      patch.sigma *= sharp ? kSharpInflation : kSmoothInflation;
       if (good(patch) && (!best.valid || patch.sigma < best.sigma)) best = patch;
       if (best.valid && static_cast<double>(best.sigma) <= options.enough_sigma_px) break;
     }
@@ -119,10 +141,7 @@ struct Side {
     nodes.around(u, v, [&](const DisparityPatch& patch) {
       if (!start.valid || patch.zncc > start.zncc) start = patch;
     });
-    if (start.valid) {
-      const DisparityPatch patch = match(u, v, start, 5);
-      if (patch.valid) return patch;
-    }
+    if (start.valid) return match(u, v, start, 6);
     start = plane_patch(mask.disparity, u, v);
     return start.valid ? match(u, v, start, 10) : start;
   }
@@ -148,9 +167,9 @@ cv::Mat1b everywhere(const cv::Mat1b& mask, cv::Size size) { return mask.empty()
 Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDisparity& coarse,
                                        const StereoOptions& options, const Context& context) {
   const cv::Size size = pair.left.size();
-  const MatchImage left(pair.left), right(pair.right);
+  const LayeredImage left(pair.left), right(pair.right);
   const MatchMask left_mask{everywhere(pair.left_object, size), coarse.left};
-  const MatchMask right_mask{everywhere(pair.right_object, size), -coarse.right};
+  const MatchMask right_mask{everywhere(pair.right_object, size), cv::Mat1f(cv::Mat(-coarse.right))};
   const Side forward{left, right, left_mask, options}, backward{right, left, right_mask, options};
   const Nodes back = backward.match_nodes(3, context);
   context.report("range", 0.4);
@@ -164,7 +183,7 @@ Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDi
     for (int u = 0; u < size.width; ++u) {
       if (left_mask.usable(v, u) == 0) continue;
       const DisparityPatch patch = forward.match_pixel(nodes, u, v);
-      if (!patch.valid || !points_back(patch, u, v, back, options.left_right_px)) continue;
+      if (!patch.valid || !points_back(patch, u, v, back, std::max(options.left_right_px, 3.0 * patch.sigma))) continue;
       out.value(v, u) = patch.c[0];
       out.sigma(v, u) = patch.sigma;
       out.slope(v, u) = {patch.c[1], patch.c[2]};
@@ -192,7 +211,8 @@ void remove_outliers(DenseDisparity& disparity, const StereoOptions& options) {
           const cv::Vec2f slope = 0.5f * (disparity.slope(y, x) + disparity.slope(v, u));
           const float predicted = disparity.value(y, x) - slope[0] * static_cast<float>(dx) - slope[1] * static_cast<float>(dy);
           ++seen;
-          if (static_cast<double>(std::abs(predicted - d)) <= options.neighbour_px) ++agreeing;
+          const float sigma = std::max(disparity.sigma(v, u), disparity.sigma(y, x));
+          if (static_cast<double>(std::abs(predicted - d)) <= std::max(options.neighbour_px, 3.0 * sigma)) ++agreeing;
         }
       }
       // Disparity in 1/16 px, offset so that 0 stays "nothing".

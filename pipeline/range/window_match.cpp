@@ -227,6 +227,10 @@ DisparityPatch Window<R>::match(const MatchImage& there, DisparityPatch patch, c
   const Vector6 unit{1.0, R, R, R * R, R * R, R * R};
   for (int i = 0; i < 6; ++i) shape[i] = static_cast<double>(patch.c[static_cast<std::size_t>(i)]) * unit[i];
   const double start = shape[0];
+  Vector6 first = Vector6::Zero();
+  first[0] = 1.0;
+  const double variance_gain = solver.solve(first)[0];
+  constexpr double kPrecision = 3e-3;  // px
   bool converged = false;
   for (int iteration = 0; iteration < options.iterations && !converged; ++iteration) {
     const double stretch = 1.0 - shape[1] / R;
@@ -234,15 +238,12 @@ DisparityPatch Window<R>::match(const MatchImage& there, DisparityPatch patch, c
     if (!step.allFinite() || std::abs(step[0]) > 2.0) return patch;
     shape += step;
     for (int i = 0; i < 6; ++i) patch.c[static_cast<std::size_t>(i)] = static_cast<float>(shape[i] / unit[i]);
-    converged = std::abs(step[0]) < 3e-3 && step.cwiseAbs().maxCoeff() < 3e-2;
+    converged = std::abs(step[0]) < kPrecision && step.cwiseAbs().maxCoeff() < 10.0 * kPrecision;
     if (iteration + 1 < options.iterations && !converged) fit = compare(there, patch);
   }
   fit = compare(there, patch);
   if (std::abs(shape[0] - start) > 3.0 || std::abs(shape[1]) > 0.95 * R) return patch;
-  Vector6 first = Vector6::Zero();
-  first[0] = 1.0;
-  patch.sigma = static_cast<float>(std::sqrt(solver.solve(first)[0] * fit.residual_variance) *
-                                   std::abs(1.0 - shape[1] / R));
+  patch.sigma = static_cast<float>(std::sqrt(variance_gain * fit.residual_variance) * std::abs(1.0 - shape[1] / R));
   patch.zncc = static_cast<float>(fit.zncc);
   patch.valid = converged;
   return patch;
