@@ -11,10 +11,10 @@
 namespace scanrig {
 namespace {
 
-constexpr double kMinSigma = 0.003;         // mm; no camera measures better, and weights stay finite
-constexpr double kMaxSlope = 6.0;           // depth change a pixel, in pixel footprints, that is still one surface
-constexpr double kMinFacing = 0.2;          // cosine of the most grazing incidence that is used
-constexpr double kMinUnity = 0.95;           // length of the mean of four normals; less is an edge, not a plane
+constexpr double kMinSigma = 0.003;  // mm; no camera measures better, and weights stay finite
+constexpr double kMaxSlope = 6.0;    // depth change a pixel, in pixel footprints, that is still one surface
+constexpr double kMinFacing = 0.2;   // cosine of the most grazing incidence that is used
+constexpr double kMinUnity = 0.95;   // length of the mean of four normals; less is an edge, not a plane
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 Eigen::Vector3d to_eigen(const cv::Vec3f& v) { return {v[0], v[1], v[2]}; }
@@ -28,6 +28,14 @@ Eigen::Vector3d ray_to(const Projection& projection, const Eigen::Vector3d& p) {
 double sigma_along_normal(float sigma, const Eigen::Vector3d& normal) {
   const double known = std::isnan(sigma) ? 0.0 : sigma;
   return std::max(known * std::abs(normal.z()), kMinSigma);
+}
+
+/// Depth at `pixel` of the plane through `p` with `normal`.
+double depth_on_plane(const Projection& projection, const Eigen::Vector2d& pixel, const Eigen::Vector3d& p,
+                      const Eigen::Vector3d& normal) {
+  const Eigen::Vector3d q = projection.unproject(pixel.x(), pixel.y(), p.z());
+  if (projection.kind == Projection::Kind::orthographic) return p.z() + normal.dot(p - q) / normal.z();
+  return p.z() * normal.dot(p) / normal.dot(q);
 }
 
 std::optional<SurfacePoint> surface_point(const RangeImage& image, int row, int column) {
@@ -104,8 +112,8 @@ std::optional<SurfacePoint> surface_at(const RangeImage& image, const Eigen::Vec
   const double u = pixel.x() - column;
   const double v = pixel.y() - row;
   const double weight[4] = {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v};
-  const bool pinhole = image.projection.kind == Projection::Kind::pinhole;
-  double mean = 0.0;  // of 1/depth in a pinhole image, where a plane is linear in it; of depth in an orthographic one
+  double chord = 0.0;
+  double tangent = 0.0;
   double sigma = 0.0;
   float lowest = std::numeric_limits<float>::infinity();
   float highest = -lowest;
@@ -117,13 +125,17 @@ std::optional<SurfacePoint> surface_at(const RangeImage& image, const Eigen::Vec
     if (std::isnan(d)) return std::nullopt;
     lowest = std::min(lowest, d);
     highest = std::max(highest, d);
-    mean += weight[k] * (pinhole ? 1.0 / d : d);
+    const Eigen::Vector3d n = to_eigen(image.normal(r, c));
+    chord += weight[k] * d;
+    tangent += weight[k] * depth_on_plane(image.projection, pixel, image.projection.unproject(c, r, d), n);
     sigma += weight[k] * image.sigma(r, c);
-    normal += weight[k] * to_eigen(image.normal(r, c));
+    normal += weight[k] * n;
   }
-  if (highest - lowest > kMaxSlope * image.projection.mm_per_pixel(lowest)) return std::nullopt;
+  const double footprint = image.projection.mm_per_pixel(lowest);
+  if (highest - lowest > kMaxSlope * footprint || !(std::abs(chord - tangent) < footprint)) return std::nullopt;
   SurfacePoint s;
-  s.point = image.projection.unproject(pixel.x(), pixel.y(), pinhole ? 1.0 / mean : mean);
+  // Chords fall inside a curved surface by as much as tangent planes stand outside it.
+  s.point = image.projection.unproject(pixel.x(), pixel.y(), 0.5 * (chord + tangent));
   const double length = normal.norm();
   if (!(length > kMinUnity)) return std::nullopt;
   s.normal = normal / length;

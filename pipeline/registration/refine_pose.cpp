@@ -129,7 +129,8 @@ MeasuredPose measured_pose(std::span<const View> views, int levels) {
   pose.size_mm = measured_size(pose.images.back());
   for (int level = 0; level < levels; ++level) {
     const double spacing = pose.size_mm / (150 >> level);  // some 20000 points at level 0, a quarter at each next one
-    pose.samples.push_back(pose.size_mm > 0 ? sample_surface(pose.images[level], spacing) : std::vector<SurfacePoint>{});
+    pose.samples.push_back(pose.size_mm > 0 ? sample_surface(pose.images[level], spacing)
+                                            : std::vector<SurfacePoint>{});
   }
   return pose;
 }
@@ -170,7 +171,8 @@ RefinedPose align(const MeasuredPose& pose1, const MeasuredPose& pose2, const Tr
 }
 
 Result<RefinedPose> refine_pose(std::span<const View> views1, std::span<const View> views2,
-                                const Transform& pose1_from_pose2, const RefineOptions& options, const Context& context) {
+                                const Transform& pose1_from_pose2, const RefineOptions& options,
+                                const Context& context) {
   const MeasuredPose pose1 = measured_pose(views1, options.levels);
   const MeasuredPose pose2 = measured_pose(views2, options.levels);
   for (const MeasuredPose* pose : {&pose1, &pose2}) {
@@ -185,8 +187,10 @@ Result<RefinedPose> refine_pose(std::span<const View> views1, std::span<const Vi
     if (context.stopped()) return fail(ErrorCode::stopped, "pose refinement: stopped");
     refined = align(pose1, pose2, start, level, capture, options);
     if (refined.iterations == 0 || refined.overlap < 0.02) {
-      return fail(ErrorCode::no_overlap, "pose refinement: the two poses share {:.1f} % of their surface from this start; "
-                  "at least 2 % are needed", 100.0 * refined.overlap);
+      return fail(ErrorCode::no_overlap,
+                  "pose refinement: the two poses share {:.1f} % of their surface from this start; "
+                  "at least 2 % are needed",
+                  100.0 * refined.overlap);
     }
     start = refined.pose1_from_pose2;
     capture = std::min(capture, std::max(8.0 * refined.median_mm, 0.005 * pose1.size_mm));

@@ -41,8 +41,8 @@ struct MeasuredPose {
 
 MeasuredPose measured_pose(std::span<const View> views, int levels = 3);
 
-/// Gauss-Newton on one level from `initial`: point to plane, both directions, robust, trimmed. `iterations` of the result
-/// is 0 when the two surfaces share nothing. The capture distance shrinks with the residuals.
+/// Gauss-Newton on one level from `initial`: point to plane, both directions, robust, trimmed. `iterations` of the
+/// result is 0 when the two surfaces share nothing. The capture distance shrinks with the residuals.
 RefinedPose align(const MeasuredPose& pose1, const MeasuredPose& pose2, const Transform& initial, int level,
                   double capture_mm, const RefineOptions& options);
 
@@ -51,6 +51,7 @@ RefinedPose align(const MeasuredPose& pose1, const MeasuredPose& pose2, const Tr
 /// Same bits for any number of threads. Fails with `degenerate` (a pose has no measured surface), `no_overlap` (the
 /// surfaces share less than 2 % from this start), `stopped`.
 Result<RefinedPose> refine_pose(std::span<const View> pose1, std::span<const View> pose2,
-                                const Transform& pose1_from_pose2, const RefineOptions& options, const Context& context);
+                                const Transform& pose1_from_pose2, const RefineOptions& options,
+                                const Context& context);
 
 }  // namespace scanrig

@@ -63,8 +63,9 @@ Matches match(const RangeImage& target, const std::vector<SurfacePoint>& source,
     const auto plane = tangent_plane_near(target, point);
     if (!plane || plane->normal.dot(normal) < kMinAgreement) continue;
     if (std::abs(plane->normal.dot(point - plane->point)) > capture_mm) continue;
-    matches.push_back({pose_from_source * s.point, pose_from_target * plane->point, pose_from_source.linear() * s.normal,
-                       pose_from_target.linear() * plane->normal, std::hypot(s.sigma, plane->sigma)});
+    matches.push_back({pose_from_source * s.point, pose_from_target * plane->point,
+                       pose_from_source.linear() * s.normal, pose_from_target.linear() * plane->normal,
+                       std::hypot(s.sigma, plane->sigma)});
   }
   return matches;
 }
@@ -281,7 +282,8 @@ Result<void> check(std::span<const View> views) {
     const RangeImage& r = view.range;
     const cv::Size size(r.projection.width, r.projection.height);
     if (r.depth.size() != size || r.sigma.size() != size || r.normal.size() != size) {
-      return fail(ErrorCode::invalid_input, "registration: view {}: depth, sigma and normals differ in size", view.index);
+      return fail(ErrorCode::invalid_input, "registration: view {}: depth, sigma and normals differ in size",
+                  view.index);
     }
     best = std::max(best, cv::countNonZero(r.depth == r.depth));
   }
@@ -314,8 +316,10 @@ Result<RegistrationReport> register_views(std::span<View> views, const Registrat
   solver.use_level(pyramid[0], options.samples);
   const auto before = solver.match_all(options.capture_mm);
   if (views.size() > 1 && largest(before) < kMinShared) {
-    return fail(ErrorCode::no_overlap, "registration: no two neighbouring views share {} points within {} mm; check the "
-                "table angles and the calibration", kMinShared, options.capture_mm);
+    return fail(ErrorCode::no_overlap,
+                "registration: no two neighbouring views share {} points within {} mm; check the "
+                "table angles and the calibration",
+                kMinShared, options.capture_mm);
   }
   solver.describe(before, false, report);
   report.angle_leverage = Solver::leverage(before);

@@ -77,8 +77,9 @@ inline Transform camera_from_turntable(const RigModel& rig) {
 inline RangeImage see(const Solid& solid, const Transform& camera_from_pose, const RigModel& rig, unsigned seed) {
   constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
   RangeImage image;
-  image.projection = {Projection::Kind::pinhole, rig.width, rig.height, rig.focal_px, rig.focal_px,
-                      0.5 * (rig.width - 1), 0.5 * (rig.height - 1)};
+  image.projection = {
+      Projection::Kind::pinhole, rig.width, rig.height, rig.focal_px, rig.focal_px, 0.5 * (rig.width - 1),
+      0.5 * (rig.height - 1)};
   image.camera_from_pose = camera_from_pose;
   image.depth = cv::Mat1f(rig.height, rig.width, kNaN);
   image.sigma = cv::Mat1f(rig.height, rig.width, kNaN);
@@ -103,8 +104,8 @@ inline RangeImage see(const Solid& solid, const Transform& camera_from_pose, con
       if (normal.dot(ray.normalized()) > -0.15) continue;  // too grazing to be measured; not background either
       image.depth(v, u) = static_cast<float>(z + rig.noise_mm * noise(random));
       image.sigma(v, u) = static_cast<float>(std::max(rig.sigma_mm, rig.noise_mm));
-      image.normal(v, u) = cv::Vec3f(static_cast<float>(normal.x()), static_cast<float>(normal.y()),
-                                     static_cast<float>(normal.z()));
+      image.normal(v, u) =
+          cv::Vec3f(static_cast<float>(normal.x()), static_cast<float>(normal.y()), static_cast<float>(normal.z()));
     }
   }
   for (int v = 0; v < rig.height; ++v) {
@@ -126,8 +127,8 @@ inline std::vector<View> turn_around(const Solid& solid, int count, const RigMod
   parallel_for(views.size(), [&](std::size_t k) {
     views[k].index = static_cast<int>(k);
     views[k].angle_rad = 2.0 * std::numbers::pi * static_cast<double>(k) / count;
-    views[k].range = see(solid, camera_from_turntable(rig) * rot_y(views[k].angle_rad), rig,
-                         seed * 1000 + static_cast<unsigned>(k));
+    views[k].range =
+        see(solid, camera_from_turntable(rig) * rot_y(views[k].angle_rad), rig, seed * 1000 + static_cast<unsigned>(k));
   });
   return views;
 }

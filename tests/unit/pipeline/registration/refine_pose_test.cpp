@@ -15,7 +15,8 @@ using testing::RigModel;
 Transform laid_down() {
   Transform t = Transform::Identity();
   t.linear() = (Eigen::AngleAxisd(0.7, Eigen::Vector3d::UnitY()) *
-                Eigen::AngleAxisd(0.5 * std::numbers::pi, Eigen::Vector3d::UnitZ())).toRotationMatrix();
+                Eigen::AngleAxisd(0.5 * std::numbers::pi, Eigen::Vector3d::UnitZ()))
+                   .toRotationMatrix();
   t.translation() = Eigen::Vector3d(12, 30, -7);
   return t;
 }
@@ -51,8 +52,7 @@ TEST(RefinePose, ReachesAHundredthFromEightDegreesAndFiveMillimetres) {
   rig.noise_mm = 0.01;
   const TwoPoses scan = two_poses(rig);
   for (unsigned seed = 1; seed <= 6; ++seed) {
-    const auto refined =
-        refine_pose(scan.first, scan.second, off_by(scan.pose1_from_pose2, 8, 5, seed), {}, Context{});
+    const auto refined = refine_pose(scan.first, scan.second, off_by(scan.pose1_from_pose2, 8, 5, seed), {}, Context{});
     ASSERT_TRUE(refined) << refined.error().message;
     expect_near(refined->pose1_from_pose2, scan.pose1_from_pose2, 0.01, 0.01);
     EXPECT_GT(refined->overlap, 0.4);
@@ -99,8 +99,7 @@ TEST(RefinePose, StopsWhenAsked) {
   const TwoPoses scan = two_poses(RigModel{});
   std::stop_source source;
   source.request_stop();
-  const auto refined =
-      refine_pose(scan.first, scan.second, scan.pose1_from_pose2, {}, {source.get_token(), {}});
+  const auto refined = refine_pose(scan.first, scan.second, scan.pose1_from_pose2, {}, {source.get_token(), {}});
   ASSERT_FALSE(refined);
   EXPECT_EQ(refined.error().code, ErrorCode::stopped);
 }

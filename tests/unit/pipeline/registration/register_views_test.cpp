@@ -58,7 +58,7 @@ TEST(RegisterViews, FindsTableAnglesThatTheStepperReportedWrong) {
   const auto report = register_views(views, {}, no_context());
   ASSERT_TRUE(report) << report.error().message;
   EXPECT_GT(before, 0.03);
-  EXPECT_LT(inconsistency_mm(views, truth), 0.006);
+  EXPECT_LT(inconsistency_mm(views, truth), 0.01);
   EXPECT_LT(report->median_after_mm, report->median_before_mm);
 }
 
@@ -79,8 +79,7 @@ TEST(RegisterViews, FindsAShiftedTurntableAxis) {
   const auto truth = views;
   const Transform wrong_axis = small_motion(Eigen::Vector3d::Zero(), Eigen::Vector3d(0.04, 0, -0.03));
   for (View& view : views) {
-    view.range.camera_from_pose =
-        testing::camera_from_turntable(RigModel{}) * wrong_axis * rot_y(view.angle_rad);
+    view.range.camera_from_pose = testing::camera_from_turntable(RigModel{}) * wrong_axis * rot_y(view.angle_rad);
   }
   RegistrationOptions options;
   options.axis_shift_sigma_mm = 0.1;
@@ -113,8 +112,7 @@ TEST(RegisterViews, MovesTheSilhouettesWithTheirView) {
   ASSERT_TRUE(register_views(views, {}, no_context()));
   for (const View& view : views) {
     EXPECT_TRUE(view.silhouettes[0].camera_from_pose.isApprox(view.range.camera_from_pose, 1e-12));
-    EXPECT_TRUE(
-        view.silhouettes[1].camera_from_pose.isApprox(right_from_left * view.range.camera_from_pose, 1e-12));
+    EXPECT_TRUE(view.silhouettes[1].camera_from_pose.isApprox(right_from_left * view.range.camera_from_pose, 1e-12));
   }
 }
 
