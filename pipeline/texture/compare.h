@@ -15,7 +15,7 @@ struct ComparisonOptions {
 /// How a rendering differs from a photo of the same thing.
 struct Comparison {
   double psnr_db = 0.0;           ///< over all channels inside the eroded mask
-  double median_offset_px = 0.0;  ///< of the patches, by phase correlation; NaN without patches of enough contrast
+  double median_offset_px = 0.0;  ///< of the patches; NaN without patches of enough contrast
   double p95_offset_px = 0.0;
   int patches = 0;
 };
