@@ -146,6 +146,32 @@ TEST(VirtualClock, ANotifiedWaiterIsNotOvertakenByItsDeadline) {
   }
 }
 
+TEST(VirtualClock, TimeWaitsForANotifiedOutsiderToLookAgain) {
+  for (int round = 0; round < 500; ++round) {
+    VirtualClock clock;
+    auto busy = std::make_unique<Clock::Busy>(clock);
+    std::thread sleeper([&] { clock.sleep_for(milliseconds(1)); });
+    Shared<bool> told(clock);
+    std::latch looked(1);
+    int looks = 0;
+    Clock::TimePoint second_look{};
+    std::thread outsider([&] {
+      std::unique_lock lock(told.mutex);
+      clock.wait_until(lock, told.changed, kNever, [&] {
+        if (++looks == 1) looked.count_down();
+        if (looks == 2) second_look = clock.now();
+        return told.value;
+      });
+    });
+    looked.wait();
+    told.set(true);  // needs the lock: the outsider waits by now
+    busy.reset();
+    outsider.join();
+    sleeper.join();
+    ASSERT_EQ(second_look, Clock::TimePoint{});
+  }
+}
+
 TEST(VirtualClock, AMessageBetweenActorsArrivesBeforeAnyTimePasses) {
   VirtualClock clock;
   Shared<int> question(clock);
