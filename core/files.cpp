@@ -54,7 +54,8 @@ Result<void> write_and_sync(const std::filesystem::path& path, std::span<const s
 Result<std::string> read_file(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::exists(path, error)) return fail(ErrorCode::not_found, "no such file: {}", path.string());
-  if (std::filesystem::is_directory(path, error)) return fail(ErrorCode::io, "{} is a folder, not a file", path.string());
+  if (std::filesystem::is_directory(path, error))
+    return fail(ErrorCode::io, "{} is a folder, not a file", path.string());
   std::ifstream stream(path, std::ios::binary);
   std::ostringstream text;
   if (stream) text << stream.rdbuf();

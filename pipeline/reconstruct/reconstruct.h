@@ -13,7 +13,7 @@ namespace scanrig {
 
 struct ReconstructOptions {
   double voxel_mm = 0.25;
-  int threads = 0;                 ///< 0: all of the machine's; the result is the same for any number
+  int threads = 0;                  ///< 0: all of the machine's; the result is the same for any number
   std::string fusion = "evidence";  ///< `evidence`, or `paper` for the class table as published
   std::string poses = "hull";       ///< `hull`, or `egi` for the paper's tessellated sphere
   bool texture = true;
@@ -36,8 +36,8 @@ class Reconstruction {
   Reconstruction(Reconstruction&&) noexcept;
   Reconstruction& operator=(Reconstruction&&) noexcept;
 
-  /// Range image and silhouettes of one view. `pose` is 0 or 1. Fails with `invalid_input`, `degenerate` (nothing seen),
-  /// `out_of_range` (the object is larger than the working volume), `stopped`.
+  /// Range image and silhouettes of one view. `pose` is 0 or 1. Fails with `invalid_input`, `degenerate` (nothing
+  /// seen), `out_of_range` (the object is larger than the working volume), `stopped`.
   Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context);
   /// An imported range image.
   Result<void> add_range_view(std::size_t pose, const ViewRecord& record, RangeImage range, const Context& context);
@@ -45,7 +45,8 @@ class Reconstruction {
   /// Registers the pose's views and makes its partial model. Fails with `degenerate`, `no_overlap`, `stopped`.
   Result<void> finish_pose(std::size_t pose, const Context& context);
 
-  /// Pose 2 into pose 1, integration, texture. Fails with `same_rest`, `ambiguous`, `no_overlap`, `degenerate`, `stopped`.
+  /// Pose 2 into pose 1, integration, texture. Fails with `same_rest`, `ambiguous`, `no_overlap`, `degenerate`,
+  /// `stopped`.
   Result<Model> finish(const Context& context);
 
  private:

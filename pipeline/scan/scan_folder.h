@@ -30,7 +30,7 @@ struct ViewRecord {
   std::string taken;         ///< ISO 8601
   std::string pixel_format;  ///< "Mono8", "BayerRG8", "BGR8"; empty for range scans
   std::map<std::string, FileRecord> files;
-  std::optional<Projection> grid;  ///< range scans: orthographic
+  std::optional<Projection> grid;                      ///< range scans: orthographic
   Transform camera_from_pose = Transform::Identity();  ///< range scans only
 };
 
@@ -71,7 +71,8 @@ Result<Calibration> read_calibration(const std::filesystem::path& file);
 /// A scan on disk. Threads: one user at a time.
 class ScanFolder {
  public:
-  /// Makes the folder with its manifest and a copy of the calibration file (empty path: none). Fails with `exists`, `io`.
+  /// Makes the folder with its manifest and a copy of the calibration file (empty path: none). Fails with `exists`,
+  /// `io`.
   static Result<ScanFolder> create(const std::filesystem::path& folder, Manifest manifest,
                                    const std::filesystem::path& calibration_file);
 

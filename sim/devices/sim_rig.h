@@ -42,7 +42,7 @@ class SimRig {
   virtual void press_stop() = 0;
   virtual void press_reset() = 0;
   virtual void set_estop(bool ok) = 0;
-  virtual void turn_over() = 0;         ///< puts the object on its next rest
+  virtual void turn_over() = 0;  ///< puts the object on its next rest
   virtual PanelOutputs lamps() const = 0;
 
   // Faults, for tests.

@@ -15,7 +15,8 @@ TEST(Transform, TheTableTurnsCounterClockwiseSeenFromAbove) {
 
 TEST(Transform, RotationAngleIsAccurateNearZeroAndNearPi) {
   for (const double angle : {1e-9, 1e-4, 1.0, 3.1415}) {
-    EXPECT_NEAR(rotation_angle(small_motion(angle * Eigen::Vector3d(1, 2, -2).normalized(), {}).linear()), angle, 1e-11);
+    EXPECT_NEAR(rotation_angle(small_motion(angle * Eigen::Vector3d(1, 2, -2).normalized(), {}).linear()), angle,
+                1e-11);
   }
 }
 
