@@ -36,7 +36,7 @@ Result<void> sync_folder(const std::filesystem::path& folder) {
   return {};
 }
 
-Result<void> write_and_sync(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+Result<void> write_all(const std::filesystem::path& path, std::span<const std::byte> bytes) {
   const Descriptor fd(::open(path.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
   if (fd.get() < 0) return fail_errno("cannot create", path);
   while (!bytes.empty()) {
@@ -45,7 +45,12 @@ Result<void> write_and_sync(const std::filesystem::path& path, std::span<const s
     if (written < 0) return fail_errno("cannot write", path);
     bytes = bytes.subspan(static_cast<std::size_t>(written));
   }
-  if (::fsync(fd.get()) != 0) return fail_errno("cannot sync", path);
+  return {};
+}
+
+Result<void> sync_file(const std::filesystem::path& path) {
+  const Descriptor fd(::open(path.c_str(), O_WRONLY | O_CLOEXEC));
+  if (fd.get() < 0 || ::fsync(fd.get()) != 0) return fail_errno("cannot sync", path);
   return {};
 }
 
@@ -66,7 +71,8 @@ Result<std::string> read_file(const std::filesystem::path& path) {
 Result<void> write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
   std::filesystem::path temporary = path;
   temporary += fmt::format(".tmp{}", ::getpid());
-  auto written = write_and_sync(temporary, bytes);
+  auto written = write_all(temporary, bytes);
+  if (written) written = sync_file(temporary);
   if (written && ::rename(temporary.c_str(), path.c_str()) != 0) {
     written = Result<void>(fail_errno("cannot rename to", path));
   }
@@ -79,6 +85,16 @@ Result<void> write_file_atomically(const std::filesystem::path& path, std::span<
 
 Result<void> write_file_atomically(const std::filesystem::path& path, std::string_view text) {
   return write_file_atomically(path, std::as_bytes(std::span(text.data(), text.size())));
+}
+
+Result<void> write_files_synced(const std::filesystem::path& folder, std::span<const FileContent> files) {
+  for (const FileContent& file : files) {
+    if (auto written = write_all(folder / file.name, file.bytes); !written) return written;
+  }
+  for (const FileContent& file : files) {
+    if (auto synced = sync_file(folder / file.name); !synced) return synced;
+  }
+  return sync_folder(folder);
 }
 
 Result<void> create_directories_synced(const std::filesystem::path& path) {

@@ -18,6 +18,14 @@ Result<std::string> read_file(const std::filesystem::path& path);
 Result<void> write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 Result<void> write_file_atomically(const std::filesystem::path& path, std::string_view text);
 
+struct FileContent {
+  std::string name;  ///< within the folder
+  std::span<const std::byte> bytes;
+};
+/// Writes several files of one folder, then syncs each of them and the folder once. Cheaper than one by one but not
+/// atomic: for files that nobody reads until something else names them. Fails with `io`.
+Result<void> write_files_synced(const std::filesystem::path& folder, std::span<const FileContent> files);
+
 /// Creates `path` and its parents and syncs each new entry's folder. Fails with `io`.
 Result<void> create_directories_synced(const std::filesystem::path& path);
 

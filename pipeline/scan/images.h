@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/result.h"
+#include "pipeline/scan/manifest.h"
+
+namespace scanrig {
+
+/// The four images of a view, as the sensors delivered them.
+struct RawView {
+  std::string pixel_format;
+  cv::Mat left_pattern, right_pattern, left_plain, right_plain;
+};
+
+/// The four images of a view, ready for use: BGR (colour sensors, demosaiced) or grey (mono sensors), 8 bit.
+struct ViewImages {
+  int index = 0;
+  double angle_rad = 0.0;  ///< table angle as measured
+  cv::Mat left_pattern, right_pattern, left_plain, right_plain;
+};
+
+/// Demosaics where needed. Fails with `invalid_input` for a format or sizes that do not belong together.
+Result<ViewImages> to_view_images(const RawView& raw, const ViewRecord& record);
+
+/// Whether every image is 8 bit, has the format's channels and left and right each have one size. `invalid_input`.
+Result<void> check_images(const RawView& raw);
+
+/// PNG, lightly compressed. Fails with `invalid_input` (not an image a PNG can hold).
+Result<std::vector<std::byte>> encode_png(const cv::Mat& image);
+/// 32-bit float TIFF; NaN is kept.
+Result<std::vector<std::byte>> encode_tiff(const cv::Mat1f& depth);
+/// Either, as it is stored. Fails with `invalid_input` (unreadable or truncated).
+Result<cv::Mat> decode_image(std::string_view bytes);
+
+}  // namespace scanrig

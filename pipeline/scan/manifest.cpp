@@ -1,0 +1,155 @@
+#include "pipeline/scan/manifest.h"
+
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "pipeline/scan/strict_json.h"
+
+namespace scanrig {
+namespace {
+
+using nlohmann::ordered_json;
+
+constexpr std::array kStates = {"queued",    "scanning", "waiting_for_flip", "scanned", "interrupted",
+                                "cancelled", "failed"};
+constexpr std::array kSources = {"stereo", "range"};
+
+ordered_json to_json(const FileRecord& file) { return {{"path", file.path}, {"sha256", file.sha256}}; }
+
+ordered_json to_json(const Transform& transform) {
+  ordered_json rows = ordered_json::array();
+  for (int r = 0; r < 3; ++r) {
+    rows.push_back({transform.linear()(r, 0), transform.linear()(r, 1), transform.linear()(r, 2)});
+  }
+  const Eigen::Vector3d& t = transform.translation();
+  return {{"rotation", rows}, {"translation", {t.x(), t.y(), t.z()}}};
+}
+
+ordered_json to_json(const ViewRecord& view) {
+  ordered_json files = ordered_json::object();
+  for (const auto& [role, file] : view.files) files[role] = to_json(file);
+  ordered_json json = {{"index", view.index},
+                       {"commanded_deg", view.commanded_deg},
+                       {"measured_deg", view.measured_deg},
+                       {"moving_ms", view.moving_ms},
+                       {"settling_ms", view.settling_ms},
+                       {"taken", view.taken},
+                       {"pixel_format", view.pixel_format},
+                       {"files", files}};
+  if (view.grid) {
+    json["grid"] = {{"fx", view.grid->fx}, {"fy", view.grid->fy}, {"cx", view.grid->cx}, {"cy", view.grid->cy}};
+    json["camera_from_pose"] = to_json(view.camera_from_pose);
+  }
+  return json;
+}
+
+FileRecord read_file_record(JsonObject object) {
+  FileRecord file{object.inner_path("path"), object.sha256("sha256")};
+  object.close();
+  return file;
+}
+
+Projection read_grid(JsonObject object) {
+  Projection grid;
+  grid.kind = Projection::Kind::orthographic;
+  grid.fx = object.number("fx", 1e-6, 1e6);
+  grid.fy = object.number("fy", 1e-6, 1e6);
+  grid.cx = object.number("cx", -1e6, 1e6);
+  grid.cy = object.number("cy", -1e6, 1e6);
+  object.close();
+  return grid;
+}
+
+ViewRecord read_view(JsonObject object, bool stereo) {
+  ViewRecord view;
+  view.index = object.integer("index", 0, 9999);
+  view.commanded_deg = object.number("commanded_deg", -3600, 3600);
+  view.measured_deg = object.number("measured_deg", -3600, 3600);
+  view.moving_ms = object.number("moving_ms", 0);
+  view.settling_ms = object.number("settling_ms", 0);
+  view.taken = object.text("taken");
+  view.pixel_format =
+      stereo ? object.one_of("pixel_format", {"Mono8", "BayerRG8", "BGR8"}) : object.one_of("pixel_format", {""});
+  JsonObject files = object.object("files");
+  const std::vector<std::string> roles =
+      stereo ? std::vector<std::string>{"left_pattern", "right_pattern", "left_plain", "right_plain"}
+             : std::vector<std::string>{"range"};
+  for (const std::string& role : roles) view.files[role] = read_file_record(files.object(role));
+  files.close();
+  if (!stereo) {
+    view.grid = read_grid(object.object("grid"));
+    view.camera_from_pose = object.transform("camera_from_pose");
+  }
+  object.close();
+  return view;
+}
+
+PoseRecord read_pose(JsonObject object, bool stereo) {
+  PoseRecord pose;
+  pose.name = object.text("name");
+  if (pose.name.empty() || pose.name.front() == '.' || pose.name.find('/') != std::string::npos) {
+    object.reject("name", fmt::format("\"{}\" cannot be the name of a folder", pose.name));
+  }
+  pose.complete = object.flag("complete");
+  for (JsonObject& view : object.objects("views")) {
+    pose.views.push_back(read_view(view, stereo));
+    if (pose.views.size() > 1 && pose.views.back().index <= pose.views[pose.views.size() - 2].index) {
+      view.reject("index", "views must be listed by ascending index, each once");
+    }
+  }
+  object.close();
+  return pose;
+}
+
+}  // namespace
+
+std::string to_json(const Manifest& manifest) {
+  ordered_json json = {{"format", "scanrig-scan"},   {"version", 1},
+                       {"id", manifest.id},          {"created", manifest.created},
+                       {"state", manifest.state},    {"source", manifest.source},
+                       {"profile", manifest.profile}};
+  if (manifest.calibration) json["calibration"] = to_json(*manifest.calibration);
+  json["poses"] = ordered_json::array();
+  for (const PoseRecord& pose : manifest.poses) {
+    ordered_json views = ordered_json::array();
+    for (const ViewRecord& view : pose.views) views.push_back(to_json(view));
+    json["poses"].push_back({{"name", pose.name}, {"complete", pose.complete}, {"views", views}});
+  }
+  return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+}
+
+Result<Manifest> read_manifest(const std::filesystem::path& file) {
+  auto json = JsonFile::read(file, "scanrig-scan", 1);
+  if (!json) return pass_on(json);
+  JsonObject& root = json->root();
+  Manifest manifest;
+  manifest.id = root.text("id");
+  manifest.created = root.text("created");
+  manifest.state = root.text("state");
+  manifest.source = root.text("source");
+  manifest.profile = root.text("profile");
+  if (const auto words = check_words(manifest); !words) root.reject("", words.error().message);
+  if (root.has("calibration")) manifest.calibration = read_file_record(root.object("calibration"));
+  std::set<std::string> names;
+  for (JsonObject& pose : root.objects("poses")) {
+    manifest.poses.push_back(read_pose(pose, manifest.source == "stereo"));
+    if (!names.insert(manifest.poses.back().name).second) pose.reject("name", "is that of another pose");
+  }
+  if (const auto whole = json->finish(); !whole) return pass_on(whole);
+  return manifest;
+}
+
+Result<void> check_words(const Manifest& manifest) {
+  if (std::find(kStates.begin(), kStates.end(), manifest.state) == kStates.end()) {
+    return fail(ErrorCode::invalid_input, "state: \"{}\" is not one of: {}", manifest.state, fmt::join(kStates, ", "));
+  }
+  if (std::find(kSources.begin(), kSources.end(), manifest.source) == kSources.end()) {
+    return fail(ErrorCode::invalid_input, "source: \"{}\" is not one of: {}", manifest.source,
+                fmt::join(kSources, ", "));
+  }
+  return {};
+}
+
+}  // namespace scanrig

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <filesystem>
+#include <initializer_list>
+#include <limits>
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/result.h"
+#include "core/transform.h"
+
+namespace scanrig {
+
+/// One object of a JsonFile. Every key it holds must be asked for and every key asked for must be there; the first
+/// fault is kept in the file and what is returned after it is empty, so a reader asks for everything and checks once.
+class JsonObject {
+ public:
+  JsonObject(const nlohmann::json* value, std::string path, std::optional<Error>* fault);
+
+  [[nodiscard]] bool has(std::string_view key) const;
+  double number(std::string_view key, double least = -std::numeric_limits<double>::max(),
+                double most = std::numeric_limits<double>::max());
+  int integer(std::string_view key, int least, int most);
+  bool flag(std::string_view key);
+  std::string text(std::string_view key);
+  std::string one_of(std::string_view key, std::initializer_list<std::string_view> allowed);
+  std::string sha256(std::string_view key);
+  /// A path that stays inside the folder of the file.
+  std::string inner_path(std::string_view key);
+  std::vector<double> numbers(std::string_view key);
+  JsonObject object(std::string_view key);
+  std::vector<JsonObject> objects(std::string_view key);
+  /// { "rotation": [[..],[..],[..]], "translation": [..] }, orthonormal to 1e-5, no mirror, translation within 1e5 mm.
+  Transform transform(std::string_view key);
+  /// A key whose content is not for this reader.
+  void ignore(std::string_view key);
+
+  /// Faults a key (or the object, with an empty one) for a reason of the reader's own.
+  void reject(std::string_view key, std::string_view why, ErrorCode code = ErrorCode::invalid_input);
+  /// To be called last: faults the first key nobody asked for.
+  void close();
+
+ private:
+  const nlohmann::json* take(std::string_view key);
+  std::optional<double> finite(const nlohmann::json& value, const std::string& where);
+  [[nodiscard]] std::string where(std::string_view key) const;
+  void reject_at(const std::string& where, std::string_view why, ErrorCode code = ErrorCode::invalid_input);
+
+  const nlohmann::json* value_;  ///< null after a fault
+  std::string path_;
+  std::optional<Error>* fault_;
+  std::vector<std::string> taken_;
+};
+
+/// A JSON file of one of the formats of docs/scan-folder.md, read strictly. Errors name the file and the key's path.
+class JsonFile {
+ public:
+  /// Fails with `not_found`, `io`, `invalid_input` (not JSON, another format), `unsupported` (a version not known
+  /// here).
+  static Result<JsonFile> read(const std::filesystem::path& file, std::string_view format, int version);
+  ~JsonFile();
+  JsonFile(JsonFile&&) noexcept;
+  JsonFile& operator=(JsonFile&&) noexcept;
+
+  JsonObject& root() { return *root_; }
+  [[nodiscard]] const std::string& sha256() const { return sha256_; }
+  /// Closes the root and returns the first fault, if any.
+  Result<void> finish();
+
+ private:
+  JsonFile();
+  std::unique_ptr<nlohmann::json> document_;
+  std::unique_ptr<std::optional<Error>> fault_;
+  std::optional<JsonObject> root_;
+  std::string name_;
+  std::string sha256_;
+};
+
+}  // namespace scanrig

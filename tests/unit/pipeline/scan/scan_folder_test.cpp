@@ -1,0 +1,295 @@
+#include "pipeline/scan/scan_folder.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "core/hash.h"
+#include "tests/unit/pipeline/scan/scan_samples.h"
+
+namespace scanrig {
+namespace {
+
+using namespace scan_samples;
+
+class ScanFolderTest : public FolderTest {
+ protected:
+  std::filesystem::path scan_ = folder_ / "scan";
+
+  ScanFolder create() {
+    write_text(folder_ / "calibration.json", calibration_json());
+    Manifest manifest;
+    manifest.id = "20261121-093000-1";
+    manifest.created = "2026-11-21T09:30:00Z";
+    auto scan = ScanFolder::create(scan_, manifest, folder_ / "calibration.json");
+    EXPECT_TRUE(scan) << scan.error().message;
+    return std::move(*scan);
+  }
+  ScanFolder with_one_view() {
+    ScanFolder scan = create();
+    EXPECT_TRUE(scan.add_view(0, record(0), raw_view(0)));
+    return scan;
+  }
+  static ViewRecord record(int index) {
+    ViewRecord view;
+    view.index = index;
+    view.commanded_deg = 45.0 * index;
+    view.measured_deg = 45.0 * index + 0.0031;
+    view.settling_ms = 210;
+    view.taken = "2026-11-21T09:30:04Z";
+    return view;
+  }
+  void edit_manifest(const std::string& what, const std::string& with) {
+    write_text(scan_ / "scan.json", replaced(read_file(scan_ / "scan.json").value(), what, with));
+  }
+  /// Opening fails with this code and names these.
+  void expect_refused(ErrorCode code, const std::vector<std::string>& names) {
+    const auto scan = ScanFolder::open(scan_);
+    ASSERT_FALSE(scan);
+    EXPECT_EQ(scan.error().code, code) << scan.error().message;
+    for (const auto& name : names)
+      EXPECT_NE(scan.error().message.find(name), std::string::npos) << scan.error().message;
+  }
+  void expect_unloadable(ErrorCode code, const std::string& name) {
+    const auto scan = ScanFolder::open(scan_);
+    ASSERT_TRUE(scan) << scan.error().message;
+    const auto raw = scan->load_raw(0, 0);
+    ASSERT_FALSE(raw);
+    EXPECT_EQ(raw.error().code, code) << raw.error().message;
+    EXPECT_NE(raw.error().message.find(name), std::string::npos) << raw.error().message;
+  }
+  /// Replaces a stored image and its hash in the manifest, so that only the content can be at fault.
+  void replace_image(const std::string& name, const std::string& bytes) {
+    const std::string old = sha256(read_file(scan_ / name).value());
+    write_text(scan_ / name, bytes);
+    edit_manifest(old, sha256(bytes));
+  }
+};
+
+std::string png(const cv::Mat& image) {
+  const auto bytes = encode_png(image).value();
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+TEST_F(ScanFolderTest, WhatIsWrittenIsReadBack) {
+  {
+    ScanFolder scan = create();
+    for (int i : {0, 1}) ASSERT_TRUE(scan.add_view(0, record(i), raw_view(i)));
+    ASSERT_TRUE(scan.set_pose_complete(0));
+    ASSERT_TRUE(scan.add_view(1, record(0), raw_view(7)));
+    ASSERT_TRUE(scan.set_state("waiting_for_flip"));
+  }
+  const auto scan = ScanFolder::open(scan_);
+  ASSERT_TRUE(scan) << scan.error().message;
+  const Manifest& manifest = scan->manifest();
+  EXPECT_EQ(manifest.id, "20261121-093000-1");
+  EXPECT_EQ(manifest.state, "waiting_for_flip");
+  ASSERT_EQ(manifest.poses.size(), 2u);
+  EXPECT_TRUE(manifest.poses[0].complete);
+  EXPECT_FALSE(manifest.poses[1].complete);
+  ASSERT_EQ(manifest.poses[0].views.size(), 2u);
+  EXPECT_EQ(manifest.poses[0].views[1].measured_deg, 45.0031);
+  EXPECT_EQ(manifest.poses[0].views[1].files.at("left_plain").path, "pose1/view01/left_plain.png");
+  const auto raw = scan->load_raw(1, 0);
+  ASSERT_TRUE(raw) << raw.error().message;
+  EXPECT_TRUE(same(raw->left_pattern, raw_view(7).left_pattern));
+  EXPECT_TRUE(same(raw->right_plain, raw_view(7).right_plain));
+  const auto images = scan->load_images(0, 1);
+  ASSERT_TRUE(images);
+  EXPECT_EQ(images->left_plain.channels(), 3);
+  EXPECT_NEAR(images->angle_rad, 0.78545, 1e-4);
+  const auto calibration = scan->load_calibration();
+  ASSERT_TRUE(calibration) << calibration.error().message;
+  EXPECT_EQ(calibration->right.projection.fy, 201.0);
+  EXPECT_EQ(calibration->left.distortion[4], 0.05);
+  EXPECT_EQ(calibration->sha256, manifest.calibration->sha256);
+}
+
+TEST_F(ScanFolderTest, AnExistingFolderIsNotOverwritten) {
+  create();
+  const auto again = ScanFolder::create(scan_, {}, {});
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().code, ErrorCode::exists);
+}
+
+TEST_F(ScanFolderTest, AFolderThatCannotBeMadeIsAnInputOutputError) {
+  write_text(folder_ / "file", "");
+  const auto scan = ScanFolder::create(folder_ / "file" / "scan", {}, {});
+  ASSERT_FALSE(scan);
+  EXPECT_EQ(scan.error().code, ErrorCode::io);
+}
+
+TEST_F(ScanFolderTest, ABadCalibrationMakesNoScan) {
+  write_text(folder_ / "bad.json", "{}");
+  EXPECT_FALSE(ScanFolder::create(scan_, {}, folder_ / "bad.json"));
+  EXPECT_FALSE(std::filesystem::exists(scan_));
+}
+
+TEST_F(ScanFolderTest, AViewTakenAgainReplacesTheFirst) {
+  ScanFolder scan = create();
+  for (int i : {3, 1, 2}) ASSERT_TRUE(scan.add_view(0, record(i), raw_view(i)));
+  for (int seed : {20, 30, 40}) {
+    ASSERT_TRUE(scan.add_view(0, record(2), raw_view(seed)));
+    const auto opened = ScanFolder::open(scan_);
+    ASSERT_TRUE(opened) << opened.error().message;
+    ASSERT_EQ(opened->manifest().poses[0].views.size(), 3u);
+    EXPECT_EQ(opened->manifest().poses[0].views[1].index, 2);
+    EXPECT_TRUE(same(opened->load_raw(0, 1)->left_plain, raw_view(seed).left_plain));
+  }
+  const std::filesystem::directory_iterator folders(scan_ / "pose1");
+  EXPECT_EQ(std::distance(folders, {}), 3) << "the replaced views' folders are gone";
+}
+
+// The manifest is written last: at every moment before, the old manifest and every file it names are whole.
+TEST_F(ScanFolderTest, ACrashBeforeTheManifestLeavesTheOldScan) {
+  ScanFolder scan = with_one_view();
+  const std::string before = read_file(scan_ / "scan.json").value();
+  ASSERT_TRUE(scan.add_view(0, record(1), raw_view(1)));
+  write_text(scan_ / "scan.json", before);
+  write_text(scan_ / "scan.json.tmp4711", "{ half a mani");
+  auto opened = ScanFolder::open(scan_);
+  ASSERT_TRUE(opened) << opened.error().message;
+  ASSERT_EQ(opened->manifest().poses[0].views.size(), 1u);
+  EXPECT_TRUE(opened->load_raw(0, 0));
+  EXPECT_TRUE(opened->add_view(0, record(1), raw_view(5))) << "the left-over folder is in nobody's way";
+  EXPECT_TRUE(same(ScanFolder::open(scan_)->load_raw(0, 1)->left_pattern, raw_view(5).left_pattern));
+}
+
+// With the manifest's rename made impossible, as on a full disk, the view that was to be replaced must still be there.
+TEST_F(ScanFolderTest, AFailedReplacementLeavesTheFirstView) {
+  ScanFolder scan = with_one_view();
+  std::filesystem::rename(scan_ / "scan.json", scan_ / "kept.json");
+  std::filesystem::create_directories(scan_ / "scan.json" / "in the way");
+  const auto added = scan.add_view(0, record(0), raw_view(9));
+  ASSERT_FALSE(added);
+  EXPECT_EQ(added.error().code, ErrorCode::io);
+  EXPECT_TRUE(same(scan.load_raw(0, 0)->left_pattern, raw_view(0).left_pattern));
+  std::filesystem::remove_all(scan_ / "scan.json");
+  std::filesystem::rename(scan_ / "kept.json", scan_ / "scan.json");
+  EXPECT_TRUE(same(ScanFolder::open(scan_)->load_raw(0, 0)->left_pattern, raw_view(0).left_pattern));
+}
+
+TEST_F(ScanFolderTest, ImagesThatDoNotBelongTogetherAreNotStored) {
+  ScanFolder scan = create();
+  RawView raw = raw_view(0);
+  raw.left_plain = cv::Mat::zeros(10, 10, CV_8UC1);
+  EXPECT_EQ(scan.add_view(0, record(0), raw).error().code, ErrorCode::invalid_input);
+  raw = raw_view(0);
+  raw.pixel_format = "BGR8";
+  EXPECT_EQ(scan.add_view(0, record(0), raw).error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(scan.add_view(1, record(0), raw_view(0)).error().code, ErrorCode::invalid_input) << "pose 2 before pose 1";
+  EXPECT_TRUE(scan.manifest().poses.empty());
+}
+
+TEST_F(ScanFolderTest, AFolderWithoutAManifestIsNotFound) { expect_refused(ErrorCode::not_found, {"scan.json"}); }
+
+TEST_F(ScanFolderTest, AMissingImageIsNamed) {
+  with_one_view();
+  std::filesystem::remove(scan_ / "pose1/view00/right_plain.png");
+  expect_refused(ErrorCode::not_found, {"pose1/view00/right_plain.png"});
+}
+
+TEST_F(ScanFolderTest, AnUnknownKeyIsNamedWithItsPath) {
+  with_one_view();
+  edit_manifest("\"settling_ms\"", "\"speed\": 1, \"settling_ms\"");
+  expect_refused(ErrorCode::invalid_input, {"scan.json", "poses[0].views[0].speed"});
+}
+
+TEST_F(ScanFolderTest, AMissingKeyIsNamedWithItsPath) {
+  with_one_view();
+  edit_manifest("\"measured_deg\"", "\"measured\"");
+  expect_refused(ErrorCode::invalid_input, {"scan.json", "poses[0].views[0].measured_deg"});
+}
+
+TEST_F(ScanFolderTest, AFutureVersionIsUnsupported) {
+  with_one_view();
+  edit_manifest("\"version\": 1", "\"version\": 2");
+  expect_refused(ErrorCode::unsupported, {"scan.json", "version"});
+}
+
+TEST_F(ScanFolderTest, AnUnknownStateIsRefused) {
+  ScanFolder scan = with_one_view();
+  EXPECT_EQ(scan.set_state("asleep").error().code, ErrorCode::invalid_input);
+  edit_manifest("\"scanning\"", "\"asleep\"");
+  expect_refused(ErrorCode::invalid_input, {"scan.json", "state", "asleep"});
+}
+
+TEST_F(ScanFolderTest, HalfAManifestIsRefused) {
+  with_one_view();
+  const std::string text = read_file(scan_ / "scan.json").value();
+  write_text(scan_ / "scan.json", text.substr(0, text.size() / 2));
+  expect_refused(ErrorCode::invalid_input, {"scan.json", "JSON"});
+}
+
+TEST_F(ScanFolderTest, APathOutOfTheFolderIsRefused) {
+  with_one_view();
+  edit_manifest("pose1/view00/left_plain.png", "../left_plain.png");
+  expect_refused(ErrorCode::invalid_input, {"files.left_plain.path"});
+}
+
+TEST_F(ScanFolderTest, AChangedImageIsNoticedByItsHash) {
+  with_one_view();
+  write_text(scan_ / "pose1/view00/left_plain.png", png(raw_view(3).left_plain));
+  expect_unloadable(ErrorCode::invalid_input, "pose1/view00/left_plain.png");
+}
+
+TEST_F(ScanFolderTest, ATruncatedPngIsNamedEvenWhenItsHashIsRight) {
+  with_one_view();
+  const std::string whole = png(raw_view(0).left_plain);
+  replace_image("pose1/view00/left_plain.png", whole.substr(0, whole.size() * 2 / 3));
+  expect_unloadable(ErrorCode::invalid_input, "pose1/view00/left_plain.png");
+}
+
+TEST_F(ScanFolderTest, AnImageOfTheWrongSizeIsNamed) {
+  with_one_view();
+  replace_image("pose1/view00/right_pattern.png", png(cv::Mat::zeros(24, 32, CV_8UC1)));
+  expect_unloadable(ErrorCode::invalid_input, "pose1/view00/right_pattern.png");
+}
+
+TEST_F(ScanFolderTest, AnImageOfSixteenBitsIsRefused) {
+  with_one_view();
+  replace_image("pose1/view00/right_pattern.png", png(cv::Mat::zeros(48, 64, CV_16UC1)));
+  expect_unloadable(ErrorCode::invalid_input, "pose1/view00");
+}
+
+TEST_F(ScanFolderTest, AViewThatIsNotThereIsNotFound) {
+  EXPECT_EQ(with_one_view().load_raw(0, 1).error().code, ErrorCode::not_found);
+}
+
+TEST_F(ScanFolderTest, ARangeViewKeepsItsDepthsAndItsGaps) {
+  Manifest manifest;
+  manifest.source = "range";
+  auto scan = ScanFolder::create(scan_, manifest, {});
+  ASSERT_TRUE(scan) << scan.error().message;
+  // A plane rising 0.5 mm a mm in x, with a hole and a step of 20 mm.
+  cv::Mat1f depth(40, 60);
+  for (int r = 0; r < depth.rows; ++r) {
+    for (int c = 0; c < depth.cols; ++c)
+      depth(r, c) = 300.0f + 0.25f * static_cast<float>(c) + (c >= 30 ? 20.0f : 0.0f);
+  }
+  depth(20, 10) = std::numeric_limits<float>::quiet_NaN();
+  ViewRecord view = record(0);
+  view.grid = Projection{Projection::Kind::orthographic, 60, 40, 2.0, 2.0, 29.5, 19.5};
+  view.camera_from_pose.translation() = Eigen::Vector3d(1, 2, 3);
+  ASSERT_TRUE(scan->add_range_view(0, view, depth));
+
+  const auto opened = ScanFolder::open(scan_);
+  ASSERT_TRUE(opened) << opened.error().message;
+  const auto range = opened->load_range(0, 0);
+  ASSERT_TRUE(range) << range.error().message;
+  EXPECT_EQ(range->projection.width, 60);
+  EXPECT_EQ(range->camera_from_pose.translation(), Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(range->depth(5, 7), depth(5, 7));
+  EXPECT_TRUE(std::isnan(range->depth(20, 10)));
+  // (0.5, 0, -1) / |.| at the camera's side; also beside the step, where only one surface may be asked.
+  for (const int col : {7, 29, 30}) {
+    EXPECT_NEAR(range->normal(5, col)[0], 0.44721, 1e-4) << col;
+    EXPECT_NEAR(range->normal(5, col)[2], -0.89443, 1e-4) << col;
+    EXPECT_GT(range->sigma(5, col), 0.0f);
+  }
+  EXPECT_EQ(opened->load_raw(0, 0).error().code, ErrorCode::invalid_input) << "no images in a range scan";
+}
+
+}  // namespace
+}  // namespace scanrig

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+
+#include "core/files.h"
+#include "pipeline/scan/scan_folder.h"
+
+namespace scanrig::scan_samples {
+
+/// A folder of its own for each test, removed afterwards.
+class FolderTest : public testing::Test {
+ protected:
+  std::filesystem::path folder_ =
+      std::filesystem::path(testing::TempDir()) /
+      ("scanrig_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+  void SetUp() override {
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+};
+
+inline std::string camera_json() {
+  return R"({ "serial": "A1", "width": 64, "height": 48, "fx": 200.0, "fy": 201.0, "cx": 31.5, "cy": 23.5,
+              "distortion": [0.1, -0.2, 0.001, 0.002, 0.05],
+              "camera_from_turntable": { "rotation": [[1, 0, 0], [0, -1, 0], [0, 0, -1]],
+                                         "translation": [10, 45, 640] } })";
+}
+
+inline std::string calibration_json() {
+  return R"({ "format": "scanrig-calibration", "version": 1, "date": "2026-11-21T09:00:00Z", "table_radius_mm": 90,
+              "left": )" +
+         camera_json() + R"(, "right": )" + camera_json() + "}";
+}
+
+inline void write_text(const std::filesystem::path& file, const std::string& text) { std::ofstream(file) << text; }
+
+inline std::string replaced(std::string text, const std::string& what, const std::string& with) {
+  const auto at = text.find(what);
+  EXPECT_NE(at, std::string::npos) << "the sample holds no " << what;
+  return at == std::string::npos ? text : text.replace(at, what.size(), with);
+}
+
+/// Images of 64x48 whose content depends on `seed`.
+inline RawView raw_view(int seed) {
+  RawView raw{"BayerRG8", {}, {}, {}, {}};
+  for (cv::Mat* image : {&raw.left_pattern, &raw.right_pattern, &raw.left_plain, &raw.right_plain}) {
+    image->create(48, 64, CV_8UC1);
+    ++seed;
+    for (int r = 0; r < image->rows; ++r) {
+      for (int c = 0; c < image->cols; ++c) image->at<uchar>(r, c) = static_cast<uchar>(r * 7 + c * 13 + seed * 31);
+    }
+  }
+  return raw;
+}
+
+inline bool same(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && a.type() == b.type() && std::equal(a.datastart, a.dataend, b.datastart);
+}
+
+}  // namespace scanrig::scan_samples
