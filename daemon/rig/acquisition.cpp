@@ -1,6 +1,6 @@
 #include "daemon/rig/acquisition.h"
 
-#include "daemon/jobs/timestamp.h"
+#include "daemon/station/timestamp.h"
 
 namespace scanrig {
 namespace {

@@ -10,7 +10,7 @@ namespace scanrig {
 
 struct AcquisitionOptions {
   Clock::Duration home_limit = std::chrono::seconds(60);
-  Clock::Duration move_limit = std::chrono::seconds(60);  ///< the longest move is one unwinding of all poses
+  Clock::Duration move_limit = std::chrono::seconds(60);     ///< the longest move is one unwinding of all poses
   Clock::Duration exposure_limit = std::chrono::seconds(2);  ///< arm, fire and collect, each
   Clock::Duration stop_limit = std::chrono::seconds(3);
   int redo_limit = 3;  ///< lost exposures in a row before the view fails

@@ -2,12 +2,14 @@
 
 #include <utility>
 
+#include "daemon/actor_thread.h"
+
 namespace scanrig {
 namespace {
 
-constexpr auto kPoll = std::chrono::milliseconds(50);        ///< longest wait of a lamp for a quiet panel
+constexpr auto kPoll = std::chrono::milliseconds(50);  ///< longest wait of a lamp for a quiet panel
 constexpr auto kShowLimit = std::chrono::milliseconds(500);
-constexpr auto kRetry = std::chrono::seconds(1);             ///< after a panel that did not answer
+constexpr auto kRetry = std::chrono::seconds(1);  ///< after a panel that did not answer
 
 }  // namespace
 
@@ -25,7 +27,7 @@ std::vector<Event> changes(const PanelInputs& before, const PanelInputs& after) 
 }
 
 PanelThread::PanelThread(Panel& panel, Clock& clock, std::function<void(Event)> tell)
-    : panel_(panel), clock_(clock), tell_(std::move(tell)), thread_([this] { run(); }) {}
+    : panel_(panel), clock_(clock), tell_(std::move(tell)), thread_(start_actor(clock, [this] { run(); })) {}
 
 PanelThread::~PanelThread() {
   {
@@ -42,7 +44,6 @@ void PanelThread::show(const PanelOutputs& outputs) {
 }
 
 void PanelThread::run() {
-  const Clock::Actor actor(clock_);
   while (true) {
     auto done = show_wanted();
     if (done) done = read_inputs();

@@ -2,15 +2,16 @@
 
 #include <utility>
 
+#include "daemon/actor_thread.h"
+
 namespace scanrig {
 
 RigThread::RigThread(const Devices& devices, Clock& clock, AcquisitionOptions options, std::function<void(Event)> tell)
     : devices_(devices),
-      clock_(clock),
       acquisition_(devices, clock, options),
       tell_(std::move(tell)),
       inbox_(clock),
-      thread_([this] { run(); }) {}
+      thread_(start_actor(clock, [this] { run(); })) {}
 
 RigThread::~RigThread() {
   interrupt();
@@ -29,7 +30,6 @@ void RigThread::interrupt() noexcept {
 }
 
 void RigThread::run() {
-  const Clock::Actor actor(clock_);
   while (auto command = inbox_.take()) tell_(perform(*command));
 }
 

@@ -31,7 +31,6 @@ class RigThread {
   void interrupt() noexcept;
 
   Devices devices_;
-  Clock& clock_;
   Acquisition acquisition_;
   std::function<void(Event)> tell_;
   Mailbox<Command> inbox_;

@@ -8,8 +8,8 @@ namespace scanrig {
 /// One view as the rig delivered it, in memory only.
 struct TakenView {
   ViewId id;
-  ViewRecord record;  ///< `files` still empty
-  RawView images;
+  ViewRecord record{};  ///< `files` still empty
+  RawView images{};
   int redone = 0;  ///< exposures that were lost and taken again
 };
 

@@ -22,7 +22,7 @@ struct StationPorts {
 
 struct ControlLoopOptions {
   StationRules rules;
-  Clock::Duration warning = std::chrono::seconds(2);       ///< lamp before the first move
+  Clock::Duration warning = std::chrono::seconds(2);         ///< lamp before the first move
   Clock::Duration shutdown_limit = std::chrono::seconds(5);  ///< for the rig to be seen stopped
 };
 

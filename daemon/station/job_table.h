@@ -30,11 +30,11 @@ struct JobInfo {
   JobState state = JobState::queued;
   int poses = 0;
   int views = 0;  ///< a pose
-  std::vector<StoredView> stored;
-  std::vector<StageShare> stages;  ///< of the reconstruction, in the order they began
-  std::optional<Error> error;      ///< why it failed, was interrupted or cancelled
-  std::string model;               ///< path of the model file, once it is there
-  std::string report;
+  std::vector<StoredView> stored{};
+  std::vector<StageShare> stages{};  ///< of the reconstruction, in the order they began
+  std::optional<Error> error{};      ///< why it failed, was interrupted or cancelled
+  std::string model{};               ///< path of the model file, once it is there
+  std::string report{};
 };
 
 /// All jobs by id, oldest first. Entries are immutable: a changed job is a new entry, so that copies are cheap.

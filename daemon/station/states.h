@@ -13,7 +13,7 @@ enum class JobState { queued, scanning, waiting_for_flip, reconstructing, done, 
 /// What the rig is busy with, inside a machine state.
 enum class Activity {
   none,
-  warning,           ///< the lamp warns, nothing moves yet
+  warning,  ///< the lamp warns, nothing moves yet
   homing,
   scanning,          ///< turning and exposing
   storing,           ///< all views of the pose are taken, the last ones go to disk

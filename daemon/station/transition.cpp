@@ -143,7 +143,10 @@ class Transition {
 
  private:
   StationState& s() { return step_.state; }
-  void act(Action action) { step_.actions.push_back(std::move(action)); }
+  template <class SomeAction>
+  void act(SomeAction action) {
+    step_.actions.emplace_back(std::move(action));
+  }
   bool has(const std::string& job) { return s().job && s().job->id == job; }
 
   template <class... Args>

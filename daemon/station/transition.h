@@ -21,10 +21,10 @@ struct ActiveJob {
   std::string id;
   JobState state = JobState::queued;
   int pose = 0;
-  int asked = 0;   ///< views of this pose the rig was told to take
-  int taken = 0;   ///< views whose four images are in memory
-  int stored = 0;  ///< views that survive a power cut
-  std::optional<Error> reconstruction;  ///< why there will be no model
+  int asked = 0;                          ///< views of this pose the rig was told to take
+  int taken = 0;                          ///< views whose four images are in memory
+  int stored = 0;                         ///< views that survive a power cut
+  std::optional<Error> reconstruction{};  ///< why there will be no model
 };
 
 struct StationState {
@@ -33,7 +33,7 @@ struct StationState {
   bool estop_ok = true;
   bool guard_closed = true;
   bool shutting_down = false;
-  bool finished = false;  ///< shut down: the rig is seen stopped, or cannot be reached
+  bool finished = false;                          ///< shut down: the rig is seen stopped, or cannot be reached
   std::string cause = "The daemon has started.";  ///< why the machine is in this state
   std::optional<ActiveJob> job;
 };

@@ -1,4 +1,4 @@
-#include "daemon/jobs/timestamp.h"
+#include "daemon/station/timestamp.h"
 
 #include <fmt/chrono.h>
 
