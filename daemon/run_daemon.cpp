@@ -1,17 +1,13 @@
 #include "daemon/run_daemon.h"
 
 #include "daemon/api/server.h"
+#include "daemon/overloaded.h"
 #include "daemon/rig/panel_thread.h"
 #include "daemon/rig/rig_thread.h"
 #include "daemon/station/timestamp.h"
 
 namespace scanrig {
 namespace {
-
-template <class... Handlers>
-struct Overloaded : Handlers... {
-  using Handlers::operator()...;
-};
 
 /// The serial number tells apart jobs of one second; a folder that is already there is never taken.
 std::string fresh_job_id(const std::filesystem::path& root) {

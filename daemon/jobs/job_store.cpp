@@ -101,7 +101,7 @@ Result<JobTable> JobStore::recover() const {
     if (!job) {
       job = JobInfo{.id = folder.filename(), .folder = folder, .state = JobState::failed, .error = job.error()};
     }
-    jobs[job->id] = std::make_shared<const JobInfo>(std::move(*job));
+    jobs.emplace(job->id, std::make_shared<const JobInfo>(*job));
   }
   if (error) return fail(ErrorCode::io, "cannot list {}: {}", options_.root.string(), error.message());
   return jobs;

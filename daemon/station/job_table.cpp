@@ -1,6 +1,9 @@
 #include "daemon/station/job_table.h"
 
 #include <algorithm>
+#include <tuple>
+
+#include "daemon/overloaded.h"
 
 namespace scanrig {
 namespace {
@@ -23,42 +26,48 @@ void set_progress(JobInfo& job, const event::StageProgress& e) {
   }
 }
 
+void set_pose_stored(JobInfo& job, int pose) {
+  const bool last = pose + 1 == job.poses;
+  job.state = last ? JobState::reconstructing : JobState::waiting_for_flip;
+  if (last && job.error) job.state = JobState::failed;  // the reconstruction gave up earlier
+}
+
 }  // namespace
 
 void update(JobTable& table, const Event& event, int poses, int views) {
-  if (const auto* e = std::get_if<event::JobCreated>(&event)) {
-    table[e->job] = std::make_shared<JobInfo>(
-        JobInfo{.id = e->job, .folder = e->folder, .state = JobState::scanning, .poses = poses, .views = views});
-  } else if (const auto* e = std::get_if<event::ViewStored>(&event)) {
-    change(table, e->id.job, [&](JobInfo& job) {
-      job.state = JobState::scanning;
-      job.stored.push_back({e->id.pose, e->id.view, e->measured_deg, e->redone});
-    });
-  } else if (const auto* e = std::get_if<event::PoseStored>(&event)) {
-    change(table, e->job, [&](JobInfo& job) {
-      const bool last = e->pose + 1 == poses;
-      job.state = last ? JobState::reconstructing : JobState::waiting_for_flip;
-      if (last && job.error) job.state = JobState::failed;  // the reconstruction gave up earlier
-    });
-  } else if (const auto* e = std::get_if<event::JobClosed>(&event)) {
-    change(table, e->job, [&](JobInfo& job) {
-      job.state = e->state;
-      job.error = e->why;
-    });
-  } else if (const auto* e = std::get_if<event::StageProgress>(&event)) {
-    change(table, e->job, [&](JobInfo& job) { set_progress(job, *e); });
-  } else if (const auto* e = std::get_if<event::ReconstructionFailed>(&event)) {
-    change(table, e->job, [&](JobInfo& job) {
-      job.error = e->error;
-      if (job.state == JobState::reconstructing) job.state = JobState::failed;
-    });
-  } else if (const auto* e = std::get_if<event::ModelReady>(&event)) {
-    change(table, e->job, [&](JobInfo& job) {
-      job.state = JobState::done;
-      job.model = e->model;
-      job.report = e->report;
-    });
-  }
+  std::visit(
+      Overloaded{
+          [&](const event::JobCreated& e) {
+            table[e.job] = std::make_shared<JobInfo>(
+                JobInfo{.id = e.job, .folder = e.folder, .state = JobState::scanning, .poses = poses, .views = views});
+          },
+          [&](const event::ViewStored& e) {
+            change(table, e.id.job, [&](JobInfo& job) {
+              job.state = JobState::scanning;
+              job.stored.push_back({e.id.pose, e.id.view, e.measured_deg, e.redone});
+            });
+          },
+          [&](const event::PoseStored& e) {
+            change(table, e.job, [&](JobInfo& job) { set_pose_stored(job, e.pose); });
+          },
+          [&](const event::JobClosed& e) {
+            change(table, e.job, [&](JobInfo& job) { std::tie(job.state, job.error) = std::tuple(e.state, e.why); });
+          },
+          [&](const event::StageProgress& e) { change(table, e.job, [&](JobInfo& job) { set_progress(job, e); }); },
+          [&](const event::ReconstructionFailed& e) {
+            change(table, e.job, [&](JobInfo& job) {
+              job.error = e.error;
+              if (job.state == JobState::reconstructing) job.state = JobState::failed;
+            });
+          },
+          [&](const event::ModelReady& e) {
+            change(table, e.job, [&](JobInfo& job) {
+              std::tie(job.state, job.model, job.report) = std::tuple(JobState::done, e.model, e.report);
+            });
+          },
+          [](const auto&) {},  // concerns the machine only
+      },
+      event);
 }
 
 }  // namespace scanrig

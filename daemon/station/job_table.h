@@ -25,8 +25,8 @@ struct StageShare {
 
 /// What is known of one job.
 struct JobInfo {
-  std::string id;
-  std::string folder;
+  std::string id{};
+  std::string folder{};
   JobState state = JobState::queued;
   int poses = 0;
   int views = 0;  ///< a pose
