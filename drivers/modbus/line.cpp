@@ -39,12 +39,14 @@ constexpr int kDeviceSawWrongCrc = EMBXMEMPAR;
 
 enum class Heard { nothing, something, hangup };
 
-/// Throws away what has arrived.
-Heard discard(int port) {
+/// Throws away what arrives within `wait`, up to the first byte.
+Heard discard(int port, Clock::Duration wait) {
+  pollfd watched{port, POLLIN, 0};
+  if (::poll(&watched, 1, static_cast<int>(std::chrono::ceil<milliseconds>(wait).count())) <= 0) return Heard::nothing;
+  // Reading would not tell: a port that hung up reads as one with nothing to say.
+  if (watched.revents & (POLLHUP | POLLERR | POLLNVAL)) return Heard::hangup;
   std::array<char, 256> bytes;
-  const ssize_t count = ::read(port, bytes.data(), bytes.size());
-  if (count > 0) return Heard::something;
-  return count < 0 && (errno == EAGAIN || errno == EINTR) ? Heard::nothing : Heard::hangup;
+  return ::read(port, bytes.data(), bytes.size()) > 0 ? Heard::something : Heard::nothing;
 }
 
 }  // namespace
@@ -84,7 +86,7 @@ Result<void> Line::request(std::string_view what, std::uint16_t address, Deadlin
   if (!context_) {
     if (auto opened = open(); !opened) return opened;
   }
-  const Heard unasked = discard(modbus_get_socket(context_.get()));
+  const Heard unasked = discard(modbus_get_socket(context_.get()), Clock::Duration::zero());
   if (unasked == Heard::hangup) return failed(EIO, who());
   if (unasked == Heard::something) {
     answer_missed_ = true;
@@ -139,10 +141,7 @@ Result<void> Line::wait_until_quiet(Deadline deadline) {
     if (deadline.expired(clock_)) {
       return fail(ErrorCode::timeout, "{}: the deadline passed before the line fell silent", who());
     }
-    const auto wait = std::min(quiet_at - clock_.now(), deadline.left(clock_));
-    pollfd watched{port, POLLIN, 0};
-    if (::poll(&watched, 1, static_cast<int>(std::chrono::ceil<milliseconds>(wait).count())) <= 0) continue;
-    const Heard heard = discard(port);
+    const Heard heard = discard(port, std::min(quiet_at - clock_.now(), deadline.left(clock_)));
     if (heard == Heard::hangup) return failed(EIO, who());
     if (heard == Heard::something) quiet_at = clock_.now() + silence;
   }

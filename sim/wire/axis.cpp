@@ -11,6 +11,7 @@ constexpr std::chrono::microseconds kStep{500};
 constexpr double kStepSeconds = std::chrono::duration<double>(kStep).count();
 constexpr double kQuickStopFactor = 4.0;
 constexpr double kStillDeg = 0.001;
+constexpr double kBackOffDeg = 2.0;  ///< closer than this to the home switch it is closed already
 
 /// Two's complement, as the drive's counter wraps.
 std::int32_t wrapped(double pulses) {
@@ -24,6 +25,8 @@ Axis::Axis(const AxisOptions& options, Clock::TimePoint now) : options_(options)
 }
 
 double Axis::pulses_per_degree() const { return options_.pulses_per_motor_rev * options_.gear_ratio / 360.0; }
+
+double Axis::turn() const { return 360.0 * pulses_per_degree(); }
 
 void Axis::advance(Clock::TimePoint now) {
   while (running() && now_ + kStep <= now) {
@@ -46,9 +49,11 @@ void Axis::move_to(std::int32_t counter, const AxisMotion& motion) {
 }
 
 void Axis::seek_home(const AxisMotion& motion) {
-  begin(Mode::seeking_home, motion);
-  const double turn = 360.0 * pulses_per_degree();
-  goal_ = std::floor(motor_ / turn) * turn;
+  const double beyond_switch = motor_ - std::floor(motor_ / turn()) * turn();
+  const double near = kBackOffDeg * pulses_per_degree();
+  const bool on_switch = beyond_switch < near || beyond_switch > turn() - near;
+  begin(on_switch ? Mode::backing_off : Mode::seeking_home, motion);
+  goal_ = motor_ + (on_switch ? 2.0 * near : -beyond_switch);
   reached_switch_ = false;
 }
 
@@ -62,30 +67,40 @@ void Axis::set_counter(std::int32_t value) {
 }
 
 void Axis::step() {
-  const double position = mode_ == Mode::seeking_home ? motor_ : command_;
-  const double left = goal_ - position;
+  const bool by_switch = mode_ == Mode::backing_off || mode_ == Mode::seeking_home;
+  const double left = goal_ - (by_switch ? motor_ : command_);
   double wanted = 0.0;
   double change = motion_.deceleration * kQuickStopFactor * kStepSeconds;
   if (mode_ != Mode::stopping) {
-    wanted = std::copysign(std::min(motion_.speed, std::sqrt(2.0 * motion_.deceleration * std::abs(left))), left);
+    // The highest speed from which steps of equal deceleration end on the goal.
+    const double slower = motion_.deceleration * kStepSeconds;
+    const double steps = std::sqrt(0.25 + 2.0 * std::abs(left) / (slower * kStepSeconds)) - 0.5;
+    wanted = std::copysign(std::min(motion_.speed, steps * slower), left);
     change = (std::abs(wanted) > std::abs(velocity_) ? motion_.acceleration : motion_.deceleration) * kStepSeconds;
   }
   velocity_ += std::clamp(wanted - velocity_, -change, change);
   double way = velocity_ * kStepSeconds;
-  const bool there = mode_ != Mode::stopping && std::abs(left) <= std::max(std::abs(way), 0.5) &&
-                     std::abs(velocity_) <= 2.0 * motion_.deceleration * kStepSeconds + std::abs(wanted);
+  const bool there = mode_ != Mode::stopping && way * left >= left * left;
   if (there) way = left;
   command_ += way;
   if (!blocked_) motor_ += way;
   const double half_play = 0.5 * options_.backlash_deg * pulses_per_degree();
   table_ = std::clamp(table_, motor_ - half_play, motor_ + half_play);
-  if (mode_ == Mode::stopping ? velocity_ == 0.0 : there && (mode_ != Mode::seeking_home || motor_ == goal_)) {
-    if (mode_ == Mode::seeking_home) {
-      reached_switch_ = true;
-      set_counter(0);
-    }
-    end();
+  if (mode_ == Mode::stopping ? velocity_ == 0.0 : there && !(by_switch && blocked_)) finish();
+}
+
+void Axis::finish() {
+  if (mode_ == Mode::backing_off) {
+    velocity_ = 0.0;
+    mode_ = Mode::seeking_home;
+    goal_ = std::round(motor_ / turn()) * turn();
+    return;
   }
+  if (mode_ == Mode::seeking_home) {
+    reached_switch_ = true;
+    set_counter(0);
+  }
+  end();
 }
 
 void Axis::end() {

@@ -49,7 +49,8 @@ class Axis {
   void advance(Clock::TimePoint now);
 
   void move_to(std::int32_t counter, const AxisMotion& motion);  ///< absolute, in counter values
-  void seek_home(const AxisMotion& motion);  ///< negative, until the switch closes; then counter = 0
+  void seek_home(
+      const AxisMotion& motion);  ///< negative, until the switch closes; first away from a closed one; then counter = 0
   void quick_stop();
   void set_counter(std::int32_t value);  ///< declares where it is
 
@@ -64,12 +65,14 @@ class Axis {
   [[nodiscard]] const std::vector<AxisLeg>& legs() const { return legs_; }
 
  private:
-  enum class Mode { standing, moving, seeking_home, stopping };
+  enum class Mode { standing, moving, backing_off, seeking_home, stopping };
 
   void begin(Mode mode, const AxisMotion& motion);
   void step();
+  void finish();
   void end();
   [[nodiscard]] double pulses_per_degree() const;
+  [[nodiscard]] double turn() const;       ///< of the table, pulses
   [[nodiscard]] double vibration() const;  ///< pulses
 
   AxisOptions options_;
