@@ -54,14 +54,16 @@ std::vector<Pairing> ring_pairings(int views, int reach) {
 Matches match(const RangeImage& target, const std::vector<SurfacePoint>& source, const Transform& pose_from_source,
               const Transform& target_from_pose, double capture_mm) {
   constexpr double kMinAgreement = 0.7;  // cosine between the two normals
+  constexpr double kMinFacing = 0.5;     // stereo is biased where it looks along the surface
   const Transform target_from_source = target_from_pose * pose_from_source;
   const Transform pose_from_target = target_from_pose.inverse();
   Matches matches;
   for (const SurfacePoint& s : source) {
+    if (s.facing < kMinFacing) continue;
     const Eigen::Vector3d point = target_from_source * s.point;
     const Eigen::Vector3d normal = target_from_source.linear() * s.normal;
     const auto plane = tangent_plane_near(target, point);
-    if (!plane || plane->normal.dot(normal) < kMinAgreement) continue;
+    if (!plane || plane->facing < kMinFacing || plane->normal.dot(normal) < kMinAgreement) continue;
     if (std::abs(plane->normal.dot(point - plane->point)) > capture_mm) continue;
     matches.push_back({pose_from_source * s.point, pose_from_target * plane->point,
                        pose_from_source.linear() * s.normal, pose_from_target.linear() * plane->normal,
@@ -157,7 +159,7 @@ void Solver::add_data(const std::vector<Matches>& matches, Eigen::MatrixXd& norm
   for (const Matches& pair : matches) {
     for (const Match& m : pair) all.push_back(std::abs(m.distance()) / m.sigma);
   }
-  const double scale = 3.0 * std::max(1.0, 1.4826 * quantile(std::move(all), 0.5));
+  const double scale = 1.5 * std::max(1.0, 1.4826 * quantile(std::move(all), 0.5));
   std::vector<Sums> sums(matches.size());
   parallel_for(matches.size(), [&](std::size_t k) {
     for (const Match& m : matches[k]) {
@@ -302,7 +304,7 @@ RegistrationOptions RegistrationOptions::imported() {
   options.rotation_sigma_deg = 0.5;
   options.translation_sigma_mm = 1.0;
   options.axis_tilt_sigma_deg = options.axis_shift_sigma_mm = 0.0;
-  options.pair_bias_mm = 0.01;
+  options.pair_bias_mm = 0.02;
   options.capture_mm = 4.0;
   return options;
 }
