@@ -18,6 +18,7 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 constexpr int kAxisUnknowns = 4;  // tilt about x and z, shift along x and z
 constexpr double kMinLeverage = 0.02;
+constexpr double kSettled = 3e-4;  // mm
 constexpr std::size_t kMinShared = 100;
 
 /// Which view's points are held against which view's surface.
@@ -98,7 +99,7 @@ class Solver {
     return matches;
   }
 
-  /// One Gauss-Newton step; the size of the largest correction, in units of its prior's standard deviation.
+  /// One Gauss-Newton step; how far it moves the surface at most, mm.
   double step(const std::vector<Matches>& matches);
 
   /// How much the surface resists turning: the slope along the turn, taken from both views' normals, whose noise is
@@ -212,13 +213,13 @@ double Solver::step(const std::vector<Matches>& matches) {
   add_priors(normal, right);
   const Eigen::VectorXd solution = normal.ldlt().solve(right);
   axis_ = solution.head<kAxisUnknowns>();
-  const Vector6 weight = prior_information().diagonal().cwiseSqrt();
+  constexpr double kArm = 50.0;  // mm, from the axis to the surface, roughly
   double largest = 0.0;
   for (std::size_t v = 0; v < correction_.size(); ++v) {
     const Vector6 delta = solution.segment<6>(kAxisUnknowns + 6 * static_cast<int>(v));
     correction_[v] += delta;
     camera_from_pose_[v] = camera_from_pose_[v] * small_motion(delta.head<3>(), delta.tail<3>());
-    largest = std::max(largest, delta.cwiseProduct(weight).cwiseAbs().maxCoeff());
+    largest = std::max(largest, delta.head<3>().norm() * kArm + delta.tail<3>().norm());
   }
   return largest;
 }
@@ -332,7 +333,7 @@ Result<RegistrationReport> register_views(std::span<View> views, const Registrat
     const double capture = options.capture_mm / (1 << (options.levels - 1 - level));
     for (int k = 0; k < options.iterations; ++k) {
       if (context.stopped()) return fail(ErrorCode::stopped, "registration: stopped");
-      if (solver.step(solver.match_all(capture)) < 0.01) break;
+      if (solver.step(solver.match_all(capture)) < kSettled) break;
     }
     context.report("registration", 1.0 - static_cast<double>(level) / options.levels);
   }
