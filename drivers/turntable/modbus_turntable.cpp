@@ -81,13 +81,14 @@ Result<void> ModbusTurntable::find_home(Deadline deadline) {
       command([&] { return here ? drive_.set_zero(deadline) : drive_.start_homing(deadline); }, begins, deadline);
   if (!started) return started;
 
-  std::int32_t last_position = before->position;
+  std::int32_t anchor = before->position;
   auto still_since = clock_.now();
   const auto homed = watch(
       "homing",
       [&](const DriveState& state) {
         const bool at_home = begins(state) && state.homed && !state.running && near(state.position, 0);
-        const bool moved = !near(state.position, std::exchange(last_position, state.position));
+        const bool moved = !near(state.position, anchor);
+        if (moved) anchor = state.position;
         if (!at_home || moved) still_since = clock_.now();
         if (clock_.now() - still_since >= options_.settle && at_home) return Seen::done;
         return moved || at_home ? Seen::progress : Seen::waiting;
