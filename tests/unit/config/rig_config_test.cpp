@@ -222,7 +222,7 @@ TEST_F(RigConfigTest, DamagedFilesAreRefusedOrReadButNeverCrash) {
   };
   static constexpr std::string_view kBytes("\0\"'=[]{}.#\n\r\t0123456789-+eE_xn\x80\xFF\xC3", 33);
   int refused = 0;
-  for (int round = 0; round < 3000; ++round) {
+  for (int round = 0; round < 1000; ++round) {
     std::string text = example_;
     for (std::size_t change = 0; change <= below(4); ++change) {
       const std::size_t at = below(text.size());
@@ -240,7 +240,7 @@ TEST_F(RigConfigTest, DamagedFilesAreRefusedOrReadButNeverCrash) {
     ASSERT_EQ(rig.error().code, ErrorCode::invalid_input);
     ASSERT_THAT(rig.error().message, StartsWith(file_.string() + ":"));
   }
-  EXPECT_GT(refused, 1000);
+  EXPECT_GT(refused, 500);
 }
 
 }  // namespace
