@@ -14,7 +14,8 @@ constexpr milliseconds kStalledAfter{2000};
 constexpr milliseconds kEnableTime{1000};
 constexpr milliseconds kStandingTime{50};  ///< the position must not change for this long to be called standing
 constexpr int kAttempts = 3;
-constexpr double kSlowHoming = 0.2;  ///< of the working speed, for the last approach of the switch
+constexpr int kStopReplyTimeouts = 12;  ///< three attempts, each with its quiet line, and some room
+constexpr double kSlowHoming = 0.2;     ///< of the working speed, for the last approach of the switch
 constexpr double kFastHoming = 0.5;
 
 }  // namespace
@@ -244,9 +245,13 @@ Result<void> ModbusTurntable::not_stopped() {
   return {};
 }
 
-/// The drive's state, after an owed stop has been delivered and unless someone has asked to stop.
+/// The drive's state, unless someone has asked to stop.
 Result<DriveState> ModbusTurntable::ask(Deadline deadline) {
   if (auto free = not_stopped(); !free) return pass_on(free);
+  return read_after_owed_stop(deadline);
+}
+
+Result<DriveState> ModbusTurntable::read_after_owed_stop(Deadline deadline) {
   if (stop_owed_) {
     if (auto told = drive_.stop(deadline); !told) return pass_on(told);
     stop_owed_ = false;
@@ -261,7 +266,7 @@ tl::unexpected<Error> ModbusTurntable::give_up(const Error& error) {
     const std::scoped_lock lock(mutex_);
     stop_requested_ = false;
   }
-  stop_owed_ = !drive_.stop(Deadline::after(clock_, 12 * options_.line.reply_timeout));
+  stop_owed_ = !drive_.stop(Deadline::after(clock_, kStopReplyTimeouts * options_.line.reply_timeout));
   return fail(error.code, "turntable: {}; {}", error.message,
               stop_owed_ ? "the stop was not confirmed: the table may be moving" : "the motor was told to stop");
 }
@@ -295,7 +300,7 @@ Result<void> ModbusTurntable::stop(Deadline deadline) {
 }
 
 Result<void> ModbusTurntable::reset_alarm(Deadline deadline) {
-  auto state = drive_.read_state(deadline);
+  auto state = read_after_owed_stop(deadline);
   if (!state) return pass_on(state, "turntable");
   if (!state->fault) return {};
   if (auto reset = drive_.reset_alarm(deadline); !reset) return pass_on(reset, "turntable");
@@ -307,11 +312,7 @@ Result<void> ModbusTurntable::reset_alarm(Deadline deadline) {
 }
 
 Result<TurntableStatus> ModbusTurntable::status(Deadline deadline) {
-  if (stop_owed_) {
-    if (auto told = drive_.stop(deadline); !told) return pass_on(told, "turntable");
-    stop_owed_ = false;
-  }
-  const auto state = drive_.read_state(deadline);
+  const auto state = read_after_owed_stop(deadline);
   if (!state) return pass_on(state, "turntable");
   TurntableStatus status;
   status.motion = state->running ? TurntableStatus::Motion::moving : TurntableStatus::Motion::standing;
