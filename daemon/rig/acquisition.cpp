@@ -13,13 +13,13 @@ bool is_lost(const Error& error) { return error.code == ErrorCode::timeout || er
 
 Result<void> Acquisition::home() {
   if (auto dark = devices_.projector.dark(Deadline::after(clock_, options_.exposure_limit)); !dark) {
-    return pass_on(dark, "projector");
+    return pass_on(dark);
   }
   if (auto reset = devices_.turntable.reset_alarm(Deadline::after(clock_, options_.stop_limit)); !reset) {
-    return pass_on(reset, "turntable");
+    return pass_on(reset);
   }
   if (auto home = devices_.turntable.home(Deadline::after(clock_, options_.home_limit)); !home) {
-    return pass_on(home, "turntable");
+    return pass_on(home);
   }
   return {};
 }
@@ -27,7 +27,7 @@ Result<void> Acquisition::home() {
 Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle) {
   const Degrees turns{360.0 * id.pose};
   const auto move = devices_.turntable.rotate_to(turns + angle, Deadline::after(clock_, options_.move_limit));
-  if (!move) return pass_on(move, "turntable");
+  if (!move) return pass_on(move);
 
   TakenView view{.id = id};
   const auto pattern = expose(Light::pattern, view.redone);
@@ -50,8 +50,8 @@ Result<void> Acquisition::stop() {
   const auto deadline = Deadline::after(clock_, options_.stop_limit);
   const auto dark = devices_.projector.dark(deadline);
   const auto stopped = devices_.turntable.stop(deadline);
-  if (!stopped) return pass_on(stopped, "turntable");
-  if (!dark) return pass_on(dark, "projector");
+  if (!stopped) return pass_on(stopped);
+  if (!dark) return pass_on(dark);
   return {};
 }
 
@@ -66,14 +66,12 @@ Result<StereoFrame> Acquisition::expose(Light light, int& redone) {
 
 Result<StereoFrame> Acquisition::expose_once(Light light) {
   if (auto armed = devices_.camera.arm(Deadline::after(clock_, options_.exposure_limit)); !armed) {
-    return pass_on(armed, "camera");
+    return pass_on(armed);
   }
   if (auto fired = devices_.projector.fire(light, Deadline::after(clock_, options_.exposure_limit)); !fired) {
-    return pass_on(fired, "projector");
+    return pass_on(fired);
   }
-  auto frame = devices_.camera.collect(Deadline::after(clock_, options_.exposure_limit));
-  if (!frame) return pass_on(frame, "camera");
-  return frame;
+  return devices_.camera.collect(Deadline::after(clock_, options_.exposure_limit));
 }
 
 }  // namespace scanrig

@@ -23,6 +23,8 @@ class Acquisition {
   Acquisition(const Devices& devices, Clock& clock, AcquisitionOptions options)
       : devices_(devices), clock_(clock), options_(options) {}
 
+  // Errors are passed on as the devices say them: each names itself.
+
   /// Clears an alarm, darkens the projector, finds home. Fails as Turntable::home.
   Result<void> home();
 
