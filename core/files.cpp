@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <sstream>
@@ -107,6 +108,29 @@ Result<void> create_directories_synced(const std::filesystem::path& path) {
     }
     if (auto synced = sync_folder(p->parent_path()); !synced) return synced;
   }
+  return {};
+}
+
+Result<void> replace_folder(const std::filesystem::path& prepared, const std::filesystem::path& target) {
+  std::error_code error;
+  if (!std::filesystem::exists(target, error)) {
+    if (::rename(prepared.c_str(), target.c_str()) != 0) return fail_errno("cannot rename to", target);
+    return sync_folder(target.parent_path());
+  }
+  std::filesystem::path old = prepared;
+  if (::renameat2(AT_FDCWD, prepared.c_str(), AT_FDCWD, target.c_str(), RENAME_EXCHANGE) != 0) {
+    if (errno != EINVAL && errno != ENOSYS) return fail_errno("cannot exchange", target);
+    old += ".old";
+    if (::rename(target.c_str(), old.c_str()) != 0) return fail_errno("cannot move away", target);
+    if (::rename(prepared.c_str(), target.c_str()) != 0) {
+      auto failed = fail_errno("cannot rename to", target);
+      ::rename(old.c_str(), target.c_str());
+      return failed;
+    }
+  }
+  if (auto synced = sync_folder(target.parent_path()); !synced) return synced;
+  std::filesystem::remove_all(old, error);
+  if (error) return fail(ErrorCode::io, "cannot remove the replaced folder {}: {}", old.string(), error.message());
   return {};
 }
 

@@ -29,4 +29,8 @@ Result<void> write_files_synced(const std::filesystem::path& folder, std::span<c
 /// Creates `path` and its parents and syncs each new entry's folder. Fails with `io`.
 Result<void> create_directories_synced(const std::filesystem::path& path);
 
+/// Puts the folder `prepared`, its files already synced, in the place of `target` on the same file system, and syncs.
+/// An older `target` is exchanged in one step where the file system can do that, and removed. Fails with `io`.
+Result<void> replace_folder(const std::filesystem::path& prepared, const std::filesystem::path& target);
+
 }  // namespace scanrig

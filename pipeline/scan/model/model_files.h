@@ -1,0 +1,39 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/result.h"
+#include "pipeline/mesh/mesh.h"
+
+namespace scanrig {
+
+/// What write_model_files has written, relative to the folder.
+struct ModelFiles {
+  std::vector<std::string> names;
+};
+
+/// Writes model.glb, model.ply, model.stl, and, where there is a texture, model.obj, model.mtl, model.png; and
+/// `report_json` as report.json unless empty. `model` is in mm, +Y up. Whole or nothing: everything is written and
+/// synced under a temporary name beside `folder`, which then takes its place; an older folder is replaced as a whole.
+/// Fails with `degenerate` (no faces), `io`.
+Result<ModelFiles> write_model_files(const TexturedMesh& model, std::string_view report_json,
+                                     const std::filesystem::path& folder);
+
+/// glTF 2.0 binary: metres, +Y up, vertices doubled where charts meet, texture as JPEG inside, matte material.
+/// Fails with `degenerate`, `internal` (the image cannot be encoded).
+Result<std::string> encode_glb(const TexturedMesh& model);
+
+/// Binary little-endian, mm, the closed surface: x y z nx ny nz, and where known red green blue, views, sigma.
+std::string encode_ply(const Mesh& mesh);
+
+/// Binary; mm, said in the header.
+std::string encode_stl(const Mesh& mesh);
+
+/// Wavefront text, mm; `material_file` is the name of what encode_mtl gives, `image_file` that of the atlas.
+std::string encode_obj(const TexturedMesh& model, std::string_view material_file);
+std::string encode_mtl(std::string_view image_file);
+
+}  // namespace scanrig

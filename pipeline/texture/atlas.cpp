@@ -1,0 +1,126 @@
+#include "pipeline/texture/atlas.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/parallel.h"
+
+namespace scanrig {
+namespace {
+
+constexpr double kScaleStep = 0.95;
+constexpr double kSmallestScale = 0.01;
+
+/// Shelves: the tallest first, side by side until the row is full. Places in the order of `sizes`, or nothing.
+std::optional<std::vector<cv::Point>> pack(const std::vector<cv::Size>& sizes, int side) {
+  std::vector<std::size_t> order(sizes.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return sizes[a].height > sizes[b].height; });
+  std::vector<cv::Point> places(sizes.size());
+  cv::Point next(0, 0);
+  int shelf = 0;
+  for (const std::size_t i : order) {
+    if (sizes[i].width > side) return std::nullopt;
+    if (next.x + sizes[i].width > side) {
+      next = {0, next.y + shelf};
+      shelf = 0;
+    }
+    shelf = std::max(shelf, sizes[i].height);
+    if (next.y + shelf > side) return std::nullopt;
+    places[i] = next;
+    next.x += sizes[i].width;
+  }
+  return places;
+}
+
+void draw_face(const std::array<Eigen::Vector2d, 3>& corners, double depth, int face, const std::vector<double>& depths,
+               cv::Mat1i& owner) {
+  const Eigen::Vector2d low = corners[0].cwiseMin(corners[1]).cwiseMin(corners[2]);
+  const Eigen::Vector2d high = corners[0].cwiseMax(corners[1]).cwiseMax(corners[2]);
+  for (int y = static_cast<int>(std::ceil(low.y())); y <= high.y(); ++y) {
+    for (int x = static_cast<int>(std::ceil(low.x())); x <= high.x(); ++x) {
+      const auto weights = barycentric(corners, {x, y});
+      if (!weights || weights->minCoeff() < 0.0) continue;
+      int& now = owner(y, x);
+      if (now < 0 || depth < depths[static_cast<std::size_t>(now)]) now = face;
+    }
+  }
+}
+
+/// Lets the faces at the rim of a chart own the texels next to it.
+void pad(cv::Mat1i chart, int padding) {
+  for (int round = 0; round < padding; ++round) {
+    const cv::Mat1i before = chart.clone();
+    for (int y = 0; y < chart.rows; ++y) {
+      for (int x = 0; x < chart.cols; ++x) {
+        if (before(y, x) >= 0) continue;
+        for (int v = std::max(0, y - 1); v <= std::min(y + 1, chart.rows - 1) && chart(y, x) < 0; ++v) {
+          for (int u = std::max(0, x - 1); u <= std::min(x + 1, chart.cols - 1) && chart(y, x) < 0; ++u) {
+            chart(y, x) = before(v, u);
+          }
+        }
+      }
+    }
+  }
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector3d> barycentric(const std::array<Eigen::Vector2d, 3>& corners, const Eigen::Vector2d& at) {
+  const Eigen::Vector2d a = corners[1] - corners[0];
+  const Eigen::Vector2d b = corners[2] - corners[0];
+  const Eigen::Vector2d p = at - corners[0];
+  const double area = a.x() * b.y() - a.y() * b.x();
+  if (std::abs(area) < 1e-12) return std::nullopt;
+  const double first = (p.x() * b.y() - p.y() * b.x()) / area;
+  const double second = (a.x() * p.y() - a.y() * p.x()) / area;
+  return Eigen::Vector3d(1.0 - first - second, first, second);
+}
+
+std::optional<AtlasLayout> lay_out(const Mesh& mesh, std::span<const ChartView> views, std::span<const Chart> charts,
+                                   int atlas_px, double max_texels_per_px, int padding_px) {
+  AtlasLayout layout;
+  layout.corners.resize(mesh.faces.size());
+  std::vector<double> depths(mesh.faces.size());
+  std::vector<Eigen::AlignedBox2d> boxes(charts.size());
+  parallel_for(charts.size(), [&](std::size_t c) {
+    const ChartView& view = views[charts[c].view];
+    for (const auto f : charts[c].faces) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        const Eigen::Vector3f& vertex = mesh.vertices[mesh.faces[f][k]];
+        layout.corners[f][k] = view.project(vertex);
+        depths[f] += (view.view_from_model * vertex.cast<double>()).z() / 3.0;
+        boxes[c].extend(layout.corners[f][k]);
+      }
+    }
+  });
+
+  std::optional<std::vector<cv::Point>> places;
+  std::vector<cv::Size> sizes(charts.size());
+  for (double scale = max_texels_per_px; scale > kSmallestScale && !places; scale *= kScaleStep) {
+    for (std::size_t c = 0; c < charts.size(); ++c) {
+      // In double first: a foreign mesh may be any size.
+      const Eigen::Vector2d size = (scale * boxes[c].sizes()).cwiseMin(1e6);
+      sizes[c] = cv::Size(static_cast<int>(std::ceil(size.x())), static_cast<int>(std::ceil(size.y()))) +
+                 cv::Size(2 * padding_px + 1, 2 * padding_px + 1);
+    }
+    places = pack(sizes, atlas_px);
+    layout.texels_per_px = scale;
+  }
+  if (!places) return std::nullopt;
+
+  layout.owner = cv::Mat1i(atlas_px, atlas_px, -1);
+  parallel_for(charts.size(), [&](std::size_t c) {
+    const Eigen::Vector2d origin((*places)[c].x + padding_px, (*places)[c].y + padding_px);
+    for (const auto f : charts[c].faces) {
+      for (auto& corner : layout.corners[f]) corner = layout.texels_per_px * (corner - boxes[c].min()) + origin;
+      draw_face(layout.corners[f], depths[f], static_cast<int>(f), depths, layout.owner);
+    }
+    pad(layout.owner(cv::Rect((*places)[c], sizes[c])), padding_px);
+  });
+  return layout;
+}
+
+}  // namespace scanrig

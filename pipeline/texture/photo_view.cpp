@@ -1,0 +1,185 @@
+#include "pipeline/texture/photo_view.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+
+#include "core/parallel.h"
+#include "core/units.h"
+
+namespace scanrig {
+namespace {
+
+constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+constexpr int kSaturated = 250;
+/// Two neighbouring pixels whose depths differ by more than this many pixel widths belong to two surfaces: steeper than
+/// any incidence that counts (tan 79 deg).
+constexpr float kStep = 5.0F;
+/// A point may lie this many pixel widths behind the mapped surface: half a pixel of the steepest slope.
+constexpr double kSlack = 3.0;
+
+/// Catmull-Rom weights of the four pixels around a fraction.
+std::array<float, 4> cubic(float t) {
+  const float t2 = t * t;
+  const float t3 = t2 * t;
+  return {0.5F * (-t3 + 2.0F * t2 - t), 0.5F * (3.0F * t3 - 5.0F * t2 + 2.0F), 0.5F * (-3.0F * t3 + 4.0F * t2 + t),
+          0.5F * (t3 - t2)};
+}
+
+cv::Rect window_of(const Mesh& mesh, const Photo& photo) {
+  Eigen::AlignedBox2d box;
+  for (const auto& v : mesh.vertices) {
+    const Eigen::Vector3d in_turntable = photo.turntable_from_model * v.cast<double>();
+    if ((photo.camera.camera_from_turntable * in_turntable).z() <= 0.0) continue;
+    box.extend(photo.camera.project(in_turntable));
+  }
+  if (box.isEmpty()) return {};
+  const Eigen::Array2d size(photo.image.cols, photo.image.rows);
+  const Eigen::Array2d low = box.min().array().floor().max(-2.0).min(size) - 2.0;
+  const Eigen::Array2d high = box.max().array().ceil().max(-2.0).min(size) + 3.0;
+  const cv::Rect wanted(cv::Point(static_cast<int>(low.x()), static_cast<int>(low.y())),
+                        cv::Point(static_cast<int>(high.x()), static_cast<int>(high.y())));
+  return wanted & cv::Rect(0, 0, photo.image.cols, photo.image.rows);
+}
+
+}  // namespace
+
+Eigen::Vector3d pixel_ray(const Camera& camera, double u, double v) {
+  const double xd = (u - camera.projection.cx) / camera.projection.fx;
+  const double yd = (v - camera.projection.cy) / camera.projection.fy;
+  const auto& [k1, k2, p1, p2, k3] = camera.distortion;
+  double x = xd;
+  double y = yd;
+  // Fixed point of the distortion; contracts by the distortion's own size, so 1e-12 after a few rounds.
+  for (int round = 0; round < 20; ++round) {
+    const double r2 = x * x + y * y;
+    const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
+    const double nx = (xd - 2.0 * p1 * x * y - p2 * (r2 + 2.0 * x * x)) / radial;
+    const double ny = (yd - p1 * (r2 + 2.0 * y * y) - 2.0 * p2 * x * y) / radial;
+    const double change = std::abs(nx - x) + std::abs(ny - y);
+    x = nx;
+    y = ny;
+    if (change < 1e-10) break;
+  }
+  return {x, y, 1.0};
+}
+
+PhotoView::PhotoView(const Photo& photo, const Mesh& mesh, const RayScene& scene, const TextureOptions& options,
+                     double typical)
+    : photo_(&photo),
+      camera_from_model_(photo.camera.camera_from_turntable * photo.turntable_from_model),
+      centre_(camera_from_model_.inverse().translation()),
+      px_per_mm_at_1mm_(photo.camera.projection.fx / typical),
+      cos_limit_(std::cos(to_radians(options.max_incidence_deg))),
+      sharpness_(options.sharpness),
+      edge_px_(options.edge_px),
+      edge_fade_px_(options.edge_fade_px),
+      window_(window_of(mesh, photo)) {
+  depth_ = cv::Mat1f(window_.size(), kNan);
+  edge_px_away_ = cv::Mat1f(window_.size(), 0.0F);
+  if (window_.empty()) return;
+  cast(scene);
+  find_edges();
+}
+
+void PhotoView::cast(const RayScene& scene) {
+  const Eigen::Matrix3d model_from_camera = camera_from_model_.linear().transpose();
+  const Eigen::Vector3f origin = centre_.cast<float>();
+  parallel_for(static_cast<std::size_t>(window_.height), [&](std::size_t row) {
+    const int y = static_cast<int>(row);
+    for (int x = 0; x < window_.width; ++x) {
+      const Eigen::Vector3d ray = model_from_camera * pixel_ray(photo_->camera, x + window_.x, y + window_.y);
+      if (const auto hit = scene.first_hit(origin, ray.cast<float>())) depth_(y, x) = hit->distance;
+    }
+  });
+}
+
+void PhotoView::find_edges() {
+  const float mm_per_px_at_1mm = static_cast<float>(1.0 / photo_->camera.projection.fx);
+  // Written so that NaN (no mesh) against a number is a step as well.
+  const auto step = [&](float a, float b) { return !(std::abs(a - b) <= kStep * mm_per_px_at_1mm * std::min(a, b)); };
+  cv::Mat1b inside(window_.size(), uchar{0});
+  parallel_for(static_cast<std::size_t>(window_.height), [&](std::size_t row) {
+    const int y = static_cast<int>(row);
+    for (int x = 0; x < window_.width; ++x) {
+      const float z = depth_(y, x);
+      const bool edge = std::isnan(z) || x == 0 || y == 0 || x == window_.width - 1 || y == window_.height - 1 ||
+                        step(z, depth_(y, x - 1)) || step(z, depth_(y, x + 1)) || step(z, depth_(y - 1, x)) ||
+                        step(z, depth_(y + 1, x));
+      inside(y, x) = edge ? uchar{0} : uchar{255};
+    }
+  });
+  cv::distanceTransform(inside, edge_px_away_, cv::DIST_L2, cv::DIST_MASK_5);
+}
+
+std::optional<Sight> PhotoView::look(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
+  const double cosine = normal.dot(towards(point));
+  if (cosine <= cos_limit_) return std::nullopt;
+  const Eigen::Vector3d in_turntable = photo_->turntable_from_model * point;
+  const double z = (photo_->camera.camera_from_turntable * in_turntable).z();
+  if (z <= 0.0) return std::nullopt;
+  const Eigen::Vector2d pixel = photo_->camera.project(in_turntable);
+  const double x = pixel.x() - window_.x;
+  const double y = pixel.y() - window_.y;
+  if (!(x >= 1.0 && y >= 1.0 && x < window_.width - 2 && y < window_.height - 2)) return std::nullopt;
+
+  const int near_x = static_cast<int>(std::lround(x));
+  const int near_y = static_cast<int>(std::lround(y));
+  // NaN (no mesh there) fails the comparison.
+  if (!(z <= depth_(near_y, near_x) + kSlack * z / photo_->camera.projection.fx)) return std::nullopt;
+
+  const int ix = static_cast<int>(x);
+  const int iy = static_cast<int>(y);
+  const double fx = x - ix;
+  const double fy = y - iy;
+  const double away = (1 - fy) * ((1 - fx) * edge_px_away_(iy, ix) + fx * edge_px_away_(iy, ix + 1)) +
+                      fy * ((1 - fx) * edge_px_away_(iy + 1, ix) + fx * edge_px_away_(iy + 1, ix + 1));
+  const double fade = std::min(1.0, (away - edge_px_) / edge_fade_px_);
+  if (fade <= 0.0) return std::nullopt;
+
+  const double beyond = (cosine - cos_limit_) / (1.0 - cos_limit_);
+  const double quality = beyond * beyond * px_per_mm_at_1mm_ / z;
+  return Sight{pixel, cosine, fade * fade * std::pow(quality, sharpness_)};
+}
+
+Eigen::Vector3f PhotoView::colour(const Eigen::Vector2d& pixel) const {
+  const cv::Mat3b& image = photo_->image;
+  const int x = static_cast<int>(std::floor(pixel.x()));
+  const int y = static_cast<int>(std::floor(pixel.y()));
+  const auto across = cubic(static_cast<float>(pixel.x() - x));
+  const auto down = cubic(static_cast<float>(pixel.y() - y));
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  for (int j = 0; j < 4; ++j) {
+    const cv::Vec3b* row = image[std::clamp(y - 1 + j, 0, image.rows - 1)];
+    for (int i = 0; i < 4; ++i) {
+      const cv::Vec3b& c = row[std::clamp(x - 1 + i, 0, image.cols - 1)];
+      sum += across[i] * down[j] * Eigen::Vector3f(c[0], c[1], c[2]);
+    }
+  }
+  return sum.cwiseMax(0.0F) / 255.0F;
+}
+
+bool PhotoView::saturated(const Eigen::Vector2d& pixel) const {
+  const cv::Mat3b& image = photo_->image;
+  const cv::Vec3b& c = image(std::clamp(static_cast<int>(std::lround(pixel.y())), 0, image.rows - 1),
+                             std::clamp(static_cast<int>(std::lround(pixel.x())), 0, image.cols - 1));
+  return std::max({c[0], c[1], c[2]}) >= kSaturated;
+}
+
+double typical_px_per_mm(const Mesh& mesh, std::span<const Photo> photos) {
+  Eigen::AlignedBox3f box;
+  for (const auto& v : mesh.vertices) box.extend(v);
+  std::vector<double> found;
+  for (const Photo& photo : photos) {
+    const double z =
+        (photo.camera.camera_from_turntable * (photo.turntable_from_model * box.center().cast<double>())).z();
+    if (z > 0.0) found.push_back(photo.camera.projection.fx / z);
+  }
+  if (found.empty()) return 1.0;
+  std::nth_element(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(found.size() / 2), found.end());
+  return found[found.size() / 2];
+}
+
+}  // namespace scanrig

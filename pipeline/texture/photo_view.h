@@ -1,0 +1,59 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core/mat.hpp>
+#include <optional>
+
+#include "pipeline/texture/ray_scene.h"
+#include "pipeline/texture/texture.h"
+
+namespace scanrig {
+
+/// Where a camera's pixel looks: direction in the camera frame with z = 1, lens distortion taken out.
+Eigen::Vector3d pixel_ray(const Camera& camera, double u, double v);
+
+/// A point of the surface as one photo shows it.
+struct Sight {
+  Eigen::Vector2d pixel;  ///< in the photo, distortion included
+  double cosine = 0.0;    ///< of the incidence
+  double weight = 0.0;    ///< 0..about 1: how much this photo knows about the point
+};
+
+/// A photo together with what of the mesh it shows. Refers to the photo given; threads: const functions from any.
+class PhotoView {
+ public:
+  /// Casts one ray a pixel. `typical_px_per_mm` is the resolution that counts as 1 in weights.
+  PhotoView(const Photo& photo, const Mesh& mesh, const RayScene& scene, const TextureOptions& options,
+            double typical_px_per_mm);
+
+  /// How the photo shows `point` with unit `normal` (model frame, mm); nothing if it does not.
+  [[nodiscard]] std::optional<Sight> look(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const;
+  /// Linear BGR between pixels, bicubic; `pixel` as look() gave it.
+  [[nodiscard]] Eigen::Vector3f colour(const Eigen::Vector2d& pixel) const;
+  /// True where the sensor is at its end: the colour is no longer a measurement.
+  [[nodiscard]] bool saturated(const Eigen::Vector2d& pixel) const;
+
+  [[nodiscard]] const Photo& photo() const { return *photo_; }
+  [[nodiscard]] Transform camera_from_model() const { return camera_from_model_; }
+  [[nodiscard]] const Eigen::Vector3d& centre() const { return centre_; }  ///< of projection, model frame
+  /// Unit vector from `point` to the camera, model frame.
+  [[nodiscard]] Eigen::Vector3d towards(const Eigen::Vector3d& point) const { return (centre_ - point).normalized(); }
+
+ private:
+  void cast(const RayScene& scene);
+  void find_edges();
+
+  const Photo* photo_;
+  Transform camera_from_model_;
+  Eigen::Vector3d centre_;
+  double px_per_mm_at_1mm_;  ///< focal length over the typical resolution
+  double cos_limit_, sharpness_, edge_px_, edge_fade_px_;
+  cv::Rect window_;         ///< the pixels that can show the mesh; the two maps cover it
+  cv::Mat1f depth_;         ///< z in the camera frame, mm; NaN where the photo shows no mesh
+  cv::Mat1f edge_px_away_;  ///< distance to the nearest depth edge or outline
+};
+
+/// Pixels a millimetre in the middle of the mesh, median over the photos.
+double typical_px_per_mm(const Mesh& mesh, std::span<const Photo> photos);
+
+}  // namespace scanrig

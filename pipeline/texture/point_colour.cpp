@@ -1,0 +1,155 @@
+#include "pipeline/texture/point_colour.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+
+namespace scanrig {
+namespace {
+
+/// Difference from the majority at which a photo has lost half of its say, relative to the colour, and in full scale.
+constexpr float kOutlierShare = 0.08F;
+constexpr float kOutlierFloor = 0.02F;
+constexpr int kRobustRounds = 2;
+constexpr float kSaturatedSay = 0.01F;
+constexpr std::size_t kLightSpots = 20000;
+constexpr int kFillRounds = 60;
+
+struct Look {
+  Eigen::Vector3f bgr;
+  float weight;
+};
+
+/// Middle by weight of each channel: where the majority is, whatever the outliers say.
+Eigen::Vector3f weighted_median(std::vector<Look>& looks) {
+  Eigen::Vector3f middle;
+  for (int channel = 0; channel < 3; ++channel) {
+    std::sort(looks.begin(), looks.end(),
+              [&](const Look& a, const Look& b) { return a.bgr[channel] < b.bgr[channel]; });
+    float half = 0.0F;
+    for (const Look& look : looks) half += 0.5F * look.weight;
+    std::size_t i = 0;
+    for (float sum = looks[0].weight; sum < half && i + 1 < looks.size(); sum += looks[i].weight) ++i;
+    middle[channel] = looks[i].bgr[channel];
+  }
+  return middle;
+}
+
+/// The vertices that share an edge with each vertex, as offsets into one list.
+struct Neighbours {
+  std::vector<std::uint32_t> first, list;
+  explicit Neighbours(const Mesh& mesh) : first(mesh.vertices.size() + 1, 0) {
+    for (const auto& face : mesh.faces) {
+      for (const auto v : face) first[v + 1] += 2;
+    }
+    for (std::size_t v = 1; v < first.size(); ++v) first[v] += first[v - 1];
+    list.resize(first.back());
+    auto next = first;
+    for (const auto& face : mesh.faces) {
+      for (std::size_t k = 0; k < 3; ++k) {
+        list[next[face[k]]++] = face[(k + 1) % 3];
+        list[next[face[k]]++] = face[(k + 2) % 3];
+      }
+    }
+  }
+  [[nodiscard]] std::span<const std::uint32_t> of(std::uint32_t v) const {
+    return {list.data() + first[v], list.data() + first[v + 1]};
+  }
+};
+
+}  // namespace
+
+PointColour blend_photos(std::span<const PhotoView> views, const RigLight& light, const Eigen::Vector3d& point,
+                         const Eigen::Vector3d& normal) {
+  thread_local std::vector<Look> looks;
+  looks.clear();
+  for (const PhotoView& view : views) {
+    const auto sight = view.look(point, normal);
+    if (!sight) continue;
+    const Transform& turntable_from_model = view.photo().turntable_from_model;
+    const Eigen::Vector3f lit = light.at(turntable_from_model.linear() * normal, turntable_from_model * point);
+    const float say = view.saturated(sight->pixel) ? kSaturatedSay : 1.0F;
+    looks.push_back({view.colour(sight->pixel).cwiseQuotient(lit), say * static_cast<float>(sight->weight)});
+  }
+  if (looks.empty()) return {};
+
+  Eigen::Vector3f best = weighted_median(looks);
+  float weight = 0.0F;
+  for (int round = 0; round < kRobustRounds; ++round) {
+    const float limit = kOutlierFloor + kOutlierShare * best.maxCoeff();
+    Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+    float say = 0.0F;
+    weight = 0.0F;
+    for (const Look& look : looks) {
+      const float off = (look.bgr - best).squaredNorm() / (limit * limit);
+      const float w = look.weight / ((1.0F + off) * (1.0F + off));
+      sum += w * look.bgr;
+      say += w;
+      weight += look.weight;
+    }
+    best = sum / say;
+  }
+  return {best, weight};
+}
+
+RigLight light_from_photos(std::span<const PhotoView> views, const Mesh& mesh,
+                           const std::vector<Eigen::Vector3f>& normals) {
+  const std::size_t step = mesh.vertices.size() / kLightSpots + 1;
+  std::vector<std::vector<LightSample>> spots;
+  for (std::size_t v = 0; v < mesh.vertices.size(); v += step) {
+    const Eigen::Vector3d point = mesh.vertices[v].cast<double>();
+    const Eigen::Vector3d normal = normals[v].cast<double>();
+    std::vector<LightSample> spot;
+    for (const PhotoView& view : views) {
+      const auto sight = view.look(point, normal);
+      if (!sight || view.saturated(sight->pixel)) continue;
+      const Transform& turntable_from_model = view.photo().turntable_from_model;
+      const Eigen::Vector3f bgr = view.colour(sight->pixel);
+      if (bgr.minCoeff() <= kOutlierFloor) continue;
+      spot.push_back(
+          {turntable_from_model.linear() * normal, turntable_from_model * point, bgr, std::sqrt(sight->weight)});
+    }
+    spots.push_back(std::move(spot));
+  }
+  return fit_rig_light(spots);
+}
+
+void fill_unseen(const Mesh& mesh, std::vector<PointColour>& colours) {
+  const Neighbours neighbours(mesh);
+  std::vector<std::uint32_t> known;
+  std::vector<std::uint8_t> has(colours.size(), 0);
+  Eigen::Vector3f mean = Eigen::Vector3f::Zero();
+  for (std::uint32_t v = 0; v < colours.size(); ++v) {
+    if (colours[v].weight <= 0.0F) continue;
+    has[v] = 1;
+    known.push_back(v);
+    mean += colours[v].bgr;
+  }
+  if (!known.empty()) mean /= static_cast<float>(known.size());
+
+  // A wave outwards from what is known gives every vertex a start and an order ...
+  std::vector<std::uint32_t> filled;
+  for (std::size_t i = 0; i < known.size() + filled.size(); ++i) {
+    const std::uint32_t v = i < known.size() ? known[i] : filled[i - known.size()];
+    for (const auto other : neighbours.of(v)) {
+      if (has[other] != 0) continue;
+      has[other] = 1;
+      colours[other].bgr = colours[v].bgr;
+      filled.push_back(other);
+    }
+  }
+  for (std::size_t v = 0; v < colours.size(); ++v) {
+    if (has[v] == 0) colours[v].bgr = mean;  // a part that no photo sees at all
+  }
+  // ... and averaging in that order smooths it (Gauss-Seidel on the surface's Laplace equation).
+  for (int round = 0; round < kFillRounds; ++round) {
+    for (const auto v : filled) {
+      Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+      for (const auto other : neighbours.of(v)) sum += colours[other].bgr;
+      colours[v].bgr = sum / static_cast<float>(neighbours.of(v).size());
+    }
+  }
+}
+
+}  // namespace scanrig

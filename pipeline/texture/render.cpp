@@ -1,0 +1,132 @@
+#include "pipeline/texture/render.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/parallel.h"
+#include "pipeline/texture/photo_view.h"
+#include "pipeline/texture/shading.h"
+
+namespace scanrig {
+namespace {
+
+/// Between texel centres; uv as glTF has it.
+Eigen::Vector3f fetch(const cv::Mat3b& atlas, const Eigen::Vector2f& uv) {
+  const float x = std::clamp(uv.x() * static_cast<float>(atlas.cols) - 0.5F, 0.0F, static_cast<float>(atlas.cols - 1));
+  const float y = std::clamp(uv.y() * static_cast<float>(atlas.rows) - 0.5F, 0.0F, static_cast<float>(atlas.rows - 1));
+  const int x0 = static_cast<int>(x);
+  const int y0 = static_cast<int>(y);
+  const int x1 = std::min(x0 + 1, atlas.cols - 1);
+  const int y1 = std::min(y0 + 1, atlas.rows - 1);
+  const float fx = x - static_cast<float>(x0);
+  const float fy = y - static_cast<float>(y0);
+  return (1.0F - fy) * ((1.0F - fx) * from_srgb(atlas(y0, x0)) + fx * from_srgb(atlas(y0, x1))) +
+         fy * ((1.0F - fx) * from_srgb(atlas(y1, x0)) + fx * from_srgb(atlas(y1, x1)));
+}
+
+/// A lamp at the camera and a stronger one above it to the left.
+float grey(const Eigen::Vector3d& normal_in_camera) {
+  const Eigen::Vector3d lamp = Eigen::Vector3d(-0.5, -0.7, -0.6).normalized();
+  return static_cast<float>(0.05 + 0.25 * std::max(0.0, -normal_in_camera.z()) +
+                            0.5 * std::max(0.0, lamp.dot(normal_in_camera)));
+}
+
+cv::Vec3b to_linear_bytes(const Eigen::Vector3f& linear) {
+  cv::Vec3b bytes;
+  for (int k = 0; k < 3; ++k) {
+    bytes[k] = static_cast<uchar>(std::lround(255.0F * std::clamp(linear[k], 0.0F, 1.0F)));
+  }
+  return bytes;
+}
+
+}  // namespace
+
+MeshRenderer::MeshRenderer(TexturedMesh mesh, RayScene scene) : mesh_(std::move(mesh)), scene_(std::move(scene)) {}
+
+Result<MeshRenderer> MeshRenderer::create(TexturedMesh mesh) {
+  auto scene = RayScene::create(mesh.mesh);
+  if (!scene) return pass_on(scene, "render");
+  if (mesh.mesh.normals.size() != mesh.mesh.vertices.size()) mesh.mesh.normals = vertex_normals(mesh.mesh);
+  return MeshRenderer(std::move(mesh), std::move(*scene));
+}
+
+Eigen::Vector3f MeshRenderer::paint(const RayScene::Hit& hit, Surface surface) const {
+  if (surface == Surface::texture) {
+    const auto& uv = mesh_.corner_uv[hit.face];
+    return fetch(mesh_.atlas, hit.weights[0] * uv[0] + hit.weights[1] * uv[1] + hit.weights[2] * uv[2]);
+  }
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const auto& [red, green, blue] = mesh_.mesh.colour[mesh_.mesh.faces[hit.face][static_cast<std::size_t>(k)]];
+    sum += hit.weights[k] * from_srgb(cv::Vec3b(blue, green, red));
+  }
+  return sum;
+}
+
+Eigen::Vector3f MeshRenderer::normal(const RayScene::Hit& hit) const {
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  for (int k = 0; k < 3; ++k) {
+    sum += hit.weights[k] * mesh_.mesh.normals[mesh_.mesh.faces[hit.face][static_cast<std::size_t>(k)]];
+  }
+  return sum.normalized();
+}
+
+Result<Rendering> MeshRenderer::render(const Camera& camera, const Transform& turntable_from_model,
+                                       const RenderOptions& options) const {
+  if (options.supersample < 1 || options.supersample > 16) {
+    return fail(ErrorCode::invalid_input, "render: {} x {} rays a pixel; 1 to 16 are possible", options.supersample,
+                options.supersample);
+  }
+  if (options.surface == Surface::texture &&
+      (mesh_.atlas.empty() || mesh_.corner_uv.size() != mesh_.mesh.faces.size())) {
+    return fail(ErrorCode::invalid_input, "render: the mesh has no texture");
+  }
+  if (options.surface == Surface::vertex_colour && mesh_.mesh.colour.size() != mesh_.mesh.vertices.size()) {
+    return fail(ErrorCode::invalid_input, "render: the mesh has no vertex colours");
+  }
+
+  const Transform camera_from_model = camera.camera_from_turntable * turntable_from_model;
+  const Eigen::Vector3d centre = camera_from_model.inverse().translation();
+  const Eigen::Vector3f background =
+      options.as_photo ? Eigen::Vector3f(options.background[0], options.background[1], options.background[2]) / 255.0F
+                       : from_srgb(options.background);
+  const auto shade = [&](const RayScene::Hit& hit, const Eigen::Vector3d& ray) -> Eigen::Vector3f {
+    const Eigen::Vector3d n = normal(hit).cast<double>();
+    if (options.surface == Surface::grey) return Eigen::Vector3f::Constant(grey(camera_from_model.linear() * n));
+    const Eigen::Vector3f colour = paint(hit, options.surface);
+    if (!options.as_photo) return colour;
+    const Eigen::Vector3d point = turntable_from_model * (centre + hit.distance * ray);
+    const Eigen::Vector3f lit = options.as_photo->light.at(turntable_from_model.linear() * n, point);
+    return colour.cwiseProduct(lit) / static_cast<float>(options.as_photo->gain);
+  };
+
+  const cv::Size size(camera.projection.width, camera.projection.height);
+  Rendering out{cv::Mat3b(size, options.background), cv::Mat1f(size, std::numeric_limits<float>::quiet_NaN()),
+                cv::Mat1b(size, uchar{0})};
+  const auto cast = [&](double u, double v) {
+    const Eigen::Vector3d ray = camera_from_model.linear().transpose() * pixel_ray(camera, u, v);
+    return std::pair(scene_.first_hit(centre.cast<float>(), ray.cast<float>()), ray);
+  };
+  const int n = options.supersample;
+  parallel_for(static_cast<std::size_t>(size.height), [&](std::size_t row) {
+    const int y = static_cast<int>(row);
+    for (int x = 0; x < size.width; ++x) {
+      if (const auto [hit, ray] = cast(x, y); hit) {
+        out.depth(y, x) = hit->distance;
+        out.mask(y, x) = 255;
+      }
+      Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+      for (int k = 0; k < n * n; ++k) {
+        const auto [hit, ray] = cast(x + (k % n + 0.5) / n - 0.5, y + (k / n + 0.5) / n - 0.5);
+        sum += hit ? shade(*hit, ray) : background;
+      }
+      sum /= static_cast<float>(n * n);
+      out.image(y, x) = options.as_photo ? to_linear_bytes(sum) : to_srgb(sum);
+    }
+  });
+  return out;
+}
+
+}  // namespace scanrig

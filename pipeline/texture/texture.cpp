@@ -1,0 +1,193 @@
+#include "pipeline/texture/texture.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+#include "core/parallel.h"
+#include "pipeline/texture/atlas.h"
+#include "pipeline/texture/face_labels.h"
+#include "pipeline/texture/photo_view.h"
+#include "pipeline/texture/point_colour.h"
+#include "pipeline/texture/shading.h"
+
+namespace scanrig {
+namespace {
+
+constexpr std::size_t kBlock = 1024;
+/// Say of the surroundings' colour against the photos' (about 1 for a good view): counts only where they see next to
+/// nothing, and makes the passage to unseen surface continuous.
+constexpr float kFillSay = 1e-4F;
+/// The brightest paint (this share of the vertices lies below it) is brought to this linear value ...
+constexpr double kWhiteShare = 0.99;
+constexpr double kWhite = 0.8;
+/// ... unless that takes more gain than this: a dark object stays dark.
+constexpr double kMostGain = 3.0;
+
+Result<void> check(const Mesh& mesh, std::span<const Photo> photos, const TextureOptions& options) {
+  if (mesh.faces.empty()) return fail(ErrorCode::degenerate, "texture: the mesh has no faces");
+  if (!std::all_of(mesh.vertices.begin(), mesh.vertices.end(), [](const auto& v) { return v.allFinite(); })) {
+    return fail(ErrorCode::invalid_input, "texture: the mesh has a vertex that is not a number");
+  }
+  if (photos.empty()) return fail(ErrorCode::invalid_input, "texture: no photos");
+  for (std::size_t p = 0; p < photos.size(); ++p) {
+    const Projection& projection = photos[p].camera.projection;
+    if (photos[p].image.empty() || photos[p].image.cols != projection.width ||
+        photos[p].image.rows != projection.height) {
+      return fail(ErrorCode::invalid_input, "texture: photo {} is {} x {}, its camera {} x {}", p, photos[p].image.cols,
+                  photos[p].image.rows, projection.width, projection.height);
+    }
+  }
+  if (options.atlas_px < 16 || options.atlas_px > 32768 || !(options.max_texels_per_px > 0.0) ||
+      options.padding_px < 0 || !(options.edge_px >= 0.0) || !(options.edge_fade_px > 0.0) ||
+      !(options.max_incidence_deg > 0.0 && options.max_incidence_deg < 90.0) || !(options.sharpness >= 0.0)) {
+    return fail(ErrorCode::invalid_input, "texture: an option is out of range");
+  }
+  return {};
+}
+
+void for_blocks(std::size_t count, const std::function<void(std::size_t)>& body) {
+  parallel_for((count + kBlock - 1) / kBlock, [&](std::size_t block) {
+    for (std::size_t i = block * kBlock; i < std::min(count, (block + 1) * kBlock); ++i) body(i);
+  });
+}
+
+/// One byte a vertex and photo: does the photo show it?
+std::vector<std::uint8_t> seen_vertices(const Mesh& mesh, std::span<const PhotoView> views) {
+  std::vector<std::uint8_t> seen(mesh.vertices.size() * views.size());
+  for_blocks(mesh.vertices.size(), [&](std::size_t v) {
+    for (std::size_t p = 0; p < views.size(); ++p) {
+      seen[v * views.size() + p] =
+          views[p].look(mesh.vertices[v].cast<double>(), mesh.normals[v].cast<double>()) ? 1 : 0;
+    }
+  });
+  return seen;
+}
+
+/// One gain for the whole scan that makes the brightest paint a sane white.
+double gain_for(const std::vector<PointColour>& colours) {
+  std::vector<float> brightest;
+  for (const auto& c : colours) {
+    if (c.weight > 0.0F) brightest.push_back(c.bgr.maxCoeff());
+  }
+  const auto white =
+      brightest.begin() + static_cast<std::ptrdiff_t>(kWhiteShare * static_cast<double>(brightest.size() - 1));
+  std::nth_element(brightest.begin(), white, brightest.end());
+  return std::min(kMostGain, kWhite / std::max(1e-3, static_cast<double>(*white)));
+}
+
+/// What texels that no face owns show: harmless where a viewer's coarser levels reach beyond the padding.
+Eigen::Vector3f mean_colour(const std::vector<PointColour>& colours) {
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  for (const auto& c : colours) sum += c.bgr;
+  return sum / static_cast<float>(colours.size());
+}
+
+/// Colour of the texel (x, y), which `face` owns.
+cv::Vec3b texel_colour(const Mesh& mesh, const AtlasLayout& layout, std::span<const PhotoView> views,
+                       const RigLight& light, const std::vector<PointColour>& at_vertices, float gain, int x, int y) {
+  const auto f = static_cast<std::size_t>(layout.owner(y, x));
+  const Mesh::Face& face = mesh.faces[f];
+  const Eigen::Vector3d weights =
+      barycentric(layout.corners[f], Eigen::Vector2d(x, y)).value_or(Eigen::Vector3d(1, 0, 0));
+  // Beyond its rim a chart goes on in the plane of the face, but with the light and the fill of the rim.
+  const Eigen::Vector3d inside = weights.cwiseMax(0.0) / weights.cwiseMax(0.0).sum();
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  Eigen::Vector3f fill = Eigen::Vector3f::Zero();
+  for (int k = 0; k < 3; ++k) {
+    const std::uint32_t v = face[static_cast<std::size_t>(k)];
+    point += weights[k] * mesh.vertices[v].cast<double>();
+    normal += inside[k] * mesh.normals[v].cast<double>();
+    fill += static_cast<float>(inside[k]) * at_vertices[v].bgr;
+  }
+  const PointColour seen = blend_photos(views, light, point, normal.normalized());
+  return to_srgb(gain * (seen.weight * seen.bgr + kFillSay * fill) / (seen.weight + kFillSay));
+}
+
+double seen_share(const Mesh& mesh, const std::vector<PointColour>& colours) {
+  double all = 0.0;
+  double seen = 0.0;
+  for (const auto& [a, b, c] : mesh.faces) {
+    const double area =
+        (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]).cast<double>().norm();
+    all += area;
+    if (colours[a].weight > 0.0F && colours[b].weight > 0.0F && colours[c].weight > 0.0F) seen += area;
+  }
+  return seen / std::max(all, 1e-12);
+}
+
+}  // namespace
+
+Result<TexturedModel> texture_mesh(const Mesh& mesh, std::span<const Photo> photos, const TextureOptions& options,
+                                   const Context& context) {
+  if (auto good = check(mesh, photos, options); !good) return pass_on(good);
+  auto scene = RayScene::create(mesh);
+  if (!scene) return pass_on(scene, "texture");
+
+  TexturedModel model;
+  Mesh& out = model.mesh.mesh;
+  out = mesh;
+  if (out.normals.size() != out.vertices.size()) out.normals = vertex_normals(out);
+
+  const double px_per_mm = typical_px_per_mm(mesh, photos);
+  std::vector<PhotoView> views;
+  for (const Photo& photo : photos) {
+    if (context.stopped()) return fail(ErrorCode::stopped, "texture: stopped");
+    views.emplace_back(photo, out, *scene, options, px_per_mm);
+    context.report("texture", 0.3 * static_cast<double>(views.size()) / static_cast<double>(photos.size()));
+  }
+
+  model.light = light_from_photos(views, out, out.normals);
+  std::vector<PointColour> colours(out.vertices.size());
+  for_blocks(colours.size(), [&](std::size_t v) {
+    colours[v] = blend_photos(views, model.light, out.vertices[v].cast<double>(), out.normals[v].cast<double>());
+  });
+  if (std::none_of(colours.begin(), colours.end(), [](const PointColour& c) { return c.weight > 0.0F; })) {
+    return fail(ErrorCode::degenerate, "texture: no photo sees the mesh; check the cameras' poses");
+  }
+  model.seen_share = seen_share(out, colours);
+  fill_unseen(out, colours);
+  model.exposure_gain = gain_for(colours);
+  const auto gain = static_cast<float>(model.exposure_gain);
+  out.colour.resize(colours.size());
+  for (std::size_t v = 0; v < colours.size(); ++v) {
+    const cv::Vec3b bgr = to_srgb(gain * colours[v].bgr);
+    out.colour[v] = {bgr[2], bgr[1], bgr[0]};
+  }
+  context.report("texture", 0.5);
+  if (context.stopped()) return fail(ErrorCode::stopped, "texture: stopped");
+
+  const auto flat = chart_views(views, px_per_mm);
+  const auto charts = cut_into_charts(out, flat, views.size(), seen_vertices(out, views));
+  const auto layout = lay_out(out, flat, charts, options.atlas_px, options.max_texels_per_px, options.padding_px);
+  if (!layout) {
+    return fail(ErrorCode::out_of_range, "texture: {} charts do not fit into an atlas of {} pixels; take a larger one",
+                charts.size(), options.atlas_px);
+  }
+  model.charts = charts.size();
+  model.texels_per_px = layout->texels_per_px;
+  context.report("texture", 0.6);
+  if (context.stopped()) return fail(ErrorCode::stopped, "texture: stopped");
+
+  model.mesh.atlas = cv::Mat3b(options.atlas_px, options.atlas_px, to_srgb(gain * mean_colour(colours)));
+  parallel_for(static_cast<std::size_t>(options.atlas_px), [&](std::size_t row) {
+    const int y = static_cast<int>(row);
+    for (int x = 0; x < options.atlas_px; ++x) {
+      if (layout->owner(y, x) < 0) continue;
+      model.mesh.atlas(y, x) = texel_colour(out, *layout, views, model.light, colours, gain, x, y);
+    }
+  });
+  model.mesh.corner_uv.resize(out.faces.size());
+  for (std::size_t f = 0; f < out.faces.size(); ++f) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      // A texel's centre is half a texel from its corner, and (0, 0) is the corner of the first.
+      model.mesh.corner_uv[f][k] = ((layout->corners[f][k].array() + 0.5) / options.atlas_px).matrix().cast<float>();
+    }
+  }
+  context.report("texture", 1.0);
+  return model;
+}
+
+}  // namespace scanrig

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <vector>
+
+#include "core/context.h"
+#include "core/result.h"
+#include "pipeline/volume/field.h"
+
+namespace scanrig {
+
+/// Blocks of 8 x 8 x 8 nodes, stored only where the surface passes; every other block is all inside or all outside.
+class BlockGrid {
+ public:
+  static constexpr int kSide = 8;
+  static constexpr int kNodes = kSide * kSide * kSide;
+
+  struct Block {
+    Eigen::Vector3i index;  ///< of the block; its first node is kSide times that
+    std::array<float, kNodes> distance;
+    std::array<Support, kNodes> support;
+    [[nodiscard]] static int node(int x, int y, int z) { return (z * kSide + y) * kSide + x; }
+  };
+
+  /// Covers `box` with room around it.
+  BlockGrid(const Eigen::AlignedBox3f& box, float voxel_mm);
+
+  /// Stores the blocks around `seeds` and wherever the sign of `field` changes from block to block, then follows the
+  /// surface from block to block until it is closed. Fails with `out_of_range`, `stopped`.
+  Result<void> fill(const Field& field, const std::vector<Eigen::Vector3f>& seeds, const Context& context);
+
+  [[nodiscard]] const std::vector<Block>& blocks() const { return blocks_; }
+  [[nodiscard]] std::vector<Block>& blocks() { return blocks_; }
+  [[nodiscard]] const Eigen::Vector3i& size() const { return size_; }  ///< in blocks
+  [[nodiscard]] float voxel() const { return voxel_; }
+  [[nodiscard]] Eigen::Vector3f position(const Eigen::Vector3i& node) const {
+    return origin_ + voxel_ * node.cast<float>();
+  }
+  /// The stored block, or null; also null outside the grid.
+  [[nodiscard]] const Block* find(const Eigen::Vector3i& block) const;
+  /// Of a block that is not stored. Outside the grid everything is outside.
+  [[nodiscard]] bool all_inside(const Eigen::Vector3i& block) const;
+
+ private:
+  static constexpr std::int32_t kOutside = -1, kInside = -2;
+  [[nodiscard]] bool contains(const Eigen::Vector3i& block) const {
+    return (block.array() >= 0).all() && (block.array() < size_.array()).all();
+  }
+  [[nodiscard]] std::size_t linear(const Eigen::Vector3i& block) const {
+    return (static_cast<std::size_t>(block.z()) * size_.y() + block.y()) * size_.x() + block.x();
+  }
+  void classify_blocks(const Field& field);
+  [[nodiscard]] std::vector<Eigen::Vector3i> seed_blocks(const std::vector<Eigen::Vector3f>& seeds) const;
+  [[nodiscard]] std::vector<Eigen::Vector3i> open_neighbours(const Block& block) const;
+  void evaluate(const Field& field, Block& block) const;
+
+  Eigen::Vector3f origin_;
+  float voxel_;
+  Eigen::Vector3i size_;
+  std::vector<std::int32_t> slot_;  ///< one a block: its place in blocks_, or what it is
+  std::vector<Block> blocks_;
+};
+
+}  // namespace scanrig

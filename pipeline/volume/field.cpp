@@ -1,0 +1,186 @@
+#include "pipeline/volume/field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace scanrig {
+namespace {
+
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+/// Full weight near the surface, none at the edge of the band, so that two faces of a wall as thin as the band do not
+/// pull at each other and nothing jumps where the band ends.
+float taper(float distance, float band) { return std::clamp(1.5F * (1.0F - std::abs(distance) / band), 0.0F, 1.0F); }
+
+/// Middle weight over all measured pixels, and their centroid.
+struct SurfaceStatistics {
+  float median_weight = 1.0F;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+};
+
+SurfaceStatistics surface_statistics(const std::vector<std::vector<RangeEvidence>>& views_of_pose) {
+  std::vector<float> weights;
+  SurfaceStatistics result;
+  for (const auto& views : views_of_pose) {
+    for (const auto& view : views) {
+      for (const auto& pixel : view.surface()) {
+        weights.push_back(pixel.weight);
+        result.centre += pixel.point.cast<double>();
+      }
+    }
+  }
+  if (weights.empty()) return result;
+  result.centre /= static_cast<double>(weights.size());
+  const auto middle = weights.begin() + static_cast<std::ptrdiff_t>(weights.size() / 2);
+  std::nth_element(weights.begin(), middle, weights.end());
+  result.median_weight = *middle;
+  return result;
+}
+
+}  // namespace
+
+Field::Field(std::vector<std::vector<RangeEvidence>> views_of_pose, std::vector<Transform> model_from_pose, Hull hull,
+             const VolumeOptions& options, double band_mm)
+    : views_of_pose_(std::move(views_of_pose)),
+      hull_(std::move(hull)),
+      fusion_(options.fusion),
+      band_(static_cast<float>(band_mm)),
+      class_threshold_(static_cast<float>(2.0 * options.voxel_mm)),
+      hull_tolerance_(0.4F * band_) {
+  for (const auto& transform : model_from_pose) pose_from_model_.push_back(transform.inverse());
+  const SurfaceStatistics statistics = surface_statistics(views_of_pose_);
+  free_weight_ = statistics.median_weight;
+  centre_ = statistics.centre;
+}
+
+Field::Neighbourhood Field::everywhere() const {
+  Neighbourhood result{{}, hull_};
+  for (const auto& views : views_of_pose_) {
+    for (const auto& view : views) result.views.push_back(&view);
+  }
+  return result;
+}
+
+Field::Neighbourhood Field::near(const Eigen::Vector3f& centre, float radius) const {
+  Neighbourhood result{{}, hull_.near(centre, radius, band_)};
+  for (const auto& views : views_of_pose_) {
+    for (const auto& view : views) {
+      if (!view.knows_background() || !view.says_nothing_near(centre, radius)) result.views.push_back(&view);
+    }
+  }
+  return result;
+}
+
+FieldValue Field::at(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const {
+  return fusion_ == VolumeOptions::Fusion::evidence ? from_evidence(point, neighbourhood)
+                                                    : from_class_table(point, neighbourhood);
+}
+
+/// Hull and, where an image has neither silhouette nor background, its footprint: a point that two images see beside
+/// all they measured is outside.
+float Field::bounds(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const {
+  float first = -kInfinity, second = -kInfinity;
+  for (const auto* view : neighbourhood.views) {
+    const float beside = view->beside_footprint_mm(point);
+    if (beside > first) {
+      second = first;
+      first = beside;
+    } else if (beside > second) {
+      second = beside;
+    }
+  }
+  return std::max(neighbourhood.hull.distance(point), second);
+}
+
+FieldValue Field::from_evidence(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const {
+  float weight = 0.0F, sum = 0.0F;
+  bool is_free = false, is_surface = false;
+  for (const auto* view : neighbourhood.views) {
+    const RangeSample s = view->sample(point);
+    if (s.kind == RangeSample::Kind::surface) {
+      const float w = s.weight * taper(s.distance, band_);
+      weight += w;
+      sum += w * s.distance;
+      is_surface = true;
+    } else if (s.kind == RangeSample::Kind::free) {
+      is_free = true;
+      if (!s.clearly_free) continue;
+      weight += free_weight_;
+      sum += free_weight_ * band_;
+    }
+  }
+  if (is_surface && weight > 0.0F) {
+    const float limit = neighbourhood.hull.distance(point) - hull_tolerance_;
+    return {std::clamp(std::max(sum / weight, limit), -band_, band_), Support::measured};
+  }
+  if (is_free) return {band_, Support::free};
+  return {std::clamp(bounds(point, neighbourhood), -band_, band_), Support::bounds};
+}
+
+/// The class and D of one pose from its N0 = N/2 views nearest in azimuth to the outward direction.
+PoseDistance Field::pose_distance(const Eigen::Vector3f& point, std::size_t pose) const {
+  const auto& views = views_of_pose_[pose];
+  const Eigen::Vector3d p = point.cast<double>();
+  const auto horizontal = [&](const Eigen::Vector3d& direction) {
+    Eigen::Vector3d d = pose_from_model_[pose].linear() * direction;
+    d.y() = 0.0;
+    return d.norm() > 0.0 ? Eigen::Vector3d(d.normalized()) : d;
+  };
+  const Eigen::Vector3d outward = horizontal(p - centre_);
+  std::vector<std::pair<double, std::size_t>> order;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    order.emplace_back(-outward.dot(horizontal(views[i].towards_camera(centre_))), i);
+  }
+  std::sort(order.begin(), order.end());
+  order.resize((views.size() + 1) / 2);
+  std::vector<ViewDistance> distances;
+  for (const auto& [cosine, i] : order) {
+    const RangeSample s = views[i].sample(point);
+    if (s.kind != RangeSample::Kind::none) distances.push_back({s.distance, s.weight, s.sigma});
+  }
+  return classify(distances, class_threshold_);
+}
+
+FieldValue Field::from_class_table(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const {
+  PoseDistance value = pose_distance(point, 0);
+  bool measured = value.surface_views > 0;
+  if (poses() == 2) {
+    const PoseDistance other = pose_distance(point, 1);
+    measured = measured || other.surface_views > 0;
+    const bool unseen = value.voxel_class == VoxelClass::unseen && other.voxel_class == VoxelClass::unseen;
+    if (!unseen) {
+      value.distance = combine(value, other, class_threshold_).distance;
+      value.voxel_class = VoxelClass::overlap;
+    }
+  }
+  const float outside = bounds(point, neighbourhood);
+  if (value.voxel_class == VoxelClass::unseen) return {std::clamp(outside, -band_, band_), Support::bounds};
+  const float distance = std::clamp(std::max(value.distance, outside - hull_tolerance_), -band_, band_);
+  if (measured) return {distance, Support::measured};
+  return {std::clamp(std::max(distance, outside), -band_, band_), distance > 0.0F ? Support::free : Support::bounds};
+}
+
+PointEvidence Field::evidence_at(const Eigen::Vector3f& point) const {
+  PointEvidence result;
+  const Neighbourhood all = everywhere();
+  float weight = 0.0F, sum = 0.0F, variance = 0.0F;
+  for (const auto* view : all.views) {
+    const RangeSample s = view->sample(point);
+    if (s.kind != RangeSample::Kind::surface) continue;
+    const float w = s.weight * taper(s.distance, band_);
+    weight += w;
+    sum += w * s.distance;
+    variance += w * w * s.sigma * s.sigma;
+    result.normal += w * s.normal;
+    if (std::abs(s.distance) < std::max(class_threshold_, 4.0F * s.sigma)) ++result.views;
+  }
+  result.value = at(point, all);
+  if (!(weight > 0.0F)) return result;
+  result.surface_distance = sum / weight;
+  result.normal.normalize();
+  result.sigma = std::sqrt(variance) / weight;
+  return result;
+}
+
+}  // namespace scanrig

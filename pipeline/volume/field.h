@@ -1,0 +1,73 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "pipeline/volume/class_table.h"
+#include "pipeline/volume/hull.h"
+#include "pipeline/volume/integrate.h"
+#include "pipeline/volume/range_evidence.h"
+
+namespace scanrig {
+
+/// Why the field has its value at a point.
+enum class Support : std::uint8_t {
+  bounds,    ///< nothing was measured: the hull decides, or it is unseen
+  free,      ///< seen through
+  measured,  ///< near a measured surface
+};
+
+struct FieldValue {
+  float distance = 0.0F;  ///< mm, positive outside, clamped to the band
+  Support support = Support::bounds;
+};
+
+/// What the range images know about a point of the surface.
+struct PointEvidence {
+  FieldValue value;
+  float surface_distance = 0.0F;  ///< weighted mean of the views' distances, without hull and free space
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();
+  int views = 0;  ///< that measured the surface within a voxel of the point
+  float sigma = 0.0F;
+};
+
+/// The signed distance of the whole object at any point of the model's frame, gathered from all views.
+class Field {
+ public:
+  /// `views_of_pose`: prepared views, pose after pose.
+  Field(std::vector<std::vector<RangeEvidence>> views_of_pose, std::vector<Transform> model_from_pose, Hull hull,
+        const VolumeOptions& options, double band_mm);
+
+  /// The views and bounds that matter near one place.
+  struct Neighbourhood {
+    std::vector<const RangeEvidence*> views;
+    Hull hull;
+  };
+  [[nodiscard]] Neighbourhood near(const Eigen::Vector3f& centre, float radius) const;
+  [[nodiscard]] Neighbourhood everywhere() const;
+
+  [[nodiscard]] FieldValue at(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;
+  [[nodiscard]] PointEvidence evidence_at(const Eigen::Vector3f& point) const;
+  [[nodiscard]] PoseDistance pose_distance(const Eigen::Vector3f& point, std::size_t pose) const;
+  [[nodiscard]] std::size_t poses() const { return views_of_pose_.size(); }
+  [[nodiscard]] float class_threshold() const { return class_threshold_; }
+  [[nodiscard]] float band() const { return band_; }
+
+ private:
+  [[nodiscard]] FieldValue from_evidence(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;
+  [[nodiscard]] FieldValue from_class_table(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;
+  [[nodiscard]] float bounds(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;
+
+  std::vector<std::vector<RangeEvidence>> views_of_pose_;
+  std::vector<Transform> pose_from_model_;
+  Hull hull_;
+  VolumeOptions::Fusion fusion_;
+  float band_;             ///< mm
+  float class_threshold_;  ///< d_TH of the paper, mm
+  float hull_tolerance_;   ///< a measured surface may stand out of the hull by this, mm
+  float free_weight_;      ///< of one view that sees through, beside the weights of measured surfaces
+  Eigen::Vector3d centre_;  ///< of what was measured; outward directions start at the vertical line through it
+};
+
+}  // namespace scanrig

@@ -1,0 +1,55 @@
+#include "pipeline/volume/hull.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace scanrig {
+
+void Hull::add_silhouette(const Silhouette& silhouette, const Transform& model_from_pose) {
+  const Transform camera_from_model = silhouette.camera_from_pose * model_from_pose.inverse();
+  outlines_.push_back(
+      {&silhouette, camera_from_model.linear().cast<float>(), camera_from_model.translation().cast<float>()});
+}
+
+void Hull::add_table(const Transform& model_from_pose) {
+  const Eigen::Vector3d down = model_from_pose.linear() * -Eigen::Vector3d::UnitY();
+  tables_.emplace_back(down.cast<float>(), static_cast<float>(-down.dot(model_from_pose.translation())));
+}
+
+float Hull::distance(const Eigen::Vector3f& p) const {
+  float result = std::max((box_.min() - p).maxCoeff(), (p - box_.max()).maxCoeff());
+  for (const auto& table : tables_) result = std::max(result, table.signedDistance(p));
+  for (const auto& outline : outlines_) result = std::max(result, outline.distance(p));
+  return result;
+}
+
+Hull Hull::near(const Eigen::Vector3f& centre, float radius, float band) const {
+  Hull result = *this;
+  // A contour's distance falls or rises by about a millimetre a millimetre; a quarter is left for perspective.
+  std::erase_if(result.outlines_,
+                [&](const Outline& outline) { return outline.distance(centre) < -(band + 1.25F * radius); });
+  return result;
+}
+
+/// Bilinear in the image; a point that projects outside the image is not bounded by it.
+float Hull::Outline::distance(const Eigen::Vector3f& point) const {
+  constexpr float kUnknown = -std::numeric_limits<float>::infinity();
+  const Eigen::Vector3f p = rotation * point + translation;
+  if (!(p.z() > 0.0F)) return kUnknown;
+  const Projection& projection = silhouette->projection;
+  const float u = static_cast<float>(projection.fx) * p.x() / p.z() + static_cast<float>(projection.cx);
+  const float v = static_cast<float>(projection.fy) * p.y() / p.z() + static_cast<float>(projection.cy);
+  const cv::Mat1f& px = silhouette->outside_px;
+  if (!(u >= 0.0F && v >= 0.0F && u < static_cast<float>(px.cols - 1) && v < static_cast<float>(px.rows - 1))) {
+    return kUnknown;
+  }
+  const int x = static_cast<int>(u), y = static_cast<int>(v);
+  const float a = u - static_cast<float>(x), b = v - static_cast<float>(y);
+  const float* top = px[y];
+  const float* bottom = px[y + 1];
+  const float pixels =
+      (1 - b) * ((1 - a) * top[x] + a * top[x + 1]) + b * ((1 - a) * bottom[x] + a * bottom[x + 1]);
+  return pixels * static_cast<float>(projection.mm_per_pixel(p.z()));
+}
+
+}  // namespace scanrig

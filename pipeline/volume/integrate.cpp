@@ -1,0 +1,193 @@
+#include "pipeline/volume/integrate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "core/parallel.h"
+#include "pipeline/mesh/topology.h"
+#include "pipeline/volume/block_grid.h"
+#include "pipeline/volume/field.h"
+#include "pipeline/volume/hull.h"
+#include "pipeline/volume/marching_cubes.h"
+#include "pipeline/volume/surface.h"
+
+namespace scanrig {
+namespace {
+
+constexpr double kHullRoomMm = 25.0;  // the hull of a pose reaches this far beyond what was measured
+
+Result<void> check(const RangeImage& range) {
+  const cv::Size size(range.projection.width, range.projection.height);
+  const bool fits = range.depth.size() == size && range.sigma.size() == size && range.normal.size() == size &&
+                    (range.background.empty() || range.background.size() == size);
+  if (!fits) return fail(ErrorCode::invalid_input, "the matrices do not have the projection's size");
+  if (!(range.projection.fx > 0.0 && range.projection.fy > 0.0)) {
+    return fail(ErrorCode::invalid_input, "the focal length must be positive");
+  }
+  return {};
+}
+
+bool is_rigid(const Transform& transform) {
+  return transform.matrix().allFinite() && (transform.linear().transpose() * transform.linear()).isIdentity(1e-6) &&
+         transform.linear().determinant() > 0.0;
+}
+
+Result<void> check(std::span<const PosedViews> poses, const VolumeOptions& options) {
+  if (poses.empty() || poses.size() > 2) {
+    return fail(ErrorCode::invalid_input, "volume: one or two poses can be integrated, not {}", poses.size());
+  }
+  if (!(options.voxel_mm > 0.0) || !(options.band_mm >= 0.0)) {
+    return fail(ErrorCode::invalid_input, "volume: voxel_mm must be positive and band_mm not negative, got {} and {}",
+                options.voxel_mm, options.band_mm);
+  }
+  for (std::size_t p = 0; p < poses.size(); ++p) {
+    if (!is_rigid(poses[p].model_from_pose)) {
+      return fail(ErrorCode::invalid_input, "volume: pose {}: model_from_pose is not a rigid motion", p + 1);
+    }
+    for (const auto& view : poses[p].views) {
+      if (auto ok = check(view.range); !ok) {
+        return pass_on(ok, fmt::format("volume: pose {}, view {}", p + 1, view.index));
+      }
+      for (const auto& s : view.silhouettes) {
+        if (s.outside_px.size() != cv::Size(s.projection.width, s.projection.height)) {
+          return fail(ErrorCode::invalid_input, "volume: pose {}, view {}: the silhouette does not have its size", p + 1,
+                      view.index);
+        }
+      }
+    }
+  }
+  return {};
+}
+
+/// Three voxels, or four sigma of the data (median of every pixel's) where that is more.
+double band(std::span<const PosedViews> poses, const VolumeOptions& options) {
+  if (options.band_mm > 0.0) return options.band_mm;
+  std::vector<float> sigmas;
+  for (const auto& pose : poses) {
+    for (const auto& view : pose.views) {
+      std::copy_if(view.range.sigma.begin(), view.range.sigma.end(), std::back_inserter(sigmas),
+                   [](float sigma) { return !std::isnan(sigma); });
+    }
+  }
+  if (sigmas.empty()) return 3.0 * options.voxel_mm;
+  const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
+  std::nth_element(sigmas.begin(), middle, sigmas.end());
+  return std::max(3.0 * options.voxel_mm, 4.0 * *middle);
+}
+
+bool has_silhouettes(const PosedViews& pose) {
+  return std::any_of(pose.views.begin(), pose.views.end(), [](const View& v) { return !v.silhouettes.empty(); });
+}
+
+struct Prepared {
+  std::vector<std::vector<RangeEvidence>> views_of_pose;
+  std::vector<Transform> model_from_pose;
+  std::vector<Eigen::Vector3f> seeds;  ///< one measured point in about eight
+  Eigen::AlignedBox3f box;             ///< of everything measured
+};
+
+Prepared prepare(std::span<const PosedViews> poses, const VolumeOptions& options, double band_mm) {
+  constexpr std::size_t kSeedStride = 8;
+  Prepared result;
+  for (const auto& pose : poses) {
+    std::vector<std::optional<RangeEvidence>> made(pose.views.size());
+    parallel_for(made.size(), [&](std::size_t i) {
+      made[i].emplace(pose.views[i].range, pose.model_from_pose, band_mm, options.voxel_mm);
+    });
+    auto& views = result.views_of_pose.emplace_back();
+    for (auto& view : made) views.push_back(std::move(*view));
+    result.model_from_pose.push_back(pose.model_from_pose);
+    for (const auto& view : views) {
+      std::size_t count = 0;
+      for (const auto& pixel : view.surface()) {
+        result.box.extend(pixel.point);
+        if (count++ % kSeedStride == 0) result.seeds.push_back(pixel.point);
+      }
+    }
+  }
+  return result;
+}
+
+Hull make_hull(std::span<const PosedViews> poses, const VolumeOptions& options, const Eigen::AlignedBox3f& box) {
+  Hull hull(box);
+  for (const auto& pose : poses) {
+    for (const auto& view : pose.views) {
+      for (const auto& silhouette : view.silhouettes) hull.add_silhouette(silhouette, pose.model_from_pose);
+    }
+    if (has_silhouettes(pose) || options.table_without_silhouettes) hull.add_table(pose.model_from_pose);
+  }
+  return hull;
+}
+
+/// Classes on every fourth node of the stored blocks.
+void count_classes(const Field& field, const BlockGrid& grid, VolumeReport& report) {
+  struct Count {
+    std::array<std::array<std::size_t, kVoxelClasses>, 2> classes{};
+    ClassPairCounts pairs{};
+    std::size_t alarms = 0;
+  };
+  std::vector<Count> counts(grid.blocks().size());
+  parallel_for(counts.size(), [&](std::size_t i) {
+    for (int corner = 0; corner < 8; ++corner) {
+      const Eigen::Vector3i node = 4 * Eigen::Vector3i(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
+      const Eigen::Vector3f point = grid.position(BlockGrid::kSide * grid.blocks()[i].index + node);
+      std::array<PoseDistance, 2> pose;
+      for (std::size_t p = 0; p < field.poses(); ++p) {
+        pose[p] = field.pose_distance(point, p);
+        ++counts[i].classes[p][static_cast<std::size_t>(pose[p].voxel_class)];
+      }
+      if (field.poses() < 2) continue;
+      ++counts[i].pairs[static_cast<std::size_t>(pose[0].voxel_class)][static_cast<std::size_t>(pose[1].voxel_class)];
+      counts[i].alarms += combine(pose[0], pose[1], field.class_threshold()).alarm ? 1 : 0;
+    }
+  });
+  report.class_counts.assign(field.poses(), {});
+  for (const auto& count : counts) {
+    for (std::size_t a = 0; a < kVoxelClasses; ++a) {
+      for (std::size_t p = 0; p < field.poses(); ++p) report.class_counts[p][a] += count.classes[p][a];
+      for (std::size_t b = 0; b < kVoxelClasses; ++b) report.class_pairs[a][b] += count.pairs[a][b];
+    }
+    report.alarms += count.alarms;
+  }
+}
+
+}  // namespace
+
+Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions& options, const Context& context) {
+  if (auto ok = check(poses, options); !ok) return pass_on(ok);
+  Surface result;
+  VolumeReport& report = result.report;
+  report.band_mm = band(poses, options);
+  context.report("volume", 0.0);
+  Prepared prepared = prepare(poses, options, report.band_mm);
+  if (prepared.seeds.empty()) return fail(ErrorCode::degenerate, "volume: no view measured any surface");
+  if (context.stopped()) return fail(ErrorCode::stopped, "volume: stopped");
+
+  Eigen::AlignedBox3f box = prepared.box;
+  if (std::any_of(poses.begin(), poses.end(), has_silhouettes)) {
+    const auto room = Eigen::Vector3f::Constant(static_cast<float>(kHullRoomMm));
+    box = {box.min() - room, box.max() + room};
+  }
+  const Field field(std::move(prepared.views_of_pose), std::move(prepared.model_from_pose),
+                    make_hull(poses, options, box), options, report.band_mm);
+  context.report("volume", 0.2);
+  BlockGrid grid(box, static_cast<float>(options.voxel_mm));
+  if (auto ok = grid.fill(field, prepared.seeds, context); !ok) return pass_on(ok);
+  report.active_voxels = grid.blocks().size() * BlockGrid::kNodes;
+  context.report("volume", 0.7);
+
+  const Mesh all = extract_surface(grid);
+  result.mesh = largest_component(all);
+  report.dropped_components = components(all).count - 1;
+  if (result.mesh.faces.empty()) return fail(ErrorCode::degenerate, "volume: the surface encloses nothing");
+  report.genus = report.genus_before_repair = topology(result.mesh).genus();
+  finish_surface(field, static_cast<float>(options.voxel_mm), result.mesh);
+  report.closed_vertices = static_cast<std::size_t>(std::count(result.mesh.views.begin(), result.mesh.views.end(), 0));
+  report.measured_vertices = result.mesh.vertices.size() - report.closed_vertices;
+  count_classes(field, grid, report);
+  context.report("volume", 1.0);
+  return result;
+}
+
+}  // namespace scanrig

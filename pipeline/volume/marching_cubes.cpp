@@ -1,0 +1,241 @@
+#include "pipeline/volume/marching_cubes.h"
+
+#include <algorithm>
+#include <limits>
+
+#include "core/parallel.h"
+
+namespace scanrig {
+namespace {
+
+constexpr int kSide = BlockGrid::kSide;
+constexpr int kCorners = kSide + 1;  // nodes along a block's cells, the next block's first included
+
+/// The edge between two corners that differ in one coordinate.
+int edge_between(int a, int b) {
+  const int axis = (a ^ b) == 1 ? 0 : (a ^ b) == 2 ? 1 : 2;
+  const int low = a & b;
+  const int others = axis == 0 ? low >> 1 : axis == 1 ? (low & 1) | (low >> 1 & 2) : low & 3;
+  return 4 * axis + others;
+}
+
+/// Corner at which an edge starts.
+int edge_start(int edge) {
+  const int axis = edge / 4, k = edge % 4;
+  return axis == 0 ? k << 1 : axis == 1 ? (k & 1) | (k & 2) << 1 : k;
+}
+
+/// Corners of a face, counter-clockwise seen from outside the cell. Faces: 2 axis + side.
+std::array<int, 4> face_corners(int face) {
+  const int axis = face / 2, side = face % 2;
+  const int u = 1 << (axis + 1) % 3, v = 1 << (axis + 2) % 3, base = side << axis;
+  if (side == 1) return {base, base | u, base | u | v, base | v};
+  return {base, base | v, base | u | v, base | u};
+}
+
+bool on_common_face(int edge_a, int edge_b) {
+  for (int face = 0; face < 6; ++face) {
+    const auto corners = face_corners(face);
+    const auto holds = [&](int edge) {
+      for (int i = 0; i < 4; ++i) {
+        if (edge_between(corners[i], corners[(i + 1) % 4]) == edge) return true;
+      }
+      return false;
+    };
+    if (holds(edge_a) && holds(edge_b)) return true;
+  }
+  return false;
+}
+
+/// For every cut edge the next one around its polygon. On each face a cut separates one run of outside corners.
+std::array<int, 12> polygon_links(int inside) {
+  std::array<int, 12> next;
+  next.fill(-1);
+  for (int face = 0; face < 6; ++face) {
+    const auto corners = face_corners(face);
+    const auto is_inside = [&](int i) { return (inside >> corners[i % 4] & 1) != 0; };
+    for (int i = 0; i < 4; ++i) {
+      if (!is_inside(i) || is_inside(i + 1)) continue;  // the run of outside corners starts at i + 1
+      int last = i + 1;
+      while (!is_inside(last + 1)) ++last;
+      const int enters = edge_between(corners[i], corners[(i + 1) % 4]);
+      const int leaves = edge_between(corners[last % 4], corners[(last + 1) % 4]);
+      next[enters] = leaves;
+    }
+  }
+  return next;
+}
+
+/// Splits a polygon into triangles so that no diagonal lies on a cell face. Returns false if there is no such way.
+bool triangulate(const std::vector<int>& polygon, CaseTriangles& triangles) {
+  const std::size_t n = polygon.size();
+  if (n == 3) {
+    triangles.push_back({static_cast<std::uint8_t>(polygon[0]), static_cast<std::uint8_t>(polygon[1]),
+                         static_cast<std::uint8_t>(polygon[2])});
+    return true;
+  }
+  for (std::size_t i = 0; i < n; ++i) {  // cut off the ear at i
+    const int before = polygon[(i + n - 1) % n], after = polygon[(i + 1) % n];
+    if (on_common_face(before, after)) continue;
+    std::vector<int> rest = polygon;
+    rest.erase(rest.begin() + static_cast<std::ptrdiff_t>(i));
+    const std::size_t done = triangles.size();
+    if (triangulate({before, polygon[i], after}, triangles) && triangulate(rest, triangles)) return true;
+    triangles.resize(done);
+  }
+  return false;
+}
+
+CaseTriangles make_case(int inside) {
+  CaseTriangles triangles;
+  std::array<int, 12> next = polygon_links(inside);
+  for (int start = 0; start < 12; ++start) {
+    std::vector<int> polygon;
+    for (int edge = start; next[edge] >= 0;) {
+      polygon.push_back(edge);
+      edge = std::exchange(next[edge], -1);
+    }
+    if (!polygon.empty() && !triangulate(polygon, triangles)) std::abort();  // a test visits every case
+  }
+  return triangles;
+}
+
+/// Distances at the corners of a block's cells.
+using Corners = std::array<float, kCorners * kCorners * kCorners>;
+int corner(const Eigen::Vector3i& n) { return (n.z() * kCorners + n.y()) * kCorners + n.x(); }
+int node(const Eigen::Vector3i& n) { return BlockGrid::Block::node(n.x(), n.y(), n.z()); }
+
+/// Calls `body` for the cells of a block, each by its first corner.
+template <class Body>
+void for_each_node(int side, const Body& body) {
+  Eigen::Vector3i n;
+  for (n.z() = 0; n.z() < side; ++n.z()) {
+    for (n.y() = 0; n.y() < side; ++n.y()) {
+      for (n.x() = 0; n.x() < side; ++n.x()) body(n);
+    }
+  }
+}
+
+/// A block and the seven that follow it; a block that is not stored is null.
+struct Octet {
+  std::array<const BlockGrid::Block*, 8> block;
+  std::array<float, 8> constant;  ///< distance in the blocks that are not stored
+
+  Octet(const BlockGrid& grid, const Eigen::Vector3i& first) {
+    for (int i = 0; i < 8; ++i) {
+      const Eigen::Vector3i index = first + Eigen::Vector3i(i & 1, i >> 1 & 1, i >> 2 & 1);
+      block[i] = grid.find(index);
+      constant[i] = grid.all_inside(index) ? -1.0F : 1.0F;
+    }
+  }
+  static int which(const Eigen::Vector3i& n) {
+    return (n.x() == kSide ? 1 : 0) | (n.y() == kSide ? 2 : 0) | (n.z() == kSide ? 4 : 0);
+  }
+  [[nodiscard]] float distance(const Eigen::Vector3i& n) const {
+    const int i = which(n);
+    return block[i] == nullptr ? constant[i] : block[i]->distance[node(n.unaryExpr([](int c) { return c % kSide; }))];
+  }
+};
+
+/// Vertices on the edges that start in one block.
+struct BlockVertices {
+  std::vector<std::uint32_t> of_edge;  ///< 3 node + axis -> number within the block; empty: no vertices
+  std::vector<Eigen::Vector3f> positions;
+};
+
+BlockVertices cut_edges(const BlockGrid& grid, const BlockGrid::Block& block) {
+  const Octet octet(grid, block.index);
+  BlockVertices result;
+  for_each_node(kSide, [&](const Eigen::Vector3i& n) {
+    const float here = octet.distance(n);
+    for (int axis = 0; axis < 3; ++axis) {
+      const Eigen::Vector3i step = Eigen::Vector3i::Unit(axis);
+      const float there = octet.distance(n + step);
+      if ((here < 0.0F) == (there < 0.0F)) continue;
+      if (result.of_edge.empty()) result.of_edge.resize(std::size_t{3} * BlockGrid::kNodes);
+      result.of_edge[3 * node(n) + axis] = static_cast<std::uint32_t>(result.positions.size());
+      // A hair's breadth from the nodes, so that no triangle shrinks to nothing.
+      const float t = std::clamp(here / (here - there), 0.01F, 0.99F);
+      result.positions.push_back(grid.position(kSide * block.index + n) + grid.voxel() * t * step.cast<float>());
+    }
+  });
+  return result;
+}
+
+struct Numbering {
+  const BlockGrid& grid;
+  const std::vector<BlockVertices>& vertices;
+  std::vector<std::uint32_t> first;  ///< of each block
+};
+
+std::vector<Mesh::Face> cell_faces(const Numbering& numbering, const Eigen::Vector3i& index) {
+  const Octet octet(numbering.grid, index);
+  Corners distance;
+  for_each_node(kCorners, [&](const Eigen::Vector3i& n) { distance[corner(n)] = octet.distance(n); });
+  std::vector<Mesh::Face> faces;
+  const auto vertex = [&](const Eigen::Vector3i& cell, int edge) {
+    const int start = edge_start(edge);
+    const Eigen::Vector3i n = cell + Eigen::Vector3i(start & 1, start >> 1 & 1, start >> 2 & 1);
+    const auto* owner = octet.block[Octet::which(n)];
+    const auto slot = static_cast<std::size_t>(owner - numbering.grid.blocks().data());
+    const int local = node(n.unaryExpr([](int c) { return c % kSide; }));
+    return numbering.first[slot] + numbering.vertices[slot].of_edge[3 * local + edge / 4];
+  };
+  for_each_node(kSide, [&](const Eigen::Vector3i& cell) {
+    unsigned inside = 0;
+    for (unsigned c = 0; c < 8; ++c) {
+      const Eigen::Vector3i n = cell + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2 & 1);
+      inside |= distance[corner(n)] < 0.0F ? 1U << c : 0U;
+    }
+    for (const auto& t : marching_cubes_cases()[inside]) {
+      faces.push_back({vertex(cell, t[0]), vertex(cell, t[1]), vertex(cell, t[2])});
+    }
+  });
+  return faces;
+}
+
+/// The stored blocks and those just before them, whose last cells reach into a stored block.
+std::vector<Eigen::Vector3i> blocks_with_cells(const BlockGrid& grid) {
+  std::vector<Eigen::Vector3i> result;
+  for (const auto& block : grid.blocks()) {
+    for (int i = 0; i < 8; ++i) {
+      const Eigen::Vector3i index = block.index - Eigen::Vector3i(i & 1, i >> 1 & 1, i >> 2 & 1);
+      if (i == 0 || grid.find(index) == nullptr) result.push_back(index);
+    }
+  }
+  const auto less = [](const Eigen::Vector3i& a, const Eigen::Vector3i& b) {
+    return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
+  };
+  std::sort(result.begin(), result.end(), less);
+  result.erase(std::unique(result.begin(), result.end()), result.end());
+  return result;
+}
+
+}  // namespace
+
+const std::array<CaseTriangles, 256>& marching_cubes_cases() {
+  static const auto cases = [] {
+    std::array<CaseTriangles, 256> all;
+    for (int inside = 0; inside < 256; ++inside) all[inside] = make_case(inside);
+    return all;
+  }();
+  return cases;
+}
+
+Mesh extract_surface(const BlockGrid& grid) {
+  std::vector<BlockVertices> vertices(grid.blocks().size());
+  parallel_for(vertices.size(), [&](std::size_t i) { vertices[i] = cut_edges(grid, grid.blocks()[i]); });
+  Numbering numbering{grid, vertices, {}};
+  Mesh mesh;
+  for (const auto& block : vertices) {
+    numbering.first.push_back(static_cast<std::uint32_t>(mesh.vertices.size()));
+    mesh.vertices.insert(mesh.vertices.end(), block.positions.begin(), block.positions.end());
+  }
+  const std::vector<Eigen::Vector3i> cells = blocks_with_cells(grid);
+  std::vector<std::vector<Mesh::Face>> faces(cells.size());
+  parallel_for(cells.size(), [&](std::size_t i) { faces[i] = cell_faces(numbering, cells[i]); });
+  for (const auto& part : faces) mesh.faces.insert(mesh.faces.end(), part.begin(), part.end());
+  return mesh;
+}
+
+}  // namespace scanrig

@@ -1,0 +1,87 @@
+#include "pipeline/volume/surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/parallel.h"
+#include "pipeline/mesh/solid.h"
+
+namespace scanrig {
+namespace {
+
+constexpr std::size_t kChunk = 4096;  // vertices a task
+
+/// Each vertex's neighbours, row after row.
+struct Adjacency {
+  std::vector<std::uint32_t> first, neighbour;
+};
+
+Adjacency adjacency(const Mesh& mesh) {
+  // In a closed manifold every directed edge occurs once: a vertex's neighbours are the heads of its edges.
+  Adjacency result;
+  result.first.assign(mesh.vertices.size() + 1, 0);
+  for (const auto& f : mesh.faces) {
+    for (const auto v : f) ++result.first[v + 1];
+  }
+  for (std::size_t i = 1; i < result.first.size(); ++i) result.first[i] += result.first[i - 1];
+  std::vector<std::uint32_t> fill = result.first;
+  result.neighbour.resize(3 * mesh.faces.size());
+  for (const auto& f : mesh.faces) {
+    for (std::size_t k = 0; k < 3; ++k) result.neighbour[fill[f[k]]++] = f[(k + 1) % 3];
+  }
+  return result;
+}
+
+/// Staircases of the carved surface go; a vertex stays within half a voxel of where it was.
+void smooth_unmeasured(float voxel_mm, Mesh& mesh) {
+  constexpr int kRounds = 4;
+  const Adjacency around = adjacency(mesh);
+  const std::vector<Eigen::Vector3f> original = mesh.vertices;
+  for (int round = 0; round < kRounds; ++round) {
+    const std::vector<Eigen::Vector3f> before = mesh.vertices;
+    for (std::size_t v = 0; v < before.size(); ++v) {
+      if (mesh.views[v] != 0 || around.first[v] == around.first[v + 1]) continue;
+      Eigen::Vector3f mean = Eigen::Vector3f::Zero();
+      for (auto i = around.first[v]; i < around.first[v + 1]; ++i) mean += before[around.neighbour[i]];
+      mean /= static_cast<float>(around.first[v + 1] - around.first[v]);
+      Eigen::Vector3f move = 0.5F * (before[v] + mean) - original[v];
+      const float length = move.norm();
+      if (length > 0.5F * voxel_mm) move *= 0.5F * voxel_mm / length;
+      mesh.vertices[v] = original[v] + move;
+    }
+  }
+}
+
+/// One step along the measured normal; `views` and `sigma` where the vertex ends up on what was measured.
+void settle_vertex(const Field& field, float voxel_mm, const Eigen::Vector3f& outward, Mesh& mesh, std::size_t v) {
+  constexpr float kAcross = 0.5F;  // cosine between the surface and what was measured, below which they differ
+  Eigen::Vector3f& position = mesh.vertices[v];
+  PointEvidence evidence = field.evidence_at(position);
+  if (evidence.views == 0 || evidence.normal.dot(outward) < kAcross) return;
+  const float reach = 0.5F * voxel_mm;
+  if (std::abs(evidence.surface_distance) > reach) return;
+  const Eigen::Vector3f moved = position - evidence.surface_distance * evidence.normal;
+  evidence = field.evidence_at(moved);
+  if (evidence.views == 0 || std::abs(evidence.surface_distance) > 0.2F * reach) return;
+  position = moved;
+  mesh.views[v] = static_cast<std::uint8_t>(std::min(evidence.views, 255));
+  mesh.sigma[v] = evidence.sigma;
+}
+
+}  // namespace
+
+void finish_surface(const Field& field, float voxel_mm, Mesh& mesh) {
+  const std::size_t count = mesh.vertices.size();
+  mesh.views.assign(count, 0);
+  mesh.sigma.assign(count, std::numeric_limits<float>::quiet_NaN());
+  const std::vector<Eigen::Vector3f> outward = vertex_normals(mesh);
+  parallel_for((count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+    const std::size_t end = std::min(count, (chunk + 1) * kChunk);
+    for (std::size_t v = chunk * kChunk; v < end; ++v) settle_vertex(field, voxel_mm, outward[v], mesh, v);
+  });
+  smooth_unmeasured(voxel_mm, mesh);
+  mesh.normals = vertex_normals(mesh);
+}
+
+}  // namespace scanrig
