@@ -1,0 +1,42 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "core/context.h"
+#include "core/result.h"
+#include "pipeline/evaluate/scores.h"
+#include "pipeline/evaluate/true_view.h"
+#include "pipeline/evaluate/truth.h"
+#include "pipeline/mesh/mesh.h"
+#include "pipeline/scan/scan_folder.h"
+
+namespace scanrig {
+
+struct EvaluateOptions {
+  std::size_t samples = 200'000;  ///< spread over each surface
+  double carve_voxel_mm = 0.5;    ///< of the ideal carve
+  ObservableRule observable;
+};
+
+/// What is to be judged.
+struct Claim {
+  TexturedMesh model;                         ///< pose 1's turntable frame; `views` and `sigma` are its claims
+  std::optional<Transform> pose1_from_pose2;  ///< as the reconstruction found it
+};
+
+/// Judges a model against the truth by the rules of pipeline.md, section 9. `photos`: the scan's plain images for the
+/// texture's figures, or null. Stages reported: "evaluate".
+/// Fails with `degenerate` (a mesh without faces), `stopped`, and as the photos' loading does.
+Result<Scores> evaluate(const Claim& claim, const Truth& truth, const ScanFolder* photos,
+                        const EvaluateOptions& options, const Context& context);
+
+/// The model that a reconstruction left in `folder`: model.ply, texture coordinates of model.obj and model.png where
+/// they are, `pose1_from_pose2` of report.json where it is. Fails with `not_found`, `io`, `invalid_input`.
+Result<Claim> read_claim(const std::filesystem::path& folder);
+
+/// For each sample, in how many of the truth's views it is observable.
+std::vector<int> observable_views(const std::vector<SurfaceSample>& samples, const Truth& truth,
+                                  const SurfaceIndex& surface, const ObservableRule& rule);
+
+}  // namespace scanrig

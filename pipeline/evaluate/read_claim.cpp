@@ -1,0 +1,94 @@
+#include <charconv>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <string_view>
+
+#include "core/files.h"
+#include "pipeline/evaluate/evaluate.h"
+#include "pipeline/scan/model/mesh_reader.h"
+#include "pipeline/scan/strict_json.h"
+
+namespace scanrig {
+namespace {
+
+bool take_number(std::string_view& text, auto& value) {
+  text.remove_prefix(std::min(text.find_first_not_of(" /"), text.size()));
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  return error == std::errc();
+}
+
+/// The texture coordinates that an OBJ written beside the PLY gives the corners of the same faces: its "vt u v" and
+/// "f v/t v/t v/t" lines.
+Result<void> read_corner_uv(const std::filesystem::path& file, TexturedMesh& model) {
+  const auto text = read_file(file);
+  if (!text) return pass_on(text);
+  const auto bad = [&file](std::string_view line) {
+    return fail(ErrorCode::invalid_input, "{}: not the faces of the PLY beside it: {}", file.string(), line);
+  };
+  std::vector<Eigen::Vector2f> uv;
+  std::string_view rest = *text;
+  while (!rest.empty()) {
+    const std::string_view line = rest.substr(0, rest.find('\n'));
+    rest.remove_prefix(std::min(line.size() + 1, rest.size()));
+    if (line.starts_with("vt ")) {
+      std::string_view words = line.substr(3);
+      Eigen::Vector2f& at = uv.emplace_back();
+      if (!take_number(words, at.x()) || !take_number(words, at.y())) return bad(line);
+      at.y() = 1.0F - at.y();
+    } else if (line.starts_with("f ")) {
+      std::string_view words = line.substr(2);
+      const std::size_t face = model.corner_uv.size();
+      if (face == model.mesh.faces.size()) return bad(line);
+      auto& corners = model.corner_uv.emplace_back();
+      for (int k = 0; k < 3; ++k) {
+        std::size_t v = 0, t = 0;
+        if (!take_number(words, v) || !take_number(words, t)) return bad(line);
+        if (v != model.mesh.faces[face][k] + std::size_t{1} || t == 0 || t > uv.size()) return bad(line);
+        corners[k] = uv[t - 1];
+      }
+    }
+  }
+  return model.corner_uv.size() == model.mesh.faces.size() ? Result<void>() : bad("faces are missing");
+}
+
+Result<std::optional<Transform>> read_pose2(const std::filesystem::path& file) {
+  const auto text = read_file(file);
+  if (!text) return pass_on(text);
+  const auto report = nlohmann::json::parse(*text, nullptr, false);
+  if (report.is_discarded()) return fail(ErrorCode::invalid_input, "{}: not valid JSON", file.string());
+  if (!report.is_object() || !report.contains("pose1_from_pose2")) return std::nullopt;
+  std::optional<Error> fault;
+  const Transform transform = JsonObject(&report, "", &fault).transform("pose1_from_pose2");
+  if (fault) return tl::unexpected<Error>(fault->in(file.string()));
+  return transform;
+}
+
+}  // namespace
+
+Result<Claim> read_claim(const std::filesystem::path& folder) {
+  Claim claim;
+  auto mesh = read_ply(folder / "model.ply");
+  if (!mesh) return pass_on(mesh);
+  claim.model.mesh = std::move(*mesh);
+  std::error_code error;
+  if (std::filesystem::exists(folder / "model.obj", error)) {
+    if (const auto read = read_corner_uv(folder / "model.obj", claim.model); !read) return pass_on(read);
+    const auto bytes = read_file(folder / "model.png");
+    if (!bytes) return pass_on(bytes);
+    auto atlas = decode_image(*bytes);
+    if (!atlas) return pass_on(atlas, (folder / "model.png").string());
+    if (atlas->type() != CV_8UC3) {
+      return fail(ErrorCode::invalid_input, "{}: not an 8-bit colour image", (folder / "model.png").string());
+    }
+    claim.model.atlas = *atlas;
+  }
+  if (std::filesystem::exists(folder / "report.json", error)) {
+    const auto pose2 = read_pose2(folder / "report.json");
+    if (!pose2) return pass_on(pose2);
+    claim.pose1_from_pose2 = *pose2;
+  }
+  return claim;
+}
+
+}  // namespace scanrig

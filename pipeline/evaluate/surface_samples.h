@@ -1,0 +1,33 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "pipeline/mesh/mesh.h"
+
+namespace scanrig {
+
+/// A point of a surface; each of a set stands for the same area.
+struct SurfaceSample {
+  Eigen::Vector3d point;
+  Eigen::Vector3d normal;  ///< unit, of the face
+  std::uint32_t face = 0;
+  Eigen::Vector3d weights;  ///< barycentric, of the face's three corners
+};
+
+/// `count` points spread evenly over the area of the faces named. Always the same points for the same surface; none if
+/// the faces have no area.
+std::vector<SurfaceSample> sample_surface(const Mesh& mesh, const std::vector<std::uint32_t>& faces, std::size_t count);
+
+double area_of(const Mesh& mesh, const std::vector<std::uint32_t>& faces);  ///< mm^2
+
+/// The faces that are labelled measured (all three vertices seen by at least one view), or those that are not.
+/// Without labels all faces count as measured.
+std::vector<std::uint32_t> measured_faces(const Mesh& mesh, bool measured);
+
+/// The value below which the share `q` of the values lies; NaN if there are none.
+double quantile(std::vector<double> values, double q);
+
+}  // namespace scanrig

@@ -1,0 +1,104 @@
+#include "pipeline/evaluate/texture_figures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "core/parallel.h"
+#include "core/units.h"
+#include "pipeline/evaluate/surface_samples.h"
+#include "pipeline/texture/render.h"
+
+namespace scanrig {
+namespace {
+
+constexpr int kPatch = 32;
+constexpr int kErosion = 6;
+constexpr int kReach = 6;               ///< how far a patch is looked for, px
+constexpr double kLeastGradient = 1.0;  ///< deviation of the gradient over a patch, grey levels a pixel
+constexpr double kLeastCorrelation = 0.6;
+
+cv::Mat1f gradient_magnitude(const cv::Mat& image) {
+  cv::Mat grey;
+  if (image.channels() == 3) {
+    cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
+  } else {
+    grey = image;
+  }
+  cv::Mat1f smooth, dx, dy, magnitude;
+  grey.convertTo(smooth, CV_32F);
+  cv::GaussianBlur(smooth, smooth, {0, 0}, 1.0);
+  cv::Sobel(smooth, dx, CV_32F, 1, 0, 3, 0.125);
+  cv::Sobel(smooth, dy, CV_32F, 0, 1, 3, 0.125);
+  cv::magnitude(dx, dy, magnitude);
+  return magnitude;
+}
+
+/// Place of the peak between three values, -0.5..0.5.
+double vertex(double before, double peak, double after) {
+  const double bend = before - 2.0 * peak + after;
+  return bend < 0.0 ? std::clamp(0.5 * (before - after) / bend, -0.5, 0.5) : 0.0;
+}
+
+/// NaN if the patch says nothing.
+double offset_of(const cv::Mat1f& drawn, const cv::Mat1f& photo, const cv::Rect& patch) {
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(drawn(patch), mean, deviation);
+  if (deviation[0] < kLeastGradient) return std::nan("");
+  const cv::Rect window(patch.x - kReach, patch.y - kReach, patch.width + 2 * kReach, patch.height + 2 * kReach);
+  if ((window & cv::Rect({0, 0}, photo.size())) != window) return std::nan("");
+  cv::Mat1f score;
+  cv::matchTemplate(photo(window), drawn(patch), score, cv::TM_CCOEFF_NORMED);
+  double best = 0.0;
+  cv::Point at;
+  cv::minMaxLoc(score, nullptr, &best, nullptr, &at);
+  const bool inside = at.x > 0 && at.y > 0 && at.x + 1 < score.cols && at.y + 1 < score.rows;
+  if (best < kLeastCorrelation || !inside) return std::nan("");
+  const double dx = at.x - kReach + vertex(score(at.y, at.x - 1), best, score(at.y, at.x + 1));
+  const double dy = at.y - kReach + vertex(score(at.y - 1, at.x), best, score(at.y + 1, at.x));
+  return std::hypot(dx, dy);
+}
+
+}  // namespace
+
+std::vector<double> patch_offsets(const cv::Mat& drawn, const cv::Mat& photo, const cv::Mat1b& mask) {
+  const cv::Mat1f drawn_gradient = gradient_magnitude(drawn), photo_gradient = gradient_magnitude(photo);
+  cv::Mat1b eroded;
+  cv::erode(mask, eroded, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * kErosion + 1, 2 * kErosion + 1}), {-1, -1},
+            1, cv::BORDER_CONSTANT, 0);
+  std::vector<double> offsets;
+  for (int y = 0; y + kPatch <= mask.rows; y += kPatch / 2) {
+    for (int x = 0; x + kPatch <= mask.cols; x += kPatch / 2) {
+      const cv::Rect patch(x, y, kPatch, kPatch);
+      if (cv::countNonZero(eroded(patch)) < patch.area()) continue;
+      const double offset = offset_of(drawn_gradient, photo_gradient, patch);
+      if (!std::isnan(offset)) offsets.push_back(offset);
+    }
+  }
+  return offsets;
+}
+
+Result<Scores::TextureFigures> texture_figures(const TexturedMesh& model, const Truth& truth, const ScanFolder& photos,
+                                               const Context& context) {
+  const auto renderer = MeshRenderer::create(model);
+  if (!renderer) return pass_on(renderer);
+  std::vector<double> offsets;
+  for (std::size_t p = 0; p < std::min(truth.poses.size(), photos.manifest().poses.size()); ++p) {
+    const TruePose& pose = truth.poses[p];
+    for (std::size_t v = 0; v < std::min(pose.angles_deg.size(), photos.manifest().poses[p].views.size()); ++v) {
+      if (context.stopped()) return fail(ErrorCode::stopped, "evaluation stopped");
+      const auto images = photos.load_images(p, v);
+      if (!images) return pass_on(images);
+      RenderOptions options;
+      options.supersample = 2;
+      const auto drawn =
+          renderer->render(truth.left, rot_y(to_radians(pose.angles_deg[v])) * pose.table_from_truth, options);
+      if (!drawn) return pass_on(drawn);
+      const auto found = patch_offsets(drawn->image, images->left_plain, drawn->mask);
+      offsets.insert(offsets.end(), found.begin(), found.end());
+    }
+  }
+  return Scores::TextureFigures{offsets.size(), quantile(offsets, 0.5), quantile(offsets, 0.95)};
+}
+
+}  // namespace scanrig
