@@ -1,6 +1,5 @@
 #include "sim/apps/shoot.h"
 
-#include <cmath>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
@@ -9,6 +8,7 @@
 #include "core/units.h"
 #include "sim/scene/profile.h"
 #include "sim/scene/random.h"
+#include "sim/scene/standing.h"
 #include "sim/scene/truth.h"
 
 namespace scanrig::sim {
@@ -28,25 +28,13 @@ Result<std::string> save_png(const cv::Mat& image, const fs::path& file) {
   return sha256(bytes);
 }
 
-/// Where the axis really stands, and what its encoder says.
-struct Standing {
-  double true_deg = 0.0;
-  double measured_deg = 0.0;
-};
-
-Standing stand(double commanded, std::uint64_t key) {
-  const Profile& p = profile();
-  const double angle = commanded + p.repeatability_deg * normal(mix(key, 0x7461626c65));
-  return {angle, p.encoder_step_deg * std::round(angle / p.encoder_step_deg)};
-}
-
-Result<ordered_json> shoot_view(Scene& scene, int pose, int index, double commanded, const Standing& standing,
+Result<ordered_json> shoot_view(Scene& scene, int pose, int index, double commanded, double true_deg,
                                 const fs::path& folder, std::uint64_t exposure) {
   const std::string path = fmt::format("pose{}/view{:02}", pose + 1, index);
   if (const auto made = create_directories_synced(folder / path); !made) return pass_on(made);
   ordered_json files = ordered_json::object();
   for (const bool pattern : {true, false}) {
-    const StereoImages images = scene.shoot(pose, to_radians(standing.true_deg), pattern, exposure++);
+    const StereoImages images = scene.shoot(pose, to_radians(true_deg), pattern, exposure++);
     for (const bool left : {true, false}) {
       const std::string name = fmt::format("{}_{}", left ? "left" : "right", pattern ? "pattern" : "plain");
       const std::string file = path + "/" + name + ".png";
@@ -58,9 +46,9 @@ Result<ordered_json> shoot_view(Scene& scene, int pose, int index, double comman
   const int seconds = 10 * static_cast<int>(exposure / 2);
   return ordered_json{{"index", index},
                       {"commanded_deg", commanded},
-                      {"measured_deg", standing.measured_deg},
+                      {"measured_deg", encoder_reading(true_deg)},
                       {"moving_ms", index == 0 ? 0 : 1500},
-                      {"settling_ms", std::lround(1e3 * profile().settling_s)},
+                      {"settling_ms", static_cast<int>(1e3 * profile().settling_s)},
                       {"taken", fmt::format("2026-11-21T09:{:02}:{:02}Z", seconds / 60 % 60, seconds % 60)},
                       {"pixel_format", "BayerRG8"},
                       {"files", files}};
@@ -96,22 +84,22 @@ Result<void> shoot(const ShootOptions& options, const fs::path& folder) {
   if (const auto written = write_calibration(**scene, folder / "calibration.json"); !written) return written;
   auto json = manifest(folder, options.scene);
   if (!json) return pass_on(json);
-  std::vector<std::vector<double>> angles;
+  std::vector<PoseTruth> truth;
   std::uint64_t exposure = 0;
   for (int pose = 0; pose < options.scene.poses; ++pose) {
     ordered_json views = ordered_json::array();
-    angles.emplace_back();
+    truth.push_back({pose, {}});
     for (int index = 0; index < options.views; ++index, exposure += 2) {
       const double commanded = 360.0 * index / options.views;
-      const Standing standing = stand(commanded, mix(options.scene.seed, pose, index));
-      const auto view = shoot_view(**scene, pose, index, commanded, standing, folder, exposure);
+      const double true_deg = resting_angle(commanded, mix(options.scene.seed, 7, pose, index));
+      const auto view = shoot_view(**scene, pose, index, commanded, true_deg, folder, exposure);
       if (!view) return pass_on(view);
       views.push_back(*view);
-      angles.back().push_back(standing.true_deg);
+      truth.back().angles_deg.push_back(true_deg);
     }
     (*json)["poses"].push_back({{"name", fmt::format("pose{}", pose + 1)}, {"complete", true}, {"views", views}});
   }
-  if (const auto written = write_truth(**scene, angles, folder); !written) return written;
+  if (const auto written = write_truth(**scene, truth, folder); !written) return written;
   return write_file_atomically(folder / "scan.json", json->dump(2) + "\n");
 }
 

@@ -15,9 +15,9 @@ cv::Mat mirrors(double image_scale) {
   const Profile& p = profile();
   cv::Mat on = cv::Mat::zeros(p.projector_height, p.projector_width, CV_8U);
   // Projector pixels a camera pixel, at the aim point.
-  const double camera_pixel = p.projector_focal_px / std::hypot(p.distance_mm * std::sin(p.elevation_deg * CV_PI / 180) +
-                                                                    p.projector_above_mm,
-                                                                p.distance_mm * std::cos(p.elevation_deg * CV_PI / 180)) *
+  const double camera_pixel = p.projector_focal_px /
+                              std::hypot(p.distance_mm * std::sin(p.elevation_deg * CV_PI / 180) + p.projector_above_mm,
+                                         p.distance_mm * std::cos(p.elevation_deg * CV_PI / 180)) *
                               p.distance_mm / (p.focal_px * image_scale);
   double mean_area = 0.0;
   for (int i = 0; i < 3; ++i) {
@@ -78,8 +78,8 @@ float DotPattern::brightness(double u, double v, double sigma) const {
   const auto fine = static_cast<std::size_t>(position);
   const std::size_t coarse = std::min(fine + 1, levels_.size() - 1);
   const auto share = static_cast<float>(position - static_cast<double>(fine));
-  const float mixed = share > 0.0F ? (1.0F - share) * sample(levels_[fine]) + share * sample(levels_[coarse])
-                                   : sample(levels_[fine]);
+  const float mixed =
+      share > 0.0F ? (1.0F - share) * sample(levels_[fine]) + share * sample(levels_[coarse]) : sample(levels_[fine]);
   return mixed / 60000.0F;
 }
 

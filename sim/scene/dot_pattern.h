@@ -18,9 +18,9 @@ class DotPattern {
 
  private:
   struct Level {
-    double sigma = 0.0;     // projector pixels
+    double sigma = 0.0;      // projector pixels
     double per_pixel = 1.0;  // samples a projector pixel
-    cv::Mat samples;        // 16 bit
+    cv::Mat samples;         // 16 bit
   };
   std::vector<Level> levels_;
 };

@@ -71,8 +71,7 @@ cv::Mat obj_image(const fs::path& file, const std::string& library) {
     }
   }
   const std::string stem = file.stem().string();
-  for (const std::string& candidate :
-       {name, stem + "_texture.png", stem.substr(0, stem.find('_')) + "_texture.png"}) {
+  for (const std::string& candidate : {name, stem + "_texture.png", stem.substr(0, stem.find('_')) + "_texture.png"}) {
     if (candidate.empty() || !fs::exists(file.parent_path() / candidate)) continue;
     cv::Mat image = cv::imread((file.parent_path() / candidate).string(), cv::IMREAD_COLOR);
     if (!image.empty()) return image;
@@ -153,8 +152,8 @@ PlyHeader ply_header(std::string_view text) {
     }
     if (word(0) == "property" && !header.elements.empty()) {
       const bool list = word(1) == "list";
-      header.elements.back().properties.push_back(
-          list ? PlyProperty{word(3), word(4), word(2)} : PlyProperty{word(1), word(2), ""});
+      header.elements.back().properties.push_back(list ? PlyProperty{word(3), word(4), word(2)}
+                                                       : PlyProperty{word(1), word(2), ""});
     }
   });
   header.end = std::min(text.find('\n', stop), text.size() - 1) + 1;

@@ -27,7 +27,8 @@ struct Lattice {
 
   [[nodiscard]] Vector3d node(const Vector3i& n) const { return origin + cell * n.cast<double>(); }
   [[nodiscard]] static EdgeKey key(const Vector3i& n, int direction) {
-    return ((static_cast<EdgeKey>(n.x()) << 20 | static_cast<EdgeKey>(n.y())) << 20 | static_cast<EdgeKey>(n.z())) << 3 |
+    return ((static_cast<EdgeKey>(n.x()) << 20 | static_cast<EdgeKey>(n.y())) << 20 | static_cast<EdgeKey>(n.z()))
+               << 3 |
            static_cast<EdgeKey>(direction);
   }
   [[nodiscard]] Vector3d vertex(EdgeKey key, const Field& field) const {

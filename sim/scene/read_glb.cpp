@@ -24,7 +24,8 @@ std::array<double, 4> element(const tinygltf::Model& model, int accessor_index, 
   const auto& view = model.bufferViews.at(accessor.bufferView);
   const auto& bytes = model.buffers.at(view.buffer).data;
   const auto stride = static_cast<std::size_t>(accessor.ByteStride(view));
-  const auto size = static_cast<std::size_t>(tinygltf::GetComponentSizeInBytes(static_cast<unsigned>(accessor.componentType)));
+  const auto size =
+      static_cast<std::size_t>(tinygltf::GetComponentSizeInBytes(static_cast<unsigned>(accessor.componentType)));
   const std::size_t start = view.byteOffset + accessor.byteOffset + i * stride;
   std::array<double, 4> values{};
   for (int c = 0; c < count; ++c) {
@@ -74,8 +75,8 @@ void add_primitive(const tinygltf::Model& model, const tinygltf::Primitive& prim
     Eigen::Vector3i t;
     std::array<Eigen::Vector2f, 3> corners{};
     for (int c = 0; c < 3; ++c) {
-      const std::size_t v = primitive.indices < 0 ? i + c
-                                                  : static_cast<std::size_t>(element(model, primitive.indices, i + c, 1)[0]);
+      const std::size_t v =
+          primitive.indices < 0 ? i + c : static_cast<std::size_t>(element(model, primitive.indices, i + c, 1)[0]);
       t[c] = first + static_cast<int>(v);
       if (!textured) continue;
       const auto at = element(model, uv->second, v, 2);  // glTF counts v from the top of the image

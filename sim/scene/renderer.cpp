@@ -134,7 +134,7 @@ class Shot {
     const auto u = static_cast<float>(hit.u), v = static_cast<float>(hit.v), w = 1.0F - u - v;
     const Surroundings around{w * corner[0].ambient + u * corner[1].ambient + v * corner[2].ambient,
                               w * corner[0].openness + u * corner[1].openness + v * corner[2].openness};
-    s.plain = albedo.cwiseProduct(Light::irradiance(around, normal));
+    s.plain = albedo.cwiseProduct(RoomLight::irradiance(around, normal));
     light_up(s, point, normal, albedo, size);
     return s;
   }
@@ -149,7 +149,7 @@ class Shot {
     s.surface = Surface::table;
     s.depth = depth;
     s.plain = albedo.cwiseProduct(
-        Light::irradiance(placed_.light.on_table(in_table.x(), in_table.z()), Vector3d::UnitY()));
+        RoomLight::irradiance(placed_.light.on_table(in_table.x(), in_table.z()), Vector3d::UnitY()));
     light_up(s, point, Vector3d::UnitY(), albedo, size);
     return s;
   }
@@ -177,7 +177,7 @@ class Shot {
     const Surroundings free{Vector3f::Constant(0.8F), 1.0F};
     const Vector3f albedo = rgb(profile().backdrop_albedo);
     s.plain = static_cast<float>(1.0 - 0.25 * fall) *
-              albedo.cwiseProduct(Light::irradiance(free, Vector3d(0.0, 0.5, 0.87)));
+              albedo.cwiseProduct(RoomLight::irradiance(free, Vector3d(0.0, 0.5, 0.87)));
     light_up(s, point, backdrop_normal_, albedo, footprint(depth, 1.0, 1.0));
     return s;
   }

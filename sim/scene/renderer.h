@@ -3,10 +3,10 @@
 #include <opencv2/core/mat.hpp>
 
 #include "sim/scene/dot_pattern.h"
-#include "sim/scene/light.h"
 #include "sim/scene/object.h"
 #include "sim/scene/optics.h"
 #include "sim/scene/ray_caster.h"
+#include "sim/scene/room_light.h"
 
 namespace scanrig::sim {
 
@@ -20,7 +20,7 @@ struct Radiance {
 struct Placed {
   const Object& object;
   const RayCaster& rays;
-  const Light& light;
+  const RoomLight& light;
   Transform table_from_object;
 };
 

@@ -148,14 +148,15 @@ Result<Transform> put_down(const TriangleMesh& mesh, const Vector3d& down, std::
   }
   const Circle circle = smallest_circle(plan);
   if (2.0 * circle.radius > p.largest_diameter_mm || high - low > p.largest_height_mm) {
-    return fail(ErrorCode::invalid_input,
-                "object: larger than the working volume ({:.0f} mm across and {:.0f} mm high in one of its rests, {:.0f} "
-                "and {:.0f} fit): give a smaller height",
-                2.0 * circle.radius, high - low, p.largest_diameter_mm, p.largest_height_mm);
+    return fail(
+        ErrorCode::invalid_input,
+        "object: larger than the working volume ({:.0f} mm across and {:.0f} mm high in one of its rests, {:.0f} "
+        "and {:.0f} fit): give a smaller height",
+        2.0 * circle.radius, high - low, p.largest_diameter_mm, p.largest_height_mm);
   }
   const double offset = 3.0 * std::sqrt(uniform(mix(seed, 2))), phi = 2.0 * std::numbers::pi * uniform(mix(seed, 3));
-  table_from_object.pretranslate(Vector3d(offset * std::cos(phi) - circle.centre.x(), -low,
-                                          offset * std::sin(phi) - circle.centre.y()));
+  table_from_object.pretranslate(
+      Vector3d(offset * std::cos(phi) - circle.centre.x(), -low, offset * std::sin(phi) - circle.centre.y()));
   return table_from_object;
 }
 
@@ -188,9 +189,7 @@ Result<std::vector<Transform>> draw_placements(const TriangleMesh& mesh, std::ui
   const int first = draw(rests, uniform(mix(seed, 4)), [](const Rest&) { return true; });
   int second = first;
   if (first >= 0 && !same_rest) {
-    const auto turned_over = [&](const Rest& r) {
-      return angle_between(r.down, rests[first].down) > to_radians(30.0);
-    };
+    const auto turned_over = [&](const Rest& r) { return angle_between(r.down, rests[first].down) > to_radians(30.0); };
     second = draw(rests, uniform(mix(seed, 5)), turned_over);
   }
   if (second < 0) {

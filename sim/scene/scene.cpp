@@ -10,8 +10,9 @@ namespace scanrig::sim {
 
 Result<std::unique_ptr<Scene>> Scene::create(const SceneOptions& options) {
   if (!(options.image_scale >= 0.1 && options.image_scale <= 1.0) || options.poses < 1) {
-    return fail(ErrorCode::out_of_range, "scene: image scale {} and {} poses: 0.1 to 1 and at least one pose are possible",
-                options.image_scale, options.poses);
+    return fail(ErrorCode::out_of_range,
+                "scene: image scale {} and {} poses: 0.1 to 1 and at least one pose are possible", options.image_scale,
+                options.poses);
   }
   auto object = load_object(options.object, options.height_mm);
   if (!object) return pass_on(object);
@@ -29,9 +30,9 @@ Scene::Scene(Object object, std::vector<Transform> placements, const SceneOption
       dots_(options.image_scale),
       lights_(placements_.size()) {}
 
-const Light& Scene::light_of(int pose) {
+const RoomLight& Scene::light_of(int pose) {
   auto& light = lights_[pose];
-  if (!light) light = std::make_unique<Light>(object_, rays_, placements_[pose]);
+  if (!light) light = std::make_unique<RoomLight>(object_, rays_, placements_[pose]);
   return *light;
 }
 

@@ -47,7 +47,7 @@ class Scene {
   [[nodiscard]] const std::vector<Transform>& placements() const { return placements_; }
 
  private:
-  const Light& light_of(int pose);
+  const RoomLight& light_of(int pose);
 
   SceneOptions options_;
   Object object_;
@@ -55,7 +55,7 @@ class Scene {
   RigGeometry rig_;
   RayCaster rays_;
   DotPattern dots_;
-  std::vector<std::unique_ptr<Light>> lights_;  // made when a pose is first seen
+  std::vector<std::unique_ptr<RoomLight>> lights_;  // made when a pose is first seen
 
   // The last thing rendered.
   int pose_ = -1;

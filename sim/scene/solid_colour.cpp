@@ -30,8 +30,7 @@ double grain(const Vector3d& p, double wavelength, double footprint, unsigned sa
   double sum = 0.0;
   for (int corner = 0; corner < 8; ++corner) {
     const Vector3i d(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
-    const double weight =
-        (d.x() ? s.x() : 1.0 - s.x()) * (d.y() ? s.y() : 1.0 - s.y()) * (d.z() ? s.z() : 1.0 - s.z());
+    const double weight = (d.x() ? s.x() : 1.0 - s.x()) * (d.y() ? s.y() : 1.0 - s.y()) * (d.z() ? s.z() : 1.0 - s.z());
     sum += weight * (2.0 * uniform(cell_hash(c + d, salt)) - 1.0);
   }
   return kept * sum;
@@ -74,13 +73,13 @@ class Painted final : public SurfaceColour {
  public:
   Vector3f albedo(const SurfacePoint& at) const override {
     const double width = std::max(at.footprint_mm, 0.25);
-    const Vector3d warp(grain(at.position, 9.0, 0.0, 1), grain(at.position, 9.0, 0.0, 2), grain(at.position, 9.0, 0.0, 3));
+    const Vector3d warp(grain(at.position, 9.0, 0.0, 1), grain(at.position, 9.0, 0.0, 2),
+                        grain(at.position, 9.0, 0.0, 3));
     const Vector3d p = at.position + 2.0 * warp;
     const Patches patch = patches(p, 17.0, 4);
     const double share = edge(patch.margin, 2.0 * width);  // 0.5 on the border
-    const Vector3f colour =
-        static_cast<float>(share) * paint(patch.first, p, width) +
-        static_cast<float>(1.0 - share) * paint(patch.second, p, width);
+    const Vector3f colour = static_cast<float>(share) * paint(patch.first, p, width) +
+                            static_cast<float>(1.0 - share) * paint(patch.second, p, width);
     const double fine = 0.16 * grain(at.position, 0.7, at.footprint_mm, 5) +
                         0.13 * grain(at.position, 1.6, at.footprint_mm, 6) +
                         0.10 * grain(at.position, 4.1, at.footprint_mm, 7);
@@ -89,10 +88,10 @@ class Painted final : public SurfaceColour {
 
  private:
   static Vector3f paint(std::uint64_t patch, const Vector3d& p, double width) {
-    static const std::array<Vector3f, 8> kPalette = {
-        Vector3f(0.72F, 0.16F, 0.08F), Vector3f(0.78F, 0.55F, 0.10F), Vector3f(0.20F, 0.48F, 0.14F),
-        Vector3f(0.80F, 0.74F, 0.60F), Vector3f(0.52F, 0.28F, 0.14F), Vector3f(0.70F, 0.34F, 0.36F),
-        Vector3f(0.40F, 0.50F, 0.38F), Vector3f(0.76F, 0.40F, 0.12F)};
+    static const std::array<Vector3f, 8> kPalette = {Vector3f(0.72F, 0.16F, 0.08F), Vector3f(0.78F, 0.55F, 0.10F),
+                                                     Vector3f(0.20F, 0.48F, 0.14F), Vector3f(0.80F, 0.74F, 0.60F),
+                                                     Vector3f(0.52F, 0.28F, 0.14F), Vector3f(0.70F, 0.34F, 0.36F),
+                                                     Vector3f(0.40F, 0.50F, 0.38F), Vector3f(0.76F, 0.40F, 0.12F)};
     const Vector3f& ground = kPalette[patch % kPalette.size()];
     const Vector3f& figure = kPalette[(patch % kPalette.size() + 1 + (patch >> 8) % 7) % kPalette.size()];
     double share = 0.0;

@@ -42,8 +42,7 @@ std::unique_ptr<SurfaceColour> vertex_colour(std::vector<Eigen::Vector3f> colour
 
 /// An image on the surface. `image`: 8 bit BGR, sRGB. `corners`: texture coordinates of each triangle's corners, (0,0)
 /// at the lower left of the image, repeated outside [0,1]. `triangle_area_mm2`: for the footprint.
-std::unique_ptr<SurfaceColour> image_colour(const cv::Mat& image,
-                                            std::vector<std::array<Eigen::Vector2f, 3>> corners,
+std::unique_ptr<SurfaceColour> image_colour(const cv::Mat& image, std::vector<std::array<Eigen::Vector2f, 3>> corners,
                                             const std::vector<double>& triangle_area_mm2);
 
 }  // namespace scanrig::sim

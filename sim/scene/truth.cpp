@@ -52,19 +52,15 @@ std::string ply(const TriangleMesh& mesh, const Transform& placed) {
 }  // namespace
 
 Result<void> write_calibration(const Scene& scene, const std::filesystem::path& file) {
-  const ordered_json json = {{"format", "scanrig-calibration"},
-                             {"version", 1},
-                             {"date", "2026-11-21T09:00:00Z"},
-                             {"table_radius_mm", profile().table_radius_mm},
-                             {"left", camera(scene.rig().left)},
-                             {"right", camera(scene.rig().right)}};
+  const ordered_json json = {{"format", "scanrig-calibration"},  {"version", 1},
+                             {"date", "2026-11-21T09:00:00Z"},   {"table_radius_mm", profile().table_radius_mm},
+                             {"left", camera(scene.rig().left)}, {"right", camera(scene.rig().right)}};
   return write_file_atomically(file, json.dump(2) + "\n");
 }
 
-Result<void> write_truth(const Scene& scene, const std::vector<std::vector<double>>& angles_deg,
-                         const std::filesystem::path& folder) {
-  const auto& placements = scene.placements();
-  const Transform truth_from_object = placements.front();
+Result<void> write_truth(const Scene& scene, const std::vector<PoseTruth>& poses, const std::filesystem::path& folder) {
+  const auto table_from_object = [&](std::size_t pose) { return scene.placements()[poses[pose].placement]; };
+  const Transform truth_from_object = table_from_object(0);
   ordered_json projector = lens(scene.rig().projector);
   projector["projector_from_turntable"] = to_json(scene.rig().projector.eye_from_turntable);
   ordered_json json = {{"format", "scanrig-truth"},
@@ -78,12 +74,11 @@ Result<void> write_truth(const Scene& scene, const std::vector<std::vector<doubl
                        {"projector", projector},
                        {"table_radius_mm", profile().table_radius_mm},
                        {"poses", ordered_json::array()}};
-  for (std::size_t i = 0; i < placements.size(); ++i) {
-    ordered_json pose = {{"table_from_truth", to_json(placements[i] * truth_from_object.inverse())}};
-    pose["angles_deg"] = i < angles_deg.size() ? angles_deg[i] : std::vector<double>{};
-    json["poses"].push_back(pose);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    json["poses"].push_back({{"table_from_truth", to_json(table_from_object(i) * truth_from_object.inverse())},
+                             {"angles_deg", poses[i].angles_deg}});
   }
-  if (placements.size() > 1) json["pose1_from_pose2"] = to_json(placements[0] * placements[1].inverse());
+  if (poses.size() > 1) json["pose1_from_pose2"] = to_json(table_from_object(0) * table_from_object(1).inverse());
   if (const auto written = write_file_atomically(folder / "truth.ply", ply(scene.object().mesh, truth_from_object));
       !written) {
     return written;

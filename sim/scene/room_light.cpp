@@ -1,4 +1,4 @@
-#include "sim/scene/light.h"
+#include "sim/scene/room_light.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -15,7 +15,8 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-constexpr int kRays = 48;
+constexpr int kVertexRays = 48;   // smoothed over the neighbours afterwards
+constexpr int kTableRays = 400;   // a shadow on an even table shows every step
 constexpr double kReach = 200.0;  // mm; nothing of the object is farther
 constexpr int kGrid = 121;        // nodes across the table
 constexpr double kStep = 1.5;     // mm between them
@@ -23,15 +24,12 @@ constexpr double kStep = 1.5;     // mm between them
 Vector3f rgb(const double* c) { return Eigen::Map<const Vector3d>(c).cast<float>(); }
 
 /// Directions over the hemisphere around +Z, spread evenly under the cosine law.
-const std::array<Vector3d, kRays>& hemisphere() {
-  static const std::array<Vector3d, kRays> directions = [] {
-    std::array<Vector3d, kRays> d;
-    for (int i = 0; i < kRays; ++i) {
-      const double r = std::sqrt((i + 0.5) / kRays), phi = i * std::numbers::pi * (3.0 - std::sqrt(5.0));
-      d[i] = {r * std::cos(phi), r * std::sin(phi), std::sqrt(1.0 - r * r)};
-    }
-    return d;
-  }();
+std::vector<Vector3d> hemisphere(int count) {
+  std::vector<Vector3d> directions;
+  for (int i = 0; i < count; ++i) {
+    const double r = std::sqrt((i + 0.5) / count), phi = i * std::numbers::pi * (3.0 - std::sqrt(5.0));
+    directions.emplace_back(r * std::cos(phi), r * std::sin(phi), std::sqrt(1.0 - r * r));
+  }
   return directions;
 }
 
@@ -44,14 +42,14 @@ Vector3f room(const Vector3d& from, const Vector3d& direction) {
   return table ? Vector3f(0.9F * rgb(p.table_albedo)) : Vector3f(0.5F * rgb(p.backdrop_albedo));
 }
 
-Surroundings gather(const RayCaster& rays, const Transform& object_from_table, const Vector3d& from,
-                    const Vector3d& normal) {
+Surroundings gather(const RayCaster& rays, const Transform& object_from_table, const std::vector<Vector3d>& directions,
+                    const Vector3d& from, const Vector3d& normal) {
   const Vector3f mutual(0.16F, 0.15F, 0.14F);  // light between the object's own parts
   Eigen::Matrix3d frame;
   frame << normal.unitOrthogonal(), normal.cross(normal.unitOrthogonal()), normal;
   Surroundings s;
   int open = 0;
-  for (const auto& d : hemisphere()) {
+  for (const auto& d : directions) {
     const Vector3d direction = frame * d;
     const Vector3d start = from + 0.05 * normal;
     if (rays.blocked(object_from_table * start, object_from_table.linear() * (kReach * direction))) {
@@ -61,8 +59,9 @@ Surroundings gather(const RayCaster& rays, const Transform& object_from_table, c
       ++open;
     }
   }
-  s.ambient /= kRays;
-  s.openness = static_cast<float>(open) / kRays;
+  const auto all = static_cast<float>(directions.size());
+  s.ambient /= all;
+  s.openness = static_cast<float>(open) / all;
   return s;
 }
 
@@ -85,13 +84,14 @@ void smooth(const std::vector<Eigen::Vector3i>& triangles, std::vector<Surroundi
 
 }  // namespace
 
-Light::Light(const Object& object, const RayCaster& rays, const Transform& table_from_object)
+RoomLight::RoomLight(const Object& object, const RayCaster& rays, const Transform& table_from_object)
     : vertices_(object.mesh.vertices.size()), table_(kGrid, kGrid, CV_32F) {
   const Transform object_from_table = table_from_object.inverse();
+  const auto around_vertex = hemisphere(kVertexRays), over_table = hemisphere(kTableRays);
   constexpr std::size_t kChunk = 512;
   parallel_for((vertices_.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
     for (std::size_t i = chunk * kChunk; i < std::min(vertices_.size(), (chunk + 1) * kChunk); ++i) {
-      vertices_[i] = gather(rays, object_from_table, table_from_object * object.mesh.vertices[i],
+      vertices_[i] = gather(rays, object_from_table, around_vertex, table_from_object * object.mesh.vertices[i],
                             table_from_object.linear() * object.normals[i]);
     }
   });
@@ -100,12 +100,12 @@ Light::Light(const Object& object, const RayCaster& rays, const Transform& table
     const int j = static_cast<int>(row);
     for (int i = 0; i < kGrid; ++i) {
       const Vector3d at(kStep * (i - kGrid / 2), 0.0, kStep * (j - kGrid / 2));
-      table_.at<float>(j, i) = gather(rays, object_from_table, at, Vector3d::UnitY()).openness;
+      table_.at<float>(j, i) = gather(rays, object_from_table, over_table, at, Vector3d::UnitY()).openness;
     }
   });
 }
 
-Surroundings Light::on_table(double x, double z) const {
+Surroundings RoomLight::on_table(double x, double z) const {
   const double u = std::clamp(x / kStep + kGrid / 2, 0.0, kGrid - 1.001);
   const double v = std::clamp(z / kStep + kGrid / 2, 0.0, kGrid - 1.001);
   const int i = static_cast<int>(u), j = static_cast<int>(v);
@@ -115,7 +115,7 @@ Surroundings Light::on_table(double x, double z) const {
   return {Vector3f::Constant(0.9F * open + 0.1F * (1.0F - open)), open};
 }
 
-Vector3f Light::irradiance(const Surroundings& surroundings, const Vector3d& normal) {
+Vector3f RoomLight::irradiance(const Surroundings& surroundings, const Vector3d& normal) {
   struct SoftBox {
     Vector3d towards;
     double share;

@@ -18,9 +18,9 @@ struct Surroundings {
 /// The plain exposure's light: a sky that is the same all around, and three large soft boxes that stand in the room.
 /// The sky's part turns with the object, so it is gathered once for each placement: by rays at the mesh's vertices and
 /// on a grid over the table.
-class Light {
+class RoomLight {
  public:
-  Light(const Object& object, const RayCaster& rays, const Transform& table_from_object);
+  RoomLight(const Object& object, const RayCaster& rays, const Transform& table_from_object);
 
   [[nodiscard]] Surroundings at_vertex(int vertex) const { return vertices_[vertex]; }
   /// `x`, `z` in the table's own (turning) frame.
