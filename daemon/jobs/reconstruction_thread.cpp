@@ -9,7 +9,6 @@
 
 #include "daemon/actor_thread.h"
 #include "daemon/jobs/job_store.h"
-#include "daemon/jobs/publish.h"
 
 namespace scanrig {
 
@@ -87,12 +86,10 @@ void ReconstructionThread::handle(const Abandon& message) {
 }
 
 Result<void> ReconstructionThread::make_model() {
-  return publish_folder(model_folder(current_->folder), [this](const std::filesystem::path& folder) {
-    const auto progress = [this](std::string_view stage, double fraction) {
-      tell_progress(std::string(stage), fraction);
-    };
-    return current_->reconstructor->finish(folder, context(progress));
-  });
+  const auto progress = [this](std::string_view stage, double fraction) {
+    tell_progress(std::string(stage), fraction);
+  };
+  return current_->reconstructor->finish(model_folder(current_->folder), context(progress));
 }
 
 void ReconstructionThread::check(const Result<void>& done) {

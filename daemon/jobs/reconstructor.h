@@ -19,7 +19,7 @@ class Reconstructor {
   virtual ~Reconstructor() = default;
   virtual Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context) = 0;
   virtual Result<void> finish_pose(std::size_t pose, const Context& context) = 0;
-  /// Makes the model and writes its files and report.json into `folder`, which is there and empty.
+  /// Makes the model and writes its files and report.json as a whole: after a failure there is no `folder`.
   virtual Result<void> finish(const std::filesystem::path& folder, const Context& context) = 0;
 };
 

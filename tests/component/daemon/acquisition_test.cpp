@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "core/virtual_clock.h"
 #include "tests/component/daemon/fake_rig.h"
 
@@ -31,10 +33,19 @@ TEST_F(AcquisitionTest, AViewIsFourImagesAtTheAngleMeasured) {
 
 TEST_F(AcquisitionTest, TheSecondPoseGoesOnInTheNextTurn) {
   ASSERT_TRUE(acquisition.home());
-  const auto view = acquisition.take_view({"job", 1, 1}, {45.0});
+  for (const double angle : {0.0, 120.0, 240.0}) ASSERT_TRUE(acquisition.take_view({"job", 0, 0}, {angle}));
+  const auto view = acquisition.take_view({"job", 1, 0}, {0.0});
   ASSERT_TRUE(view);
-  EXPECT_EQ(rig.turntable.targets.back(), 405.0);
-  EXPECT_NEAR(view->record.measured_deg, 45.01, 1e-9);
+  EXPECT_EQ(rig.turntable.targets.back(), 360.0);
+  EXPECT_NEAR(view->record.measured_deg, 0.01, 1e-9);
+}
+
+TEST_F(AcquisitionTest, ATableWoundUpByManyJobsIsUnwound) {
+  ASSERT_TRUE(acquisition.home());
+  for (int turn = 0; turn < 20; ++turn) {
+    for (const double angle : {0.0, 120.0, 240.0}) ASSERT_TRUE(acquisition.take_view({"job", 0, 0}, {angle}));
+  }
+  EXPECT_LE(std::ranges::max(rig.turntable.targets), 4 * 360.0);
 }
 
 TEST_F(AcquisitionTest, ALostExposureIsRedoneAndCounted) {

@@ -39,6 +39,7 @@ class FakeReconstructor final : public Reconstructor {
     const std::lock_guard guard(log_.mutex);
     log_.calls.emplace_back("finish");
     if (!log_.answer_to_finish) return log_.answer_to_finish;
+    if (auto made = create_directories_synced(folder); !made) return made;
     if (auto written = write_file_atomically(folder / "model.glb", "glTF"); !written) return written;
     return write_file_atomically(folder / "report.json", "{}");
   }
