@@ -1,0 +1,103 @@
+#include <CLI/CLI.hpp>
+#include <functional>
+
+#include "daemon/ctl/verbs.h"
+
+namespace {
+
+using namespace scanrig;
+using namespace scanrig::ctl;
+
+/// The verb that was asked for; set while the command line is read.
+using Chosen = std::function<ExitCode()>;
+
+void add_client_verbs(CLI::App& app, Connection& connection, Chosen& chosen) {
+  const auto verb = [&](const char* name, const char* about) {
+    auto* sub = app.add_subcommand(name, about);
+    sub->add_option("--socket", connection.socket, "the daemon's socket")->envname("SCANRIG_SOCKET");
+    sub->add_flag("--json", connection.json, "print JSON");
+    return sub;
+  };
+  auto* status = verb("status", "what the station does, why, and what to do next");
+  auto* status_follow = status->add_flag("--follow", "follow the job that has the rig, or the next one, to its end");
+  status->callback([&, status_follow] {
+    chosen = [&, status_follow] { return ctl::status(connection, status_follow->count() > 0); };
+  });
+  auto* start = verb("start", "start a scan; after the flip: continue");
+  auto* start_follow = start->add_flag("--follow", "follow the job to its end");
+  start->callback([&, start_follow] {
+    chosen = [&, start_follow] { return ctl::start(connection, start_follow->count() > 0); };
+  });
+  for (const std::string button : {"stop", "reset"}) {
+    verb(button.c_str(), button == "stop" ? "stop the table and cancel the scan" : "clear a fault and home the table")
+        ->callback([&, button] { chosen = [&, button] { return press(connection, button); }; });
+  }
+  auto* jobs = verb("jobs", "all jobs, or one in detail");
+  auto* id = jobs->add_option("ID", "the job");
+  jobs->callback([&, id] {
+    chosen = [&, id] { return ctl::jobs(connection, id->empty() ? "" : id->as<std::string>()); };
+  });
+}
+
+void add_reconstruct(CLI::App& app, ReconstructVerb& verb, Chosen& chosen) {
+  auto* sub = app.add_subcommand("reconstruct", "make the model of a scan folder");
+  sub->add_option("DIR", verb.scan, "the scan folder")->required();
+  sub->add_option("--out", verb.out, "folder for the model, not there yet (default: DIR/model)");
+  sub->add_option("--threads", verb.options.threads, "threads; 0: all of the machine's")->check(CLI::Range(0, 1024));
+  sub->add_option("--voxel-mm", verb.options.voxel_mm, "size of a voxel")->check(CLI::Range(0.05, 10.0));
+  sub->add_option("--fusion", verb.options.fusion, "how poses are integrated")
+      ->check(CLI::IsMember({"evidence", "paper"}));
+  sub->add_option("--poses", verb.options.poses, "how rests are found")->check(CLI::IsMember({"hull", "egi"}));
+  sub->add_flag("!--no-texture", verb.options.texture, "shape only");
+  sub->callback([&] { chosen = [&] { return reconstruct(verb); }; });
+}
+
+void add_evaluate(CLI::App& app, EvaluateVerb& verb, Chosen& chosen) {
+  auto* sub = app.add_subcommand("evaluate", "compare a model with the truth of a simulated scan");
+  sub->add_option("DIR", verb.scan, "the scan folder, with truth.json")->required();
+  sub->add_option("--model", verb.model, "the model's folder (default: DIR/model)");
+  sub->add_flag("--json", verb.json, "print JSON");
+  sub->callback([&] { chosen = [&] { return evaluate(verb); }; });
+}
+
+void add_import(CLI::App& app, ImportVerb& verb, Chosen& chosen) {
+  auto* sub = app.add_subcommand("import", "make a scan folder from other people's data");
+  sub->require_subcommand(1);
+  auto* stanford = sub->add_subcommand("stanford", "range scans of the Stanford repository");
+  stanford->add_option("CONF", verb.conf, "the .conf file of each pose")->required()->expected(1, 2);
+  stanford->add_option("--out", verb.out, "the scan folder to make")->required();
+  stanford->callback([&] { chosen = [&] { return import_stanford(verb); }; });
+}
+
+void add_check_config(CLI::App& app, CheckConfigVerb& verb, Chosen& chosen) {
+  auto* sub = app.add_subcommand("check-config", "read a rig.toml and tell everything that is wrong with it");
+  sub->add_option("FILE", verb.file, "the configuration")->required();
+  sub->add_option("--drives", verb.drives, "folder of the drive profiles");
+  sub->callback([&] { chosen = [&] { return check_config(verb); }; });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("scanrig: the operator's and engineer's command. Exit codes: docs/exit-codes.md");
+  app.require_subcommand(1);
+  Chosen chosen;
+  Connection connection{.socket = "/run/scanrig/api.sock"};
+  ReconstructVerb reconstruct_verb;
+  EvaluateVerb evaluate_verb;
+  ImportVerb import_verb;
+  CheckConfigVerb check_config_verb;
+  add_client_verbs(app, connection, chosen);
+  add_reconstruct(app, reconstruct_verb, chosen);
+  add_evaluate(app, evaluate_verb, chosen);
+  add_import(app, import_verb, chosen);
+  add_check_config(app, check_config_verb, chosen);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    return static_cast<int>(complain(ExitCode::usage, error.what()));
+  }
+  return static_cast<int>(chosen());
+}
