@@ -16,7 +16,10 @@ constexpr std::array kStates = {"queued",    "scanning", "waiting_for_flip", "sc
                                 "cancelled", "failed"};
 constexpr std::array kSources = {"stereo", "range"};
 
-ordered_json to_json(const FileRecord& file) { return {{"path", file.path}, {"sha256", file.sha256}}; }
+/// A view's file has its place under "path", the calibration under "file".
+ordered_json to_json(const FileRecord& file, const char* key = "path") {
+  return {{key, file.path}, {"sha256", file.sha256}};
+}
 
 ordered_json to_json(const Transform& transform) {
   ordered_json rows = ordered_json::array();
@@ -45,8 +48,8 @@ ordered_json to_json(const ViewRecord& view) {
   return json;
 }
 
-FileRecord read_file_record(JsonObject object) {
-  FileRecord file{object.inner_path("path"), object.sha256("sha256")};
+FileRecord read_file_record(JsonObject object, std::string_view key = "path") {
+  FileRecord file{object.inner_path(key), object.sha256("sha256")};
   object.close();
   return file;
 }
@@ -110,7 +113,7 @@ std::string to_json(const Manifest& manifest) {
                        {"id", manifest.id},          {"created", manifest.created},
                        {"state", manifest.state},    {"source", manifest.source},
                        {"profile", manifest.profile}};
-  if (manifest.calibration) json["calibration"] = to_json(*manifest.calibration);
+  if (manifest.calibration) json["calibration"] = to_json(*manifest.calibration, "file");
   json["poses"] = ordered_json::array();
   for (const PoseRecord& pose : manifest.poses) {
     ordered_json views = ordered_json::array();
@@ -131,7 +134,7 @@ Result<Manifest> read_manifest(const std::filesystem::path& file) {
   manifest.source = root.text("source");
   manifest.profile = root.text("profile");
   if (const auto words = check_words(manifest); !words) root.reject("", words.error().message);
-  if (root.has("calibration")) manifest.calibration = read_file_record(root.object("calibration"));
+  if (root.has("calibration")) manifest.calibration = read_file_record(root.object("calibration"), "file");
   std::set<std::string> names;
   for (JsonObject& pose : root.objects("poses")) {
     manifest.poses.push_back(read_pose(pose, manifest.source == "stereo"));

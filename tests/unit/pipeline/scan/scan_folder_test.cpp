@@ -106,6 +106,34 @@ TEST_F(ScanFolderTest, WhatIsWrittenIsReadBack) {
   EXPECT_EQ(calibration->sha256, manifest.calibration->sha256);
 }
 
+// The example of docs/scan-folder.md, shortened to one view.
+TEST_F(ScanFolderTest, TheDocumentedManifestIsRead) {
+  const std::string zeros(64, '0');
+  std::string text = R"({
+    "format": "scanrig-scan", "version": 1, "id": "20261121-093000-1", "created": "2026-11-21T09:30:00Z",
+    "state": "scanning", "source": "stereo", "profile": "",
+    "calibration": { "file": "calibration.json", "sha256": "HASH" },
+    "poses": [
+      { "name": "pose1", "complete": true,
+        "views": [
+          { "index": 0, "commanded_deg": 0.0, "measured_deg": 0.003, "moving_ms": 0, "settling_ms": 210,
+            "taken": "2026-11-21T09:30:04Z", "pixel_format": "BayerRG8",
+            "files": {
+              "left_pattern":  { "path": "pose1/view00/left_pattern.png",  "sha256": "HASH" },
+              "right_pattern": { "path": "pose1/view00/right_pattern.png", "sha256": "HASH" },
+              "left_plain":    { "path": "pose1/view00/left_plain.png",    "sha256": "HASH" },
+              "right_plain":   { "path": "pose1/view00/right_plain.png",   "sha256": "HASH" } } } ] },
+      { "name": "pose2", "complete": false, "views": [] } ] })";
+  for (auto at = text.find("HASH"); at != std::string::npos; at = text.find("HASH")) text.replace(at, 4, zeros);
+  write_text(folder_ / "scan.json", text);
+  const auto manifest = read_manifest(folder_ / "scan.json");
+  ASSERT_TRUE(manifest) << manifest.error().message;
+  EXPECT_EQ(manifest->calibration->path, "calibration.json");
+  EXPECT_EQ(manifest->poses.at(0).views.at(0).settling_ms, 210.0);
+  write_text(folder_ / "again.json", to_json(*manifest));
+  EXPECT_EQ(to_json(*read_manifest(folder_ / "again.json")), to_json(*manifest));
+}
+
 TEST_F(ScanFolderTest, AnExistingFolderIsNotOverwritten) {
   create();
   const auto again = ScanFolder::create(scan_, {}, {});
