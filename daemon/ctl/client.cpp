@@ -20,9 +20,7 @@ using Answer = tl::expected<nlohmann::json, Refusal>;
 
 constexpr timeval kPatience{.tv_sec = 15, .tv_usec = 0};
 
-Answer unreachable(std::string message) {
-  return tl::unexpected(Refusal{ExitCode::unreachable, std::move(message)});
-}
+Answer unreachable(std::string message) { return tl::unexpected(Refusal{ExitCode::unreachable, std::move(message)}); }
 
 Answer understand(const http::response<http::string_body>& response, const std::string& target) {
   auto json = nlohmann::json::parse(response.body(), nullptr, false);

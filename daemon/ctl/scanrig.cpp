@@ -11,32 +11,31 @@ using namespace scanrig::ctl;
 /// The verb that was asked for; set while the command line is read.
 using Chosen = std::function<ExitCode()>;
 
-void add_client_verbs(CLI::App& app, Connection& connection, Chosen& chosen) {
-  const auto verb = [&](const char* name, const char* about) {
+struct ClientVerb {
+  Connection connection{.socket = "/run/scanrig/api.sock"};
+  bool follow = false;
+  std::string job;
+};
+
+void add_client_verbs(CLI::App& app, ClientVerb& verb, Chosen& chosen) {
+  const auto add = [&](const char* name, const char* about, Chosen run) {
     auto* sub = app.add_subcommand(name, about);
-    sub->add_option("--socket", connection.socket, "the daemon's socket")->envname("SCANRIG_SOCKET");
-    sub->add_flag("--json", connection.json, "print JSON");
+    sub->add_option("--socket", verb.connection.socket, "the daemon's socket")->envname("SCANRIG_SOCKET");
+    sub->add_flag("--json", verb.connection.json, "print JSON");
+    sub->callback([&chosen, run = std::move(run)] { chosen = run; });
     return sub;
   };
-  auto* status = verb("status", "what the station does, why, and what to do next");
-  auto* status_follow = status->add_flag("--follow", "follow the job that has the rig, or the next one, to its end");
-  status->callback([&, status_follow] {
-    chosen = [&, status_follow] { return ctl::status(connection, status_follow->count() > 0); };
-  });
-  auto* start = verb("start", "start a scan; after the flip: continue");
-  auto* start_follow = start->add_flag("--follow", "follow the job to its end");
-  start->callback([&, start_follow] {
-    chosen = [&, start_follow] { return ctl::start(connection, start_follow->count() > 0); };
-  });
-  for (const std::string button : {"stop", "reset"}) {
-    verb(button.c_str(), button == "stop" ? "stop the table and cancel the scan" : "clear a fault and home the table")
-        ->callback([&, button] { chosen = [&, button] { return press(connection, button); }; });
-  }
-  auto* jobs = verb("jobs", "all jobs, or one in detail");
-  auto* id = jobs->add_option("ID", "the job");
-  jobs->callback([&, id] {
-    chosen = [&, id] { return ctl::jobs(connection, id->empty() ? "" : id->as<std::string>()); };
-  });
+  add("status", "what the station does, why, and what to do next", [&] {
+    return status(verb.connection, verb.follow);
+  })->add_flag("--follow", verb.follow, "follow the job that has the rig, or the next one, to its end");
+  add("start", "start a scan; after the flip: continue", [&] {
+    return start(verb.connection, verb.follow);
+  })->add_flag("--follow", verb.follow, "follow the job to its end");
+  add("stop", "stop the table and cancel the scan", [&] { return press(verb.connection, "stop"); });
+  add("reset", "clear a fault and home the table", [&] { return press(verb.connection, "reset"); });
+  add("jobs", "all jobs, or one in detail", [&] {
+    return jobs(verb.connection, verb.job);
+  })->add_option("ID", verb.job, "the job");
 }
 
 void add_reconstruct(CLI::App& app, ReconstructVerb& verb, Chosen& chosen) {
@@ -47,7 +46,7 @@ void add_reconstruct(CLI::App& app, ReconstructVerb& verb, Chosen& chosen) {
   sub->add_option("--voxel-mm", verb.options.voxel_mm, "size of a voxel")->check(CLI::Range(0.05, 10.0));
   sub->add_option("--fusion", verb.options.fusion, "how poses are integrated")
       ->check(CLI::IsMember({"evidence", "paper"}));
-  sub->add_option("--poses", verb.options.poses, "how rests are found")->check(CLI::IsMember({"hull", "egi"}));
+  sub->add_option("--rests", verb.options.rests, "how rests are found")->check(CLI::IsMember({"hull", "egi"}));
   sub->add_flag("!--no-texture", verb.options.texture, "shape only");
   sub->callback([&] { chosen = [&] { return reconstruct(verb); }; });
 }
@@ -82,12 +81,12 @@ int main(int argc, char** argv) {
   CLI::App app("scanrig: the operator's and engineer's command. Exit codes: docs/exit-codes.md");
   app.require_subcommand(1);
   Chosen chosen;
-  Connection connection{.socket = "/run/scanrig/api.sock"};
+  ClientVerb client_verb;
   ReconstructVerb reconstruct_verb;
   EvaluateVerb evaluate_verb;
   ImportVerb import_verb;
   CheckConfigVerb check_config_verb;
-  add_client_verbs(app, connection, chosen);
+  add_client_verbs(app, client_verb, chosen);
   add_reconstruct(app, reconstruct_verb, chosen);
   add_evaluate(app, evaluate_verb, chosen);
   add_import(app, import_verb, chosen);

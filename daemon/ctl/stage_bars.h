@@ -9,9 +9,8 @@
 
 namespace scanrig::ctl {
 
-/// Lines and a bar a stage. On a terminal the running stage's bar is drawn over itself; in a log each stage is one line,
-/// written when it is complete.
-/// Threads: one user at a time.
+/// Lines and a bar a stage. On a terminal the running stage's bar is drawn over itself; in a log each stage is one
+/// line, written when it is complete. Threads: one user at a time.
 class StageBars {
  public:
   StageBars(std::FILE* out, bool terminal) : out_(out), terminal_(terminal) {}

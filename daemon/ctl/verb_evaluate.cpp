@@ -9,8 +9,8 @@ namespace scanrig::ctl {
 namespace {
 
 std::string gate_line(const Gate& gate) {
-  return fmt::format("{:<44} {:>10.4g}  {} {:<8.4g} {}", gate.name, gate.measured, gate.at_most ? "<=" : ">=",
-                     gate.limit, gate.ok() ? "ok" : "NOT REACHED");
+  return fmt::format("{:<44} {:>10.4g}  {} {:<8.4g} {}", gate.name, gate.measured,
+                     gate.at_most ? "<=" : ">=", gate.limit, gate.ok() ? "ok" : "NOT REACHED");
 }
 
 nlohmann::json to_json(const Gate& gate) {
@@ -41,8 +41,8 @@ ExitCode evaluate(const EvaluateVerb& verb) {
   }
   const auto missed = std::ranges::count_if(limits, [](const Gate& gate) { return !gate.ok(); });
   if (missed == 0) return ExitCode::ok;
-  return complain(ExitCode::below_limits, fmt::format("{}: {} of {} limits are not reached", verb.scan.string(), missed,
-                                                      limits.size()));
+  return complain(ExitCode::below_limits,
+                  fmt::format("{}: {} of {} limits are not reached", verb.scan.string(), missed, limits.size()));
 }
 
 }  // namespace scanrig::ctl

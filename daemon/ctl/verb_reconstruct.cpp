@@ -1,12 +1,10 @@
 #include <unistd.h>
 
-#include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "daemon/ctl/stage_bars.h"
 #include "daemon/ctl/verbs.h"
 #include "daemon/signal_stop.h"
-#include "pipeline/scan/model/model_files.h"
 
 namespace scanrig::ctl {
 
@@ -21,15 +19,13 @@ ExitCode reconstruct(const ReconstructVerb& verb) {
 
   const SignalStop stop;
   StageBars bars(stdout, ::isatty(STDOUT_FILENO) == 1);
-  const Context context{stop.token(), [&](std::string_view stage, double fraction) {
-                          bars.update(std::string(stage), fraction);
-                        }};
+  const Context context{stop.token(),
+                        [&](std::string_view stage, double fraction) { bars.update(std::string(stage), fraction); }};
   const auto model = scanrig::reconstruct(*scan, verb.options, context);
   bars.end(model.has_value());
   if (!model) return complain(model.error());
-  const auto written = write_model_files(model->mesh, model->report->dump(2), out);
-  if (!written) return complain(written.error());
-  for (const auto& name : written->names) fmt::print("{}\n", (out / name).string());
+  if (const auto written = write_model(*model, out); !written) return complain(written.error());
+  fmt::print("{}\n{}\n", (out / "model.glb").string(), (out / "report.json").string());
   return ExitCode::ok;
 }
 

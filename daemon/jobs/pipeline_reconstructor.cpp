@@ -1,17 +1,13 @@
 #include "daemon/jobs/pipeline_reconstructor.h"
 
-#include <nlohmann/json.hpp>
 #include <utility>
-
-#include "pipeline/scan/model/model_files.h"
 
 namespace scanrig {
 namespace {
 
 class PipelineReconstructor final : public Reconstructor {
  public:
-  PipelineReconstructor(const Calibration& calibration, const ReconstructOptions& options)
-      : reconstruction_(calibration, options) {}
+  explicit PipelineReconstructor(Reconstruction reconstruction) : reconstruction_(std::move(reconstruction)) {}
 
   Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context) override {
     return reconstruction_.add_view(pose, images, context);
@@ -22,9 +18,7 @@ class PipelineReconstructor final : public Reconstructor {
   Result<void> finish(const std::filesystem::path& folder, const Context& context) override {
     const auto model = reconstruction_.finish(context);
     if (!model) return pass_on(model);
-    const auto written = write_model_files(model->mesh, model->report->dump(2), folder);
-    if (!written) return pass_on(written);
-    return {};
+    return write_model(*model, folder);
   }
 
  private:
@@ -34,8 +28,9 @@ class PipelineReconstructor final : public Reconstructor {
 }  // namespace
 
 ReconstructorFactory pipeline_reconstructor(ReconstructOptions options) {
-  return [options = std::move(options)](const Calibration& calibration) {
-    return std::make_unique<PipelineReconstructor>(calibration, options);
+  return [options = std::move(options)](const Calibration& calibration, const Manifest& manifest) {
+    const ScanIdentity identity{.id = manifest.id, .profile = manifest.profile};
+    return std::make_unique<PipelineReconstructor>(Reconstruction(calibration, options, identity));
   };
 }
 

@@ -39,12 +39,11 @@ void ReconstructionThread::run() {
 void ReconstructionThread::handle(const Begin& message) {
   current_ = Current{.job = message.job, .folder = message.folder};
   told_stage_.clear();
-  const auto calibration = read_calibration(message.folder / "calibration.json");
-  if (calibration) {
-    current_->reconstructor = factory_(*calibration);
-  } else {
-    check(pass_on(calibration));
-  }
+  const auto scan = ScanFolder::open(message.folder);
+  if (!scan) return check(pass_on(scan));
+  const auto calibration = scan->load_calibration();
+  if (!calibration) return check(pass_on(calibration));
+  current_->reconstructor = factory_(*calibration, scan->manifest());
 }
 
 void ReconstructionThread::handle(const AddView& message) {

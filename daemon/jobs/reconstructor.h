@@ -9,6 +9,7 @@
 #include "core/result.h"
 #include "pipeline/calibration/camera.h"
 #include "pipeline/scan/images.h"
+#include "pipeline/scan/manifest.h"
 
 namespace scanrig {
 
@@ -23,6 +24,6 @@ class Reconstructor {
   virtual Result<void> finish(const std::filesystem::path& folder, const Context& context) = 0;
 };
 
-using ReconstructorFactory = std::function<std::unique_ptr<Reconstructor>(const Calibration&)>;
+using ReconstructorFactory = std::function<std::unique_ptr<Reconstructor>(const Calibration&, const Manifest&)>;
 
 }  // namespace scanrig

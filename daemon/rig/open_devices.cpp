@@ -19,6 +19,19 @@ std::string_view name_of(config::ProjectorConfig::Driver driver) {
   return "unknown";
 }
 
+std::string_view name_of(config::StereoCameraConfig::Driver driver) {
+  switch (driver) {
+    case config::StereoCameraConfig::Driver::aravis: return "aravis";
+    case config::StereoCameraConfig::Driver::v4l2: return "v4l2";
+    case config::StereoCameraConfig::Driver::v4l2_side_by_side: return "v4l2-side-by-side";
+  }
+  return "unknown";
+}
+
+std::string_view name_of(config::PanelConfig::Driver driver) {
+  return driver == config::PanelConfig::Driver::gpio ? "gpio" : "modbus-io";
+}
+
 Result<std::unique_ptr<Turntable>> open_turntable(const config::TurntableConfig& config, Clock& clock) {
   auto turntable = ModbusTurntable::create(config.modbus, clock);
   if (!turntable) return pass_on(turntable);
@@ -29,17 +42,26 @@ Result<std::unique_ptr<Projector>> open_projector(const config::ProjectorConfig&
   return not_yet("projector", name_of(config.driver));
 }
 
+Result<std::unique_ptr<StereoCamera>> open_camera(const config::StereoCameraConfig& config) {
+  return not_yet("stereo_camera", name_of(config.driver));
+}
+
+Result<std::unique_ptr<Panel>> open_panel(const config::PanelConfig& config) {
+  return not_yet("panel", name_of(config.driver));
+}
+
 }  // namespace
 
 Result<OpenDevices> open_devices(const config::RigConfig& config, Clock& clock) {
-  OpenDevices open;
   auto turntable = open_turntable(config.turntable, clock);
   if (!turntable) return pass_on(turntable);
-  open.turntable = std::move(*turntable);
   auto projector = open_projector(config.projector);
   if (!projector) return pass_on(projector);
-  open.projector = std::move(*projector);
-  return open;
+  auto camera = open_camera(config.stereo_camera);
+  if (!camera) return pass_on(camera);
+  auto panel = open_panel(config.panel);
+  if (!panel) return pass_on(panel);
+  return OpenDevices{std::move(*turntable), std::move(*projector), std::move(*camera), std::move(*panel)};
 }
 
 }  // namespace scanrig

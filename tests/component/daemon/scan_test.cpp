@@ -25,7 +25,9 @@ class Daemon : public scan_samples::FolderTest {
     options.jobs = {
         .root = folder_ / "jobs", .calibration_file = folder_ / "calibration.json", .profile = {}, .views = 3};
     options.socket = folder_ / "api.sock";
-    options.reconstructor = [this](const Calibration&) { return std::make_unique<fakes::FakeReconstructor>(log); };
+    options.reconstructor = [this](const Calibration&, const Manifest&) {
+      return std::make_unique<fakes::FakeReconstructor>(log);
+    };
   }
   void TearDown() override {
     if (thread.joinable()) shut_down();
