@@ -17,11 +17,11 @@ namespace scanrig {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr std::array<std::uint8_t, 3> kRadii = {7, 10, 15};
 // Noise of neighbouring pixels is correlated (demosaicing, resampling), so that the residual shows too little of it:
 // found from known truth, see README.md. The smoothing's own share is sqrt(4 pi) times its width.
-constexpr float kSharpInflation = 2.0f;
+constexpr float kSharpInflation = 1.7f;
 constexpr float kSmoothInflation = 2.5f;
+const float kConfidence = getenv("KC")?float(atof(getenv("KC"))):2.0f;  // standard deviations
 constexpr double kSmoothing = 0.7;  // px, of the larger windows' images
 
 cv::Mat1f smoothed(const cv::Mat1f& image) {
@@ -101,22 +101,49 @@ struct Side {
            static_cast<double>(patch.sigma) <= options.largest_sigma_px;
   }
 
-  /// Matches with the smallest window that measures well enough, else with the best.
-  [[nodiscard]] DisparityPatch match(int u, int v, const DisparityPatch& start, int iterations) const {
+  /// Whether a larger window's answer is one that the smaller window's noise explains.
+  static bool compatible(const DisparityPatch& small, const DisparityPatch& large) {
+    const float spread = std::sqrt(std::max(0.0f, small.sigma * small.sigma - large.sigma * large.sigma));
+    return std::abs(small.c[0] - large.c[0]) <= kConfidence * spread;
+  }
+
+  [[nodiscard]] DisparityPatch match_sharp(int u, int v, DisparityPatch patch, std::uint8_t radius, int iterations) const {
     WindowOptions window;
     window.iterations = iterations;
-    DisparityPatch best;
-    for (const std::uint8_t radius : kRadii) {
-      if (radius < start.radius) continue;
-      DisparityPatch patch = start;
-      patch.radius = radius;
-      const bool sharp = radius == kRadii.front();
-      if (!sharp) window.curvature_prior = 0.1f;
-      patch = match_window(sharp ? here.sharp : here.smooth, sharp ? there.sharp : there.smooth, mask, u, v, patch, window);
-      patch.sigma *= sharp ? kSharpInflation : kSmoothInflation;
-      if (good(patch) && (!best.valid || patch.sigma < best.sigma)) best = patch;
-      if (best.valid && static_cast<double>(best.sigma) <= options.enough_sigma_px) break;
+    patch.radius = radius;
+    patch = match_window(here.sharp, there.sharp, mask, u, v, patch, window);
+    patch.sigma *= kSharpInflation;
+    return patch;
+  }
+
+  [[nodiscard]] DisparityPatch match_smooth(int u, int v, DisparityPatch patch, std::uint8_t radius, int iterations) const {
+    WindowOptions window;
+    window.iterations = iterations;
+    window.curvature_prior = getenv("CP")?atof(getenv("CP")):0.15f;
+    patch.radius = radius;
+    patch = match_window(here.smooth, there.smooth, mask, u, v, patch, window);
+    patch.sigma *= kSmoothInflation;
+    return patch;
+  }
+
+  /// Matches with the window that suits signal and shape: the smaller of two sharp ones where the larger one's answer is
+  /// outside its confidence (a crease, a step: the rule of intersecting confidence intervals [Katkovnik 1999]), large
+  /// smoothed ones where the signal is low.
+  [[nodiscard]] DisparityPatch match(int u, int v, const DisparityPatch& start, int iterations) const {
+    const double enough = getenv("EN")?atof(getenv("EN")):options.enough_sigma_px;
+    DisparityPatch best = match_sharp(u, v, start, 7, iterations);
+    {
+      const DisparityPatch small = match_sharp(u, v, best.valid ? best : start, 5, iterations);
+      if (good(small) && (!good(best) || !compatible(small, best))) best = small;
     }
+    if (good(best) && double(best.sigma) <= enough) return best;
+    for (const std::uint8_t radius : {std::uint8_t{10}, std::uint8_t{15}}) {
+      const DisparityPatch large = match_smooth(u, v, best.valid ? best : start, radius, iterations);
+      if (!good(large) || (good(best) && (large.sigma >= best.sigma || !compatible(best, large)))) continue;
+      best = large;
+      if (double(best.sigma) <= enough) break;
+    }
+    best.valid = good(best);
     return best;
   }
 
@@ -160,6 +187,21 @@ bool points_back(const DisparityPatch& patch, int u, int v, const Nodes& there, 
   return static_cast<double>(nearest) <= tolerance;
 }
 
+/// Disparities that the other image's disparities confirm; what only one camera sees goes. `towards`: -1 left to right.
+cv::Mat1f confirmed(const cv::Mat1f& here, const cv::Mat1f& there, float towards) {
+  constexpr float kTolerance = 1.5f;  // px
+  cv::Mat1f out(here.size(), kNaN);
+  for (int v = 0; v < here.rows; ++v) {
+    for (int u = 0; u < here.cols; ++u) {
+      const float d = here(v, u);
+      if (std::isnan(d)) continue;
+      const int landing = static_cast<int>(std::lround(static_cast<float>(u) + towards * d));
+      if (landing >= 0 && landing < here.cols && std::abs(there(v, landing) - d) <= kTolerance) out(v, u) = d;
+    }
+  }
+  return out;
+}
+
 cv::Mat1b everywhere(const cv::Mat1b& mask, cv::Size size) { return mask.empty() ? cv::Mat1b(size, 255) : mask; }
 
 }  // namespace
@@ -168,8 +210,11 @@ Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDi
                                        const StereoOptions& options, const Context& context) {
   const cv::Size size = pair.left.size();
   const LayeredImage left(pair.left), right(pair.right);
-  const MatchMask left_mask{everywhere(pair.left_object, size), coarse.left};
-  const MatchMask right_mask{everywhere(pair.right_object, size), cv::Mat1f(cv::Mat(-coarse.right))};
+  const cv::Mat1f coarse_left = getenv("NOLR")?coarse.left:confirmed(coarse.left, coarse.right, -1.0f);
+  cv::Mat1f coarse_right = getenv("NOLR")?coarse.right.clone():confirmed(coarse.right, coarse.left, 1.0f);
+  coarse_right *= -1.0f;  // u_right - u_left, seen from the right
+  const MatchMask left_mask{everywhere(pair.left_object, size), coarse_left};
+  const MatchMask right_mask{everywhere(pair.right_object, size), coarse_right};
   const Side forward{left, right, left_mask, options}, backward{right, left, right_mask, options};
   const Nodes back = backward.match_nodes(3, context);
   context.report("range", 0.4);

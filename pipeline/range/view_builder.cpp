@@ -24,7 +24,7 @@ Result<Silhouette> silhouette_of(const cv::Mat& plain, const RectifyingMap& map,
 
 cv::Mat1b inside(const Silhouette& silhouette) {
   cv::Mat1b mask;
-  cv::compare(silhouette.outside_px, 0.0, mask, cv::CMP_LT);
+  cv::compare(silhouette.outside_px, getenv("IN")?atof(getenv("IN")):-1.5, mask, cv::CMP_LT);
   return mask;
 }
 
@@ -77,7 +77,7 @@ Result<View> make_view(const Rectification& rectification, const StereoImages& i
     cv::compare(view.silhouettes.front().outside_px, 1.0, view.range.background, cv::CMP_GT);
     for (int v = 0; v < view.range.depth.rows; ++v) {
       for (int u = 0; u < view.range.depth.cols; ++u) {
-        if (view.range.background(v, u) != 0) forget(view.range, u, v);
+        if (view.silhouettes.front().outside_px(v, u) > (getenv("ER")?atof(getenv("ER")):-2.5)) forget(view.range, u, v);
       }
     }
   } else {

@@ -1,4 +1,5 @@
 #include "pipeline/texture/render.h"
+#include "pipeline/mesh/solid.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,5 @@
 #include "pipeline/texture/texture.h"
+#include "pipeline/mesh/solid.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -57,7 +57,8 @@ class Field {
  private:
   [[nodiscard]] FieldValue from_evidence(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;
   [[nodiscard]] FieldValue from_class_table(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;
-  [[nodiscard]] float bounds(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;
+  [[nodiscard]] float bounds(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood,
+                             std::size_t views_behind) const;
 
   std::vector<std::vector<RangeEvidence>> views_of_pose_;
   std::vector<Transform> pose_from_model_;
