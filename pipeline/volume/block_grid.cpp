@@ -139,4 +139,28 @@ Result<void> BlockGrid::fill(const Field& field, const std::vector<Eigen::Vector
   return {};
 }
 
+BlockGrid::Block& BlockGrid::store(const Eigen::Vector3i& block, float band_mm) {
+  std::int32_t& slot = slot_[linear(block)];
+  if (slot < 0) {
+    Block& fresh = blocks_.emplace_back();
+    fresh.index = block;
+    fresh.distance.fill(slot == kInside ? -band_mm : band_mm);
+    fresh.support.fill(Support::bounds);
+    slot = static_cast<std::int32_t>(blocks_.size() - 1);
+  }
+  return blocks_[static_cast<std::size_t>(slot)];
+}
+
+void BlockGrid::set(const Eigen::Vector3i& node, float distance, float band_mm) {
+  const auto block_of = [](const Eigen::Vector3i& n) {
+    return n.unaryExpr([](int c) { return c / kSide; }).eval();
+  };
+  for (const auto& face : kFaces) {
+    const Eigen::Vector3i other = block_of(node + face);
+    if (contains(other)) store(other, band_mm);
+  }
+  const Eigen::Vector3i local = node - kSide * block_of(node);
+  store(block_of(node), band_mm).distance[Block::node(local.x(), local.y(), local.z())] = distance;
+}
+
 }  // namespace scanrig
