@@ -53,18 +53,17 @@ std::vector<Pairing> ring_pairings(int views, int reach) {
 }
 
 Matches match(const RangeImage& target, const std::vector<SurfacePoint>& source, const Transform& pose_from_source,
-              const Transform& target_from_pose, double capture_mm) {
+              const Transform& target_from_pose, double capture_mm, const RegistrationOptions& options) {
   constexpr double kMinAgreement = 0.7;  // cosine between the two normals
-  constexpr double kMinFacing = 0.5;     // stereo is biased where it looks along the surface
   const Transform target_from_source = target_from_pose * pose_from_source;
   const Transform pose_from_target = target_from_pose.inverse();
   Matches matches;
   for (const SurfacePoint& s : source) {
-    if (s.facing < kMinFacing) continue;
+    if (s.facing < options.least_facing) continue;
     const Eigen::Vector3d point = target_from_source * s.point;
     const Eigen::Vector3d normal = target_from_source.linear() * s.normal;
     const auto plane = tangent_plane_near(target, point);
-    if (!plane || plane->facing < kMinFacing || plane->normal.dot(normal) < kMinAgreement) continue;
+    if (!plane || plane->facing < options.least_facing || plane->normal.dot(normal) < kMinAgreement) continue;
     if (std::abs(plane->normal.dot(point - plane->point)) > capture_mm) continue;
     matches.push_back({pose_from_source * s.point, pose_from_target * plane->point,
                        pose_from_source.linear() * s.normal, pose_from_target.linear() * plane->normal,
@@ -94,7 +93,8 @@ class Solver {
     std::vector<Matches> matches(pairings_.size());
     parallel_for(pairings_.size(), [&](std::size_t k) {
       const auto [i, j] = pairings_[k];
-      matches[k] = match((*images_)[j], samples_[i], camera_from_pose_[i].inverse(), camera_from_pose_[j], capture_mm);
+      matches[k] =
+          match((*images_)[j], samples_[i], camera_from_pose_[i].inverse(), camera_from_pose_[j], capture_mm, options_);
     });
     return matches;
   }
@@ -307,6 +307,7 @@ RegistrationOptions RegistrationOptions::imported() {
   options.axis_tilt_sigma_deg = options.axis_shift_sigma_mm = 0.0;
   options.pair_bias_mm = 0.02;
   options.capture_mm = 4.0;
+  options.least_facing = 0.25;
   return options;
 }
 
