@@ -12,25 +12,25 @@ namespace {
 constexpr float kOutlierShare = 0.08F;
 constexpr float kOutlierFloor = 0.02F;
 constexpr int kRobustRounds = 2;
-constexpr float kSaturatedSay = 0.01F;
+constexpr float kSaturatedSay = 0.001F;
 constexpr std::size_t kLightSpots = 20000;
 constexpr int kFillRounds = 60;
 
 struct Look {
   Eigen::Vector3f bgr;
-  float weight;
+  float vote, weight;  // as in Sight
 };
 
-/// Middle by weight of each channel: where the majority is, whatever the outliers say.
+/// Middle by votes of each channel: where the majority is, whatever the outliers say.
 Eigen::Vector3f weighted_median(std::vector<Look>& looks) {
   Eigen::Vector3f middle;
   for (int channel = 0; channel < 3; ++channel) {
     std::sort(looks.begin(), looks.end(),
               [&](const Look& a, const Look& b) { return a.bgr[channel] < b.bgr[channel]; });
     float half = 0.0F;
-    for (const Look& look : looks) half += 0.5F * look.weight;
+    for (const Look& look : looks) half += 0.5F * look.vote;
     std::size_t i = 0;
-    for (float sum = looks[0].weight; sum < half && i + 1 < looks.size(); sum += looks[i].weight) ++i;
+    for (float sum = looks[0].vote; sum < half && i + 1 < looks.size(); sum += looks[i].vote) ++i;
     middle[channel] = looks[i].bgr[channel];
   }
   return middle;
@@ -69,8 +69,10 @@ PointColour blend_photos(std::span<const PhotoView> views, const RigLight& light
     if (!sight) continue;
     const Transform& turntable_from_model = view.photo().turntable_from_model;
     const Eigen::Vector3f lit = light.at(turntable_from_model.linear() * normal, turntable_from_model * point);
-    const float say = view.saturated(sight->pixel) ? kSaturatedSay : 1.0F;
-    looks.push_back({view.colour(sight->pixel).cwiseQuotient(lit), say * static_cast<float>(sight->weight)});
+    const Sample sample = view.sample(sight->pixel);
+    const float say = sample.saturated ? kSaturatedSay : 1.0F;
+    looks.push_back({sample.bgr.cwiseQuotient(lit), say * static_cast<float>(sight->vote),
+                     say * static_cast<float>(sight->weight)});
   }
   if (looks.empty()) return {};
 
@@ -103,12 +105,11 @@ RigLight light_from_photos(std::span<const PhotoView> views, const Mesh& mesh,
     std::vector<LightSample> spot;
     for (const PhotoView& view : views) {
       const auto sight = view.look(point, normal);
-      if (!sight || view.saturated(sight->pixel)) continue;
+      if (!sight) continue;
+      const Sample sample = view.sample(sight->pixel);
+      if (sample.saturated || sample.bgr.minCoeff() <= kOutlierFloor) continue;
       const Transform& turntable_from_model = view.photo().turntable_from_model;
-      const Eigen::Vector3f bgr = view.colour(sight->pixel);
-      if (bgr.minCoeff() <= kOutlierFloor) continue;
-      spot.push_back(
-          {turntable_from_model.linear() * normal, turntable_from_model * point, bgr, std::sqrt(sight->weight)});
+      spot.push_back({turntable_from_model.linear() * normal, turntable_from_model * point, sample.bgr, sight->vote});
     }
     spots.push_back(std::move(spot));
   }
