@@ -11,7 +11,7 @@ namespace {
 /// Difference from the majority at which a photo has lost half of its say, relative to the colour, and in full scale.
 constexpr float kOutlierShare = 0.08F;
 constexpr float kOutlierFloor = 0.02F;
-constexpr int kRobustRounds = 2;
+constexpr std::array<float, 4> kOutlierWidths = {4.0F, 2.0F, 1.0F, 1.0F};
 constexpr float kSaturatedSay = 0.001F;
 constexpr std::size_t kLightSpots = 20000;
 constexpr int kFillRounds = 60;
@@ -20,21 +20,6 @@ struct Look {
   Eigen::Vector3f bgr;
   float vote, weight;  // as in Sight
 };
-
-/// Middle by votes of each channel: where the majority is, whatever the outliers say.
-Eigen::Vector3f weighted_median(std::vector<Look>& looks) {
-  Eigen::Vector3f middle;
-  for (int channel = 0; channel < 3; ++channel) {
-    std::sort(looks.begin(), looks.end(),
-              [&](const Look& a, const Look& b) { return a.bgr[channel] < b.bgr[channel]; });
-    float half = 0.0F;
-    for (const Look& look : looks) half += 0.5F * look.vote;
-    std::size_t i = 0;
-    for (float sum = looks[0].vote; sum < half && i + 1 < looks.size(); sum += looks[i].vote) ++i;
-    middle[channel] = looks[i].bgr[channel];
-  }
-  return middle;
-}
 
 /// The vertices that share an edge with each vertex, as offsets into one list.
 struct Neighbours {
@@ -76,19 +61,25 @@ PointColour blend_photos(std::span<const PhotoView> views, const RigLight& light
   }
   if (looks.empty()) return {};
 
-  Eigen::Vector3f best = weighted_median(looks);
+  Eigen::Vector3f best = Eigen::Vector3f::Zero();
+  float votes = 0.0F;
   float weight = 0.0F;
-  for (int round = 0; round < kRobustRounds; ++round) {
-    const float limit = kOutlierFloor + kOutlierShare * best.maxCoeff();
+  for (const Look& look : looks) {
+    best += look.vote * look.bgr;
+    votes += look.vote;
+    weight += look.weight;
+  }
+  best /= votes;
+  // From wide to narrow, so that the majority is found without a jump anywhere on the surface.
+  for (const float width : kOutlierWidths) {
+    const float limit = width * (kOutlierFloor + kOutlierShare * best.maxCoeff());
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
     float say = 0.0F;
-    weight = 0.0F;
     for (const Look& look : looks) {
       const float off = (look.bgr - best).squaredNorm() / (limit * limit);
-      const float w = look.weight / ((1.0F + off) * (1.0F + off));
+      const float w = (width > 1.0F ? look.vote : look.weight) / ((1.0F + off) * (1.0F + off));
       sum += w * look.bgr;
       say += w;
-      weight += look.weight;
     }
     best = sum / say;
   }
