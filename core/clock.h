@@ -24,9 +24,40 @@ class Clock {
 
   virtual void notify_all(std::condition_variable& changed) = 0;
 
+  /// Held by a thread for as long as it runs: a virtual clock moves only while every actor waits in it.
+  /// Whoever starts the thread holds a Busy until the thread has its Actor. Nothing on a real clock.
+  class Actor {
+   public:
+    explicit Actor(Clock& clock) : clock_(clock) { clock_.enter(); }
+    ~Actor() { clock_.leave(); }
+    Actor(const Actor&) = delete;
+    Actor& operator=(const Actor&) = delete;
+
+   private:
+    Clock& clock_;
+  };
+
+  /// Holds a virtual clock still, for work that must cost no time. May pass to another thread.
+  class Busy {
+   public:
+    explicit Busy(Clock& clock) : clock_(clock) { clock_.hold(); }
+    ~Busy() { clock_.release(); }
+    Busy(const Busy&) = delete;
+    Busy& operator=(const Busy&) = delete;
+
+   private:
+    Clock& clock_;
+  };
+
   /// Sleeps; for devices' physics, never to wait for somebody else's result.
   void sleep_until(TimePoint until);
   void sleep_for(Duration duration) { sleep_until(now() + duration); }
+
+ private:
+  virtual void enter() {}
+  virtual void leave() {}
+  virtual void hold() {}
+  virtual void release() {}
 };
 
 class RealClock final : public Clock {

@@ -28,6 +28,13 @@ std::string_view to_string(ErrorCode code) {
   return "unknown";
 }
 
+std::optional<ErrorCode> parse_error_code(std::string_view name) {
+  for (int i = 0; i <= static_cast<int>(ErrorCode::internal); ++i) {
+    if (to_string(static_cast<ErrorCode>(i)) == name) return static_cast<ErrorCode>(i);
+  }
+  return std::nullopt;
+}
+
 Error Error::in(std::string_view who) const { return Error{code, fmt::format("{}: {}", who, message)}; }
 
 ExitCode exit_code(ErrorCode code) {

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
@@ -34,6 +35,7 @@ enum class ErrorCode {
 };
 
 std::string_view to_string(ErrorCode code);
+std::optional<ErrorCode> parse_error_code(std::string_view name);  ///< of the words of to_string()
 
 struct Error {
   ErrorCode code = ErrorCode::internal;

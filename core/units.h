@@ -13,6 +13,16 @@ struct Degrees {
   friend Degrees operator-(Degrees a, Degrees b) { return {a.value - b.value}; }
 };
 
+struct DegreesPerSecond {
+  double value = 0.0;
+  auto operator<=>(const DegreesPerSecond&) const = default;
+};
+
+struct DegreesPerSecond2 {
+  double value = 0.0;
+  auto operator<=>(const DegreesPerSecond2&) const = default;
+};
+
 constexpr double to_radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 constexpr double to_radians(Degrees angle) { return to_radians(angle.value); }
 constexpr double to_degrees(double radians) { return radians * 180.0 / std::numbers::pi; }

@@ -1,22 +1,32 @@
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
+#include <string>
 
 #include "core/context.h"
 #include "core/result.h"
 #include "pipeline/calibration/camera.h"
 #include "pipeline/mesh/mesh.h"
+#include "pipeline/range/range_image.h"
+#include "pipeline/scan/images.h"
 #include "pipeline/scan/scan_folder.h"
 
 namespace scanrig {
 
 struct ReconstructOptions {
-  double voxel_mm = 0.25;
+  double voxel_mm = 0.25;           ///< of the model; partial models for finding the pose are coarser
   int threads = 0;                  ///< 0: all of the machine's; the result is the same for any number
   std::string fusion = "evidence";  ///< `evidence`, or `paper` for the class table as published
-  std::string poses = "hull";       ///< `hull`, or `egi` for the paper's tessellated sphere
+  std::string rests = "hull";       ///< `hull`, or `egi` for the paper's tessellated sphere
   bool texture = true;
+};
+
+/// Where the data come from, for the report.
+struct ScanIdentity {
+  std::string id;
+  std::string profile;  ///< hash of the simulated sensor's profile; empty for a real rig
 };
 
 /// What a scan becomes.
@@ -31,22 +41,24 @@ struct Model {
 class Reconstruction {
  public:
   /// A stereo scan.
-  Reconstruction(Calibration calibration, ReconstructOptions options);
+  Reconstruction(Calibration calibration, ReconstructOptions options, ScanIdentity identity);
+  /// A scan of imported range images: no calibration, no silhouettes, no colour.
+  Reconstruction(ReconstructOptions options, ScanIdentity identity);
   ~Reconstruction();
   Reconstruction(Reconstruction&&) noexcept;
   Reconstruction& operator=(Reconstruction&&) noexcept;
 
-  /// Range image and silhouettes of one view. `pose` is 0 or 1. Fails with `invalid_input`, `degenerate` (nothing
-  /// seen), `out_of_range` (the object is larger than the working volume), `stopped`.
+  /// Range image and silhouettes of one view. `pose` is 0 or 1. Fails with `invalid_input` (options, sizes),
+  /// `degenerate` (nothing seen), `out_of_range` (the object is larger than the working volume), `stopped`.
   Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context);
-  /// An imported range image.
-  Result<void> add_range_view(std::size_t pose, const ViewRecord& record, RangeImage range, const Context& context);
+  /// An imported range image, placed in its pose.
+  Result<void> add_range_view(std::size_t pose, int index, double angle_rad, RangeImage range, const Context& context);
 
   /// Registers the pose's views and makes its partial model. Fails with `degenerate`, `no_overlap`, `stopped`.
   Result<void> finish_pose(std::size_t pose, const Context& context);
 
-  /// Pose 2 into pose 1, integration, texture. Fails with `same_rest`, `ambiguous`, `no_overlap`, `degenerate`,
-  /// `stopped`.
+  /// Pose 2 into pose 1, integration, texture; with one pose, its own complete model. Every pose is finished before.
+  /// Fails with `same_rest`, `ambiguous`, `no_overlap`, `degenerate`, `stopped`.
   Result<Model> finish(const Context& context);
 
  private:
@@ -54,7 +66,11 @@ class Reconstruction {
   std::unique_ptr<State> state_;
 };
 
-/// The whole of a scan folder, from the files. Same input and options, same bits.
+/// The whole of a scan folder, from its files. Same input and options, same bits. Fails as the stages and the files do;
+/// `invalid_input` too for a scan whose views are not all there.
 Result<Model> reconstruct(const ScanFolder& scan, const ReconstructOptions& options, const Context& context);
+
+/// Mesh, texture and report.json into `folder` (made or replaced as a whole). Fails with `io`.
+Result<void> write_model(const Model& model, const std::filesystem::path& folder);
 
 }  // namespace scanrig

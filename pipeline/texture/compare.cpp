@@ -8,6 +8,57 @@
 #include <vector>
 
 namespace scanrig {
+namespace {
+
+constexpr double kNoise = 2.0;  // grey levels
+constexpr int kRounds = 10;
+constexpr double kSettled = 1e-3;  // px
+
+/// A piece of the rendering with what placing it by least squares needs.
+class Patch {
+ public:
+  Patch(const cv::Mat1f& grey, const cv::Mat1f& window) : window_(window) {
+    cv::subtract(grey, cv::mean(grey), grey_);
+    cv::Mat1f dx, dy;
+    cv::Sobel(grey_, dx, CV_32F, 1, 0, 3, 1.0 / 8.0);
+    cv::Sobel(grey_, dy, CV_32F, 0, 1, 3, 1.0 / 8.0);
+    wx_ = dx.mul(window);
+    wy_ = dy.mul(window);
+    normal_ = {wx_.dot(dx), wx_.dot(dy), wx_.dot(dy), wy_.dot(dy)};
+  }
+
+  /// Of its place along the direction in which it is placed worst.
+  [[nodiscard]] double sigma() const {
+    const double half = 0.5 * (normal_(0, 0) + normal_(1, 1));
+    const double least = half - std::sqrt(std::max(0.0, half * half - cv::determinant(normal_)));
+    return kNoise / std::sqrt(std::max(least, 1e-9));
+  }
+
+  /// Where it lies in `photo`, against `centre`: the whole pixels by phase correlation, the fraction by least squares
+  /// on the grey levels, whose means may differ.
+  [[nodiscard]] cv::Point2d shift(cv::Point2f centre, const cv::Mat1f& photo) const {
+    cv::Mat1f there;
+    cv::getRectSubPix(photo, grey_.size(), centre, there);
+    cv::subtract(there, cv::mean(there), there);
+    const cv::Point2d start = cv::phaseCorrelate(grey_, there, window_);
+    cv::Point2d shift = start;
+    for (int round = 0; round < kRounds; ++round) {
+      cv::getRectSubPix(photo, grey_.size(), centre + cv::Point2f(shift), there);
+      cv::subtract(there, cv::mean(there), there);
+      cv::subtract(grey_, there, there);
+      const cv::Vec2d step = normal_.inv() * cv::Vec2d(wx_.dot(there), wy_.dot(there));
+      shift += cv::Point2d(step);
+      if (cv::norm(step) < kSettled) break;
+    }
+    return cv::norm(shift - start) < 2.0 ? shift : start;
+  }
+
+ private:
+  cv::Mat1f window_, grey_, wx_, wy_;
+  cv::Matx22d normal_;
+};
+
+}  // namespace
 
 Result<Comparison> compare_images(const cv::Mat3b& rendered, const cv::Mat3b& photo, const cv::Mat1b& mask,
                                   const ComparisonOptions& options) {
@@ -25,9 +76,15 @@ Result<Comparison> compare_images(const cv::Mat3b& rendered, const cv::Mat3b& ph
   const double difference = cv::norm(rendered, photo, cv::NORM_L2, inside);
   result.psnr_db = 20.0 * std::log10(255.0 / std::max(1e-6, difference / std::sqrt(3.0 * pixels)));
 
-  cv::Mat1b grey_rendered, grey_photo;
-  cv::cvtColor(rendered, grey_rendered, cv::COLOR_BGR2GRAY);
-  cv::cvtColor(photo, grey_photo, cv::COLOR_BGR2GRAY);
+  const auto grey = [](const cv::Mat3b& image) {
+    cv::Mat3f fine;
+    cv::Mat1f one;
+    image.convertTo(fine, CV_32F);
+    cv::cvtColor(fine, one, cv::COLOR_BGR2GRAY);
+    return one;
+  };
+  const cv::Mat1f grey_rendered = grey(rendered);
+  const cv::Mat1f grey_photo = grey(photo);
   cv::Mat1f window;
   const cv::Size patch(options.patch_px, options.patch_px);
   cv::createHanningWindow(window, patch, CV_32F);
@@ -36,14 +93,11 @@ Result<Comparison> compare_images(const cv::Mat3b& rendered, const cv::Mat3b& ph
     for (int x = 0; x + patch.width <= photo.cols; x += patch.width / 2) {
       const cv::Rect at(cv::Point(x, y), patch);
       if (cv::countNonZero(inside(at)) < at.area()) continue;
-      cv::Scalar mean, deviation;
-      cv::meanStdDev(grey_photo(at), mean, deviation);
-      if (deviation[0] < options.least_contrast) continue;
-      cv::Mat1f a, b;
-      grey_rendered(at).convertTo(a, CV_32F, 1.0, -cv::mean(grey_rendered(at))[0]);
-      grey_photo(at).convertTo(b, CV_32F, 1.0, -mean[0]);
-      const cv::Point2d shift = cv::phaseCorrelate(a, b, window);
-      offsets.push_back(std::hypot(shift.x, shift.y));
+      const Patch piece(grey_rendered(at), window);
+      if (piece.sigma() > options.patch_sigma_px) continue;
+      const cv::Point2f centre(static_cast<float>(x + 0.5 * (patch.width - 1)),
+                               static_cast<float>(y + 0.5 * (patch.height - 1)));
+      offsets.push_back(cv::norm(piece.shift(centre, grey_photo)));
     }
   }
   std::sort(offsets.begin(), offsets.end());

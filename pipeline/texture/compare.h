@@ -7,15 +7,17 @@
 namespace scanrig {
 
 struct ComparisonOptions {
-  int erosion_px = 6;           ///< of the mask: outlines are another matter than texture
-  int patch_px = 48;            ///< side of the patches whose shift is measured, half overlapping
-  double least_contrast = 4.0;  ///< grey levels of deviation: below it a patch says nothing about its place
+  int erosion_px = 6;  ///< of the mask: outlines are another matter than texture
+  int patch_px = 48;   ///< side of the patches whose shift is measured, half overlapping
+  /// Patches that grey levels with a noise of 2 could not place better than this (of little structure, or structure in
+  /// one direction only) say nothing and are left out.
+  double patch_sigma_px = 0.05;
 };
 
 /// How a rendering differs from a photo of the same thing.
 struct Comparison {
   double psnr_db = 0.0;           ///< over all channels inside the eroded mask
-  double median_offset_px = 0.0;  ///< of the patches, by phase correlation; NaN without patches of enough contrast
+  double median_offset_px = 0.0;  ///< of the patches; NaN without patches of enough structure
   double p95_offset_px = 0.0;
   int patches = 0;
 };

@@ -68,9 +68,9 @@ PointColour blend_photos(std::span<const PhotoView> views, const RigLight& light
     const auto sight = view.look(point, normal);
     if (!sight) continue;
     const Transform& turntable_from_model = view.photo().turntable_from_model;
-    const double lit = light.at(turntable_from_model.linear() * normal, turntable_from_model * point);
+    const Eigen::Vector3f lit = light.at(turntable_from_model.linear() * normal, turntable_from_model * point);
     const float say = view.saturated(sight->pixel) ? kSaturatedSay : 1.0F;
-    looks.push_back({view.colour(sight->pixel) / static_cast<float>(lit), say * static_cast<float>(sight->weight)});
+    looks.push_back({view.colour(sight->pixel).cwiseQuotient(lit), say * static_cast<float>(sight->weight)});
   }
   if (looks.empty()) return {};
 
@@ -105,10 +105,10 @@ RigLight light_from_photos(std::span<const PhotoView> views, const Mesh& mesh,
       const auto sight = view.look(point, normal);
       if (!sight || view.saturated(sight->pixel)) continue;
       const Transform& turntable_from_model = view.photo().turntable_from_model;
-      const double brightness = view.colour(sight->pixel).mean();
-      if (brightness <= kOutlierFloor) continue;
+      const Eigen::Vector3f bgr = view.colour(sight->pixel);
+      if (bgr.minCoeff() <= kOutlierFloor) continue;
       spot.push_back(
-          {turntable_from_model.linear() * normal, turntable_from_model * point, brightness, std::sqrt(sight->weight)});
+          {turntable_from_model.linear() * normal, turntable_from_model * point, bgr, std::sqrt(sight->weight)});
     }
     spots.push_back(std::move(spot));
   }

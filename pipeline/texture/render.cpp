@@ -1,4 +1,5 @@
 #include "pipeline/texture/render.h"
+#include "pipeline/mesh/solid.h"
 
 #include <algorithm>
 #include <cmath>
@@ -98,8 +99,8 @@ Result<Rendering> MeshRenderer::render(const Camera& camera, const Transform& tu
     const Eigen::Vector3f colour = paint(hit, options.surface);
     if (!options.as_photo) return colour;
     const Eigen::Vector3d point = turntable_from_model * (centre + hit.distance * ray);
-    const double lit = options.as_photo->light.at(turntable_from_model.linear() * n, point) / options.as_photo->gain;
-    return colour * static_cast<float>(lit);
+    const Eigen::Vector3f lit = options.as_photo->light.at(turntable_from_model.linear() * n, point);
+    return colour.cwiseProduct(lit) / static_cast<float>(options.as_photo->gain);
   };
 
   const cv::Size size(camera.projection.width, camera.projection.height);

@@ -1,6 +1,5 @@
 #include "pipeline/texture/shading.h"
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -27,16 +26,6 @@ Eigen::Vector3f from_srgb(const cv::Vec3b& encoded) {
     return values;
   }();
   return {table[encoded[0]], table[encoded[1]], table[encoded[2]]};
-}
-
-std::vector<Eigen::Vector3f> vertex_normals(const Mesh& mesh) {
-  std::vector<Eigen::Vector3f> normals(mesh.vertices.size(), Eigen::Vector3f::Zero());
-  for (const auto& [a, b, c] : mesh.faces) {
-    const Eigen::Vector3f across = (mesh.vertices[b] - mesh.vertices[a]).cross(mesh.vertices[c] - mesh.vertices[a]);
-    for (const auto v : {a, b, c}) normals[v] += across;
-  }
-  for (auto& n : normals) n = n.squaredNorm() > 0.0F ? Eigen::Vector3f(n.normalized()) : Eigen::Vector3f::UnitY();
-  return normals;
 }
 
 }  // namespace scanrig

@@ -1,4 +1,5 @@
 #include "pipeline/texture/texture.h"
+#include "pipeline/mesh/solid.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -75,6 +76,13 @@ double gain_for(const std::vector<PointColour>& colours) {
       brightest.begin() + static_cast<std::ptrdiff_t>(kWhiteShare * static_cast<double>(brightest.size() - 1));
   std::nth_element(brightest.begin(), white, brightest.end());
   return std::min(kMostGain, kWhite / std::max(1e-3, static_cast<double>(*white)));
+}
+
+/// What texels that no face owns show: harmless where a viewer's coarser levels reach beyond the padding.
+Eigen::Vector3f mean_colour(const std::vector<PointColour>& colours) {
+  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  for (const auto& c : colours) sum += c.bgr;
+  return sum / static_cast<float>(colours.size());
 }
 
 /// Colour of the texel (x, y), which `face` owns.
@@ -164,8 +172,7 @@ Result<TexturedModel> texture_mesh(const Mesh& mesh, std::span<const Photo> phot
   context.report("texture", 0.6);
   if (context.stopped()) return fail(ErrorCode::stopped, "texture: stopped");
 
-  const auto& unused = out.colour.front();
-  model.mesh.atlas = cv::Mat3b(options.atlas_px, options.atlas_px, cv::Vec3b(unused[2], unused[1], unused[0]));
+  model.mesh.atlas = cv::Mat3b(options.atlas_px, options.atlas_px, to_srgb(gain * mean_colour(colours)));
   parallel_for(static_cast<std::size_t>(options.atlas_px), [&](std::size_t row) {
     const int y = static_cast<int>(row);
     for (int x = 0; x < options.atlas_px; ++x) {

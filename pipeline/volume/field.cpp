@@ -114,8 +114,9 @@ FieldValue Field::from_evidence(const Eigen::Vector3f& point, const Neighbourhoo
     const float limit = neighbourhood.hull.distance(point) - hull_tolerance_;
     return {std::clamp(std::max(sum / weight, limit), -band_, band_), Support::measured};
   }
-  if (is_free) return {band_, Support::free};
-  return {std::clamp(bounds(point, neighbourhood), -band_, band_), Support::bounds};
+  const float outside = std::clamp(bounds(point, neighbourhood), -band_, band_);
+  if (is_free) return {outside > 0.0F ? outside : band_, Support::free};  // the hull knows better how far outside
+  return {outside, Support::bounds};
 }
 
 /// The class and D of one pose from its N0 = N/2 views nearest in azimuth to the outward direction.

@@ -10,6 +10,7 @@
 #include "pipeline/volume/field.h"
 #include "pipeline/volume/hull.h"
 #include "pipeline/volume/marching_cubes.h"
+#include "pipeline/volume/relax.h"
 #include "pipeline/volume/surface.h"
 
 namespace scanrig {
@@ -175,6 +176,7 @@ Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions
   BlockGrid grid(box, static_cast<float>(options.voxel_mm));
   if (auto ok = grid.fill(field, prepared.seeds, context); !ok) return pass_on(ok);
   report.active_voxels = grid.blocks().size() * BlockGrid::kNodes;
+  relax_unmeasured(grid, field.band());
   context.report("volume", 0.7);
 
   const Mesh all = extract_surface(grid);

@@ -60,7 +60,7 @@ std::array<int, 12> polygon_links(int inside) {
       while (!is_inside(last + 1)) ++last;
       const int enters = edge_between(corners[i], corners[(i + 1) % 4]);
       const int leaves = edge_between(corners[last % 4], corners[(last + 1) % 4]);
-      next[enters] = leaves;
+      next[leaves] = enters;
     }
   }
   return next;

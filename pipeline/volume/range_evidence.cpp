@@ -11,11 +11,11 @@ namespace {
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kSteepest = 0.2F;      // cosine of incidence (78 deg) beyond which a range pixel is not believed
 constexpr float kFinestSigma = 0.001F;  // mm; keeps the weights of noise-free data finite
-constexpr int kSpeckPixels = 16;       // a patch smaller than this is noise
 constexpr float kFadePixels = 8.0F;    // weights fade over the last pixels before an edge
 constexpr float kFootprintGapMm = 3.0F;     // gaps up to twice this are bridged in a footprint
 constexpr float kFootprintMarginMm = 1.0F;  // range images lose this much at a limb
 constexpr int kTile = 16;
+constexpr int kBeside[4][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
 constexpr int kNeighbours[8][2] = {{-1, -1}, {0, -1}, {1, -1}, {-1, 0}, {1, 0}, {-1, 1}, {0, 1}, {1, 1}};
 
 }  // namespace
@@ -30,10 +30,11 @@ RangeEvidence::RangeEvidence(const RangeImage& range, const Transform& model_fro
   crop(range);
   make_planes(range);
   close_pinholes();
-  drop_specks_and_fade_edges();
+  const int voxel_pixels = std::max(1, static_cast<int>(std::ceil(voxel_mm / mm_per_pixel())));
+  drop_specks_and_fade_edges(voxel_pixels);
   make_tiles();
   if (!knows_background_) make_footprint();
-  erode_free_depth(std::max(1, static_cast<int>(std::ceil(voxel_mm / mm_per_pixel()))));
+  erode_free_depth(voxel_pixels);
 }
 
 /// Everything outside the crop is background, or everything is unknown.
@@ -155,36 +156,30 @@ void RangeEvidence::close_pinholes() {
   }
 }
 
-void RangeEvidence::drop_specks_and_fade_edges() {
-  cv::Mat1b inner(height_, width_, uchar{0});
-  std::vector<bool> seen(pixels_.size());
-  std::vector<int> patch;
-  for (int start = 0; start < width_ * height_; ++start) {
-    if (seen[start] || pixels_[start].state != State::surface) continue;
-    patch.assign(1, start);
-    seen[start] = true;
-    for (std::size_t next = 0; next < patch.size(); ++next) {
-      const int x = patch[next] % width_, y = patch[next] / width_;
-      int joined = 0;
-      for (const auto& [dx, dy] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
-        const int nx = x + dx, ny = y + dy;
-        if (nx < 0 || ny < 0 || nx >= width_ || ny >= height_ || pixel(nx, ny).state != State::surface) continue;
-        if (!one_surface(x, y, nx, ny)) continue;
-        ++joined;
-        const int index = ny * width_ + nx;
-        if (!seen[index]) patch.push_back(index);
-        seen[index] = true;
-      }
-      if (joined == 4) inner(y, x) = 255;
-    }
-    if (patch.size() >= kSpeckPixels) continue;
-    for (const int index : patch) pixels_[index] = Pixel{};
-  }
+/// Patches and strips too narrow to span a few voxels go: the free space in front of them would be a thread that voxels
+/// resolve into beads and loops. Weights of the rest fade towards the edges.
+void RangeEvidence::drop_specks_and_fade_edges(int radius) {
   if (pixels_.empty()) return;
-  cv::Mat1f to_edge;
+  cv::Mat1b inner(height_, width_, uchar{0});
+  for (int y = 1; y + 1 < height_; ++y) {
+    for (int x = 1; x + 1 < width_; ++x) {
+      if (pixel(x, y).state != State::surface) continue;
+      const bool joined = std::all_of(std::begin(kBeside), std::end(kBeside), [&](const auto& step) {
+        return pixel(x + step[0], y + step[1]).state == State::surface && one_surface(x, y, x + step[0], y + step[1]);
+      });
+      if (joined) inner(y, x) = 255;
+    }
+  }
+  cv::Mat1f to_edge, to_core;
   cv::distanceTransform(inner, to_edge, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+  cv::distanceTransform(to_edge < static_cast<float>(radius), to_core, cv::DIST_L2, cv::DIST_MASK_PRECISE);
   for (int y = 0; y < height_; ++y) {
-    for (int x = 0; x < width_; ++x) pixel(x, y).weight *= std::min(1.0F, (1.0F + to_edge(y, x)) / kFadePixels);
+    for (int x = 0; x < width_; ++x) {
+      Pixel& p = pixel(x, y);
+      if (p.state != State::surface) continue;
+      if (to_core(y, x) > static_cast<float>(radius) + 1.0F) p = Pixel{};
+      p.weight *= std::min(1.0F, (1.0F + to_edge(y, x)) / kFadePixels);
+    }
   }
 }
 

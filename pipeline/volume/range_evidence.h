@@ -68,7 +68,7 @@ class RangeEvidence {
   void crop(const RangeImage& range);
   void make_planes(const RangeImage& range);
   void close_pinholes();
-  void drop_specks_and_fade_edges();
+  void drop_specks_and_fade_edges(int radius);
   void erode_free_depth(int radius);
   void make_footprint();
   void make_tiles();

@@ -16,8 +16,9 @@ namespace scanrig::sim {
 
 struct SimRigOptions {
   std::filesystem::path object;  ///< OBJ, PLY or GLB; empty: the built-in figurine
-  double height_mm = 100.0;      ///< the object is scaled so that its bounding cylinder is this high in its own up axis
-  std::uint64_t seed = 1;        ///< placements, sensor noise, table errors
+  double height_mm =
+      100.0;               ///< largest extent of the object: its bounding cylinder, along its longest way, is this high
+  std::uint64_t seed = 1;  ///< placements, sensor noise, table errors
   int poses = 2;
   double image_scale = 1.0;      ///< 0.25 gives 320x240 with the same field of view, for fast tests
   bool same_rest_twice = false;  ///< the operator forgets to turn the object over
@@ -28,7 +29,8 @@ struct SimRigOptions {
 /// Threads: each device as its interface says; the operator's functions may be called from any thread.
 class SimRig {
  public:
-  /// Fails with `invalid_input` (the mesh cannot be used, or is larger than the working volume), `not_found`.
+  /// Fails with `invalid_input` (the mesh cannot be used, or is larger than the working volume), `not_found`,
+  /// `unsupported` (the kind of file), `degenerate` (no two rests to lie on), `out_of_range` (image_scale, poses).
   static Result<std::unique_ptr<SimRig>> create(const SimRigOptions& options, Clock& clock);
   virtual ~SimRig() = default;
 
@@ -51,7 +53,8 @@ class SimRig {
 
   /// The calibration of docs/scan-folder.md, exact.
   virtual Result<void> write_calibration(const std::filesystem::path& file) const = 0;
-  /// truth.json and truth.ply for the exposures taken since create(); into a scan folder.
+  /// truth.json and truth.ply, into a scan folder, for the latest `poses` times the object was put down and exposed; a
+  /// view taken again replaces the one before. Fails with `degenerate` (nothing exposed yet), `io`.
   virtual Result<void> write_truth(const std::filesystem::path& folder) const = 0;
   virtual std::string profile_sha256() const = 0;
 };

@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
 
+#include "pipeline/mesh/solid.h"
 #include "pipeline/scan/model/bytes.h"
 #include "pipeline/scan/model/corner_vertices.h"
 #include "pipeline/scan/model/model_files.h"

@@ -1,5 +1,6 @@
 #include <Eigen/Geometry>
 
+#include "pipeline/mesh/solid.h"
 #include "pipeline/scan/model/bytes.h"
 #include "pipeline/scan/model/model_files.h"
 #include "pipeline/texture/shading.h"

@@ -1,4 +1,4 @@
-#include "painted_scene.h"
+#include "tests/unit/pipeline/texture/painted_scene.h"
 
 #include <cmath>
 #include <limits>
@@ -12,7 +12,7 @@ namespace scanrig::testing {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-constexpr int kRays = 4;
+constexpr int kRays = 3;
 
 std::optional<double> hit(const Ball& ball, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
   const Eigen::Vector3d to = origin - ball.centre;
@@ -58,7 +58,7 @@ std::vector<cv::Point2d> rays_of(const Camera& camera) {
   const cv::Matx33d matrix(p.fx, 0, p.cx, 0, p.fy, p.cy, 0, 0, 1);
   const std::vector<double> distortion(camera.distortion.begin(), camera.distortion.end());
   cv::undistortPoints(pixels, rays, matrix, distortion, cv::noArray(), cv::noArray(),
-                      cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 20, 1e-9));
+                      cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 1e-7));
   return rays;
 }
 
@@ -71,9 +71,19 @@ Mesh PaintedScene::mesh(double edge) const {
 }
 
 Photo PaintedScene::photo(const Camera& camera, double angle_rad) const {
+  return std::move(photos(camera, {angle_rad}).front());
+}
+
+std::vector<Photo> PaintedScene::photos(const Camera& camera, const std::vector<double>& angles_rad) const {
+  const auto rays = rays_of(camera);
+  std::vector<Photo> taken;
+  for (const double angle : angles_rad) taken.push_back(expose(camera, angle, rays));
+  return taken;
+}
+
+Photo PaintedScene::expose(const Camera& camera, double angle_rad, const std::vector<cv::Point2d>& rays) const {
   Photo photo{camera, rot_y(angle_rad), cv::Mat3b(camera.projection.height, camera.projection.width)};
   const Transform model_from_camera = (camera.camera_from_turntable * photo.turntable_from_model).inverse();
-  const auto rays = rays_of(camera);
   const Eigen::Vector3d backdrop(0.8, 0.1, 0.1);
   parallel_for(static_cast<std::size_t>(photo.image.rows), [&](std::size_t y) {
     for (int x = 0; x < photo.image.cols; ++x) {
@@ -132,10 +142,10 @@ Eigen::Vector3d striped(const Eigen::Vector3d& p) {
           0.4 + 0.1 * std::sin(2.0 * kPi * p.z() / 9.0) + 0.08 * fine};
 }
 
-std::vector<Photo> around(const PaintedScene& scene, const Camera& camera, int count) {
-  std::vector<Photo> photos;
-  for (int k = 0; k < count; ++k) photos.push_back(scene.photo(camera, 2.0 * kPi * k / count));
-  return photos;
+std::vector<double> turns(int count) {
+  std::vector<double> angles;
+  for (int k = 0; k < count; ++k) angles.push_back(2.0 * kPi * k / count);
+  return angles;
 }
 
 }  // namespace scanrig::testing

@@ -16,7 +16,8 @@ struct Ball {
 
 /// Painted balls on the turntable under lamps that do not turn with it, photographed by formulae of its own: ray against
 /// sphere, OpenCV's undistortion. Nothing of it is shared with the code under test.
-struct PaintedScene {
+class PaintedScene {
+ public:
   std::vector<Ball> balls;
   /// Linear BGR, 0..1, at a point of ball `index`.
   std::function<Eigen::Vector3d(std::size_t index, const Eigen::Vector3d& point)> paint;
@@ -25,8 +26,12 @@ struct PaintedScene {
 
   /// Triangles of about `edge` mm, vertices on the balls, no normals.
   [[nodiscard]] Mesh mesh(double edge) const;
-  /// As a camera at the default rig's place takes it, table at `angle`; 4 x 4 rays a pixel.
+  /// As `camera` takes it with the table at each angle; 3 x 3 rays a pixel.
+  [[nodiscard]] std::vector<Photo> photos(const Camera& camera, const std::vector<double>& angles_rad) const;
   [[nodiscard]] Photo photo(const Camera& camera, double angle_rad) const;
+
+ private:
+  [[nodiscard]] Photo expose(const Camera& camera, double angle_rad, const std::vector<cv::Point2d>& rays) const;
 };
 
 /// A camera of the default rig at a share of its resolution: `azimuth` from the rig's middle, with lens distortion.
@@ -35,7 +40,7 @@ Camera rig_camera(double azimuth_rad, double elevation_rad, double image_scale);
 /// Soft stripes in all directions and colours, finest period 3 mm.
 Eigen::Vector3d striped(const Eigen::Vector3d& point);
 
-/// `count` photos around the table by one camera.
-std::vector<Photo> around(const PaintedScene& scene, const Camera& camera, int count);
+/// `count` table angles all around.
+std::vector<double> turns(int count);
 
 }  // namespace scanrig::testing

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "pipeline/mesh/solid.h"
 #include "pipeline/mesh/topology.h"
 #include "tests/unit/pipeline/volume/analytic_rig.h"
 
@@ -22,7 +23,7 @@ TEST(Integrate, SphereOnTheTableBecomesOneClosedSurfaceOnItsTrueSurface) {
   EXPECT_EQ(shape.genus(), 0);
   const Accuracy a = accuracy(surface->mesh, solid);
   EXPECT_LE(a.median, 0.005);
-  printf("%g %g %g share %g closed %g\n", a.median,a.p95,a.greatest,a.measured_share,a.greatest_closed);
+  auto sp=solid_properties(surface->mesh); printf("vol %g (%g)\n", sp?sp->volume_mm3:-1, 4./3*3.14159265*27000); printf("%g %g %g share %g closed %g\n", a.median,a.p95,a.greatest,a.measured_share,a.greatest_closed);
 }
 
 }  // namespace

@@ -1,0 +1,14 @@
+#pragma once
+
+#include <filesystem>
+
+#include "core/result.h"
+#include "drivers/turntable/drive_profile.h"
+
+namespace scanrig::config {
+
+/// A drive profile, see config/drives/leadshine-rs.toml. Fails with `not_found`, `io`, `invalid_input` (every problem
+/// with file and line).
+Result<DriveProfile> read_drive_profile(const std::filesystem::path& file);
+
+}  // namespace scanrig::config

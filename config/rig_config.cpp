@@ -1,0 +1,173 @@
+#include "config/rig_config.h"
+
+#include "config/section.h"
+#include "config/turntable_section.h"
+
+namespace scanrig::config {
+namespace {
+
+/// { line = "NAME", active = "low" } or { channel = 3 }; active high unless told otherwise.
+Pin read_pin(Section& section, std::string_view key, bool by_channel) {
+  Pin pin;
+  section.section(key, [&](Section& s) {
+    if (by_channel) {
+      s.number("channel", pin.channel, {0, 255});
+    } else {
+      s.text("line", pin.line);
+    }
+    if (s.has("active")) s.choice<bool>("active", pin.active_low, {{"low", true}, {"high", false}});
+  });
+  return pin;
+}
+
+void read_safety(Section& s, SafetyConfig& safety) {
+  using Home = SafetyConfig::HomeAfterRestart;
+  safety.estop = read_pin(s, "estop", false);
+  if (s.has("guard")) safety.guard = read_pin(s, "guard", false);
+  s.choice<Home>("home_after_restart", safety.home_after_restart,
+                 {{"on_reset", Home::on_reset}, {"guarded", Home::guarded}});
+  s.flag("remote_start", safety.remote_start);
+  if (safety.guard) return;
+  if (safety.remote_start) s.report("remote_start", "true needs a guard");
+  if (safety.home_after_restart == Home::guarded) s.report("home_after_restart", "\"guarded\" needs a guard");
+}
+
+void read_projector(Section& s, std::chrono::microseconds exposure, ProjectorConfig& projector) {
+  using Driver = ProjectorConfig::Driver;
+  s.choice<Driver>(
+      "driver", projector.driver,
+      {{"gpio", Driver::gpio}, {"lightcrafter4500", Driver::lightcrafter4500}, {"manual", Driver::manual}});
+  if (projector.driver == Driver::gpio) {
+    s.text("line", projector.line);
+    if (s.has("plain_line")) s.text("plain_line", projector.plain_line.emplace());
+  }
+  if (projector.driver != Driver::manual) {
+    s.number("pulse_us", projector.pulse, {10, 1'000'000});
+    if (projector.pulse < exposure) {
+      s.report("pulse_us", fmt::format("{} is shorter than the exposure_us of {} in [stereo_camera]",
+                                       projector.pulse.count(), exposure.count()));
+    }
+  }
+  s.number("warm_up_s", projector.warm_up, {0, 7200});
+}
+
+void read_sensor(Section& section, std::string_view key, SensorConfig& sensor) {
+  section.section(key, [&](Section& s) {
+    s.text("serial", sensor.serial);
+    if (s.has("address")) s.text("address", sensor.address);
+  });
+}
+
+void read_stereo_camera(Section& s, StereoCameraConfig& camera) {
+  using Driver = StereoCameraConfig::Driver;
+  using Edge = StereoCameraConfig::Edge;
+  using FrameClock = StereoCameraConfig::FrameClock;
+  s.choice<Driver>(
+      "driver", camera.driver,
+      {{"aravis", Driver::aravis}, {"v4l2", Driver::v4l2}, {"v4l2-side-by-side", Driver::v4l2_side_by_side}});
+  read_sensor(s, "left", camera.left);
+  if (camera.driver != Driver::v4l2_side_by_side) {
+    read_sensor(s, "right", camera.right);
+    if (!camera.left.serial.empty() && camera.left.serial == camera.right.serial) {
+      s.report("right", "has the same serial number as left");
+    }
+  }
+  s.section("trigger", [&](Section& trigger) {
+    trigger.text("source", camera.trigger_source);
+    trigger.choice<Edge>("edge", camera.trigger_edge, {{"rising", Edge::rising}, {"falling", Edge::falling}});
+  });
+  std::vector<Choice<std::string>> formats;
+  for (const char* format : {"Mono8", "Mono10", "Mono12", "BayerRG8", "RGB8", "BGR8"})
+    formats.push_back({format, format});
+  s.choice("pixel_format", camera.pixel_format, formats);
+  s.number("exposure_us", camera.exposure, {10, 1'000'000});
+  if (camera.driver == Driver::aravis) {
+    s.section("packet", [&](Section& packet) {
+      packet.number("size_bytes", camera.packet_bytes, {576, 16000});
+      packet.number("delay_us", camera.packet_delay, {0, 100'000});
+    });
+    s.choice<FrameClock>("clock", camera.frame_clock, {{"interval", FrameClock::interval}, {"ptp", FrameClock::ptp}});
+  }
+  s.number("frame_timeout_ms", camera.frame_timeout, {10, 10'000});
+}
+
+void read_panel(Section& s, PanelConfig& panel) {
+  using Driver = PanelConfig::Driver;
+  s.choice<Driver>("driver", panel.driver, {{"gpio", Driver::gpio}, {"modbus-io", Driver::modbus_io}});
+  const bool by_channel = panel.driver == Driver::modbus_io;
+  if (by_channel) read_modbus_line(s, panel.io_module);
+  panel.inputs["start"] = read_pin(s, "start", by_channel);
+  for (const char* key : {"stop", "reset", "part_present", "flipped"}) {
+    if (s.has(key)) panel.inputs[key] = read_pin(s, key, by_channel);
+  }
+  for (const char* key :
+       {"lamp_red", "lamp_amber", "lamp_green", "start_lamp", "flip_request", "busy", "pass", "fail"}) {
+    if (s.has(key)) panel.outputs[key] = read_pin(s, key, by_channel);
+  }
+}
+
+void read_recipes(Section& s, std::map<std::string, RecipeConfig>& recipes) {
+  const auto read = [&](const std::string& name) {
+    auto& recipe = recipes[name];
+    s.section(name, [&](Section& r) {
+      r.number("views", recipe.views, {3, 72});
+      r.number("poses", recipe.poses, {1, 2});
+      r.number("flip_timeout_min", recipe.flip_timeout, {1, 1440});
+    });
+  };
+  read("default");
+  for (const std::string& name : s.free_keys()) {
+    if (name != "default") read(name);
+  }
+}
+
+void read_folder(Section& s, std::string_view key, const std::filesystem::path& base, std::filesystem::path& path) {
+  std::string text;
+  s.text(key, text);
+  if (text.find('\0') != std::string::npos) return s.report(key, "is not a path");
+  path = base / text;
+}
+
+void read_reconstruction(Section& s, ReconstructionConfig& reconstruction) {
+  using Executor = ReconstructionConfig::Executor;
+  s.choice<Executor>("executor", reconstruction.executor,
+                     {{"in_process", Executor::in_process}, {"process", Executor::process}});
+  s.number("memory_gib", reconstruction.memory_gib, {1, 1024});
+  s.number("voxel_mm", reconstruction.voxel_mm, {0.02, 5});
+}
+
+void read_rig(Section& root, const std::filesystem::path& base, const std::vector<std::filesystem::path>& drives,
+              RigConfig& rig) {
+  int schema = 0;
+  root.one_of("schema", schema, {1});
+  root.section("safety", [&](Section& s) { read_safety(s, rig.safety); });
+  root.section("turntable", [&](Section& s) { read_turntable(s, drives, rig.turntable); });
+  root.section("stereo_camera", [&](Section& s) { read_stereo_camera(s, rig.stereo_camera); });
+  root.section("projector", [&](Section& s) { read_projector(s, rig.stereo_camera.exposure, rig.projector); });
+  root.section("panel", [&](Section& s) { read_panel(s, rig.panel); });
+  root.section("calibration", [&](Section& s) { read_folder(s, "file", base, rig.calibration_file); });
+  root.section("recipe", [&](Section& s) { read_recipes(s, rig.recipes); });
+  root.section("storage", [&](Section& s) {
+    read_folder(s, "root", base, rig.storage.root);
+    s.number("reserve_gib", rig.storage.reserve_gib, {0, 100'000});
+  });
+  root.section("reconstruction", [&](Section& s) { read_reconstruction(s, rig.reconstruction); });
+  root.section("api", [&](Section& s) {
+    read_folder(s, "socket", base, rig.api.socket);
+    if (s.has("http_port")) s.number("http_port", rig.api.http_port.emplace(), {1024, 65535});
+  });
+}
+
+}  // namespace
+
+Result<RigConfig> read_rig_config(const std::filesystem::path& file, const std::filesystem::path& drives) {
+  const auto base = file.parent_path();
+  std::vector<std::filesystem::path> folders{drives};
+  if (drives.empty()) folders = {base / "drives", base / ".." / "drives", "/usr/share/scanrig/drives"};
+  RigConfig rig;
+  const auto read = read_toml(file, [&](Section& root) { read_rig(root, base, folders, rig); });
+  if (!read) return pass_on(read);
+  return rig;
+}
+
+}  // namespace scanrig::config

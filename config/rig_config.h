@@ -1,0 +1,116 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+
+#include "core/result.h"
+#include "drivers/turntable/modbus_turntable.h"
+
+namespace scanrig::config {
+
+/// A digital input or output: a GPIO line by its name, or a channel of a Modbus I/O module.
+struct Pin {
+  std::string line;
+  int channel = 0;
+  bool active_low = false;
+};
+
+struct SafetyConfig {
+  enum class HomeAfterRestart { on_reset, guarded };
+  Pin estop;
+  std::optional<Pin> guard;
+  HomeAfterRestart home_after_restart = HomeAfterRestart::on_reset;
+  bool remote_start = false;  ///< only with a guard
+};
+
+struct TurntableConfig {
+  enum class Driver { modbus };
+  Driver driver = Driver::modbus;
+  ModbusTurntableOptions modbus;  ///< with the drive profile it names
+};
+
+struct ProjectorConfig {
+  enum class Driver { gpio, lightcrafter4500, manual };
+  Driver driver = Driver::gpio;
+  std::string line;                        ///< gpio: fires the dots and both cameras
+  std::optional<std::string> plain_line;   ///< gpio: fires the cameras and even light, without the dots
+  std::chrono::microseconds pulse{15000};  ///< at least the exposure
+  std::chrono::seconds warm_up{600};
+};
+
+struct SensorConfig {
+  std::string serial;
+  std::string address;  ///< GigE cameras; empty: found by serial number
+};
+
+struct StereoCameraConfig {
+  enum class Driver { aravis, v4l2, v4l2_side_by_side };
+  enum class Edge { rising, falling };
+  enum class FrameClock { interval, ptp };
+  Driver driver = Driver::aravis;
+  SensorConfig left;
+  SensorConfig right;  ///< empty when one device delivers both side by side
+  std::string trigger_source;
+  Edge trigger_edge = Edge::rising;
+  std::string pixel_format;
+  std::chrono::microseconds exposure{12000};
+  int packet_bytes = 0;  ///< aravis only
+  std::chrono::microseconds packet_delay{0};
+  std::chrono::milliseconds frame_timeout{500};
+  FrameClock frame_clock = FrameClock::interval;
+};
+
+struct PanelConfig {
+  enum class Driver { gpio, modbus_io };
+  Driver driver = Driver::gpio;
+  modbus::LineOptions io_module;       ///< modbus_io
+  std::map<std::string, Pin> inputs;   ///< by the names of PanelInputs; `start` is always there
+  std::map<std::string, Pin> outputs;  ///< by their keys, such as lamp_green
+};
+
+struct RecipeConfig {
+  int views = 8;
+  int poses = 2;
+  std::chrono::minutes flip_timeout{30};
+};
+
+struct StorageConfig {
+  std::filesystem::path root;
+  double reserve_gib = 20;
+};
+
+struct ReconstructionConfig {
+  enum class Executor { in_process, process };
+  Executor executor = Executor::in_process;
+  double memory_gib = 6;
+  double voxel_mm = 0.25;
+};
+
+struct ApiConfig {
+  std::filesystem::path socket;
+  std::optional<int> http_port;  ///< on the loopback interface
+};
+
+/// rig.toml, checked; relative paths are made relative to the file's folder.
+struct RigConfig {
+  SafetyConfig safety;
+  TurntableConfig turntable;
+  ProjectorConfig projector;
+  StereoCameraConfig stereo_camera;
+  PanelConfig panel;
+  std::filesystem::path calibration_file;
+  std::map<std::string, RecipeConfig> recipes;  ///< `default` is always there
+  StorageConfig storage;
+  ReconstructionConfig reconstruction;
+  ApiConfig api;
+};
+
+/// Drive profiles are looked for in `drives`; by default in `drives` beside the file, in `../drives`, and in
+/// /usr/share/scanrig/drives.
+/// Fails with `not_found`, `io`, or `invalid_input`: at most 20 problems, each on a line of its own, in order of line.
+Result<RigConfig> read_rig_config(const std::filesystem::path& file, const std::filesystem::path& drives = {});
+
+}  // namespace scanrig::config

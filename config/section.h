@@ -1,0 +1,130 @@
+#pragma once
+
+#include <toml++/toml.h>
+#include <concepts>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <initializer_list>
+#include <limits>
+#include <optional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "core/result.h"
+
+namespace scanrig::config {
+
+/// Everything that is wrong with one file, told at once and in the order of its lines.
+class Problems {
+ public:
+  explicit Problems(std::string file) : file_(std::move(file)) {}
+  void add(int line, std::string text) { found_.emplace_back(line, std::move(text)); }
+  [[nodiscard]] bool none() const { return found_.empty(); }
+  [[nodiscard]] Error error() const;
+
+ private:
+  std::string file_;
+  std::vector<std::pair<int, std::string>> found_;
+};
+
+struct Range {
+  double min;
+  double max;
+};
+
+template <class T>
+struct Choice {
+  std::string_view name;
+  T value;
+};
+
+/// One table of a file. Each reader takes a key that must be there, checks its value and stores it; what does not fit
+/// is reported and leaves the variable as it was. Keys nobody asked for are unknown keys.
+class Section {
+ public:
+  Section(const toml::table& table, std::string name, std::string prefix, Problems& problems)
+      : table_(table), name_(std::move(name)), prefix_(std::move(prefix)), problems_(problems) {}
+
+  void text(std::string_view key, std::string& value);
+  void flag(std::string_view key, bool& value);
+
+  template <std::integral T>
+  void number(std::string_view key, T& value, Range allowed) {
+    if (const auto found = integer(key)) {
+      if (within(key, static_cast<double>(*found), allowed)) value = static_cast<T>(*found);
+    }
+  }
+  template <std::floating_point T>
+  void number(std::string_view key, T& value, Range allowed) {
+    if (const auto found = real(key)) {
+      if (within(key, *found, allowed)) value = *found;
+    }
+  }
+  /// An integer with the unit that the key's name ends with.
+  template <class Rep, class Period>
+  void number(std::string_view key, std::chrono::duration<Rep, Period>& value, Range allowed) {
+    Rep count = value.count();
+    number(key, count, allowed);
+    value = std::chrono::duration<Rep, Period>(count);
+  }
+  template <std::integral T>
+  void one_of(std::string_view key, T& value, const std::vector<T>& allowed) {
+    const auto found = integer(key);
+    if (!found) return;
+    for (const T one : allowed) {
+      if (*found == one) {
+        value = one;
+        return;
+      }
+    }
+    report(key, fmt::format("{} is not one of {}", *found, fmt::join(allowed, ", ")));
+  }
+  template <class T>
+  void choice(std::string_view key, T& value, const std::vector<Choice<T>>& allowed) {
+    std::string name;
+    text(key, name);
+    if (name.empty()) return;
+    std::vector<std::string_view> names;
+    for (const auto& one : allowed) {
+      if (one.name == name) {
+        value = one.value;
+        return;
+      }
+      names.push_back(one.name);
+    }
+    report(key, fmt::format("\"{}\" is not one of {}", name, fmt::join(names, ", ")));
+  }
+
+  /// Whether an optional key is there; from then on the key is known.
+  [[nodiscard]] bool has(std::string_view key);
+  void section(std::string_view key, const std::function<void(Section&)>& read);
+  /// Each value of an array: an integer or a text.
+  void items(std::string_view key, const std::function<void(std::optional<std::int64_t>, std::string_view)>& read);
+  /// The keys of a table whose names are free.
+  [[nodiscard]] std::vector<std::string> free_keys() const;
+
+  void report(std::string_view key, std::string_view problem);
+  void report_unknown_keys();
+
+ private:
+  const toml::node* find(std::string_view key);
+  std::optional<std::int64_t> integer(std::string_view key);
+  std::optional<double> real(std::string_view key);
+  bool within(std::string_view key, double value, Range allowed);
+
+  const toml::table& table_;
+  std::string name_;    // of the table in brackets
+  std::string prefix_;  // of the keys of an inline table: "home."
+  Problems& problems_;
+  std::set<std::string, std::less<>> known_;
+};
+
+/// Reads a file through `read`. Fails with `not_found`, `io`, or `invalid_input` with every problem on a line of its
+/// own: "FILE:LINE: [table] key: what is wrong".
+Result<void> read_toml(const std::filesystem::path& file, const std::function<void(Section&)>& read);
+
+}  // namespace scanrig::config

@@ -1,0 +1,99 @@
+#include "config/turntable_section.h"
+
+#include <fmt/ranges.h>
+
+#include "config/drive_profile_file.h"
+
+namespace scanrig::config {
+namespace {
+
+/// A tolerance finer than this many pulses cannot be told from the drive's own rounding.
+constexpr double kMinTolerancePulses = 2.0;
+
+void read_profile(Section& s, const std::vector<std::filesystem::path>& folders, DriveProfile& profile) {
+  std::string name;
+  s.text("profile", name);
+  if (name.empty()) return;
+  if (name.find('/') != std::string::npos) return s.report("profile", "must be a name, not a path");
+  std::vector<std::string> tried;
+  for (const auto& folder : folders) {
+    const auto file = folder / (name + ".toml");
+    auto read = read_drive_profile(file);
+    if (read) {
+      profile = *read;
+      return;
+    }
+    if (read.error().code != ErrorCode::not_found) return s.report("profile", read.error().message);
+    tried.push_back(file.string());
+  }
+  s.report("profile", fmt::format("there is none of {}", fmt::join(tried, ", ")));
+}
+
+void check_against_drive(Section& s, const ModbusTurntableOptions& options) {
+  const auto& profile = options.profile;
+  if (options.line.unit_id < profile.min_unit_id || options.line.unit_id > profile.max_unit_id) {
+    s.report("unit_id", fmt::format("{} is not between {} and {}, as {} allows", options.line.unit_id,
+                                    profile.min_unit_id, profile.max_unit_id, profile.name));
+  }
+  if (auto word = options.scale.speed_word(options.speed, profile); !word)
+    s.report("speed_deg_s", word.error().message);
+  if (auto word = options.scale.acceleration_word(options.acceleration, profile); !word) {
+    s.report("acceleration_deg_s2", word.error().message);
+  }
+  if (options.tolerance.value * options.scale.pulses_per_degree() < kMinTolerancePulses) {
+    s.report("tolerance_deg",
+             fmt::format("{} is less than {} pulses of the motor; at least {:.4f} is possible", options.tolerance.value,
+                         kMinTolerancePulses, kMinTolerancePulses / options.scale.pulses_per_degree()));
+  }
+}
+
+void read_soft_limits(Section& s, std::optional<AngleRange>& limits) {
+  if (!s.has("soft_limits")) return;
+  AngleRange range;
+  s.section("soft_limits", [&](Section& inner) {
+    inner.number("min_deg", range.min.value, {-36000, 36000});
+    inner.number("max_deg", range.max.value, {-36000, 36000});
+    if (range.max <= range.min) inner.report("max_deg", "must be more than min_deg");
+  });
+  limits = range;
+}
+
+}  // namespace
+
+void read_modbus_line(Section& s, modbus::LineOptions& line) {
+  using modbus::Parity;
+  s.text("device", line.device);
+  s.one_of("baud", line.baud, {9600, 19200, 38400, 57600, 115200});
+  s.choice<Parity>("parity", line.parity, {{"none", Parity::none}, {"even", Parity::even}, {"odd", Parity::odd}});
+  s.number("unit_id", line.unit_id, {1, 247});
+  s.number("reply_timeout_ms", line.reply_timeout, {10, 2000});
+}
+
+void read_turntable(Section& s, const std::vector<std::filesystem::path>& drive_folders, TurntableConfig& turntable) {
+  auto& options = turntable.modbus;
+  s.choice<TurntableConfig::Driver>("driver", turntable.driver, {{"modbus", TurntableConfig::Driver::modbus}});
+  read_profile(s, drive_folders, options.profile);
+  read_modbus_line(s, options.line);
+  s.number("pulses_per_motor_rev", options.scale.pulses_per_motor_rev, {200, 65535});
+  s.number("gear_ratio", options.scale.gear_ratio, {0.1, 1000});
+  s.choice<bool>("positive", options.scale.positive_ccw, {{"ccw", true}, {"cw", false}});
+  s.section("home", [&](Section& home) {
+    std::vector<Choice<std::string>> modes{{"here", "here"}};
+    for (const auto& [mode, value] : options.profile.homing.modes) modes.push_back({mode, mode});
+    if (options.profile.name.empty()) {
+      home.text("mode", options.home_mode);  // which modes there are is not known
+    } else {
+      home.choice("mode", options.home_mode, modes);
+    }
+    home.number("offset_deg", options.scale.home_offset.value, {-360, 360});
+  });
+  s.number("speed_deg_s", options.speed.value, {0.1, 360});
+  s.number("acceleration_deg_s2", options.acceleration.value, {0.1, 3600});
+  s.number("backlash_deg", options.backlash.value, {0, 10});
+  s.number("tolerance_deg", options.tolerance.value, {0.0001, 1});
+  s.number("settle_ms", options.settle, {0, 10000});
+  read_soft_limits(s, options.soft_limits);
+  if (!options.profile.name.empty()) check_against_drive(s, options);
+}
+
+}  // namespace scanrig::config

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <list>
+#include <set>
+#include <thread>
+
+#include "core/clock.h"
+
+namespace scanrig {
+
+/// A clock for tests: it jumps to the earliest moment anybody waits for as soon as every actor waits in it.
+/// A waiter that was notified counts as running until it has looked again, so no wake-up is overtaken by a time-out.
+/// Threads that are no actors may wait too; they never keep the clock from moving, except while they look again.
+/// An actor that blocks on anything but this clock stops time for everybody.
+class VirtualClock final : public Clock {
+ public:
+  [[nodiscard]] TimePoint now() const override;
+  bool wait_until(std::unique_lock<std::mutex>& lock, std::condition_variable& changed, TimePoint until,
+                  const std::function<bool()>& ready) override;
+  void notify_all(std::condition_variable& changed) override;
+
+ private:
+  struct Waiter {
+    const std::condition_variable* changed;  ///< only its address is used: what the waiter listens to
+    TimePoint until;
+    bool actor;
+    bool woken = false;
+    std::condition_variable wake{};
+  };
+
+  void enter() override;
+  void leave() override;
+  void hold() override;
+  void release() override;
+
+  void wake(Waiter& waiter);
+  void move_if_idle();
+
+  // Lock order: a waiter's own mutex, then this one.
+  mutable std::mutex mutex_;
+  TimePoint now_{};
+  std::set<std::thread::id> actors_;
+  std::list<Waiter*> waiters_;      ///< asleep, not yet woken
+  std::size_t waiting_actors_ = 0;  ///< of `waiters_`
+  std::size_t looking_again_ = 0;   ///< woken, `ready()` not yet evaluated
+  std::size_t holds_ = 0;
+};
+
+}  // namespace scanrig

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+#include "daemon/station/control_loop.h"
+
+namespace scanrig {
+
+struct ApiRequest {
+  std::string method;  ///< "GET"
+  std::string target;  ///< "/api/v1/status"
+};
+
+struct ApiResponse {
+  unsigned status = 200;
+  std::string body;  ///< JSON
+};
+
+/// Version 1 of the API:
+///   GET /api/v1/status, /api/v1/jobs, /api/v1/jobs/ID    POST /api/v1/start, /api/v1/stop, /api/v1/reset
+/// Reads the latest snapshot or posts to the control loop; never waits. `send` is called once, from this thread or
+/// from the control loop's. An error is {"error": {"code", "message"}} with status 404, 405 or 409.
+void answer(const ApiRequest& request, ControlLoop& loop, std::function<void(ApiResponse)> send);
+
+}  // namespace scanrig

@@ -1,0 +1,91 @@
+#include "daemon/api/socket_file.h"
+
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+#include "core/files.h"
+
+namespace scanrig {
+namespace {
+
+namespace fs = std::filesystem;
+
+Result<sockaddr_un> address_of(const fs::path& path) {
+  sockaddr_un address{};
+  address.sun_family = AF_UNIX;
+  if (path.empty() || path.native().size() >= sizeof address.sun_path) {
+    return fail(ErrorCode::invalid_input, "{}: not a path for a socket, which has 1 to {} bytes", path.string(),
+                sizeof address.sun_path - 1);
+  }
+  std::memcpy(address.sun_path, path.c_str(), path.native().size());
+  return address;
+}
+
+tl::unexpected<Error> fail_errno(const char* doing, const fs::path& path, int fd) {
+  auto error = fail(ErrorCode::io, "cannot {} the socket {}: {}", doing, path.string(), std::strerror(errno));
+  if (fd >= 0) ::close(fd);
+  return error;
+}
+
+int open_socket() { return ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0); }
+
+const sockaddr* plain(const sockaddr_un& address) { return reinterpret_cast<const sockaddr*>(&address); }
+
+Result<void> check_free(const fs::path& path) {
+  std::error_code error;
+  const auto status = fs::symlink_status(path, error);
+  if (status.type() == fs::file_type::not_found) return {};
+  if (status.type() != fs::file_type::socket) {
+    return fail(ErrorCode::exists, "{}: is there and no socket: name another path", path.string());
+  }
+  const auto other = connect_to_socket(path);
+  if (!other) return {};
+  ::close(*other);
+  return fail(ErrorCode::refused, "{}: another daemon answers there", path.string());
+}
+
+}  // namespace
+
+Result<int> connect_to_socket(const fs::path& path) {
+  const auto address = address_of(path);
+  if (!address) return pass_on(address);
+  const int fd = open_socket();
+  if (fd < 0) return fail_errno("make", path, fd);
+  if (::connect(fd, plain(*address), sizeof *address) == 0) return fd;
+  const bool missing = errno == ENOENT;
+  ::close(fd);
+  if (missing) return fail(ErrorCode::not_found, "{}: no such socket", path.string());
+  return fail(ErrorCode::io, "{}: nobody answers", path.string());
+}
+
+Result<int> listen_on_socket(const fs::path& path) {
+  if (auto address = address_of(path); !address) return pass_on(address);
+  if (path.has_parent_path()) {
+    if (auto made = create_directories_synced(path.parent_path()); !made) return pass_on(made);
+  }
+  if (auto free = check_free(path); !free) return pass_on(free);
+  // Bound under another name, so that nobody can connect before the mode is set; the rename also removes a stale file.
+  fs::path temporary = path;
+  temporary += fmt::format(".{}", ::getpid());
+  const auto address = address_of(temporary);
+  if (!address) return pass_on(address);
+  ::unlink(temporary.c_str());
+  const int fd = open_socket();
+  if (fd < 0) return fail_errno("make", path, fd);
+  if (::bind(fd, plain(*address), sizeof *address) != 0) return fail_errno("bind", path, fd);
+  if (::chmod(temporary.c_str(), 0660) != 0 || ::listen(fd, SOMAXCONN) != 0 ||
+      ::rename(temporary.c_str(), path.c_str()) != 0) {
+    auto error = fail_errno("open", path, fd);
+    ::unlink(temporary.c_str());
+    return error;
+  }
+  return fd;
+}
+
+}  // namespace scanrig

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <thread>
+#include <variant>
+
+#include "daemon/jobs/job_store.h"
+#include "daemon/jobs/reconstruction_thread.h"
+#include "daemon/mailbox.h"
+#include "daemon/station/events.h"
+
+namespace scanrig {
+
+/// Puts jobs and views on disk while the table moves. A view is told as stored, and handed to the reconstruction, only
+/// when it survives a power cut.
+class JobThread {
+ public:
+  using Task =
+      std::variant<action::CreateJob, action::StoreView, action::FinishPose, action::ResumeJob, action::CloseJob>;
+  using ScannedHook = std::function<Result<void>(const std::filesystem::path& job_folder)>;
+
+  /// `on_scanned` (may be empty) is called when all views of a job are on disk, before anybody is told.
+  JobThread(Clock& clock, const JobStore& store, ReconstructionThread& reconstruction, ScannedHook on_scanned,
+            std::function<void(Event)> tell);
+  /// Does what was posted, then joins.
+  ~JobThread();
+  JobThread(const JobThread&) = delete;
+  JobThread& operator=(const JobThread&) = delete;
+
+  void post(Task task) { inbox_.post(std::move(task)); }
+
+ private:
+  void run();
+  void handle(const action::CreateJob& task);
+  void handle(const action::StoreView& task);
+  void handle(const action::FinishPose& task);
+  void handle(const action::ResumeJob& task);
+  void handle(const action::CloseJob& task);
+  Result<void> finish_pose(const action::FinishPose& task);
+
+  const JobStore& store_;
+  ReconstructionThread& reconstruction_;
+  ScannedHook on_scanned_;
+  std::function<void(Event)> tell_;
+  Mailbox<Task> inbox_;
+  std::optional<ScanFolder> scan_;  ///< of the job that has the rig; of the thread only
+  std::thread thread_;
+};
+
+}  // namespace scanrig

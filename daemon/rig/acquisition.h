@@ -1,0 +1,46 @@
+#pragma once
+
+#include <chrono>
+
+#include "core/clock.h"
+#include "daemon/rig/devices.h"
+#include "daemon/rig/taken_view.h"
+
+namespace scanrig {
+
+struct AcquisitionOptions {
+  Clock::Duration home_limit = std::chrono::seconds(60);
+  Clock::Duration move_limit = std::chrono::seconds(60);     ///< the longest move is one unwinding of all poses
+  Clock::Duration exposure_limit = std::chrono::seconds(2);  ///< arm, fire and collect, each
+  Clock::Duration stop_limit = std::chrono::seconds(3);
+  int redo_limit = 3;  ///< lost exposures in a row before the view fails
+};
+
+/// The order in which the devices do one thing. Every wait has a deadline.
+/// Threads: one owner, which owns turntable, projector and camera too.
+class Acquisition {
+ public:
+  Acquisition(const Devices& devices, Clock& clock, AcquisitionOptions options)
+      : devices_(devices), clock_(clock), options_(options) {}
+
+  /// Clears an alarm, darkens the projector, finds home. Fails as Turntable::home.
+  Result<void> home();
+
+  /// Turns to `angle` and takes the four images. An exposure whose frames are lost or torn is redone and counted.
+  /// Pose p is taken in turn p, always onwards: nothing unwinds between the poses. Recorded angles are within the turn.
+  /// Fails as the device that failed; the table has been told to stop then.
+  Result<TakenView> take_view(const ViewId& id, Degrees angle);
+
+  /// Returns once the table is seen standing and the projector dark. Both are tried, whatever the other says.
+  Result<void> stop();
+
+ private:
+  Result<StereoFrame> expose(Light light, int& redone);
+  Result<StereoFrame> expose_once(Light light);
+
+  Devices devices_;
+  Clock& clock_;
+  AcquisitionOptions options_;
+};
+
+}  // namespace scanrig

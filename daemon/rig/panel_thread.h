@@ -1,0 +1,47 @@
+#pragma once
+
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "core/clock.h"
+#include "daemon/station/events.h"
+#include "drivers/panel/panel.h"
+
+namespace scanrig {
+
+/// What the change of the panel's inputs means: buttons count when they go down.
+std::vector<Event> changes(const PanelInputs& before, const PanelInputs& after);
+
+/// The owner of the panel: reports its inputs, shows what it is told.
+class PanelThread {
+ public:
+  PanelThread(Panel& panel, Clock& clock, std::function<void(Event)> tell);
+  ~PanelThread();
+  PanelThread(const PanelThread&) = delete;
+  PanelThread& operator=(const PanelThread&) = delete;
+
+  /// Lamps for the panel; shown within the polling period. Does not wait.
+  void show(const PanelOutputs& outputs);
+
+ private:
+  void run();
+  Result<void> show_wanted();
+  Result<void> read_inputs();
+
+  Panel& panel_;
+  Clock& clock_;
+  std::function<void(Event)> tell_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  PanelOutputs wanted_;
+  bool stop_ = false;
+  // Of the thread only.
+  std::optional<PanelOutputs> shown_;
+  std::optional<PanelInputs> known_;
+  std::thread thread_;
+};
+
+}  // namespace scanrig

@@ -1,0 +1,52 @@
+#include "daemon/rig/rig_thread.h"
+
+#include <utility>
+
+#include "daemon/actor_thread.h"
+
+namespace scanrig {
+
+RigThread::RigThread(const Devices& devices, Clock& clock, AcquisitionOptions options, std::function<void(Event)> tell)
+    : devices_(devices),
+      acquisition_(devices, clock, options),
+      tell_(std::move(tell)),
+      inbox_(clock),
+      thread_(start_actor(clock, [this] { run(); })) {}
+
+RigThread::~RigThread() {
+  interrupt();
+  inbox_.close();
+  thread_.join();
+}
+
+void RigThread::stop() {
+  interrupt();
+  inbox_.post(action::StopRig{});
+}
+
+void RigThread::interrupt() noexcept {
+  devices_.turntable.request_stop();
+  devices_.projector.request_dark();
+}
+
+void RigThread::run() {
+  while (auto command = inbox_.take()) tell_(perform(*command));
+}
+
+Event RigThread::perform(const Command& command) {
+  if (std::holds_alternative<action::Home>(command)) {
+    auto home = acquisition_.home();
+    if (!home) return event::RigFailed{home.error()};
+    return event::Homed{};
+  }
+  if (const auto* view = std::get_if<action::TakeView>(&command)) {
+    auto taken = acquisition_.take_view(view->id, view->angle);
+    if (!taken) return event::RigFailed{taken.error()};
+    return event::ViewTaken{std::make_shared<const TakenView>(std::move(*taken))};
+  }
+  auto stopped = acquisition_.stop();
+  if (!stopped) return event::StopFailed{stopped.error()};
+  return event::Stopped{};
+}
+
+}  // namespace scanrig

@@ -1,0 +1,16 @@
+#pragma once
+
+#include "daemon/station/events.h"
+#include "pipeline/scan/scan_folder.h"
+
+namespace scanrig {
+
+/// One view as the rig delivered it, in memory only.
+struct TakenView {
+  ViewId id;
+  ViewRecord record{};  ///< `files` still empty
+  RawView images{};
+  int redone = 0;  ///< exposures that were lost and taken again
+};
+
+}  // namespace scanrig

@@ -1,0 +1,61 @@
+#include "daemon/run_daemon.h"
+
+#include "daemon/api/server.h"
+#include "daemon/overloaded.h"
+#include "daemon/rig/panel_thread.h"
+#include "daemon/rig/rig_thread.h"
+#include "daemon/station/timestamp.h"
+
+namespace scanrig {
+namespace {
+
+/// The serial number tells apart jobs of one second; a folder that is already there is never taken.
+std::string fresh_job_id(const std::filesystem::path& root) {
+  const auto now = std::chrono::system_clock::now();
+  std::error_code ignored;
+  for (int serial = 1;; ++serial) {
+    auto id = job_id(now, serial);
+    if (!std::filesystem::exists(root / id, ignored)) return id;
+  }
+}
+
+void perform(const Action& action, RigThread& rig, JobThread& jobs) {
+  std::visit(
+      Overloaded{[](const action::Warn&) {},  // the control loop's own
+                 [&](const action::Home&) { rig.home(); }, [&](const action::StopRig&) { rig.stop(); },
+                 [&](const action::TakeView& a) { rig.take_view(a); }, [&](const auto& task) { jobs.post(task); }},
+      action);
+}
+
+}  // namespace
+
+Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Clock& clock, std::stop_token stop) {
+  auto store = JobStore::open(options.jobs);
+  if (!store) return pass_on(store);
+  auto known = store->recover();
+  if (!known) return pass_on(known);
+
+  const StationRules rules{options.jobs.poses, options.jobs.views, options.remote};
+  ControlLoop loop(clock, {.rules = rules, .warning = options.warning}, std::move(*known));
+  const auto tell = [&loop](Event event) { loop.post(std::move(event)); };
+
+  auto api = ApiServer::start(options.socket, loop);
+  if (!api) return pass_on(api);
+
+  // Time stands until every thread is there. They end in reverse order: the panel shows the last lamps, the rig is
+  // seen standing, what was taken goes to disk, then the reconstruction that all of them feed is stopped.
+  std::optional<Clock::Busy> starting(clock);
+  ReconstructionThread reconstruction(clock, options.reconstructor, rules.poses, rules.views, tell);
+  JobThread jobs(clock, *store, reconstruction, options.on_scanned, tell);
+  RigThread rig(devices, clock, options.acquisition, tell);
+  PanelThread panel(devices.panel, clock, tell);
+
+  const std::stop_callback shut_down(stop, [&loop] { loop.post(event::Shutdown{}); });
+  const Clock::Actor actor(clock);
+  starting.reset();
+  return loop.run({.perform = [&](const Action& action) { perform(action, rig, jobs); },
+                   .show = [&](const PanelOutputs& outputs) { panel.show(outputs); },
+                   .fresh_job_id = [&] { return fresh_job_id(options.jobs.root); }});
+}
+
+}  // namespace scanrig

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <filesystem>
+#include <stop_token>
+
+#include "core/clock.h"
+#include "core/result.h"
+#include "daemon/jobs/job_store.h"
+#include "daemon/jobs/job_thread.h"
+#include "daemon/jobs/reconstructor.h"
+#include "daemon/rig/acquisition.h"
+#include "daemon/rig/devices.h"
+#include "daemon/station/control_loop.h"
+
+namespace scanrig {
+
+struct DaemonOptions {
+  JobStoreOptions jobs;          ///< its poses and views are the recipe of every job
+  std::filesystem::path socket;  ///< of the API
+  bool remote = false;           ///< the API may start and reset
+  AcquisitionOptions acquisition;
+  Clock::Duration warning = std::chrono::seconds(2);
+  ReconstructorFactory reconstructor;
+  JobThread::ScannedHook on_scanned;
+};
+
+/// The daemon from start-up to a clean stop: owns all threads but the caller's, which becomes the control loop.
+/// Returns after `stop` with the motor stopped, the projector dark and an unfinished job marked interrupted.
+/// Fails with `io`, `refused` (another daemon), `invalid_input` before it begins, `timeout` when the rig was not seen
+/// stopped at the end. The devices outlive the call.
+Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Clock& clock, std::stop_token stop);
+
+}  // namespace scanrig

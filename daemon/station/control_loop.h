@@ -1,0 +1,68 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "core/clock.h"
+#include "daemon/mailbox.h"
+#include "daemon/station/events.h"
+#include "daemon/station/snapshot.h"
+#include "daemon/station/transition.h"
+#include "drivers/panel/panel.h"
+
+namespace scanrig {
+
+/// Where the decisions of the control loop go. Called from its thread; none may wait.
+struct StationPorts {
+  std::function<void(const Action&)> perform;  ///< everything but Warn
+  std::function<void(const PanelOutputs&)> show;
+  std::function<std::string()> fresh_job_id;
+};
+
+struct ControlLoopOptions {
+  StationRules rules;
+  Clock::Duration warning = std::chrono::seconds(2);         ///< lamp before the first move
+  Clock::Duration shutdown_limit = std::chrono::seconds(5);  ///< for the rig to be seen stopped
+};
+
+/// The thread of the state machine: takes events one by one, decides, hands out actions, publishes a snapshot.
+/// Threads: run() has its own; all the rest may be called from any.
+class ControlLoop {
+ public:
+  using Reply = std::function<void(const Result<std::string>&)>;  ///< the job's id, empty without one
+
+  ControlLoop(Clock& clock, ControlLoopOptions options, JobTable known_jobs);
+
+  void post(Event event) { inbox_.post({std::move(event), {}}); }
+  /// `reply` is called from the control loop's thread, soon, and must not wait. After a shutdown it may never be.
+  void press(Button button, Origin origin, Reply reply) {
+    inbox_.post({event::Pressed{button, origin, {}}, std::move(reply)});
+  }
+  [[nodiscard]] std::shared_ptr<const Snapshot> snapshot() const { return published_.get(); }
+
+  /// Runs until a Shutdown is done. Fails with `timeout` when the rig was not seen stopped by then.
+  Result<void> run(const StationPorts& ports);
+
+ private:
+  struct Message {
+    Event event;
+    Reply reply;
+  };
+
+  void handle(Message message, const StationPorts& ports);
+  void publish();
+
+  Clock& clock_;
+  ControlLoopOptions options_;
+  Mailbox<Message> inbox_;
+  Published published_;
+  // Of run()'s thread only.
+  StationState state_;
+  JobTable jobs_;
+  std::uint64_t revision_ = 0;
+  Clock::TimePoint warning_over_ = Clock::TimePoint::max();
+  Clock::TimePoint give_up_ = Clock::TimePoint::max();
+};
+
+}  // namespace scanrig

@@ -1,0 +1,129 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/result.h"
+#include "core/units.h"
+#include "daemon/station/states.h"
+
+namespace scanrig {
+
+/// Which view of which job; poses and views count from 0.
+struct ViewId {
+  std::string job;
+  int pose = 0;
+  int view = 0;
+  bool operator==(const ViewId&) const = default;
+};
+
+struct TakenView;  // daemon/rig/taken_view.h
+
+/// What happened: told to the station by its threads, the panel and the API.
+namespace event {
+struct PanelFound {
+  bool estop_ok, guard_closed;
+};  ///< the panel's first answer
+struct Pressed {
+  Button button;
+  Origin origin;
+  std::string fresh_job_id;
+};
+struct EstopChanged {
+  bool ok;
+};
+struct GuardChanged {
+  bool closed;
+};
+struct WarningOver {};
+struct Homed {};
+struct ViewTaken {
+  std::shared_ptr<const TakenView> view;
+};
+struct Stopped {};  ///< the table is seen standing, the projector dark
+struct RigFailed {
+  Error error;
+};  ///< a move or an exposure; the motor has been told to stop
+struct StopFailed {
+  Error error;
+};  ///< nobody knows whether the table moves
+struct PanelFailed {
+  Error error;
+};
+struct JobCreated {
+  std::string job, folder;
+};
+struct ViewStored {
+  ViewId id;
+  double measured_deg;
+  int redone;
+};  ///< it survives a power cut
+struct PoseStored {
+  std::string job;
+  int pose;
+};
+struct JobClosed {
+  std::string job;
+  JobState state;
+  Error why;
+};
+struct StoreFailed {
+  std::string job;
+  Error error;
+};
+struct StageProgress {
+  std::string job, stage;
+  double fraction;
+};
+struct ReconstructionFailed {
+  std::string job;
+  Error error;
+};
+struct ModelReady {
+  std::string job, model, report;
+};  ///< paths of the files
+struct Shutdown {};
+}  // namespace event
+
+using Event = std::variant<event::PanelFound, event::Pressed, event::EstopChanged, event::GuardChanged,
+                           event::WarningOver, event::Homed, event::ViewTaken, event::Stopped, event::RigFailed,
+                           event::StopFailed, event::PanelFailed, event::JobCreated, event::ViewStored,
+                           event::PoseStored, event::JobClosed, event::StoreFailed, event::StageProgress,
+                           event::ReconstructionFailed, event::ModelReady, event::Shutdown>;
+
+/// What is to be done about it. None of them waits.
+namespace action {
+struct Warn {};     ///< WarningOver comes after the warning time
+struct Home {};     ///< clears a device alarm first
+struct StopRig {};  ///< answered by Stopped or StopFailed
+struct TakeView {
+  ViewId id;
+  Degrees angle;
+};
+struct CreateJob {
+  std::string job;
+};
+struct StoreView {
+  std::shared_ptr<const TakenView> view;
+};
+struct FinishPose {
+  std::string job;
+  int pose;
+  bool last;
+};  ///< the manifest says: complete; waiting or scanned
+struct ResumeJob {
+  std::string job;
+};  ///< the manifest says: scanning again
+struct CloseJob {
+  std::string job;
+  JobState state;
+  Error why;
+};
+}  // namespace action
+
+using Action = std::variant<action::Warn, action::Home, action::StopRig, action::TakeView, action::CreateJob,
+                            action::StoreView, action::FinishPose, action::ResumeJob, action::CloseJob>;
+
+}  // namespace scanrig

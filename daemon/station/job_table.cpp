@@ -1,0 +1,73 @@
+#include "daemon/station/job_table.h"
+
+#include <algorithm>
+#include <tuple>
+
+#include "daemon/overloaded.h"
+
+namespace scanrig {
+namespace {
+
+template <class Change>
+void change(JobTable& table, const std::string& id, const Change& how) {
+  const auto found = table.find(id);
+  if (found == table.end()) return;
+  auto job = std::make_shared<JobInfo>(*found->second);
+  how(*job);
+  found->second = std::move(job);
+}
+
+void set_progress(JobInfo& job, const event::StageProgress& e) {
+  const auto stage = std::ranges::find(job.stages, e.stage, &StageShare::name);
+  if (stage == job.stages.end()) {
+    job.stages.push_back({e.stage, e.fraction});
+  } else {
+    stage->fraction = e.fraction;
+  }
+}
+
+void set_pose_stored(JobInfo& job, int pose) {
+  const bool last = pose + 1 == job.poses;
+  job.state = last ? JobState::reconstructing : JobState::waiting_for_flip;
+  if (last && job.error) job.state = JobState::failed;  // the reconstruction gave up earlier
+}
+
+}  // namespace
+
+void update(JobTable& table, const Event& event, int poses, int views) {
+  std::visit(
+      Overloaded{
+          [&](const event::JobCreated& e) {
+            table[e.job] = std::make_shared<JobInfo>(
+                JobInfo{.id = e.job, .folder = e.folder, .state = JobState::scanning, .poses = poses, .views = views});
+          },
+          [&](const event::ViewStored& e) {
+            change(table, e.id.job, [&](JobInfo& job) {
+              job.state = JobState::scanning;
+              job.stored.push_back({e.id.pose, e.id.view, e.measured_deg, e.redone});
+            });
+          },
+          [&](const event::PoseStored& e) {
+            change(table, e.job, [&](JobInfo& job) { set_pose_stored(job, e.pose); });
+          },
+          [&](const event::JobClosed& e) {
+            change(table, e.job, [&](JobInfo& job) { std::tie(job.state, job.error) = std::tuple(e.state, e.why); });
+          },
+          [&](const event::StageProgress& e) { change(table, e.job, [&](JobInfo& job) { set_progress(job, e); }); },
+          [&](const event::ReconstructionFailed& e) {
+            change(table, e.job, [&](JobInfo& job) {
+              job.error = e.error;
+              if (job.state == JobState::reconstructing) job.state = JobState::failed;
+            });
+          },
+          [&](const event::ModelReady& e) {
+            change(table, e.job, [&](JobInfo& job) {
+              std::tie(job.state, job.model, job.report) = std::tuple(JobState::done, e.model, e.report);
+            });
+          },
+          [](const auto&) {},  // concerns the machine only
+      },
+      event);
+}
+
+}  // namespace scanrig

@@ -1,0 +1,26 @@
+#include "daemon/station/lamps.h"
+
+#include <ranges>
+
+namespace scanrig {
+
+PanelOutputs lamps(const StationState& state, const JobTable& jobs) {
+  PanelOutputs out;
+  const bool warning = state.activity == Activity::warning;
+  const bool flip = state.activity == Activity::waiting_for_flip;
+  out.red = state.machine == MachineState::error;
+  out.amber = state.machine == MachineState::halted || warning || flip;
+  out.busy = state.activity != Activity::none && !flip;
+  out.green = state.machine == MachineState::ready || (out.busy && !warning && !out.red && !out.amber);
+  out.start_lamp = state.machine == MachineState::ready || flip;
+  out.flip_request = flip;
+  for (const auto& [id, job] : jobs | std::views::reverse) {
+    if (!is_final(job->state)) continue;
+    out.pass = job->state == JobState::done;
+    out.fail = !out.pass;
+    break;
+  }
+  return out;
+}
+
+}  // namespace scanrig

@@ -1,0 +1,13 @@
+#pragma once
+
+#include "daemon/station/job_table.h"
+#include "daemon/station/transition.h"
+#include "drivers/panel/panel.h"
+
+namespace scanrig {
+
+/// What the lamps say. Red: fault. Amber: act now, or (with busy) keep your hands away. Green: ready or working.
+/// The start lamp burns where Start would do something. Pass and fail tell how the newest finished job ended.
+PanelOutputs lamps(const StationState& state, const JobTable& jobs);
+
+}  // namespace scanrig

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "daemon/station/job_table.h"
+#include "daemon/station/states.h"
+
+namespace scanrig {
+
+/// Everything the station says about itself at one moment. Immutable once published.
+struct Snapshot {
+  std::uint64_t revision = 0;
+  MachineState machine = MachineState::preoperational;
+  Activity activity = Activity::none;
+  std::string cause;
+  std::string sentence;
+  std::string next_action;
+  std::string job;  ///< the one that has the rig; empty: none
+  JobTable jobs;
+};
+
+/// The latest snapshot, from one writer to any number of readers.
+class Published {
+ public:
+  void set(std::shared_ptr<const Snapshot> snapshot) {
+    const std::lock_guard guard(mutex_);
+    snapshot_.swap(snapshot);
+  }
+  [[nodiscard]] std::shared_ptr<const Snapshot> get() const {
+    const std::lock_guard guard(mutex_);
+    return snapshot_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::shared_ptr<const Snapshot> snapshot_ = std::make_shared<Snapshot>();
+};
+
+}  // namespace scanrig

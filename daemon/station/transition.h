@@ -1,0 +1,51 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+#include "daemon/station/events.h"
+#include "daemon/station/states.h"
+
+namespace scanrig {
+
+struct StationRules {
+  int poses = 2;
+  int views = 8;        ///< a pose, at equal angles
+  bool remote = false;  ///< start and reset by the API are allowed
+};
+
+/// The job that has the rig.
+struct ActiveJob {
+  std::string id;
+  JobState state = JobState::queued;
+  int pose = 0;
+  int asked = 0;                          ///< views of this pose the rig was told to take
+  int taken = 0;                          ///< views whose four images are in memory
+  int stored = 0;                         ///< views that survive a power cut
+  std::optional<Error> reconstruction{};  ///< why there will be no model
+};
+
+struct StationState {
+  MachineState machine = MachineState::preoperational;
+  Activity activity = Activity::none;
+  bool estop_ok = true;
+  bool guard_closed = true;
+  bool shutting_down = false;
+  bool finished = false;                          ///< shut down: the rig is seen stopped, or cannot be reached
+  std::string cause = "The daemon has started.";  ///< why the machine is in this state
+  std::optional<ActiveJob> job;
+};
+
+struct Step {
+  StationState state;
+  std::vector<Action> actions;
+  std::optional<Error> refused;  ///< a press that was not obeyed; nothing has changed then
+};
+
+/// The whole behaviour of the station as a pure function: what happens next, and what is to be done.
+/// Events that come too late for the state they belong to change nothing.
+Step next(const StationState& state, const Event& event, const StationRules& rules);
+
+}  // namespace scanrig

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "core/clock.h"
+#include "core/result.h"
+#include "drivers/modbus/line.h"
+#include "drivers/turntable/axis_scale.h"
+#include "drivers/turntable/drive_profile.h"
+
+namespace scanrig {
+
+/// What the drive says about itself at one moment.
+struct DriveState {
+  bool fault = false;
+  bool enabled = false;
+  bool running = false;
+  bool in_position = false;
+  bool homed = false;
+  std::int32_t position = 0;  ///< measured, pulses
+};
+
+/// The values of a move in the drive's own units.
+struct DriveMotion {
+  std::uint16_t speed = 0;
+  std::uint16_t acceleration = 0;
+  std::uint16_t deceleration = 0;
+};
+
+/// A motor drive as its profile describes it. Requests that may be repeated without harm are sent up to three times,
+/// each repetition counted in the line's statistics; those that start a motion are sent once.
+/// Every function fails with `timeout`, `protocol`, `io` as modbus::Line does.
+/// Threads: one owner.
+class ModbusDrive {
+ public:
+  ModbusDrive(modbus::LineOptions line, DriveProfile profile, Clock& clock)
+      : line_(std::move(line), clock), profile_(std::move(profile)) {}
+
+  /// Status and position, read in turn. What follows a missed answer is never the same request again but the other
+  /// one, whose answer has another length: even an answer later than the quiet line is refused, not believed.
+  Result<DriveState> read_state(Deadline deadline);
+  Result<int> read_pulses_per_motor_rev(Deadline deadline);
+  /// The present alarm in words, empty when there is none.
+  Result<std::string> read_alarm(Deadline deadline);
+
+  Result<void> enable(Deadline deadline);
+  Result<void> stop(Deadline deadline);
+  Result<void> set_homing(const std::string& mode, const DriveMotion& fast, std::uint16_t slow_speed,
+                          Deadline deadline);
+  Result<void> set_soft_limits(const MovePlanner::Counter& range, Deadline deadline);
+  /// Fails with `device_alarm` when this drive wants a power cycle.
+  Result<void> reset_alarm(Deadline deadline);
+
+  Result<void> start_move(std::int32_t target, const DriveMotion& motion, Deadline deadline);
+  Result<void> start_homing(Deadline deadline) { return write(profile_.homing.start, deadline); }
+  Result<void> set_zero(Deadline deadline) { return write(profile_.homing.set_zero, deadline); }
+
+  /// Whether the last request may have been carried out although it failed.
+  [[nodiscard]] bool answer_missed() const { return line_.answer_missed(); }
+  void count_retry() { line_.count_retry(); }
+  [[nodiscard]] const modbus::LineStatistics& statistics() const { return line_.statistics(); }
+
+ private:
+  Result<void> write(const DriveProfile::Trigger& trigger, Deadline deadline) {
+    return line_.write(trigger.address, trigger.value, deadline);
+  }
+  template <class Request>
+  auto repeat(const Request& request) -> decltype(request());
+
+  modbus::Line line_;
+  DriveProfile profile_;
+};
+
+}  // namespace scanrig

@@ -1,0 +1,257 @@
+#include "pipeline/pose/estimate_pose.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "core/parallel.h"
+#include "core/units.h"
+#include "pipeline/pose/point_pairs.h"
+
+namespace scanrig {
+namespace {
+
+constexpr int kLevels = 4;  // of the range pyramid; the last has some 300 samples a pose
+constexpr int kPointPairMotions = 40;
+
+/// A candidate on its way, with what the measurements say of it.
+struct Hypothesis {
+  Candidate candidate;
+  std::vector<Testimony> testimonies;
+  double score = 0.0;
+  double condition = 0.0;
+};
+
+/// Everything the search needs of the two poses.
+struct Scene {
+  RestingSolid solid1, solid2;
+  MeasuredPose measured1, measured2;
+  Witness witness1, witness2;
+  double size_mm = 0.0;
+  Eigen::Vector3d middle2 = Eigen::Vector3d::Zero();  ///< of pose 2's object
+};
+
+bool alike(const Transform& a, const Transform& b, const Scene& scene, double degrees) {
+  return rotation_angle(a.linear().transpose() * b.linear()) < to_radians(degrees) &&
+         (a * scene.middle2 - b * scene.middle2).norm() < 0.05 * scene.size_mm;
+}
+
+/// Confirmations fade with the distance: a ranking for motions that are still degrees off.
+double soft_score(const std::vector<Testimony>& testimonies, double reach_mm) {
+  double sum = 0.0;
+  for (const Testimony& t : testimonies) {
+    if (t.kind == Testimony::Kind::free_space) sum -= 1.0;
+    if (t.kind == Testimony::Kind::surface) sum += 1.0 - std::abs(t.distance_mm) / reach_mm;
+  }
+  return sum / static_cast<double>(std::max<std::size_t>(testimonies.size(), 1));
+}
+
+/// One narrowing of the field: align what is left, hear the witnesses, keep the best that are distinct.
+struct Round {
+  int level;         ///< of the pyramid
+  int iterations;    ///< of the alignment before judging; 0: judge only
+  double capture;    ///< as a share of the object's size
+  double reach;      ///< the same
+  std::size_t keep;  ///< best hypotheses that stay
+  double apart_deg;  ///< and that are this far apart
+};
+
+void narrow(std::vector<Hypothesis>& field, const Scene& scene, const Round& round) {
+  parallel_for(field.size(), [&](std::size_t i) {
+    Hypothesis& h = field[i];
+    if (round.iterations > 0) {
+      RefineOptions refine;
+      refine.iterations = round.iterations;
+      const RefinedPose aligned = align(scene.measured1, scene.measured2, h.candidate.pose1_from_pose2, round.level,
+                                        round.capture * scene.size_mm, refine);
+      h.candidate.pose1_from_pose2 = aligned.pose1_from_pose2;
+      h.condition = aligned.condition;
+    }
+    const double reach = round.reach * scene.size_mm;
+    h.testimonies = hear(scene.witness1, scene.witness2, h.candidate.pose1_from_pose2, round.level, reach);
+    h.score = soft_score(h.testimonies, reach);
+  });
+  std::stable_sort(field.begin(), field.end(),
+                   [](const Hypothesis& a, const Hypothesis& b) { return a.score > b.score; });
+  std::vector<Hypothesis> kept;
+  for (Hypothesis& h : field) {
+    if (kept.size() == round.keep) break;
+    const bool known = std::ranges::any_of(kept, [&](const Hypothesis& k) {
+      return alike(k.candidate.pose1_from_pose2, h.candidate.pose1_from_pose2, scene, round.apart_deg);
+    });
+    if (!known) kept.push_back(std::move(h));
+  }
+  field = std::move(kept);
+}
+
+double height_above_table(const Mesh& solid) { return reach_along(solid.vertices, Eigen::Vector3d::UnitY()); }
+
+Result<Scene> set_scene(const PoseInput& pose1, const PoseInput& pose2) {
+  Scene scene;
+  const auto facts1 = solid_facts(pose1.solid);
+  if (!facts1) return pass_on(facts1, "pose 1");
+  const auto facts2 = solid_facts(pose2.solid);
+  if (!facts2) return pass_on(facts2, "pose 2");
+  scene.solid1 = {*facts1, height_above_table(pose1.solid), {}};
+  scene.solid2 = {*facts2, height_above_table(pose2.solid), {}};
+  scene.measured1 = measured_pose(pose1.views, kLevels);
+  scene.measured2 = measured_pose(pose2.views, kLevels);
+  scene.size_mm = 0.5 * (scene.measured1.size_mm + scene.measured2.size_mm);
+  scene.middle2 = facts2->centre_of_mass;
+  for (const MeasuredPose* pose : {&scene.measured1, &scene.measured2}) {
+    if (pose->samples[kLevels - 2].size() < 50) {
+      return fail(ErrorCode::degenerate, "pose estimation: pose {} has no measured surface to speak of",
+                  pose == &scene.measured1 ? 1 : 2);
+    }
+  }
+  return scene;
+}
+
+void add_pair(const RestPair& pair, const char* generator, const Scene& scene, std::vector<Hypothesis>& field) {
+  for (const double swivel : swivels_of(pair)) {
+    Hypothesis h;
+    h.candidate.pose1_from_pose2 = transform_of(pair, scene.solid1.facts, scene.solid2.facts, swivel);
+    h.candidate.generator = generator;
+    h.candidate.normal1 = pair.of_pose1.normal;
+    h.candidate.normal2 = pair.of_pose2.normal;
+    field.push_back(std::move(h));
+  }
+}
+
+/// The paper's generator. `same rest` is always among the hypotheses: it can only be refused if it was looked for.
+Result<void> add_rest_hypotheses(const PoseInput& pose1, const PoseInput& pose2, const PoseOptions& options,
+                                 Scene& scene, PoseEstimate& estimate, std::vector<Hypothesis>& field) {
+  const bool egi = options.rests == PoseOptions::Rests::egi;
+  const auto find = egi ? &rests_on_sphere : &rests_on_hull;
+  auto rests1 = find(pose1.solid, scene.solid1.facts, scene.solid2.height_mm, options.stable);
+  if (!rests1) return pass_on(rests1, "pose 1");
+  auto rests2 = find(pose2.solid, scene.solid2.facts, scene.solid1.height_mm, options.stable);
+  if (!rests2) return pass_on(rests2, "pose 2");
+  estimate.counts1 = rests1->counts;
+  estimate.counts2 = rests2->counts;
+  scene.solid1.rests = std::move(rests1->rests);
+  scene.solid2.rests = std::move(rests2->rests);
+  const auto pairs = pair_rests(scene.solid1, scene.solid2, options.pairs);
+  estimate.pairs = static_cast<int>(pairs.size());
+  for (const RestPair& pair : pairs) add_pair(pair, egi ? "egi" : "hull", scene, field);
+  return {};
+}
+
+void add_point_pair_hypotheses(const Scene& scene, std::vector<Hypothesis>& field) {
+  for (const Vote& vote : vote_by_point_pairs(scene.measured1.samples[kLevels - 2],
+                                              scene.measured2.samples[kLevels - 2], scene.size_mm, kPointPairMotions)) {
+    Hypothesis h;
+    h.candidate.pose1_from_pose2 = vote.pose1_from_pose2;
+    h.candidate.generator = "point pairs";
+    field.push_back(std::move(h));
+  }
+}
+
+/// Degrees between the vertical of pose 2 and that of pose 1.
+double tilt_deg(const Transform& pose1_from_pose2) {
+  const Eigen::Vector3d up = pose1_from_pose2.linear().col(1);
+  return to_degrees(std::atan2(std::hypot(up.x(), up.z()), up.y()));
+}
+
+std::string describe(const Candidate& c) {
+  const Eigen::AngleAxisd turn(c.pose1_from_pose2.linear());
+  return fmt::format("{:.1f} deg about ({:.2f}, {:.2f}, {:.2f}), {:.0f} % confirmed, {:.1f} % contradicted",
+                     to_degrees(turn.angle()), turn.axis().x(), turn.axis().y(), turn.axis().z(),
+                     100.0 * c.tally.confirmed, 100.0 * c.tally.contradicted);
+}
+
+/// One yardstick for all: the spread of the best fitting hypothesis that covers enough.
+void judge(std::vector<Hypothesis>& field, const PoseOptions& options) {
+  double spread = std::numeric_limits<double>::infinity();
+  for (const Hypothesis& h : field) {
+    const Tally loose = tally(h.testimonies, std::numeric_limits<double>::infinity());
+    if (loose.confirmed > options.least_overlap) spread = std::min(spread, 1.4826 * loose.median_mm);
+  }
+  for (Hypothesis& h : field) h.candidate.tally = tally(h.testimonies, spread);
+  std::stable_sort(field.begin(), field.end(), [](const Hypothesis& a, const Hypothesis& b) {
+    return a.candidate.tally.score() > b.candidate.tally.score();
+  });
+  for (Hypothesis& h : field) {
+    const Disagreement d = compare(field[0].testimonies, h.testimonies, spread);
+    Candidate& c = h.candidate;
+    c.contradicted_more = d.only_second - d.only_first;
+    c.separable = d.first_is_better();
+    c.angle_to_best_deg = to_degrees(
+        rotation_angle(field[0].candidate.pose1_from_pose2.linear().transpose() * c.pose1_from_pose2.linear()));
+  }
+}
+
+Result<void> decide(const std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options) {
+  if (field.empty())
+    return fail(ErrorCode::no_overlap, "pose estimation: no motion between the poses could be proposed");
+  const Candidate& best = field[0].candidate;
+  const Tally& t = best.tally;
+  if (t.confirmed < options.least_overlap ||
+      t.contradicted > options.most_contradicted * (t.confirmed + t.contradicted) ||
+      t.median_mm > options.worst_median * scene.size_mm) {
+    return fail(ErrorCode::no_overlap,
+                "pose estimation: the two poses do not fit together; the best of {} tried: {}. "
+                "Is it the same object, and do the poses show enough common surface?",
+                field.size(), describe(best));
+  }
+  std::string others;
+  bool all_same_rest = tilt_deg(best.pose1_from_pose2) < options.same_rest_tilt_deg;
+  for (const Hypothesis& h : field) {
+    const Candidate& c = h.candidate;
+    if (c.angle_to_best_deg < options.same_deg || c.separable || c.tally.confirmed < 0.7 * t.confirmed) continue;
+    others += fmt::format("; {}", describe(c));
+    all_same_rest = all_same_rest && tilt_deg(c.pose1_from_pose2) < options.same_rest_tilt_deg;
+  }
+  if (all_same_rest) {
+    return fail(ErrorCode::same_rest,
+                "pose estimation: the object was not turned over between the two poses, it only turned "
+                "about the vertical by {:.1f} deg; lay it on another side and scan pose 2 again",
+                to_degrees(Eigen::AngleAxisd(best.pose1_from_pose2.linear()).angle()));
+  }
+  if (!others.empty()) {
+    return fail(ErrorCode::ambiguous,
+                "pose estimation: the object looks the same in more than one way: {}{}. Stick a mark "
+                "of clay on it, or choose another second pose",
+                describe(best), others);
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose2, const PoseOptions& options,
+                                   const Context& context) {
+  auto scene = set_scene(pose1, pose2);
+  if (!scene) return pass_on(scene);
+  scene->witness1 = {&scene->measured1, pose1.views};
+  scene->witness2 = {&scene->measured2, pose2.views};
+  PoseEstimate estimate;
+  std::vector<Hypothesis> field;
+  if (options.stable_tangent_planes) {
+    if (auto ok = add_rest_hypotheses(pose1, pose2, options, *scene, estimate, field); !ok) return pass_on(ok);
+  }
+  if (options.point_pairs) add_point_pair_hypotheses(*scene, field);
+  add_pair(same_rest_pair(scene->solid1, scene->solid2), "same rest", *scene, field);
+  estimate.hypotheses = static_cast<int>(field.size());
+
+  constexpr Round kRounds[] = {{3, 0, 0.00, 0.050, 120, 4.0},  // as proposed
+                               {3, 10, 0.10, 0.040, 16, 5.0},  // coarse
+                               {2, 15, 0.05, 0.025, 8, 5.0},   // middle
+                               {1, 15, 0.02, 0.015, 8, 5.0}};  // verdict
+  for (const Round& round : kRounds) {
+    if (context.stopped()) return fail(ErrorCode::stopped, "pose estimation: stopped");
+    narrow(field, *scene, round);
+    if (round.iterations == 0) estimate.refined = static_cast<int>(field.size());
+    context.report("pose", static_cast<double>(&round - kRounds + 1) / std::size(kRounds));
+  }
+  judge(field, options);
+  if (auto ok = decide(field, *scene, options); !ok) return pass_on(ok);
+  estimate.best = field[0].candidate;
+  estimate.pose1_from_pose2 = estimate.best.pose1_from_pose2;
+  estimate.overlap = estimate.best.tally.confirmed;
+  estimate.condition = field[0].condition;
+  for (std::size_t i = 1; i < field.size(); ++i) estimate.alternatives.push_back(field[i].candidate);
+  return estimate;
+}
+
+}  // namespace scanrig

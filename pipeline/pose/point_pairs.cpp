@@ -1,0 +1,161 @@
+#include "pipeline/pose/point_pairs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+#include "core/parallel.h"
+#include "core/units.h"
+
+namespace scanrig {
+namespace {
+
+constexpr int kDistanceSteps = 16;  // over the range of distances used
+constexpr int kAngleSteps = 15;     // over 180 deg
+constexpr int kTurnSteps = 30;      // over 360 deg
+constexpr int kKeys = kDistanceSteps * kAngleSteps * kAngleSteps * kAngleSteps;
+constexpr double kShortest = 0.12;  // pairs, as a share of the object's size
+constexpr double kLongest = 0.6;
+constexpr std::size_t kReferences = 200;  // points of surface 2 that vote
+constexpr std::size_t kPeaks = 3;         // motions taken from each
+
+int angle_step(double cosine) {
+  const double share = std::acos(std::clamp(cosine, -1.0, 1.0)) / std::numbers::pi;
+  return std::min(static_cast<int>(share * kAngleSteps), kAngleSteps - 1);
+}
+
+/// Key of a pair of oriented points, or -1 where its distance is not used.
+int key_of(const SurfacePoint& a, const SurfacePoint& b, double size_mm) {
+  const Eigen::Vector3d d = b.point - a.point;
+  const double length = d.norm();
+  const double share = (length / size_mm - kShortest) / (kLongest - kShortest);
+  if (share < 0.0 || share >= 1.0) return -1;
+  const Eigen::Vector3d u = d / length;
+  int key = static_cast<int>(share * kDistanceSteps);
+  key = key * kAngleSteps + angle_step(a.normal.dot(u));
+  key = key * kAngleSteps + angle_step(b.normal.dot(u));
+  return key * kAngleSteps + angle_step(a.normal.dot(b.normal));
+}
+
+/// The frame of an oriented point: itself at the origin, its normal along x.
+Transform local_from_surface(const SurfacePoint& p) {
+  Transform t = Transform::Identity();
+  t.linear() = Eigen::Quaterniond::FromTwoVectors(p.normal, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  t.translation() = -t.linear() * p.point;
+  return t;
+}
+
+/// Angle of `p` about the normal of the oriented point.
+double turn_of(const Transform& local, const Eigen::Vector3d& p) {
+  const Eigen::Vector3d q = local * p;
+  return std::atan2(q.z(), q.y());
+}
+
+/// All pairs of a surface, sorted by key.
+struct PairTable {
+  struct Entry {
+    std::uint32_t reference;
+    float turn;
+  };
+  std::vector<std::uint32_t> begin;  ///< a key; one more at the end
+  std::vector<Entry> entries;
+  std::vector<Transform> local;
+};
+
+PairTable make_table(std::span<const SurfacePoint> surface, double size_mm) {
+  const std::size_t count = surface.size();
+  PairTable table;
+  table.local.resize(count);
+  std::vector<std::int32_t> keys(count * count, -1);
+  parallel_for(count, [&](std::size_t i) {
+    table.local[i] = local_from_surface(surface[i]);
+    for (std::size_t j = 0; j < count; ++j) keys[i * count + j] = key_of(surface[i], surface[j], size_mm);
+  });
+  table.begin.assign(kKeys + 1, 0);
+  for (const std::int32_t key : keys) {
+    if (key >= 0) ++table.begin[key + 1];
+  }
+  for (int k = 0; k < kKeys; ++k) table.begin[k + 1] += table.begin[k];
+  table.entries.resize(table.begin[kKeys]);
+  std::vector<std::uint32_t> next(table.begin.begin(), table.begin.end() - 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t j = 0; j < count; ++j) {
+      const std::int32_t key = keys[i * count + j];
+      if (key < 0) continue;
+      const auto turn = static_cast<float>(turn_of(table.local[i], surface[j].point));
+      table.entries[next[key]++] = {static_cast<std::uint32_t>(i), turn};
+    }
+  }
+  return table;
+}
+
+/// The motions that the pairs starting at one point of surface 2 agree on most.
+std::vector<Vote> votes_of(const PairTable& table, std::span<const SurfacePoint> surface2, std::size_t reference,
+                           double size_mm) {
+  constexpr double kTwoPi = 2.0 * std::numbers::pi;
+  const Transform local2 = local_from_surface(surface2[reference]);
+  std::vector<float> votes(table.local.size() * kTurnSteps, 0.0F);
+  for (const SurfacePoint& other : surface2) {
+    const int key = key_of(surface2[reference], other, size_mm);
+    if (key < 0) continue;
+    const double turn2 = turn_of(local2, other.point);
+    // A common key says little: its votes count less.
+    const float weight = 1.0F / std::sqrt(static_cast<float>(table.begin[key + 1] - table.begin[key]) + 1.0F);
+    for (std::uint32_t e = table.begin[key]; e < table.begin[key + 1]; ++e) {
+      const double turn = (table.entries[e].turn - turn2) / kTwoPi;
+      const int step = static_cast<int>((turn - std::floor(turn)) * kTurnSteps) % kTurnSteps;
+      votes[table.entries[e].reference * kTurnSteps + step] += weight;
+    }
+  }
+  std::vector<Vote> peaks;
+  for (std::size_t peak = 0; peak < kPeaks; ++peak) {
+    const auto best = std::max_element(votes.begin(), votes.end());
+    const auto cell = static_cast<std::size_t>(best - votes.begin());
+    const double turn = kTwoPi * (static_cast<double>(cell % kTurnSteps) + 0.5) / kTurnSteps;
+    const Eigen::AngleAxisd about_normal(turn, Eigen::Vector3d::UnitX());
+    peaks.push_back({table.local[cell / kTurnSteps].inverse() * about_normal * local2, *best});
+    *best = 0.0F;
+  }
+  return peaks;
+}
+
+bool alike(const Transform& a, const Transform& b, const Eigen::Vector3d& middle, double size_mm) {
+  return rotation_angle(a.linear().transpose() * b.linear()) < to_radians(12.0) &&
+         (a * middle - b * middle).norm() < 0.06 * size_mm;
+}
+
+}  // namespace
+
+std::vector<Vote> vote_by_point_pairs(std::span<const SurfacePoint> surface1, std::span<const SurfacePoint> surface2,
+                                      double size_mm, int most) {
+  if (surface1.empty() || surface2.empty()) return {};
+  const PairTable table = make_table(surface1, size_mm);
+  const std::size_t stride = std::max<std::size_t>(1, surface2.size() / kReferences);
+  std::vector<std::vector<Vote>> parts((surface2.size() + stride - 1) / stride);
+  parallel_for(parts.size(), [&](std::size_t k) { parts[k] = votes_of(table, surface2, k * stride, size_mm); });
+
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  for (const SurfacePoint& p : surface2) middle += p.point / static_cast<double>(surface2.size());
+  std::vector<Vote> all;
+  for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
+  // What different points of surface 2 vote for must be the same motion: add up the votes of its like.
+  std::vector<Vote> summed = all;
+  parallel_for(all.size(), [&](std::size_t i) {
+    summed[i].votes = 0.0;
+    for (const Vote& v : all) {
+      if (alike(all[i].pose1_from_pose2, v.pose1_from_pose2, middle, size_mm)) summed[i].votes += v.votes;
+    }
+  });
+  std::stable_sort(summed.begin(), summed.end(), [](const Vote& a, const Vote& b) { return a.votes > b.votes; });
+  std::vector<Vote> chosen;
+  for (const Vote& v : summed) {
+    if (chosen.size() == static_cast<std::size_t>(most)) break;
+    const bool known = std::ranges::any_of(
+        chosen, [&](const Vote& c) { return alike(c.pose1_from_pose2, v.pose1_from_pose2, middle, size_mm); });
+    if (!known) chosen.push_back(v);
+  }
+  return chosen;
+}
+
+}  // namespace scanrig

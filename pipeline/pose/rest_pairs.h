@@ -1,0 +1,53 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/transform.h"
+#include "pipeline/pose/stable_rests.h"
+
+namespace scanrig {
+
+/// The table's outward normal seen from the object: what it rests on in either pose.
+inline Eigen::Vector3d base_normal() { return -Eigen::Vector3d::UnitY(); }
+
+/// A solid in its pose's turntable frame and the planes it can rest on.
+struct RestingSolid {
+  SolidFacts facts;
+  double height_mm = 0.0;  ///< above the table in its own pose
+  std::vector<StableRest> rests;
+};
+
+/// The rest of solid 1 that pose 2 stands on, with the rest of solid 2 that pose 1 stands on.
+struct RestPair {
+  StableRest of_pose1;
+  StableRest of_pose2;
+  double cost = 0.0;  ///< squared misfit of angle and heights in units of their tolerances; the smaller the better
+};
+
+struct RestPairOptions {
+  double angle_sigma_deg = 6.0;  ///< smooth contacts make normals jitter by degrees
+  double height_sigma_mm = 2.0;  ///< or `height_sigma` of the size: partial models are closed by their hull
+  double height_sigma = 0.04;
+  double worst_cost = 30.0;
+  int most = 40;
+};
+
+/// Pairs of rests, best first, that agree on the angle to the base, angle(n_T1, n_B) = angle(n_T2, n_B), and on the
+/// heights, extent(V1, n_T1) = H2 and extent(V2, n_T2) = H1. The gates are soft [measured: a hard 3 deg gate loses the
+/// true pair in 2 of 10 trials].
+std::vector<RestPair> pair_rests(const RestingSolid& pose1, const RestingSolid& pose2, const RestPairOptions& options);
+
+/// pose1_from_pose2 of a pair: R n_T2 = n_B and R n_B = n_T1, both met equally well (TRIAD on the bisectors), then
+/// turned by `swivel` radians about n_T1. Contact fixes the translation along n_B and n_T1, the centres of mass the
+/// rest.
+Transform transform_of(const RestPair& pair, const SolidFacts& pose1, const SolidFacts& pose2, double swivel);
+
+/// The swivels to try. Within 30 deg of upside down the two contacts are one and any angle about the vertical fits:
+/// the full circle; out to 60 deg the angle is known poorly; beyond, the closed form holds.
+std::vector<double> swivels_of(const RestPair& pair);
+
+/// The pair that says "not turned over": both poses rest on the same face; any angle about the vertical fits.
+RestPair same_rest_pair(const RestingSolid& pose1, const RestingSolid& pose2);
+
+}  // namespace scanrig

@@ -1,0 +1,18 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+
+namespace scanrig {
+
+/// Disparities to about a third of a pixel, of both images of a rectified pair: u_left - u_right, px, NaN unknown.
+struct CoarseDisparity {
+  cv::Mat1f left;   ///< on the left image's pixels
+  cv::Mat1f right;  ///< on the right image's pixels
+};
+
+/// Semi-global matching [Hirschmueller 2008; OpenCV, MODE_SGBM_3WAY] on images freed of shading, each image in its turn.
+/// `rows`: the only rows looked at. Throws what OpenCV throws.
+CoarseDisparity coarse_disparity(const cv::Mat1f& left, const cv::Mat1f& right, int min_disparity, int max_disparity,
+                                 cv::Range rows);
+
+}  // namespace scanrig

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+
+#include "core/context.h"
+#include "core/result.h"
+#include "pipeline/range/coarse_disparity.h"
+#include "pipeline/range/stereo.h"
+
+namespace scanrig {
+
+/// u_left - u_right on the left image's pixels; NaN unknown in every matrix.
+struct DenseDisparity {
+  cv::Mat1f value;  ///< px
+  cv::Mat1f sigma;  ///< px
+  cv::Mat2f slope;  ///< d value / du, d value / dv
+};
+
+/// Least-squares matching of every object pixel, from both images, and only what both agree on. Fails with `stopped`.
+Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDisparity& coarse,
+                                       const StereoOptions& options, const Context& context);
+
+/// Takes out what its surroundings contradict: lone pixels, specks, the rims of depth steps.
+void remove_outliers(DenseDisparity& disparity, const StereoOptions& options);
+
+}  // namespace scanrig

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+
+#include "core/result.h"
+#include "pipeline/calibration/camera.h"
+
+namespace scanrig {
+
+/// Where each pixel of a rectified image lies in the sensor's image, lens distortion included; pixels.
+struct RectifyingMap {
+  cv::Mat1f u;
+  cv::Mat1f v;
+};
+
+/// Both cameras turned so that a point lies in the same row of both images. Made once a calibration, used for every view.
+/// The principal points are NOT equal: each image keeps looking where its toed-in camera looked, so that the
+/// disparities u_left - u_right stay small: u_left - u_right = fx * baseline / z + (left.cx - right.cx).
+struct Rectification {
+  Projection left, right;  ///< pinhole, same size, focal length and cy
+  Transform left_from_turntable = Transform::Identity();
+  Transform right_from_turntable = Transform::Identity();
+  double baseline_mm = 0.0;
+  double table_radius_mm = 0.0;
+  int min_disparity = 0;  ///< px, u_left - u_right over the working volume
+  int max_disparity = 0;
+  RectifyingMap left_map, right_map;
+};
+
+/// Above the table, around the axis: where an object may be.
+struct WorkingVolume {
+  double radius_mm = 65.0;
+  double height_mm = 150.0;
+};
+
+/// Fails with `invalid_input` (no image size or focal length, no baseline, a baseline along the line of sight) and
+/// `out_of_range` (no part of the working volume is seen by both cameras).
+Result<Rectification> rectify(const Calibration& calibration, const WorkingVolume& volume = {});
+
+/// A sensor image in the rectified grid, 8 bit, one or three channels; outside the sensor its border is continued.
+/// Fails with `invalid_input` for another size or type.
+Result<cv::Mat> rectified(const RectifyingMap& map, const cv::Mat& image);
+
+/// The same as grey float values without loss of sub-pixel position (cubic B-spline, prefiltered), for matching.
+/// Colour is weighted 1:2:1 (B, G, R), as often as a Bayer sensor samples them.
+Result<cv::Mat1f> rectified_grey(const RectifyingMap& map, const cv::Mat& image);
+
+}  // namespace scanrig

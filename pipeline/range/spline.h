@@ -1,0 +1,24 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+namespace scanrig {
+
+/// Cubic B-spline coefficients of an image, so that the spline passes through its values [Unser, Splines, 1999].
+/// The border is mirrored.
+cv::Mat1f spline_coefficients(const cv::Mat1f& image);
+
+/// An image as one cubic a pixel along each row: value(x + t) = c[0] + t (c[1] + t (c[2] + t c[3])), 0 <= t < 1,
+/// the cubic B-spline through the row's values. Cubics of one row lie behind one another.
+class CubicRows {
+ public:
+  explicit CubicRows(const cv::Mat1f& image);
+  [[nodiscard]] const float* row(int y) const { return cubics_.data() + size_t(y) * size_t(width_) * 4; }
+
+ private:
+  int width_;
+  std::vector<float> cubics_;
+};
+
+}  // namespace scanrig

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+
+#include "pipeline/range/spline.h"
+
+namespace scanrig {
+
+/// Disparity around a pixel, second order: u_here - u_there = c0 + c1 x + c2 y + c3 x^2 + c4 x y + c5 y^2, where x, y are
+/// the pixels from it. Windows reach `radius` pixels to each side.
+struct DisparityPatch {
+  std::array<float, 6> c{};
+  float sigma = 0.0f;  ///< of c0, px
+  float zncc = 0.0f;
+  std::uint8_t radius = 0;
+  bool valid = false;
+
+  [[nodiscard]] float at(float x, float y) const {
+    return c[0] + x * (c[1] + c[3] * x + c[4] * y) + y * (c[2] + c[5] * y);
+  }
+  /// The same surface, described around the pixel (x, y) away.
+  [[nodiscard]] DisparityPatch moved(float x, float y) const {
+    DisparityPatch p = *this;
+    p.c[0] = at(x, y);
+    p.c[1] += 2.0f * c[3] * x + c[4] * y;
+    p.c[2] += 2.0f * c[5] * y + c[4] * x;
+    return p;
+  }
+};
+
+/// One image of a rectified pair, prepared for matching.
+struct MatchImage {
+  explicit MatchImage(const cv::Mat1f& image);
+  cv::Mat1f value;
+  CubicRows cubic;
+};
+
+/// What the matcher knows about the pixels of the image it starts from.
+struct MatchMask {
+  cv::Mat1b usable;    ///< not 0: shows the object
+  cv::Mat1f disparity;  ///< coarse, px; NaN unknown; keeps pixels beyond a depth step out of a window
+};
+
+struct WindowOptions {
+  int iterations = 8;
+  float step_px = 1.5f;          ///< a coarse disparity further than this from the patch belongs to another surface
+  float least_support = 0.45f;   ///< share of the window that must belong to the patch
+  float curvature_prior = 0.5f;  ///< px over a window of radius 7: the second order is worth its noise only above this
+};
+
+/// Least-squares matching of the window around (u, v) with second-order shape, gain and offset [Sutton, Orteu and Schreier,
+/// Image Correlation, 2009, ch. 5]: Gauss-Newton from `patch`, with the gradient of `here` (inverse compositional).
+/// `patch.radius` is 7, 10 or 15. Returns the patch where it stopped; invalid when it diverged or had too little to see.
+DisparityPatch match_window(const MatchImage& here, const MatchImage& there, const MatchMask& mask, int u, int v,
+                            const DisparityPatch& patch, const WindowOptions& options);
+
+}  // namespace scanrig

@@ -1,0 +1,69 @@
+#include <nlohmann/json.hpp>
+
+#include "core/units.h"
+#include "pipeline/reconstruct/reconstruct.h"
+#include "pipeline/scan/model/model_files.h"
+
+namespace scanrig {
+namespace {
+
+Result<void> add_all(const ScanFolder& scan, std::size_t pose, Reconstruction& reconstruction, const Context& context) {
+  const auto& views = scan.manifest().poses[pose].views;
+  const bool stereo = scan.manifest().source == "stereo";
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    if (context.stopped()) return fail(ErrorCode::stopped, "stopped by request");
+    context.report("range", static_cast<double>(v) / static_cast<double>(views.size()));
+    Result<void> added;
+    if (stereo) {
+      const auto images = scan.load_images(pose, v);
+      if (!images) return pass_on(images);
+      added = reconstruction.add_view(pose, *images, context);
+    } else {
+      auto range = scan.load_range(pose, v);
+      if (!range) return pass_on(range);
+      added = reconstruction.add_range_view(pose, views[v].index, to_radians(views[v].measured_deg), std::move(*range),
+                                            context);
+    }
+    if (!added) return added;
+  }
+  return {};
+}
+
+Result<Reconstruction> begin(const ScanFolder& scan, const ReconstructOptions& options) {
+  const ScanIdentity identity{.id = scan.manifest().id, .profile = scan.manifest().profile};
+  if (scan.manifest().source != "stereo") return Reconstruction(options, identity);
+  auto calibration = scan.load_calibration();
+  if (!calibration) return pass_on(calibration);
+  return Reconstruction(std::move(*calibration), options, identity);
+}
+
+}  // namespace
+
+Result<Model> reconstruct(const ScanFolder& scan, const ReconstructOptions& options, const Context& context) {
+  const auto& poses = scan.manifest().poses;
+  if (poses.empty()) return fail(ErrorCode::invalid_input, "{} has no poses", scan.path().string());
+  for (const PoseRecord& pose : poses) {
+    if (!pose.complete) {
+      return fail(ErrorCode::invalid_input, "{}: {} is not complete: only {} of its views were taken",
+                  scan.path().string(), pose.name, pose.views.size());
+    }
+  }
+  auto reconstruction = begin(scan, options);
+  if (!reconstruction) return pass_on(reconstruction);
+  for (std::size_t pose = 0; pose < poses.size(); ++pose) {
+    if (auto added = add_all(scan, pose, *reconstruction, context); !added) return pass_on(added, scan.path().string());
+    if (auto done = reconstruction->finish_pose(pose, context); !done) return pass_on(done, scan.path().string());
+  }
+  auto model = reconstruction->finish(context);
+  if (!model) return pass_on(model, scan.path().string());
+  return model;
+}
+
+Result<void> write_model(const Model& model, const std::filesystem::path& folder) {
+  const std::string report = model.report ? model.report->dump(1) + "\n" : std::string();
+  const auto written = write_model_files(model.mesh, report, folder);
+  if (!written) return pass_on(written);
+  return {};
+}
+
+}  // namespace scanrig

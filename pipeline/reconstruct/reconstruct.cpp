@@ -1,0 +1,244 @@
+#include "pipeline/reconstruct/reconstruct.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "core/parallel.h"
+#include "pipeline/pose/estimate_pose.h"
+#include "pipeline/range/rectification.h"
+#include "pipeline/range/view_builder.h"
+#include "pipeline/reconstruct/report.h"
+#include "pipeline/reconstruct/stage_log.h"
+#include "pipeline/registration/refine_pose.h"
+#include "pipeline/registration/register_views.h"
+#include "pipeline/texture/texture.h"
+#include "pipeline/volume/integrate.h"
+
+namespace scanrig {
+namespace {
+
+/// Partial models only have to carry the search for the pose; finer ones do not find it better.
+constexpr double kPartialVoxelMm = 0.8;
+
+struct PlainPair {
+  cv::Mat3b left, right;
+};
+
+struct PoseState {
+  std::vector<View> views;
+  std::vector<PlainPair> plain;  ///< one a view; empty for range scans and grey sensors
+  RegistrationReport registration;
+  Surface partial;
+  bool finished = false;
+};
+
+Result<VolumeOptions::Fusion> fusion_of(const std::string& name) {
+  if (name == "evidence") return VolumeOptions::Fusion::evidence;
+  if (name == "paper") return VolumeOptions::Fusion::paper;
+  return fail(ErrorCode::invalid_input, "fusion \"{}\" is neither \"evidence\" nor \"paper\"", name);
+}
+
+Result<PoseOptions> pose_options_of(const std::string& rests) {
+  PoseOptions options;
+  if (rests == "hull") {
+    options.rests = PoseOptions::Rests::hull;
+  } else if (rests == "egi") {
+    options.rests = PoseOptions::Rests::egi;
+  } else {
+    return fail(ErrorCode::invalid_input, "rests \"{}\" is neither \"hull\" nor \"egi\"", rests);
+  }
+  return options;
+}
+
+}  // namespace
+
+struct Reconstruction::State {
+  ReconstructOptions options;
+  ScanIdentity identity;
+  std::optional<Calibration> calibration;
+  std::optional<Rectification> rectification;
+  std::vector<PoseState> poses;
+  StageLog log;
+
+  Result<PoseState*> open_pose(std::size_t pose);
+  Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context);
+  Result<void> finish_pose(std::size_t pose, const Context& context);
+  Result<Transform> find_pose(Report& report, const Context& context);
+  Result<Surface> surface(const Transform& pose1_from_pose2, const Context& context);
+  [[nodiscard]] std::vector<Photo> photos(const Transform& pose1_from_pose2) const;
+  Result<void> add_texture(TexturedMesh& model, const Transform& pose1_from_pose2, Report& report,
+                           const Context& context);
+  Result<Model> finish(const Context& context);
+};
+
+Result<PoseState*> Reconstruction::State::open_pose(std::size_t pose) {
+  if (pose > 1) return fail(ErrorCode::invalid_input, "a scan has one or two poses, not {}", pose + 1);
+  if (pose > poses.size()) return fail(ErrorCode::invalid_input, "pose {} has no views before pose {}", pose, pose + 1);
+  if (pose == poses.size()) poses.emplace_back();
+  if (poses[pose].finished) return fail(ErrorCode::invalid_input, "pose {} is finished already", pose + 1);
+  return &poses[pose];
+}
+
+Result<void> Reconstruction::State::add_view(std::size_t pose, const ViewImages& images, const Context& context) {
+  auto open = open_pose(pose);
+  if (!open) return pass_on(open);
+  const StageLog::Timer timer(log, "range");
+  if (!rectification) {
+    auto made = rectify(*calibration);
+    if (!made) return pass_on(made, "calibration");
+    rectification = std::move(*made);
+  }
+  const StereoImages stereo{images.left_pattern, images.right_pattern, images.left_plain, images.right_plain};
+  auto view = make_view(*rectification, stereo, images.angle_rad, images.index, {}, context);
+  if (!view) return pass_on(view, fmt::format("pose {} view {}", pose + 1, images.index));
+  (*open)->views.push_back(std::move(*view));
+  if (images.left_plain.channels() == 3) {
+    (*open)->plain.push_back({images.left_plain, images.right_plain});
+  }
+  return {};
+}
+
+Result<void> Reconstruction::State::finish_pose(std::size_t pose, const Context& context) {
+  auto open = open_pose(pose);
+  if (!open) return pass_on(open);
+  PoseState& state = **open;
+  if (state.views.empty()) return fail(ErrorCode::invalid_input, "pose {} has no views", pose + 1);
+  {
+    const StageLog::Timer timer(log, "registration");
+    context.report("registration", 0.0);
+    const auto registration = calibration ? RegistrationOptions{} : RegistrationOptions::imported();
+    auto report = register_views(state.views, registration, context);
+    if (!report) return pass_on(report, fmt::format("pose {}", pose + 1));
+    state.registration = std::move(*report);
+  }
+  const StageLog::Timer timer(log, "partial model");
+  const PosedViews posed{.views = state.views};
+  auto partial = integrate({&posed, 1}, {.voxel_mm = std::max(kPartialVoxelMm, options.voxel_mm)}, context);
+  if (!partial) return pass_on(partial, fmt::format("pose {}", pose + 1));
+  state.partial = std::move(*partial);
+  state.finished = true;
+  return {};
+}
+
+Result<Transform> Reconstruction::State::find_pose(Report& report, const Context& context) {
+  if (poses.size() < 2) return Transform::Identity();
+  const StageLog::Timer timer(log, "pose");
+  const auto pose_options = pose_options_of(options.rests);
+  if (!pose_options) return pass_on(pose_options);
+  const PoseInput first{.solid = poses[0].partial.mesh, .views = poses[0].views};
+  const PoseInput second{.solid = poses[1].partial.mesh, .views = poses[1].views};
+  const auto estimate = estimate_pose(first, second, *pose_options, context);
+  if (!estimate) return pass_on(estimate);
+  report.add_estimate(*estimate);
+  const auto refined = refine_pose(poses[0].views, poses[1].views, estimate->pose1_from_pose2, {}, context);
+  if (!refined) return pass_on(refined);
+  report.add_refinement(*refined);
+  return refined->pose1_from_pose2;
+}
+
+Result<Surface> Reconstruction::State::surface(const Transform& pose1_from_pose2, const Context& context) {
+  const StageLog::Timer timer(log, "integration");
+  const auto fusion = fusion_of(options.fusion);
+  if (!fusion) return pass_on(fusion);
+  std::vector<PosedViews> posed;
+  posed.push_back({.views = poses[0].views});
+  if (poses.size() > 1) posed.push_back({.views = poses[1].views, .model_from_pose = pose1_from_pose2});
+  return integrate(posed, {.voxel_mm = options.voxel_mm, .fusion = *fusion}, context);
+}
+
+std::vector<Photo> Reconstruction::State::photos(const Transform& pose1_from_pose2) const {
+  std::vector<Photo> photos;
+  for (std::size_t p = 0; p < poses.size(); ++p) {
+    const Transform pose_from_model = p == 0 ? Transform::Identity() : pose1_from_pose2.inverse();
+    for (std::size_t v = 0; v < poses[p].plain.size(); ++v) {
+      // What registration did to the view's range image holds for its photographs too.
+      const Transform turntable_from_pose =
+          rectification->left_from_turntable.inverse() * poses[p].views[v].range.camera_from_pose;
+      const Transform turntable_from_model = turntable_from_pose * pose_from_model;
+      photos.push_back({calibration->left, turntable_from_model, poses[p].plain[v].left});
+      photos.push_back({calibration->right, turntable_from_model, poses[p].plain[v].right});
+    }
+  }
+  return photos;
+}
+
+Result<Model> Reconstruction::State::finish(const Context& context) {
+  if (poses.empty()) return fail(ErrorCode::invalid_input, "the scan has no views");
+  for (std::size_t p = 0; p < poses.size(); ++p) {
+    if (!poses[p].finished) return fail(ErrorCode::invalid_input, "pose {} is not finished", p + 1);
+  }
+  Report report(options, identity, calibration);
+  for (const PoseState& pose : poses) report.add_pose(pose.views, pose.registration, pose.partial.report);
+  const auto pose1_from_pose2 = find_pose(report, context);
+  if (!pose1_from_pose2) return pass_on(pose1_from_pose2, "pose 2 in pose 1");
+  auto integrated = surface(*pose1_from_pose2, context);
+  if (!integrated) return pass_on(integrated, "integration");
+
+  Model model;
+  model.mesh.mesh = std::move(integrated->mesh);
+  if (auto done = add_texture(model.mesh, *pose1_from_pose2, report, context); !done) return pass_on(done, "texture");
+  report.add_surface(model.mesh.mesh, integrated->report);
+  model.report = std::make_shared<const nlohmann::json>(report.finished(log));
+  return model;
+}
+
+Result<void> Reconstruction::State::add_texture(TexturedMesh& model, const Transform& pose1_from_pose2, Report& report,
+                                                const Context& context) {
+  const auto photographs = options.texture ? photos(pose1_from_pose2) : std::vector<Photo>();
+  if (photographs.empty()) return {};
+  const StageLog::Timer timer(log, "texture");
+  auto textured = texture_mesh(model.mesh, photographs, {}, context);
+  if (!textured) return pass_on(textured);
+  report.add_texture(*textured);
+  model = std::move(textured->mesh);
+  return {};
+}
+
+Reconstruction::Reconstruction(Calibration calibration, ReconstructOptions options, ScanIdentity identity)
+    : state_(std::make_unique<State>()) {
+  state_->options = std::move(options);
+  state_->identity = std::move(identity);
+  state_->calibration = std::move(calibration);
+}
+
+Reconstruction::Reconstruction(ReconstructOptions options, ScanIdentity identity) : state_(std::make_unique<State>()) {
+  state_->options = std::move(options);
+  state_->identity = std::move(identity);
+}
+
+Reconstruction::~Reconstruction() = default;
+Reconstruction::Reconstruction(Reconstruction&&) noexcept = default;
+Reconstruction& Reconstruction::operator=(Reconstruction&&) noexcept = default;
+
+Result<void> Reconstruction::add_view(std::size_t pose, const ViewImages& images, const Context& context) {
+  if (!state_->calibration) return fail(ErrorCode::invalid_input, "a scan of range images takes no photographs");
+  Result<void> done;
+  with_threads(state_->options.threads, [&] { done = state_->add_view(pose, images, context); });
+  return done;
+}
+
+Result<void> Reconstruction::add_range_view(std::size_t pose, int index, double angle_rad, RangeImage range,
+                                            const Context& /*context*/) {
+  if (state_->calibration) return fail(ErrorCode::invalid_input, "a stereo scan takes no range images");
+  auto open = state_->open_pose(pose);
+  if (!open) return pass_on(open);
+  (*open)->views.push_back({.index = index, .angle_rad = angle_rad, .range = std::move(range), .silhouettes = {}});
+  return {};
+}
+
+Result<void> Reconstruction::finish_pose(std::size_t pose, const Context& context) {
+  Result<void> done;
+  with_threads(state_->options.threads, [&] { done = state_->finish_pose(pose, context); });
+  return done;
+}
+
+Result<Model> Reconstruction::finish(const Context& context) {
+  Result<Model> model;
+  with_threads(state_->options.threads, [&] { model = state_->finish(context); });
+  return model;
+}
+
+}  // namespace scanrig

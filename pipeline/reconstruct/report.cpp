@@ -1,0 +1,198 @@
+#include "pipeline/reconstruct/report.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
+
+#include "core/version.h"
+#include "pipeline/mesh/solid.h"
+#include "pipeline/mesh/topology.h"
+
+namespace scanrig {
+namespace {
+
+using nlohmann::json;
+
+/// JSON has no NaN: what is not known is null.
+json number(double value) { return std::isfinite(value) ? json(value) : json(); }
+
+json vector_json(const Eigen::Vector3d& v) { return {number(v.x()), number(v.y()), number(v.z())}; }
+
+json transform_json(const Transform& transform) {
+  json rotation = json::array();
+  for (int row = 0; row < 3; ++row) {
+    rotation.push_back(vector_json(Eigen::Vector3d(transform.linear().row(row).transpose())));
+  }
+  return {{"rotation", rotation}, {"translation", vector_json(transform.translation())}};
+}
+
+json view_json(const View& view, const ViewFit& fit) {
+  const cv::Mat1f& depth = view.range.depth;
+  const auto measured = static_cast<double>(cv::countNonZero(depth == depth));  // NaN differs from itself
+  return {{"index", fit.index},
+          {"measured_share_of_image", measured / static_cast<double>(depth.total())},
+          {"angle_correction_deg", number(fit.angle_correction_deg)},
+          {"rotation_correction_deg", vector_json(fit.rotation_deg)},
+          {"translation_correction_mm", vector_json(fit.translation_mm)},
+          {"residual_median_before_mm", number(fit.median_before_mm)},
+          {"residual_median_mm", number(fit.median_after_mm)},
+          {"residual_rms_mm", number(fit.rms_after_mm)},
+          {"overlap", number(fit.overlap)}};
+}
+
+json volume_json(const VolumeReport& volume) {
+  constexpr std::array<const char*, kVoxelClasses> kNames = {"overlap", "nonoverlap", "inside", "outside", "unseen"};
+  json classes = json::array();
+  for (const auto& pose : volume.class_counts) {
+    json counts;
+    for (std::size_t c = 0; c < kVoxelClasses; ++c) counts[kNames[c]] = pose[c];
+    classes.push_back(counts);
+  }
+  json pairs;
+  for (std::size_t a = 0; a < kVoxelClasses; ++a) {
+    for (std::size_t b = 0; b < kVoxelClasses; ++b) {
+      if (volume.class_pairs[a][b] > 0) pairs[fmt::format("{}/{}", kNames[a], kNames[b])] = volume.class_pairs[a][b];
+    }
+  }
+  return {{"band_mm", volume.band_mm},
+          {"active_voxels", volume.active_voxels},
+          {"dropped_components", volume.dropped_components},
+          {"genus_before_repair", volume.genus_before_repair},
+          {"voxels_cut", volume.voxels_cut},
+          {"voxels_filled", volume.voxels_filled},
+          {"classes", classes},
+          {"class_pairs", pairs},
+          {"alarms", volume.alarms}};
+}
+
+double face_area(const Mesh& mesh, const Mesh::Face& face) {
+  const Eigen::Vector3d a = mesh.vertices[face[0]].cast<double>();
+  const Eigen::Vector3d b = mesh.vertices[face[1]].cast<double>();
+  const Eigen::Vector3d c = mesh.vertices[face[2]].cast<double>();
+  return 0.5 * (b - a).cross(c - a).norm();
+}
+
+json candidate_json(const Candidate& candidate) {
+  return {{"pose1_from_pose2", transform_json(candidate.pose1_from_pose2)},
+          {"generator", candidate.generator},
+          {"rest_normal_in_pose1", vector_json(candidate.normal1)},
+          {"rest_normal_in_pose2", vector_json(candidate.normal2)},
+          {"confirmed", candidate.tally.confirmed},
+          {"contradicted", candidate.tally.contradicted},
+          {"in_free_space", candidate.tally.free_space},
+          {"median_mm", number(candidate.tally.median_mm)},
+          {"angle_to_best_deg", candidate.angle_to_best_deg},
+          {"contradicted_more_than_best", candidate.contradicted_more},
+          {"separable", candidate.separable}};
+}
+
+json counts_json(const RestCounts& counts) {
+  return {{"tangent_planes", counts.tangent_planes},
+          {"after_base_plane", counts.after_base_plane},
+          {"after_stability", counts.after_stability},
+          {"after_height", counts.after_height}};
+}
+
+json mesh_json(const Mesh& mesh) {
+  const Topology shape = topology(mesh);
+  double area = 0.0, measured = 0.0;
+  for (const Mesh::Face& face : mesh.faces) {
+    const double here = face_area(mesh, face);
+    area += here;
+    if (mesh.views[face[0]] > 0 && mesh.views[face[1]] > 0 && mesh.views[face[2]] > 0) measured += here;
+  }
+  json result = {{"vertices", mesh.vertices.size()},
+                 {"faces", mesh.faces.size()},
+                 {"components", shape.components},
+                 {"watertight", shape.watertight()},
+                 {"genus", shape.genus()},
+                 {"area_mm2", area},
+                 {"measured_share", measured / area},
+                 {"closed_share", 1.0 - measured / area}};
+  if (const auto solid = solid_properties(mesh)) {
+    result["volume_mm3"] = solid->volume_mm3;
+    result["centre_of_mass"] = vector_json(solid->centre_of_mass);
+  }
+  return result;
+}
+
+}  // namespace
+
+Report::Report(const ReconstructOptions& options, const ScanIdentity& identity,
+               const std::optional<Calibration>& calibration)
+    : json_(std::make_unique<json>()) {
+  json& report = *json_;
+  report["format"] = "scanrig-report";
+  report["version"] = 1;
+  report["software"] = {{"name", "scanrig"}, {"version", kVersion}, {"compiler", kCompiler}};
+  report["scan"] = identity.id;
+  report["profile_sha256"] = identity.profile;
+  report["calibration_sha256"] = calibration ? calibration->sha256 : "";
+  report["options"] = {{"voxel_mm", options.voxel_mm},
+                       {"fusion", options.fusion},
+                       {"rests", options.rests},
+                       {"texture", options.texture},
+                       {"threads", options.threads}};
+  report["poses"] = json::array();
+}
+
+Report::~Report() = default;
+
+void Report::add_pose(std::span<const View> views, const RegistrationReport& registration,
+                      const VolumeReport& partial) {
+  json per_view = json::array();
+  for (std::size_t v = 0; v < views.size(); ++v) per_view.push_back(view_json(views[v], registration.views[v]));
+  (*json_)["poses"].push_back({{"views", per_view},
+                               {"residual_median_before_mm", number(registration.median_before_mm)},
+                               {"residual_median_mm", number(registration.median_after_mm)},
+                               {"axis_tilt_correction_deg", registration.axis_tilt_deg},
+                               {"axis_shift_correction_mm", registration.axis_shift_mm},
+                               {"angle_observable", registration.angle_observable},
+                               {"partial_model", volume_json(partial)}});
+}
+
+void Report::add_estimate(const PoseEstimate& estimate) {
+  json alternatives = json::array();
+  for (const Candidate& candidate : estimate.alternatives) alternatives.push_back(candidate_json(candidate));
+  (*json_)["pose_estimate"] = {{"pose1_from_pose2", transform_json(estimate.pose1_from_pose2)},
+                               {"chosen", candidate_json(estimate.best)},
+                               {"alternatives", alternatives},
+                               {"tangent_planes", {counts_json(estimate.counts1), counts_json(estimate.counts2)}},
+                               {"pairs", estimate.pairs},
+                               {"hypotheses", estimate.hypotheses},
+                               {"refined", estimate.refined},
+                               {"overlap", estimate.overlap},
+                               {"condition", number(estimate.condition)}};
+}
+
+void Report::add_refinement(const RefinedPose& refined) {
+  (*json_)["pose_refinement"] = {{"pose1_from_pose2", transform_json(refined.pose1_from_pose2)},
+                                 {"residual_median_mm", number(refined.median_mm)},
+                                 {"residual_rms_mm", number(refined.rms_mm)},
+                                 {"overlap", refined.overlap},
+                                 {"correspondences", refined.correspondences},
+                                 {"condition", number(refined.condition)}};
+}
+
+void Report::add_surface(const Mesh& mesh, const VolumeReport& volume) {
+  (*json_)["integration"] = volume_json(volume);
+  (*json_)["mesh"] = mesh_json(mesh);
+}
+
+void Report::add_texture(const TexturedModel& textured) {
+  (*json_)["texture"] = {{"atlas_px", textured.mesh.atlas.cols},
+                         {"charts", textured.charts},
+                         {"texels_per_photo_px", textured.texels_per_px},
+                         {"exposure_gain", textured.exposure_gain},
+                         {"seen_share", textured.seen_share}};
+}
+
+json Report::finished(const StageLog& log) const {
+  json report = *json_;
+  report["stages"] = log.to_json();
+  return report;
+}
+
+}  // namespace scanrig

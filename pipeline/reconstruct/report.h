@@ -1,0 +1,36 @@
+#pragma once
+
+#include <memory>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <span>
+
+#include "pipeline/pose/estimate_pose.h"
+#include "pipeline/reconstruct/reconstruct.h"
+#include "pipeline/reconstruct/stage_log.h"
+#include "pipeline/registration/refine_pose.h"
+#include "pipeline/registration/register_views.h"
+#include "pipeline/texture/texture.h"
+#include "pipeline/volume/integrate.h"
+
+namespace scanrig {
+
+/// Collects report.json, docs/report.md. Lengths mm, angles degrees.
+class Report {
+ public:
+  Report(const ReconstructOptions& options, const ScanIdentity& identity,
+         const std::optional<Calibration>& calibration);
+  ~Report();
+
+  void add_pose(std::span<const View> views, const RegistrationReport& registration, const VolumeReport& partial);
+  void add_estimate(const PoseEstimate& estimate);
+  void add_refinement(const RefinedPose& refined);
+  void add_surface(const Mesh& mesh, const VolumeReport& volume);
+  void add_texture(const TexturedModel& textured);
+  [[nodiscard]] nlohmann::json finished(const StageLog& log) const;
+
+ private:
+  std::unique_ptr<nlohmann::json> json_;
+};
+
+}  // namespace scanrig

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/context.h"
+#include "core/result.h"
+#include "pipeline/range/range_image.h"
+
+namespace scanrig {
+
+/// How far each part of the calibration may be wrong (standard deviations), and how the search goes.
+struct RegistrationOptions {
+  double angle_sigma_deg = 0.01;       ///< of each table angle: the stepper
+  double rotation_sigma_deg = 0.002;   ///< of each view on its own: vibration
+  double translation_sigma_mm = 0.01;  ///< of each view on its own
+  double axis_tilt_sigma_deg = 0.002;  ///< of the turntable axis, common to all views; 0: not solved for
+  double axis_shift_sigma_mm = 0.005;  ///< the same, its position
+  double pair_bias_mm = 0.001;         ///< error of two views' mean distance that more points do not average away
+  double capture_mm = 1.0;             ///< farthest distance between corresponding surfaces at the start
+  int neighbours = 2;                  ///< views up to this many places away around the ring are compared
+  int samples = 20000;                 ///< points a view at the finest level, a quarter of it at each coarser one
+  int levels = 3;
+  int iterations = 8;  ///< most Gauss-Newton steps a level
+
+  /// For range scans whose views were placed by somebody else, to a millimetre and half a degree.
+  static RegistrationOptions imported();
+};
+
+/// What registration did to one view and how well it then lies on its neighbours.
+struct ViewFit {
+  int index = 0;
+  double angle_correction_deg = 0.0;                         ///< the table angle's part of the correction
+  Eigen::Vector3d rotation_deg = Eigen::Vector3d::Zero();    ///< the view's own part, pose frame
+  Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();  ///< the same
+  double median_before_mm = 0.0, median_after_mm = 0.0;      ///< of |point to plane|, untrimmed; NaN without overlap
+  double rms_before_mm = 0.0, rms_after_mm = 0.0;
+  double overlap = 0.0;  ///< share of its points that a neighbour sees too
+};
+
+struct RegistrationReport {
+  std::vector<ViewFit> views;
+  double axis_tilt_deg = 0.0;  ///< correction of the axis that all views share
+  double axis_shift_mm = 0.0;
+  /// False for a body of revolution: the table angles could not be measured and stay as the stepper reported them.
+  bool angle_observable = true;
+  double angle_leverage = 0.0;  ///< rms slope of the surface along the turn, 0 for a body of revolution; < 0.02 is none
+  double median_before_mm = 0.0, median_after_mm = 0.0;
+};
+
+/// Moves the views of one pose, silhouettes included, onto each other: least squares over the table angles, the axis
+/// and small rigid corrections, all held by the priors of `options`; point to plane between neighbours around the ring,
+/// which is closed [Park and Subbarao 2002; 2003 for the correspondences]. The pose's frame stays where it is.
+/// Same bits for any number of threads. A single view is returned as it is.
+/// Fails with `invalid_input` (maps of a view differ in size), `degenerate` (no view has 100 measured points),
+/// `no_overlap` (no two views share 100 points), `stopped`; the views are then unchanged.
+Result<RegistrationReport> register_views(std::span<View> views, const RegistrationOptions& options,
+                                          const Context& context);
+
+}  // namespace scanrig

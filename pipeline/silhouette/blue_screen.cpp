@@ -1,0 +1,157 @@
+#include "pipeline/silhouette/blue_screen.h"
+
+#include <algorithm>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "pipeline/silhouette/contour_distance.h"
+
+namespace scanrig {
+namespace {
+
+constexpr int kBorder = 12;       // px; the frame around the image that shows the screen
+constexpr float kDarkLevel = 12;  // sum of B, G, R below which chroma is noise
+
+/// How much of the screen's chroma a pixel has: 0 grey, 1 the screen.
+cv::Mat1f screen_key(const cv::Mat3f& image, double screen_share) {
+  cv::Mat1f key(image.size());
+  const float scale = 1.0f / static_cast<float>(screen_share - 1.0 / 3.0);
+  for (int y = 0; y < image.rows; ++y) {
+    for (int x = 0; x < image.cols; ++x) {
+      const cv::Vec3f& c = image(y, x);
+      const float sum = c[0] + c[1] + c[2];
+      // The dark is drawn towards grey by less than one grey level a channel.
+      key(y, x) = ((c[0] + 1.0f) / (sum + 3.0f) - 1.0f / 3.0f) * scale;
+    }
+  }
+  return key;
+}
+
+/// The median share of blue along the image's border; 0 when it is dark.
+double border_blue_share(const cv::Mat3f& image) {
+  std::vector<float> shares;
+  for (int y = 0; y < image.rows; ++y) {
+    const bool whole_row = y < kBorder || y >= image.rows - kBorder;
+    for (int x = 0; x < image.cols; ++x) {
+      if (!whole_row && x == kBorder) x = image.cols - kBorder;
+      const cv::Vec3f& c = image(y, x);
+      const float sum = c[0] + c[1] + c[2];
+      if (sum > kDarkLevel) shares.push_back(c[0] / sum);
+    }
+  }
+  if (shares.size() < static_cast<std::size_t>(image.cols)) return 0.0;
+  const auto middle = shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2);
+  std::nth_element(shares.begin(), middle, shares.end());
+  return static_cast<double>(*middle);
+}
+
+/// Parts smaller than `smallest` pixels are cleared.
+void remove_parts(cv::Mat1b& mask, double smallest, int connectivity) {
+  cv::Mat1i labels;
+  cv::Mat stats, centroids;
+  const int count = cv::connectedComponentsWithStats(mask, labels, stats, centroids, connectivity, CV_32S);
+  std::vector<std::uint8_t> kept(static_cast<std::size_t>(count), 0);
+  for (int i = 1; i < count; ++i) {
+    kept[static_cast<std::size_t>(i)] = stats.at<int>(i, cv::CC_STAT_AREA) >= smallest ? 255 : 0;
+  }
+  for (int y = 0; y < mask.rows; ++y) {
+    for (int x = 0; x < mask.cols; ++x) mask(y, x) = kept[static_cast<std::size_t>(labels(y, x))];
+  }
+}
+
+int largest_part(const cv::Mat1b& mask) {
+  cv::Mat1i labels;
+  cv::Mat stats, centroids;
+  const int count = cv::connectedComponentsWithStats(mask, labels, stats, centroids, 8, CV_32S);
+  int largest = 0;
+  for (int i = 1; i < count; ++i) largest = std::max(largest, stats.at<int>(i, cv::CC_STAT_AREA));
+  return largest;
+}
+
+/// The colour of the pixels in `mask` around each pixel; those away from the mask's edge count first.
+cv::Mat3f colour_around(const cv::Mat3f& image, const cv::Mat1b& mask) {
+  cv::Mat1b core;
+  cv::erode(mask, core, cv::getStructuringElement(cv::MORPH_ELLIPSE, {7, 7}));
+  cv::Mat1f weight(mask.size());
+  cv::Mat3f weighted(mask.size());
+  for (int y = 0; y < mask.rows; ++y) {
+    for (int x = 0; x < mask.cols; ++x) {
+      weight(y, x) = core(y, x) != 0 ? 1.0f : mask(y, x) != 0 ? 1e-3f : 0.0f;
+      weighted(y, x) = image(y, x) * weight(y, x);
+    }
+  }
+  const cv::Size window(15, 15);
+  cv::boxFilter(weighted, weighted, CV_32F, window, {-1, -1}, false);
+  cv::boxFilter(weight, weight, CV_32F, window, {-1, -1}, false);
+  for (int y = 0; y < mask.rows; ++y) {
+    for (int x = 0; x < mask.cols; ++x) weighted(y, x) *= 1.0f / std::max(weight(y, x), 1e-4f);
+  }
+  return weighted;
+}
+
+/// 1/2 - alpha, alpha the object's share in a pixel's light. Only a pixel near the mask's edge can be mixed; there it is
+/// put between the object's and the screen's colour nearby.
+cv::Mat1f outside_share(const cv::Mat3f& image, const cv::Mat1b& object) {
+  const cv::Mat1b screen(255 - object);
+  const cv::Mat3f object_colour = colour_around(image, object), screen_colour = colour_around(image, screen);
+  cv::Mat1b grown, shrunk;
+  const cv::Mat band = cv::getStructuringElement(cv::MORPH_ELLIPSE, {7, 7});
+  cv::dilate(object, grown, band);
+  cv::erode(object, shrunk, band);
+  cv::Mat1f field(image.size());
+  for (int y = 0; y < image.rows; ++y) {
+    for (int x = 0; x < image.cols; ++x) {
+      field(y, x) = object(y, x) != 0 ? -0.5f : 0.5f;
+      if (grown(y, x) == 0 || shrunk(y, x) != 0) continue;
+      const cv::Vec3f contrast = object_colour(y, x) - screen_colour(y, x);
+      const float square = contrast.dot(contrast);
+      if (square < 25.0f) continue;  // too alike to tell a mixture
+      const float alpha = (image(y, x) - screen_colour(y, x)).dot(contrast) / square;
+      field(y, x) = 0.5f - std::clamp(alpha, 0.0f, 1.0f);
+    }
+  }
+  return field;
+}
+
+bool touches_border(const cv::Mat1b& mask) {
+  const int right = mask.cols - 2, bottom = mask.rows - 2;
+  return cv::countNonZero(mask.rowRange(0, 2)) + cv::countNonZero(mask.rowRange(bottom, mask.rows)) +
+             cv::countNonZero(mask.colRange(0, 2)) + cv::countNonZero(mask.colRange(right, mask.cols)) >
+         0;
+}
+
+}  // namespace
+
+Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const BlueScreenOptions& options) {
+  if (image.type() != CV_8UC3 || image.cols < 4 * kBorder || image.rows < 4 * kBorder) {
+    return fail(ErrorCode::invalid_input, "silhouette: a blue screen needs a colour image (BGR, 8 bit) of {} px or more",
+                4 * kBorder);
+  }
+  cv::Mat3f colour, smooth;
+  image.convertTo(colour, CV_32F);
+  cv::boxFilter(colour, smooth, CV_32F, {3, 3}, {-1, -1}, true, cv::BORDER_REPLICATE);
+  const double share = border_blue_share(smooth);
+  if (share < options.least_blue_share) {
+    return fail(ErrorCode::degenerate,
+                "silhouette: the border of the image is not blue ({:.0f} % of its light); is the screen in place and lit?",
+                100.0 * share);
+  }
+  const cv::Mat1f key = screen_key(smooth, share);
+  cv::Mat1b object(key.size());
+  cv::compare(key, options.object_key, object, cv::CMP_LT);
+  const int largest = largest_part(object);
+  if (largest < options.smallest_hole_px) {
+    return fail(ErrorCode::degenerate, "silhouette: no object before the blue screen");
+  }
+  remove_parts(object, std::max<double>(options.smallest_hole_px, options.smallest_part_share * largest), 8);
+  cv::Mat1b screen(255 - object);
+  remove_parts(screen, options.smallest_hole_px, 4);
+  object = 255 - screen;
+  if (touches_border(object)) {
+    return fail(ErrorCode::out_of_range,
+                "silhouette: the object reaches the border of the image, it is larger than the working volume");
+  }
+  return contour_distance(outside_share(colour, object));
+}
+
+}  // namespace scanrig

@@ -1,0 +1,92 @@
+#include "pipeline/volume/relax.h"
+
+#include "core/parallel.h"
+
+namespace scanrig {
+namespace {
+
+using Block = BlockGrid::Block;
+constexpr int kSide = BlockGrid::kSide;
+constexpr int kPadded = kSide + 2;
+constexpr int kRounds = 8;  // of a seven-point mean: a Gaussian of 1.5 voxels
+
+/// A block's distances with one layer of its six neighbours around.
+struct Padded {
+  std::array<float, kPadded * kPadded * kPadded> distance;
+  std::array<bool, 6> open;  ///< the neighbour is stored
+
+  static int at(int x, int y, int z) { return ((z + 1) * kPadded + y + 1) * kPadded + x + 1; }
+
+  Padded(const BlockGrid& grid, const Block& block, float band) {
+    for (int z = 0; z < kSide; ++z) {
+      for (int y = 0; y < kSide; ++y) {
+        for (int x = 0; x < kSide; ++x) distance[at(x, y, z)] = block.distance[Block::node(x, y, z)];
+      }
+    }
+    for (int face = 0; face < 6; ++face) {
+      const int axis = face / 2, side = face % 2;
+      const Eigen::Vector3i index = block.index + (side == 0 ? -1 : 1) * Eigen::Vector3i::Unit(axis);
+      const Block* other = grid.find(index);
+      open[face] = other != nullptr;
+      const float constant = grid.all_inside(index) ? -band : band;
+      Eigen::Vector3i here, there;
+      here[axis] = side == 0 ? -1 : kSide;
+      there[axis] = side == 0 ? kSide - 1 : 0;
+      for (int i = 0; i < kSide; ++i) {
+        for (int j = 0; j < kSide; ++j) {
+          here[(axis + 1) % 3] = there[(axis + 1) % 3] = i;
+          here[(axis + 2) % 3] = there[(axis + 2) % 3] = j;
+          distance[at(here.x(), here.y(), here.z())] =
+              other == nullptr ? constant : other->distance[Block::node(there.x(), there.y(), there.z())];
+        }
+      }
+    }
+  }
+
+  /// A node beside a block that is not stored keeps its sign: the surface may not leave the stored blocks.
+  [[nodiscard]] bool touches_unstored(int x, int y, int z) const {
+    return (x == 0 && !open[0]) || (x == kSide - 1 && !open[1]) || (y == 0 && !open[2]) ||
+           (y == kSide - 1 && !open[3]) || (z == 0 && !open[4]) || (z == kSide - 1 && !open[5]);
+  }
+};
+
+std::array<float, BlockGrid::kNodes> relaxed(const BlockGrid& grid, const Block& block, float band) {
+  const Padded padded(grid, block, band);
+  std::array<float, BlockGrid::kNodes> result = block.distance;
+  for (int z = 0; z < kSide; ++z) {
+    for (int y = 0; y < kSide; ++y) {
+      for (int x = 0; x < kSide; ++x) {
+        const int node = Block::node(x, y, z);
+        if (block.support[node] == Support::measured || padded.touches_unstored(x, y, z)) continue;
+        const auto& d = padded.distance;
+        const int i = Padded::at(x, y, z);
+        constexpr int kRow = kPadded, kLayer = kPadded * kPadded;
+        result[node] = (d[i] + d[i - 1] + d[i + 1] + d[i - kRow] + d[i + kRow] + d[i - kLayer] + d[i + kLayer]) / 7.0F;
+      }
+    }
+  }
+  return result;
+}
+
+/// Nothing to do where all of a block and its surroundings is measured or of one sign; a cheap test on the block alone.
+bool has_unmeasured(const Block& block) {
+  for (const Support support : block.support) {
+    if (support != Support::measured) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+void relax_unmeasured(BlockGrid& grid, float band_mm) {
+  std::vector<Block>& blocks = grid.blocks();
+  std::vector<std::array<float, BlockGrid::kNodes>> next(blocks.size());
+  for (int round = 0; round < kRounds; ++round) {
+    parallel_for(blocks.size(), [&](std::size_t i) {
+      next[i] = has_unmeasured(blocks[i]) ? relaxed(grid, blocks[i], band_mm) : blocks[i].distance;
+    });
+    parallel_for(blocks.size(), [&](std::size_t i) { blocks[i].distance = next[i]; });
+  }
+}
+
+}  // namespace scanrig

@@ -1,0 +1,40 @@
+#pragma once
+
+#include "core/clock.h"
+
+namespace scanrig::sim {
+
+/// The motion of the table as a function of time: a trapezoid of speed, then a vibration that dies out.
+/// Angles in degrees. No threads, no clock: whoever owns it passes the time in.
+class Axis {
+ public:
+  /// From where it is at `now` (it must stand) to `target`.
+  void go(double target, Clock::TimePoint now);
+  /// Brakes as hard as it accelerates.
+  void brake(Clock::TimePoint now);
+  /// Stands from now on, wherever it is: blocked.
+  void freeze(Clock::TimePoint now);
+  /// Takes `degrees` off the count: the same place, another name.
+  void rename(double degrees);
+
+  [[nodiscard]] double angle(Clock::TimePoint now) const;
+  /// When the trapezoid ends, and when the vibration has died out.
+  [[nodiscard]] Clock::TimePoint arrival() const;
+  [[nodiscard]] Clock::TimePoint still() const;
+
+ private:
+  struct State {
+    double way = 0.0;    // deg from from_
+    double speed = 0.0;  // deg/s, along the way
+  };
+  [[nodiscard]] State state(double seconds) const;
+
+  Clock::TimePoint start_{};
+  double from_ = 0.0;
+  double sign_ = 1.0;
+  double first_speed_ = 0.0;                                    // deg/s at the start
+  double accelerating_ = 0.0, cruising_ = 0.0, braking_ = 0.0;  // s
+  bool vibrates_ = false;
+};
+
+}  // namespace scanrig::sim

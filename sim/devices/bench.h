@@ -1,0 +1,70 @@
+#pragma once
+
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "core/clock.h"
+#include "drivers/panel/panel.h"
+#include "drivers/projector/projector.h"
+#include "sim/devices/axis.h"
+#include "sim/scene/scene.h"
+#include "sim/scene/truth.h"
+
+namespace scanrig::sim {
+
+/// A button springs back once it has been seen: no press is lost, however late somebody looks.
+enum class Button { released, pressed, seen };
+
+/// What the cameras saw at an edge; it becomes images when they are asked for.
+struct Exposure {
+  int placement = 0;
+  double angle_deg = 0.0;
+  bool pattern = false;
+  std::uint64_t number = 0;
+  std::uint64_t trigger = 0;
+  Clock::TimePoint taken;
+  Clock::TimePoint arrival;  ///< of the frames at the host
+};
+
+/// What the devices share: the scene on the table, and what operator and tests do to it.
+/// `mutex` guards everything but `scene`, which belongs to the camera (its const part to all). Whoever changes
+/// something somebody may wait for calls clock.notify_all(changed).
+struct Bench {
+  Bench(std::unique_ptr<Scene> the_scene, Clock& the_clock) : clock(the_clock), scene(std::move(the_scene)) {}
+
+  Clock& clock;
+  const std::unique_ptr<Scene> scene;
+  std::mutex mutex;
+  std::condition_variable changed;
+
+  // Turntable.
+  Axis axis;
+  bool stalled = false;
+  bool stop_requested = false;
+
+  // Projector and cameras.
+  bool dark_requested = false;
+  bool armed = false;
+  std::uint64_t triggers = 0;
+  std::uint64_t exposures = 0;
+  std::optional<Exposure> in_flight;
+  int frames_to_lose = 0;
+
+  // Panel.
+  Button start = Button::released;
+  Button stop = Button::released;
+  Button reset = Button::released;
+  bool estop_ok = true;
+  PanelOutputs lamps;
+
+  // Each time the object was put down, and the table angles at which it was then taken.
+  std::vector<PoseTruth> history = {{}};
+
+  /// The trigger edge, at the beginning of an exposure. Call with `mutex` held.
+  void edge(Light light);
+};
+
+}  // namespace scanrig::sim

@@ -1,0 +1,92 @@
+#include "sim/devices/devices.h"
+
+#include "core/units.h"
+#include "sim/scene/profile.h"
+
+namespace scanrig::sim {
+
+Result<void> SimProjector::fire(Light light, Deadline deadline) {
+  Bench& b = bench_;
+  std::unique_lock lock(b.mutex);
+  b.dark_requested = false;
+  b.edge(light);
+  const auto over =
+      b.clock.now() + std::chrono::round<Clock::Duration>(std::chrono::duration<double>(profile().exposure_s));
+  const bool cut = b.clock.wait_until(lock, b.changed, std::min(over, deadline.at), [&b] { return b.dark_requested; });
+  if (cut || deadline.at < over) b.in_flight.reset();  // half an exposure is none
+  if (cut) return fail(ErrorCode::io, "projector: went dark on request before the pulse was over");
+  if (deadline.at < over) return fail(ErrorCode::timeout, "projector: the pulse was not over in time");
+  return {};
+}
+
+Result<void> SimProjector::dark(Deadline) {
+  request_dark();
+  return {};
+}
+
+void SimProjector::request_dark() noexcept {
+  const std::scoped_lock lock(bench_.mutex);
+  bench_.dark_requested = true;
+  bench_.clock.notify_all(bench_.changed);
+}
+
+Result<void> SimStereoCamera::arm(Deadline) {
+  const std::scoped_lock lock(bench_.mutex);
+  bench_.in_flight.reset();
+  bench_.triggers = 0;
+  bench_.armed = collectable_ = true;
+  return {};
+}
+
+Result<StereoFrame> SimStereoCamera::collect(Deadline deadline) {
+  Bench& b = bench_;
+  std::unique_lock lock(b.mutex);
+  if (!collectable_) return fail(ErrorCode::protocol, "camera: nothing to collect, it was not armed");
+  collectable_ = false;
+  // First the edge, then the frames' way to us.
+  const bool exposed = b.clock.wait_until(lock, b.changed, deadline.at, [&b] { return b.in_flight.has_value(); });
+  if (exposed) {
+    const auto arrival = std::min(b.in_flight->arrival, deadline.at);
+    b.clock.wait_until(lock, b.changed, arrival, [&b] { return !b.in_flight; });
+  }
+  b.armed = false;
+  if (!b.in_flight || deadline.at < b.in_flight->arrival) {
+    b.in_flight.reset();
+    return fail(ErrorCode::timeout, "camera: no pair of frames in time; arm again and repeat the exposure");
+  }
+  const Exposure e = *b.in_flight;
+  b.in_flight.reset();
+  lock.unlock();
+  const StereoImages images = b.scene->shoot(e.placement, to_radians(e.angle_deg), e.pattern, e.number);
+  return StereoFrame{images.left, images.right, PixelFormat::bayer_rggb8, e.trigger, e.taken};
+}
+
+Result<PanelInputs> SimPanel::wait_change(const PanelInputs& known, Deadline deadline) {
+  Bench& b = bench_;
+  std::unique_lock lock(b.mutex);
+  for (Button* button : {&b.start, &b.stop, &b.reset}) {
+    if (*button == Button::seen) *button = Button::released;
+  }
+  const auto inputs = [&b] {
+    PanelInputs now;
+    now.start = b.start != Button::released;
+    now.stop = b.stop != Button::released;
+    now.reset = b.reset != Button::released;
+    now.estop_ok = b.estop_ok;
+    return now;
+  };
+  b.clock.wait_until(lock, b.changed, deadline.at, [&] { return inputs() != known; });
+  const PanelInputs now = inputs();
+  for (Button* button : {&b.start, &b.stop, &b.reset}) {
+    if (*button == Button::pressed) *button = Button::seen;
+  }
+  return now;
+}
+
+Result<void> SimPanel::show(const PanelOutputs& outputs, Deadline) {
+  const std::scoped_lock lock(bench_.mutex);
+  bench_.lamps = outputs;
+  return {};
+}
+
+}  // namespace scanrig::sim

@@ -1,0 +1,66 @@
+#pragma once
+
+#include "drivers/camera/stereo_camera.h"
+#include "drivers/panel/panel.h"
+#include "drivers/projector/projector.h"
+#include "drivers/turntable/turntable.h"
+#include "sim/devices/bench.h"
+
+namespace scanrig::sim {
+
+/// Fails as Turntable says, of its codes: `not_homed`, `out_of_range` (beyond ten turns), `timeout`, `stalled`,
+/// `device_alarm` (the E-stop has cut the motor's power), `stopped`. A target out of range leaves the zero known.
+class SimTurntable final : public Turntable {
+ public:
+  explicit SimTurntable(Bench& bench) : bench_(bench) {}
+  Result<void> home(Deadline deadline) override;
+  Result<Move> rotate_to(Degrees target, Deadline deadline) override;
+  Result<void> stop(Deadline deadline) override;
+  Result<void> reset_alarm(Deadline deadline) override;
+  Result<TurntableStatus> status(Deadline deadline) override;
+  void request_stop() noexcept override;
+
+ private:
+  Result<void> travel(std::unique_lock<std::mutex>& lock, double target, Deadline deadline, Move& move);
+  Result<void> wait_for(std::unique_lock<std::mutex>& lock, Clock::TimePoint moment, Deadline deadline);
+
+  Bench& bench_;
+  bool homed_ = false;
+  std::uint64_t moves_ = 0;
+};
+
+/// Fails with `timeout`, and with `io` if request_dark() cut the pulse short.
+class SimProjector final : public Projector {
+ public:
+  explicit SimProjector(Bench& bench) : bench_(bench) {}
+  Result<void> fire(Light light, Deadline deadline) override;
+  Result<void> dark(Deadline deadline) override;
+  void request_dark() noexcept override;
+
+ private:
+  Bench& bench_;
+};
+
+/// collect() fails with `timeout`, and with `protocol` if it was not armed.
+class SimStereoCamera final : public StereoCamera {
+ public:
+  explicit SimStereoCamera(Bench& bench) : bench_(bench) {}
+  Result<void> arm(Deadline deadline) override;
+  Result<StereoFrame> collect(Deadline deadline) override;
+
+ private:
+  Bench& bench_;
+  bool collectable_ = false;  // armed since the last collect()
+};
+
+class SimPanel final : public Panel {
+ public:
+  explicit SimPanel(Bench& bench) : bench_(bench) {}
+  Result<PanelInputs> wait_change(const PanelInputs& known, Deadline deadline) override;
+  Result<void> show(const PanelOutputs& outputs, Deadline deadline) override;
+
+ private:
+  Bench& bench_;
+};
+
+}  // namespace scanrig::sim

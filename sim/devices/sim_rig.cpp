@@ -1,0 +1,81 @@
+#include "sim/devices/sim_rig.h"
+
+#include <algorithm>
+
+#include "sim/devices/devices.h"
+#include "sim/scene/profile.h"
+
+namespace scanrig::sim {
+namespace {
+
+class Rig final : public SimRig {
+ public:
+  Rig(std::unique_ptr<Scene> scene, Clock& clock) : bench_(std::move(scene), clock) {}
+
+  Turntable& turntable() override { return turntable_; }
+  Projector& projector() override { return projector_; }
+  StereoCamera& camera() override { return camera_; }
+  Panel& panel() override { return panel_; }
+
+  void press_start() override { set(bench_.start, Button::pressed); }
+  void press_stop() override { set(bench_.stop, Button::pressed); }
+  void press_reset() override { set(bench_.reset, Button::pressed); }
+  void set_estop(bool ok) override { set(bench_.estop_ok, ok); }
+  void stall_turntable(bool stalled) override { set(bench_.stalled, stalled); }
+  void lose_frames(int count) override { set(bench_.frames_to_lose, count); }
+
+  void turn_over() override {
+    const std::scoped_lock lock(bench_.mutex);
+    const int next = bench_.history.back().placement + 1;
+    bench_.history.push_back({next % static_cast<int>(bench_.scene->placements().size()), {}});
+  }
+
+  PanelOutputs lamps() const override {
+    const std::scoped_lock lock(bench_.mutex);
+    return bench_.lamps;
+  }
+
+  Result<void> write_calibration(const std::filesystem::path& file) const override {
+    return sim::write_calibration(*bench_.scene, file);
+  }
+
+  Result<void> write_truth(const std::filesystem::path& folder) const override {
+    std::vector<PoseTruth> taken;
+    {
+      const std::scoped_lock lock(bench_.mutex);
+      std::copy_if(bench_.history.begin(), bench_.history.end(), std::back_inserter(taken),
+                   [](const PoseTruth& p) { return !p.angles_deg.empty(); });
+    }
+    const auto poses = static_cast<std::size_t>(bench_.scene->options().poses);
+    if (taken.size() > poses) taken.erase(taken.begin(), taken.end() - static_cast<std::ptrdiff_t>(poses));
+    if (taken.empty()) return fail(ErrorCode::degenerate, "truth: no exposure has been taken yet");
+    return sim::write_truth(*bench_.scene, taken, folder);
+  }
+
+  std::string profile_sha256() const override { return sim::profile_sha256(); }
+
+ private:
+  template <class T>
+  void set(T& what, T value) {
+    const std::scoped_lock lock(bench_.mutex);
+    what = value;
+    bench_.clock.notify_all(bench_.changed);
+  }
+
+  mutable Bench bench_;
+  SimTurntable turntable_{bench_};
+  SimProjector projector_{bench_};
+  SimStereoCamera camera_{bench_};
+  SimPanel panel_{bench_};
+};
+
+}  // namespace
+
+Result<std::unique_ptr<SimRig>> SimRig::create(const SimRigOptions& options, Clock& clock) {
+  auto scene = Scene::create({options.object, options.height_mm, options.seed, options.poses, options.image_scale,
+                              options.same_rest_twice, options.noise});
+  if (!scene) return pass_on(scene, "simulated rig");
+  return std::make_unique<Rig>(std::move(*scene), clock);
+}
+
+}  // namespace scanrig::sim

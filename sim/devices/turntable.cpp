@@ -1,0 +1,116 @@
+#include <cmath>
+
+#include "sim/devices/devices.h"
+#include "sim/scene/standing.h"
+
+namespace scanrig::sim {
+namespace {
+
+constexpr double kFarthest = 3600.0;  // deg either way
+
+}  // namespace
+
+/// Waits until `moment`; meanwhile anything that ends a move ends the wait.
+Result<void> SimTurntable::wait_for(std::unique_lock<std::mutex>& lock, Clock::TimePoint moment, Deadline deadline) {
+  Bench& b = bench_;
+  const auto disturbed = [&b] { return b.stop_requested || !b.estop_ok || b.stalled; };
+  if (b.clock.wait_until(lock, b.changed, std::min(moment, deadline.at), disturbed)) {
+    if (b.stop_requested) return fail(ErrorCode::stopped, "turntable: stopped on request");
+    if (!b.estop_ok) return fail(ErrorCode::device_alarm, "turntable: the drive has no power: E-stop");
+    // Blocked: after two seconds without progress the drive's owner gives up.
+    b.axis.freeze(b.clock.now());
+    const auto given_up = b.clock.now() + std::chrono::seconds(2);
+    const auto called_off = [&b] { return b.stop_requested || !b.estop_ok; };
+    if (b.clock.wait_until(lock, b.changed, std::min(given_up, deadline.at), called_off)) {
+      return wait_for(lock, moment, deadline);
+    }
+    if (deadline.at < given_up) return fail(ErrorCode::timeout, "turntable: not at its target in time");
+    return fail(ErrorCode::stalled, "turntable: does not move; see what blocks the table");
+  }
+  if (deadline.at < moment) return fail(ErrorCode::timeout, "turntable: not at its target in time");
+  return {};
+}
+
+Result<void> SimTurntable::travel(std::unique_lock<std::mutex>& lock, double target, Deadline deadline, Move& move) {
+  Bench& b = bench_;
+  const auto begin = b.clock.now();
+  if (!b.stop_requested && b.estop_ok) {
+    b.axis.go(resting_angle(target, mix(b.scene->options().seed, 8, ++moves_)), begin);
+  }
+  auto done = wait_for(lock, b.axis.arrival(), deadline);
+  const auto arrived = b.clock.now();
+  if (done) done = wait_for(lock, b.axis.still(), deadline);
+  if (!done) {
+    b.axis.brake(b.clock.now());
+    homed_ = false;
+    return done;
+  }
+  move = {{target}, {encoder_reading(b.axis.angle(b.clock.now()))}, arrived - begin, b.clock.now() - arrived};
+  return {};
+}
+
+Result<void> SimTurntable::home(Deadline deadline) {
+  Bench& b = bench_;
+  std::unique_lock lock(b.mutex);
+  homed_ = false;
+  // A table that still brakes is let come to a stand first.
+  if (auto standing = wait_for(lock, b.axis.still(), deadline); !standing) {
+    b.stop_requested = false;
+    return standing;
+  }
+  const double turns = 360.0 * std::round(b.axis.angle(b.clock.now()) / 360.0);
+  b.axis.rename(turns);
+  Move move;
+  const auto done = travel(lock, 0.0, deadline, move);
+  b.stop_requested = false;
+  homed_ = done.has_value();
+  return done;
+}
+
+Result<Move> SimTurntable::rotate_to(Degrees target, Deadline deadline) {
+  Bench& b = bench_;
+  std::unique_lock lock(b.mutex);
+  if (!b.stop_requested && !homed_) return fail(ErrorCode::not_homed, "turntable: has no zero; home it first");
+  if (!(std::abs(target.value) <= kFarthest)) {
+    return fail(ErrorCode::out_of_range, "turntable: {} degrees: only {} either way are possible", target.value,
+                kFarthest);
+  }
+  Move move;
+  if (const auto done = travel(lock, target.value, deadline, move); !done) return pass_on(done);
+  return move;
+}
+
+Result<void> SimTurntable::stop(Deadline deadline) {
+  Bench& b = bench_;
+  std::unique_lock lock(b.mutex);
+  b.axis.brake(b.clock.now());
+  const auto standing = b.axis.still();
+  b.clock.wait_until(lock, b.changed, std::min(standing, deadline.at), [] { return false; });
+  if (deadline.at < standing) return fail(ErrorCode::timeout, "turntable: not seen standing in time; it may be moving");
+  return {};
+}
+
+Result<void> SimTurntable::reset_alarm(Deadline) {
+  const std::scoped_lock lock(bench_.mutex);
+  if (!bench_.estop_ok) return fail(ErrorCode::device_alarm, "turntable: the drive has no power: release the E-stop");
+  return {};
+}
+
+Result<TurntableStatus> SimTurntable::status(Deadline) {
+  const std::scoped_lock lock(bench_.mutex);
+  const auto now = bench_.clock.now();
+  TurntableStatus status;
+  status.motion = now < bench_.axis.still() ? TurntableStatus::Motion::moving : TurntableStatus::Motion::standing;
+  status.homed = homed_;
+  status.angle = Degrees{encoder_reading(bench_.axis.angle(now))};
+  if (!bench_.estop_ok) status.alarm = "no motor power: E-stop";
+  return status;
+}
+
+void SimTurntable::request_stop() noexcept {
+  const std::scoped_lock lock(bench_.mutex);
+  bench_.stop_requested = true;
+  bench_.clock.notify_all(bench_.changed);
+}
+
+}  // namespace scanrig::sim

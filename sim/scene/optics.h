@@ -1,0 +1,41 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <string>
+
+#include "core/transform.h"
+
+namespace scanrig::sim {
+
+/// A lens and a raster: camera, or projector run backwards. Axes as OpenCV's: x right, y down, z forward; mm; pixel
+/// centres at integer coordinates; distortion k1 k2 p1 p2 k3 as in OpenCV.
+struct Eye {
+  std::string serial;
+  int width = 0;
+  int height = 0;
+  double fx = 0.0;
+  double fy = 0.0;
+  double cx = 0.0;
+  double cy = 0.0;
+  std::array<double, 5> distortion{};
+  Transform eye_from_turntable = Transform::Identity();
+
+  /// Pixel of a point in the turntable frame in front of the eye.
+  [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& point_in_turntable) const;
+  /// Direction in the eye's frame, z = 1, of a (distorted) pixel.
+  [[nodiscard]] Eigen::Vector3d ray(double u, double v) const;
+  /// Where the eye is, in the turntable frame.
+  [[nodiscard]] Eigen::Vector3d centre() const { return eye_from_turntable.inverse().translation(); }
+};
+
+struct RigGeometry {
+  Eye left;
+  Eye right;
+  Eye projector;
+};
+
+/// The default rig with sensors of `image_scale` times the full resolution and the same field of view.
+RigGeometry default_rig(double image_scale = 1.0);
+
+}  // namespace scanrig::sim

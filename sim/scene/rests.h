@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+
+#include "core/result.h"
+#include "core/transform.h"
+#include "sim/scene/mesh.h"
+
+namespace scanrig::sim {
+
+/// A way the object can lie still on a plane.
+struct Rest {
+  Eigen::Vector3d down = -Eigen::Vector3d::UnitY();  ///< unit, in the object's frame: what points to the table
+  double height = 0.0;                               ///< mm from the plane to the centre of mass
+  double chance = 0.0;                               ///< share of random drops that end here
+};
+
+/// Puts the object down in random orientations and rolls it, corner by corner and edge by edge, until its centre of
+/// mass can sink no lower. Rests from which a tilt of 2 degrees in some direction would make it roll on are left out.
+/// Most likely first. Same seed, same rests.
+std::vector<Rest> stable_rests(const TriangleMesh& mesh, std::uint64_t seed);
+
+/// Two of the rests more than 30 degrees apart, drawn by chance, and the placements that put the object down so: lowest
+/// point on y = 0, bounding cylinder within 3 mm of the axis, turned at random.
+/// `count` placements alternate between the two; with `same_rest` all use the first (turned and moved anew each time).
+/// Fails with `degenerate` (there are no two such rests), `invalid_input` (larger than the working volume).
+Result<std::vector<Transform>> draw_placements(const TriangleMesh& mesh, std::uint64_t seed, int count, bool same_rest);
+
+}  // namespace scanrig::sim

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <vector>
+
+#include "core/transform.h"
+#include "sim/scene/object.h"
+#include "sim/scene/ray_caster.h"
+
+namespace scanrig::sim {
+
+/// How open a surface is to the room, and what it gets from around it.
+struct Surroundings {
+  Eigen::Vector3f ambient = Eigen::Vector3f::Zero();  ///< from sky, table and the object itself; a free, upward face: 1
+  float openness = 1.0F;                              ///< share of the hemisphere that no part of the object covers
+};
+
+/// The plain exposure's light: a sky that is the same all around, and three large soft boxes that stand in the room.
+/// The sky's part turns with the object, so it is gathered once for each placement: by rays at the mesh's vertices and
+/// on a grid over the table.
+class RoomLight {
+ public:
+  RoomLight(const Object& object, const RayCaster& rays, const Transform& table_from_object);
+
+  [[nodiscard]] Surroundings at_vertex(int vertex) const { return vertices_[vertex]; }
+  /// `x`, `z` in the table's own (turning) frame.
+  [[nodiscard]] Surroundings on_table(double x, double z) const;
+
+  /// Irradiance of a surface with unit normal `normal` (turntable frame, angle included).
+  static Eigen::Vector3f irradiance(const Surroundings& surroundings, const Eigen::Vector3d& normal);
+
+ private:
+  std::vector<Surroundings> vertices_;
+  cv::Mat table_;  // openness
+};
+
+}  // namespace scanrig::sim

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "core/result.h"
+#include "sim/scene/object.h"
+#include "sim/scene/optics.h"
+#include "sim/scene/renderer.h"
+
+namespace scanrig::sim {
+
+struct SceneOptions {
+  std::filesystem::path object;  ///< OBJ, PLY or GLB; empty: the built-in figurine
+  double height_mm = 100.0;      ///< see load_object
+  std::uint64_t seed = 1;        ///< placements and noise
+  int poses = 2;
+  double image_scale = 1.0;
+  bool same_rest_twice = false;  ///< every pose is the first rest, only turned and moved
+  bool noise = true;
+};
+
+/// Left and right image of one exposure, 8 bit BayerRG8.
+struct StereoImages {
+  cv::Mat left;
+  cv::Mat right;
+};
+
+/// The object in all its poses under the default rig.
+/// Threads: one at a time.
+class Scene {
+ public:
+  /// Fails as load_object and draw_placements, and with `out_of_range` (image_scale outside 0.1 to 1, poses below 1).
+  static Result<std::unique_ptr<Scene>> create(const SceneOptions& options);
+  /// For tests: a given object in given placements.
+  Scene(Object object, std::vector<Transform> placements, const SceneOptions& options);
+
+  /// The table stands at `angle` (radians). `exposure` counts exposures; with the seed it names the noise.
+  /// The second light of the same pose and angle costs next to nothing.
+  StereoImages shoot(int pose, double angle, bool pattern, std::uint64_t exposure);
+
+  [[nodiscard]] const Object& object() const { return object_; }
+  [[nodiscard]] const RigGeometry& rig() const { return rig_; }
+  [[nodiscard]] const SceneOptions& options() const { return options_; }
+  /// table_from_object of each pose.
+  [[nodiscard]] const std::vector<Transform>& placements() const { return placements_; }
+
+ private:
+  const RoomLight& light_of(int pose);
+
+  SceneOptions options_;
+  Object object_;
+  std::vector<Transform> placements_;
+  RigGeometry rig_;
+  RayCaster rays_;
+  DotPattern dots_;
+  std::vector<std::unique_ptr<RoomLight>> lights_;  // made when a pose is first seen
+
+  // The last thing rendered.
+  int pose_ = -1;
+  double angle_ = 0.0;
+  Radiance left_;
+  Radiance right_;
+};
+
+}  // namespace scanrig::sim

@@ -1,0 +1,136 @@
+#include "sim/wire/axis.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace scanrig::sim::wire {
+namespace {
+
+constexpr std::chrono::microseconds kStep{500};
+constexpr double kStepSeconds = std::chrono::duration<double>(kStep).count();
+constexpr double kQuickStopFactor = 4.0;
+constexpr double kStillDeg = 0.001;
+constexpr double kBackOffDeg = 2.0;  ///< closer than this to the home switch it is closed already
+
+/// Two's complement, as the drive's counter wraps.
+std::int32_t wrapped(double pulses) {
+  return static_cast<std::int32_t>(static_cast<std::uint32_t>(static_cast<std::int64_t>(std::llround(pulses))));
+}
+
+}  // namespace
+
+Axis::Axis(const AxisOptions& options, Clock::TimePoint now) : options_(options), now_(now), ended_(now) {
+  motor_ = command_ = table_ = counter_zero_ = options.start_deg * pulses_per_degree();
+}
+
+double Axis::pulses_per_degree() const { return options_.pulses_per_motor_rev * options_.gear_ratio / 360.0; }
+
+double Axis::turn() const { return 360.0 * pulses_per_degree(); }
+
+void Axis::advance(Clock::TimePoint now) {
+  while (running() && now_ + kStep <= now) {
+    now_ += kStep;
+    step();
+  }
+  if (!running()) now_ = std::max(now_, now);
+}
+
+void Axis::begin(Mode mode, const AxisMotion& motion) {
+  if (running()) end();
+  mode_ = mode;
+  motion_ = motion;
+  legs_.push_back({truth().table_deg, truth().table_deg, now_, now_});
+}
+
+void Axis::move_to(std::int32_t counter, const AxisMotion& motion) {
+  begin(Mode::moving, motion);
+  goal_ = command_ + (static_cast<double>(counter) - commanded());
+}
+
+void Axis::seek_home(const AxisMotion& motion) {
+  const double beyond_switch = motor_ - std::floor(motor_ / turn()) * turn();
+  const double near = kBackOffDeg * pulses_per_degree();
+  const bool on_switch = beyond_switch < near || beyond_switch > turn() - near;
+  begin(on_switch ? Mode::backing_off : Mode::seeking_home, motion);
+  goal_ = motor_ + (on_switch ? 2.0 * near : -beyond_switch);
+  reached_switch_ = false;
+}
+
+void Axis::quick_stop() {
+  if (running()) mode_ = Mode::stopping;
+}
+
+void Axis::set_counter(std::int32_t value) {
+  command_ = motor_;
+  counter_zero_ = command_ - value;
+}
+
+void Axis::step() {
+  const bool by_switch = mode_ == Mode::backing_off || mode_ == Mode::seeking_home;
+  const double left = goal_ - (by_switch ? motor_ : command_);
+  double wanted = 0.0;
+  double change = motion_.deceleration * kQuickStopFactor * kStepSeconds;
+  if (mode_ != Mode::stopping) {
+    // The highest speed from which steps of equal deceleration end on the goal.
+    const double slower = motion_.deceleration * kStepSeconds;
+    const double steps = std::sqrt(0.25 + 2.0 * std::abs(left) / (slower * kStepSeconds)) - 0.5;
+    wanted = std::copysign(std::min(motion_.speed, steps * slower), left);
+    change = (std::abs(wanted) > std::abs(velocity_) ? motion_.acceleration : motion_.deceleration) * kStepSeconds;
+  }
+  velocity_ += std::clamp(wanted - velocity_, -change, change);
+  double way = velocity_ * kStepSeconds;
+  const bool there = mode_ != Mode::stopping && way * left >= left * left;
+  if (there) way = left;
+  command_ += way;
+  if (!blocked_) motor_ += way;
+  const double half_play = 0.5 * options_.backlash_deg * pulses_per_degree();
+  table_ = std::clamp(table_, motor_ - half_play, motor_ + half_play);
+  if (mode_ == Mode::stopping ? velocity_ == 0.0 : there && !(by_switch && blocked_)) finish();
+}
+
+void Axis::finish() {
+  if (mode_ == Mode::backing_off) {
+    velocity_ = 0.0;
+    mode_ = Mode::seeking_home;
+    goal_ = std::round(motor_ / turn()) * turn();
+    return;
+  }
+  if (mode_ == Mode::seeking_home) {
+    reached_switch_ = true;
+    set_counter(0);
+  }
+  end();
+}
+
+void Axis::end() {
+  mode_ = Mode::standing;
+  velocity_ = 0.0;
+  ended_ = now_;
+  shaking_ = !blocked_;
+  legs_.back().to_deg = table_ / pulses_per_degree();
+  legs_.back().ended = now_;
+}
+
+double Axis::vibration() const {
+  if (running() || !shaking_) return 0.0;
+  const double t = std::chrono::duration<double>(now_ - ended_).count();
+  return options_.vibration_deg * pulses_per_degree() * std::exp(-t / options_.vibration_decay_s) *
+         std::cos(2.0 * std::numbers::pi * options_.vibration_hz * t);
+}
+
+std::int32_t Axis::commanded() const { return wrapped(command_ - counter_zero_); }
+
+std::int32_t Axis::measured() const { return wrapped(motor_ + vibration() - counter_zero_); }
+
+AxisTruth Axis::truth() const {
+  AxisTruth truth;
+  truth.table_deg = (table_ + vibration()) / pulses_per_degree();
+  truth.speed_deg_s = blocked_ ? 0.0 : velocity_ / pulses_per_degree();
+  const double t = std::chrono::duration<double>(now_ - ended_).count();
+  const bool shakes = shaking_ && options_.vibration_deg * std::exp(-t / options_.vibration_decay_s) > kStillDeg;
+  truth.moving = running() ? !blocked_ : shakes;
+  return truth;
+}
+
+}  // namespace scanrig::sim::wire

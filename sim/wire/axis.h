@@ -1,0 +1,95 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/clock.h"
+
+namespace scanrig::sim::wire {
+
+struct AxisOptions {
+  double pulses_per_motor_rev = 10000;
+  double gear_ratio = 90;       ///< motor turns per table turn
+  double backlash_deg = 0.3;    ///< play between motor and table, at the table
+  double start_deg = 137.0;     ///< of the table when switched on, from the home switch
+  double vibration_deg = 0.05;  ///< of the table, when a motion ends
+  double vibration_decay_s = 0.015;
+  double vibration_hz = 25.0;
+};
+
+/// How a motion is to be run, in motor units.
+struct AxisMotion {
+  double speed = 0;         ///< pulses/s
+  double acceleration = 0;  ///< pulses/s^2
+  double deceleration = 0;
+};
+
+/// What the axis really does, whatever anyone believes.
+struct AxisTruth {
+  double table_deg = 0;    ///< from the home switch, positive pulses positive, many turns wide
+  double speed_deg_s = 0;  ///< of the motor, at the table
+  bool moving = false;     ///< the motor runs or the table still shakes
+};
+
+/// One motion as it was carried out.
+struct AxisLeg {
+  double from_deg = 0;
+  double to_deg = 0;
+  Clock::TimePoint begun;
+  Clock::TimePoint ended;
+};
+
+/// Motor, gear with play, table. A step motor: where it is sent and where it is differ when it is blocked or loses
+/// steps. Computed in steps of half a millisecond up to the time asked for.
+/// Threads: one user at a time.
+class Axis {
+ public:
+  Axis(const AxisOptions& options, Clock::TimePoint now);
+
+  void advance(Clock::TimePoint now);
+
+  void move_to(std::int32_t counter, const AxisMotion& motion);  ///< absolute, in counter values
+  void seek_home(
+      const AxisMotion& motion);  ///< negative, until the switch closes; first away from a closed one; then counter = 0
+  void quick_stop();
+  void set_counter(std::int32_t value);  ///< declares where it is
+
+  void block(bool blocked) { blocked_ = blocked; }
+  void lose_steps(double pulses) { motor_ -= pulses; }
+
+  [[nodiscard]] bool running() const { return mode_ != Mode::standing; }
+  [[nodiscard]] bool reached_switch() const { return reached_switch_; }  ///< by the last seek_home()
+  [[nodiscard]] std::int32_t commanded() const;
+  [[nodiscard]] std::int32_t measured() const;
+  [[nodiscard]] AxisTruth truth() const;
+  [[nodiscard]] const std::vector<AxisLeg>& legs() const { return legs_; }
+
+ private:
+  enum class Mode { standing, moving, backing_off, seeking_home, stopping };
+
+  void begin(Mode mode, const AxisMotion& motion);
+  void step();
+  void finish();
+  void end();
+  [[nodiscard]] double pulses_per_degree() const;
+  [[nodiscard]] double turn() const;       ///< of the table, pulses
+  [[nodiscard]] double vibration() const;  ///< pulses
+
+  AxisOptions options_;
+  Clock::TimePoint now_;
+  Clock::TimePoint ended_;
+  Mode mode_ = Mode::standing;
+  AxisMotion motion_;
+  double velocity_ = 0;  // pulses/s
+  double command_ = 0;   // where the motor is sent, pulses
+  double goal_ = 0;
+  double motor_ = 0;         // where it is
+  double table_ = 0;         // in motor pulses
+  double counter_zero_ = 0;  // command_ at which the counter reads 0
+  bool blocked_ = false;
+  bool reached_switch_ = false;
+  bool shaking_ = false;
+  std::vector<AxisLeg> legs_;
+};
+
+}  // namespace scanrig::sim::wire

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+namespace scanrig::sim::wire {
+
+using Bytes = std::vector<std::uint8_t>;
+
+/// CRC-16/MODBUS: polynomial 0xA001 reflected, start 0xFFFF [Modbus over serial line V1.02, appendix B].
+std::uint16_t modbus_crc(std::span<const std::uint8_t> bytes);
+/// The bytes with their checksum, low byte first.
+Bytes with_crc(Bytes bytes);
+bool crc_fits(std::span<const std::uint8_t> frame);
+
+/// A request of one of the three functions the drive knows: 03 read, 06 write one, 16 write several.
+struct ModbusRequest {
+  std::uint8_t unit = 0;
+  std::uint8_t function = 0;
+  std::uint16_t address = 0;
+  std::uint16_t count = 0;            ///< registers to read
+  std::vector<std::uint16_t> values;  ///< to write
+};
+
+/// How long the frame that begins with these bytes is, as far as they tell; nothing: more bytes are needed.
+std::optional<std::size_t> request_length(std::span<const std::uint8_t> bytes);
+
+/// Reads a frame of the right length and checksum; nothing when its function is not known or its lengths disagree.
+std::optional<ModbusRequest> parse_request(std::span<const std::uint8_t> frame);
+
+Bytes read_answer(const ModbusRequest& request, std::span<const std::uint16_t> values);
+Bytes write_answer(const ModbusRequest& request);
+Bytes exception_answer(std::uint8_t unit, std::uint8_t function, std::uint8_t exception);
+
+}  // namespace scanrig::sim::wire

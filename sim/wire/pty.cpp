@@ -1,0 +1,65 @@
+#include "sim/wire/pty.h"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <pty.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+namespace scanrig::sim::wire {
+
+Result<Pty> Pty::open(const std::filesystem::path& link) {
+  termios raw{};
+  cfmakeraw(&raw);
+  int master = -1, slave = -1;
+  std::array<char, 64> name{};
+  if (::openpty(&master, &slave, name.data(), &raw, nullptr) != 0) {
+    return fail(ErrorCode::io, "cannot open a pseudo-terminal: {}", std::strerror(errno));
+  }
+  ::fcntl(master, F_SETFD, FD_CLOEXEC);
+  ::fcntl(slave, F_SETFD, FD_CLOEXEC);
+  Pty pty(master, slave, link);
+  std::error_code error;
+  std::filesystem::remove(link, error);
+  std::filesystem::create_symlink(name.data(), link, error);
+  if (error) return fail(ErrorCode::io, "cannot create {}: {}", link.string(), error.message());
+  return pty;
+}
+
+Pty::Pty(Pty&& other) noexcept
+    : master_(std::exchange(other.master_, -1)),
+      slave_(std::exchange(other.slave_, -1)),
+      link_(std::exchange(other.link_, {})) {}
+
+Pty::~Pty() {
+  if (master_ < 0) return;
+  std::error_code ignored;
+  std::filesystem::remove(link_, ignored);
+  ::close(slave_);
+  ::close(master_);
+}
+
+Bytes Pty::read(std::chrono::milliseconds wait) {
+  pollfd watched{master_, POLLIN, 0};
+  if (::poll(&watched, 1, static_cast<int>(wait.count())) <= 0) return {};
+  Bytes bytes(256);
+  const ssize_t count = ::read(master_, bytes.data(), bytes.size());
+  bytes.resize(count > 0 ? static_cast<std::size_t>(count) : 0);
+  return bytes;
+}
+
+void Pty::write(std::span<const std::uint8_t> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(master_, bytes.data(), bytes.size());
+    if (count <= 0) return;  // nobody reads: as on a wire
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+}
+
+}  // namespace scanrig::sim::wire

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "config/drive_profile_file.h"
+#include "drivers/turntable/modbus_turntable.h"
+#include "sim/wire/leadshine_drive.h"
+#include "sim/wire/modbus_server.h"
+#include "tests/component/turntable/turntable_bench.h"
+
+namespace scanrig {
+
+/// The shipped driver and profile against the far end of the wire; a light table, so that real time is short.
+class ModbusBench : public TurntableBench {
+ public:
+  using Change = std::function<void(ModbusTurntableOptions&)>;
+
+  explicit ModbusBench(const Change& change = [](auto&) {}) {
+    auto profile = config::read_drive_profile(SCANRIG_SOURCE_DIR "/config/drives/leadshine-rs.toml");
+    EXPECT_TRUE(profile) << profile.error().message;
+    ModbusTurntableOptions options;
+    options.line.device = link_;
+    options.profile = *profile;
+    options.scale.gear_ratio = axis_.gear_ratio;
+    options.speed = {1800};
+    options.acceleration = {20000};
+    options.tolerance = {0.05};
+    options.settle = std::chrono::milliseconds(60);
+    change(options);
+    options_ = options;
+    auto table = ModbusTurntable::create(options, clock_);
+    EXPECT_TRUE(table) << table.error().message;
+    table_ = std::move(*table);
+    auto server = sim::wire::ModbusServer::start(link_, 1, drive_, clock_);
+    EXPECT_TRUE(server) << server.error().message;
+    server_ = std::move(*server);
+  }
+
+  ModbusTurntable& turntable() override { return *table_; }
+  Clock& clock() override { return clock_; }
+  double seen_deg() override { return drive_.truth().table_deg * (options_.scale.positive_ccw ? 1.0 : -1.0); }
+  bool seen_moving() override { return drive_.truth().moving; }
+  void block(bool blocked) override { drive_.block(blocked); }
+  void when_moving(std::function<void()> act) override {
+    onlooker_ = std::jthread([this, act = std::move(act)](const std::stop_token& stop) {
+      while (!seen_moving()) {
+        if (stop.stop_requested()) return;
+        clock_.sleep_for(std::chrono::milliseconds(1));
+      }
+      act();
+    });
+  }
+  Clock::Duration too_short() override { return std::chrono::milliseconds(60); }
+  Degrees tolerance() override { return options_.tolerance; }
+
+  sim::wire::LeadshineDrive& drive() { return drive_; }
+  sim::wire::ModbusServer& server() { return *server_; }
+
+ private:
+  RealClock clock_;
+  sim::wire::AxisOptions axis_{.gear_ratio = 9};
+  sim::wire::LeadshineDrive drive_{axis_, clock_};
+  std::string link_ = testing::TempDir() + "turntable" + std::to_string(::getpid()) + "-" +
+                      std::to_string(reinterpret_cast<std::uintptr_t>(this));
+  ModbusTurntableOptions options_;
+  std::unique_ptr<sim::wire::ModbusServer> server_;
+  std::unique_ptr<ModbusTurntable> table_;
+  std::jthread onlooker_;
+};
+
+}  // namespace scanrig

@@ -1,0 +1,139 @@
+#include "daemon/jobs/job_store.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/unit/pipeline/scan/scan_samples.h"
+
+namespace scanrig {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+class JobStoreTest : public scan_samples::FolderTest {
+ protected:
+  void SetUp() override {
+    FolderTest::SetUp();
+    scan_samples::write_text(folder_ / "calibration.json", scan_samples::calibration_json());
+    options = {.root = folder_ / "jobs", .calibration_file = folder_ / "calibration.json", .profile = "p"};
+  }
+  JobStore open() {
+    auto store = JobStore::open(options);
+    EXPECT_TRUE(store) << store.error().message;
+    return std::move(*store);
+  }
+  /// A job with one view in the state `state`.
+  fs::path make_job(const JobStore& store, const std::string& id, const std::string& state) {
+    auto scan = store.create(id);
+    EXPECT_TRUE(scan) << scan.error().message;
+    ViewRecord view;
+    view.measured_deg = 0.25;
+    EXPECT_TRUE(scan->add_view(0, view, scan_samples::raw_view(1)));
+    EXPECT_TRUE(scan->set_state(state));
+    return scan->path();
+  }
+  JobInfo recovered(const JobStore& store, const std::string& id) {
+    const auto jobs = store.recover();
+    EXPECT_TRUE(jobs && jobs->contains(id));
+    return *jobs->at(id);
+  }
+  JobStoreOptions options;
+};
+
+TEST_F(JobStoreTest, AnEmptyRootIsMadeAndHasNoJobs) {
+  const auto store = open();
+  EXPECT_TRUE(fs::is_directory(options.root));
+  EXPECT_TRUE(store.recover()->empty());
+}
+
+TEST_F(JobStoreTest, ASecondDaemonIsKeptOutOfTheRoot) {
+  const auto store = open();
+  const auto second = JobStore::open(options);
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, ErrorCode::refused);
+  EXPECT_THAT(second.error().message, HasSubstr(options.root.string()));
+}
+
+TEST_F(JobStoreTest, TheRootIsFreeAgainAfterwards) {
+  { const auto store = open(); }
+  EXPECT_TRUE(JobStore::open(options));
+}
+
+TEST_F(JobStoreTest, ARootThatCannotBeMadeIsAnIoError) {
+  scan_samples::write_text(folder_ / "jobs", "a file");
+  const auto store = JobStore::open(options);
+  ASSERT_FALSE(store);
+  EXPECT_EQ(store.error().code, ErrorCode::io);
+}
+
+TEST_F(JobStoreTest, AMissingCalibrationIsSaidByName) {
+  options.calibration_file = folder_ / "nowhere.json";
+  const auto store = open();
+  const auto scan = store.create("job");
+  ASSERT_FALSE(scan);
+  EXPECT_EQ(scan.error().code, ErrorCode::not_found);
+  EXPECT_THAT(scan.error().message, HasSubstr("nowhere.json"));
+  EXPECT_FALSE(fs::exists(options.root / "job")) << "nothing half-written";
+}
+
+TEST_F(JobStoreTest, AnIdThatIsTakenIsNotOverwritten) {
+  const auto store = open();
+  make_job(store, "job", "scanned");
+  const auto again = store.create("job");
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().code, ErrorCode::exists);
+}
+
+TEST_F(JobStoreTest, AJobThatWasBeingScannedIsMarkedInterruptedWithItsViews) {
+  const auto store = open();
+  for (const std::string state : {"queued", "scanning", "waiting_for_flip"}) {
+    const auto folder = make_job(store, state, state);
+    const auto job = recovered(store, state);
+    EXPECT_EQ(job.state, JobState::interrupted);
+    ASSERT_EQ(job.stored.size(), 1u);
+    EXPECT_EQ(job.stored[0].measured_deg, 0.25);
+    EXPECT_EQ(ScanFolder::open(folder)->manifest().state, "interrupted") << "the folder is the truth";
+  }
+}
+
+TEST_F(JobStoreTest, AScannedJobWithAReportIsDone) {
+  const auto store = open();
+  const auto folder = make_job(store, "job", "scanned");
+  fs::create_directories(model_folder(folder));
+  scan_samples::write_text(report_file(folder), "{}");
+  const auto job = recovered(store, "job");
+  EXPECT_EQ(job.state, JobState::done);
+  EXPECT_EQ(job.model, model_file(folder).string());
+}
+
+TEST_F(JobStoreTest, AScannedJobWithoutAModelSaysHowToMakeIt) {
+  const auto store = open();
+  make_job(store, "job", "scanned");
+  const auto job = recovered(store, "job");
+  EXPECT_EQ(job.state, JobState::interrupted);
+  EXPECT_THAT(job.error->message, HasSubstr("scanrig reconstruct"));
+}
+
+TEST_F(JobStoreTest, AFailedReconstructionIsRemembered) {
+  const auto store = open();
+  const auto folder = make_job(store, "job", "scanned");
+  ASSERT_TRUE(write_failure(folder, {ErrorCode::same_rest, "the object was not turned over"}));
+  const auto job = recovered(store, "job");
+  EXPECT_EQ(job.state, JobState::failed);
+  EXPECT_EQ(job.error->code, ErrorCode::same_rest);
+  EXPECT_EQ(job.error->message, "the object was not turned over");
+}
+
+TEST_F(JobStoreTest, AFolderThatCannotBeReadIsAFailedJobAndTheOthersAreListed) {
+  const auto store = open();
+  make_job(store, "good", "cancelled");
+  fs::create_directories(options.root / "bad");
+  scan_samples::write_text(options.root / "bad" / "scan.json", "{ not json");
+  EXPECT_EQ(recovered(store, "good").state, JobState::cancelled);
+  const auto bad = recovered(store, "bad");
+  EXPECT_EQ(bad.state, JobState::failed);
+  EXPECT_THAT(bad.error->message, HasSubstr("scan.json"));
+}
+
+}  // namespace
+}  // namespace scanrig

@@ -1,0 +1,44 @@
+#include "daemon/station/lamps.h"
+
+#include <gtest/gtest.h>
+
+namespace scanrig {
+namespace {
+
+PanelOutputs of(MachineState machine, Activity activity, const JobTable& jobs = {}) {
+  StationState state;
+  state.machine = machine;
+  state.activity = activity;
+  return lamps(state, jobs);
+}
+
+TEST(Lamps, TellIdleWorkingActNowAndFaultApart) {
+  const auto halted = of(MachineState::halted, Activity::none);
+  const auto warning = of(MachineState::single_execution, Activity::warning);
+  const auto working = of(MachineState::single_execution, Activity::scanning);
+  const auto ready = of(MachineState::ready, Activity::none);
+  const auto flip = of(MachineState::single_execution, Activity::waiting_for_flip);
+  const auto fault = of(MachineState::error, Activity::none);
+  EXPECT_EQ(halted, (PanelOutputs{.amber = true}));
+  EXPECT_EQ(warning, (PanelOutputs{.amber = true, .busy = true}));
+  EXPECT_EQ(working, (PanelOutputs{.green = true, .busy = true}));
+  EXPECT_EQ(ready, (PanelOutputs{.green = true, .start_lamp = true}));
+  EXPECT_EQ(flip, (PanelOutputs{.amber = true, .start_lamp = true, .flip_request = true}));
+  EXPECT_EQ(fault, (PanelOutputs{.red = true}));
+}
+
+TEST(Lamps, AFaultIsRedOnlyEvenWhileStopping) {
+  EXPECT_EQ(of(MachineState::error, Activity::stopping), (PanelOutputs{.red = true, .busy = true}));
+}
+
+TEST(Lamps, PassAndFailTellHowTheNewestFinishedJobEnded) {
+  const auto job = [](JobState state) { return std::make_shared<const JobInfo>(JobInfo{.state = state}); };
+  JobTable jobs{{"1", job(JobState::failed)}, {"2", job(JobState::done)}, {"3", job(JobState::scanning)}};
+  EXPECT_TRUE(of(MachineState::ready, Activity::none, jobs).pass);
+  jobs["4"] = job(JobState::failed);
+  EXPECT_TRUE(of(MachineState::ready, Activity::none, jobs).fail);
+  EXPECT_FALSE(of(MachineState::ready, Activity::none, jobs).pass);
+}
+
+}  // namespace
+}  // namespace scanrig

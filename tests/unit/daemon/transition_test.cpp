@@ -1,0 +1,365 @@
+#include "daemon/station/transition.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "daemon/rig/taken_view.h"
+#include "daemon/station/words.h"
+
+namespace scanrig {
+namespace {
+
+using testing::HasSubstr;
+
+/// Drives the pure transition function and keeps what it asked for.
+class Station : public testing::Test {
+ protected:
+  void tell(const Event& event) {
+    auto step = next(state, event, rules);
+    state = std::move(step.state);
+    actions = std::move(step.actions);
+    refused = std::move(step.refused);
+  }
+  void press(Button button, Origin origin = Origin::panel) { tell(event::Pressed{button, origin, "job"}); }
+
+  template <class SomeAction>
+  const SomeAction* asked_for() const {
+    for (const auto& action : actions) {
+      if (const auto* found = std::get_if<SomeAction>(&action)) return found;
+    }
+    return nullptr;
+  }
+
+  void start_up() {
+    tell(event::PanelFound{true, true});
+    tell(event::Stopped{});
+  }
+  void get_ready() {
+    start_up();
+    press(Button::reset);
+    tell(event::WarningOver{});
+    tell(event::Homed{});
+  }
+  void begin_scan() {
+    get_ready();
+    press(Button::start);
+    tell(event::JobCreated{"job", "/jobs/job"});
+    tell(event::WarningOver{});
+  }
+  void take(int pose, int view) {
+    tell(event::ViewTaken{std::make_shared<TakenView>(TakenView{.id = {"job", pose, view}})});
+  }
+  void store(int pose, int view) { tell(event::ViewStored{{"job", pose, view}, 0.0, 0}); }
+  void take_and_store_all(int pose) {
+    for (int view = 0; view < rules.views; ++view) {
+      take(pose, view);
+      store(pose, view);
+    }
+  }
+  void reach_flip() {
+    begin_scan();
+    take_and_store_all(0);
+    tell(event::PoseStored{"job", 0});
+  }
+
+  StationRules rules{.poses = 2, .views = 4, .remote = false};
+  StationState state;
+  std::vector<Action> actions;
+  std::optional<Error> refused;
+};
+
+TEST_F(Station, StartsUpHaltedOnlyAfterTheTableIsSeenStanding) {
+  tell(event::PanelFound{true, true});
+  EXPECT_NE(asked_for<action::StopRig>(), nullptr);
+  press(Button::reset);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->code, ErrorCode::busy);
+  tell(event::Stopped{});
+  EXPECT_EQ(state.machine, MachineState::halted);
+  EXPECT_EQ(state.activity, Activity::none);
+}
+
+TEST_F(Station, HomesOnlyAfterResetAndTheWarning) {
+  start_up();
+  press(Button::start);
+  ASSERT_TRUE(refused);
+  EXPECT_THAT(refused->message, HasSubstr("Press Reset first"));
+  press(Button::reset);
+  EXPECT_EQ(state.machine, MachineState::initialized);
+  EXPECT_NE(asked_for<action::Warn>(), nullptr);
+  EXPECT_EQ(asked_for<action::Home>(), nullptr);
+  tell(event::WarningOver{});
+  EXPECT_NE(asked_for<action::Home>(), nullptr);
+  tell(event::Homed{});
+  EXPECT_EQ(state.machine, MachineState::ready);
+}
+
+TEST_F(Station, MovesForAJobOnlyWhenWarnedAndTheFolderIsThere) {
+  get_ready();
+  press(Button::start);
+  EXPECT_NE(asked_for<action::CreateJob>(), nullptr);
+  EXPECT_NE(asked_for<action::Warn>(), nullptr);
+  tell(event::WarningOver{});
+  EXPECT_EQ(asked_for<action::TakeView>(), nullptr) << "the job's folder is not there yet";
+  tell(event::JobCreated{"job", "/jobs/job"});
+  ASSERT_NE(asked_for<action::TakeView>(), nullptr);
+  EXPECT_EQ(asked_for<action::TakeView>()->id, (ViewId{"job", 0, 0}));
+}
+
+TEST_F(Station, TakesViewsAtEqualAngles) {
+  begin_scan();
+  for (int view = 0; view < 4; ++view) {
+    ASSERT_NE(asked_for<action::TakeView>(), nullptr);
+    EXPECT_EQ(asked_for<action::TakeView>()->id.view, view);
+    EXPECT_DOUBLE_EQ(asked_for<action::TakeView>()->angle.value, 90.0 * view);
+    if (view > 0) store(0, view - 1);
+    take(0, view);
+  }
+  EXPECT_EQ(asked_for<action::TakeView>(), nullptr) << "a fifth view of four";
+}
+
+TEST_F(Station, KeepsAtMostTwoViewsInMemoryOnly) {
+  begin_scan();
+  take(0, 0);
+  EXPECT_NE(asked_for<action::StoreView>(), nullptr);
+  EXPECT_NE(asked_for<action::TakeView>(), nullptr) << "one view may be unstored while the table moves on";
+  take(0, 1);
+  EXPECT_EQ(asked_for<action::TakeView>(), nullptr) << "two are unstored";
+  store(0, 0);
+  EXPECT_NE(asked_for<action::TakeView>(), nullptr);
+}
+
+TEST_F(Station, AsksForTheFlipWhenThePoseIsOnDisk) {
+  begin_scan();
+  for (int view = 0; view < 4; ++view) {
+    take(0, view);
+    if (view < 3) store(0, view);
+  }
+  EXPECT_EQ(state.activity, Activity::storing);
+  EXPECT_EQ(asked_for<action::FinishPose>(), nullptr);
+  store(0, 3);
+  ASSERT_NE(asked_for<action::FinishPose>(), nullptr);
+  EXPECT_FALSE(asked_for<action::FinishPose>()->last);
+  EXPECT_EQ(state.activity, Activity::storing) << "not before the manifest says so";
+  tell(event::PoseStored{"job", 0});
+  EXPECT_EQ(state.activity, Activity::waiting_for_flip);
+  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("Turn the object over"));
+}
+
+TEST_F(Station, StartMeansContinueAfterTheFlipAndWarnsAgain) {
+  reach_flip();
+  press(Button::start);
+  EXPECT_FALSE(refused);
+  EXPECT_NE(asked_for<action::Warn>(), nullptr);
+  EXPECT_NE(asked_for<action::ResumeJob>(), nullptr);
+  tell(event::WarningOver{});
+  ASSERT_NE(asked_for<action::TakeView>(), nullptr);
+  EXPECT_EQ(asked_for<action::TakeView>()->id, (ViewId{"job", 1, 0}));
+}
+
+TEST_F(Station, IsReadyForTheNextJobWhenTheLastViewIsOnDisk) {
+  reach_flip();
+  press(Button::start);
+  tell(event::WarningOver{});
+  take_and_store_all(1);
+  ASSERT_NE(asked_for<action::FinishPose>(), nullptr);
+  EXPECT_TRUE(asked_for<action::FinishPose>()->last);
+  tell(event::PoseStored{"job", 1});
+  EXPECT_EQ(state.machine, MachineState::ready);
+  EXPECT_FALSE(state.job);
+}
+
+TEST_F(Station, IgnoresStartWhileBusy) {
+  begin_scan();
+  const auto before = state.job->asked;
+  press(Button::start);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->code, ErrorCode::busy);
+  EXPECT_TRUE(actions.empty());
+  EXPECT_EQ(state.job->asked, before);
+}
+
+TEST_F(Station, StopCancelsTheJobAndEndsHaltedWhenSeenStanding) {
+  begin_scan();
+  press(Button::stop);
+  EXPECT_NE(asked_for<action::StopRig>(), nullptr);
+  ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::cancelled);
+  tell(event::RigFailed{{ErrorCode::stopped, "turntable: stopped"}});
+  EXPECT_EQ(state.machine, MachineState::halted) << "a move cut short by Stop is no fault";
+  EXPECT_EQ(state.activity, Activity::stopping);
+  tell(event::Stopped{});
+  EXPECT_EQ(state.activity, Activity::none);
+}
+
+TEST_F(Station, AViewThatComesAfterStopIsNotKept) {
+  begin_scan();
+  press(Button::stop);
+  take(0, 0);
+  EXPECT_TRUE(actions.empty());
+}
+
+TEST_F(Station, StopWhileWaitingForTheFlipNeedsNoHoming) {
+  reach_flip();
+  press(Button::stop);
+  ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
+  EXPECT_EQ(state.machine, MachineState::ready);
+}
+
+TEST_F(Station, StopIsRefusedWhenNothingMoves) {
+  get_ready();
+  press(Button::stop);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->code, ErrorCode::refused);
+}
+
+TEST_F(Station, AFaultLatchesUntilReset) {
+  begin_scan();
+  tell(event::RigFailed{{ErrorCode::stalled, "turntable: stalled at 12 deg"}});
+  EXPECT_EQ(state.machine, MachineState::error);
+  EXPECT_THAT(state.cause, HasSubstr("stalled at 12 deg"));
+  EXPECT_NE(asked_for<action::StopRig>(), nullptr);
+  ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::interrupted);
+  tell(event::Stopped{});
+  EXPECT_EQ(state.machine, MachineState::error);
+  press(Button::start);
+  EXPECT_TRUE(refused);
+  EXPECT_EQ(state.machine, MachineState::error);
+  press(Button::reset);
+  EXPECT_EQ(state.machine, MachineState::initialized);
+}
+
+TEST_F(Station, TheFirstFaultIsTheOneShown) {
+  begin_scan();
+  tell(event::RigFailed{{ErrorCode::stalled, "turntable: stalled"}});
+  tell(event::PanelFailed{{ErrorCode::io, "panel: gone"}});
+  EXPECT_EQ(state.cause, "turntable: stalled.");
+}
+
+TEST_F(Station, TheEstopOutranksTheFaultItCauses) {
+  begin_scan();
+  tell(event::RigFailed{{ErrorCode::timeout, "turntable: no reply"}});
+  tell(event::EstopChanged{false});
+  EXPECT_THAT(state.cause, HasSubstr("e-stop"));
+  tell(event::Stopped{});
+  press(Button::reset);
+  ASSERT_TRUE(refused);
+  EXPECT_THAT(refused->message, HasSubstr("release it"));
+  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("Release the e-stop"));
+  tell(event::EstopChanged{true});
+  EXPECT_EQ(state.machine, MachineState::error) << "releasing starts nothing";
+  press(Button::reset);
+  EXPECT_EQ(state.machine, MachineState::initialized);
+}
+
+TEST_F(Station, AnEstopThatIsPressedAtStartUpIsAFault) {
+  tell(event::PanelFound{false, true});
+  EXPECT_EQ(state.machine, MachineState::error);
+}
+
+TEST_F(Station, AnOpenGuardStopsAMovingTableButNotAFlip) {
+  reach_flip();
+  tell(event::GuardChanged{false});
+  EXPECT_EQ(state.activity, Activity::waiting_for_flip);
+  press(Button::start);
+  ASSERT_TRUE(refused);
+  EXPECT_THAT(refused->message, HasSubstr("guard"));
+  tell(event::GuardChanged{true});
+  press(Button::start);
+  tell(event::GuardChanged{false});
+  EXPECT_EQ(state.machine, MachineState::error);
+}
+
+TEST_F(Station, ATableThatCannotBeSeenStandingIsSaidToMayBeMoving) {
+  begin_scan();
+  press(Button::stop);
+  tell(event::StopFailed{{ErrorCode::timeout, "turntable: no reply"}});
+  EXPECT_EQ(state.machine, MachineState::error);
+  EXPECT_THAT(state.cause, HasSubstr("may be moving"));
+  EXPECT_EQ(state.activity, Activity::none) << "or Reset could never be pressed";
+}
+
+TEST_F(Station, AFullDiskFailsTheJobAndIsAFault) {
+  begin_scan();
+  take(0, 0);
+  tell(event::StoreFailed{"job", {ErrorCode::io, "cannot write: No space left on device"}});
+  EXPECT_EQ(state.machine, MachineState::error);
+  ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::failed);
+}
+
+TEST_F(Station, AFailedReconstructionSparesTheFlip) {
+  begin_scan();
+  tell(event::ReconstructionFailed{"job", {ErrorCode::out_of_range, "the object is larger than the working volume"}});
+  EXPECT_EQ(state.machine, MachineState::single_execution) << "the frames of the pose are evidence";
+  take_and_store_all(0);
+  tell(event::PoseStored{"job", 0});
+  ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::failed);
+  EXPECT_EQ(state.machine, MachineState::ready);
+}
+
+TEST_F(Station, RemoteStartAndResetAreRefusedUnlessConfigured) {
+  start_up();
+  press(Button::reset, Origin::remote);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->code, ErrorCode::refused);
+  rules.remote = true;
+  press(Button::reset, Origin::remote);
+  EXPECT_FALSE(refused);
+}
+
+TEST_F(Station, RemoteStopIsAlwaysObeyed) {
+  begin_scan();
+  press(Button::stop, Origin::remote);
+  EXPECT_FALSE(refused);
+  EXPECT_NE(asked_for<action::StopRig>(), nullptr);
+}
+
+TEST_F(Station, ShutdownInterruptsTheJobAndEndsWhenTheRigIsSeenStopped) {
+  begin_scan();
+  tell(event::Shutdown{});
+  ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::interrupted);
+  EXPECT_FALSE(state.finished);
+  press(Button::start);
+  EXPECT_TRUE(refused);
+  tell(event::Stopped{});
+  EXPECT_TRUE(state.finished);
+}
+
+TEST_F(Station, LateEventsOfAnOldJobChangeNothing) {
+  get_ready();
+  const auto before = state.cause;
+  tell(event::ViewStored{{"old", 0, 0}, 0.0, 0});
+  tell(event::PoseStored{"old", 0});
+  tell(event::StoreFailed{"old", {ErrorCode::io, "late"}});
+  tell(event::WarningOver{});
+  take(0, 0);
+  EXPECT_EQ(state.machine, MachineState::ready);
+  EXPECT_EQ(state.cause, before);
+  EXPECT_TRUE(actions.empty());
+}
+
+TEST_F(Station, EveryStateHasASentence) {
+  const auto said = [&] { return !describe(state, rules).sentence.empty() && !state.cause.empty(); };
+  EXPECT_TRUE(said());
+  start_up();
+  EXPECT_TRUE(said());
+  press(Button::reset);
+  EXPECT_TRUE(said());
+  tell(event::WarningOver{});
+  EXPECT_TRUE(said());
+  tell(event::Homed{});
+  EXPECT_TRUE(said());
+  press(Button::start);
+  EXPECT_TRUE(said());
+  tell(event::WarningOver{});
+  EXPECT_TRUE(said());
+  tell(event::EstopChanged{false});
+  EXPECT_TRUE(said());
+}
+
+}  // namespace
+}  // namespace scanrig

@@ -1,0 +1,173 @@
+#include "pipeline/registration/register_views.h"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+
+#include "tests/unit/pipeline/registration/analytic_views.h"
+
+namespace scanrig {
+namespace {
+
+using testing::RigModel;
+
+Context no_context() { return {}; }
+
+/// Moves the calibration of each view away from the truth by a table angle error and a jolt.
+void disturb(std::vector<View>& views, double angle_deg, double shift_mm) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  for (View& view : views) {
+    Transform& t = view.range.camera_from_pose;
+    const Eigen::Vector3d shift(normal(random), normal(random), normal(random));
+    t = t * small_motion(Eigen::Vector3d(0, to_radians(angle_deg) * normal(random), 0), shift_mm * shift);
+  }
+}
+
+/// Largest distance between where two calibrations see the object's corners, after the common motion is taken out.
+double inconsistency_mm(const std::vector<View>& views, const std::vector<View>& truth) {
+  double worst = 0.0;
+  const Transform common = views[0].range.camera_from_pose.inverse() * truth[0].range.camera_from_pose;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const Transform move = views[v].range.camera_from_pose.inverse() * truth[v].range.camera_from_pose;
+    for (int k = 0; k < 8; ++k) {
+      const Eigen::Vector3d corner(k & 1 ? 30 : -30, k & 2 ? 60 : 0, k & 4 ? 30 : -30);
+      worst = std::max(worst, (move * corner - common * corner).norm());
+    }
+  }
+  return worst;
+}
+
+TEST(RegisterViews, LeavesAPerfectCalibrationAlone) {
+  auto views = testing::turn_around(testing::workpiece(), 8, RigModel{});
+  const auto truth = views;
+  const auto report = register_views(views, {}, no_context());
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_LT(inconsistency_mm(views, truth), 0.005);
+  EXPECT_LT(report->median_after_mm, 0.003);
+  EXPECT_TRUE(report->angle_observable);
+}
+
+TEST(RegisterViews, FindsTableAnglesThatTheStepperReportedWrong) {
+  RigModel rig;
+  rig.noise_mm = 0.01;
+  auto views = testing::turn_around(testing::workpiece(), 8, rig);
+  const auto truth = views;
+  disturb(views, 0.03, 0.0);
+  const double before = inconsistency_mm(views, truth);
+  const auto report = register_views(views, {}, no_context());
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_GT(before, 0.03);
+  EXPECT_LT(inconsistency_mm(views, truth), 0.01);
+  EXPECT_LT(report->median_after_mm, report->median_before_mm);
+}
+
+TEST(RegisterViews, PlacesImportedScansThatAreAMillimetreOff) {
+  RigModel rig;
+  rig.noise_mm = 0.02;
+  auto views = testing::turn_around(testing::workpiece(), 8, rig);
+  const auto truth = views;
+  disturb(views, 0.4, 0.5);
+  const auto report = register_views(views, RegistrationOptions::imported(), no_context());
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_LT(inconsistency_mm(views, truth), 0.03);
+  EXPECT_NEAR(report->median_after_mm, 0.02, 0.01);
+}
+
+TEST(RegisterViews, FindsAShiftedTurntableAxis) {
+  auto views = testing::turn_around(testing::workpiece(), 8, RigModel{});
+  const auto truth = views;
+  const Transform wrong_axis = small_motion(Eigen::Vector3d::Zero(), Eigen::Vector3d(0.04, 0, -0.03));
+  for (View& view : views) {
+    view.range.camera_from_pose = testing::camera_from_turntable(RigModel{}) * wrong_axis * rot_y(view.angle_rad);
+  }
+  RegistrationOptions options;
+  options.axis_shift_sigma_mm = 0.1;
+  const auto report = register_views(views, options, no_context());
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_NEAR(report->axis_shift_mm, 0.05, 0.005);
+  EXPECT_LT(inconsistency_mm(views, truth), 0.01);
+}
+
+TEST(RegisterViews, HoldsTheAnglesOfABodyOfRevolutionAndSaysSo) {
+  RigModel rig;
+  rig.noise_mm = 0.01;
+  const auto vase = testing::together({testing::upright_cylinder({0, 0, 0}, 25, 50), testing::ball({0, 55, 0}, 20)});
+  auto views = testing::turn_around(vase, 8, rig);
+  const auto report = register_views(views, {}, no_context());
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_FALSE(report->angle_observable);
+  for (const ViewFit& fit : report->views) EXPECT_EQ(fit.angle_correction_deg, 0.0);
+}
+
+TEST(RegisterViews, MovesTheSilhouettesWithTheirView) {
+  auto views = testing::turn_around(testing::workpiece(), 8, RigModel{});
+  disturb(views, 0.02, 0.0);
+  const Transform right_from_left = small_motion(Eigen::Vector3d(0, 0.1, 0), Eigen::Vector3d(160, 0, 0));
+  for (View& view : views) {
+    view.silhouettes.resize(2);
+    view.silhouettes[0].camera_from_pose = view.range.camera_from_pose;
+    view.silhouettes[1].camera_from_pose = right_from_left * view.range.camera_from_pose;
+  }
+  ASSERT_TRUE(register_views(views, {}, no_context()));
+  for (const View& view : views) {
+    EXPECT_TRUE(view.silhouettes[0].camera_from_pose.isApprox(view.range.camera_from_pose, 1e-12));
+    EXPECT_TRUE(view.silhouettes[1].camera_from_pose.isApprox(right_from_left * view.range.camera_from_pose, 1e-12));
+  }
+}
+
+TEST(RegisterViews, GivesTheSameBitsOnAnyNumberOfThreads) {
+  RigModel rig;
+  rig.noise_mm = 0.01;
+  auto one = testing::turn_around(testing::workpiece(), 8, rig);
+  disturb(one, 0.02, 0.0);
+  auto many = one;
+  with_threads(1, [&] { ASSERT_TRUE(register_views(one, {}, no_context())); });
+  with_threads(3, [&] { ASSERT_TRUE(register_views(many, {}, no_context())); });
+  for (std::size_t v = 0; v < one.size(); ++v) {
+    EXPECT_EQ(0, std::memcmp(one[v].range.camera_from_pose.data(), many[v].range.camera_from_pose.data(),
+                             16 * sizeof(double)));
+  }
+}
+
+TEST(RegisterViews, ReturnsASingleViewAsItIs) {
+  auto views = testing::turn_around(testing::workpiece(), 1, RigModel{});
+  const auto truth = views;
+  ASSERT_TRUE(register_views(views, {}, no_context()));
+  EXPECT_TRUE(views[0].range.camera_from_pose.isApprox(truth[0].range.camera_from_pose, 1e-9));
+}
+
+TEST(RegisterViews, RefusesMapsOfDifferentSizes) {
+  auto views = testing::turn_around(testing::workpiece(), 2, RigModel{});
+  views[1].range.sigma = cv::Mat1f(3, 3, 0.0F);
+  const auto report = register_views(views, {}, no_context());
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().code, ErrorCode::invalid_input);
+}
+
+TEST(RegisterViews, SaysSoWhenNothingWasMeasured) {
+  auto views = testing::turn_around(testing::ball({0, -500, 0}, 1), 8, RigModel{});
+  const auto report = register_views(views, {}, no_context());
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().code, ErrorCode::degenerate);
+}
+
+TEST(RegisterViews, SaysSoWhenTheViewsShareNothing) {
+  auto views = testing::turn_around(testing::workpiece(), 2, RigModel{});
+  views[1].range.camera_from_pose = views[1].range.camera_from_pose * Eigen::Translation3d(0, 300, 0);
+  const auto report = register_views(views, {}, no_context());
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().code, ErrorCode::no_overlap);
+}
+
+TEST(RegisterViews, StopsWhenAsked) {
+  auto views = testing::turn_around(testing::workpiece(), 8, RigModel{});
+  std::stop_source source;
+  source.request_stop();
+  const auto report = register_views(views, {}, {source.get_token(), {}});
+  ASSERT_FALSE(report);
+  EXPECT_EQ(report.error().code, ErrorCode::stopped);
+}
+
+}  // namespace
+}  // namespace scanrig
