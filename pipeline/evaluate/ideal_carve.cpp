@@ -18,8 +18,8 @@ constexpr float kClampVoxels = 4.0F;
 struct Evidence {
   const TrueImage* image = nullptr;
   cv::Mat1f outside_px;  ///< negative inside the outline
-  cv::Mat1f depth;       ///< of observable points, at every second pixel; NaN elsewhere; empty: none
-  cv::Mat1f cosine;      ///< of the incidence there
+  cv::Mat3f point;       ///< observable, truth frame, at every second pixel; NaN elsewhere; empty: none
+  cv::Mat3f normal;      ///< of the surface there
 };
 
 cv::Mat1f outline_distance(const TrueImage& image) {
@@ -44,12 +44,12 @@ Eigen::Vector3d normal_of(const Mesh& mesh, int face) {
 Evidence evidence_of(const TrueImage& image, const TrueView& view, const Mesh& mesh, bool depth) {
   Evidence evidence{&image, outline_distance(image), {}, {}};
   if (!depth) return evidence;
-  evidence.depth = cv::Mat1f((image.depth.rows + 1) / 2, (image.depth.cols + 1) / 2, std::nanf(""));
-  evidence.cosine = evidence.depth.clone();
+  evidence.point = cv::Mat3f((image.depth.rows + 1) / 2, (image.depth.cols + 1) / 2, cv::Vec3f::all(std::nanf("")));
+  evidence.normal = evidence.point.clone();
   const Transform truth_from_camera = image.camera.camera_from_turntable.inverse();
-  parallel_for(static_cast<std::size_t>(evidence.depth.rows), [&](std::size_t r) {
+  parallel_for(static_cast<std::size_t>(evidence.point.rows), [&](std::size_t r) {
     const int row = static_cast<int>(r);
-    for (int col = 0; col < evidence.depth.cols; ++col) {
+    for (int col = 0; col < evidence.point.cols; ++col) {
       const int face = image.face(2 * row, 2 * col);
       if (face < 0) continue;
       const double z = image.depth(2 * row, 2 * col);
@@ -57,8 +57,10 @@ Evidence evidence_of(const TrueImage& image, const TrueView& view, const Mesh& m
       const Eigen::Vector3d point = truth_from_camera * (z * ray);
       const Eigen::Vector3d normal = normal_of(mesh, face);
       if (!view.observes(point, normal)) continue;
-      evidence.depth(row, col) = static_cast<float>(z);
-      evidence.cosine(row, col) = static_cast<float>((image.centre - point).normalized().dot(normal));
+      for (int k = 0; k < 3; ++k) {
+        evidence.point(row, col)[k] = static_cast<float>(point[k]);
+        evidence.normal(row, col)[k] = static_cast<float>(normal[k]);
+      }
     }
   });
   return evidence;
@@ -72,9 +74,12 @@ double outside(const Evidence& evidence, const Eigen::Vector3d& point) {
   const double z = (camera.camera_from_turntable * point).z();
   const int col = static_cast<int>(std::lround(px.x())), row = static_cast<int>(std::lround(px.y()));
   const double beside = evidence.outside_px(row, col) * camera.projection.mm_per_pixel(z);
-  if (evidence.depth.empty()) return beside;
-  const float depth = evidence.depth(row / 2, col / 2);
-  const double before = (depth - z) * evidence.cosine(row / 2, col / 2);
+  if (evidence.point.empty()) return beside;
+  // Along the ray, but through the tangent plane: the pixel's own ray passes a little beside the point.
+  const cv::Vec3f& hit = evidence.point(row / 2, col / 2);
+  const cv::Vec3f& normal = evidence.normal(row / 2, col / 2);
+  const double before =
+      (point - Eigen::Vector3d(hit[0], hit[1], hit[2])).dot(Eigen::Vector3d(normal[0], normal[1], normal[2]));
   return before > beside ? before : beside;  // NaN: beside
 }
 

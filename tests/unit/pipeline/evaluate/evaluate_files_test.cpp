@@ -1,0 +1,122 @@
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+#include "core/files.h"
+#include "pipeline/evaluate/evaluate.h"
+#include "pipeline/evaluate/texture_figures.h"
+#include "pipeline/scan/model/model_files.h"
+#include "tests/unit/pipeline/evaluate/ball_truth.h"
+
+namespace scanrig {
+namespace {
+
+using namespace ball_truth;
+
+class EvaluateFilesTest : public testing::Test {
+ protected:
+  std::filesystem::path folder_ = std::filesystem::path(testing::TempDir()) / "scanrig_evaluate_files_test";
+  void SetUp() override {
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  void write_truth(const std::string& projector_key = "projector_from_turntable") {
+    const std::string identity = R"({ "rotation": [[1,0,0],[0,1,0],[0,0,1]], "translation": [0, 0, 640] })";
+    const std::string lens = R"("width": 1280, "height": 960, "fx": 4266, "fy": 4266, "cx": 640, "cy": 480)";
+    const std::string camera =
+        R"({ "serial": "S", )" + lens + R"(, "distortion": [0,0,0,0,0], "camera_from_turntable": )" + identity + "}";
+    const std::string text = R"({ "format": "scanrig-truth", "version": 1, "profile_sha256": "", "object": "ball",
+        "seed": 1, "mesh": "truth.ply", "left": )" +
+                             camera + R"(, "right": )" + camera + R"(, "projector": { )" + lens + ", \"" +
+                             projector_key + "\": " + identity + R"( }, "table_radius_mm": 90,
+        "poses": [ { "table_from_truth": )" +
+                             identity + R"(, "angles_deg": [0, 45] } ], "pose1_from_pose2": )" + identity + "}";
+    ASSERT_TRUE(write_file_atomically(folder_ / "truth.json", text));
+    ASSERT_TRUE(write_file_atomically(folder_ / "truth.ply", encode_ply(ball())));
+  }
+};
+
+TEST_F(EvaluateFilesTest, TheTruthIsRead) {
+  write_truth();
+  const auto truth = read_truth(folder_);
+  ASSERT_TRUE(truth) << truth.error().message;
+  EXPECT_EQ(truth->mesh.faces.size(), ball().faces.size());
+  EXPECT_EQ(truth->poses.at(0).angles_deg, (std::vector<double>{0.0, 45.0}));
+  EXPECT_EQ(truth->pose1_from_pose2->translation().z(), 640.0);
+  EXPECT_EQ(truth->table_radius_mm, 90.0);
+}
+
+TEST_F(EvaluateFilesTest, ABadTruthIsNamed) {
+  EXPECT_EQ(read_truth(folder_).error().code, ErrorCode::not_found);
+  write_truth("projector");
+  const auto truth = read_truth(folder_);
+  ASSERT_FALSE(truth);
+  EXPECT_EQ(truth.error().code, ErrorCode::invalid_input);
+  EXPECT_NE(truth.error().message.find("projector.projector_from_turntable"), std::string::npos)
+      << truth.error().message;
+}
+
+TEST_F(EvaluateFilesTest, AModelsClaimsAreReadBack) {
+  TexturedMesh model{ball(kRadius, kCentre, 10), {}, cv::Mat3b(16, 16, cv::Vec3b(10, 200, 30))};
+  model.mesh.views[3] = 0;
+  model.mesh.sigma.assign(model.mesh.vertices.size(), 0.02F);
+  for (std::size_t f = 0; f < model.mesh.faces.size(); ++f) {
+    const float u = static_cast<float>(f) / 1000.0F;
+    model.corner_uv.push_back({Eigen::Vector2f(u, 0.25F), Eigen::Vector2f(u, 0.5F), Eigen::Vector2f(0.75F, u)});
+  }
+  const std::string report = R"({ "pose1_from_pose2": { "rotation": [[1,0,0],[0,1,0],[0,0,1]],
+                                                        "translation": [1, 2, 3] } })";
+  ASSERT_TRUE(write_model_files(model, report, folder_ / "model"));
+  const auto claim = read_claim(folder_ / "model");
+  ASSERT_TRUE(claim) << claim.error().message;
+  EXPECT_EQ(claim->model.mesh.views[3], 0);
+  EXPECT_EQ(claim->model.mesh.sigma[5], 0.02F);
+  ASSERT_EQ(claim->model.corner_uv.size(), model.corner_uv.size());
+  EXPECT_LT((claim->model.corner_uv[7][2] - model.corner_uv[7][2]).norm(), 1e-6F);
+  EXPECT_EQ(claim->model.atlas(5, 5), cv::Vec3b(10, 200, 30));
+  EXPECT_EQ(claim->pose1_from_pose2->translation(), Eigen::Vector3d(1, 2, 3));
+
+  ASSERT_TRUE(write_file_atomically(folder_ / "model" / "model.obj", "vt 0 0\nf 1/1 2/1 4/1\n"));
+  EXPECT_EQ(read_claim(folder_ / "model").error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(read_claim(folder_ / "absent").error().code, ErrorCode::not_found);
+}
+
+/// Blobs of grey without period.
+cv::Mat1b speckle() {
+  cv::Mat1f noise(300, 400);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> grey(0.0F, 255.0F);
+  for (float& value : noise) value = grey(random);
+  cv::GaussianBlur(noise, noise, {0, 0}, 2.5);
+  cv::normalize(noise, noise, 0, 255, cv::NORM_MINMAX);
+  cv::Mat1b image;
+  noise.convertTo(image, CV_8U);
+  return image;
+}
+
+TEST(PatchOffsets, AShiftIsFoundInAnotherLight) {
+  const cv::Mat1b drawn = speckle();
+  cv::Mat photo;
+  const cv::Mat shift = (cv::Mat_<double>(2, 3) << 1, 0, 1.5, 0, 1, -0.8);
+  cv::warpAffine(drawn, photo, shift, drawn.size(), cv::INTER_CUBIC, cv::BORDER_REFLECT);
+  photo.convertTo(photo, CV_8U, 0.5, 20.0);
+  cv::Mat1b mask(drawn.size(), uchar{0});
+  mask(cv::Rect(50, 50, 300, 200)) = 255;
+  const auto offsets = patch_offsets(drawn, photo, mask);
+  EXPECT_GT(offsets.size(), 50u);
+  EXPECT_NEAR(quantile(offsets, 0.5), 1.7, 0.05);
+  EXPECT_LT(quantile(patch_offsets(drawn, drawn, mask), 0.95), 0.03);
+}
+
+TEST(PatchOffsets, WithoutStructureThereIsNothingToSay) {
+  const cv::Mat1b flat(300, 400, uchar{100});
+  const cv::Mat1b all(300, 400, uchar{255});
+  EXPECT_TRUE(patch_offsets(flat, speckle(), all).empty());
+  EXPECT_TRUE(patch_offsets(speckle(), speckle(), cv::Mat1b(300, 400, uchar{0})).empty());
+}
+
+}  // namespace
+}  // namespace scanrig
