@@ -67,8 +67,8 @@ TEST_F(EvaluateFilesTest, AModelsClaimsAreReadBack) {
     const float u = static_cast<float>(f) / 1000.0F;
     model.corner_uv.push_back({Eigen::Vector2f(u, 0.25F), Eigen::Vector2f(u, 0.5F), Eigen::Vector2f(0.75F, u)});
   }
-  const std::string report = R"({ "pose1_from_pose2": { "rotation": [[1,0,0],[0,1,0],[0,0,1]],
-                                                        "translation": [1, 2, 3] } })";
+  const std::string report = R"({ "pose_refinement": { "residual_median_mm": 0.02,
+      "pose1_from_pose2": { "rotation": [[1,0,0],[0,1,0],[0,0,1]], "translation": [1, 2, 3] } } })";
   ASSERT_TRUE(write_model_files(model, report, folder_ / "model"));
   const auto claim = read_claim(folder_ / "model");
   ASSERT_TRUE(claim) << claim.error().message;
