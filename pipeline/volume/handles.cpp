@@ -55,15 +55,16 @@ std::size_t flip_if_better(BlockGrid& grid, const VoxelLabels& labels, const std
 HandleRepair repair_handles(BlockGrid& grid, long genus, float band_mm) {
   HandleRepair result{0, 0, genus};
   const float shallow = 0.5F * grid.voxel();  // a flipped voxel's distance: the film is about a voxel thick
-  {
+  const auto most = static_cast<std::size_t>(std::pow(kWidestFilledMm / grid.voxel(), 2.0F));
+  // Cutting comes first: what no view saw may be empty, what a view saw through is.
+  for (const bool cutting : {true, false}) {
+    if (result.genus <= 0) break;
     VoxelLabels labels(grid);
-    const auto most = static_cast<std::size_t>(std::pow(kWidestFilledMm / grid.voxel(), 2.0F));
-    const auto films = small_films(labels, labels.grow(/*inside=*/false), most);
-    result.filled = flip_if_better(grid, labels, films, -shallow, band_mm, result.genus);
-  }
-  if (result.genus > 0) {
-    VoxelLabels labels(grid);
-    result.cut = flip_if_better(grid, labels, labels.grow(/*inside=*/true), shallow, band_mm, result.genus);
+    std::vector<std::size_t> films = labels.grow(/*inside=*/cutting);
+    if (!cutting) films = small_films(labels, films, most);
+    const std::size_t flipped =
+        flip_if_better(grid, labels, films, cutting ? shallow : -shallow, band_mm, result.genus);
+    (cutting ? result.cut : result.filled) += flipped;
   }
   return result;
 }

@@ -53,8 +53,8 @@ Result<void> check(std::span<const PosedViews> poses, const VolumeOptions& optio
       }
       for (const auto& s : view.silhouettes) {
         if (s.outside_px.size() != cv::Size(s.projection.width, s.projection.height)) {
-          return fail(ErrorCode::invalid_input, "volume: pose {}, view {}: the silhouette does not have its size", p + 1,
-                      view.index);
+          return fail(ErrorCode::invalid_input, "volume: pose {}, view {}: the silhouette does not have its size",
+                      p + 1, view.index);
         }
       }
     }

@@ -114,19 +114,20 @@ void VoxelLabels::mark_doubtful(const BlockGrid& grid) {
     const Eigen::Vector3i n = node(i);
     const auto* block = grid.find(n.unaryExpr([](int c) { return c / kSide; }));
     const Eigen::Vector3i local = n.unaryExpr([](int c) { return c % kSide; });
-    return block != nullptr && block->support[BlockGrid::Block::node(local.x(), local.y(), local.z())] == Support::measured;
+    return block != nullptr &&
+           block->support[BlockGrid::Block::node(local.x(), local.y(), local.z())] == Support::measured;
   };
   std::vector<std::size_t> certain, doubtful;
   for (const auto& block : grid.blocks()) {
     for (int n = 0; n < BlockGrid::kNodes; ++n) {
-      const Eigen::Vector3i p = kSide * block.index - first_ +
-                                Eigen::Vector3i(n % kSide, n / kSide % kSide, n / (kSide * kSide));
+      const Eigen::Vector3i p =
+          kSide * block.index - first_ + Eigen::Vector3i(n % kSide, n / kSide % kSide, n / (kSide * kSide));
       const auto i = static_cast<std::size_t>(step(p.x(), p.y(), p.z()));
-      bool surface = false, measured = block.support[n] == Support::measured;
+      bool surface = false, measured = false;  // both ends of a cut edge must be
       for (const auto face : faces) {
         if (has(i + face, kInside) == has(i, kInside)) continue;
         surface = true;
-        measured = measured || is_measured(i + face);
+        measured = measured || (block.support[n] == Support::measured && is_measured(i + face));
       }
       if (surface) (measured ? certain : doubtful).push_back(i);
     }
