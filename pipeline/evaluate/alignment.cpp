@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/parallel.h"
+#include "core/statistics.h"
 
 namespace scanrig {
 namespace {

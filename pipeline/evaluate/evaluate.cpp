@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "core/parallel.h"
+#include "core/statistics.h"
 #include "core/units.h"
 #include "pipeline/evaluate/alignment.h"
 #include "pipeline/evaluate/ideal_carve.h"

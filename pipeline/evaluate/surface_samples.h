@@ -27,7 +27,4 @@ double area_of(const Mesh& mesh, const std::vector<std::uint32_t>& faces);  ///<
 /// Without labels all faces count as measured.
 std::vector<std::uint32_t> measured_faces(const Mesh& mesh, bool measured);
 
-/// The value below which the share `q` of the values lies; NaN if there are none.
-double quantile(std::vector<double> values, double q);
-
 }  // namespace scanrig

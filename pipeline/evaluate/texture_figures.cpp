@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/parallel.h"
+#include "core/statistics.h"
 #include "core/units.h"
 #include "pipeline/evaluate/surface_samples.h"
 #include "pipeline/texture/render.h"

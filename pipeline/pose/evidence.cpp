@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
+#include "core/statistics.h"
 #include "pipeline/registration/robust.h"
 
 namespace scanrig {

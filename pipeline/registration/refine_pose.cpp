@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/parallel.h"
+#include "core/statistics.h"
 #include "pipeline/registration/robust.h"
 
 namespace scanrig {

@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/parallel.h"
+#include "core/statistics.h"
 #include "core/units.h"
 #include "pipeline/registration/range_surface.h"
 #include "pipeline/registration/robust.h"

@@ -4,6 +4,7 @@
 #include <random>
 
 #include "core/files.h"
+#include "core/statistics.h"
 #include "pipeline/evaluate/evaluate.h"
 #include "pipeline/evaluate/texture_figures.h"
 #include "pipeline/scan/model/model_files.h"

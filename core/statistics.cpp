@@ -1,4 +1,4 @@
-#include "pipeline/registration/robust.h"
+#include "core/statistics.h"
 
 #include <algorithm>
 #include <cmath>
