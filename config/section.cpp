@@ -143,7 +143,7 @@ Result<void> read_toml(const std::filesystem::path& file, const std::function<vo
   } catch (const toml::parse_error& error) {
     problems.add(static_cast<int>(error.source().begin.line), std::string(error.description()));
   }
-  if (!problems.none()) return tl::unexpected(problems.error());
+  if (problems.count() > 0) return tl::unexpected(problems.error());
   return {};
 }
 

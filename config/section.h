@@ -23,7 +23,7 @@ class Problems {
  public:
   explicit Problems(std::string file) : file_(std::move(file)) {}
   void add(int line, std::string text) { found_.emplace_back(line, std::move(text)); }
-  [[nodiscard]] bool none() const { return found_.empty(); }
+  [[nodiscard]] std::size_t count() const { return found_.size(); }
   [[nodiscard]] Error error() const;
 
  private:
@@ -47,7 +47,11 @@ struct Choice {
 class Section {
  public:
   Section(const toml::table& table, std::string name, std::string prefix, Problems& problems)
-      : table_(table), name_(std::move(name)), prefix_(std::move(prefix)), problems_(problems) {}
+      : table_(table),
+        name_(std::move(name)),
+        prefix_(std::move(prefix)),
+        problems_(problems),
+        problems_before_(problems.count()) {}
 
   void text(std::string_view key, std::string& value);
   void flag(std::string_view key, bool& value);
@@ -107,6 +111,8 @@ class Section {
   /// The keys of a table whose names are free.
   [[nodiscard]] std::vector<std::string> free_keys() const;
 
+  /// Nothing was wrong in this table so far: rules between its keys can be checked.
+  [[nodiscard]] bool sound() const { return problems_.count() == problems_before_; }
   void report(std::string_view key, std::string_view problem);
   void report_unknown_keys();
 
@@ -120,6 +126,7 @@ class Section {
   std::string name_;    // of the table in brackets
   std::string prefix_;  // of the keys of an inline table: "home."
   Problems& problems_;
+  std::size_t problems_before_;
   std::set<std::string, std::less<>> known_;
 };
 

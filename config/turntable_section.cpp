@@ -93,7 +93,7 @@ void read_turntable(Section& s, const std::vector<std::filesystem::path>& drive_
   s.number("tolerance_deg", options.tolerance.value, {0.0001, 1});
   s.number("settle_ms", options.settle, {0, 10000});
   read_soft_limits(s, options.soft_limits);
-  if (!options.profile.name.empty()) check_against_drive(s, options);
+  if (s.sound()) check_against_drive(s, options);
 }
 
 }  // namespace scanrig::config

@@ -9,7 +9,6 @@
 
 #include "daemon/actor_thread.h"
 #include "daemon/jobs/job_store.h"
-#include "daemon/jobs/publish.h"
 
 namespace scanrig {
 
@@ -40,12 +39,11 @@ void ReconstructionThread::run() {
 void ReconstructionThread::handle(const Begin& message) {
   current_ = Current{.job = message.job, .folder = message.folder};
   told_stage_.clear();
-  const auto calibration = read_calibration(message.folder / "calibration.json");
-  if (calibration) {
-    current_->reconstructor = factory_(*calibration);
-  } else {
-    check(pass_on(calibration));
-  }
+  const auto scan = ScanFolder::open(message.folder);
+  if (!scan) return check(pass_on(scan));
+  const auto calibration = scan->load_calibration();
+  if (!calibration) return check(pass_on(calibration));
+  current_->reconstructor = factory_(*calibration, scan->manifest());
 }
 
 void ReconstructionThread::handle(const AddView& message) {
@@ -87,12 +85,10 @@ void ReconstructionThread::handle(const Abandon& message) {
 }
 
 Result<void> ReconstructionThread::make_model() {
-  return publish_folder(model_folder(current_->folder), [this](const std::filesystem::path& folder) {
-    const auto progress = [this](std::string_view stage, double fraction) {
-      tell_progress(std::string(stage), fraction);
-    };
-    return current_->reconstructor->finish(folder, context(progress));
-  });
+  const auto progress = [this](std::string_view stage, double fraction) {
+    tell_progress(std::string(stage), fraction);
+  };
+  return current_->reconstructor->finish(model_folder(current_->folder), context(progress));
 }
 
 void ReconstructionThread::check(const Result<void>& done) {

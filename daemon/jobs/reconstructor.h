@@ -9,6 +9,7 @@
 #include "core/result.h"
 #include "pipeline/calibration/camera.h"
 #include "pipeline/scan/images.h"
+#include "pipeline/scan/manifest.h"
 
 namespace scanrig {
 
@@ -19,10 +20,10 @@ class Reconstructor {
   virtual ~Reconstructor() = default;
   virtual Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context) = 0;
   virtual Result<void> finish_pose(std::size_t pose, const Context& context) = 0;
-  /// Makes the model and writes its files and report.json into `folder`, which is there and empty.
+  /// Makes the model and writes its files and report.json as a whole: after a failure there is no `folder`.
   virtual Result<void> finish(const std::filesystem::path& folder, const Context& context) = 0;
 };
 
-using ReconstructorFactory = std::function<std::unique_ptr<Reconstructor>(const Calibration&)>;
+using ReconstructorFactory = std::function<std::unique_ptr<Reconstructor>(const Calibration&, const Manifest&)>;
 
 }  // namespace scanrig

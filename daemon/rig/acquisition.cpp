@@ -1,5 +1,7 @@
 #include "daemon/rig/acquisition.h"
 
+#include <cmath>
+
 #include "daemon/station/timestamp.h"
 
 namespace scanrig {
@@ -7,27 +9,32 @@ namespace {
 
 double milliseconds(Clock::Duration duration) { return std::chrono::duration<double, std::milli>(duration).count(); }
 
+constexpr double kMostWound = 4 * 360.0;
+
+/// `angle` plus as many whole turns as bring it nearest to `to`.
+double nearest_turn(double angle, double to) { return angle + 360.0 * std::round((to - angle) / 360.0); }
+
 bool is_lost(const Error& error) { return error.code == ErrorCode::timeout || error.code == ErrorCode::protocol; }
 
 }  // namespace
 
 Result<void> Acquisition::home() {
   if (auto dark = devices_.projector.dark(Deadline::after(clock_, options_.exposure_limit)); !dark) {
-    return pass_on(dark, "projector");
+    return pass_on(dark);
   }
   if (auto reset = devices_.turntable.reset_alarm(Deadline::after(clock_, options_.stop_limit)); !reset) {
-    return pass_on(reset, "turntable");
+    return pass_on(reset);
   }
+  position_deg_ = 0.0;
   if (auto home = devices_.turntable.home(Deadline::after(clock_, options_.home_limit)); !home) {
-    return pass_on(home, "turntable");
+    return pass_on(home);
   }
   return {};
 }
 
 Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle) {
-  const Degrees turns{360.0 * id.pose};
-  const auto move = devices_.turntable.rotate_to(turns + angle, Deadline::after(clock_, options_.move_limit));
-  if (!move) return pass_on(move, "turntable");
+  const auto move = turn_to(angle);
+  if (!move) return pass_on(move);
 
   TakenView view{.id = id};
   const auto pattern = expose(Light::pattern, view.redone);
@@ -36,8 +43,8 @@ Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle) {
   if (!plain) return pass_on(plain);
 
   view.record.index = id.view;
-  view.record.commanded_deg = angle.value;
-  view.record.measured_deg = (move->measured - turns).value;
+  view.record.commanded_deg = move->commanded.value;
+  view.record.measured_deg = move->measured.value;
   view.record.moving_ms = milliseconds(move->moving);
   view.record.settling_ms = milliseconds(move->settling);
   view.record.taken = iso_time(std::chrono::system_clock::now());
@@ -50,9 +57,21 @@ Result<void> Acquisition::stop() {
   const auto deadline = Deadline::after(clock_, options_.stop_limit);
   const auto dark = devices_.projector.dark(deadline);
   const auto stopped = devices_.turntable.stop(deadline);
-  if (!stopped) return pass_on(stopped, "turntable");
-  if (!dark) return pass_on(dark, "projector");
+  if (!stopped) return pass_on(stopped);
+  if (!dark) return pass_on(dark);
   return {};
+}
+
+Result<Move> Acquisition::turn_to(Degrees angle) {
+  double target = nearest_turn(angle.value, position_deg_);
+  if (std::abs(target) > kMostWound) target = angle.value;
+  auto move = devices_.turntable.rotate_to({target}, Deadline::after(clock_, options_.move_limit));
+  if (!move) return move;
+  position_deg_ = target;
+  // Some turntables count turns, some do not: recorded is the angle within the turn that was asked for.
+  move->commanded = angle;
+  move->measured.value = nearest_turn(move->measured.value, angle.value);
+  return move;
 }
 
 Result<StereoFrame> Acquisition::expose(Light light, int& redone) {
@@ -66,14 +85,12 @@ Result<StereoFrame> Acquisition::expose(Light light, int& redone) {
 
 Result<StereoFrame> Acquisition::expose_once(Light light) {
   if (auto armed = devices_.camera.arm(Deadline::after(clock_, options_.exposure_limit)); !armed) {
-    return pass_on(armed, "camera");
+    return pass_on(armed);
   }
   if (auto fired = devices_.projector.fire(light, Deadline::after(clock_, options_.exposure_limit)); !fired) {
-    return pass_on(fired, "projector");
+    return pass_on(fired);
   }
-  auto frame = devices_.camera.collect(Deadline::after(clock_, options_.exposure_limit));
-  if (!frame) return pass_on(frame, "camera");
-  return frame;
+  return devices_.camera.collect(Deadline::after(clock_, options_.exposure_limit));
 }
 
 }  // namespace scanrig

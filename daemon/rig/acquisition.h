@@ -23,11 +23,13 @@ class Acquisition {
   Acquisition(const Devices& devices, Clock& clock, AcquisitionOptions options)
       : devices_(devices), clock_(clock), options_(options) {}
 
+  // Errors are passed on as the devices say them: each names itself.
+
   /// Clears an alarm, darkens the projector, finds home. Fails as Turntable::home.
   Result<void> home();
 
-  /// Turns to `angle` and takes the four images. An exposure whose frames are lost or torn is redone and counted.
-  /// Pose p is taken in turn p, always onwards: nothing unwinds between the poses. Recorded angles are within the turn.
+  /// Turns to `angle`, the shorter way, and takes the four images. An exposure whose frames are lost or torn is redone
+  /// and counted. A table wound up by several jobs is unwound on the way.
   /// Fails as the device that failed; the table has been told to stop then.
   Result<TakenView> take_view(const ViewId& id, Degrees angle);
 
@@ -35,12 +37,14 @@ class Acquisition {
   Result<void> stop();
 
  private:
+  Result<Move> turn_to(Degrees angle);
   Result<StereoFrame> expose(Light light, int& redone);
   Result<StereoFrame> expose_once(Light light);
 
   Devices devices_;
   Clock& clock_;
   AcquisitionOptions options_;
+  double position_deg_ = 0.0;  ///< where the last move ended, turns counted from home
 };
 
 }  // namespace scanrig

@@ -47,7 +47,7 @@ void PanelThread::run() {
   while (true) {
     auto done = show_wanted();
     if (done) done = read_inputs();
-    if (!done) tell_(event::PanelFailed{done.error().in("panel")});
+    if (!done) tell_(event::PanelFailed{done.error()});
     std::unique_lock lock(mutex_);
     const auto pause = done ? clock_.now() : clock_.now() + kRetry;
     if (clock_.wait_until(lock, changed_, pause, [this] { return stop_; })) break;

@@ -25,6 +25,7 @@ void RigThread::stop() {
 }
 
 void RigThread::interrupt() noexcept {
+  ++interrupts_;
   devices_.turntable.request_stop();
   devices_.projector.request_dark();
 }
@@ -33,9 +34,17 @@ void RigThread::run() {
   while (auto command = inbox_.take()) tell_(perform(*command));
 }
 
+Result<void> RigThread::home_now() {
+  const unsigned before = interrupts_;
+  auto home = acquisition_.home();
+  // A stop that found nothing running is still kept by the turntable, and ends the next move: that was this one.
+  const bool stale = !home && home.error().code == ErrorCode::stopped && interrupts_ == before;
+  return stale ? acquisition_.home() : home;
+}
+
 Event RigThread::perform(const Command& command) {
   if (std::holds_alternative<action::Home>(command)) {
-    auto home = acquisition_.home();
+    auto home = home_now();
     if (!home) return event::RigFailed{home.error()};
     return event::Homed{};
   }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <functional>
 #include <thread>
 #include <variant>
@@ -29,10 +30,12 @@ class RigThread {
   void run();
   Event perform(const Command& command);
   void interrupt() noexcept;
+  Result<void> home_now();
 
   Devices devices_;
   Acquisition acquisition_;
   std::function<void(Event)> tell_;
+  std::atomic<unsigned> interrupts_ = 0;
   Mailbox<Command> inbox_;
   std::thread thread_;
 };

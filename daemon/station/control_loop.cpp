@@ -20,13 +20,16 @@ Result<void> ControlLoop::run(const StationPorts& ports) {
     if (message) {
       handle(std::move(*message), ports);
     } else if (clock_.now() >= give_up_) {
-      return fail(ErrorCode::timeout, "the rig was not seen stopped before the daemon ended: the table may be moving");
+      break;
     } else if (clock_.now() >= warning_over_) {
       warning_over_ = Clock::TimePoint::max();
       handle({event::WarningOver{}, {}}, ports);
     }
   }
   inbox_.close();
+  if (!state_.finished || state_.may_be_moving) {
+    return fail(ErrorCode::timeout, "the rig was not seen stopped before the daemon ended: the table may be moving");
+  }
   return {};
 }
 

@@ -66,7 +66,10 @@ class Transition {
     take_next_view();
   }
 
-  void operator()(const event::Stopped&) { stopped(); }
+  void operator()(const event::Stopped&) {
+    s().may_be_moving = false;
+    stopped();
+  }
 
   void operator()(const event::RigFailed& e) {
     if (s().activity == Activity::stopping || s().machine == MachineState::error) return;  // cut short by the stop
@@ -76,6 +79,7 @@ class Transition {
   void operator()(const event::StopFailed& e) {
     s().machine = MachineState::error;
     s().cause = fmt::format("The table may be moving: {}.", e.error.message);
+    s().may_be_moving = true;
     stopped();  // no more evidence will come
   }
 

@@ -33,7 +33,8 @@ struct StationState {
   bool estop_ok = true;
   bool guard_closed = true;
   bool shutting_down = false;
-  bool finished = false;                          ///< shut down: the rig is seen stopped, or cannot be reached
+  bool finished = false;                          ///< shut down, the rig asked to stop
+  bool may_be_moving = false;                     ///< the last stop was not confirmed
   std::string cause = "The daemon has started.";  ///< why the machine is in this state
   std::optional<ActiveJob> job;
 };

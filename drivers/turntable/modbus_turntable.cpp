@@ -14,7 +14,8 @@ constexpr milliseconds kStalledAfter{2000};
 constexpr milliseconds kEnableTime{1000};
 constexpr milliseconds kStandingTime{50};  ///< the position must not change for this long to be called standing
 constexpr int kAttempts = 3;
-constexpr double kSlowHoming = 0.2;  ///< of the working speed, for the last approach of the switch
+constexpr int kStopReplyTimeouts = 12;  ///< three attempts, each with its quiet line, and some room
+constexpr double kSlowHoming = 0.2;     ///< of the working speed, for the last approach of the switch
 constexpr double kFastHoming = 0.5;
 
 }  // namespace
@@ -81,13 +82,14 @@ Result<void> ModbusTurntable::find_home(Deadline deadline) {
       command([&] { return here ? drive_.set_zero(deadline) : drive_.start_homing(deadline); }, begins, deadline);
   if (!started) return started;
 
-  std::int32_t last_position = before->position;
+  std::int32_t anchor = before->position;
   auto still_since = clock_.now();
   const auto homed = watch(
       "homing",
       [&](const DriveState& state) {
         const bool at_home = begins(state) && state.homed && !state.running && near(state.position, 0);
-        const bool moved = !near(state.position, std::exchange(last_position, state.position));
+        const bool moved = !near(state.position, anchor);
+        if (moved) anchor = state.position;
         if (!at_home || moved) still_since = clock_.now();
         if (clock_.now() - still_since >= options_.settle && at_home) return Seen::done;
         return moved || at_home ? Seen::progress : Seen::waiting;
@@ -243,9 +245,13 @@ Result<void> ModbusTurntable::not_stopped() {
   return {};
 }
 
-/// The drive's state, after an owed stop has been delivered and unless someone has asked to stop.
+/// The drive's state, unless someone has asked to stop.
 Result<DriveState> ModbusTurntable::ask(Deadline deadline) {
   if (auto free = not_stopped(); !free) return pass_on(free);
+  return read_after_owed_stop(deadline);
+}
+
+Result<DriveState> ModbusTurntable::read_after_owed_stop(Deadline deadline) {
   if (stop_owed_) {
     if (auto told = drive_.stop(deadline); !told) return pass_on(told);
     stop_owed_ = false;
@@ -260,7 +266,7 @@ tl::unexpected<Error> ModbusTurntable::give_up(const Error& error) {
     const std::scoped_lock lock(mutex_);
     stop_requested_ = false;
   }
-  stop_owed_ = !drive_.stop(Deadline::after(clock_, 12 * options_.line.reply_timeout));
+  stop_owed_ = !drive_.stop(Deadline::after(clock_, kStopReplyTimeouts * options_.line.reply_timeout));
   return fail(error.code, "turntable: {}; {}", error.message,
               stop_owed_ ? "the stop was not confirmed: the table may be moving" : "the motor was told to stop");
 }
@@ -294,7 +300,7 @@ Result<void> ModbusTurntable::stop(Deadline deadline) {
 }
 
 Result<void> ModbusTurntable::reset_alarm(Deadline deadline) {
-  auto state = drive_.read_state(deadline);
+  auto state = read_after_owed_stop(deadline);
   if (!state) return pass_on(state, "turntable");
   if (!state->fault) return {};
   if (auto reset = drive_.reset_alarm(deadline); !reset) return pass_on(reset, "turntable");
@@ -306,11 +312,7 @@ Result<void> ModbusTurntable::reset_alarm(Deadline deadline) {
 }
 
 Result<TurntableStatus> ModbusTurntable::status(Deadline deadline) {
-  if (stop_owed_) {
-    if (auto told = drive_.stop(deadline); !told) return pass_on(told, "turntable");
-    stop_owed_ = false;
-  }
-  const auto state = drive_.read_state(deadline);
+  const auto state = read_after_owed_stop(deadline);
   if (!state) return pass_on(state, "turntable");
   TurntableStatus status;
   status.motion = state->running ? TurntableStatus::Motion::moving : TurntableStatus::Motion::standing;

@@ -66,6 +66,7 @@ class ModbusTurntable final : public Turntable {
   Result<void> healthy(const DriveState& state, Deadline deadline);
   Result<void> not_stopped();
   Result<DriveState> ask(Deadline deadline);
+  Result<DriveState> read_after_owed_stop(Deadline deadline);
   tl::unexpected<Error> give_up(const Error& error);
   void pause();
 

@@ -25,10 +25,10 @@ Result<Mesh> decimate(const Mesh& mesh, const DecimateOptions& options) {
   const float* positions = mesh.vertices.front().data();
   const float scale = meshopt_simplifyScale(positions, mesh.vertices.size(), sizeof(Eigen::Vector3f));
   std::vector<unsigned> fewer(indices.size());
-  const std::size_t count = meshopt_simplify(
-      fewer.data(), indices.data(), indices.size(), positions, mesh.vertices.size(), sizeof(Eigen::Vector3f),
-      3 * options.target_faces, static_cast<float>(options.max_error_mm) / scale, /*options=*/0,
-      /*result_error=*/nullptr);
+  const std::size_t count = meshopt_simplify(fewer.data(), indices.data(), indices.size(), positions,
+                                             mesh.vertices.size(), sizeof(Eigen::Vector3f), 3 * options.target_faces,
+                                             static_cast<float>(options.max_error_mm) / scale, /*options=*/0,
+                                             /*result_error=*/nullptr);
 
   Mesh simplified = mesh;
   simplified.faces.clear();

@@ -110,8 +110,8 @@ Topology topology(const Mesh& mesh) {
     for (const auto v : f) used[v] = true;
   }
   result.non_manifold_vertices = count_split_vertices(mesh, edges);
-  result.euler = static_cast<long>(std::count(used.begin(), used.end(), true)) - edge_count +
-                 static_cast<long>(mesh.faces.size());
+  result.euler =
+      static_cast<long>(std::count(used.begin(), used.end(), true)) - edge_count + static_cast<long>(mesh.faces.size());
   return result;
 }
 

@@ -3,9 +3,36 @@
 #include <cmath>
 
 #include "core/parallel.h"
+#include "core/units.h"
 #include "pipeline/pose/stable_rests.h"
 
 namespace scanrig {
+namespace {
+
+/// Normals of the hull's facets, the largest first; a facet within 1.5 deg of a larger one is merged into it.
+std::vector<StableRest> facet_directions(const std::vector<Mesh::Face>& faces,
+                                         const std::vector<Eigen::Vector3d>& corners) {
+  std::vector<Eigen::Vector3d> areas;
+  for (const Mesh::Face& face : faces) {
+    const Eigen::Vector3d& a = corners[face[0]];
+    const Eigen::Vector3d area = (corners[face[1]] - a).cross(corners[face[2]] - a);
+    if (area.norm() > 1e-9) areas.push_back(area);  // a sliver has no normal
+  }
+  std::stable_sort(areas.begin(), areas.end(), [](const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+    return a.squaredNorm() > b.squaredNorm();
+  });
+  const double merged = std::cos(to_radians(1.5));
+  std::vector<StableRest> directions;
+  for (const Eigen::Vector3d& area : areas) {
+    const Eigen::Vector3d normal = area.normalized();
+    const bool known =
+        std::ranges::any_of(directions, [&](const StableRest& d) { return d.normal.dot(normal) > merged; });
+    if (!known) directions.push_back({.normal = normal});
+  }
+  return directions;
+}
+
+}  // namespace
 
 Result<StableRests> rests_on_hull(const Mesh& solid, const SolidFacts& facts, double other_height_mm,
                                   const StableRestOptions& options) {
@@ -15,29 +42,17 @@ Result<StableRests> rests_on_hull(const Mesh& solid, const SolidFacts& facts, do
   std::vector<Eigen::Vector3d> corners;
   for (const Eigen::Vector3f& v : hull->vertices) corners.push_back(v.cast<double>());
 
-  // A facet stands for all facets that are coplanar with it: its supports are all corners close to its plane.
-  std::vector<StableRest> candidates(hull->faces.size());
-  parallel_for(hull->faces.size(), [&](std::size_t f) {
-    const auto& face = hull->faces[f];
-    const Eigen::Vector3d& a = corners[face[0]];
-    const Eigen::Vector3d area = (corners[face[1]] - a).cross(corners[face[2]] - a);
+  std::vector<StableRest> candidates = facet_directions(hull->faces, corners);
+  parallel_for(candidates.size(), [&](std::size_t f) {
     StableRest& rest = candidates[f];
-    if (area.norm() < 1e-9) return;  // a sliver has no normal; margin 0 and normal 0 mark it
-    rest.normal = area.normalized();
-    rest.offset_mm = -1e300;
-    double lowest = 1e300;
-    for (const Eigen::Vector3d& c : corners) {
-      rest.offset_mm = std::max(rest.offset_mm, rest.normal.dot(c));
-      lowest = std::min(lowest, rest.normal.dot(c));
-    }
-    rest.height_mm = rest.offset_mm - lowest;
+    rest.offset_mm = reach_along(hull->vertices, rest.normal);
+    rest.height_mm = rest.offset_mm + reach_along(hull->vertices, -rest.normal);
     std::vector<Eigen::Vector3d> supports;
     for (const Eigen::Vector3d& c : corners) {
       if (rest.normal.dot(c) > rest.offset_mm - options.flatness * facts.size_mm) supports.push_back(c);
     }
     rest.margin_mm = support_margin(supports, rest.normal, facts.centre_of_mass);
   });
-  std::erase_if(candidates, [](const StableRest& rest) { return rest.normal.isZero(); });
 
   StableRests found;
   found.counts.tangent_planes = found.counts.after_base_plane = static_cast<int>(candidates.size());

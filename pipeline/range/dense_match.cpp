@@ -17,11 +17,12 @@ namespace scanrig {
 namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-constexpr std::array<std::uint8_t, 3> kRadii = {7, 10, 15};
 // Noise of neighbouring pixels is correlated (demosaicing, resampling), so that the residual shows too little of it:
 // found from known truth, see README.md. The smoothing's own share is sqrt(4 pi) times its width.
-constexpr float kSharpInflation = 2.0f;
+constexpr float kSharpInflation = 1.7f;
 constexpr float kSmoothInflation = 2.5f;
+constexpr float kTilt = 0.6f;  // px of disparity a px at which sigma has grown by 1.4
+constexpr float kConfidence = 3.0f;  // standard deviations
 constexpr double kSmoothing = 0.7;  // px, of the larger windows' images
 
 cv::Mat1f smoothed(const cv::Mat1f& image) {
@@ -101,22 +102,46 @@ struct Side {
            static_cast<double>(patch.sigma) <= options.largest_sigma_px;
   }
 
-  /// Matches with the smallest window that measures well enough, else with the best.
-  [[nodiscard]] DisparityPatch match(int u, int v, const DisparityPatch& start, int iterations) const {
+  /// Whether a larger window's answer is one that the smaller window's noise explains.
+  static bool compatible(const DisparityPatch& small, const DisparityPatch& large) {
+    const float spread = std::sqrt(std::max(0.0f, small.sigma * small.sigma - large.sigma * large.sigma));
+    return std::abs(small.c[0] - large.c[0]) <= kConfidence * spread;
+  }
+
+  [[nodiscard]] DisparityPatch match_sharp(int u, int v, DisparityPatch patch, std::uint8_t radius, int iterations) const {
     WindowOptions window;
     window.iterations = iterations;
-    DisparityPatch best;
-    for (const std::uint8_t radius : kRadii) {
-      if (radius < start.radius) continue;
-      DisparityPatch patch = start;
-      patch.radius = radius;
-      const bool sharp = radius == kRadii.front();
-      if (!sharp) window.curvature_prior = 0.1f;
-      patch = match_window(sharp ? here.sharp : here.smooth, sharp ? there.sharp : there.smooth, mask, u, v, patch, window);
-      patch.sigma *= sharp ? kSharpInflation : kSmoothInflation;
-      if (good(patch) && (!best.valid || patch.sigma < best.sigma)) best = patch;
-      if (best.valid && static_cast<double>(best.sigma) <= options.enough_sigma_px) break;
+    patch.radius = radius;
+    patch = match_window(here.sharp, there.sharp, mask, u, v, patch, window);
+    patch.sigma *= kSharpInflation;
+    return patch;
+  }
+
+  [[nodiscard]] DisparityPatch match_smooth(int u, int v, DisparityPatch patch, std::uint8_t radius, int iterations) const {
+    WindowOptions window;
+    window.iterations = iterations;
+    window.curvature_prior = 0.15f;
+    patch.radius = radius;
+    patch = match_window(here.smooth, there.smooth, mask, u, v, patch, window);
+    patch.sigma *= kSmoothInflation;
+    return patch;
+  }
+
+  /// Matches with the window that suits signal and shape: the smaller of two sharp ones where the larger one's answer is
+  /// outside its confidence (a crease, a step: the rule of intersecting confidence intervals [Katkovnik 1999]), large
+  /// smoothed ones where the signal is low.
+  [[nodiscard]] DisparityPatch match(int u, int v, const DisparityPatch& start, int iterations) const {
+    DisparityPatch best = match_sharp(u, v, start, 7, iterations);
+    const DisparityPatch small = match_sharp(u, v, best.valid ? best : start, 5, iterations);
+    if (good(small) && (!good(best) || !compatible(small, best))) best = small;
+    if (good(best) && double(best.sigma) <= options.enough_sigma_px) return best;
+    for (const std::uint8_t radius : {std::uint8_t{10}, std::uint8_t{15}}) {
+      const DisparityPatch large = match_smooth(u, v, best.valid ? best : start, radius, iterations);
+      if (!good(large) || (good(best) && (large.sigma >= best.sigma || !compatible(best, large)))) continue;
+      best = large;
+      if (double(best.sigma) <= options.enough_sigma_px) break;
     }
+    best.valid = good(best);
     return best;
   }
 
@@ -160,6 +185,21 @@ bool points_back(const DisparityPatch& patch, int u, int v, const Nodes& there, 
   return static_cast<double>(nearest) <= tolerance;
 }
 
+/// Disparities that the other image's disparities confirm; what only one camera sees goes. `towards`: -1 left to right.
+cv::Mat1f confirmed(const cv::Mat1f& here, const cv::Mat1f& there, float towards) {
+  constexpr float kTolerance = 1.5f;  // px
+  cv::Mat1f out(here.size(), kNaN);
+  for (int v = 0; v < here.rows; ++v) {
+    for (int u = 0; u < here.cols; ++u) {
+      const float d = here(v, u);
+      if (std::isnan(d)) continue;
+      const int landing = static_cast<int>(std::lround(static_cast<float>(u) + towards * d));
+      if (landing >= 0 && landing < here.cols && std::abs(there(v, landing) - d) <= kTolerance) out(v, u) = d;
+    }
+  }
+  return out;
+}
+
 cv::Mat1b everywhere(const cv::Mat1b& mask, cv::Size size) { return mask.empty() ? cv::Mat1b(size, 255) : mask; }
 
 }  // namespace
@@ -168,8 +208,11 @@ Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDi
                                        const StereoOptions& options, const Context& context) {
   const cv::Size size = pair.left.size();
   const LayeredImage left(pair.left), right(pair.right);
-  const MatchMask left_mask{everywhere(pair.left_object, size), coarse.left};
-  const MatchMask right_mask{everywhere(pair.right_object, size), cv::Mat1f(cv::Mat(-coarse.right))};
+  const cv::Mat1f coarse_left = confirmed(coarse.left, coarse.right, -1.0f);
+  cv::Mat1f coarse_right = confirmed(coarse.right, coarse.left, 1.0f);
+  coarse_right *= -1.0f;  // u_right - u_left, seen from the right
+  const MatchMask left_mask{everywhere(pair.left_object, size), coarse_left};
+  const MatchMask right_mask{everywhere(pair.right_object, size), coarse_right};
   const Side forward{left, right, left_mask, options}, backward{right, left, right_mask, options};
   const Nodes back = backward.match_nodes(3, context);
   context.report("range", 0.4);
@@ -185,7 +228,8 @@ Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDi
       const DisparityPatch patch = forward.match_pixel(nodes, u, v);
       if (!patch.valid || !points_back(patch, u, v, back, std::max(options.left_right_px, 3.0 * patch.sigma))) continue;
       out.value(v, u) = patch.c[0];
-      out.sigma(v, u) = patch.sigma;
+      // Tilted away, the two windows differ by more than the model knows: found from known truth, see README.md.
+      out.sigma(v, u) = patch.sigma * std::hypot(1.0f, patch.c[1] / kTilt, patch.c[2] / kTilt);
       out.slope(v, u) = {patch.c[1], patch.c[2]};
     }
   });
@@ -193,30 +237,56 @@ Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDi
   return out;
 }
 
+namespace {
+
+/// What the neighbours in eight directions say about a pixel.
+struct Neighbours {
+  int seen = 0;
+  int agreeing = 0;
+  bool step = false;  // one of them is beyond a depth step
+};
+
+Neighbours ask_neighbours(const DenseDisparity& disparity, int u, int v, const StereoOptions& options) {
+  constexpr std::array<int, 2> kApart = {4, 6};  // px
+  constexpr double kStep = 1.5;                   // px
+  const cv::Size size = disparity.value.size();
+  const float d = disparity.value(v, u);
+  Neighbours answer;
+  for (const int apart : kApart) {
+    for (int dy = -apart; dy <= apart; dy += apart) {
+      for (int dx = -apart; dx <= apart; dx += apart) {
+        const int x = u + dx, y = v + dy;
+        if ((dx == 0 && dy == 0) || x < 0 || y < 0 || x >= size.width || y >= size.height) continue;
+        if (std::isnan(disparity.value(y, x))) continue;
+        const cv::Vec2f slope = 0.5f * (disparity.slope(y, x) + disparity.slope(v, u));
+        const float predicted =
+            disparity.value(y, x) - slope[0] * static_cast<float>(dx) - slope[1] * static_cast<float>(dy);
+        const double off = static_cast<double>(std::abs(predicted - d));
+        answer.step |= off > kStep;
+        if (apart != kApart.front()) continue;
+        const double sigma = static_cast<double>(std::max(disparity.sigma(v, u), disparity.sigma(y, x)));
+        ++answer.seen;
+        if (off <= std::max(options.neighbour_px, 3.0 * sigma)) ++answer.agreeing;
+      }
+    }
+  }
+  return answer;
+}
+
+}  // namespace
+
 void remove_outliers(DenseDisparity& disparity, const StereoOptions& options) {
-  constexpr int kApart = 4;
+  constexpr int kLeastAgreeing = 5;  // of 8: the rim of what was measured goes
   const cv::Size size = disparity.value.size();
   cv::Mat1s kept(size, short{0});
   parallel_for(static_cast<std::size_t>(size.height), [&](std::size_t row) {
     const int v = static_cast<int>(row);
     for (int u = 0; u < size.width; ++u) {
-      const float d = disparity.value(v, u);
-      if (std::isnan(d)) continue;
-      int seen = 0, agreeing = 0;
-      for (int dy = -kApart; dy <= kApart; dy += kApart) {
-        for (int dx = -kApart; dx <= kApart; dx += kApart) {
-          const int x = u + dx, y = v + dy;
-          if ((dx == 0 && dy == 0) || x < 0 || y < 0 || x >= size.width || y >= size.height) continue;
-          if (std::isnan(disparity.value(y, x))) continue;
-          const cv::Vec2f slope = 0.5f * (disparity.slope(y, x) + disparity.slope(v, u));
-          const float predicted = disparity.value(y, x) - slope[0] * static_cast<float>(dx) - slope[1] * static_cast<float>(dy);
-          ++seen;
-          const float sigma = std::max(disparity.sigma(v, u), disparity.sigma(y, x));
-          if (static_cast<double>(std::abs(predicted - d)) <= std::max(options.neighbour_px, 3.0 * sigma)) ++agreeing;
-        }
-      }
+      if (std::isnan(disparity.value(v, u))) continue;
+      const Neighbours n = ask_neighbours(disparity, u, v, options);
+      if (n.step || n.agreeing < kLeastAgreeing || 4 * n.agreeing < 3 * n.seen) continue;
       // Disparity in 1/16 px, offset so that 0 stays "nothing".
-      if (agreeing >= 3 && 4 * agreeing >= 3 * seen) kept(v, u) = cv::saturate_cast<short>(16000.0f + 16.0f * d);
+      kept(v, u) = cv::saturate_cast<short>(16000.0f + 16.0f * disparity.value(v, u));
     }
   });
   cv::filterSpeckles(kept, 0.0, options.smallest_patch_px, 16.0);

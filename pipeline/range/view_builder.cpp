@@ -7,6 +7,10 @@
 namespace scanrig {
 namespace {
 
+// Pixels this near to the outline carry light from behind the object: they stay out of the matcher's windows.
+constexpr double kMixedPx = 1.5;
+// Depth this near to the outline is left out: the surface turns away there.
+constexpr float kRimPx = 2.5f;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 Result<Silhouette> silhouette_of(const cv::Mat& plain, const RectifyingMap& map, const Projection& projection,
@@ -24,7 +28,7 @@ Result<Silhouette> silhouette_of(const cv::Mat& plain, const RectifyingMap& map,
 
 cv::Mat1b inside(const Silhouette& silhouette) {
   cv::Mat1b mask;
-  cv::compare(silhouette.outside_px, 0.0, mask, cv::CMP_LT);
+  cv::compare(silhouette.outside_px, -kMixedPx, mask, cv::CMP_LT);
   return mask;
 }
 
@@ -77,7 +81,7 @@ Result<View> make_view(const Rectification& rectification, const StereoImages& i
     cv::compare(view.silhouettes.front().outside_px, 1.0, view.range.background, cv::CMP_GT);
     for (int v = 0; v < view.range.depth.rows; ++v) {
       for (int u = 0; u < view.range.depth.cols; ++u) {
-        if (view.range.background(v, u) != 0) forget(view.range, u, v);
+        if (view.silhouettes.front().outside_px(v, u) > -kRimPx) forget(view.range, u, v);
       }
     }
   } else {

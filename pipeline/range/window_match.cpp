@@ -268,6 +268,7 @@ MatchImage::MatchImage(const cv::Mat1f& image) : value(image), cubic(image) {}
 DisparityPatch match_window(const MatchImage& here, const MatchImage& there, const MatchMask& mask, int u, int v,
                             const DisparityPatch& patch, const WindowOptions& options) {
   switch (patch.radius) {
+    case 5: return match_with<5>(here, there, mask, u, v, patch, options);
     case 7: return match_with<7>(here, there, mask, u, v, patch, options);
     case 10: return match_with<10>(here, there, mask, u, v, patch, options);
     default: return match_with<15>(here, there, mask, u, v, patch, options);

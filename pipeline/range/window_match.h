@@ -52,7 +52,7 @@ struct WindowOptions {
 
 /// Least-squares matching of the window around (u, v) with second-order shape, gain and offset [Sutton, Orteu and Schreier,
 /// Image Correlation, 2009, ch. 5]: Gauss-Newton from `patch`, with the gradient of `here` (inverse compositional).
-/// `patch.radius` is 7, 10 or 15. Returns the patch where it stopped; invalid when it diverged or had too little to see.
+/// `patch.radius` is 5, 7, 10 or 15. Returns the patch where it stopped; invalid when it diverged or had too little to see.
 DisparityPatch match_window(const MatchImage& here, const MatchImage& there, const MatchMask& mask, int u, int v,
                             const DisparityPatch& patch, const WindowOptions& options);
 

@@ -168,8 +168,8 @@ void Report::add_estimate(const PoseEstimate& estimate) {
 }
 
 void Report::add_refinement(const RefinedPose& refined) {
-  (*json_)["pose_refinement"] = {{"pose1_from_pose2", transform_json(refined.pose1_from_pose2)},
-                                 {"residual_median_mm", number(refined.median_mm)},
+  (*json_)["pose1_from_pose2"] = transform_json(refined.pose1_from_pose2);
+  (*json_)["pose_refinement"] = {{"residual_median_mm", number(refined.median_mm)},
                                  {"residual_rms_mm", number(refined.rms_mm)},
                                  {"overlap", refined.overlap},
                                  {"correspondences", refined.correspondences},

@@ -45,7 +45,8 @@ std::optional<SurfacePoint> surface_point(const RangeImage& image, int row, int 
   SurfacePoint s;
   s.point = image.projection.unproject(column, row, depth);
   s.normal = to_eigen(n);
-  if (-s.normal.dot(ray_to(image.projection, s.point)) < kMinFacing) return std::nullopt;
+  s.facing = -s.normal.dot(ray_to(image.projection, s.point));
+  if (s.facing < kMinFacing) return std::nullopt;
   s.sigma = sigma_along_normal(image.sigma(row, column), s.normal);
   return s;
 }
@@ -139,6 +140,7 @@ std::optional<SurfacePoint> surface_at(const RangeImage& image, const Eigen::Vec
   const double length = normal.norm();
   if (!(length > kMinUnity)) return std::nullopt;
   s.normal = normal / length;
+  s.facing = -s.normal.dot(ray_to(image.projection, s.point));
   s.sigma = sigma_along_normal(static_cast<float>(sigma), s.normal);
   return s;
 }
@@ -173,7 +175,6 @@ std::vector<SurfacePoint> sample_image(const RangeImage& image, int count) {
 std::vector<SurfacePoint> sample_surface(const RangeLevel& images, double spacing_mm) {
   struct Candidate {
     std::uint64_t cube;
-    double facing;
     SurfacePoint point;
   };
   std::vector<std::vector<Candidate>> found(images.size());
@@ -189,8 +190,8 @@ std::vector<SurfacePoint> sample_surface(const RangeLevel& images, double spacin
           stride = std::max(1, static_cast<int>(0.5 * spacing_mm / image.projection.mm_per_pixel(s->point.z())));
         }
         Candidate c;
-        c.facing = -s->normal.dot(ray_to(image.projection, s->point));
-        c.point = {pose_from_camera * s->point, pose_from_camera.linear() * s->normal, s->sigma, static_cast<int>(v)};
+        c.point = {pose_from_camera * s->point, pose_from_camera.linear() * s->normal, s->sigma, s->facing,
+                   static_cast<int>(v)};
         c.cube = 0;
         for (int axis = 0; axis < 3; ++axis) {
           const auto cell = std::llround(c.point.point[axis] / spacing_mm) + (1 << 20);
@@ -203,7 +204,7 @@ std::vector<SurfacePoint> sample_surface(const RangeLevel& images, double spacin
   std::vector<Candidate> all;
   for (const auto& part : found) all.insert(all.end(), part.begin(), part.end());
   std::stable_sort(all.begin(), all.end(), [](const Candidate& a, const Candidate& b) {
-    return a.cube != b.cube ? a.cube < b.cube : a.facing > b.facing;
+    return a.cube != b.cube ? a.cube < b.cube : a.point.facing > b.point.facing;
   });
   std::vector<SurfacePoint> samples;
   for (std::size_t i = 0; i < all.size(); ++i) {

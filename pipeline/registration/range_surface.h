@@ -13,6 +13,7 @@ struct SurfacePoint {
   Eigen::Vector3d point;   ///< mm
   Eigen::Vector3d normal;  ///< unit, outward
   double sigma = 0.0;      ///< standard deviation along the normal, mm; never below 0.003
+  double facing = 0.0;     ///< cosine of the angle between the normal and the direction to the camera
   int view = 0;            ///< which of the views measured it
 };
 

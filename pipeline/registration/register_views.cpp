@@ -18,6 +18,7 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 constexpr int kAxisUnknowns = 4;  // tilt about x and z, shift along x and z
 constexpr double kMinLeverage = 0.02;
+constexpr double kSettled = 3e-4;  // mm
 constexpr std::size_t kMinShared = 100;
 
 /// Which view's points are held against which view's surface.
@@ -52,16 +53,17 @@ std::vector<Pairing> ring_pairings(int views, int reach) {
 }
 
 Matches match(const RangeImage& target, const std::vector<SurfacePoint>& source, const Transform& pose_from_source,
-              const Transform& target_from_pose, double capture_mm) {
+              const Transform& target_from_pose, double capture_mm, const RegistrationOptions& options) {
   constexpr double kMinAgreement = 0.7;  // cosine between the two normals
   const Transform target_from_source = target_from_pose * pose_from_source;
   const Transform pose_from_target = target_from_pose.inverse();
   Matches matches;
   for (const SurfacePoint& s : source) {
+    if (s.facing < options.least_facing) continue;
     const Eigen::Vector3d point = target_from_source * s.point;
     const Eigen::Vector3d normal = target_from_source.linear() * s.normal;
     const auto plane = tangent_plane_near(target, point);
-    if (!plane || plane->normal.dot(normal) < kMinAgreement) continue;
+    if (!plane || plane->facing < options.least_facing || plane->normal.dot(normal) < kMinAgreement) continue;
     if (std::abs(plane->normal.dot(point - plane->point)) > capture_mm) continue;
     matches.push_back({pose_from_source * s.point, pose_from_target * plane->point,
                        pose_from_source.linear() * s.normal, pose_from_target.linear() * plane->normal,
@@ -91,12 +93,13 @@ class Solver {
     std::vector<Matches> matches(pairings_.size());
     parallel_for(pairings_.size(), [&](std::size_t k) {
       const auto [i, j] = pairings_[k];
-      matches[k] = match((*images_)[j], samples_[i], camera_from_pose_[i].inverse(), camera_from_pose_[j], capture_mm);
+      matches[k] =
+          match((*images_)[j], samples_[i], camera_from_pose_[i].inverse(), camera_from_pose_[j], capture_mm, options_);
     });
     return matches;
   }
 
-  /// One Gauss-Newton step; the size of the largest correction, in units of its prior's standard deviation.
+  /// One Gauss-Newton step; how far it moves the surface at most, mm.
   double step(const std::vector<Matches>& matches);
 
   /// How much the surface resists turning: the slope along the turn, taken from both views' normals, whose noise is
@@ -157,7 +160,7 @@ void Solver::add_data(const std::vector<Matches>& matches, Eigen::MatrixXd& norm
   for (const Matches& pair : matches) {
     for (const Match& m : pair) all.push_back(std::abs(m.distance()) / m.sigma);
   }
-  const double scale = 3.0 * std::max(1.0, 1.4826 * quantile(std::move(all), 0.5));
+  const double scale = 1.5 * std::max(1.0, 1.4826 * quantile(std::move(all), 0.5));
   std::vector<Sums> sums(matches.size());
   parallel_for(matches.size(), [&](std::size_t k) {
     for (const Match& m : matches[k]) {
@@ -210,13 +213,13 @@ double Solver::step(const std::vector<Matches>& matches) {
   add_priors(normal, right);
   const Eigen::VectorXd solution = normal.ldlt().solve(right);
   axis_ = solution.head<kAxisUnknowns>();
-  const Vector6 weight = prior_information().diagonal().cwiseSqrt();
+  constexpr double kArm = 50.0;  // mm, from the axis to the surface, roughly
   double largest = 0.0;
   for (std::size_t v = 0; v < correction_.size(); ++v) {
     const Vector6 delta = solution.segment<6>(kAxisUnknowns + 6 * static_cast<int>(v));
     correction_[v] += delta;
     camera_from_pose_[v] = camera_from_pose_[v] * small_motion(delta.head<3>(), delta.tail<3>());
-    largest = std::max(largest, delta.cwiseProduct(weight).cwiseAbs().maxCoeff());
+    largest = std::max(largest, delta.head<3>().norm() * kArm + delta.tail<3>().norm());
   }
   return largest;
 }
@@ -302,8 +305,9 @@ RegistrationOptions RegistrationOptions::imported() {
   options.rotation_sigma_deg = 0.5;
   options.translation_sigma_mm = 1.0;
   options.axis_tilt_sigma_deg = options.axis_shift_sigma_mm = 0.0;
-  options.pair_bias_mm = 0.01;
+  options.pair_bias_mm = 0.02;
   options.capture_mm = 4.0;
+  options.least_facing = 0.25;
   return options;
 }
 
@@ -330,7 +334,7 @@ Result<RegistrationReport> register_views(std::span<View> views, const Registrat
     const double capture = options.capture_mm / (1 << (options.levels - 1 - level));
     for (int k = 0; k < options.iterations; ++k) {
       if (context.stopped()) return fail(ErrorCode::stopped, "registration: stopped");
-      if (solver.step(solver.match_all(capture)) < 0.01) break;
+      if (solver.step(solver.match_all(capture)) < kSettled) break;
     }
     context.report("registration", 1.0 - static_cast<double>(level) / options.levels);
   }

@@ -11,7 +11,7 @@ struct ComparisonOptions {
   int patch_px = 48;   ///< side of the patches whose shift is measured, half overlapping
   /// Patches that grey levels with a noise of 2 could not place better than this (of little structure, or structure in
   /// one direction only) say nothing and are left out.
-  double patch_sigma_px = 0.05;
+  double patch_sigma_px = 0.1;
 };
 
 /// How a rendering differs from a photo of the same thing.

@@ -141,31 +141,26 @@ std::optional<Sight> PhotoView::look(const Eigen::Vector3d& point, const Eigen::
 
   const double beyond = (cosine - cos_limit_) / (1.0 - cos_limit_);
   const double quality = beyond * beyond * px_per_mm_at_1mm_ / z;
-  return Sight{pixel, cosine, fade * fade * std::pow(quality, sharpness_)};
+  return Sight{pixel, fade * fade * quality, fade * fade * std::pow(quality, sharpness_)};
 }
 
-Eigen::Vector3f PhotoView::colour(const Eigen::Vector2d& pixel) const {
+Sample PhotoView::sample(const Eigen::Vector2d& pixel) const {
   const cv::Mat3b& image = photo_->image;
   const int x = static_cast<int>(std::floor(pixel.x()));
   const int y = static_cast<int>(std::floor(pixel.y()));
   const auto across = cubic(static_cast<float>(pixel.x() - x));
   const auto down = cubic(static_cast<float>(pixel.y() - y));
   Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+  uchar highest = 0;
   for (int j = 0; j < 4; ++j) {
     const cv::Vec3b* row = image[std::clamp(y - 1 + j, 0, image.rows - 1)];
     for (int i = 0; i < 4; ++i) {
       const cv::Vec3b& c = row[std::clamp(x - 1 + i, 0, image.cols - 1)];
       sum += across[i] * down[j] * Eigen::Vector3f(c[0], c[1], c[2]);
+      highest = std::max({highest, c[0], c[1], c[2]});
     }
   }
-  return sum.cwiseMax(0.0F) / 255.0F;
-}
-
-bool PhotoView::saturated(const Eigen::Vector2d& pixel) const {
-  const cv::Mat3b& image = photo_->image;
-  const cv::Vec3b& c = image(std::clamp(static_cast<int>(std::lround(pixel.y())), 0, image.rows - 1),
-                             std::clamp(static_cast<int>(std::lround(pixel.x())), 0, image.cols - 1));
-  return std::max({c[0], c[1], c[2]}) >= kSaturated;
+  return {sum.cwiseMax(0.0F) / 255.0F, highest >= kSaturated};
 }
 
 double typical_px_per_mm(const Mesh& mesh, std::span<const Photo> photos) {

@@ -15,8 +15,13 @@ Eigen::Vector3d pixel_ray(const Camera& camera, double u, double v);
 /// A point of the surface as one photo shows it.
 struct Sight {
   Eigen::Vector2d pixel;  ///< in the photo, distortion included
-  double cosine = 0.0;    ///< of the incidence
-  double weight = 0.0;    ///< 0..about 1: how much this photo knows about the point
+  double vote = 0.0;      ///< 0..about 1: say in what the point's colour is not: cos^2 * resolution, less near edges
+  double weight = 0.0;    ///< 0..about 1: share in the blend: the same, sharpened
+};
+
+struct Sample {
+  Eigen::Vector3f bgr = Eigen::Vector3f::Zero();  ///< linear, 1 = full scale
+  bool saturated = false;  ///< a pixel of those that went in is at the sensor's end: no longer a measurement
 };
 
 /// A photo together with what of the mesh it shows. Refers to the photo given; threads: const functions from any.
@@ -28,10 +33,8 @@ class PhotoView {
 
   /// How the photo shows `point` with unit `normal` (model frame, mm); nothing if it does not.
   [[nodiscard]] std::optional<Sight> look(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const;
-  /// Linear BGR between pixels, bicubic; `pixel` as look() gave it.
-  [[nodiscard]] Eigen::Vector3f colour(const Eigen::Vector2d& pixel) const;
-  /// True where the sensor is at its end: the colour is no longer a measurement.
-  [[nodiscard]] bool saturated(const Eigen::Vector2d& pixel) const;
+  /// What the photo shows there, between pixels (bicubic); `pixel` as look() gave it.
+  [[nodiscard]] Sample sample(const Eigen::Vector2d& pixel) const;
 
   [[nodiscard]] const Photo& photo() const { return *photo_; }
   [[nodiscard]] Transform camera_from_model() const { return camera_from_model_; }

@@ -11,30 +11,15 @@ namespace {
 /// Difference from the majority at which a photo has lost half of its say, relative to the colour, and in full scale.
 constexpr float kOutlierShare = 0.08F;
 constexpr float kOutlierFloor = 0.02F;
-constexpr int kRobustRounds = 2;
-constexpr float kSaturatedSay = 0.01F;
+constexpr std::array<float, 4> kOutlierWidths = {4.0F, 2.0F, 1.0F, 1.0F};
+constexpr float kSaturatedSay = 0.001F;
 constexpr std::size_t kLightSpots = 20000;
 constexpr int kFillRounds = 60;
 
 struct Look {
   Eigen::Vector3f bgr;
-  float weight;
+  float vote, weight;  // as in Sight
 };
-
-/// Middle by weight of each channel: where the majority is, whatever the outliers say.
-Eigen::Vector3f weighted_median(std::vector<Look>& looks) {
-  Eigen::Vector3f middle;
-  for (int channel = 0; channel < 3; ++channel) {
-    std::sort(looks.begin(), looks.end(),
-              [&](const Look& a, const Look& b) { return a.bgr[channel] < b.bgr[channel]; });
-    float half = 0.0F;
-    for (const Look& look : looks) half += 0.5F * look.weight;
-    std::size_t i = 0;
-    for (float sum = looks[0].weight; sum < half && i + 1 < looks.size(); sum += looks[i].weight) ++i;
-    middle[channel] = looks[i].bgr[channel];
-  }
-  return middle;
-}
 
 /// The vertices that share an edge with each vertex, as offsets into one list.
 struct Neighbours {
@@ -69,24 +54,32 @@ PointColour blend_photos(std::span<const PhotoView> views, const RigLight& light
     if (!sight) continue;
     const Transform& turntable_from_model = view.photo().turntable_from_model;
     const Eigen::Vector3f lit = light.at(turntable_from_model.linear() * normal, turntable_from_model * point);
-    const float say = view.saturated(sight->pixel) ? kSaturatedSay : 1.0F;
-    looks.push_back({view.colour(sight->pixel).cwiseQuotient(lit), say * static_cast<float>(sight->weight)});
+    const Sample sample = view.sample(sight->pixel);
+    const float say = sample.saturated ? kSaturatedSay : 1.0F;
+    looks.push_back({sample.bgr.cwiseQuotient(lit), say * static_cast<float>(sight->vote),
+                     say * static_cast<float>(sight->weight)});
   }
   if (looks.empty()) return {};
 
-  Eigen::Vector3f best = weighted_median(looks);
+  Eigen::Vector3f best = Eigen::Vector3f::Zero();
+  float votes = 0.0F;
   float weight = 0.0F;
-  for (int round = 0; round < kRobustRounds; ++round) {
-    const float limit = kOutlierFloor + kOutlierShare * best.maxCoeff();
+  for (const Look& look : looks) {
+    best += look.vote * look.bgr;
+    votes += look.vote;
+    weight += look.weight;
+  }
+  best /= votes;
+  // From wide to narrow, so that the majority is found without a jump anywhere on the surface.
+  for (const float width : kOutlierWidths) {
+    const float limit = width * (kOutlierFloor + kOutlierShare * best.maxCoeff());
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
     float say = 0.0F;
-    weight = 0.0F;
     for (const Look& look : looks) {
       const float off = (look.bgr - best).squaredNorm() / (limit * limit);
-      const float w = look.weight / ((1.0F + off) * (1.0F + off));
+      const float w = (width > 1.0F ? look.vote : look.weight) / ((1.0F + off) * (1.0F + off));
       sum += w * look.bgr;
       say += w;
-      weight += look.weight;
     }
     best = sum / say;
   }
@@ -103,12 +96,11 @@ RigLight light_from_photos(std::span<const PhotoView> views, const Mesh& mesh,
     std::vector<LightSample> spot;
     for (const PhotoView& view : views) {
       const auto sight = view.look(point, normal);
-      if (!sight || view.saturated(sight->pixel)) continue;
+      if (!sight) continue;
+      const Sample sample = view.sample(sight->pixel);
+      if (sample.saturated || sample.bgr.minCoeff() <= kOutlierFloor) continue;
       const Transform& turntable_from_model = view.photo().turntable_from_model;
-      const Eigen::Vector3f bgr = view.colour(sight->pixel);
-      if (bgr.minCoeff() <= kOutlierFloor) continue;
-      spot.push_back(
-          {turntable_from_model.linear() * normal, turntable_from_model * point, bgr, std::sqrt(sight->weight)});
+      spot.push_back({turntable_from_model.linear() * normal, turntable_from_model * point, sample.bgr, sight->vote});
     }
     spots.push_back(std::move(spot));
   }

@@ -30,7 +30,7 @@ struct RenderOptions {
   int supersample = 1;  ///< n x n rays a pixel, their light averaged
   cv::Vec3b background{0, 0, 0};
   /// Given: the image is linear light under the rig's lamps, to be compared with a photo. Not given: sRGB, unlit.
-  std::optional<Exposure> as_photo;
+  std::optional<Exposure> as_photo = std::nullopt;
 };
 
 /// All matrices have the camera's size.

@@ -9,8 +9,9 @@ namespace scanrig {
 namespace {
 
 constexpr std::size_t kMostBlocks = 400'000;  // about 1 GB of nodes
-const std::array<Eigen::Vector3i, 6> kFaces = {Eigen::Vector3i{-1, 0, 0}, {1, 0, 0},  {0, -1, 0},
-                                               {0, 1, 0},                 {0, 0, -1}, {0, 0, 1}};
+constexpr double kMostBlocksInBox = 3e7;
+const std::array<Eigen::Vector3i, 6> kFaces = {
+    Eigen::Vector3i{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}};
 
 }  // namespace
 
@@ -108,14 +109,18 @@ std::vector<Eigen::Vector3i> BlockGrid::open_neighbours(const Block& block) cons
 }
 
 Result<void> BlockGrid::fill(const Field& field, const std::vector<Eigen::Vector3f>& seeds, const Context& context) {
+  if (size_.cast<double>().prod() > kMostBlocksInBox) {
+    return fail(ErrorCode::out_of_range, "volume: {} x {} x {} blocks of 8 voxels are too many; use larger voxels",
+                size_.x(), size_.y(), size_.z());
+  }
   classify_blocks(field);
   if (context.stopped()) return fail(ErrorCode::stopped, "volume: stopped");
   std::vector<Eigen::Vector3i> wanted = seed_blocks(seeds);
   while (!wanted.empty()) {
     const std::size_t first = blocks_.size();
     if (first + wanted.size() > kMostBlocks) {
-      return fail(ErrorCode::out_of_range, "volume: the surface needs more than {} blocks of 8 voxels; use larger voxels",
-                  kMostBlocks);
+      return fail(ErrorCode::out_of_range,
+                  "volume: the surface needs more than {} blocks of 8 voxels; use larger voxels", kMostBlocks);
     }
     blocks_.resize(first + wanted.size());
     parallel_for(wanted.size(), [&](std::size_t i) {
@@ -137,6 +142,28 @@ Result<void> BlockGrid::fill(const Field& field, const std::vector<Eigen::Vector
             [&](const Block& a, const Block& b) { return linear(a.index) < linear(b.index); });
   for (std::size_t i = 0; i < blocks_.size(); ++i) slot_[linear(blocks_[i].index)] = static_cast<std::int32_t>(i);
   return {};
+}
+
+BlockGrid::Block& BlockGrid::store(const Eigen::Vector3i& block, float band_mm) {
+  std::int32_t& slot = slot_[linear(block)];
+  if (slot < 0) {
+    Block& fresh = blocks_.emplace_back();
+    fresh.index = block;
+    fresh.distance.fill(slot == kInside ? -band_mm : band_mm);
+    fresh.support.fill(Support::bounds);
+    slot = static_cast<std::int32_t>(blocks_.size() - 1);
+  }
+  return blocks_[static_cast<std::size_t>(slot)];
+}
+
+void BlockGrid::set(const Eigen::Vector3i& node, float distance, float band_mm) {
+  const auto block_of = [](const Eigen::Vector3i& n) { return n.unaryExpr([](int c) { return c / kSide; }).eval(); };
+  for (const auto& face : kFaces) {
+    const Eigen::Vector3i other = block_of(node + face);
+    if (contains(other)) store(other, band_mm);
+  }
+  const Eigen::Vector3i local = node - kSide * block_of(node);
+  store(block_of(node), band_mm).distance[Block::node(local.x(), local.y(), local.z())] = distance;
 }
 
 }  // namespace scanrig

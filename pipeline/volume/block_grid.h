@@ -32,6 +32,9 @@ class BlockGrid {
   /// surface from block to block until it is closed. Fails with `out_of_range`, `stopped`.
   Result<void> fill(const Field& field, const std::vector<Eigen::Vector3f>& seeds, const Context& context);
 
+  /// Gives one node a distance; its block and the blocks it touches are stored if they are not yet.
+  void set(const Eigen::Vector3i& node, float distance, float band_mm);
+
   [[nodiscard]] const std::vector<Block>& blocks() const { return blocks_; }
   [[nodiscard]] std::vector<Block>& blocks() { return blocks_; }
   [[nodiscard]] const Eigen::Vector3i& size() const { return size_; }  ///< in blocks
@@ -52,6 +55,7 @@ class BlockGrid {
   [[nodiscard]] std::size_t linear(const Eigen::Vector3i& block) const {
     return (static_cast<std::size_t>(block.z()) * size_.y() + block.y()) * size_.x() + block.x();
   }
+  Block& store(const Eigen::Vector3i& block, float band_mm);
   void classify_blocks(const Field& field);
   [[nodiscard]] std::vector<Eigen::Vector3i> seed_blocks(const std::vector<Eigen::Vector3f>& seeds) const;
   [[nodiscard]] std::vector<Eigen::Vector3i> open_neighbours(const Block& block) const;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 
 namespace scanrig {
@@ -77,25 +78,25 @@ FieldValue Field::at(const Eigen::Vector3f& point, const Neighbourhood& neighbou
                                                     : from_class_table(point, neighbourhood);
 }
 
-/// Hull and, where an image has neither silhouette nor background, its footprint: a point that two images see beside
-/// all they measured is outside.
-float Field::bounds(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const {
-  float first = -kInfinity, second = -kInfinity;
+/// Hull and, where an image has neither silhouette nor background, its footprint: a point that lies beside all they
+/// measured for more images than see it behind their surface, and for two at least, is outside.
+float Field::bounds(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood, std::size_t views_behind) const {
+  const float hull = neighbourhood.hull.distance(point);
+  std::vector<float> beside;
   for (const auto* view : neighbourhood.views) {
-    const float beside = view->beside_footprint_mm(point);
-    if (beside > first) {
-      second = first;
-      first = beside;
-    } else if (beside > second) {
-      second = beside;
-    }
+    if (!view->knows_background()) beside.push_back(view->beside_footprint_mm(point));
   }
-  return std::max(neighbourhood.hull.distance(point), second);
+  const std::size_t rank = std::max<std::size_t>(1, views_behind);
+  if (beside.size() <= rank) return hull;
+  const auto nth = beside.begin() + static_cast<std::ptrdiff_t>(rank);
+  std::nth_element(beside.begin(), nth, beside.end(), std::greater<>());
+  return std::max(hull, *nth);
 }
 
 FieldValue Field::from_evidence(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const {
   float weight = 0.0F, sum = 0.0F;
   bool is_free = false, is_surface = false;
+  std::size_t views_behind = 0;
   for (const auto* view : neighbourhood.views) {
     const RangeSample s = view->sample(point);
     if (s.kind == RangeSample::Kind::surface) {
@@ -108,13 +109,15 @@ FieldValue Field::from_evidence(const Eigen::Vector3f& point, const Neighbourhoo
       if (!s.clearly_free) continue;
       weight += free_weight_;
       sum += free_weight_ * band_;
+    } else if (s.kind == RangeSample::Kind::behind) {
+      ++views_behind;
     }
   }
   if (is_surface && weight > 0.0F) {
     const float limit = neighbourhood.hull.distance(point) - hull_tolerance_;
     return {std::clamp(std::max(sum / weight, limit), -band_, band_), Support::measured};
   }
-  const float outside = std::clamp(bounds(point, neighbourhood), -band_, band_);
+  const float outside = std::clamp(bounds(point, neighbourhood, views_behind), -band_, band_);
   if (is_free) return {outside > 0.0F ? outside : band_, Support::free};  // the hull knows better how far outside
   return {outside, Support::bounds};
 }
@@ -155,7 +158,7 @@ FieldValue Field::from_class_table(const Eigen::Vector3f& point, const Neighbour
       value.voxel_class = VoxelClass::overlap;
     }
   }
-  const float outside = bounds(point, neighbourhood);
+  const float outside = bounds(point, neighbourhood, 0);
   if (value.voxel_class == VoxelClass::unseen) return {std::clamp(outside, -band_, band_), Support::bounds};
   const float distance = std::clamp(std::max(value.distance, outside - hull_tolerance_), -band_, band_);
   if (measured) return {distance, Support::measured};

@@ -57,16 +57,17 @@ class Field {
  private:
   [[nodiscard]] FieldValue from_evidence(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;
   [[nodiscard]] FieldValue from_class_table(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;
-  [[nodiscard]] float bounds(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;
+  [[nodiscard]] float bounds(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood,
+                             std::size_t views_behind) const;
 
   std::vector<std::vector<RangeEvidence>> views_of_pose_;
   std::vector<Transform> pose_from_model_;
   Hull hull_;
   VolumeOptions::Fusion fusion_;
-  float band_;             ///< mm
-  float class_threshold_;  ///< d_TH of the paper, mm
-  float hull_tolerance_;   ///< a measured surface may stand out of the hull by this, mm
-  float free_weight_;      ///< of one view that sees through, beside the weights of measured surfaces
+  float band_;              ///< mm
+  float class_threshold_;   ///< d_TH of the paper, mm
+  float hull_tolerance_;    ///< a measured surface may stand out of the hull by this, mm
+  float free_weight_;       ///< of one view that sees through, beside the weights of measured surfaces
   Eigen::Vector3d centre_;  ///< of what was measured; outward directions start at the vertical line through it
 };
 

@@ -47,8 +47,7 @@ float Hull::Outline::distance(const Eigen::Vector3f& point) const {
   const float a = u - static_cast<float>(x), b = v - static_cast<float>(y);
   const float* top = px[y];
   const float* bottom = px[y + 1];
-  const float pixels =
-      (1 - b) * ((1 - a) * top[x] + a * top[x + 1]) + b * ((1 - a) * bottom[x] + a * bottom[x + 1]);
+  const float pixels = (1 - b) * ((1 - a) * top[x] + a * top[x + 1]) + b * ((1 - a) * bottom[x] + a * bottom[x + 1]);
   return pixels * static_cast<float>(projection.mm_per_pixel(p.z()));
 }
 

@@ -8,6 +8,7 @@
 #include "pipeline/mesh/topology.h"
 #include "pipeline/volume/block_grid.h"
 #include "pipeline/volume/field.h"
+#include "pipeline/volume/handles.h"
 #include "pipeline/volume/hull.h"
 #include "pipeline/volume/marching_cubes.h"
 #include "pipeline/volume/relax.h"
@@ -52,8 +53,8 @@ Result<void> check(std::span<const PosedViews> poses, const VolumeOptions& optio
       }
       for (const auto& s : view.silhouettes) {
         if (s.outside_px.size() != cv::Size(s.projection.width, s.projection.height)) {
-          return fail(ErrorCode::invalid_input, "volume: pose {}, view {}: the silhouette does not have its size", p + 1,
-                      view.index);
+          return fail(ErrorCode::invalid_input, "volume: pose {}, view {}: the silhouette does not have its size",
+                      p + 1, view.index);
         }
       }
     }
@@ -179,11 +180,19 @@ Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions
   relax_unmeasured(grid, field.band());
   context.report("volume", 0.7);
 
-  const Mesh all = extract_surface(grid);
+  Mesh all = extract_surface(grid);
   result.mesh = largest_component(all);
-  report.dropped_components = components(all).count - 1;
   if (result.mesh.faces.empty()) return fail(ErrorCode::degenerate, "volume: the surface encloses nothing");
   report.genus = report.genus_before_repair = topology(result.mesh).genus();
+  if (options.repair_handles && report.genus > 0) {
+    const HandleRepair repair = repair_handles(grid, report.genus, field.band());
+    report.voxels_cut = repair.cut;
+    report.voxels_filled = repair.filled;
+    report.genus = repair.genus;
+    all = extract_surface(grid);
+    result.mesh = largest_component(all);
+  }
+  report.dropped_components = components(all).count - 1;
   finish_surface(field, static_cast<float>(options.voxel_mm), result.mesh);
   report.closed_vertices = static_cast<std::size_t>(std::count(result.mesh.views.begin(), result.mesh.views.end(), 0));
   report.measured_vertices = result.mesh.vertices.size() - report.closed_vertices;

@@ -26,8 +26,8 @@ struct VolumeOptions {
   };
   double voxel_mm = 0.25;
   Fusion fusion = Fusion::evidence;
-  double band_mm = 0.0;                ///< half width of the zone around a surface in which it is evidence;
-                                       ///< 0: three voxels, or four sigma where the data are noisier
+  double band_mm = 0.0;                    ///< half width of the zone around a surface in which it is evidence;
+                                           ///< 0: three voxels, or four sigma where the data are noisier
   bool table_without_silhouettes = false;  ///< bound a pose by its plane y = 0 even if it has no silhouettes
   bool repair_handles = true;              ///< undo handles and tunnels that nothing measured supports
 };
@@ -36,8 +36,8 @@ struct VolumeReport {
   double band_mm = 0.0;
   std::size_t active_voxels = 0;
   std::size_t measured_vertices = 0;
-  std::size_t closed_vertices = 0;      ///< closed by the hull, the table or at the end of free space
-  std::size_t dropped_components = 0;   ///< loose bits and enclosed cavities
+  std::size_t closed_vertices = 0;     ///< closed by the hull, the table or at the end of free space
+  std::size_t dropped_components = 0;  ///< loose bits and enclosed cavities
   long genus_before_repair = 0;
   long genus = 0;
   std::size_t voxels_cut = 0;     ///< taken out of the solid to undo a handle

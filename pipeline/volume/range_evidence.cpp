@@ -9,9 +9,9 @@ namespace scanrig {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr float kSteepest = 0.2F;      // cosine of incidence (78 deg) beyond which a range pixel is not believed
-constexpr float kFinestSigma = 0.001F;  // mm; keeps the weights of noise-free data finite
-constexpr float kFadePixels = 8.0F;    // weights fade over the last pixels before an edge
+constexpr float kSteepest = 0.2F;           // cosine of incidence (78 deg) beyond which a range pixel is not believed
+constexpr float kFinestSigma = 0.001F;      // mm; keeps the weights of noise-free data finite
+constexpr float kFadePixels = 8.0F;         // weights fade over the last pixels before an edge
 constexpr float kFootprintGapMm = 3.0F;     // gaps up to twice this are bridged in a footprint
 constexpr float kFootprintMarginMm = 1.0F;  // range images lose this much at a limb
 constexpr int kTile = 16;
@@ -20,8 +20,7 @@ constexpr int kNeighbours[8][2] = {{-1, -1}, {0, -1}, {1, -1}, {-1, 0}, {1, 0}, 
 
 }  // namespace
 
-RangeEvidence::RangeEvidence(const RangeImage& range, const Transform& model_from_pose, double band_mm,
-                             double voxel_mm)
+RangeEvidence::RangeEvidence(const RangeImage& range, const Transform& model_from_pose, double band_mm, double voxel_mm)
     : camera_from_model_(range.camera_from_pose * model_from_pose.inverse()),
       rotation_(camera_from_model_.linear().cast<float>()),
       translation_(camera_from_model_.translation().cast<float>()),
@@ -77,7 +76,7 @@ void RangeEvidence::make_planes(const RangeImage& range) {
       const Eigen::Vector3f normal(n[0], n[1], n[2]);
       const Eigen::Vector3f point = projection_.unproject(x, y, depth).cast<float>();
       const Eigen::Vector3f ray = projection_.kind == Projection::Kind::pinhole ? Eigen::Vector3f(point.normalized())
-                                                                                 : Eigen::Vector3f::UnitZ();
+                                                                                : Eigen::Vector3f::UnitZ();
       const float cosine = -normal.dot(ray);
       if (!(cosine > kSteepest)) continue;
       if (std::isnan(range.sigma(v, u))) continue;
@@ -146,8 +145,11 @@ void RangeEvidence::close_pinholes() {
           ++count;
         }
         if (count < 5 || farthest - nearest > 0.5F * band_mm_) continue;
-        Pixel filled{.normal = normal.normalized(), .weight = weight, .sigma = sigma,
-                     .free_depth = depth / static_cast<float>(count), .state = State::surface};
+        Pixel filled{.normal = normal.normalized(),
+                     .weight = weight,
+                     .sigma = sigma,
+                     .free_depth = depth / static_cast<float>(count),
+                     .state = State::surface};
         const Eigen::Vector3f in_camera = projection_.unproject(x, y, filled.free_depth).cast<float>();
         filled.offset = filled.normal.dot(rotation_.transpose() * (in_camera - translation_));
         pixel(x, y) = filled;

@@ -55,7 +55,7 @@ class RangeEvidence {
   enum class State : std::uint8_t { unknown, surface, background };
   struct Pixel {
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< model frame
-    float offset = 0.0F;      ///< plane: normal . x = offset
+    float offset = 0.0F;                               ///< plane: normal . x = offset
     float weight = 0.0F;
     float sigma = 0.0F;       ///< along the normal
     float free_depth = 0.0F;  ///< everything nearer than this is free in the whole window; +infinity: background

@@ -50,7 +50,7 @@ double plinth(const Vector3d& p) {
   constexpr double kRound = 2.0;
   const Vector2d d(side + kRound, level + kRound);
   const double slab = d.cwiseMax(0.0).norm() + std::min(d.maxCoeff(), 0.0) - kRound;
-  const double hollow = ellipsoid(p, {3.0, -2.0, 0.0}, {17.0, 16.0, 13.0});
+  const double hollow = ellipsoid(p, {3.0, -2.0, 0.0}, {17.0, 11.5, 13.0});
   return -smooth_min(-slab, hollow, 2.0);
 }
 
@@ -85,7 +85,7 @@ double limbs(const Vector3d& p) {
   const double lower = capsule(p, {31.0, 42.0, 7.0}, {37.0, 58.0, 14.0}, 4.2, 3.4);
   const double hand = ellipsoid(p, {37.5, 61.0, 15.0}, {4.6, 5.2, 3.6});
   const double right = smooth_min(smooth_min(upper, lower, 1.5), hand, 2.0);
-  const double left = capsule(p, {-14.0, 47.0, 2.0}, {-22.0, 30.0, 11.0}, 5.0, 4.0);
+  const double left = capsule(p, {-14.0, 47.0, 2.0}, {-29.0, 33.0, 12.0}, 5.0, 4.0);
   const double tail_root = capsule(p, {-4.0, 22.0, -12.0}, {-10.0, 20.0, -30.0}, 3.4, 2.2);
   const double tail_tip = capsule(p, {-10.0, 20.0, -30.0}, {-16.0, 38.0, -37.0}, 2.2, 1.5);
   return std::min(std::min(right, left), smooth_min(tail_root, tail_tip, 1.5));

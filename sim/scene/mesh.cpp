@@ -25,11 +25,15 @@ Circle through(const Vector2d& a, const Vector2d& b, const Vector2d& c) {
   return {a + centre, centre.norm()};
 }
 
-/// The i-th of `count` directions spread evenly over the sphere by the golden angle.
-Vector3d spread_direction(int i, int count) {
-  const double y = 1.0 - (2.0 * i + 1.0) / count, r = std::sqrt(1.0 - y * y);
-  const double phi = i * std::numbers::pi * (3.0 - std::sqrt(5.0));
-  return {r * std::cos(phi), y, r * std::sin(phi)};
+/// Directions spread evenly over the sphere by the golden angle.
+std::vector<Vector3d> spread_directions(int count) {
+  std::vector<Vector3d> directions;
+  for (int i = 0; i < count; ++i) {
+    const double y = 1.0 - (2.0 * i + 1.0) / count, r = std::sqrt(1.0 - y * y);
+    const double phi = i * std::numbers::pi * (3.0 - std::sqrt(5.0));
+    directions.emplace_back(r * std::cos(phi), y, r * std::sin(phi));
+  }
+  return directions;
 }
 
 bool contains(const Circle& circle, const Vector2d& p) { return (p - circle.centre).norm() <= circle.radius + 1e-9; }
@@ -103,35 +107,29 @@ std::vector<Vector3d> vertex_normals(const TriangleMesh& mesh) {
 std::vector<Vector3d> extreme_vertices(const std::vector<Vector3d>& vertices) {
   // A few directions first: what is farthest in a direction near one of them is nearly farthest in that one, by at most
   // the size of the mesh times the angle between the two. Only such vertices are looked at again.
-  constexpr int kCones = 1000, kDirections = 20000;
+  const auto cones = spread_directions(1000), directions = spread_directions(20000);
   Vector3d middle = Vector3d::Zero();
   for (const auto& v : vertices) middle += v / static_cast<double>(vertices.size());
   double reach = 0.0;
   for (const auto& v : vertices) reach = std::max(reach, (v - middle).norm());
-  std::vector<std::vector<int>> members(kCones);
-  for (int i = 0; i < kDirections; ++i) {
-    const Vector3d d = spread_direction(i, kDirections);
-    int nearest = 0;
-    for (int c = 1; c < kCones; ++c) {
-      if (d.dot(spread_direction(c, kCones)) > d.dot(spread_direction(nearest, kCones))) nearest = c;
-    }
-    members[nearest].push_back(i);
+  std::vector<std::vector<Vector3d>> members(cones.size());
+  for (const auto& d : directions) {
+    const auto farther = [&d](const Vector3d& a, const Vector3d& b) { return d.dot(a) < d.dot(b); };
+    members[std::max_element(cones.begin(), cones.end(), farther) - cones.begin()].push_back(d);
   }
-  std::vector<std::vector<int>> best(kCones);
-  parallel_for(kCones, [&](std::size_t c) {
-    const Vector3d axis = spread_direction(static_cast<int>(c), kCones);
+  std::vector<std::vector<int>> best(cones.size());
+  parallel_for(cones.size(), [&](std::size_t c) {
     double chord = 0.0;
-    for (const int i : members[c]) chord = std::max(chord, (axis - spread_direction(i, kDirections)).norm());
+    for (const auto& d : members[c]) chord = std::max(chord, (cones[c] - d).norm());
     std::vector<double> along(vertices.size());
     double far = -1e300;
-    for (std::size_t v = 0; v < vertices.size(); ++v) far = std::max(far, along[v] = axis.dot(vertices[v]));
+    for (std::size_t v = 0; v < vertices.size(); ++v) far = std::max(far, along[v] = cones[c].dot(vertices[v]));
     std::vector<int> near;
     for (std::size_t v = 0; v < vertices.size(); ++v) {
       if (along[v] >= far - 2.0 * reach * chord) near.push_back(static_cast<int>(v));
     }
-    for (const int i : members[c]) {
-      const Vector3d d = spread_direction(i, kDirections);
-      const auto lower = [&](int a, int b) { return d.dot(vertices[a]) < d.dot(vertices[b]); };
+    for (const auto& d : members[c]) {
+      const auto lower = [&](int i, int j) { return d.dot(vertices[i]) < d.dot(vertices[j]); };
       best[c].push_back(*std::max_element(near.begin(), near.end(), lower));
     }
   });

@@ -38,15 +38,16 @@ struct Lattice {
     Vector3d a = node(n), b = node(n + Vector3i(d & 1, d >> 1 & 1, d >> 2 & 1));
     double fa = field(a), fb = field(b);
     Vector3d at = a;
-    // Regula falsi, Illinois form: four steps bring a smooth field to well below a micrometre.
-    for (int i = 0; i < 4; ++i) {
+    // Regula falsi, Illinois form: five steps bring a smooth field to well below a micrometre.
+    int replaced = 0;
+    for (int i = 0; i < 5; ++i) {
       at = a + fa / (fa - fb) * (b - a);
       const double f = field(at);
       if (f == 0.0) break;
       if ((f < 0.0) == (fb < 0.0)) {
-        b = at, fb = f, fa *= i ? 0.5 : 1.0;
+        b = at, fb = f, fa *= replaced < 0 ? 0.5 : 1.0, replaced = -1;
       } else {
-        a = at, fa = f, fb *= i ? 0.5 : 1.0;
+        a = at, fa = f, fb *= replaced > 0 ? 0.5 : 1.0, replaced = 1;
       }
     }
     return at;

@@ -41,8 +41,8 @@ struct Profile {
   unsigned dot_seed = 20021204;
 
   // Light. Full scale of the sensor is reached by irradiance * albedo = 1.
-  double ambient = 0.42;            ///< sky above, plain exposure
-  double broad_lights = 0.44;       ///< three soft boxes together, plain exposure
+  double ambient = 0.48;            ///< sky above, plain exposure
+  double broad_lights = 0.50;       ///< three soft boxes together, plain exposure
   double pattern_room_light = 0.1;  ///< share of the plain light that stays on while the projector shines
   double projector_light = 0.68;    ///< on a surface that faces it at the aim point
   double projector_black = 0.02;    ///< light between the dots, share of a dot's

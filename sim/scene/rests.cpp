@@ -102,14 +102,15 @@ Vector3d roll(const Points& points, Vector3d down) {
   return down;
 }
 
-/// A tilt of two degrees any way lifts the centre of mass.
+/// A tilt of two degrees any way lifts the centre of mass, and by more than the facets of a round body would.
 bool is_firm(const Points& points, const Vector3d& down) {
   const double tilt = to_radians(2.0), at_rest = height(points, down);
+  constexpr double kLeastLift = 1e-3;  // of the height of the centre of mass
   const Vector3d side = down.unitOrthogonal(), other = down.cross(side);
   for (int i = 0; i < 24; ++i) {
     const double phi = 2.0 * std::numbers::pi * i / 24;
     const Vector3d tilted = std::cos(tilt) * down + std::sin(tilt) * (std::cos(phi) * side + std::sin(phi) * other);
-    if (height(points, tilted) <= at_rest) return false;
+    if (height(points, tilted) < (1.0 + kLeastLift) * at_rest) return false;
   }
   return true;
 }

@@ -80,8 +80,8 @@ class Painted final : public SurfaceColour {
     const double share = edge(patch.margin, 2.0 * width);  // 0.5 on the border
     const Vector3f colour = static_cast<float>(share) * paint(patch.first, p, width) +
                             static_cast<float>(1.0 - share) * paint(patch.second, p, width);
-    const double fine = 0.16 * grain(at.position, 0.7, at.footprint_mm, 5) +
-                        0.13 * grain(at.position, 1.6, at.footprint_mm, 6) +
+    const double fine = 0.19 * grain(at.position, 0.7, at.footprint_mm, 5) +
+                        0.15 * grain(at.position, 1.6, at.footprint_mm, 6) +
                         0.10 * grain(at.position, 4.1, at.footprint_mm, 7);
     return measurable(static_cast<float>(1.0 + fine) * colour);
   }
@@ -114,7 +114,7 @@ class Stone final : public SurfaceColour {
   Vector3f albedo(const SurfacePoint& at) const override {
     double value = 0.46, warmth = 0.0;
     constexpr std::array<double, 6> kWavelength = {0.6, 1.1, 2.1, 4.3, 8.7, 16.0};
-    constexpr std::array<double, 6> kStrength = {0.12, 0.12, 0.11, 0.10, 0.08, 0.08};
+    constexpr std::array<double, 6> kStrength = {0.16, 0.15, 0.12, 0.09, 0.07, 0.07};
     for (unsigned i = 0; i < kWavelength.size(); ++i) {
       const double g = grain(at.position, kWavelength[i], at.footprint_mm, 16 + i);
       value += kStrength[i] * g;

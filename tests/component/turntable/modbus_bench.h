@@ -31,6 +31,7 @@ class ModbusBench : public TurntableBench {
     options.acceleration = {20000};
     options.tolerance = {0.05};
     options.settle = std::chrono::milliseconds(60);
+    options.line.reply_timeout = std::chrono::milliseconds(30);
     change(options);
     options_ = options;
     auto table = ModbusTurntable::create(options, clock_);
@@ -58,12 +59,13 @@ class ModbusBench : public TurntableBench {
   Clock::Duration too_short() override { return std::chrono::milliseconds(60); }
   Degrees tolerance() override { return options_.tolerance; }
 
+  const std::string& device() const { return link_; }
   sim::wire::LeadshineDrive& drive() { return drive_; }
   sim::wire::ModbusServer& server() { return *server_; }
 
  private:
   RealClock clock_;
-  sim::wire::AxisOptions axis_{.gear_ratio = 9};
+  sim::wire::AxisOptions axis_{.gear_ratio = 9, .start_deg = 20};
   sim::wire::LeadshineDrive drive_{axis_, clock_};
   std::string link_ = testing::TempDir() + "turntable" + std::to_string(::getpid()) + "-" +
                       std::to_string(reinterpret_cast<std::uintptr_t>(this));

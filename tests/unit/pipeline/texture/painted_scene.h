@@ -14,8 +14,8 @@ struct Ball {
   double radius;
 };
 
-/// Painted balls on the turntable under lamps that do not turn with it, photographed by formulae of its own: ray against
-/// sphere, OpenCV's undistortion. Nothing of it is shared with the code under test.
+/// Painted balls on the turntable under lamps that do not turn with it, photographed by formulae of its own: ray
+/// against sphere, OpenCV's undistortion. Nothing of it is shared with the code under test.
 class PaintedScene {
  public:
   std::vector<Ball> balls;

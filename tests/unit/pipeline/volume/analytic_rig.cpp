@@ -45,16 +45,30 @@ bool sees(const Cast& cast, const Eigen::Vector3d& eye, const Hit& hit, const Ei
   return !cast(point + 0.02 * hit.normal, to_eye).has_value();
 }
 
+/// One ray a pixel, nine where a neighbour says otherwise.
 Silhouette take_silhouette(const Rig& rig, const Cast& cast, const Transform& camera_from_pose) {
   constexpr int kFiner = 3;  // sub-pixels a side
   Silhouette result{projection_of(rig), camera_from_pose, {}};
   const Transform pose_from_camera = camera_from_pose.inverse();
-  cv::Mat1b outside(rig.height * kFiner, rig.width * kFiner, uchar{255});
-  parallel_for(static_cast<std::size_t>(outside.rows), [&](std::size_t row) {
-    for (int x = 0; x < outside.cols; ++x) {
-      const double u = (x + 0.5) / kFiner - 0.5, v = (static_cast<double>(row) + 0.5) / kFiner - 0.5;
-      const Eigen::Vector3d ray = pose_from_camera.linear() * result.projection.unproject(u, v, 1.0).normalized();
-      if (cast(pose_from_camera.translation(), ray)) outside(static_cast<int>(row), x) = 0;
+  const auto misses = [&](double u, double v) {
+    const Eigen::Vector3d ray = pose_from_camera.linear() * result.projection.unproject(u, v, 1.0).normalized();
+    return cast(pose_from_camera.translation(), ray) ? uchar{0} : uchar{255};
+  };
+  cv::Mat1b coarse(rig.height, rig.width), low, high;
+  const auto by_rows = [&](const auto& body) {
+    parallel_for(static_cast<std::size_t>(rig.height), [&](std::size_t row) {
+      for (int x = 0; x < rig.width; ++x) body(x, static_cast<int>(row));
+    });
+  };
+  by_rows([&](int x, int y) { coarse(y, x) = misses(x, y); });
+  cv::erode(coarse, low, cv::Mat());
+  cv::dilate(coarse, high, cv::Mat());
+  cv::Mat1b outside(rig.height * kFiner, rig.width * kFiner);
+  by_rows([&](int x, int y) {
+    for (int k = 0; k < kFiner * kFiner; ++k) {
+      const int i = k % kFiner, j = k / kFiner;
+      outside(y * kFiner + j, x * kFiner + i) =
+          low(y, x) == high(y, x) ? coarse(y, x) : misses(x + (i + 0.5) / kFiner - 0.5, y + (j + 0.5) / kFiner - 0.5);
     }
   });
   cv::Mat1f away, within;
@@ -107,8 +121,8 @@ RangeImage take_range(const Rig& rig, const Cast& cast, const Transform& pose_fr
       }
       const Eigen::Vector3d point = pose_from_camera.translation() + hit->distance * ray;
       if (hit->normal.dot(-ray) < std::cos(to_radians(rig.steepest_deg))) continue;
-      if (rig.stereo && !(sees(cast, right, *hit, point, rig.steepest_deg) &&
-                          sees(cast, projector, *hit, point, rig.steepest_deg))) {
+      if (rig.stereo &&
+          !(sees(cast, right, *hit, point, rig.steepest_deg) && sees(cast, projector, *hit, point, rig.steepest_deg))) {
         continue;
       }
       set_pixel(range, x, y, point, hit->normal, std::max(rig.noise_mm, 0.01));
@@ -177,11 +191,13 @@ Solid carve(Solid from, Solid what) {
 }
 
 Solid moved(Solid solid, const Transform& to_from) {
-  return [solid = std::move(solid), from_to = to_from.inverse()](const Eigen::Vector3d& p) { return solid(from_to * p); };
+  return
+      [solid = std::move(solid), from_to = to_from.inverse()](const Eigen::Vector3d& p) { return solid(from_to * p); };
 }
 
 Cast cast_into(Solid solid) {
-  return [solid = std::move(solid)](const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) -> std::optional<Hit> {
+  return [solid = std::move(solid)](const Eigen::Vector3d& origin,
+                                    const Eigen::Vector3d& direction) -> std::optional<Hit> {
     double t = 0.0;
     for (int step = 0; step < 400 && t < 2.0 * kStandOff; ++step) {
       const double d = solid(origin + t * direction);

@@ -27,7 +27,7 @@ Solid moved(Solid solid, const Transform& to_from);
 
 /// A turntable rig as in the project's default, on fewer pixels; images are exact up to the noise asked for.
 struct Rig {
-  int width = 400, height = 300;
+  int width = 300, height = 225;
   double mm_per_pixel = 0.4;
   double elevation_deg = 22.0;
   int views = 8;

@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <cstring>
+#include <numbers>
+
+#include "core/parallel.h"
 #include "pipeline/mesh/solid.h"
 #include "pipeline/mesh/topology.h"
 #include "tests/unit/pipeline/volume/analytic_rig.h"
@@ -10,20 +15,228 @@ namespace scanrig {
 namespace {
 
 using namespace test;
+using Fusion = VolumeOptions::Fusion;
 
-TEST(Integrate, SphereOnTheTableBecomesOneClosedSurfaceOnItsTrueSurface) {
-  const Solid solid = sphere({0, 30, 0}, 30);
-  const auto views = take_views({}, cast_into(solid));
+Result<Surface> integrate_views(const std::vector<View>& views, const VolumeOptions& options = {.voxel_mm = 0.5}) {
   const PosedViews pose{views};
-  const auto surface = integrate({&pose, 1}, {.voxel_mm = 0.5});
-  ASSERT_TRUE(surface) << surface.error().message;
-  const Topology shape = topology(surface->mesh);
+  return integrate({&pose, 1}, options);
+}
+
+/// One closed component without self-contact, of the genus that is true.
+void expect_closed(const Mesh& mesh, long genus) {
+  const Topology shape = topology(mesh);
   EXPECT_TRUE(shape.watertight());
   EXPECT_EQ(shape.components, 1U);
-  EXPECT_EQ(shape.genus(), 0);
-  const Accuracy a = accuracy(surface->mesh, solid);
+  EXPECT_EQ(shape.genus(), genus);
+  EXPECT_EQ(mesh.views.size(), mesh.vertices.size());
+  EXPECT_EQ(mesh.sigma.size(), mesh.vertices.size());
+  EXPECT_EQ(mesh.normals.size(), mesh.vertices.size());
+}
+
+double volume(const Mesh& mesh) { return solid_properties(mesh).value().volume_mm3; }
+
+const Solid& ball() {
+  static const Solid solid = sphere({0, 30, 0}, 25);
+  return solid;
+}
+const std::vector<View>& ball_views() {
+  static const auto views = take_views({}, cast_into(ball()));
+  return views;
+}
+
+TEST(Integrate, NoiseFreeSphereIsClosedAndWithinFiveMicrometres) {
+  const auto surface = integrate_views(ball_views());
+  ASSERT_TRUE(surface) << surface.error().message;
+  expect_closed(surface->mesh, 0);
+  const Accuracy a = accuracy(surface->mesh, ball());
   EXPECT_LE(a.median, 0.005);
-  auto sp=solid_properties(surface->mesh); printf("vol %g (%g)\n", sp?sp->volume_mm3:-1, 4./3*3.14159265*27000); printf("%g %g %g share %g closed %g\n", a.median,a.p95,a.greatest,a.measured_share,a.greatest_closed);
+  EXPECT_LE(a.p95, 0.01);
+  EXPECT_LE(a.greatest, 0.05);
+  EXPECT_GT(a.measured_share, 0.7);
+  EXPECT_EQ(surface->report.measured_vertices + surface->report.closed_vertices, surface->mesh.vertices.size());
+}
+
+TEST(Integrate, VerticesKnowHowManyViewsMeasuredThemAndHowWell) {
+  const auto surface = integrate_views(ball_views());
+  ASSERT_TRUE(surface);
+  for (std::size_t v = 0; v < surface->mesh.vertices.size(); ++v) {
+    if (surface->mesh.views[v] == 0) {
+      EXPECT_TRUE(std::isnan(surface->mesh.sigma[v]));
+      EXPECT_LT(surface->mesh.vertices[v].y(), 32.0F);  // only the underside of a ball is hidden from above
+    } else {
+      EXPECT_LE(surface->mesh.views[v], 8);
+      EXPECT_GT(surface->mesh.sigma[v], 0.0F);
+      EXPECT_LE(surface->mesh.sigma[v], 0.0101F);  // one view's
+    }
+  }
+}
+
+TEST(Integrate, NoiseIsAveragedAndDropoutsLeaveNoHoles) {
+  const auto views = take_views({.noise_mm = 0.04, .dropouts = 0.05}, cast_into(ball()));
+  const auto surface = integrate_views(views);
+  ASSERT_TRUE(surface) << surface.error().message;
+  expect_closed(surface->mesh, 0);
+  const Accuracy a = accuracy(surface->mesh, ball());
+  EXPECT_LE(a.median, 0.02);
+  EXPECT_LE(a.p95, 0.06);
+  EXPECT_LE(a.greatest, 0.25);
+}
+
+TEST(Integrate, HandleOfATorusSurvives) {
+  const Solid ring = torus({0, 27, 0}, Eigen::Vector3d(0.3, 0.2, 1).normalized(), 18, 6);
+  const auto surface = integrate_views(take_views({.noise_mm = 0.02}, cast_into(ring)));
+  ASSERT_TRUE(surface) << surface.error().message;
+  expect_closed(surface->mesh, 1);
+  EXPECT_LE(accuracy(surface->mesh, ring).median, 0.01);
+}
+
+TEST(Integrate, OneMillimetreWallKeepsBothFacesInPlace) {
+  Transform turn = Transform::Identity();
+  turn.linear() = rot_y(0.4).linear();
+  const Solid wall = moved(box({-10, 35, -0.5}, {10, 52, 0.5}), turn);
+  const auto surface = integrate_views(take_views({.mm_per_pixel = 0.15}, cast_into(wall)), {.voxel_mm = 0.25});
+  ASSERT_TRUE(surface) << surface.error().message;
+  expect_closed(surface->mesh, 0);
+  EXPECT_LE(accuracy(surface->mesh, wall).median, 0.005);
+  EXPECT_NEAR(volume(surface->mesh), 20.0 * 17.0 * 1.0, 40.0);
+}
+
+TEST(Integrate, DeepPitBesideLegsAndAGapKeepsGenusZero) {
+  const Solid body = carve(box({-18, 18, -12}, {18, 40, 12}), cylinder(0, 0, 24, 60, 6));
+  const Solid solid = join({body, box({-18, 0, -12}, {-2, 20, 12}), box({2, 0, -12}, {18, 20, 12})});
+  const auto views = take_views({.noise_mm = 0.03, .dropouts = 0.02}, cast_into(solid));
+  for (const auto fusion : {Fusion::evidence, Fusion::paper}) {
+    const auto surface = integrate_views(views, {.voxel_mm = 0.5, .fusion = fusion});
+    ASSERT_TRUE(surface) << surface.error().message;
+    expect_closed(surface->mesh, 0);
+    EXPECT_LE(accuracy(surface->mesh, solid).p95, 0.1);
+  }
+}
+
+/// The paper's Figures 4 and 5: a hollow that only the second pose can see.
+class Cup : public testing::Test {
+ protected:
+  static constexpr double kDepth = 8.0, kInner = 20.0;
+  Cup() {
+    turned_over_.linear() = Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitX()).toRotationMatrix();
+    turned_over_.translation() = Eigen::Vector3d(3, 25, -2);
+    const Solid upside_down = carve(cylinder(0, 0, 0, 25, 24), cylinder(0, 0, -5, kDepth, kInner));
+    solid_ = upside_down;
+    first_ = take_views({}, cast_into(upside_down));
+    second_ = take_views({}, cast_into(moved(upside_down, turned_over_)));
+  }
+  Transform turned_over_ = Transform::Identity();  // pose 2 from pose 1
+  Solid solid_;
+  std::vector<View> first_, second_;
+};
+
+TEST_F(Cup, HollowUnseenInPoseOneIsOpenedByPoseTwoInBothModes) {
+  const double hollow = std::numbers::pi * kInner * kInner * kDepth;
+  const double filled = std::numbers::pi * 24 * 24 * 25;
+  for (const auto fusion : {Fusion::evidence, Fusion::paper}) {
+    const VolumeOptions options{.voxel_mm = 0.5, .fusion = fusion};
+    const auto partial = integrate_views(first_, options);
+    ASSERT_TRUE(partial) << partial.error().message;
+    EXPECT_NEAR(volume(partial->mesh), filled, 0.02 * filled);
+
+    const std::vector<PosedViews> poses = {{first_}, {second_, turned_over_.inverse()}};
+    const auto whole = integrate(poses, options);
+    ASSERT_TRUE(whole) << whole.error().message;
+    expect_closed(whole->mesh, 0);
+    EXPECT_NEAR(volume(whole->mesh), filled - hollow, 0.02 * filled);
+    EXPECT_LE(accuracy(whole->mesh, solid_).median, 0.005);
+
+    std::size_t pairs = 0, classes = 0;
+    for (const auto& row : whole->report.class_pairs) {
+      for (const auto count : row) pairs += count;
+    }
+    for (const auto count : whole->report.class_counts.at(1)) classes += count;
+    EXPECT_EQ(pairs, classes);
+    EXPECT_GT(whole->report.class_pairs[0][0], 0U);  // overlap in both poses
+  }
+}
+
+TEST_F(Cup, SameBitsForAnyNumberOfThreads) {
+  const std::vector<PosedViews> poses = {{first_}, {second_, turned_over_.inverse()}};
+  Result<Surface> one = fail(ErrorCode::internal, ""), three = one;
+  with_threads(1, [&] { one = integrate(poses, {.voxel_mm = 0.8}); });
+  with_threads(3, [&] { three = integrate(poses, {.voxel_mm = 0.8}); });
+  ASSERT_TRUE(one && three);
+  ASSERT_EQ(one->mesh.vertices.size(), three->mesh.vertices.size());
+  EXPECT_EQ(std::memcmp(one->mesh.vertices.data(), three->mesh.vertices.data(),
+                        one->mesh.vertices.size() * sizeof(Eigen::Vector3f)),
+            0);
+  EXPECT_EQ(one->mesh.faces, three->mesh.faces);
+  EXPECT_EQ(one->mesh.views, three->mesh.views);
+}
+
+TEST(Integrate, ImportedOrthographicScansWithoutBackgroundMakeAClosedSolid) {
+  const Solid ring = torus({0, 30, 0}, Eigen::Vector3d::UnitZ(), 18, 7);
+  std::vector<View> views;
+  for (int i = 0; i < 12; ++i) {
+    const double a = 2.0 * std::numbers::pi * i / 12;
+    views.push_back(take_orthographic(cast_into(ring), {std::sin(a), 0, std::cos(a)}, {0, 30, 0}, 30, 0.4));
+  }
+  const auto surface = integrate_views(views);
+  ASSERT_TRUE(surface) << surface.error().message;
+  expect_closed(surface->mesh, 1);
+  EXPECT_LE(accuracy(surface->mesh, ring).median, 0.01);
+  const double truth = 2 * std::numbers::pi * std::numbers::pi * 18 * 49;
+  EXPECT_NEAR(volume(surface->mesh), truth, 0.05 * truth);
+}
+
+TEST(Integrate, TableBoundsScansWithoutSilhouettesOnlyWhereAsked) {
+  const Solid sunk = sphere({0, 20, 0}, 25);  // reaches below the table
+  std::vector<View> views;
+  for (int i = 0; i < 8; ++i) {
+    const double a = 2.0 * std::numbers::pi * i / 8;
+    views.push_back(take_orthographic(cast_into(sunk), {std::sin(a), 0, std::cos(a)}, {0, 20, 0}, 30, 0.5));
+  }
+  const auto lowest = [&](bool table) {
+    const auto surface = integrate_views(views, {.voxel_mm = 0.8, .table_without_silhouettes = table});
+    float y = 1e9F;
+    for (const auto& v : surface.value().mesh.vertices) y = std::min(y, v.y());
+    return y;
+  };
+  EXPECT_LT(lowest(false), -3.0F);
+  EXPECT_GT(lowest(true), -2.0F);
+}
+
+TEST(Integrate, RefusesWhatItCannotUse) {
+  const auto code = [](std::span<const PosedViews> poses, const VolumeOptions& options = {}) {
+    return integrate(poses, options).error().code;
+  };
+  const std::vector<PosedViews> one = {{ball_views()}};
+  EXPECT_EQ(code({}), ErrorCode::invalid_input);
+  EXPECT_EQ(code(std::vector<PosedViews>(3, one[0])), ErrorCode::invalid_input);
+  EXPECT_EQ(code(one, {.voxel_mm = 0.0}), ErrorCode::invalid_input);
+  EXPECT_EQ(code(one, {.voxel_mm = 0.5, .band_mm = -1.0}), ErrorCode::invalid_input);
+  std::vector<PosedViews> stretched = one;
+  stretched[0].model_from_pose.linear() *= 1.01;
+  EXPECT_EQ(code(stretched), ErrorCode::invalid_input);
+
+  std::vector<View> views = {ball_views()[0]};
+  views[0].range.normal = cv::Mat3f();
+  EXPECT_EQ(code(std::vector<PosedViews>{{views}}), ErrorCode::invalid_input);
+  views = {ball_views()[0]};
+  views[0].silhouettes[0].outside_px = cv::Mat1f();
+  EXPECT_EQ(code(std::vector<PosedViews>{{views}}), ErrorCode::invalid_input);
+}
+
+TEST(Integrate, NothingMeasuredIsDegenerate) {
+  const auto views = take_views({.width = 40, .height = 30, .views = 2}, cast_into(sphere({500, 0, 0}, 1)));
+  EXPECT_EQ(integrate_views(views).error().code, ErrorCode::degenerate);
+}
+
+TEST(Integrate, VoxelsTooSmallForTheMachineAreOutOfRange) {
+  EXPECT_EQ(integrate_views(ball_views(), {.voxel_mm = 0.01}).error().code, ErrorCode::out_of_range);
+}
+
+TEST(Integrate, StopsWhenAsked) {
+  std::stop_source source;
+  source.request_stop();
+  const PosedViews pose{ball_views()};
+  EXPECT_EQ(integrate({&pose, 1}, {}, {source.get_token(), {}}).error().code, ErrorCode::stopped);
 }
 
 }  // namespace

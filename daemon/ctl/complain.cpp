@@ -1,0 +1,15 @@
+#include <cstdio>
+
+#include "daemon/ctl/verbs.h"
+
+namespace scanrig::ctl {
+
+ExitCode complain(const Error& error) { return complain(exit_code(error.code), error.message); }
+
+ExitCode complain(ExitCode code, const std::string& message) {
+  std::fflush(stdout);
+  fmt::print(stderr, "scanrig: {}\n", message);
+  return code;
+}
+
+}  // namespace scanrig::ctl

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdio>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "core/clock.h"
+
+namespace scanrig::ctl {
+
+/// Lines and a bar a stage. On a terminal the running stage's bar is drawn over itself; in a log each stage is one
+/// line, written when it is complete. Threads: one user at a time.
+class StageBars {
+ public:
+  StageBars(std::FILE* out, bool terminal) : out_(out), terminal_(terminal) {}
+
+  void line(std::string_view text);
+  void update(const std::string& stage, double fraction);
+  /// The work is over: stages that never said 1 are complete (or stay where they are, if it failed).
+  void end(bool success);
+
+ private:
+  struct Stage {
+    Clock::TimePoint begun;
+    double fraction = 0.0;
+    bool written = false;
+  };
+  void write(const std::string& name, Stage& stage);
+  void draw(const std::string& name, const Stage& stage);
+  void clear();
+
+  std::FILE* out_;
+  bool terminal_;
+  bool drawn_ = false;
+  RealClock clock_;
+  std::map<std::string, Stage, std::less<>> stages_;
+};
+
+/// "range               [##########----------]  50 %    1.2 s"
+std::string bar(std::string_view name, double fraction, Clock::Duration spent);
+
+}  // namespace scanrig::ctl

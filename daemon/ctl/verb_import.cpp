@@ -1,0 +1,14 @@
+#include "daemon/ctl/verbs.h"
+#include "pipeline/scan/import_stanford.h"
+
+namespace scanrig::ctl {
+
+ExitCode import_stanford(const ImportVerb& verb) {
+  const auto pose2 = verb.conf.size() > 1 ? std::optional(verb.conf[1]) : std::nullopt;
+  const auto imported = scanrig::import_stanford(verb.conf[0], pose2, verb.out);
+  if (!imported) return complain(imported.error());
+  fmt::print("{}\n", verb.out.string());
+  return ExitCode::ok;
+}
+
+}  // namespace scanrig::ctl

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/result.h"
+#include "pipeline/reconstruct/reconstruct.h"
+
+/// The verbs of the scanrig command. Each prints its result on stdout, or one sentence "scanrig: ..." on stderr.
+namespace scanrig::ctl {
+
+/// Tells an error and gives the exit code that belongs to it.
+ExitCode complain(const Error& error);
+ExitCode complain(ExitCode code, const std::string& message);
+
+// Clients of the daemon.
+
+struct Connection {
+  std::filesystem::path socket;
+  bool json = false;  ///< print the API's answer as it is
+};
+
+ExitCode status(const Connection& connection, bool follow);
+ExitCode jobs(const Connection& connection, const std::string& id);
+ExitCode start(const Connection& connection, bool follow);
+/// `button`: "stop" or "reset".
+ExitCode press(const Connection& connection, const std::string& button);
+
+// Offline.
+
+struct ReconstructVerb {
+  std::filesystem::path scan;
+  std::filesystem::path out;  ///< empty: `model` in the scan folder
+  ReconstructOptions options;
+};
+ExitCode reconstruct(const ReconstructVerb& verb);
+
+struct EvaluateVerb {
+  std::filesystem::path scan;
+  std::filesystem::path model;  ///< empty: `model` in the scan folder
+  bool json = false;
+};
+ExitCode evaluate(const EvaluateVerb& verb);
+
+struct ImportVerb {
+  std::vector<std::filesystem::path> conf;  ///< one a pose
+  std::filesystem::path out;
+};
+ExitCode import_stanford(const ImportVerb& verb);
+
+struct CheckConfigVerb {
+  std::filesystem::path file;
+  std::filesystem::path drives;  ///< empty: where the daemon looks
+};
+ExitCode check_config(const CheckConfigVerb& verb);
+
+}  // namespace scanrig::ctl

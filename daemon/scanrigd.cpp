@@ -1,0 +1,57 @@
+#include <CLI/CLI.hpp>
+
+#include "config/rig_config.h"
+#include "daemon/jobs/pipeline_reconstructor.h"
+#include "daemon/rig/open_devices.h"
+#include "daemon/run_daemon.h"
+#include "daemon/signal_stop.h"
+
+namespace {
+
+using namespace scanrig;
+
+DaemonOptions options_from(const config::RigConfig& config) {
+  const auto& recipe = config.recipes.at("default");
+  DaemonOptions options;
+  options.jobs = {.root = config.storage.root,
+                  .calibration_file = config.calibration_file,
+                  .profile = "",
+                  .poses = recipe.poses,
+                  .views = recipe.views};
+  options.socket = config.api.socket;
+  options.remote = config.safety.remote_start;
+  ReconstructOptions reconstruct;
+  reconstruct.voxel_mm = config.reconstruction.voxel_mm;
+  options.reconstructor = pipeline_reconstructor(reconstruct);
+  return options;
+}
+
+Result<void> run(const std::filesystem::path& file, const SignalStop& stop) {
+  const auto config = config::read_rig_config(file);
+  if (!config) return pass_on(config);
+  RealClock clock;
+  const auto open = open_devices(*config, clock);
+  if (!open) return pass_on(open, file.string());
+  return run_daemon(open->devices(), options_from(*config), clock, stop.token());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("scanrigd: the daemon of a scanning rig. Exit codes: docs/exit-codes.md");
+  std::filesystem::path config = "/etc/scanrig/rig.toml";
+  app.add_option("--config", config, "the rig's configuration")->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    fmt::print(stderr, "scanrigd: {}\n", error.what());
+    return static_cast<int>(ExitCode::usage);
+  }
+  const SignalStop stop;
+  const auto done = run(config, stop);
+  if (done) return static_cast<int>(ExitCode::ok);
+  fmt::print(stderr, "scanrigd: {}\n", done.error().message);
+  return static_cast<int>(exit_code(done.error().code));
+}

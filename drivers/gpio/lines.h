@@ -1,0 +1,52 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/clock.h"
+#include "core/result.h"
+
+namespace scanrig::gpio {
+
+struct LineSpec {
+  std::string name;  ///< as the kernel knows it, see gpioinfo(1)
+  bool active_low = false;
+};
+
+/// One output line; inactive when made and when destroyed.
+/// Threads: one owner.
+class Output {
+ public:
+  virtual ~Output() = default;
+  /// Fails with `io`.
+  virtual Result<void> set(bool active) = 0;
+};
+
+/// Several input lines, in the order they were asked for; true is active. Not debounced.
+/// Threads: one owner.
+class Inputs {
+ public:
+  virtual ~Inputs() = default;
+  /// Waits, in real time, until the levels differ from `known` or the deadline passes; returns the levels either way.
+  /// Fails with `io`.
+  virtual Result<std::vector<bool>> wait_change(const std::vector<bool>& known, Deadline deadline) = 0;
+};
+
+/// Where lines come from.
+class Lines {
+ public:
+  virtual ~Lines() = default;
+  /// Fail with `not_found` (no chip has a line of that name), `io` (the line is in use, access is refused).
+  virtual Result<std::unique_ptr<Output>> output(const LineSpec& line) = 0;
+  virtual Result<std::unique_ptr<Inputs>> inputs(const std::vector<LineSpec>& lines) = 0;
+};
+
+/// The GPIO chips of this machine, through libgpiod 1 or 2.
+std::unique_ptr<Lines> chip_lines(Clock& clock);
+
+/// Stand-in for machines without a GPIO chip, for tests: lines behind a Unix socket. See README.md for its words.
+std::unique_ptr<Lines> socket_lines(std::filesystem::path socket, Clock& clock);
+
+}  // namespace scanrig::gpio

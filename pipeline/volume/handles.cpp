@@ -1,0 +1,72 @@
+#include "pipeline/volume/handles.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/mesh/topology.h"
+#include "pipeline/volume/marching_cubes.h"
+#include "pipeline/volume/voxel_labels.h"
+
+namespace scanrig {
+namespace {
+
+constexpr float kWidestFilledMm = 2.0F;  // a doubtful tunnel wider than this is not filled
+
+/// Only the films, joined through faces, edges or corners, of at most `most` voxels.
+std::vector<std::size_t> small_films(const VoxelLabels& labels, const std::vector<std::size_t>& voxels,
+                                     std::size_t most) {
+  std::vector<std::size_t> result;
+  std::vector<bool> seen(voxels.size());
+  for (std::size_t start = 0; start < voxels.size(); ++start) {
+    if (seen[start]) continue;
+    std::vector<std::size_t> film = {start};
+    seen[start] = true;
+    for (std::size_t next = 0; next < film.size(); ++next) {
+      for (int k = 0; k < 27; ++k) {
+        const std::size_t other = voxels[film[next]] + labels.step(k % 3 - 1, k / 3 % 3 - 1, k / 9 - 1);
+        const auto found = std::lower_bound(voxels.begin(), voxels.end(), other);
+        if (found == voxels.end() || *found != other) continue;
+        const auto index = static_cast<std::size_t>(found - voxels.begin());
+        if (!seen[index]) film.push_back(index);
+        seen[index] = true;
+      }
+    }
+    if (film.size() > most) continue;
+    for (const auto index : film) result.push_back(voxels[index]);
+  }
+  return result;
+}
+
+/// Flips voxels; the change is kept if it leaves fewer handles.
+std::size_t flip_if_better(BlockGrid& grid, const VoxelLabels& labels, const std::vector<std::size_t>& voxels,
+                           float distance, float band_mm, long& genus) {
+  if (voxels.empty()) return 0;
+  BlockGrid changed = grid;
+  for (const auto i : voxels) changed.set(labels.node(i), distance, band_mm);
+  const long after = topology(largest_component(extract_surface(changed))).genus();
+  if (after >= genus) return 0;
+  genus = after;
+  grid = std::move(changed);
+  return voxels.size();
+}
+
+}  // namespace
+
+HandleRepair repair_handles(BlockGrid& grid, long genus, float band_mm) {
+  HandleRepair result{0, 0, genus};
+  const float shallow = 0.5F * grid.voxel();  // a flipped voxel's distance: the film is about a voxel thick
+  const auto most = static_cast<std::size_t>(std::pow(kWidestFilledMm / grid.voxel(), 2.0F));
+  // Cutting comes first: what no view saw may be empty, what a view saw through is.
+  for (const bool cutting : {true, false}) {
+    if (result.genus <= 0) break;
+    VoxelLabels labels(grid);
+    std::vector<std::size_t> films = labels.grow(/*inside=*/cutting);
+    if (!cutting) films = small_films(labels, films, most);
+    const std::size_t flipped =
+        flip_if_better(grid, labels, films, cutting ? shallow : -shallow, band_mm, result.genus);
+    (cutting ? result.cut : result.filled) += flipped;
+  }
+  return result;
+}
+
+}  // namespace scanrig

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstddef>
+
+#include "pipeline/volume/block_grid.h"
+
+namespace scanrig {
+
+struct HandleRepair {
+  std::size_t cut = 0;     ///< voxels taken out of the solid
+  std::size_t filled = 0;  ///< voxels added to it
+  long genus = 0;          ///< of the largest component, after the repair
+};
+
+/// Undoes handles that rest on nothing measured, `genus` of them or fewer. A set is rebuilt from its certain voxels
+/// (those nearer to measured surface than to closed) by adding doubtful ones only where that makes no new loop (simple
+/// points); what cannot be added is a film across a doubtful tunnel, which is filled if it is small, or across a
+/// doubtful bridge, which is cut. Loops among certain voxels stay: they were measured.
+HandleRepair repair_handles(BlockGrid& grid, long genus, float band_mm);
+
+}  // namespace scanrig

@@ -1,0 +1,105 @@
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <optional>
+
+#include "core/files.h"
+#include "core/virtual_clock.h"
+#include "daemon/jobs/pipeline_reconstructor.h"
+#include "daemon/run_daemon.h"
+#include "daemon/signal_stop.h"
+#include "sim/apps/operator.h"
+#include "sim/devices/sim_rig.h"
+
+namespace {
+
+using namespace scanrig;
+
+struct SimOptions {
+  sim::SimRigOptions rig;
+  std::filesystem::path socket = "out/api.sock";
+  std::filesystem::path jobs = "out/jobs";
+  int views = 8;
+  double voxel_mm = 0.25;
+  int threads = 0;
+  std::string clock = "real";
+  std::string operator_at_rig = "auto";
+};
+
+void add_options(CLI::App& app, SimOptions& o) {
+  app.add_option("--socket", o.socket, "socket of the API")->capture_default_str();
+  app.add_option("--jobs", o.jobs, "folder of the jobs; calibration.json beside them")->capture_default_str();
+  app.add_option("--object", o.rig.object, "mesh to scan (OBJ, PLY, GLB); default: the built-in figurine");
+  app.add_option("--height-mm", o.rig.height_mm, "height the object is scaled to")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 1000.0));
+  app.add_option("--seed", o.rig.seed, "placements, sensor noise, table errors")->capture_default_str();
+  app.add_option("--views", o.views, "views a pose")->capture_default_str()->check(CLI::Range(1, 360));
+  app.add_option("--scale", o.rig.image_scale, "of the images: 0.25 gives 320x240")
+      ->capture_default_str()
+      ->check(CLI::Range(0.05, 1.0));
+  app.add_flag("--same-rest", o.rig.same_rest_twice, "the operator forgets to turn the object over");
+  app.add_option("--voxel-mm", o.voxel_mm, "size of a voxel")->capture_default_str()->check(CLI::Range(0.05, 10.0));
+  app.add_option("--threads", o.threads, "of the reconstruction; 0: all")->check(CLI::Range(0, 1024));
+  app.add_option("--clock", o.clock, "real, or virtual: no waiting for the rig")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"real", "virtual"}));
+  app.add_option("--operator", o.operator_at_rig, "auto: somebody scans one object; none: use the API")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"auto", "none"}));
+}
+
+/// The object must be one that the rig can take before anything is written.
+Result<void> run(const SimOptions& o, const SignalStop& stop) {
+  std::unique_ptr<Clock> clock;
+  if (o.clock == "virtual") {
+    clock = std::make_unique<VirtualClock>();
+  } else {
+    clock = std::make_unique<RealClock>();
+  }
+  auto rig = sim::SimRig::create(o.rig, *clock);
+  if (!rig) return pass_on(rig);
+  sim::SimRig& r = **rig;
+
+  if (auto made = create_directories_synced(o.jobs); !made) return made;
+  const auto calibration = o.jobs / "calibration.json";
+  if (auto written = r.write_calibration(calibration); !written) return written;
+
+  ReconstructOptions reconstruct;
+  reconstruct.voxel_mm = o.voxel_mm;
+  reconstruct.threads = o.threads;
+  DaemonOptions options;
+  options.jobs = {.root = o.jobs,
+                  .calibration_file = calibration,
+                  .profile = r.profile_sha256(),
+                  .poses = o.rig.poses,
+                  .views = o.views};
+  options.socket = o.socket;
+  options.remote = true;
+  options.reconstructor = pipeline_reconstructor(reconstruct);
+  options.on_scanned = [&r](const std::filesystem::path& folder) { return r.write_truth(folder); };
+
+  std::optional<sim::Operator> somebody;
+  if (o.operator_at_rig == "auto") somebody.emplace(r, *clock);
+  return run_daemon({r.turntable(), r.projector(), r.camera(), r.panel()}, options, *clock, stop.token());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("scanrigd-sim: the daemon over a simulated rig in the same process. Exit codes: docs/exit-codes.md");
+  SimOptions options;
+  add_options(app, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
+  } catch (const CLI::ParseError& error) {
+    fmt::print(stderr, "scanrigd-sim: {}\n", error.what());
+    return static_cast<int>(ExitCode::usage);
+  }
+  const SignalStop stop;
+  const auto done = run(options, stop);
+  if (done) return static_cast<int>(ExitCode::ok);
+  fmt::print(stderr, "scanrigd-sim: {}\n", done.error().message);
+  return static_cast<int>(exit_code(done.error().code));
+}

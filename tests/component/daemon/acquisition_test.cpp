@@ -1,0 +1,80 @@
+#include "daemon/rig/acquisition.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "core/virtual_clock.h"
+#include "tests/component/daemon/fake_rig.h"
+
+namespace scanrig {
+namespace {
+
+class AcquisitionTest : public testing::Test {
+ protected:
+  VirtualClock clock;
+  fakes::FakeRig rig{clock};
+  Acquisition acquisition{rig.devices(), clock, {}};
+};
+
+TEST_F(AcquisitionTest, AViewIsFourImagesAtTheAngleMeasured) {
+  ASSERT_TRUE(acquisition.home());
+  const auto view = acquisition.take_view({"job", 0, 1}, {45.0});
+  ASSERT_TRUE(view) << view.error().message;
+  EXPECT_DOUBLE_EQ(view->record.commanded_deg, 45.0);
+  EXPECT_DOUBLE_EQ(view->record.measured_deg, 45.01);
+  EXPECT_DOUBLE_EQ(view->record.moving_ms, 1001.0);
+  EXPECT_DOUBLE_EQ(view->record.settling_ms, 200.0);
+  EXPECT_EQ(view->record.pixel_format, "Mono8");
+  EXPECT_EQ(view->images.left_pattern.at<unsigned char>(0, 0), 200);
+  EXPECT_EQ(view->images.right_plain.at<unsigned char>(0, 0), 100);
+  EXPECT_EQ(view->redone, 0);
+}
+
+TEST_F(AcquisitionTest, TheSecondPoseGoesOnInTheNextTurn) {
+  ASSERT_TRUE(acquisition.home());
+  for (const double angle : {0.0, 120.0, 240.0}) ASSERT_TRUE(acquisition.take_view({"job", 0, 0}, {angle}));
+  const auto view = acquisition.take_view({"job", 1, 0}, {0.0});
+  ASSERT_TRUE(view);
+  EXPECT_EQ(rig.turntable.targets.back(), 360.0);
+  EXPECT_NEAR(view->record.measured_deg, 0.01, 1e-9);
+}
+
+TEST_F(AcquisitionTest, ATableWoundUpByManyJobsIsUnwound) {
+  ASSERT_TRUE(acquisition.home());
+  for (int turn = 0; turn < 20; ++turn) {
+    for (const double angle : {0.0, 120.0, 240.0}) ASSERT_TRUE(acquisition.take_view({"job", 0, 0}, {angle}));
+  }
+  EXPECT_LE(std::ranges::max(rig.turntable.targets), 4 * 360.0);
+}
+
+TEST_F(AcquisitionTest, ALostExposureIsRedoneAndCounted) {
+  ASSERT_TRUE(acquisition.home());
+  rig.line.lose = 2;
+  const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
+  ASSERT_TRUE(view);
+  EXPECT_EQ(view->redone, 2);
+  EXPECT_EQ(rig.line.exposures, 4);
+  EXPECT_EQ(view->images.left_pattern.at<unsigned char>(0, 0), 200) << "the redone exposure is the pattern again";
+}
+
+TEST_F(AcquisitionTest, ACameraThatStaysSilentFailsTheView) {
+  ASSERT_TRUE(acquisition.home());
+  rig.line.lose = 100;
+  const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
+  ASSERT_FALSE(view);
+  EXPECT_EQ(view.error().code, ErrorCode::timeout);
+  EXPECT_EQ(rig.line.exposures, 4) << "one and three redone";
+}
+
+TEST_F(AcquisitionTest, FailuresOfTheTurntableArePassedOn) {
+  EXPECT_EQ(acquisition.take_view({"job", 0, 0}, {0.0}).error().code, ErrorCode::not_homed);
+  ASSERT_TRUE(acquisition.home());
+  rig.turntable.stalled = true;
+  EXPECT_EQ(acquisition.take_view({"job", 0, 1}, {45.0}).error().code, ErrorCode::stalled);
+  rig.turntable.unreachable = true;
+  EXPECT_EQ(acquisition.stop().error().code, ErrorCode::timeout);
+}
+
+}  // namespace
+}  // namespace scanrig

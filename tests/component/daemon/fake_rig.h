@@ -1,0 +1,234 @@
+#pragma once
+
+#include <mutex>
+#include <opencv2/core/mat.hpp>
+#include <string>
+#include <vector>
+
+#include "core/clock.h"
+#include "daemon/rig/devices.h"
+
+namespace scanrig::fakes {
+
+/// Devices that keep to their interfaces and remember what was done to them; nothing is rendered.
+/// The test's thread is the operator: it looks at the lamps and presses buttons.
+
+class FakeTurntable final : public Turntable {
+ public:
+  explicit FakeTurntable(Clock& clock) : clock_(clock) {}
+
+  Result<void> home(Deadline deadline) override {
+    const auto turned = turn_to(0.0, deadline);
+    const std::lock_guard guard(mutex);
+    homed_ = turned.has_value();
+    return turned ? Result<void>{} : pass_on(turned);
+  }
+  Result<Move> rotate_to(Degrees target, Deadline deadline) override {
+    {
+      const std::lock_guard guard(mutex);
+      if (!homed_) return fail(ErrorCode::not_homed, "turntable: not homed");
+    }
+    auto turned = turn_to(target.value, deadline);
+    if (turned) return turned;
+    const std::lock_guard guard(mutex);
+    homed_ = false;
+    return turned;
+  }
+  Result<void> stop(Deadline) override {
+    const std::lock_guard guard(mutex);
+    if (unreachable) return fail(ErrorCode::timeout, "turntable: no reply");
+    moving = false;
+    return {};
+  }
+  Result<void> reset_alarm(Deadline) override { return {}; }
+  Result<TurntableStatus> status(Deadline) override { return TurntableStatus{}; }
+  void request_stop() noexcept override {
+    {
+      const std::lock_guard guard(mutex);
+      stop_requested_ = true;
+    }
+    clock_.notify_all(changed_);
+  }
+
+  std::mutex mutex;  ///< of all that follows
+  bool moving = false;
+  bool stalled = false;
+  bool unreachable = false;
+  std::vector<double> targets;                ///< of every move, homing included
+  std::vector<Clock::TimePoint> move_starts;  ///< of the same
+
+ private:
+  /// 45 degrees a second; a stop ends it, and one from before it too.
+  Result<Move> turn_to(double target, Deadline deadline) {
+    std::unique_lock lock(mutex);
+    const auto start = clock_.now();
+    if (std::exchange(stop_requested_, false)) return fail(ErrorCode::stopped, "turntable: stopped on request");
+    targets.push_back(target);
+    move_starts.push_back(start);
+    moving = true;
+    const auto way = std::chrono::duration<double>(std::abs(target - angle_) / 45.0);
+    const auto arrival = start + std::chrono::duration_cast<Clock::Duration>(way) + std::chrono::milliseconds(1);
+    const auto until =
+        stalled ? std::min(deadline.at, start + std::chrono::seconds(2)) : std::min(deadline.at, arrival);
+    const bool stop = clock_.wait_until(lock, changed_, until, [this] { return stop_requested_; });
+    moving = false;
+    if (stop) {
+      stop_requested_ = false;
+      return fail(ErrorCode::stopped, "turntable: stopped on request");
+    }
+    if (stalled) return fail(ErrorCode::stalled, "turntable: no progress for 2 s");
+    if (until < arrival) return fail(ErrorCode::timeout, "turntable: not there in time");
+    angle_ = target;
+    return Move{{target}, {target + 0.01}, arrival - start, std::chrono::milliseconds(200)};
+  }
+
+  Clock& clock_;
+  std::condition_variable changed_;
+  double angle_ = 200.0;
+  bool homed_ = false;
+  bool stop_requested_ = false;
+};
+
+/// Projector and cameras share the trigger line.
+struct TriggerLine {
+  std::mutex mutex;
+  bool lit = false;
+  bool armed = false;
+  int exposures = 0;  ///< since the beginning
+  int lose = 0;       ///< the next exposures whose frames never arrive
+  Light last = Light::plain;
+};
+
+class FakeProjector final : public Projector {
+ public:
+  explicit FakeProjector(TriggerLine& line) : line_(line) {}
+  Result<void> fire(Light light, Deadline) override {
+    const std::lock_guard guard(line_.mutex);
+    ++line_.exposures;
+    line_.last = light;
+    line_.lit = false;  // the pulse is over when this returns
+    return {};
+  }
+  Result<void> dark(Deadline) override {
+    const std::lock_guard guard(line_.mutex);
+    line_.lit = false;
+    return {};
+  }
+  void request_dark() noexcept override {}
+
+ private:
+  TriggerLine& line_;
+};
+
+class FakeCamera final : public StereoCamera {
+ public:
+  FakeCamera(TriggerLine& line, Clock& clock) : line_(line), clock_(clock) {}
+  Result<void> arm(Deadline) override {
+    const std::lock_guard guard(line_.mutex);
+    line_.armed = true;
+    return {};
+  }
+  Result<StereoFrame> collect(Deadline deadline) override {
+    bool lost = false;
+    StereoFrame frame;
+    {
+      const std::lock_guard guard(line_.mutex);
+      if (!line_.armed) return fail(ErrorCode::protocol, "camera: not armed");
+      line_.armed = false;
+      lost = line_.lose > 0;
+      if (lost) --line_.lose;
+      const cv::Scalar grey(line_.last == Light::pattern ? 200 : 100);
+      frame.left = cv::Mat(48, 64, CV_8UC1, grey);
+      frame.right = cv::Mat(48, 64, CV_8UC1, grey);
+      frame.taken = clock_.now();
+    }
+    if (lost) {
+      clock_.sleep_until(deadline.at);
+      return fail(ErrorCode::timeout, "camera: no frame");
+    }
+    return frame;
+  }
+
+ private:
+  TriggerLine& line_;
+  Clock& clock_;
+};
+
+class FakePanel final : public Panel {
+ public:
+  explicit FakePanel(Clock& clock) : clock_(clock) {}
+
+  Result<PanelInputs> wait_change(const PanelInputs& known, Deadline deadline) override {
+    std::unique_lock lock(mutex_);
+    clock_.wait_until(lock, changed_, deadline.at, [&] { return broken_ || inputs_ != known; });
+    if (broken_) return fail(ErrorCode::io, "panel: unplugged");
+    seen_ = inputs_;
+    clock_.notify_all(changed_);
+    return inputs_;
+  }
+  Result<void> show(const PanelOutputs& outputs, Deadline) override {
+    {
+      const std::lock_guard guard(mutex_);
+      outputs_ = outputs;
+      attached_ = true;
+    }
+    attach_.notify_all();
+    clock_.notify_all(changed_);
+    return {};
+  }
+
+  // The operator's side.
+
+  /// Until somebody drives the panel, in real time: the clock knows nobody yet who could keep it from running away.
+  void wait_attached() {
+    std::unique_lock lock(mutex_);
+    attach_.wait(lock, [&] { return attached_; });
+  }
+
+  /// Looks at the lamps until `as_wanted`, for a virtual hour at most.
+  bool wait_for_lamps(const std::function<bool(const PanelOutputs&)>& as_wanted) {
+    std::unique_lock lock(mutex_);
+    return clock_.wait_until(lock, changed_, clock_.now() + std::chrono::hours(1), [&] { return as_wanted(outputs_); });
+  }
+  /// Presses until the panel's owner has seen it, then lets go.
+  void press(bool PanelInputs::*button) {
+    set(button, true);
+    set(button, false);
+  }
+  void set(bool PanelInputs::*input, bool value) {
+    std::unique_lock lock(mutex_);
+    inputs_.*input = value;
+    clock_.notify_all(changed_);
+    clock_.wait_until(lock, changed_, clock_.now() + std::chrono::hours(1), [&] { return seen_ == inputs_; });
+  }
+  void break_down(bool broken) {
+    {
+      const std::lock_guard guard(mutex_);
+      broken_ = broken;
+    }
+    clock_.notify_all(changed_);
+  }
+
+ private:
+  Clock& clock_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  PanelInputs inputs_;
+  PanelInputs seen_;
+  PanelOutputs outputs_;
+  bool broken_ = false;
+  std::condition_variable attach_;
+  bool attached_ = false;
+};
+
+struct FakeRig {
+  explicit FakeRig(Clock& clock) : turntable(clock), projector(line), camera(line, clock), panel(clock) {}
+  Devices devices() { return {turntable, projector, camera, panel}; }
+  TriggerLine line;
+  FakeTurntable turntable;
+  FakeProjector projector;
+  FakeCamera camera;
+  FakePanel panel;
+};
+
+}  // namespace scanrig::fakes

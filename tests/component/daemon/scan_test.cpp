@@ -1,0 +1,336 @@
+#include <gmock/gmock.h>
+
+#include <thread>
+
+#include "core/virtual_clock.h"
+#include "daemon/run_daemon.h"
+#include "tests/component/daemon/fake_reconstructor.h"
+#include "tests/component/daemon/fake_rig.h"
+#include "tests/unit/pipeline/scan/scan_samples.h"
+
+namespace scanrig {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::seconds;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+/// A whole daemon over fake devices on a virtual clock; the test is the operator.
+class Daemon : public scan_samples::FolderTest {
+ protected:
+  void SetUp() override {
+    FolderTest::SetUp();
+    scan_samples::write_text(folder_ / "calibration.json", scan_samples::calibration_json());
+    options.jobs = {
+        .root = folder_ / "jobs", .calibration_file = folder_ / "calibration.json", .profile = {}, .views = 3};
+    options.socket = folder_ / "api.sock";
+    options.reconstructor = [this](const Calibration&, const Manifest&) {
+      return std::make_unique<fakes::FakeReconstructor>(log);
+    };
+  }
+  void TearDown() override {
+    if (thread.joinable()) shut_down();
+    FolderTest::TearDown();
+  }
+  void boot() {
+    const Clock::Busy until_it_runs(clock);
+    thread = std::thread([this] { result = run_daemon(rig.devices(), options, clock, stop.get_token()); });
+    rig.panel.wait_attached();
+  }
+  void shut_down() {
+    stop.request_stop();
+    thread.join();
+  }
+
+  bool wait_ready() {
+    return rig.panel.wait_for_lamps([](const auto& l) { return l.start_lamp && !l.flip_request; });
+  }
+  bool wait_flip() {
+    return rig.panel.wait_for_lamps([](const auto& l) { return l.flip_request; });
+  }
+  bool wait_halted() {
+    return rig.panel.wait_for_lamps([](const auto& l) { return l.amber && !l.busy && !l.start_lamp; });
+  }
+  bool wait_fault() {
+    return rig.panel.wait_for_lamps([](const auto& l) { return l.red && !l.busy; });
+  }
+  bool wait_busy() {
+    return rig.panel.wait_for_lamps([](const auto& l) { return l.busy && l.green; });
+  }
+  bool wait_pass() {
+    return rig.panel.wait_for_lamps([](const auto& l) { return l.pass && l.start_lamp; });
+  }
+  bool wait_fail() {
+    return rig.panel.wait_for_lamps([](const auto& l) { return l.fail && l.start_lamp; });
+  }
+  void get_ready() {
+    ASSERT_TRUE(wait_halted());
+    rig.panel.press(&PanelInputs::reset);
+    ASSERT_TRUE(wait_ready());
+  }
+  void scan_both_poses() {
+    rig.panel.press(&PanelInputs::start);
+    ASSERT_TRUE(wait_flip());
+    rig.panel.press(&PanelInputs::start);
+  }
+
+  std::vector<fs::path> job_folders() const {
+    std::vector<fs::path> folders;
+    for (const auto& entry : fs::directory_iterator(folder_ / "jobs")) folders.push_back(entry.path());
+    std::ranges::sort(folders);
+    return folders;
+  }
+  ScanFolder only_job() const {
+    const auto folders = job_folders();
+    EXPECT_EQ(folders.size(), 1u);
+    auto scan = ScanFolder::open(folders.at(0));
+    EXPECT_TRUE(scan) << scan.error().message;
+    return std::move(*scan);
+  }
+  void expect_all_stored_views_readable(const ScanFolder& scan) {
+    for (std::size_t pose = 0; pose < scan.manifest().poses.size(); ++pose) {
+      for (std::size_t view = 0; view < scan.manifest().poses[pose].views.size(); ++view) {
+        // The sample calibration is for images of the fakes' size.
+        EXPECT_TRUE(scan.load_images(pose, view)) << pose << "/" << view;
+      }
+    }
+  }
+
+  VirtualClock clock;
+  fakes::FakeRig rig{clock};
+  fakes::ReconstructionLog log;
+  DaemonOptions options;
+  std::stop_source stop;
+  Result<void> result;
+  std::thread thread;
+};
+
+TEST_F(Daemon, MakesOneModelFromTwoPoses) {
+  boot();
+  get_ready();
+  scan_both_poses();
+  ASSERT_TRUE(wait_pass());
+  shut_down();
+  EXPECT_TRUE(result) << result.error().message;
+
+  const auto scan = only_job();
+  EXPECT_EQ(scan.manifest().state, "scanned");
+  ASSERT_EQ(scan.manifest().poses.size(), 2u);
+  for (const auto& pose : scan.manifest().poses) {
+    EXPECT_TRUE(pose.complete);
+    EXPECT_EQ(pose.views.size(), 3u);
+  }
+  EXPECT_NEAR(scan.manifest().poses[1].views[2].measured_deg, 240.01, 1e-9);
+  expect_all_stored_views_readable(scan);
+  EXPECT_EQ(*read_file(model_file(scan.path())), "glTF");
+  EXPECT_THAT(log.calls, ElementsAre("view 0/0", "view 0/1", "view 0/2", "pose 0", "view 1/0", "view 1/1", "view 1/2",
+                                     "pose 1", "finish"));
+  for (const auto& [pattern, plain] : log.grey_levels) EXPECT_GT(pattern, plain);
+  EXPECT_THAT(rig.turntable.targets, ElementsAre(0, 0, 120, 240, 360, 480, 600));
+  EXPECT_FALSE(fs::exists(options.socket)) << "the socket goes with the daemon";
+}
+
+TEST_F(Daemon, NothingMovesBeforeResetAndTwoSecondsOfWarning) {
+  boot();
+  ASSERT_TRUE(wait_halted());
+  EXPECT_TRUE(rig.turntable.targets.empty());
+  const auto pressed = clock.now();
+  rig.panel.press(&PanelInputs::reset);
+  ASSERT_TRUE(wait_ready());
+  const std::lock_guard guard(rig.turntable.mutex);
+  ASSERT_EQ(rig.turntable.move_starts.size(), 1u);
+  EXPECT_GE(rig.turntable.move_starts[0] - pressed, seconds(2));
+}
+
+TEST_F(Daemon, DoesTwoJobsInARow) {
+  boot();
+  get_ready();
+  scan_both_poses();
+  ASSERT_TRUE(wait_pass());
+  scan_both_poses();
+  ASSERT_TRUE(rig.panel.wait_for_lamps([](const auto& l) { return l.busy; }));
+  ASSERT_TRUE(wait_ready());
+  shut_down();
+  EXPECT_EQ(job_folders().size(), 2u);
+  for (const auto& folder : job_folders()) EXPECT_TRUE(fs::exists(report_file(folder)));
+}
+
+TEST_F(Daemon, LostFramesAreRedoneWithoutAFault) {
+  rig.line.lose = 3;
+  boot();
+  get_ready();
+  scan_both_poses();
+  ASSERT_TRUE(wait_pass());
+  EXPECT_EQ(rig.line.exposures, 12 + 3);
+}
+
+TEST_F(Daemon, ACameraThatGoesSilentInterruptsTheJobAndLatches) {
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_flip());
+  {
+    const std::lock_guard guard(rig.line.mutex);
+    rig.line.lose = 4;
+  }
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_fault());
+  rig.panel.press(&PanelInputs::start);
+  const auto moves = rig.turntable.targets.size();
+  rig.panel.press(&PanelInputs::reset);
+  ASSERT_TRUE(wait_ready());
+  EXPECT_EQ(rig.turntable.targets.size(), moves + 1) << "Reset homes, Start did nothing";
+  shut_down();
+  EXPECT_EQ(only_job().manifest().state, "interrupted");
+  EXPECT_EQ(only_job().manifest().poses.at(0).views.size(), 3u);
+  EXPECT_THAT(read_failure(only_job().path())->message, HasSubstr("no frame"));
+}
+
+TEST_F(Daemon, AStalledTableIsAFaultThatNamesIt) {
+  boot();
+  ASSERT_TRUE(wait_halted());
+  rig.turntable.stalled = true;
+  rig.panel.press(&PanelInputs::reset);
+  ASSERT_TRUE(wait_fault());
+  {
+    const std::lock_guard guard(rig.turntable.mutex);
+    rig.turntable.stalled = false;
+  }
+  rig.panel.press(&PanelInputs::reset);
+  EXPECT_TRUE(wait_ready());
+}
+
+TEST_F(Daemon, TheEstopStopsAMovingTableAndNothingResumesByItself) {
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_busy());
+  rig.panel.set(&PanelInputs::estop_ok, false);
+  ASSERT_TRUE(wait_fault());
+  rig.panel.set(&PanelInputs::estop_ok, true);
+  const auto moves = rig.turntable.targets.size();
+  EXPECT_FALSE(rig.turntable.moving);
+  rig.panel.press(&PanelInputs::start);
+  clock.sleep_for(seconds(60));
+  EXPECT_EQ(rig.turntable.targets.size(), moves);
+  rig.panel.press(&PanelInputs::reset);
+  EXPECT_TRUE(wait_ready());
+}
+
+TEST_F(Daemon, StopCancelsTheJob) {
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_busy());
+  rig.panel.press(&PanelInputs::stop);
+  ASSERT_TRUE(wait_halted());
+  rig.panel.press(&PanelInputs::reset);
+  ASSERT_TRUE(wait_ready()) << "a stop asked for in the past must not end the homing";
+  shut_down();
+  EXPECT_EQ(only_job().manifest().state, "cancelled");
+}
+
+TEST_F(Daemon, AShutdownInTheMiddleOfAScanIsCleanAndKeepsWhatIsStored) {
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_flip());
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_busy());
+  shut_down();
+  EXPECT_TRUE(result) << result.error().message;
+  EXPECT_FALSE(rig.turntable.moving);
+  EXPECT_FALSE(rig.line.lit);
+  const auto scan = only_job();
+  EXPECT_EQ(scan.manifest().state, "interrupted");
+  EXPECT_GE(scan.manifest().poses.at(0).views.size(), 3u);
+  expect_all_stored_views_readable(scan);
+}
+
+TEST_F(Daemon, AShutdownWithAnUnreachableTableSaysSo) {
+  boot();
+  ASSERT_TRUE(wait_halted());
+  {
+    const std::lock_guard guard(rig.turntable.mutex);
+    rig.turntable.unreachable = true;
+  }
+  shut_down();
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, ErrorCode::timeout);
+  EXPECT_THAT(result.error().message, HasSubstr("may be moving"));
+}
+
+TEST_F(Daemon, AFailedReconstructionFailsTheJobAndLeavesNoModel) {
+  log.answer_to_finish = fail(ErrorCode::same_rest, "the object was not turned over");
+  boot();
+  get_ready();
+  scan_both_poses();
+  ASSERT_TRUE(wait_fail());
+  shut_down();
+  EXPECT_FALSE(fs::exists(model_folder(only_job().path())));
+  EXPECT_EQ(read_failure(only_job().path())->code, ErrorCode::same_rest);
+  EXPECT_EQ(only_job().manifest().state, "scanned") << "the frames are all there";
+}
+
+TEST_F(Daemon, AnObjectThatCannotBeReconstructedIsNotTurnedOver) {
+  log.answer_to_view = fail(ErrorCode::out_of_range, "the object is larger than the working volume");
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_fail());
+  shut_down();
+  EXPECT_EQ(only_job().manifest().state, "failed");
+  EXPECT_EQ(only_job().manifest().poses.size(), 1u);
+}
+
+TEST_F(Daemon, AMissingCalibrationIsAFaultAndLeavesNoFolder) {
+  boot();
+  get_ready();
+  fs::remove(options.jobs.calibration_file);
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_fault());
+  EXPECT_TRUE(job_folders().empty());
+}
+
+TEST_F(Daemon, AnUnpluggedPanelIsAFault) {
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_busy());
+  rig.panel.break_down(true);
+  clock.sleep_for(seconds(5));
+  rig.panel.break_down(false);
+  EXPECT_TRUE(wait_fault());
+}
+
+TEST_F(Daemon, ASecondDaemonIsRefused) {
+  boot();
+  ASSERT_TRUE(wait_halted());
+  fakes::FakeRig other(clock);
+  const auto second = run_daemon(other.devices(), options, clock, {});
+  ASSERT_FALSE(second);
+  EXPECT_EQ(second.error().code, ErrorCode::refused);
+  auto elsewhere = options;
+  elsewhere.jobs.root = folder_ / "other_jobs";
+  const auto same_socket = run_daemon(other.devices(), elsewhere, clock, {});
+  ASSERT_FALSE(same_socket);
+  EXPECT_EQ(same_socket.error().code, ErrorCode::refused);
+}
+
+TEST_F(Daemon, TheScannedHookSeesTheWholeScanBeforeAnybodyIsTold) {
+  int views_seen = 0;
+  options.on_scanned = [&](const fs::path& folder) -> Result<void> {
+    const auto scan = ScanFolder::open(folder);
+    for (const auto& pose : scan->manifest().poses) views_seen += static_cast<int>(pose.views.size());
+    return write_file_atomically(folder / "truth.json", "{}");
+  };
+  boot();
+  get_ready();
+  scan_both_poses();
+  ASSERT_TRUE(wait_pass());
+  EXPECT_EQ(views_seen, 6);
+}
+
+}  // namespace
+}  // namespace scanrig

@@ -1,0 +1,247 @@
+#include "config/rig_config.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+#include "tests/unit/config/file_under_test.h"
+
+namespace scanrig::config {
+namespace {
+
+using testing::HasSubstr;
+using testing::StartsWith;
+
+const std::filesystem::path kDrives = std::filesystem::path(SCANRIG_SOURCE_DIR) / "config" / "drives";
+
+class RigConfigTest : public FileUnderTest {
+ protected:
+  const std::string example_ = shipped("rigs/example.toml");
+
+  Result<RigConfig> read(const std::string& text) const {
+    write(text);
+    return read_rig_config(file_, kDrives);
+  }
+  /// The example with one text replaced has exactly one problem, on `line_with`'s line.
+  void expect_problem(const std::string& from, const std::string& to, const std::string& problem,
+                      const std::string& line_with = "") const {
+    SCOPED_TRACE(to);
+    const std::string text = replaced(example_, from, to);
+    const auto rig = read(text);
+    ASSERT_FALSE(rig);
+    EXPECT_EQ(rig.error().code, ErrorCode::invalid_input);
+    const int line = line_of(text, line_with.empty() ? to : line_with);
+    EXPECT_EQ(rig.error().message, fmt::format("{}:{}: {}", file_.string(), line, problem));
+  }
+};
+
+TEST_F(RigConfigTest, TheShippedExampleIsReadAsItIsWritten) {
+  const auto read = read_rig_config(std::filesystem::path(SCANRIG_SOURCE_DIR) / "config/rigs/example.toml");
+  ASSERT_TRUE(read) << read.error().message;
+  const RigConfig& rig = *read;
+  EXPECT_EQ(rig.safety.estop.line, "ESTOP_OK");
+  EXPECT_TRUE(rig.safety.estop.active_low);
+  EXPECT_EQ(rig.safety.guard.value().line, "GUARD_OK");
+  EXPECT_FALSE(rig.safety.remote_start);
+  const auto& table = rig.turntable.modbus;
+  EXPECT_EQ(table.profile.name, "leadshine-rs");
+  EXPECT_EQ(table.line.device, "/dev/scanrig/turntable");
+  EXPECT_EQ(table.line.baud, 115200);
+  EXPECT_EQ(table.line.parity, modbus::Parity::none);
+  EXPECT_EQ(table.line.reply_timeout, std::chrono::milliseconds(60));
+  EXPECT_EQ(table.scale.pulses_per_motor_rev, 10000);
+  EXPECT_EQ(table.scale.gear_ratio, 90.0);
+  EXPECT_TRUE(table.scale.positive_ccw);
+  EXPECT_EQ(table.home_mode, "switch");
+  EXPECT_EQ(table.speed, DegreesPerSecond{45});
+  EXPECT_EQ(table.acceleration, DegreesPerSecond2{90});
+  EXPECT_EQ(table.backlash, Degrees{0.5});
+  EXPECT_EQ(table.tolerance, Degrees{0.02});
+  EXPECT_EQ(table.settle, std::chrono::milliseconds(200));
+  EXPECT_EQ(rig.projector.driver, ProjectorConfig::Driver::gpio);
+  EXPECT_EQ(rig.projector.pulse, std::chrono::microseconds(15000));
+  EXPECT_EQ(rig.stereo_camera.left.serial, "40012345");
+  EXPECT_EQ(rig.stereo_camera.right.address, "192.168.10.12");
+  EXPECT_EQ(rig.stereo_camera.packet_bytes, 8192);
+  EXPECT_EQ(rig.panel.inputs.at("start").line, "START");
+  EXPECT_EQ(rig.panel.outputs.at("lamp_green").line, "LAMP_GREEN");
+  EXPECT_EQ(rig.calibration_file, "/var/lib/scanrig/calibration.json");
+  EXPECT_EQ(rig.recipes.at("default").views, 8);
+  EXPECT_EQ(rig.recipes.at("default").flip_timeout, std::chrono::minutes(30));
+  EXPECT_EQ(rig.storage.reserve_gib, 20);
+  EXPECT_EQ(rig.reconstruction.voxel_mm, 0.25);
+  EXPECT_EQ(rig.api.socket, "/run/scanrig/api.sock");
+  EXPECT_FALSE(rig.api.http_port);
+}
+
+TEST_F(RigConfigTest, EachKindOfProblemIsToldWithItsLineAndWhatIsAllowed) {
+  expect_problem("baud = 115200", "baud = 115201",
+                 "[turntable] baud: 115201 is not one of 9600, 19200, 38400, 57600, 115200");
+  expect_problem("baud = 115200", "baud = \"fast\"", "[turntable] baud: must be a whole number");
+  expect_problem("speed_deg_s = 45", "speed_deg_s = true", "[turntable] speed_deg_s: must be a number");
+  expect_problem("settle_ms = 200", "settle_ms = -1", "[turntable] settle_ms: -1 is not between 0 and 10000");
+  expect_problem("settle_ms = 200", "settle_ms = 0.5", "[turntable] settle_ms: must be a whole number");
+  expect_problem("gear_ratio = 90.0", "gear_ratio = nan", "[turntable] gear_ratio: nan is not between 0.1 and 1000");
+  expect_problem("remote_start = false", "remote_start = 0", "[safety] remote_start: must be true or false");
+  expect_problem("positive = \"ccw\"", "positive = \"left\"", "[turntable] positive: \"left\" is not one of ccw, cw");
+  expect_problem("line = \"PROJ_TRIG\"", "line = \"\"", "[projector] line: must not be empty");
+  expect_problem("line = \"PROJ_TRIG\"", "line = 7", "[projector] line: must be a text in quotes");
+  expect_problem("unit_id = 1\n", "", "[turntable] unit_id: missing", "[turntable]");
+  expect_problem("mode = \"switch\"", "mode = \"wall\"",
+                 "[turntable] home.mode: \"wall\" is not one of here, limit, switch");
+  expect_problem("mode = \"switch\", ", "", "[turntable] home.mode: missing", "home = ");
+  expect_problem("[recipe.default]", "[recipe.fast]", "[recipe] default: missing");
+  expect_problem("views = 8", "views = 2", "[recipe.default] views: 2 is not between 3 and 72");
+  expect_problem("schema = 1", "schema = 2", "schema: 2 is not one of 1");
+  expect_problem("driver = \"modbus\"", "driver = \"grbl\"", "[turntable] driver: \"grbl\" is not one of modbus");
+  expect_problem("home = { mode = \"switch\", offset_deg = 0.0 }", "home = 3", "[turntable] home: must be a table");
+}
+
+TEST_F(RigConfigTest, UnknownKeysAndSectionsAreProblems) {
+  expect_problem(
+      "settle_ms = 200", "settle_ms = 200\nsettle = 1",
+      "[turntable] settle: unknown key; known here: acceleration_deg_s2, backlash_deg, baud, device, driver, "
+      "gear_ratio, home, parity, positive, profile, pulses_per_motor_rev, reply_timeout_ms, settle_ms, "
+      "soft_limits, speed_deg_s, tolerance_deg, unit_id",
+      "settle = 1");
+  expect_problem("offset_deg = 0.0", "offset_deg = 0.0, speed = 3",
+                 "[turntable] home.speed: unknown key; known here: mode, offset_deg");
+  const auto rig = read(example_ + "\n[extra]\na = 1\n");
+  ASSERT_FALSE(rig);
+  EXPECT_THAT(rig.error().message, HasSubstr("extra: unknown key; known here: api, calibration"));
+}
+
+TEST_F(RigConfigTest, RulesBetweenKeysAreChecked) {
+  expect_problem("pulse_us = 15000", "pulse_us = 11000",
+                 "[projector] pulse_us: 11000 is shorter than the exposure_us of 12000 in [stereo_camera]");
+  expect_problem("\"40012346\"", "\"40012345\"", "[stereo_camera] right: has the same serial number as left",
+                 "right = ");
+  expect_problem("unit_id = 1", "unit_id = 32",
+                 "[turntable] unit_id: 32 is not between 1 and 31, as leadshine-rs allows");
+  expect_problem(
+      "speed_deg_s = 45", "speed_deg_s = 300",
+      "[turntable] speed_deg_s: 300 deg/s at the table is 4500 rpm at the motor, the drive allows more than 0 "
+      "to 3000 rpm");
+  expect_problem("tolerance_deg = 0.02", "tolerance_deg = 0.0005",
+                 "[turntable] tolerance_deg: 0.0005 is less than 2 pulses of the motor; at least 0.0008 is possible");
+  expect_problem("settle_ms = 200", "soft_limits = { min_deg = 10, max_deg = 10 }\nsettle_ms = 200",
+                 "[turntable] soft_limits.max_deg: must be more than min_deg", "soft_limits");
+  const std::string no_guard = replaced(example_, "guard = { line", "#guard = { line");
+  const auto remote = read(replaced(no_guard, "remote_start = false", "remote_start = true"));
+  ASSERT_FALSE(remote);
+  EXPECT_THAT(remote.error().message, HasSubstr("[safety] remote_start: true needs a guard"));
+  const auto guarded = read(replaced(no_guard, "\"on_reset\"", "\"guarded\""));
+  ASSERT_FALSE(guarded);
+  EXPECT_THAT(guarded.error().message, HasSubstr("[safety] home_after_restart: \"guarded\" needs a guard"));
+  EXPECT_TRUE(read(no_guard));
+}
+
+TEST_F(RigConfigTest, AProfileThatIsNotThereOrWrongIsToldAtItsKey) {
+  const std::string missing = replaced(example_, "\"leadshine-rs\"", "\"none-such\"");
+  auto rig = read(missing);
+  ASSERT_FALSE(rig);
+  EXPECT_THAT(rig.error().message, HasSubstr("[turntable] profile: there is none of "));
+  EXPECT_THAT(rig.error().message, HasSubstr((kDrives / "none-such.toml").string()));
+  rig = read(replaced(example_, "\"leadshine-rs\"", "\"../../etc/passwd\""));
+  ASSERT_FALSE(rig);
+  EXPECT_THAT(rig.error().message, HasSubstr("[turntable] profile: must be a name, not a path"));
+}
+
+TEST_F(RigConfigTest, OtherDriversAreCheckedWithTheirOwnKeys) {
+  std::string text = replaced(example_, "driver = \"gpio\"                         # gpio | light",
+                              "driver = \"manual\"                       # gpio | light");
+  auto rig = read(text);
+  ASSERT_FALSE(rig);
+  EXPECT_THAT(rig.error().message, HasSubstr("[projector] line: unknown key; known here: driver, warm_up_s"));
+  text = replaced(replaced(text, "line = \"PROJ_TRIG\"", "#"), "pulse_us", "#");
+  rig = read(text);
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->projector.driver, ProjectorConfig::Driver::manual);
+
+  const std::string panel =
+      "[panel]\ndriver = \"modbus-io\"\ndevice = \"/dev/ttyUSB1\"\nbaud = 9600\nparity = \"even\"\nunit_id = 3\n"
+      "reply_timeout_ms = 100\nstart = { channel = 0 }\nreset = { channel = 1, active = \"low\" }\n"
+      "lamp_red = { channel = 0 }\n";
+  const auto begin = example_.find("[panel]"), end = example_.find("[calibration]");
+  rig = read(example_.substr(0, begin) + panel + example_.substr(end));
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->panel.driver, PanelConfig::Driver::modbus_io);
+  EXPECT_EQ(rig->panel.io_module.unit_id, 3);
+  EXPECT_EQ(rig->panel.inputs.at("reset").channel, 1);
+  EXPECT_TRUE(rig->panel.inputs.at("reset").active_low);
+}
+
+TEST_F(RigConfigTest, RelativePathsStartAtTheFilesFolder) {
+  const auto rig = read(replaced(example_, "/var/lib/scanrig/calibration.json", "calibration.json"));
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->calibration_file, folder_ / "calibration.json");
+}
+
+TEST_F(RigConfigTest, AllProblemsAreToldAtOnceInOrderOfLine) {
+  std::string text = replaced(example_, "baud = 115200", "baud = 1");
+  text = replaced(text, "estop = { line = \"ESTOP_OK\"", "estop = { line = 1");
+  text = replaced(text, "voxel_mm = 0.25", "voxel_mm = 0");
+  const auto rig = read(text);
+  ASSERT_FALSE(rig);
+  const std::string& told = rig.error().message;
+  EXPECT_EQ(std::ranges::count(told, '\n'), 2);
+  EXPECT_LT(told.find("[safety] estop.line"), told.find("[turntable] baud"));
+  EXPECT_LT(told.find("[turntable] baud"), told.find("[reconstruction] voxel_mm"));
+}
+
+TEST_F(RigConfigTest, MoreThanTwentyProblemsAreCounted) {
+  std::string text = "schema = 1\n";
+  for (int i = 0; i < 30; ++i) text += fmt::format("unknown{} = 1\n", i);
+  const auto rig = read(text);
+  ASSERT_FALSE(rig);
+  EXPECT_EQ(std::ranges::count(rig.error().message, '\n'), 20);
+  EXPECT_THAT(rig.error().message, HasSubstr("\nand 20 more"));  // ten sections are missing, too
+}
+
+TEST_F(RigConfigTest, TextThatIsNotTomlIsToldWithItsLine) {
+  const auto rig = read("schema = 1\n[safety\n");
+  ASSERT_FALSE(rig);
+  EXPECT_EQ(rig.error().code, ErrorCode::invalid_input);
+  EXPECT_THAT(rig.error().message, StartsWith(file_.string() + ":2: "));
+}
+
+TEST_F(RigConfigTest, AMissingFileIsNotFound) {
+  const auto rig = read_rig_config(folder_ / "absent.toml");
+  ASSERT_FALSE(rig);
+  EXPECT_EQ(rig.error().code, ErrorCode::not_found);
+  EXPECT_THAT(rig.error().message, HasSubstr("absent.toml"));
+}
+
+/// Bytes lost, doubled, changed, lines swapped and dropped: never a crash, every refusal with file and line.
+TEST_F(RigConfigTest, DamagedFilesAreRefusedOrReadButNeverCrash) {
+  std::mt19937 random(1);
+  const auto below = [&](std::size_t limit) {
+    return std::uniform_int_distribution<std::size_t>(0, limit - 1)(random);
+  };
+  static constexpr std::string_view kBytes("\0\"'=[]{}.#\n\r\t0123456789-+eE_xn\x80\xFF\xC3", 33);
+  int refused = 0;
+  for (int round = 0; round < 1000; ++round) {
+    std::string text = example_;
+    for (std::size_t change = 0; change <= below(4); ++change) {
+      const std::size_t at = below(text.size());
+      switch (below(5)) {
+        case 0: text.erase(at, 1 + below(20)); break;
+        case 1: text.insert(at, text.substr(below(text.size()), below(40))); break;
+        case 2: text[at] = kBytes[below(kBytes.size())]; break;
+        case 3: text.insert(at, 1 + below(300), kBytes[below(kBytes.size())]); break;
+        default: text.resize(at + 1); break;
+      }
+    }
+    const auto rig = read(text);
+    if (rig) continue;
+    ++refused;
+    ASSERT_EQ(rig.error().code, ErrorCode::invalid_input);
+    ASSERT_THAT(rig.error().message, StartsWith(file_.string() + ":"));
+  }
+  EXPECT_GT(refused, 500);
+}
+
+}  // namespace
+}  // namespace scanrig::config
