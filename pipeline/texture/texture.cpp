@@ -41,7 +41,7 @@ Result<void> check(const Mesh& mesh, std::span<const Photo> photos, const Textur
   }
   if (options.atlas_px < 16 || options.atlas_px > 32768 || !(options.max_texels_per_px > 0.0) ||
       options.padding_px < 0 || !(options.edge_px >= 0.0) || !(options.edge_fade_px > 0.0) ||
-      !(options.max_incidence_deg > 0.0 && options.max_incidence_deg < 90.0) || !(options.sharpness >= 0.0)) {
+      !(options.max_incidence_deg > 0.0 && options.max_incidence_deg < 90.0)) {
     return fail(ErrorCode::invalid_input, "texture: an option is out of range");
   }
   return {};
