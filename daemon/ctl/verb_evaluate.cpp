@@ -6,18 +6,6 @@
 #include "pipeline/evaluate/evaluate.h"
 
 namespace scanrig::ctl {
-namespace {
-
-nlohmann::json to_json(const Gate& gate) {
-  return {{"name", gate.name},
-          {"limit", gate.limit},
-          {"measured", gate.measured},
-          {"at_most", gate.at_most},
-          {"ok", gate.ok()}};
-}
-
-}  // namespace
-
 ExitCode evaluate(const EvaluateVerb& verb) {
   const auto truth = read_truth(verb.scan);
   if (!truth) return complain(truth.error());
@@ -31,9 +19,7 @@ ExitCode evaluate(const EvaluateVerb& verb) {
   if (!scores) return complain(scores.error());
   const auto limits = gates(*scores);
   if (verb.json) {
-    auto json = scanrig::to_json(*scores);
-    for (const auto& gate : limits) json["gates"].push_back(to_json(gate));
-    fmt::print("{}\n", json.dump(2));
+    fmt::print("{}\n", to_json(*scores).dump(2));
   } else {
     fmt::print("{}", to_table(*scores));
   }

@@ -71,16 +71,11 @@ def stop(daemon):
             daemon.kill()
 
 
-def place_results(jobs, folder, keep):
-    """The one job's files directly under `folder`: moved there, or linked while the daemon still serves them."""
+def link_results(jobs, folder):
+    """The one job's files directly under `folder`, while they stay where the daemon knows them."""
     job = max((p for p in jobs.iterdir() if p.is_dir()), key=lambda p: p.name)
     for entry in job.iterdir():
-        if keep:
-            (folder / entry.name).symlink_to(os.path.relpath(entry, folder))
-        else:
-            entry.rename(folder / entry.name)
-    if not keep:
-        shutil.rmtree(jobs)
+        (folder / entry.name).symlink_to(os.path.relpath(entry, folder))
 
 
 def scores_of(options, folder):
@@ -125,7 +120,7 @@ def main():
             return followed
         if not options.keep:
             stop(daemon)
-        place_results(jobs, folder, options.keep)
+        link_results(jobs, folder)
         scored = scores_of(options, folder)
         print(f"Model   {folder}/model/model.glb\nReport  {folder}/model/report.json")
         print(f"Wall time {time.monotonic() - began:.1f} s")
