@@ -40,6 +40,7 @@ void read_projector(Section& s, std::chrono::microseconds exposure, ProjectorCon
   if (projector.driver == Driver::gpio) {
     s.text("line", projector.line);
     if (s.has("plain_line")) s.text("plain_line", projector.plain_line.emplace());
+    if (s.has("active")) s.choice<bool>("active", projector.active_low, {{"low", true}, {"high", false}});
   }
   if (projector.driver != Driver::manual) {
     s.number("pulse_us", projector.pulse, {10, 1'000'000});
@@ -97,7 +98,7 @@ void read_panel(Section& s, PanelConfig& panel) {
   const bool by_channel = panel.driver == Driver::modbus_io;
   if (by_channel) read_modbus_line(s, panel.io_module);
   panel.inputs["start"] = read_pin(s, "start", by_channel);
-  for (const char* key : {"stop", "reset", "part_present", "flipped"}) {
+  for (const char* key : {"stop", "reset", "part_present"}) {
     if (s.has(key)) panel.inputs[key] = read_pin(s, key, by_channel);
   }
   for (const char* key :
@@ -152,6 +153,9 @@ void read_rig(Section& root, const std::filesystem::path& base, const std::vecto
     s.number("reserve_gib", rig.storage.reserve_gib, {0, 100'000});
   });
   root.section("reconstruction", [&](Section& s) { read_reconstruction(s, rig.reconstruction); });
+  if (root.has("gpio")) {
+    root.section("gpio", [&](Section& s) { read_folder(s, "socket", base, rig.gpio_socket.emplace()); });
+  }
   root.section("api", [&](Section& s) {
     read_folder(s, "socket", base, rig.api.socket);
     if (s.has("http_port")) s.number("http_port", rig.api.http_port.emplace(), {1024, 65535});

@@ -37,6 +37,7 @@ struct ProjectorConfig {
   Driver driver = Driver::gpio;
   std::string line;                        ///< gpio: fires the dots and both cameras
   std::optional<std::string> plain_line;   ///< gpio: fires the cameras and even light, without the dots
+  bool active_low = false;                 ///< gpio: both lines
   std::chrono::microseconds pulse{15000};  ///< at least the exposure
   std::chrono::seconds warm_up{600};
 };
@@ -106,6 +107,7 @@ struct RigConfig {
   StorageConfig storage;
   ReconstructionConfig reconstruction;
   ApiConfig api;
+  std::optional<std::filesystem::path> gpio_socket;  ///< tests only: GPIO lines behind a socket instead of chips
 };
 
 /// Drive profiles are looked for in `drives`; by default in `drives` beside the file, in `../drives`, and in

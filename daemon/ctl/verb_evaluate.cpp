@@ -8,13 +8,12 @@
 namespace scanrig::ctl {
 namespace {
 
-std::string gate_line(const Gate& gate) {
-  return fmt::format("{:<44} {:>10.4g}  {} {:<8.4g} {}", gate.name, gate.measured,
-                     gate.at_most ? "<=" : ">=", gate.limit, gate.ok() ? "ok" : "NOT REACHED");
-}
-
 nlohmann::json to_json(const Gate& gate) {
-  return {{"name", gate.name}, {"limit", gate.limit}, {"measured", gate.measured}, {"ok", gate.ok()}};
+  return {{"name", gate.name},
+          {"limit", gate.limit},
+          {"measured", gate.measured},
+          {"at_most", gate.at_most},
+          {"ok", gate.ok()}};
 }
 
 }  // namespace
@@ -37,7 +36,6 @@ ExitCode evaluate(const EvaluateVerb& verb) {
     fmt::print("{}\n", json.dump(2));
   } else {
     fmt::print("{}", to_table(*scores));
-    for (const auto& gate : limits) fmt::print("{}\n", gate_line(gate));
   }
   const auto missed = std::ranges::count_if(limits, [](const Gate& gate) { return !gate.ok(); });
   if (missed == 0) return ExitCode::ok;

@@ -32,7 +32,7 @@ Result<Scores> evaluate(const Claim& claim, const Truth& truth, const ScanFolder
                         const EvaluateOptions& options, const Context& context);
 
 /// The model that a reconstruction left in `folder`: model.ply, texture coordinates of model.obj and model.png where
-/// they are, `pose_refinement.pose1_from_pose2` of report.json where it is. Fails with `not_found`, `io`,
+/// they are, `pose1_from_pose2` of report.json where it is. Fails with `not_found`, `io`,
 /// `invalid_input`.
 Result<Claim> read_claim(const std::filesystem::path& folder);
 

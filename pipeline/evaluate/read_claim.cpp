@@ -57,10 +57,9 @@ Result<std::optional<Transform>> read_pose2(const std::filesystem::path& file) {
   if (!text) return pass_on(text);
   const auto report = nlohmann::json::parse(*text, nullptr, false);
   if (report.is_discarded()) return fail(ErrorCode::invalid_input, "{}: not valid JSON", file.string());
-  if (!report.is_object() || !report.contains("pose_refinement")) return std::nullopt;
+  if (!report.is_object() || !report.contains("pose1_from_pose2")) return std::nullopt;
   std::optional<Error> fault;
-  JsonObject refinement(&report["pose_refinement"], "pose_refinement", &fault);
-  const Transform transform = refinement.transform("pose1_from_pose2");
+  const Transform transform = JsonObject(&report, "", &fault).transform("pose1_from_pose2");
   if (fault) return tl::unexpected<Error>(fault->in(file.string()));
   return transform;
 }

@@ -225,6 +225,7 @@ Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose
   if (!scene) return pass_on(scene);
   scene->witness1 = {&scene->measured1, pose1.views};
   scene->witness2 = {&scene->measured2, pose2.views};
+  if (context.stopped()) return fail(ErrorCode::stopped, "pose estimation: stopped");
   PoseEstimate estimate;
   std::vector<Hypothesis> field;
   if (options.stable_tangent_planes) {

@@ -17,8 +17,9 @@ constexpr int kTurnSteps = 30;      // over 360 deg
 constexpr int kKeys = kDistanceSteps * kAngleSteps * kAngleSteps * kAngleSteps;
 constexpr double kShortest = 0.12;  // pairs, as a share of the object's size
 constexpr double kLongest = 0.6;
-constexpr std::size_t kReferences = 200;  // points of surface 2 that vote
-constexpr std::size_t kPeaks = 3;         // motions taken from each
+constexpr std::size_t kReferences = 200;   // points of surface 2 that vote
+constexpr std::uint32_t kMostAlike = 400;  // pairs looked at under one key
+constexpr std::size_t kPeaks = 3;          // motions taken from each
 
 int angle_step(double cosine) {
   const double share = std::acos(std::clamp(cosine, -1.0, 1.0)) / std::numbers::pi;
@@ -100,9 +101,10 @@ std::vector<Vote> votes_of(const PairTable& table, std::span<const SurfacePoint>
     const int key = key_of(surface2[reference], other, size_mm);
     if (key < 0) continue;
     const double turn2 = turn_of(local2, other.point);
-    // A common key says little: its votes count less.
-    const float weight = 1.0F / std::sqrt(static_cast<float>(table.begin[key + 1] - table.begin[key]) + 1.0F);
-    for (std::uint32_t e = table.begin[key]; e < table.begin[key + 1]; ++e) {
+    // A common key (flat faces have them) says little: its votes count less, and a part of its pairs is enough.
+    const std::uint32_t alike = table.begin[key + 1] - table.begin[key];
+    const float weight = 1.0F / std::sqrt(static_cast<float>(alike) + 1.0F);
+    for (std::uint32_t e = table.begin[key]; e < table.begin[key + 1]; e += 1 + alike / kMostAlike) {
       const double turn = (table.entries[e].turn - turn2) / kTwoPi;
       const int step = static_cast<int>((turn - std::floor(turn)) * kTurnSteps) % kTurnSteps;
       votes[table.entries[e].reference * kTurnSteps + step] += weight;

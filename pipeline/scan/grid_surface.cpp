@@ -13,7 +13,7 @@ namespace {
 constexpr double kSteepest = 3.7;
 /// A plane through at least this many of the nine cells around.
 constexpr int kLeastNeighbours = 5;
-/// Noise along the normal, mm: Stanford's dragon scans (cells of 0.5 x 0.7 mm) lie 0.10 mm (median) off their
+/// Noise along the normal, mm: Stanford's dragon scans (cells of 0.5 x 0.7 mm) lie about 0.10 mm (median) off their
 /// neighbours' surfaces at up to 50 degrees of incidence and 0.15 mm beyond, the sum of two scans' noise.
 constexpr double kNoise = 0.1;
 

@@ -73,7 +73,6 @@ PhotoView::PhotoView(const Photo& photo, const Mesh& mesh, const RayScene& scene
       centre_(camera_from_model_.inverse().translation()),
       px_per_mm_at_1mm_(photo.camera.projection.fx / typical),
       cos_limit_(std::cos(to_radians(options.max_incidence_deg))),
-      sharpness_(options.sharpness),
       edge_px_(options.edge_px),
       edge_fade_px_(options.edge_fade_px),
       window_(window_of(mesh, photo)) {
@@ -141,7 +140,7 @@ std::optional<Sight> PhotoView::look(const Eigen::Vector3d& point, const Eigen::
 
   const double beyond = (cosine - cos_limit_) / (1.0 - cos_limit_);
   const double quality = beyond * beyond * px_per_mm_at_1mm_ / z;
-  return Sight{pixel, fade * fade * quality, fade * fade * std::pow(quality, sharpness_)};
+  return Sight{pixel, fade * fade * quality};
 }
 
 Sample PhotoView::sample(const Eigen::Vector2d& pixel) const {

@@ -15,8 +15,7 @@ Eigen::Vector3d pixel_ray(const Camera& camera, double u, double v);
 /// A point of the surface as one photo shows it.
 struct Sight {
   Eigen::Vector2d pixel;  ///< in the photo, distortion included
-  double vote = 0.0;      ///< 0..about 1: say in what the point's colour is not: cos^2 * resolution, less near edges
-  double weight = 0.0;    ///< 0..about 1: share in the blend: the same, sharpened
+  double weight = 0.0;    ///< 0..about 1: cos^2 of the incidence * resolution, fading out towards depth edges
 };
 
 struct Sample {
@@ -50,7 +49,7 @@ class PhotoView {
   Transform camera_from_model_;
   Eigen::Vector3d centre_;
   double px_per_mm_at_1mm_;  ///< focal length over the typical resolution
-  double cos_limit_, sharpness_, edge_px_, edge_fade_px_;
+  double cos_limit_, edge_px_, edge_fade_px_;
   cv::Rect window_;         ///< the pixels that can show the mesh; the two maps cover it
   cv::Mat1f depth_;         ///< z in the camera frame, mm; NaN where the photo shows no mesh
   cv::Mat1f edge_px_away_;  ///< distance to the nearest depth edge or outline

@@ -18,7 +18,7 @@ constexpr int kFillRounds = 60;
 
 struct Look {
   Eigen::Vector3f bgr;
-  float vote, weight;  // as in Sight
+  float weight;
 };
 
 /// The vertices that share an edge with each vertex, as offsets into one list.
@@ -56,20 +56,17 @@ PointColour blend_photos(std::span<const PhotoView> views, const RigLight& light
     const Eigen::Vector3f lit = light.at(turntable_from_model.linear() * normal, turntable_from_model * point);
     const Sample sample = view.sample(sight->pixel);
     const float say = sample.saturated ? kSaturatedSay : 1.0F;
-    looks.push_back({sample.bgr.cwiseQuotient(lit), say * static_cast<float>(sight->vote),
-                     say * static_cast<float>(sight->weight)});
+    looks.push_back({sample.bgr.cwiseQuotient(lit), say * static_cast<float>(sight->weight)});
   }
   if (looks.empty()) return {};
 
   Eigen::Vector3f best = Eigen::Vector3f::Zero();
-  float votes = 0.0F;
   float weight = 0.0F;
   for (const Look& look : looks) {
-    best += look.vote * look.bgr;
-    votes += look.vote;
+    best += look.weight * look.bgr;
     weight += look.weight;
   }
-  best /= votes;
+  best /= weight;
   // From wide to narrow, so that the majority is found without a jump anywhere on the surface.
   for (const float width : kOutlierWidths) {
     const float limit = width * (kOutlierFloor + kOutlierShare * best.maxCoeff());
@@ -77,7 +74,7 @@ PointColour blend_photos(std::span<const PhotoView> views, const RigLight& light
     float say = 0.0F;
     for (const Look& look : looks) {
       const float off = (look.bgr - best).squaredNorm() / (limit * limit);
-      const float w = (width > 1.0F ? look.vote : look.weight) / ((1.0F + off) * (1.0F + off));
+      const float w = look.weight / ((1.0F + off) * (1.0F + off));
       sum += w * look.bgr;
       say += w;
     }
@@ -100,7 +97,7 @@ RigLight light_from_photos(std::span<const PhotoView> views, const Mesh& mesh,
       const Sample sample = view.sample(sight->pixel);
       if (sample.saturated || sample.bgr.minCoeff() <= kOutlierFloor) continue;
       const Transform& turntable_from_model = view.photo().turntable_from_model;
-      spot.push_back({turntable_from_model.linear() * normal, turntable_from_model * point, sample.bgr, sight->vote});
+      spot.push_back({turntable_from_model.linear() * normal, turntable_from_model * point, sample.bgr, sight->weight});
     }
     spots.push_back(std::move(spot));
   }

@@ -42,7 +42,7 @@ Result<void> check(const Mesh& mesh, std::span<const Photo> photos, const Textur
   }
   if (options.atlas_px < 16 || options.atlas_px > 32768 || !(options.max_texels_per_px > 0.0) ||
       options.padding_px < 0 || !(options.edge_px >= 0.0) || !(options.edge_fade_px > 0.0) ||
-      !(options.max_incidence_deg > 0.0 && options.max_incidence_deg < 90.0) || !(options.sharpness >= 0.0)) {
+      !(options.max_incidence_deg > 0.0 && options.max_incidence_deg < 90.0)) {
     return fail(ErrorCode::invalid_input, "texture: an option is out of range");
   }
   return {};
@@ -119,6 +119,51 @@ double seen_share(const Mesh& mesh, const std::vector<PointColour>& colours) {
   return seen / std::max(all, 1e-12);
 }
 
+/// Fills in the model's light, gain, seen share and vertex colours; returns the linear paint at the vertices, that of
+/// unseen ones taken from their surroundings.
+Result<std::vector<PointColour>> colour_vertices(std::span<const PhotoView> views, TexturedModel& model) {
+  Mesh& mesh = model.mesh.mesh;
+  model.light = light_from_photos(views, mesh, mesh.normals);
+  std::vector<PointColour> colours(mesh.vertices.size());
+  for_blocks(colours.size(), [&](std::size_t v) {
+    colours[v] = blend_photos(views, model.light, mesh.vertices[v].cast<double>(), mesh.normals[v].cast<double>());
+  });
+  if (std::none_of(colours.begin(), colours.end(), [](const PointColour& c) { return c.weight > 0.0F; })) {
+    return fail(ErrorCode::degenerate, "texture: no photo sees the mesh; check the cameras' poses");
+  }
+  model.seen_share = seen_share(mesh, colours);
+  model.exposure_gain = gain_for(colours);
+  fill_unseen(mesh, colours);
+  mesh.colour.resize(colours.size());
+  for (std::size_t v = 0; v < colours.size(); ++v) {
+    const cv::Vec3b bgr = to_srgb(static_cast<float>(model.exposure_gain) * colours[v].bgr);
+    mesh.colour[v] = {bgr[2], bgr[1], bgr[0]};
+  }
+  return colours;
+}
+
+/// Draws the atlas and fills in the texture coordinates.
+void draw_atlas(const AtlasLayout& layout, std::span<const PhotoView> views, const std::vector<PointColour>& colours,
+                TexturedModel& model) {
+  const cv::Size size = layout.owner.size();
+  const auto gain = static_cast<float>(model.exposure_gain);
+  model.mesh.atlas = cv::Mat3b(size, to_srgb(gain * mean_colour(colours)));
+  parallel_for(static_cast<std::size_t>(size.height), [&](std::size_t row) {
+    const int y = static_cast<int>(row);
+    for (int x = 0; x < size.width; ++x) {
+      if (layout.owner(y, x) < 0) continue;
+      model.mesh.atlas(y, x) = texel_colour(model.mesh.mesh, layout, views, model.light, colours, gain, x, y);
+    }
+  });
+  model.mesh.corner_uv.resize(layout.corners.size());
+  for (std::size_t f = 0; f < layout.corners.size(); ++f) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      // A texel's centre is half a texel from its corner, and (0, 0) is the corner of the first.
+      model.mesh.corner_uv[f][k] = ((layout.corners[f][k].array() + 0.5) / size.width).matrix().cast<float>();
+    }
+  }
+}
+
 }  // namespace
 
 Result<TexturedModel> texture_mesh(const Mesh& mesh, std::span<const Photo> photos, const TextureOptions& options,
@@ -126,6 +171,7 @@ Result<TexturedModel> texture_mesh(const Mesh& mesh, std::span<const Photo> phot
   if (auto good = check(mesh, photos, options); !good) return pass_on(good);
   auto scene = RayScene::create(mesh);
   if (!scene) return pass_on(scene, "texture");
+  const auto stopped = [] { return fail(ErrorCode::stopped, "texture: stopped"); };
 
   TexturedModel model;
   Mesh& out = model.mesh.mesh;
@@ -135,30 +181,15 @@ Result<TexturedModel> texture_mesh(const Mesh& mesh, std::span<const Photo> phot
   const double px_per_mm = typical_px_per_mm(mesh, photos);
   std::vector<PhotoView> views;
   for (const Photo& photo : photos) {
-    if (context.stopped()) return fail(ErrorCode::stopped, "texture: stopped");
+    if (context.stopped()) return stopped();
     views.emplace_back(photo, out, *scene, options, px_per_mm);
     context.report("texture", 0.3 * static_cast<double>(views.size()) / static_cast<double>(photos.size()));
   }
 
-  model.light = light_from_photos(views, out, out.normals);
-  std::vector<PointColour> colours(out.vertices.size());
-  for_blocks(colours.size(), [&](std::size_t v) {
-    colours[v] = blend_photos(views, model.light, out.vertices[v].cast<double>(), out.normals[v].cast<double>());
-  });
-  if (std::none_of(colours.begin(), colours.end(), [](const PointColour& c) { return c.weight > 0.0F; })) {
-    return fail(ErrorCode::degenerate, "texture: no photo sees the mesh; check the cameras' poses");
-  }
-  model.seen_share = seen_share(out, colours);
-  fill_unseen(out, colours);
-  model.exposure_gain = gain_for(colours);
-  const auto gain = static_cast<float>(model.exposure_gain);
-  out.colour.resize(colours.size());
-  for (std::size_t v = 0; v < colours.size(); ++v) {
-    const cv::Vec3b bgr = to_srgb(gain * colours[v].bgr);
-    out.colour[v] = {bgr[2], bgr[1], bgr[0]};
-  }
-  context.report("texture", 0.5);
-  if (context.stopped()) return fail(ErrorCode::stopped, "texture: stopped");
+  const auto colours = colour_vertices(views, model);
+  if (!colours) return pass_on(colours);
+  context.report("texture", 0.4);
+  if (context.stopped()) return stopped();
 
   const auto flat = chart_views(views, px_per_mm);
   const auto charts = cut_into_charts(out, flat, views.size(), seen_vertices(out, views));
@@ -169,24 +200,10 @@ Result<TexturedModel> texture_mesh(const Mesh& mesh, std::span<const Photo> phot
   }
   model.charts = charts.size();
   model.texels_per_px = layout->texels_per_px;
-  context.report("texture", 0.6);
-  if (context.stopped()) return fail(ErrorCode::stopped, "texture: stopped");
+  context.report("texture", 0.5);
+  if (context.stopped()) return stopped();
 
-  model.mesh.atlas = cv::Mat3b(options.atlas_px, options.atlas_px, to_srgb(gain * mean_colour(colours)));
-  parallel_for(static_cast<std::size_t>(options.atlas_px), [&](std::size_t row) {
-    const int y = static_cast<int>(row);
-    for (int x = 0; x < options.atlas_px; ++x) {
-      if (layout->owner(y, x) < 0) continue;
-      model.mesh.atlas(y, x) = texel_colour(out, *layout, views, model.light, colours, gain, x, y);
-    }
-  });
-  model.mesh.corner_uv.resize(out.faces.size());
-  for (std::size_t f = 0; f < out.faces.size(); ++f) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      // A texel's centre is half a texel from its corner, and (0, 0) is the corner of the first.
-      model.mesh.corner_uv[f][k] = ((layout->corners[f][k].array() + 0.5) / options.atlas_px).matrix().cast<float>();
-    }
-  }
+  draw_atlas(*layout, views, *colours, model);
   context.report("texture", 1.0);
   return model;
 }

@@ -25,9 +25,8 @@ struct TextureOptions {
   double max_texels_per_px = 2.0;   ///< of a photo's pixel; less where the charts would not fit
   int padding_px = 4;               ///< each chart's colour goes on this far beyond its faces
   double edge_px = 1.5;             ///< pixels this near to a depth edge are not used ...
-  double edge_fade_px = 8.0;        ///< ... and the next ones fade in over this width
+  double edge_fade_px = 12.0;       ///< ... and the next ones fade in over this width
   double max_incidence_deg = 75.0;  ///< a photo says nothing about surface seen more flatly than this
-  double sharpness = 2.0;           ///< exponent on cos^2 * resolution: higher trusts the best photo more
 };
 
 struct TexturedModel {

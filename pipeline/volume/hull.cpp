@@ -1,6 +1,7 @@
 #include "pipeline/volume/hull.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace scanrig {
@@ -31,24 +32,22 @@ Hull Hull::near(const Eigen::Vector3f& centre, float radius, float band) const {
   return result;
 }
 
-/// Bilinear in the image; a point that projects outside the image is not bounded by it.
+/// Bilinear in the image. The object is in the picture: outside the image the distance to its border adds up.
 float Hull::Outline::distance(const Eigen::Vector3f& point) const {
-  constexpr float kUnknown = -std::numeric_limits<float>::infinity();
   const Eigen::Vector3f p = rotation * point + translation;
-  if (!(p.z() > 0.0F)) return kUnknown;
+  if (!(p.z() > 0.0F)) return -std::numeric_limits<float>::infinity();
   const Projection& projection = silhouette->projection;
-  const float u = static_cast<float>(projection.fx) * p.x() / p.z() + static_cast<float>(projection.cx);
-  const float v = static_cast<float>(projection.fy) * p.y() / p.z() + static_cast<float>(projection.cy);
   const cv::Mat1f& px = silhouette->outside_px;
-  if (!(u >= 0.0F && v >= 0.0F && u < static_cast<float>(px.cols - 1) && v < static_cast<float>(px.rows - 1))) {
-    return kUnknown;
-  }
+  const float at_u = static_cast<float>(projection.fx) * p.x() / p.z() + static_cast<float>(projection.cx);
+  const float at_v = static_cast<float>(projection.fy) * p.y() / p.z() + static_cast<float>(projection.cy);
+  const float u = std::clamp(at_u, 0.0F, static_cast<float>(px.cols) - 1.01F);
+  const float v = std::clamp(at_v, 0.0F, static_cast<float>(px.rows) - 1.01F);
   const int x = static_cast<int>(u), y = static_cast<int>(v);
   const float a = u - static_cast<float>(x), b = v - static_cast<float>(y);
   const float* top = px[y];
   const float* bottom = px[y + 1];
   const float pixels = (1 - b) * ((1 - a) * top[x] + a * top[x + 1]) + b * ((1 - a) * bottom[x] + a * bottom[x + 1]);
-  return pixels * static_cast<float>(projection.mm_per_pixel(p.z()));
+  return (pixels + std::hypot(at_u - u, at_v - v)) * static_cast<float>(projection.mm_per_pixel(p.z()));
 }
 
 }  // namespace scanrig

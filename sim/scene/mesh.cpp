@@ -117,20 +117,24 @@ std::vector<Vector3d> extreme_vertices(const std::vector<Vector3d>& vertices) {
     const auto farther = [&d](const Vector3d& a, const Vector3d& b) { return d.dot(a) < d.dot(b); };
     members[std::max_element(cones.begin(), cones.end(), farther) - cones.begin()].push_back(d);
   }
+  using Columns = Eigen::Matrix<float, Eigen::Dynamic, 3>;
+  Columns all(vertices.size(), 3);
+  for (std::size_t v = 0; v < vertices.size(); ++v) all.row(v) = (vertices[v] - middle).cast<float>();
   std::vector<std::vector<int>> best(cones.size());
   parallel_for(cones.size(), [&](std::size_t c) {
     double chord = 0.0;
     for (const auto& d : members[c]) chord = std::max(chord, (cones[c] - d).norm());
-    std::vector<double> along(vertices.size());
-    double far = -1e300;
-    for (std::size_t v = 0; v < vertices.size(); ++v) far = std::max(far, along[v] = cones[c].dot(vertices[v]));
+    const Eigen::VectorXf along = all * cones[c].cast<float>();
+    const float least = along.maxCoeff() - static_cast<float>(2.0 * reach * chord);
     std::vector<int> near;
-    for (std::size_t v = 0; v < vertices.size(); ++v) {
-      if (along[v] >= far - 2.0 * reach * chord) near.push_back(static_cast<int>(v));
+    for (int v = 0; v < along.size(); ++v) {
+      if (along[v] >= least) near.push_back(v);
     }
+    const Columns candidates = all(near, Eigen::all);
     for (const auto& d : members[c]) {
-      const auto lower = [&](int i, int j) { return d.dot(vertices[i]) < d.dot(vertices[j]); };
-      best[c].push_back(*std::max_element(near.begin(), near.end(), lower));
+      Eigen::Index farthest = 0;
+      (candidates * d.cast<float>()).maxCoeff(&farthest);
+      best[c].push_back(near[farthest]);
     }
   });
   std::vector<int> kept;

@@ -33,7 +33,9 @@ struct Words {
   }
   [[nodiscard]] double number(std::size_t i) const {
     double value = std::nan("");
-    if (i < all.size()) std::from_chars(all[i].data(), all[i].data() + all[i].size(), value);
+    if (i >= all.size()) return value;
+    const std::string_view word = all[i].substr(all[i].starts_with('+') ? 1 : 0);
+    std::from_chars(word.data(), word.data() + word.size(), value);
     return value;
   }
 };
@@ -101,19 +103,23 @@ class PlyBody {
   PlyBody(std::string_view bytes, bool text) : bytes_(bytes), text_(text) {}
 
   double next(const std::string& type) { return text_ ? next_word() : next_binary(type); }
+  [[nodiscard]] bool at_end() const { return at_ >= bytes_.size(); }
 
  private:
   double next_word() {
     at_ = std::min(bytes_.find_first_not_of(" \t\r\n", at_), bytes_.size());
     double value = std::nan("");
-    const auto end = std::from_chars(bytes_.data() + at_, bytes_.data() + bytes_.size(), value).ptr;
-    at_ = static_cast<std::size_t>(end - bytes_.data());
+    const auto [end, error] = std::from_chars(bytes_.data() + at_, bytes_.data() + bytes_.size(), value);
+    at_ = error == std::errc() ? static_cast<std::size_t>(end - bytes_.data()) : bytes_.size();
     return value;
   }
   template <class T>
   double raw() {
     T value;
-    if (at_ + sizeof value > bytes_.size()) return std::nan("");
+    if (at_ + sizeof value > bytes_.size()) {
+      at_ = bytes_.size();
+      return std::nan("");
+    }
     std::memcpy(&value, bytes_.data() + at_, sizeof value);
     at_ += sizeof value;
     return static_cast<double>(value);
@@ -166,7 +172,7 @@ void add_polygon(TriangleMesh& mesh, const std::vector<int>& polygon) {
 
 void read_ply_element(const PlyElement& element, PlyBody& body, MeshFile& out) {
   std::vector<int> list;
-  for (std::size_t i = 0; i < element.count; ++i) {
+  for (std::size_t i = 0; i < element.count && !body.at_end(); ++i) {
     Vector3d position = Vector3d::Zero();
     Vector3f colour(-1.0F, -1.0F, -1.0F);
     list.clear();
@@ -177,7 +183,7 @@ void read_ply_element(const PlyElement& element, PlyBody& body, MeshFile& out) {
         for (int j = 0; j < count; ++j) {
           const double value = body.next(property.type);
           if (std::isnan(value)) return;
-          if (indices) list.push_back(static_cast<int>(value));
+          if (indices) list.push_back(value >= 0.0 && value < 2e9 ? static_cast<int>(value) : -1);
         }
         continue;
       }

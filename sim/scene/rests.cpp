@@ -36,7 +36,7 @@ int lowest(const Points& points, const Vector3d& down) {
 double height(const Points& points, const Vector3d& down) { return down.dot(points[lowest(points, down)]); }
 
 struct Touch {
-  double angle = 1e300;  ///< rad to turn until the point touches
+  double slope = 1e300;  ///< tangent of the angle to turn until the point touches
   int point = -1;
 };
 
@@ -49,8 +49,8 @@ Touch next_touch(const Points& points, const Vector3d& pivot, const Vector3d& do
     const Vector3d d = points[i] - pivot;
     const double sink = side.dot(d);
     if (sink <= 1e-9) continue;
-    const double angle = std::atan2(-down.dot(d), sink);  // gap above the plane over how fast it closes
-    if (angle < first.angle) first = {angle, i};
+    const double slope = -down.dot(d) / sink;  // gap above the plane over how fast it closes
+    if (slope < first.slope) first = {slope, i};
   }
   return first;
 }
@@ -94,9 +94,10 @@ Vector3d roll(const Points& points, Vector3d down) {
     const Touch touch = next_touch(points, pivot, down, *side, contacts);
     // The lowest point of the arc: the centre of mass straight above the pivot (or the edge).
     const double bottom = std::atan2(-side->dot(pivot), down.dot(pivot));
-    const double angle = std::clamp(touch.angle, 0.0, bottom);
+    const double touching = std::atan(touch.slope);
+    const double angle = std::clamp(touching, 0.0, bottom);
     down = (std::cos(angle) * down + std::sin(angle) * *side).normalized();
-    if (touch.point < 0 || touch.angle > bottom) return down;
+    if (touch.point < 0 || touching > bottom) return down;
     contacts.push_back(touch.point);
   }
   return down;

@@ -15,7 +15,7 @@ namespace {
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-constexpr int kVertexRays = 40;   // smoothed over the neighbours afterwards
+constexpr int kVertexRays = 28;   // smoothed over the neighbours afterwards
 constexpr int kTableRays = 300;   // a shadow on an even table shows every step
 constexpr double kReach = 200.0;  // mm; nothing of the object is farther
 constexpr int kGrid = 73;         // nodes across the table
@@ -95,7 +95,7 @@ RoomLight::RoomLight(const Object& object, const RayCaster& rays, const Transfor
                             table_from_object.linear() * object.normals[i]);
     }
   });
-  for (int i = 0; i < 3; ++i) smooth(object.mesh.triangles, vertices_);
+  for (int i = 0; i < 4; ++i) smooth(object.mesh.triangles, vertices_);
   parallel_for(kGrid, [&](std::size_t row) {
     const int j = static_cast<int>(row);
     for (int i = 0; i < kGrid; ++i) {

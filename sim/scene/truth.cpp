@@ -75,8 +75,9 @@ Result<void> write_truth(const Scene& scene, const std::vector<PoseTruth>& poses
                        {"table_radius_mm", profile().table_radius_mm},
                        {"poses", ordered_json::array()}};
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    json["poses"].push_back({{"table_from_truth", to_json(table_from_object(i) * truth_from_object.inverse())},
-                             {"angles_deg", poses[i].angles_deg}});
+    const Transform table_from_truth =
+        i == 0 ? Transform::Identity() : table_from_object(i) * truth_from_object.inverse();
+    json["poses"].push_back({{"table_from_truth", to_json(table_from_truth)}, {"angles_deg", poses[i].angles_deg}});
   }
   if (poses.size() > 1) json["pose1_from_pose2"] = to_json(table_from_object(0) * table_from_object(1).inverse());
   if (const auto written = write_file_atomically(folder / "truth.ply", ply(scene.object().mesh, truth_from_object));

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <random>
 
@@ -8,6 +9,7 @@
 #include "pipeline/evaluate/evaluate.h"
 #include "pipeline/evaluate/texture_figures.h"
 #include "pipeline/scan/model/model_files.h"
+#include "pipeline/texture/render.h"
 #include "tests/unit/pipeline/evaluate/ball_truth.h"
 
 namespace scanrig {
@@ -68,8 +70,8 @@ TEST_F(EvaluateFilesTest, AModelsClaimsAreReadBack) {
     const float u = static_cast<float>(f) / 1000.0F;
     model.corner_uv.push_back({Eigen::Vector2f(u, 0.25F), Eigen::Vector2f(u, 0.5F), Eigen::Vector2f(0.75F, u)});
   }
-  const std::string report = R"({ "pose_refinement": { "residual_median_mm": 0.02,
-      "pose1_from_pose2": { "rotation": [[1,0,0],[0,1,0],[0,0,1]], "translation": [1, 2, 3] } } })";
+  const std::string report = R"({ "version": "0.1.0",
+      "pose1_from_pose2": { "rotation": [[1,0,0],[0,1,0],[0,0,1]], "translation": [1, 2, 3] } })";
   ASSERT_TRUE(write_model_files(model, report, folder_ / "model"));
   const auto claim = read_claim(folder_ / "model");
   ASSERT_TRUE(claim) << claim.error().message;
@@ -96,6 +98,45 @@ cv::Mat1b speckle() {
   cv::Mat1b image;
   noise.convertTo(image, CV_8U);
   return image;
+}
+
+/// The ball painted with speckle, by longitude and latitude.
+TexturedMesh painted_ball() {
+  TexturedMesh model{ball(), {}, {}};
+  cv::cvtColor(speckle(), model.atlas, cv::COLOR_GRAY2BGR);
+  for (const Mesh::Face& face : model.mesh.faces) {
+    auto& uv = model.corner_uv.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Eigen::Vector3d d = (model.mesh.vertices[face[k]].cast<double>() - kCentre).normalized();
+      uv[k] = {static_cast<float>(0.5 + std::atan2(d.x(), d.z()) / (2.0 * std::numbers::pi)),
+               static_cast<float>(std::acos(std::clamp(d.y(), -1.0, 1.0)) / std::numbers::pi)};
+    }
+  }
+  return model;
+}
+
+TEST_F(EvaluateFilesTest, ATextureThatHasSlippedIsNoticed) {
+  const Truth truth = rig_and_ball({20.0});
+  TexturedMesh model = painted_ball();
+  RenderOptions sharp;
+  sharp.supersample = 3;
+  const auto photo = MeshRenderer::create(model)->render(truth.left, rot_y(to_radians(20.0)), sharp);
+  ASSERT_TRUE(photo) << photo.error().message;
+  auto scan = ScanFolder::create(folder_ / "scan", {}, {});
+  ASSERT_TRUE(scan);
+  cv::Mat darker;
+  photo->image.convertTo(darker, CV_8U, 0.6);
+  ASSERT_TRUE(scan->add_view(0, {}, {"BGR8", darker, darker, darker, darker}));
+
+  const auto right = texture_figures(model, truth, *scan, {});
+  ASSERT_TRUE(right) << right.error().message;
+  EXPECT_GT(right->patches, 20u);
+  EXPECT_LT(right->median_px, 0.1);
+  // Slipped by 0.4 degrees about the axis: 0.17 mm or 1.2 px where the ball faces the camera, less towards its rim.
+  for (auto& v : model.mesh.vertices) v = (rot_y(to_radians(0.4)) * v.cast<double>()).cast<float>();
+  const auto slipped = texture_figures(model, truth, *scan, {});
+  ASSERT_TRUE(slipped);
+  EXPECT_NEAR(slipped->median_px, 1.0, 0.2);
 }
 
 TEST(PatchOffsets, AShiftIsFoundInAnotherLight) {

@@ -11,7 +11,7 @@ namespace {
 
 using testing::Solid;
 
-const testing::RigModel kRig{.width = 320, .height = 240, .focal_px = 1130, .noise_mm = 0.01};
+const testing::RigModel kRig{.width = 240, .height = 180, .focal_px = 850, .noise_mm = 0.01};
 
 /// An object in two poses, scanned and closed.
 struct Scan {
@@ -127,7 +127,7 @@ TEST(EstimatePose, WillNotGuessHowAPlainBoxWasTurned) {
 }
 
 TEST(EstimatePose, DecidesByASmallFeatureWhereTheRestIsSymmetric) {
-  const Solid box = testing::together({testing::block({-30, 0, -20}, {30, 30, 20}), testing::ball({15, 24, 16}, 6)});
+  const Solid box = testing::together({testing::block({-30, 0, -20}, {30, 30, 20}), testing::ball({26, 19, 7}, 6)});
   const Scan s = scan(box, turn(25, Eigen::Vector3d::UnitY()) * turn(90, Eigen::Vector3d::UnitX()));
   expect_found(s.estimate(), s);
 }

@@ -55,7 +55,7 @@ TEST_P(RestsEitherWay, TheOffsetTouchesTheSolidAndNothingLiesBeyond) {
 }
 
 INSTANTIATE_TEST_SUITE_P(HullAndSphere, RestsEitherWay, ::testing::Values(&rests_on_hull, &rests_on_sphere),
-                         [](const auto& info) { return info.param == &rests_on_hull ? "Hull" : "Sphere"; });
+                         [](const auto& way) { return way.param == &rests_on_hull ? "Hull" : "Sphere"; });
 
 TEST(RestsOnHull, KeepsTheRestsOfAWorkPieceThatItsFacesShow) {
   const Mesh solid = testing::mesh_of(testing::workpiece(), {-34, -3, -24}, {35, 66, 36}, 2.0);
@@ -63,8 +63,8 @@ TEST(RestsOnHull, KeepsTheRestsOfAWorkPieceThatItsFacesShow) {
   ASSERT_TRUE(facts) << facts.error().message;
   const auto found = rests_on_hull(solid, *facts, 60, {});
   ASSERT_TRUE(found) << found.error().message;
-  for (const Eigen::Vector3d& side :
-       {-Eigen::Vector3d::UnitY(), -Eigen::Vector3d::UnitX(), -Eigen::Vector3d::UnitZ()}) {
+  for (const int axis : {0, 1, 2}) {
+    const Eigen::Vector3d side = -Eigen::Vector3d::Unit(axis);
     const bool there = std::ranges::any_of(
         found->rests, [&](const StableRest& rest) { return rest.normal.dot(side) > std::cos(to_radians(2)); });
     EXPECT_TRUE(there) << side.transpose();

@@ -26,9 +26,14 @@ struct TwoPoses {
   Transform pose1_from_pose2 = laid_down().inverse();
 };
 
-TwoPoses two_poses(const RigModel& rig) {
-  return {testing::turn_around(testing::workpiece(), 8, rig, 1),
-          testing::turn_around(testing::moved(testing::workpiece(), laid_down()), 8, rig, 2)};
+const TwoPoses& two_poses() {
+  static const TwoPoses poses = [] {
+    RigModel rig{.width = 320, .height = 240, .focal_px = 1130};
+    rig.noise_mm = 0.01;
+    return TwoPoses{testing::turn_around(testing::workpiece(), 8, rig, 1),
+                    testing::turn_around(testing::moved(testing::workpiece(), laid_down()), 8, rig, 2)};
+  }();
+  return poses;
 }
 
 /// `t` disturbed by `angle_deg` about some axis through the middle of the object and by `shift_mm`.
@@ -48,9 +53,7 @@ void expect_near(const Transform& got, const Transform& truth, double angle_deg,
 }
 
 TEST(RefinePose, ReachesAHundredthFromEightDegreesAndFiveMillimetres) {
-  RigModel rig;
-  rig.noise_mm = 0.01;
-  const TwoPoses scan = two_poses(rig);
+  const TwoPoses& scan = two_poses();
   for (unsigned seed = 1; seed <= 6; ++seed) {
     const auto refined = refine_pose(scan.first, scan.second, off_by(scan.pose1_from_pose2, 8, 5, seed), {}, Context{});
     ASSERT_TRUE(refined) << refined.error().message;
@@ -63,14 +66,14 @@ TEST(RefinePose, ReachesAHundredthFromEightDegreesAndFiveMillimetres) {
 
 TEST(RefinePose, SaysHowWellTheMotionIsKnown) {
   const auto cylinder = testing::upright_cylinder({0, 0, 0}, 20, 60);
-  const auto views = testing::turn_around(cylinder, 8, RigModel{});
+  const auto views = testing::turn_around(cylinder, 8, {.width = 240, .height = 180, .focal_px = 850});
   const auto turned = refine_pose(views, views, rot_y(0.05), {}, Context{});
   ASSERT_TRUE(turned) << turned.error().message;
   EXPECT_GT(turned->condition, 1e4);
 }
 
 TEST(RefinePose, GivesTheSameBitsOnAnyNumberOfThreads) {
-  const TwoPoses scan = two_poses(RigModel{});
+  const TwoPoses& scan = two_poses();
   Result<RefinedPose> one;
   Result<RefinedPose> many;
   const Transform start = off_by(scan.pose1_from_pose2, 4, 2, 3);
@@ -81,14 +84,14 @@ TEST(RefinePose, GivesTheSameBitsOnAnyNumberOfThreads) {
 }
 
 TEST(RefinePose, SaysSoWhenAPoseIsEmpty) {
-  const TwoPoses scan = two_poses(RigModel{});
+  const TwoPoses& scan = two_poses();
   const auto refined = refine_pose(scan.first, {}, Transform::Identity(), {}, Context{});
   ASSERT_FALSE(refined);
   EXPECT_EQ(refined.error().code, ErrorCode::degenerate);
 }
 
 TEST(RefinePose, SaysSoWhenTheSurfacesDoNotMeet) {
-  const TwoPoses scan = two_poses(RigModel{});
+  const TwoPoses& scan = two_poses();
   const Transform far = Eigen::Translation3d(0, 400, 0) * scan.pose1_from_pose2;
   const auto refined = refine_pose(scan.first, scan.second, far, {}, Context{});
   ASSERT_FALSE(refined);
@@ -96,7 +99,7 @@ TEST(RefinePose, SaysSoWhenTheSurfacesDoNotMeet) {
 }
 
 TEST(RefinePose, StopsWhenAsked) {
-  const TwoPoses scan = two_poses(RigModel{});
+  const TwoPoses& scan = two_poses();
   std::stop_source source;
   source.request_stop();
   const auto refined = refine_pose(scan.first, scan.second, scan.pose1_from_pose2, {}, {source.get_token(), {}});

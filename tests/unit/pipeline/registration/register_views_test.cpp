@@ -13,6 +13,12 @@ using testing::RigModel;
 
 Context no_context() { return {}; }
 
+/// The work piece seen without noise; rendered once.
+std::vector<View> clean_views() {
+  static const std::vector<View> views = testing::turn_around(testing::workpiece(), 8, RigModel{});
+  return views;
+}
+
 /// Moves the calibration of each view away from the truth by a table angle error and a jolt.
 void disturb(std::vector<View>& views, double angle_deg, double shift_mm) {
   std::mt19937 random(7);
@@ -39,7 +45,7 @@ double inconsistency_mm(const std::vector<View>& views, const std::vector<View>&
 }
 
 TEST(RegisterViews, LeavesAPerfectCalibrationAlone) {
-  auto views = testing::turn_around(testing::workpiece(), 8, RigModel{});
+  auto views = clean_views();
   const auto truth = views;
   const auto report = register_views(views, {}, no_context());
   ASSERT_TRUE(report) << report.error().message;
@@ -78,7 +84,7 @@ TEST(RegisterViews, PlacesImportedScansThatAreAMillimetreOff) {
 }
 
 TEST(RegisterViews, FindsAShiftedTurntableAxis) {
-  auto views = testing::turn_around(testing::workpiece(), 8, RigModel{});
+  auto views = clean_views();
   const auto truth = views;
   const Transform wrong_axis = small_motion(Eigen::Vector3d::Zero(), Eigen::Vector3d(0.04, 0, -0.03));
   for (View& view : views) {
@@ -105,7 +111,7 @@ TEST(RegisterViews, HoldsTheAnglesOfABodyOfRevolutionAndSaysSo) {
 }
 
 TEST(RegisterViews, MovesTheSilhouettesWithTheirView) {
-  auto views = testing::turn_around(testing::workpiece(), 8, RigModel{});
+  auto views = clean_views();
   disturb(views, 0.02, 0.0);
   const Transform right_from_left = small_motion(Eigen::Vector3d(0, 0.1, 0), Eigen::Vector3d(160, 0, 0));
   for (View& view : views) {
@@ -121,9 +127,7 @@ TEST(RegisterViews, MovesTheSilhouettesWithTheirView) {
 }
 
 TEST(RegisterViews, GivesTheSameBitsOnAnyNumberOfThreads) {
-  RigModel rig;
-  rig.noise_mm = 0.01;
-  auto one = testing::turn_around(testing::workpiece(), 8, rig);
+  auto one = clean_views();
   disturb(one, 0.02, 0.0);
   auto many = one;
   with_threads(1, [&] { ASSERT_TRUE(register_views(one, {}, no_context())); });
@@ -165,7 +169,7 @@ TEST(RegisterViews, SaysSoWhenTheViewsShareNothing) {
 }
 
 TEST(RegisterViews, StopsWhenAsked) {
-  auto views = testing::turn_around(testing::workpiece(), 8, RigModel{});
+  auto views = clean_views();
   std::stop_source source;
   source.request_stop();
   const auto report = register_views(views, {}, {source.get_token(), {}});

@@ -127,6 +127,12 @@ TEST_F(ObjectFile, CutShortIsRefused) {
                        "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\nabc"),
                  ErrorCode::invalid_input, "m.ply");
 }
+TEST_F(ObjectFile, ThatPromisesMoreThanItHoldsIsRefusedAtOnce) {
+  const std::string header =
+      "ply\nformat ascii 1.0\nelement vertex 99999999999999\nproperty float x\nproperty float y\nproperty float z\n"
+      "element face 1\nproperty list uchar int vertex_indices\nend_header\n";
+  expect_refused(write("m.ply", header + "0 0 0\n1 0 junk\n"), ErrorCode::invalid_input, "no faces");
+}
 TEST(Object, OfNoHeightIsRefused) { EXPECT_EQ(load_object({}, 0.0).error().code, ErrorCode::invalid_input); }
 
 TEST(Colours, CanBeKeyedAndMeasured) {

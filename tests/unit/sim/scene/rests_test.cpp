@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <cstdlib>
+#include <filesystem>
 
 #include "core/units.h"
 #include "sim/scene/figurine.h"
@@ -93,6 +95,21 @@ TEST(Placements, OfAnObjectLargerThanTheWorkingVolumeAreRefused) {
   ASSERT_FALSE(placed);
   EXPECT_EQ(placed.error().code, ErrorCode::invalid_input);
   EXPECT_NE(placed.error().message.find("larger than the working volume"), std::string::npos);
+}
+
+TEST(Placements, OfScannedObjectsFitAtHundredMillimetres) {
+  const char* given = std::getenv("SCANRIG_SHARED_DATA");
+  const std::filesystem::path meshes =
+      std::filesystem::path(given ? given : SCANRIG_SOURCE_DIR "/../shared/data") / "meshes";
+  if (!std::filesystem::exists(meshes)) GTEST_SKIP() << meshes << " is not here";
+  for (const char* file : {"spot/spot_triangulated.obj", "igea_tri.ply", "ycb_banana/textured_simple_reoriented.obj"}) {
+    const auto object = load_object(meshes / file, 100.0);
+    ASSERT_TRUE(object) << object.error().message;
+    for (const std::uint64_t seed : {1, 2, 3}) {
+      const auto placed = draw_placements(object->mesh, seed, 2, false);
+      EXPECT_TRUE(placed) << file << ": " << placed.error().message;
+    }
+  }
 }
 
 }  // namespace

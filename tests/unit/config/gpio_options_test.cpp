@@ -1,0 +1,62 @@
+#include "config/gpio_options.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/unit/config/file_under_test.h"
+
+namespace scanrig::config {
+namespace {
+
+class GpioOptionsTest : public FileUnderTest {
+ protected:
+  Result<RigConfig> read(const std::string& text) const {
+    write(text);
+    return read_rig_config(file_, std::filesystem::path(SCANRIG_SOURCE_DIR) / "config" / "drives");
+  }
+};
+
+TEST_F(GpioOptionsTest, EveryWiredLineReachesItsPlace) {
+  std::string text = shipped("rigs/example.toml");
+  text = replaced(text, "[calibration]",
+                  "stop = { line = \"A\" }\nreset = { line = \"B\" }\npart_present = { line = \"C\" }\n"
+                  "lamp_red = { line = \"D\" }\nlamp_amber = { line = \"E\" }\nstart_lamp = { line = \"F\" }\n"
+                  "busy = { line = \"G\" }\nflip_request = { line = \"H\" }\npass = { line = \"I\" }\n"
+                  "fail = { line = \"J\" }\n\n[gpio]\nsocket = \"gpio.sock\"\n\n[calibration]");
+  text = replaced(text, "pulse_us", "plain_line = \"PLAIN\"\nactive = \"low\"\npulse_us");
+  const auto rig = read(text);
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->gpio_socket, folder_ / "gpio.sock");
+
+  const auto panel = gpio_panel_options(*rig);
+  EXPECT_EQ(panel.inputs.size(), 6u);
+  EXPECT_EQ(panel.outputs.size(), 8u);
+  const auto line_of = [](const auto& wired, auto field) {
+    for (const auto& [one, line] : wired) {
+      if (one == field) return line.name;
+    }
+    return std::string();
+  };
+  EXPECT_EQ(line_of(panel.inputs, &PanelInputs::estop_ok), "ESTOP_OK");
+  EXPECT_EQ(line_of(panel.inputs, &PanelInputs::guard_closed), "GUARD_OK");
+  EXPECT_EQ(line_of(panel.inputs, &PanelInputs::start), "START");
+  EXPECT_EQ(line_of(panel.inputs, &PanelInputs::stop), "A");
+  EXPECT_EQ(line_of(panel.inputs, &PanelInputs::reset), "B");
+  EXPECT_EQ(line_of(panel.inputs, &PanelInputs::part_present), "C");
+  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::red), "D");
+  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::amber), "E");
+  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::green), "LAMP_GREEN");
+  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::start_lamp), "F");
+  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::busy), "G");
+  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::flip_request), "H");
+  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::pass), "I");
+  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::fail), "J");
+
+  const auto projector = gpio_projector_options(rig->projector);
+  EXPECT_EQ(projector.pattern_line.name, "PROJ_TRIG");
+  EXPECT_TRUE(projector.pattern_line.active_low);
+  EXPECT_EQ(projector.plain_line.value().name, "PLAIN");
+  EXPECT_EQ(projector.pulse, std::chrono::microseconds(15000));
+}
+
+}  // namespace
+}  // namespace scanrig::config
