@@ -1,0 +1,91 @@
+#include "daemon/ctl/follow.h"
+
+#include <gmock/gmock.h>
+
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+namespace scanrig::ctl {
+namespace {
+
+using nlohmann::json;
+using testing::HasSubstr;
+using testing::Not;
+
+/// What is written for a log, not for a terminal.
+class Follow : public testing::Test {
+ protected:
+  ~Follow() override { std::fclose(out); }
+  std::string text() {
+    std::rewind(out);
+    std::string all(100000, '\0');
+    all.resize(std::fread(all.data(), 1, all.size(), out));
+    return all;
+  }
+  static json view(int pose, int index, int redone) {
+    return {{"pose", pose}, {"view", index}, {"measured_deg", 45.01}, {"redone", redone}};
+  }
+  static json job(const std::string& state) {
+    return {{"id", "J"},
+            {"state", state},
+            {"poses", 2},
+            {"views", 8},
+            {"stored", json::array()},
+            {"stages", json::array()},
+            {"error", nullptr},
+            {"folder", "/j"},
+            {"model", "/j/model/model.glb"},
+            {"report", "/j/model/report.json"}};
+  }
+  std::FILE* out = std::tmpfile();
+  StageBars bars{out, false};
+  JobStory story{bars};
+  json status = {{"next_action", "Turn the object over."}};
+};
+
+TEST_F(Follow, EachViewIsToldOnce) {
+  auto j = job("scanning");
+  j["stored"] = {view(0, 0, 0)};
+  EXPECT_FALSE(story.tell(status, j));
+  j["stored"] = {view(0, 0, 0), view(0, 1, 2)};
+  EXPECT_FALSE(story.tell(status, j));
+  EXPECT_FALSE(story.tell(status, j));
+  EXPECT_EQ(text(),
+            "Job J\n"
+            "  pose 1/2  view 1/8    45.010 deg  stored\n"
+            "  pose 1/2  view 2/8    45.010 deg  stored, 2 exposures redone\n");
+}
+
+TEST_F(Follow, TheFlipIsAskedForOnce) {
+  for (int i = 0; i < 3; ++i) story.tell(status, job("waiting_for_flip"));
+  EXPECT_EQ(text(), "Job J\n  Turn the object over.\n");
+}
+
+TEST_F(Follow, AStageIsOneLineWhenComplete) {
+  auto j = job("reconstructing");
+  j["stages"] = {{{"name", "volume"}, {"fraction", 0.5}}};
+  story.tell(status, j);
+  EXPECT_THAT(text(), Not(HasSubstr("volume")));
+  j["stages"] = {{{"name", "volume"}, {"fraction", 1.0}}};
+  story.tell(status, j);
+  story.tell(status, j);
+  EXPECT_THAT(text(), HasSubstr("volume                 [##############################] 100 %"));
+  EXPECT_EQ(text().find("volume"), text().rfind("volume"));
+}
+
+TEST_F(Follow, EndsWithThePathsAndCodeZero) {
+  EXPECT_TRUE(story.tell(status, job("done")));
+  EXPECT_EQ(story.end(job("done")), ExitCode::ok);
+  EXPECT_THAT(text(), HasSubstr("model   /j/model/model.glb"));
+  EXPECT_THAT(text(), HasSubstr("report  /j/model/report.json"));
+}
+
+TEST_F(Follow, AFailedJobEndsWithTheCodeOfItsError) {
+  auto j = job("failed");
+  j["error"] = {{"code", "same_rest"}, {"message", "not turned over"}};
+  EXPECT_TRUE(story.tell(status, j));
+  EXPECT_EQ(story.end(j), ExitCode::no_model);
+}
+
+}  // namespace
+}  // namespace scanrig::ctl
