@@ -9,7 +9,7 @@ namespace scanrig {
 
 /// The outline of the object in one distortion-free image.
 struct Silhouette {
-  Projection projection;                               ///< pinhole
+  Projection projection;                              ///< pinhole
   Transform camera_from_pose = Transform::Identity();  ///< the pose's turntable frame at table angle 0 -> this camera
   cv::Mat1f outside_px;  ///< signed distance to the contour in pixels, sub-pixel, positive outside the object
 };
