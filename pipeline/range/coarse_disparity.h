@@ -10,8 +10,8 @@ struct CoarseDisparity {
   cv::Mat1f right;  ///< on the right image's pixels
 };
 
-/// Semi-global matching [Hirschmueller 2008; OpenCV, MODE_SGBM_3WAY] on images freed of shading, each image in its turn.
-/// `rows`: the only rows looked at. Throws what OpenCV throws.
+/// Semi-global matching [Hirschmueller 2008; OpenCV, MODE_SGBM_3WAY] on images freed of shading, each image in its
+/// turn. `rows`: the only rows looked at. Throws what OpenCV throws.
 CoarseDisparity coarse_disparity(const cv::Mat1f& left, const cv::Mat1f& right, int min_disparity, int max_disparity,
                                  cv::Range rows);
 

@@ -21,9 +21,10 @@ constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 // found from known truth, see README.md. The smoothing's own share is sqrt(4 pi) times its width.
 constexpr float kSharpInflation = 1.7f;
 constexpr float kSmoothInflation = 2.5f;
-constexpr float kTilt = 0.6f;  // px of disparity a px at which sigma has grown by 1.4
-constexpr float kConfidence = 3.0f;  // standard deviations
-constexpr double kSmoothing = 0.7;  // px, of the larger windows' images
+constexpr std::uint8_t kSharpRadius = 7;  // px
+constexpr float kTilt = 0.6f;             // px of disparity a px at which sigma has grown by 1.4
+constexpr float kConfidence = 3.0f;       // standard deviations
+constexpr double kSmoothing = 0.7;        // px, of the larger windows' images
 
 cv::Mat1f smoothed(const cv::Mat1f& image) {
   cv::Mat1f out;
@@ -48,9 +49,12 @@ struct Nodes {
         rows((size.height + stride - 1) / stride),
         patches(static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows)) {}
   [[nodiscard]] DisparityPatch& at(int column, int row) {
-    return patches[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(column)];
+    return patches[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns) +
+                   static_cast<std::size_t>(column)];
   }
-  [[nodiscard]] const DisparityPatch& at(int column, int row) const { return const_cast<Nodes*>(this)->at(column, row); }
+  [[nodiscard]] const DisparityPatch& at(int column, int row) const {
+    return const_cast<Nodes*>(this)->at(column, row);
+  }
 
   /// Calls visit(patch moved to (u, v)) for the valid nodes around it, nearest ring.
   template <class Visit>
@@ -59,7 +63,8 @@ struct Nodes {
     for (int row = top; row <= std::min(top + 1, rows - 1); ++row) {
       for (int column = left; column <= std::min(left + 1, columns - 1); ++column) {
         const DisparityPatch& node = at(column, row);
-        if (node.valid) visit(node.moved(static_cast<float>(u - column * stride), static_cast<float>(v - row * stride)));
+        if (node.valid)
+          visit(node.moved(static_cast<float>(u - column * stride), static_cast<float>(v - row * stride)));
       }
     }
   }
@@ -108,7 +113,8 @@ struct Side {
     return std::abs(small.c[0] - large.c[0]) <= kConfidence * spread;
   }
 
-  [[nodiscard]] DisparityPatch match_sharp(int u, int v, DisparityPatch patch, std::uint8_t radius, int iterations) const {
+  [[nodiscard]] DisparityPatch match_sharp(int u, int v, DisparityPatch patch, std::uint8_t radius,
+                                           int iterations) const {
     WindowOptions window;
     window.iterations = iterations;
     patch.radius = radius;
@@ -117,7 +123,8 @@ struct Side {
     return patch;
   }
 
-  [[nodiscard]] DisparityPatch match_smooth(int u, int v, DisparityPatch patch, std::uint8_t radius, int iterations) const {
+  [[nodiscard]] DisparityPatch match_smooth(int u, int v, DisparityPatch patch, std::uint8_t radius,
+                                            int iterations) const {
     WindowOptions window;
     window.iterations = iterations;
     window.curvature_prior = 0.15f;
@@ -127,11 +134,11 @@ struct Side {
     return patch;
   }
 
-  /// Matches with the window that suits signal and shape: the smaller of two sharp ones where the larger one's answer is
-  /// outside its confidence (a crease, a step: the rule of intersecting confidence intervals [Katkovnik 1999]), large
-  /// smoothed ones where the signal is low.
+  /// Matches with the window that suits signal and shape: the smaller of two sharp ones where the larger one's answer
+  /// is outside its confidence (a crease, a step: the rule of intersecting confidence intervals [Katkovnik 1999]),
+  /// large smoothed ones where the signal is low.
   [[nodiscard]] DisparityPatch match(int u, int v, const DisparityPatch& start, int iterations) const {
-    DisparityPatch best = match_sharp(u, v, start, 7, iterations);
+    DisparityPatch best = match_sharp(u, v, start, kSharpRadius, iterations);
     const DisparityPatch small = match_sharp(u, v, best.valid ? best : start, 5, iterations);
     if (good(small) && (!good(best) || !compatible(small, best))) best = small;
     if (good(best) && double(best.sigma) <= options.enough_sigma_px) return best;
@@ -248,7 +255,7 @@ struct Neighbours {
 
 Neighbours ask_neighbours(const DenseDisparity& disparity, int u, int v, const StereoOptions& options) {
   constexpr std::array<int, 2> kApart = {4, 6};  // px
-  constexpr double kStep = 1.5;                   // px
+  constexpr double kStep = 1.5;                  // px
   const cv::Size size = disparity.value.size();
   const float d = disparity.value(v, u);
   Neighbours answer;

@@ -13,8 +13,8 @@ struct RectifyingMap {
   cv::Mat1f v;
 };
 
-/// Both cameras turned so that a point lies in the same row of both images. Made once a calibration, used for every view.
-/// The principal points are NOT equal: each image keeps looking where its toed-in camera looked, so that the
+/// Both cameras turned so that a point lies in the same row of both images. Made once a calibration, used for every
+/// view. The principal points are NOT equal: each image keeps looking where its toed-in camera looked, so that the
 /// disparities u_left - u_right stay small: u_left - u_right = fx * baseline / z + (left.cx - right.cx).
 struct Rectification {
   Projection left, right;  ///< pinhole, same size, focal length and cy

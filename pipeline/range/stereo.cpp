@@ -53,8 +53,12 @@ cv::Range object_rows(const cv::Mat1b& mask, int height) {
 RangeImage to_range(const RectifiedPair& pair, const DenseDisparity& disparity) {
   const Projection& p = pair.left_projection;
   const cv::Size size(p.width, p.height);
-  RangeImage range{p, Transform::Identity(), cv::Mat1f(size, kNaN), cv::Mat1f(size, kNaN),
-                   cv::Mat3f(size, cv::Vec3f(kNaN, kNaN, kNaN)), {}};
+  RangeImage range{p,
+                   Transform::Identity(),
+                   cv::Mat1f(size, kNaN),
+                   cv::Mat1f(size, kNaN),
+                   cv::Mat3f(size, cv::Vec3f(kNaN, kNaN, kNaN)),
+                   {}};
   const double strength = p.fx * pair.baseline_mm;
   parallel_for(static_cast<std::size_t>(size.height), [&](std::size_t row) {
     const int v = static_cast<int>(row);
@@ -62,7 +66,8 @@ RangeImage to_range(const RectifiedPair& pair, const DenseDisparity& disparity) 
       // Disparity between equal principal points: strength / depth.
       const double d = static_cast<double>(disparity.value(v, u)) - p.cx + pair.right_cx;
       if (!(d > 0.0)) continue;  // NaN too
-      const double du = static_cast<double>(disparity.slope(v, u)[0]), dv = static_cast<double>(disparity.slope(v, u)[1]);
+      const double du = static_cast<double>(disparity.slope(v, u)[0]),
+                   dv = static_cast<double>(disparity.slope(v, u)[1]);
       const double depth = strength / d;
       range.depth(v, u) = static_cast<float>(depth);
       range.sigma(v, u) = static_cast<float>(depth / d * static_cast<double>(disparity.sigma(v, u)));
@@ -95,8 +100,9 @@ Result<RangeImage> match_rectified(const RectifiedPair& pair, const StereoOption
   remove_outliers(*disparity, options);
   RangeImage range = to_range(pair, *disparity);
   if (cv::countNonZero(range.depth == range.depth) == 0) {
-    return fail(ErrorCode::degenerate,
-                "range: nothing matched between left and right image; is the projector on, the calibration the right one?");
+    return fail(
+        ErrorCode::degenerate,
+        "range: nothing matched between left and right image; is the projector on, the calibration the right one?");
   }
   context.report("range", 1.0);
   return range;

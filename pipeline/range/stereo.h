@@ -10,12 +10,12 @@
 namespace scanrig {
 
 struct StereoOptions {
-  double least_zncc = 0.8;        ///< correlation below which a match is not believed
-  double left_right_px = 0.3;     ///< the match from the right image must come back this near
+  double least_zncc = 0.8;         ///< correlation below which a match is not believed
+  double left_right_px = 0.3;      ///< the match from the right image must come back this near, or within 3 sigma
   double largest_sigma_px = 0.25;  ///< beyond it a pixel counts as not measured
-  double enough_sigma_px = 0.08;  ///< a larger window is tried only above this
-  double neighbour_px = 0.25;     ///< neighbours 4 px away must predict a pixel this well
-  int smallest_patch_px = 150;    ///< smaller islands are dropped
+  double enough_sigma_px = 0.08;   ///< a larger window is tried only above this
+  double neighbour_px = 0.25;      ///< neighbours 4 px away must predict a pixel this well, or within 3 sigma
+  int smallest_patch_px = 150;     ///< smaller islands are dropped
 };
 
 /// Two images whose rows correspond.

@@ -24,10 +24,10 @@ struct ViewOptions {
 };
 
 /// Everything one table angle gives: range image in the rectified left camera's frame with its background, and both
-/// silhouettes. Grey images have no blue screen: no silhouettes, no background, and table and surroundings are told from
-/// the object by height and radius. `angle_rad` is the table's measured angle.
-/// Fails with `invalid_input` (sizes, types), `degenerate` (no screen, nothing seen or matched), `out_of_range` (the
-/// object reaches the border of an image), `stopped`.
+/// silhouettes. Grey images have no blue screen: no silhouettes, no background, and table and surroundings are told
+/// from the object by height and radius. `angle_rad` is the table's measured angle. Fails with `invalid_input` (sizes,
+/// types), `degenerate` (no screen, nothing seen or matched), `out_of_range` (the object reaches the border of an
+/// image), `stopped`.
 Result<View> make_view(const Rectification& rectification, const StereoImages& images, double angle_rad, int index,
                        const ViewOptions& options, const Context& context);
 

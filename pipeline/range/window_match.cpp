@@ -14,8 +14,8 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 constexpr std::array<int, 6> kPowerX = {0, 1, 0, 2, 1, 0};
 constexpr std::array<int, 6> kPowerY = {0, 0, 1, 0, 1, 2};
 
-/// Sums over a window, times powers of y, one a column ("lane"): adding row by row vectorises in any instruction set and
-/// always in the same order. x and y are in units of the radius.
+/// Sums over a window, times powers of y, one a column ("lane"): adding row by row vectorises in any instruction set
+/// and always in the same order. x and y are in units of the radius.
 template <int kLanes, int kPowers>
 struct Moments {
   alignas(64) float sums[kPowers][kLanes] = {};

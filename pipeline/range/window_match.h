@@ -8,8 +8,8 @@
 
 namespace scanrig {
 
-/// Disparity around a pixel, second order: u_here - u_there = c0 + c1 x + c2 y + c3 x^2 + c4 x y + c5 y^2, where x, y are
-/// the pixels from it. Windows reach `radius` pixels to each side.
+/// Disparity around a pixel, second order: u_here - u_there = c0 + c1 x + c2 y + c3 x^2 + c4 x y + c5 y^2, where x, y
+/// are the pixels from it. Windows reach `radius` pixels to each side.
 struct DisparityPatch {
   std::array<float, 6> c{};
   float sigma = 0.0f;  ///< of c0, px
@@ -39,7 +39,7 @@ struct MatchImage {
 
 /// What the matcher knows about the pixels of the image it starts from.
 struct MatchMask {
-  cv::Mat1b usable;    ///< not 0: shows the object
+  cv::Mat1b usable;     ///< not 0: shows the object
   cv::Mat1f disparity;  ///< coarse, px; NaN unknown; keeps pixels beyond a depth step out of a window
 };
 
@@ -50,9 +50,10 @@ struct WindowOptions {
   float curvature_prior = 0.5f;  ///< px over a window of radius 7: the second order is worth its noise only above this
 };
 
-/// Least-squares matching of the window around (u, v) with second-order shape, gain and offset [Sutton, Orteu and Schreier,
-/// Image Correlation, 2009, ch. 5]: Gauss-Newton from `patch`, with the gradient of `here` (inverse compositional).
-/// `patch.radius` is 5, 7, 10 or 15. Returns the patch where it stopped; invalid when it diverged or had too little to see.
+/// Least-squares matching of the window around (u, v) with second-order shape, gain and offset [Sutton, Orteu and
+/// Schreier, Image Correlation, 2009, ch. 5]: Gauss-Newton from `patch`, with the gradient of `here` (inverse
+/// compositional). `patch.radius` is 5, 7, 10 or 15. Returns the patch where it stopped; invalid when it diverged or
+/// had too little to see.
 DisparityPatch match_window(const MatchImage& here, const MatchImage& there, const MatchMask& mask, int u, int v,
                             const DisparityPatch& patch, const WindowOptions& options);
 

@@ -89,8 +89,8 @@ cv::Mat3f colour_around(const cv::Mat3f& image, const cv::Mat1b& mask) {
   return weighted;
 }
 
-/// 1/2 - alpha, alpha the object's share in a pixel's light. Only a pixel near the mask's edge can be mixed; there it is
-/// put between the object's and the screen's colour nearby.
+/// 1/2 - alpha, alpha the object's share in a pixel's light. Only a pixel near the mask's edge can be mixed; there it
+/// is put between the object's and the screen's colour nearby.
 cv::Mat1f outside_share(const cv::Mat3f& image, const cv::Mat1b& object) {
   const cv::Mat1b screen(255 - object);
   const cv::Mat3f object_colour = colour_around(image, object), screen_colour = colour_around(image, screen);
@@ -124,17 +124,18 @@ bool touches_border(const cv::Mat1b& mask) {
 
 Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const BlueScreenOptions& options) {
   if (image.type() != CV_8UC3 || image.cols < 4 * kBorder || image.rows < 4 * kBorder) {
-    return fail(ErrorCode::invalid_input, "silhouette: a blue screen needs a colour image (BGR, 8 bit) of {} px or more",
-                4 * kBorder);
+    return fail(ErrorCode::invalid_input,
+                "silhouette: a blue screen needs a colour image (BGR, 8 bit) of {} px or more", 4 * kBorder);
   }
   cv::Mat3f colour, smooth;
   image.convertTo(colour, CV_32F);
   cv::boxFilter(colour, smooth, CV_32F, {3, 3}, {-1, -1}, true, cv::BORDER_REPLICATE);
   const double share = border_blue_share(smooth);
   if (share < options.least_blue_share) {
-    return fail(ErrorCode::degenerate,
-                "silhouette: the border of the image is not blue ({:.0f} % of its light); is the screen in place and lit?",
-                100.0 * share);
+    return fail(
+        ErrorCode::degenerate,
+        "silhouette: the border of the image is not blue ({:.0f} % of its light); is the screen in place and lit?",
+        100.0 * share);
   }
   const cv::Mat1f key = screen_key(smooth, share);
   cv::Mat1b object(key.size());

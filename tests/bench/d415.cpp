@@ -12,8 +12,8 @@ namespace {
 std::string number(double value) { return std::isfinite(value) ? fmt::format("{:.3f}", value) : "null"; }
 
 std::string json(const scanrig::bench::D415Measure& m) {
-  return fmt::format(R"({{"rms_px": {}, "coverage": {}, "rim_smeared_px": {}, "rim_bridged_px": {}}})", number(m.rms_px),
-                     number(m.coverage), number(m.rim_smeared_px), number(m.rim_bridged_px));
+  return fmt::format(R"({{"rms_px": {}, "coverage": {}, "rim_smeared_px": {}, "rim_bridged_px": {}}})",
+                     number(m.rms_px), number(m.coverage), number(m.rim_smeared_px), number(m.rim_bridged_px));
 }
 
 }  // namespace

@@ -2,81 +2,204 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
-#include <cmath>
+#include <cstdlib>
 #include <cstring>
-#include <opencv2/imgcodecs.hpp>
-#include <vector>
+#include <opencv2/core.hpp>
+#include <string>
 
 #include "core/parallel.h"
+#include "core/units.h"
+#include "tests/bench/d415_measure.h"
+#include "tests/unit/pipeline/range/comparison.h"
 #include "tests/unit/pipeline/range/two_cameras.h"
 
 namespace scanrig {
 namespace {
 
+using test::Comparison;
 using test::Surface;
 
-struct Comparison {
-  double median = 0.0, p95 = 0.0, p99 = 0.0, bias = 0.0;  // mm
-  double gross = 0.0;     // share of measured pixels more than 0.25 mm off
-  double coverage = 0.0;  // share of true pixels (incidence < 65 deg) measured
-  double sigma_ratio = 0.0;  // median |error / sigma| * 1.48
-};
-
-Comparison compare(const RangeImage& range, const cv::Mat1f& truth) {
-  std::vector<double> errors, ratios;
-  double sum = 0.0, seen = 0.0, measured = 0.0, gross = 0.0;
-  for (int v = 1; v + 1 < truth.rows; ++v) {
-    for (int u = 1; u + 1 < truth.cols; ++u) {
-      const double z = truth(v, u);
-      const double slope = std::max(std::abs(double(truth(v, u + 1)) - truth(v, u - 1)), std::abs(double(truth(v + 1, u)) - truth(v - 1, u)));
-      if (slope < 2 * 2.1 * z / 4266.7) {
-        ++seen;
-        measured += std::isfinite(range.depth(v, u)) ? 1 : 0;
-      }
-      if (!std::isfinite(range.depth(v, u))) continue;
-      if (!std::isfinite(z)) {
-        ++gross;
-        errors.push_back(1.0);
-        continue;
-      }
-      const double error = double(range.depth(v, u)) - z;
-      sum += error;
-      errors.push_back(std::abs(error));
-      ratios.push_back(std::abs(error) / double(range.sigma(v, u)));
-      if (std::abs(error) > 0.25) ++gross;
-    }
-  }
-  std::sort(errors.begin(), errors.end());
-  std::sort(ratios.begin(), ratios.end());
-  const auto at = [&](double q) { return errors.empty() ? NAN : errors[std::size_t(q * double(errors.size() - 1))]; };
-  return {at(0.5), at(0.95), at(0.99), sum / double(errors.size()), gross / double(errors.size()), measured / seen,
-          ratios.empty() ? NAN : 1.48 * ratios[ratios.size() / 2]};
+cv::Mat1b where_known(const cv::Mat1f& depth) {
+  cv::Mat1b known;
+  cv::compare(depth, depth, known, cv::CMP_EQ);
+  return known;
 }
 
-TEST(Stereo, Try) {
-  const Calibration calibration = test::default_rig({640, 480});
-  const Surface surface = test::nearest_of(test::ball({0, 45, 0}, 25), test::ball({0, 65, 22}, 6));
-  test::Look look;
-  const cv::Mat3b left = test::render(calibration.left, surface, look);
-  look.seed = 2;
-  const cv::Mat3b right = test::render(calibration.right, surface, look);
-  const auto rectification = rectify(calibration);
-  ASSERT_TRUE(rectification) << rectification.error().message;
-  printf("disparities %d %d\n", rectification->min_disparity, rectification->max_disparity);
-  const cv::Mat1f truth = test::true_depth(rectification->left, rectification->left_from_turntable, surface);
-  const cv::Mat1b mask = truth == truth;
-  const auto t0 = std::chrono::steady_clock::now();
-  const auto range = match_stereo(*rectification, left, right, mask, {}, {}, {});
-  const double s = std::chrono::duration<double>(std::chrono::steady_clock::now() - t0).count();
+/// A rendered surface before the rectified default rig.
+struct Scene {
+  Rectification rectification;
+  cv::Mat3b left, right;
+  cv::Mat1f truth;
+  cv::Mat1b object;
+
+  explicit Scene(const Surface& surface, cv::Size size = {400, 320}) {
+    const Calibration calibration = test::default_rig(size);
+    rectification = *rectify(calibration, {25.0, 90.0});
+    test::Look look;
+    left = test::render(calibration.left, surface, look);
+    look.seed = 2;
+    right = test::render(calibration.right, surface, look);
+    truth = test::true_depth(rectification.left, rectification.left_from_turntable, surface);
+    object = where_known(truth);
+  }
+  [[nodiscard]] Result<RangeImage> match(const Context& context = {}) const {
+    return match_stereo(rectification, left, right, object, {}, {}, context);
+  }
+  /// The object without `margin` pixels along its outline.
+  [[nodiscard]] cv::Mat1b inner(int margin) const {
+    cv::Mat1b out(object.size(), std::uint8_t{0});
+    for (int v = margin; v + margin < object.rows; ++v) {
+      for (int u = margin; u + margin < object.cols; ++u) {
+        const cv::Rect around(u - margin, v - margin, 2 * margin + 1, 2 * margin + 1);
+        out(v, u) = cv::countNonZero(object(around)) == around.area() ? 255 : 0;
+      }
+    }
+    return out;
+  }
+};
+
+const Eigen::Vector3d kMiddle(0, 45, 0);
+
+TEST(Stereo, MeasuresABallToHundredthsOfAMillimetre) {
+  const Scene scene(test::ball(kMiddle, 20));
+  const auto range = scene.match();
   ASSERT_TRUE(range) << range.error().message;
-  const Comparison c = compare(*range, truth);
-  printf("pixels %d: median %.4f p95 %.4f p99 %.4f bias %.4f gross %.4f%% coverage %.4f sigma %.2f, %.2f s\n", cv::countNonZero(mask), c.median, c.p95, c.p99,
-         c.bias, 100 * c.gross, c.coverage, c.sigma_ratio, s);
-  cv::imwrite("/tmp/range_left.png", left);
-  cv::Mat1b picture = (range->depth - truth) * 1000 + 128;
-  picture.setTo(0, range->depth != range->depth);
-  cv::imwrite("/tmp/range_error.png", picture);
+  const Comparison c = test::compare(*range, scene.truth, scene.inner(12));
+  EXPECT_LT(c.median, 0.01);
+  EXPECT_LT(c.p95, 0.05);
+  EXPECT_LT(std::abs(c.bias), 0.003);
+  EXPECT_GT(c.coverage, 0.98);
+  EXPECT_LT(test::compare(*range, scene.truth, scene.object).gross, 0.002);
+}
+
+TEST(Stereo, MeasuresSmallRadiiWithoutFlatteningThem) {
+  const Scene scene(test::ball(kMiddle, 5), {240, 240});
+  const auto range = scene.match();
+  ASSERT_TRUE(range) << range.error().message;
+  const Comparison c = test::compare(*range, scene.truth, scene.inner(8));
+  EXPECT_LT(c.median, 0.015);
+  EXPECT_LT(std::abs(c.bias), 0.006);
+}
+
+TEST(Stereo, MeasuresASurfaceThatTurnsAwayBySixtyDegrees) {
+  const double angle = to_radians(60.0);
+  const Scene scene(test::disc(kMiddle, {std::sin(angle), 0.0, std::cos(angle)}, 25));
+  const auto range = scene.match();
+  ASSERT_TRUE(range) << range.error().message;
+  const Comparison c = test::compare(*range, scene.truth, scene.inner(10));
+  EXPECT_LT(c.median, 0.02);
+  EXPECT_LT(c.p95, 0.08);
+  EXPECT_GT(c.coverage, 0.95);
+}
+
+TEST(Stereo, SigmaTellsTheSizeOfTheErrors) {
+  const Scene scene(test::disc(kMiddle, Eigen::Vector3d(0.3, 0.2, 1.0).normalized(), 22));
+  const auto range = scene.match();
+  ASSERT_TRUE(range) << range.error().message;
+  const Comparison c = test::compare(*range, scene.truth, scene.object);
+  // These images have no colour mosaic, whose correlated noise sigma allows for.
+  EXPECT_GT(c.sigma_ratio, 0.4);
+  EXPECT_LT(c.sigma_ratio, 1.2);
+}
+
+TEST(Stereo, NormalsAreTheSurfacesTowardsTheCamera) {
+  const Eigen::Vector3d normal = Eigen::Vector3d(0.4, 0.3, 1.0).normalized();
+  const Scene scene(test::disc(kMiddle, normal, 22));
+  const auto range = scene.match();
+  ASSERT_TRUE(range) << range.error().message;
+  const Eigen::Vector3d expected = scene.rectification.left_from_turntable.linear() * normal;
+  double worst = 0.0, sum = 0.0, count = 0.0;
+  for (int v = 0; v < range->depth.rows; ++v) {
+    for (int u = 0; u < range->depth.cols; ++u) {
+      if (std::isnan(range->depth(v, u))) continue;
+      const cv::Vec3f& n = range->normal(v, u);
+      const Eigen::Vector3d got(static_cast<double>(n[0]), static_cast<double>(n[1]), static_cast<double>(n[2]));
+      ASSERT_NEAR(got.norm(), 1.0, 1e-5);
+      const double degrees = to_degrees(std::acos(std::min(1.0, got.dot(expected))));
+      worst = std::max(worst, degrees);
+      sum += degrees;
+      count += 1.0;
+    }
+  }
+  EXPECT_LT(sum / count, 1.5);
+  EXPECT_LT(worst, 25.0);
+}
+
+TEST(Stereo, PutsNothingBetweenTheTwoSidesOfADepthStep) {
+  const Surface near_disc = test::disc({0, 52, 12}, {0, 0.37, 0.93}, 8);
+  const Scene scene(test::nearest_of(test::disc(kMiddle, {0, 0.37, 0.93}, 24), near_disc));
+  const auto range = scene.match();
+  ASSERT_TRUE(range) << range.error().message;
+  const Comparison c = test::compare(*range, scene.truth, scene.object);
+  EXPECT_LT(c.gross, 0.003);
+  EXPECT_GT(c.coverage, 0.75);
+}
+
+TEST(Stereo, GivesTheSameBitsForAnyNumberOfThreads) {
+  const Scene scene(test::ball(kMiddle, 10), {280, 240});
+  cv::Mat1f first;
+  for (const int threads : {1, 2, 5}) {
+    with_threads(threads, [&] {
+      const auto range = scene.match();
+      ASSERT_TRUE(range) << range.error().message;
+      if (first.empty()) first = range->depth;
+      EXPECT_EQ(std::memcmp(first.data, range->depth.data, first.total() * sizeof(float)), 0) << threads << " threads";
+    });
+  }
+}
+
+TEST(Stereo, SaysWhenNothingMatches) {
+  const Scene scene(test::ball(kMiddle, 10), {280, 240});
+  const cv::Mat3b dark(scene.left.size(), cv::Vec3b(3, 3, 3));
+  const auto blank = match_stereo(scene.rectification, dark, dark, scene.object, {}, {}, {});
+  ASSERT_FALSE(blank);
+  EXPECT_EQ(blank.error().code, ErrorCode::degenerate);
+  const cv::Mat1b nothing(scene.left.size(), std::uint8_t{0});
+  const auto hidden = match_stereo(scene.rectification, scene.left, scene.right, nothing, {}, {}, {});
+  ASSERT_FALSE(hidden);
+  EXPECT_EQ(hidden.error().code, ErrorCode::degenerate);
+}
+
+TEST(Stereo, StopsWhenAsked) {
+  const Scene scene(test::ball(kMiddle, 10), {280, 240});
+  std::stop_source stop;
+  const auto at_half = [&](std::string_view, double fraction) {
+    if (fraction >= 0.4) stop.request_stop();
+  };
+  const auto range = scene.match({stop.get_token(), at_half});
+  ASSERT_FALSE(range);
+  EXPECT_EQ(range.error().code, ErrorCode::stopped);
+}
+
+TEST(Stereo, RefusesWhatDoesNotBelongTogether) {
+  const Scene scene(test::ball(kMiddle, 10), {280, 240});
+  const cv::Mat1f image(240, 280, 50.0f);
+  const RectifiedPair good{image, image, {}, {}, scene.rectification.left, 0.0, 160.0, -20, 20};
+  RectifiedPair size = good, mask = good, baseline = good, disparities = good;
+  size.right = cv::Mat1f(240, 200, 50.0f);
+  mask.left_object = cv::Mat1b(10, 10, std::uint8_t{255});
+  baseline.baseline_mm = 0.0;
+  disparities.max_disparity = -20;
+  for (const RectifiedPair& pair : {size, mask, baseline, disparities, RectifiedPair()}) {
+    const auto range = match_rectified(pair, {}, {});
+    ASSERT_FALSE(range);
+    EXPECT_EQ(range.error().code, ErrorCode::invalid_input) << range.error().message;
+  }
+  const auto small = match_stereo(scene.rectification, cv::Mat3b(10, 10), scene.right, {}, {}, {}, {});
+  ASSERT_FALSE(small);
+  EXPECT_EQ(small.error().code, ErrorCode::invalid_input);
+}
+
+TEST(Stereo, MeasuresTheSheetOfARealDotPair) {
+  const char* shared = std::getenv("SCANRIG_SHARED_DATA");
+  const std::filesystem::path folder =
+      std::filesystem::path(shared != nullptr ? shared : SCANRIG_SOURCE_DIR "/../shared/data") / "d415_ir_pair";
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not here";
+  const auto result = bench::measure_d415(folder);
+  ASSERT_TRUE(result) << result.error().message;
+  EXPECT_LT(result->ours.rms_px, 0.20);
+  EXPECT_GT(result->ours.coverage, 0.97);
+  EXPECT_LE(result->ours.rim_smeared_px, result->sgbm.rim_smeared_px);
 }
 
 }  // namespace

@@ -13,7 +13,8 @@ namespace scanrig::test {
 namespace {
 
 double hashed(std::int64_t x, std::int64_t y, std::uint64_t salt) {
-  std::uint64_t h = std::uint64_t(x) * 0x9E3779B97F4A7C15ull ^ std::uint64_t(y) * 0xC2B2AE3D27D4EB4Full ^ salt * 0x165667B19E3779F9ull;
+  std::uint64_t h = std::uint64_t(x) * 0x9E3779B97F4A7C15ull ^ std::uint64_t(y) * 0xC2B2AE3D27D4EB4Full ^
+                    salt * 0x165667B19E3779F9ull;
   h = (h ^ (h >> 30)) * 0xBF58476D1CE4E5B9ull;
   h = (h ^ (h >> 27)) * 0x94D049BB133111EBull;
   return static_cast<double>((h ^ (h >> 31)) >> 11) / 9007199254740992.0;
@@ -104,7 +105,8 @@ cv::Mat3b render(const Camera& camera, const Surface& surface, const Look& look)
       Eigen::Vector3d colour = Eigen::Vector3d::Zero();
       for (const double b : {-0.25, 0.25}) {
         for (const double a : {-0.25, 0.25}) {
-          const Eigen::Vector3d direction = (turntable_from_camera.linear() * p.unproject(u + a, v + b, 1.0)).normalized();
+          const Eigen::Vector3d direction =
+              (turntable_from_camera.linear() * p.unproject(u + a, v + b, 1.0)).normalized();
           const Eigen::Vector3d origin = turntable_from_camera.translation();
           const auto distance = surface(origin, direction);
           if (!distance) {

@@ -17,14 +17,14 @@ Surface ball(const Eigen::Vector3d& centre, double radius);
 Surface disc(const Eigen::Vector3d& centre, const Eigen::Vector3d& normal, double radius);
 Surface nearest_of(const Surface& a, const Surface& b);
 
-/// The default rig of the design: f = 4266.7 px, 640 mm away, 22 deg above, baseline 160 mm, toed in; `size` pixels around
-/// the line of sight to (0, 45, 0).
+/// The default rig of the design: f = 4266.7 px, 640 mm away, 22 deg above, baseline 160 mm, toed in; `size` pixels
+/// around the line of sight to (0, 45, 0).
 Calibration default_rig(cv::Size size);
 
 struct Look {
-  bool dots = true;        ///< smooth random dots from a projector between the cameras
-  double noise = 2.0;      ///< grey levels
-  Eigen::Vector3d screen = {150, 50, 20};   ///< BGR of what is not the object
+  bool dots = true;                          ///< smooth random dots from a projector between the cameras
+  double noise = 2.0;                        ///< grey levels
+  Eigen::Vector3d screen = {150, 50, 20};    ///< BGR of what is not the object
   Eigen::Vector3d object = {120, 120, 120};  ///< BGR of the object between dots
   unsigned seed = 1;
 };

@@ -1,0 +1,158 @@
+#include "pipeline/silhouette/blue_screen.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <random>
+
+namespace scanrig {
+namespace {
+
+using Colour = cv::Vec3d;
+/// Signed distance to the painted object, positive outside.
+using Shape = std::function<double(double x, double y)>;
+
+constexpr int kWidth = 240, kHeight = 200;
+const Colour kScreen(140, 45, 15), kGrey(90, 90, 90);
+
+Shape disc(double x0, double y0, double radius) {
+  return [=](double x, double y) { return std::hypot(x - x0, y - y0) - radius; };
+}
+Shape ring(double x0, double y0, double outer, double inner) {
+  return [=](double x, double y) {
+    const double r = std::hypot(x - x0, y - y0);
+    return std::max(r - outer, inner - r);
+  };
+}
+
+/// Paints shapes over the screen as a lens would show them (edges over about a pixel and a half) and adds noise.
+class Scene {
+ public:
+  Scene() : light_(kHeight, kWidth, kScreen) {}
+
+  Scene& paint(const Shape& shape, const std::function<Colour(int, int, const Colour&)>& colour) {
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        const double alpha = 1.0 / (1.0 + std::exp(shape(x, y) / 0.35));
+        light_(y, x) = alpha * colour(x, y, light_(y, x)) + (1.0 - alpha) * light_(y, x);
+      }
+    }
+    return *this;
+  }
+  Scene& paint(const Shape& shape, const Colour& colour) {
+    return paint(shape, [colour](int, int, const Colour&) { return colour; });
+  }
+  [[nodiscard]] cv::Mat3b image() const {
+    std::mt19937 random(5);
+    std::normal_distribution<double> noise(0.0, 2.0);
+    cv::Mat3b out(kHeight, kWidth);
+    for (int y = 0; y < kHeight; ++y) {
+      for (int x = 0; x < kWidth; ++x) {
+        for (int c = 0; c < 3; ++c) out(y, x)[c] = cv::saturate_cast<std::uint8_t>(light_(y, x)[c] + noise(random));
+      }
+    }
+    return out;
+  }
+
+ private:
+  cv::Mat_<Colour> light_;
+};
+
+/// Root mean square of the error within `reach` px of the true outline.
+double outline_error(const cv::Mat1f& outside, const Shape& truth, double reach = 2.0) {
+  double squares = 0.0;
+  int count = 0;
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      const double d = truth(x, y);
+      if (std::abs(d) > reach) continue;
+      squares += std::pow(static_cast<double>(outside(y, x)) - d, 2);
+      ++count;
+    }
+  }
+  return std::sqrt(squares / count);
+}
+
+TEST(BlueScreen, FindsAnOutlineToAFractionOfAPixel) {
+  const Shape object = disc(120.3, 98.6, 55.2);
+  const auto outside = blue_screen_outline(Scene().paint(object, kGrey).image());
+  ASSERT_TRUE(outside) << outside.error().message;
+  EXPECT_LT(outline_error(*outside, object), 0.12);
+  EXPECT_LT(outline_error(*outside, object, 40.0), 0.5);
+}
+
+TEST(BlueScreen, SeesTheScreenThroughALoop) {
+  const Shape object = ring(120, 100, 60, 12);
+  const auto outside = blue_screen_outline(Scene().paint(object, kGrey).image());
+  ASSERT_TRUE(outside) << outside.error().message;
+  EXPECT_GT((*outside)(100, 120), 10.0f);
+  EXPECT_LT(outline_error(*outside, object), 0.15);
+}
+
+TEST(BlueScreen, TakesNeitherShadowNorTableMarkNorSpeckForTheObject) {
+  const Shape object = disc(110, 90, 45);
+  Scene scene;
+  scene.paint(disc(150, 140, 40), [](int, int, const Colour& below) { return 0.25 * below; });  // shadow
+  for (int i = 0; i < 8; ++i) scene.paint(disc(20 + 28 * i, 185, 2.5), Colour(170, 75, 40));    // marks of the table
+  scene.paint(disc(30, 30, 1.5), Colour(200, 200, 200));                                        // dust
+  const auto outside = blue_screen_outline(scene.paint(object, kGrey).image());
+  ASSERT_TRUE(outside) << outside.error().message;
+  EXPECT_LT(outline_error(*outside, object), 0.2);
+  EXPECT_GT((*outside)(185, 20), 50.0f);
+  EXPECT_GT((*outside)(30, 30), 50.0f);
+  EXPECT_GT((*outside)(160, 160), 30.0f);
+}
+
+TEST(BlueScreen, KeepsTheFootOfAnObjectThatReflectsTheTable) {
+  const Shape object = disc(120, 100, 50);
+  const auto spill = [](int, int y, const Colour&) {
+    const double share = std::clamp((y - 110) / 40.0, 0.0, 1.0);
+    return Colour(kGrey * (1.0 - 0.5 * share) + share * 0.3 * kScreen);
+  };
+  const auto outside = blue_screen_outline(Scene().paint(object, spill).image());
+  ASSERT_TRUE(outside) << outside.error().message;
+  EXPECT_LT(outline_error(*outside, object), 0.2);
+}
+
+TEST(BlueScreen, KeepsHighlightsAndDarkSpots) {
+  const Shape object = disc(120, 100, 50);
+  Scene scene;
+  scene.paint(object, kGrey).paint(disc(110, 90, 2.5), kScreen).paint(disc(130, 110, 8), Colour(4, 4, 4));
+  const auto outside = blue_screen_outline(scene.image());
+  ASSERT_TRUE(outside) << outside.error().message;
+  EXPECT_LT((*outside)(90, 110), -20.0f);
+  EXPECT_LT((*outside)(110, 130), -20.0f);
+}
+
+TEST(BlueScreen, SaysWhenThereIsNoObject) {
+  const auto outside = blue_screen_outline(Scene().image());
+  ASSERT_FALSE(outside);
+  EXPECT_EQ(outside.error().code, ErrorCode::degenerate);
+}
+
+TEST(BlueScreen, SaysWhenTheScreenIsNotBlue) {
+  const auto outside = blue_screen_outline(cv::Mat3b(kHeight, kWidth, cv::Vec3b(80, 80, 80)));
+  ASSERT_FALSE(outside);
+  EXPECT_EQ(outside.error().code, ErrorCode::degenerate);
+  EXPECT_NE(outside.error().message.find("blue"), std::string::npos);
+}
+
+TEST(BlueScreen, SaysWhenTheObjectReachesTheBorder) {
+  const auto outside = blue_screen_outline(Scene().paint(disc(120, 30, 50), kGrey).image());
+  ASSERT_FALSE(outside);
+  EXPECT_EQ(outside.error().code, ErrorCode::out_of_range);
+  EXPECT_NE(outside.error().message.find("larger than the working volume"), std::string::npos);
+}
+
+TEST(BlueScreen, RefusesGreyAndDeepImages) {
+  for (const cv::Mat& image : {cv::Mat(kHeight, kWidth, CV_8UC1), cv::Mat(kHeight, kWidth, CV_16UC3), cv::Mat()}) {
+    const auto outside = blue_screen_outline(image);
+    ASSERT_FALSE(outside);
+    EXPECT_EQ(outside.error().code, ErrorCode::invalid_input);
+  }
+}
+
+}  // namespace
+}  // namespace scanrig
