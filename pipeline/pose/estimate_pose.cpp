@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "core/parallel.h"
@@ -62,6 +63,7 @@ void narrow(std::vector<Hypothesis>& field, const Scene& scene, const Round& rou
     if (round.iterations > 0) {
       RefineOptions refine;
       refine.iterations = round.iterations;
+      refine.contacts = h.candidate.contacts;
       const RefinedPose aligned = align(scene.measured1, scene.measured2, h.candidate.pose1_from_pose2, round.level,
                                         round.capture * scene.size_mm, refine);
       h.candidate.pose1_from_pose2 = aligned.pose1_from_pose2;
@@ -112,6 +114,7 @@ void add_pair(const RestPair& pair, const char* generator, const Scene& scene, s
     Hypothesis h;
     h.candidate.pose1_from_pose2 = transform_of(pair, scene.solid1.facts, scene.solid2.facts, swivel);
     h.candidate.generator = generator;
+    h.candidate.contacts = contacts_of(pair, scene.solid2.facts);
     h.candidate.normal1 = pair.of_pose1.normal;
     h.candidate.normal2 = pair.of_pose2.normal;
     field.push_back(std::move(h));
@@ -172,13 +175,34 @@ void judge(std::vector<Hypothesis>& field, const PoseOptions& options) {
     return a.candidate.tally.score() > b.candidate.tally.score();
   });
   for (Hypothesis& h : field) {
-    const Disagreement d = compare(field[0].testimonies, h.testimonies, spread);
+    const Comparison with_best = compare(field[0].testimonies, h.testimonies, spread);
     Candidate& c = h.candidate;
-    c.contradicted_more = d.only_second - d.only_first;
-    c.separable = d.first_is_better();
+    c.contradicted_more = with_best.contradicted_more;
+    c.separable = with_best.separable;
     c.angle_to_best_deg = to_degrees(
         rotation_angle(field[0].candidate.pose1_from_pose2.linear().transpose() * c.pose1_from_pose2.linear()));
   }
+}
+
+/// Another answer that the measurements do not tell from `best`.
+bool is_rival(const Candidate& c, const Candidate& best, const PoseOptions& options) {
+  return c.angle_to_best_deg > options.same_deg && !c.separable && c.tally.confirmed > 0.7 * best.tally.confirmed;
+}
+
+/// Takes what cannot be told apart yet to full resolution; what was told apart stays behind the finalists.
+void settle(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options) {
+  if (field.empty()) return;
+  judge(field, options);
+  const auto rivals = std::stable_partition(field.begin() + 1, field.end(), [&](const Hypothesis& h) {
+    return is_rival(h.candidate, field[0].candidate, options);
+  });
+  if (rivals - field.begin() < 2) return;
+  std::vector<Hypothesis> finalists(std::make_move_iterator(field.begin()), std::make_move_iterator(rivals));
+  std::vector<Hypothesis> others(std::make_move_iterator(rivals), std::make_move_iterator(field.end()));
+  narrow(finalists, scene, {0, 10, 0.01, 0.015, finalists.size(), options.same_deg});
+  judge(finalists, options);
+  field = std::move(finalists);
+  field.insert(field.end(), std::make_move_iterator(others.begin()), std::make_move_iterator(others.end()));
 }
 
 Result<void> decide(const std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options) {
@@ -198,7 +222,7 @@ Result<void> decide(const std::vector<Hypothesis>& field, const Scene& scene, co
   bool all_same_rest = tilt_deg(best.pose1_from_pose2) < options.same_rest_tilt_deg;
   for (const Hypothesis& h : field) {
     const Candidate& c = h.candidate;
-    if (c.angle_to_best_deg < options.same_deg || c.separable || c.tally.confirmed < 0.7 * t.confirmed) continue;
+    if (!is_rival(c, best, options)) continue;
     others += fmt::format("; {}", describe(c));
     all_same_rest = all_same_rest && tilt_deg(c.pose1_from_pose2) < options.same_rest_tilt_deg;
   }
@@ -245,7 +269,7 @@ Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose
     if (round.iterations == 0) estimate.refined = static_cast<int>(field.size());
     context.report("pose", static_cast<double>(&round - kRounds + 1) / std::size(kRounds));
   }
-  judge(field, options);
+  settle(field, *scene, options);
   if (auto ok = decide(field, *scene, options); !ok) return pass_on(ok);
   estimate.best = field[0].candidate;
   estimate.pose1_from_pose2 = estimate.best.pose1_from_pose2;

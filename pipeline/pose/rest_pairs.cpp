@@ -74,6 +74,14 @@ Transform transform_of(const RestPair& pair, const SolidFacts& pose1, const Soli
   return t;
 }
 
+std::vector<Contact> contacts_of(const RestPair& pair, const SolidFacts& pose2) {
+  const auto foot_on = [&](const Eigen::Vector3d& normal, double offset) {
+    return Eigen::Vector3d(pose2.centre_of_mass + normal * (offset - normal.dot(pose2.centre_of_mass)));
+  };
+  return {{foot_on(pair.of_pose2.normal, pair.of_pose2.offset_mm), base_normal(), 0.0},
+          {foot_on(base_normal(), 0.0), pair.of_pose1.normal, pair.of_pose1.offset_mm}};
+}
+
 std::vector<double> swivels_of(const RestPair& pair) {
   const double from_upside_down = to_degrees(angle_between(pair.of_pose1.normal, -base_normal()));
   std::vector<double> swivels;

@@ -5,6 +5,7 @@
 
 #include "core/transform.h"
 #include "pipeline/pose/stable_rests.h"
+#include "pipeline/registration/refine_pose.h"
 
 namespace scanrig {
 
@@ -42,6 +43,9 @@ std::vector<RestPair> pair_rests(const RestingSolid& pose1, const RestingSolid& 
 /// turned by `swivel` radians about n_T1. Contact fixes the translation along n_B and n_T1, the centres of mass the
 /// rest.
 Transform transform_of(const RestPair& pair, const SolidFacts& pose1, const SolidFacts& pose2, double swivel);
+
+/// What the pair says of the tables: pose 2's rest touches pose 1's table, pose 1's rest pose 2's.
+std::vector<Contact> contacts_of(const RestPair& pair, const SolidFacts& pose2);
 
 /// The swivels to try. Within 30 deg of upside down the two contacts are one and any angle about the vertical fits:
 /// the full circle; out to 60 deg the angle is known poorly; beyond, the closed form holds.

@@ -11,7 +11,7 @@ namespace {
 
 using testing::Solid;
 
-const testing::RigModel kRig{.width = 240, .height = 180, .focal_px = 850, .noise_mm = 0.01};
+const testing::RigModel kRig{.width = 288, .height = 216, .focal_px = 1000, .noise_mm = 0.01};
 
 /// An object in two poses, scanned and closed.
 struct Scan {
