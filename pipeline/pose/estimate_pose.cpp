@@ -26,6 +26,7 @@ struct Hypothesis {
 /// Everything the search needs of the two poses.
 struct Scene {
   RestingSolid solid1, solid2;
+  std::vector<RestPair> pairs;
   MeasuredPose measured1, measured2;
   Witness witness1, witness2;
   double size_mm = 0.0;
@@ -63,6 +64,7 @@ void narrow(std::vector<Hypothesis>& field, const Scene& scene, const Round& rou
     if (round.iterations > 0) {
       RefineOptions refine;
       refine.iterations = round.iterations;
+      h.candidate.contacts = contacts_for(h.candidate.pose1_from_pose2, scene.pairs, scene.solid2.facts);
       refine.contacts = h.candidate.contacts;
       const RefinedPose aligned = align(scene.measured1, scene.measured2, h.candidate.pose1_from_pose2, round.level,
                                         round.capture * scene.size_mm, refine);
@@ -114,7 +116,6 @@ void add_pair(const RestPair& pair, const char* generator, const Scene& scene, s
     Hypothesis h;
     h.candidate.pose1_from_pose2 = transform_of(pair, scene.solid1.facts, scene.solid2.facts, swivel);
     h.candidate.generator = generator;
-    h.candidate.contacts = contacts_of(pair, scene.solid2.facts);
     h.candidate.normal1 = pair.of_pose1.normal;
     h.candidate.normal2 = pair.of_pose2.normal;
     field.push_back(std::move(h));
@@ -134,9 +135,9 @@ Result<void> add_rest_hypotheses(const PoseInput& pose1, const PoseInput& pose2,
   estimate.counts2 = rests2->counts;
   scene.solid1.rests = std::move(rests1->rests);
   scene.solid2.rests = std::move(rests2->rests);
-  const auto pairs = pair_rests(scene.solid1, scene.solid2, options.pairs);
-  estimate.pairs = static_cast<int>(pairs.size());
-  for (const RestPair& pair : pairs) add_pair(pair, egi ? "egi" : "hull", scene, field);
+  scene.pairs = pair_rests(scene.solid1, scene.solid2, options.pairs);
+  estimate.pairs = static_cast<int>(scene.pairs.size());
+  for (const RestPair& pair : scene.pairs) add_pair(pair, egi ? "egi" : "hull", scene, field);
   return {};
 }
 

@@ -40,7 +40,7 @@ struct Candidate {
   std::string generator;                              ///< "hull", "egi", "point pairs" or "same rest"
   Eigen::Vector3d normal1 = Eigen::Vector3d::Zero();  ///< n_T1 and n_T2 of the pair it came from; 0 for point pairs
   Eigen::Vector3d normal2 = Eigen::Vector3d::Zero();
-  std::vector<Contact> contacts;  ///< with the tables, for the refinement; none from point pairs
+  std::vector<Contact> contacts;  ///< with the tables, for the refinement
   Tally tally;
   double angle_to_best_deg = 0.0;
   int contradicted_more = 0;  ///< samples that speak against it and not against the best, less the other way round

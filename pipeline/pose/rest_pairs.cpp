@@ -74,12 +74,24 @@ Transform transform_of(const RestPair& pair, const SolidFacts& pose1, const Soli
   return t;
 }
 
-std::vector<Contact> contacts_of(const RestPair& pair, const SolidFacts& pose2) {
+std::vector<Contact> contacts_for(const Transform& pose1_from_pose2, std::span<const RestPair> pairs,
+                                  const SolidFacts& pose2) {
+  const Eigen::Matrix3d& turn = pose1_from_pose2.linear();
+  const RestPair* best = nullptr;
+  double nearest = to_radians(3.0);
+  for (const RestPair& pair : pairs) {
+    const double apart = std::max(angle_between(pair.of_pose1.normal, turn * base_normal()),
+                                  angle_between(pair.of_pose2.normal, turn.transpose() * base_normal()));
+    if (apart >= nearest) continue;
+    nearest = apart;
+    best = &pair;
+  }
+  if (!best) return {};
   const auto foot_on = [&](const Eigen::Vector3d& normal, double offset) {
     return Eigen::Vector3d(pose2.centre_of_mass + normal * (offset - normal.dot(pose2.centre_of_mass)));
   };
-  return {{foot_on(pair.of_pose2.normal, pair.of_pose2.offset_mm), base_normal(), 0.0},
-          {foot_on(base_normal(), 0.0), pair.of_pose1.normal, pair.of_pose1.offset_mm}};
+  return {{foot_on(best->of_pose2.normal, best->of_pose2.offset_mm), base_normal(), 0.0},
+          {foot_on(base_normal(), 0.0), best->of_pose1.normal, best->of_pose1.offset_mm}};
 }
 
 std::vector<double> swivels_of(const RestPair& pair) {

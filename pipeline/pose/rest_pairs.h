@@ -44,8 +44,10 @@ std::vector<RestPair> pair_rests(const RestingSolid& pose1, const RestingSolid& 
 /// rest.
 Transform transform_of(const RestPair& pair, const SolidFacts& pose1, const SolidFacts& pose2, double swivel);
 
-/// What the pair says of the tables: pose 2's rest touches pose 1's table, pose 1's rest pose 2's.
-std::vector<Contact> contacts_of(const RestPair& pair, const SolidFacts& pose2);
+/// What the tables say of a motion: the contacts of the pair that agrees with it best, pose 2's rest on pose 1's table
+/// and pose 1's rest on pose 2's; none where no pair agrees within 3 deg.
+std::vector<Contact> contacts_for(const Transform& pose1_from_pose2, std::span<const RestPair> pairs,
+                                  const SolidFacts& pose2);
 
 /// The swivels to try. Within 30 deg of upside down the two contacts are one and any angle about the vertical fits:
 /// the full circle; out to 60 deg the angle is known poorly; beyond, the closed form holds.

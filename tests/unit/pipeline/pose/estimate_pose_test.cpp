@@ -74,7 +74,7 @@ TEST(EstimatePose, FindsAnObjectLaidOnItsSideByTheFacetsOfItsHull) {
   expect_found(estimate, workpiece_on_its_side());
   EXPECT_EQ(estimate->best.generator, "hull");
   EXPECT_GT(estimate->best.tally.confirmed, 0.3);
-  EXPECT_LT(estimate->best.tally.contradicted, 0.05);
+  EXPECT_LT(estimate->best.tally.contradicted, 0.1);
   EXPECT_FALSE(estimate->alternatives.empty());
 }
 
@@ -95,6 +95,7 @@ TEST(EstimatePose, FindsItByPointPairsAlone) {
   EXPECT_EQ(estimate->best.generator, "point pairs");
 }
 
+/// Nearly all surface that both poses see is upright: the tables' contacts hold the height.
 TEST(EstimatePose, FindsAnObjectTurnedUpsideDown) {
   const Solid stool =
       testing::together({testing::block({-32, 0, -22}, {32, 20, 22}), testing::block({-25, 15, -20}, {-13, 45, -2}),
