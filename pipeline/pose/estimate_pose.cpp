@@ -257,7 +257,7 @@ Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose
     if (auto ok = add_rest_hypotheses(pose1, pose2, options, *scene, estimate, field); !ok) return pass_on(ok);
   }
   if (options.point_pairs) add_point_pair_hypotheses(*scene, field);
-  add_pair(same_rest_pair(scene->solid1, scene->solid2), "same rest", *scene, field);
+  add_pair(same_rest_pair(scene->solid1, scene->solid2), "turn on the table", *scene, field);
   estimate.hypotheses = static_cast<int>(field.size());
 
   constexpr Round kRounds[] = {{3, 0, 0.00, 0.050, 120, 4.0},  // as proposed

@@ -37,7 +37,7 @@ struct PoseOptions {
 /// A motion between the poses after refinement, with the verdict on it.
 struct Candidate {
   Transform pose1_from_pose2 = Transform::Identity();
-  std::string generator;                              ///< "hull", "egi", "point pairs" or "same rest"
+  std::string generator;                              ///< "hull", "egi", "point pairs" or "turn on the table"
   Eigen::Vector3d normal1 = Eigen::Vector3d::Zero();  ///< n_T1 and n_T2 of the pair it came from; 0 for point pairs
   Eigen::Vector3d normal2 = Eigen::Vector3d::Zero();
   std::vector<Contact> contacts;  ///< with the tables, for the refinement
