@@ -46,7 +46,7 @@ std::vector<RestPair> pair_rests(const RestingSolid& pose1, const RestingSolid& 
       const Eigen::Vector3d misfit(to_degrees(turn) / options.angle_sigma_deg,
                                    (one.height_mm - pose2.height_mm) / height_sigma,
                                    (two.height_mm - pose1.height_mm) / height_sigma);
-      if (misfit.squaredNorm() < options.worst_cost) pairs.push_back({one, two, misfit.squaredNorm()});
+      pairs.push_back({one, two, misfit.squaredNorm()});
     }
   }
   std::stable_sort(pairs.begin(), pairs.end(), [](const RestPair& a, const RestPair& b) { return a.cost < b.cost; });
@@ -99,10 +99,8 @@ std::vector<double> swivels_of(const RestPair& pair) {
   std::vector<double> swivels;
   if (from_upside_down < 30.0 || from_upside_down > 175.0) {
     for (int k = 0; k < 36; ++k) swivels.push_back(to_radians(10.0 * k));
-  } else if (from_upside_down < 60.0) {
-    for (const double degrees : {-12.0, 0.0, 12.0}) swivels.push_back(to_radians(degrees));
   } else {
-    swivels.push_back(0.0);
+    for (const double degrees : {0.0, -12.0, 12.0}) swivels.push_back(to_radians(degrees));
   }
   return swivels;
 }

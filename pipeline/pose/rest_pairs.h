@@ -30,8 +30,7 @@ struct RestPairOptions {
   double angle_sigma_deg = 6.0;  ///< smooth contacts make normals jitter by degrees
   double height_sigma_mm = 2.0;  ///< or `height_sigma` of the size: partial models are closed by their hull
   double height_sigma = 0.04;
-  double worst_cost = 30.0;
-  int most = 40;
+  int most = 40;  ///< the best stay, however poor: models closed crudely misjudge heights by centimetres
 };
 
 /// Pairs of rests, best first, that agree on the angle to the base, angle(n_T1, n_B) = angle(n_T2, n_B), and on the
@@ -50,7 +49,7 @@ std::vector<Contact> contacts_for(const Transform& pose1_from_pose2, std::span<c
                                   const SolidFacts& pose2);
 
 /// The swivels to try. Within 30 deg of upside down the two contacts are one and any angle about the vertical fits:
-/// the full circle; out to 60 deg the angle is known poorly; beyond, the closed form holds.
+/// the full circle; beyond, the closed form and its neighbours, since normals of smooth contacts jitter.
 std::vector<double> swivels_of(const RestPair& pair);
 
 /// The pair that says "not turned over": both poses rest on the same face; any angle about the vertical fits.
