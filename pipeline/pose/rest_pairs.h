@@ -34,8 +34,8 @@ struct RestPairOptions {
 };
 
 /// Pairs of rests, best first, that agree on the angle to the base, angle(n_T1, n_B) = angle(n_T2, n_B), and on the
-/// heights, extent(V1, n_T1) = H2 and extent(V2, n_T2) = H1. The gates are soft [measured: a hard 3 deg gate loses the
-/// true pair in 2 of 10 trials].
+/// heights, extent(V1, n_T1) = H2 and extent(V2, n_T2) = H1. Nothing is gated out but by the number of pairs
+/// [measured: a hard 3 deg gate loses the true pair in 2 of 10 trials].
 std::vector<RestPair> pair_rests(const RestingSolid& pose1, const RestingSolid& pose2, const RestPairOptions& options);
 
 /// pose1_from_pose2 of a pair: R n_T2 = n_B and R n_B = n_T1, both met equally well (TRIAD on the bisectors), then
