@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 
 #include "core/parallel.h"
@@ -25,6 +26,7 @@ struct Hypothesis {
 /// Everything the search needs of the two poses.
 struct Scene {
   RestingSolid solid1, solid2;
+  std::vector<RestPair> pairs;
   MeasuredPose measured1, measured2;
   Witness witness1, witness2;
   double size_mm = 0.0;
@@ -62,6 +64,8 @@ void narrow(std::vector<Hypothesis>& field, const Scene& scene, const Round& rou
     if (round.iterations > 0) {
       RefineOptions refine;
       refine.iterations = round.iterations;
+      h.candidate.contacts = contacts_for(h.candidate.pose1_from_pose2, scene.pairs, scene.solid2.facts);
+      refine.contacts = h.candidate.contacts;
       const RefinedPose aligned = align(scene.measured1, scene.measured2, h.candidate.pose1_from_pose2, round.level,
                                         round.capture * scene.size_mm, refine);
       h.candidate.pose1_from_pose2 = aligned.pose1_from_pose2;
@@ -131,9 +135,9 @@ Result<void> add_rest_hypotheses(const PoseInput& pose1, const PoseInput& pose2,
   estimate.counts2 = rests2->counts;
   scene.solid1.rests = std::move(rests1->rests);
   scene.solid2.rests = std::move(rests2->rests);
-  const auto pairs = pair_rests(scene.solid1, scene.solid2, options.pairs);
-  estimate.pairs = static_cast<int>(pairs.size());
-  for (const RestPair& pair : pairs) add_pair(pair, egi ? "egi" : "hull", scene, field);
+  scene.pairs = pair_rests(scene.solid1, scene.solid2, options.pairs);
+  estimate.pairs = static_cast<int>(scene.pairs.size());
+  for (const RestPair& pair : scene.pairs) add_pair(pair, egi ? "egi" : "hull", scene, field);
   return {};
 }
 
@@ -172,13 +176,34 @@ void judge(std::vector<Hypothesis>& field, const PoseOptions& options) {
     return a.candidate.tally.score() > b.candidate.tally.score();
   });
   for (Hypothesis& h : field) {
-    const Disagreement d = compare(field[0].testimonies, h.testimonies, spread);
+    const Comparison with_best = compare(field[0].testimonies, h.testimonies, spread);
     Candidate& c = h.candidate;
-    c.contradicted_more = d.only_second - d.only_first;
-    c.separable = d.first_is_better();
+    c.contradicted_more = with_best.contradicted_more;
+    c.separable = with_best.separable;
     c.angle_to_best_deg = to_degrees(
         rotation_angle(field[0].candidate.pose1_from_pose2.linear().transpose() * c.pose1_from_pose2.linear()));
   }
+}
+
+/// Another answer that the measurements do not tell from `best`.
+bool is_rival(const Candidate& c, const Candidate& best, const PoseOptions& options) {
+  return c.angle_to_best_deg > options.same_deg && !c.separable && c.tally.confirmed > 0.7 * best.tally.confirmed;
+}
+
+/// Takes what cannot be told apart yet to full resolution; what was told apart stays behind the finalists.
+void settle(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options) {
+  if (field.empty()) return;
+  judge(field, options);
+  const auto rivals = std::stable_partition(field.begin() + 1, field.end(), [&](const Hypothesis& h) {
+    return is_rival(h.candidate, field[0].candidate, options);
+  });
+  if (rivals - field.begin() < 2) return;
+  std::vector<Hypothesis> finalists(std::make_move_iterator(field.begin()), std::make_move_iterator(rivals));
+  std::vector<Hypothesis> others(std::make_move_iterator(rivals), std::make_move_iterator(field.end()));
+  narrow(finalists, scene, {0, 10, 0.01, 0.015, finalists.size(), options.same_deg});
+  judge(finalists, options);
+  field = std::move(finalists);
+  field.insert(field.end(), std::make_move_iterator(others.begin()), std::make_move_iterator(others.end()));
 }
 
 Result<void> decide(const std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options) {
@@ -198,7 +223,7 @@ Result<void> decide(const std::vector<Hypothesis>& field, const Scene& scene, co
   bool all_same_rest = tilt_deg(best.pose1_from_pose2) < options.same_rest_tilt_deg;
   for (const Hypothesis& h : field) {
     const Candidate& c = h.candidate;
-    if (c.angle_to_best_deg < options.same_deg || c.separable || c.tally.confirmed < 0.7 * t.confirmed) continue;
+    if (!is_rival(c, best, options)) continue;
     others += fmt::format("; {}", describe(c));
     all_same_rest = all_same_rest && tilt_deg(c.pose1_from_pose2) < options.same_rest_tilt_deg;
   }
@@ -232,7 +257,7 @@ Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose
     if (auto ok = add_rest_hypotheses(pose1, pose2, options, *scene, estimate, field); !ok) return pass_on(ok);
   }
   if (options.point_pairs) add_point_pair_hypotheses(*scene, field);
-  add_pair(same_rest_pair(scene->solid1, scene->solid2), "same rest", *scene, field);
+  add_pair(same_rest_pair(scene->solid1, scene->solid2), "turn on the table", *scene, field);
   estimate.hypotheses = static_cast<int>(field.size());
 
   constexpr Round kRounds[] = {{3, 0, 0.00, 0.050, 120, 4.0},  // as proposed
@@ -245,7 +270,7 @@ Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose
     if (round.iterations == 0) estimate.refined = static_cast<int>(field.size());
     context.report("pose", static_cast<double>(&round - kRounds + 1) / std::size(kRounds));
   }
-  judge(field, options);
+  settle(field, *scene, options);
   if (auto ok = decide(field, *scene, options); !ok) return pass_on(ok);
   estimate.best = field[0].candidate;
   estimate.pose1_from_pose2 = estimate.best.pose1_from_pose2;

@@ -37,9 +37,10 @@ struct PoseOptions {
 /// A motion between the poses after refinement, with the verdict on it.
 struct Candidate {
   Transform pose1_from_pose2 = Transform::Identity();
-  std::string generator;                              ///< "hull", "egi", "point pairs" or "same rest"
+  std::string generator;                              ///< "hull", "egi", "point pairs" or "turn on the table"
   Eigen::Vector3d normal1 = Eigen::Vector3d::Zero();  ///< n_T1 and n_T2 of the pair it came from; 0 for point pairs
   Eigen::Vector3d normal2 = Eigen::Vector3d::Zero();
+  std::vector<Contact> contacts;  ///< with the tables, for the refinement
   Tally tally;
   double angle_to_best_deg = 0.0;
   int contradicted_more = 0;  ///< samples that speak against it and not against the best, less the other way round

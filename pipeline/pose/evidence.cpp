@@ -76,10 +76,10 @@ Testimony ask(const Witness& witness, int level, const SurfacePoint& sample, dou
   return best;
 }
 
-bool contradicts(const Testimony& t, double spread_mm) {
+bool contradicts(const Testimony& t, double spread_mm, double tolerance = kTolerance) {
   if (t.kind == Testimony::Kind::free_space) return true;
   return t.kind == Testimony::Kind::surface &&
-         std::abs(t.distance_mm) > kTolerance * std::hypot(static_cast<double>(t.sigma_mm), spread_mm);
+         std::abs(t.distance_mm) > tolerance * std::hypot(static_cast<double>(t.sigma_mm), spread_mm);
 }
 
 }  // namespace
@@ -123,17 +123,19 @@ Tally tally(const std::vector<Testimony>& testimonies, double spread_mm) {
   return result;
 }
 
-bool Disagreement::first_is_better() const {
-  return only_second - only_first > 4.0 * std::sqrt(static_cast<double>(only_first + only_second)) + 4.0;
-}
-
-Disagreement compare(const std::vector<Testimony>& first, const std::vector<Testimony>& second, double spread_mm) {
-  Disagreement result;
-  for (std::size_t i = 0; i < first.size(); ++i) {
-    const bool a = contradicts(first[i], spread_mm);
-    const bool b = contradicts(second[i], spread_mm);
-    result.only_first += a && !b;
-    result.only_second += b && !a;
+Comparison compare(const std::vector<Testimony>& first, const std::vector<Testimony>& second, double spread_mm) {
+  Comparison result;
+  for (const double tolerance : {3.0 * kTolerance, kTolerance}) {
+    int only_first = 0;
+    int only_second = 0;
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      const bool a = contradicts(first[i], spread_mm, tolerance);
+      const bool b = contradicts(second[i], spread_mm, tolerance);
+      only_first += a && !b;
+      only_second += b && !a;
+    }
+    result.contradicted_more = only_second - only_first;
+    result.separable |= result.contradicted_more > 4.0 * std::sqrt(static_cast<double>(only_first + only_second)) + 4.0;
   }
   return result;
 }

@@ -43,13 +43,13 @@ struct Tally {
 /// Counts with a tolerance of 4 standard deviations, sigma joined by `spread_mm`, what sigma does not know.
 Tally tally(const std::vector<Testimony>& testimonies, double spread_mm);
 
-/// How many samples `a` contradicts and `b` does not, and the other way round: the paired comparison of two motions.
-struct Disagreement {
-  int only_first = 0;
-  int only_second = 0;
-  /// The second motion is contradicted more often than chance explains (McNemar's test at 4 standard deviations).
-  [[nodiscard]] bool first_is_better() const;
+/// How many more samples contradict `second` alone than `first` alone, and whether that is more than chance: McNemar's
+/// test at 4 standard deviations, once at the tolerance above and once at three times it, where a small feature stands
+/// out from the noise of edges.
+struct Comparison {
+  int contradicted_more = 0;
+  bool separable = false;
 };
-Disagreement compare(const std::vector<Testimony>& first, const std::vector<Testimony>& second, double spread_mm);
+Comparison compare(const std::vector<Testimony>& first, const std::vector<Testimony>& second, double spread_mm);
 
 }  // namespace scanrig

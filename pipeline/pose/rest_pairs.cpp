@@ -46,7 +46,7 @@ std::vector<RestPair> pair_rests(const RestingSolid& pose1, const RestingSolid& 
       const Eigen::Vector3d misfit(to_degrees(turn) / options.angle_sigma_deg,
                                    (one.height_mm - pose2.height_mm) / height_sigma,
                                    (two.height_mm - pose1.height_mm) / height_sigma);
-      if (misfit.squaredNorm() < options.worst_cost) pairs.push_back({one, two, misfit.squaredNorm()});
+      pairs.push_back({one, two, misfit.squaredNorm()});
     }
   }
   std::stable_sort(pairs.begin(), pairs.end(), [](const RestPair& a, const RestPair& b) { return a.cost < b.cost; });
@@ -74,15 +74,33 @@ Transform transform_of(const RestPair& pair, const SolidFacts& pose1, const Soli
   return t;
 }
 
+std::vector<Contact> contacts_for(const Transform& pose1_from_pose2, std::span<const RestPair> pairs,
+                                  const SolidFacts& pose2) {
+  const Eigen::Matrix3d& turn = pose1_from_pose2.linear();
+  const RestPair* best = nullptr;
+  double nearest = to_radians(3.0);
+  for (const RestPair& pair : pairs) {
+    const double apart = std::max(angle_between(pair.of_pose1.normal, turn * base_normal()),
+                                  angle_between(pair.of_pose2.normal, turn.transpose() * base_normal()));
+    if (apart >= nearest) continue;
+    nearest = apart;
+    best = &pair;
+  }
+  if (!best) return {};
+  const auto foot_on = [&](const Eigen::Vector3d& normal, double offset) {
+    return Eigen::Vector3d(pose2.centre_of_mass + normal * (offset - normal.dot(pose2.centre_of_mass)));
+  };
+  return {{foot_on(best->of_pose2.normal, best->of_pose2.offset_mm), base_normal(), 0.0},
+          {foot_on(base_normal(), 0.0), best->of_pose1.normal, best->of_pose1.offset_mm}};
+}
+
 std::vector<double> swivels_of(const RestPair& pair) {
   const double from_upside_down = to_degrees(angle_between(pair.of_pose1.normal, -base_normal()));
   std::vector<double> swivels;
   if (from_upside_down < 30.0 || from_upside_down > 175.0) {
     for (int k = 0; k < 36; ++k) swivels.push_back(to_radians(10.0 * k));
-  } else if (from_upside_down < 60.0) {
-    for (const double degrees : {-12.0, 0.0, 12.0}) swivels.push_back(to_radians(degrees));
   } else {
-    swivels.push_back(0.0);
+    for (const double degrees : {0.0, -12.0, 12.0}) swivels.push_back(to_radians(degrees));
   }
   return swivels;
 }

@@ -5,6 +5,7 @@
 
 #include "core/transform.h"
 #include "pipeline/pose/stable_rests.h"
+#include "pipeline/registration/refine_pose.h"
 
 namespace scanrig {
 
@@ -29,13 +30,12 @@ struct RestPairOptions {
   double angle_sigma_deg = 6.0;  ///< smooth contacts make normals jitter by degrees
   double height_sigma_mm = 2.0;  ///< or `height_sigma` of the size: partial models are closed by their hull
   double height_sigma = 0.04;
-  double worst_cost = 30.0;
-  int most = 40;
+  int most = 40;  ///< the best stay, however poor: models closed crudely misjudge heights by centimetres
 };
 
 /// Pairs of rests, best first, that agree on the angle to the base, angle(n_T1, n_B) = angle(n_T2, n_B), and on the
-/// heights, extent(V1, n_T1) = H2 and extent(V2, n_T2) = H1. The gates are soft [measured: a hard 3 deg gate loses the
-/// true pair in 2 of 10 trials].
+/// heights, extent(V1, n_T1) = H2 and extent(V2, n_T2) = H1. Nothing is gated out but by the number of pairs
+/// [measured: a hard 3 deg gate loses the true pair in 2 of 10 trials].
 std::vector<RestPair> pair_rests(const RestingSolid& pose1, const RestingSolid& pose2, const RestPairOptions& options);
 
 /// pose1_from_pose2 of a pair: R n_T2 = n_B and R n_B = n_T1, both met equally well (TRIAD on the bisectors), then
@@ -43,8 +43,13 @@ std::vector<RestPair> pair_rests(const RestingSolid& pose1, const RestingSolid& 
 /// rest.
 Transform transform_of(const RestPair& pair, const SolidFacts& pose1, const SolidFacts& pose2, double swivel);
 
+/// What the tables say of a motion: the contacts of the pair that agrees with it best, pose 2's rest on pose 1's table
+/// and pose 1's rest on pose 2's; none where no pair agrees within 3 deg.
+std::vector<Contact> contacts_for(const Transform& pose1_from_pose2, std::span<const RestPair> pairs,
+                                  const SolidFacts& pose2);
+
 /// The swivels to try. Within 30 deg of upside down the two contacts are one and any angle about the vertical fits:
-/// the full circle; out to 60 deg the angle is known poorly; beyond, the closed form holds.
+/// the full circle; beyond, the closed form and its neighbours, since normals of smooth contacts jitter.
 std::vector<double> swivels_of(const RestPair& pair);
 
 /// The pair that says "not turned over": both poses rest on the same face; any angle about the vertical fits.

@@ -57,7 +57,7 @@ Result<StableRests> rests_on_hull(const Mesh& solid, const SolidFacts& facts, do
   StableRests found;
   found.counts.tangent_planes = found.counts.after_base_plane = static_cast<int>(candidates.size());
   std::erase_if(candidates, [&](const StableRest& rest) { return rest.margin_mm < -dilation; });
-  found.rests = distinct(std::move(candidates), options.apart_deg);
+  found.rests = distinct(candidates, options.apart_deg);  // of neighbours the largest facet: it is the contact
   found.counts.after_stability = static_cast<int>(found.rests.size());
   found.counts.after_height = static_cast<int>(std::ranges::count_if(found.rests, [&](const StableRest& rest) {
     return std::abs(rest.height_mm - other_height_mm) < options.height_tolerance_mm;

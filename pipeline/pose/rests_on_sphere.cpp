@@ -125,7 +125,7 @@ Result<StableRests> rests_on_sphere(const Mesh& solid, const SolidFacts& facts, 
     ++found.counts.after_height;
     found.rests.push_back(plane);
   }
-  found.rests = distinct(std::move(found.rests), 0.0);
+  found.rests = distinct(found.rests, 0.0);
   return found;
 }
 

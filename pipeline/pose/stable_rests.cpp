@@ -61,9 +61,7 @@ double support_margin(std::span<const Eigen::Vector3d> supports, const Eigen::Ve
   return inside ? nearest : -nearest;
 }
 
-std::vector<StableRest> distinct(std::vector<StableRest> rests, double apart_deg) {
-  std::stable_sort(rests.begin(), rests.end(),
-                   [](const StableRest& a, const StableRest& b) { return a.margin_mm > b.margin_mm; });
+std::vector<StableRest> distinct(const std::vector<StableRest>& rests, double apart_deg) {
   const double same = std::cos(to_radians(apart_deg));
   std::vector<StableRest> kept;
   for (const StableRest& rest : rests) {
@@ -71,6 +69,8 @@ std::vector<StableRest> distinct(std::vector<StableRest> rests, double apart_deg
         std::any_of(kept.begin(), kept.end(), [&](const StableRest& k) { return k.normal.dot(rest.normal) > same; });
     if (!known) kept.push_back(rest);
   }
+  std::stable_sort(kept.begin(), kept.end(),
+                   [](const StableRest& a, const StableRest& b) { return a.margin_mm > b.margin_mm; });
   return kept;
 }
 

@@ -55,7 +55,7 @@ Result<StableRests> rests_on_sphere(const Mesh& solid, const SolidFacts& facts, 
 double support_margin(std::span<const Eigen::Vector3d> supports, const Eigen::Vector3d& normal,
                       const Eigen::Vector3d& point);
 
-/// The most stable of each bunch of rests whose normals are within `apart_deg`, most stable first.
-std::vector<StableRest> distinct(std::vector<StableRest> rests, double apart_deg);
+/// The first of each bunch of rests whose normals are within `apart_deg`; of these the most stable first.
+std::vector<StableRest> distinct(const std::vector<StableRest>& rests, double apart_deg);
 
 }  // namespace scanrig

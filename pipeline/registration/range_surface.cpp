@@ -63,7 +63,9 @@ void average_block(const RangeImage& fine, int row, int column, RangeImage& coar
     const int r = 2 * row + k / 2;
     const int c = 2 * column + k % 2;
     if (!(fine.depth(r, c) <= limit) || std::isnan(fine.normal(r, c)[0])) continue;
-    depth += fine.depth(r, c);
+    // The depth its plane has in the block's middle: at a rim the known pixels are not around the middle.
+    depth += depth_on_plane(fine.projection, {2 * column + 0.5, 2 * row + 0.5},
+                            fine.projection.unproject(c, r, fine.depth(r, c)), to_eigen(fine.normal(r, c)));
     sigma += fine.sigma(r, c);  // not divided by sqrt(count): neighbours share a matching window
     normal += fine.normal(r, c);
     ++count;

@@ -114,6 +114,16 @@ Equations accumulate(const Found& found, double keep) {
   return e;
 }
 
+void add_contacts(const std::vector<Contact>& contacts, const Transform& pose1_from_pose2, Equations& e) {
+  constexpr double kShare = 1e-3;  // of the surfaces' weight: nothing beside what they do decide
+  const double w = kShare * e.normal.bottomRightCorner<3, 3>().trace();
+  for (const Contact& c : contacts) {
+    const double distance = c.normal_in_pose1.dot(pose1_from_pose2 * c.point_in_pose2) - c.offset_mm;
+    e.normal.bottomRightCorner<3, 3>() += w * c.normal_in_pose1 * c.normal_in_pose1.transpose();
+    e.right.tail<3>() -= w * distance * c.normal_in_pose1;
+  }
+}
+
 double condition_of(const Matrix6& information, double arm_mm) {
   Vector6 arc;
   arc << Eigen::Vector3d::Constant(1.0 / arm_mm), Eigen::Vector3d::Ones();
@@ -146,7 +156,8 @@ RefinedPose align(const MeasuredPose& pose1, const MeasuredPose& pose2, const Tr
   double capture = capture_mm;
   Found found = find_both_ways(pose1, pose2, initial, level, capture);
   while (result.iterations < options.iterations && found.correspondences.size() >= kMinCorrespondences) {
-    const Equations e = accumulate(found, options.keep);
+    Equations e = accumulate(found, options.keep);
+    add_contacts(options.contacts, result.pose1_from_pose2, e);
     const Matrix6 damped = e.normal + 1e-9 * e.normal.trace() * Matrix6::Identity();
     const Vector6 x = damped.ldlt().solve(e.right);
     const Eigen::Translation3d to_centre(e.centre);

@@ -9,11 +9,20 @@
 
 namespace scanrig {
 
+/// A plane of pose 1 that a point of pose 2 is known to touch: a table top. It decides only what the surfaces leave
+/// open, such as the height of an upright prism turned upside down.
+struct Contact {
+  Eigen::Vector3d point_in_pose2 = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal_in_pose1 = Eigen::Vector3d::Zero();  ///< unit
+  double offset_mm = 0.0;                                     ///< normal.x = offset
+};
+
 struct RefineOptions {
   double capture_mm = 12.0;  ///< farthest distance between corresponding surfaces at the start
   double keep = 0.8;         ///< share of the correspondences that is used, the closest ones
   int levels = 3;
   int iterations = 25;  ///< most Gauss-Newton steps a level
+  std::vector<Contact> contacts;
 };
 
 /// How pose 2 lies on pose 1.

@@ -11,7 +11,7 @@ namespace {
 
 using testing::Solid;
 
-const testing::RigModel kRig{.width = 240, .height = 180, .focal_px = 850, .noise_mm = 0.01};
+const testing::RigModel kRig{.width = 288, .height = 216, .focal_px = 1000, .noise_mm = 0.01};
 
 /// An object in two poses, scanned and closed.
 struct Scan {
@@ -62,9 +62,11 @@ void expect_found(const Result<PoseEstimate>& estimate, const Scan& s) {
   EXPECT_LT((t * middle - s.pose1_from_pose2 * middle).norm(), 0.1);
 }
 
-void expect_error(const Result<PoseEstimate>& estimate, ErrorCode code) {
+/// `says`: part of the message.
+void expect_error(const Result<PoseEstimate>& estimate, ErrorCode code, const std::string& says = "") {
   ASSERT_FALSE(estimate) << "found by " << estimate->best.generator;
   EXPECT_EQ(estimate.error().code, code) << estimate.error().message;
+  EXPECT_NE(estimate.error().message.find(says), std::string::npos) << estimate.error().message;
 }
 
 TEST(EstimatePose, FindsAnObjectLaidOnItsSideByTheFacetsOfItsHull) {
@@ -74,7 +76,7 @@ TEST(EstimatePose, FindsAnObjectLaidOnItsSideByTheFacetsOfItsHull) {
   expect_found(estimate, workpiece_on_its_side());
   EXPECT_EQ(estimate->best.generator, "hull");
   EXPECT_GT(estimate->best.tally.confirmed, 0.3);
-  EXPECT_LT(estimate->best.tally.contradicted, 0.05);
+  EXPECT_LT(estimate->best.tally.contradicted, 0.1);
   EXPECT_FALSE(estimate->alternatives.empty());
 }
 
@@ -95,6 +97,7 @@ TEST(EstimatePose, FindsItByPointPairsAlone) {
   EXPECT_EQ(estimate->best.generator, "point pairs");
 }
 
+/// Nearly all surface that both poses see is upright: the tables' contacts hold the height.
 TEST(EstimatePose, FindsAnObjectTurnedUpsideDown) {
   const Solid stool =
       testing::together({testing::block({-32, 0, -22}, {32, 20, 22}), testing::block({-25, 15, -20}, {-13, 45, -2}),
@@ -107,23 +110,18 @@ TEST(EstimatePose, FindsAnObjectTurnedUpsideDown) {
 
 TEST(EstimatePose, FindsAnObjectHeldByPuttyInNoRestAtAll) {
   const Scan s = scan(testing::workpiece(), turn(63, {1, 2, -1}), 5.0);
-  const auto estimate = s.estimate();
-  expect_found(estimate, s);
+  expect_found(s.estimate(), s);
 }
 
 TEST(EstimatePose, SeesThatTheObjectWasNotTurnedOver) {
   const Scan s = scan(testing::workpiece(), turn(65, Eigen::Vector3d::UnitY()));
-  const auto estimate = s.estimate();
-  expect_error(estimate, ErrorCode::same_rest);
-  EXPECT_NE(estimate.error().message.find("not turned over"), std::string::npos);
+  expect_error(s.estimate(), ErrorCode::same_rest, "not turned over");
 }
 
 TEST(EstimatePose, WillNotGuessHowAPlainBoxWasTurned) {
   const Scan s = scan(testing::block({-30, 0, -20}, {30, 30, 20}),
                       turn(25, Eigen::Vector3d::UnitY()) * turn(90, Eigen::Vector3d::UnitX()));
-  const auto estimate = s.estimate();
-  expect_error(estimate, ErrorCode::ambiguous);
-  EXPECT_NE(estimate.error().message.find("; "), std::string::npos);  // the other answers are listed
+  expect_error(s.estimate(), ErrorCode::ambiguous, "; ");  // the other answers are listed
 }
 
 TEST(EstimatePose, DecidesByASmallFeatureWhereTheRestIsSymmetric) {
