@@ -85,8 +85,11 @@ json to_json(const Scores& s) {
                          {"p95_px", number(s.texture->p95_px)}};
   }
   for (const Gate& gate : gates(s)) {
-    result["gates"].push_back(
-        {{"name", gate.name}, {"limit", gate.limit}, {"measured", number(gate.measured)}, {"ok", gate.ok()}});
+    result["gates"].push_back({{"name", gate.name},
+                               {"limit", gate.limit},
+                               {"measured", number(gate.measured)},
+                               {"at_most", gate.at_most},
+                               {"ok", gate.ok()}});
   }
   return result;
 }

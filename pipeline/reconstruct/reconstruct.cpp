@@ -133,7 +133,8 @@ Result<Transform> Reconstruction::State::find_pose(Report& report, const Context
   const auto estimate = estimate_pose(first, second, *pose_options, context);
   if (!estimate) return pass_on(estimate);
   report.add_estimate(*estimate);
-  const auto refined = refine_pose(poses[0].views, poses[1].views, estimate->pose1_from_pose2, {}, context);
+  const auto refined = refine_pose(poses[0].views, poses[1].views, estimate->pose1_from_pose2,
+                                   {.contacts = estimate->best.contacts}, context);
   if (!refined) return pass_on(refined);
   report.add_refinement(*refined);
   return refined->pose1_from_pose2;
