@@ -53,8 +53,8 @@ Result<MeshRenderer> MeshRenderer::create(TexturedMesh mesh) {
   return MeshRenderer(std::move(mesh), std::move(*scene));
 }
 
-Eigen::Vector3f MeshRenderer::paint(const RayScene::Hit& hit, Surface surface) const {
-  if (surface == Surface::texture) {
+Eigen::Vector3f MeshRenderer::paint(const RayScene::Hit& hit, Paint surface) const {
+  if (surface == Paint::texture) {
     const auto& uv = mesh_.corner_uv[hit.face];
     return fetch(mesh_.atlas, hit.weights[0] * uv[0] + hit.weights[1] * uv[1] + hit.weights[2] * uv[2]);
   }
@@ -80,11 +80,11 @@ Result<Rendering> MeshRenderer::render(const Camera& camera, const Transform& tu
     return fail(ErrorCode::invalid_input, "render: {} x {} rays a pixel; 1 to 16 are possible", options.supersample,
                 options.supersample);
   }
-  if (options.surface == Surface::texture &&
+  if (options.surface == Paint::texture &&
       (mesh_.atlas.empty() || mesh_.corner_uv.size() != mesh_.mesh.faces.size())) {
     return fail(ErrorCode::invalid_input, "render: the mesh has no texture");
   }
-  if (options.surface == Surface::vertex_colour && mesh_.mesh.colour.size() != mesh_.mesh.vertices.size()) {
+  if (options.surface == Paint::vertex_colour && mesh_.mesh.colour.size() != mesh_.mesh.vertices.size()) {
     return fail(ErrorCode::invalid_input, "render: the mesh has no vertex colours");
   }
 
@@ -95,7 +95,7 @@ Result<Rendering> MeshRenderer::render(const Camera& camera, const Transform& tu
                        : from_srgb(options.background);
   const auto shade = [&](const RayScene::Hit& hit, const Eigen::Vector3d& ray) -> Eigen::Vector3f {
     const Eigen::Vector3d n = normal(hit).cast<double>();
-    if (options.surface == Surface::grey) return Eigen::Vector3f::Constant(grey(camera_from_model.linear() * n));
+    if (options.surface == Paint::grey) return Eigen::Vector3f::Constant(grey(camera_from_model.linear() * n));
     const Eigen::Vector3f colour = paint(hit, options.surface);
     if (!options.as_photo) return colour;
     const Eigen::Vector3d point = turntable_from_model * (centre + hit.distance * ray);

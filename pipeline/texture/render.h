@@ -12,7 +12,7 @@
 
 namespace scanrig {
 
-enum class Surface {
+enum class Paint {
   texture,        ///< the atlas
   vertex_colour,  ///< Mesh::colour
   grey,           ///< plain grey, lit from above the camera: shows the shape
@@ -26,7 +26,7 @@ struct Exposure {
 };
 
 struct RenderOptions {
-  Surface surface = Surface::texture;
+  Paint surface = Paint::texture;
   int supersample = 1;  ///< n x n rays a pixel, their light averaged
   cv::Vec3b background{0, 0, 0};
   /// Given: the image is linear light under the rig's lamps, to be compared with a photo. Not given: sRGB, unlit.
@@ -52,7 +52,7 @@ class MeshRenderer {
 
  private:
   MeshRenderer(TexturedMesh mesh, RayScene scene);
-  [[nodiscard]] Eigen::Vector3f paint(const RayScene::Hit& hit, Surface surface) const;
+  [[nodiscard]] Eigen::Vector3f paint(const RayScene::Hit& hit, Paint surface) const;
   [[nodiscard]] Eigen::Vector3f normal(const RayScene::Hit& hit) const;
 
   TexturedMesh mesh_;

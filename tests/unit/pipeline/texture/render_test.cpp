@@ -51,7 +51,7 @@ TEST(RenderTest, depthIsTheDistanceAlongTheCamerasAxis) {
   const Camera camera = rig_camera(0.0, 0.4, 0.5);
   const auto renderer = MeshRenderer::create({scene.mesh(0.5), {}, {}});
   ASSERT_TRUE(renderer);
-  const auto image = renderer->render(camera, Transform::Identity(), {.surface = Surface::grey});
+  const auto image = renderer->render(camera, Transform::Identity(), {.surface = Paint::grey});
   ASSERT_TRUE(image);
   const Eigen::Vector3d centre = camera.camera_from_turntable * scene.balls[0].centre;
   const Eigen::Vector2d pixel = camera.project(scene.balls[0].centre);
@@ -66,7 +66,7 @@ TEST(RenderTest, depthIsTheDistanceAlongTheCamerasAxis) {
 TEST(RenderTest, vertexColoursAreDrawnAndTheBackgroundIsAsAsked) {
   const auto renderer = MeshRenderer::create(square(cv::Mat3b(4, 4)));
   const auto image = renderer->render(rig_camera(0.0, 0.3, 0.25), Transform::Identity(),
-                                      {.surface = Surface::vertex_colour, .background = {7, 8, 9}});
+                                      {.surface = Paint::vertex_colour, .background = {7, 8, 9}});
   ASSERT_TRUE(image);
   EXPECT_EQ(image->image(120, 160), cv::Vec3b(0, 0, 255));
   EXPECT_EQ(image->image(0, 0), cv::Vec3b(7, 8, 9));
@@ -84,9 +84,9 @@ TEST(RenderTest, whatCannotBeDrawnIsSaid) {
     EXPECT_FALSE(image);
     return image ? ErrorCode::internal : image.error().code;
   };
-  EXPECT_EQ(code({.surface = Surface::texture}), ErrorCode::invalid_input);
-  EXPECT_EQ(code({.surface = Surface::vertex_colour}), ErrorCode::invalid_input);
-  EXPECT_EQ(code({.surface = Surface::grey, .supersample = 0}), ErrorCode::invalid_input);
+  EXPECT_EQ(code({.surface = Paint::texture}), ErrorCode::invalid_input);
+  EXPECT_EQ(code({.surface = Paint::vertex_colour}), ErrorCode::invalid_input);
+  EXPECT_EQ(code({.surface = Paint::grey, .supersample = 0}), ErrorCode::invalid_input);
 }
 
 TEST(RaySceneTest, theNearestFaceIsHitFromEitherSideAndNothingBehind) {
