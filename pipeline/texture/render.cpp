@@ -80,8 +80,7 @@ Result<Rendering> MeshRenderer::render(const Camera& camera, const Transform& tu
     return fail(ErrorCode::invalid_input, "render: {} x {} rays a pixel; 1 to 16 are possible", options.supersample,
                 options.supersample);
   }
-  if (options.surface == Paint::texture &&
-      (mesh_.atlas.empty() || mesh_.corner_uv.size() != mesh_.mesh.faces.size())) {
+  if (options.surface == Paint::texture && (mesh_.atlas.empty() || mesh_.corner_uv.size() != mesh_.mesh.faces.size())) {
     return fail(ErrorCode::invalid_input, "render: the mesh has no texture");
   }
   if (options.surface == Paint::vertex_colour && mesh_.mesh.colour.size() != mesh_.mesh.vertices.size()) {
