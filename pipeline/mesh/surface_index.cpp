@@ -1,4 +1,4 @@
-#include "pipeline/evaluate/surface_index.h"
+#include "pipeline/mesh/surface_index.h"
 
 #if __has_include(<embree4/rtcore.h>)
 #include <embree4/rtcore.h>
@@ -83,7 +83,7 @@ Result<SurfaceIndex> SurfaceIndex::create(const Mesh& mesh, const std::vector<st
   scene->device = rtcNewDevice(nullptr);
   if (!scene->device) return fail(ErrorCode::internal, "Embree gives no device");
   scene->scene = rtcNewScene(scene->device);
-  rtcSetSceneFlags(scene->scene, RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneFlags(scene->scene, RTC_SCENE_FLAG_ROBUST);  // no ray slips through between two faces
   RTCGeometry geometry = rtcNewGeometry(scene->device, RTC_GEOMETRY_TYPE_TRIANGLE);
   void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                            sizeof(Eigen::Vector3f), scene->vertices.size());
@@ -117,7 +117,7 @@ std::optional<SurfaceIndex::Hit> SurfaceIndex::first_hit(const Eigen::Vector3d& 
   rtcIntersect1(scene_->scene, &context, &ray);
 #endif
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  return Hit{ray.ray.tfar, scene_->numbers[ray.hit.primID]};
+  return Hit{ray.ray.tfar, scene_->numbers[ray.hit.primID], {1.0F - ray.hit.u - ray.hit.v, ray.hit.u, ray.hit.v}};
 }
 
 bool SurfaceIndex::blocked(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
