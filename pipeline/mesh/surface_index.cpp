@@ -7,8 +7,8 @@
 #endif
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <numeric>
 #include <utility>
 
@@ -90,8 +90,8 @@ Result<SurfaceIndex> SurfaceIndex::create(const Mesh& mesh, const std::vector<st
   void* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(Mesh::Face),
                                           scene->faces.size());
   if (vertices && indices) {
-    std::memcpy(vertices, scene->vertices.data(), scene->vertices.size() * sizeof(Eigen::Vector3f));
-    std::memcpy(indices, scene->faces.data(), scene->faces.size() * sizeof(Mesh::Face));
+    std::copy(scene->vertices.begin(), scene->vertices.end(), static_cast<Eigen::Vector3f*>(vertices));
+    std::copy(scene->faces.begin(), scene->faces.end(), static_cast<Mesh::Face*>(indices));
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene->scene, geometry);
   }

@@ -119,7 +119,8 @@ Result<Rendering> MeshRenderer::render(const Camera& camera, const Transform& tu
       }
       Eigen::Vector3f sum = Eigen::Vector3f::Zero();
       for (int k = 0; k < n * n; ++k) {
-        const auto [hit, ray] = cast(x + (k % n + 0.5) / n - 0.5, y + (k / n + 0.5) / n - 0.5);
+        const int column = k % n, line = k / n;
+        const auto [hit, ray] = cast(x + (column + 0.5) / n - 0.5, y + (line + 0.5) / n - 0.5);
         sum += hit ? shade(*hit, ray) : background;
       }
       sum /= static_cast<float>(n * n);
