@@ -48,6 +48,15 @@ Result<RigPanel::Wiring> wiring_of(const std::string& name) {
   return found->second;
 }
 
+Result<wire::Parity> parity_of(const std::string& name) {
+  using wire::Parity;
+  static const std::map<std::string, Parity> words{
+      {"none", Parity::none}, {"even", Parity::even}, {"odd", Parity::odd}};
+  const auto found = words.find(name);
+  if (found == words.end()) return fail(ErrorCode::invalid_input, "a parity is none, even or odd");
+  return found->second;
+}
+
 json to_json(const RigTruth& truth) {
   return {{"angle_deg", truth.angle_deg},       {"speed_deg_s", truth.speed_deg_s}, {"standing", truth.standing},
           {"projector_on", truth.projector_on}, {"counter", truth.counter},         {"powered", truth.powered}};
@@ -135,6 +144,13 @@ Result<void> RigControl::set(const std::string& knob, const json& value, const j
        }},
       {"estop_cuts_power",
        [&]() -> Result<void> { return rig_.set_estop_cuts_power(value.get<bool>()), Result<void>(); }},
+      {"line",
+       [&]() -> Result<void> {
+         const auto parity = parity_of(value.value("parity", "none"));
+         if (!parity) return pass_on(parity);
+         rig_.set_line({value.value("baud", 115200), *parity});
+         return {};
+       }},
       {"positive",
        [&]() -> Result<void> { return rig_.set_positive_ccw(value.get<std::string>() == "ccw"), Result<void>(); }},
       {"wiring", [&]() -> Result<void> {

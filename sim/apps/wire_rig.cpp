@@ -3,11 +3,16 @@
 #include "core/files.h"
 
 namespace scanrig::sim {
+namespace {
+
+constexpr std::chrono::milliseconds kLineWatch{5};
+
+}  // namespace
 
 Result<std::unique_ptr<WireRig>> WireRig::start(const WireRigOptions& o, Clock& clock) {
   if (o.toml.drive != "leadshine-rs") return fail(ErrorCode::unsupported, "no simulated drive {}", o.toml.drive);
   if (auto made = create_directories_synced(o.toml.folder); !made) return pass_on(made);
-  std::unique_ptr<WireRig> rig(new WireRig);
+  std::unique_ptr<WireRig> rig(new WireRig(o.toml.folder / "turntable"));
   rig->positive_ccw_ = o.positive_ccw;
   rig->drive_ = std::make_unique<wire::LeadshineDrive>(o.axis, clock);
   if (o.preload_counter) rig->drive_->preload_counter(*o.preload_counter);
@@ -18,6 +23,7 @@ Result<std::unique_ptr<WireRig>> WireRig::start(const WireRigOptions& o, Clock& 
   if (!panel) return pass_on(panel);
   rig->panel_ = std::move(*panel);
   if (auto written = write_rig_toml(o.toml); !written) return pass_on(written);
+  rig->line_watch_ = std::jthread([&rig = *rig](const std::stop_token& stop) { rig.watch_line(stop); });
   return rig;
 }
 
@@ -52,7 +58,7 @@ void WireRig::set_fault(std::optional<wire::WireFault> fault) {
 
 void WireRig::apply_fault() {
   server_->clear_faults();
-  if (!powered_) {
+  if (!powered_ || !understood_) {
     server_->inject({.kind = wire::WireFault::Kind::deaf});
   } else if (fault_) {
     server_->inject(*fault_);
@@ -73,6 +79,27 @@ void WireRig::set_estop_cuts_power(bool cuts) {
 void WireRig::set_positive_ccw(bool ccw) {
   const std::scoped_lock lock(mutex_);
   positive_ccw_ = ccw;
+}
+
+void WireRig::set_line(const wire::LineSettings& settings) {
+  const std::scoped_lock lock(mutex_);
+  drive_settings_ = settings;
+}
+
+/// A driver that sets the port otherwise than the drive's own is noise to it.
+void WireRig::watch_line(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    const auto settings = wire::line_settings(port_);
+    {
+      const std::scoped_lock lock(mutex_);
+      const bool understood = !settings || *settings == drive_settings_;
+      if (understood != understood_) {
+        understood_ = understood;
+        apply_fault();
+      }
+    }
+    std::this_thread::sleep_for(kLineWatch);
+  }
 }
 
 }  // namespace scanrig::sim

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "core/clock.h"
@@ -15,6 +16,7 @@
 #include "sim/apps/rig_toml.h"
 #include "sim/wire/axis.h"
 #include "sim/wire/leadshine_drive.h"
+#include "sim/wire/line_settings.h"
 #include "sim/wire/modbus_server.h"
 
 namespace scanrig::sim {
@@ -53,21 +55,28 @@ class WireRig {
   void set_fault(std::optional<wire::WireFault> fault);
   Result<void> plug_in(bool plugged);
   void set_estop_cuts_power(bool cuts);
+  /// How the drive's own port is set: it hears only who speaks like that.
+  void set_line(const wire::LineSettings& settings);
   void set_positive_ccw(bool ccw);
   [[nodiscard]] wire::LeadshineDrive& drive() { return *drive_; }
 
  private:
-  WireRig() = default;
+  explicit WireRig(std::filesystem::path port) : port_(std::move(port)) {}
   void apply_fault();
+  void watch_line(const std::stop_token& stop);
 
+  const std::filesystem::path port_;
   mutable std::mutex mutex_;
   bool positive_ccw_ = true;
   bool estop_cuts_power_ = true;
   bool powered_ = true;
+  wire::LineSettings drive_settings_;
+  bool understood_ = true;  ///< the port is set as the drive's own
   std::optional<wire::WireFault> fault_;
   std::unique_ptr<wire::LeadshineDrive> drive_;
   std::unique_ptr<wire::ModbusServer> server_;
   std::unique_ptr<RigPanel> panel_;
+  std::jthread line_watch_;  ///< last: it is joined before the rest goes
 };
 
 }  // namespace scanrig::sim
