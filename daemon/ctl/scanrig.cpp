@@ -15,6 +15,7 @@ struct ClientVerb {
   Connection connection{.socket = "/run/scanrig/api.sock"};
   bool follow = false;
   std::string job;
+  MaintenanceVerb maintenance;
 };
 
 void add_client_verbs(CLI::App& app, ClientVerb& verb, Chosen& chosen) {
@@ -33,6 +34,14 @@ void add_client_verbs(CLI::App& app, ClientVerb& verb, Chosen& chosen) {
   })->add_flag("--follow", verb.follow, "follow the job to its end");
   add("stop", "stop the table and cancel the scan", [&] { return press(verb.connection, "stop"); });
   add("reset", "clear a fault and home the table", [&] { return press(verb.connection, "reset"); });
+  auto* maintain = add("maintenance", "home, jog and try the rig while no job can run",
+                       [&] { return maintenance(verb.connection, verb.maintenance); });
+  maintain->add_option("WHAT", verb.maintenance.what, "on, off, or what to do while it is on")
+      ->required()
+      ->check(CLI::IsMember({"on", "off", "home", "jog", "pulse", "lamp_test", "io"}));
+  maintain->add_option("--to", verb.maintenance.to_deg, "jog: to this angle");
+  maintain->add_option("--by", verb.maintenance.by_deg, "jog: by this much");
+  maintain->add_option("--speed", verb.maintenance.speed_deg_s, "jog: deg/s")->capture_default_str();
   add("jobs", "all jobs, or one in detail", [&] {
     return jobs(verb.connection, verb.job);
   })->add_option("ID", verb.job, "the job");

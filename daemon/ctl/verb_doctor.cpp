@@ -1,8 +1,8 @@
 #include <cstdio>
 
-#include "daemon/ctl/bench_devices.h"
 #include "daemon/ctl/doctor/examine.h"
 #include "daemon/ctl/doctor/inventory.h"
+#include "daemon/ctl/free_rig.h"
 #include "daemon/ctl/verbs.h"
 
 namespace scanrig::ctl {

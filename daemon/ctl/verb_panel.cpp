@@ -1,7 +1,8 @@
 #include <cstdio>
 
-#include "daemon/ctl/bench_devices.h"
+#include "daemon/ctl/free_rig.h"
 #include "daemon/ctl/verbs.h"
+#include "daemon/rig/open_devices.h"
 #include "daemon/signal_stop.h"
 
 namespace scanrig::ctl {
@@ -22,14 +23,14 @@ ExitCode watch_panel(const PanelVerb& verb) {
   const auto rig = free_rig(verb.config);
   if (!rig) return complain(rig.error());
   RealClock clock;
-  const auto bench = bench_panel(*rig, clock);
-  if (!bench) return complain(bench.error());
+  const auto open = open_devices(*rig, clock);
+  if (!open) return complain(open.error());
   const SignalStop signal;
   const auto begun = clock.now();
   const auto end = verb.seconds > 0 ? begun + std::chrono::seconds(verb.seconds) : Clock::TimePoint::max();
   PanelInputs known;
   for (bool first = true; !signal.token().stop_requested() && clock.now() < end; first = false) {
-    const auto now = bench->panel->wait_change(known, Deadline::after(clock, first ? Clock::Duration{} : kGlance));
+    const auto now = open->panel->wait_change(known, Deadline::after(clock, first ? Clock::Duration{} : kGlance));
     if (!now) return complain(now.error());
     if (first || *now != known) tell(*now, clock.now() - begun);
     known = *now;

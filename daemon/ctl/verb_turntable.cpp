@@ -1,8 +1,9 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "daemon/ctl/bench_devices.h"
+#include "daemon/ctl/free_rig.h"
 #include "daemon/ctl/verbs.h"
+#include "daemon/rig/open_devices.h"
 #include "daemon/signal_stop.h"
 
 namespace scanrig::ctl {
@@ -96,10 +97,11 @@ ExitCode turntable(const TurntableVerb& verb) {
   if (!rig) return complain(rig.error());
   RealClock clock;
   if (verb.what == "read") return read_registers(*rig, clock, verb.json);
-  const auto table = bench_turntable(*rig, clock);
-  if (!table) return complain(table.error());
-  if (verb.what != "status") return move(verb, **table, clock);
-  const auto status = (*table)->status(Deadline::after(clock, kAskLimit));
+  const auto open = open_devices(*rig, clock);
+  if (!open) return complain(open.error());
+  auto& table = *open->turntable;
+  if (verb.what != "status") return move(verb, table, clock);
+  const auto status = table.status(Deadline::after(clock, kAskLimit));
   return status ? tell(*status, verb.json) : complain(status.error());
 }
 

@@ -28,6 +28,13 @@ ExitCode start(const Connection& connection, bool follow);
 /// `button`: "stop" or "reset".
 ExitCode press(const Connection& connection, const std::string& button);
 
+struct MaintenanceVerb {
+  std::string what = "on";  ///< on, off, home, jog, pulse, lamp_test, io
+  std::optional<double> to_deg, by_deg;
+  double speed_deg_s = 10.0;
+};
+ExitCode maintenance(const Connection& connection, const MaintenanceVerb& verb);
+
 // Offline.
 
 struct ReconstructVerb {

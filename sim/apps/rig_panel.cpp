@@ -9,37 +9,48 @@ namespace {
 struct Signal {
   const char* name;
   const char* line;
+  std::size_t channel = 0;  ///< of the Modbus I/O module
 };
 
-constexpr std::array kInputs{Signal{"start", "START"},    Signal{"stop", "STOP"},      Signal{"reset", "RESET"},
-                             Signal{"estop", "ESTOP_OK"}, Signal{"guard", "GUARD_OK"}, Signal{"part", "PART_PRESENT"},
-                             Signal{"flipped", "FLIPPED"}};
-constexpr std::array kLamps{Signal{"lamp_red", "LAMP_RED"},
-                            Signal{"lamp_amber", "LAMP_AMBER"},
-                            Signal{"lamp_green", "LAMP_GREEN"},
-                            Signal{"start_lamp", "START_LAMP"},
-                            Signal{"flip_request", "FLIP"},
-                            Signal{"busy", "BUSY"},
-                            Signal{"pass", "PASS"},
-                            Signal{"fail", "FAIL"}};
+constexpr std::array kInputs{Signal{"start", "START", 0},    Signal{"stop", "STOP", 1},
+                             Signal{"reset", "RESET", 2},    Signal{"estop", "ESTOP_OK", 3},
+                             Signal{"guard", "GUARD_OK", 4}, Signal{"part", "PART_PRESENT", 5},
+                             Signal{"flipped", "FLIPPED", 6}};
+constexpr std::array kLamps{Signal{"lamp_red", "LAMP_RED", 0},
+                            Signal{"lamp_amber", "LAMP_AMBER", 1},
+                            Signal{"lamp_green", "LAMP_GREEN", 2},
+                            Signal{"start_lamp", "START_LAMP", 3},
+                            Signal{"flip_request", "FLIP", 4},
+                            Signal{"busy", "BUSY", 5},
+                            Signal{"pass", "PASS", 6},
+                            Signal{"fail", "FAIL", 7}};
+constexpr std::uint8_t kModuleUnit = 2;
 constexpr std::array kLights{Signal{"projector", "PROJ_TRIG"}, Signal{"plain_light", "PROJ_PLAIN"}};
 
 }  // namespace
 
-Result<std::unique_ptr<RigPanel>> RigPanel::start(const std::filesystem::path& socket, Clock& clock) {
+Result<std::unique_ptr<RigPanel>> RigPanel::start(const std::filesystem::path& folder, bool on_module, Clock& clock) {
   std::unique_ptr<RigPanel> panel(new RigPanel(clock));
   std::map<std::string, bool> levels;
   for (const Signal& input : kInputs) {
     const std::string name = input.name;
     const bool at_rest_pressed = name == "guard" || name == "part";
-    panel->inputs_[name] = {.line = input.line, .opens = name == "estop", .pressed = at_rest_pressed};
+    panel->inputs_[name] = {
+        .line = input.line, .channel = input.channel, .opens = name == "estop", .pressed = at_rest_pressed};
     levels[input.line] = name != "estop" && !at_rest_pressed;  // a closed contact pulls low
   }
   for (const Signal& lamp : kLamps) levels[lamp.line] = false;
   for (const Signal& light : kLights) levels[light.line] = false;
-  auto gpio = wire::GpioSocket::start(socket, std::move(levels), clock);
+  auto gpio = wire::GpioSocket::start(folder / "gpio.sock", std::move(levels), clock);
   if (!gpio) return pass_on(gpio);
   panel->gpio_ = std::move(*gpio);
+  if (on_module) {
+    panel->module_ = std::make_unique<wire::ModbusIoModule>(kInputs.size(), kLamps.size());
+    auto server = wire::ModbusServer::start(folder / "panel", kModuleUnit, *panel->module_, clock);
+    if (!server) return pass_on(server);
+    panel->server_ = std::move(*server);
+  }
+  for (const Signal& input : kInputs) panel->apply(input.name);
   return panel;
 }
 
@@ -48,6 +59,7 @@ void RigPanel::apply(const std::string& name) {
   bool closed = input.pressed != input.opens;
   if (input.wiring != Wiring::wired) closed = input.wiring == Wiring::bridged;
   gpio_->set(input.line, !closed);
+  if (module_) module_->set(input.channel, closed);
 }
 
 Result<Clock::TimePoint> RigPanel::press(const std::string& name, bool pressed) {
@@ -84,7 +96,7 @@ bool RigPanel::pressed(const std::string& input) const {
 
 std::map<std::string, bool> RigPanel::outputs() const {
   std::map<std::string, bool> all;
-  for (const Signal& lamp : kLamps) all[lamp.name] = gpio_->level(lamp.line);
+  for (const Signal& lamp : kLamps) all[lamp.name] = module_ ? module_->coil(lamp.channel) : gpio_->level(lamp.line);
   for (const Signal& light : kLights) all[light.name] = gpio_->level(light.line);
   return all;
 }

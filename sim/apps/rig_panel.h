@@ -11,11 +11,14 @@
 #include "core/clock.h"
 #include "core/result.h"
 #include "sim/wire/gpio_socket.h"
+#include "sim/wire/modbus_io.h"
+#include "sim/wire/modbus_server.h"
 
 namespace scanrig::sim {
 
 /// The operator's side of the simulated rig: buttons, contacts, lamps and the projector's trigger line, behind the GPIO
-/// socket. Buttons and the e-stop's and guard's contacts pull their line low when they are closed.
+/// socket; or, but for the trigger, behind a Modbus I/O module, unit 2. A closed contact pulls its GPIO line low and
+/// sets its input of the module.
 /// Threads: every function may be called from any thread.
 class RigPanel {
  public:
@@ -29,7 +32,8 @@ class RigPanel {
     bool on = false;
   };
 
-  static Result<std::unique_ptr<RigPanel>> start(const std::filesystem::path& socket, Clock& clock);
+  /// FOLDER/gpio.sock and, with `on_module`, the port FOLDER/panel. Fails with `io`.
+  static Result<std::unique_ptr<RigPanel>> start(const std::filesystem::path& folder, bool on_module, Clock& clock);
 
   /// "start", "stop", "reset", "estop" (pressed: its contact opens), "guard" (pressed: closed), "part", "flipped".
   /// Returns when the level changed. Fails with `not_found`.
@@ -40,6 +44,7 @@ class RigPanel {
   [[nodiscard]] bool pressed(const std::string& input) const;
   [[nodiscard]] bool light() const;  ///< dots or even light
   [[nodiscard]] std::vector<Change> changes() const;
+  [[nodiscard]] wire::ModbusServer* module_port() { return server_.get(); }  ///< null on GPIO
 
  private:
   explicit RigPanel(Clock& clock) : clock_(clock) {}
@@ -47,6 +52,7 @@ class RigPanel {
 
   struct Input {
     std::string line;
+    std::size_t channel = 0;
     bool opens = false;  ///< a normally closed contact
     bool pressed = false;
     Wiring wiring = Wiring::wired;
@@ -57,6 +63,8 @@ class RigPanel {
   std::map<std::string, Input> inputs_;
   std::vector<Change> pressed_changes_;
   std::unique_ptr<wire::GpioSocket> gpio_;
+  std::unique_ptr<wire::ModbusIoModule> module_;
+  std::unique_ptr<wire::ModbusServer> server_;
 };
 
 }  // namespace scanrig::sim

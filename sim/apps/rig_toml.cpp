@@ -35,8 +35,9 @@ std::string panel(const RigTomlOptions& o) {
   if (o.panel != "gpio")
     text += port(o, "panel") + "parity = \"none\"\nunit_id = 2\nreply_timeout_ms = 60\npoll_ms = 20\n";
   const char* low = ", active = \"low\"";
-  text += fmt::format("start = {}\nstop = {}\nreset = {}\npart_present = {}\n", pin(o, "START", 0, low),
-                      pin(o, "STOP", 1, low), pin(o, "RESET", 2, low), pin(o, "PART_PRESENT", 5, low));
+  text += fmt::format("start = {}\nstop = {}\nreset = {}\npart_present = {}\nflipped = {}\n", pin(o, "START", 0, low),
+                      pin(o, "STOP", 1, low), pin(o, "RESET", 2, low), pin(o, "PART_PRESENT", 5, low),
+                      pin(o, "FLIPPED", 6, low));
   int coil = 0;
   for (const auto& [key, line] :
        {std::pair("lamp_red", "LAMP_RED"), std::pair("lamp_amber", "LAMP_AMBER"), std::pair("lamp_green", "LAMP_GREEN"),

@@ -11,6 +11,9 @@ constexpr std::chrono::milliseconds kLineWatch{5};
 
 Result<std::unique_ptr<WireRig>> WireRig::start(const WireRigOptions& o, Clock& clock) {
   if (o.toml.drive != "leadshine-rs") return fail(ErrorCode::unsupported, "no simulated drive {}", o.toml.drive);
+  if (o.toml.panel != "gpio" && o.toml.panel != "modbus-io") {
+    return fail(ErrorCode::unsupported, "no simulated panel {}", o.toml.panel);
+  }
   if (auto made = create_directories_synced(o.toml.folder); !made) return pass_on(made);
   std::unique_ptr<WireRig> rig(new WireRig(o.toml.folder / "turntable"));
   rig->positive_ccw_ = o.positive_ccw;
@@ -19,7 +22,7 @@ Result<std::unique_ptr<WireRig>> WireRig::start(const WireRigOptions& o, Clock& 
   auto server = wire::ModbusServer::start(o.toml.folder / "turntable", 1, *rig->drive_, clock);
   if (!server) return pass_on(server);
   rig->server_ = std::move(*server);
-  auto panel = RigPanel::start(o.toml.folder / "gpio.sock", clock);
+  auto panel = RigPanel::start(o.toml.folder, o.toml.panel == "modbus-io", clock);
   if (!panel) return pass_on(panel);
   rig->panel_ = std::move(*panel);
   if (auto written = write_rig_toml(o.toml); !written) return pass_on(written);

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "daemon/ctl/bench_devices.h"
 #include "daemon/ctl/doctor/examine.h"
+#include "daemon/rig/open_devices.h"
 
 namespace scanrig::ctl::doctor {
 namespace {
@@ -91,18 +91,20 @@ class Revolution {
 
 /// Home, then a quarter turn that ought to be counter-clockwise.
 Result<void> show_quarter_turn(const config::RigConfig& rig, Clock& clock) {
-  const auto table = bench_turntable(rig, clock);
-  if (!table) return pass_on(table);
-  if (auto homed = (*table)->home(Deadline::after(clock, kMoveLimit)); !homed) return homed;
-  const auto moved = (*table)->rotate_to({90}, Deadline::after(clock, kMoveLimit));
+  const auto open = open_devices(rig, clock);
+  if (!open) return pass_on(open);
+  auto& table = *open->turntable;
+  if (auto homed = table.home(Deadline::after(clock, kMoveLimit)); !homed) return homed;
+  const auto moved = table.rotate_to({90}, Deadline::after(clock, kMoveLimit));
   if (!moved) return pass_on(moved);
   return {};
 }
 
 Result<void> go_home(const config::RigConfig& rig, Clock& clock) {
-  const auto table = bench_turntable(rig, clock);
-  if (!table) return pass_on(table);
-  return (*table)->home(Deadline::after(clock, kMoveLimit));
+  const auto open = open_devices(rig, clock);
+  if (!open) return pass_on(open);
+  auto& table = *open->turntable;
+  return table.home(Deadline::after(clock, kMoveLimit));
 }
 
 void check_sign(const config::RigConfig& rig, const Operator& person, Report& report) {

@@ -1,7 +1,7 @@
 #include <fmt/format.h>
 
-#include "daemon/ctl/bench_devices.h"
 #include "daemon/ctl/doctor/examine.h"
+#include "daemon/rig/open_devices.h"
 
 namespace scanrig::ctl::doctor {
 namespace {
@@ -69,15 +69,15 @@ void check_estop(const config::RigConfig& rig, Panel& panel, bool drive_answers,
 void examine_panel(const config::RigConfig& rig, bool drive_answers, const Operator& person, Clock& clock,
                    Report& report) {
   report.section("Panel");
-  const auto bench = bench_panel(rig, clock);
-  if (!bench) {
-    const bool estop =
-        !rig.safety.estop.line.empty() && bench.error().message.find(rig.safety.estop.line) != std::string::npos;
-    return report.find(estop ? "estop_not_wired" : "panel", bench.error().message + ".",
-                       "Name the lines as gpioinfo shows them, and see that this user may open the chip.");
+  const auto open = open_devices(rig, clock);
+  if (!open) return report.find("panel", open.error().message + ".", "Correct the configuration.");
+  const auto now = open->panel->wait_change({}, Deadline::after(clock, kAskLimit));
+  if (!now) {
+    const auto& line = rig.safety.estop.line;
+    const bool estop = !line.empty() && now.error().message.find(line) != std::string::npos;
+    return report.find(estop ? "estop_not_wired" : "panel", now.error().message + ".",
+                       "Check the panel's wiring and power; name the lines as gpioinfo shows them.");
   }
-  const auto now = bench->panel->wait_change({}, Deadline::after(clock, kAskLimit));
-  if (!now) return report.find("panel", now.error().message + ".", "Check the panel's wiring and power.");
   report.note(fmt::format("e-stop {}, guard {}, start {}, stop {}, reset {}", now->estop_ok ? "ok" : "pressed",
                           now->guard_closed ? "closed" : "open", now->start ? "pressed" : "-",
                           now->stop ? "pressed" : "-", now->reset ? "pressed" : "-"));
@@ -87,7 +87,7 @@ void examine_panel(const config::RigConfig& rig, bool drive_answers, const Opera
                        "Release it. If it is released: its normally closed contact is not wired to this input, or "
                        "`active` is the wrong way round.");
   }
-  check_estop(rig, *bench->panel, drive_answers, person, clock, report);
+  check_estop(rig, *open->panel, drive_answers, person, clock, report);
 }
 
 }  // namespace scanrig::ctl::doctor
