@@ -15,17 +15,20 @@ namespace scanrig::bench {
 /// What goes wrong on the wire: the columns of the matrix.
 enum class Fault { silent, late, damaged, device_error, stalled, unplugged, back_after_2s, earlier_answer };
 
-constexpr std::array kFaults{
-    std::pair(Fault::silent, "silent"),         std::pair(Fault::late, "late"),
-    std::pair(Fault::damaged, "wrong CRC or short frame"), std::pair(Fault::device_error, "device error or alarm"),
-    std::pair(Fault::stalled, "stalled"),       std::pair(Fault::unplugged, "unplugged"),
-    std::pair(Fault::back_after_2s, "back after 2 s"),     std::pair(Fault::earlier_answer, "answer of an earlier request")};
+inline constexpr std::array kFaults{std::pair(Fault::silent, "silent"),
+                             std::pair(Fault::late, "late"),
+                             std::pair(Fault::damaged, "wrong CRC or short frame"),
+                             std::pair(Fault::device_error, "device error or alarm"),
+                             std::pair(Fault::stalled, "stalled"),
+                             std::pair(Fault::unplugged, "unplugged"),
+                             std::pair(Fault::back_after_2s, "back after 2 s"),
+                             std::pair(Fault::earlier_answer, "answer of an earlier request")};
 
 /// How one call of one driver ended under one fault.
 struct Outcome {
   bool applicable = true;
-  std::string told;                 ///< the error it ended in, or why the cell is not applicable
-  std::vector<std::string> wrongs;  ///< what did not hold; empty: held
+  std::string told{};                 ///< the error it ended in, or why the cell is not applicable
+  std::vector<std::string> wrongs{};  ///< what did not hold; empty: held
   bool hung = false;
   bool wrong_position = false;
 

@@ -21,8 +21,8 @@ Outcome timed(Clock& clock, Clock::Duration limit, const std::vector<ErrorCode>&
   const auto done = call({begun + limit});
   const auto over = clock.now() - begun - limit;
   outcome.hung = over > std::chrono::seconds(5);
-  outcome.expect(over <= kGrace, fmt::format("{:.0f} ms past its deadline",
-                                             std::chrono::duration<double, std::milli>(over).count()));
+  outcome.expect(over <= kGrace,
+                 fmt::format("{:.0f} ms past its deadline", std::chrono::duration<double, std::milli>(over).count()));
   outcome.told = done ? "ok" : fmt::format("{}: {}", to_string(done.error().code), done.error().message);
   if (named.empty()) {
     outcome.expect(done.has_value(), "did not succeed");
