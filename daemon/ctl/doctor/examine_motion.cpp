@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdlib>
 
@@ -32,7 +33,7 @@ class Revolution {
       const auto back = seek_switch();
       if (!back) return pass_on(back);
       // Coming straight back is not going around: then the switch is sought from the other side.
-      if (std::abs(*back) > 2.0 * std::abs(*gone)) return std::abs(*back) + std::abs(*gone);
+      if (*back > 2.0 * std::abs(*gone)) return *back + std::abs(*gone);
     }
     return fail(ErrorCode::stalled, "homing came straight back to the switch from both sides");
   }
@@ -64,6 +65,7 @@ class Revolution {
     return way;
   }
 
+  /// How far it was to the switch, pulses.
   Result<double> seek_switch() {
     const auto by = Deadline::after(clock_, kRevolutionLimit);
     const auto before = drive_.read_state(by);
@@ -72,13 +74,15 @@ class Revolution {
     if (!fast) return pass_on(fast);
     if (auto set = drive_.set_homing(options_.home_mode, *fast, fast->speed, by); !set) return pass_on(set);
     if (auto started = drive_.start_homing(by); !started) return pass_on(started);
-    std::int32_t last = before->position;
+    // The furthest way seen, not the last: state and position are read in turn, and home sets the position to zero.
+    double furthest = 0.0;
     for (bool begun = false;; clock_.sleep_for(kPoll)) {
       const auto state = drive_.read_state(by);
       if (!state) return pass_on(state);
       begun = begun || state->running || !state->homed;
-      if (begun && state->homed && !state->running) return static_cast<double>(last) - before->position;
-      if (state->running) last = state->position;
+      if (begun && state->homed && !state->running) return furthest;
+      if (state->running)
+        furthest = std::max(furthest, std::abs(static_cast<double>(state->position) - before->position));
       if (state->fault) return fail(ErrorCode::device_alarm, "the drive raised an alarm while it sought the switch");
       if (by.expired(clock_)) return fail(ErrorCode::timeout, "the home switch was not seen again");
     }
