@@ -117,6 +117,7 @@ class Transition : public Machine {
     s().may_be_moving = false;
     if (e.light) set_problem("projector", *e.light);
     stopped();
+    if (!s().shutting_down) act(action::CheckDevices{});  // what is absent is shown before somebody presses Start
     home_if_guarded();
   }
 

@@ -1,15 +1,10 @@
 #include <gmock/gmock.h>
-#include <poll.h>
-#include <sys/socket.h>
-#include <sys/un.h>
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <thread>
 
 #include "daemon/ctl/client.h"
-#include "pipeline/scan/scan_folder.h"
 #include "tests/component/safety/wire_rig.h"
 #include "tests/system/daemon/process.h"
 
