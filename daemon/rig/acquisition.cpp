@@ -77,13 +77,10 @@ std::vector<DeviceHealth> Acquisition::check() {
           health("projector", devices_.projector.dark(limit())), health("camera", devices_.camera.arm(limit()))};
 }
 
-Result<void> Acquisition::stop() {
+Acquisition::Stop Acquisition::stop() {
   const auto deadline = Deadline::after(clock_, options_.stop_limit);
   const auto dark = devices_.projector.dark(deadline);
-  const auto stopped = devices_.turntable.stop(deadline);
-  if (!stopped) return pass_on(stopped);
-  if (!dark) return pass_on(dark);
-  return {};
+  return {devices_.turntable.stop(deadline), dark};
 }
 
 Result<Move> Acquisition::turn_to(Degrees angle) {

@@ -44,8 +44,12 @@ class Acquisition {
   /// Asks each device something that does no harm.
   std::vector<DeviceHealth> check();
 
-  /// Returns once the table is seen standing and the projector dark. Both are tried, whatever the other says.
-  Result<void> stop();
+  struct Stop {
+    Result<void> table;  ///< seen standing
+    Result<void> light;  ///< told to be dark
+  };
+  /// Both are tried, whatever the other says.
+  Stop stop();
 
  private:
   Result<Move> turn_to(Degrees angle);

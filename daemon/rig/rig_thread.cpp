@@ -65,9 +65,9 @@ Event RigThread::perform(const Command& command) {
     return event::Pulsed{};
   }
   if (std::holds_alternative<action::CheckDevices>(command)) return event::DevicesSeen{acquisition_.check()};
-  auto stopped = acquisition_.stop();
-  if (!stopped) return event::StopFailed{stopped.error()};
-  return event::Stopped{};
+  const auto stopped = acquisition_.stop();
+  if (!stopped.table) return event::StopFailed{stopped.table.error()};
+  return event::Stopped{stopped.light ? std::nullopt : std::optional(stopped.light.error())};
 }
 
 }  // namespace scanrig

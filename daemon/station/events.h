@@ -75,7 +75,9 @@ struct Homed {};
 struct ViewTaken {
   std::shared_ptr<const TakenView> view;
 };
-struct Stopped {};  ///< the table is seen standing, the projector dark
+struct Stopped {
+  std::optional<Error> light{};  ///< why the projector is not known to be dark
+};  ///< the table is seen standing
 struct RigFailed {
   Error error;
 };  ///< a move or an exposure; the motor has been told to stop

@@ -112,9 +112,12 @@ class Transition : public Machine {
     take_next_view();
   }
 
-  void operator()(const event::Stopped&) {
+  /// A projector that cannot be reached is an absent device; it does not make the table move.
+  void operator()(const event::Stopped& e) {
     s().may_be_moving = false;
+    if (e.light) set_problem("projector", *e.light);
     stopped();
+    if (!s().shutting_down) act(action::CheckDevices{});  // what is absent is shown before somebody presses Start
     home_if_guarded();
   }
 
@@ -216,6 +219,16 @@ class Transition : public Machine {
     if (job.asked > job.taken || job.taken - job.stored >= kMostUnstored) return;
     act(action::TakeView{{job.id, job.pose, job.asked}, {360.0 * job.asked / rules().views}});
     ++job.asked;
+  }
+
+  void set_problem(const std::string& name, const Error& error) {
+    for (auto& device : s().devices) {
+      if (device.name == name) {
+        device.problem = error;
+        return;
+      }
+    }
+    s().devices.push_back({name, error});
   }
 
   /// What is absent is told, and does not let a job begin.

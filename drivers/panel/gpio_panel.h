@@ -11,8 +11,8 @@ namespace scanrig {
 
 /// Which line is which input or output; what is not wired keeps its rest value.
 struct GpioPanelOptions {
-  std::vector<std::pair<bool PanelInputs::*, gpio::LineSpec>> inputs;
-  std::vector<std::pair<bool PanelOutputs::*, gpio::LineSpec>> outputs;
+  std::vector<std::pair<bool PanelInputs::*, gpio::LineSpec>> inputs{};
+  std::vector<std::pair<bool PanelOutputs::*, gpio::LineSpec>> outputs{};
 };
 
 /// Buttons, switches and lamps on GPIO lines, debounced as PanelDebounce says. The lamps keep what they show last.

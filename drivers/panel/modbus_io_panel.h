@@ -17,8 +17,8 @@ struct ModbusIoPanelOptions {
     bool active_low = false;
   };
   modbus::LineOptions line;
-  std::vector<std::pair<bool PanelInputs::*, Signal>> inputs;    ///< at least one
-  std::vector<std::pair<bool PanelOutputs::*, Signal>> outputs;  ///< coils
+  std::vector<std::pair<bool PanelInputs::*, Signal>> inputs{};    ///< at least one
+  std::vector<std::pair<bool PanelOutputs::*, Signal>> outputs{};  ///< coils
   std::chrono::milliseconds poll{20};
 };
 
