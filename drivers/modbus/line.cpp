@@ -70,6 +70,34 @@ Result<std::vector<std::uint16_t>> Line::read(std::uint16_t address, int count, 
   return values;
 }
 
+Result<std::vector<bool>> Line::read_coils(std::uint16_t address, int count, Deadline deadline) {
+  std::vector<std::uint8_t> bits(static_cast<std::size_t>(count));
+  const auto done = request("read coils", address, deadline,
+                            [&](_modbus* line) { return modbus_read_bits(line, address, count, bits.data()); });
+  if (!done) return pass_on(done);
+  return std::vector<bool>(bits.begin(), bits.end());
+}
+
+Result<std::vector<bool>> Line::read_inputs(std::uint16_t address, int count, Deadline deadline) {
+  std::vector<std::uint8_t> bits(static_cast<std::size_t>(count));
+  const auto done = request("read inputs", address, deadline,
+                            [&](_modbus* line) { return modbus_read_input_bits(line, address, count, bits.data()); });
+  if (!done) return pass_on(done);
+  return std::vector<bool>(bits.begin(), bits.end());
+}
+
+Result<void> Line::write_coil(std::uint16_t address, bool on, Deadline deadline) {
+  return request("write coil", address, deadline,
+                 [&](_modbus* line) { return modbus_write_bit(line, address, on ? 1 : 0); });
+}
+
+Result<void> Line::write_coils(std::uint16_t address, const std::vector<bool>& on, Deadline deadline) {
+  const std::vector<std::uint8_t> bits(on.begin(), on.end());
+  return request("write coils", address, deadline, [&](_modbus* line) {
+    return modbus_write_bits(line, address, static_cast<int>(bits.size()), bits.data());
+  });
+}
+
 Result<void> Line::write(std::uint16_t address, std::uint16_t value, Deadline deadline) {
   return request("write", address, deadline,
                  [&](_modbus* line) { return modbus_write_register(line, address, value); });

@@ -49,6 +49,12 @@ class Line {
   Line(const Line&) = delete;
   Line& operator=(const Line&) = delete;
 
+  /// Functions 01 and 02: coils and discrete inputs.
+  Result<std::vector<bool>> read_coils(std::uint16_t address, int count, Deadline deadline);
+  Result<std::vector<bool>> read_inputs(std::uint16_t address, int count, Deadline deadline);
+  /// Functions 05 and 15.
+  Result<void> write_coil(std::uint16_t address, bool on, Deadline deadline);
+  Result<void> write_coils(std::uint16_t address, const std::vector<bool>& on, Deadline deadline);
   /// Function 03.
   Result<std::vector<std::uint16_t>> read(std::uint16_t address, int count, Deadline deadline);
   /// Function 06.

@@ -326,6 +326,13 @@ Result<TurntableStatus> ModbusTurntable::status(Deadline deadline) {
   return status;
 }
 
+Result<void> ModbusTurntable::limit_speed(std::optional<DegreesPerSecond> limit) {
+  const auto speed = options_.scale.speed_word(std::min(options_.speed, limit.value_or(options_.speed)), options_.profile);
+  if (!speed) return pass_on(speed, "turntable");
+  motion_.speed = *speed;
+  return {};
+}
+
 void ModbusTurntable::request_stop() noexcept {
   {
     const std::scoped_lock lock(mutex_);

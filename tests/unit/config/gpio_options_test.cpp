@@ -19,6 +19,7 @@ TEST_F(GpioOptionsTest, EveryWiredLineReachesItsPlace) {
   std::string text = shipped("rigs/example.toml");
   text = replaced(text, "[calibration]",
                   "stop = { line = \"A\" }\nreset = { line = \"B\" }\npart_present = { line = \"C\" }\n"
+                  "flipped = { line = \"K\" }\n"
                   "lamp_red = { line = \"D\" }\nlamp_amber = { line = \"E\" }\nstart_lamp = { line = \"F\" }\n"
                   "busy = { line = \"G\" }\nflip_request = { line = \"H\" }\npass = { line = \"I\" }\n"
                   "fail = { line = \"J\" }\n\n[gpio]\nsocket = \"gpio.sock\"\n\n[calibration]");
@@ -28,7 +29,7 @@ TEST_F(GpioOptionsTest, EveryWiredLineReachesItsPlace) {
   EXPECT_EQ(rig->gpio_socket, folder_ / "gpio.sock");
 
   const auto panel = gpio_panel_options(*rig);
-  EXPECT_EQ(panel.inputs.size(), 6u);
+  EXPECT_EQ(panel.inputs.size(), 7u);
   EXPECT_EQ(panel.outputs.size(), 8u);
   const auto line_of = [](const auto& wired, auto field) {
     for (const auto& [one, line] : wired) {
@@ -42,6 +43,7 @@ TEST_F(GpioOptionsTest, EveryWiredLineReachesItsPlace) {
   EXPECT_EQ(line_of(panel.inputs, &PanelInputs::stop), "A");
   EXPECT_EQ(line_of(panel.inputs, &PanelInputs::reset), "B");
   EXPECT_EQ(line_of(panel.inputs, &PanelInputs::part_present), "C");
+  EXPECT_EQ(line_of(panel.inputs, &PanelInputs::flipped), "K");
   EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::red), "D");
   EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::amber), "E");
   EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::green), "LAMP_GREEN");

@@ -20,7 +20,7 @@ class Api : public testing::Test {
     job->stored = {{0, 3, 135.01, 1}};
     job->stages = {{"volume", 0.5}};
     job->error = Error{ErrorCode::same_rest, "not turned over"};
-    loop_ = std::make_unique<ControlLoop>(clock_, ControlLoopOptions{.rules = {.remote = true}},
+    loop_ = std::make_unique<ControlLoop>(clock_, ControlLoopOptions{.rules = {.remote = true, .guard = true}},
                                           JobTable{{"old", std::move(job)}});
     thread_ = std::thread([this] {
       const auto perform = [this](const Action& action) {
