@@ -114,8 +114,11 @@ int main(int argc, char** argv) {
   add_control(app, control_verb, chosen);
   try {
     app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : static_cast<int>(ExitCode::usage);
+    std::fprintf(stderr, "scanrig-sim: %s\n", error.what());
+    return static_cast<int>(ExitCode::usage);
   }
   if (const auto done = chosen(); !done) {
     std::fprintf(stderr, "scanrig-sim: %s\n", done.error().message.c_str());
