@@ -34,9 +34,8 @@ void add_client_verbs(CLI::App& app, ClientVerb& verb, Chosen& chosen) {
   })->add_flag("--follow", verb.follow, "follow the job to its end");
   add("stop", "stop the table and cancel the scan", [&] { return press(verb.connection, "stop"); });
   add("reset", "clear a fault and home the table", [&] { return press(verb.connection, "reset"); });
-  auto* maintain = add("maintenance", "home, jog and try the rig while no job can run", [&] {
-    return maintenance(verb.connection, verb.maintenance);
-  });
+  auto* maintain = add("maintenance", "home, jog and try the rig while no job can run",
+                       [&] { return maintenance(verb.connection, verb.maintenance); });
   maintain->add_option("WHAT", verb.maintenance.what, "on, off, or what to do while it is on")
       ->required()
       ->check(CLI::IsMember({"on", "off", "home", "jog", "pulse", "lamp_test", "io"}));

@@ -28,7 +28,8 @@ ExitCode maintenance(const Connection& connection, const MaintenanceVerb& verb) 
   if (verb.what == "jog" && verb.to_deg.has_value() == verb.by_deg.has_value()) {
     return complain(ExitCode::usage, "maintenance jog needs --to or --by");
   }
-  const auto answer = io ? ask(connection.socket, "GET", "/api/v1/io") : ask(connection.socket, "POST", target_of(verb));
+  const auto answer =
+      io ? ask(connection.socket, "GET", "/api/v1/io") : ask(connection.socket, "POST", target_of(verb));
   if (!answer) return complain(answer.error().exit, answer.error().message);
   if (connection.json) {
     fmt::print("{}\n", answer->dump(2));
