@@ -20,15 +20,32 @@ Pin read_pin(Section& section, std::string_view key, bool by_channel) {
   return pin;
 }
 
+/// Two signals on one contact would hide each other. `others` are compared with, and not with one another.
+void report_shared(Section& s, const std::map<std::string, Pin>& pins, const std::map<std::string, Pin>& others) {
+  const auto compare = [&](const std::string& key, const Pin& pin, const std::map<std::string, Pin>& with) {
+    for (const auto& [name, other] : with) {
+      if (name == key || pin.line != other.line || pin.channel != other.channel) continue;
+      return s.report(key, fmt::format("is on the same contact as {}", name));
+    }
+  };
+  for (auto pin = pins.begin(); pin != pins.end(); ++pin) {
+    compare(pin->first, pin->second, {pins.begin(), pin});
+    compare(pin->first, pin->second, others);
+  }
+}
+
 /// The panel's driver watches e-stop and guard.
-void read_safety(Section& s, PanelConfig::Driver panel, SafetyConfig& safety) {
+void read_safety(Section& s, const PanelConfig& panel, SafetyConfig& safety) {
   using Home = SafetyConfig::HomeAfterRestart;
-  const bool by_channel = panel == PanelConfig::Driver::modbus_io;
+  const bool by_channel = panel.driver == PanelConfig::Driver::modbus_io;
   safety.estop = read_pin(s, "estop", by_channel);
   if (s.has("guard")) safety.guard = read_pin(s, "guard", by_channel);
   s.choice<Home>("home_after_restart", safety.home_after_restart,
                  {{"on_reset", Home::on_reset}, {"guarded", Home::guarded}});
   s.flag("remote_start", safety.remote_start);
+  std::map<std::string, Pin> contacts{{"estop", safety.estop}};
+  if (safety.guard) contacts["guard"] = *safety.guard;
+  if (s.sound()) report_shared(s, contacts, panel.inputs);
   if (safety.guard) return;
   if (safety.remote_start) s.report("remote_start", "true needs a guard");
   if (safety.home_after_restart == Home::guarded) s.report("home_after_restart", "\"guarded\" needs a guard");
@@ -122,6 +139,9 @@ void read_panel(Section& s, PanelConfig& panel) {
        {"lamp_red", "lamp_amber", "lamp_green", "start_lamp", "flip_request", "busy", "pass", "fail"}) {
     if (s.has(key)) panel.outputs[key] = read_pin(s, key, by_channel);
   }
+  if (!s.sound()) return;
+  report_shared(s, panel.inputs, {});
+  report_shared(s, panel.outputs, {});
 }
 
 void read_recipes(Section& s, std::map<std::string, RecipeConfig>& recipes) {
@@ -155,7 +175,7 @@ void read_rig(Section& root, const std::filesystem::path& base, const std::vecto
   root.section("stereo_camera", [&](Section& s) { read_stereo_camera(s, base, cameras, rig.stereo_camera); });
   root.section("projector", [&](Section& s) { read_projector(s, rig.stereo_camera.exposure, rig.projector); });
   root.section("panel", [&](Section& s) { read_panel(s, rig.panel); });
-  root.section("safety", [&](Section& s) { read_safety(s, rig.panel.driver, rig.safety); });
+  root.section("safety", [&](Section& s) { read_safety(s, rig.panel, rig.safety); });
   root.section("calibration", [&](Section& s) { read_path(s, "file", base, rig.calibration_file); });
   root.section("recipe", [&](Section& s) { read_recipes(s, rig.recipes); });
   root.section("storage", [&](Section& s) {

@@ -25,9 +25,8 @@ void perform(const Action& action, RigThread& rig, JobThread& jobs) {
                  [](const action::WaitForEstop&) {}, [](const action::RetryStopLater&) {},
                  [](const action::CheckLater&) {}, [](const action::TestLamps&) {},
                  [&](const action::Home&) { rig.home(); }, [&](const action::StopRig&) { rig.stop(); },
-                 [&](const action::TakeView& a) { rig.take_view(a); },
-                 [&](const action::Jog& a) { rig.jog(a); }, [&](const action::Pulse&) { rig.pulse(); },
-                 [&](const action::CheckDevices&) { rig.check_devices(); },
+                 [&](const action::TakeView& a) { rig.take_view(a); }, [&](const action::Jog& a) { rig.jog(a); },
+                 [&](const action::Pulse&) { rig.pulse(); }, [&](const action::CheckDevices&) { rig.check_devices(); },
                  [&](const auto& task) { jobs.post(task); }},
       action);
 }

@@ -31,8 +31,12 @@ ordered_json to_detailed_json(const JobInfo& job) {
   auto json = to_json(job);
   json["stored"] = ordered_json::array();
   for (const auto& v : job.stored) {
-    json["stored"].push_back(
-        {{"pose", v.pose}, {"view", v.view}, {"measured_deg", v.measured_deg}, {"redone", v.redone}});
+    json["stored"].push_back({{"pose", v.pose},
+                              {"view", v.view},
+                              {"measured_deg", v.measured_deg},
+                              {"error_deg", v.measured_deg - v.commanded_deg},
+                              {"settling_ms", v.settling_ms},
+                              {"redone", v.redone}});
   }
   json["stages"] = ordered_json::array();
   for (const auto& stage : job.stages) json["stages"].push_back({{"name", stage.name}, {"fraction", stage.fraction}});
@@ -123,8 +127,8 @@ struct NamedRequest {
   event::MaintenanceAsked::What what;
 };
 constexpr NamedRequest kMaintenance[] = {
-    {"on", event::MaintenanceAsked::What::on},     {"off", event::MaintenanceAsked::What::off},
-    {"home", event::MaintenanceAsked::What::home}, {"jog", event::MaintenanceAsked::What::jog},
+    {"on", event::MaintenanceAsked::What::on},       {"off", event::MaintenanceAsked::What::off},
+    {"home", event::MaintenanceAsked::What::home},   {"jog", event::MaintenanceAsked::What::jog},
     {"pulse", event::MaintenanceAsked::What::pulse}, {"lamp_test", event::MaintenanceAsked::What::lamp_test}};
 
 /// The number behind `key=` in "a=1&b=2"; nothing when it is not there or is none.
@@ -143,7 +147,8 @@ std::optional<double> number_in(std::string_view query, std::string_view key) {
 /// "jog?by_deg=-5&speed_deg_s=2", "jog?to_deg=90", "on", ...
 Result<event::MaintenanceAsked> maintenance_of(const std::string& text) {
   const auto mark = text.find('?');
-  const std::string_view query = mark == std::string::npos ? std::string_view() : std::string_view(text).substr(mark + 1);
+  const std::string_view query =
+      mark == std::string::npos ? std::string_view() : std::string_view(text).substr(mark + 1);
   const auto found = std::ranges::find(kMaintenance, text.substr(0, mark), &NamedRequest::name);
   if (found == std::end(kMaintenance)) return fail(ErrorCode::not_found, "maintenance has no {}", text);
   event::MaintenanceAsked asked{.what = found->what, .speed = kMaxJogSpeed};

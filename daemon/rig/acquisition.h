@@ -14,7 +14,7 @@ struct AcquisitionOptions {
   Clock::Duration exposure_limit = std::chrono::seconds(2);  ///< arm, fire and collect, each
   Clock::Duration stop_limit = std::chrono::seconds(3);
   Clock::Duration check_limit = std::chrono::milliseconds(500);  ///< for each device
-  int redo_limit = 3;  ///< lost exposures in a row before the view fails
+  int redo_limit = 3;                                            ///< lost exposures in a row before the view fails
 };
 
 /// The order in which the devices do one thing. Every wait has a deadline.

@@ -25,12 +25,10 @@ MadeSafe make_safe(const config::RigConfig& config, Clock& clock, Deadline deadl
   const auto open = open_devices(config, clock);
   if (!open) return {pass_on(open), pass_on(open), pass_on(open)};
   MadeSafe made;
-  std::thread projector([&] {
-    made.projector = until(clock, deadline, [&] { return open->projector->dark(deadline); });
-  });
-  std::thread panel([&] {
-    made.panel = until(clock, deadline, [&] { return open->panel->show({.red = true}, deadline); });
-  });
+  std::thread projector(
+      [&] { made.projector = until(clock, deadline, [&] { return open->projector->dark(deadline); }); });
+  std::thread panel(
+      [&] { made.panel = until(clock, deadline, [&] { return open->panel->show({.red = true}, deadline); }); });
   made.turntable = until(clock, deadline, [&] { return open->turntable->stop(deadline); });
   projector.join();
   panel.join();

@@ -17,7 +17,8 @@ struct MadeSafe {
 MadeSafe make_safe(const config::RigConfig& config, Clock& clock, Deadline deadline);
 
 /// For systemd's ExecStopPost=: within a second, with a line on standard error for what was not reached.
-/// `ok`, `device` (the table may be moving), `partly_safe` (it stands, but light or lamp were not reached), `bad_input`.
+/// `ok`, `device` (the table may be moving), `partly_safe` (it stands, but light or lamp were not reached),
+/// `bad_input`.
 ExitCode make_safe_now(const Result<config::RigConfig>& config, const char* program);
 
 }  // namespace scanrig

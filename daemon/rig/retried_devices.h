@@ -10,8 +10,8 @@
 
 namespace scanrig {
 
-/// A device that need not be there: it is opened by its first use, and again after it failed with `io`. Until then every
-/// use fails as opening does, so the rest of the rig runs on and the device is back without a restart.
+/// A device that need not be there: it is opened by its first use, and again after it failed with `io`. Until then
+/// every use fails as opening does, so the rest of the rig runs on and the device is back without a restart.
 template <class Device>
 class Retried {
  public:

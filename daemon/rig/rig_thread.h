@@ -33,8 +33,8 @@ class RigThread {
   void interrupt() noexcept;
 
  private:
-  using Command = std::variant<action::Home, action::TakeView, action::Jog, action::Pulse, action::CheckDevices,
-                               action::StopRig>;
+  using Command =
+      std::variant<action::Home, action::TakeView, action::Jog, action::Pulse, action::CheckDevices, action::StopRig>;
 
   void run();
   Event perform(const Command& command);

@@ -68,15 +68,14 @@ void ControlLoop::handle(Message message, const StationPorts& ports) {
 }
 
 void ControlLoop::carry_out(const Action& action, const StationPorts& ports) {
-  std::visit(Overloaded{[&](const action::Warn&) { wake_later(event::WarningOver{}, options_.warning); },
-                        [&](const action::WaitForEstop&) {
-                          wake_later(event::EstopWindowOver{}, options_.estop_window);
-                        },
-                        [&](const action::RetryStopLater&) { wake_later(event::StopRetryDue{}, options_.stop_retry); },
-                        [&](const action::CheckLater&) { wake_later(event::CheckDue{}, options_.check_period); },
-                        [&](const action::TestLamps&) { lamps_tested_ = clock_.now() + kLampTest; },
-                        [&](const auto& other) { ports.perform(other); }},
-             action);
+  std::visit(
+      Overloaded{[&](const action::Warn&) { wake_later(event::WarningOver{}, options_.warning); },
+                 [&](const action::WaitForEstop&) { wake_later(event::EstopWindowOver{}, options_.estop_window); },
+                 [&](const action::RetryStopLater&) { wake_later(event::StopRetryDue{}, options_.stop_retry); },
+                 [&](const action::CheckLater&) { wake_later(event::CheckDue{}, options_.check_period); },
+                 [&](const action::TestLamps&) { lamps_tested_ = clock_.now() + kLampTest; },
+                 [&](const auto& other) { ports.perform(other); }},
+      action);
 }
 
 void ControlLoop::wake_later(Event event, Clock::Duration after) {

@@ -23,11 +23,11 @@ struct StationPorts {
 
 struct ControlLoopOptions {
   StationRules rules;
-  Clock::Duration warning = std::chrono::seconds(2);         ///< lamp before the first move
+  Clock::Duration warning = std::chrono::seconds(2);              ///< lamp before the first move
   Clock::Duration estop_window = std::chrono::milliseconds(200);  ///< a device that fails may only lack power
   Clock::Duration stop_retry = std::chrono::seconds(1);           ///< while the table may be moving
   Clock::Duration check_period = std::chrono::seconds(2);         ///< of the devices, in quiet times
-  Clock::Duration shutdown_limit = std::chrono::seconds(5);  ///< for the rig to be seen stopped
+  Clock::Duration shutdown_limit = std::chrono::seconds(5);       ///< for the rig to be seen stopped
 };
 
 /// The thread of the state machine: takes events one by one, decides, hands out actions, publishes a snapshot.

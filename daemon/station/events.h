@@ -63,7 +63,7 @@ struct DevicesSeen {
 struct MaintenanceAsked {
   enum class What { on, off, home, jog, pulse, lamp_test };
   What what;
-  Degrees angle{};       ///< jog: where to, or by how much
+  Degrees angle{};  ///< jog: where to, or by how much
   bool relative = false;
   DegreesPerSecond speed{};  ///< jog
 };
@@ -77,7 +77,7 @@ struct ViewTaken {
 };
 struct Stopped {
   std::optional<Error> light{};  ///< why the projector is not known to be dark
-};  ///< the table is seen standing
+};                               ///< the table is seen standing
 struct RigFailed {
   Error error;
 };  ///< a move or an exposure; the motor has been told to stop
@@ -94,6 +94,8 @@ struct ViewStored {
   ViewId id;
   double measured_deg;
   int redone;
+  double commanded_deg = 0.0;
+  double settling_ms = 0.0;
 };  ///< it survives a power cut
 struct PoseStored {
   std::string job;
@@ -122,17 +124,17 @@ struct ModelReady {
 struct Shutdown {};
 }  // namespace event
 
-using Event = std::variant<event::PanelFound, event::InputsSeen, event::Pressed, event::EstopChanged,
-                           event::GuardChanged, event::WarningOver, event::EstopWindowOver, event::StopRetryDue,
-                           event::CheckDue, event::DevicesSeen, event::MaintenanceAsked, event::Jogged, event::Pulsed,
-                           event::Homed, event::ViewTaken, event::Stopped, event::RigFailed,
-                           event::StopFailed, event::PanelFailed, event::JobCreated, event::ViewStored,
-                           event::PoseStored, event::JobClosed, event::StoreFailed, event::StageProgress,
-                           event::ReconstructionFailed, event::ModelReady, event::Shutdown>;
+using Event =
+    std::variant<event::PanelFound, event::InputsSeen, event::Pressed, event::EstopChanged, event::GuardChanged,
+                 event::WarningOver, event::EstopWindowOver, event::StopRetryDue, event::CheckDue, event::DevicesSeen,
+                 event::MaintenanceAsked, event::Jogged, event::Pulsed, event::Homed, event::ViewTaken, event::Stopped,
+                 event::RigFailed, event::StopFailed, event::PanelFailed, event::JobCreated, event::ViewStored,
+                 event::PoseStored, event::JobClosed, event::StoreFailed, event::StageProgress,
+                 event::ReconstructionFailed, event::ModelReady, event::Shutdown>;
 
 /// What is to be done about it. None of them waits.
 namespace action {
-struct Warn {};     ///< WarningOver comes after the warning time
+struct Warn {};            ///< WarningOver comes after the warning time
 struct WaitForEstop {};    ///< EstopWindowOver comes after the window
 struct RetryStopLater {};  ///< StopRetryDue comes after a while
 struct CheckLater {};      ///< CheckDue comes after a while
@@ -143,8 +145,8 @@ struct Jog {
   Degrees angle;
   bool relative;
   DegreesPerSecond speed;
-};                  ///< answered by Jogged or RigFailed
-struct Pulse {};    ///< answered by Pulsed or RigFailed
+};                ///< answered by Jogged or RigFailed
+struct Pulse {};  ///< answered by Pulsed or RigFailed
 struct TestLamps {};
 struct TakeView {
   ViewId id;
@@ -171,9 +173,9 @@ struct CloseJob {
 };
 }  // namespace action
 
-using Action = std::variant<action::Warn, action::WaitForEstop, action::RetryStopLater, action::CheckLater,
-                            action::CheckDevices, action::Home, action::StopRig, action::Jog, action::Pulse,
-                            action::TestLamps, action::TakeView, action::CreateJob,
-                            action::StoreView, action::FinishPose, action::ResumeJob, action::CloseJob>;
+using Action =
+    std::variant<action::Warn, action::WaitForEstop, action::RetryStopLater, action::CheckLater, action::CheckDevices,
+                 action::Home, action::StopRig, action::Jog, action::Pulse, action::TestLamps, action::TakeView,
+                 action::CreateJob, action::StoreView, action::FinishPose, action::ResumeJob, action::CloseJob>;
 
 }  // namespace scanrig

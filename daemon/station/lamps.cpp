@@ -12,7 +12,8 @@ PanelOutputs lamps(const StationState& state, const JobTable& jobs, bool blink) 
   out.amber = (state.machine == MachineState::halted && !out.red) || warning || flip ||
               (state.machine == MachineState::maintenance && blink);
   out.busy = (state.activity != Activity::none && !flip) || state.unnamed;
-  out.green = state.machine == MachineState::ready || (out.busy && !state.maintenance && !warning && !out.red && !out.amber);
+  out.green =
+      state.machine == MachineState::ready || (out.busy && !state.maintenance && !warning && !out.red && !out.amber);
   out.start_lamp = state.machine == MachineState::ready || flip;
   out.flip_request = flip;
   for (const auto& [id, job] : jobs | std::views::reverse) {

@@ -10,8 +10,8 @@ using What = event::MaintenanceAsked::What;
 void begin(Machine& m) {
   auto& s = m.s();
   if (s.machine == MachineState::maintenance) return m.refuse(ErrorCode::refused, "Maintenance mode is on already.");
-  const bool idle = s.machine == MachineState::halted || s.machine == MachineState::error ||
-                    s.machine == MachineState::ready;
+  const bool idle =
+      s.machine == MachineState::halted || s.machine == MachineState::error || s.machine == MachineState::ready;
   if (!idle || s.activity != Activity::none || s.may_be_moving || s.unnamed) {
     return m.refuse(ErrorCode::busy, "Maintenance begins when the rig is idle: it is {} ({}).", to_string(s.machine),
                     to_string(s.activity));

@@ -22,7 +22,7 @@ struct Snapshot {
   PanelInputs inputs{};
   PanelOutputs outputs{};
   std::vector<DeviceHealth> devices{};  ///< as of the last check
-  std::string job;  ///< the one that has the rig; empty: none
+  std::string job;                      ///< the one that has the rig; empty: none
   JobTable jobs;
 };
 

@@ -203,7 +203,6 @@ class Transition : public Machine {
   void operator()(const event::StageProgress&) {}
   void operator()(const event::ModelReady&) {}
 
-
  private:
   bool has(const std::string& job) { return s().job && s().job->id == job; }
 
@@ -243,7 +242,8 @@ class Transition : public Machine {
 
   void start(const std::string& fresh_job_id) {
     const bool flipped = s().activity == Activity::waiting_for_flip;
-    if (s().maintenance) return refuse(ErrorCode::refused, "Maintenance mode is on: there are no jobs until it is off.");
+    if (s().maintenance)
+      return refuse(ErrorCode::refused, "Maintenance mode is on: there are no jobs until it is off.");
     if (s().machine == MachineState::halted || s().machine == MachineState::error ||
         s().machine == MachineState::preoperational) {
       return refuse(ErrorCode::refused, "The station is {}: {} Press Reset first.", to_string(s().machine), s().cause);

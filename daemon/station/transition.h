@@ -12,15 +12,14 @@ namespace scanrig {
 
 struct StationRules {
   int poses = 2;
-  int views = 8;        ///< a pose, at equal angles
-  bool remote = false;         ///< the API may start and home while the guard is closed; needs a guard
-  bool guard = false;          ///< there is a guard whose contact is wired
-  bool home_guarded = false;   ///< after a restart a closed guard homes the table, without Reset
-  bool manual_light = false;   ///< a hand switches the projector
+  int views = 8;              ///< a pose, at equal angles
+  bool remote = false;        ///< the API may start and home while the guard is closed; needs a guard
+  bool guard = false;         ///< there is a guard whose contact is wired
+  bool home_guarded = false;  ///< after a restart a closed guard homes the table, without Reset
+  bool manual_light = false;  ///< a hand switches the projector
 };
 
 constexpr DegreesPerSecond kMaxJogSpeed{10};
-
 
 /// The job that has the rig.
 struct ActiveJob {
@@ -36,9 +35,9 @@ struct ActiveJob {
 /// An engineer has the rig.
 struct Maintenance {
   MachineState before = MachineState::halted;
-  bool moved = false;    ///< something has moved outside a job
+  bool moved = false;  ///< something has moved outside a job
   bool homed = false;
-  bool consent = false;  ///< Reset was pressed at the panel since it began
+  bool consent = false;              ///< Reset was pressed at the panel since it began
   std::optional<action::Jog> jog{};  ///< to be done when the warning is over
 };
 
@@ -48,8 +47,8 @@ struct StationState {
   bool panel_known = false;  ///< what e-stop and guard say is known
   bool estop_ok = true;
   bool guard_closed = true;
-  bool latched = false;         ///< a fault that only Reset at the panel clears
-  bool home_by_guard = true;    ///< nothing but a restart lies behind us
+  bool latched = false;            ///< a fault that only Reset at the panel clears
+  bool home_by_guard = true;       ///< nothing but a restart lies behind us
   std::optional<Error> unnamed{};  ///< a fault that may turn out to be the e-stop
   std::optional<Maintenance> maintenance{};
   PanelInputs inputs{};

@@ -327,7 +327,8 @@ Result<TurntableStatus> ModbusTurntable::status(Deadline deadline) {
 }
 
 Result<void> ModbusTurntable::limit_speed(std::optional<DegreesPerSecond> limit) {
-  const auto speed = options_.scale.speed_word(std::min(options_.speed, limit.value_or(options_.speed)), options_.profile);
+  const auto speed =
+      options_.scale.speed_word(std::min(options_.speed, limit.value_or(options_.speed)), options_.profile);
   if (!speed) return pass_on(speed, "turntable");
   motion_.speed = *speed;
   return {};

@@ -133,7 +133,8 @@ void ModbusServer::handle(const std::stop_token& stop, Pty& pty, const Bytes& fr
 Bytes ModbusServer::carry_out(const Bytes& frame, bool obey, std::uint8_t exception) {
   if (!crc_fits(frame)) return exception_answer(frame[0], frame[1], kWrongCrc);
   const auto request = parse_request(frame);
-  if (!request || request->count > (request->of_bits() ? kMaxBits : kMaxRegisters)) return exception_answer(frame[0], frame[1], kIllegalFunction);
+  if (!request || request->count > (request->of_bits() ? kMaxBits : kMaxRegisters))
+    return exception_answer(frame[0], frame[1], kIllegalFunction);
   std::function<void(const ModbusRequest&)> listener;
   {
     const std::scoped_lock lock(mutex_);

@@ -1,10 +1,13 @@
-"""Motion, light, panel: faults on the wire, emergency stop, restarts, long runs."""
+"""Motion, light, panel: faults on the wire, emergency stop, restarts, long runs, the doctor, fuzzed parsers."""
 import pathlib
 import shutil
 import tempfile
 
 import motion_doctor
+import motion_fuzz
+import motion_long
 import motion_matrix
+import motion_safety
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 
@@ -15,6 +18,9 @@ def measure(bench):
     scratch.chmod(0o755)
     try:
         motion_matrix.measure(bench, ROOT, scratch)
+        motion_safety.measure(bench, scratch)
+        motion_long.measure(bench, ROOT, scratch)
         motion_doctor.measure(bench, scratch)
+        motion_fuzz.measure(bench, ROOT, scratch)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)

@@ -99,12 +99,12 @@ class Rig:
 
     # The daemon
 
-    def start_daemon(self, *options, wait=True):
+    def start_daemon(self, scale=0.25, wait=True):
         self.api.unlink(missing_ok=True)
         output = open(self.folder / "daemon.log", "a")
-        command = [self.bin / "scanrigd-sim", "--config", self.config, "--scale", "0.25", *options]
+        command = [self.bin / "scanrigd-sim", "--config", self.config, "--scale", scale]
         self.daemon = subprocess.Popen([str(word) for word in command], stdout=output, stderr=output)
-        if wait and not self.wait(lambda: self.status() is not None, DAEMON_READY_S):
+        if wait and not self.wait(self.asks_for_reset, DAEMON_READY_S):
             raise RuntimeError(f"the daemon did not start, see {self.folder / 'daemon.log'}")
 
     def kill_daemon(self, number):
@@ -151,7 +151,11 @@ class Rig:
         status = self.status()
         return status is not None and status["machine"] == state
 
+    def asks_for_reset(self):
+        return "Reset" in (self.status() or {}).get("next_action", "")
+
     def get_ready(self, limit_s=30):
         """Reset at the panel until the table is homed."""
+        self.wait(self.asks_for_reset, limit_s)
         self.tap("reset")
         return self.wait(lambda: self.machine_is("Operational.Ready"), limit_s)

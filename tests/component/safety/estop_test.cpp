@@ -44,8 +44,8 @@ class DaemonOnWires : public testing::Test {
       return std::make_unique<fakes::FakeReconstructor>(log);
     };
     thread = std::thread([this, options] {
-      result = run_daemon({*open->turntable, *open->projector, camera, *open->panel}, options, rig.clock,
-                          stop.get_token());
+      result =
+          run_daemon({*open->turntable, *open->projector, camera, *open->panel}, options, rig.clock, stop.get_token());
     });
   }
   void TearDown() override {

@@ -26,8 +26,7 @@ class WireRig {
   /// Texts of rig.toml and what stands there instead.
   using Changes = std::vector<std::pair<std::string, std::string>>;
 
-  explicit WireRig(const sim::wire::AxisOptions& axis, const Changes& changes = {})
-      : drive(axis, clock) {
+  explicit WireRig(const sim::wire::AxisOptions& axis, const Changes& changes = {}) : drive(axis, clock) {
     std::filesystem::create_directories(folder);
     std::filesystem::copy(std::filesystem::path(SCANRIG_SOURCE_DIR) / "config/drives", folder / "drives");
     plug_in();

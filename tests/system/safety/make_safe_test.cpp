@@ -26,9 +26,7 @@ class MakeSafe : public testing::Test {
   int make_safe() {
     return Process({SCANRIGD_PROGRAM, "--make-safe", "--config", rig.config()}, rig.folder / "make_safe.log").wait();
   }
-  double seconds_since(Clock::TimePoint then) {
-    return std::chrono::duration<double>(rig.clock.now() - then).count();
-  }
+  double seconds_since(Clock::TimePoint then) { return std::chrono::duration<double>(rig.clock.now() - then).count(); }
 
   WireRig rig{{}};
   std::optional<Process> daemon;
