@@ -100,15 +100,12 @@ Result<void> write_files_synced(const std::filesystem::path& folder, std::span<c
 
 Result<void> create_directories_synced(const std::filesystem::path& path) {
   std::error_code error;
-  std::vector<std::filesystem::path> missing;
-  for (auto p = path; !p.empty() && !std::filesystem::exists(p, error); p = p.parent_path()) missing.push_back(p);
-  for (auto p = missing.rbegin(); p != missing.rend(); ++p) {
-    if (!std::filesystem::create_directory(*p, error) && error) {
-      return fail(ErrorCode::io, "cannot create the folder {}: {}", p->string(), error.message());
-    }
-    if (auto synced = sync_folder(p->parent_path()); !synced) return synced;
+  if (path.empty() || std::filesystem::exists(path, error)) return {};
+  if (auto parent = create_directories_synced(path.parent_path()); !parent) return parent;
+  if (!std::filesystem::create_directory(path, error) && error) {
+    return fail(ErrorCode::io, "cannot create the folder {}: {}", path.string(), error.message());
   }
-  return {};
+  return sync_folder(path.parent_path());
 }
 
 Result<void> replace_folder(const std::filesystem::path& prepared, const std::filesystem::path& target) {

@@ -63,4 +63,31 @@ struct CheckConfigVerb {
 };
 ExitCode check_config(const CheckConfigVerb& verb);
 
+// At the rig, on the devices themselves, while no daemon runs.
+
+struct TurntableVerb {
+  std::string what;  ///< "home", "move", "status", "read"
+  double angle_deg = 0.0;
+  std::filesystem::path config = "/etc/scanrig/rig.toml";
+  bool yes = false;
+  bool json = false;
+};
+/// `move` homes first: an angle without a known zero is none.
+ExitCode turntable(const TurntableVerb& verb);
+
+struct PanelVerb {
+  std::filesystem::path config = "/etc/scanrig/rig.toml";
+  int seconds = 0;  ///< 0: until interrupted
+};
+ExitCode watch_panel(const PanelVerb& verb);
+
+struct DoctorVerb {
+  std::filesystem::path config = "/etc/scanrig/rig.toml";
+  bool yes_move = false;  ///< the table may be turned
+  bool answers = false;   ///< somebody at the rig answers on standard input although it is no terminal
+  bool json = false;
+};
+/// `device` when something was found.
+ExitCode examine_rig(const DoctorVerb& verb);
+
 }  // namespace scanrig::ctl

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "core/transform.h"
-#include "pipeline/evaluate/surface_index.h"
+#include "pipeline/mesh/surface_index.h"
 #include "pipeline/evaluate/surface_samples.h"
 
 namespace scanrig {

@@ -140,7 +140,8 @@ void score_topology(const Mesh& model, const Mesh& truth, const SurfaceIndex& su
   scores.components = found.components;
   scores.watertight = found.watertight();
   scores.genus = found.genus();
-  scores.true_genus = topology(truth).genus();
+  const Topology wanted = topology(truth);
+  if (wanted.watertight()) scores.true_genus = wanted.genus();
   scores.self_intersections = self_intersecting_faces(model, surface);
 }
 

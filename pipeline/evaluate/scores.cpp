@@ -41,8 +41,8 @@ std::vector<Gate> gates(const Scores& s) {
       {"E closed share less unobservable share", 0.02, s.closed_share - (1.0 - s.observable_share)},
       {"watertight", 1.0, s.watertight ? 1.0 : 0.0, false},
       {"components", 1.0, static_cast<double>(s.components)},
-      {"genus off", 0.0, static_cast<double>(std::abs(s.genus - s.true_genus))},
       {"self-intersecting faces", 0.0, static_cast<double>(s.self_intersections)}};
+  if (s.true_genus) all.push_back({"genus off", 0.0, static_cast<double>(std::abs(s.genus - *s.true_genus))});
   if (s.pose2) {
     all.push_back({"pose 2, deg", 0.01, s.pose2->deg});
     all.push_back({"pose 2, mm", 0.01, s.pose2->mm});
@@ -76,7 +76,7 @@ json to_json(const Scores& s) {
                    {"components", s.components},
                    {"watertight", s.watertight},
                    {"genus", s.genus},
-                   {"true_genus", s.true_genus},
+                   {"true_genus", s.true_genus ? json(*s.true_genus) : json()},
                    {"self_intersecting_faces", s.self_intersections}}}};
   if (s.pose2) result["pose2_error"] = {{"deg", s.pose2->deg}, {"mm", s.pose2->mm}};
   if (s.texture) {

@@ -50,7 +50,7 @@ struct Scores {
   std::size_t components = 0;
   bool watertight = false;
   long genus = 0;
-  long true_genus = 0;
+  std::optional<long> true_genus;      ///< where the truth's mesh is watertight; an open one has none
   std::size_t self_intersections = 0;  ///< faces that cross another
 
   struct PoseError {

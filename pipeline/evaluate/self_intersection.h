@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "pipeline/evaluate/surface_index.h"
+#include "pipeline/mesh/surface_index.h"
 
 namespace scanrig {
 

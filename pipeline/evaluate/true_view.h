@@ -3,7 +3,7 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
-#include "pipeline/evaluate/surface_index.h"
+#include "pipeline/mesh/surface_index.h"
 #include "pipeline/evaluate/surface_samples.h"
 #include "pipeline/evaluate/truth.h"
 

@@ -108,9 +108,9 @@ Result<void> ScanFolder::store_view(std::size_t pose, ViewRecord record, std::sp
   std::vector<FileContent> contents;
   record.files.clear();
   for (const auto& [role, bytes] : images) {
-    const std::string name = role + std::string(extension);
+    const std::string name = fmt::format("{}{}", role, extension);
     contents.push_back({name, bytes});
-    record.files[role] = {folder + "/" + name, sha256(bytes)};
+    record.files[role] = {fmt::format("{}/{}", folder, name), sha256(bytes)};
   }
   if (auto made = create_directories_synced(path_ / folder); !made) return made;
   if (auto written = write_files_synced(path_ / folder, contents); !written) return written;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "core/files.h"
 #include "core/hash.h"
@@ -209,6 +210,10 @@ Result<JsonFile> JsonFile::read(const std::filesystem::path& file, std::string_v
   result.sha256_ = scanrig::sha256(*text);
   try {
     *result.document_ = json::parse(*text);
+  } catch (const json::parse_error& e) {
+    return fail(ErrorCode::invalid_input, "{}:{}: not valid JSON from here on", result.name_,
+                1 + std::count(text->begin(),
+                               text->begin() + static_cast<std::ptrdiff_t>(std::min(e.byte, text->size())), '\n'));
   } catch (const json::exception& e) {
     return fail(ErrorCode::invalid_input, "{}: not valid JSON: {}", result.name_, e.what());
   }

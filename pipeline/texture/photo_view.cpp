@@ -66,7 +66,7 @@ Eigen::Vector3d pixel_ray(const Camera& camera, double u, double v) {
   return {x, y, 1.0};
 }
 
-PhotoView::PhotoView(const Photo& photo, const Mesh& mesh, const RayScene& scene, const TextureOptions& options,
+PhotoView::PhotoView(const Photo& photo, const Mesh& mesh, const SurfaceIndex& scene, const TextureOptions& options,
                      double typical)
     : photo_(&photo),
       camera_from_model_(photo.camera.camera_from_turntable * photo.turntable_from_model),
@@ -83,14 +83,13 @@ PhotoView::PhotoView(const Photo& photo, const Mesh& mesh, const RayScene& scene
   find_edges();
 }
 
-void PhotoView::cast(const RayScene& scene) {
+void PhotoView::cast(const SurfaceIndex& scene) {
   const Eigen::Matrix3d model_from_camera = camera_from_model_.linear().transpose();
-  const Eigen::Vector3f origin = centre_.cast<float>();
   parallel_for(static_cast<std::size_t>(window_.height), [&](std::size_t row) {
     const int y = static_cast<int>(row);
     for (int x = 0; x < window_.width; ++x) {
       const Eigen::Vector3d ray = model_from_camera * pixel_ray(photo_->camera, x + window_.x, y + window_.y);
-      if (const auto hit = scene.first_hit(origin, ray.cast<float>())) depth_(y, x) = hit->distance;
+      if (const auto hit = scene.first_hit(centre_, ray)) depth_(y, x) = static_cast<float>(hit->distance);
     }
   });
 }

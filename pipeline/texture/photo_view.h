@@ -4,7 +4,7 @@
 #include <opencv2/core/mat.hpp>
 #include <optional>
 
-#include "pipeline/texture/ray_scene.h"
+#include "pipeline/mesh/surface_index.h"
 #include "pipeline/texture/texture.h"
 
 namespace scanrig {
@@ -27,7 +27,7 @@ struct Sample {
 class PhotoView {
  public:
   /// Casts one ray a pixel. `typical_px_per_mm` is the resolution that counts as 1 in weights.
-  PhotoView(const Photo& photo, const Mesh& mesh, const RayScene& scene, const TextureOptions& options,
+  PhotoView(const Photo& photo, const Mesh& mesh, const SurfaceIndex& scene, const TextureOptions& options,
             double typical_px_per_mm);
 
   /// How the photo shows `point` with unit `normal` (model frame, mm); nothing if it does not.
@@ -42,7 +42,7 @@ class PhotoView {
   [[nodiscard]] Eigen::Vector3d towards(const Eigen::Vector3d& point) const { return (centre_ - point).normalized(); }
 
  private:
-  void cast(const RayScene& scene);
+  void cast(const SurfaceIndex& scene);
   void find_edges();
 
   const Photo* photo_;

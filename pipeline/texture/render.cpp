@@ -44,16 +44,16 @@ cv::Vec3b to_linear_bytes(const Eigen::Vector3f& linear) {
 
 }  // namespace
 
-MeshRenderer::MeshRenderer(TexturedMesh mesh, RayScene scene) : mesh_(std::move(mesh)), scene_(std::move(scene)) {}
+MeshRenderer::MeshRenderer(TexturedMesh mesh, SurfaceIndex scene) : mesh_(std::move(mesh)), scene_(std::move(scene)) {}
 
 Result<MeshRenderer> MeshRenderer::create(TexturedMesh mesh) {
-  auto scene = RayScene::create(mesh.mesh);
+  auto scene = SurfaceIndex::create(mesh.mesh);
   if (!scene) return pass_on(scene, "render");
   if (mesh.mesh.normals.size() != mesh.mesh.vertices.size()) mesh.mesh.normals = vertex_normals(mesh.mesh);
   return MeshRenderer(std::move(mesh), std::move(*scene));
 }
 
-Eigen::Vector3f MeshRenderer::paint(const RayScene::Hit& hit, Paint surface) const {
+Eigen::Vector3f MeshRenderer::paint(const SurfaceIndex::Hit& hit, Paint surface) const {
   if (surface == Paint::texture) {
     const auto& uv = mesh_.corner_uv[hit.face];
     return fetch(mesh_.atlas, hit.weights[0] * uv[0] + hit.weights[1] * uv[1] + hit.weights[2] * uv[2]);
@@ -66,7 +66,7 @@ Eigen::Vector3f MeshRenderer::paint(const RayScene::Hit& hit, Paint surface) con
   return sum;
 }
 
-Eigen::Vector3f MeshRenderer::normal(const RayScene::Hit& hit) const {
+Eigen::Vector3f MeshRenderer::normal(const SurfaceIndex::Hit& hit) const {
   Eigen::Vector3f sum = Eigen::Vector3f::Zero();
   for (int k = 0; k < 3; ++k) {
     sum += hit.weights[k] * mesh_.mesh.normals[mesh_.mesh.faces[hit.face][static_cast<std::size_t>(k)]];
@@ -92,7 +92,7 @@ Result<Rendering> MeshRenderer::render(const Camera& camera, const Transform& tu
   const Eigen::Vector3f background =
       options.as_photo ? Eigen::Vector3f(options.background[0], options.background[1], options.background[2]) / 255.0F
                        : from_srgb(options.background);
-  const auto shade = [&](const RayScene::Hit& hit, const Eigen::Vector3d& ray) -> Eigen::Vector3f {
+  const auto shade = [&](const SurfaceIndex::Hit& hit, const Eigen::Vector3d& ray) -> Eigen::Vector3f {
     const Eigen::Vector3d n = normal(hit).cast<double>();
     if (options.surface == Paint::grey) return Eigen::Vector3f::Constant(grey(camera_from_model.linear() * n));
     const Eigen::Vector3f colour = paint(hit, options.surface);
@@ -107,19 +107,20 @@ Result<Rendering> MeshRenderer::render(const Camera& camera, const Transform& tu
                 cv::Mat1b(size, uchar{0})};
   const auto cast = [&](double u, double v) {
     const Eigen::Vector3d ray = camera_from_model.linear().transpose() * pixel_ray(camera, u, v);
-    return std::pair(scene_.first_hit(centre.cast<float>(), ray.cast<float>()), ray);
+    return std::pair(scene_.first_hit(centre, ray), ray);
   };
   const int n = options.supersample;
   parallel_for(static_cast<std::size_t>(size.height), [&](std::size_t row) {
     const int y = static_cast<int>(row);
     for (int x = 0; x < size.width; ++x) {
       if (const auto [hit, ray] = cast(x, y); hit) {
-        out.depth(y, x) = hit->distance;
+        out.depth(y, x) = static_cast<float>(hit->distance);
         out.mask(y, x) = 255;
       }
       Eigen::Vector3f sum = Eigen::Vector3f::Zero();
       for (int k = 0; k < n * n; ++k) {
-        const auto [hit, ray] = cast(x + (k % n + 0.5) / n - 0.5, y + (k / n + 0.5) / n - 0.5);
+        const int column = k % n, line = k / n;
+        const auto [hit, ray] = cast(x + (column + 0.5) / n - 0.5, y + (line + 0.5) / n - 0.5);
         sum += hit ? shade(*hit, ray) : background;
       }
       sum /= static_cast<float>(n * n);

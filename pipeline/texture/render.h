@@ -7,7 +7,7 @@
 #include "core/transform.h"
 #include "pipeline/calibration/camera.h"
 #include "pipeline/mesh/mesh.h"
-#include "pipeline/texture/ray_scene.h"
+#include "pipeline/mesh/surface_index.h"
 #include "pipeline/texture/rig_light.h"
 
 namespace scanrig {
@@ -51,12 +51,12 @@ class MeshRenderer {
                            const RenderOptions& options = {}) const;
 
  private:
-  MeshRenderer(TexturedMesh mesh, RayScene scene);
-  [[nodiscard]] Eigen::Vector3f paint(const RayScene::Hit& hit, Paint surface) const;
-  [[nodiscard]] Eigen::Vector3f normal(const RayScene::Hit& hit) const;
+  MeshRenderer(TexturedMesh mesh, SurfaceIndex scene);
+  [[nodiscard]] Eigen::Vector3f paint(const SurfaceIndex::Hit& hit, Paint surface) const;
+  [[nodiscard]] Eigen::Vector3f normal(const SurfaceIndex::Hit& hit) const;
 
   TexturedMesh mesh_;
-  RayScene scene_;
+  SurfaceIndex scene_;
 };
 
 }  // namespace scanrig

@@ -169,7 +169,7 @@ void draw_atlas(const AtlasLayout& layout, std::span<const PhotoView> views, con
 Result<TexturedModel> texture_mesh(const Mesh& mesh, std::span<const Photo> photos, const TextureOptions& options,
                                    const Context& context) {
   if (auto good = check(mesh, photos, options); !good) return pass_on(good);
-  auto scene = RayScene::create(mesh);
+  auto scene = SurfaceIndex::create(mesh);
   if (!scene) return pass_on(scene, "texture");
   const auto stopped = [] { return fail(ErrorCode::stopped, "texture: stopped"); };
 

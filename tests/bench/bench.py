@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The one place where figures are made: ./dev bench GROUP... [--quick]
+"""The one place where figures are made: ./dev bench GROUP... [--quick] [--record]
 
 Every group is a module beside this file with `measure(bench)`; it calls bench.line() for each figure that an issue or a
 design page asks for. Prints what | asked | measured | ok, writes out/bench.json, exits 1 when a line falls short.
@@ -12,6 +12,8 @@ import os
 import pathlib
 import subprocess
 import sys
+
+import record as record_file
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
@@ -73,8 +75,11 @@ def main():
     parser = argparse.ArgumentParser(prog="./dev bench", description=__doc__.splitlines()[0])
     parser.add_argument("groups", nargs="+", choices=groups, metavar="GROUP", help=f"one of: {', '.join(groups)}")
     parser.add_argument("--quick", action="store_true", help="fewer repetitions; for a first look, not for the record")
+    parser.add_argument("--record", action="store_true", help="put the full table into docs/measured.md")
     parser.add_argument("--bin", required=True, help=argparse.SUPPRESS)
     options = parser.parse_args()
+    if options.record and options.quick:
+        parser.error("--record wants the full measurement, not --quick")
 
     bench = Bench(options.bin, options.quick)
     print(f"commit {commit()}, {bench.cores} cores{', quick' if options.quick else ''}")
@@ -90,6 +95,8 @@ def main():
     record = {"commit": commit(), "cores": bench.cores, "quick": options.quick, "profile": bench.profile,
               "lines": bench.lines}
     (ROOT / "out" / "bench.json").write_text(json.dumps(record, indent=1) + "\n")
+    if options.record:
+        record_file.write(ROOT / "docs" / "measured.md", options.groups, record)
     return 1 if False in held else 0
 
 

@@ -156,6 +156,15 @@ TEST(Evaluate, HolesBitsAndCrossingsAreCounted) {
   EXPECT_LT(scores.self_intersections, 1000u);
 }
 
+TEST(Evaluate, AnOpenTruthHasNoGenusToCompareWith) {
+  Truth truth = rig_and_ball({0.0, 180.0});
+  EXPECT_EQ(score(ball(), truth).true_genus, 0);
+  truth.mesh.faces.erase(truth.mesh.faces.begin());
+  const Scores scores = score(ball(), truth);
+  EXPECT_EQ(scores.true_genus, std::nullopt);
+  for (const Gate& gate : gates(scores)) EXPECT_NE(gate.name, "genus off");
+}
+
 TEST(Evaluate, TheSecondPoseIsHeldAgainstItsTruth) {
   Truth truth = rig_and_ball({0.0});
   truth.pose1_from_pose2 = Transform::Identity();

@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "pipeline/texture/compare.h"
-#include "pipeline/texture/ray_scene.h"
+#include "pipeline/mesh/surface_index.h"
 #include "tests/unit/pipeline/texture/painted_scene.h"
 
 namespace scanrig {
@@ -87,20 +87,6 @@ TEST(RenderTest, whatCannotBeDrawnIsSaid) {
   EXPECT_EQ(code({.surface = Paint::texture}), ErrorCode::invalid_input);
   EXPECT_EQ(code({.surface = Paint::vertex_colour}), ErrorCode::invalid_input);
   EXPECT_EQ(code({.surface = Paint::grey, .supersample = 0}), ErrorCode::invalid_input);
-}
-
-TEST(RaySceneTest, theNearestFaceIsHitFromEitherSideAndNothingBehind) {
-  TexturedMesh two = square(cv::Mat3b(4, 4));
-  for (const auto& v : square(cv::Mat3b(4, 4)).mesh.vertices)
-    two.mesh.vertices.emplace_back(v + Eigen::Vector3f(0, 0, 5));
-  two.mesh.faces.push_back({4, 5, 6});
-  const auto scene = RayScene::create(two.mesh);
-  ASSERT_TRUE(scene);
-  EXPECT_EQ(scene->first_hit({10, 30, 50}, {0, 0, -1})->face, 2u);
-  EXPECT_NEAR(scene->first_hit({10, 30, 50}, {0, 0, -2})->distance, 22.5F, 1e-4F);
-  EXPECT_EQ(scene->first_hit({10, 30, -50}, {0, 0, 1})->face, 0u);
-  EXPECT_FALSE(scene->first_hit({10, 30, 50}, {0, 0, 1}));
-  EXPECT_EQ(RayScene::create({}).error().code, ErrorCode::degenerate);
 }
 
 cv::Mat3b noise_image(int seed) {

@@ -1,4 +1,4 @@
-#include "pipeline/evaluate/surface_index.h"
+#include "pipeline/mesh/surface_index.h"
 
 #if __has_include(<embree4/rtcore.h>)
 #include <embree4/rtcore.h>
@@ -7,8 +7,8 @@
 #endif
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <numeric>
 #include <utility>
 
@@ -83,15 +83,15 @@ Result<SurfaceIndex> SurfaceIndex::create(const Mesh& mesh, const std::vector<st
   scene->device = rtcNewDevice(nullptr);
   if (!scene->device) return fail(ErrorCode::internal, "Embree gives no device");
   scene->scene = rtcNewScene(scene->device);
-  rtcSetSceneFlags(scene->scene, RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneFlags(scene->scene, RTC_SCENE_FLAG_ROBUST);  // no ray slips through between two faces
   RTCGeometry geometry = rtcNewGeometry(scene->device, RTC_GEOMETRY_TYPE_TRIANGLE);
   void* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                            sizeof(Eigen::Vector3f), scene->vertices.size());
   void* indices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, sizeof(Mesh::Face),
                                           scene->faces.size());
   if (vertices && indices) {
-    std::memcpy(vertices, scene->vertices.data(), scene->vertices.size() * sizeof(Eigen::Vector3f));
-    std::memcpy(indices, scene->faces.data(), scene->faces.size() * sizeof(Mesh::Face));
+    std::copy(scene->vertices.begin(), scene->vertices.end(), static_cast<Eigen::Vector3f*>(vertices));
+    std::copy(scene->faces.begin(), scene->faces.end(), static_cast<Mesh::Face*>(indices));
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene->scene, geometry);
   }
@@ -117,7 +117,7 @@ std::optional<SurfaceIndex::Hit> SurfaceIndex::first_hit(const Eigen::Vector3d& 
   rtcIntersect1(scene_->scene, &context, &ray);
 #endif
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  return Hit{ray.ray.tfar, scene_->numbers[ray.hit.primID]};
+  return Hit{ray.ray.tfar, scene_->numbers[ray.hit.primID], {1.0F - ray.hit.u - ray.hit.v, ray.hit.u, ray.hit.v}};
 }
 
 bool SurfaceIndex::blocked(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {

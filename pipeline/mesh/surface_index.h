@@ -13,14 +13,15 @@
 
 namespace scanrig {
 
-/// The triangles of a mesh, ready for rays and for the nearest point. Geometry of its own: it shares no code with the
-/// simulator's renderer nor with what makes the models.
+/// The triangles of a mesh, ready for rays and for the nearest point; the only place of the pipeline that knows Embree
+/// (3.13 or 4).
 /// Threads: the const functions may be called from any number of threads. Same question, same answer.
 class SurfaceIndex {
  public:
   struct Hit {
     double distance = 0.0;  ///< in lengths of the direction
     std::uint32_t face = 0;
+    Eigen::Vector3f weights;  ///< barycentric, of the face's three corners
   };
   struct Nearest {
     double distance = std::numeric_limits<double>::infinity();  ///< infinite: nothing within the limit
@@ -35,6 +36,7 @@ class SurfaceIndex {
   SurfaceIndex(SurfaceIndex&&) noexcept;
   SurfaceIndex& operator=(SurfaceIndex&&) noexcept;
 
+  /// The nearest face, seen from either side, along origin + t * direction, t >= 0.
   [[nodiscard]] std::optional<Hit> first_hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
   /// Whether a face crosses the segment.
   [[nodiscard]] bool blocked(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const;

@@ -1,4 +1,4 @@
-#include "pipeline/evaluate/surface_index.h"
+#include "pipeline/mesh/surface_index.h"
 
 #include <gtest/gtest.h>
 
@@ -6,12 +6,12 @@
 #include <random>
 #include <set>
 
-#include "tests/unit/pipeline/evaluate/ball_truth.h"
+#include "tests/unit/pipeline/mesh/ball_mesh.h"
 
 namespace scanrig {
 namespace {
 
-using namespace ball_truth;
+using namespace ball_mesh;
 
 TEST(SurfaceIndex, NearestAgreesWithTheBall) {
   const auto index = SurfaceIndex::create(ball());
@@ -56,6 +56,10 @@ TEST(SurfaceIndex, RaysHitAndSegmentsAreBlockedOnlyByWhatIsBetween) {
   const auto hit = index->first_hit(outside, Eigen::Vector3d(-2.0, 0.0, 0.0));
   ASSERT_TRUE(hit);
   EXPECT_NEAR(hit->distance, 37.55, 0.02);
+  const Mesh mesh = ball();
+  Eigen::Vector3d there = Eigen::Vector3d::Zero();
+  for (int k = 0; k < 3; ++k) there += hit->weights[k] * mesh.vertices[mesh.faces[hit->face][k]].cast<double>();
+  EXPECT_NEAR((there - outside).norm(), 2.0 * hit->distance, 1e-3) << "the weights name the point";
   EXPECT_FALSE(index->first_hit(outside, Eigen::Vector3d::UnitX()));
   EXPECT_TRUE(index->blocked(outside, kCentre));
   EXPECT_FALSE(index->blocked(outside, kCentre + Eigen::Vector3d(30.0, 0.0, 0.0)));

@@ -1,0 +1,172 @@
+#include "sim/apps/rig_control.h"
+
+#include <fmt/ranges.h>
+
+#include <functional>
+#include <map>
+#include <nlohmann/json.hpp>
+
+namespace scanrig::sim {
+namespace {
+
+using nlohmann::json;
+using Kind = wire::WireFault::Kind;
+
+constexpr std::size_t kMostAtOnce = 20000;  ///< frames or changes in one answer
+
+std::int64_t nanoseconds(Clock::TimePoint at) { return at.time_since_epoch().count(); }
+
+const std::map<std::string, Kind>& fault_kinds() {
+  static const std::map<std::string, Kind> kinds{{"silent", Kind::deaf},
+                                                 {"answer_lost", Kind::answer_lost},
+                                                 {"late", Kind::late},
+                                                 {"wrong_crc", Kind::wrong_crc},
+                                                 {"short_frame", Kind::cut_short},
+                                                 {"refuse", Kind::refuse},
+                                                 {"earlier_answer", Kind::earlier_answer}};
+  return kinds;
+}
+
+/// "none", or a fault with its "fault_count" (requests, -1: all), "fault_delay_ms" and "fault_function".
+Result<std::optional<wire::WireFault>> fault_of(const std::string& name, const json& all) {
+  if (name == "none") return std::nullopt;
+  const auto kind = fault_kinds().find(name);
+  if (kind == fault_kinds().end()) return fail(ErrorCode::invalid_input, "there is no fault \"{}\"", name);
+  wire::WireFault fault{.kind = kind->second};
+  fault.count = all.value("fault_count", -1);
+  fault.delay = std::chrono::milliseconds(all.value("fault_delay_ms", 200));
+  if (all.contains("fault_function")) fault.function = all["fault_function"].get<std::uint8_t>();
+  return fault;
+}
+
+Result<RigPanel::Wiring> wiring_of(const std::string& name) {
+  using Wiring = RigPanel::Wiring;
+  static const std::map<std::string, Wiring> words{
+      {"wired", Wiring::wired}, {"broken", Wiring::broken}, {"bridged", Wiring::bridged}};
+  const auto found = words.find(name);
+  if (found == words.end()) return fail(ErrorCode::invalid_input, "a wire is wired, broken or bridged");
+  return found->second;
+}
+
+Result<wire::Parity> parity_of(const std::string& name) {
+  using wire::Parity;
+  static const std::map<std::string, Parity> words{
+      {"none", Parity::none}, {"even", Parity::even}, {"odd", Parity::odd}};
+  const auto found = words.find(name);
+  if (found == words.end()) return fail(ErrorCode::invalid_input, "a parity is none, even or odd");
+  return found->second;
+}
+
+json to_json(const RigTruth& truth) {
+  return {{"angle_deg", truth.angle_deg},       {"speed_deg_s", truth.speed_deg_s}, {"standing", truth.standing},
+          {"projector_on", truth.projector_on}, {"counter", truth.counter},         {"powered", truth.powered}};
+}
+
+json to_json(const wire::WireFrame& frame, std::size_t number) {
+  return {{"n", number},
+          {"at_ns", nanoseconds(frame.at)},
+          {"from_master", frame.from_master},
+          {"bytes", fmt::format("{:02X}", fmt::join(frame.bytes, " "))}};
+}
+
+json to_json(const RigPanel::Change& change, std::size_t number) {
+  return {{"n", number}, {"at_ns", nanoseconds(change.at)}, {"name", change.name}, {"on", change.on}};
+}
+
+/// Those from number `since` on; "next" is the number to ask for the time after.
+template <class Entry>
+json since(const char* name, const std::vector<Entry>& all, std::size_t since) {
+  json list = json::array();
+  std::size_t next = std::min(since, all.size());
+  for (; next < all.size() && list.size() < kMostAtOnce; ++next) list.push_back(to_json(all[next], next));
+  return {{name, list}, {"next", next}};
+}
+
+}  // namespace
+
+std::string RigControl::answer(const std::string& line) {
+  const auto say = [](const json& answer) { return answer.dump(-1, ' ', false, json::error_handler_t::replace); };
+  try {
+    const auto done = obey(json::parse(line));
+    return say(done ? *done : json{{"error", done.error().message}});
+  } catch (const json::exception& wrong) {
+    return say({{"error", wrong.what()}});
+  }
+}
+
+Result<json> RigControl::obey(const json& request) {
+  if (request.contains("get")) return get(request);
+  if (request.contains("set")) {
+    for (const auto& [knob, value] : request["set"].items()) {
+      if (auto done = set(knob, value, request["set"]); !done) return pass_on(done);
+    }
+    return json{{"ok", true}, {"at_ns", nanoseconds(clock_.now())}};
+  }
+  for (const bool press : {true, false}) {
+    const char* verb = press ? "press" : "release";
+    if (!request.contains(verb)) continue;
+    const auto at = rig_.press(request[verb].get<std::string>(), press);
+    if (!at) return pass_on(at);
+    return json{{"ok", true}, {"at_ns", nanoseconds(*at)}};
+  }
+  return fail(ErrorCode::invalid_input, "a request has one of: get, set, press, release");
+}
+
+Result<json> RigControl::get(const json& request) {
+  const auto what = request["get"].get<std::string>();
+  const auto from = request.value("since", std::size_t{0});
+  if (what == "truth") return to_json(rig_.truth());
+  if (what == "frames") return since("frames", rig_.frames(), from);
+  if (what == "changes") return since("changes", rig_.panel().changes(), from);
+  if (what == "inputs") return json(rig_.panel().inputs());
+  if (what == "outputs") return json(rig_.panel().outputs());
+  return fail(ErrorCode::invalid_input, "get one of: truth, frames, changes, inputs, outputs; not \"{}\"", what);
+}
+
+Result<void> RigControl::set(const std::string& knob, const json& value, const json& all) {
+  const std::map<std::string, std::function<Result<void>()>> knobs{
+      {"fault",
+       [&]() -> Result<void> {
+         const auto fault = fault_of(value.get<std::string>(), all);
+         if (!fault) return pass_on(fault);
+         rig_.set_fault(*fault);
+         return {};
+       }},
+      {"unplugged", [&] { return rig_.plug_in(!value.get<bool>()); }},
+      {"blocked", [&]() -> Result<void> { return rig_.drive().block(value.get<bool>()), Result<void>(); }},
+      {"lost_steps", [&]() -> Result<void> { return rig_.drive().lose_steps(value.get<double>()), Result<void>(); }},
+      {"counter", [&]() -> Result<void> { return rig_.drive().preload_counter(value.get<int>()), Result<void>(); }},
+      {"power_cycle", [&]() -> Result<void> { return rig_.drive().power_cycle(), Result<void>(); }},
+      {"alarm",
+       [&]() -> Result<void> {
+         rig_.drive().raise_alarm(value.get<std::uint16_t>(), all.value("alarm_can_be_reset", true));
+         return {};
+       }},
+      {"estop_cuts_power",
+       [&]() -> Result<void> { return rig_.set_estop_cuts_power(value.get<bool>()), Result<void>(); }},
+      {"line",
+       [&]() -> Result<void> {
+         const auto parity = parity_of(value.value("parity", "none"));
+         if (!parity) return pass_on(parity);
+         rig_.set_line({value.value("baud", 115200), *parity});
+         return {};
+       }},
+      {"positive",
+       [&]() -> Result<void> { return rig_.set_positive_ccw(value.get<std::string>() == "ccw"), Result<void>(); }},
+      {"wiring", [&]() -> Result<void> {
+         for (const auto& [input, word] : value.items()) {
+           const auto wiring = wiring_of(word.get<std::string>());
+           if (!wiring) return pass_on(wiring);
+           if (auto done = rig_.panel().rewire(input, *wiring); !done) return done;
+         }
+         return {};
+       }}};
+  static const std::vector<std::string> companions{"fault_count", "fault_delay_ms", "fault_function",
+                                                   "alarm_can_be_reset"};
+  if (std::ranges::find(companions, knob) != companions.end()) return {};
+  const auto found = knobs.find(knob);
+  if (found == knobs.end()) return fail(ErrorCode::invalid_input, "there is no knob \"{}\"", knob);
+  return found->second();
+}
+
+}  // namespace scanrig::sim

@@ -1,0 +1,69 @@
+"""A bare Debian in a folder, and what the project's own commands do there, on two cores, from nothing."""
+import contextlib
+import os
+import pathlib
+import shutil
+import subprocess
+import tempfile
+import time
+
+CORES = "0,1"
+
+
+def archive():
+    """The Debian archive that this machine itself is installed from, or None."""
+    form = "$(REPO_URI) $(LABEL)"
+    try:
+        answer = subprocess.run(["apt-get", "indextargets", "--format", form], capture_output=True, text=True)
+    except FileNotFoundError:
+        return None
+    for line in answer.stdout.splitlines():
+        address, _, label = line.partition(" ")
+        if label == "Debian":
+            return address
+    return None
+
+
+def why_not():
+    """A sentence where this machine cannot make one, else None."""
+    if os.geteuid() != 0:
+        return "not measured: making a bare machine wants root"
+    if not shutil.which("mmdebstrap"):
+        return "not measured: mmdebstrap is not installed"
+    if len(os.sched_getaffinity(0)) < 2:
+        return "not measured: fewer than 2 cores"
+    return None if archive() else "not measured: no Debian archive is configured here"
+
+
+@contextlib.contextmanager
+def bare_machine(suite):
+    """The root folder of a machine with nothing but essential packages and apt; gone afterwards."""
+    root = pathlib.Path(tempfile.mkdtemp(prefix="scanrig-bare-"))
+    try:
+        subprocess.run(["mmdebstrap", "--quiet", "--variant=minbase", suite, root, archive()], check=True, timeout=600)
+        shutil.copy("/etc/resolv.conf", root / "etc/resolv.conf")
+        yield root
+    finally:
+        shutil.rmtree(root)
+
+
+def run_inside(root, command, timeout):
+    """Runs `command` (a shell line) inside, on two cores, with its own /proc and /dev. Returns (process, seconds)."""
+    inside = ("mount -t proc proc {0}/proc && mount --rbind /dev {0}/dev && exec chroot {0} /usr/bin/env -i "
+              "PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 sh -c {1}")
+    quoted = "'" + command.replace("'", "'\\''") + "'"
+    began = time.monotonic()
+    done = subprocess.run(["taskset", "-c", CORES, "unshare", "--mount", "--pid", "--fork", "--kill-child", "sh", "-c",
+                           inside.format(root, quoted)], capture_output=True, text=True, timeout=timeout)
+    return done, time.monotonic() - began
+
+
+def build_seconds(tree):
+    """From the first compile's start to the last one's end, as ninja logged it."""
+    spans = [line.split("\t")[:2] for line in (tree / ".ninja_log").read_text().splitlines() if line[:1].isdigit()]
+    return (max(int(end) for _, end in spans) - min(int(start) for start, _ in spans)) / 1000
+
+
+def clone_into(source, root):
+    subprocess.run(["git", "clone", "-q", source, root / "scanrig"], check=True)
+    return root / "scanrig"
