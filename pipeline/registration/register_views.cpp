@@ -209,8 +209,8 @@ void Solver::add_priors(Eigen::MatrixXd& normal, Eigen::VectorXd& right) const {
 }
 
 /// What all views' corrections have in common, seen from their cameras, is the axis's and only the axis's. Left to the
-/// views it would take up what scanners have wrong at grazing incidence: b (1 - cos) is what moving every view b towards
-/// its camera does, and the model grows by b.
+/// views it would take up what scanners have wrong at grazing incidence: b (1 - cos) is what moving every view b
+/// towards its camera does, and the model grows by b.
 void Solver::hold_common_motion(Eigen::MatrixXd& normal, Eigen::VectorXd& right) const {
   constexpr double kInformation = 1e10;  // 1 / (0.01 um)^2 or 1 / (0.0006 deg)^2
   const auto views = static_cast<double>(correction_.size());
