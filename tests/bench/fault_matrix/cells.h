@@ -16,13 +16,13 @@ namespace scanrig::bench {
 enum class Fault { silent, late, damaged, device_error, stalled, unplugged, back_after_2s, earlier_answer };
 
 inline constexpr std::array kFaults{std::pair(Fault::silent, "silent"),
-                             std::pair(Fault::late, "late"),
-                             std::pair(Fault::damaged, "wrong CRC or short frame"),
-                             std::pair(Fault::device_error, "device error or alarm"),
-                             std::pair(Fault::stalled, "stalled"),
-                             std::pair(Fault::unplugged, "unplugged"),
-                             std::pair(Fault::back_after_2s, "back after 2 s"),
-                             std::pair(Fault::earlier_answer, "answer of an earlier request")};
+                                    std::pair(Fault::late, "late"),
+                                    std::pair(Fault::damaged, "wrong CRC or short frame"),
+                                    std::pair(Fault::device_error, "device error or alarm"),
+                                    std::pair(Fault::stalled, "stalled"),
+                                    std::pair(Fault::unplugged, "unplugged"),
+                                    std::pair(Fault::back_after_2s, "back after 2 s"),
+                                    std::pair(Fault::earlier_answer, "answer of an earlier request")};
 
 /// How one call of one driver ended under one fault.
 struct Outcome {
