@@ -53,7 +53,10 @@ class DaemonOnWires : public testing::Test {
     thread.join();
   }
   void get_ready() {
-    rig.press("RESET");
+    ASSERT_TRUE(rig.wait_for([&] {  // refused as long as something is not settled yet
+      rig.press("RESET");
+      return rig.lamp("BUSY") || rig.lamp("START_LAMP");
+    }));
     ASSERT_TRUE(rig.wait_ready());
   }
 
