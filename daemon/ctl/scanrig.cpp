@@ -72,7 +72,10 @@ void add_import(CLI::App& app, ImportVerb& verb, Chosen& chosen) {
   auto* sub = app.add_subcommand("import", "make a scan folder from other people's data");
   sub->require_subcommand(1);
   auto* stanford = sub->add_subcommand("stanford", "range scans of the Stanford repository");
-  stanford->add_option("CONF", verb.conf, "the .conf file of each pose")->required()->expected(1, 2);
+  stanford->add_option("--pose", verb.conf, "the .conf file of a pose; once or twice")
+      ->required()
+      ->expected(1)
+      ->take_all();
   stanford->add_option("--out", verb.out, "the scan folder to make")->required();
   stanford->callback([&] { chosen = [&] { return import_stanford(verb); }; });
 }

@@ -64,17 +64,17 @@ void Machine::name_fault() {
   close_job(JobState::interrupted, {ErrorCode::stopped, s().cause});
 }
 
+const char* Machine::unsafe() {
+  if (!s().panel_known) return "The panel cannot be read, so nobody knows about the e-stop: see to the panel first.";
+  if (!s().estop_ok) return "The e-stop is pressed: release it first.";
+  if (!s().guard_closed) return "The guard is open: close it first.";
+  return nullptr;
+}
+
 bool Machine::safe_to_move() {
-  if (!s().panel_known) {
-    refuse(ErrorCode::refused, "The panel cannot be read, so nobody knows about the e-stop: see to the panel first.");
-  } else if (!s().estop_ok) {
-    refuse(ErrorCode::refused, "The e-stop is pressed: release it first.");
-  } else if (!s().guard_closed) {
-    refuse(ErrorCode::refused, "The guard is open: close it first.");
-  } else {
-    return true;
-  }
-  return false;
+  const char* const why_not = unsafe();
+  if (why_not) refuse(ErrorCode::refused, "{}", why_not);
+  return !why_not;
 }
 
 bool Machine::remote_may_move(std::string_view what) {
@@ -98,7 +98,7 @@ void Machine::begin_homing(std::string cause) {
 void Machine::home_if_guarded() {
   if (!rules_.home_guarded || !rules_.guard || !s().home_by_guard) return;
   if (s().machine != MachineState::halted || s().activity != Activity::none || s().shutting_down) return;
-  if (!s().panel_known || !s().estop_ok || !s().guard_closed || s().may_be_moving) return;
+  if (unsafe()) return;
   begin_homing("The guard is closed.");
 }
 

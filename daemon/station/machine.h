@@ -40,6 +40,8 @@ class Machine {
   void fault_unnamed(const Error& error);
   void name_fault();
 
+  /// Why nothing may move now; null: it may.
+  const char* unsafe();
   /// Refuses, and says why, unless e-stop and guard are known to be closed.
   bool safe_to_move();
   /// The same for whoever is not at the panel: he needs a guard between him and the table.

@@ -100,6 +100,10 @@ Result<void> ModbusDrive::stop(Deadline deadline) {
   return repeat([&] { return write(profile_.stop, deadline); });
 }
 
+void ModbusDrive::stop_unheard() {
+  if (line_.answer_missed()) std::ignore = line_.write_unheard(profile_.stop.address, profile_.stop.value);
+}
+
 Result<void> ModbusDrive::set_homing(const std::string& mode, const DriveMotion& fast, std::uint16_t slow_speed,
                                      Deadline deadline) {
   const auto& homing = profile_.homing;

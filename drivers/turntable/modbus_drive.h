@@ -46,6 +46,11 @@ class ModbusDrive {
 
   Result<void> enable(Deadline deadline);
   Result<void> stop(Deadline deadline);
+  /// The same at once where the answer to the last request was missed, when stop() would first wait for a quiet line.
+  /// Whoever calls it calls stop() next.
+  void stop_unheard();
+  /// From any thread, see modbus::Line.
+  void hurry(bool on) noexcept { line_.hurry(on); }
   Result<void> set_homing(const std::string& mode, const DriveMotion& fast, std::uint16_t slow_speed,
                           Deadline deadline);
   Result<void> set_soft_limits(const MovePlanner::Counter& range, Deadline deadline);

@@ -259,6 +259,12 @@ Result<DriveState> ModbusTurntable::read_after_owed_stop(Deadline deadline) {
   return drive_.read_state(deadline);
 }
 
+Result<void> ModbusTurntable::stop_drive(Deadline deadline) {
+  drive_.stop_unheard();
+  drive_.hurry(false);
+  return drive_.stop(deadline);
+}
+
 /// After any failure: no known zero, and the motor is told to stop.
 tl::unexpected<Error> ModbusTurntable::give_up(const Error& error) {
   homed_ = flank_loaded_ = false;
@@ -266,7 +272,7 @@ tl::unexpected<Error> ModbusTurntable::give_up(const Error& error) {
     const std::scoped_lock lock(mutex_);
     stop_requested_ = false;
   }
-  stop_owed_ = !drive_.stop(Deadline::after(clock_, kStopReplyTimeouts * options_.line.reply_timeout));
+  stop_owed_ = !stop_drive(Deadline::after(clock_, kStopReplyTimeouts * options_.line.reply_timeout));
   return fail(error.code, "turntable: {}; {}", error.message,
               stop_owed_ ? "the stop was not confirmed: the table may be moving" : "the motor was told to stop");
 }
@@ -282,7 +288,7 @@ Result<void> ModbusTurntable::stop(Deadline deadline) {
     stop_owed_ = true;
     return tl::unexpected(Error{error.code, error.message + "; the table may be moving"}.in("turntable"));
   };
-  if (auto told = drive_.stop(deadline); !told) return failed(told.error());
+  if (auto told = stop_drive(deadline); !told) return failed(told.error());
   stop_owed_ = false;
   flank_loaded_ = false;
   auto since = clock_.now();
@@ -339,6 +345,7 @@ void ModbusTurntable::request_stop() noexcept {
     const std::scoped_lock lock(mutex_);
     stop_requested_ = true;
   }
+  drive_.hurry(true);
   clock_.notify_all(wake_);
 }
 

@@ -68,6 +68,7 @@ class ModbusTurntable final : public Turntable {
   Result<void> not_stopped();
   Result<DriveState> ask(Deadline deadline);
   Result<DriveState> read_after_owed_stop(Deadline deadline);
+  Result<void> stop_drive(Deadline deadline);
   tl::unexpected<Error> give_up(const Error& error);
   void pause();
 

@@ -31,9 +31,10 @@ void add_shoot(CLI::App& app, ShootVerb& verb, Chosen& chosen) {
   shoot->add_option("--height-mm", options.scene.height_mm, "Largest extent of the object")->capture_default_str();
   shoot->add_option("--seed", options.scene.seed, "Placements, noise and table errors")->capture_default_str();
   shoot->add_option("--poses", options.scene.poses, "How often the object is put down")->capture_default_str();
-  shoot->add_option("--views", options.views, "Table angles a pose")->capture_default_str();
+  shoot->add_option("--views", options.views, "Table angles a pose")->check(CLI::Range(1, 99))->capture_default_str();
   shoot->add_option("--scale", options.scene.image_scale, "Resolution, as a share of 1280x960")->capture_default_str();
   shoot->add_flag("--same-rest", options.scene.same_rest_twice, "The operator forgets to turn the object over");
+  shoot->add_flag("--any-size", options.scene.any_size, "Put the object down although it is too large");
   shoot->add_flag("!--no-noise", options.scene.noise, "Leave the sensors' noise out");
   shoot->callback([&] { chosen = [&] { return sim::shoot(verb.options, verb.folder); }; });
 }
@@ -113,8 +114,11 @@ int main(int argc, char** argv) {
   add_control(app, control_verb, chosen);
   try {
     app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : static_cast<int>(ExitCode::usage);
+    std::fprintf(stderr, "scanrig-sim: %s\n", error.what());
+    return static_cast<int>(ExitCode::usage);
   }
   if (const auto done = chosen(); !done) {
     std::fprintf(stderr, "scanrig-sim: %s\n", done.error().message.c_str());

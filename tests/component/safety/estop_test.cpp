@@ -173,6 +173,20 @@ TEST_F(DaemonOnWires, AnEstopThatSilencesTheDriveReadsAsAnEstop) {
   EXPECT_THAT(*failure, testing::HasSubstr("e-stop"));
 }
 
+TEST_F(DaemonOnWires, AnEstopDoesNotWaitForASilentDriveToAnswer) {
+  ASSERT_TRUE(rig.wait_halted());
+  get_ready();
+  rig.press("START");
+  ASSERT_TRUE(rig.wait_moving());
+  rig.serial->inject({sim::wire::WireFault::Kind::answer_lost});
+  rig.clock.sleep_for(milliseconds(80));  // longer than a reply may take: the line is waited for to fall silent
+  const auto pressed = rig.clock.now();
+  rig.set_estop(false);
+  ASSERT_TRUE(rig.wait_for([&] { return !rig.stops(pressed).empty(); }));
+  EXPECT_LT(rig.stops(pressed).front() - pressed, milliseconds(100));
+  ASSERT_TRUE(rig.wait_fault());
+}
+
 TEST_F(DaemonOnWires, APanelThatVanishesAndComesBackNeedsNoRestart) {
   ASSERT_TRUE(rig.wait_halted());
   get_ready();

@@ -9,7 +9,7 @@
 
 #include "core/parallel.h"
 #include "core/units.h"
-#include "tests/bench/d415_measure.h"
+#include "tests/bench/real_data/d415_measure.h"
 #include "tests/unit/pipeline/range/comparison.h"
 #include "tests/unit/pipeline/range/two_cameras.h"
 
