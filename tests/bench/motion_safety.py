@@ -110,7 +110,7 @@ def scan_once(rig):
 
 def estop_reconstruction(bench, scratch):
     """Edges for as long as reconstructions run; every one needs Reset and home before the next."""
-    wanted = 4 if bench.quick else 100
+    wanted = 2 if bench.quick else 100
     crew_share = -(-wanted // 2)
 
     def crew(member):

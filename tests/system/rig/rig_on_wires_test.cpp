@@ -45,10 +45,13 @@ class RigOnWires : public testing::Test {
     const auto answer = sim::wire::say_to_control_socket(folder_ / "control.sock", request.dump());
     return answer ? json::parse(*answer) : json::object();
   }
-  void tap(const char* button) {
+  /// Held until it has its effect.
+  template <class Effect>
+  bool press_until(const char* button, const Effect& effect) {
     say({{"press", button}});
-    clock_.sleep_for(milliseconds(120));  // longer than the panel's debouncing
+    const bool came = soon(effect);
     say({{"release", button}});
+    return came;
   }
   template <class Ready>
   bool soon(const Ready& ready, std::chrono::seconds limit = std::chrono::seconds(60)) {
@@ -83,11 +86,12 @@ class RigOnWires : public testing::Test {
 TEST_F(RigOnWires, AJobGoesFromResetToTheModel) {
   start_rig({"--panel", "modbus-io"});
   start_daemon();
-  tap("reset");
+  const auto lamp = [&](const char* name) { return say({{"get", "outputs"}}).value(name, false); };
+  ASSERT_TRUE(press_until("reset", [&] { return machine() != "Halted"; })) << log();
   ASSERT_TRUE(soon([&] { return machine() == "Operational.Ready"; })) << log();
-  tap("start");
-  ASSERT_TRUE(soon([&] { return say({{"get", "outputs"}}).value("flip_request", false); })) << log();
-  tap("start");
+  ASSERT_TRUE(press_until("start", [&] { return machine() == "Operational.SingleExecution"; })) << log();
+  ASSERT_TRUE(soon([&] { return lamp("flip_request"); })) << log();
+  ASSERT_TRUE(press_until("start", [&] { return !lamp("flip_request"); })) << log();
   const auto job = [&] { return ask("jobs").value("jobs", json::array()); };
   ASSERT_TRUE(soon([&] { return !job().empty() && job()[0]["state"] == "done"; })) << log() << job();
   const auto told = ask("jobs/" + job()[0]["id"].get<std::string>());
