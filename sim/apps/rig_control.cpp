@@ -117,10 +117,14 @@ Result<json> RigControl::get(const json& request) {
   const auto from = request.value("since", std::size_t{0});
   if (what == "truth") return to_json(rig_.truth());
   if (what == "frames") return since("frames", rig_.frames(), from);
+  if (what == "panel_frames" && rig_.panel().module_port()) {
+    return since("frames", rig_.panel().module_port()->log(), from);
+  }
   if (what == "changes") return since("changes", rig_.panel().changes(), from);
   if (what == "inputs") return json(rig_.panel().inputs());
   if (what == "outputs") return json(rig_.panel().outputs());
-  return fail(ErrorCode::invalid_input, "get one of: truth, frames, changes, inputs, outputs; not \"{}\"", what);
+  return fail(ErrorCode::invalid_input,
+              "get one of: truth, frames, panel_frames (of a module), changes, inputs, outputs; not \"{}\"", what);
 }
 
 Result<void> RigControl::set(const std::string& knob, const json& value, const json& all) {
@@ -130,6 +134,32 @@ Result<void> RigControl::set(const std::string& knob, const json& value, const j
          const auto fault = fault_of(value.get<std::string>(), all);
          if (!fault) return pass_on(fault);
          rig_.set_fault(*fault);
+         return {};
+       }},
+      {"panel_fault",
+       [&]() -> Result<void> {
+         auto* module = rig_.panel().module_port();
+         const auto fault = fault_of(value.get<std::string>(), all);
+         if (!fault) return pass_on(fault);
+         if (!module) return fail(ErrorCode::invalid_input, "this rig's panel is on GPIO: its lines have no faults");
+         module->clear_faults();
+         if (*fault) module->inject(**fault);
+         return {};
+       }},
+      {"panel_unplugged",
+       [&]() -> Result<void> {
+         auto* module = rig_.panel().module_port();
+         if (!module) return fail(ErrorCode::invalid_input, "this rig's panel is on GPIO: it has no plug");
+         if (!value.get<bool>()) return module->come_back();
+         module->vanish();
+         return {};
+       }},
+      {"physics",
+       [&]() -> Result<void> {
+         const wire::AxisOptions rest;
+         rig_.drive().set_physics({.backlash_deg = value.value("backlash_deg", rest.backlash_deg),
+                                   .vibration_deg = value.value("vibration_deg", rest.vibration_deg),
+                                   .vibration_decay_s = value.value("vibration_decay_s", rest.vibration_decay_s)});
          return {};
        }},
       {"unplugged", [&] { return rig_.plug_in(!value.get<bool>()); }},

@@ -55,6 +55,8 @@ class Axis {
   void set_counter(std::int32_t value);  ///< declares where it is
 
   void block(bool blocked) { blocked_ = blocked; }
+  /// Play and vibration as in `options` from now on; gear and start stay as they were.
+  void set_physics(const AxisOptions& options);
   void lose_steps(double pulses) { motor_ -= pulses; }
 
   [[nodiscard]] bool running() const { return mode_ != Mode::standing; }

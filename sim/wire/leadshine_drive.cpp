@@ -153,6 +153,12 @@ void LeadshineDrive::preload_counter(std::int32_t value) {
   axis_.set_counter(value);
 }
 
+void LeadshineDrive::set_physics(const AxisOptions& options) {
+  const std::scoped_lock lock(mutex_);
+  refresh();
+  axis_.set_physics(options);
+}
+
 AxisTruth LeadshineDrive::truth() const {
   const std::scoped_lock lock(mutex_);
   refresh();

@@ -27,6 +27,7 @@ class LeadshineDrive final : public RegisterDevice {
   void raise_alarm(std::uint16_t code, bool can_be_reset = true);
   void power_cycle();  ///< alarm, home and enable are gone, the counter starts at 0
   void preload_counter(std::int32_t value);
+  void set_physics(const AxisOptions& options);  ///< as Axis::set_physics()
 
   // Truth.
   [[nodiscard]] AxisTruth truth() const;

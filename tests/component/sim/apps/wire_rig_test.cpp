@@ -170,6 +170,31 @@ TEST_F(WireRigTest, ContactsAreBridgedBrokenAndMended) {
   EXPECT_EQ(changes[0]["on"], true);
 }
 
+TEST_F(WireRigTest, ThePanelsModuleHasFaultsOfItsOwn) {
+  EXPECT_TRUE(say({{"set", {{"panel_fault", "silent"}}}}).contains("error"));  // on GPIO
+  start("leadshine-rs", "modbus-io");
+  ModbusIoPanel panel(config::modbus_io_panel_options(*config()), clock_);
+  EXPECT_TRUE(panel.wait_change({}, within(milliseconds(300))));
+  EXPECT_FALSE(say({{"get", "panel_frames"}})["frames"].empty());
+  say({{"set", {{"panel_fault", "silent"}}}});
+  EXPECT_FALSE(panel.wait_change({}, within(milliseconds(1000))));
+  say({{"set", {{"panel_fault", "none"}, {"panel_unplugged", true}}}});
+  EXPECT_FALSE(panel.wait_change({}, within(milliseconds(1000))));
+  say({{"set", {{"panel_unplugged", false}}}});
+  EXPECT_TRUE(panel.wait_change({}, within(milliseconds(1000))));
+}
+
+TEST_F(WireRigTest, PhysicsChangesWhileItRuns) {
+  const auto table = driver();
+  ASSERT_TRUE(table->home(within(seconds(20))));
+  ASSERT_TRUE(table->rotate_to({0}, within(seconds(10))));
+  const auto seen = [&] { return say({{"get", "truth"}})["angle_deg"].get<double>(); };
+  const double tight = seen();
+  say({{"set", {{"physics", {{"backlash_deg", 2.0}}}}}});
+  ASSERT_TRUE(table->rotate_to({90}, within(seconds(10))));
+  EXPECT_NEAR(seen() - tight, 90 - 0.85, 0.05);  // half of the play it had, 0.3, and of the one it has
+}
+
 TEST_F(WireRigTest, SeveralClientsAreHeardAtOnce) {
   std::vector<std::jthread> clients;
   std::atomic<int> heard = 0;
