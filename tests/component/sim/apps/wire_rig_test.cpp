@@ -36,6 +36,7 @@ class WireRigTest : public testing::Test {
     options.toml.folder = folder_;
     options.toml.drive = drive;
     options.toml.panel = panel;
+    options.axis.start_deg = 20;
     options.toml.speed_deg_s = 180;
     options.toml.acceleration_deg_s2 = 2000;
     auto rig = WireRig::start(options, clock_);
