@@ -116,10 +116,10 @@ def estop_reconstruction(bench, scratch):
     def crew(member):
         took = []
         with motion_rig.Rig(bench.bin, scratch / f"rec{member}", "--speed-deg-s", "180", "--acceleration-deg-s2", "1000",
-                            "--views", "8", "--poses", "2") as rig:
+                            "--views", "4" if bench.quick else "8", "--poses", "2") as rig:
             rig.edit_config("voxel_mm = 1.0", "voxel_mm = 0.2")
             rig.set(estop_cuts_power=False)
-            rig.start_daemon(scale=0.5)
+            rig.start_daemon(scale=0.25 if bench.quick else 0.5)
             end = time.monotonic() + (150 if bench.quick else 1800)
             while len(took) < crew_share and time.monotonic() < end:
                 if not reconstructing(rig) and not scan_once(rig):
@@ -190,7 +190,7 @@ def restarted(rig, n):
 
 
 def restarts(bench, scratch):
-    wanted = 12 if bench.quick else 200
+    wanted = 8 if bench.quick else 200
     lives = in_parallel(bench, scratch, "life", wanted, restarted)
     unasked, homeless, moves, still = (sum(column) for column in zip(*lives))
     bench.line("no motion after a restart without Reset", "0 frames that move",
