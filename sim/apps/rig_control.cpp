@@ -117,56 +117,86 @@ Result<json> RigControl::get(const json& request) {
   const auto from = request.value("since", std::size_t{0});
   if (what == "truth") return to_json(rig_.truth());
   if (what == "frames") return since("frames", rig_.frames(), from);
+  if (what == "panel_frames" && rig_.panel().module_port()) {
+    return since("frames", rig_.panel().module_port()->log(), from);
+  }
   if (what == "changes") return since("changes", rig_.panel().changes(), from);
   if (what == "inputs") return json(rig_.panel().inputs());
   if (what == "outputs") return json(rig_.panel().outputs());
-  return fail(ErrorCode::invalid_input, "get one of: truth, frames, changes, inputs, outputs; not \"{}\"", what);
+  return fail(ErrorCode::invalid_input,
+              "get one of: truth, frames, panel_frames (of a module), changes, inputs, outputs; not \"{}\"", what);
+}
+
+/// Knobs of the panel and of the wiring; nothing for a name that is none of them.
+std::optional<Result<void>> RigControl::set_panel(const std::string& knob, const json& value, const json& all) {
+  auto* module = rig_.panel().module_port();
+  if (knob == "wiring") {
+    for (const auto& [input, word] : value.items()) {
+      const auto wiring = wiring_of(word.get<std::string>());
+      if (!wiring) return pass_on(wiring);
+      if (auto done = rig_.panel().rewire(input, *wiring); !done) return done;
+    }
+    return Result<void>();
+  }
+  if (knob != "panel_fault" && knob != "panel_unplugged") return std::nullopt;
+  if (!module)
+    return fail(ErrorCode::invalid_input, "this rig's panel is on GPIO: its lines have no faults and no plug");
+  if (knob == "panel_fault") {
+    const auto fault = fault_of(value.get<std::string>(), all);
+    if (!fault) return pass_on(fault);
+    module->clear_faults();
+    if (*fault) module->inject(**fault);
+    return Result<void>();
+  }
+  if (!value.get<bool>()) return module->come_back();
+  module->vanish();
+  return Result<void>();
+}
+
+/// Knobs of the drive's port; nothing for a name that is none of them.
+std::optional<Result<void>> RigControl::set_port(const std::string& knob, const json& value, const json& all) {
+  if (knob == "fault") {
+    const auto fault = fault_of(value.get<std::string>(), all);
+    if (!fault) return pass_on(fault);
+    rig_.set_fault(*fault);
+  } else if (knob == "unplugged") {
+    return rig_.plug_in(!value.get<bool>());
+  } else if (knob == "line") {
+    const auto parity = parity_of(value.value("parity", "none"));
+    if (!parity) return pass_on(parity);
+    rig_.set_line({value.value("baud", 115200), *parity});
+  } else {
+    return std::nullopt;
+  }
+  return Result<void>();
 }
 
 Result<void> RigControl::set(const std::string& knob, const json& value, const json& all) {
-  const std::map<std::string, std::function<Result<void>()>> knobs{
-      {"fault",
-       [&]() -> Result<void> {
-         const auto fault = fault_of(value.get<std::string>(), all);
-         if (!fault) return pass_on(fault);
-         rig_.set_fault(*fault);
-         return {};
-       }},
-      {"unplugged", [&] { return rig_.plug_in(!value.get<bool>()); }},
-      {"blocked", [&]() -> Result<void> { return rig_.drive().block(value.get<bool>()), Result<void>(); }},
-      {"lost_steps", [&]() -> Result<void> { return rig_.drive().lose_steps(value.get<double>()), Result<void>(); }},
-      {"counter", [&]() -> Result<void> { return rig_.drive().preload_counter(value.get<int>()), Result<void>(); }},
-      {"power_cycle", [&]() -> Result<void> { return rig_.drive().power_cycle(), Result<void>(); }},
-      {"alarm",
-       [&]() -> Result<void> {
-         rig_.drive().raise_alarm(value.get<std::uint16_t>(), all.value("alarm_can_be_reset", true));
-         return {};
-       }},
-      {"estop_cuts_power",
-       [&]() -> Result<void> { return rig_.set_estop_cuts_power(value.get<bool>()), Result<void>(); }},
-      {"line",
-       [&]() -> Result<void> {
-         const auto parity = parity_of(value.value("parity", "none"));
-         if (!parity) return pass_on(parity);
-         rig_.set_line({value.value("baud", 115200), *parity});
-         return {};
-       }},
-      {"positive",
-       [&]() -> Result<void> { return rig_.set_positive_ccw(value.get<std::string>() == "ccw"), Result<void>(); }},
-      {"wiring", [&]() -> Result<void> {
-         for (const auto& [input, word] : value.items()) {
-           const auto wiring = wiring_of(word.get<std::string>());
-           if (!wiring) return pass_on(wiring);
-           if (auto done = rig_.panel().rewire(input, *wiring); !done) return done;
-         }
-         return {};
-       }}};
   static const std::vector<std::string> companions{"fault_count", "fault_delay_ms", "fault_function",
                                                    "alarm_can_be_reset"};
   if (std::ranges::find(companions, knob) != companions.end()) return {};
+  if (auto done = set_panel(knob, value, all)) return *done;
+  if (auto done = set_port(knob, value, all)) return *done;
+  auto& drive = rig_.drive();
+  const std::map<std::string, std::function<void()>> knobs{
+      {"blocked", [&] { drive.block(value.get<bool>()); }},
+      {"lost_steps", [&] { drive.lose_steps(value.get<double>()); }},
+      {"counter", [&] { drive.preload_counter(value.get<int>()); }},
+      {"power_cycle", [&] { drive.power_cycle(); }},
+      {"alarm", [&] { drive.raise_alarm(value.get<std::uint16_t>(), all.value("alarm_can_be_reset", true)); }},
+      {"physics",
+       [&] {
+         const wire::AxisOptions rest;
+         drive.set_physics({.backlash_deg = value.value("backlash_deg", rest.backlash_deg),
+                            .vibration_deg = value.value("vibration_deg", rest.vibration_deg),
+                            .vibration_decay_s = value.value("vibration_decay_s", rest.vibration_decay_s)});
+       }},
+      {"estop_cuts_power", [&] { rig_.set_estop_cuts_power(value.get<bool>()); }},
+      {"positive", [&] { rig_.set_positive_ccw(value.get<std::string>() == "ccw"); }}};
   const auto found = knobs.find(knob);
   if (found == knobs.end()) return fail(ErrorCode::invalid_input, "there is no knob \"{}\"", knob);
-  return found->second();
+  found->second();
+  return {};
 }
 
 }  // namespace scanrig::sim

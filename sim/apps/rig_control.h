@@ -1,6 +1,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 
 #include "sim/apps/wire_rig.h"
@@ -19,6 +20,9 @@ class RigControl {
  private:
   Result<nlohmann::json> obey(const nlohmann::json& request);
   Result<nlohmann::json> get(const nlohmann::json& request);
+  std::optional<Result<void>> set_panel(const std::string& knob, const nlohmann::json& value,
+                                        const nlohmann::json& all);
+  std::optional<Result<void>> set_port(const std::string& knob, const nlohmann::json& value, const nlohmann::json& all);
   Result<void> set(const std::string& knob, const nlohmann::json& value, const nlohmann::json& all);
 
   WireRig& rig_;

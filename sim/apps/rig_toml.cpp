@@ -24,7 +24,7 @@ std::string turntable(const RigTomlOptions& o) {
     text += fmt::format("pulses_per_motor_rev = {:.0f}\n", o.pulses_per_motor_rev);
   }
   return text + fmt::format(
-                    "reply_timeout_ms = 60\ngear_ratio = {:.4f}\npositive = \"{}\"\n"
+                    "reply_timeout_ms = 100\ngear_ratio = {:.4f}\npositive = \"{}\"\n"
                     "home = {{ mode = \"{}\", offset_deg = 0.0 }}\nspeed_deg_s = {}\nacceleration_deg_s2 = {}\n"
                     "backlash_deg = 0.5\ntolerance_deg = 0.02\nsettle_ms = 200\n\n",
                     o.gear_ratio, o.positive_ccw ? "ccw" : "cw", o.drive == "oriental-az" ? "encoder" : "switch",
@@ -34,7 +34,7 @@ std::string turntable(const RigTomlOptions& o) {
 std::string panel(const RigTomlOptions& o) {
   std::string text = fmt::format("[panel]\ndriver = \"{}\"\n", o.panel);
   if (o.panel != "gpio")
-    text += port(o, "panel") + "parity = \"none\"\nunit_id = 2\nreply_timeout_ms = 60\npoll_ms = 20\n";
+    text += port(o, "panel") + "parity = \"none\"\nunit_id = 2\nreply_timeout_ms = 100\npoll_ms = 20\n";
   const char* low = ", active = \"low\"";
   text += fmt::format("start = {}\nstop = {}\nreset = {}\npart_present = {}\nflipped = {}\n", pin(o, "START", 0, low),
                       pin(o, "STOP", 1, low), pin(o, "RESET", 2, low), pin(o, "PART_PRESENT", 5, low),

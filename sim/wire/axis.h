@@ -56,6 +56,8 @@ class Axis {
   void follow_encoder() { command_ = motor_; }  ///< a closed loop starts from where the shaft is; only while standing
 
   void block(bool blocked) { blocked_ = blocked; }
+  /// Play and vibration as in `options` from now on; gear and start stay as they were.
+  void set_physics(const AxisOptions& options);
   void lose_steps(double pulses) { motor_ -= pulses; }
 
   [[nodiscard]] bool running() const { return mode_ != Mode::standing; }

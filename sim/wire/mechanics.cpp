@@ -22,6 +22,12 @@ void Mechanics::preload_counter(std::int32_t value) {
   axis_.set_counter(value);
 }
 
+void Mechanics::set_physics(const AxisOptions& options) {
+  const std::scoped_lock lock(mutex_);
+  refresh();
+  axis_.set_physics(options);
+}
+
 void Mechanics::send_round(double deg) {
   const std::scoped_lock lock(mutex_);
   refresh();

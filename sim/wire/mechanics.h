@@ -23,6 +23,7 @@ class Mechanics {
   virtual void power_cycle() = 0;
   /// The counter reads `value` where the table stands.
   void preload_counter(std::int32_t value);
+  void set_physics(const AxisOptions& options);  ///< as Axis::set_physics()
   /// Somebody else sends the table on by `deg`, at 90 deg/s.
   void send_round(double deg);
 

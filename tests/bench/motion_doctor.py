@@ -1,4 +1,5 @@
 """`scanrig doctor` against each of the six faults that it must find."""
+import concurrent.futures
 import json
 import os
 import subprocess
@@ -7,7 +8,8 @@ import motion_rig
 
 FAST = ("--speed-deg-s", "180", "--acceleration-deg-s2", "1000")
 LIMIT_S = 120
-PROMPT_PRESS, PROMPT_RELEASE, PROMPT_SIGN = "Press the emergency stop", "Release the emergency stop", "which way"
+PROMPT_PRESS, PROMPT_RELEASE, PROMPT_ENTER = "Press the emergency stop", "Release the emergency stop", "press Enter"
+PROMPT_SIGN = "which way"
 
 
 def consult(rig, present=True, as_user=None):
@@ -29,6 +31,9 @@ def consult(rig, present=True, as_user=None):
             rig.press("estop")
         elif PROMPT_RELEASE in prompt:
             rig.release("estop")
+            if PROMPT_ENTER in prompt:
+                process.stdin.write("\n")
+                process.stdin.flush()
         elif PROMPT_SIGN in prompt:
             # The operator has watched the table: home is 0, the quarter turn ends at +90 or at -90 (or, from there, at
             # 270) as the world sees it.
@@ -45,7 +50,7 @@ def consult(rig, present=True, as_user=None):
         return {}, code
 
 
-def cases(bench):
+def cases():
     """name, the finding it must lead to, what to spoil, options of the doctor, options of the rig."""
     def swap(rig):
         os.symlink(os.readlink(rig.folder / "panel"), rig.folder / "other")
@@ -71,21 +76,23 @@ def cases(bench):
         yield "missing group", "missing_group", None, {}, ()
 
 
+def attempt(bench, folder, finding, spoil, how, options):
+    """What the doctor finds, as a line's end: measured and ok."""
+    if spoil is None:
+        return "not measured: needs root to become another user", None
+    with motion_rig.Rig(bench.bin, folder, *FAST, *options) as rig:
+        try:
+            spoil(rig)
+            findings, code = consult(rig, **how)
+        except PermissionError as refused:
+            return f"not measured: {refused}", None
+    wanted = {finding} if finding else set()
+    return f"{', '.join(findings) or 'nothing'}, exit code {code}", set(findings) == wanted and (code != 0) == bool(wanted)
+
+
 def measure(bench, scratch):
-    found = []
-    for number, (name, finding, spoil, how, options) in enumerate(cases(bench)):
-        if spoil is None:
-            bench.line(f"doctor: {name}", f"finds {finding}", "not measured: needs root to become another user", None)
-            continue
-        with motion_rig.Rig(bench.bin, scratch / f"doctor{number}", *FAST, *options) as rig:
-            try:
-                spoil(rig)
-                findings, code = consult(rig, **how)
-            except PermissionError as refused:
-                bench.line(f"doctor: {name}", f"finds {finding}", f"not measured: {refused}", None)
-                continue
-        wanted = {finding} if finding else set()
-        ok = set(findings) == wanted and (code != 0) == bool(wanted)
-        bench.line(f"doctor: {name}", f"finds {finding or 'nothing'}, exit code {'not 0' if wanted else '0'}",
-                   f"{', '.join(findings) or 'nothing'}, exit code {code}", ok)
-        found.append(ok)
+    tried = list(cases())
+    with concurrent.futures.ThreadPoolExecutor(len(tried)) as pool:
+        ended = list(pool.map(lambda n: attempt(bench, scratch / f"doctor{n}", *tried[n][1:]), range(len(tried))))
+    for (name, finding, *_), (measured, ok) in zip(tried, ended):
+        bench.line(f"doctor: {name}", f"finds {finding or 'nothing'}, exit code {'not 0' if finding else '0'}", measured, ok)

@@ -87,7 +87,7 @@ def job_tells(bench, scratch):
     off = [abs((view["measured_deg"] - view["commanded_deg"] + 180) % 360 - 180) for view in whole]
     bench.line("accuracy and settle time of each move in the job", f"4 views, within {TOLERANCE_DEG} deg",
                f"{len(whole)} views, worst {max(off, default=float('nan')):.4f} deg, settling "
-               f"{max((view['settling_ms'] for view in whole), default=0)} ms at most",
+               f"{max((view['settling_ms'] for view in whole), default=0):.0f} ms at most",
                len(whole) == 4 and max(off) <= TOLERANCE_DEG)
 
 

@@ -3,6 +3,7 @@ import json
 import re
 
 LIMIT_S = 900
+WORKERS = 8  # the cells mostly wait
 INTERFACES = {"Turntable": "drivers/turntable/turntable.h", "Projector": "drivers/projector/projector.h",
               "Panel": "drivers/panel/panel.h", "StereoCamera": "drivers/camera/stereo_camera.h"}
 
@@ -56,7 +57,7 @@ def write(path, wanted, cells, faults):
 def measure(bench, root, scratch):
     ports = scratch / "matrix"
     ports.mkdir(parents=True, exist_ok=True)
-    done = bench.run([bench.bin / "fault_matrix", root / "config" / "drives", ports, 4], LIMIT_S)
+    done = bench.run([bench.bin / "fault_matrix", root / "config" / "drives", ports, WORKERS], LIMIT_S)
     cells, faults = {}, []
     for line in done.stdout.splitlines():
         cell = json.loads(line)

@@ -9,7 +9,7 @@ import time
 
 READY_S = 10
 DAEMON_READY_S = 60
-TAP_S = 0.12  # longer than the panel's debouncing
+TAP_S = 0.2  # as a hand does; the panel debounces for 50 ms
 
 # Frames of a Leadshine RS drive that start or end a motion [docs of the family: block 0x6200, trigger 0x6002].
 MOVE, TRIGGER = "10 62 00", "06 60 02"

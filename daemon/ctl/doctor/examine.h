@@ -18,7 +18,8 @@ void examine_motion(const config::RigConfig& rig, const Operator& person, Clock&
 
 /// Lamps can be lit, inputs read; with somebody there, whether the e-stop's input follows the button and whether the
 /// drive loses its power. Findings: `panel`, `estop_not_wired`, `estop_keeps_power`.
-void examine_panel(const config::RigConfig& rig, bool drive_answers, const Operator& person, Clock& clock,
+/// Returns whether the table may be turned: nothing speaks against the emergency stop.
+bool examine_panel(const config::RigConfig& rig, bool drive_answers, const Operator& person, Clock& clock,
                    Report& report);
 
 }  // namespace scanrig::ctl::doctor

@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <tuple>
+
 #include "daemon/ctl/doctor/examine.h"
 #include "daemon/rig/open_devices.h"
 
@@ -48,6 +50,7 @@ void check_estop(const config::RigConfig& rig, Panel& panel, bool drive_answers,
   const auto pressed = wait_for_estop(panel, false, clock);
   if (!pressed) return report.find("panel", pressed.error().message + ".", "Check the panel's wiring.");
   if (!*pressed) {
+    std::ignore = person.ask("Release the emergency stop, then press Enter.");
     return report.find("estop_not_wired",
                        fmt::format("The emergency stop was to be pressed, and its input ({}) did not change.", line),
                        "Wire the second, normally closed contact of the emergency stop to this input; look for a "
@@ -66,28 +69,34 @@ void check_estop(const config::RigConfig& rig, Panel& panel, bool drive_answers,
 
 }  // namespace
 
-void examine_panel(const config::RigConfig& rig, bool drive_answers, const Operator& person, Clock& clock,
+bool examine_panel(const config::RigConfig& rig, bool drive_answers, const Operator& person, Clock& clock,
                    Report& report) {
   report.section("Panel");
   const auto open = open_devices(rig, clock);
-  if (!open) return report.find("panel", open.error().message + ".", "Correct the configuration.");
+  if (!open) {
+    report.find("panel", open.error().message + ".", "Correct the configuration.");
+    return false;
+  }
   const auto now = open->panel->wait_change({}, Deadline::after(clock, kAskLimit));
   if (!now) {
     const auto& line = rig.safety.estop.line;
     const bool estop = !line.empty() && now.error().message.find(line) != std::string::npos;
-    return report.find(estop ? "estop_not_wired" : "panel", now.error().message + ".",
-                       "Check the panel's wiring and power; name the lines as gpioinfo shows them.");
+    report.find(estop ? "estop_not_wired" : "panel", now.error().message + ".",
+                "Check the panel's wiring and power; name the lines as gpioinfo shows them.");
+    return false;
   }
   report.note(fmt::format("e-stop {}, guard {}, start {}, stop {}, reset {}", now->estop_ok ? "ok" : "pressed",
                           now->guard_closed ? "closed" : "open", now->start ? "pressed" : "-",
                           now->stop ? "pressed" : "-", now->reset ? "pressed" : "-"));
   if (!now->estop_ok) {
-    return report.find("estop_not_wired",
-                       fmt::format("The emergency stop reads pressed ({}).", name_of(rig.safety.estop)),
-                       "Release it. If it is released: its normally closed contact is not wired to this input, or "
-                       "`active` is the wrong way round.");
+    report.find("estop_not_wired", fmt::format("The emergency stop reads pressed ({}).", name_of(rig.safety.estop)),
+                "Release it. If it is released: its normally closed contact is not wired to this input, or `active` is "
+                "the wrong way round.");
+    return false;
   }
+  const auto found_before = report.findings().size();
   check_estop(rig, *open->panel, drive_answers, person, clock, report);
+  return report.findings().size() == found_before;
 }
 
 }  // namespace scanrig::ctl::doctor

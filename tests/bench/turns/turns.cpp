@@ -17,7 +17,8 @@ namespace {
 
 constexpr int kFaster = 100;
 constexpr double kStepDeg = 120;
-constexpr std::chrono::seconds kMoveLimit{60};
+constexpr std::chrono::minutes kMoveLimit{10};  ///< six of the wall's seconds: a busy machine is not the subject
+constexpr std::chrono::milliseconds kReplyTimeout{1000};
 constexpr double kLongestWayDeg = 361;  ///< a way longer than a turn was not asked for by anybody
 
 /// The wall's clock, faster. The wire's own time-outs stay in the wall's time.
@@ -49,6 +50,7 @@ Seen go_round(const DriveProfile& profile, const std::filesystem::path& port, in
   const auto server = sim::wire::ModbusServer::start(port, 1, drive, clock);
   ModbusTurntableOptions options;
   options.line.device = port;
+  options.line.reply_timeout = kReplyTimeout;
   options.profile = profile;
   options.scale.gear_ratio = 90;
   options.speed = {180};
