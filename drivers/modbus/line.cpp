@@ -189,7 +189,7 @@ Result<void> Line::wait_until_quiet(Deadline deadline) {
     if (deadline.expired(clock_)) {
       return fail(ErrorCode::timeout, "{}: the deadline passed before the line fell silent", who());
     }
-    if (hurry_) return fail(ErrorCode::timeout, "{}: called off before the line fell silent", who());
+    if (hurry_) return fail(ErrorCode::stopped, "{}: called off before the line fell silent", who());
     const Heard heard = discard(port, std::min({quiet_at - clock_.now(), deadline.left(clock_), kLook}));
     if (heard == Heard::hangup) return failed(EIO, who());
     if (heard == Heard::something) quiet_at = clock_.now() + silence;

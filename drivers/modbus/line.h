@@ -67,7 +67,7 @@ class Line {
   /// wait. It may collide with a late answer, so it is to be repeated as a request. Fails with `io`.
   Result<void> write_unheard(std::uint16_t address, std::uint16_t value);
 
-  /// From any thread. While on, no request waits for a quiet line: it fails with `timeout` instead.
+  /// From any thread. While on, no request waits for a quiet line: it fails with `stopped` instead.
   void hurry(bool on) noexcept { hurry_ = on; }
 
   /// The last request was sent, but whether the device has acted on it is not known: its answer was missed or corrupt.

@@ -1,0 +1,143 @@
+"""The first road: Start to model in the simulated rig, real scans through the same pipeline, bad input, power cuts."""
+import json
+import pathlib
+import shutil
+import time
+
+import bad_input
+import bare_machine
+import dragon
+import rim
+import sigkill
+import truth_absent
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+DEMO = ROOT / "sim" / "apps" / "demo.py"
+SEEDS = (1, 2, 3)
+
+
+def two_cores(command):
+    return ["taskset", "-c", "0,1", *command]
+
+
+def objects(bench):
+    """Name and mesh of each object asked for; None where the data are absent."""
+    meshes = bench.data / "meshes" if bench.data else None
+    yield "figurine", []
+    for name, file in (("spot", "spot/spot_triangulated.obj"), ("igea", "igea_tri.ply")):
+        yield name, ["--object", meshes / file] if meshes else None
+
+
+def demo(bench, folder, options):
+    shutil.rmtree(folder, ignore_errors=True)
+    command = ["python3", DEMO, "--bin", bench.bin, "--out", folder, *options]
+    began = time.monotonic()
+    done = bench.run(command, 3600)
+    return done, time.monotonic() - began
+
+
+def demo_itself(bench, folder, done, seconds):
+    wanted = ["scan.json", "model/model.glb", "model/model.ply", "model/report.json", "truth.ply", "truth.json"]
+    absent = [name for name in wanted if not (folder / name).is_file()]
+    bench.line("demo ends with exit code 0", "0", done.returncode, done.returncode == 0)
+    bench.line("files under DIR", ", ".join(wanted), f"absent: {', '.join(absent)}" if absent else "all", not absent)
+    if absent:
+        return
+    header = (folder / "model/model.ply").read_bytes()[:2000].decode("ascii", "replace").partition("end_header")[0]
+    properties = [line.split()[-1] for line in header.splitlines() if line.startswith("property")]
+    bench.line("model.ply has views and sigma", "both", " ".join(properties), {"views", "sigma"} <= set(properties))
+    views = sum("view" in line for line in done.stdout.splitlines())
+    ends = ["model.glb", "report.json", "Scores", "Wall time"]
+    bench.line("demo prints a line per view, then paths, scores, wall time", "16 lines, all four",
+               f"{views} lines, {sum(word in done.stdout for word in ends)} of 4",
+               views >= 16 and all(word in done.stdout for word in ends))
+    report = json.loads((folder / "model/report.json").read_text())
+    bench.profile = report.get("profile_sha256", "")
+    missing = truth_absent.report_gaps(report)
+    bench.line("report.json holds all that is asked", "all", ", ".join(missing) or "all", not missing)
+    bench.line("demo, Start to scores, this machine", "reported", f"{seconds:.0f} s on {bench.cores} cores", True)
+
+
+def accuracy(bench, name, seed, folder):
+    scores = json.loads((folder / "scores.json").read_text())
+    shape, measured, pose = scores["topology"], scores["measured"], scores["pose2_error"]
+    what = f"{name} seed {seed}"
+    right = shape["components"] == 1 and shape["watertight"] and shape["genus"] == shape["true_genus"]
+    bench.line(f"{what}: topology", "1 component, watertight, genus of the truth",
+               f"{shape['components']} component, {'watertight' if shape['watertight'] else 'open'}, "
+               f"genus {shape['genus']} of {shape['true_genus']}", right)
+    bench.at_most(f"{what}: measured area, median", 0.04, measured["median_mm"], "mm", 4)
+    bench.at_most(f"{what}: measured area, p95", 0.2, measured["p95_mm"], "mm", 4)
+    bench.at_least(f"{what}: observable truth within 0.15 mm", 95, 100 * scores["covered_0.15_mm"], "%")
+    bench.at_most(f"{what}: measured area further than 0.5 mm off", 1, 100 * measured["share_over_0.50_mm"], "%")
+    bench.at_most(f"{what}: pose 2 into pose 1, rotation", 0.1, pose["deg"], "deg", 4)
+    bench.at_most(f"{what}: pose 2 into pose 1, translation", 0.1, pose["mm"], "mm", 4)
+    bench.at_most(f"{what}: texture, median patch offset", 1, scores["texture"]["median_px"], "px")
+
+
+def nine_runs(bench):
+    for name, options in objects(bench):
+        for seed in SEEDS[:1] if bench.quick else SEEDS:
+            if options is None:
+                bench.line(f"{name} seed {seed}", "a model within the limits", "not measured: no data", None)
+                continue
+            folder = bench.out / f"{name}_{seed}"
+            done, seconds = demo(bench, folder, [*options, "--seed", seed])
+            if name == "figurine" and seed == 1:
+                demo_itself(bench, folder, done, seconds)
+            if not (folder / "scores.json").is_file():
+                bench.line(f"{name} seed {seed}", "a model within the limits", f"none: {done.stderr.strip()}", False)
+                continue
+            accuracy(bench, name, seed, folder)
+
+
+def render_time(bench):
+    if bench.cores < 2:
+        bench.line("a rendered view (four images) on 2 cores", "<= 4 s", "not measured: 1 core", None)
+        return
+    seconds = {}
+    for views in (1, 5):
+        folder = bench.out / "render"
+        shutil.rmtree(folder, ignore_errors=True)
+        began = time.monotonic()
+        bench.run(two_cores([bench.bin / "scanrig-sim", "shoot", "--out", folder, "--views", views]), 300, check=True)
+        seconds[views] = time.monotonic() - began
+        shutil.rmtree(folder)
+    # two poses: 8 views more in the second run than in the first
+    bench.at_most("a rendered view (four images) on 2 cores", 4, (seconds[5] - seconds[1]) / 8, "s")
+
+
+def from_nothing(bench):
+    what = "a bare Debian 12 on 2 cores"
+    reason = "not measured: --quick" if bench.quick else bare_machine.why_not()
+    if reason:
+        bench.line(f"{what}: from nothing to the demo's model", "<= 10 min", reason, None)
+        bench.line(f"{what}: of which the build", "<= 6 min", reason, None)
+        return
+    with bare_machine.bare_machine("bookworm") as root:
+        tree = bare_machine.clone_into(ROOT, root)
+        done, seconds = bare_machine.run_inside(root, "cd /scanrig && ./dev demo", 3600)
+        if done.returncode != 0:
+            bench.line(f"{what}: from nothing to the demo's model", "<= 10 min", done.stderr[-300:], False)
+            return
+        bench.at_most(f"{what}: from nothing to the demo's model", 10, seconds / 60, "min", 1)
+        bench.at_most(f"{what}: of which the build", 6, bare_machine.build_seconds(tree / "build/release") / 60, "min", 1)
+
+
+def each_case(bench, what, cases):
+    for name, ok, measured in cases:
+        bench.line(f"{what}: {name}", "as documented", measured, ok)
+
+
+def measure(bench):
+    nine_runs(bench)
+    render_time(bench)
+    scratch = bench.out / "scratch"
+    shutil.rmtree(scratch, ignore_errors=True)
+    scratch.mkdir()
+    each_case(bench, "same model", truth_absent.cases(bench.bin, scratch))
+    dragon.measure(bench)
+    rim.measure(bench)
+    each_case(bench, "bad input", bad_input.cases(bench.bin, scratch, ROOT / "config" / "rigs" / "example.toml"))
+    each_case(bench, "SIGKILL in a scan", sigkill.cases(bench.bin, scratch, 3 if bench.quick else 20))
+    from_nothing(bench)
