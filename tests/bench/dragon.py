@@ -28,8 +28,6 @@ def figures(bench, name, data, confs):
     shutil.rmtree(scan, ignore_errors=True)
     scanrig = bench.bin / "scanrig"
     poses = [word for conf in confs for word in ("--pose", conf)]
-    if "--pose" not in bench.run([scanrig, "import", "stanford", "--help"], timeout=10).stdout:
-        poses = confs
     for command in ([scanrig, "import", "stanford", *poses, "--out", scan], [scanrig, "reconstruct", scan],
                     [bench.bin / "bench_dragon", data, scan]):
         done = bench.run(command, timeout=900)
