@@ -29,8 +29,7 @@ Result<std::unique_ptr<ModbusTurntable>> ModbusTurntable::create(ModbusTurntable
   if (!speed) return pass_on(speed, "turntable");
   if (!fast) return pass_on(fast, "turntable");
   if (!acceleration) return pass_on(acceleration, "turntable");
-  const auto& homing_of = options.profile.homing;
-  if (options.home_mode == "here" ? !homing_of.set_zero : !homing_of.modes.contains(options.home_mode)) {
+  if (options.home_mode != "here" && !options.profile.homing.modes.contains(options.home_mode)) {
     return fail(ErrorCode::out_of_range, "turntable: {} has no homing mode '{}'", options.profile.name,
                 options.home_mode);
   }
@@ -74,9 +73,9 @@ Result<void> ModbusTurntable::find_home(Deadline deadline) {
     if (!set) return set;
   }
   // The homed bit may still be that of the last homing: something must be seen to happen first.
-  bool begun = here || (options_.profile.homing.zero_is_known && near(before->position, 0));
+  bool begun = here;
   const auto begins = [&](const DriveState& state) {
-    begun = begun || state.running || before->homed != state.homed;
+    begun = begun || state.running || (before->homed && !state.homed);
     return begun && !(here && !near(state.position, 0));
   };
   const auto started =
@@ -106,8 +105,8 @@ Result<void> ModbusTurntable::check_and_enable(Deadline deadline) {
   if (!state) return pass_on(state);
   const auto pulses = drive_.read_pulses_per_motor_rev(deadline);
   if (!pulses) return pass_on(pulses);
-  if (*pulses && **pulses != options_.scale.pulses_per_motor_rev) {
-    return fail(ErrorCode::protocol, "the drive is set to {} pulses a motor turn, the configuration says {}", **pulses,
+  if (*pulses != options_.scale.pulses_per_motor_rev) {
+    return fail(ErrorCode::protocol, "the drive is set to {} pulses a motor turn, the configuration says {}", *pulses,
                 options_.scale.pulses_per_motor_rev);
   }
   if (state->running) {
@@ -139,7 +138,7 @@ Result<Move> ModbusTurntable::rotate_to(Degrees target, Deadline deadline) {
 
 Result<Move> ModbusTurntable::turn(Degrees target, const DriveState& before, const MovePlan& plan, Deadline deadline) {
   const auto begun = clock_.now();
-  if (before.running || (options_.profile.status.homed_stays && !before.homed)) {
+  if (before.running || !before.homed) {
     return before.running ? fail(ErrorCode::protocol, "the table moves although nothing was commanded")
                           : fail(ErrorCode::not_homed, "the drive has lost its home (switched off in between?)");
   }
@@ -323,7 +322,7 @@ Result<TurntableStatus> ModbusTurntable::status(Deadline deadline) {
   if (!state) return pass_on(state, "turntable");
   TurntableStatus status;
   status.motion = state->running ? TurntableStatus::Motion::moving : TurntableStatus::Motion::standing;
-  status.homed = homed_ && (state->homed || !options_.profile.status.homed_stays);
+  status.homed = homed_ && state->homed;
   if (status.homed) status.angle = options_.scale.angle(state->position);
   if (state->fault) {
     const auto alarm = drive_.read_alarm(deadline);

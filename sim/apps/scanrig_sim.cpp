@@ -60,7 +60,7 @@ Result<void> serve_rig(const sim::WireRigOptions& options) {
 void add_rig(CLI::App& app, sim::WireRigOptions& o, Chosen& chosen) {
   auto* rig = app.add_subcommand("rig", "The simulated rig on the wire, until SIGTERM; see sim/wire/README.md");
   rig->add_option("--dir", o.toml.folder, "folder for rig.toml, ports and sockets")->required();
-  rig->add_option("--drive", o.toml.drive, "leadshine-rs, oriental-az")->capture_default_str();
+  rig->add_option("--drive", o.toml.drive, "leadshine-rs, oriental-az, grbl")->capture_default_str();
   rig->add_option("--panel", o.toml.panel, "gpio, modbus-io")->capture_default_str();
   rig->add_option("--gear-ratio", o.toml.gear_ratio, "motor turns per table turn")->capture_default_str();
   rig->add_option("--preload-counter", o.preload_counter, "the drive's counter at the start, pulses");

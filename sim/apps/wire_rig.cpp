@@ -1,8 +1,6 @@
 #include "sim/apps/wire_rig.h"
 
 #include "core/files.h"
-#include "sim/wire/leadshine_drive.h"
-#include "sim/wire/oriental_drive.h"
 
 namespace scanrig::sim {
 namespace {
@@ -12,15 +10,16 @@ constexpr std::chrono::milliseconds kLineWatch{5};
 }  // namespace
 
 Result<std::unique_ptr<WireRig>> WireRig::start(const WireRigOptions& o, Clock& clock) {
+  if (o.toml.drive != "leadshine-rs") return fail(ErrorCode::unsupported, "no simulated drive {}", o.toml.drive);
   if (o.toml.panel != "gpio" && o.toml.panel != "modbus-io") {
     return fail(ErrorCode::unsupported, "no simulated panel {}", o.toml.panel);
   }
   if (auto made = create_directories_synced(o.toml.folder); !made) return pass_on(made);
   std::unique_ptr<WireRig> rig(new WireRig(o.toml.folder / "turntable"));
   rig->positive_ccw_ = o.positive_ccw;
-  if (!rig->put_drive(o, clock)) return fail(ErrorCode::unsupported, "no simulated drive {}", o.toml.drive);
+  rig->drive_ = std::make_unique<wire::LeadshineDrive>(o.axis, clock);
   if (o.preload_counter) rig->drive_->preload_counter(*o.preload_counter);
-  auto server = wire::ModbusServer::start(o.toml.folder / "turntable", 1, *rig->registers_, clock);
+  auto server = wire::ModbusServer::start(o.toml.folder / "turntable", 1, *rig->drive_, clock);
   if (!server) return pass_on(server);
   rig->server_ = std::move(*server);
   auto panel = RigPanel::start(o.toml.folder, o.toml.panel == "modbus-io", clock);
@@ -29,17 +28,6 @@ Result<std::unique_ptr<WireRig>> WireRig::start(const WireRigOptions& o, Clock& 
   if (auto written = write_rig_toml(o.toml); !written) return pass_on(written);
   rig->line_watch_ = std::jthread([&rig = *rig](const std::stop_token& stop) { rig.watch_line(stop); });
   return rig;
-}
-
-bool WireRig::put_drive(const WireRigOptions& o, Clock& clock) {
-  const auto put = [&](auto drive) {
-    drive_ = drive.get();
-    registers_ = std::move(drive);
-    return true;
-  };
-  if (o.toml.drive == "leadshine-rs") return put(std::make_unique<wire::LeadshineDrive>(o.axis, clock));
-  if (o.toml.drive == "oriental-az") return put(std::make_unique<wire::OrientalDrive>(o.axis, clock));
-  return false;
 }
 
 RigTruth WireRig::truth() const {

@@ -15,8 +15,8 @@
 #include "sim/apps/rig_panel.h"
 #include "sim/apps/rig_toml.h"
 #include "sim/wire/axis.h"
+#include "sim/wire/leadshine_drive.h"
 #include "sim/wire/line_settings.h"
-#include "sim/wire/mechanics.h"
 #include "sim/wire/modbus_server.h"
 
 namespace scanrig::sim {
@@ -58,11 +58,10 @@ class WireRig {
   /// How the drive's own port is set: it hears only who speaks like that.
   void set_line(const wire::LineSettings& settings);
   void set_positive_ccw(bool ccw);
-  [[nodiscard]] wire::Mechanics& drive() { return *drive_; }
+  [[nodiscard]] wire::LeadshineDrive& drive() { return *drive_; }
 
  private:
   explicit WireRig(std::filesystem::path port) : port_(std::move(port)) {}
-  bool put_drive(const WireRigOptions& options, Clock& clock);
   void apply_fault();
   void watch_line(const std::stop_token& stop);
 
@@ -74,8 +73,7 @@ class WireRig {
   wire::LineSettings drive_settings_;
   bool understood_ = true;  ///< the port is set as the drive's own
   std::optional<wire::WireFault> fault_;
-  std::unique_ptr<wire::RegisterDevice> registers_;
-  wire::Mechanics* drive_ = nullptr;  ///< the same object
+  std::unique_ptr<wire::LeadshineDrive> drive_;
   std::unique_ptr<wire::ModbusServer> server_;
   std::unique_ptr<RigPanel> panel_;
   std::jthread line_watch_;  ///< last: it is joined before the rest goes

@@ -97,11 +97,11 @@ void tell_registers(ModbusDrive& drive, const ModbusTurntableOptions& options, C
     report.find("drive_alarm", fmt::format("The drive reports an alarm: {}.", *alarm),
                 "Remove its cause; Reset at the panel clears it, or switch the drive off and on.");
   }
-  if (pulses && *pulses && **pulses != options.scale.pulses_per_motor_rev) {
+  if (pulses && *pulses != options.scale.pulses_per_motor_rev) {
     report.find("pulses_per_motor_rev",
-                fmt::format("The drive is set to {} pulses a motor turn, the configuration says {}.", **pulses,
+                fmt::format("The drive is set to {} pulses a motor turn, the configuration says {}.", *pulses,
                             options.scale.pulses_per_motor_rev),
-                fmt::format("Set pulses_per_motor_rev = {} in [turntable].", **pulses));
+                fmt::format("Set pulses_per_motor_rev = {} in [turntable].", *pulses));
   }
 }
 

@@ -4,14 +4,9 @@
 namespace scanrig {
 namespace {
 
-template <const char* kProfile>
-std::unique_ptr<TurntableBench> make_bench() {
-  return std::make_unique<ModbusBench>([](auto&) {}, kProfile);
-}
-constexpr char kLeadshine[] = "leadshine-rs", kOriental[] = "oriental-az";
+std::unique_ptr<TurntableBench> make_bench() { return std::make_unique<ModbusBench>(); }
 
-INSTANTIATE_TEST_SUITE_P(Leadshine, TurntableCompliance, testing::Values(&make_bench<kLeadshine>));
-INSTANTIATE_TEST_SUITE_P(Oriental, TurntableCompliance, testing::Values(&make_bench<kOriental>));
+INSTANTIATE_TEST_SUITE_P(Modbus, TurntableCompliance, testing::Values(&make_bench));
 
 }  // namespace
 }  // namespace scanrig
