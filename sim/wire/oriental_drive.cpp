@@ -93,6 +93,7 @@ void OrientalDrive::input(std::uint16_t now) {
   if ((risen & kZhome) == 0 || pair(kAlarm) != 0) return;
   homed_ = false;
   homing_ = true;
+  axis_.follow_motor();
   axis_.move_to(0, {kZhomeTurnsPerS * pulses_per_motor_rev_, kZhomeTurnsPerS2 * pulses_per_motor_rev_,
                     kZhomeTurnsPerS2 * pulses_per_motor_rev_});
 }
@@ -106,6 +107,7 @@ void OrientalDrive::start_direct_data() {
   }
   const bool absolute = pair(kType) == 1;
   homing_ = false;
+  axis_.follow_motor();
   axis_.move_to(absolute ? pair(kPosition) : axis_.commanded() + pair(kPosition),
                 {static_cast<double>(pair(kSpeed)), static_cast<double>(pair(kAcceleration)),
                  static_cast<double>(pair(kDeceleration))});
