@@ -133,7 +133,7 @@ Result<Move> AxisTurntable::turn(Degrees target, const DriveState& before, const
 }
 
 Result<AxisTurntable::Arrival> AxisTurntable::run_to(std::int32_t target, const DriveState& before,
-                                                         Clock::Duration settle, Deadline deadline) {
+                                                     Clock::Duration settle, Deadline deadline) {
   const auto sent =
       command([&] { return drive_->start_move(target, deadline); },
               [&](const DriveState& state) {
@@ -169,7 +169,7 @@ Result<AxisTurntable::Arrival> AxisTurntable::run_to(std::int32_t target, const 
 /// Sends what starts a motion. When the answer is missed, the drive is asked whether it has obeyed before it is sent
 /// again.
 Result<void> AxisTurntable::command(const std::function<Result<void>()>& send,
-                                      const std::function<bool(const DriveState&)>& obeyed, Deadline deadline) {
+                                    const std::function<bool(const DriveState&)>& obeyed, Deadline deadline) {
   for (int attempt = 1;; ++attempt) {
     auto sent = send();
     if (sent || !drive_->answer_missed() || sent.error().code == ErrorCode::io) return sent;

@@ -24,10 +24,10 @@ struct AxisTurntableOptions {
   std::optional<AngleRange> soft_limits;
 };
 
-/// A turntable moved by a motor drive: what a move is, whatever the drive speaks. A move has arrived when the drive says
-/// in position and its position is within the tolerance, both without a break for the settle time.
-/// rotate_to() takes the angle modulo 360 degrees and goes the shorter way, ending counter-clockwise; `out_of_range`
-/// and `not_homed` found before anything was sent leave home as it is. When the stop after a failure could not be
+/// A turntable moved by a motor drive: what a move is, whatever the drive speaks. A move has arrived when the drive
+/// says in position and its position is within the tolerance, both without a break for the settle time. rotate_to()
+/// takes the angle modulo 360 degrees and goes the shorter way, ending counter-clockwise; `out_of_range` and
+/// `not_homed` found before anything was sent leave home as it is. When the stop after a failure could not be
 /// delivered, it is the first thing sent once the drive answers again.
 class AxisTurntable : public Turntable {
  public:

@@ -57,7 +57,7 @@ struct DriveProfile {
   struct Homing {
     std::optional<std::uint16_t> mode_address;
     std::map<std::string, std::uint16_t> modes;  ///< "switch", "limit", "absolute"
-    bool absolute = false;                       ///< the encoder knows the zero: homing seeks nothing, it only goes there
+    bool absolute = false;  ///< the encoder knows the zero: homing seeks nothing, it only goes there
     std::optional<Block> speeds;
     Trigger start;
     Trigger set_zero;  ///< declares the present position home

@@ -10,9 +10,7 @@ constexpr double kFastHoming = 0.5;
 
 /// In the drive's own units. Fails with `out_of_range`.
 Result<DriveMotion> motion_of(const ModbusTurntableOptions& options, double share) {
-  const auto speed = [&](double of) {
-    return options.scale.speed_word({options.speed.value * of}, options.profile);
-  };
+  const auto speed = [&](double of) { return options.scale.speed_word({options.speed.value * of}, options.profile); };
   const auto usual = speed(share), slow = speed(kSlowHoming);
   const auto acceleration = options.scale.acceleration_word(options.acceleration, options.profile);
   if (!usual) return pass_on(usual);
@@ -46,9 +44,7 @@ class ModbusTurntable::Drive final : public AxisDrive {
                 scale_.pulses_per_motor_rev);
   }
   Result<void> enable(Deadline deadline) override { return drive_.enable(deadline); }
-  Result<void> prepare_homing(Deadline deadline) override {
-    return drive_.set_homing(home_mode_, homing_, deadline);
-  }
+  Result<void> prepare_homing(Deadline deadline) override { return drive_.set_homing(home_mode_, homing_, deadline); }
   Result<void> start_homing(Deadline deadline) override { return drive_.start_homing(deadline); }
   Result<void> set_zero(Deadline deadline) override { return drive_.set_zero(deadline); }
   [[nodiscard]] bool knows_zero() const override { return drive_.knows_zero(); }

@@ -15,8 +15,7 @@ std::int32_t joined(std::uint16_t high, std::uint16_t low) {
 
 }  // namespace
 
-LeadshineDrive::LeadshineDrive(const AxisOptions& axis, Clock& clock)
-    : SimulatedDrive(axis, clock) {
+LeadshineDrive::LeadshineDrive(const AxisOptions& axis, Clock& clock) : SimulatedDrive(axis, clock) {
   for (const std::uint16_t address : {kPulses, kEnable, kStatus, kControl, kAlarm, std::uint16_t{0x6000}, kTrigger}) {
     registers_[address] = 0;
   }

@@ -32,8 +32,8 @@ OrientalDrive::OrientalDrive(const AxisOptions& axis, Clock& clock) : SimulatedD
   add(kGearA, kGearB + 1);
   put_pair(kGearA, 1);
   put_pair(kGearB, static_cast<std::int32_t>(axis.pulses_per_motor_rev / kFactoryPulses));
-  axis_.set_counter(static_cast<std::int32_t>(
-      std::lround(axis.start_deg * axis.pulses_per_motor_rev * axis.gear_ratio / 360.0)));
+  axis_.set_counter(
+      static_cast<std::int32_t>(std::lround(axis.start_deg * axis.pulses_per_motor_rev * axis.gear_ratio / 360.0)));
 }
 
 std::int32_t OrientalDrive::pair(std::uint16_t upper) const {
