@@ -148,6 +148,7 @@ Result<AxisTurntable::Arrival> AxisTurntable::run_to(std::int32_t target, const 
   const auto arrived = watch(
       fmt::format("turning to {:.2f} deg", options_.scale.angle(target).value),
       [&](const DriveState& state) {
+        if (!state.homed) return Seen::homeless;
         const auto now = clock_.now();
         const std::int64_t left = std::abs(std::int64_t{target} - state.position);
         const bool nearer = left + tolerance_pulses() <= least_left;
@@ -181,7 +182,8 @@ Result<void> AxisTurntable::command(const std::function<Result<void>()>& send,
   }
 }
 
-/// Polls until `look` says done. Fails with `stopped`, `device_alarm`, `stalled`, `timeout`, `protocol`, `io`.
+/// Polls until `look` says done. Fails with `stopped`, `not_homed`, `device_alarm`, `stalled`, `timeout`, `protocol`,
+/// `io`.
 Result<void> AxisTurntable::watch(std::string_view doing, const Look& look, Deadline deadline) {
   for (auto last_progress = clock_.now();;) {
     const auto state = ask(deadline);
@@ -189,6 +191,9 @@ Result<void> AxisTurntable::watch(std::string_view doing, const Look& look, Dead
     if (auto fit = healthy(*state, deadline); !fit) return fit;
     const Seen seen = look(*state);
     if (seen == Seen::done) return {};
+    if (seen == Seen::homeless) {
+      return fail(ErrorCode::not_homed, "{}: the drive has lost its home (switched off, reset?)", doing);
+    }
     if (seen == Seen::progress) last_progress = clock_.now();
     if (clock_.now() - last_progress >= kStalledAfter) {
       return fail(ErrorCode::stalled, "{}: no progress for 2 s, the axis reads {:.3f} deg; is something in the way?",

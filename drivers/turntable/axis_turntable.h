@@ -45,7 +45,7 @@ class AxisTurntable : public Turntable {
                 MovePlanner::Counter counter, Clock& clock);
 
  private:
-  enum class Seen { waiting, progress, done };
+  enum class Seen { waiting, progress, done, homeless };
   struct Arrival {
     Clock::TimePoint in_position;
     Clock::TimePoint still;
