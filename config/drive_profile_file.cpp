@@ -16,7 +16,14 @@ void read_trigger(Section& section, std::string_view key, DriveProfile::Trigger&
   section.section(key, [&](Section& s) {
     s.number("register", trigger.address, kWord);
     s.number("value", trigger.value, kWord);
+    if (s.has("released")) s.flag("released", trigger.released);
   });
+}
+
+void read_optional(Section& s, std::string_view key, std::optional<std::uint16_t>& address) {
+  if (!s.has(key)) return;
+  address = 0;
+  s.number(key, *address, kWord);
 }
 
 void read_bits(Section& section, std::string_view key, std::uint16_t& mask) {
@@ -32,40 +39,102 @@ void read_bits(Section& section, std::string_view key, std::uint16_t& mask) {
   mask = static_cast<std::uint16_t>(bits);
 }
 
-void read_move(Section& s, DriveProfile::Move& move) {
-  using Word = DriveProfile::Move::Word;
-  static const std::vector<Choice<Word>> kWords{{"position_high", Word::position_high},
-                                                {"position_low", Word::position_low},
-                                                {"speed", Word::speed},
-                                                {"acceleration", Word::acceleration},
-                                                {"deceleration", Word::deceleration}};
-  s.number("register", move.address, kWord);
+struct WordName {
+  std::string_view name;
+  DriveProfile::Block::Word word;
+  bool high;
+};
+
+/// A value of 16 bits, or either half of one of 32.
+const std::vector<WordName>& word_names() {
+  using Word = DriveProfile::Block::Word;
+  static const std::vector<WordName> names{{"position_high", Word::position, true},
+                                           {"position_low", Word::position, false},
+                                           {"speed", Word::speed, false},
+                                           {"speed_high", Word::speed, true},
+                                           {"speed_low", Word::speed, false},
+                                           {"slow_speed", Word::slow_speed, false},
+                                           {"acceleration", Word::acceleration, false},
+                                           {"acceleration_high", Word::acceleration, true},
+                                           {"acceleration_low", Word::acceleration, false},
+                                           {"deceleration", Word::deceleration, false},
+                                           {"deceleration_high", Word::deceleration, true},
+                                           {"deceleration_low", Word::deceleration, false}};
+  return names;
+}
+
+void read_block(Section& s, DriveProfile::Block& block) {
+  s.number("register", block.address, kWord);
   s.items("words", [&](std::optional<std::int64_t> number, std::string_view name) {
-    const auto found = std::ranges::find(kWords, name, &Choice<Word>::name);
+    const auto found = std::ranges::find(word_names(), name, &WordName::name);
     if (number && *number >= 0 && *number <= 0xFFFF) {
-      move.words.push_back({Word::constant, static_cast<std::uint16_t>(*number)});
-    } else if (!number && found != kWords.end()) {
-      move.words.push_back({found->value, 0});
+      block.words.push_back({DriveProfile::Block::Word::constant, false, static_cast<std::uint16_t>(*number)});
+    } else if (!number && found != word_names().end()) {
+      block.words.push_back({found->word, found->high, 0});
     } else {
       s.report("words", fmt::format("{} is neither a word (0 to 0xFFFF) nor a known name",
                                     number ? std::to_string(*number) : fmt::format("\"{}\"", name)));
     }
   });
-  for (const auto& word : kWords) {
-    if (std::ranges::count(move.words, word.value, &DriveProfile::Move::Item::word) != 1) {
-      s.report("words", fmt::format("must contain \"{}\" exactly once", word.name));
+}
+
+/// A move says everything once: a position, and how fast.
+void read_move(Section& s, DriveProfile::Block& move) {
+  using Word = DriveProfile::Block::Word;
+  read_block(s, move);
+  if (!s.sound()) return;
+  const auto times = [&](Word word, bool high) {
+    return std::ranges::count_if(move.words, [&](const auto& item) { return item.word == word && item.high == high; });
+  };
+  if (times(Word::position, true) != 1) s.report("words", "must contain \"position_high\" exactly once");
+  if (times(Word::position, false) != 1) s.report("words", "must contain \"position_low\" exactly once");
+  for (const auto& [word, name] : {std::pair(Word::speed, "speed"), std::pair(Word::acceleration, "acceleration"),
+                                   std::pair(Word::deceleration, "deceleration")}) {
+    if (times(word, false) != 1 || times(word, true) > 1) {
+      s.report("words", fmt::format("must contain \"{0}\", or \"{0}_high\" and \"{0}_low\", exactly once", name));
     }
   }
+  if (move.has(Word::acceleration, true) != move.has(Word::deceleration, true)) {
+    s.report("words", "must hold acceleration and deceleration in the same number of bits");
+  }
+  if (move.has(Word::slow_speed, false)) s.report("words", "holds \"slow_speed\", which belongs to homing");
 }
 
 void read_homing(Section& s, DriveProfile::Homing& homing) {
-  s.number("mode_register", homing.mode_address, kWord);
+  read_optional(s, "mode_register", homing.mode_address);
   s.section("modes", [&](Section& modes) {
     for (const std::string& mode : modes.free_keys()) modes.number(mode, homing.modes[mode], kWord);
   });
-  s.number("speeds_register", homing.speeds_address, kWord);
+  if (s.has("absolute")) s.flag("absolute", homing.absolute);
+  if (s.has("speeds")) s.section("speeds", [&](Section& speeds) { read_block(speeds, homing.speeds.emplace()); });
   read_trigger(s, "start", homing.start);
   read_trigger(s, "set_zero", homing.set_zero);
+}
+
+void read_resolution(Section& s, DriveProfile::Resolution& resolution) {
+  if (s.has("base")) s.number("base", resolution.base, {1, 65535});
+  read_optional(s, "multiply_register", resolution.multiply_address);
+  read_optional(s, "divide_register", resolution.divide_address);
+  if (!resolution.multiply_address && !resolution.divide_address) {
+    s.report("multiply_register", "is missing, and divide_register too: the resolution could not be checked");
+  }
+}
+
+void read_soft_limits(Section& s, DriveProfile::SoftLimits& limits) {
+  int bit = 0;
+  s.number("control_register", limits.control_address, kWord);
+  s.number("control_bit", bit, {0, 15});
+  limits.control_mask = static_cast<std::uint16_t>(1u << bit);
+  s.number("register", limits.address, kWord);
+}
+
+void read_status(Section& s, DriveProfile::Status& status) {
+  s.number("register", status.address, kWord);
+  read_bits(s, "fault", status.fault);
+  if (s.has("enabled")) read_bits(s, "enabled", status.enabled);
+  read_bits(s, "running", status.running);
+  read_bits(s, "in_position", status.in_position);
+  read_bits(s, "homed", status.homed);
 }
 
 void read_alarm(Section& s, DriveProfile::Alarm& alarm) {
@@ -105,27 +174,16 @@ Result<DriveProfile> read_drive_profile(const std::filesystem::path& file) {
     root.choice<Acceleration>(
         "acceleration_unit", profile.acceleration_unit,
         {{"ms_per_1000_rpm", Acceleration::ms_per_1000_rpm}, {"pulses_per_s2", Acceleration::pulses_per_s2}});
-    root.number("pulses_per_motor_rev_register", profile.pulses_per_motor_rev_address, kWord);
+    root.section("pulses_per_motor_rev", [&](Section& s) { read_resolution(s, profile.pulses_per_motor_rev); });
     root.number("feedback_register", profile.feedback_address, kWord);
-    read_trigger(root, "enable", profile.enable);
+    if (root.has("enable")) read_trigger(root, "enable", profile.enable.emplace());
     read_trigger(root, "stop", profile.stop);
     root.section("move", [&](Section& s) { read_move(s, profile.move); });
-    root.section("status", [&](Section& s) {
-      s.number("register", profile.status.address, kWord);
-      read_bits(s, "fault", profile.status.fault);
-      read_bits(s, "enabled", profile.status.enabled);
-      read_bits(s, "running", profile.status.running);
-      read_bits(s, "in_position", profile.status.in_position);
-      read_bits(s, "homed", profile.status.homed);
-    });
+    root.section("status", [&](Section& s) { read_status(s, profile.status); });
     root.section("homing", [&](Section& s) { read_homing(s, profile.homing); });
-    root.section("soft_limits", [&](Section& s) {
-      int bit = 0;
-      s.number("control_register", profile.soft_limits.control_address, kWord);
-      s.number("control_bit", bit, {0, 15});
-      profile.soft_limits.control_mask = static_cast<std::uint16_t>(1u << bit);
-      s.number("register", profile.soft_limits.address, kWord);
-    });
+    if (root.has("soft_limits")) {
+      root.section("soft_limits", [&](Section& s) { read_soft_limits(s, profile.soft_limits.emplace()); });
+    }
     root.section("alarm", [&](Section& s) { read_alarm(s, profile.alarm); });
   });
   if (!read) return pass_on(read);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 
 #include "core/result.h"
@@ -22,9 +23,9 @@ struct AxisScale {
   [[nodiscard]] Degrees angle(double pulses) const;
   [[nodiscard]] double motor_rpm(DegreesPerSecond speed) const { return speed.value * gear_ratio / 6.0; }
 
-  /// The values of the speed and acceleration words. Fails with `out_of_range`.
-  [[nodiscard]] Result<std::uint16_t> speed_word(DegreesPerSecond speed, const DriveProfile& profile) const;
-  [[nodiscard]] Result<std::uint16_t> acceleration_word(DegreesPerSecond2 acceleration,
+  /// What a drive is told as speed and acceleration. Fails with `out_of_range`.
+  [[nodiscard]] Result<std::uint32_t> speed_word(DegreesPerSecond speed, const DriveProfile& profile) const;
+  [[nodiscard]] Result<std::uint32_t> acceleration_word(DegreesPerSecond2 acceleration,
                                                         const DriveProfile& profile) const;
 };
 
@@ -45,17 +46,20 @@ struct MovePlanner {
   Degrees backlash;   ///< every angle is approached counter-clockwise over at least this much
   Degrees tolerance;  ///< a correction this small needs no new approach
   std::optional<AngleRange> soft_limits;
-
-  /// The shortest way to `target`, an angle modulo 360 degrees, that stays inside the soft limits and the drive's
-  /// 32-bit counter: near its end the axis goes the other way round, so the counter never overflows. `flank_loaded`:
-  /// the last move ended counter-clockwise, so the backlash is taken up. Nothing when no equivalent of `target` fits.
-  [[nodiscard]] std::optional<MovePlan> plan(std::int32_t from, Degrees target, bool flank_loaded) const;
-
-  /// The counter values that may be used, lowest first.
+  /// Counter values, lowest first.
   struct Counter {
     double min;
     double max;
   };
+  /// What the device can count.
+  Counter device{std::numeric_limits<std::int32_t>::min(), std::numeric_limits<std::int32_t>::max()};
+
+  /// The shortest way to `target`, an angle modulo 360 degrees, that stays inside the soft limits and the device's
+  /// counter: near its end the axis goes the other way round, so the counter never overflows. `flank_loaded`: the last
+  /// move ended counter-clockwise, so the backlash is taken up. Nothing when no equivalent of `target` fits.
+  [[nodiscard]] std::optional<MovePlan> plan(std::int32_t from, Degrees target, bool flank_loaded) const;
+
+  /// The counter values that may be used.
   [[nodiscard]] Counter counter_range() const;
 };
 

@@ -15,33 +15,50 @@ struct DriveProfile {
   struct Trigger {
     std::uint16_t address = 0;
     std::uint16_t value = 0;
+    bool released = false;  ///< an input that must be let go: 0 is written after the value
   };
 
-  /// The block that starts an absolute move, written in one request.
-  struct Move {
-    enum class Word { constant, position_high, position_low, speed, acceleration, deceleration };
+  /// Words written in one request.
+  struct Block {
+    enum class Word { constant, position, speed, slow_speed, acceleration, deceleration };
     struct Item {
       Word word = Word::constant;
+      bool high = false;        ///< the upper half of a 32-bit value
       std::uint16_t value = 0;  ///< of a constant
     };
     std::uint16_t address = 0;
     std::vector<Item> words;
+
+    [[nodiscard]] bool has(Word word, bool high) const {
+      for (const Item& item : words) {
+        if (item.word == word && item.high == high) return true;
+      }
+      return false;
+    }
+  };
+
+  /// Pulses a motor turn: `base`, times and by what two registers hold, where there are any.
+  struct Resolution {
+    int base = 1;
+    std::optional<std::uint16_t> multiply_address;
+    std::optional<std::uint16_t> divide_address;
   };
 
   /// Masks of the status register; a state holds when all bits of its mask are set.
   struct Status {
     std::uint16_t address = 0;
     std::uint16_t fault = 0;
-    std::uint16_t enabled = 0;
+    std::uint16_t enabled = 0;  ///< 0: the drive does not tell, and is taken for enabled
     std::uint16_t running = 0;
     std::uint16_t in_position = 0;
     std::uint16_t homed = 0;
   };
 
   struct Homing {
-    std::uint16_t mode_address = 0;
-    std::map<std::string, std::uint16_t> modes;  ///< "switch", "limit"
-    std::uint16_t speeds_address = 0;            ///< fast speed, slow speed, acceleration, deceleration
+    std::optional<std::uint16_t> mode_address;
+    std::map<std::string, std::uint16_t> modes;  ///< "switch", "limit", "absolute"
+    bool absolute = false;  ///< the encoder knows the zero: homing seeks nothing, it only goes there
+    std::optional<Block> speeds;
     Trigger start;
     Trigger set_zero;  ///< declares the present position home
   };
@@ -70,14 +87,14 @@ struct DriveProfile {
   SpeedUnit speed_unit = SpeedUnit::rpm;
   AccelerationUnit acceleration_unit = AccelerationUnit::ms_per_1000_rpm;
   double max_motor_rpm = 3000;
-  std::uint16_t pulses_per_motor_rev_address = 0;
-  Trigger enable;
+  Resolution pulses_per_motor_rev;
+  std::optional<Trigger> enable;
   Trigger stop;
-  Move move;
+  Block move;  ///< starts an absolute move
   Status status;
   std::uint16_t feedback_address = 0;  ///< measured position in pulses, 32 bit
   Homing homing;
-  SoftLimits soft_limits;
+  std::optional<SoftLimits> soft_limits;
   Alarm alarm;
 };
 

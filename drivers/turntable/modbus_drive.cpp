@@ -18,15 +18,18 @@ std::int32_t from_words(const std::vector<std::uint16_t>& words) {
   return static_cast<std::int32_t>(std::uint32_t{words[0]} << 16 | words[1]);
 }
 
-std::uint16_t word_of(const DriveProfile::Move::Item& item, std::int32_t target, const DriveMotion& motion) {
-  using Word = DriveProfile::Move::Word;
+std::uint16_t word_of(const DriveProfile::Block::Item& item, std::int32_t target, const DriveMotion& motion) {
+  using Word = DriveProfile::Block::Word;
+  const auto half = [&](std::uint32_t value) {
+    return item.high ? high_word(static_cast<std::int32_t>(value)) : low_word(static_cast<std::int32_t>(value));
+  };
   switch (item.word) {
     case Word::constant: return item.value;
-    case Word::position_high: return high_word(target);
-    case Word::position_low: return low_word(target);
-    case Word::speed: return motion.speed;
-    case Word::acceleration: return motion.acceleration;
-    case Word::deceleration: return motion.deceleration;
+    case Word::position: return half(static_cast<std::uint32_t>(target));
+    case Word::speed: return half(motion.speed);
+    case Word::slow_speed: return half(motion.slow_speed);
+    case Word::acceleration: return half(motion.acceleration);
+    case Word::deceleration: return half(motion.deceleration);
   }
   return 0;
 }
@@ -73,11 +76,21 @@ Result<DriveState> ModbusDrive::read_state(Deadline deadline) {
 }
 
 Result<int> ModbusDrive::read_pulses_per_motor_rev(Deadline deadline) {
-  return repeat([&]() -> Result<int> {
-    const auto words = line_.read(profile_.pulses_per_motor_rev_address, 1, deadline);
-    if (!words) return pass_on(words);
-    return words->front();
-  });
+  const auto& resolution = profile_.pulses_per_motor_rev;
+  const auto factor = [&](const std::optional<std::uint16_t>& address) -> Result<int> {
+    if (!address) return 1;
+    return repeat([&]() -> Result<int> {
+      const auto words = line_.read(*address, 1, deadline);
+      if (!words) return pass_on(words);
+      return words->front();
+    });
+  };
+  const auto times = factor(resolution.multiply_address);
+  if (!times) return times;
+  const auto by = factor(resolution.divide_address);
+  if (!by) return by;
+  if (*by == 0) return fail(ErrorCode::protocol, "{}: its electronic gear divides by 0", profile_.name);
+  return resolution.base * *times / *by;
 }
 
 Result<std::string> ModbusDrive::read_alarm(Deadline deadline) {
@@ -87,34 +100,70 @@ Result<std::string> ModbusDrive::read_alarm(Deadline deadline) {
     const std::uint16_t code = words->front();
     if (code == 0) return std::string();
     const auto known = profile_.alarm.words.find(code);
-    if (known == profile_.alarm.words.end()) return fmt::format("alarm 0x{:02X}, not in {}", code, profile_.name);
+    if (known == profile_.alarm.words.end()) {
+      return fmt::format("alarm 0x{:02X}, which the profile {} does not know: see the drive's manual", code,
+                         profile_.name);
+    }
     return fmt::format("{} (alarm 0x{:02X})", known->second, code);
   });
 }
 
+Result<void> ModbusDrive::write(const DriveProfile::Trigger& trigger, Deadline deadline) {
+  if (trigger.released) to_release_ = trigger.address;
+  return line_.write(trigger.address, trigger.value, deadline);
+}
+
+/// Lets go of what is still pulled: the drive acts on the edge, and would not see the next one.
+Result<void> ModbusDrive::release(Deadline deadline) {
+  if (!to_release_) return {};
+  const auto released = repeat([&] { return line_.write(*to_release_, 0, deadline); });
+  if (released) to_release_.reset();
+  return released;
+}
+
+Result<void> ModbusDrive::pull(const DriveProfile::Trigger& trigger, Deadline deadline) {
+  if (auto free = release(deadline); !free) return free;
+  if (auto written = write(trigger, deadline); !written) return written;
+  return release(deadline);
+}
+
+Result<void> ModbusDrive::write(const DriveProfile::Block& block, std::int32_t target, const DriveMotion& motion,
+                                Deadline deadline) {
+  std::vector<std::uint16_t> words;
+  for (const auto& item : block.words) words.push_back(word_of(item, target, motion));
+  return line_.write(block.address, words, deadline);
+}
+
 Result<void> ModbusDrive::enable(Deadline deadline) {
-  return repeat([&] { return write(profile_.enable, deadline); });
+  if (!profile_.enable) return {};
+  return repeat([&] { return write(*profile_.enable, deadline); });
 }
 
 Result<void> ModbusDrive::stop(Deadline deadline) {
-  return repeat([&] { return write(profile_.stop, deadline); });
+  // Whatever is still pulled waits: the stop comes first.
+  if (auto told = repeat([&] { return write(profile_.stop, deadline); }); !told) return told;
+  return release(deadline);
 }
 
 void ModbusDrive::stop_unheard() {
-  if (line_.answer_missed()) std::ignore = line_.write_unheard(profile_.stop.address, profile_.stop.value);
+  if (!line_.answer_missed()) return;
+  if (profile_.stop.released) to_release_ = profile_.stop.address;
+  std::ignore = line_.write_unheard(profile_.stop.address, profile_.stop.value);
 }
 
-Result<void> ModbusDrive::set_homing(const std::string& mode, const DriveMotion& fast, std::uint16_t slow_speed,
-                                     Deadline deadline) {
+Result<void> ModbusDrive::set_homing(const std::string& mode, const DriveMotion& motion, Deadline deadline) {
   const auto& homing = profile_.homing;
-  const auto set = repeat([&] { return line_.write(homing.mode_address, homing.modes.at(mode), deadline); });
-  if (!set) return set;
-  const std::array<std::uint16_t, 4> speeds{fast.speed, slow_speed, fast.acceleration, fast.deceleration};
-  return repeat([&] { return line_.write(homing.speeds_address, speeds, deadline); });
+  if (homing.mode_address) {
+    const auto set = repeat([&] { return line_.write(*homing.mode_address, homing.modes.at(mode), deadline); });
+    if (!set) return set;
+  }
+  if (!homing.speeds) return {};
+  return repeat([&] { return write(*homing.speeds, 0, motion, deadline); });
 }
 
 Result<void> ModbusDrive::set_soft_limits(const MovePlanner::Counter& range, Deadline deadline) {
-  const auto& limits = profile_.soft_limits;
+  if (!profile_.soft_limits) return {};
+  const auto& limits = *profile_.soft_limits;
   const auto plus = static_cast<std::int32_t>(range.max), minus = static_cast<std::int32_t>(range.min);
   const std::array<std::uint16_t, 4> words{high_word(plus), low_word(plus), high_word(minus), low_word(minus)};
   if (auto written = repeat([&] { return line_.write(limits.address, words, deadline); }); !written) return written;
@@ -128,13 +177,12 @@ Result<void> ModbusDrive::reset_alarm(Deadline deadline) {
   if (profile_.alarm.reset == DriveProfile::Alarm::Reset::power_cycle) {
     return fail(ErrorCode::device_alarm, "{} clears an alarm only when switched off and on again", profile_.name);
   }
-  return repeat([&] { return write(profile_.alarm.reset_trigger, deadline); });
+  return repeat([&] { return pull(profile_.alarm.reset_trigger, deadline); });
 }
 
 Result<void> ModbusDrive::start_move(std::int32_t target, const DriveMotion& motion, Deadline deadline) {
-  std::vector<std::uint16_t> words;
-  for (const auto& item : profile_.move.words) words.push_back(word_of(item, target, motion));
-  return line_.write(profile_.move.address, words, deadline);
+  if (auto free = release(deadline); !free) return free;
+  return write(profile_.move, target, motion, deadline);
 }
 
 }  // namespace scanrig

@@ -1,31 +1,23 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "core/clock.h"
 #include "core/result.h"
 #include "drivers/modbus/line.h"
-#include "drivers/turntable/axis_scale.h"
+#include "drivers/turntable/axis_drive.h"
 #include "drivers/turntable/drive_profile.h"
 
 namespace scanrig {
 
-/// What the drive says about itself at one moment.
-struct DriveState {
-  bool fault = false;
-  bool enabled = false;
-  bool running = false;
-  bool in_position = false;
-  bool homed = false;
-  std::int32_t position = 0;  ///< measured, pulses
-};
-
-/// The values of a move in the drive's own units.
+/// The values of a motion in the drive's own units.
 struct DriveMotion {
-  std::uint16_t speed = 0;
-  std::uint16_t acceleration = 0;
-  std::uint16_t deceleration = 0;
+  std::uint32_t speed = 0;
+  std::uint32_t acceleration = 0;
+  std::uint32_t deceleration = 0;
+  std::uint32_t slow_speed = 0;  ///< of homing, for the last approach of the switch
 };
 
 /// A motor drive as its profile describes it. Requests that may be repeated without harm are sent up to three times,
@@ -35,7 +27,10 @@ struct DriveMotion {
 class ModbusDrive {
  public:
   ModbusDrive(modbus::LineOptions line, DriveProfile profile, Clock& clock)
-      : line_(std::move(line), clock), profile_(std::move(profile)) {}
+      : line_(std::move(line), clock), profile_(std::move(profile)) {
+    // Whoever was here before may have been killed with an input pulled.
+    if (profile_.stop.released) to_release_ = profile_.stop.address;
+  }
 
   /// Status and position, read in turn. What follows a missed answer is never the same request again but the other
   /// one, whose answer has another length: even an answer later than the quiet line is refused, not believed.
@@ -51,15 +46,17 @@ class ModbusDrive {
   void stop_unheard();
   /// From any thread, see modbus::Line.
   void hurry(bool on) noexcept { line_.hurry(on); }
-  Result<void> set_homing(const std::string& mode, const DriveMotion& fast, std::uint16_t slow_speed,
-                          Deadline deadline);
+  /// Mode and speeds, as far as the drive wants to be told.
+  Result<void> set_homing(const std::string& mode, const DriveMotion& motion, Deadline deadline);
+  /// Nothing where the drive has none: the caller keeps them.
   Result<void> set_soft_limits(const MovePlanner::Counter& range, Deadline deadline);
   /// Fails with `device_alarm` when this drive wants a power cycle.
   Result<void> reset_alarm(Deadline deadline);
 
   Result<void> start_move(std::int32_t target, const DriveMotion& motion, Deadline deadline);
-  Result<void> start_homing(Deadline deadline) { return write(profile_.homing.start, deadline); }
-  Result<void> set_zero(Deadline deadline) { return write(profile_.homing.set_zero, deadline); }
+  Result<void> start_homing(Deadline deadline) { return pull(profile_.homing.start, deadline); }
+  Result<void> set_zero(Deadline deadline) { return pull(profile_.homing.set_zero, deadline); }
+  [[nodiscard]] bool knows_zero() const { return profile_.homing.absolute; }
 
   /// Whether the last request may have been carried out although it failed.
   [[nodiscard]] bool answer_missed() const { return line_.answer_missed(); }
@@ -67,14 +64,17 @@ class ModbusDrive {
   [[nodiscard]] const modbus::LineStatistics& statistics() const { return line_.statistics(); }
 
  private:
-  Result<void> write(const DriveProfile::Trigger& trigger, Deadline deadline) {
-    return line_.write(trigger.address, trigger.value, deadline);
-  }
+  Result<void> write(const DriveProfile::Trigger& trigger, Deadline deadline);
+  Result<void> write(const DriveProfile::Block& block, std::int32_t target, const DriveMotion& motion,
+                     Deadline deadline);
+  Result<void> pull(const DriveProfile::Trigger& trigger, Deadline deadline);
+  Result<void> release(Deadline deadline);
   template <class Request>
   auto repeat(const Request& request) -> decltype(request());
 
   modbus::Line line_;
   DriveProfile profile_;
+  std::optional<std::uint16_t> to_release_;  // the register of a trigger that is still pulled
 };
 
 }  // namespace scanrig

@@ -1,352 +1,100 @@
 #include "drivers/turntable/modbus_turntable.h"
 
-#include <algorithm>
-#include <cmath>
-#include <cstdlib>
+#include <limits>
 
 namespace scanrig {
 namespace {
 
-using std::chrono::milliseconds;
-
-constexpr milliseconds kPollPeriod{10};
-constexpr milliseconds kStalledAfter{2000};
-constexpr milliseconds kEnableTime{1000};
-constexpr milliseconds kStandingTime{50};  ///< the position must not change for this long to be called standing
-constexpr int kAttempts = 3;
-constexpr int kStopReplyTimeouts = 12;  ///< three attempts, each with its quiet line, and some room
-constexpr double kSlowHoming = 0.2;     ///< of the working speed, for the last approach of the switch
+constexpr double kSlowHoming = 0.2;  ///< of the working speed, for the last approach of the switch
 constexpr double kFastHoming = 0.5;
+
+/// In the drive's own units. Fails with `out_of_range`.
+Result<DriveMotion> motion_of(const ModbusTurntableOptions& options, double share) {
+  const auto speed = [&](double of) { return options.scale.speed_word({options.speed.value * of}, options.profile); };
+  const auto usual = speed(share), slow = speed(kSlowHoming);
+  const auto acceleration = options.scale.acceleration_word(options.acceleration, options.profile);
+  if (!usual) return pass_on(usual);
+  if (!slow) return pass_on(slow);
+  if (!acceleration) return pass_on(acceleration);
+  return DriveMotion{*usual, *acceleration, *acceleration, *slow};
+}
 
 }  // namespace
 
+/// The drive, with the motions it is to make.
+class ModbusTurntable::Drive final : public AxisDrive {
+ public:
+  Drive(const ModbusTurntableOptions& options, const DriveMotion& motion, const DriveMotion& homing, Clock& clock)
+      : drive_(options.line, options.profile, clock),
+        profile_(options.profile),
+        scale_(options.scale),
+        home_mode_(options.home_mode),
+        motion_(motion),
+        homing_(homing) {}
+
+  Result<DriveState> read_state(Deadline deadline) override { return drive_.read_state(deadline); }
+  Result<std::string> read_alarm(Deadline deadline) override { return drive_.read_alarm(deadline); }
+  Result<void> reset_alarm(Deadline deadline) override { return drive_.reset_alarm(deadline); }
+
+  Result<void> check(Deadline deadline) override {
+    const auto pulses = drive_.read_pulses_per_motor_rev(deadline);
+    if (!pulses) return pass_on(pulses);
+    if (*pulses == scale_.pulses_per_motor_rev) return {};
+    return fail(ErrorCode::protocol, "the drive is set to {} pulses a motor turn, the configuration says {}", *pulses,
+                scale_.pulses_per_motor_rev);
+  }
+  Result<void> enable(Deadline deadline) override { return drive_.enable(deadline); }
+  Result<void> prepare_homing(Deadline deadline) override { return drive_.set_homing(home_mode_, homing_, deadline); }
+  Result<void> start_homing(Deadline deadline) override { return drive_.start_homing(deadline); }
+  Result<void> set_zero(Deadline deadline) override { return drive_.set_zero(deadline); }
+  [[nodiscard]] bool knows_zero() const override { return drive_.knows_zero(); }
+  Result<void> set_soft_limits(const MovePlanner::Counter& range, Deadline deadline) override {
+    return drive_.set_soft_limits(range, deadline);
+  }
+
+  Result<void> set_speed(DegreesPerSecond speed) override {
+    const auto word = scale_.speed_word(speed, profile_);
+    if (!word) return pass_on(word);
+    motion_.speed = *word;
+    return {};
+  }
+  Result<void> start_move(std::int32_t target, Deadline deadline) override {
+    return drive_.start_move(target, motion_, deadline);
+  }
+
+  Result<void> stop(Deadline deadline) override { return drive_.stop(deadline); }
+  void stop_unheard() override { drive_.stop_unheard(); }
+  void hurry(bool on) noexcept override { drive_.hurry(on); }
+  [[nodiscard]] bool answer_missed() const override { return drive_.answer_missed(); }
+  void count_retry() override { drive_.count_retry(); }
+  [[nodiscard]] const modbus::LineStatistics& statistics() const { return drive_.statistics(); }
+
+ private:
+  ModbusDrive drive_;
+  const DriveProfile profile_;
+  const AxisScale scale_;
+  const std::string home_mode_;
+  DriveMotion motion_;
+  const DriveMotion homing_;
+};
+
 Result<std::unique_ptr<ModbusTurntable>> ModbusTurntable::create(ModbusTurntableOptions options, Clock& clock) {
-  const auto word_at = [&](double share) {
-    return options.scale.speed_word({options.speed.value * share}, options.profile);
-  };
-  const auto speed = word_at(1.0), fast = word_at(kFastHoming);
-  const auto acceleration = options.scale.acceleration_word(options.acceleration, options.profile);
-  if (!speed) return pass_on(speed, "turntable");
-  if (!fast) return pass_on(fast, "turntable");
-  if (!acceleration) return pass_on(acceleration, "turntable");
+  const auto motion = motion_of(options, 1.0), homing = motion_of(options, kFastHoming);
+  if (!motion) return pass_on(motion, "turntable");
+  if (!homing) return pass_on(homing, "turntable");
   if (options.home_mode != "here" && !options.profile.homing.modes.contains(options.home_mode)) {
     return fail(ErrorCode::out_of_range, "turntable: {} has no homing mode '{}'", options.profile.name,
                 options.home_mode);
   }
-  const DriveMotion motion{*speed, *acceleration, *acceleration}, homing{*fast, *acceleration, *acceleration};
-  return std::unique_ptr<ModbusTurntable>(new ModbusTurntable(std::move(options), motion, homing, clock));
+  auto drive = std::make_unique<Drive>(options, *motion, *homing, clock);
+  const auto& line = drive->statistics();
+  return std::unique_ptr<ModbusTurntable>(new ModbusTurntable(options, std::move(drive), line, clock));
 }
 
-ModbusTurntable::ModbusTurntable(ModbusTurntableOptions options, DriveMotion motion, DriveMotion homing, Clock& clock)
-    : options_(std::move(options)),
-      motion_(motion),
-      homing_motion_(homing),
-      planner_{options_.scale, options_.backlash, options_.tolerance, options_.soft_limits},
-      clock_(clock),
-      drive_(options_.line, options_.profile, clock) {}
-
-std::int32_t ModbusTurntable::tolerance_pulses() const {
-  return std::max(1, static_cast<std::int32_t>(options_.tolerance.value * options_.scale.pulses_per_degree()));
-}
-
-bool ModbusTurntable::near(std::int32_t a, std::int32_t b) const {
-  return std::abs(std::int64_t{a} - std::int64_t{b}) <= tolerance_pulses();
-}
-
-Result<void> ModbusTurntable::home(Deadline deadline) {
-  homed_ = flank_loaded_ = false;
-  if (auto found = find_home(deadline); !found) return give_up(found.error());
-  homed_ = true;
-  return {};
-}
-
-Result<void> ModbusTurntable::find_home(Deadline deadline) {
-  if (auto ready = check_and_enable(deadline); !ready) return ready;
-  auto before = ask(deadline);
-  if (!before) return pass_on(before);
-
-  const bool here = options_.home_mode == "here";
-  if (!here) {
-    const auto slow = options_.scale.speed_word({options_.speed.value * kSlowHoming}, options_.profile);
-    if (!slow) return pass_on(slow);
-    const auto set = drive_.set_homing(options_.home_mode, homing_motion_, *slow, deadline);
-    if (!set) return set;
-  }
-  // The homed bit may still be that of the last homing: something must be seen to happen first.
-  bool begun = here;
-  const auto begins = [&](const DriveState& state) {
-    begun = begun || state.running || (before->homed && !state.homed);
-    return begun && !(here && !near(state.position, 0));
-  };
-  const auto started =
-      command([&] { return here ? drive_.set_zero(deadline) : drive_.start_homing(deadline); }, begins, deadline);
-  if (!started) return started;
-
-  std::int32_t anchor = before->position;
-  auto still_since = clock_.now();
-  const auto homed = watch(
-      "homing",
-      [&](const DriveState& state) {
-        const bool at_home = begins(state) && state.homed && !state.running && near(state.position, 0);
-        const bool moved = !near(state.position, anchor);
-        if (moved) anchor = state.position;
-        if (!at_home || moved) still_since = clock_.now();
-        if (clock_.now() - still_since >= options_.settle && at_home) return Seen::done;
-        return moved || at_home ? Seen::progress : Seen::waiting;
-      },
-      deadline);
-  if (!homed) return homed;
-  if (!options_.soft_limits) return {};
-  return drive_.set_soft_limits(planner_.counter_range(), deadline);
-}
-
-Result<void> ModbusTurntable::check_and_enable(Deadline deadline) {
-  auto state = ask(deadline);
-  if (!state) return pass_on(state);
-  const auto pulses = drive_.read_pulses_per_motor_rev(deadline);
-  if (!pulses) return pass_on(pulses);
-  if (*pulses != options_.scale.pulses_per_motor_rev) {
-    return fail(ErrorCode::protocol, "the drive is set to {} pulses a motor turn, the configuration says {}", *pulses,
-                options_.scale.pulses_per_motor_rev);
-  }
-  if (state->running) {
-    if (auto stopped = stop(deadline); !stopped) return stopped;
-  }
-  if (!state->fault && !state->enabled) {
-    if (auto enabled = drive_.enable(deadline); !enabled) return enabled;
-    for (const auto by = deadline.at_most(clock_, kEnableTime); !state->enabled && !by.expired(clock_);) {
-      if (state = ask(deadline); !state) return pass_on(state);
-    }
-  }
-  return healthy(*state, deadline);
-}
-
-Result<Move> ModbusTurntable::rotate_to(Degrees target, Deadline deadline) {
-  if (auto free = not_stopped(); !free) return give_up(free.error());
-  if (!homed_) return fail(ErrorCode::not_homed, "turntable: no known zero: home it first");
-  const auto before = ask(deadline);
-  if (!before) return give_up(before.error());
-  if (auto fit = healthy(*before, deadline); !fit) return give_up(fit.error());
-  const auto plan = planner_.plan(before->position, target, flank_loaded_);
-  if (!plan) {
-    return fail(ErrorCode::out_of_range, "turntable: {} deg cannot be reached within the soft limits", target.value);
-  }
-  auto move = turn(target, *before, *plan, deadline);
-  if (!move) return give_up(move.error());
-  return move;
-}
-
-Result<Move> ModbusTurntable::turn(Degrees target, const DriveState& before, const MovePlan& plan, Deadline deadline) {
-  const auto begun = clock_.now();
-  if (before.running || !before.homed) {
-    return before.running ? fail(ErrorCode::protocol, "the table moves although nothing was commanded")
-                          : fail(ErrorCode::not_homed, "the drive has lost its home (switched off in between?)");
-  }
-  flank_loaded_ = false;
-  DriveState state = before;
-  if (plan.before) {
-    const auto passed = run_to(*plan.before, state, Clock::Duration::zero(), deadline);
-    if (!passed) return pass_on(passed);
-    state.position = passed->position;
-  }
-  const auto arrival = run_to(plan.target, state, options_.settle, deadline);
-  if (!arrival) return pass_on(arrival);
-  flank_loaded_ = true;
-  const Degrees measured = options_.scale.angle(arrival->position);
-  return Move{target, target + Degrees{std::remainder((measured - target).value, 360.0)}, arrival->in_position - begun,
-              arrival->still - arrival->in_position};
-}
-
-Result<ModbusTurntable::Arrival> ModbusTurntable::run_to(std::int32_t target, const DriveState& before,
-                                                         Clock::Duration settle, Deadline deadline) {
-  const auto sent =
-      command([&] { return drive_.start_move(target, motion_, deadline); },
-              [&](const DriveState& state) {
-                return state.running || near(state.position, target) || !near(state.position, before.position);
-              },
-              deadline);
-  if (!sent) return pass_on(sent);
-
-  Arrival arrival;
-  std::optional<Clock::TimePoint> in_position;
-  std::int64_t least_left = std::abs(std::int64_t{target} - before.position);
-  const auto arrived = watch(
-      fmt::format("turning to {:.2f} deg", options_.scale.angle(target).value),
-      [&](const DriveState& state) {
-        const auto now = clock_.now();
-        const std::int64_t left = std::abs(std::int64_t{target} - state.position);
-        const bool nearer = left + tolerance_pulses() <= least_left;
-        if (nearer) least_left = left;
-        if (state.running || !state.in_position || !near(state.position, target)) {
-          in_position.reset();
-          return nearer ? Seen::progress : Seen::waiting;
-        }
-        if (!in_position) in_position = now;
-        if (now - *in_position < settle) return Seen::progress;
-        arrival = {*in_position, now, state.position};
-        return Seen::done;
-      },
-      deadline);
-  if (!arrived) return pass_on(arrived);
-  return arrival;
-}
-
-/// Sends what starts a motion. When the answer is missed, the drive is asked whether it has obeyed before it is sent
-/// again.
-Result<void> ModbusTurntable::command(const std::function<Result<void>()>& send,
-                                      const std::function<bool(const DriveState&)>& obeyed, Deadline deadline) {
-  for (int attempt = 1;; ++attempt) {
-    auto sent = send();
-    if (sent || !drive_.answer_missed() || sent.error().code == ErrorCode::io) return sent;
-    const auto state = ask(deadline);
-    if (!state) return pass_on(state);
-    if (obeyed(*state)) return {};
-    if (attempt == kAttempts) return sent;
-    drive_.count_retry();
-  }
-}
-
-/// Polls until `look` says done. Fails with `stopped`, `device_alarm`, `stalled`, `timeout`, `protocol`, `io`.
-Result<void> ModbusTurntable::watch(std::string_view doing, const Look& look, Deadline deadline) {
-  for (auto last_progress = clock_.now();;) {
-    const auto state = ask(deadline);
-    if (!state) return pass_on(state);
-    if (auto fit = healthy(*state, deadline); !fit) return fit;
-    const Seen seen = look(*state);
-    if (seen == Seen::done) return {};
-    if (seen == Seen::progress) last_progress = clock_.now();
-    if (clock_.now() - last_progress >= kStalledAfter) {
-      return fail(ErrorCode::stalled, "{}: no progress for 2 s, the axis reads {:.3f} deg; is something in the way?",
-                  doing, options_.scale.angle(state->position).value);
-    }
-    if (deadline.expired(clock_)) {
-      return fail(ErrorCode::timeout, "{}: not there by the deadline, the axis reads {:.3f} deg", doing,
-                  options_.scale.angle(state->position).value);
-    }
-    pause();
-  }
-}
-
-Result<void> ModbusTurntable::healthy(const DriveState& state, Deadline deadline) {
-  if (state.fault) {
-    const auto alarm = drive_.read_alarm(deadline);
-    if (!alarm) return pass_on(alarm);
-    return fail(ErrorCode::device_alarm, "the drive reports {}", alarm->empty() ? "a fault without a code" : *alarm);
-  }
-  if (!state.enabled) {
-    return fail(ErrorCode::device_alarm, "the drive is switched off; check the emergency stop and the motor's power");
-  }
-  return {};
-}
-
-Result<void> ModbusTurntable::not_stopped() {
-  const std::scoped_lock lock(mutex_);
-  if (stop_requested_) return fail(ErrorCode::stopped, "stopped on request");
-  return {};
-}
-
-/// The drive's state, unless someone has asked to stop.
-Result<DriveState> ModbusTurntable::ask(Deadline deadline) {
-  if (auto free = not_stopped(); !free) return pass_on(free);
-  return read_after_owed_stop(deadline);
-}
-
-Result<DriveState> ModbusTurntable::read_after_owed_stop(Deadline deadline) {
-  if (stop_owed_) {
-    if (auto told = drive_.stop(deadline); !told) return pass_on(told);
-    stop_owed_ = false;
-  }
-  return drive_.read_state(deadline);
-}
-
-Result<void> ModbusTurntable::stop_drive(Deadline deadline) {
-  drive_.stop_unheard();
-  drive_.hurry(false);
-  return drive_.stop(deadline);
-}
-
-/// After any failure: no known zero, and the motor is told to stop.
-tl::unexpected<Error> ModbusTurntable::give_up(const Error& error) {
-  homed_ = flank_loaded_ = false;
-  if (error.code == ErrorCode::stopped) {
-    const std::scoped_lock lock(mutex_);
-    stop_requested_ = false;
-  }
-  stop_owed_ = !stop_drive(Deadline::after(clock_, kStopReplyTimeouts * options_.line.reply_timeout));
-  return fail(error.code, "turntable: {}; {}", error.message,
-              stop_owed_ ? "the stop was not confirmed: the table may be moving" : "the motor was told to stop");
-}
-
-/// Waits until the next poll is due or someone asks to stop.
-void ModbusTurntable::pause() {
-  std::unique_lock lock(mutex_);
-  clock_.wait_until(lock, wake_, clock_.now() + kPollPeriod, [&] { return stop_requested_; });
-}
-
-Result<void> ModbusTurntable::stop(Deadline deadline) {
-  const auto failed = [&](const Error& error) {
-    stop_owed_ = true;
-    return tl::unexpected(Error{error.code, error.message + "; the table may be moving"}.in("turntable"));
-  };
-  if (auto told = stop_drive(deadline); !told) return failed(told.error());
-  stop_owed_ = false;
-  flank_loaded_ = false;
-  auto since = clock_.now();
-  for (std::optional<std::int32_t> last; !deadline.expired(clock_); pause()) {
-    const auto state = drive_.read_state(deadline);
-    if (!state) return failed(state.error());
-    if (state->running || !last || !near(*last, state->position)) {
-      since = clock_.now();
-      last = state->position;
-    } else if (clock_.now() - since >= kStandingTime) {
-      return {};
-    }
-  }
-  return failed({ErrorCode::timeout, "stop: not seen standing by the deadline"});
-}
-
-Result<void> ModbusTurntable::reset_alarm(Deadline deadline) {
-  auto state = read_after_owed_stop(deadline);
-  if (!state) return pass_on(state, "turntable");
-  if (!state->fault) return {};
-  if (auto reset = drive_.reset_alarm(deadline); !reset) return pass_on(reset, "turntable");
-  if (state = drive_.read_state(deadline); !state) return pass_on(state, "turntable");
-  if (!state->fault) return {};
-  const auto alarm = drive_.read_alarm(deadline);
-  if (!alarm) return pass_on(alarm, "turntable");
-  return fail(ErrorCode::device_alarm, "turntable: the alarm stays: {}; remove its cause", *alarm);
-}
-
-Result<TurntableStatus> ModbusTurntable::status(Deadline deadline) {
-  const auto state = read_after_owed_stop(deadline);
-  if (!state) return pass_on(state, "turntable");
-  TurntableStatus status;
-  status.motion = state->running ? TurntableStatus::Motion::moving : TurntableStatus::Motion::standing;
-  status.homed = homed_ && state->homed;
-  if (status.homed) status.angle = options_.scale.angle(state->position);
-  if (state->fault) {
-    const auto alarm = drive_.read_alarm(deadline);
-    if (!alarm) return pass_on(alarm, "turntable");
-    status.alarm = alarm->empty() ? "a fault without a code" : *alarm;
-  }
-  return status;
-}
-
-Result<void> ModbusTurntable::limit_speed(std::optional<DegreesPerSecond> limit) {
-  const auto speed =
-      options_.scale.speed_word(std::min(options_.speed, limit.value_or(options_.speed)), options_.profile);
-  if (!speed) return pass_on(speed, "turntable");
-  motion_.speed = *speed;
-  return {};
-}
-
-void ModbusTurntable::request_stop() noexcept {
-  {
-    const std::scoped_lock lock(mutex_);
-    stop_requested_ = true;
-  }
-  drive_.hurry(true);
-  clock_.notify_all(wake_);
-}
+ModbusTurntable::ModbusTurntable(const ModbusTurntableOptions& options, std::unique_ptr<Drive> drive,
+                                 const modbus::LineStatistics& line, Clock& clock)
+    : AxisTurntable(options, std::move(drive), options.line.reply_timeout,
+                    {std::numeric_limits<std::int32_t>::min(), std::numeric_limits<std::int32_t>::max()}, clock),
+      line_(line) {}
 
 }  // namespace scanrig

@@ -1,93 +1,31 @@
 #pragma once
 
-#include <condition_variable>
-#include <functional>
 #include <memory>
-#include <mutex>
-#include <optional>
-#include <string>
 
+#include "drivers/turntable/axis_turntable.h"
 #include "drivers/turntable/modbus_drive.h"
-#include "drivers/turntable/turntable.h"
 
 namespace scanrig {
 
-struct ModbusTurntableOptions {
+struct ModbusTurntableOptions : AxisTurntableOptions {
   modbus::LineOptions line;
   DriveProfile profile;
-  AxisScale scale;                   ///< checked against the drive when homing
-  std::string home_mode = "switch";  ///< a mode of the profile, or "here": the present position is home
-  DegreesPerSecond speed{45};
-  DegreesPerSecond2 acceleration{90};
-  Degrees backlash{0.5};
-  Degrees tolerance{0.02};  ///< between target and measured angle, at the table
-  std::chrono::milliseconds settle{200};
-  std::optional<AngleRange> soft_limits;
 };
 
-/// A turntable moved by a Modbus motor drive. A move has arrived when the drive says in position and the measured
-/// position is within the tolerance, both without a break for the settle time.
-/// rotate_to() takes the angle modulo 360 degrees and goes the shorter way, ending counter-clockwise; `out_of_range`
-/// and `not_homed` found before anything was sent leave home as it is. When the stop after a failure could not be
-/// delivered, it is the first frame sent once the drive answers again.
-class ModbusTurntable final : public Turntable {
+/// A turntable moved by a Modbus motor drive.
+class ModbusTurntable final : public AxisTurntable {
  public:
   /// Checks the options; the port is opened by the first use. Fails with `out_of_range`.
   static Result<std::unique_ptr<ModbusTurntable>> create(ModbusTurntableOptions options, Clock& clock);
 
-  Result<void> home(Deadline deadline) override;
-  Result<Move> rotate_to(Degrees target, Deadline deadline) override;
-  Result<void> stop(Deadline deadline) override;
-  Result<void> reset_alarm(Deadline deadline) override;
-  Result<TurntableStatus> status(Deadline deadline) override;
-  Result<void> limit_speed(std::optional<DegreesPerSecond> limit) override;
-  void request_stop() noexcept override;
-
-  [[nodiscard]] const modbus::LineStatistics& statistics() const { return drive_.statistics(); }
+  [[nodiscard]] const modbus::LineStatistics& statistics() const { return line_; }
 
  private:
-  enum class Seen { waiting, progress, done };
-  struct Arrival {
-    Clock::TimePoint in_position;
-    Clock::TimePoint still;
-    std::int32_t position = 0;
-  };
-  using Look = std::function<Seen(const DriveState&)>;
+  class Drive;
+  ModbusTurntable(const ModbusTurntableOptions& options, std::unique_ptr<Drive> drive,
+                  const modbus::LineStatistics& line, Clock& clock);
 
-  ModbusTurntable(ModbusTurntableOptions options, DriveMotion motion, DriveMotion homing, Clock& clock);
-
-  Result<void> find_home(Deadline deadline);
-  Result<void> check_and_enable(Deadline deadline);
-  Result<Move> turn(Degrees target, const DriveState& before, const MovePlan& plan, Deadline deadline);
-  Result<Arrival> run_to(std::int32_t target, const DriveState& before, Clock::Duration settle, Deadline deadline);
-
-  Result<void> command(const std::function<Result<void>()>& send, const std::function<bool(const DriveState&)>& obeyed,
-                       Deadline deadline);
-  Result<void> watch(std::string_view doing, const Look& look, Deadline deadline);
-  Result<void> healthy(const DriveState& state, Deadline deadline);
-  Result<void> not_stopped();
-  Result<DriveState> ask(Deadline deadline);
-  Result<DriveState> read_after_owed_stop(Deadline deadline);
-  Result<void> stop_drive(Deadline deadline);
-  tl::unexpected<Error> give_up(const Error& error);
-  void pause();
-
-  [[nodiscard]] std::int32_t tolerance_pulses() const;
-  [[nodiscard]] bool near(std::int32_t a, std::int32_t b) const;
-
-  ModbusTurntableOptions options_;
-  DriveMotion motion_;
-  DriveMotion homing_motion_;
-  MovePlanner planner_;
-  Clock& clock_;
-  ModbusDrive drive_;
-  bool homed_ = false;
-  bool flank_loaded_ = false;  // the last move ended counter-clockwise
-  bool stop_owed_ = false;     // a stop could not be delivered
-
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  bool stop_requested_ = false;  // guarded by mutex_
+  const modbus::LineStatistics& line_;
 };
 
 }  // namespace scanrig

@@ -1,6 +1,8 @@
 #include "sim/apps/wire_rig.h"
 
 #include "core/files.h"
+#include "sim/wire/leadshine_drive.h"
+#include "sim/wire/oriental_drive.h"
 
 namespace scanrig::sim {
 namespace {
@@ -10,24 +12,33 @@ constexpr std::chrono::milliseconds kLineWatch{5};
 }  // namespace
 
 Result<std::unique_ptr<WireRig>> WireRig::start(const WireRigOptions& o, Clock& clock) {
-  if (o.toml.drive != "leadshine-rs") return fail(ErrorCode::unsupported, "no simulated drive {}", o.toml.drive);
   if (o.toml.panel != "gpio" && o.toml.panel != "modbus-io") {
     return fail(ErrorCode::unsupported, "no simulated panel {}", o.toml.panel);
   }
   if (auto made = create_directories_synced(o.toml.folder); !made) return pass_on(made);
   std::unique_ptr<WireRig> rig(new WireRig(o.toml.folder / "turntable"));
   rig->positive_ccw_ = o.positive_ccw;
-  rig->drive_ = std::make_unique<wire::LeadshineDrive>(o.axis, clock);
+  if (auto started = rig->start_drive(o, clock); !started) return pass_on(started);
   if (o.preload_counter) rig->drive_->preload_counter(*o.preload_counter);
-  auto server = wire::ModbusServer::start(o.toml.folder / "turntable", 1, *rig->drive_, clock);
-  if (!server) return pass_on(server);
-  rig->server_ = std::move(*server);
   auto panel = RigPanel::start(o.toml.folder, o.toml.panel == "modbus-io", clock);
   if (!panel) return pass_on(panel);
   rig->panel_ = std::move(*panel);
   if (auto written = write_rig_toml(o.toml); !written) return pass_on(written);
   rig->line_watch_ = std::jthread([&rig = *rig](const std::stop_token& stop) { rig.watch_line(stop); });
   return rig;
+}
+
+Result<void> WireRig::start_drive(const WireRigOptions& o, Clock& clock) {
+  const auto on_modbus = [&](auto drive) -> Result<void> {
+    auto server = wire::ModbusServer::start(port_, 1, *drive, clock);
+    if (!server) return pass_on(server);
+    server_ = std::move(*server);
+    drive_ = std::move(drive);
+    return {};
+  };
+  if (o.toml.drive == "leadshine-rs") return on_modbus(std::make_unique<wire::LeadshineDrive>(o.axis, clock));
+  if (o.toml.drive == "oriental-az") return on_modbus(std::make_unique<wire::OrientalDrive>(o.axis, clock));
+  return fail(ErrorCode::unsupported, "no simulated drive {}", o.toml.drive);
 }
 
 RigTruth WireRig::truth() const {

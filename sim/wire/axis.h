@@ -52,7 +52,8 @@ class Axis {
   void seek_home(
       const AxisMotion& motion);  ///< negative, until the switch closes; first away from a closed one; then counter = 0
   void quick_stop();
-  void set_counter(std::int32_t value);  ///< declares where it is
+  void set_counter(std::int32_t value);       ///< declares where it is
+  void follow_motor() { command_ = motor_; }  ///< a closed loop: what was lost does not count as done
 
   void block(bool blocked) { blocked_ = blocked; }
   /// Play and vibration as in `options` from now on; gear and start stay as they were.

@@ -15,8 +15,7 @@ std::int32_t joined(std::uint16_t high, std::uint16_t low) {
 
 }  // namespace
 
-LeadshineDrive::LeadshineDrive(const AxisOptions& axis, Clock& clock)
-    : clock_(clock), pulses_per_motor_rev_(axis.pulses_per_motor_rev), axis_(axis, clock.now()) {
+LeadshineDrive::LeadshineDrive(const AxisOptions& axis, Clock& clock) : SimulatedDrive(axis, clock) {
   for (const std::uint16_t address : {kPulses, kEnable, kStatus, kControl, kAlarm, std::uint16_t{0x6000}, kTrigger}) {
     registers_[address] = 0;
   }
@@ -90,8 +89,7 @@ AxisMotion LeadshineDrive::motion(std::uint16_t rpm, std::uint16_t acceleration,
   return {pulses(rpm), rate(acceleration), rate(deceleration)};
 }
 
-void LeadshineDrive::refresh() const {
-  axis_.advance(clock_.now());
+void LeadshineDrive::follow() const {
   if (homing_ && !axis_.running()) {
     homing_ = false;
     homed_ = axis_.reached_switch();
@@ -118,18 +116,6 @@ std::uint16_t LeadshineDrive::status() const {
   return static_cast<std::uint16_t>(bits);
 }
 
-void LeadshineDrive::block(bool blocked) {
-  const std::scoped_lock lock(mutex_);
-  refresh();
-  axis_.block(blocked);
-}
-
-void LeadshineDrive::lose_steps(double pulses) {
-  const std::scoped_lock lock(mutex_);
-  refresh();
-  axis_.lose_steps(pulses);
-}
-
 void LeadshineDrive::raise_alarm(std::uint16_t code, bool can_be_reset) {
   const std::scoped_lock lock(mutex_);
   refresh();
@@ -147,34 +133,10 @@ void LeadshineDrive::power_cycle() {
   registers_[kAlarm] = registers_[kEnable] = 0;
 }
 
-void LeadshineDrive::preload_counter(std::int32_t value) {
+void LeadshineDrive::send(std::int32_t pulses) {
   const std::scoped_lock lock(mutex_);
   refresh();
-  axis_.set_counter(value);
-}
-
-void LeadshineDrive::set_physics(const AxisOptions& options) {
-  const std::scoped_lock lock(mutex_);
-  refresh();
-  axis_.set_physics(options);
-}
-
-AxisTruth LeadshineDrive::truth() const {
-  const std::scoped_lock lock(mutex_);
-  refresh();
-  return axis_.truth();
-}
-
-std::vector<AxisLeg> LeadshineDrive::legs() const {
-  const std::scoped_lock lock(mutex_);
-  refresh();
-  return axis_.legs();
-}
-
-std::int32_t LeadshineDrive::counter() const {
-  const std::scoped_lock lock(mutex_);
-  refresh();
-  return axis_.measured();
+  axis_.move_to(axis_.commanded() + pulses, motion(135, 100, 100));
 }
 
 std::uint16_t LeadshineDrive::peek(std::uint16_t address) const {

@@ -22,63 +22,9 @@ Result<std::unique_ptr<ModbusServer>> ModbusServer::start(std::filesystem::path 
   return server;
 }
 
-ModbusServer::~ModbusServer() { vanish(); }
-
-void ModbusServer::vanish() {
-  const std::scoped_lock lock(port_mutex_);
-  thread_ = {};
-  pty_.reset();
-}
-
-Result<void> ModbusServer::come_back() {
-  const std::scoped_lock lock(port_mutex_);
-  if (pty_) return {};
-  auto pty = Pty::open(link_);
-  if (!pty) return pass_on(pty);
-  pty_.emplace(std::move(*pty));
-  thread_ = std::jthread([this](const std::stop_token& stop) { serve(stop, *pty_); });
-  return {};
-}
-
-void ModbusServer::inject(const WireFault& fault) {
-  const std::scoped_lock lock(mutex_);
-  faults_.push_back(fault);
-}
-
-void ModbusServer::clear_faults() {
-  const std::scoped_lock lock(mutex_);
-  faults_.clear();
-}
-
-std::vector<WireFrame> ModbusServer::log() const {
-  const std::scoped_lock lock(mutex_);
-  return log_;
-}
-
-void ModbusServer::clear_log() {
-  const std::scoped_lock lock(mutex_);
-  log_.clear();
-}
-
 void ModbusServer::on_request(std::function<void(const ModbusRequest&)> listener) {
-  const std::scoped_lock lock(mutex_);
+  const std::scoped_lock lock(listener_mutex_);
   listener_ = std::move(listener);
-}
-
-void ModbusServer::note(bool from_master, const Bytes& bytes) {
-  const std::scoped_lock lock(mutex_);
-  log_.push_back({clock_.now(), from_master, bytes});
-}
-
-std::optional<WireFault> ModbusServer::next_fault(std::uint8_t function) {
-  const std::scoped_lock lock(mutex_);
-  for (auto fault = faults_.begin(); fault != faults_.end(); ++fault) {
-    if (fault->function && *fault->function != function) continue;
-    const WireFault found = *fault;
-    if (fault->count > 0 && --fault->count == 0) faults_.erase(fault);
-    return found;
-  }
-  return std::nullopt;
 }
 
 void ModbusServer::serve(const std::stop_token& stop, Pty& pty) {
@@ -104,30 +50,8 @@ void ModbusServer::handle(const std::stop_token& stop, Pty& pty, const Bytes& fr
   const auto fault = next_fault(frame[1]);
   using Kind = WireFault::Kind;
   if (fault && fault->kind == Kind::deaf) return;
-
-  Bytes answer = carry_out(frame, !fault || fault->kind != Kind::refuse, fault ? fault->exception : std::uint8_t{0});
-  const Bytes good = answer;
-  if (fault) {
-    switch (fault->kind) {
-      case Kind::answer_lost: answer.clear(); break;
-      case Kind::wrong_crc: answer.back() ^= 0x5A; break;
-      case Kind::cut_short: answer.resize(answer.size() / 2); break;
-      case Kind::earlier_answer: answer = last_answer_; break;
-      case Kind::late: {
-        // In slices, so that the adapter can be pulled meanwhile.
-        for (const auto at = clock_.now() + fault->delay; clock_.now() < at && !stop.stop_requested();) {
-          clock_.sleep_for(std::min<Clock::Duration>(at - clock_.now(), milliseconds(5)));
-        }
-        break;
-      }
-      case Kind::deaf:
-      case Kind::refuse: break;
-    }
-  }
-  last_answer_ = good;
-  if (answer.empty()) return;
-  note(false, answer);
-  pty.write(answer);
+  const bool obey = !fault || fault->kind != Kind::refuse;
+  send(stop, pty, carry_out(frame, obey, fault ? fault->exception : std::uint8_t{0}), fault);
 }
 
 Bytes ModbusServer::carry_out(const Bytes& frame, bool obey, std::uint8_t exception) {
@@ -137,7 +61,7 @@ Bytes ModbusServer::carry_out(const Bytes& frame, bool obey, std::uint8_t except
     return exception_answer(frame[0], frame[1], kIllegalFunction);
   std::function<void(const ModbusRequest&)> listener;
   {
-    const std::scoped_lock lock(mutex_);
+    const std::scoped_lock lock(listener_mutex_);
     listener = listener_;
   }
   if (listener) listener(*request);

@@ -1,10 +1,12 @@
 #include <atomic>
 #include <fstream>
+#include <type_traits>
 
 #include "config/drive_profile_file.h"
 #include "drivers/turntable/modbus_turntable.h"
 #include "sim/wire/leadshine_drive.h"
 #include "sim/wire/modbus_server.h"
+#include "sim/wire/oriental_drive.h"
 #include "tests/bench/fault_matrix/turntable_end.h"
 
 namespace scanrig::bench {
@@ -16,20 +18,23 @@ using std::chrono::milliseconds;
 constexpr milliseconds kReplyTimeout{30};
 constexpr milliseconds kLate{50};  ///< later than any answer is waited for
 constexpr std::uint8_t kReadFunction = 3;
+constexpr std::int32_t kRound = 200'000;  // pulses: 800 deg
 
 std::string fresh_port(const std::filesystem::path& scratch) {
   static std::atomic<int> count = 0;
   return scratch / fmt::format("port{}", count++);
 }
 
-class LeadshineEnd final : public TurntableEnd {
+template <class Drive>
+class ModbusEnd final : public TurntableEnd {
  public:
-  LeadshineEnd(const std::filesystem::path& scratch, const DriveProfile& profile, Clock& clock)
+  ModbusEnd(const std::filesystem::path& scratch, const DriveProfile& profile, Clock& clock)
       : drive_({.gear_ratio = kGear, .start_deg = 20}, clock) {
     ModbusTurntableOptions options;
     options.line.device = fresh_port(scratch);
     options.line.reply_timeout = kReplyTimeout;
     options.profile = profile;
+    options.home_mode = profile.homing.modes.contains("switch") ? "switch" : profile.homing.modes.begin()->first;
     options.scale.gear_ratio = kGear;
     options.speed = {kSpeedDegS};
     options.acceleration = {kAccelerationDegS2};
@@ -61,10 +66,7 @@ class LeadshineEnd final : public TurntableEnd {
     drive_.block(false);
     std::ignore = server_->come_back();
   }
-  void send_round() override {
-    const std::array<std::uint16_t, 8> move{1, 0x0003, 0x0D40, 135, 100, 100, 0, 0x10};  // 200,000 pulses, 800 deg
-    drive_.write(0x6200, move);
-  }
+  void send_round() override { drive_.send(kRound); }
   void raise_alarm(bool can_be_reset) override {
     alarm_can_be_reset_ = can_be_reset;
     drive_.raise_alarm(0x20, can_be_reset);
@@ -75,7 +77,7 @@ class LeadshineEnd final : public TurntableEnd {
   }
 
  private:
-  sim::wire::LeadshineDrive drive_;
+  Drive drive_;
   bool alarm_can_be_reset_ = true;
   std::unique_ptr<sim::wire::ModbusServer> server_;
   std::unique_ptr<ModbusTurntable> table_;
@@ -86,10 +88,14 @@ class LeadshineEnd final : public TurntableEnd {
 std::vector<TurntableKind> shipped_turntables(const std::filesystem::path& scratch,
                                               const std::filesystem::path& profiles) {
   std::vector<TurntableKind> kinds;
-  const auto leadshine = config::read_drive_profile(profiles / "leadshine-rs.toml").value();
-  kinds.push_back({"ModbusTurntable", "leadshine-rs", [scratch, leadshine](Clock& clock) {
-                     return std::make_unique<LeadshineEnd>(scratch, leadshine, clock);
-                   }});
+  const auto add = [&]<class Drive>(const std::string& name, std::type_identity<Drive>) {
+    const auto profile = config::read_drive_profile(profiles / (name + ".toml")).value();
+    kinds.push_back({"ModbusTurntable", name, [scratch, profile](Clock& clock) {
+                       return std::make_unique<ModbusEnd<Drive>>(scratch, profile, clock);
+                     }});
+  };
+  add("leadshine-rs", std::type_identity<sim::wire::LeadshineDrive>());
+  add("oriental-az", std::type_identity<sim::wire::OrientalDrive>());
   return kinds;
 }
 

@@ -4,9 +4,11 @@
 namespace scanrig {
 namespace {
 
-std::unique_ptr<TurntableBench> make_bench() { return std::make_unique<ModbusBench>(); }
+std::unique_ptr<TurntableBench> leadshine() { return std::make_unique<ModbusBench>(kLeadshine); }
+std::unique_ptr<TurntableBench> oriental() { return std::make_unique<ModbusBench>(kOriental); }
 
-INSTANTIATE_TEST_SUITE_P(Modbus, TurntableCompliance, testing::Values(&make_bench));
+INSTANTIATE_TEST_SUITE_P(Leadshine, TurntableCompliance, testing::Values(&leadshine));
+INSTANTIATE_TEST_SUITE_P(Oriental, TurntableCompliance, testing::Values(&oriental));
 
 }  // namespace
 }  // namespace scanrig

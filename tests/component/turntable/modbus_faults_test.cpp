@@ -7,7 +7,6 @@
 namespace scanrig {
 namespace {
 
-using sim::wire::Bytes;
 using sim::wire::ModbusRequest;
 using sim::wire::WireFault;
 using sim::wire::WireFrame;
@@ -16,17 +15,38 @@ using testing::HasSubstr;
 
 constexpr std::uint8_t kRead = 0x03, kWriteOne = 0x06, kWriteSeveral = 0x10;
 
-bool is_move(const WireFrame& frame) {
-  return frame.from_master && frame.bytes[1] == kWriteSeveral && frame.bytes[2] == 0x62;
-}
-bool is_stop(const WireFrame& frame) {
-  return frame.from_master && frame.bytes == Bytes{0x01, 0x06, 0x60, 0x02, 0x00, 0x40, 0x37, 0xFA};
-}
 bool is_read(const WireFrame& frame) { return frame.from_master && frame.bytes[1] == kRead; }
+bool is_write(const WireFrame& frame, std::uint8_t function, std::uint16_t address) {
+  return frame.from_master && frame.bytes[1] == function && frame.bytes[2] == address >> 8 &&
+         frame.bytes[3] == (address & 0xFF);
+}
 
-class ModbusFaults : public testing::Test {
+struct Spoiled {
+  const char* name;
+  WireFault fault;
+  ErrorCode code;
+  bool hears_stop;
+};
+
+/// What every profile must do; the parameter is the drive.
+class ModbusFaults : public testing::TestWithParam<ModbusKind> {
  protected:
   static void slow(ModbusTurntableOptions& options) { options.speed = {450}; }
+
+  bool is_move(const WireFrame& frame) const {
+    return is_write(frame, kWriteSeveral, bench_->options().profile.move.address);
+  }
+  bool is_stop(const WireFrame& frame) const {
+    const auto& stop = bench_->options().profile.stop;
+    return is_write(frame, kWriteOne, stop.address) && frame.bytes[4] == 0 && frame.bytes[5] == stop.value;
+  }
+  auto moves_sent() const {
+    const auto log = bench_->server().log();
+    return std::ranges::count_if(log, [this](const auto& frame) { return is_move(frame); });
+  }
+
+  /// The alarm of a table that cannot follow.
+  static std::uint16_t following_error() { return GetParam().profile == kOriental.profile ? 0x10 : 0x20; }
 
   Deadline within(milliseconds time) { return Deadline::after(bench_->clock(), time); }
   Result<void> home() { return bench_->turntable().home(within(milliseconds(5000))); }
@@ -34,7 +54,7 @@ class ModbusFaults : public testing::Test {
 
   void start(const ModbusBench::Change& change) {
     bench_.reset();
-    bench_ = std::make_unique<ModbusBench>(change);
+    bench_ = std::make_unique<ModbusBench>(GetParam(), change);
   }
   void start_at_zero(const ModbusBench::Change& change = [](auto&) {}) {
     start(change);
@@ -46,10 +66,12 @@ class ModbusFaults : public testing::Test {
   }
   /// From the next move on, after it has been heard.
   void once_turning(std::function<void()> act) {
-    bench_->server().on_request([act = std::move(act)](const ModbusRequest& request) {
-      if (request.address == 0x6200) act();
+    const auto move = bench_->options().profile.move.address;
+    bench_->server().on_request([move, act = std::move(act)](const ModbusRequest& request) {
+      if (request.address == move) act();
     });
   }
+  void expect_named_end(const Spoiled& spoiled);
   void expect_rest(double by_deg) {
     for (const auto by = within(milliseconds(2000)); bench_->seen_moving() && !by.expired(bench_->clock());) {
       bench_->clock().sleep_for(milliseconds(2));
@@ -67,25 +89,34 @@ class ModbusFaults : public testing::Test {
     const auto moved = rotate_to(10);
     ASSERT_TRUE(moved) << moved.error().message;
   }
-  auto sent(bool (*kind)(const WireFrame&)) {
-    const auto log = bench_->server().log();
-    return std::ranges::count_if(log, kind);
+
+  std::unique_ptr<ModbusBench> bench_ = std::make_unique<ModbusBench>(GetParam());
+};
+
+/// What only this family has.
+class LeadshineFaults : public ModbusFaults {};
+
+const std::vector<Spoiled>& all_spoiled() {
+  constexpr auto forever = -1;
+  static const std::vector<Spoiled> all{
+      {"Silent", {WireFault::Kind::deaf, forever}, ErrorCode::timeout, false},
+      {"AnswersLost", {WireFault::Kind::answer_lost, forever, kRead}, ErrorCode::timeout, true},
+      {"Late", {WireFault::Kind::late, forever, kRead, milliseconds(50)}, ErrorCode::timeout, true},
+      {"WrongCrc", {WireFault::Kind::wrong_crc, forever, kRead}, ErrorCode::protocol, true},
+      {"CutShort", {WireFault::Kind::cut_short, forever, kRead}, ErrorCode::timeout, true},
+      {"Refused", {WireFault::Kind::refuse, forever, kRead, {}, 4}, ErrorCode::protocol, true},
+      {"EarlierAnswers", {WireFault::Kind::earlier_answer, forever, kRead}, ErrorCode::protocol, true}};
+  return all;
+}
+
+TEST_P(ModbusFaults, SpoiledAnswersEndInTheirErrorWithinTheDeadlineWithTheTableAtRest) {
+  for (const Spoiled& spoiled : all_spoiled()) {
+    SCOPED_TRACE(spoiled.name);
+    expect_named_end(spoiled);
   }
+}
 
-  std::unique_ptr<ModbusBench> bench_ = std::make_unique<ModbusBench>();
-};
-
-struct Spoiled {
-  const char* name;
-  WireFault fault;
-  ErrorCode code;
-  bool hears_stop;
-};
-
-class SpoiledAnswers : public ModbusFaults, public testing::WithParamInterface<Spoiled> {};
-
-TEST_P(SpoiledAnswers, EndInTheirErrorWithinTheDeadlineWithTheTableAtRest) {
-  const Spoiled& spoiled = GetParam();
+void ModbusFaults::expect_named_end(const Spoiled& spoiled) {
   start_at_zero(slow);
   once_turning([&] { bench_->server().inject(spoiled.fault); });
   const auto began = bench_->clock().now();
@@ -106,20 +137,7 @@ TEST_P(SpoiledAnswers, EndInTheirErrorWithinTheDeadlineWithTheTableAtRest) {
   expect_home_is_needed_and_helps();
 }
 
-constexpr auto forever = -1;
-INSTANTIATE_TEST_SUITE_P(
-    All, SpoiledAnswers,
-    testing::Values(
-        Spoiled{"Silent", {WireFault::Kind::deaf, forever}, ErrorCode::timeout, false},
-        Spoiled{"AnswersLost", {WireFault::Kind::answer_lost, forever, kRead}, ErrorCode::timeout, true},
-        Spoiled{"Late", {WireFault::Kind::late, forever, kRead, milliseconds(50)}, ErrorCode::timeout, true},
-        Spoiled{"WrongCrc", {WireFault::Kind::wrong_crc, forever, kRead}, ErrorCode::protocol, true},
-        Spoiled{"CutShort", {WireFault::Kind::cut_short, forever, kRead}, ErrorCode::timeout, true},
-        Spoiled{"Refused", {WireFault::Kind::refuse, forever, kRead, {}, 4}, ErrorCode::protocol, true},
-        Spoiled{"EarlierAnswers", {WireFault::Kind::earlier_answer, forever, kRead}, ErrorCode::protocol, true}),
-    [](const auto& spoiled) { return spoiled.param.name; });
-
-TEST_F(ModbusFaults, OneDamagedAnswerIsAskedForAgainAndCounted) {
+TEST_P(ModbusFaults, OneDamagedAnswerIsAskedForAgainAndCounted) {
   start_at_zero();
   const auto before = bench_->turntable().statistics();
   bench_->server().inject({WireFault::Kind::wrong_crc, 1, kRead});
@@ -129,29 +147,30 @@ TEST_F(ModbusFaults, OneDamagedAnswerIsAskedForAgainAndCounted) {
   EXPECT_GE(after.retries - before.retries, 1u);
 }
 
-TEST_F(ModbusFaults, AMoveWhoseAnswerIsLostIsNotSentAgainOnceSeenRunning) {
+TEST_P(ModbusFaults, AMoveWhoseAnswerIsLostIsNotSentAgainOnceSeenRunning) {
   start_at_zero(slow);
   bench_->server().inject({WireFault::Kind::answer_lost, 1, kWriteSeveral});
   const auto moved = rotate_to(45);
   ASSERT_TRUE(moved) << moved.error().message;
   EXPECT_NEAR(moved->measured.value, 45, 0.05);
-  EXPECT_EQ(sent(is_move), 1);
+  EXPECT_EQ(moves_sent(), 1);
 }
 
-TEST_F(ModbusFaults, AMoveThatWasNotHeardIsSentAgainOnlyAfterReading) {
+TEST_P(ModbusFaults, AMoveThatWasNotHeardIsSentAgainOnlyAfterReading) {
   start_at_zero();
   bench_->server().inject({WireFault::Kind::deaf, 1, kWriteSeveral});
   const auto moved = rotate_to(45);
   ASSERT_TRUE(moved) << moved.error().message;
-  ASSERT_EQ(sent(is_move), 2);
+  ASSERT_EQ(moves_sent(), 2);
   const auto log = bench_->server().log();
-  const auto first = std::ranges::find_if(log, is_move);
-  const auto second = std::find_if(first + 1, log.end(), is_move);
+  const auto move = [this](const auto& frame) { return is_move(frame); };
+  const auto first = std::ranges::find_if(log, move);
+  const auto second = std::find_if(first + 1, log.end(), move);
   EXPECT_TRUE(std::any_of(first, second, is_read));
   EXPECT_GE(bench_->turntable().statistics().retries, 1u);
 }
 
-TEST_F(ModbusFaults, APulledAdapterIsAnIoErrorAndTheDriveHearsStopFirstWhenItIsBack) {
+TEST_P(ModbusFaults, APulledAdapterIsAnIoErrorAndTheDriveHearsStopFirstWhenItIsBack) {
   start_at_zero(slow);
   bench_->when_moving([&] { bench_->server().vanish(); });
   const auto moved = rotate_to(90);
@@ -172,7 +191,7 @@ TEST_F(ModbusFaults, APulledAdapterIsAnIoErrorAndTheDriveHearsStopFirstWhenItIsB
   expect_home_is_needed_and_helps();
 }
 
-TEST_F(ModbusFaults, TwoMastersCannotShareALine) {
+TEST_P(ModbusFaults, TwoMastersCannotShareALine) {
   start_at_zero();
   modbus::LineOptions options;
   options.device = bench_->device();
@@ -183,17 +202,17 @@ TEST_F(ModbusFaults, TwoMastersCannotShareALine) {
   EXPECT_THAT(read.error().message, HasSubstr("another program"));
 }
 
-TEST_F(ModbusFaults, AnAlarmIsToldInWordsAndHoldsUntilItIsReset) {
+TEST_P(ModbusFaults, AnAlarmIsToldInWordsAndHoldsUntilItIsReset) {
   start_at_zero(slow);
-  bench_->when_moving([&] { bench_->drive().raise_alarm(0x20); });
+  bench_->when_moving([&] { bench_->drive().raise_alarm(following_error()); });
   const auto moved = rotate_to(90);
   ASSERT_FALSE(moved);
   EXPECT_EQ(moved.error().code, ErrorCode::device_alarm);
-  EXPECT_THAT(moved.error().message, HasSubstr("position following error"));
+  EXPECT_THAT(moved.error().message, HasSubstr("is the table blocked"));
   expect_rest(89.0);
   const auto status = bench_->turntable().status(within(milliseconds(500)));
   ASSERT_TRUE(status);
-  EXPECT_THAT(status->alarm, HasSubstr("position following error"));
+  EXPECT_THAT(status->alarm, HasSubstr("is the table blocked"));
   const auto homed = home();
   ASSERT_FALSE(homed);
   EXPECT_EQ(homed.error().code, ErrorCode::device_alarm);
@@ -201,15 +220,28 @@ TEST_F(ModbusFaults, AnAlarmIsToldInWordsAndHoldsUntilItIsReset) {
   expect_home_is_needed_and_helps();
 }
 
-TEST_F(ModbusFaults, AnAlarmThatStaysIsSaid) {
+TEST_P(ModbusFaults, EveryAlarmOfTheProfileIsToldInWords) {
+  const auto& words = bench_->options().profile.alarm.words;
+  ASSERT_FALSE(words.empty());
+  for (const auto& [code, text] : words) {
+    bench_->drive().raise_alarm(code);
+    const auto status = bench_->turntable().status(within(milliseconds(500)));
+    ASSERT_TRUE(status) << status.error().message;
+    EXPECT_THAT(status->alarm, HasSubstr(text));
+    EXPECT_THAT(status->alarm, HasSubstr(fmt::format("0x{:02X}", code)));
+  }
+}
+
+TEST_P(ModbusFaults, AnAlarmThatStaysIsSaid) {
   bench_->drive().raise_alarm(0x7777, false);
   const auto reset = bench_->turntable().reset_alarm(within(milliseconds(1000)));
   ASSERT_FALSE(reset);
   EXPECT_EQ(reset.error().code, ErrorCode::device_alarm);
   EXPECT_THAT(reset.error().message, HasSubstr("0x7777"));
+  EXPECT_THAT(reset.error().message, HasSubstr("see the drive's manual"));
 }
 
-TEST_F(ModbusFaults, ADriveThatWantsAPowerCycleIsNotResetByRegister) {
+TEST_P(ModbusFaults, ADriveThatWantsAPowerCycleIsNotResetByRegister) {
   start([](auto& options) { options.profile.alarm.reset = DriveProfile::Alarm::Reset::power_cycle; });
   bench_->drive().raise_alarm(0x01);
   const auto reset = bench_->turntable().reset_alarm(within(milliseconds(1000)));
@@ -220,31 +252,31 @@ TEST_F(ModbusFaults, ADriveThatWantsAPowerCycleIsNotResetByRegister) {
   EXPECT_TRUE(bench_->turntable().reset_alarm(within(milliseconds(1000))));
 }
 
-TEST_F(ModbusFaults, ADriveThatWasSwitchedOffInBetweenHasNoHome) {
+TEST_P(ModbusFaults, ADriveThatWasSwitchedOffInBetweenHasNoHome) {
   start_at_zero();
   bench_->drive().power_cycle();
   const std::uint16_t on = 1;
-  bench_->drive().write(0x000F, {&on, 1});
+  if (const auto& enable = bench_->options().profile.enable) bench_->registers().write(enable->address, {&on, 1});
   const auto moved = rotate_to(45);
   ASSERT_FALSE(moved);
   EXPECT_EQ(moved.error().code, ErrorCode::not_homed) << moved.error().message;
-  EXPECT_EQ(sent(is_move), 0);
+  EXPECT_EQ(moves_sent(), 0);
   expect_home_is_needed_and_helps();
 }
 
-TEST_F(ModbusFaults, ADisabledDriveIsNotSentAnywhere) {
+TEST_P(LeadshineFaults, ADisabledDriveIsNotSentAnywhere) {
   start_at_zero();
   const std::uint16_t off = 0;
-  bench_->drive().write(0x000F, {&off, 1});
+  bench_->registers().write(0x000F, {&off, 1});
   const auto moved = rotate_to(45);
   ASSERT_FALSE(moved);
   EXPECT_EQ(moved.error().code, ErrorCode::device_alarm);
   EXPECT_THAT(moved.error().message, HasSubstr("emergency stop"));
-  EXPECT_EQ(sent(is_move), 0);
+  EXPECT_EQ(moves_sent(), 0);
   expect_home_is_needed_and_helps();
 }
 
-TEST_F(ModbusFaults, LostStepsAreNotCalledArrival) {
+TEST_P(ModbusFaults, LostStepsAreNotCalledArrival) {
   start_at_zero(slow);
   bench_->when_moving([&] { bench_->drive().lose_steps(500); });  // 2 degrees
   const auto moved = rotate_to(45);
@@ -253,12 +285,12 @@ TEST_F(ModbusFaults, LostStepsAreNotCalledArrival) {
   expect_home_is_needed_and_helps();
 }
 
-TEST_F(ModbusFaults, NoMoveIsSentWithoutHome) {
+TEST_P(ModbusFaults, NoMoveIsSentWithoutHome) {
   ASSERT_FALSE(rotate_to(45));
-  EXPECT_EQ(sent(is_move), 0);
+  EXPECT_EQ(moves_sent(), 0);
 }
 
-TEST_F(ModbusFaults, ADriveSetToOtherPulsesIsRefused) {
+TEST_P(ModbusFaults, ADriveSetToOtherPulsesIsRefused) {
   start([](auto& options) { options.scale.pulses_per_motor_rev = 4000; });
   const auto homed = home();
   ASSERT_FALSE(homed);
@@ -266,7 +298,7 @@ TEST_F(ModbusFaults, ADriveSetToOtherPulsesIsRefused) {
   EXPECT_THAT(homed.error().message, HasSubstr("10000 pulses"));
 }
 
-TEST_F(ModbusFaults, AtTheEndOfTheCounterTheTableGoesTheOtherWayRound) {
+TEST_P(ModbusFaults, AtTheEndOfTheCounterTheTableGoesTheOtherWayRound) {
   start_at_zero();
   constexpr double kPulsesPerDegree = 250;
   // 20 degrees before the 32-bit counter is full.
@@ -279,7 +311,7 @@ TEST_F(ModbusFaults, AtTheEndOfTheCounterTheTableGoesTheOtherWayRound) {
   EXPECT_NEAR(bench_->seen_deg() - seen, 45 - 360, 0.05);
 }
 
-TEST_F(ModbusFaults, ATableWhoseMotorRunsTheOtherWayStillCountsCounterClockwise) {
+TEST_P(ModbusFaults, ATableWhoseMotorRunsTheOtherWayStillCountsCounterClockwise) {
   start_at_zero([](auto& options) {
     options.scale.positive_ccw = false;
     options.scale.home_offset = {10};
@@ -293,14 +325,18 @@ TEST_F(ModbusFaults, ATableWhoseMotorRunsTheOtherWayStillCountsCounterClockwise)
   EXPECT_NEAR(bench_->seen_deg() - zero, 45, 0.05);  // the play of the gear does not show
 }
 
-TEST_F(ModbusFaults, EveryMoveEndsCounterClockwise) {
+TEST_P(ModbusFaults, EveryMoveEndsCounterClockwise) {
   start_at_zero();
   for (const double angle : {90.0, 45.0, 315.0, 0.0, 350.0}) ASSERT_TRUE(rotate_to(angle));
+  const auto& words = bench_->options().profile.move.words;
+  const auto high = std::ranges::find(words, DriveProfile::Block::Word::position, &DriveProfile::Block::Item::word);
+  const auto at = static_cast<std::size_t>(7 + 2 * (high - words.begin()));
   double last = 0;
   for (const auto& frame : bench_->server().log()) {
     if (!is_move(frame)) continue;
     const auto& b = frame.bytes;
-    const double target = static_cast<std::int32_t>(std::uint32_t{b[9]} << 24 | b[10] << 16 | b[11] << 8 | b[12]);
+    const double target =
+        static_cast<std::int32_t>(std::uint32_t{b[at]} << 24 | b[at + 1] << 16 | b[at + 2] << 8 | b[at + 3]);
     const bool final = std::abs(std::remainder(target / 250, 5.0)) < 0.01;
     if (final) {
       EXPECT_GT(target, last);
@@ -309,21 +345,27 @@ TEST_F(ModbusFaults, EveryMoveEndsCounterClockwise) {
   }
 }
 
-TEST_F(ModbusFaults, SoftLimitsAreKeptByTheDriverAndToldToTheDrive) {
+TEST_P(ModbusFaults, SoftLimitsAreKeptByTheDriver) {
   start_at_zero([](auto& options) { options.soft_limits = AngleRange{{-10}, {200}}; });
-  EXPECT_EQ(bench_->drive().peek(0x6000), 2);
-  EXPECT_EQ(bench_->drive().peek(0x6007), 50000);
-  EXPECT_EQ(bench_->drive().peek(0x6008), 0xFFFF);
-  EXPECT_EQ(bench_->drive().peek(0x6009), 0x10000 - 2500);
   const auto moved = rotate_to(270);
   ASSERT_FALSE(moved);
   EXPECT_EQ(moved.error().code, ErrorCode::out_of_range);
-  EXPECT_EQ(sent(is_move), 0);
+  EXPECT_EQ(moves_sent(), 0);
   EXPECT_TRUE(rotate_to(180));
   EXPECT_TRUE(rotate_to(355));  // is -5
 }
 
-TEST_F(ModbusFaults, HereCanBeHome) {
+TEST_P(LeadshineFaults, SoftLimitsAreToldToTheDrive) {
+  start_at_zero([](auto& options) { options.soft_limits = AngleRange{{-10}, {200}}; });
+  std::array<std::uint16_t, 4> limits{};
+  std::uint16_t control = 0;
+  bench_->registers().read(0x6006, limits);
+  bench_->registers().read(0x6000, {&control, 1});
+  EXPECT_EQ(control, 2);
+  EXPECT_THAT(limits, testing::ElementsAre(0, 50000, 0xFFFF, 0x10000 - 2500));
+}
+
+TEST_P(ModbusFaults, HereCanBeHome) {
   start([](auto& options) { options.home_mode = "here"; });
   const double here = bench_->seen_deg();
   ASSERT_TRUE(home());
@@ -332,7 +374,7 @@ TEST_F(ModbusFaults, HereCanBeHome) {
   EXPECT_NEAR(bench_->seen_deg() - here, 45, 0.3);
 }
 
-TEST_F(ModbusFaults, StopIsNotClaimedWithoutAnAnswer) {
+TEST_P(ModbusFaults, StopIsNotClaimedWithoutAnAnswer) {
   start_at_zero();
   bench_->server().inject({WireFault::Kind::deaf});
   const auto stopped = bench_->turntable().stop(within(milliseconds(600)));
@@ -341,7 +383,7 @@ TEST_F(ModbusFaults, StopIsNotClaimedWithoutAnAnswer) {
   EXPECT_THAT(stopped.error().message, HasSubstr("may be moving"));
 }
 
-TEST_F(ModbusFaults, OptionsTheDriveCannotFollowAreRefusedBeforeThePortIsOpened) {
+TEST(ModbusTurntableOptionsTest, WhatTheDriveCannotFollowIsRefusedBeforeThePortIsOpened) {
   RealClock clock;
   ModbusTurntableOptions options;
   options.scale.gear_ratio = 1000;
@@ -350,6 +392,12 @@ TEST_F(ModbusFaults, OptionsTheDriveCannotFollowAreRefusedBeforeThePortIsOpened)
   EXPECT_EQ(table.error().code, ErrorCode::out_of_range);
   EXPECT_THAT(table.error().message, HasSubstr("7500 rpm"));
 }
+
+std::string name(const testing::TestParamInfo<ModbusKind>& kind) {
+  return kind.param.profile == kOriental.profile ? "Oriental" : "Leadshine";
+}
+INSTANTIATE_TEST_SUITE_P(Modbus, ModbusFaults, testing::Values(kLeadshine, kOriental), name);
+INSTANTIATE_TEST_SUITE_P(Modbus, LeadshineFaults, testing::Values(kLeadshine), name);
 
 }  // namespace
 }  // namespace scanrig

@@ -47,7 +47,7 @@ TEST_F(DriveProfileTest, RegistersAreThoseOfTheManual) {
   EXPECT_EQ(profile->stop.address, 0x6002);
   EXPECT_EQ(profile->stop.value, 0x40);
   EXPECT_EQ(profile->alarm.words.at(0x02).substr(0, 12), "over-voltage");
-  EXPECT_EQ(profile->soft_limits.control_mask, 2);
+  EXPECT_EQ(profile->soft_limits->control_mask, 2);
 }
 
 TEST_F(DriveProfileTest, WhatDoesNotFitIsTold) {

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "core/clock.h"
+#include "core/result.h"
+
+namespace scanrig::serial {
+
+/// A plain serial line, 8N1, raw, held by one program at a time (an advisory lock, as drivers/modbus takes it).
+/// Waits in real time. Threads: one owner.
+class Port {
+ public:
+  /// Fails with `io`: absent, not a terminal, no such speed, or used by another program.
+  static Result<Port> open(const std::string& device, int baud);
+  Port(Port&& other) noexcept;
+  Port& operator=(Port&& other) noexcept;
+  ~Port();
+
+  /// All of `bytes`. Fails with `timeout` (the line takes no more within `wait`), `io` (the port is gone).
+  Result<void> write(std::string_view bytes, Clock::Duration wait);
+  /// What arrives within `wait`, as soon as something does; empty when nothing does. Fails with `io`.
+  Result<std::string> read(Clock::Duration wait);
+
+ private:
+  Port(int descriptor, std::string device) : descriptor_(descriptor), device_(std::move(device)) {}
+  /// Whether `events` happen within `wait`. Fails with `io`.
+  Result<bool> ready(short events, Clock::Duration wait);
+
+  int descriptor_ = -1;
+  std::string device_;
+};
+
+}  // namespace scanrig::serial

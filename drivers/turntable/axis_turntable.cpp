@@ -1,0 +1,330 @@
+#include "drivers/turntable/axis_turntable.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+namespace scanrig {
+namespace {
+
+using std::chrono::milliseconds;
+
+constexpr milliseconds kPollPeriod{10};
+constexpr milliseconds kStalledAfter{2000};
+constexpr milliseconds kEnableTime{1000};
+constexpr milliseconds kStandingTime{50};  ///< the position must not change for this long to be called standing
+constexpr int kAttempts = 3;
+constexpr int kStopReplyTimeouts = 12;  ///< three attempts, each with its quiet line, and some room
+
+}  // namespace
+
+AxisTurntable::AxisTurntable(AxisTurntableOptions options, std::unique_ptr<AxisDrive> drive,
+                             Clock::Duration reply_timeout, MovePlanner::Counter counter, Clock& clock)
+    : options_(std::move(options)),
+      planner_{options_.scale, options_.backlash, options_.tolerance, options_.soft_limits, counter},
+      reply_timeout_(reply_timeout),
+      clock_(clock),
+      drive_(std::move(drive)) {}
+
+std::int32_t AxisTurntable::tolerance_pulses() const {
+  return std::max(1, static_cast<std::int32_t>(options_.tolerance.value * options_.scale.pulses_per_degree()));
+}
+
+bool AxisTurntable::near(std::int32_t a, std::int32_t b) const {
+  return std::abs(std::int64_t{a} - std::int64_t{b}) <= tolerance_pulses();
+}
+
+Result<void> AxisTurntable::home(Deadline deadline) {
+  homed_ = flank_loaded_ = false;
+  if (auto found = find_home(deadline); !found) return give_up(found.error());
+  homed_ = true;
+  return {};
+}
+
+Result<void> AxisTurntable::find_home(Deadline deadline) {
+  if (auto ready = check_and_enable(deadline); !ready) return ready;
+  auto before = ask(deadline);
+  if (!before) return pass_on(before);
+
+  const bool here = options_.home_mode == "here";
+  if (!here) {
+    if (auto prepared = drive_->prepare_homing(deadline); !prepared) return prepared;
+  }
+  // Where the zero is sought, the homed bit may still be that of the last homing: something must be seen to happen.
+  const bool sought = !here && !drive_->knows_zero();
+  bool begun = false;
+  const auto begins = [&](const DriveState& state) {
+    begun = begun || state.running || (sought ? before->homed && !state.homed : near(state.position, 0));
+    return begun;
+  };
+  const auto started =
+      command([&] { return here ? drive_->set_zero(deadline) : drive_->start_homing(deadline); }, begins, deadline);
+  if (!started) return started;
+
+  std::int32_t anchor = before->position;
+  auto still_since = clock_.now();
+  const auto homed = watch(
+      "homing",
+      [&](const DriveState& state) {
+        const bool at_home = begins(state) && state.homed && !state.running && near(state.position, 0);
+        const bool moved = !near(state.position, anchor);
+        if (moved) anchor = state.position;
+        if (!at_home || moved) still_since = clock_.now();
+        if (clock_.now() - still_since >= options_.settle && at_home) return Seen::done;
+        return moved || at_home || state.blind ? Seen::progress : Seen::waiting;
+      },
+      deadline);
+  if (!homed) return homed;
+  if (!options_.soft_limits) return {};
+  return drive_->set_soft_limits(planner_.counter_range(), deadline);
+}
+
+Result<void> AxisTurntable::check_and_enable(Deadline deadline) {
+  auto state = ask(deadline);
+  if (!state) return pass_on(state);
+  if (state->running) {
+    if (auto stopped = stop(deadline); !stopped) return stopped;
+  }
+  if (auto fit = drive_->check(deadline); !fit) return fit;
+  if (state = ask(deadline); !state) return pass_on(state);
+  if (!state->fault && !state->enabled) {
+    if (auto enabled = drive_->enable(deadline); !enabled) return enabled;
+    for (const auto by = deadline.at_most(clock_, kEnableTime); !state->enabled && !by.expired(clock_);) {
+      if (state = ask(deadline); !state) return pass_on(state);
+    }
+  }
+  return healthy(*state, deadline);
+}
+
+Result<Move> AxisTurntable::rotate_to(Degrees target, Deadline deadline) {
+  if (auto free = not_stopped(); !free) return give_up(free.error());
+  if (!homed_) return fail(ErrorCode::not_homed, "turntable: no known zero: home it first");
+  const auto before = ask(deadline);
+  if (!before) return give_up(before.error());
+  if (auto fit = healthy(*before, deadline); !fit) return give_up(fit.error());
+  const auto plan = planner_.plan(before->position, target, flank_loaded_);
+  if (!plan) {
+    return fail(ErrorCode::out_of_range, "turntable: {} deg cannot be reached within the soft limits", target.value);
+  }
+  auto move = turn(target, *before, *plan, deadline);
+  if (!move) return give_up(move.error());
+  return move;
+}
+
+Result<Move> AxisTurntable::turn(Degrees target, const DriveState& before, const MovePlan& plan, Deadline deadline) {
+  const auto begun = clock_.now();
+  if (before.running || !before.homed) {
+    return before.running ? fail(ErrorCode::protocol, "the table moves although nothing was commanded")
+                          : fail(ErrorCode::not_homed, "the drive has lost its home (switched off in between?)");
+  }
+  flank_loaded_ = false;
+  DriveState state = before;
+  if (plan.before) {
+    const auto passed = run_to(*plan.before, state, Clock::Duration::zero(), deadline);
+    if (!passed) return pass_on(passed);
+    state.position = passed->position;
+  }
+  const auto arrival = run_to(plan.target, state, options_.settle, deadline);
+  if (!arrival) return pass_on(arrival);
+  flank_loaded_ = true;
+  const Degrees measured = options_.scale.angle(arrival->position);
+  return Move{target, target + Degrees{std::remainder((measured - target).value, 360.0)}, arrival->in_position - begun,
+              arrival->still - arrival->in_position};
+}
+
+Result<AxisTurntable::Arrival> AxisTurntable::run_to(std::int32_t target, const DriveState& before,
+                                                     Clock::Duration settle, Deadline deadline) {
+  const auto sent =
+      command([&] { return drive_->start_move(target, deadline); },
+              [&](const DriveState& state) {
+                return state.running || near(state.position, target) || !near(state.position, before.position);
+              },
+              deadline);
+  if (!sent) return pass_on(sent);
+
+  Arrival arrival;
+  std::optional<Clock::TimePoint> in_position;
+  std::int64_t least_left = std::abs(std::int64_t{target} - before.position);
+  const auto arrived = watch(
+      fmt::format("turning to {:.2f} deg", options_.scale.angle(target).value),
+      [&](const DriveState& state) {
+        if (!state.homed) return Seen::homeless;
+        const auto now = clock_.now();
+        const std::int64_t left = std::abs(std::int64_t{target} - state.position);
+        const bool nearer = left + tolerance_pulses() <= least_left;
+        if (nearer) least_left = left;
+        if (state.running || !state.in_position || !near(state.position, target)) {
+          in_position.reset();
+          return nearer ? Seen::progress : Seen::waiting;
+        }
+        if (!in_position) in_position = now;
+        if (now - *in_position < settle) return Seen::progress;
+        arrival = {*in_position, now, state.position};
+        return Seen::done;
+      },
+      deadline);
+  if (!arrived) return pass_on(arrived);
+  return arrival;
+}
+
+/// Sends what starts a motion. When the answer is missed, the drive is asked whether it has obeyed before it is sent
+/// again.
+Result<void> AxisTurntable::command(const std::function<Result<void>()>& send,
+                                    const std::function<bool(const DriveState&)>& obeyed, Deadline deadline) {
+  for (int attempt = 1;; ++attempt) {
+    auto sent = send();
+    if (sent || !drive_->answer_missed() || sent.error().code == ErrorCode::io) return sent;
+    const auto state = ask(deadline);
+    if (!state) return pass_on(state);
+    if (obeyed(*state)) return {};
+    if (attempt == kAttempts) return sent;
+    drive_->count_retry();
+  }
+}
+
+/// Polls until `look` says done. Fails with `stopped`, `not_homed`, `device_alarm`, `stalled`, `timeout`, `protocol`,
+/// `io`.
+Result<void> AxisTurntable::watch(std::string_view doing, const Look& look, Deadline deadline) {
+  for (auto last_progress = clock_.now();;) {
+    const auto state = ask(deadline);
+    if (!state) return pass_on(state);
+    if (auto fit = healthy(*state, deadline); !fit) return fit;
+    const Seen seen = look(*state);
+    if (seen == Seen::done) return {};
+    if (seen == Seen::homeless) {
+      return fail(ErrorCode::not_homed, "{}: the drive has lost its home (switched off, reset?)", doing);
+    }
+    if (seen == Seen::progress) last_progress = clock_.now();
+    if (clock_.now() - last_progress >= kStalledAfter) {
+      return fail(ErrorCode::stalled, "{}: no progress for 2 s, the axis reads {:.3f} deg; is something in the way?",
+                  doing, options_.scale.angle(state->position).value);
+    }
+    if (deadline.expired(clock_)) {
+      return fail(ErrorCode::timeout, "{}: not there by the deadline, the axis reads {:.3f} deg", doing,
+                  options_.scale.angle(state->position).value);
+    }
+    pause();
+  }
+}
+
+Result<void> AxisTurntable::healthy(const DriveState& state, Deadline deadline) {
+  if (state.fault) {
+    const auto alarm = drive_->read_alarm(deadline);
+    if (!alarm) return pass_on(alarm);
+    return fail(ErrorCode::device_alarm, "the drive reports {}", alarm->empty() ? "a fault without a code" : *alarm);
+  }
+  if (!state.enabled) {
+    return fail(ErrorCode::device_alarm, "the drive is switched off; check the emergency stop and the motor's power");
+  }
+  return {};
+}
+
+Result<void> AxisTurntable::not_stopped() {
+  const std::scoped_lock lock(mutex_);
+  if (stop_requested_) return fail(ErrorCode::stopped, "stopped on request");
+  return {};
+}
+
+/// The drive's state, unless someone has asked to stop.
+Result<DriveState> AxisTurntable::ask(Deadline deadline) {
+  if (auto free = not_stopped(); !free) return pass_on(free);
+  return read_after_owed_stop(deadline);
+}
+
+Result<DriveState> AxisTurntable::read_after_owed_stop(Deadline deadline) {
+  if (stop_owed_) {
+    if (auto told = drive_->stop(deadline); !told) return pass_on(told);
+    stop_owed_ = false;
+  }
+  return drive_->read_state(deadline);
+}
+
+Result<void> AxisTurntable::stop_drive(Deadline deadline) {
+  drive_->stop_unheard();
+  drive_->hurry(false);
+  return drive_->stop(deadline);
+}
+
+/// After any failure: no known zero, and the motor is told to stop.
+tl::unexpected<Error> AxisTurntable::give_up(const Error& error) {
+  homed_ = flank_loaded_ = false;
+  if (error.code == ErrorCode::stopped) {
+    const std::scoped_lock lock(mutex_);
+    stop_requested_ = false;
+  }
+  stop_owed_ = !stop_drive(Deadline::after(clock_, kStopReplyTimeouts * reply_timeout_));
+  return fail(error.code, "turntable: {}; {}", error.message,
+              stop_owed_ ? "the stop was not confirmed: the table may be moving" : "the motor was told to stop");
+}
+
+/// Waits until the next poll is due or someone asks to stop.
+void AxisTurntable::pause() {
+  std::unique_lock lock(mutex_);
+  clock_.wait_until(lock, wake_, clock_.now() + kPollPeriod, [&] { return stop_requested_; });
+}
+
+Result<void> AxisTurntable::stop(Deadline deadline) {
+  const auto failed = [&](const Error& error) {
+    stop_owed_ = true;
+    return tl::unexpected(Error{error.code, error.message + "; the table may be moving"}.in("turntable"));
+  };
+  if (auto told = stop_drive(deadline); !told) return failed(told.error());
+  stop_owed_ = false;
+  flank_loaded_ = false;
+  auto since = clock_.now();
+  for (std::optional<std::int32_t> last; !deadline.expired(clock_); pause()) {
+    const auto state = drive_->read_state(deadline);
+    if (!state) return failed(state.error());
+    if (state->running || !last || !near(*last, state->position)) {
+      since = clock_.now();
+      last = state->position;
+    } else if (clock_.now() - since >= kStandingTime) {
+      return {};
+    }
+  }
+  return failed({ErrorCode::timeout, "stop: not seen standing by the deadline"});
+}
+
+Result<void> AxisTurntable::reset_alarm(Deadline deadline) {
+  auto state = read_after_owed_stop(deadline);
+  if (!state) return pass_on(state, "turntable");
+  if (!state->fault) return {};
+  if (auto reset = drive_->reset_alarm(deadline); !reset) return pass_on(reset, "turntable");
+  if (state = drive_->read_state(deadline); !state) return pass_on(state, "turntable");
+  if (!state->fault) return {};
+  const auto alarm = drive_->read_alarm(deadline);
+  if (!alarm) return pass_on(alarm, "turntable");
+  return fail(ErrorCode::device_alarm, "turntable: the alarm stays: {}; remove its cause", *alarm);
+}
+
+Result<TurntableStatus> AxisTurntable::status(Deadline deadline) {
+  const auto state = read_after_owed_stop(deadline);
+  if (!state) return pass_on(state, "turntable");
+  TurntableStatus status;
+  status.motion = state->running ? TurntableStatus::Motion::moving : TurntableStatus::Motion::standing;
+  status.homed = homed_ && state->homed;
+  if (status.homed) status.angle = options_.scale.angle(state->position);
+  if (state->fault) {
+    const auto alarm = drive_->read_alarm(deadline);
+    if (!alarm) return pass_on(alarm, "turntable");
+    status.alarm = alarm->empty() ? "a fault without a code" : *alarm;
+  }
+  return status;
+}
+
+Result<void> AxisTurntable::limit_speed(std::optional<DegreesPerSecond> limit) {
+  const auto set = drive_->set_speed(std::min(options_.speed, limit.value_or(options_.speed)));
+  if (!set) return pass_on(set, "turntable");
+  return {};
+}
+
+void AxisTurntable::request_stop() noexcept {
+  {
+    const std::scoped_lock lock(mutex_);
+    stop_requested_ = true;
+  }
+  drive_->hurry(true);
+  clock_.notify_all(wake_);
+}
+
+}  // namespace scanrig

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "drivers/turntable/axis_drive.h"
+#include "drivers/turntable/turntable.h"
+
+namespace scanrig {
+
+struct AxisTurntableOptions {
+  AxisScale scale;                   ///< checked against the drive when homing
+  std::string home_mode = "switch";  ///< how the drive homes, or "here": the present position is home
+  DegreesPerSecond speed{45};
+  DegreesPerSecond2 acceleration{90};
+  Degrees backlash{0.5};
+  Degrees tolerance{0.02};  ///< between target and measured angle, at the table
+  std::chrono::milliseconds settle{200};
+  std::optional<AngleRange> soft_limits;
+};
+
+/// A turntable moved by a motor drive: what a move is, whatever the drive speaks. A move has arrived when the drive
+/// says in position and its position is within the tolerance, both without a break for the settle time. rotate_to()
+/// takes the angle modulo 360 degrees and goes the shorter way, ending counter-clockwise; `out_of_range` and
+/// `not_homed` found before anything was sent leave home as it is. When the stop after a failure could not be
+/// delivered, it is the first thing sent once the drive answers again.
+class AxisTurntable : public Turntable {
+ public:
+  Result<void> home(Deadline deadline) override;
+  Result<Move> rotate_to(Degrees target, Deadline deadline) override;
+  Result<void> stop(Deadline deadline) override;
+  Result<void> reset_alarm(Deadline deadline) override;
+  Result<TurntableStatus> status(Deadline deadline) override;
+  Result<void> limit_speed(std::optional<DegreesPerSecond> limit) override;
+  void request_stop() noexcept override;
+
+ protected:
+  /// `reply_timeout`: the longest that the drive takes to answer. `counter`: what it can count.
+  AxisTurntable(AxisTurntableOptions options, std::unique_ptr<AxisDrive> drive, Clock::Duration reply_timeout,
+                MovePlanner::Counter counter, Clock& clock);
+
+ private:
+  enum class Seen { waiting, progress, done, homeless };
+  struct Arrival {
+    Clock::TimePoint in_position;
+    Clock::TimePoint still;
+    std::int32_t position = 0;
+  };
+  using Look = std::function<Seen(const DriveState&)>;
+
+  Result<void> find_home(Deadline deadline);
+  Result<void> check_and_enable(Deadline deadline);
+  Result<Move> turn(Degrees target, const DriveState& before, const MovePlan& plan, Deadline deadline);
+  Result<Arrival> run_to(std::int32_t target, const DriveState& before, Clock::Duration settle, Deadline deadline);
+
+  Result<void> command(const std::function<Result<void>()>& send, const std::function<bool(const DriveState&)>& obeyed,
+                       Deadline deadline);
+  Result<void> watch(std::string_view doing, const Look& look, Deadline deadline);
+  Result<void> healthy(const DriveState& state, Deadline deadline);
+  Result<void> not_stopped();
+  Result<DriveState> ask(Deadline deadline);
+  Result<DriveState> read_after_owed_stop(Deadline deadline);
+  Result<void> stop_drive(Deadline deadline);
+  tl::unexpected<Error> give_up(const Error& error);
+  void pause();
+
+  [[nodiscard]] std::int32_t tolerance_pulses() const;
+  [[nodiscard]] bool near(std::int32_t a, std::int32_t b) const;
+
+  AxisTurntableOptions options_;
+  MovePlanner planner_;
+  Clock::Duration reply_timeout_;
+  Clock& clock_;
+  std::unique_ptr<AxisDrive> drive_;
+  bool homed_ = false;
+  bool flank_loaded_ = false;  // the last move ended counter-clockwise
+  bool stop_owed_ = false;     // a stop could not be delivered
+
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool stop_requested_ = false;  // guarded by mutex_
+};
+
+}  // namespace scanrig

@@ -1,0 +1,164 @@
+#include "sim/wire/oriental_drive.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+
+namespace scanrig::sim::wire {
+namespace {
+
+constexpr std::uint8_t kIllegalAddress = 2, kIllegalValue = 3;
+constexpr std::uint16_t kDirectData = 0x0058, kType = 0x005A, kPosition = 0x005C, kSpeed = 0x005E,
+                        kAcceleration = 0x0060, kDeceleration = 0x0062, kCurrent = 0x0064, kTrigger = 0x0066,
+                        kInput = 0x007D, kStatus = 0x007F, kAlarm = 0x0080, kCommandPosition = 0x00C6,
+                        kFeedback = 0x00CC, kPreset = 0x018A, kGearA = 0x0380, kGearB = 0x0382;
+constexpr std::uint16_t kZhome = 1u << 4, kStop = 1u << 5, kAlarmReset = 1u << 7;
+constexpr double kInPositionPulses = 18;   ///< 1.8 degrees of a motor with 1000 pulses are 5; wider with a finer gear
+constexpr double kZhomeTurnsPerS = 100;    ///< of the motor
+constexpr double kZhomeTurnsPerS2 = 1000;  ///< of the motor
+constexpr double kFactoryPulses = 1000;
+
+}  // namespace
+
+OrientalDrive::OrientalDrive(const AxisOptions& axis, Clock& clock) : SimulatedDrive(axis, clock) {
+  const auto add = [&](unsigned first, unsigned last) {
+    for (unsigned address = first; address <= last; ++address) registers_[static_cast<std::uint16_t>(address)] = 0;
+  };
+  add(kDirectData, kTrigger + 1);
+  add(0x007C, kAlarm + 1);
+  add(kCommandPosition, kCommandPosition + 1);
+  add(kFeedback, kFeedback + 1);
+  add(kPreset, kPreset + 1);
+  add(kGearA, kGearB + 1);
+  put_pair(kGearA, 1);
+  put_pair(kGearB, static_cast<std::int32_t>(axis.pulses_per_motor_rev / kFactoryPulses));
+  axis_.set_counter(
+      static_cast<std::int32_t>(std::lround(axis.start_deg * axis.pulses_per_motor_rev * axis.gear_ratio / 360.0)));
+}
+
+std::int32_t OrientalDrive::pair(std::uint16_t upper) const {
+  return static_cast<std::int32_t>(std::uint32_t{registers_[upper]} << 16 |
+                                   registers_[static_cast<std::uint16_t>(upper + 1)]);
+}
+
+void OrientalDrive::put_pair(std::uint16_t upper, std::int32_t value) const {
+  registers_[upper] = static_cast<std::uint16_t>(static_cast<std::uint32_t>(value) >> 16);
+  registers_[static_cast<std::uint16_t>(upper + 1)] =
+      static_cast<std::uint16_t>(static_cast<std::uint32_t>(value) & 0xFFFF);
+}
+
+std::uint8_t OrientalDrive::read(std::uint16_t address, std::span<std::uint16_t> values) {
+  const std::scoped_lock lock(mutex_);
+  refresh();
+  for (std::uint16_t& value : values) {
+    const auto found = registers_.find(address++);
+    if (found == registers_.end()) return kIllegalAddress;
+    value = found->second;
+  }
+  return 0;
+}
+
+std::uint8_t OrientalDrive::write(std::uint16_t address, std::span<const std::uint16_t> values) {
+  const std::scoped_lock lock(mutex_);
+  refresh();
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const auto at = static_cast<std::uint16_t>(address + i);
+    if (!registers_.contains(at) || at == kStatus || at == kFeedback) return kIllegalAddress;
+  }
+  if (address == kDirectData && values.size() == 16 && (values[3] < 1 || values[3] > 3)) return kIllegalValue;
+  for (const std::uint16_t value : values) {
+    const std::uint16_t before = registers_[address];
+    if (address == kInput) input(value);
+    registers_[address] = value;
+    if (address == kTrigger + 1 && value == 1) start_direct_data();
+    if (address == kPreset + 1 && value == 1 && before == 0) {
+      axis_.set_counter(0);
+      homed_ = true;
+    }
+    ++address;
+  }
+  refresh();
+  return 0;
+}
+
+/// STOP is a level, the others act on their edge.
+void OrientalDrive::input(std::uint16_t now) {
+  const auto risen = static_cast<std::uint16_t>(now & ~registers_[kInput]);
+  if ((risen & kAlarmReset) != 0 && alarm_can_be_reset_) put_pair(kAlarm, 0);
+  if ((now & kStop) != 0) {
+    homing_ = false;
+    axis_.quick_stop();
+    return;
+  }
+  if ((risen & kZhome) == 0 || pair(kAlarm) != 0) return;
+  homed_ = false;
+  homing_ = true;
+  axis_.follow_motor();
+  axis_.move_to(0, {kZhomeTurnsPerS * pulses_per_motor_rev_, kZhomeTurnsPerS2 * pulses_per_motor_rev_,
+                    kZhomeTurnsPerS2 * pulses_per_motor_rev_});
+}
+
+/// Refused in silence with an alarm or while STOP is held, as the real one does.
+void OrientalDrive::start_direct_data() {
+  if (pair(kAlarm) != 0 || (registers_[kInput] & kStop) != 0) return;
+  if (pair(kSpeed) <= 0 || pair(kAcceleration) <= 0 || pair(kDeceleration) <= 0 || pair(kCurrent) <= 0) {
+    put_pair(kAlarm, 0x70);  // operation data error
+    return;
+  }
+  const bool absolute = pair(kType) == 1;
+  homing_ = false;
+  axis_.follow_motor();
+  axis_.move_to(absolute ? pair(kPosition) : axis_.commanded() + pair(kPosition),
+                {static_cast<double>(pair(kSpeed)), static_cast<double>(pair(kAcceleration)),
+                 static_cast<double>(pair(kDeceleration))});
+}
+
+void OrientalDrive::follow() const {
+  if (homing_ && !axis_.running()) {
+    homing_ = false;
+    homed_ = true;
+  }
+  put_pair(kCommandPosition, axis_.commanded());
+  put_pair(kFeedback, axis_.measured());
+  registers_[kStatus] = status();
+}
+
+std::uint16_t OrientalDrive::status() const {
+  const bool alarm = pair(kAlarm) != 0;
+  const bool stop_held = (registers_[kInput] & kStop) != 0;
+  const double off = std::abs(static_cast<double>(axis_.commanded()) - axis_.measured());
+  unsigned bits = 0;
+  if (homed_) bits |= 1u << 4;
+  if (!alarm && !axis_.running() && !stop_held) bits |= 1u << 5;
+  if (alarm) bits |= 1u << 7;
+  if (axis_.running()) bits |= 1u << 13;
+  if (off <= kInPositionPulses * pulses_per_motor_rev_ / kFactoryPulses) bits |= 1u << 14;
+  return static_cast<std::uint16_t>(bits);
+}
+
+void OrientalDrive::raise_alarm(std::uint16_t code, bool can_be_reset) {
+  const std::scoped_lock lock(mutex_);
+  refresh();
+  put_pair(kAlarm, code);
+  alarm_can_be_reset_ = can_be_reset;
+  homing_ = false;
+  axis_.quick_stop();
+}
+
+void OrientalDrive::power_cycle() {
+  const std::scoped_lock lock(mutex_);
+  refresh();
+  axis_.quick_stop();
+  homed_ = homing_ = false;
+  put_pair(kAlarm, 0);
+  registers_[kInput] = 0;
+}
+
+void OrientalDrive::send(std::int32_t pulses) {
+  const std::scoped_lock lock(mutex_);
+  refresh();
+  axis_.move_to(axis_.commanded() + pulses,
+                {2.25 * pulses_per_motor_rev_, 100 * pulses_per_motor_rev_, 100 * pulses_per_motor_rev_});
+}
+
+}  // namespace scanrig::sim::wire

@@ -1,0 +1,88 @@
+#include "sim/wire/wire_server.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace scanrig::sim::wire {
+
+using std::chrono::milliseconds;
+
+void WireServer::vanish() {
+  const std::scoped_lock lock(port_mutex_);
+  thread_ = {};
+  pty_.reset();
+}
+
+Result<void> WireServer::come_back() {
+  const std::scoped_lock lock(port_mutex_);
+  if (pty_) return {};
+  auto pty = Pty::open(link_);
+  if (!pty) return pass_on(pty);
+  pty_.emplace(std::move(*pty));
+  thread_ = std::jthread([this](const std::stop_token& stop) { serve(stop, *pty_); });
+  return {};
+}
+
+void WireServer::inject(const WireFault& fault) {
+  const std::scoped_lock lock(mutex_);
+  faults_.push_back(fault);
+}
+
+void WireServer::clear_faults() {
+  const std::scoped_lock lock(mutex_);
+  faults_.clear();
+}
+
+std::vector<WireFrame> WireServer::log() const {
+  const std::scoped_lock lock(mutex_);
+  return log_;
+}
+
+void WireServer::clear_log() {
+  const std::scoped_lock lock(mutex_);
+  log_.clear();
+}
+
+void WireServer::note(bool from_master, const Bytes& bytes) {
+  const std::scoped_lock lock(mutex_);
+  log_.push_back({clock_.now(), from_master, bytes});
+}
+
+std::optional<WireFault> WireServer::next_fault(std::uint8_t function) {
+  const std::scoped_lock lock(mutex_);
+  for (auto fault = faults_.begin(); fault != faults_.end(); ++fault) {
+    if (fault->function && *fault->function != function) continue;
+    const WireFault found = *fault;
+    if (fault->count > 0 && --fault->count == 0) faults_.erase(fault);
+    return found;
+  }
+  return std::nullopt;
+}
+
+void WireServer::send(const std::stop_token& stop, Pty& pty, Bytes answer, const std::optional<WireFault>& fault) {
+  using Kind = WireFault::Kind;
+  const Bytes good = answer;
+  if (fault && !answer.empty()) {
+    switch (fault->kind) {
+      case Kind::answer_lost: answer.clear(); break;
+      case Kind::wrong_crc: answer[answer.size() - 1 - answer.size() / 4] ^= 0x9A; break;
+      case Kind::cut_short: answer.resize(answer.size() / 2); break;
+      case Kind::earlier_answer: answer = last_answer_; break;
+      case Kind::late: {
+        // In slices, so that the adapter can be pulled meanwhile.
+        for (const auto at = clock_.now() + fault->delay; clock_.now() < at && !stop.stop_requested();) {
+          clock_.sleep_for(std::min<Clock::Duration>(at - clock_.now(), milliseconds(5)));
+        }
+        break;
+      }
+      case Kind::deaf:
+      case Kind::refuse: break;
+    }
+  }
+  last_answer_ = good;
+  if (answer.empty()) return;
+  note(false, answer);
+  pty.write(answer);
+}
+
+}  // namespace scanrig::sim::wire

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <vector>
+
+#include "core/clock.h"
+#include "core/result.h"
+#include "sim/wire/modbus_frame.h"
+#include "sim/wire/pty.h"
+
+namespace scanrig::sim::wire {
+
+/// A way to misbehave towards the next requests.
+struct WireFault {
+  enum class Kind {
+    deaf,           ///< does not hear the request
+    answer_lost,    ///< obeys, its answer is lost
+    late,           ///< obeys, answers `delay` later; meanwhile it hears nothing else
+    wrong_crc,      ///< obeys, the answer is damaged
+    cut_short,      ///< obeys, half of the answer arrives
+    refuse,         ///< does not obey, answers with `exception`
+    earlier_answer  ///< obeys, repeats the answer it gave before
+  };
+  Kind kind = Kind::deaf;
+  int count = -1;                          ///< requests to spoil; negative: all
+  std::optional<std::uint8_t> function{};  ///< spoil only requests of this kind: Modbus function, or first letter
+  std::chrono::milliseconds delay{0};
+  std::uint8_t exception = 4;
+};
+
+/// One frame, as it passed the far end of the wire.
+struct WireFrame {
+  Clock::TimePoint at;
+  bool from_master = false;
+  Bytes bytes;
+};
+
+/// A device on a pseudo-terminal, in a thread of its own. The device's state changes before it answers.
+/// Threads: every function may be called from any thread.
+class WireServer {
+ public:
+  virtual ~WireServer() = default;
+
+  void inject(const WireFault& fault);
+  void clear_faults();
+  /// Pulls the adapter, and plugs it in again (fails with `io`).
+  void vanish();
+  Result<void> come_back();
+
+  [[nodiscard]] std::vector<WireFrame> log() const;
+  void clear_log();
+
+ protected:
+  WireServer(std::filesystem::path link, Clock& clock) : link_(std::move(link)), clock_(clock) {}
+
+  /// Serves the line until stopped. Who derives from this calls vanish() in its destructor.
+  virtual void serve(const std::stop_token& stop, Pty& pty) = 0;
+
+  void note(bool from_master, const Bytes& bytes);
+  std::optional<WireFault> next_fault(std::uint8_t function);
+  /// Sends the answer to a request, spoilt as the fault says.
+  void send(const std::stop_token& stop, Pty& pty, Bytes answer, const std::optional<WireFault>& fault);
+
+  Clock& clock() { return clock_; }
+
+ private:
+  const std::filesystem::path link_;
+  Clock& clock_;
+
+  mutable std::mutex mutex_;
+  std::deque<WireFault> faults_;
+  std::vector<WireFrame> log_;
+  Bytes last_answer_;  // server's thread only
+
+  std::mutex port_mutex_;
+  std::optional<Pty> pty_;
+  std::jthread thread_;
+};
+
+}  // namespace scanrig::sim::wire
