@@ -54,7 +54,7 @@ class AxisDrive {
   /// The same at once where the answer to the last request was missed, when stop() would first wait for a quiet line.
   /// Whoever calls it calls stop() next.
   virtual void stop_unheard() = 0;
-  /// While on, no request waits for a quiet line: it fails with `timeout` instead.
+  /// While on, no request waits for a quiet line: it fails with `stopped` instead.
   virtual void hurry(bool on) noexcept = 0;
 
   /// Whether the last request may have been carried out although it failed.

@@ -62,7 +62,7 @@ Result<void> Link::wait_until_quiet(Deadline deadline) {
     if (deadline.expired(clock_)) {
       return fail(ErrorCode::timeout, "{}: the deadline passed before the line fell silent", options_.device);
     }
-    if (hurry_) return fail(ErrorCode::timeout, "{}: called off before the line fell silent", options_.device);
+    if (hurry_) return fail(ErrorCode::stopped, "{}: called off before the line fell silent", options_.device);
     const auto line = next_line(std::min<Clock::Duration>(quiet_at - clock_.now(), kLook));
     if (!line) return pass_on(line);
     if (*line) quiet_at = clock_.now() + silence;

@@ -45,7 +45,7 @@ class Revolution {
     const auto acceleration = o.scale.acceleration_word(o.acceleration, o.profile);
     if (!speed) return pass_on(speed);
     if (!acceleration) return pass_on(acceleration);
-    return DriveMotion{*speed, *acceleration, *acceleration};
+    return DriveMotion{*speed, *acceleration, *acceleration, *speed};
   }
 
   Result<double> step_aside(int side) {
@@ -72,7 +72,7 @@ class Revolution {
     const auto fast = motion(kHomingShare);
     if (!before) return pass_on(before);
     if (!fast) return pass_on(fast);
-    if (auto set = drive_.set_homing(options_.home_mode, *fast, fast->speed, by); !set) return pass_on(set);
+    if (auto set = drive_.set_homing(options_.home_mode, *fast, by); !set) return pass_on(set);
     if (auto started = drive_.start_homing(by); !started) return pass_on(started);
     // The furthest way seen, not the last: state and position are read in turn, and home sets the position to zero.
     double furthest = 0.0;
