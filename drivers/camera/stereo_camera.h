@@ -31,8 +31,8 @@ struct StereoFrame {
   PixelFormat format = PixelFormat::mono8;
   std::uint64_t trigger = 0;  ///< how many triggers since arm(), this one included
   Clock::TimePoint taken;
-  ImageEvidence left_evidence;
-  ImageEvidence right_evidence;
+  ImageEvidence left_evidence = {};
+  ImageEvidence right_evidence = {};
 };
 
 /// Two synchronised sensors, bound by serial number, triggered by the projector's edge.
