@@ -117,6 +117,7 @@ Result<void> AravisSensor::connect() {
       attempt_("connect to " + device, [&](GError** error) { camera_.reset(arv_camera_new(device.c_str(), error)); });
   if (!opened) return opened;
   lost_ = false;
+  arv_camera_set_range_check_policy(camera_.get(), ARV_RANGE_CHECK_POLICY_ENABLE);
   g_signal_connect(arv_camera_get_device(camera_.get()), "control-lost", G_CALLBACK(on_control_lost), &lost_);
   std::string serial;
   const auto asked = attempt_("read the serial number", [&](GError** error) {

@@ -216,7 +216,8 @@ Result<void> SensorCamera::expect_no_more(Channel& channel) {
 }
 
 Result<void> SensorCamera::expect_one_moment(const std::vector<SensorFrame>& frames) {
-  if (frames.size() < 2 || options_.by == TriggeringOptions::By::free_run) return {};
+  // Without a common edge there is no common moment: the light stays on, and the table stands.
+  if (frames.size() < 2 || options_.by != TriggeringOptions::By::line) return {};
   Channel &left = channels_[0], &right = channels_[1];
   const auto left_time = frames[0].stamp.time, right_time = frames[1].stamp.time;
   std::chrono::nanoseconds apart{0}, since{0};

@@ -104,6 +104,7 @@ Result<std::unique_ptr<GigeCameras>> GigeCameras::start(const GigeCamerasOptions
     own.serial = side == Side::left ? options.left_serial : options.right_serial;
     own.size = options.size;
     own.late_by = options.late_by;
+    own.trigger_selector = options.trigger_selector;
     // No two crystals agree.
     own.clock_ahead = side == Side::left ? std::chrono::seconds(4711) : std::chrono::seconds(-123);
     own.clock_drift = side == Side::left ? 30e-6 : -40e-6;

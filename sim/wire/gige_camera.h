@@ -45,6 +45,7 @@ struct GigeCamerasOptions {
   std::string right_serial = "40012346";
   cv::Size size{160, 120};
   std::chrono::milliseconds late_by{150};
+  std::string trigger_selector = "FrameStart";  ///< what the trigger that starts a frame is called
 };
 
 /// Share of the frames each fault happens to, by chance, to one of the two sensors at a time.

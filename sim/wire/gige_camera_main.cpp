@@ -1,6 +1,6 @@
 // scanrig-gige-camera: two GigE Vision cameras in a process of their own, for tests of the camera driver.
 //
-//   scanrig-gige-camera GPIO_SOCKET WIDTH HEIGHT LATE_MS
+//   scanrig-gige-camera GPIO_SOCKET WIDTH HEIGHT LATE_MS [TRIGGER_SELECTOR]
 //
 // Serves the trigger lines DOTS and PLAIN on GPIO_SOCKET (see gpio_socket.h): a rising edge exposes both cameras. Says
 // "ready" when both answer on the wire. Obeys, one line each, answered by "ok" or words:
@@ -90,12 +90,13 @@ int run(const std::string& socket, GigeCamerasOptions options) {
 }  // namespace scanrig::sim::wire
 
 int main(int argc, char** argv) {
-  if (argc != 5) {
-    std::cerr << "usage: scanrig-gige-camera GPIO_SOCKET WIDTH HEIGHT LATE_MS\n";
+  if (argc < 5 || argc > 6) {
+    std::cerr << "usage: scanrig-gige-camera GPIO_SOCKET WIDTH HEIGHT LATE_MS [TRIGGER_SELECTOR]\n";
     return static_cast<int>(scanrig::ExitCode::usage);
   }
   scanrig::sim::wire::GigeCamerasOptions options;
   options.size = {std::atoi(argv[2]), std::atoi(argv[3])};
   options.late_by = std::chrono::milliseconds(std::atoi(argv[4]));
+  if (argc == 6) options.trigger_selector = argv[5];
   return scanrig::sim::wire::run(argv[1], options);
 }

@@ -1,9 +1,13 @@
 #include "sim/wire/gige_sensor.h"
 
+#include <arpa/inet.h>
 #include <arv.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
@@ -12,8 +16,8 @@
 namespace scanrig::sim::wire {
 namespace {
 
-/// Aravis' own description, with Line0 standing for the software trigger.
-std::string genicam_description() {
+/// Aravis' own description, with Line0 standing for the software trigger, and with `selector` for FrameStart.
+std::string genicam_description(const std::string& selector) {
   ArvFakeCamera* sample = arv_fake_camera_new("sample");
   std::size_t size = 0;
   const char* bytes = arv_fake_camera_get_genicam_xml(sample, &size);
@@ -22,7 +26,45 @@ std::string genicam_description() {
   const std::size_t line = text.find("Name=\"Line0\"");
   const std::size_t value = text.find("<Value>0</Value>", line);
   if (line != std::string::npos && value != std::string::npos) text.replace(value, 16, "<Value>1</Value>");
+  const std::string frame_start = "Name=\"FrameStart\"";
+  if (const auto name = text.find(frame_start); name != std::string::npos) {
+    text.replace(name, frame_start.size(), "Name=\"" + selector + "\"");
+  }
   return text;
+}
+
+/// Mean over 5x5 pixels, of those there are at the rim.
+void blur(cv::Mat& image) {
+  constexpr int kReach = 2;
+  const cv::Mat sharp = image.clone();
+  const cv::Rect whole(0, 0, image.cols, image.rows);
+  for (int y = 0; y < image.rows; ++y) {
+    for (int x = 0; x < image.cols; ++x) {
+      const cv::Rect around(x - kReach, y - kReach, 2 * kReach + 1, 2 * kReach + 1);
+      image.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(cv::mean(sharp(around & whole))[0]);
+    }
+  }
+}
+
+/// A socket for nudge(), or -1.
+int socket_to(const std::string& address) {
+  sockaddr_in camera{};
+  camera.sin_family = AF_INET;
+  camera.sin_port = htons(3956);
+  ::inet_pton(AF_INET, address.c_str(), &camera.sin_addr);
+  const int descriptor = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+  std::ignore = ::connect(descriptor, reinterpret_cast<const sockaddr*>(&camera), sizeof camera);
+  return descriptor;
+}
+
+/// Aravis' camera looks at its trigger register every millisecond, but now and then only after 100 ms or the next
+/// packet: a discovery request [GigE Vision 1.2, 14.1] is one.
+void nudge(int descriptor) {
+  constexpr std::array<std::uint8_t, 8> kDiscovery{0x42, 0x01, 0x00, 0x02, 0x00, 0x00, 0x00, 0x01};
+  std::array<std::uint8_t, 512> answer;
+  while (::recv(descriptor, answer.data(), answer.size(), 0) > 0) {
+  }
+  std::ignore = ::send(descriptor, kDiscovery.data(), kDiscovery.size(), 0);
 }
 
 std::uint16_t id_after(std::uint16_t id) { return id == 65535 ? 1 : static_cast<std::uint16_t>(id + 1); }
@@ -35,7 +77,7 @@ Result<std::unique_ptr<GigeSensor>> GigeSensor::start(const GigeSensorOptions& o
   const int descriptor = ::mkstemp(file.data());
   if (descriptor < 0) return fail(ErrorCode::io, "no temporary file {}", file);
   ::close(descriptor);
-  std::ofstream(file) << genicam_description();
+  std::ofstream(file) << genicam_description(options.trigger_selector);
   std::unique_ptr<GigeSensor> sensor(new GigeSensor(options, std::move(source), clock, file));
   if (auto plugged = sensor->plug(true); !plugged) return pass_on(plugged);
   return sensor;
@@ -47,6 +89,7 @@ GigeSensor::GigeSensor(const GigeSensorOptions& options, FrameSource source, Clo
       clock_(clock),
       description_(std::move(description)),
       started_(clock.now()),
+      nudge_socket_(socket_to(options.address)),
       sender_([this](const std::stop_token& stop) { send_frames(stop); }) {}
 
 GigeSensor::~GigeSensor() {
@@ -54,6 +97,7 @@ GigeSensor::~GigeSensor() {
   changed_.notify_all();
   sender_.join();
   std::ignore = plug(false);
+  ::close(nudge_socket_);
   std::error_code ignored;
   std::filesystem::remove(description_, ignored);
 }
@@ -142,11 +186,13 @@ void GigeSensor::send_frames(const std::stop_token& stop) {
     if (due) {
       triggered_ = *first;
       queue_.erase(first);
-      if (core_) arv_fake_camera_write_register(core_, ARV_FAKE_CAMERA_REGISTER_TRIGGER_SOFTWARE, 1);
-      continue;
+      arv_fake_camera_write_register(core_, ARV_FAKE_CAMERA_REGISTER_TRIGGER_SOFTWARE, 1);
     }
-    auto wake = now + std::chrono::milliseconds(100);
-    if (first != queue_.end() && !triggered_) wake = std::min(wake, first->due);
+    if (triggered_) nudge(nudge_socket_);
+    auto wake = now + std::chrono::milliseconds(triggered_ ? 2 : 100);
+    if (!triggered_) {
+      for (const Frame& frame : queue_) wake = std::min(wake, frame.due);
+    }
     const std::size_t waiting = queue_.size();
     const bool busy = triggered_.has_value();
     clock_.wait_until(lock, changed_, wake, [&] {
@@ -175,7 +221,7 @@ void GigeSensor::fill(ArvBuffer* buffer) {
     camera = camera_;
     clock_.notify_all(changed_);
   }
-  constexpr double kTornShare = 0.3;
+  constexpr double kTornShare = 0.5;
   if (camera) g_object_set(camera, "gvsp-lost-ratio", frame.fault == GigeFault::torn ? kTornShare : 0.0, nullptr);
   arv_buffer_set_frame_id(buffer, frame.id);
   arv_buffer_set_timestamp(buffer, static_cast<std::uint64_t>(frame.stamp.count()));
@@ -199,14 +245,7 @@ void GigeSensor::draw(const Frame& frame, cv::Mat& image) const {
   source_(side, frame.exposure, image);
   if (frame.fault == GigeFault::dark) image.setTo(3);
   if (frame.fault == GigeFault::blurred) {
-    const cv::Mat sharp = image.clone();
-    constexpr int kReach = 3;
-    for (int y = kReach; y < image.rows - kReach; ++y) {
-      for (int x = kReach; x < image.cols - kReach; ++x) {
-        const cv::Rect around(x - kReach, y - kReach, 2 * kReach + 1, 2 * kReach + 1);
-        image.at<std::uint8_t>(y, x) = cv::saturate_cast<std::uint8_t>(cv::mean(sharp(around))[0]);
-      }
-    }
+    for (int pass = 0; pass < 2; ++pass) blur(image);
   }
   hide_number(static_cast<std::uint32_t>(frame.exposure.number), image);
 }

@@ -19,6 +19,7 @@ struct GigeSensorOptions {
   std::string address, serial;
   cv::Size size;
   std::chrono::milliseconds late_by{0};
+  std::string trigger_selector;
   std::chrono::nanoseconds clock_ahead{0};
   double clock_drift = 0.0;
 };
@@ -56,6 +57,7 @@ class GigeSensor {
   Clock& clock_;
   const std::string description_;  // file of the GenICam description
   const Clock::TimePoint started_;
+  const int nudge_socket_;
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;

@@ -1,5 +1,4 @@
-#include <gmock/gmock.h>
-
+#include <map>
 #include <sstream>
 
 #include "tests/component/camera/aravis_bench.h"
@@ -8,7 +7,6 @@ namespace scanrig {
 namespace {
 
 using std::chrono::milliseconds;
-using testing::HasSubstr;
 
 /// The hidden number decides: what is handed out is of this trigger, in both images.
 TEST(AravisFaults, OfAThousandTriggersWithLossesNoneGivesAMismatchedOrOlderPair) {
@@ -36,13 +34,12 @@ TEST(AravisFaults, OfAThousandTriggersWithLossesNoneGivesAMismatchedOrOlderPair)
   int lost = 0, late = 0, torn = 0, stale = 0;
   counts >> lost >> late >> torn >> stale;
   EXPECT_GT(lost * late * torn * stale, 0);
-  EXPECT_GE(named[ErrorCode::timeout] + named[ErrorCode::protocol], lost + late + torn + stale);
   const TriggerCounts& seen = bench.camera().counts();
-  RecordProperty("happened", fmt::format("{} lost {} late {} torn {} stale", lost, late, torn, stale));
-  std::cout << fmt::format(
-      "happened: {} lost, {} late, {} torn, {} stale; named: {} lost, {} torn, {} old, {} odd; {} strays, {} "
-      "warm-ups\n",
-      lost, late, torn, stale, seen.lost, seen.torn, seen.old, seen.odd, seen.strays, seen.warm_up);
+  EXPECT_GE(seen.lost, static_cast<std::uint64_t>(lost + late));  // and what a busy machine delays
+  EXPECT_EQ(seen.torn, static_cast<std::uint64_t>(torn));
+  EXPECT_EQ(seen.old, static_cast<std::uint64_t>(stale));
+  EXPECT_EQ(static_cast<std::uint64_t>(named[ErrorCode::timeout]), seen.lost);
+  EXPECT_EQ(static_cast<std::uint64_t>(named[ErrorCode::protocol]), seen.torn + seen.old + seen.odd);
 }
 
 }  // namespace
