@@ -46,9 +46,10 @@ function(scanrig_program name)
   target_link_libraries(${name} PRIVATE ${ARG_LINK} scanrig_warnings)
 endfunction()
 
-# scanrig_test(NAME LABEL unit|component|system SOURCES a_test.cpp ... LINK libs [TIMEOUT seconds])
+# scanrig_test(NAME LABEL unit|component|system SOURCES a_test.cpp ... LINK libs [TIMEOUT seconds] [REAL_TIME])
+# REAL_TIME: it holds deadlines of tens of milliseconds against a wire; nothing else runs beside it.
 function(scanrig_test name)
-  cmake_parse_arguments(ARG "" "LABEL;TIMEOUT" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "REAL_TIME" "LABEL;TIMEOUT" "SOURCES;LINK" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
@@ -57,6 +58,9 @@ function(scanrig_test name)
   target_compile_definitions(${name} PRIVATE SCANRIG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
   add_test(NAME ${name} COMMAND ${name})
   set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL} TIMEOUT ${ARG_TIMEOUT})
+  if(ARG_REAL_TIME)
+    set_tests_properties(${name} PROPERTIES RUN_SERIAL ON)
+  endif()
 endfunction()
 
 # Adds every folder below the current one that has a CMakeLists.txt, in the order given, the rest by name.

@@ -16,6 +16,7 @@ void read_trigger(Section& section, std::string_view key, DriveProfile::Trigger&
   section.section(key, [&](Section& s) {
     s.number("register", trigger.address, kWord);
     s.number("value", trigger.value, kWord);
+    if (s.has("release")) s.number("release", trigger.release.emplace(), kWord);
   });
 }
 
@@ -28,7 +29,6 @@ void read_bits(Section& section, std::string_view key, std::uint16_t& mask) {
       section.report(key, "holds a bit that is not between 0 and 15");
     }
   });
-  if (bits == 0) section.report(key, "must name at least one bit");
   mask = static_cast<std::uint16_t>(bits);
 }
 
@@ -39,13 +39,20 @@ void read_move(Section& s, DriveProfile::Move& move) {
                                                 {"speed", Word::speed},
                                                 {"acceleration", Word::acceleration},
                                                 {"deceleration", Word::deceleration}};
+  static const std::vector<Choice<Word>> kHighWords{{"speed_high", Word::speed_high},
+                                                    {"acceleration_high", Word::acceleration_high},
+                                                    {"deceleration_high", Word::deceleration_high}};
   s.number("register", move.address, kWord);
   s.items("words", [&](std::optional<std::int64_t> number, std::string_view name) {
-    const auto found = std::ranges::find(kWords, name, &Choice<Word>::name);
+    const auto known = [&](const std::vector<Choice<Word>>& words) {
+      const auto found = std::ranges::find(words, name, &Choice<Word>::name);
+      return found == words.end() ? std::nullopt : std::optional(found->value);
+    };
+    const auto word = known(kWords) ? known(kWords) : known(kHighWords);
     if (number && *number >= 0 && *number <= 0xFFFF) {
       move.words.push_back({Word::constant, static_cast<std::uint16_t>(*number)});
-    } else if (!number && found != kWords.end()) {
-      move.words.push_back({found->value, 0});
+    } else if (!number && word) {
+      move.words.push_back({*word, 0});
     } else {
       s.report("words", fmt::format("{} is neither a word (0 to 0xFFFF) nor a known name",
                                     number ? std::to_string(*number) : fmt::format("\"{}\"", name)));
@@ -56,16 +63,30 @@ void read_move(Section& s, DriveProfile::Move& move) {
       s.report("words", fmt::format("must contain \"{}\" exactly once", word.name));
     }
   }
+  for (const auto& word : kHighWords) {
+    if (std::ranges::count(move.words, word.value, &DriveProfile::Move::Item::word) > 1) {
+      s.report("words", fmt::format("must contain \"{}\" at most once", word.name));
+    }
+  }
 }
 
 void read_homing(Section& s, DriveProfile::Homing& homing) {
-  s.number("mode_register", homing.mode_address, kWord);
+  if (s.has("mode_register")) s.number("mode_register", homing.mode_address.emplace(), kWord);
   s.section("modes", [&](Section& modes) {
     for (const std::string& mode : modes.free_keys()) modes.number(mode, homing.modes[mode], kWord);
   });
-  s.number("speeds_register", homing.speeds_address, kWord);
+  if (s.has("speeds_register")) s.number("speeds_register", homing.speeds_address.emplace(), kWord);
+  if (s.has("zero_is_known")) s.flag("zero_is_known", homing.zero_is_known);
   read_trigger(s, "start", homing.start);
-  read_trigger(s, "set_zero", homing.set_zero);
+  if (s.has("set_zero")) read_trigger(s, "set_zero", homing.set_zero.emplace());
+}
+
+void read_soft_limits(Section& s, DriveProfile::SoftLimits& limits) {
+  int bit = 0;
+  s.number("control_register", limits.control_address, kWord);
+  s.number("control_bit", bit, {0, 15});
+  limits.control_mask = static_cast<std::uint16_t>(1u << bit);
+  s.number("register", limits.address, kWord);
 }
 
 void read_alarm(Section& s, DriveProfile::Alarm& alarm) {
@@ -105,9 +126,11 @@ Result<DriveProfile> read_drive_profile(const std::filesystem::path& file) {
     root.choice<Acceleration>(
         "acceleration_unit", profile.acceleration_unit,
         {{"ms_per_1000_rpm", Acceleration::ms_per_1000_rpm}, {"pulses_per_s2", Acceleration::pulses_per_s2}});
-    root.number("pulses_per_motor_rev_register", profile.pulses_per_motor_rev_address, kWord);
+    if (root.has("pulses_per_motor_rev_register")) {
+      root.number("pulses_per_motor_rev_register", profile.pulses_per_motor_rev_address.emplace(), kWord);
+    }
     root.number("feedback_register", profile.feedback_address, kWord);
-    read_trigger(root, "enable", profile.enable);
+    if (root.has("enable")) read_trigger(root, "enable", profile.enable.emplace());
     read_trigger(root, "stop", profile.stop);
     root.section("move", [&](Section& s) { read_move(s, profile.move); });
     root.section("status", [&](Section& s) {
@@ -117,15 +140,14 @@ Result<DriveProfile> read_drive_profile(const std::filesystem::path& file) {
       read_bits(s, "running", profile.status.running);
       read_bits(s, "in_position", profile.status.in_position);
       read_bits(s, "homed", profile.status.homed);
+      if (s.has("homed_stays")) s.flag("homed_stays", profile.status.homed_stays);
+      if (profile.status.fault == 0) s.report("fault", "must name at least one bit");
+      if (profile.status.running == 0) s.report("running", "must name at least one bit");
     });
     root.section("homing", [&](Section& s) { read_homing(s, profile.homing); });
-    root.section("soft_limits", [&](Section& s) {
-      int bit = 0;
-      s.number("control_register", profile.soft_limits.control_address, kWord);
-      s.number("control_bit", bit, {0, 15});
-      profile.soft_limits.control_mask = static_cast<std::uint16_t>(1u << bit);
-      s.number("register", profile.soft_limits.address, kWord);
-    });
+    if (root.has("soft_limits")) {
+      root.section("soft_limits", [&](Section& s) { read_soft_limits(s, profile.soft_limits.emplace()); });
+    }
     root.section("alarm", [&](Section& s) { read_alarm(s, profile.alarm); });
   });
   if (!read) return pass_on(read);

@@ -3,13 +3,12 @@
 namespace scanrig::config {
 namespace {
 
-gpio::LineSpec line_of(const Pin& pin) { return {pin.line, pin.active_low}; }
-
 const std::map<std::string, bool PanelInputs::*>& inputs_by_key() {
   static const std::map<std::string, bool PanelInputs::*> fields{{"start", &PanelInputs::start},
                                                                  {"stop", &PanelInputs::stop},
                                                                  {"reset", &PanelInputs::reset},
-                                                                 {"part_present", &PanelInputs::part_present}};
+                                                                 {"part_present", &PanelInputs::part_present},
+                                                                 {"flipped", &PanelInputs::flipped}};
   return fields;
 }
 
@@ -20,6 +19,17 @@ const std::map<std::string, bool PanelOutputs::*>& outputs_by_key() {
       {"busy", &PanelOutputs::busy},        {"flip_request", &PanelOutputs::flip_request},
       {"pass", &PanelOutputs::pass},        {"fail", &PanelOutputs::fail}};
   return fields;
+}
+
+/// Every wired signal at its place, as `wiring` of the driver at hand has it.
+template <class Options, class Wiring>
+Options panel_options(const RigConfig& rig, const Wiring& wiring) {
+  Options options;
+  options.inputs.emplace_back(&PanelInputs::estop_ok, wiring(rig.safety.estop));
+  if (rig.safety.guard) options.inputs.emplace_back(&PanelInputs::guard_closed, wiring(*rig.safety.guard));
+  for (const auto& [key, pin] : rig.panel.inputs) options.inputs.emplace_back(inputs_by_key().at(key), wiring(pin));
+  for (const auto& [key, pin] : rig.panel.outputs) options.outputs.emplace_back(outputs_by_key().at(key), wiring(pin));
+  return options;
 }
 
 }  // namespace
@@ -33,11 +43,15 @@ GpioProjectorOptions gpio_projector_options(const ProjectorConfig& projector) {
 }
 
 GpioPanelOptions gpio_panel_options(const RigConfig& rig) {
-  GpioPanelOptions options;
-  options.inputs.emplace_back(&PanelInputs::estop_ok, line_of(rig.safety.estop));
-  if (rig.safety.guard) options.inputs.emplace_back(&PanelInputs::guard_closed, line_of(*rig.safety.guard));
-  for (const auto& [key, pin] : rig.panel.inputs) options.inputs.emplace_back(inputs_by_key().at(key), line_of(pin));
-  for (const auto& [key, pin] : rig.panel.outputs) options.outputs.emplace_back(outputs_by_key().at(key), line_of(pin));
+  return panel_options<GpioPanelOptions>(rig, [](const Pin& pin) { return gpio::LineSpec{pin.line, pin.active_low}; });
+}
+
+ModbusIoPanelOptions modbus_io_panel_options(const RigConfig& rig) {
+  auto options = panel_options<ModbusIoPanelOptions>(rig, [](const Pin& pin) {
+    return ModbusIoPanelOptions::Signal{static_cast<std::uint16_t>(pin.channel), pin.active_low};
+  });
+  options.line = rig.panel.io_module;
+  options.poll = rig.panel.poll;
   return options;
 }
 

@@ -20,13 +20,32 @@ Pin read_pin(Section& section, std::string_view key, bool by_channel) {
   return pin;
 }
 
-void read_safety(Section& s, SafetyConfig& safety) {
+/// Two signals on one contact would hide each other. `others` are compared with, and not with one another.
+void report_shared(Section& s, const std::map<std::string, Pin>& pins, const std::map<std::string, Pin>& others) {
+  const auto compare = [&](const std::string& key, const Pin& pin, const std::map<std::string, Pin>& with) {
+    for (const auto& [name, other] : with) {
+      if (name == key || pin.line != other.line || pin.channel != other.channel) continue;
+      return s.report(key, fmt::format("is on the same contact as {}", name));
+    }
+  };
+  for (auto pin = pins.begin(); pin != pins.end(); ++pin) {
+    compare(pin->first, pin->second, {pins.begin(), pin});
+    compare(pin->first, pin->second, others);
+  }
+}
+
+/// The panel's driver watches e-stop and guard.
+void read_safety(Section& s, const PanelConfig& panel, SafetyConfig& safety) {
   using Home = SafetyConfig::HomeAfterRestart;
-  safety.estop = read_pin(s, "estop", false);
-  if (s.has("guard")) safety.guard = read_pin(s, "guard", false);
+  const bool by_channel = panel.driver == PanelConfig::Driver::modbus_io;
+  safety.estop = read_pin(s, "estop", by_channel);
+  if (s.has("guard")) safety.guard = read_pin(s, "guard", by_channel);
   s.choice<Home>("home_after_restart", safety.home_after_restart,
                  {{"on_reset", Home::on_reset}, {"guarded", Home::guarded}});
   s.flag("remote_start", safety.remote_start);
+  std::map<std::string, Pin> contacts{{"estop", safety.estop}};
+  if (safety.guard) contacts["guard"] = *safety.guard;
+  if (s.sound()) report_shared(s, contacts, panel.inputs);
   if (safety.guard) return;
   if (safety.remote_start) s.report("remote_start", "true needs a guard");
   if (safety.home_after_restart == Home::guarded) s.report("home_after_restart", "\"guarded\" needs a guard");
@@ -52,6 +71,13 @@ void read_projector(Section& s, std::chrono::microseconds exposure, ProjectorCon
   s.number("warm_up_s", projector.warm_up, {0, 7200});
 }
 
+void read_path(Section& s, std::string_view key, const std::filesystem::path& base, std::filesystem::path& path) {
+  std::string text;
+  s.text(key, text);
+  if (text.find('\0') != std::string::npos) return s.report(key, "is not a path");
+  path = base / text;
+}
+
 void read_sensor(Section& section, std::string_view key, SensorConfig& sensor) {
   section.section(key, [&](Section& s) {
     s.text("serial", sensor.serial);
@@ -59,13 +85,18 @@ void read_sensor(Section& section, std::string_view key, SensorConfig& sensor) {
   });
 }
 
-void read_stereo_camera(Section& s, StereoCameraConfig& camera) {
+void read_stereo_camera(Section& s, const std::filesystem::path& base, Cameras cameras, StereoCameraConfig& camera) {
   using Driver = StereoCameraConfig::Driver;
   using Edge = StereoCameraConfig::Edge;
   using FrameClock = StereoCameraConfig::FrameClock;
-  s.choice<Driver>(
-      "driver", camera.driver,
-      {{"aravis", Driver::aravis}, {"v4l2", Driver::v4l2}, {"v4l2-side-by-side", Driver::v4l2_side_by_side}});
+  std::vector<Choice<Driver>> drivers{
+      {"aravis", Driver::aravis}, {"v4l2", Driver::v4l2}, {"v4l2-side-by-side", Driver::v4l2_side_by_side}};
+  if (cameras == Cameras::or_simulated) drivers.push_back({"simulated", Driver::simulated});
+  s.choice<Driver>("driver", camera.driver, drivers);
+  if (camera.driver == Driver::simulated) {
+    read_path(s, "truth", base, camera.truth);
+    return s.number("exposure_us", camera.exposure, {10, 1'000'000});
+  }
   read_sensor(s, "left", camera.left);
   if (camera.driver != Driver::v4l2_side_by_side) {
     read_sensor(s, "right", camera.right);
@@ -96,15 +127,21 @@ void read_panel(Section& s, PanelConfig& panel) {
   using Driver = PanelConfig::Driver;
   s.choice<Driver>("driver", panel.driver, {{"gpio", Driver::gpio}, {"modbus-io", Driver::modbus_io}});
   const bool by_channel = panel.driver == Driver::modbus_io;
-  if (by_channel) read_modbus_line(s, panel.io_module);
+  if (by_channel) {
+    read_modbus_line(s, panel.io_module);
+    s.number("poll_ms", panel.poll, {5, 200});
+  }
   panel.inputs["start"] = read_pin(s, "start", by_channel);
-  for (const char* key : {"stop", "reset", "part_present"}) {
+  for (const char* key : {"stop", "reset", "part_present", "flipped"}) {
     if (s.has(key)) panel.inputs[key] = read_pin(s, key, by_channel);
   }
   for (const char* key :
        {"lamp_red", "lamp_amber", "lamp_green", "start_lamp", "flip_request", "busy", "pass", "fail"}) {
     if (s.has(key)) panel.outputs[key] = read_pin(s, key, by_channel);
   }
+  if (!s.sound()) return;
+  report_shared(s, panel.inputs, {});
+  report_shared(s, panel.outputs, {});
 }
 
 void read_recipes(Section& s, std::map<std::string, RecipeConfig>& recipes) {
@@ -122,13 +159,6 @@ void read_recipes(Section& s, std::map<std::string, RecipeConfig>& recipes) {
   }
 }
 
-void read_folder(Section& s, std::string_view key, const std::filesystem::path& base, std::filesystem::path& path) {
-  std::string text;
-  s.text(key, text);
-  if (text.find('\0') != std::string::npos) return s.report(key, "is not a path");
-  path = base / text;
-}
-
 void read_reconstruction(Section& s, ReconstructionConfig& reconstruction) {
   using Executor = ReconstructionConfig::Executor;
   s.choice<Executor>("executor", reconstruction.executor,
@@ -138,38 +168,39 @@ void read_reconstruction(Section& s, ReconstructionConfig& reconstruction) {
 }
 
 void read_rig(Section& root, const std::filesystem::path& base, const std::vector<std::filesystem::path>& drives,
-              RigConfig& rig) {
+              Cameras cameras, RigConfig& rig) {
   int schema = 0;
   root.one_of("schema", schema, {1});
-  root.section("safety", [&](Section& s) { read_safety(s, rig.safety); });
   root.section("turntable", [&](Section& s) { read_turntable(s, drives, rig.turntable); });
-  root.section("stereo_camera", [&](Section& s) { read_stereo_camera(s, rig.stereo_camera); });
+  root.section("stereo_camera", [&](Section& s) { read_stereo_camera(s, base, cameras, rig.stereo_camera); });
   root.section("projector", [&](Section& s) { read_projector(s, rig.stereo_camera.exposure, rig.projector); });
   root.section("panel", [&](Section& s) { read_panel(s, rig.panel); });
-  root.section("calibration", [&](Section& s) { read_folder(s, "file", base, rig.calibration_file); });
+  root.section("safety", [&](Section& s) { read_safety(s, rig.panel, rig.safety); });
+  root.section("calibration", [&](Section& s) { read_path(s, "file", base, rig.calibration_file); });
   root.section("recipe", [&](Section& s) { read_recipes(s, rig.recipes); });
   root.section("storage", [&](Section& s) {
-    read_folder(s, "root", base, rig.storage.root);
+    read_path(s, "root", base, rig.storage.root);
     s.number("reserve_gib", rig.storage.reserve_gib, {0, 100'000});
   });
   root.section("reconstruction", [&](Section& s) { read_reconstruction(s, rig.reconstruction); });
   if (root.has("gpio")) {
-    root.section("gpio", [&](Section& s) { read_folder(s, "socket", base, rig.gpio_socket.emplace()); });
+    root.section("gpio", [&](Section& s) { read_path(s, "socket", base, rig.gpio_socket.emplace()); });
   }
   root.section("api", [&](Section& s) {
-    read_folder(s, "socket", base, rig.api.socket);
+    read_path(s, "socket", base, rig.api.socket);
     if (s.has("http_port")) s.number("http_port", rig.api.http_port.emplace(), {1024, 65535});
   });
 }
 
 }  // namespace
 
-Result<RigConfig> read_rig_config(const std::filesystem::path& file, const std::filesystem::path& drives) {
+Result<RigConfig> read_rig_config(const std::filesystem::path& file, const std::filesystem::path& drives,
+                                  Cameras cameras) {
   const auto base = file.parent_path();
   std::vector<std::filesystem::path> folders{drives};
   if (drives.empty()) folders = {base / "drives", base / ".." / "drives", "/usr/share/scanrig/drives"};
   RigConfig rig;
-  const auto read = read_toml(file, [&](Section& root) { read_rig(root, base, folders, rig); });
+  const auto read = read_toml(file, [&](Section& root) { read_rig(root, base, folders, cameras, rig); });
   if (!read) return pass_on(read);
   return rig;
 }

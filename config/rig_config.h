@@ -48,7 +48,7 @@ struct SensorConfig {
 };
 
 struct StereoCameraConfig {
-  enum class Driver { aravis, v4l2, v4l2_side_by_side };
+  enum class Driver { aravis, v4l2, v4l2_side_by_side, simulated };
   enum class Edge { rising, falling };
   enum class FrameClock { interval, ptp };
   Driver driver = Driver::aravis;
@@ -62,12 +62,14 @@ struct StereoCameraConfig {
   std::chrono::microseconds packet_delay{0};
   std::chrono::milliseconds frame_timeout{500};
   FrameClock frame_clock = FrameClock::interval;
+  std::filesystem::path truth;  ///< simulated: the control socket that tells where the table is
 };
 
 struct PanelConfig {
   enum class Driver { gpio, modbus_io };
   Driver driver = Driver::gpio;
   modbus::LineOptions io_module;       ///< modbus_io
+  std::chrono::milliseconds poll{20};  ///< modbus_io
   std::map<std::string, Pin> inputs;   ///< by the names of PanelInputs; `start` is always there
   std::map<std::string, Pin> outputs;  ///< by their keys, such as lamp_green
 };
@@ -110,9 +112,13 @@ struct RigConfig {
   std::optional<std::filesystem::path> gpio_socket;  ///< tests only: GPIO lines behind a socket instead of chips
 };
 
+/// Simulated cameras are for scanrigd-sim: to any other program they are not a known driver.
+enum class Cameras { real, or_simulated };
+
 /// Drive profiles are looked for in `drives`; by default in `drives` beside the file, in `../drives`, and in
 /// /usr/share/scanrig/drives.
 /// Fails with `not_found`, `io`, or `invalid_input`: at most 20 problems, each on a line of its own, in order of line.
-Result<RigConfig> read_rig_config(const std::filesystem::path& file, const std::filesystem::path& drives = {});
+Result<RigConfig> read_rig_config(const std::filesystem::path& file, const std::filesystem::path& drives = {},
+                                  Cameras cameras = Cameras::real);
 
 }  // namespace scanrig::config

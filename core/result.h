@@ -79,6 +79,7 @@ enum class ExitCode : int {
   below_limits = 8,
   unreachable = 9,
   stopped = 10,
+  partly_safe = 11,
 };
 
 ExitCode exit_code(ErrorCode code);

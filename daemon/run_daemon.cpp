@@ -21,9 +21,13 @@ std::string fresh_job_id(const std::filesystem::path& root) {
 
 void perform(const Action& action, RigThread& rig, JobThread& jobs) {
   std::visit(
-      Overloaded{[](const action::Warn&) {},  // the control loop's own
+      Overloaded{[](const action::Warn&) {},  // these are the control loop's own
+                 [](const action::WaitForEstop&) {}, [](const action::RetryStopLater&) {},
+                 [](const action::CheckLater&) {}, [](const action::TestLamps&) {},
                  [&](const action::Home&) { rig.home(); }, [&](const action::StopRig&) { rig.stop(); },
-                 [&](const action::TakeView& a) { rig.take_view(a); }, [&](const auto& task) { jobs.post(task); }},
+                 [&](const action::TakeView& a) { rig.take_view(a); }, [&](const action::Jog& a) { rig.jog(a); },
+                 [&](const action::Pulse&) { rig.pulse(); }, [&](const action::CheckDevices&) { rig.check_devices(); },
+                 [&](const auto& task) { jobs.post(task); }},
       action);
 }
 
@@ -35,7 +39,12 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   auto known = store->recover();
   if (!known) return pass_on(known);
 
-  const StationRules rules{options.jobs.poses, options.jobs.views, options.remote};
+  const StationRules rules{.poses = options.jobs.poses,
+                           .views = options.jobs.views,
+                           .remote = options.remote,
+                           .guard = options.guard,
+                           .home_guarded = options.home_guarded,
+                           .manual_light = options.manual_light};
   ControlLoop loop(clock, {.rules = rules, .warning = options.warning}, std::move(*known));
   const auto tell = [&loop](Event event) { loop.post(std::move(event)); };
 
@@ -48,7 +57,7 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   ReconstructionThread reconstruction(clock, options.reconstructor, rules.poses, rules.views, tell);
   JobThread jobs(clock, *store, reconstruction, options.on_scanned, tell);
   RigThread rig(devices, clock, options.acquisition, tell);
-  PanelThread panel(devices.panel, clock, tell);
+  PanelThread panel(devices.panel, clock, tell, [&rig] { rig.interrupt(); });
 
   const std::stop_callback shut_down(stop, [&loop] { loop.post(event::Shutdown{}); });
   const Clock::Actor actor(clock);

@@ -17,7 +17,10 @@ namespace scanrig {
 struct DaemonOptions {
   JobStoreOptions jobs;          ///< its poses and views are the recipe of every job
   std::filesystem::path socket;  ///< of the API
-  bool remote = false;           ///< the API may start and reset
+  bool remote = false;           ///< the API may start and home while the guard is closed
+  bool guard = false;            ///< there is a guard
+  bool home_guarded = false;     ///< after a restart a closed guard homes the table, without Reset
+  bool manual_light = false;     ///< a hand switches the projector
   AcquisitionOptions acquisition;
   Clock::Duration warning = std::chrono::seconds(2);
   ReconstructorFactory reconstructor;

@@ -1,7 +1,8 @@
 #include <CLI/CLI.hpp>
 
 #include "config/rig_config.h"
-#include "daemon/jobs/pipeline_reconstructor.h"
+#include "daemon/options_from.h"
+#include "daemon/rig/make_safe.h"
 #include "daemon/rig/open_devices.h"
 #include "daemon/run_daemon.h"
 #include "daemon/signal_stop.h"
@@ -9,22 +10,6 @@
 namespace {
 
 using namespace scanrig;
-
-DaemonOptions options_from(const config::RigConfig& config) {
-  const auto& recipe = config.recipes.at("default");
-  DaemonOptions options;
-  options.jobs = {.root = config.storage.root,
-                  .calibration_file = config.calibration_file,
-                  .profile = "",
-                  .poses = recipe.poses,
-                  .views = recipe.views};
-  options.socket = config.api.socket;
-  options.remote = config.safety.remote_start;
-  ReconstructOptions reconstruct;
-  reconstruct.voxel_mm = config.reconstruction.voxel_mm;
-  options.reconstructor = pipeline_reconstructor(reconstruct);
-  return options;
-}
 
 Result<void> run(const std::filesystem::path& file, const SignalStop& stop) {
   const auto config = config::read_rig_config(file);
@@ -40,7 +25,9 @@ Result<void> run(const std::filesystem::path& file, const SignalStop& stop) {
 int main(int argc, char** argv) {
   CLI::App app("scanrigd: the daemon of a scanning rig. Exit codes: docs/exit-codes.md");
   std::filesystem::path config = "/etc/scanrig/rig.toml";
+  bool make_safe = false;
   app.add_option("--config", config, "the rig's configuration")->capture_default_str();
+  app.add_flag("--make-safe", make_safe, "stop the table, light off, red lamp; for when the daemon has ended");
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp& help) {
@@ -49,6 +36,7 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "scanrigd: {}\n", error.what());
     return static_cast<int>(ExitCode::usage);
   }
+  if (make_safe) return static_cast<int>(make_safe_now(config::read_rig_config(config), "scanrigd"));
   const SignalStop stop;
   const auto done = run(config, stop);
   if (done) return static_cast<int>(ExitCode::ok);

@@ -61,6 +61,9 @@ ExitCode status(const Connection& connection, bool follow_job) {
     return ExitCode::ok;
   }
   fmt::print("{}: {}\n  because: {}\n", text(*answer, "machine"), text(*answer, "sentence"), text(*answer, "cause"));
+  for (const auto& device : answer->at("devices")) {
+    if (!device.at("ok").get<bool>()) fmt::print("  absent: {}\n", text(device.at("problem"), "message"));
+  }
   if (const auto action = text(*answer, "next_action"); !action.empty()) fmt::print("  next: {}\n", action);
   if (const auto job = text(*answer, "job"); !job.empty()) fmt::print("  job: {}\n", job);
   return ExitCode::ok;

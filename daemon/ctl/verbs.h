@@ -28,6 +28,13 @@ ExitCode start(const Connection& connection, bool follow);
 /// `button`: "stop" or "reset".
 ExitCode press(const Connection& connection, const std::string& button);
 
+struct MaintenanceVerb {
+  std::string what = "on";  ///< on, off, home, jog, pulse, lamp_test, io
+  std::optional<double> to_deg, by_deg;
+  double speed_deg_s = 10.0;
+};
+ExitCode maintenance(const Connection& connection, const MaintenanceVerb& verb);
+
 // Offline.
 
 struct ReconstructVerb {
@@ -55,5 +62,32 @@ struct CheckConfigVerb {
   std::filesystem::path drives;  ///< empty: where the daemon looks
 };
 ExitCode check_config(const CheckConfigVerb& verb);
+
+// At the rig, on the devices themselves, while no daemon runs.
+
+struct TurntableVerb {
+  std::string what;  ///< "home", "move", "status", "read"
+  double angle_deg = 0.0;
+  std::filesystem::path config = "/etc/scanrig/rig.toml";
+  bool yes = false;
+  bool json = false;
+};
+/// `move` homes first: an angle without a known zero is none.
+ExitCode turntable(const TurntableVerb& verb);
+
+struct PanelVerb {
+  std::filesystem::path config = "/etc/scanrig/rig.toml";
+  int seconds = 0;  ///< 0: until interrupted
+};
+ExitCode watch_panel(const PanelVerb& verb);
+
+struct DoctorVerb {
+  std::filesystem::path config = "/etc/scanrig/rig.toml";
+  bool yes_move = false;  ///< the table may be turned
+  bool answers = false;   ///< somebody at the rig answers on standard input although it is no terminal
+  bool json = false;
+};
+/// `device` when something was found.
+ExitCode examine_rig(const DoctorVerb& verb);
 
 }  // namespace scanrig::ctl

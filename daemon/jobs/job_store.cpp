@@ -24,7 +24,7 @@ std::vector<StoredView> stored_views(const Manifest& manifest) {
   std::vector<StoredView> views;
   for (std::size_t pose = 0; pose < manifest.poses.size(); ++pose) {
     for (const auto& view : manifest.poses[pose].views) {
-      views.push_back({static_cast<int>(pose), view.index, view.measured_deg, 0});
+      views.push_back({static_cast<int>(pose), view.index, view.measured_deg, 0, view.commanded_deg, view.settling_ms});
     }
   }
   return views;

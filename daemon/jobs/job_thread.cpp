@@ -40,7 +40,8 @@ void JobThread::handle(const action::StoreView& task) {
   const auto stored = scan_->add_view(static_cast<std::size_t>(view.id.pose), view.record, view.images);
   if (!stored) return tell_(event::StoreFailed{view.id.job, stored.error()});
   reconstruction_.add_view(task.view);
-  tell_(event::ViewStored{view.id, view.record.measured_deg, view.redone});
+  tell_(event::ViewStored{view.id, view.record.measured_deg, view.redone, view.record.commanded_deg,
+                          view.record.settling_ms});
 }
 
 Result<void> JobThread::finish_pose(const action::FinishPose& task) {

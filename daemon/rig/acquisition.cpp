@@ -53,13 +53,34 @@ Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle) {
   return view;
 }
 
-Result<void> Acquisition::stop() {
+Result<Degrees> Acquisition::jog(const action::Jog& jog) {
+  if (auto limited = devices_.turntable.limit_speed(jog.speed); !limited) return pass_on(limited);
+  auto move = devices_.turntable.rotate_to({jog.angle.value + (jog.relative ? position_deg_ : 0.0)},
+                                           Deadline::after(clock_, options_.move_limit));
+  auto free = devices_.turntable.limit_speed(std::nullopt);
+  if (!move) return pass_on(move);
+  if (!free) return pass_on(free);
+  position_deg_ = move->commanded.value;
+  return move->measured;
+}
+
+Result<void> Acquisition::pulse() {
+  return devices_.projector.fire(Light::pattern, Deadline::after(clock_, options_.exposure_limit));
+}
+
+std::vector<DeviceHealth> Acquisition::check() {
+  const auto limit = [this] { return Deadline::after(clock_, options_.check_limit); };
+  const auto health = [](const char* name, const auto& answer) {
+    return DeviceHealth{name, answer ? std::nullopt : std::optional(answer.error())};
+  };
+  return {health("turntable", devices_.turntable.status(limit())),
+          health("projector", devices_.projector.dark(limit())), health("camera", devices_.camera.arm(limit()))};
+}
+
+Acquisition::Stop Acquisition::stop() {
   const auto deadline = Deadline::after(clock_, options_.stop_limit);
   const auto dark = devices_.projector.dark(deadline);
-  const auto stopped = devices_.turntable.stop(deadline);
-  if (!stopped) return pass_on(stopped);
-  if (!dark) return pass_on(dark);
-  return {};
+  return {devices_.turntable.stop(deadline), dark};
 }
 
 Result<Move> Acquisition::turn_to(Degrees angle) {

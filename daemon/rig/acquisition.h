@@ -13,7 +13,8 @@ struct AcquisitionOptions {
   Clock::Duration move_limit = std::chrono::seconds(60);     ///< the longest move is one unwinding of all poses
   Clock::Duration exposure_limit = std::chrono::seconds(2);  ///< arm, fire and collect, each
   Clock::Duration stop_limit = std::chrono::seconds(3);
-  int redo_limit = 3;  ///< lost exposures in a row before the view fails
+  Clock::Duration check_limit = std::chrono::milliseconds(500);  ///< for each device
+  int redo_limit = 3;                                            ///< lost exposures in a row before the view fails
 };
 
 /// The order in which the devices do one thing. Every wait has a deadline.
@@ -33,8 +34,22 @@ class Acquisition {
   /// Fails as the device that failed; the table has been told to stop then.
   Result<TakenView> take_view(const ViewId& id, Degrees angle);
 
-  /// Returns once the table is seen standing and the projector dark. Both are tried, whatever the other says.
-  Result<void> stop();
+  /// Turns an engineer's way, no faster than asked; the angle measured. Fails as Turntable::rotate_to, and with
+  /// `unsupported` where the speed cannot be limited.
+  Result<Degrees> jog(const action::Jog& jog);
+
+  /// One flash of the dots. Fails as Projector::fire.
+  Result<void> pulse();
+
+  /// Asks each device something that does no harm.
+  std::vector<DeviceHealth> check();
+
+  struct Stop {
+    Result<void> table;  ///< seen standing
+    Result<void> light;  ///< told to be dark
+  };
+  /// Both are tried, whatever the other says.
+  Stop stop();
 
  private:
   Result<Move> turn_to(Degrees angle);

@@ -1,15 +1,19 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include "config/rig_config.h"
 #include "core/clock.h"
 #include "daemon/rig/devices.h"
+#include "drivers/gpio/lines.h"
 
 namespace scanrig {
 
-/// The devices of a real rig, opened.
+/// The devices of a real rig. A projector, panel or camera that cannot be opened, or that this version has no driver
+/// for, fails at every use until it can; the turntable's driver does that by itself.
 struct OpenDevices {
+  std::unique_ptr<gpio::Lines> lines;
   std::unique_ptr<Turntable> turntable;
   std::unique_ptr<Projector> projector;
   std::unique_ptr<StereoCamera> camera;
@@ -18,8 +22,7 @@ struct OpenDevices {
   [[nodiscard]] Devices devices() const { return {*turntable, *projector, *camera, *panel}; }
 };
 
-/// Opens what the configuration names. Fails with `unsupported` for a driver that this version does not have, and as
-/// the drivers do.
+/// `config` outlives the devices. Fails with `out_of_range` for a turntable that cannot do what it is asked for.
 Result<OpenDevices> open_devices(const config::RigConfig& config, Clock& clock);
 
 }  // namespace scanrig

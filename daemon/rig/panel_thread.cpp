@@ -20,14 +20,19 @@ std::vector<Event> changes(const PanelInputs& before, const PanelInputs& after) 
   };
   if (before.estop_ok != after.estop_ok) events.emplace_back(event::EstopChanged{after.estop_ok});
   if (before.guard_closed != after.guard_closed) events.emplace_back(event::GuardChanged{after.guard_closed});
+  if (before != after) events.emplace_back(event::InputsSeen{after});
   pressed(before.stop, after.stop, Button::stop);
   pressed(before.reset, after.reset, Button::reset);
   pressed(before.start, after.start, Button::start);
   return events;
 }
 
-PanelThread::PanelThread(Panel& panel, Clock& clock, std::function<void(Event)> tell)
-    : panel_(panel), clock_(clock), tell_(std::move(tell)), thread_(start_actor(clock, [this] { run(); })) {}
+PanelThread::PanelThread(Panel& panel, Clock& clock, std::function<void(Event)> tell, std::function<void()> on_estop)
+    : panel_(panel),
+      clock_(clock),
+      tell_(std::move(tell)),
+      on_estop_(std::move(on_estop)),
+      thread_(start_actor(clock, [this] { run(); })) {}
 
 PanelThread::~PanelThread() {
   {
@@ -47,7 +52,10 @@ void PanelThread::run() {
   while (true) {
     auto done = show_wanted();
     if (done) done = read_inputs();
-    if (!done) tell_(event::PanelFailed{done.error()});
+    if (!done) {
+      known_.reset();  // what a panel says that comes back is news
+      tell_(event::PanelFailed{done.error()});
+    }
     std::unique_lock lock(mutex_);
     const auto pause = done ? clock_.now() : clock_.now() + kRetry;
     if (clock_.wait_until(lock, changed_, pause, [this] { return stop_; })) break;
@@ -73,7 +81,9 @@ Result<void> PanelThread::read_inputs() {
   const auto inputs = panel_.wait_change(known_.value_or(PanelInputs{}),
                                          known_ ? Deadline::after(clock_, kPoll) : Deadline{clock_.now()});
   if (!inputs) return pass_on(inputs);
+  if (!inputs->estop_ok && (!known_ || known_->estop_ok)) on_estop_();
   if (!known_) {
+    tell_(event::InputsSeen{*inputs});
     tell_(event::PanelFound{inputs->estop_ok, inputs->guard_closed});
   } else {
     for (auto& event : changes(*known_, *inputs)) tell_(std::move(event));

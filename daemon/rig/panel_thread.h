@@ -18,7 +18,8 @@ std::vector<Event> changes(const PanelInputs& before, const PanelInputs& after);
 /// The owner of the panel: reports its inputs, shows what it is told.
 class PanelThread {
  public:
-  PanelThread(Panel& panel, Clock& clock, std::function<void(Event)> tell);
+  /// `on_estop` is called first, before anybody is told, and must not wait.
+  PanelThread(Panel& panel, Clock& clock, std::function<void(Event)> tell, std::function<void()> on_estop);
   ~PanelThread();
   PanelThread(const PanelThread&) = delete;
   PanelThread& operator=(const PanelThread&) = delete;
@@ -34,6 +35,7 @@ class PanelThread {
   Panel& panel_;
   Clock& clock_;
   std::function<void(Event)> tell_;
+  std::function<void()> on_estop_;
   std::mutex mutex_;
   std::condition_variable changed_;
   PanelOutputs wanted_;

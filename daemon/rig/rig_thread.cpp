@@ -7,8 +7,9 @@
 namespace scanrig {
 
 RigThread::RigThread(const Devices& devices, Clock& clock, AcquisitionOptions options, std::function<void(Event)> tell)
-    : devices_(devices),
-      acquisition_(devices, clock, options),
+    : turntable_(devices.turntable, clock),
+      devices_{turntable_, devices.projector, devices.camera, devices.panel},
+      acquisition_(devices_, clock, options),
       tell_(std::move(tell)),
       inbox_(clock),
       thread_(start_actor(clock, [this] { run(); })) {}
@@ -53,9 +54,20 @@ Event RigThread::perform(const Command& command) {
     if (!taken) return event::RigFailed{taken.error()};
     return event::ViewTaken{std::make_shared<const TakenView>(std::move(*taken))};
   }
-  auto stopped = acquisition_.stop();
-  if (!stopped) return event::StopFailed{stopped.error()};
-  return event::Stopped{};
+  if (const auto* jog = std::get_if<action::Jog>(&command)) {
+    const auto measured = acquisition_.jog(*jog);
+    if (!measured) return event::RigFailed{measured.error()};
+    return event::Jogged{*measured};
+  }
+  if (std::holds_alternative<action::Pulse>(command)) {
+    const auto fired = acquisition_.pulse();
+    if (!fired) return event::RigFailed{fired.error()};
+    return event::Pulsed{};
+  }
+  if (std::holds_alternative<action::CheckDevices>(command)) return event::DevicesSeen{acquisition_.check()};
+  const auto stopped = acquisition_.stop();
+  if (!stopped.table) return event::StopFailed{stopped.table.error()};
+  return event::Stopped{stopped.light ? std::nullopt : std::optional(stopped.light.error())};
 }
 
 }  // namespace scanrig

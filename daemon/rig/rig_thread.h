@@ -7,10 +7,12 @@
 
 #include "daemon/mailbox.h"
 #include "daemon/rig/acquisition.h"
+#include "daemon/rig/turntable_thread.h"
 
 namespace scanrig {
 
-/// The owner of turntable, projector and camera: does one thing after the other and tells the station how it went.
+/// The owner of projector and camera, and through TurntableThread of the turntable: does one thing after the other and
+/// tells the station how it went.
 class RigThread {
  public:
   RigThread(const Devices& devices, Clock& clock, AcquisitionOptions options, std::function<void(Event)> tell);
@@ -21,17 +23,24 @@ class RigThread {
 
   void home() { inbox_.post(action::Home{}); }
   void take_view(action::TakeView view) { inbox_.post(std::move(view)); }
+  void jog(action::Jog jog) { inbox_.post(jog); }
+  void pulse() { inbox_.post(action::Pulse{}); }
+  void check_devices() { inbox_.post(action::CheckDevices{}); }
   /// Cuts short what runs, then waits for evidence that the table stands and the projector is dark.
   void stop();
+  /// The e-stop's short cut: the motor is told to stop and the light goes out at once. From any thread; the station
+  /// follows with stop().
+  void interrupt() noexcept;
 
  private:
-  using Command = std::variant<action::Home, action::TakeView, action::StopRig>;
+  using Command =
+      std::variant<action::Home, action::TakeView, action::Jog, action::Pulse, action::CheckDevices, action::StopRig>;
 
   void run();
   Event perform(const Command& command);
-  void interrupt() noexcept;
   Result<void> home_now();
 
+  TurntableThread turntable_;
   Devices devices_;
   Acquisition acquisition_;
   std::function<void(Event)> tell_;

@@ -3,10 +3,18 @@
 #include <algorithm>
 #include <utility>
 
+#include "daemon/overloaded.h"
 #include "daemon/station/lamps.h"
 #include "daemon/station/words.h"
 
 namespace scanrig {
+namespace {
+
+constexpr auto kBlink = std::chrono::milliseconds(500);
+constexpr auto kLampTest = std::chrono::seconds(3);
+constexpr PanelOutputs kAllOn{true, true, true, true, true, true, true, true};
+
+}  // namespace
 
 ControlLoop::ControlLoop(Clock& clock, ControlLoopOptions options, JobTable known_jobs)
     : clock_(clock), options_(options), inbox_(clock), jobs_(std::move(known_jobs)) {
@@ -14,16 +22,21 @@ ControlLoop::ControlLoop(Clock& clock, ControlLoopOptions options, JobTable know
 }
 
 Result<void> ControlLoop::run(const StationPorts& ports) {
-  ports.show(lamps(state_, jobs_));
+  wake_later(event::CheckDue{}, options_.check_period);
+  show(ports);
   while (!state_.finished) {
-    auto message = inbox_.take(std::min(warning_over_, give_up_));
+    auto next_later = std::ranges::min_element(later_, {}, [](const auto& one) { return one.second.at; });
+    const auto later = next_later == later_.end() ? Clock::TimePoint::max() : next_later->second.at;
+    auto message = inbox_.take(std::min({later, next_blink_, give_up_}));
     if (message) {
       handle(std::move(*message), ports);
     } else if (clock_.now() >= give_up_) {
       break;
-    } else if (clock_.now() >= warning_over_) {
-      warning_over_ = Clock::TimePoint::max();
-      handle({event::WarningOver{}, {}}, ports);
+    } else if (clock_.now() >= next_blink_) {
+      blink(ports);
+    } else if (clock_.now() >= later) {
+      auto due = later_.extract(next_later);
+      handle({std::move(due.mapped().event), {}}, ports);
     }
   }
   inbox_.close();
@@ -43,15 +56,9 @@ void ControlLoop::handle(Message message, const StationPorts& ports) {
   auto step = next(state_, message.event, options_.rules);
   state_ = std::move(step.state);
   update(jobs_, message.event, options_.rules.poses, options_.rules.views);
-  for (const auto& action : step.actions) {
-    if (std::holds_alternative<action::Warn>(action)) {
-      warning_over_ = clock_.now() + options_.warning;
-    } else {
-      ports.perform(action);
-    }
-  }
+  for (const auto& action : step.actions) carry_out(action, ports);
+  show(ports);
   publish();
-  ports.show(lamps(state_, jobs_));
   if (!message.reply) return;
   if (step.refused) {
     message.reply(tl::unexpected(*step.refused));
@@ -60,8 +67,39 @@ void ControlLoop::handle(Message message, const StationPorts& ports) {
   }
 }
 
+void ControlLoop::carry_out(const Action& action, const StationPorts& ports) {
+  std::visit(
+      Overloaded{[&](const action::Warn&) { wake_later(event::WarningOver{}, options_.warning); },
+                 [&](const action::WaitForEstop&) { wake_later(event::EstopWindowOver{}, options_.estop_window); },
+                 [&](const action::RetryStopLater&) { wake_later(event::StopRetryDue{}, options_.stop_retry); },
+                 [&](const action::CheckLater&) { wake_later(event::CheckDue{}, options_.check_period); },
+                 [&](const action::TestLamps&) { lamps_tested_ = clock_.now() + kLampTest; },
+                 [&](const auto& other) { ports.perform(other); }},
+      action);
+}
+
+void ControlLoop::wake_later(Event event, Clock::Duration after) {
+  const auto kind = event.index();
+  later_.insert_or_assign(kind, Later{clock_.now() + after, std::move(event)});
+}
+
+void ControlLoop::blink(const StationPorts& ports) {
+  blink_ = !blink_;
+  show(ports);
+}
+
+/// Lamps that blink, or are all on for a test, are looked at again soon.
+void ControlLoop::show(const StationPorts& ports) {
+  const bool testing = clock_.now() < lamps_tested_;
+  shown_ = testing ? kAllOn : lamps(state_, jobs_, blink_);
+  next_blink_ = testing || state_.maintenance ? clock_.now() + kBlink : Clock::TimePoint::max();
+  ports.show(shown_);
+}
+
 void ControlLoop::publish() {
   auto words = describe(state_, options_.rules);
+  auto devices = state_.devices;
+  devices.push_back({"panel", state_.panel_problem});
   published_.set(std::make_shared<const Snapshot>(Snapshot{
       .revision = ++revision_,
       .machine = state_.machine,
@@ -69,6 +107,10 @@ void ControlLoop::publish() {
       .cause = state_.cause,
       .sentence = std::move(words.sentence),
       .next_action = std::move(words.next_action),
+      .may_be_moving = state_.may_be_moving,
+      .inputs = state_.inputs,
+      .outputs = shown_,
+      .devices = std::move(devices),
       .job = state_.job ? state_.job->id : std::string(),
       .jobs = jobs_,
   }));

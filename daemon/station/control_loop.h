@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 
@@ -22,8 +23,11 @@ struct StationPorts {
 
 struct ControlLoopOptions {
   StationRules rules;
-  Clock::Duration warning = std::chrono::seconds(2);         ///< lamp before the first move
-  Clock::Duration shutdown_limit = std::chrono::seconds(5);  ///< for the rig to be seen stopped
+  Clock::Duration warning = std::chrono::seconds(2);              ///< lamp before the first move
+  Clock::Duration estop_window = std::chrono::milliseconds(200);  ///< a device that fails may only lack power
+  Clock::Duration stop_retry = std::chrono::seconds(1);           ///< while the table may be moving
+  Clock::Duration check_period = std::chrono::seconds(2);         ///< of the devices, in quiet times
+  Clock::Duration shutdown_limit = std::chrono::seconds(5);       ///< for the rig to be seen stopped
 };
 
 /// The thread of the state machine: takes events one by one, decides, hands out actions, publishes a snapshot.
@@ -39,6 +43,8 @@ class ControlLoop {
   void press(Button button, Origin origin, Reply reply) {
     inbox_.post({event::Pressed{button, origin, {}}, std::move(reply)});
   }
+  /// The same for what an engineer asks for.
+  void ask(event::MaintenanceAsked what, Reply reply) { inbox_.post({what, std::move(reply)}); }
   [[nodiscard]] std::shared_ptr<const Snapshot> snapshot() const { return published_.get(); }
 
   /// Runs until a Shutdown is done. Fails with `timeout` when the rig was not seen stopped by then.
@@ -51,6 +57,10 @@ class ControlLoop {
   };
 
   void handle(Message message, const StationPorts& ports);
+  void carry_out(const Action& action, const StationPorts& ports);
+  void wake_later(Event event, Clock::Duration after);
+  void blink(const StationPorts& ports);
+  void show(const StationPorts& ports);
   void publish();
 
   Clock& clock_;
@@ -61,7 +71,15 @@ class ControlLoop {
   StationState state_;
   JobTable jobs_;
   std::uint64_t revision_ = 0;
-  Clock::TimePoint warning_over_ = Clock::TimePoint::max();
+  struct Later {
+    Clock::TimePoint at;
+    Event event;
+  };
+  std::map<std::size_t, Later> later_;  // by the kind of event: one of a kind, the newest counts
+  PanelOutputs shown_;
+  bool blink_ = false;
+  Clock::TimePoint next_blink_ = Clock::TimePoint::max();
+  Clock::TimePoint lamps_tested_ = Clock::TimePoint::min();
   Clock::TimePoint give_up_ = Clock::TimePoint::max();
 };
 

@@ -16,6 +16,8 @@ struct StoredView {
   int view = 0;
   double measured_deg = 0.0;
   int redone = 0;  ///< exposures that were lost and taken again
+  double commanded_deg = 0.0;
+  double settling_ms = 0.0;  ///< from in-position to still
 };
 
 struct StageShare {

@@ -4,14 +4,16 @@
 
 namespace scanrig {
 
-PanelOutputs lamps(const StationState& state, const JobTable& jobs) {
+PanelOutputs lamps(const StationState& state, const JobTable& jobs, bool blink) {
   PanelOutputs out;
   const bool warning = state.activity == Activity::warning;
   const bool flip = state.activity == Activity::waiting_for_flip;
-  out.red = state.machine == MachineState::error;
-  out.amber = state.machine == MachineState::halted || warning || flip;
-  out.busy = state.activity != Activity::none && !flip;
-  out.green = state.machine == MachineState::ready || (out.busy && !warning && !out.red && !out.amber);
+  out.red = state.machine == MachineState::error || state.may_be_moving || state.shutting_down;
+  out.amber = (state.machine == MachineState::halted && !out.red) || warning || flip ||
+              (state.machine == MachineState::maintenance && blink);
+  out.busy = (state.activity != Activity::none && !flip) || state.unnamed;
+  out.green =
+      state.machine == MachineState::ready || (out.busy && !state.maintenance && !warning && !out.red && !out.amber);
   out.start_lamp = state.machine == MachineState::ready || flip;
   out.flip_request = flip;
   for (const auto& [id, job] : jobs | std::views::reverse) {

@@ -18,7 +18,11 @@ struct Snapshot {
   std::string cause;
   std::string sentence;
   std::string next_action;
-  std::string job;  ///< the one that has the rig; empty: none
+  bool may_be_moving = false;  ///< the last stop was not confirmed
+  PanelInputs inputs{};
+  PanelOutputs outputs{};
+  std::vector<DeviceHealth> devices{};  ///< as of the last check
+  std::string job;                      ///< the one that has the rig; empty: none
   JobTable jobs;
 };
 

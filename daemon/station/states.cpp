@@ -6,6 +6,7 @@ std::string_view to_string(MachineState state) {
   switch (state) {
     case MachineState::preoperational: return "Preoperational";
     case MachineState::halted: return "Halted";
+    case MachineState::maintenance: return "Halted.Maintenance";
     case MachineState::error: return "Error";
     case MachineState::initialized: return "Operational.Initialized";
     case MachineState::ready: return "Operational.Ready";
@@ -33,6 +34,8 @@ std::string_view to_string(Activity activity) {
     case Activity::none: return "none";
     case Activity::warning: return "warning";
     case Activity::homing: return "homing";
+    case Activity::jogging: return "jogging";
+    case Activity::pulsing: return "pulsing";
     case Activity::scanning: return "scanning";
     case Activity::storing: return "storing";
     case Activity::waiting_for_flip: return "waiting_for_flip";

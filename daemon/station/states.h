@@ -5,8 +5,9 @@
 
 namespace scanrig {
 
-/// The machine, in the words of OPC 40100-1. `initialized` covers homing.
-enum class MachineState { preoperational, halted, error, initialized, ready, single_execution };
+/// The machine, in the words of OPC 40100-1. `initialized` covers homing, `maintenance` is halted with
+/// an engineer at the rig.
+enum class MachineState { preoperational, halted, maintenance, error, initialized, ready, single_execution };
 
 enum class JobState { queued, scanning, waiting_for_flip, reconstructing, done, failed, interrupted, cancelled };
 
@@ -15,6 +16,8 @@ enum class Activity {
   none,
   warning,  ///< the lamp warns, nothing moves yet
   homing,
+  jogging,           ///< maintenance: turning to where the engineer wants it
+  pulsing,           ///< maintenance: one flash of the projector
   scanning,          ///< turning and exposing
   storing,           ///< all views of the pose are taken, the last ones go to disk
   waiting_for_flip,  ///< standing, dark

@@ -12,9 +12,14 @@ namespace scanrig {
 
 struct StationRules {
   int poses = 2;
-  int views = 8;        ///< a pose, at equal angles
-  bool remote = false;  ///< start and reset by the API are allowed
+  int views = 8;              ///< a pose, at equal angles
+  bool remote = false;        ///< the API may start and home while the guard is closed; needs a guard
+  bool guard = false;         ///< there is a guard whose contact is wired
+  bool home_guarded = false;  ///< after a restart a closed guard homes the table, without Reset
+  bool manual_light = false;  ///< a hand switches the projector
 };
+
+constexpr DegreesPerSecond kMaxJogSpeed{10};
 
 /// The job that has the rig.
 struct ActiveJob {
@@ -27,11 +32,28 @@ struct ActiveJob {
   std::optional<Error> reconstruction{};  ///< why there will be no model
 };
 
+/// An engineer has the rig.
+struct Maintenance {
+  MachineState before = MachineState::halted;
+  bool moved = false;  ///< something has moved outside a job
+  bool homed = false;
+  bool consent = false;              ///< Reset was pressed at the panel since it began
+  std::optional<action::Jog> jog{};  ///< to be done when the warning is over
+};
+
 struct StationState {
   MachineState machine = MachineState::preoperational;
   Activity activity = Activity::none;
+  bool panel_known = false;  ///< what e-stop and guard say is known
   bool estop_ok = true;
   bool guard_closed = true;
+  bool latched = false;            ///< a fault that only Reset at the panel clears
+  bool home_by_guard = true;       ///< nothing but a restart lies behind us
+  std::optional<Error> unnamed{};  ///< a fault that may turn out to be the e-stop
+  std::optional<Maintenance> maintenance{};
+  PanelInputs inputs{};
+  std::optional<Error> panel_problem{};
+  std::vector<DeviceHealth> devices{};  ///< as of the last check
   bool shutting_down = false;
   bool finished = false;                          ///< shut down, the rig asked to stop
   bool may_be_moving = false;                     ///< the last stop was not confirmed
@@ -40,9 +62,9 @@ struct StationState {
 };
 
 struct Step {
-  StationState state;
-  std::vector<Action> actions;
-  std::optional<Error> refused;  ///< a press that was not obeyed; nothing has changed then
+  StationState state{};
+  std::vector<Action> actions{};
+  std::optional<Error> refused{};  ///< a press that was not obeyed; nothing has changed then
 };
 
 /// The whole behaviour of the station as a pure function: what happens next, and what is to be done.

@@ -6,10 +6,30 @@ namespace scanrig {
 namespace {
 
 std::string how_to_reset(const StationState& state) {
+  if (state.may_be_moving) return "Keep away from the table. See to the drive's power and cable; it is being stopped.";
   if (state.activity == Activity::stopping) return "Wait until the table is seen standing.";
+  if (!state.panel_known) return "See to the panel: it cannot be read.";
   if (!state.estop_ok) return "Release the e-stop, then press Reset.";
   if (!state.guard_closed) return "Close the guard, then press Reset.";
-  return "Press Reset.";
+  return state.latched ? "See to the cause, then press Reset at the panel." : "Press Reset.";
+}
+
+std::string with_light(const StationRules& rules, const char* before, const std::string& action) {
+  return rules.manual_light ? before + action : action;
+}
+
+Words in_maintenance(const StationState& state) {
+  switch (state.activity) {
+    case Activity::none: return {"Maintenance: there are no jobs.", ""};
+    case Activity::warning: return {"Maintenance: the table is about to move.", ""};
+    case Activity::stopping: return {"Maintenance: the table is being stopped.", ""};
+    default: return {fmt::format("Maintenance: {}.", to_string(state.activity)), ""};
+  }
+}
+
+std::string fault_sentence(const StationState& state) {
+  if (state.may_be_moving) return "The table may be moving: its drive does not answer.";
+  return "A fault stopped the rig.";
 }
 
 std::string working(const StationState& state, const StationRules& rules) {
@@ -32,10 +52,14 @@ Words describe(const StationState& state, const StationRules& rules) {
     case MachineState::halted:
       if (state.shutting_down) return {"The daemon is shutting down.", ""};
       return {"The table is not homed.", how_to_reset(state)};
-    case MachineState::error: return {"A fault stopped the rig.", how_to_reset(state)};
+    case MachineState::maintenance: return in_maintenance(state);
+    case MachineState::error:
+      return {fault_sentence(state), with_light(rules, "Switch the projector off. ", how_to_reset(state))};
     case MachineState::initialized:
       return {state.activity == Activity::warning ? "The table is about to move." : "The table is finding home.", ""};
-    case MachineState::ready: return {"The rig is ready.", "Put an object on the table, then press Start."};
+    case MachineState::ready:
+      return {"The rig is ready.",
+              with_light(rules, "Switch the projector on. ", "Put an object on the table, then press Start.")};
     case MachineState::single_execution:
       if (state.activity == Activity::waiting_for_flip) {
         return {fmt::format("Pose {} of {} is complete.", state.job->pose + 1, rules.poses),

@@ -30,17 +30,19 @@ tl::unexpected<Error> failed(const std::string& what) {
 
 class ChipOutput final : public Output {
  public:
-  ChipOutput(LinePtr line, std::string name) : line_(std::move(line)), name_(std::move(name)) {}
-  ~ChipOutput() override { gpiod_line_set_value(line_.get(), 0); }
+  ChipOutput(LinePtr line, LineSpec spec) : line_(std::move(line)), spec_(std::move(spec)) {}
+  ~ChipOutput() override {
+    if (!spec_.keep) gpiod_line_set_value(line_.get(), 0);
+  }
 
   Result<void> set(bool active) override {
-    if (gpiod_line_set_value(line_.get(), active ? 1 : 0) != 0) return failed("set " + name_);
+    if (gpiod_line_set_value(line_.get(), active ? 1 : 0) != 0) return failed("set " + spec_.name);
     return {};
   }
 
  private:
   LinePtr line_;
-  std::string name_;
+  LineSpec spec_;
 };
 
 class ChipInputs final : public Inputs {
@@ -85,7 +87,7 @@ class ChipLines final : public Lines {
     auto line = find(spec);
     if (!line) return pass_on(line);
     if (gpiod_line_request_output_flags(line->get(), kConsumer, flags(spec), 0) != 0) return failed("use " + spec.name);
-    return std::make_unique<ChipOutput>(std::move(*line), spec.name);
+    return std::make_unique<ChipOutput>(std::move(*line), spec);
   }
 
   Result<std::unique_ptr<Inputs>> inputs(const std::vector<LineSpec>& specs) override {

@@ -66,18 +66,20 @@ Result<Line> request_line(const LineSpec& line, bool output) {
 
 class ChipOutput final : public Output {
  public:
-  ChipOutput(Line line, std::string name) : line_(std::move(line)), name_(std::move(name)) {}
-  ~ChipOutput() override { std::ignore = set(false); }
+  ChipOutput(Line line, LineSpec spec) : line_(std::move(line)), spec_(std::move(spec)) {}
+  ~ChipOutput() override {
+    if (!spec_.keep) std::ignore = set(false);
+  }
 
   Result<void> set(bool active) override {
     const auto value = active ? GPIOD_LINE_VALUE_ACTIVE : GPIOD_LINE_VALUE_INACTIVE;
-    if (gpiod_line_request_set_value(line_.request.get(), line_.offset, value) != 0) return failed("set " + name_);
+    if (gpiod_line_request_set_value(line_.request.get(), line_.offset, value) != 0) return failed("set " + spec_.name);
     return {};
   }
 
  private:
   Line line_;
-  std::string name_;
+  LineSpec spec_;
 };
 
 class ChipInputs final : public Inputs {
@@ -123,7 +125,7 @@ class ChipLines final : public Lines {
   Result<std::unique_ptr<Output>> output(const LineSpec& spec) override {
     auto line = request_line(spec, true);
     if (!line) return pass_on(line);
-    return std::make_unique<ChipOutput>(std::move(*line), spec.name);
+    return std::make_unique<ChipOutput>(std::move(*line), spec);
   }
 
   Result<std::unique_ptr<Inputs>> inputs(const std::vector<LineSpec>& specs) override {

@@ -13,9 +13,10 @@ namespace scanrig::gpio {
 struct LineSpec {
   std::string name;  ///< as the kernel knows it, see gpioinfo(1)
   bool active_low = false;
+  bool keep = false;  ///< an output that is left as it is when destroyed, as far as its chip does that
 };
 
-/// One output line; inactive when made and when destroyed.
+/// One output line; inactive when made, and when destroyed unless it is to be kept.
 /// Threads: one owner.
 class Output {
  public:

@@ -74,7 +74,9 @@ class Connection {
 class SocketOutput final : public Output {
  public:
   SocketOutput(Connection connection, LineSpec line) : connection_(std::move(connection)), line_(std::move(line)) {}
-  ~SocketOutput() override { std::ignore = set(false); }
+  ~SocketOutput() override {
+    if (!line_.keep) std::ignore = set(false);
+  }
 
   Result<void> set(bool active) override {
     auto sent = connection_.send(fmt::format("output {} {}", line_.name, active != line_.active_low ? 1 : 0));

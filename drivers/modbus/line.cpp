@@ -37,6 +37,9 @@ bool refused(int error) { return error >= EMBXILFUN && error <= EMBXGTAR; }
 /// Leadshine's "wrong CRC": the request reached the device damaged and was not carried out.
 constexpr int kDeviceSawWrongCrc = EMBXMEMPAR;
 
+/// How soon somebody who waits for a quiet line sees that he is to hurry.
+constexpr Clock::Duration kLook = milliseconds(5);
+
 enum class Heard { nothing, something, hangup };
 
 /// Throws away what arrives within `wait`, up to the first byte.
@@ -70,6 +73,34 @@ Result<std::vector<std::uint16_t>> Line::read(std::uint16_t address, int count, 
   return values;
 }
 
+Result<std::vector<bool>> Line::read_coils(std::uint16_t address, int count, Deadline deadline) {
+  std::vector<std::uint8_t> bits(static_cast<std::size_t>(count));
+  const auto done = request("read coils", address, deadline,
+                            [&](_modbus* line) { return modbus_read_bits(line, address, count, bits.data()); });
+  if (!done) return pass_on(done);
+  return std::vector<bool>(bits.begin(), bits.end());
+}
+
+Result<std::vector<bool>> Line::read_inputs(std::uint16_t address, int count, Deadline deadline) {
+  std::vector<std::uint8_t> bits(static_cast<std::size_t>(count));
+  const auto done = request("read inputs", address, deadline,
+                            [&](_modbus* line) { return modbus_read_input_bits(line, address, count, bits.data()); });
+  if (!done) return pass_on(done);
+  return std::vector<bool>(bits.begin(), bits.end());
+}
+
+Result<void> Line::write_coil(std::uint16_t address, bool on, Deadline deadline) {
+  return request("write coil", address, deadline,
+                 [&](_modbus* line) { return modbus_write_bit(line, address, on ? 1 : 0); });
+}
+
+Result<void> Line::write_coils(std::uint16_t address, const std::vector<bool>& on, Deadline deadline) {
+  const std::vector<std::uint8_t> bits(on.begin(), on.end());
+  return request("write coils", address, deadline, [&](_modbus* line) {
+    return modbus_write_bits(line, address, static_cast<int>(bits.size()), bits.data());
+  });
+}
+
 Result<void> Line::write(std::uint16_t address, std::uint16_t value, Deadline deadline) {
   return request("write", address, deadline,
                  [&](_modbus* line) { return modbus_write_register(line, address, value); });
@@ -79,6 +110,23 @@ Result<void> Line::write(std::uint16_t address, std::span<const std::uint16_t> v
   return request("write", address, deadline, [&](_modbus* line) {
     return modbus_write_registers(line, address, static_cast<int>(values.size()), values.data());
   });
+}
+
+Result<void> Line::write_unheard(std::uint16_t address, std::uint16_t value) {
+  if (!context_) {
+    if (auto opened = open(); !opened) return opened;
+  }
+  const auto low = [](int word) { return static_cast<std::uint8_t>(word & 0xFF); };
+  const std::array<std::uint8_t, 6> frame{low(options_.unit_id), 0x06,      low(address >> 8), low(address),
+                                          low(value >> 8),       low(value)};
+  clock_.sleep_until(last_byte_ + frame_gap(options_.baud));
+  ++statistics_.requests;
+  const int sent = modbus_send_raw_request(context_.get(), frame.data(), static_cast<int>(frame.size()));
+  const int error = errno;
+  last_byte_ = clock_.now();
+  answer_missed_ = true;
+  if (sent > 0) return {};
+  return failed(error, fmt::format("{}: write 0x{:04X}", who(), address));
 }
 
 Result<void> Line::request(std::string_view what, std::uint16_t address, Deadline deadline,
@@ -141,7 +189,8 @@ Result<void> Line::wait_until_quiet(Deadline deadline) {
     if (deadline.expired(clock_)) {
       return fail(ErrorCode::timeout, "{}: the deadline passed before the line fell silent", who());
     }
-    const Heard heard = discard(port, std::min(quiet_at - clock_.now(), deadline.left(clock_)));
+    if (hurry_) return fail(ErrorCode::timeout, "{}: called off before the line fell silent", who());
+    const Heard heard = discard(port, std::min({quiet_at - clock_.now(), deadline.left(clock_), kLook}));
     if (heard == Heard::hangup) return failed(EIO, who());
     if (heard == Heard::something) quiet_at = clock_.now() + silence;
   }

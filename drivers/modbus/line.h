@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstdint>
 #include <functional>
@@ -49,12 +50,25 @@ class Line {
   Line(const Line&) = delete;
   Line& operator=(const Line&) = delete;
 
+  /// Functions 01 and 02: coils and discrete inputs.
+  Result<std::vector<bool>> read_coils(std::uint16_t address, int count, Deadline deadline);
+  Result<std::vector<bool>> read_inputs(std::uint16_t address, int count, Deadline deadline);
+  /// Functions 05 and 15.
+  Result<void> write_coil(std::uint16_t address, bool on, Deadline deadline);
+  Result<void> write_coils(std::uint16_t address, const std::vector<bool>& on, Deadline deadline);
   /// Function 03.
   Result<std::vector<std::uint16_t>> read(std::uint16_t address, int count, Deadline deadline);
   /// Function 06.
   Result<void> write(std::uint16_t address, std::uint16_t value, Deadline deadline);
   /// Function 16.
   Result<void> write(std::uint16_t address, std::span<const std::uint16_t> values, Deadline deadline);
+
+  /// Function 06 sent at once, whatever is on the line, its answer thrown away with the rest: for a stop that must not
+  /// wait. It may collide with a late answer, so it is to be repeated as a request. Fails with `io`.
+  Result<void> write_unheard(std::uint16_t address, std::uint16_t value);
+
+  /// From any thread. While on, no request waits for a quiet line: it fails with `timeout` instead.
+  void hurry(bool on) noexcept { hurry_ = on; }
 
   /// The last request was sent, but whether the device has acted on it is not known: its answer was missed or corrupt.
   [[nodiscard]] bool answer_missed() const { return answer_missed_; }
@@ -79,6 +93,7 @@ class Line {
   Clock& clock_;
   std::unique_ptr<_modbus, Closer> context_;  // null while the port is not open
   bool answer_missed_ = false;
+  std::atomic<bool> hurry_ = false;
   Clock::TimePoint last_byte_;
   LineStatistics statistics_;
 };

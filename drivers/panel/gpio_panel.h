@@ -1,27 +1,23 @@
 #pragma once
 
 #include <memory>
-#include <optional>
 #include <utility>
 #include <vector>
 
 #include "drivers/gpio/lines.h"
-#include "drivers/panel/panel.h"
+#include "drivers/panel/debounce.h"
 
 namespace scanrig {
 
 /// Which line is which input or output; what is not wired keeps its rest value.
 struct GpioPanelOptions {
-  std::vector<std::pair<bool PanelInputs::*, gpio::LineSpec>> inputs;
-  std::vector<std::pair<bool PanelOutputs::*, gpio::LineSpec>> outputs;
+  std::vector<std::pair<bool PanelInputs::*, gpio::LineSpec>> inputs{};
+  std::vector<std::pair<bool PanelOutputs::*, gpio::LineSpec>> outputs{};
 };
 
-/// Buttons, switches and lamps on GPIO lines. A level counts once it has held for 50 ms; e-stop and guard count at once
-/// when they open. A start button pressed when the panel is opened counts only after it has been released.
+/// Buttons, switches and lamps on GPIO lines, debounced as PanelDebounce says. The lamps keep what they show last.
 class GpioPanel final : public Panel {
  public:
-  static constexpr std::chrono::milliseconds kDebounce{50};
-
   /// All lamps off. Fails with `not_found`, `io`.
   static Result<std::unique_ptr<GpioPanel>> open(const GpioPanelOptions& options, gpio::Lines& lines, Clock& clock);
 
@@ -29,26 +25,18 @@ class GpioPanel final : public Panel {
   Result<void> show(const PanelOutputs& outputs, Deadline deadline) override;
 
  private:
-  struct Input {
-    bool PanelInputs::*field;
-    bool level = false;    // as it is
-    bool settled = false;  // as it counts
-    bool held_since_open = false;
-    Clock::TimePoint since;
-  };
   struct Lamp {
     bool PanelOutputs::*field;
     std::unique_ptr<gpio::Output> line;
   };
 
-  explicit GpioPanel(Clock& clock) : clock_(clock) {}
-  void take(const std::vector<bool>& levels);
-  [[nodiscard]] PanelInputs settled() const;
+  Result<void> look(Deadline deadline);
+  GpioPanel(const std::vector<bool PanelInputs::*>& fields, Clock& clock) : clock_(clock), debounce_(fields) {}
 
   Clock& clock_;
   std::unique_ptr<gpio::Inputs> lines_;
   std::vector<bool> levels_;
-  std::vector<Input> inputs_;
+  PanelDebounce debounce_;
   std::vector<Lamp> lamps_;
 };
 

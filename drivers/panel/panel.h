@@ -13,6 +13,7 @@ struct PanelInputs {
   bool estop_ok = true;
   bool guard_closed = true;
   bool part_present = true;
+  bool flipped = false;  ///< something else than the operator says that the object was turned over
   bool operator==(const PanelInputs&) const = default;
 };
 
@@ -35,7 +36,8 @@ class Panel {
   virtual ~Panel() = default;
 
   /// Waits until the inputs differ from `known` or the deadline passes; returns the inputs either way.
-  /// Fails with `io`, `protocol`.
+  /// Fails with `timeout`, `protocol`, `io` (the inputs are unknown: whoever moves something stops), `device_alarm`
+  /// (a button is pressed since the panel was opened).
   virtual Result<PanelInputs> wait_change(const PanelInputs& known, Deadline deadline) = 0;
 
   /// Fails with `timeout`, `protocol`, `io`.

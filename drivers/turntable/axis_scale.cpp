@@ -6,11 +6,10 @@
 #include <limits>
 
 namespace scanrig {
-namespace {
-
-constexpr double kMaxWord = std::numeric_limits<std::uint16_t>::max();
-
-}  // namespace
+double DriveProfile::Move::largest(Word high) const {
+  const bool wide = std::ranges::find(words, high, &Item::word) != words.end();
+  return wide ? std::numeric_limits<std::int32_t>::max() : std::numeric_limits<std::uint16_t>::max();
+}
 
 double AxisScale::pulses(Degrees angle) const {
   return (positive_ccw ? 1.0 : -1.0) * (angle + home_offset).value * pulses_per_degree();
@@ -20,7 +19,7 @@ Degrees AxisScale::angle(double pulses) const {
   return Degrees{(positive_ccw ? 1.0 : -1.0) * pulses / pulses_per_degree()} - home_offset;
 }
 
-Result<std::uint16_t> AxisScale::speed_word(DegreesPerSecond speed, const DriveProfile& profile) const {
+Result<std::uint32_t> AxisScale::speed_word(DegreesPerSecond speed, const DriveProfile& profile) const {
   const double rpm = motor_rpm(speed);
   if (!(rpm > 0.0 && rpm <= profile.max_motor_rpm)) {
     return fail(ErrorCode::out_of_range,
@@ -28,21 +27,22 @@ Result<std::uint16_t> AxisScale::speed_word(DegreesPerSecond speed, const DriveP
                 speed.value, rpm, profile.max_motor_rpm);
   }
   const double word = profile.speed_unit == DriveProfile::SpeedUnit::rpm ? rpm : rpm * pulses_per_motor_rev / 60.0;
-  if (word > kMaxWord) {
+  if (word > profile.move.largest(DriveProfile::Move::Word::speed_high)) {
     return fail(ErrorCode::out_of_range, "{} deg/s is more than the drive's speed word holds", speed.value);
   }
-  return static_cast<std::uint16_t>(std::max(1.0, std::round(word)));
+  return static_cast<std::uint32_t>(std::max(1.0, std::round(word)));
 }
 
-Result<std::uint16_t> AxisScale::acceleration_word(DegreesPerSecond2 acceleration, const DriveProfile& profile) const {
+Result<std::uint32_t> AxisScale::acceleration_word(DegreesPerSecond2 acceleration, const DriveProfile& profile) const {
   const double rpm_per_s = acceleration.value * gear_ratio / 6.0;
   const bool by_time = profile.acceleration_unit == DriveProfile::AccelerationUnit::ms_per_1000_rpm;
   const double word = std::round(by_time ? 1e6 / rpm_per_s : rpm_per_s * pulses_per_motor_rev / 60.0);
-  if (!(rpm_per_s > 0.0 && word >= 1.0 && word <= kMaxWord)) {
+  const double largest = profile.move.largest(DriveProfile::Move::Word::acceleration_high);
+  if (!(rpm_per_s > 0.0 && word >= 1.0 && word <= largest)) {
     return fail(ErrorCode::out_of_range, "{} deg/s2 is {:.0f} in the drive's unit, 1 to {:.0f} can be written",
-                acceleration.value, word, kMaxWord);
+                acceleration.value, word, largest);
   }
-  return static_cast<std::uint16_t>(word);
+  return static_cast<std::uint32_t>(word);
 }
 
 MovePlanner::Counter MovePlanner::counter_range() const {

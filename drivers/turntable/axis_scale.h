@@ -23,8 +23,8 @@ struct AxisScale {
   [[nodiscard]] double motor_rpm(DegreesPerSecond speed) const { return speed.value * gear_ratio / 6.0; }
 
   /// The values of the speed and acceleration words. Fails with `out_of_range`.
-  [[nodiscard]] Result<std::uint16_t> speed_word(DegreesPerSecond speed, const DriveProfile& profile) const;
-  [[nodiscard]] Result<std::uint16_t> acceleration_word(DegreesPerSecond2 acceleration,
+  [[nodiscard]] Result<std::uint32_t> speed_word(DegreesPerSecond speed, const DriveProfile& profile) const;
+  [[nodiscard]] Result<std::uint32_t> acceleration_word(DegreesPerSecond2 acceleration,
                                                         const DriveProfile& profile) const;
 };
 

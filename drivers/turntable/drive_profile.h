@@ -15,20 +15,34 @@ struct DriveProfile {
   struct Trigger {
     std::uint16_t address = 0;
     std::uint16_t value = 0;
+    std::optional<std::uint16_t> release{};  ///< written next, for a drive that acts when a bit changes
   };
 
   /// The block that starts an absolute move, written in one request.
   struct Move {
-    enum class Word { constant, position_high, position_low, speed, acceleration, deceleration };
+    enum class Word {
+      constant,
+      position_high,
+      position_low,
+      speed_high,
+      speed,
+      acceleration_high,
+      acceleration,
+      deceleration_high,
+      deceleration
+    };
     struct Item {
       Word word = Word::constant;
       std::uint16_t value = 0;  ///< of a constant
     };
     std::uint16_t address = 0;
     std::vector<Item> words;
+
+    /// The largest speed or acceleration that fits the block.
+    [[nodiscard]] double largest(Word high) const;
   };
 
-  /// Masks of the status register; a state holds when all bits of its mask are set.
+  /// Masks of the status register; a state holds when all bits of its mask are set, so an empty mask always holds.
   struct Status {
     std::uint16_t address = 0;
     std::uint16_t fault = 0;
@@ -36,14 +50,16 @@ struct DriveProfile {
     std::uint16_t running = 0;
     std::uint16_t in_position = 0;
     std::uint16_t homed = 0;
+    bool homed_stays = true;  ///< false: it is told until the next motion only
   };
 
   struct Homing {
-    std::uint16_t mode_address = 0;
-    std::map<std::string, std::uint16_t> modes;  ///< "switch", "limit"
-    std::uint16_t speeds_address = 0;            ///< fast speed, slow speed, acceleration, deceleration
+    std::optional<std::uint16_t> mode_address;
+    std::map<std::string, std::uint16_t> modes;   ///< "switch", "limit", "encoder"
+    std::optional<std::uint16_t> speeds_address;  ///< fast speed, slow speed, acceleration, deceleration
+    bool zero_is_known = false;                   ///< an absolute encoder: at home nothing moves
     Trigger start;
-    Trigger set_zero;  ///< declares the present position home
+    std::optional<Trigger> set_zero;  ///< declares the present position home
   };
 
   struct SoftLimits {
@@ -70,14 +86,14 @@ struct DriveProfile {
   SpeedUnit speed_unit = SpeedUnit::rpm;
   AccelerationUnit acceleration_unit = AccelerationUnit::ms_per_1000_rpm;
   double max_motor_rpm = 3000;
-  std::uint16_t pulses_per_motor_rev_address = 0;
-  Trigger enable;
+  std::optional<std::uint16_t> pulses_per_motor_rev_address;
+  std::optional<Trigger> enable;
   Trigger stop;
   Move move;
   Status status;
   std::uint16_t feedback_address = 0;  ///< measured position in pulses, 32 bit
   Homing homing;
-  SoftLimits soft_limits;
+  std::optional<SoftLimits> soft_limits;
   Alarm alarm;
 };
 

@@ -8,12 +8,8 @@ namespace {
 
 constexpr int kAttempts = 3;
 
-constexpr std::uint16_t high_word(std::int32_t value) {
-  return static_cast<std::uint16_t>(static_cast<std::uint32_t>(value) >> 16);
-}
-constexpr std::uint16_t low_word(std::int32_t value) {
-  return static_cast<std::uint16_t>(static_cast<std::uint32_t>(value) & 0xFFFFu);
-}
+constexpr std::uint16_t high_word(std::uint32_t value) { return static_cast<std::uint16_t>(value >> 16); }
+constexpr std::uint16_t low_word(std::uint32_t value) { return static_cast<std::uint16_t>(value & 0xFFFFu); }
 std::int32_t from_words(const std::vector<std::uint16_t>& words) {
   return static_cast<std::int32_t>(std::uint32_t{words[0]} << 16 | words[1]);
 }
@@ -22,11 +18,14 @@ std::uint16_t word_of(const DriveProfile::Move::Item& item, std::int32_t target,
   using Word = DriveProfile::Move::Word;
   switch (item.word) {
     case Word::constant: return item.value;
-    case Word::position_high: return high_word(target);
-    case Word::position_low: return low_word(target);
-    case Word::speed: return motion.speed;
-    case Word::acceleration: return motion.acceleration;
-    case Word::deceleration: return motion.deceleration;
+    case Word::position_high: return high_word(static_cast<std::uint32_t>(target));
+    case Word::position_low: return low_word(static_cast<std::uint32_t>(target));
+    case Word::speed_high: return high_word(motion.speed);
+    case Word::speed: return low_word(motion.speed);
+    case Word::acceleration_high: return high_word(motion.acceleration);
+    case Word::acceleration: return low_word(motion.acceleration);
+    case Word::deceleration_high: return high_word(motion.deceleration);
+    case Word::deceleration: return low_word(motion.deceleration);
   }
   return 0;
 }
@@ -42,6 +41,12 @@ auto ModbusDrive::repeat(const Request& request) -> decltype(request()) {
     answer = request();
   }
   return answer;
+}
+
+Result<void> ModbusDrive::write(const DriveProfile::Trigger& trigger, Deadline deadline) {
+  auto written = line_.write(trigger.address, trigger.value, deadline);
+  if (!written || !trigger.release) return written;
+  return line_.write(trigger.address, *trigger.release, deadline);
 }
 
 Result<DriveState> ModbusDrive::read_state(Deadline deadline) {
@@ -72,9 +77,10 @@ Result<DriveState> ModbusDrive::read_state(Deadline deadline) {
   });
 }
 
-Result<int> ModbusDrive::read_pulses_per_motor_rev(Deadline deadline) {
-  return repeat([&]() -> Result<int> {
-    const auto words = line_.read(profile_.pulses_per_motor_rev_address, 1, deadline);
+Result<std::optional<int>> ModbusDrive::read_pulses_per_motor_rev(Deadline deadline) {
+  if (!profile_.pulses_per_motor_rev_address) return std::nullopt;
+  return repeat([&]() -> Result<std::optional<int>> {
+    const auto words = line_.read(*profile_.pulses_per_motor_rev_address, 1, deadline);
     if (!words) return pass_on(words);
     return words->front();
   });
@@ -93,25 +99,36 @@ Result<std::string> ModbusDrive::read_alarm(Deadline deadline) {
 }
 
 Result<void> ModbusDrive::enable(Deadline deadline) {
-  return repeat([&] { return write(profile_.enable, deadline); });
+  if (!profile_.enable) return {};
+  return repeat([&] { return write(*profile_.enable, deadline); });
 }
 
 Result<void> ModbusDrive::stop(Deadline deadline) {
   return repeat([&] { return write(profile_.stop, deadline); });
 }
 
-Result<void> ModbusDrive::set_homing(const std::string& mode, const DriveMotion& fast, std::uint16_t slow_speed,
+void ModbusDrive::stop_unheard() {
+  if (line_.answer_missed()) std::ignore = line_.write_unheard(profile_.stop.address, profile_.stop.value);
+}
+
+Result<void> ModbusDrive::set_homing(const std::string& mode, const DriveMotion& fast, std::uint32_t slow_speed,
                                      Deadline deadline) {
   const auto& homing = profile_.homing;
-  const auto set = repeat([&] { return line_.write(homing.mode_address, homing.modes.at(mode), deadline); });
-  if (!set) return set;
-  const std::array<std::uint16_t, 4> speeds{fast.speed, slow_speed, fast.acceleration, fast.deceleration};
-  return repeat([&] { return line_.write(homing.speeds_address, speeds, deadline); });
+  if (homing.mode_address) {
+    const auto set = repeat([&] { return line_.write(*homing.mode_address, homing.modes.at(mode), deadline); });
+    if (!set) return set;
+  }
+  if (!homing.speeds_address) return {};
+  const std::array speeds{low_word(fast.speed), low_word(slow_speed), low_word(fast.acceleration),
+                          low_word(fast.deceleration)};
+  return repeat([&] { return line_.write(*homing.speeds_address, speeds, deadline); });
 }
 
 Result<void> ModbusDrive::set_soft_limits(const MovePlanner::Counter& range, Deadline deadline) {
-  const auto& limits = profile_.soft_limits;
-  const auto plus = static_cast<std::int32_t>(range.max), minus = static_cast<std::int32_t>(range.min);
+  if (!profile_.soft_limits) return {};
+  const auto& limits = *profile_.soft_limits;
+  const auto word = [](double counter) { return static_cast<std::uint32_t>(static_cast<std::int32_t>(counter)); };
+  const std::uint32_t plus = word(range.max), minus = word(range.min);
   const std::array<std::uint16_t, 4> words{high_word(plus), low_word(plus), high_word(minus), low_word(minus)};
   if (auto written = repeat([&] { return line_.write(limits.address, words, deadline); }); !written) return written;
   const auto control = repeat([&] { return line_.read(limits.control_address, 1, deadline); });

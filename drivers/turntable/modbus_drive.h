@@ -23,9 +23,9 @@ struct DriveState {
 
 /// The values of a move in the drive's own units.
 struct DriveMotion {
-  std::uint16_t speed = 0;
-  std::uint16_t acceleration = 0;
-  std::uint16_t deceleration = 0;
+  std::uint32_t speed = 0;
+  std::uint32_t acceleration = 0;
+  std::uint32_t deceleration = 0;
 };
 
 /// A motor drive as its profile describes it. Requests that may be repeated without harm are sent up to three times,
@@ -40,21 +40,30 @@ class ModbusDrive {
   /// Status and position, read in turn. What follows a missed answer is never the same request again but the other
   /// one, whose answer has another length: even an answer later than the quiet line is refused, not believed.
   Result<DriveState> read_state(Deadline deadline);
-  Result<int> read_pulses_per_motor_rev(Deadline deadline);
+  /// Nothing where the drive does not tell.
+  Result<std::optional<int>> read_pulses_per_motor_rev(Deadline deadline);
   /// The present alarm in words, empty when there is none.
   Result<std::string> read_alarm(Deadline deadline);
 
   Result<void> enable(Deadline deadline);
   Result<void> stop(Deadline deadline);
-  Result<void> set_homing(const std::string& mode, const DriveMotion& fast, std::uint16_t slow_speed,
+  /// The same at once where the answer to the last request was missed, when stop() would first wait for a quiet line.
+  /// Whoever calls it calls stop() next.
+  void stop_unheard();
+  /// From any thread, see modbus::Line.
+  void hurry(bool on) noexcept { line_.hurry(on); }
+  /// Writes what this drive lets one set about homing.
+  Result<void> set_homing(const std::string& mode, const DriveMotion& fast, std::uint32_t slow_speed,
                           Deadline deadline);
+  /// Nothing where the drive has no limits of its own.
   Result<void> set_soft_limits(const MovePlanner::Counter& range, Deadline deadline);
   /// Fails with `device_alarm` when this drive wants a power cycle.
   Result<void> reset_alarm(Deadline deadline);
 
   Result<void> start_move(std::int32_t target, const DriveMotion& motion, Deadline deadline);
   Result<void> start_homing(Deadline deadline) { return write(profile_.homing.start, deadline); }
-  Result<void> set_zero(Deadline deadline) { return write(profile_.homing.set_zero, deadline); }
+  /// Only with a profile that has it.
+  Result<void> set_zero(Deadline deadline) { return write(*profile_.homing.set_zero, deadline); }
 
   /// Whether the last request may have been carried out although it failed.
   [[nodiscard]] bool answer_missed() const { return line_.answer_missed(); }
@@ -62,9 +71,7 @@ class ModbusDrive {
   [[nodiscard]] const modbus::LineStatistics& statistics() const { return line_.statistics(); }
 
  private:
-  Result<void> write(const DriveProfile::Trigger& trigger, Deadline deadline) {
-    return line_.write(trigger.address, trigger.value, deadline);
-  }
+  Result<void> write(const DriveProfile::Trigger& trigger, Deadline deadline);
   template <class Request>
   auto repeat(const Request& request) -> decltype(request());
 

@@ -29,7 +29,8 @@ Result<std::unique_ptr<ModbusTurntable>> ModbusTurntable::create(ModbusTurntable
   if (!speed) return pass_on(speed, "turntable");
   if (!fast) return pass_on(fast, "turntable");
   if (!acceleration) return pass_on(acceleration, "turntable");
-  if (options.home_mode != "here" && !options.profile.homing.modes.contains(options.home_mode)) {
+  const auto& homing_of = options.profile.homing;
+  if (options.home_mode == "here" ? !homing_of.set_zero : !homing_of.modes.contains(options.home_mode)) {
     return fail(ErrorCode::out_of_range, "turntable: {} has no homing mode '{}'", options.profile.name,
                 options.home_mode);
   }
@@ -73,9 +74,9 @@ Result<void> ModbusTurntable::find_home(Deadline deadline) {
     if (!set) return set;
   }
   // The homed bit may still be that of the last homing: something must be seen to happen first.
-  bool begun = here;
+  bool begun = here || (options_.profile.homing.zero_is_known && near(before->position, 0));
   const auto begins = [&](const DriveState& state) {
-    begun = begun || state.running || (before->homed && !state.homed);
+    begun = begun || state.running || before->homed != state.homed;
     return begun && !(here && !near(state.position, 0));
   };
   const auto started =
@@ -105,8 +106,8 @@ Result<void> ModbusTurntable::check_and_enable(Deadline deadline) {
   if (!state) return pass_on(state);
   const auto pulses = drive_.read_pulses_per_motor_rev(deadline);
   if (!pulses) return pass_on(pulses);
-  if (*pulses != options_.scale.pulses_per_motor_rev) {
-    return fail(ErrorCode::protocol, "the drive is set to {} pulses a motor turn, the configuration says {}", *pulses,
+  if (*pulses && **pulses != options_.scale.pulses_per_motor_rev) {
+    return fail(ErrorCode::protocol, "the drive is set to {} pulses a motor turn, the configuration says {}", **pulses,
                 options_.scale.pulses_per_motor_rev);
   }
   if (state->running) {
@@ -138,7 +139,7 @@ Result<Move> ModbusTurntable::rotate_to(Degrees target, Deadline deadline) {
 
 Result<Move> ModbusTurntable::turn(Degrees target, const DriveState& before, const MovePlan& plan, Deadline deadline) {
   const auto begun = clock_.now();
-  if (before.running || !before.homed) {
+  if (before.running || (options_.profile.status.homed_stays && !before.homed)) {
     return before.running ? fail(ErrorCode::protocol, "the table moves although nothing was commanded")
                           : fail(ErrorCode::not_homed, "the drive has lost its home (switched off in between?)");
   }
@@ -259,6 +260,12 @@ Result<DriveState> ModbusTurntable::read_after_owed_stop(Deadline deadline) {
   return drive_.read_state(deadline);
 }
 
+Result<void> ModbusTurntable::stop_drive(Deadline deadline) {
+  drive_.stop_unheard();
+  drive_.hurry(false);
+  return drive_.stop(deadline);
+}
+
 /// After any failure: no known zero, and the motor is told to stop.
 tl::unexpected<Error> ModbusTurntable::give_up(const Error& error) {
   homed_ = flank_loaded_ = false;
@@ -266,7 +273,7 @@ tl::unexpected<Error> ModbusTurntable::give_up(const Error& error) {
     const std::scoped_lock lock(mutex_);
     stop_requested_ = false;
   }
-  stop_owed_ = !drive_.stop(Deadline::after(clock_, kStopReplyTimeouts * options_.line.reply_timeout));
+  stop_owed_ = !stop_drive(Deadline::after(clock_, kStopReplyTimeouts * options_.line.reply_timeout));
   return fail(error.code, "turntable: {}; {}", error.message,
               stop_owed_ ? "the stop was not confirmed: the table may be moving" : "the motor was told to stop");
 }
@@ -282,7 +289,7 @@ Result<void> ModbusTurntable::stop(Deadline deadline) {
     stop_owed_ = true;
     return tl::unexpected(Error{error.code, error.message + "; the table may be moving"}.in("turntable"));
   };
-  if (auto told = drive_.stop(deadline); !told) return failed(told.error());
+  if (auto told = stop_drive(deadline); !told) return failed(told.error());
   stop_owed_ = false;
   flank_loaded_ = false;
   auto since = clock_.now();
@@ -316,7 +323,7 @@ Result<TurntableStatus> ModbusTurntable::status(Deadline deadline) {
   if (!state) return pass_on(state, "turntable");
   TurntableStatus status;
   status.motion = state->running ? TurntableStatus::Motion::moving : TurntableStatus::Motion::standing;
-  status.homed = homed_ && state->homed;
+  status.homed = homed_ && (state->homed || !options_.profile.status.homed_stays);
   if (status.homed) status.angle = options_.scale.angle(state->position);
   if (state->fault) {
     const auto alarm = drive_.read_alarm(deadline);
@@ -326,11 +333,20 @@ Result<TurntableStatus> ModbusTurntable::status(Deadline deadline) {
   return status;
 }
 
+Result<void> ModbusTurntable::limit_speed(std::optional<DegreesPerSecond> limit) {
+  const auto speed =
+      options_.scale.speed_word(std::min(options_.speed, limit.value_or(options_.speed)), options_.profile);
+  if (!speed) return pass_on(speed, "turntable");
+  motion_.speed = *speed;
+  return {};
+}
+
 void ModbusTurntable::request_stop() noexcept {
   {
     const std::scoped_lock lock(mutex_);
     stop_requested_ = true;
   }
+  drive_.hurry(true);
   clock_.notify_all(wake_);
 }
 

@@ -40,6 +40,7 @@ class ModbusTurntable final : public Turntable {
   Result<void> stop(Deadline deadline) override;
   Result<void> reset_alarm(Deadline deadline) override;
   Result<TurntableStatus> status(Deadline deadline) override;
+  Result<void> limit_speed(std::optional<DegreesPerSecond> limit) override;
   void request_stop() noexcept override;
 
   [[nodiscard]] const modbus::LineStatistics& statistics() const { return drive_.statistics(); }
@@ -67,6 +68,7 @@ class ModbusTurntable final : public Turntable {
   Result<void> not_stopped();
   Result<DriveState> ask(Deadline deadline);
   Result<DriveState> read_after_owed_stop(Deadline deadline);
+  Result<void> stop_drive(Deadline deadline);
   tl::unexpected<Error> give_up(const Error& error);
   void pause();
 

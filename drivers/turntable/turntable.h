@@ -51,6 +51,12 @@ class Turntable {
   /// Asks the device. Fails with `timeout`, `protocol`, `io`.
   virtual Result<TurntableStatus> status(Deadline deadline) = 0;
 
+  /// Moves from now on are no faster than `limit`, and than configured; nothing: as configured.
+  /// Fails with `unsupported`, `out_of_range`.
+  virtual Result<void> limit_speed(std::optional<DegreesPerSecond> /*limit*/) {
+    return fail(ErrorCode::unsupported, "turntable: this drive's speed cannot be limited");
+  }
+
   /// Makes a running or the next home() or rotate_to() fail with `stopped` and stop the motor; cleared by home().
   virtual void request_stop() noexcept = 0;
 };

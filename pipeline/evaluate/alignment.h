@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "core/transform.h"
-#include "pipeline/mesh/surface_index.h"
 #include "pipeline/evaluate/surface_samples.h"
+#include "pipeline/mesh/surface_index.h"
 
 namespace scanrig {
 

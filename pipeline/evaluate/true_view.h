@@ -3,9 +3,9 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
-#include "pipeline/mesh/surface_index.h"
 #include "pipeline/evaluate/surface_samples.h"
 #include "pipeline/evaluate/truth.h"
+#include "pipeline/mesh/surface_index.h"
 
 namespace scanrig {
 

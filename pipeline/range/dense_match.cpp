@@ -128,6 +128,7 @@ struct Side {
     WindowOptions window;
     window.iterations = iterations;
     window.curvature_prior = 0.15f;
+    window.step_px = 1.5f;  // where the signal is low the coarse disparities are worse too
     patch.radius = radius;
     patch = match_window(here.smooth, there.smooth, mask, u, v, patch, window);
     patch.sigma *= kSmoothInflation;
@@ -246,20 +247,21 @@ Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDi
 
 namespace {
 
-/// What the neighbours in eight directions say about a pixel.
+/// What the neighbours in eight directions say about a pixel. Those beyond a depth step see another surface and have no
+/// say; but a pixel right beside a step may belong to either side.
 struct Neighbours {
   int seen = 0;
   int agreeing = 0;
-  bool step = false;  // one of them is beyond a depth step
+  bool at_step = false;
 };
 
 Neighbours ask_neighbours(const DenseDisparity& disparity, int u, int v, const StereoOptions& options) {
-  constexpr std::array<int, 2> kApart = {4, 6};  // px
-  constexpr double kStep = 1.5;                  // px
+  constexpr int kBeside = 2, kApart = 4;  // px
+  constexpr double kStep = 1.5;           // px of disparity
   const cv::Size size = disparity.value.size();
   const float d = disparity.value(v, u);
   Neighbours answer;
-  for (const int apart : kApart) {
+  for (const int apart : {kBeside, kApart}) {
     for (int dy = -apart; dy <= apart; dy += apart) {
       for (int dx = -apart; dx <= apart; dx += apart) {
         const int x = u + dx, y = v + dy;
@@ -269,8 +271,9 @@ Neighbours ask_neighbours(const DenseDisparity& disparity, int u, int v, const S
         const float predicted =
             disparity.value(y, x) - slope[0] * static_cast<float>(dx) - slope[1] * static_cast<float>(dy);
         const double off = static_cast<double>(std::abs(predicted - d));
-        answer.step |= off > kStep;
-        if (apart != kApart.front()) continue;
+        const bool beyond_step = off > kStep;
+        if (apart == kBeside) answer.at_step |= beyond_step;
+        if (apart == kBeside || beyond_step) continue;
         const double sigma = static_cast<double>(std::max(disparity.sigma(v, u), disparity.sigma(y, x)));
         ++answer.seen;
         if (off <= std::max(options.neighbour_px, 3.0 * sigma)) ++answer.agreeing;
@@ -283,7 +286,7 @@ Neighbours ask_neighbours(const DenseDisparity& disparity, int u, int v, const S
 }  // namespace
 
 void remove_outliers(DenseDisparity& disparity, const StereoOptions& options) {
-  constexpr int kLeastAgreeing = 5;  // of 8: the rim of what was measured goes
+  constexpr int kLeastAgreeing = 3;  // of 8: one side of a corner
   const cv::Size size = disparity.value.size();
   cv::Mat1s kept(size, short{0});
   parallel_for(static_cast<std::size_t>(size.height), [&](std::size_t row) {
@@ -291,7 +294,7 @@ void remove_outliers(DenseDisparity& disparity, const StereoOptions& options) {
     for (int u = 0; u < size.width; ++u) {
       if (std::isnan(disparity.value(v, u))) continue;
       const Neighbours n = ask_neighbours(disparity, u, v, options);
-      if (n.step || n.agreeing < kLeastAgreeing || 4 * n.agreeing < 3 * n.seen) continue;
+      if (n.at_step || n.agreeing < kLeastAgreeing || 4 * n.agreeing < 3 * n.seen) continue;
       // Disparity in 1/16 px, offset so that 0 stays "nothing".
       kept(v, u) = cv::saturate_cast<short>(16000.0f + 16.0f * disparity.value(v, u));
     }

@@ -23,6 +23,14 @@ namespace {
 /// Partial models only have to carry the search for the pose; finer ones do not find it better.
 constexpr double kPartialVoxelMm = 0.8;
 
+constexpr double kVoxelMm = 0.25;
+
+/// Voxels finer than the data show the data's noise and nothing else. All images of a scan come from one scanner.
+double voxel_for(const RangeImage& range) {
+  const bool pinhole = range.projection.kind == Projection::Kind::pinhole;
+  return pinhole ? kVoxelMm : std::max(kVoxelMm, range.projection.mm_per_pixel(0.0));
+}
+
 struct PlainPair {
   cv::Mat3b left, right;
 };
@@ -171,6 +179,7 @@ Result<Model> Reconstruction::State::finish(const Context& context) {
   for (std::size_t p = 0; p < poses.size(); ++p) {
     if (!poses[p].finished) return fail(ErrorCode::invalid_input, "pose {} is not finished", p + 1);
   }
+  if (options.voxel_mm == 0.0) options.voxel_mm = voxel_for(poses.front().views.front().range);
   Report report(options, identity, calibration);
   for (const PoseState& pose : poses) report.add_pose(pose.views, pose.registration, pose.partial.report);
   const auto pose1_from_pose2 = find_pose(report, context);

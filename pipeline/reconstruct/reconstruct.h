@@ -16,7 +16,8 @@
 namespace scanrig {
 
 struct ReconstructOptions {
-  double voxel_mm = 0.25;           ///< of the model; partial models for finding the pose are coarser
+  double voxel_mm = 0.0;            ///< of the model; partial models for finding the pose are coarser. 0: 0.25 mm, or
+                                    ///< the pixels of imported range images where they are larger
   int threads = 0;                  ///< 0: all of the machine's; the result is the same for any number
   std::string fusion = "evidence";  ///< `evidence`, or `paper` for the class table as published
   std::string rests = "hull";       ///< `hull`, or `egi` for the paper's tessellated sphere

@@ -116,6 +116,7 @@ class Solver {
   [[nodiscard]] Matrix6 prior_information() const;
   [[nodiscard]] Eigen::Matrix<double, 6, kAxisUnknowns> axis_effect(std::size_t v) const;
   void add_data(const std::vector<Matches>& matches, Eigen::MatrixXd& normal, Eigen::VectorXd& right) const;
+  void hold_common_motion(Eigen::MatrixXd& normal, Eigen::VectorXd& right) const;
   void add_priors(Eigen::MatrixXd& normal, Eigen::VectorXd& right) const;
 
   RegistrationOptions options_;
@@ -201,9 +202,28 @@ void Solver::add_priors(Eigen::MatrixXd& normal, Eigen::VectorXd& right) const {
     right.segment<6>(a) -= information * correction_[v];
     right.head<kAxisUnknowns>() += effect.transpose() * information * correction_[v];
   }
+  hold_common_motion(normal, right);
   const double tilt = 1.0 / variance(to_radians(options_.axis_tilt_sigma_deg));
   const double shift = 1.0 / variance(options_.axis_shift_sigma_mm);
   normal.diagonal().head<kAxisUnknowns>() += Eigen::Vector4d(tilt, tilt, shift, shift);
+}
+
+/// What all views' corrections have in common, seen from their cameras, is the axis's and only the axis's. Left to the
+/// views it would take up what scanners have wrong at grazing incidence: b (1 - cos) is what moving every view b
+/// towards its camera does, and the model grows by b.
+void Solver::hold_common_motion(Eigen::MatrixXd& normal, Eigen::VectorXd& right) const {
+  constexpr double kInformation = 1e10;  // 1 / (0.01 um)^2 or 1 / (0.0006 deg)^2
+  const auto views = static_cast<double>(correction_.size());
+  Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(kAxisUnknowns, normal.cols());  // of the corrections, less the axis
+  mean.leftCols<kAxisUnknowns>() = -Eigen::Matrix4d::Identity();
+  Eigen::Vector4d now = Eigen::Vector4d::Zero();  // the axis is solved for anew, the corrections are added to
+  for (std::size_t v = 0; v < correction_.size(); ++v) {
+    const Eigen::Matrix<double, kAxisUnknowns, 6> share = axis_effect(v).transpose() / views;
+    mean.middleCols<6>(kAxisUnknowns + 6 * static_cast<int>(v)) = share;
+    now += share * correction_[v];
+  }
+  normal += kInformation * mean.transpose() * mean;
+  right -= kInformation * mean.transpose() * now;
 }
 
 double Solver::step(const std::vector<Matches>& matches) {

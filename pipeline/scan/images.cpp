@@ -38,6 +38,22 @@ cv::Mat demosaiced(const cv::Mat& image, const std::string& pixel_format) {
   return bgr;
 }
 
+/// Whether the bytes begin as a PNG image does and end before its IEND chunk (PNG specification, 5.3): libpng would
+/// write about it to the terminal.
+bool is_cut_png(std::string_view bytes) {
+  constexpr std::string_view kSignature = "\x89PNG\r\n\x1a\n";
+  constexpr std::size_t kLength = 4, kType = 4, kCrc = 4;
+  if (!bytes.starts_with(kSignature)) return false;
+  for (std::size_t at = kSignature.size(); at + kLength + kType <= bytes.size();) {
+    std::size_t length = 0;
+    for (std::size_t i = 0; i < kLength; ++i) length = length << 8 | static_cast<unsigned char>(bytes[at + i]);
+    const auto type = bytes.substr(at + kLength, kType);
+    at += kLength + kType + length + kCrc;
+    if (type == "IEND") return at > bytes.size();
+  }
+  return true;
+}
+
 }  // namespace
 
 Result<void> check_images(const RawView& raw) {
@@ -82,6 +98,7 @@ Result<std::vector<std::byte>> encode_tiff(const cv::Mat1f& depth) {
 }
 
 Result<cv::Mat> decode_image(std::string_view bytes) {
+  if (is_cut_png(bytes)) return fail(ErrorCode::invalid_input, "a PNG image of which the end is missing");
   try {
     const cv::Mat buffer(1, static_cast<int>(bytes.size()), CV_8U, const_cast<char*>(bytes.data()));
     cv::Mat image = cv::imdecode(buffer, cv::IMREAD_UNCHANGED);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 
 #include "pipeline/scan/strict_json.h"
@@ -89,6 +90,15 @@ ViewRecord read_view(JsonObject object, bool stereo) {
   return view;
 }
 
+/// The first index that is not there before the last one (0 where there is no view at all).
+std::optional<int> first_gap(const PoseRecord& pose) {
+  if (pose.views.empty()) return 0;
+  for (int i = 0; i < static_cast<int>(pose.views.size()); ++i) {
+    if (pose.views[static_cast<std::size_t>(i)].index != i) return i;
+  }
+  return std::nullopt;
+}
+
 PoseRecord read_pose(JsonObject object, bool stereo) {
   PoseRecord pose;
   pose.name = object.text("name");
@@ -101,6 +111,9 @@ PoseRecord read_pose(JsonObject object, bool stereo) {
     if (pose.views.size() > 1 && pose.views.back().index <= pose.views[pose.views.size() - 2].index) {
       view.reject("index", "views must be listed by ascending index, each once");
     }
+  }
+  if (const auto gap = first_gap(pose); pose.complete && gap) {
+    object.reject("views", fmt::format("view {} is missing, though the pose is complete", *gap));
   }
   object.close();
   return pose;

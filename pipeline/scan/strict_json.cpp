@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "core/files.h"
 #include "core/hash.h"
@@ -10,6 +11,18 @@
 namespace scanrig {
 
 using nlohmann::json;
+
+namespace {
+
+/// Both from 1, of the byte numbered from 1.
+std::pair<std::size_t, std::size_t> line_and_column(std::string_view text, std::size_t byte) {
+  const auto before = text.substr(0, byte > 0 ? byte - 1 : 0);
+  const auto line_start = before.rfind('\n');
+  return {1 + static_cast<std::size_t>(std::count(before.begin(), before.end(), '\n')),
+          1 + before.size() - (line_start == std::string_view::npos ? 0 : line_start + 1)};
+}
+
+}  // namespace
 
 JsonObject::JsonObject(const json* value, std::string path, std::optional<Error>* fault)
     : value_(value), path_(std::move(path)), fault_(fault) {}
@@ -209,6 +222,9 @@ Result<JsonFile> JsonFile::read(const std::filesystem::path& file, std::string_v
   result.sha256_ = scanrig::sha256(*text);
   try {
     *result.document_ = json::parse(*text);
+  } catch (const json::parse_error& e) {
+    const auto [line, column] = line_and_column(*text, e.byte);
+    return fail(ErrorCode::invalid_input, "{}:{}:{}: not valid JSON from here on", result.name_, line, column);
   } catch (const json::exception& e) {
     return fail(ErrorCode::invalid_input, "{}: not valid JSON: {}", result.name_, e.what());
   }

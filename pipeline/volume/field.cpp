@@ -78,15 +78,17 @@ FieldValue Field::at(const Eigen::Vector3f& point, const Neighbourhood& neighbou
                                                     : from_class_table(point, neighbourhood);
 }
 
-/// Hull and, where an image has neither silhouette nor background, its footprint: a point that lies beside all they
-/// measured for more images than see it behind their surface, and for two at least, is outside.
+/// Hull and, where an image has neither silhouette nor background, its footprint: a point is outside if it lies beside
+/// all they measured for more images than see it behind their surface, or for more than a fifth of them, and for two at
+/// least. A fifth: dropouts at the same place of so many images are unlikely, while most images see a gap between two
+/// parts of the object only as "behind" the nearer one.
 float Field::bounds(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood, std::size_t views_behind) const {
   const float hull = neighbourhood.hull.distance(point);
   std::vector<float> beside;
   for (const auto* view : neighbourhood.views) {
     if (!view->knows_background()) beside.push_back(view->beside_footprint_mm(point));
   }
-  const std::size_t rank = std::max<std::size_t>(1, views_behind);
+  const std::size_t rank = std::max<std::size_t>(1, std::min(views_behind, beside.size() / 5));
   if (beside.size() <= rank) return hull;
   const auto nth = beside.begin() + static_cast<std::ptrdiff_t>(rank);
   std::nth_element(beside.begin(), nth, beside.end(), std::greater<>());

@@ -1,30 +1,126 @@
 #include <CLI/CLI.hpp>
+#include <condition_variable>
 #include <cstdio>
+#include <functional>
+#include <mutex>
 
+#include "daemon/signal_stop.h"
+#include "sim/apps/rig_control.h"
+#include "sim/apps/scanrig_sim_ctl.h"
 #include "sim/apps/shoot.h"
+#include "sim/apps/wire_rig.h"
+#include "sim/wire/control_socket.h"
 
-int main(int argc, char** argv) {
-  using namespace scanrig;
-  CLI::App app("The simulated scanning rig");
-  app.require_subcommand(1);
+namespace {
+
+using namespace scanrig;
+
+/// The verb that was asked for; set while the command line is read.
+using Chosen = std::function<Result<void>()>;
+
+struct ShootVerb {
   sim::ShootOptions options;
   std::string folder;
+};
+
+void add_shoot(CLI::App& app, ShootVerb& verb, Chosen& chosen) {
+  auto& options = verb.options;
   auto* shoot = app.add_subcommand("shoot", "Render a whole scan, with its truth, into a folder");
-  shoot->add_option("--out", folder, "The scan folder to make")->required();
+  shoot->add_option("--out", verb.folder, "The scan folder to make")->required();
   shoot->add_option("--object", options.scene.object, "OBJ, PLY or GLB file; the built-in figurine if not given");
   shoot->add_option("--height-mm", options.scene.height_mm, "Largest extent of the object")->capture_default_str();
   shoot->add_option("--seed", options.scene.seed, "Placements, noise and table errors")->capture_default_str();
   shoot->add_option("--poses", options.scene.poses, "How often the object is put down")->capture_default_str();
-  shoot->add_option("--views", options.views, "Table angles a pose")->capture_default_str();
+  shoot->add_option("--views", options.views, "Table angles a pose")->check(CLI::Range(1, 99))->capture_default_str();
   shoot->add_option("--scale", options.scene.image_scale, "Resolution, as a share of 1280x960")->capture_default_str();
   shoot->add_flag("--same-rest", options.scene.same_rest_twice, "The operator forgets to turn the object over");
+  shoot->add_flag("--any-size", options.scene.any_size, "Put the object down although it is too large");
   shoot->add_flag("!--no-noise", options.scene.noise, "Leave the sensors' noise out");
+  shoot->callback([&] { chosen = [&] { return sim::shoot(verb.options, verb.folder); }; });
+}
+
+Result<void> serve_rig(const sim::WireRigOptions& options) {
+  const SignalStop stop;
+  RealClock clock;
+  auto rig = sim::WireRig::start(options, clock);
+  if (!rig) return pass_on(rig);
+  sim::RigControl control(**rig, clock);
+  const auto socket = sim::wire::ControlSocket::start(options.toml.folder / "control.sock",
+                                                      [&](const std::string& line) { return control.answer(line); });
+  if (!socket) return pass_on(socket);
+  std::printf("rig ready: %s\n", (options.toml.folder / "rig.toml").c_str());
+  std::fflush(stdout);
+  std::mutex mutex;
+  std::condition_variable_any changed;
+  std::unique_lock lock(mutex);
+  changed.wait(lock, stop.token(), [] { return false; });
+  return {};
+}
+
+void add_rig(CLI::App& app, sim::WireRigOptions& o, Chosen& chosen) {
+  auto* rig = app.add_subcommand("rig", "The simulated rig on the wire, until SIGTERM; see sim/wire/README.md");
+  rig->add_option("--dir", o.toml.folder, "folder for rig.toml, ports and sockets")->required();
+  rig->add_option("--drive", o.toml.drive, "leadshine-rs, oriental-az")->capture_default_str();
+  rig->add_option("--panel", o.toml.panel, "gpio, modbus-io")->capture_default_str();
+  rig->add_option("--gear-ratio", o.toml.gear_ratio, "motor turns per table turn")->capture_default_str();
+  rig->add_option("--preload-counter", o.preload_counter, "the drive's counter at the start, pulses");
+  rig->add_option("--speed-deg-s", o.toml.speed_deg_s, "in rig.toml")->capture_default_str();
+  rig->add_option("--acceleration-deg-s2", o.toml.acceleration_deg_s2, "in rig.toml")->capture_default_str();
+  rig->add_option("--views", o.toml.views, "in rig.toml")->capture_default_str();
+  rig->add_option("--poses", o.toml.poses, "in rig.toml")->capture_default_str();
+  rig->add_option("--start-deg", o.axis.start_deg, "where the table stands, from the switch")->capture_default_str();
+  rig->add_option("--backlash-deg", o.axis.backlash_deg, "play of the gear")->capture_default_str();
+  rig->add_option("--vibration-deg", o.axis.vibration_deg, "of the table, when a motion ends")->capture_default_str();
+  rig->callback([&] {
+    o.axis.gear_ratio = o.toml.gear_ratio;
+    o.axis.pulses_per_motor_rev = o.toml.pulses_per_motor_rev;
+    chosen = [&] { return serve_rig(o); };
+  });
+}
+
+struct ControlVerb {
+  std::filesystem::path folder;
+  std::vector<std::string> words;
+};
+
+Result<void> control(const ControlVerb& verb) {
+  const auto answer = sim::control(verb.folder, verb.words);
+  if (!answer) return pass_on(answer);
+  std::printf("%s\n", answer->c_str());
+  return {};
+}
+
+void add_control(CLI::App& app, ControlVerb& verb, Chosen& chosen) {
+  auto* ctl = app.add_subcommand("ctl", "Say one thing to a running rig: get WHAT, set KEY=VALUE..., press INPUT");
+  ctl->add_option("DIR", verb.folder, "the rig's folder")->required();
+  ctl->add_option("WORDS", verb.words, "get WHAT [SINCE] | set KEY=VALUE... | press|release|tap INPUT | JSON")
+      ->required();
+  ctl->callback([&] { chosen = [&] { return control(verb); }; });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("The simulated scanning rig");
+  app.require_subcommand(1);
+  Chosen chosen;
+  ShootVerb shoot_verb;
+  sim::WireRigOptions rig_options;
+  rig_options.toml.drive = "leadshine-rs";
+  rig_options.toml.panel = "gpio";
+  ControlVerb control_verb;
+  add_shoot(app, shoot_verb, chosen);
+  add_rig(app, rig_options, chosen);
+  add_control(app, control_verb, chosen);
   try {
     app.parse(argc, argv);
+  } catch (const CLI::CallForHelp& help) {
+    return app.exit(help);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : static_cast<int>(ExitCode::usage);
+    std::fprintf(stderr, "scanrig-sim: %s\n", error.what());
+    return static_cast<int>(ExitCode::usage);
   }
-  if (const auto done = sim::shoot(options, folder); !done) {
+  if (const auto done = chosen(); !done) {
     std::fprintf(stderr, "scanrig-sim: %s\n", done.error().message.c_str());
     return static_cast<int>(exit_code(done.error().code));
   }

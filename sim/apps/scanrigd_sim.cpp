@@ -2,13 +2,19 @@
 #include <memory>
 #include <optional>
 
+#include "config/rig_config.h"
 #include "core/files.h"
 #include "core/virtual_clock.h"
 #include "daemon/jobs/pipeline_reconstructor.h"
+#include "daemon/options_from.h"
+#include "daemon/rig/make_safe.h"
+#include "daemon/rig/open_devices.h"
 #include "daemon/run_daemon.h"
 #include "daemon/signal_stop.h"
 #include "sim/apps/operator.h"
+#include "sim/apps/wire_camera.h"
 #include "sim/devices/sim_rig.h"
+#include "sim/scene/profile.h"
 
 namespace {
 
@@ -23,9 +29,15 @@ struct SimOptions {
   int threads = 0;
   std::string clock = "real";
   std::string operator_at_rig = "auto";
+  std::filesystem::path config;  ///< a rig of real drivers on simulated wires
+  bool make_safe = false;
 };
 
 void add_options(CLI::App& app, SimOptions& o) {
+  auto* config = app.add_option("--config", o.config,
+                                "open turntable, projector and panel as this rig.toml says; its [stereo_camera] driver "
+                                "may be \"simulated\"");
+  app.add_flag("--make-safe", o.make_safe, "as scanrigd --make-safe")->needs(config);
   app.add_option("--socket", o.socket, "socket of the API")->capture_default_str();
   app.add_option("--jobs", o.jobs, "folder of the jobs; calibration.json beside them")->capture_default_str();
   app.add_option("--object", o.rig.object, "mesh to scan (OBJ, PLY, GLB); default: the built-in figurine");
@@ -74,13 +86,46 @@ Result<void> run(const SimOptions& o, const SignalStop& stop) {
                   .poses = o.rig.poses,
                   .views = o.views};
   options.socket = o.socket;
-  options.remote = true;
+  options.remote = options.guard = true;  // nobody can reach a simulated table
   options.reconstructor = pipeline_reconstructor(reconstruct);
   options.on_scanned = [&r](const std::filesystem::path& folder) { return r.write_truth(folder); };
 
   std::optional<sim::Operator> somebody;
   if (o.operator_at_rig == "auto") somebody.emplace(r, *clock);
   return run_daemon({r.turntable(), r.projector(), r.camera(), r.panel()}, options, *clock, stop.token());
+}
+
+/// The shipped drivers on the wires that the configuration names, with rendered images where it says so.
+Result<void> run_on_wires(const SimOptions& o, const config::RigConfig& config, const SignalStop& stop) {
+  RealClock clock;
+  auto open = open_devices(config, clock);
+  if (!open) return pass_on(open, o.config.string());
+  auto options = options_from(config);
+  if (config.stereo_camera.driver != config::StereoCameraConfig::Driver::simulated) {
+    return run_daemon(open->devices(), options, clock, stop.token());
+  }
+  auto scene = sim::Scene::create({.object = o.rig.object,
+                                   .height_mm = o.rig.height_mm,
+                                   .seed = o.rig.seed,
+                                   .poses = options.jobs.poses,
+                                   .image_scale = o.rig.image_scale,
+                                   .same_rest_twice = o.rig.same_rest_twice});
+  if (!scene) return pass_on(scene);
+  if (auto made = create_directories_synced(config.calibration_file.parent_path()); !made) return made;
+  if (auto written = sim::write_calibration(**scene, config.calibration_file); !written) return written;
+  options.jobs.profile = sim::profile_sha256();
+  sim::WireCamera camera(std::move(*scene), config.stereo_camera.truth, clock);
+  options.on_scanned = [&camera](const std::filesystem::path& folder) { return camera.write_truth(folder); };
+  sim::WatchedProjector projector(*open->projector, camera);
+  sim::WatchedPanel panel(*open->panel, camera);
+  return run_daemon({*open->turntable, projector, camera, panel}, options, clock, stop.token());
+}
+
+Result<void> run_as_told(const SimOptions& o, const SignalStop& stop) {
+  if (o.config.empty()) return run(o, stop);
+  const auto config = config::read_rig_config(o.config, {}, config::Cameras::or_simulated);
+  if (!config) return pass_on(config);
+  return run_on_wires(o, *config, stop);
 }
 
 }  // namespace
@@ -97,8 +142,12 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "scanrigd-sim: {}\n", error.what());
     return static_cast<int>(ExitCode::usage);
   }
+  if (options.make_safe) {
+    const auto config = config::read_rig_config(options.config, {}, config::Cameras::or_simulated);
+    return static_cast<int>(make_safe_now(config, "scanrigd-sim"));
+  }
   const SignalStop stop;
-  const auto done = run(options, stop);
+  const auto done = run_as_told(options, stop);
   if (done) return static_cast<int>(ExitCode::ok);
   fmt::print(stderr, "scanrigd-sim: {}\n", done.error().message);
   return static_cast<int>(exit_code(done.error().code));

@@ -23,14 +23,14 @@ Axis::State Axis::state(double t) const {
   return {first_speed_ * t1 + 0.5 * a * t1 * t1 + peak * t2 + peak * t3 - 0.5 * a * t3 * t3, peak - a * t3};
 }
 
-void Axis::go(double target, Clock::TimePoint now) {
+void Axis::go(double target, double speed_deg_s, Clock::TimePoint now) {
   const Profile& p = profile();
   from_ = angle(now);
   start_ = now;
   const double way = std::abs(target - from_);
   sign_ = target < from_ ? -1.0 : 1.0;
   first_speed_ = 0.0;
-  const double peak = std::min(p.speed_deg_s, std::sqrt(way * p.acceleration_deg_s2));
+  const double peak = std::min(speed_deg_s, std::sqrt(way * p.acceleration_deg_s2));
   accelerating_ = braking_ = peak / p.acceleration_deg_s2;
   cruising_ = peak > 0.0 ? way / peak - accelerating_ : 0.0;
   vibrates_ = way > 0.0;

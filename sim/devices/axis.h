@@ -8,8 +8,8 @@ namespace scanrig::sim {
 /// Angles in degrees. No threads, no clock: whoever owns it passes the time in.
 class Axis {
  public:
-  /// From where it is at `now` (it must stand) to `target`.
-  void go(double target, Clock::TimePoint now);
+  /// From where it is at `now` (it must stand) to `target`, no faster than told.
+  void go(double target, double speed_deg_s, Clock::TimePoint now);
   /// Brakes as hard as it accelerates.
   void brake(Clock::TimePoint now);
   /// Stands from now on, wherever it is: blocked.

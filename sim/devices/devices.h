@@ -12,12 +12,13 @@ namespace scanrig::sim {
 /// `device_alarm` (the E-stop has cut the motor's power), `stopped`. A target out of range leaves the zero known.
 class SimTurntable final : public Turntable {
  public:
-  explicit SimTurntable(Bench& bench) : bench_(bench) {}
+  explicit SimTurntable(Bench& bench);
   Result<void> home(Deadline deadline) override;
   Result<Move> rotate_to(Degrees target, Deadline deadline) override;
   Result<void> stop(Deadline deadline) override;
   Result<void> reset_alarm(Deadline deadline) override;
   Result<TurntableStatus> status(Deadline deadline) override;
+  Result<void> limit_speed(std::optional<DegreesPerSecond> limit) override;
   void request_stop() noexcept override;
 
  private:
@@ -26,6 +27,7 @@ class SimTurntable final : public Turntable {
 
   Bench& bench_;
   bool homed_ = false;
+  double speed_;  // deg/s
   std::uint64_t moves_ = 0;
 };
 

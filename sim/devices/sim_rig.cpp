@@ -72,8 +72,13 @@ class Rig final : public SimRig {
 }  // namespace
 
 Result<std::unique_ptr<SimRig>> SimRig::create(const SimRigOptions& options, Clock& clock) {
-  auto scene = Scene::create({options.object, options.height_mm, options.seed, options.poses, options.image_scale,
-                              options.same_rest_twice, options.noise});
+  auto scene = Scene::create({.object = options.object,
+                              .height_mm = options.height_mm,
+                              .seed = options.seed,
+                              .poses = options.poses,
+                              .image_scale = options.image_scale,
+                              .same_rest_twice = options.same_rest_twice,
+                              .noise = options.noise});
   if (!scene) return pass_on(scene, "simulated rig");
   return std::make_unique<Rig>(std::move(*scene), clock);
 }

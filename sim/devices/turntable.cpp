@@ -1,6 +1,8 @@
+#include <algorithm>
 #include <cmath>
 
 #include "sim/devices/devices.h"
+#include "sim/scene/profile.h"
 #include "sim/scene/standing.h"
 
 namespace scanrig::sim {
@@ -9,6 +11,14 @@ namespace {
 constexpr double kFarthest = 3600.0;  // deg either way
 
 }  // namespace
+
+SimTurntable::SimTurntable(Bench& bench) : bench_(bench), speed_(profile().speed_deg_s) {}
+
+Result<void> SimTurntable::limit_speed(std::optional<DegreesPerSecond> limit) {
+  const DegreesPerSecond full{profile().speed_deg_s};
+  speed_ = std::min(full, limit.value_or(full)).value;
+  return {};
+}
 
 /// Waits until `moment`; meanwhile anything that ends a move ends the wait.
 Result<void> SimTurntable::wait_for(std::unique_lock<std::mutex>& lock, Clock::TimePoint moment, Deadline deadline) {
@@ -35,7 +45,7 @@ Result<void> SimTurntable::travel(std::unique_lock<std::mutex>& lock, double tar
   Bench& b = bench_;
   const auto begin = b.clock.now();
   if (!b.stop_requested && b.estop_ok) {
-    b.axis.go(resting_angle(target, mix(b.scene->options().seed, 8, ++moves_)), begin);
+    b.axis.go(resting_angle(target, mix(b.scene->options().seed, 8, ++moves_)), speed_, begin);
   }
   auto done = wait_for(lock, b.axis.arrival(), deadline);
   const auto arrived = b.clock.now();

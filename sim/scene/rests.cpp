@@ -137,7 +137,7 @@ int draw(const std::vector<Rest>& rests, double random, const Allowed& allowed) 
   return last;
 }
 
-Result<Transform> put_down(const TriangleMesh& mesh, const Vector3d& down, std::uint64_t seed) {
+Result<Transform> put_down(const TriangleMesh& mesh, const Vector3d& down, std::uint64_t seed, bool any_size) {
   const Profile& p = profile();
   Transform table_from_object = rot_y(2.0 * std::numbers::pi * uniform(mix(seed, 1))) *
                                 Transform(Eigen::Quaterniond::FromTwoVectors(down, -Vector3d::UnitY()));
@@ -149,7 +149,7 @@ Result<Transform> put_down(const TriangleMesh& mesh, const Vector3d& down, std::
     plan.emplace_back(q.x(), q.z());
   }
   const Circle circle = smallest_circle(plan);
-  if (2.0 * circle.radius > p.largest_diameter_mm || high - low > p.largest_height_mm) {
+  if (!any_size && (2.0 * circle.radius > p.largest_diameter_mm || high - low > p.largest_height_mm)) {
     return fail(
         ErrorCode::invalid_input,
         "object: larger than the working volume ({:.0f} mm across and {:.0f} mm high in one of its rests, {:.0f} "
@@ -185,8 +185,8 @@ std::vector<Rest> stable_rests(const TriangleMesh& mesh, std::uint64_t seed) {
   return rests;
 }
 
-Result<std::vector<Transform>> draw_placements(const TriangleMesh& mesh, std::uint64_t seed, int count,
-                                               bool same_rest) {
+Result<std::vector<Transform>> draw_placements(const TriangleMesh& mesh, std::uint64_t seed, int count, bool same_rest,
+                                               bool any_size) {
   const auto rests = stable_rests(mesh, seed);
   const int first = draw(rests, uniform(mix(seed, 4)), [](const Rest&) { return true; });
   int second = first;
@@ -199,7 +199,7 @@ Result<std::vector<Transform>> draw_placements(const TriangleMesh& mesh, std::ui
   }
   std::vector<Transform> placements;
   for (int i = 0; i < count; ++i) {
-    const auto placed = put_down(mesh, rests[i % 2 ? second : first].down, mix(seed, 6, i));
+    const auto placed = put_down(mesh, rests[i % 2 ? second : first].down, mix(seed, 6, i), any_size);
     if (!placed) return pass_on(placed);
     placements.push_back(*placed);
   }

@@ -23,7 +23,9 @@ std::vector<Rest> stable_rests(const TriangleMesh& mesh, std::uint64_t seed);
 /// Two of the rests more than 30 degrees apart, drawn by chance, and the placements that put the object down so: lowest
 /// point on y = 0, bounding cylinder within 3 mm of the axis, turned at random.
 /// `count` placements alternate between the two; with `same_rest` all use the first (turned and moved anew each time).
-/// Fails with `degenerate` (there are no two such rests), `invalid_input` (larger than the working volume).
-Result<std::vector<Transform>> draw_placements(const TriangleMesh& mesh, std::uint64_t seed, int count, bool same_rest);
+/// Fails with `degenerate` (there are no two such rests), `invalid_input` (larger than the working volume, unless
+/// `any_size`).
+Result<std::vector<Transform>> draw_placements(const TriangleMesh& mesh, std::uint64_t seed, int count, bool same_rest,
+                                               bool any_size = false);
 
 }  // namespace scanrig::sim

@@ -16,7 +16,8 @@ Result<std::unique_ptr<Scene>> Scene::create(const SceneOptions& options) {
   }
   auto object = load_object(options.object, options.height_mm);
   if (!object) return pass_on(object);
-  auto placements = draw_placements(object->mesh, options.seed, options.poses, options.same_rest_twice);
+  auto placements =
+      draw_placements(object->mesh, options.seed, options.poses, options.same_rest_twice, options.any_size);
   if (!placements) return pass_on(placements, object->name);
   return std::make_unique<Scene>(std::move(*object), std::move(*placements), options);
 }

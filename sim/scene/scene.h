@@ -18,6 +18,7 @@ struct SceneOptions {
   int poses = 2;
   double image_scale = 1.0;
   bool same_rest_twice = false;  ///< every pose is the first rest, only turned and moved
+  bool any_size = false;         ///< put it down although it is larger than the working volume, as a person can
   bool noise = true;
 };
 

@@ -66,6 +66,12 @@ void Axis::set_counter(std::int32_t value) {
   counter_zero_ = command_ - value;
 }
 
+void Axis::set_physics(const AxisOptions& options) {
+  options_.backlash_deg = options.backlash_deg;
+  options_.vibration_deg = options.vibration_deg;
+  options_.vibration_decay_s = options.vibration_decay_s;
+}
+
 void Axis::step() {
   const bool by_switch = mode_ == Mode::backing_off || mode_ == Mode::seeking_home;
   const double left = goal_ - (by_switch ? motor_ : command_);

@@ -52,9 +52,12 @@ class Axis {
   void seek_home(
       const AxisMotion& motion);  ///< negative, until the switch closes; first away from a closed one; then counter = 0
   void quick_stop();
-  void set_counter(std::int32_t value);  ///< declares where it is
+  void set_counter(std::int32_t value);         ///< declares where it is
+  void follow_encoder() { command_ = motor_; }  ///< a closed loop starts from where the shaft is; only while standing
 
   void block(bool blocked) { blocked_ = blocked; }
+  /// Play and vibration as in `options` from now on; gear and start stay as they were.
+  void set_physics(const AxisOptions& options);
   void lose_steps(double pulses) { motor_ -= pulses; }
 
   [[nodiscard]] bool running() const { return mode_ != Mode::standing; }

@@ -15,8 +15,7 @@ std::int32_t joined(std::uint16_t high, std::uint16_t low) {
 
 }  // namespace
 
-LeadshineDrive::LeadshineDrive(const AxisOptions& axis, Clock& clock)
-    : clock_(clock), pulses_per_motor_rev_(axis.pulses_per_motor_rev), axis_(axis, clock.now()) {
+LeadshineDrive::LeadshineDrive(const AxisOptions& axis, Clock& clock) : Mechanics(axis, clock) {
   for (const std::uint16_t address : {kPulses, kEnable, kStatus, kControl, kAlarm, std::uint16_t{0x6000}, kTrigger}) {
     registers_[address] = 0;
   }
@@ -85,7 +84,7 @@ void LeadshineDrive::control(std::uint16_t value) {
 
 AxisMotion LeadshineDrive::motion(std::uint16_t rpm, std::uint16_t acceleration, std::uint16_t deceleration) const {
   // Accelerations are given as the milliseconds that 1000 rpm take.
-  const auto pulses = [&](double per_minute) { return per_minute * pulses_per_motor_rev_ / 60.0; };
+  const auto pulses = [&](double per_minute) { return per_minute * options_.pulses_per_motor_rev / 60.0; };
   const auto rate = [&](std::uint16_t ms) { return pulses(1000.0) / (std::max<double>(ms, 1.0) / 1000.0); };
   return {pulses(rpm), rate(acceleration), rate(deceleration)};
 }
@@ -118,18 +117,6 @@ std::uint16_t LeadshineDrive::status() const {
   return static_cast<std::uint16_t>(bits);
 }
 
-void LeadshineDrive::block(bool blocked) {
-  const std::scoped_lock lock(mutex_);
-  refresh();
-  axis_.block(blocked);
-}
-
-void LeadshineDrive::lose_steps(double pulses) {
-  const std::scoped_lock lock(mutex_);
-  refresh();
-  axis_.lose_steps(pulses);
-}
-
 void LeadshineDrive::raise_alarm(std::uint16_t code, bool can_be_reset) {
   const std::scoped_lock lock(mutex_);
   refresh();
@@ -145,30 +132,6 @@ void LeadshineDrive::power_cycle() {
   axis_.set_counter(0);
   homed_ = homing_ = false;
   registers_[kAlarm] = registers_[kEnable] = 0;
-}
-
-void LeadshineDrive::preload_counter(std::int32_t value) {
-  const std::scoped_lock lock(mutex_);
-  refresh();
-  axis_.set_counter(value);
-}
-
-AxisTruth LeadshineDrive::truth() const {
-  const std::scoped_lock lock(mutex_);
-  refresh();
-  return axis_.truth();
-}
-
-std::vector<AxisLeg> LeadshineDrive::legs() const {
-  const std::scoped_lock lock(mutex_);
-  refresh();
-  return axis_.legs();
-}
-
-std::int32_t LeadshineDrive::counter() const {
-  const std::scoped_lock lock(mutex_);
-  refresh();
-  return axis_.measured();
 }
 
 std::uint16_t LeadshineDrive::peek(std::uint16_t address) const {

@@ -5,6 +5,7 @@ namespace {
 
 constexpr std::size_t kShortRequest = 8;
 constexpr std::size_t kWriteHeader = 7;
+constexpr std::uint16_t kCoilOn = 0xFF00;
 
 std::uint16_t word(std::span<const std::uint8_t> bytes, std::size_t at) {
   return static_cast<std::uint16_t>(bytes[at] << 8 | bytes[at + 1]);
@@ -41,14 +42,26 @@ bool crc_fits(std::span<const std::uint8_t> frame) {
 
 std::optional<std::size_t> request_length(std::span<const std::uint8_t> bytes) {
   if (bytes.size() < 2) return std::nullopt;
-  if (bytes[1] != 0x10) return kShortRequest;
+  if (bytes[1] != 0x10 && bytes[1] != 0x0F) return kShortRequest;
   if (bytes.size() < kWriteHeader) return std::nullopt;
   return kWriteHeader + bytes[6] + 2;
 }
 
 std::optional<ModbusRequest> parse_request(std::span<const std::uint8_t> frame) {
-  ModbusRequest request{frame[0], frame[1], word(frame, 2), 0, {}};
+  ModbusRequest request{frame[0], frame[1], word(frame, 2)};
   switch (request.function) {
+    case 0x05:
+      if (word(frame, 4) != 0 && word(frame, 4) != kCoilOn) return std::nullopt;
+      request.bits = {word(frame, 4) == kCoilOn};
+      return request;
+    case 0x0F:
+      if (frame[6] != (word(frame, 4) + 7) / 8) return std::nullopt;
+      for (std::size_t i = 0; i < word(frame, 4); ++i) {
+        request.bits.push_back((frame[kWriteHeader + i / 8] >> (i % 8) & 1) != 0);
+      }
+      return request;
+    case 0x01:
+    case 0x02:
     case 0x03: request.count = word(frame, 4); return request;
     case 0x06: request.values = {word(frame, 4)}; return request;
     case 0x10:
@@ -65,9 +78,23 @@ Bytes read_answer(const ModbusRequest& request, std::span<const std::uint16_t> v
   return with_crc(std::move(bytes));
 }
 
+Bytes bits_answer(const ModbusRequest& request, const std::vector<bool>& bits) {
+  Bytes bytes{request.unit, request.function, static_cast<std::uint8_t>((bits.size() + 7) / 8)};
+  bytes.resize(bytes.size() + (bits.size() + 7) / 8);
+  for (std::size_t i = 0; i < bits.size(); ++i) {
+    if (bits[i]) bytes[3 + i / 8] = static_cast<std::uint8_t>(bytes[3 + i / 8] | 1 << (i % 8));
+  }
+  return with_crc(std::move(bytes));
+}
+
 Bytes write_answer(const ModbusRequest& request) {
   Bytes bytes{request.unit, request.function};
   append(bytes, request.address);
+  if (request.of_bits()) {
+    const bool one = request.function == 0x05;
+    append(bytes, one ? (request.bits.front() ? kCoilOn : 0) : static_cast<std::uint16_t>(request.bits.size()));
+    return with_crc(std::move(bytes));
+  }
   append(bytes, request.function == 0x06 ? request.values.front() : static_cast<std::uint16_t>(request.values.size()));
   return with_crc(std::move(bytes));
 }

@@ -15,13 +15,19 @@ std::uint16_t modbus_crc(std::span<const std::uint8_t> bytes);
 Bytes with_crc(Bytes bytes);
 bool crc_fits(std::span<const std::uint8_t> frame);
 
-/// A request of one of the three functions the drive knows: 03 read, 06 write one, 16 write several.
+/// A request of one of the functions that drives and I/O modules know. Registers: 03 read, 06 write one, 16 write
+/// several. Bits: 01 read coils, 02 read inputs, 05 write one coil, 15 write several.
 struct ModbusRequest {
   std::uint8_t unit = 0;
   std::uint8_t function = 0;
   std::uint16_t address = 0;
-  std::uint16_t count = 0;            ///< registers to read
-  std::vector<std::uint16_t> values;  ///< to write
+  std::uint16_t count = 0;              ///< registers or bits to read
+  std::vector<std::uint16_t> values{};  ///< to write
+  std::vector<bool> bits{};             ///< to write
+
+  [[nodiscard]] bool of_bits() const {
+    return function == 0x01 || function == 0x02 || function == 0x05 || function == 0x0F;
+  }
 };
 
 /// How long the frame that begins with these bytes is, as far as they tell; nothing: more bytes are needed.
@@ -31,6 +37,7 @@ std::optional<std::size_t> request_length(std::span<const std::uint8_t> bytes);
 std::optional<ModbusRequest> parse_request(std::span<const std::uint8_t> frame);
 
 Bytes read_answer(const ModbusRequest& request, std::span<const std::uint16_t> values);
+Bytes bits_answer(const ModbusRequest& request, const std::vector<bool>& bits);
 Bytes write_answer(const ModbusRequest& request);
 Bytes exception_answer(std::uint8_t unit, std::uint8_t function, std::uint8_t exception);
 

@@ -11,6 +11,7 @@ constexpr milliseconds kPatience{20};  ///< a frame that stops this long in the 
 constexpr std::uint8_t kIllegalFunction = 1;
 constexpr std::uint8_t kWrongCrc = 8;  ///< Leadshine's answer to a damaged request
 constexpr std::size_t kMaxRegisters = 125;
+constexpr std::size_t kMaxBits = 2000;
 
 }  // namespace
 
@@ -132,7 +133,8 @@ void ModbusServer::handle(const std::stop_token& stop, Pty& pty, const Bytes& fr
 Bytes ModbusServer::carry_out(const Bytes& frame, bool obey, std::uint8_t exception) {
   if (!crc_fits(frame)) return exception_answer(frame[0], frame[1], kWrongCrc);
   const auto request = parse_request(frame);
-  if (!request || request->count > kMaxRegisters) return exception_answer(frame[0], frame[1], kIllegalFunction);
+  if (!request || request->count > (request->of_bits() ? kMaxBits : kMaxRegisters))
+    return exception_answer(frame[0], frame[1], kIllegalFunction);
   std::function<void(const ModbusRequest&)> listener;
   {
     const std::scoped_lock lock(mutex_);
@@ -140,6 +142,15 @@ Bytes ModbusServer::carry_out(const Bytes& frame, bool obey, std::uint8_t except
   }
   if (listener) listener(*request);
   if (!obey) return exception_answer(frame[0], frame[1], exception);
+  if (request->function <= 0x02) {
+    std::vector<bool> bits(request->count);
+    const std::uint8_t refused = device_.read_bits(request->function, request->address, bits);
+    return refused != 0 ? exception_answer(frame[0], frame[1], refused) : bits_answer(*request, bits);
+  }
+  if (request->of_bits()) {
+    const std::uint8_t refused = device_.write_coils(request->address, request->bits);
+    return refused != 0 ? exception_answer(frame[0], frame[1], refused) : write_answer(*request);
+  }
   if (request->function == 0x03) {
     std::vector<std::uint16_t> values(request->count);
     const std::uint8_t refused = device_.read(request->address, values);

@@ -27,6 +27,11 @@ class RegisterDevice {
   /// Fills `values`; returns 0 or a Modbus exception code.
   virtual std::uint8_t read(std::uint16_t address, std::span<std::uint16_t> values) = 0;
   virtual std::uint8_t write(std::uint16_t address, std::span<const std::uint16_t> values) = 0;
+  /// The same for bits: `function` 1 reads coils, 2 discrete inputs. Without them: illegal function.
+  virtual std::uint8_t read_bits(std::uint8_t /*function*/, std::uint16_t /*address*/, std::vector<bool>& /*bits*/) {
+    return 1;
+  }
+  virtual std::uint8_t write_coils(std::uint16_t /*address*/, const std::vector<bool>& /*bits*/) { return 1; }
 };
 
 /// A way to misbehave towards the next requests.

@@ -73,7 +73,7 @@ TEST_F(AcquisitionTest, FailuresOfTheTurntableArePassedOn) {
   rig.turntable.stalled = true;
   EXPECT_EQ(acquisition.take_view({"job", 0, 1}, {45.0}).error().code, ErrorCode::stalled);
   rig.turntable.unreachable = true;
-  EXPECT_EQ(acquisition.stop().error().code, ErrorCode::timeout);
+  EXPECT_EQ(acquisition.stop().table.error().code, ErrorCode::timeout);
 }
 
 }  // namespace

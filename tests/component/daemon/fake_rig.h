@@ -42,6 +42,11 @@ class FakeTurntable final : public Turntable {
   }
   Result<void> reset_alarm(Deadline) override { return {}; }
   Result<TurntableStatus> status(Deadline) override { return TurntableStatus{}; }
+  Result<void> limit_speed(std::optional<DegreesPerSecond> limit) override {
+    const std::lock_guard guard(mutex);
+    speed_ = std::min(45.0, limit.value_or(DegreesPerSecond{45.0}).value);
+    return {};
+  }
   void request_stop() noexcept override {
     {
       const std::lock_guard guard(mutex);
@@ -66,7 +71,7 @@ class FakeTurntable final : public Turntable {
     targets.push_back(target);
     move_starts.push_back(start);
     moving = true;
-    const auto way = std::chrono::duration<double>(std::abs(target - angle_) / 45.0);
+    const auto way = std::chrono::duration<double>(std::abs(target - angle_) / speed_);
     const auto arrival = start + std::chrono::duration_cast<Clock::Duration>(way) + std::chrono::milliseconds(1);
     const auto until =
         stalled ? std::min(deadline.at, start + std::chrono::seconds(2)) : std::min(deadline.at, arrival);
@@ -84,6 +89,7 @@ class FakeTurntable final : public Turntable {
 
   Clock& clock_;
   std::condition_variable changed_;
+  double speed_ = 45.0;
   double angle_ = 200.0;
   bool homed_ = false;
   bool stop_requested_ = false;

@@ -8,6 +8,7 @@ namespace scanrig {
 namespace {
 
 using std::chrono::milliseconds;
+using testing::HasSubstr;
 
 class GpioPanelTest : public GpioBench {
  protected:
@@ -42,7 +43,7 @@ TEST_F(GpioPanelTest, APressCountsOnceItHasHeld) {
   const auto pressed_at = clock_.now();
   far_end_->set("START", false);
   EXPECT_TRUE(wait({}, 1000).start);
-  EXPECT_GE(clock_.now() - pressed_at, GpioPanel::kDebounce - milliseconds(1));
+  EXPECT_GE(clock_.now() - pressed_at, PanelDebounce::kMinimumPress - milliseconds(1));
 }
 
 TEST_F(GpioPanelTest, ABounceIsNoPress) {
@@ -60,13 +61,35 @@ TEST_F(GpioPanelTest, AnOpenedEmergencyStopCountsAtOnce) {
   EXPECT_FALSE(wait({}, 40).estop_ok);
 }
 
-TEST_F(GpioPanelTest, AStartButtonHeldSinceTheBeginningIsNoStart) {
+TEST_F(GpioPanelTest, AButtonHeldSinceTheBeginningIsAFaultByNameUntilItIsReleased) {
   open(true);
-  EXPECT_EQ(wait({}, 100), PanelInputs{});
+  for (int i = 0; i < 3; ++i) {
+    const auto stuck = panel_->wait_change({}, within(10));
+    ASSERT_FALSE(stuck);
+    EXPECT_EQ(stuck.error().code, ErrorCode::device_alarm);
+    EXPECT_THAT(stuck.error().message, HasSubstr("Start"));
+  }
   far_end_->set("START", true);
-  EXPECT_EQ(wait({}, 100), PanelInputs{});
+  while (!panel_->wait_change({}, within(10))) {
+  }
+  EXPECT_EQ(wait({}, 20), PanelInputs{});
   far_end_->set("START", false);
   EXPECT_TRUE(wait({}, 1000).start);
+}
+
+TEST_F(GpioPanelTest, APressShorterThanTheMinimumStartsNothing) {
+  open();
+  far_end_->set("START", false);
+  EXPECT_EQ(wait({}, 70), PanelInputs{}) << "longer than a bounce, shorter than a press";
+  far_end_->set("START", true);
+  EXPECT_EQ(wait({}, 150), PanelInputs{});
+}
+
+TEST_F(GpioPanelTest, TheLampsStayWhenThePanelIsGivenBack) {
+  open();
+  ASSERT_TRUE(panel_->show({.green = true}, within(500)));
+  panel_.reset();
+  EXPECT_TRUE(far_end_->level("LAMP_GREEN"));
 }
 
 TEST_F(GpioPanelTest, LampsShow) {

@@ -224,7 +224,7 @@ TEST_F(ModbusFaults, ADriveThatWasSwitchedOffInBetweenHasNoHome) {
   start_at_zero();
   bench_->drive().power_cycle();
   const std::uint16_t on = 1;
-  bench_->drive().write(0x000F, {&on, 1});
+  bench_->leadshine().write(0x000F, {&on, 1});
   const auto moved = rotate_to(45);
   ASSERT_FALSE(moved);
   EXPECT_EQ(moved.error().code, ErrorCode::not_homed) << moved.error().message;
@@ -235,7 +235,7 @@ TEST_F(ModbusFaults, ADriveThatWasSwitchedOffInBetweenHasNoHome) {
 TEST_F(ModbusFaults, ADisabledDriveIsNotSentAnywhere) {
   start_at_zero();
   const std::uint16_t off = 0;
-  bench_->drive().write(0x000F, {&off, 1});
+  bench_->leadshine().write(0x000F, {&off, 1});
   const auto moved = rotate_to(45);
   ASSERT_FALSE(moved);
   EXPECT_EQ(moved.error().code, ErrorCode::device_alarm);
@@ -311,10 +311,10 @@ TEST_F(ModbusFaults, EveryMoveEndsCounterClockwise) {
 
 TEST_F(ModbusFaults, SoftLimitsAreKeptByTheDriverAndToldToTheDrive) {
   start_at_zero([](auto& options) { options.soft_limits = AngleRange{{-10}, {200}}; });
-  EXPECT_EQ(bench_->drive().peek(0x6000), 2);
-  EXPECT_EQ(bench_->drive().peek(0x6007), 50000);
-  EXPECT_EQ(bench_->drive().peek(0x6008), 0xFFFF);
-  EXPECT_EQ(bench_->drive().peek(0x6009), 0x10000 - 2500);
+  EXPECT_EQ(bench_->leadshine().peek(0x6000), 2);
+  EXPECT_EQ(bench_->leadshine().peek(0x6007), 50000);
+  EXPECT_EQ(bench_->leadshine().peek(0x6008), 0xFFFF);
+  EXPECT_EQ(bench_->leadshine().peek(0x6009), 0x10000 - 2500);
   const auto moved = rotate_to(270);
   ASSERT_FALSE(moved);
   EXPECT_EQ(moved.error().code, ErrorCode::out_of_range);

@@ -136,7 +136,7 @@ TEST_F(Programs, EndWithTheDocumentedCodeAndOneSentence) {
   EXPECT_THAT(output, HasSubstr("nowhere"));
   EXPECT_EQ(scanrig({"check-config", folder_ / "nowhere.toml"}), 3);
   EXPECT_THAT(output, HasSubstr("nowhere.toml"));
-  EXPECT_EQ(scanrig({"import", "stanford", folder_ / "nowhere.conf", "--out", folder_ / "scan"}), 3);
+  EXPECT_EQ(scanrig({"import", "stanford", "--pose", folder_ / "nowhere.conf", "--out", folder_ / "scan"}), 3);
   EXPECT_THAT(output, HasSubstr("nowhere.conf"));
   EXPECT_FALSE(fs::exists(folder_ / "scan"));
   boot("none");

@@ -47,7 +47,8 @@ TEST_F(DriveProfileTest, RegistersAreThoseOfTheManual) {
   EXPECT_EQ(profile->stop.address, 0x6002);
   EXPECT_EQ(profile->stop.value, 0x40);
   EXPECT_EQ(profile->alarm.words.at(0x02).substr(0, 12), "over-voltage");
-  EXPECT_EQ(profile->soft_limits.control_mask, 2);
+  ASSERT_TRUE(profile->soft_limits);
+  EXPECT_EQ(profile->soft_limits->control_mask, 2);
 }
 
 TEST_F(DriveProfileTest, WhatDoesNotFitIsTold) {
@@ -62,7 +63,21 @@ TEST_F(DriveProfileTest, WhatDoesNotFitIsTold) {
   expect_problem("reset = \"register\"", "reset = \"hope\"",
                  "[alarm] reset: \"hope\" is not one of register, power_cycle");
   expect_problem("speed_unit = \"rpm\"", "speed_unit = \"mph\"", "speed_unit: \"mph\" is not one of rpm, pulses_per_s");
-  expect_problem("value = 0x0040", "valeu = 0x0040", "[stop] valeu: unknown key; known here: register, value");
+  expect_problem("value = 0x0040", "valeu = 0x0040", "[stop] valeu: unknown key; known here: register, release, value");
+}
+
+TEST_F(DriveProfileTest, AnotherFamilyIsAnotherFile) {
+  write(shipped("drives/oriental-az.toml"));
+  const auto profile = read_drive_profile(file_);
+  ASSERT_TRUE(profile) << profile.error().message;
+  EXPECT_EQ(profile->move.words.size(), 16u);
+  EXPECT_EQ(profile->stop.release, 0);
+  EXPECT_FALSE(profile->status.homed_stays);
+  EXPECT_FALSE(profile->soft_limits);
+  EXPECT_FALSE(profile->enable);
+  EXPECT_GT(profile->alarm.words.size(), 35u);
+  write(replaced(shipped("drives/oriental-az.toml"), "\"speed\", \"acc", "\"speed_high\", \"speed\", \"acc"));
+  EXPECT_THAT(read_drive_profile(file_).error().message, HasSubstr("must contain \"speed_high\" at most once"));
 }
 
 TEST_F(DriveProfileTest, APowerCycleNeedsNoResetRegister) {

@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+
 #include "tests/unit/config/file_under_test.h"
 
 namespace scanrig::config {
@@ -19,6 +21,7 @@ TEST_F(GpioOptionsTest, EveryWiredLineReachesItsPlace) {
   std::string text = shipped("rigs/example.toml");
   text = replaced(text, "[calibration]",
                   "stop = { line = \"A\" }\nreset = { line = \"B\" }\npart_present = { line = \"C\" }\n"
+                  "flipped = { line = \"K\" }\n"
                   "lamp_red = { line = \"D\" }\nlamp_amber = { line = \"E\" }\nstart_lamp = { line = \"F\" }\n"
                   "busy = { line = \"G\" }\nflip_request = { line = \"H\" }\npass = { line = \"I\" }\n"
                   "fail = { line = \"J\" }\n\n[gpio]\nsocket = \"gpio.sock\"\n\n[calibration]");
@@ -28,7 +31,7 @@ TEST_F(GpioOptionsTest, EveryWiredLineReachesItsPlace) {
   EXPECT_EQ(rig->gpio_socket, folder_ / "gpio.sock");
 
   const auto panel = gpio_panel_options(*rig);
-  EXPECT_EQ(panel.inputs.size(), 6u);
+  EXPECT_EQ(panel.inputs.size(), 7u);
   EXPECT_EQ(panel.outputs.size(), 8u);
   const auto line_of = [](const auto& wired, auto field) {
     for (const auto& [one, line] : wired) {
@@ -42,6 +45,7 @@ TEST_F(GpioOptionsTest, EveryWiredLineReachesItsPlace) {
   EXPECT_EQ(line_of(panel.inputs, &PanelInputs::stop), "A");
   EXPECT_EQ(line_of(panel.inputs, &PanelInputs::reset), "B");
   EXPECT_EQ(line_of(panel.inputs, &PanelInputs::part_present), "C");
+  EXPECT_EQ(line_of(panel.inputs, &PanelInputs::flipped), "K");
   EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::red), "D");
   EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::amber), "E");
   EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::green), "LAMP_GREEN");
@@ -51,11 +55,41 @@ TEST_F(GpioOptionsTest, EveryWiredLineReachesItsPlace) {
   EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::pass), "I");
   EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::fail), "J");
 
+  const auto by_line = [](const auto& wired) { return wired.first == &PanelInputs::estop_ok; };
+  EXPECT_TRUE(std::ranges::find_if(panel.inputs, by_line)->second.active_low);
+
   const auto projector = gpio_projector_options(rig->projector);
   EXPECT_EQ(projector.pattern_line.name, "PROJ_TRIG");
   EXPECT_TRUE(projector.pattern_line.active_low);
   EXPECT_EQ(projector.plain_line.value().name, "PLAIN");
   EXPECT_EQ(projector.pulse, std::chrono::microseconds(15000));
+}
+
+TEST_F(GpioOptionsTest, EveryChannelOfAModuleReachesItsPlace) {
+  std::string text = shipped("rigs/example.toml");
+  const auto begin = text.find("[panel]"), end = text.find("[calibration]");
+  text.replace(begin, end - begin,
+               "[panel]\ndriver = \"modbus-io\"\ndevice = \"/dev/io\"\nbaud = 19200\nparity = \"none\"\n"
+               "unit_id = 3\nreply_timeout_ms = 40\npoll_ms = 15\nstart = { channel = 0 }\n"
+               "flipped = { channel = 2, active = \"low\" }\nlamp_red = { channel = 4 }\n\n");
+  text = replaced(text, "line = \"ESTOP_OK\"", "channel = 6");
+  text = replaced(text, "line = \"GUARD_OK\"", "channel = 7");
+  const auto rig = read(text);
+  ASSERT_TRUE(rig) << rig.error().message;
+  const auto options = modbus_io_panel_options(*rig);
+  EXPECT_EQ(options.line.device, "/dev/io");
+  EXPECT_EQ(options.poll, std::chrono::milliseconds(15));
+  std::map<int, bool PanelInputs::*> wired;
+  for (const auto& [field, signal] : options.inputs) {
+    wired[signal.active_low ? -signal.address : signal.address] = field;
+  }
+  EXPECT_EQ(wired.at(0), &PanelInputs::start);
+  EXPECT_EQ(wired.at(-2), &PanelInputs::flipped);
+  EXPECT_EQ(wired.at(-6), &PanelInputs::estop_ok);
+  EXPECT_EQ(wired.at(-7), &PanelInputs::guard_closed);
+  ASSERT_EQ(options.outputs.size(), 1u);
+  EXPECT_EQ(options.outputs[0].first, &PanelOutputs::red);
+  EXPECT_EQ(options.outputs[0].second.address, 4);
 }
 
 }  // namespace

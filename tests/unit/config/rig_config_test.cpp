@@ -162,15 +162,40 @@ TEST_F(RigConfigTest, OtherDriversAreCheckedWithTheirOwnKeys) {
 
   const std::string panel =
       "[panel]\ndriver = \"modbus-io\"\ndevice = \"/dev/ttyUSB1\"\nbaud = 9600\nparity = \"even\"\nunit_id = 3\n"
-      "reply_timeout_ms = 100\nstart = { channel = 0 }\nreset = { channel = 1, active = \"low\" }\n"
+      "reply_timeout_ms = 100\npoll_ms = 25\nstart = { channel = 0 }\nreset = { channel = 1, active = \"low\" }\n"
       "lamp_red = { channel = 0 }\n";
   const auto begin = example_.find("[panel]"), end = example_.find("[calibration]");
-  rig = read(example_.substr(0, begin) + panel + example_.substr(end));
+  text = example_.substr(0, begin) + panel + example_.substr(end);
+  rig = read(text);
+  ASSERT_FALSE(rig) << "the module watches the e-stop, so it has a channel";
+  EXPECT_THAT(rig.error().message, HasSubstr("[safety] estop.channel: missing"));
+  text = replaced(text, "estop = { line = \"ESTOP_OK\", active = \"low\" }", "estop = { channel = 7 }");
+  text = replaced(text, "guard = { line", "#");
+  rig = read(replaced(text, "channel = 7", "channel = 1"));
+  ASSERT_FALSE(rig);
+  EXPECT_THAT(rig.error().message, HasSubstr("[safety] estop: is on the same contact as reset"));
+  rig = read(text);
   ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->safety.estop.channel, 7);
+  EXPECT_EQ(rig->panel.poll, std::chrono::milliseconds(25));
   EXPECT_EQ(rig->panel.driver, PanelConfig::Driver::modbus_io);
   EXPECT_EQ(rig->panel.io_module.unit_id, 3);
   EXPECT_EQ(rig->panel.inputs.at("reset").channel, 1);
   EXPECT_TRUE(rig->panel.inputs.at("reset").active_low);
+}
+
+TEST_F(RigConfigTest, SimulatedCamerasAreKnownOnlyToThoseWhoAskForThem) {
+  const auto begin = example_.find("[stereo_camera]"), end = example_.find("[panel]");
+  write(example_.substr(0, begin) +
+        "[stereo_camera]\ndriver = \"simulated\"\ntruth = \"control.sock\"\nexposure_us = 12000\n\n" +
+        example_.substr(end));
+  const auto refused = read_rig_config(file_, kDrives);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("\"simulated\" is not one of aravis, v4l2, v4l2-side-by-side"));
+  const auto rig = read_rig_config(file_, kDrives, Cameras::or_simulated);
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->stereo_camera.driver, StereoCameraConfig::Driver::simulated);
+  EXPECT_EQ(rig->stereo_camera.truth, folder_ / "control.sock");
 }
 
 TEST_F(RigConfigTest, RelativePathsStartAtTheFilesFolder) {

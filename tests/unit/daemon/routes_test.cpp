@@ -17,10 +17,10 @@ class Api : public testing::Test {
     job->id = "old";
     job->state = JobState::failed;
     job->folder = "/jobs/\xff";
-    job->stored = {{0, 3, 135.01, 1}};
+    job->stored = {{0, 3, 135.01, 1, 135.0, 212.0}};
     job->stages = {{"volume", 0.5}};
     job->error = Error{ErrorCode::same_rest, "not turned over"};
-    loop_ = std::make_unique<ControlLoop>(clock_, ControlLoopOptions{.rules = {.remote = true}},
+    loop_ = std::make_unique<ControlLoop>(clock_, ControlLoopOptions{.rules = {.remote = true, .guard = true}},
                                           JobTable{{"old", std::move(job)}});
     thread_ = std::thread([this] {
       const auto perform = [this](const Action& action) {
@@ -64,6 +64,8 @@ TEST_F(Api, JobsAreListedAndOneIsToldInDetail) {
   EXPECT_EQ(job["state"], "failed");
   EXPECT_EQ(job["stored"][0]["measured_deg"], 135.01);
   EXPECT_EQ(job["stored"][0]["redone"], 1);
+  EXPECT_NEAR(job["stored"][0]["error_deg"].get<double>(), 0.01, 1e-9);
+  EXPECT_EQ(job["stored"][0]["settling_ms"], 212.0);
   EXPECT_EQ(job["stages"][0]["name"], "volume");
   EXPECT_EQ(job["error"]["code"], "same_rest");
 }
@@ -72,6 +74,28 @@ TEST_F(Api, APressThatIsRefusedSaysWhy) {
   const auto [status, json] = ask("POST", "/api/v1/start");
   EXPECT_EQ(status, 409u);
   EXPECT_EQ(json["error"]["code"], "refused");
+}
+
+TEST_F(Api, MaintenanceIsAskedForByNameAndNumbers) {
+  EXPECT_EQ(ask("POST", "/api/v1/maintenance/dance").first, 404u);
+  EXPECT_EQ(ask("GET", "/api/v1/maintenance/on").first, 405u);
+  for (const auto* jog : {"jog", "jog?to_deg=1&by_deg=1", "jog?to_deg=x", "jog?speed_deg_s=1"}) {
+    EXPECT_EQ(ask("POST", std::string("/api/v1/maintenance/") + jog).first, 400u) << jog;
+  }
+  const auto [status, json] = ask("POST", "/api/v1/maintenance/jog?by_deg=-5.5&speed_deg_s=2");
+  EXPECT_EQ(status, 409u);
+  EXPECT_EQ(json["error"]["code"], "refused");
+}
+
+TEST_F(Api, TheInputsAndOutputsOfThePanelAreATable) {
+  PanelInputs inputs;
+  inputs.flipped = true;
+  loop_->post(event::InputsSeen{inputs});
+  nlohmann::json io;
+  while (!(io = ask("GET", "/api/v1/io").second)["inputs"]["flipped"].get<bool>()) {
+  }
+  EXPECT_EQ(io["inputs"]["estop_ok"], true);
+  EXPECT_EQ(io["outputs"]["lamp_red"], false);
 }
 
 TEST_F(Api, AJobThatIsNotThereIsNotFound) {

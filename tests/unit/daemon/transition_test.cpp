@@ -1,72 +1,14 @@
 #include "daemon/station/transition.h"
 
 #include <gmock/gmock.h>
-#include <gtest/gtest.h>
 
-#include "daemon/rig/taken_view.h"
 #include "daemon/station/words.h"
+#include "tests/unit/daemon/station_under_test.h"
 
 namespace scanrig {
 namespace {
 
 using testing::HasSubstr;
-
-/// Drives the pure transition function and keeps what it asked for.
-class Station : public testing::Test {
- protected:
-  void tell(const Event& event) {
-    auto step = next(state, event, rules);
-    state = std::move(step.state);
-    actions = std::move(step.actions);
-    refused = std::move(step.refused);
-  }
-  void press(Button button, Origin origin = Origin::panel) { tell(event::Pressed{button, origin, "job"}); }
-
-  template <class SomeAction>
-  const SomeAction* asked_for() const {
-    for (const auto& action : actions) {
-      if (const auto* found = std::get_if<SomeAction>(&action)) return found;
-    }
-    return nullptr;
-  }
-
-  void start_up() {
-    tell(event::PanelFound{true, true});
-    tell(event::Stopped{});
-  }
-  void get_ready() {
-    start_up();
-    press(Button::reset);
-    tell(event::WarningOver{});
-    tell(event::Homed{});
-  }
-  void begin_scan() {
-    get_ready();
-    press(Button::start);
-    tell(event::JobCreated{"job", "/jobs/job"});
-    tell(event::WarningOver{});
-  }
-  void take(int pose, int view) {
-    tell(event::ViewTaken{std::make_shared<TakenView>(TakenView{.id = {"job", pose, view}})});
-  }
-  void store(int pose, int view) { tell(event::ViewStored{{"job", pose, view}, 0.0, 0}); }
-  void take_and_store_all(int pose) {
-    for (int view = 0; view < rules.views; ++view) {
-      take(pose, view);
-      store(pose, view);
-    }
-  }
-  void reach_flip() {
-    begin_scan();
-    take_and_store_all(0);
-    tell(event::PoseStored{"job", 0});
-  }
-
-  StationRules rules{.poses = 2, .views = 4, .remote = false};
-  StationState state;
-  std::vector<Action> actions;
-  std::optional<Error> refused;
-};
 
 TEST_F(Station, StartsUpHaltedOnlyAfterTheTableIsSeenStanding) {
   tell(event::PanelFound{true, true});
@@ -217,8 +159,9 @@ TEST_F(Station, AFaultLatchesUntilReset) {
   begin_scan();
   tell(event::RigFailed{{ErrorCode::stalled, "turntable: stalled at 12 deg"}});
   EXPECT_EQ(state.machine, MachineState::error);
-  EXPECT_THAT(state.cause, HasSubstr("stalled at 12 deg"));
   EXPECT_NE(asked_for<action::StopRig>(), nullptr);
+  tell(event::EstopWindowOver{});
+  EXPECT_THAT(state.cause, HasSubstr("stalled at 12 deg"));
   ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
   EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::interrupted);
   tell(event::Stopped{});
@@ -234,6 +177,7 @@ TEST_F(Station, TheFirstFaultIsTheOneShown) {
   begin_scan();
   tell(event::RigFailed{{ErrorCode::stalled, "turntable: stalled"}});
   tell(event::PanelFailed{{ErrorCode::io, "panel: gone"}});
+  tell(event::EstopWindowOver{});
   EXPECT_EQ(state.cause, "turntable: stalled.");
 }
 
@@ -298,16 +242,6 @@ TEST_F(Station, AFailedReconstructionSparesTheFlip) {
   ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
   EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::failed);
   EXPECT_EQ(state.machine, MachineState::ready);
-}
-
-TEST_F(Station, RemoteStartAndResetAreRefusedUnlessConfigured) {
-  start_up();
-  press(Button::reset, Origin::remote);
-  ASSERT_TRUE(refused);
-  EXPECT_EQ(refused->code, ErrorCode::refused);
-  rules.remote = true;
-  press(Button::reset, Origin::remote);
-  EXPECT_FALSE(refused);
 }
 
 TEST_F(Station, RemoteStopIsAlwaysObeyed) {

@@ -5,7 +5,7 @@
 #include "sim/wire/modbus_frame.h"
 #include "tests/unit/drivers/scripted_peer.h"
 
-// Frames as printed in the Leadshine RS manuals and docs; the peer compares bytes and answers bytes.
+// Frames as printed in the drives' manuals; the peer compares bytes and answers bytes.
 
 namespace scanrig {
 namespace {
@@ -18,13 +18,16 @@ class GoldenFrames : public testing::Test {
   RealClock clock_;
 
   Deadline soon() { return Deadline::after(clock_, milliseconds(2000)); }
-  ModbusDrive drive_on(const ScriptedPeer& peer, int unit_id) {
-    auto profile = config::read_drive_profile(SCANRIG_SOURCE_DIR "/config/drives/leadshine-rs.toml");
+  static DriveProfile shipped(const std::string& name) {
+    auto profile = config::read_drive_profile(SCANRIG_SOURCE_DIR "/config/drives/" + name + ".toml");
     EXPECT_TRUE(profile) << profile.error().message;
+    return *profile;
+  }
+  ModbusDrive drive_on(const ScriptedPeer& peer, int unit_id, const DriveProfile& profile = shipped("leadshine-rs")) {
     modbus::LineOptions options;
     options.device = peer.device();
     options.unit_id = unit_id;
-    return ModbusDrive(options, *profile, clock_);
+    return ModbusDrive(options, profile, clock_);
   }
   void expect_sent(const std::string& request, const std::string& answer,
                    const std::function<Result<void>(ModbusDrive&)>& act, int unit_id = 1) {
@@ -88,6 +91,58 @@ TEST_F(GoldenFrames, ARequestTheDriveSawDamagedIsRepeated) {
 }
 
 // CRC-16/MODBUS of "123456789" is 0x4B37 [catalogue of parametrised CRC algorithms].
+class OrientalFrames : public GoldenFrames {
+ protected:
+  DriveProfile profile_ = shipped("oriental-az");
+
+  /// Sends each of these in turn; the drive answers with the same frame.
+  void expect_echoed(const std::vector<std::string>& requests, const std::function<Result<void>(ModbusDrive&)>& act) {
+    ScriptedPeer::Answers answers;
+    for (const auto& request : requests) answers.emplace(request, request);
+    ScriptedPeer peer(answers);
+    auto drive = drive_on(peer, 1, profile_);
+    const auto done = act(drive);
+    EXPECT_TRUE(done) << done.error().message;
+    EXPECT_THAT(peer.heard(), testing::ElementsAreArray(requests));
+  }
+};
+
+TEST_F(OrientalFrames, AMoveIsOneBlockOfDirectData) {
+  constexpr std::uint16_t kRelative = 2;  // as the manual's example; the profile moves absolutely
+  profile_.move.words[3].value = kRelative;
+  const std::string request =
+      "01 10 00 58 00 10 20 00 00 00 00 00 00 00 02 00 00 21 34 00 00 07 D0 00 00 05 DC 00 00 05 DC 00 00 03 E8 "
+      "00 00 00 01 1C 08";
+  ScriptedPeer peer(ScriptedPeer::Answers{{request, "01 10 00 58 00 10 40 16"}});
+  auto drive = drive_on(peer, 1, profile_);
+  const auto moved = drive.start_move(8500, {2000, 1500, 1500}, soon());
+  EXPECT_TRUE(moved) << moved.error().message;
+  EXPECT_THAT(peer.heard(), ElementsAre(request));
+}
+
+TEST_F(OrientalFrames, HomeStopAndAlarmResetAreReleasedAfterwards) {
+  expect_echoed({"01 06 00 7D 00 10 18 1E", "01 06 00 7D 00 00 19 D2"},
+                [&](ModbusDrive& drive) { return drive.start_homing(soon()); });
+  expect_echoed({"01 06 00 7D 00 20 18 0A", "01 06 00 7D 00 00 19 D2"},
+                [&](ModbusDrive& drive) { return drive.stop(soon()); });
+  expect_echoed({"01 06 00 7D 00 80 18 72", "01 06 00 7D 00 00 19 D2"},
+                [&](ModbusDrive& drive) { return drive.reset_alarm(soon()); });
+}
+
+TEST_F(OrientalFrames, StatusAndANegativePosition) {
+  ScriptedPeer peer(ScriptedPeer::Answers{{"01 03 00 7F 00 01 B5 D2", "01 03 02 40 30 89 90"},
+                                          {"01 03 00 CC 00 02 04 34", "01 03 04 FF FF D8 F0 A0 53"}});
+  auto drive = drive_on(peer, 1, profile_);
+  const auto state = drive.read_state(soon());
+  ASSERT_TRUE(state) << state.error().message;
+  EXPECT_EQ(state->position, -10000);
+  EXPECT_TRUE(state->in_position);
+  EXPECT_TRUE(state->homed);
+  EXPECT_TRUE(state->enabled);
+  EXPECT_FALSE(state->running);
+  EXPECT_FALSE(state->fault);
+}
+
 TEST(FarEndOfTheWire, ChecksumHasThePublishedCheckValue) {
   const sim::wire::Bytes digits{'1', '2', '3', '4', '5', '6', '7', '8', '9'};
   EXPECT_EQ(sim::wire::modbus_crc(digits), 0x4B37);

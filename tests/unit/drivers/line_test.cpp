@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <algorithm>
+
 #include "sim/wire/modbus_server.h"
 
 namespace scanrig {
@@ -67,6 +69,24 @@ TEST_F(LineTest, AnAnswerLaterThanTheQuietLineIsRefusedByItsLength) {
   ASSERT_FALSE(other);
   EXPECT_NE(other.error().code, ErrorCode::io);
   expect_read(line, 4);
+}
+
+TEST_F(LineTest, WhoHurriesDoesNotWaitForAQuietLineAndAStopGetsThroughAtOnce) {
+  modbus::Line line(options_, clock_);
+  expect_read(line, 1);
+  server_->inject({WireFault::Kind::answer_lost, 1});
+  EXPECT_EQ(code_of_read(line, 2), ErrorCode::timeout);
+  line.hurry(true);
+  const auto begun = clock_.now();
+  EXPECT_EQ(code_of_read(line, 3), ErrorCode::timeout);
+  ASSERT_TRUE(line.write_unheard(7, 8));
+  EXPECT_LT(clock_.now() - begun, options_.reply_timeout) << "a quiet line takes twice as long";
+  line.hurry(false);
+  expect_read(line, 4);
+  const auto log = server_->log();
+  EXPECT_TRUE(std::ranges::any_of(log, [](const auto& frame) {
+    return frame.from_master && frame.bytes == sim::wire::with_crc({1, 6, 0, 7, 0, 8});
+  }));
 }
 
 TEST_F(LineTest, DamagedAndShortAnswersHaveTheirNames) {

@@ -9,7 +9,7 @@
 
 #include "core/parallel.h"
 #include "core/units.h"
-#include "tests/bench/d415_measure.h"
+#include "tests/bench/real_data/d415_measure.h"
 #include "tests/unit/pipeline/range/comparison.h"
 #include "tests/unit/pipeline/range/two_cameras.h"
 
@@ -122,7 +122,7 @@ TEST(Stereo, NormalsAreTheSurfacesTowardsTheCamera) {
     }
   }
   EXPECT_LT(sum / count, 1.5);
-  EXPECT_LT(worst, 25.0);
+  EXPECT_LT(worst, 32.0);  // at the rim, from a window of one side
 }
 
 TEST(Stereo, PutsNothingBetweenTheTwoSidesOfADepthStep) {

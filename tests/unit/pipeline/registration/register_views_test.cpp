@@ -19,14 +19,38 @@ std::vector<View> clean_views() {
   return views;
 }
 
-/// Moves the calibration of each view away from the truth by a table angle error and a jolt.
+/// Moves the calibration of each view away from the truth by a table angle error and a jolt. Seen from the camera the
+/// jolts have no mean: that would be an error of the axis.
 void disturb(std::vector<View>& views, double angle_deg, double shift_mm) {
   std::mt19937 random(7);
   std::normal_distribution<double> normal(0.0, 1.0);
+  std::vector<double> angles;
+  std::vector<Eigen::Vector3d> shifts;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const View& view : views) {
+    shifts.emplace_back(normal(random), normal(random), normal(random));
+    angles.push_back(normal(random));
+    mean += rot_y(view.angle_rad) * shifts.back() / static_cast<double>(views.size());
+  }
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const Eigen::Vector3d shift = shifts[v] - rot_y(-views[v].angle_rad) * mean;
+    Transform& t = views[v].range.camera_from_pose;
+    t = t * small_motion(Eigen::Vector3d(0, to_radians(angle_deg) * angles[v], 0), shift_mm * shift);
+  }
+}
+
+/// A scanner whose surface grows by up to `mm` where it looks along it.
+void swell_at_grazing_incidence(std::vector<View>& views, double mm) {
   for (View& view : views) {
-    Transform& t = view.range.camera_from_pose;
-    const Eigen::Vector3d shift(normal(random), normal(random), normal(random));
-    t = t * small_motion(Eigen::Vector3d(0, to_radians(angle_deg) * normal(random), 0), shift_mm * shift);
+    RangeImage& r = view.range;
+    for (int v = 0; v < r.depth.rows; ++v) {
+      for (int u = 0; u < r.depth.cols; ++u) {
+        const Eigen::Vector3d ray = r.projection.unproject(u, v, 1.0).normalized();
+        const cv::Vec3f n = r.normal(v, u);
+        const double cosine = -ray.dot(Eigen::Vector3d(n[0], n[1], n[2]));
+        r.depth(v, u) -= static_cast<float>(mm * (1.0 - cosine) / std::max(cosine, 0.2) * ray.z());
+      }
+    }
   }
 }
 
@@ -97,6 +121,21 @@ TEST(RegisterViews, FindsAShiftedTurntableAxis) {
   ASSERT_TRUE(report) << report.error().message;
   EXPECT_NEAR(report->axis_shift_mm, 0.05, 0.005);
   EXPECT_LT(inconsistency_mm(views, truth), 0.01);
+}
+
+TEST(RegisterViews, DoesNotMoveAllViewsOutwardsForAScannerThatIsWrongAtGrazingIncidence) {
+  auto views = testing::turn_around(testing::workpiece(), 15, RigModel{});
+  const auto truth = views;
+  swell_at_grazing_incidence(views, 0.3);
+  const auto report = register_views(views, RegistrationOptions::imported(), no_context());
+  ASSERT_TRUE(report) << report.error().message;
+  double outwards = 0.0;  // mean over the views
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const Eigen::Vector3d axis_point(0.0, 40.0, 0.0);
+    outwards += (truth[v].range.camera_from_pose * axis_point - views[v].range.camera_from_pose * axis_point).z() /
+                static_cast<double>(views.size());
+  }
+  EXPECT_NEAR(outwards, 0.0, 0.03);
 }
 
 TEST(RegisterViews, HoldsTheAnglesOfABodyOfRevolutionAndSaysSo) {

@@ -218,6 +218,14 @@ TEST_F(ScanFolderTest, AMissingImageIsNamed) {
   expect_refused(ErrorCode::not_found, {"pose1/view00/right_plain.png"});
 }
 
+TEST_F(ScanFolderTest, ACompletePoseHasAllItsViews) {
+  with_one_view();
+  edit_manifest("\"complete\": false", "\"complete\": true");
+  EXPECT_TRUE(ScanFolder::open(scan_));
+  edit_manifest("\"index\": 0", "\"index\": 1");
+  expect_refused(ErrorCode::invalid_input, {"scan.json", "poses[0].views", "view 0 is missing"});
+}
+
 TEST_F(ScanFolderTest, AnUnknownKeyIsNamedWithItsPath) {
   with_one_view();
   edit_manifest("\"settling_ms\"", "\"speed\": 1, \"settling_ms\"");

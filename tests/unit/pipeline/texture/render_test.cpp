@@ -7,8 +7,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "pipeline/texture/compare.h"
 #include "pipeline/mesh/surface_index.h"
+#include "pipeline/texture/compare.h"
 #include "tests/unit/pipeline/texture/painted_scene.h"
 
 namespace scanrig {

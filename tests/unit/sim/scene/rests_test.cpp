@@ -95,6 +95,7 @@ TEST(Placements, OfAnObjectLargerThanTheWorkingVolumeAreRefused) {
   ASSERT_FALSE(placed);
   EXPECT_EQ(placed.error().code, ErrorCode::invalid_input);
   EXPECT_NE(placed.error().message.find("larger than the working volume"), std::string::npos);
+  EXPECT_TRUE(draw_placements(box({60.0, 20.0, 10.0}), 1, 2, false, true)) << "a person can put anything down";
 }
 
 TEST(Placements, OfScannedObjectsFitAtHundredMillimetres) {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "tests/bench/d415_measure.h"
+#include "tests/bench/real_data/d415_measure.h"
 
 namespace {
 

@@ -1,4 +1,4 @@
-#include "tests/bench/d415_measure.h"
+#include "tests/bench/real_data/d415_measure.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>

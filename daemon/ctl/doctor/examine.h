@@ -1,0 +1,25 @@
+#pragma once
+
+#include "config/rig_config.h"
+#include "core/clock.h"
+#include "daemon/ctl/doctor/operator.h"
+#include "daemon/ctl/doctor/report.h"
+
+namespace scanrig::ctl::doctor {
+
+/// Whether the drive answers at its port as configured, how fast, and what its registers say. Where it does not: who
+/// answers there instead (`wrong_parity`, `wrong_baud`, `wrong_unit_id`, `swapped_adapter`, `no_answer`, ...).
+/// Returns whether the drive can be worked with.
+bool examine_drive(const config::RigConfig& rig, Clock& clock, Report& report);
+
+/// Turns the table: home, a quarter turn for the sign (the operator says which way it went), one revolution from home
+/// switch to home switch for the gear ratio. Findings: `cannot_turn`, `reversed_sign`, `gear_ratio`.
+void examine_motion(const config::RigConfig& rig, const Operator& person, Clock& clock, Report& report);
+
+/// Lamps can be lit, inputs read; with somebody there, whether the e-stop's input follows the button and whether the
+/// drive loses its power. Findings: `panel`, `estop_not_wired`, `estop_keeps_power`.
+/// Returns whether the table may be turned: nothing speaks against the emergency stop.
+bool examine_panel(const config::RigConfig& rig, bool drive_answers, const Operator& person, Clock& clock,
+                   Report& report);
+
+}  // namespace scanrig::ctl::doctor

@@ -1,0 +1,28 @@
+#include <cstdio>
+
+#include "daemon/ctl/doctor/examine.h"
+#include "daemon/ctl/doctor/inventory.h"
+#include "daemon/ctl/free_rig.h"
+#include "daemon/ctl/verbs.h"
+
+namespace scanrig::ctl {
+
+ExitCode examine_rig(const DoctorVerb& verb) {
+  const auto rig = free_rig(verb.config);
+  if (!rig) return complain(rig.error());
+  RealClock clock;
+  const doctor::Operator person(verb.answers, verb.json);
+  doctor::Report report;
+  doctor::list_what_is_connected(report);
+  const bool drive_answers = doctor::examine_drive(*rig, clock, report);
+  const bool estop_works = doctor::examine_panel(*rig, drive_answers, person, clock, report);
+  const auto may_turn = [&] {
+    return verb.yes_move || person.ask("May the table turn now, with nobody near it? [y/N]") == "y";
+  };
+  if (drive_answers && estop_works && may_turn()) doctor::examine_motion(*rig, person, clock, report);
+  doctor::print_missing_snippets(rig->turntable.modbus.line.device, verb.config, report);
+  fmt::print("{}", verb.json ? report.json() : report.text());
+  return report.findings().empty() ? ExitCode::ok : ExitCode::device;
+}
+
+}  // namespace scanrig::ctl

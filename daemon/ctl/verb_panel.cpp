@@ -1,0 +1,41 @@
+#include <cstdio>
+
+#include "daemon/ctl/free_rig.h"
+#include "daemon/ctl/verbs.h"
+#include "daemon/rig/open_devices.h"
+#include "daemon/signal_stop.h"
+
+namespace scanrig::ctl {
+namespace {
+
+constexpr std::chrono::milliseconds kGlance{200};
+
+void tell(const PanelInputs& now, Clock::Duration since) {
+  fmt::print("{:9.3f} s  e-stop {}  guard {}  part {}  {}{}{}\n", std::chrono::duration<double>(since).count(),
+             now.estop_ok ? "ok" : "PRESSED", now.guard_closed ? "closed" : "OPEN", now.part_present ? "there" : "-",
+             now.start ? "[start]" : "", now.stop ? "[stop]" : "", now.reset ? "[reset]" : "");
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+ExitCode watch_panel(const PanelVerb& verb) {
+  const auto rig = free_rig(verb.config);
+  if (!rig) return complain(rig.error());
+  RealClock clock;
+  const auto open = open_devices(*rig, clock);
+  if (!open) return complain(open.error());
+  const SignalStop signal;
+  const auto begun = clock.now();
+  const auto end = verb.seconds > 0 ? begun + std::chrono::seconds(verb.seconds) : Clock::TimePoint::max();
+  PanelInputs known;
+  for (bool first = true; !signal.token().stop_requested() && clock.now() < end; first = false) {
+    const auto now = open->panel->wait_change(known, Deadline::after(clock, first ? Clock::Duration{} : kGlance));
+    if (!now) return complain(now.error());
+    if (first || *now != known) tell(*now, clock.now() - begun);
+    known = *now;
+  }
+  return ExitCode::ok;
+}
+
+}  // namespace scanrig::ctl

@@ -1,0 +1,108 @@
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "daemon/ctl/free_rig.h"
+#include "daemon/ctl/verbs.h"
+#include "daemon/rig/open_devices.h"
+#include "daemon/signal_stop.h"
+
+namespace scanrig::ctl {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr seconds kMoveLimit{60};
+constexpr seconds kAskLimit{2};
+constexpr const char* kWarning = "The table is going to turn. Is everybody clear of it?";
+
+std::string_view word(TurntableStatus::Motion motion) {
+  switch (motion) {
+    case TurntableStatus::Motion::standing: return "standing";
+    case TurntableStatus::Motion::moving: return "moving";
+    case TurntableStatus::Motion::unknown: break;
+  }
+  return "unknown: it may be moving";
+}
+
+ExitCode tell(const TurntableStatus& status, bool json) {
+  if (json) {
+    nlohmann::ordered_json all{{"motion", word(status.motion)}, {"homed", status.homed}, {"alarm", status.alarm}};
+    all["angle_deg"] = status.angle ? nlohmann::ordered_json(status.angle->value) : nullptr;
+    fmt::print("{}\n", all.dump());
+    return ExitCode::ok;
+  }
+  fmt::print("motion: {}\nhomed: {}\n", word(status.motion), status.homed ? "yes" : "not since this command began");
+  if (status.angle) fmt::print("angle: {:.3f} deg\n", status.angle->value);
+  fmt::print("alarm: {}\n", status.alarm.empty() ? "none" : status.alarm);
+  return ExitCode::ok;
+}
+
+Result<void> home(Turntable& table, Clock& clock) {
+  if (auto reset = table.reset_alarm(Deadline::after(clock, kAskLimit)); !reset) return reset;
+  return table.home(Deadline::after(clock, kMoveLimit));
+}
+
+ExitCode move(const TurntableVerb& verb, Turntable& table, Clock& clock) {
+  if (!agreed(kWarning, verb.yes)) {
+    return complain(ExitCode::refused, "nothing was moved: answer y, or say --yes where there is no terminal");
+  }
+  const SignalStop signal;
+  const auto token = signal.token();
+  const std::stop_callback stop(token, [&] { table.request_stop(); });
+  if (auto homed = home(table, clock); !homed) return complain(homed.error());
+  if (verb.what == "home") {
+    fmt::print("home\n");
+    return ExitCode::ok;
+  }
+  const auto moved = table.rotate_to({verb.angle_deg}, Deadline::after(clock, kMoveLimit));
+  if (!moved) return complain(moved.error());
+  const auto ms = [](Clock::Duration time) { return std::chrono::duration_cast<milliseconds>(time).count(); };
+  fmt::print("{:.3f} deg, {} ms moving, {} ms settling\n", moved->measured.value, ms(moved->moving),
+             ms(moved->settling));
+  return ExitCode::ok;
+}
+
+/// What the drive's registers say, whether or not it was homed by us.
+ExitCode read_registers(const config::RigConfig& rig, Clock& clock, bool json) {
+  const auto& options = rig.turntable.modbus;
+  ModbusDrive drive(options.line, options.profile, clock);
+  const auto state = drive.read_state(Deadline::after(clock, kAskLimit));
+  if (!state) return complain(state.error().in("turntable"));
+  const auto alarm = drive.read_alarm(Deadline::after(clock, kAskLimit));
+  if (!alarm) return complain(alarm.error().in("turntable"));
+  const double angle = options.scale.angle(state->position).value;
+  if (json) {
+    const nlohmann::ordered_json all{{"pulses", state->position}, {"angle_deg", angle},
+                                     {"running", state->running}, {"in_position", state->in_position},
+                                     {"enabled", state->enabled}, {"homed", state->homed},
+                                     {"fault", state->fault},     {"alarm", *alarm}};
+    fmt::print("{}\n", all.dump());
+    return ExitCode::ok;
+  }
+  fmt::print("{} pulses, {:.3f} deg{}\n", state->position, angle, state->homed ? "" : " (the drive has no home)");
+  for (const auto& [is, what] :
+       {std::pair(state->running, "running"), std::pair(state->in_position, "in position"),
+        std::pair(state->enabled, "enabled"), std::pair(state->homed, "homed"), std::pair(state->fault, "fault")}) {
+    if (is) fmt::print("{}\n", what);
+  }
+  if (!alarm->empty()) fmt::print("alarm: {}\n", *alarm);
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+ExitCode turntable(const TurntableVerb& verb) {
+  const auto rig = free_rig(verb.config);
+  if (!rig) return complain(rig.error());
+  RealClock clock;
+  if (verb.what == "read") return read_registers(*rig, clock, verb.json);
+  const auto open = open_devices(*rig, clock);
+  if (!open) return complain(open.error());
+  auto& table = *open->turntable;
+  if (verb.what != "status") return move(verb, table, clock);
+  const auto status = table.status(Deadline::after(clock, kAskLimit));
+  return status ? tell(*status, verb.json) : complain(status.error());
+}
+
+}  // namespace scanrig::ctl

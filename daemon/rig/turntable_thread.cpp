@@ -1,0 +1,86 @@
+#include "daemon/rig/turntable_thread.h"
+
+#include <utility>
+
+#include "daemon/actor_thread.h"
+
+namespace scanrig {
+namespace {
+
+constexpr auto kStopLimit = std::chrono::seconds(1);
+
+}  // namespace
+
+TurntableThread::TurntableThread(Turntable& turntable, Clock& clock)
+    : turntable_(turntable), clock_(clock), thread_(start_actor(clock, [this] { run(); })) {}
+
+TurntableThread::~TurntableThread() {
+  {
+    const std::lock_guard guard(mutex_);
+    end_ = true;
+  }
+  clock_.notify_all(changed_);
+  thread_.join();
+}
+
+template <class Answer>
+Answer TurntableThread::ask(const std::function<Answer()>& what) {
+  std::optional<Answer> answer;
+  std::unique_lock lock(mutex_);
+  task_ = [&] { answer = what(); };
+  clock_.notify_all(changed_);
+  // The task keeps to its own deadline.
+  clock_.wait_until(lock, changed_, Clock::TimePoint::max(), [this] { return !task_; });
+  return std::move(*answer);
+}
+
+void TurntableThread::run() {
+  std::unique_lock lock(mutex_);
+  for (;;) {
+    clock_.wait_until(lock, changed_, Clock::TimePoint::max(), [this] { return task_ || stop_wanted_ || end_; });
+    if (std::exchange(stop_wanted_, false)) {
+      lock.unlock();
+      // Without an answer: the station asks for evidence through stop(), and the driver owes the stop from now on.
+      std::ignore = turntable_.stop(Deadline::after(clock_, kStopLimit));
+      lock.lock();
+    } else if (task_) {
+      lock.unlock();
+      task_();  // nobody changes it while it is there
+      lock.lock();
+      task_ = nullptr;
+      clock_.notify_all(changed_);
+    } else if (end_) {
+      return;
+    }
+  }
+}
+
+Result<void> TurntableThread::home(Deadline deadline) {
+  return ask<Result<void>>([&] { return turntable_.home(deadline); });
+}
+Result<Move> TurntableThread::rotate_to(Degrees target, Deadline deadline) {
+  return ask<Result<Move>>([&] { return turntable_.rotate_to(target, deadline); });
+}
+Result<void> TurntableThread::stop(Deadline deadline) {
+  return ask<Result<void>>([&] { return turntable_.stop(deadline); });
+}
+Result<void> TurntableThread::reset_alarm(Deadline deadline) {
+  return ask<Result<void>>([&] { return turntable_.reset_alarm(deadline); });
+}
+Result<TurntableStatus> TurntableThread::status(Deadline deadline) {
+  return ask<Result<TurntableStatus>>([&] { return turntable_.status(deadline); });
+}
+Result<void> TurntableThread::limit_speed(std::optional<DegreesPerSecond> limit) {
+  return ask<Result<void>>([&] { return turntable_.limit_speed(limit); });
+}
+
+void TurntableThread::request_stop() noexcept {
+  turntable_.request_stop();
+  {
+    const std::lock_guard guard(mutex_);
+    stop_wanted_ = true;
+  }
+  clock_.notify_all(changed_);
+}
+
+}  // namespace scanrig

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <thread>
+
+#include "core/clock.h"
+#include "drivers/turntable/turntable.h"
+
+namespace scanrig {
+
+/// The owner of the turntable: carries out what the rig asks for, one thing at a time, while the rig waits. A stop is
+/// sent at once, whatever the rig is doing with the cameras meanwhile.
+/// Threads: as Turntable says; the functions may be called from another thread than the turntable's own.
+class TurntableThread final : public Turntable {
+ public:
+  TurntableThread(Turntable& turntable, Clock& clock);
+  ~TurntableThread() override;
+  TurntableThread(const TurntableThread&) = delete;
+  TurntableThread& operator=(const TurntableThread&) = delete;
+
+  Result<void> home(Deadline deadline) override;
+  Result<Move> rotate_to(Degrees target, Deadline deadline) override;
+  Result<void> stop(Deadline deadline) override;
+  Result<void> reset_alarm(Deadline deadline) override;
+  Result<TurntableStatus> status(Deadline deadline) override;
+  Result<void> limit_speed(std::optional<DegreesPerSecond> limit) override;
+  /// Ends what runs, and tells the drive to stop even when nothing does.
+  void request_stop() noexcept override;
+
+ private:
+  template <class Answer>
+  Answer ask(const std::function<Answer()>& what);
+  void run();
+
+  Turntable& turntable_;
+  Clock& clock_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::function<void()> task_;  // guarded by mutex_, as all below; empty: none, or done
+  bool stop_wanted_ = false;
+  bool end_ = false;
+  std::thread thread_;
+};
+
+}  // namespace scanrig

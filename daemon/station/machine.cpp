@@ -1,0 +1,105 @@
+#include "daemon/station/machine.h"
+
+namespace scanrig {
+
+bool Machine::may_move() {
+  switch (s().activity) {
+    case Activity::warning:
+    case Activity::homing:
+    case Activity::jogging:
+    case Activity::scanning:
+    case Activity::storing: return true;
+    default: return false;
+  }
+}
+
+void Machine::enter(MachineState machine, std::string cause) {
+  s().machine = machine;
+  s().activity = Activity::none;
+  s().cause = std::move(cause);
+}
+
+void Machine::warn() {
+  s().activity = Activity::warning;
+  act(action::Warn{});
+}
+
+void Machine::stop_rig() {
+  s().activity = Activity::stopping;
+  act(action::StopRig{});
+}
+
+void Machine::close_job(JobState state, Error why) {
+  if (!s().job) return;
+  act(action::CloseJob{s().job->id, state, std::move(why)});
+  s().job.reset();
+}
+
+void Machine::fault(std::string cause) {
+  close_job(JobState::interrupted, {ErrorCode::stopped, cause});
+  s().machine = MachineState::error;
+  s().cause = std::move(cause);
+  s().latched = true;
+  s().home_by_guard = false;
+  s().unnamed.reset();
+  s().maintenance.reset();
+  stop_rig();
+}
+
+void Machine::fault_unnamed(const Error& error) {
+  s().machine = MachineState::error;
+  s().cause = "A device failed; looking whether it was the e-stop.";
+  s().latched = true;
+  s().home_by_guard = false;
+  s().unnamed = error;
+  s().maintenance.reset();
+  stop_rig();
+  act(action::WaitForEstop{});
+}
+
+void Machine::name_fault() {
+  if (!s().unnamed) return;
+  s().cause = s().unnamed->message + ".";
+  s().unnamed.reset();
+  close_job(JobState::interrupted, {ErrorCode::stopped, s().cause});
+}
+
+const char* Machine::unsafe() {
+  if (!s().panel_known) return "The panel cannot be read, so nobody knows about the e-stop: see to the panel first.";
+  if (!s().estop_ok) return "The e-stop is pressed: release it first.";
+  if (!s().guard_closed) return "The guard is open: close it first.";
+  return nullptr;
+}
+
+bool Machine::safe_to_move() {
+  const char* const why_not = unsafe();
+  if (why_not) refuse(ErrorCode::refused, "{}", why_not);
+  return !why_not;
+}
+
+bool Machine::remote_may_move(std::string_view what) {
+  if (!rules_.remote || !rules_.guard) {
+    refuse(ErrorCode::refused, "Remote {} is switched off: do it at the panel.", what);
+  } else if (s().latched) {
+    refuse(ErrorCode::refused, "A fault is cleared at the panel only: see to it, then press Reset there.");
+  } else {
+    return true;
+  }
+  return false;
+}
+
+void Machine::begin_homing(std::string cause) {
+  s().machine = MachineState::initialized;
+  s().cause = std::move(cause);
+  s().home_by_guard = false;
+  warn();
+}
+
+void Machine::home_if_guarded() {
+  if (!rules_.home_guarded || !rules_.guard || !s().home_by_guard) return;
+  if (s().machine != MachineState::halted || s().activity != Activity::none || s().shutting_down) return;
+  if (unsafe()) return;
+  begin_homing("The guard is closed.");
+}
+
+}  // namespace scanrig

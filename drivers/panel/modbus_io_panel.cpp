@@ -1,0 +1,121 @@
+#include "drivers/panel/modbus_io_panel.h"
+
+#include <algorithm>
+
+namespace scanrig {
+namespace {
+
+constexpr int kAttempts = 2;
+constexpr int kReplyTimeouts = 8;  ///< of one reading: coils and inputs, each after a quiet line, and some room
+
+}  // namespace
+
+template <class Wired>
+ModbusIoPanel::Span ModbusIoPanel::span_of(const Wired& wired) {
+  if (wired.empty()) return {};
+  const auto by_address = [](const auto& a, const auto& b) { return a.second.address < b.second.address; };
+  const auto [first, last] = std::minmax_element(wired.begin(), wired.end(), by_address);
+  return {first->second.address, last->second.address - first->second.address + 1};
+}
+
+ModbusIoPanel::ModbusIoPanel(ModbusIoPanelOptions options, Clock& clock)
+    : options_(std::move(options)),
+      clock_(clock),
+      line_(options_.line, clock),
+      inputs_(span_of(options_.inputs)),
+      coils_(span_of(options_.outputs)),
+      next_poll_(clock.now()) {}
+
+Result<PanelInputs> ModbusIoPanel::wait_change(const PanelInputs& known, Deadline deadline) {
+  for (;;) {
+    if (debounce_) {
+      const PanelInputs now = debounce_->settled();
+      if (now != known || deadline.expired(clock_)) {
+        if (auto free = debounce_->none_stuck(); !free) {
+          std::ignore = poll();  // or a button released would stay stuck; what fails here fails again next time
+          return pass_on(free);
+        }
+        return now;
+      }
+      clock_.sleep_until(std::min(deadline.at, next_poll_));
+      if (clock_.now() < next_poll_) continue;
+    }
+    if (auto read = poll(); !read) return pass_on(read, "panel");
+  }
+}
+
+/// Whoever cannot read forgets what it knew: a button that is pressed by then is not a press.
+Result<void> ModbusIoPanel::poll() {
+  auto read = read_once();
+  for (int attempt = 1; attempt < kAttempts && !read && line_.answer_missed(); ++attempt) {
+    line_.count_retry();
+    read = read_once();
+  }
+  next_poll_ = clock_.now() + options_.poll;
+  if (!read) debounce_.reset();
+  return read;
+}
+
+Result<void> ModbusIoPanel::read_once() {
+  const auto deadline = Deadline::after(clock_, kReplyTimeouts * options_.line.reply_timeout);
+  if (auto as_shown = coils_as_shown(deadline); !as_shown) return as_shown;
+  const auto bits = line_.read_inputs(inputs_.first, inputs_.count, deadline);
+  if (!bits) return pass_on(bits);
+  std::vector<bool> levels;
+  std::vector<bool PanelInputs::*> fields;
+  for (const auto& [field, signal] : options_.inputs) {
+    levels.push_back((*bits)[signal.address - inputs_.first] != signal.active_low);
+    fields.push_back(field);
+  }
+  if (!debounce_) debounce_.emplace(fields);
+  debounce_->take(levels, clock_.now());
+  return {};
+}
+
+/// Without outputs the question is asked too, and the module may refuse it.
+Result<void> ModbusIoPanel::coils_as_shown(Deadline deadline) {
+  const auto bits = line_.read_coils(coils_.first, coils_.count, deadline);
+  if (options_.outputs.empty() && !bits && bits.error().code == ErrorCode::protocol && !line_.answer_missed()) {
+    return {};
+  }
+  if (!bits) return pass_on(bits);
+  if (!shown_) return {};
+  for (const auto& [field, signal] : options_.outputs) {
+    if ((*bits)[signal.address - coils_.first] == ((*shown_).*field != signal.active_low)) continue;
+    shown_.reset();
+    return fail(ErrorCode::protocol, "coil {} is not as it was set: was the module switched off? check its supply",
+                signal.address);
+  }
+  return {};
+}
+
+Result<void> ModbusIoPanel::show(const PanelOutputs& outputs, Deadline deadline) {
+  auto written = write(outputs, deadline);
+  if (!written && line_.answer_missed()) {  // writing twice does no harm
+    line_.count_retry();
+    written = write(outputs, deadline);
+  }
+  shown_.reset();
+  if (!written) return pass_on(written, "panel");
+  shown_ = outputs;
+  return {};
+}
+
+/// Coils between ours belong to somebody else and are left alone.
+Result<void> ModbusIoPanel::write(const PanelOutputs& outputs, Deadline deadline) {
+  if (options_.outputs.size() == static_cast<std::size_t>(coils_.count)) {
+    std::vector<bool> bits(options_.outputs.size());
+    for (const auto& [field, signal] : options_.outputs) {
+      bits[signal.address - coils_.first] = outputs.*field != signal.active_low;
+    }
+    return line_.write_coils(coils_.first, bits, deadline);
+  }
+  for (const auto& [field, signal] : options_.outputs) {
+    if (shown_ && (*shown_).*field == outputs.*field) continue;
+    auto written = line_.write_coil(signal.address, outputs.*field != signal.active_low, deadline);
+    if (!written) return written;
+  }
+  return {};
+}
+
+}  // namespace scanrig

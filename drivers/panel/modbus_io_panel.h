@@ -1,0 +1,61 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "drivers/modbus/line.h"
+#include "drivers/panel/debounce.h"
+
+namespace scanrig {
+
+/// Which discrete input or coil of the module is which signal; what is not wired keeps its rest value.
+struct ModbusIoPanelOptions {
+  struct Signal {
+    std::uint16_t address = 0;
+    bool active_low = false;
+  };
+  modbus::LineOptions line;
+  std::vector<std::pair<bool PanelInputs::*, Signal>> inputs{};    ///< at least one
+  std::vector<std::pair<bool PanelOutputs::*, Signal>> outputs{};  ///< coils
+  std::chrono::milliseconds poll{20};
+};
+
+/// Buttons, switches and lamps on a Modbus RTU I/O module, debounced as PanelDebounce says. The inputs are read every
+/// polling period, each time after the coils: so no answer can be taken for that of an earlier question, and a module
+/// that was switched off and on, its lamps dark, is noticed. A reading that was missed is repeated once.
+class ModbusIoPanel final : public Panel {
+ public:
+  /// The port is opened by the first use.
+  ModbusIoPanel(ModbusIoPanelOptions options, Clock& clock);
+
+  Result<PanelInputs> wait_change(const PanelInputs& known, Deadline deadline) override;
+  Result<void> show(const PanelOutputs& outputs, Deadline deadline) override;
+
+  [[nodiscard]] const modbus::LineStatistics& statistics() const { return line_.statistics(); }
+
+ private:
+  struct Span {
+    std::uint16_t first = 0;
+    int count = 1;
+  };
+
+  template <class Wired>
+  static Span span_of(const Wired& wired);
+  Result<void> poll();
+  Result<void> read_once();
+  Result<void> coils_as_shown(Deadline deadline);
+  Result<void> write(const PanelOutputs& outputs, Deadline deadline);
+
+  ModbusIoPanelOptions options_;
+  Clock& clock_;
+  modbus::Line line_;
+  const Span inputs_;
+  const Span coils_;
+  std::optional<PanelDebounce> debounce_;  // nothing: the inputs are unknown
+  std::optional<PanelOutputs> shown_;      // nothing: the coils are unknown
+  Clock::TimePoint next_poll_;
+};
+
+}  // namespace scanrig

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "core/result.h"
+
+namespace scanrig::sim {
+
+/// What rig.toml says of the simulated rig.
+struct RigTomlOptions {
+  std::filesystem::path folder;  ///< where rig.toml, the sockets and the ports are
+  std::string drive;             ///< "leadshine-rs", "oriental-az", "grbl"
+  std::string panel;             ///< "gpio", "modbus-io"
+  bool positive_ccw = true;
+  double gear_ratio = 90;
+  double pulses_per_motor_rev = 10000;
+  double speed_deg_s = 45;
+  double acceleration_deg_s2 = 90;
+  int views = 8;
+  int poses = 2;
+};
+
+/// Writes FOLDER/rig.toml for scanrigd and scanrigd-sim, and FOLDER/drives, where the profiles are found. Fails with
+/// `io`.
+Result<void> write_rig_toml(const RigTomlOptions& options);
+
+}  // namespace scanrig::sim

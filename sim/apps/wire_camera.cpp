@@ -1,0 +1,95 @@
+#include "sim/apps/wire_camera.h"
+
+#include <algorithm>
+#include <cmath>
+#include <future>
+
+#include "core/units.h"
+
+namespace scanrig::sim {
+
+Result<void> WireCamera::arm(Deadline) {
+  if (const auto there = truth_.get(); !there) return pass_on(there);
+  exposed_.reset();
+  armed_ = true;
+  return {};
+}
+
+Result<void> WireCamera::expose(Light light, const std::function<Result<void>()>& fire) {
+  auto firing = std::async(std::launch::async, fire);
+  Result<TableTruth> middle = truth_.get();
+  bool lit = middle && middle->projector_on;
+  // Asked as long as the light may burn: it is on for a few milliseconds only.
+  while (middle && firing.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+    const auto now = truth_.get();
+    if (!now) {
+      middle = now;
+    } else if (now->projector_on) {
+      middle = now;
+      lit = true;
+    }
+  }
+  auto fired = firing.get();
+  if (!fired || !armed_) return fired;
+  armed_ = false;
+  if (!middle) {
+    exposed_ = pass_on(middle);
+    return fired;
+  }
+  remember(middle->angle_deg);
+  const std::scoped_lock lock(mutex_);
+  exposed_ = Exposure{history_.back().placement, middle->angle_deg, light == Light::pattern && lit, clock_.now()};
+  return fired;
+}
+
+Result<StereoFrame> WireCamera::collect(Deadline deadline) {
+  armed_ = false;
+  if (!exposed_) {
+    clock_.sleep_until(deadline.at);
+    return fail(ErrorCode::timeout, "simulated camera: there was no trigger edge");
+  }
+  const auto e = *std::exchange(exposed_, std::nullopt);
+  if (!e) return pass_on(e);
+  const auto images = scene_->shoot(e->placement, to_radians(e->angle_deg), e->pattern, ++exposures_);
+  return StereoFrame{images.left, images.right, PixelFormat::bayer_rggb8, 1, e->taken};
+}
+
+/// A view that is taken again replaces the one before.
+void WireCamera::remember(double angle_deg) {
+  constexpr double kSameView = 0.5;  // deg
+  const std::scoped_lock lock(mutex_);
+  auto& angles = history_.back().angles_deg;
+  const auto same = [&](double other) { return std::abs(std::remainder(other - angle_deg, 360.0)) < kSameView; };
+  const auto known = std::ranges::find_if(angles, same);
+  if (known != angles.end()) {
+    *known = angle_deg;
+  } else {
+    angles.push_back(angle_deg);
+  }
+}
+
+void WireCamera::turned_over() {
+  const std::scoped_lock lock(mutex_);
+  const int next = history_.back().placement + 1;
+  history_.push_back({next % static_cast<int>(scene_->placements().size()), {}});
+}
+
+Result<void> WireCamera::write_truth(const std::filesystem::path& folder) const {
+  std::vector<PoseTruth> taken;
+  {
+    const std::scoped_lock lock(mutex_);
+    std::ranges::copy_if(history_, std::back_inserter(taken), [](const auto& p) { return !p.angles_deg.empty(); });
+  }
+  const auto poses = static_cast<std::size_t>(scene_->options().poses);
+  if (taken.size() > poses) taken.erase(taken.begin(), taken.end() - static_cast<std::ptrdiff_t>(poses));
+  if (taken.empty()) return fail(ErrorCode::degenerate, "truth: no exposure has been taken yet");
+  return sim::write_truth(*scene_, taken, folder);
+}
+
+Result<void> WatchedPanel::show(const PanelOutputs& outputs, Deadline deadline) {
+  if (flip_requested_ && !outputs.flip_request) camera_.turned_over();
+  flip_requested_ = outputs.flip_request;
+  return panel_.show(outputs, deadline);
+}
+
+}  // namespace scanrig::sim

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <atomic>
+#include <functional>
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "core/clock.h"
+#include "drivers/camera/stereo_camera.h"
+#include "drivers/panel/panel.h"
+#include "drivers/projector/projector.h"
+#include "sim/apps/truth_socket.h"
+#include "sim/scene/scene.h"
+#include "sim/scene/truth.h"
+
+namespace scanrig::sim {
+
+/// Cameras over a rendered scene for a rig whose other devices are real drivers on simulated wires: each exposure shows
+/// the object at the table's true angle and in the light there really was, as the far end of the wire tells them.
+/// Threads: the owner of the camera; turned_over() and write_truth() from any.
+class WireCamera final : public StereoCamera {
+ public:
+  WireCamera(std::unique_ptr<Scene> scene, std::filesystem::path truth, Clock& clock)
+      : scene_(std::move(scene)), truth_(std::move(truth)), clock_(clock) {}
+
+  Result<void> arm(Deadline deadline) override;
+  Result<StereoFrame> collect(Deadline deadline) override;
+
+  /// The trigger line: an exposure begins, and lasts as long as `fire` does.
+  Result<void> expose(Light light, const std::function<Result<void>()>& fire);
+  void turned_over();
+
+  /// truth.json and truth.ply of the poses taken last, into a scan folder. Fails with `degenerate`, `io`.
+  Result<void> write_truth(const std::filesystem::path& folder) const;
+
+ private:
+  struct Exposure {
+    int placement = 0;
+    double angle_deg = 0.0;
+    bool pattern = false;
+    Clock::TimePoint taken{};
+  };
+
+  void remember(double angle_deg);
+
+  const std::unique_ptr<Scene> scene_;
+  TruthSocket truth_;
+  Clock& clock_;
+  std::uint64_t exposures_ = 0;
+  bool armed_ = false;
+  std::optional<Result<Exposure>> exposed_;
+
+  mutable std::mutex mutex_;
+  std::vector<PoseTruth> history_ = {{}};  // guarded by mutex_: each time the object was put down
+};
+
+/// In front of the real projector: what the trigger line does on a bench.
+class WatchedProjector final : public Projector {
+ public:
+  WatchedProjector(Projector& projector, WireCamera& camera) : projector_(projector), camera_(camera) {}
+  Result<void> fire(Light light, Deadline deadline) override {
+    return camera_.expose(light, [&] { return projector_.fire(light, deadline); });
+  }
+  Result<void> dark(Deadline deadline) override { return projector_.dark(deadline); }
+  void request_dark() noexcept override { projector_.request_dark(); }
+
+ private:
+  Projector& projector_;
+  WireCamera& camera_;
+};
+
+/// In front of the real panel: whoever presses Start when the flip lamp burns has turned the object over.
+class WatchedPanel final : public Panel {
+ public:
+  WatchedPanel(Panel& panel, WireCamera& camera) : panel_(panel), camera_(camera) {}
+  Result<PanelInputs> wait_change(const PanelInputs& known, Deadline deadline) override {
+    return panel_.wait_change(known, deadline);
+  }
+  Result<void> show(const PanelOutputs& outputs, Deadline deadline) override;
+
+ private:
+  Panel& panel_;
+  WireCamera& camera_;
+  bool flip_requested_ = false;
+};
+
+}  // namespace scanrig::sim

@@ -1,0 +1,120 @@
+#include "sim/apps/wire_rig.h"
+
+#include "core/files.h"
+#include "sim/wire/leadshine_drive.h"
+#include "sim/wire/oriental_drive.h"
+
+namespace scanrig::sim {
+namespace {
+
+constexpr std::chrono::milliseconds kLineWatch{5};
+
+}  // namespace
+
+Result<std::unique_ptr<WireRig>> WireRig::start(const WireRigOptions& o, Clock& clock) {
+  if (o.toml.panel != "gpio" && o.toml.panel != "modbus-io") {
+    return fail(ErrorCode::unsupported, "no simulated panel {}", o.toml.panel);
+  }
+  if (auto made = create_directories_synced(o.toml.folder); !made) return pass_on(made);
+  std::unique_ptr<WireRig> rig(new WireRig(o.toml.folder / "turntable"));
+  rig->positive_ccw_ = o.positive_ccw;
+  if (!rig->put_drive(o, clock)) return fail(ErrorCode::unsupported, "no simulated drive {}", o.toml.drive);
+  if (o.preload_counter) rig->drive_->preload_counter(*o.preload_counter);
+  auto server = wire::ModbusServer::start(o.toml.folder / "turntable", 1, *rig->registers_, clock);
+  if (!server) return pass_on(server);
+  rig->server_ = std::move(*server);
+  auto panel = RigPanel::start(o.toml.folder, o.toml.panel == "modbus-io", clock);
+  if (!panel) return pass_on(panel);
+  rig->panel_ = std::move(*panel);
+  if (auto written = write_rig_toml(o.toml); !written) return pass_on(written);
+  rig->line_watch_ = std::jthread([&rig = *rig](const std::stop_token& stop) { rig.watch_line(stop); });
+  return rig;
+}
+
+bool WireRig::put_drive(const WireRigOptions& o, Clock& clock) {
+  const auto put = [&](auto drive) {
+    drive_ = drive.get();
+    registers_ = std::move(drive);
+    return true;
+  };
+  if (o.toml.drive == "leadshine-rs") return put(std::make_unique<wire::LeadshineDrive>(o.axis, clock));
+  if (o.toml.drive == "oriental-az") return put(std::make_unique<wire::OrientalDrive>(o.axis, clock));
+  return false;
+}
+
+RigTruth WireRig::truth() const {
+  const std::scoped_lock lock(mutex_);
+  const auto axis = drive_->truth();
+  const double sign = positive_ccw_ ? 1.0 : -1.0;
+  return {.angle_deg = sign * axis.table_deg,
+          .speed_deg_s = sign * axis.speed_deg_s,
+          .standing = !axis.moving,
+          .projector_on = panel_->light(),
+          .counter = drive_->counter(),
+          .powered = powered_};
+}
+
+Result<Clock::TimePoint> WireRig::press(const std::string& input, bool pressed) {
+  auto at = panel_->press(input, pressed);
+  if (!at || input != "estop") return at;
+  const std::scoped_lock lock(mutex_);
+  const bool power = !(pressed && estop_cuts_power_);
+  if (power != powered_) drive_->power_cycle();
+  powered_ = power;
+  apply_fault();
+  return at;
+}
+
+void WireRig::set_fault(std::optional<wire::WireFault> fault) {
+  const std::scoped_lock lock(mutex_);
+  fault_ = fault;
+  apply_fault();
+}
+
+void WireRig::apply_fault() {
+  server_->clear_faults();
+  if (!powered_ || !understood_) {
+    server_->inject({.kind = wire::WireFault::Kind::deaf});
+  } else if (fault_) {
+    server_->inject(*fault_);
+  }
+}
+
+Result<void> WireRig::plug_in(bool plugged) {
+  if (plugged) return server_->come_back();
+  server_->vanish();
+  return {};
+}
+
+void WireRig::set_estop_cuts_power(bool cuts) {
+  const std::scoped_lock lock(mutex_);
+  estop_cuts_power_ = cuts;
+}
+
+void WireRig::set_positive_ccw(bool ccw) {
+  const std::scoped_lock lock(mutex_);
+  positive_ccw_ = ccw;
+}
+
+void WireRig::set_line(const wire::LineSettings& settings) {
+  const std::scoped_lock lock(mutex_);
+  drive_settings_ = settings;
+}
+
+/// A driver that sets the port otherwise than the drive's own is noise to it.
+void WireRig::watch_line(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    const auto settings = wire::line_settings(port_);
+    {
+      const std::scoped_lock lock(mutex_);
+      const bool understood = !settings || *settings == drive_settings_;
+      if (understood != understood_) {
+        understood_ = understood;
+        apply_fault();
+      }
+    }
+    std::this_thread::sleep_for(kLineWatch);
+  }
+}
+
+}  // namespace scanrig::sim

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/clock.h"
+#include "core/result.h"
+#include "sim/apps/rig_panel.h"
+#include "sim/apps/rig_toml.h"
+#include "sim/wire/axis.h"
+#include "sim/wire/line_settings.h"
+#include "sim/wire/mechanics.h"
+#include "sim/wire/modbus_server.h"
+
+namespace scanrig::sim {
+
+struct WireRigOptions {
+  RigTomlOptions toml;       ///< what rig.toml says: folder, drive, panel, gear
+  wire::AxisOptions axis;    ///< what the mechanics are
+  bool positive_ccw = true;  ///< which way positive pulses turn the table, seen from above
+  std::optional<std::int32_t> preload_counter;
+};
+
+/// How far and how fast things really are.
+struct RigTruth {
+  double angle_deg = 0;  ///< of the table, counter-clockwise from the home switch, many turns wide
+  double speed_deg_s = 0;
+  bool standing = true;
+  bool projector_on = false;  ///< dots or even light
+  std::int32_t counter = 0;   ///< the drive's, pulses
+  bool powered = true;        ///< the drive has power: no e-stop is pressed
+};
+
+/// The simulated rig on the wire: drive, panel and projector behind their ports in one folder, and rig.toml that points
+/// at them. A pressed e-stop takes the drive's power away, as the relay of a real rig does.
+/// Threads: every function may be called from any thread.
+class WireRig {
+ public:
+  /// Creates the folder. Fails with `io`, `unsupported` (no such drive or panel).
+  static Result<std::unique_ptr<WireRig>> start(const WireRigOptions& options, Clock& clock);
+
+  [[nodiscard]] RigTruth truth() const;
+  [[nodiscard]] RigPanel& panel() { return *panel_; }
+  Result<Clock::TimePoint> press(const std::string& input, bool pressed);
+  [[nodiscard]] std::vector<wire::WireFrame> frames() const { return server_->log(); }
+
+  /// Towards every request from now on, until told otherwise; nothing: the line is sound.
+  void set_fault(std::optional<wire::WireFault> fault);
+  Result<void> plug_in(bool plugged);
+  void set_estop_cuts_power(bool cuts);
+  /// How the drive's own port is set: it hears only who speaks like that.
+  void set_line(const wire::LineSettings& settings);
+  void set_positive_ccw(bool ccw);
+  [[nodiscard]] wire::Mechanics& drive() { return *drive_; }
+
+ private:
+  explicit WireRig(std::filesystem::path port) : port_(std::move(port)) {}
+  bool put_drive(const WireRigOptions& options, Clock& clock);
+  void apply_fault();
+  void watch_line(const std::stop_token& stop);
+
+  const std::filesystem::path port_;
+  mutable std::mutex mutex_;
+  bool positive_ccw_ = true;
+  bool estop_cuts_power_ = true;
+  bool powered_ = true;
+  wire::LineSettings drive_settings_;
+  bool understood_ = true;  ///< the port is set as the drive's own
+  std::optional<wire::WireFault> fault_;
+  std::unique_ptr<wire::RegisterDevice> registers_;
+  wire::Mechanics* drive_ = nullptr;  ///< the same object
+  std::unique_ptr<wire::ModbusServer> server_;
+  std::unique_ptr<RigPanel> panel_;
+  std::jthread line_watch_;  ///< last: it is joined before the rest goes
+};
+
+}  // namespace scanrig::sim

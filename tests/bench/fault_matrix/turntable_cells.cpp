@@ -1,0 +1,221 @@
+#include <cmath>
+#include <map>
+#include <thread>
+
+#include "tests/bench/fault_matrix/turntable_end.h"
+
+namespace scanrig::bench {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr seconds kMotionLimit{4};  ///< for a call that moves: longer than the 2 s after which it is a stall
+constexpr milliseconds kAskLimit{1500};
+constexpr seconds kAmple{15};
+constexpr milliseconds kAbsence{2000};
+constexpr double kFarDeg = 170;
+/// From full speed, as the drive was told to; and what the table is given on top.
+constexpr milliseconds kDeceleration{static_cast<int>(1000 * kSpeedDegS / kAccelerationDegS2)};
+constexpr milliseconds kRestGrace{100};
+
+/// Does something once the table is seen turning, from another thread.
+class Onlooker {
+ public:
+  Onlooker(TurntableEnd& end, Clock& clock, std::function<void()> act)
+      : thread_([&end, &clock, act = std::move(act)](const std::stop_token& stop) {
+          while (!end.truth().moving) {
+            if (stop.stop_requested()) return;
+            clock.sleep_for(milliseconds(1));
+          }
+          clock.sleep_for(kUnderWay);
+          if (!stop.stop_requested()) act();
+        }) {}
+
+ private:
+  static constexpr milliseconds kUnderWay{150};  ///< full speed by then
+  std::jthread thread_;
+};
+
+struct Method {
+  bool moves = false;
+  std::function<Result<void>(Turntable&, Deadline)> call;
+};
+
+const std::map<std::string, Method>& methods() {
+  static const std::map<std::string, Method> all{
+      {"home", {true, [](Turntable& table, Deadline by) { return table.home(by); }}},
+      {"rotate_to",
+       {true,
+        [](Turntable& table, Deadline by) -> Result<void> {
+          const auto moved = table.rotate_to({kFarDeg}, by);
+          if (!moved) return pass_on(moved);
+          return {};
+        }}},
+      {"stop", {false, [](Turntable& table, Deadline by) { return table.stop(by); }}},
+      {"reset_alarm", {false, [](Turntable& table, Deadline by) { return table.reset_alarm(by); }}},
+      {"status",
+       {false,
+        [](Turntable& table, Deadline by) -> Result<void> {
+          const auto status = table.status(by);
+          if (!status) return pass_on(status);
+          return {};
+        }}},
+      // Its effect is seen in the call that it ends.
+      {"request_stop", {true, [](Turntable& table, Deadline by) -> Result<void> {
+                          const auto moved = table.rotate_to({kFarDeg}, by);
+                          if (!moved) return pass_on(moved);
+                          return {};
+                        }}}};
+  return all;
+}
+
+std::optional<std::string> why_not(const std::string& method, Fault fault) {
+  if (fault != Fault::stalled) return std::nullopt;
+  if (method == "stop") return "a blocked table stands: stop succeeds as it should";
+  if (method == "status" || method == "reset_alarm") return "moves nothing, so nothing can stall";
+  return std::nullopt;
+}
+
+std::vector<ErrorCode> named(const std::string& method, Fault fault) {
+  std::vector<ErrorCode> codes;
+  switch (fault) {
+    case Fault::silent:
+    case Fault::late: codes = {ErrorCode::timeout}; break;
+    case Fault::damaged: codes = {ErrorCode::protocol, ErrorCode::timeout}; break;
+    case Fault::earlier_answer: codes = {ErrorCode::protocol}; break;
+    case Fault::stalled: codes = {ErrorCode::stalled}; break;
+    case Fault::unplugged:
+    case Fault::back_after_2s: codes = {ErrorCode::io}; break;
+    case Fault::device_error: codes = {ErrorCode::device_alarm}; break;
+  }
+  if (fault == Fault::device_error && (method == "stop" || method == "status")) codes = {};  // tell, do not fail
+  if (method == "request_stop") codes.push_back(ErrorCode::stopped);
+  return codes;
+}
+
+/// Whether the drive hears a stop while the fault lasts.
+bool reachable(Fault fault) {
+  return fault != Fault::silent && fault != Fault::unplugged && fault != Fault::back_after_2s;
+}
+
+class Trial {
+ public:
+  Trial(const TurntableKind& kind, std::string method, Fault fault)
+      : end_(kind.make(clock_)), method_(std::move(method)), fault_(fault) {}
+
+  Outcome run() {
+    if (auto ready = start_at_zero(); !ready) return broken(ready.error());
+    Outcome outcome = disturbed_call();
+    expect_rest(outcome);
+    recover(outcome);
+    return outcome;
+  }
+
+ private:
+  Deadline within(Clock::Duration time) { return Deadline::after(clock_, time); }
+
+  static Outcome broken(const Error& error) {
+    Outcome outcome{.told = error.message};
+    outcome.expect(false, "the trial could not begin");
+    return outcome;
+  }
+
+  Result<void> start_at_zero() {
+    if (auto homed = end_->table().home(within(kAmple)); !homed) return homed;
+    const auto moved = end_->table().rotate_to({0}, within(kAmple));
+    if (!moved) return pass_on(moved);
+    zero_deg_ = end_->truth().table_deg;
+    if (method_ != "home") return {};
+    const auto away = end_->table().rotate_to({120}, within(kAmple));  // homing is a way
+    if (!away) return pass_on(away);
+    return {};
+  }
+
+  Outcome disturbed_call() {
+    const Method& method = methods().at(method_);
+    const auto begin = [&] {
+      end_->begin(fault_);
+      begun_ = clock_.now();
+      if (method_ == "request_stop") end_->table().request_stop();
+    };
+    std::unique_ptr<Onlooker> onlooker;
+    if (method.moves && fault_ == Fault::stalled) {
+      begin();  // from the start: nothing will be seen turning
+    } else if (method.moves) {
+      onlooker = std::make_unique<Onlooker>(*end_, clock_, begin);
+    } else {
+      if (method_ == "reset_alarm") {
+        end_->raise_alarm(fault_ != Fault::device_error);
+      } else {
+        end_->send_round();
+        clock_.sleep_for(milliseconds(200));
+      }
+      begin();
+    }
+    return timed(clock_, method.moves ? Clock::Duration(kMotionLimit) : Clock::Duration(kAskLimit),
+                 named(method_, fault_), [&](Deadline by) { return method.call(end_->table(), by); });
+  }
+
+  /// Standing, or owned up that it may not be.
+  void expect_rest(Outcome& outcome) {
+    const bool meant_to_stop = method_ != "status" && method_ != "reset_alarm";
+    if (!meant_to_stop) return;
+    if (!reachable(fault_)) {
+      const bool owned_up = outcome.told.find("may be moving") != std::string::npos;
+      return outcome.expect(owned_up, "does not say that the table may be moving");
+    }
+    const auto by = within(kDeceleration + kRestGrace);
+    while (end_->truth().moving && !by.expired(clock_)) clock_.sleep_for(milliseconds(1));
+    outcome.expect(!end_->truth().moving, "the table still turns");
+  }
+
+  /// The fault is over: reset, home, a move that ends where it says.
+  void recover(Outcome& outcome) {
+    if (fault_ == Fault::back_after_2s) clock_.sleep_until(begun_ + kAbsence);
+    end_->end(fault_);
+    auto& table = end_->table();
+    if (method_ == "reset_alarm" && fault_ == Fault::device_error) end_->power_cycle();
+    const auto fail_with = [&](const char* what, const Error& error) {
+      outcome.expect(false, fmt::format("{} afterwards: {}", what, error.message));
+    };
+    if (auto stopped = table.stop(within(kAmple)); !stopped) return fail_with("stop", stopped.error());
+    if (auto reset = table.reset_alarm(within(kAmple)); !reset) return fail_with("reset", reset.error());
+    auto homed = table.home(within(kAmple));
+    // A stop that was asked for after the call had failed holds for the next one.
+    if (!homed && homed.error().code == ErrorCode::stopped) homed = table.home(within(kAmple));
+    if (!homed) return fail_with("home", homed.error());
+    const auto moved = table.rotate_to({45}, within(kAmple));
+    if (!moved) return fail_with("the next move", moved.error());
+    clock_.sleep_for(milliseconds(50));
+    const double off = std::remainder(end_->truth().table_deg - zero_deg_ - 45, 360.0);
+    outcome.wrong_position = std::abs(off) > 2 * kToleranceDeg;
+    outcome.expect(!outcome.wrong_position, fmt::format("the next move ended {:.3f} deg off", off));
+  }
+
+  RealClock clock_;
+  std::unique_ptr<TurntableEnd> end_;
+  const std::string method_;
+  const Fault fault_;
+  double zero_deg_ = 0;
+  Clock::TimePoint begun_;
+};
+
+}  // namespace
+
+std::vector<Cell> turntable_cells(const std::filesystem::path& scratch, const std::filesystem::path& profiles) {
+  std::vector<Cell> cells;
+  for (const TurntableKind& kind : shipped_turntables(scratch, profiles)) {
+    for (const auto& [method, unused] : methods()) {
+      for (const auto& [fault, name] : kFaults) {
+        cells.push_back({kind.driver, kind.device, method, fault, [kind, method, fault] {
+                           if (auto reason = why_not(method, fault)) return not_applicable(*reason);
+                           return Trial(kind, method, fault).run();
+                         }});
+      }
+    }
+  }
+  return cells;
+}
+
+}  // namespace scanrig::bench

@@ -1,0 +1,26 @@
+"""Motion, light, panel: faults on the wire, emergency stop, restarts, long runs, the doctor, fuzzed parsers."""
+import pathlib
+import shutil
+import tempfile
+
+import motion_doctor
+import motion_fuzz
+import motion_long
+import motion_matrix
+import motion_safety
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+
+
+def measure(bench):
+    # Short paths: a Unix socket's name has 107 characters. Readable, because the doctor is also tried as another user.
+    scratch = pathlib.Path(tempfile.mkdtemp(prefix="scanrig-motion-"))
+    scratch.chmod(0o755)
+    try:
+        motion_matrix.measure(bench, ROOT, scratch)
+        motion_safety.measure(bench, scratch)
+        motion_long.measure(bench, ROOT, scratch)
+        motion_doctor.measure(bench, scratch)
+        motion_fuzz.measure(bench, ROOT, scratch)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)

@@ -1,0 +1,98 @@
+"""`scanrig doctor` against each of the six faults that it must find."""
+import concurrent.futures
+import json
+import os
+import subprocess
+
+import motion_rig
+
+FAST = ("--speed-deg-s", "180", "--acceleration-deg-s2", "1000")
+LIMIT_S = 120
+PROMPT_PRESS, PROMPT_RELEASE, PROMPT_ENTER = "Press the emergency stop", "Release the emergency stop", "press Enter"
+PROMPT_SIGN = "which way"
+
+
+def consult(rig, present=True, as_user=None):
+    """Runs the doctor and plays the operator: the ids of its findings, and how it ended."""
+    command = [rig.bin / "scanrig", "doctor", "--config", rig.config, "--json", "--yes-move"]
+    if present:
+        command.append("--answers")
+
+    def become():
+        if as_user is not None:
+            os.setgroups([])
+            os.setgid(as_user)
+            os.setuid(as_user)
+
+    process = subprocess.Popen([str(word) for word in command], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True, preexec_fn=become)
+    for prompt in process.stderr:
+        if PROMPT_PRESS in prompt:
+            rig.press("estop")
+        elif PROMPT_RELEASE in prompt:
+            rig.release("estop")
+            if PROMPT_ENTER in prompt:
+                process.stdin.write("\n")
+                process.stdin.flush()
+        elif PROMPT_SIGN in prompt:
+            # The operator has watched the table: home is 0, the quarter turn ends at +90 or at -90 (or, from there, at
+            # 270) as the world sees it.
+            process.stdin.write("ccw\n" if rig.truth()["angle_deg"] % 360 < 180 else "cw\n")
+            process.stdin.flush()
+        if process.poll() is not None:
+            break
+    text = process.stdout.read()
+    code = process.wait(timeout=LIMIT_S)
+    rig.release("estop")
+    try:
+        return {finding["id"]: finding["problem"] for finding in json.loads(text)["findings"]}, code
+    except ValueError:
+        return {}, code
+
+
+def cases():
+    """name, the finding it must lead to, what to spoil, options of the doctor, options of the rig."""
+    def swap(rig):
+        os.symlink(os.readlink(rig.folder / "panel"), rig.folder / "other")
+        rig.edit_config(f'device = "{rig.folder}/turntable"', f'device = "{rig.folder}/other"')
+
+    yield "a sound rig", None, lambda rig: None, {}, ()
+    yield "wrong gear ratio", "gear_ratio", lambda rig: rig.edit_config("gear_ratio = 90", "gear_ratio = 72"), {}, ()
+    yield "reversed sign", "reversed_sign", lambda rig: rig.set(positive="cw"), {}, ()
+    yield "wrong parity", "wrong_parity", lambda rig: rig.set(line={"parity": "even"}), {}, ()
+    yield "swapped adapter", "swapped_adapter", swap, {}, ("--panel", "modbus-io")
+    yield "e-stop not wired", "estop_not_wired", lambda rig: rig.set(wiring={"estop": "bridged"}), {}, ()
+    if os.geteuid() == 0:
+        def strict(rig):
+            port = os.path.realpath(rig.folder / "turntable")
+            os.chmod(port, 0o660)
+            for folder in (rig.folder, *rig.folder.parents):
+                if folder.stat().st_mode & 0o005 != 0o005:
+                    raise PermissionError(f"{folder} cannot be entered by another user")
+            os.chmod(rig.folder / "gpio.sock", 0o666)
+
+        yield "missing group", "missing_group", strict, {"as_user": 65534, "present": False}, ()
+    else:
+        yield "missing group", "missing_group", None, {}, ()
+
+
+def attempt(bench, folder, finding, spoil, how, options):
+    """What the doctor finds, as a line's end: measured and ok."""
+    if spoil is None:
+        return "not measured: needs root to become another user", None
+    with motion_rig.Rig(bench.bin, folder, *FAST, *options) as rig:
+        try:
+            spoil(rig)
+            findings, code = consult(rig, **how)
+        except PermissionError as refused:
+            return f"not measured: {refused}", None
+    wanted = {finding} if finding else set()
+    return f"{', '.join(findings) or 'nothing'}, exit code {code}", set(findings) == wanted and (code != 0) == bool(wanted)
+
+
+def measure(bench, scratch):
+    tried = list(cases())
+    with concurrent.futures.ThreadPoolExecutor(len(tried)) as pool:
+        ended = list(pool.map(lambda n: attempt(bench, scratch / f"doctor{n}", *tried[n][1:]), range(len(tried))))
+    for (name, finding, *_), (measured, ok) in zip(tried, ended):
+        bench.line(f"doctor: {name}", f"finds {finding or 'nothing'}, exit code {'not 0' if finding else '0'}", measured, ok)

@@ -1,0 +1,156 @@
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "daemon/station/lamps.h"
+#include "tests/unit/daemon/safety_under_test.h"
+
+namespace scanrig {
+namespace {
+
+using testing::HasSubstr;
+using What = event::MaintenanceAsked::What;
+
+class MaintenanceMode : public Safety {
+ protected:
+  void ask(What what, double angle = 0.0, double speed = 5.0) {
+    tell(event::MaintenanceAsked{what, {angle}, true, {speed}});
+  }
+};
+
+TEST_F(MaintenanceMode, MaintenanceRefusesJobsAndBlinksAmber) {
+  get_ready();
+  ask(What::on);
+  EXPECT_EQ(state.machine, MachineState::maintenance);
+  EXPECT_EQ(to_string(state.machine), "Halted.Maintenance");
+  press(Button::start);
+  expect_refused("Maintenance mode is on");
+  EXPECT_TRUE(lamps(state, {}, true).amber);
+  EXPECT_FALSE(lamps(state, {}, false).amber);
+}
+
+TEST_F(MaintenanceMode, MaintenanceBeginsOnlyWhenIdle) {
+  begin_scan();
+  ask(What::on);
+  EXPECT_TRUE(refused);
+  ask(What::pulse);
+  expect_refused("off");
+}
+
+TEST_F(MaintenanceMode, AJogNeedsHomeAndSomebodyAtThePanelOrAGuard) {
+  start_up();
+  ask(What::on);
+  ask(What::jog, 5);
+  expect_refused("panel");
+  rules.guard = true;
+  ask(What::jog, 5);
+  expect_refused("not homed");
+  rules.guard = false;
+  press(Button::reset);
+  EXPECT_NE(asked_for<action::Warn>(), nullptr);
+  tell(event::WarningOver{});
+  EXPECT_NE(asked_for<action::Home>(), nullptr);
+  tell(event::Homed{});
+  EXPECT_EQ(state.machine, MachineState::maintenance);
+  ask(What::jog, 5);
+  EXPECT_FALSE(refused);
+  EXPECT_EQ(asked_for<action::Jog>(), nullptr) << "first the warning";
+  tell(event::WarningOver{});
+  ASSERT_NE(asked_for<action::Jog>(), nullptr);
+  EXPECT_EQ(asked_for<action::Jog>()->angle.value, 5);
+  tell(event::Jogged{{5.01}});
+  EXPECT_EQ(state.activity, Activity::none);
+  EXPECT_THAT(state.cause, HasSubstr("5.010"));
+}
+
+TEST_F(MaintenanceMode, AJogWithAnOpenGuardOrTooFastIsRefused) {
+  rules.guard = true;
+  get_ready();
+  ask(What::on);
+  ask(What::jog, 5, 10.1);
+  expect_refused("at most 10");
+  ask(What::jog, 5, 0);
+  expect_refused("at most 10");
+  ask(What::jog, std::nan(""));
+  expect_refused("angle");
+  tell(event::GuardChanged{false});
+  ask(What::jog, 5);
+  expect_refused("guard is open");
+}
+
+TEST_F(MaintenanceMode, RemoteHomingInMaintenanceFollowsTheSameRule) {
+  start_up();
+  ask(What::on);
+  ask(What::home);
+  expect_refused("switched off");
+  allow_remote();
+  ask(What::home);
+  EXPECT_FALSE(refused);
+  EXPECT_NE(asked_for<action::Warn>(), nullptr);
+}
+
+TEST_F(MaintenanceMode, WhoMovedSomethingInMaintenanceMustResetAfterwards) {
+  rules.guard = true;
+  get_ready();
+  ask(What::on);
+  ask(What::jog, 5);
+  tell(event::WarningOver{});
+  tell(event::Jogged{{5}});
+  ask(What::off);
+  EXPECT_EQ(state.machine, MachineState::halted);
+  press(Button::start);
+  EXPECT_TRUE(refused);
+}
+
+TEST_F(MaintenanceMode, WhoMovedNothingIsReadyAgain) {
+  get_ready();
+  ask(What::on);
+  ask(What::pulse);
+  EXPECT_NE(asked_for<action::Pulse>(), nullptr);
+  tell(event::Pulsed{});
+  ask(What::lamp_test);
+  EXPECT_NE(asked_for<action::TestLamps>(), nullptr);
+  ask(What::off);
+  EXPECT_EQ(state.machine, MachineState::ready);
+}
+
+TEST_F(MaintenanceMode, MaintenanceDoesNotClearAFault) {
+  begin_scan();
+  fault_and_stand();
+  ask(What::on);
+  ASSERT_EQ(state.machine, MachineState::maintenance);
+  allow_remote();
+  ask(What::home);
+  expect_refused("at the panel only");
+  ask(What::off);
+  EXPECT_EQ(state.machine, MachineState::error);
+}
+
+TEST_F(MaintenanceMode, StopEstopAndGuardEndAJog) {
+  rules.guard = true;
+  const auto jogging = [&] {
+    state = {};
+    get_ready();
+    ask(What::on);
+    ask(What::jog, 90);
+    tell(event::WarningOver{});
+  };
+  jogging();
+  press(Button::stop);
+  EXPECT_NE(asked_for<action::StopRig>(), nullptr);
+  tell(event::RigFailed{{ErrorCode::stopped, "stopped"}});
+  tell(event::Stopped{});
+  EXPECT_EQ(state.machine, MachineState::maintenance);
+  ask(What::jog, 5);
+  expect_refused("not homed");
+  jogging();
+  tell(event::EstopChanged{false});
+  EXPECT_EQ(state.machine, MachineState::error);
+  jogging();
+  tell(event::GuardChanged{false});
+  EXPECT_EQ(state.machine, MachineState::error);
+  EXPECT_NE(asked_for<action::StopRig>(), nullptr);
+}
+
+}  // namespace
+}  // namespace scanrig
