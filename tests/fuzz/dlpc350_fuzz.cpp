@@ -57,7 +57,8 @@ class Anything final : public dlpc350::Transport {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   sim::ManualClock clock;
   auto projector = LightCrafterProjector::create(
-      {}, [&]() -> Result<std::unique_ptr<dlpc350::Transport>> { return std::make_unique<Anything>(data, size, clock); },
+      {},
+      [&]() -> Result<std::unique_ptr<dlpc350::Transport>> { return std::make_unique<Anything>(data, size, clock); },
       clock);
   const auto begun = clock.now();
   for (const Light light : {Light::pattern, Light::plain}) {
