@@ -6,7 +6,6 @@
 namespace scanrig {
 namespace {
 
-constexpr int kBuffers = 6;
 constexpr std::uint64_t kGigeIds = 65535;  // 1 to 65535: 0 is skipped [GigE Vision 1.2, 24.3]
 
 struct Pfnc {
@@ -147,6 +146,7 @@ Result<void> AravisSensor::start_stream() {
   const auto asked =
       attempt_("read PayloadSize", [&](GError** error) { payload = arv_camera_get_payload(camera_.get(), error); });
   if (!asked) return asked;
+  finding_ = host_finding(ARV_IS_GV_STREAM(stream_.get()) ? CameraBus::gige : CameraBus::usb3, payload);
   for (int i = 0; i < kBuffers; ++i) arv_stream_push_buffer(stream_.get(), arv_buffer_new_allocate(payload));
   listens_to_line_ = options_.trigger_source != "Software";
   return attempt_("start the acquisition", [&](GError** error) { arv_camera_start_acquisition(camera_.get(), error); });
@@ -183,7 +183,10 @@ Result<SensorFrame> AravisSensor::read(ArvBuffer* buffer) const {
   frame.stamp.id = arv_buffer_get_frame_id(buffer);
   frame.stamp.time = std::chrono::nanoseconds(arv_buffer_get_timestamp(buffer));
   frame.damage = in_words(arv_buffer_get_status(buffer));
-  if (!frame.damage.empty()) return frame;
+  if (!frame.damage.empty()) {
+    if (finding_) frame.damage += "; " + *finding_;
+    return frame;
+  }
   const ArvPixelFormat code = arv_buffer_get_image_pixel_format(buffer);
   const auto* format = std::ranges::find(kFormats, code, &Pfnc::format);
   if (format == kFormats.end()) {

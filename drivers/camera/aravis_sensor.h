@@ -9,6 +9,8 @@
 
 namespace scanrig {
 
+inline constexpr int kBuffers = 6;  // of each camera's stream
+
 struct Unref {
   void operator()(gpointer object) const { g_object_unref(object); }
 };
@@ -67,7 +69,8 @@ class AravisSensor final : public Sensor {
   const Attempts attempt_;
   GRef<ArvCamera> camera_;
   GRef<ArvStream> stream_;
-  std::atomic<bool> lost_ = false;  // set by a thread of the library
+  std::optional<std::string> finding_;  // about this machine, see host_finding()
+  std::atomic<bool> lost_ = false;      // set by a thread of the library
   bool listens_to_line_ = true;
 };
 

@@ -189,25 +189,20 @@ Result<std::unique_ptr<SensorCamera>> open_aravis(const AravisOptions& options, 
   return std::make_unique<SensorCamera>(std::move(sensors), triggering, clock);
 }
 
-std::vector<std::string> host_findings(std::size_t frame_bytes, const std::string& root) {
-  std::vector<std::string> findings;
-  constexpr std::size_t kPair = 2, kQueued = 6;
-  // The kernel counts its own overhead: about twice the payload.
-  const auto socket_limit = read_number(root + "/proc/sys/net/core/rmem_max");
-  if (socket_limit && *socket_limit < 2 * frame_bytes) {
-    findings.push_back(
-        fmt::format("a socket may buffer {} bytes, less than a frame of {} needs: set net.core.rmem_max to at least {}",
-                    *socket_limit, frame_bytes, 2 * frame_bytes));
+std::optional<std::string> host_finding(CameraBus bus, std::size_t frame_bytes, const std::string& root) {
+  if (bus == CameraBus::gige) {
+    // The kernel counts its own overhead: about twice the payload.
+    const auto limit = read_number(root + "/proc/sys/net/core/rmem_max");
+    if (!limit || *limit >= 2 * frame_bytes) return std::nullopt;
+    return fmt::format("a socket may buffer {} bytes, too few for a frame of {}: set net.core.rmem_max to at least {}",
+                       *limit, frame_bytes, 2 * frame_bytes);
   }
-  const auto usb_limit = read_number(root + "/sys/module/usbcore/parameters/usbfs_memory_mb");
-  constexpr std::size_t kMega = 1024 * 1024;
-  const std::size_t usb_needed = (kPair * kQueued * frame_bytes + kMega - 1) / kMega;
-  if (usb_limit && *usb_limit > 0 && *usb_limit < usb_needed) {
-    findings.push_back(
-        fmt::format("USB transfers may use {} MB of memory, two USB3 cameras need {}: set usbcore.usbfs_memory_mb",
-                    *usb_limit, usb_needed));
-  }
-  return findings;
+  constexpr std::size_t kPair = 2, kMega = 1024 * 1024;
+  const auto limit = read_number(root + "/sys/module/usbcore/parameters/usbfs_memory_mb");
+  const std::size_t needed = (kPair * kBuffers * frame_bytes + kMega - 1) / kMega;
+  if (!limit || *limit == 0 || *limit >= needed) return std::nullopt;  // 0: no limit
+  return fmt::format("USB transfers may use {} MB of memory, two USB3 cameras need {}: set usbcore.usbfs_memory_mb",
+                     *limit, needed);
 }
 
 }  // namespace scanrig

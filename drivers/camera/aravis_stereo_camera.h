@@ -3,7 +3,6 @@
 #include <memory>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "drivers/camera/sensor_camera.h"
 
@@ -41,8 +40,11 @@ struct AravisOptions {
 /// `unsupported` (no trigger, no such pixel format).
 Result<std::unique_ptr<SensorCamera>> open_aravis(const AravisOptions& options, Clock& clock, Deadline deadline);
 
-/// What would lose frames although the cameras work, one sentence each with what to do: socket buffers, usbfs memory,
-/// for frames of `frame_bytes`. Reads /proc and /sys below `root`.
-std::vector<std::string> host_findings(std::size_t frame_bytes, const std::string& root = "");
+enum class CameraBus { gige, usb3 };
+
+/// What of this machine's settings would lose frames of `frame_bytes` although the cameras work: a sentence with what
+/// to do, or nothing. Socket buffers for GigE, usbfs memory for USB3; read from /proc and /sys below `root`. An error
+/// about a torn frame says it too.
+std::optional<std::string> host_finding(CameraBus bus, std::size_t frame_bytes, const std::string& root = "");
 
 }  // namespace scanrig

@@ -78,6 +78,9 @@ Result<void> SensorCamera::warm_up(Channel& channel, Deadline deadline) {
   // So long that the clocks tell an exposure of before from one of after.
   const auto gap = can_trigger ? channel.ledger.uncertainty().value_or(options_.frame_timeout / 2)
                                : Clock::Duration(options_.frame_timeout / 2);
+  if (deadline.left(clock_) < gap) {
+    return fail(ErrorCode::timeout, "{}: no time before the deadline to begin counting anew", channel.sensor->name());
+  }
   if (auto quiet = throw_away(channel, clock_.now() + gap); !quiet) return quiet;
   if (!can_trigger) {
     channel.ledger.forget_id();

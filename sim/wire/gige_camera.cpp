@@ -118,13 +118,14 @@ Result<std::unique_ptr<GigeCameras>> GigeCameras::start(const GigeCamerasOptions
 }
 
 void draw_test_image(Side side, const GigeExposure& exposure, cv::Mat& image) {
-  const std::uint32_t seed = static_cast<std::uint32_t>(exposure.number) * 2654435761u;
-  const int shift = side == Side::left ? 0 : 7;
+  const auto seed = static_cast<std::uint32_t>(exposure.number) * 2654435761u;
+  const std::uint32_t shift = side == Side::left ? 0 : 7;
   for (int y = 0; y < image.rows; ++y) {
     auto* row = image.ptr<std::uint8_t>(y);
     for (int x = 0; x < image.cols; ++x) {
-      std::uint32_t grain =
-          static_cast<std::uint32_t>((x + shift) / 2 * 73856093) ^ static_cast<std::uint32_t>(y / 2 * 19349663) ^ seed;
+      const std::uint32_t across = (static_cast<std::uint32_t>(x) + shift) / 2,
+                          down = static_cast<std::uint32_t>(y) / 2;
+      std::uint32_t grain = across * 73856093u ^ down * 19349663u ^ seed;
       grain = (grain ^ (grain >> 15)) * 2246822519u;
       const std::uint32_t grey = 40 + (grain >> 25);
       row[x] = static_cast<std::uint8_t>(exposure.pattern ? grey : grey / 4);

@@ -11,8 +11,6 @@ namespace {
 
 using std::chrono::milliseconds;
 using testing::HasSubstr;
-using testing::IsEmpty;
-using testing::SizeIs;
 
 Result<StereoFrame> expose(AravisBench& bench) {
   if (!bench.opened()) return pass_on(bench.opened());
@@ -217,22 +215,33 @@ TEST(AravisEvidence, SwappedSensorsShowEachOthersImages) {
   EXPECT_EQ(cv::norm(swapped->right, left, cv::NORM_INF), 0.0);
 }
 
-TEST(HostFindings, WhatWouldLoseFramesIsSaidInASentence) {
+TEST(HostFinding, WhatWouldLoseFramesIsSaidInASentence) {
   const auto root = std::filesystem::path(testing::TempDir()) / ("host" + std::to_string(::getpid()));
   const auto sockets = root / "proc/sys/net/core/rmem_max";
   const auto usb = root / "sys/module/usbcore/parameters/usbfs_memory_mb";
   for (const auto& file : {sockets, usb}) std::filesystem::create_directories(file.parent_path());
   constexpr std::size_t kFrame = 1280 * 960;
-  EXPECT_THAT(host_findings(kFrame, (root / "elsewhere").string()), IsEmpty());
+  EXPECT_FALSE(host_finding(CameraBus::gige, kFrame, root.string()));
   std::ofstream(sockets) << 212992;
-  std::ofstream(usb) << 16;
-  const auto findings = host_findings(kFrame, root.string());
-  ASSERT_THAT(findings, SizeIs(1));
-  EXPECT_THAT(findings[0], HasSubstr("net.core.rmem_max to at least 2457600"));
-  EXPECT_THAT(host_findings(5 * kFrame, root.string()), SizeIs(2));
+  EXPECT_THAT(host_finding(CameraBus::gige, kFrame, root.string()).value_or(""),
+              HasSubstr("net.core.rmem_max to at least 2457600"));
   std::ofstream(sockets) << 8388608;
-  EXPECT_THAT(host_findings(kFrame, root.string()), IsEmpty());
+  EXPECT_FALSE(host_finding(CameraBus::gige, kFrame, root.string()));
+  std::ofstream(usb) << 16;
+  EXPECT_FALSE(host_finding(CameraBus::usb3, kFrame, root.string()));
+  EXPECT_THAT(host_finding(CameraBus::usb3, 5 * kFrame, root.string()).value_or(""), HasSubstr("usbfs_memory_mb"));
+  std::ofstream(usb) << 0;
+  EXPECT_FALSE(host_finding(CameraBus::usb3, 5 * kFrame, root.string()));
   std::filesystem::remove_all(root);
+}
+
+TEST(AravisTriggers, WithoutTheTimeToBeginAnewArmingIsATimeout) {
+  AravisBench bench;
+  ASSERT_TRUE(bench.opened());
+  const auto armed = bench.camera().arm(Deadline::after(bench.clock(), milliseconds(5)));
+  ASSERT_FALSE(armed);
+  EXPECT_EQ(armed.error().code, ErrorCode::timeout) << armed.error().message;
+  EXPECT_TRUE(expose(bench));
 }
 
 }  // namespace
