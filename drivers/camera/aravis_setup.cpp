@@ -52,7 +52,9 @@ Result<void> set_up_trigger(ArvCamera* camera, const AravisOptions& options, con
   if (auto set = set_text(camera, "TriggerSelector", selector, attempt); !set) return set;
   if (auto set = set_trigger_source(camera, options.trigger_source, attempt); !set) return set;
   const char* edge = options.falling_edge ? "FallingEdge" : "RisingEdge";
-  if (auto set = set_text(camera, "TriggerActivation", edge, attempt); !set) return set;
+  if (has(camera, "TriggerActivation") || options.falling_edge) {
+    if (auto set = set_text(camera, "TriggerActivation", edge, attempt); !set) return set;
+  }
   return set_text(camera, "TriggerMode", "On", attempt);
 }
 

@@ -66,7 +66,7 @@ std::string obey(GigeCameras& cameras, const std::string& line) {
   return "what?";
 }
 
-int run(const std::string& socket, GigeCamerasOptions options) {
+int run(const std::string& socket, const GigeCamerasOptions& options) {
   RealClock clock;
   const auto cameras = GigeCameras::start(options, &draw_test_image, clock);
   if (!cameras) {

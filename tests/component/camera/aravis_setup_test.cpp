@@ -70,6 +70,18 @@ TEST(AravisSetup, APixelFormatTheCameraDoesNotHaveIsUnsupported) {
   EXPECT_THAT(error.message, HasSubstr("Mono12Packed"));
 }
 
+TEST(AravisSetup, AnEdgeTheCameraCannotUseIsInvalid) {
+  const auto error = refused([](auto& options) { options.falling_edge = true; });
+  EXPECT_EQ(error.code, ErrorCode::invalid_input);
+  EXPECT_THAT(error.message, HasSubstr("FallingEdge"));
+}
+
+TEST(AravisSetup, AnInputTheCameraDoesNotHaveIsInvalid) {
+  const auto error = refused([](auto& options) { options.trigger_source = "Line7"; });
+  EXPECT_EQ(error.code, ErrorCode::invalid_input);
+  EXPECT_THAT(error.message, HasSubstr("Line7"));
+}
+
 TEST(AravisSetup, PtpThatTheCameraDoesNotHaveIsUnsupported) {
   const auto error = refused([](auto& options) { options.frame_clock = TriggeringOptions::FrameClock::ptp; });
   EXPECT_EQ(error.code, ErrorCode::unsupported);
