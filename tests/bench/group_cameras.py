@@ -34,7 +34,7 @@ def replies(bench):
     """The LightCrafter's replies under libFuzzer, as the other parsers are in the motion group."""
     what = "fuzzed: LightCrafter 4500 replies"
     seconds = motion_fuzz.QUICK_SECONDS if bench.quick else motion_fuzz.SECONDS
-    problem = motion_fuzz.build(ROOT)
+    problem = motion_fuzz.build(ROOT, "dlpc350_fuzz")
     scratch = pathlib.Path(tempfile.mkdtemp(prefix="scanrig-cameras-"))
     try:
         done = None if problem else motion_fuzz.fuzz(bench, ROOT, scratch, "dlpc350")
