@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <opencv2/core/mat.hpp>
 #include <string>
 
@@ -15,6 +16,14 @@ enum class PixelFormat { mono8, bayer_rggb8, bgr8 };
 /// The name used in manifests: "Mono8", "BayerRG8", "BGR8" (GenICam PFNC).
 std::string to_string(PixelFormat format);
 
+/// How good an image is, whatever it shows; NaN where the driver does not measure it.
+struct ImageEvidence {
+  double brightness = std::numeric_limits<double>::quiet_NaN();  ///< mean grey value, 0 to 1
+  double saturated = std::numeric_limits<double>::quiet_NaN();   ///< share of the pixels at full scale, 0 to 1
+  double blur_px =
+      std::numeric_limits<double>::quiet_NaN();  ///< standard deviation of the blur of fine texture, pixels
+};
+
 /// Two images of one moment, as the sensors delivered them.
 struct StereoFrame {
   cv::Mat left;   ///< 8 bit; 1 channel for mono8 and bayer_rggb8, 3 for bgr8
@@ -22,6 +31,8 @@ struct StereoFrame {
   PixelFormat format = PixelFormat::mono8;
   std::uint64_t trigger = 0;  ///< how many triggers since arm(), this one included
   Clock::TimePoint taken;
+  ImageEvidence left_evidence = {};
+  ImageEvidence right_evidence = {};
 };
 
 /// Two synchronised sensors, bound by serial number, triggered by the projector's edge.

@@ -1,0 +1,227 @@
+#include "drivers/camera/aravis_sensor.h"
+
+#include <algorithm>
+#include <array>
+
+namespace scanrig {
+namespace {
+
+constexpr std::uint64_t kGigeIds = 65535;  // 1 to 65535: 0 is skipped [GigE Vision 1.2, 24.3]
+
+struct Pfnc {
+  ArvPixelFormat format;
+  Layout layout;
+  int bits;
+};
+
+// Names and codes of the Pixel Format Naming Convention; 10 and 12 bits unpacked, in 16-bit words.
+constexpr std::array kFormats{
+    Pfnc{ARV_PIXEL_FORMAT_MONO_8, Layout::mono, 8},
+    Pfnc{ARV_PIXEL_FORMAT_MONO_10, Layout::mono, 10},
+    Pfnc{ARV_PIXEL_FORMAT_MONO_12, Layout::mono, 12},
+    Pfnc{ARV_PIXEL_FORMAT_MONO_14, Layout::mono, 14},
+    Pfnc{ARV_PIXEL_FORMAT_MONO_16, Layout::mono, 16},
+    Pfnc{ARV_PIXEL_FORMAT_BAYER_RG_8, Layout::bayer_rg, 8},
+    Pfnc{ARV_PIXEL_FORMAT_BAYER_RG_10, Layout::bayer_rg, 10},
+    Pfnc{ARV_PIXEL_FORMAT_BAYER_RG_12, Layout::bayer_rg, 12},
+    Pfnc{ARV_PIXEL_FORMAT_BAYER_RG_16, Layout::bayer_rg, 16},
+    Pfnc{ARV_PIXEL_FORMAT_BAYER_GR_8, Layout::bayer_gr, 8},
+    Pfnc{ARV_PIXEL_FORMAT_BAYER_GR_10, Layout::bayer_gr, 10},
+    Pfnc{ARV_PIXEL_FORMAT_BAYER_GR_12, Layout::bayer_gr, 12},
+    Pfnc{ARV_PIXEL_FORMAT_BAYER_GR_16, Layout::bayer_gr, 16},
+    Pfnc{ARV_PIXEL_FORMAT_BAYER_GB_8, Layout::bayer_gb, 8},
+    Pfnc{ARV_PIXEL_FORMAT_BAYER_GB_10, Layout::bayer_gb, 10},
+    Pfnc{ARV_PIXEL_FORMAT_BAYER_GB_12, Layout::bayer_gb, 12},
+    Pfnc{ARV_PIXEL_FORMAT_BAYER_GB_16, Layout::bayer_gb, 16},
+    Pfnc{ARV_PIXEL_FORMAT_BAYER_BG_8, Layout::bayer_bg, 8},
+    Pfnc{ARV_PIXEL_FORMAT_BAYER_BG_10, Layout::bayer_bg, 10},
+    Pfnc{ARV_PIXEL_FORMAT_BAYER_BG_12, Layout::bayer_bg, 12},
+    Pfnc{ARV_PIXEL_FORMAT_BAYER_BG_16, Layout::bayer_bg, 16},
+    Pfnc{ARV_PIXEL_FORMAT_RGB_8_PACKED, Layout::rgb, 8},
+    Pfnc{ARV_PIXEL_FORMAT_BGR_8_PACKED, Layout::bgr, 8},
+    Pfnc{ARV_PIXEL_FORMAT_YUV_422_YUYV_PACKED, Layout::yuyv, 8},
+};
+
+const char* in_words(ArvBufferStatus status) {
+  switch (status) {
+    case ARV_BUFFER_STATUS_SUCCESS: return "";
+    case ARV_BUFFER_STATUS_TIMEOUT: return "packets did not come in time";
+    case ARV_BUFFER_STATUS_MISSING_PACKETS: return "packets are missing";
+    case ARV_BUFFER_STATUS_WRONG_PACKET_ID: return "packets out of order";
+    case ARV_BUFFER_STATUS_SIZE_MISMATCH: return "not of the size that was set";
+    case ARV_BUFFER_STATUS_ABORTED: return "given up by the camera";
+    default: return "not filled";
+  }
+}
+
+void on_control_lost(ArvDevice*, gpointer lost) { *static_cast<std::atomic<bool>*>(lost) = true; }
+
+/// The name of the device with this serial number, or nothing.
+std::optional<std::string> find_by_serial(const std::string& serial) {
+  arv_update_device_list();
+  for (unsigned i = 0; i < arv_get_n_devices(); ++i) {
+    const char* found = arv_get_device_serial_nbr(i);
+    if (found && serial == found) return std::string(arv_get_device_id(i));
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Result<void> Attempts::refused(const std::string& what, GError* error) const {
+  auto code = ErrorCode::io;
+  if (g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_TIMEOUT)) code = ErrorCode::timeout;
+  if (g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_NOT_FOUND)) code = ErrorCode::not_found;
+  if (g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_FEATURE_NOT_FOUND) ||
+      g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_INVALID_PARAMETER) || error->domain == ARV_GC_ERROR) {
+    code = ErrorCode::invalid_input;
+  }
+  const std::string reason = error->message;
+  g_error_free(error);
+  return fail(code, "{}: {}: {}", who_, what, reason);
+}
+
+AravisSensor::AravisSensor(const std::string& side, const AravisSensorOptions& sensor, const AravisOptions& options,
+                           Clock& clock)
+    : sensor_(sensor), options_(options), clock_(clock), attempt_(fmt::format("{} camera {}", side, sensor.serial)) {}
+
+AravisSensor::~AravisSensor() { disconnect(); }
+
+std::uint64_t AravisSensor::id_ring() const { return camera_ && arv_camera_is_uv_device(camera_.get()) ? 0 : kGigeIds; }
+
+Result<bool> AravisSensor::ready(Deadline deadline) {
+  if (camera_ && !lost_) return false;
+  disconnect();
+  if (deadline.expired(clock_)) return fail(ErrorCode::timeout, "{}: no time left to connect", name());
+  auto connected = connect();
+  if (connected) connected = start_stream();
+  if (!connected) {
+    disconnect();
+    return pass_on(connected);
+  }
+  return true;
+}
+
+Result<void> AravisSensor::connect() {
+  std::string device = sensor_.address;
+  if (device.empty()) {
+    const auto found = find_by_serial(sensor_.serial);
+    if (!found) {
+      return fail(ErrorCode::not_found, "{}: no camera with this serial number; check power, cable and network",
+                  name());
+    }
+    device = *found;
+  }
+  const auto opened =
+      attempt_("connect to " + device, [&](GError** error) { camera_.reset(arv_camera_new(device.c_str(), error)); });
+  if (!opened) return opened;
+  lost_ = false;
+  arv_camera_set_range_check_policy(camera_.get(), ARV_RANGE_CHECK_POLICY_ENABLE);
+  g_signal_connect(arv_camera_get_device(camera_.get()), "control-lost", G_CALLBACK(on_control_lost), &lost_);
+  std::string serial;
+  const auto asked = attempt_("read the serial number", [&](GError** error) {
+    if (const char* text = arv_camera_get_device_serial_number(camera_.get(), error)) serial = text;
+  });
+  if (!asked) return asked;
+  if (serial != sensor_.serial) {
+    return fail(ErrorCode::invalid_input,
+                "{}: the camera at {} has the serial number {}; correct the address or the serial", name(), device,
+                serial);
+  }
+  return set_up(camera_.get(), options_, sensor_.address, attempt_);
+}
+
+Result<void> AravisSensor::start_stream() {
+  const auto created = attempt_("open the stream", [&](GError** error) {
+    stream_.reset(arv_camera_create_stream(camera_.get(), nullptr, nullptr, error));
+  });
+  if (!created) return created;
+  if (ARV_IS_GV_STREAM(stream_.get())) {
+    // A frame with packets missing is given up early enough to be told from one that never came.
+    const auto retention = std::chrono::microseconds(options_.frame_timeout) / 2;
+    g_object_set(stream_.get(), "frame-retention", static_cast<guint>(retention.count()), "packet-timeout",
+                 static_cast<guint>(retention.count() / 5), nullptr);
+  }
+  guint payload = 0;
+  const auto asked =
+      attempt_("read PayloadSize", [&](GError** error) { payload = arv_camera_get_payload(camera_.get(), error); });
+  if (!asked) return asked;
+  finding_ = host_finding(ARV_IS_GV_STREAM(stream_.get()) ? CameraBus::gige : CameraBus::usb3, payload);
+  for (int i = 0; i < kBuffers; ++i) arv_stream_push_buffer(stream_.get(), arv_buffer_new_allocate(payload));
+  listens_to_line_ = options_.trigger_source != "Software";
+  return attempt_("start the acquisition", [&](GError** error) { arv_camera_start_acquisition(camera_.get(), error); });
+}
+
+void AravisSensor::disconnect() {
+  if (camera_ && stream_ && !lost_) {
+    std::ignore = attempt_("stop", [&](GError** error) { arv_camera_stop_acquisition(camera_.get(), error); });
+  }
+  if (camera_) g_signal_handlers_disconnect_by_data(arv_camera_get_device(camera_.get()), &lost_);
+  stream_.reset();
+  camera_.reset();
+}
+
+Result<std::optional<SensorFrame>> AravisSensor::next(Deadline deadline) {
+  if (!stream_) return fail(ErrorCode::io, "{}: not connected", name());
+  const auto wait = std::chrono::ceil<std::chrono::microseconds>(deadline.left(clock_));
+  ArvBuffer* buffer = wait.count() > 0
+                          ? arv_stream_timeout_pop_buffer(stream_.get(), static_cast<guint64>(wait.count()))
+                          : arv_stream_try_pop_buffer(stream_.get());
+  if (!buffer) {
+    if (lost_) return fail(ErrorCode::io, "{}: the connection is lost; check power and cable", name());
+    return std::nullopt;
+  }
+  auto frame = read(buffer);
+  arv_stream_push_buffer(stream_.get(), buffer);
+  if (!frame) return pass_on(frame);
+  return std::optional(std::move(*frame));
+}
+
+Result<SensorFrame> AravisSensor::read(ArvBuffer* buffer) const {
+  SensorFrame frame;
+  frame.arrival = clock_.now();
+  frame.stamp.id = arv_buffer_get_frame_id(buffer);
+  frame.stamp.time = std::chrono::nanoseconds(arv_buffer_get_timestamp(buffer));
+  frame.damage = in_words(arv_buffer_get_status(buffer));
+  if (!frame.damage.empty()) {
+    if (finding_) frame.damage += "; " + *finding_;
+    return frame;
+  }
+  const ArvPixelFormat code = arv_buffer_get_image_pixel_format(buffer);
+  const auto* format = std::ranges::find(kFormats, code, &Pfnc::format);
+  if (format == kFormats.end()) {
+    return fail(ErrorCode::unsupported, "{}: pixel format 0x{:08X} cannot be read", name(), code);
+  }
+  std::size_t size = 0;
+  const void* bytes = arv_buffer_get_image_data(buffer, &size);
+  RawImage raw;
+  raw.layout = format->layout;
+  raw.bits = format->bits;
+  raw.size = {arv_buffer_get_image_width(buffer), arv_buffer_get_image_height(buffer)};
+  raw.bytes = {static_cast<const std::uint8_t*>(bytes), size};
+  auto picture = to_picture(raw);
+  if (picture) {
+    frame.picture = std::move(*picture);
+  } else {
+    frame.damage = picture.error().message;
+  }
+  return frame;
+}
+
+Result<void> AravisSensor::listen_to_line(bool line) {
+  const bool wanted = line && options_.trigger_source != "Software";
+  if (wanted == listens_to_line_) return {};
+  auto set = set_trigger_source(camera_.get(), wanted ? options_.trigger_source : "Software", attempt_);
+  if (set) listens_to_line_ = wanted;
+  if (!set) lost_ = true;  // what does not answer is connected again
+  return set;
+}
+
+Result<void> AravisSensor::trigger() {
+  auto triggered =
+      attempt_("trigger", [&](GError** error) { arv_camera_execute_command(camera_.get(), "TriggerSoftware", error); });
+  if (!triggered) lost_ = true;
+  return triggered;
+}
+
+}  // namespace scanrig

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <arv.h>
+
+#include <atomic>
+#include <memory>
+
+#include "drivers/camera/aravis_stereo_camera.h"
+
+namespace scanrig {
+
+inline constexpr int kBuffers = 6;  // of each camera's stream
+
+struct Unref {
+  void operator()(gpointer object) const { g_object_unref(object); }
+};
+template <class T>
+using GRef = std::unique_ptr<T, Unref>;
+
+/// A GError as Result; `act` is called with a place for one: attempt("set Gain", [&](GError** e) { ... });
+class Attempts {
+ public:
+  explicit Attempts(std::string who) : who_(std::move(who)) {}
+  template <class Act>
+  Result<void> operator()(const std::string& what, Act act) const {
+    GError* error = nullptr;
+    act(&error);
+    return error ? refused(what, error) : Result<void>{};
+  }
+  [[nodiscard]] const std::string& who() const { return who_; }
+
+ private:
+  [[nodiscard]] Result<void> refused(const std::string& what, GError* error) const;
+
+  std::string who_;
+};
+
+/// Trigger, exposure, pixels and transport of one camera [GenICam SFNC 2.7, 5 and 6]. See open_aravis() for errors.
+Result<void> set_up(ArvCamera* camera, const AravisOptions& options, const std::string& address,
+                    const Attempts& attempt);
+
+/// Whether `line` (or else the software trigger) starts an exposure.
+Result<void> set_trigger_source(ArvCamera* camera, const std::string& source, const Attempts& attempt);
+
+/// One GigE Vision or USB3 Vision camera.
+class AravisSensor final : public Sensor {
+ public:
+  AravisSensor(const std::string& side, const AravisSensorOptions& sensor, const AravisOptions& options, Clock& clock);
+  ~AravisSensor() override;
+
+  [[nodiscard]] const std::string& name() const override { return attempt_.who(); }
+  Result<bool> ready(Deadline deadline) override;
+  Result<std::optional<SensorFrame>> next(Deadline deadline) override;
+  [[nodiscard]] bool can_trigger() const override { return true; }
+  [[nodiscard]] std::uint64_t id_ring() const override;
+  [[nodiscard]] bool shares_host_clock() const override { return false; }
+  Result<void> listen_to_line(bool line) override;
+  Result<void> trigger() override;
+
+ private:
+  Result<void> connect();
+  Result<void> start_stream();
+  void disconnect();
+  Result<SensorFrame> read(ArvBuffer* buffer) const;
+
+  const AravisSensorOptions sensor_;
+  const AravisOptions options_;
+  Clock& clock_;
+  const Attempts attempt_;
+  GRef<ArvCamera> camera_;
+  GRef<ArvStream> stream_;
+  std::optional<std::string> finding_;  // about this machine, see host_finding()
+  std::atomic<bool> lost_ = false;      // set by a thread of the library
+  bool listens_to_line_ = true;
+};
+
+}  // namespace scanrig

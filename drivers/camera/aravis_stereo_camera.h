@@ -1,0 +1,50 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "drivers/camera/sensor_camera.h"
+
+namespace scanrig {
+
+struct AravisSensorOptions {
+  std::string serial;   ///< the camera must have this serial number
+  std::string address;  ///< IP address of a GigE camera; empty: looked for by serial number
+};
+
+/// Part of the sensor that is read out, pixels.
+struct Region {
+  int x = 0, y = 0, width = 0, height = 0;
+};
+
+/// Two GenICam cameras, GigE Vision or USB3 Vision. Features by their SFNC names.
+struct AravisOptions {
+  AravisSensorOptions left;
+  AravisSensorOptions right;
+  std::string trigger_source = "Line0";  ///< an input of both cameras, or "Software"
+  bool falling_edge = false;
+  std::string pixel_format = "Mono8";  ///< Mono8..16, BayerRG8 and its like, RGB8, BGR8, YUV422_8; not packed ones
+  std::chrono::microseconds exposure{12000};
+  std::optional<double> gain;    ///< as the camera counts it; empty: as it is
+  std::optional<Region> region;  ///< empty: the whole sensor
+  int packet_bytes = 0;          ///< GigE: with IP and UDP headers, at most the MTU; 0: as large as passes
+  std::chrono::microseconds packet_delay{0};
+  TriggeringOptions::FrameClock frame_clock = TriggeringOptions::FrameClock::interval;
+  std::chrono::milliseconds frame_timeout{500};
+  std::chrono::seconds dead_air{10};
+};
+
+/// Connects both cameras and sets them up. Fails with `not_found` (no such camera), `io`, `timeout`, `invalid_input`
+/// (another serial number, a feature that does not take the value, packets larger than the network passes),
+/// `unsupported` (no trigger, no such pixel format).
+Result<std::unique_ptr<SensorCamera>> open_aravis(const AravisOptions& options, Clock& clock, Deadline deadline);
+
+enum class CameraBus { gige, usb3 };
+
+/// What of this machine's settings would lose frames of `frame_bytes` although the cameras work: a sentence with what
+/// to do, or nothing. Socket buffers for GigE, usbfs memory for USB3; read from /proc and /sys below `root`. An error
+/// about a torn frame says it too.
+std::optional<std::string> host_finding(CameraBus bus, std::size_t frame_bytes, const std::string& root = "");
+
+}  // namespace scanrig

@@ -1,0 +1,69 @@
+#include "drivers/camera/image_evidence.h"
+
+#include <cmath>
+
+namespace scanrig {
+namespace {
+
+/// One grey value per `step` pixels of a row and column, `channels` bytes apart, beginning at column `first`.
+struct Plane {
+  const cv::Mat& image;
+  int first;     // byte within the row
+  int step;      // pixels between samples, both ways
+  int channels;  // bytes a pixel
+
+  [[nodiscard]] int rows() const { return image.rows / step; }
+  [[nodiscard]] int cols() const { return image.cols / step; }
+  [[nodiscard]] const std::uint8_t* row(int y) const { return image.ptr<std::uint8_t>(y * step) + first; }
+  [[nodiscard]] int pitch() const { return step * channels; }
+};
+
+Plane plane_of(const cv::Mat& image, PixelFormat format) {
+  switch (format) {
+    case PixelFormat::bayer_rggb8: return {image, 1, 2, 1};
+    case PixelFormat::bgr8: return {image, 1, 1, 3};
+    case PixelFormat::mono8: break;
+  }
+  return {image, 0, 1, 1};
+}
+
+/// For independent grains seen through a Gaussian blur of standard deviation s, the spectrum falls as exp(-s^2 w^2),
+/// and the mean squares of gradient and Laplacian are as s^2 to 2.
+double blur_px(const Plane& plane) {
+  double gradient = 0.0, laplacian = 0.0;
+  for (int y = 1; y + 1 < plane.rows(); ++y) {
+    const std::uint8_t *above = plane.row(y - 1), *here = plane.row(y), *below = plane.row(y + 1);
+    std::int64_t row_gradient = 0, row_laplacian = 0;
+    for (int x = 1; x + 1 < plane.cols(); ++x) {
+      const int i = x * plane.pitch(), left = i - plane.pitch(), right = i + plane.pitch();
+      const int across = here[right] - here[left], down = below[i] - above[i];
+      const int bend = here[right] + here[left] + below[i] + above[i] - 4 * here[i];
+      row_gradient += across * across + down * down;
+      row_laplacian += bend * bend;
+    }
+    gradient += static_cast<double>(row_gradient) / 4.0;
+    laplacian += static_cast<double>(row_laplacian);
+  }
+  if (laplacian <= 0.0) return std::numeric_limits<double>::quiet_NaN();
+  return plane.step * std::sqrt(2.0 * gradient / laplacian);
+}
+
+}  // namespace
+
+ImageEvidence measure(const cv::Mat& image, PixelFormat format) {
+  if (image.empty()) return {};
+  std::int64_t sum = 0, full = 0;
+  const int bytes = image.cols * image.channels();
+  for (int y = 0; y < image.rows; ++y) {
+    const std::uint8_t* row = image.ptr<std::uint8_t>(y);
+    for (int x = 0; x < bytes; ++x) {
+      sum += row[x];
+      full += row[x] == 255;
+    }
+  }
+  const double count = static_cast<double>(image.rows) * bytes;
+  return {static_cast<double>(sum) / (255.0 * count), static_cast<double>(full) / count,
+          blur_px(plane_of(image, format))};
+}
+
+}  // namespace scanrig

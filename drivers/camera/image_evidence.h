@@ -1,0 +1,12 @@
+#pragma once
+
+#include "drivers/camera/stereo_camera.h"
+
+namespace scanrig {
+
+/// Measures an image of a StereoFrame. Of a Bayer mosaic one green site in four pixels is looked at, of a colour image
+/// the green channel. The blur is that of a texture of independent grains, such as projected dots, and is NaN for an
+/// image without any.
+ImageEvidence measure(const cv::Mat& image, PixelFormat format);
+
+}  // namespace scanrig

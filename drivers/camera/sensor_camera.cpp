@@ -1,0 +1,262 @@
+#include "drivers/camera/sensor_camera.h"
+
+#include "drivers/camera/image_evidence.h"
+
+namespace scanrig {
+namespace {
+
+using Finding = TriggerLedger::Finding;
+
+constexpr int kWarmUpTries = 4;
+constexpr const char* kRedo = "arm again and repeat the exposure";
+
+double milliseconds(std::chrono::nanoseconds time) { return std::chrono::duration<double, std::milli>(time).count(); }
+
+}  // namespace
+
+SensorCamera::SensorCamera(std::vector<std::unique_ptr<Sensor>> sensors, const TriggeringOptions& options, Clock& clock)
+    : options_(options), clock_(clock) {
+  for (auto& sensor : sensors) {
+    const TriggerLedger ledger(sensor->id_ring(), sensor->shares_host_clock());
+    channels_.push_back({std::move(sensor), ledger, std::nullopt});
+  }
+}
+
+Result<void> SensorCamera::arm(Deadline deadline) {
+  if (std::exchange(armed_, false)) in_step_ = false;  // an exposure given up; its frames may be on their way
+  const bool dead_air = clock_.now() - last_exposure_ > options_.dead_air;
+  for (Channel& channel : channels_) {
+    if (auto ready = get_ready(channel, deadline); !ready) return ready;
+  }
+  for (Channel& channel : channels_) {
+    if (auto thrown = throw_away(channel, clock_.now()); !thrown) return thrown;
+    if (in_step_ && !dead_air && channel.ledger.knows_id()) continue;
+    if (auto warm = warm_up(channel, deadline); !warm) {
+      in_step_ = false;
+      return warm;
+    }
+  }
+  in_step_ = armed_ = true;
+  trigger_after_ = clock_.now();
+  return {};
+}
+
+Result<void> SensorCamera::get_ready(Channel& channel, Deadline deadline) {
+  const auto connected_anew = channel.sensor->ready(deadline);
+  if (!connected_anew) return pass_on(connected_anew);
+  if (*connected_anew) {
+    if (channel.ledger.knows_clock()) ++counts_.returns;
+    forget(channel);
+  }
+  return {};
+}
+
+/// Its clock may have begun again, so neither it nor the pair's common time is known.
+void SensorCamera::forget(Channel& channel) {
+  channel.ledger.forget();
+  for (Channel& each : channels_) each.last_pair.reset();
+}
+
+/// What came unasked: an edge that was none, or the frame of an exposure given up.
+Result<void> SensorCamera::throw_away(Channel& channel, Clock::TimePoint until) {
+  for (;;) {
+    const auto stray = channel.sensor->next({until});
+    if (!stray) return pass_on(stray);
+    if (!*stray) return {};
+    if (options_.by == TriggeringOptions::By::free_run) continue;
+    ++counts_.strays;
+    in_step_ = false;
+  }
+}
+
+Result<void> SensorCamera::warm_up(Channel& channel, Deadline deadline) {
+  if (options_.by == TriggeringOptions::By::free_run) return {};
+  const bool can_trigger = channel.sensor->can_trigger();
+  if (can_trigger) {
+    if (auto deaf = channel.sensor->listen_to_line(false); !deaf) return deaf;
+  }
+  // So long that the clocks tell an exposure of before from one of after.
+  const auto gap = can_trigger ? channel.ledger.uncertainty().value_or(options_.frame_timeout / 2)
+                               : Clock::Duration(options_.frame_timeout / 2);
+  if (deadline.left(clock_) < gap) {
+    return fail(ErrorCode::timeout, "{}: no time before the deadline to begin counting anew", channel.sensor->name());
+  }
+  if (auto quiet = throw_away(channel, clock_.now() + gap); !quiet) return quiet;
+  if (!can_trigger) {
+    channel.ledger.forget_id();
+    return {};
+  }
+  // Nothing is known of a new clock: only a second exposure shows that the first frame was no earlier one.
+  int wanted = channel.ledger.knows_clock() ? 1 : 2;
+  for (int i = 0; i < kWarmUpTries && wanted > 0; ++i) {
+    const auto exposed = expose_once(channel, deadline);
+    if (!exposed) return pass_on(exposed);
+    if (*exposed) --wanted;
+  }
+  if (wanted > 0) {
+    forget(channel);
+    return fail(ErrorCode::protocol, "{}: {} exposures for warming up gave no frame in order; check cable and load",
+                channel.sensor->name(), kWarmUpTries);
+  }
+  return channel.sensor->listen_to_line(options_.by == TriggeringOptions::By::line);
+}
+
+/// One exposure by software. False if its frame was torn, or did not come; the next one may.
+Result<bool> SensorCamera::expose_once(Channel& channel, Deadline deadline) {
+  ++counts_.warm_up;
+  last_exposure_ = clock_.now();
+  const auto begin = last_exposure_;
+  if (auto triggered = channel.sensor->trigger(); !triggered) return pass_on(triggered);
+  const Deadline limit = deadline.at_most(clock_, options_.frame_timeout);
+  for (;;) {
+    const auto frame = channel.sensor->next(limit);
+    if (!frame) return pass_on(frame);
+    if (!*frame) {
+      if (deadline.expired(clock_)) {
+        return fail(ErrorCode::timeout, "{}: no frame before the deadline although it was told to expose",
+                    channel.sensor->name());
+      }
+      return false;
+    }
+    if (!(*frame)->damage.empty()) return false;
+    const HostWindow window{begin, (*frame)->arrival};
+    const auto finding = channel.ledger.check((*frame)->stamp, window);
+    if (finding == Finding::old_frame) continue;  // of an exposure given up; ours is still to come
+    if (finding == Finding::clock_jumped) forget(channel);
+    channel.ledger.accept((*frame)->stamp, window);
+    return finding != Finding::clock_jumped;
+  }
+}
+
+Result<StereoFrame> SensorCamera::collect(Deadline deadline) {
+  if (!std::exchange(armed_, false)) {
+    return fail(ErrorCode::protocol, "camera: nothing to collect, it was not armed");
+  }
+  in_step_ = options_.by == TriggeringOptions::By::free_run;
+  if (options_.by != TriggeringOptions::By::line) trigger_after_ = clock_.now();
+  if (options_.by == TriggeringOptions::By::software) {
+    for (Channel& channel : channels_) {
+      if (auto triggered = channel.sensor->trigger(); !triggered) return pass_on(triggered);
+    }
+  }
+  auto frames = take_all(deadline.at_most(clock_, options_.frame_timeout));
+  if (!frames) return pass_on(frames);
+  if (auto together = expect_one_moment(*frames); !together) return pass_on(together);
+  in_step_ = true;
+  last_exposure_ = clock_.now();
+  ++counts_.pairs;
+  return hand_out(*frames);
+}
+
+Result<std::vector<SensorFrame>> SensorCamera::take_all(Deadline deadline) {
+  const bool running = options_.by == TriggeringOptions::By::free_run;
+  std::vector<SensorFrame> frames;
+  for (Channel& channel : channels_) {
+    auto frame = running ? take_running(channel, deadline) : take(channel, deadline);
+    if (!frame) return pass_on(frame);
+    frames.push_back(std::move(*frame));
+  }
+  if (running) return frames;
+  for (Channel& channel : channels_) {
+    if (auto alone = expect_no_more(channel); !alone) return pass_on(alone);
+  }
+  return frames;
+}
+
+Result<SensorFrame> SensorCamera::take(Channel& channel, Deadline deadline) {
+  const std::string& who = channel.sensor->name();
+  auto next = channel.sensor->next(deadline);
+  if (!next) return pass_on(next);
+  if (!*next) {
+    ++counts_.lost;
+    return fail(ErrorCode::timeout, "{}: no frame in time, lost or late; {}", who, kRedo);
+  }
+  SensorFrame& frame = **next;
+  if (!frame.damage.empty()) {
+    ++counts_.torn;
+    return fail(ErrorCode::protocol, "{}: frame {} is torn ({}); {}", who, frame.stamp.id, frame.damage, kRedo);
+  }
+  const HostWindow window{trigger_after_, frame.arrival};
+  switch (channel.ledger.check(frame.stamp, window)) {
+    case Finding::in_order: break;
+    case Finding::old_frame:
+      ++counts_.old;
+      return fail(ErrorCode::protocol, "{}: frame {} is older than its trigger; {}", who, frame.stamp.id, kRedo);
+    case Finding::frames_missing:
+      ++counts_.odd;
+      return fail(ErrorCode::protocol, "{}: frames before frame {} are missing, or there was more than one trigger; {}",
+                  who, frame.stamp.id, kRedo);
+    case Finding::clock_jumped:
+      ++counts_.odd;
+      forget(channel);
+      return fail(ErrorCode::protocol, "{}: its clock was set, frame {} cannot be placed in time; {}", who,
+                  frame.stamp.id, kRedo);
+  }
+  channel.ledger.accept(frame.stamp, window);
+  return std::move(frame);
+}
+
+/// Frames never stop: those that began before they were asked for are passed over, damaged ones too.
+Result<SensorFrame> SensorCamera::take_running(Channel& channel, Deadline deadline) {
+  for (;;) {
+    auto next = channel.sensor->next(deadline);
+    if (!next) return pass_on(next);
+    if (!*next) {
+      ++counts_.lost;
+      return fail(ErrorCode::timeout, "{}: no frame in time; {}", channel.sensor->name(), kRedo);
+    }
+    if ((*next)->stamp.time < trigger_after_.time_since_epoch() || !(*next)->damage.empty()) continue;
+    return std::move(**next);
+  }
+}
+
+Result<void> SensorCamera::expect_no_more(Channel& channel) {
+  const auto more = channel.sensor->next({clock_.now()});
+  if (!more) return pass_on(more);
+  if (!*more) return {};
+  ++counts_.odd;
+  return fail(ErrorCode::protocol, "{}: more frames than triggers; {}", channel.sensor->name(), kRedo);
+}
+
+Result<void> SensorCamera::expect_one_moment(const std::vector<SensorFrame>& frames) {
+  // Without a common edge there is no common moment: the light stays on, and the table stands.
+  if (frames.size() < 2 || options_.by != TriggeringOptions::By::line) return {};
+  Channel &left = channels_[0], &right = channels_[1];
+  const auto left_time = frames[0].stamp.time, right_time = frames[1].stamp.time;
+  std::chrono::nanoseconds apart{0}, since{0};
+  if (options_.frame_clock == TriggeringOptions::FrameClock::ptp) {
+    apart = left_time - right_time;
+  } else if (left.last_pair && right.last_pair) {
+    since = left_time - *left.last_pair;
+    apart = since - (right_time - *right.last_pair);
+  }
+  if (std::chrono::abs(apart) > pair_tolerance(since)) {
+    ++counts_.odd;
+    return fail(ErrorCode::protocol, "camera: left and right were exposed {:.2f} ms apart; {}", milliseconds(apart),
+                kRedo);
+  }
+  left.last_pair = left_time;
+  right.last_pair = right_time;
+  return {};
+}
+
+StereoFrame SensorCamera::hand_out(std::vector<SensorFrame>& frames) {
+  StereoFrame pair;
+  const Picture& left = frames.front().picture;
+  pair.format = left.format;
+  if (frames.size() == 2) {
+    pair.left = left.image;
+    pair.right = frames.back().picture.image;
+  } else {
+    const int half = left.image.cols / 2;
+    pair.left = left.image.colRange(0, half).clone();
+    pair.right = left.image.colRange(half, 2 * half).clone();
+  }
+  pair.trigger = 1;
+  pair.taken = channels_.front().ledger.host_time(frames.front().stamp, {trigger_after_, frames.front().arrival});
+  pair.left_evidence = measure(pair.left, pair.format);
+  pair.right_evidence = measure(pair.right, pair.format);
+  return pair;
+}
+
+}  // namespace scanrig

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "drivers/camera/sensor.h"
+#include "drivers/camera/stereo_camera.h"
+#include "drivers/camera/trigger_ledger.h"
+
+namespace scanrig {
+
+/// How a pair's frames are matched with their trigger.
+struct TriggeringOptions {
+  enum class By {
+    line,      ///< the edge on the sensors' input exposes; collect() comes after it
+    software,  ///< collect() exposes, for light that stays on
+    free_run,  ///< the sensors never stop; collect() takes the first pair that begins after it was called
+  };
+  enum class FrameClock { interval, ptp };  ///< ptp: both sensors' clocks are one, so their stamps are compared
+  By by = By::line;
+  FrameClock frame_clock = FrameClock::interval;
+  std::chrono::milliseconds frame_timeout{500};  ///< from collect() to the whole pair
+  std::chrono::seconds dead_air{10};             ///< after this long without an exposure one is made and thrown away
+};
+
+/// What has happened to triggers so far.
+struct TriggerCounts {
+  std::uint64_t pairs = 0;    ///< handed out
+  std::uint64_t lost = 0;     ///< a frame did not come in time
+  std::uint64_t torn = 0;     ///< came with parts missing
+  std::uint64_t old = 0;      ///< came, but was exposed before its trigger
+  std::uint64_t odd = 0;      ///< ids skipped, more frames than triggers, sensors that do not agree, clocks set
+  std::uint64_t strays = 0;   ///< thrown away by arm()
+  std::uint64_t warm_up = 0;  ///< exposures made and thrown away
+  std::uint64_t returns = 0;  ///< connected again after a loss
+};
+
+/// A stereo camera of two sensors, or of one that delivers both images side by side. Every exposure is counted: one
+/// trigger, one whole frame from each sensor, ids without a gap, each sensor's interval since its last trigger in step
+/// with the host's and with the other sensor's. After a failure, a return or dead air arm() waits for what may be on
+/// its way and makes an exposure of its own (with sensors that have a software trigger) from which the count begins
+/// again.
+class SensorCamera final : public StereoCamera {
+ public:
+  /// `sensors`: left and right, or one for both.
+  SensorCamera(std::vector<std::unique_ptr<Sensor>> sensors, const TriggeringOptions& options, Clock& clock);
+
+  /// Fails with `timeout`, `protocol`, `io`, and with `not_found`, `unsupported`, `invalid_input` for a sensor that has
+  /// to be connected again and is not what it was.
+  Result<void> arm(Deadline deadline) override;
+  /// Fails with `timeout` (a frame is missing), `protocol` (torn, old, skipped, too many, not one moment), `io`.
+  Result<StereoFrame> collect(Deadline deadline) override;
+
+  [[nodiscard]] const TriggerCounts& counts() const { return counts_; }
+
+ private:
+  struct Channel {
+    std::unique_ptr<Sensor> sensor;
+    TriggerLedger ledger;
+    std::optional<std::chrono::nanoseconds> last_pair;  // on its own clock
+  };
+
+  Result<void> get_ready(Channel& channel, Deadline deadline);
+  void forget(Channel& channel);
+  Result<void> throw_away(Channel& channel, Clock::TimePoint until);
+  Result<void> warm_up(Channel& channel, Deadline deadline);
+  Result<bool> expose_once(Channel& channel, Deadline deadline);
+  Result<SensorFrame> take(Channel& channel, Deadline deadline);
+  Result<SensorFrame> take_running(Channel& channel, Deadline deadline);
+  Result<void> expect_no_more(Channel& channel);
+  Result<void> expect_one_moment(const std::vector<SensorFrame>& frames);
+  Result<std::vector<SensorFrame>> take_all(Deadline deadline);
+  StereoFrame hand_out(std::vector<SensorFrame>& frames);
+
+  const TriggeringOptions options_;
+  Clock& clock_;
+  std::vector<Channel> channels_;
+  bool armed_ = false;
+  bool in_step_ = false;  // nothing has failed since the ledgers were last known to be right
+  Clock::TimePoint trigger_after_{};
+  Clock::TimePoint last_exposure_{};
+  TriggerCounts counts_;
+};
+
+}  // namespace scanrig

@@ -1,0 +1,267 @@
+#include "drivers/camera/v4l2_sensor.h"
+
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+
+namespace scanrig {
+namespace {
+
+constexpr std::uint32_t kBuffers = 4;
+
+struct Fourcc {
+  std::uint32_t code;
+  Layout layout;
+  int bits;
+};
+
+constexpr std::array kFormats{
+    Fourcc{V4L2_PIX_FMT_GREY, Layout::mono, 8},         Fourcc{V4L2_PIX_FMT_Y10, Layout::mono, 10},
+    Fourcc{V4L2_PIX_FMT_Y12, Layout::mono, 12},         Fourcc{V4L2_PIX_FMT_Y16, Layout::mono, 16},
+    Fourcc{V4L2_PIX_FMT_YUYV, Layout::yuyv, 8},         Fourcc{V4L2_PIX_FMT_RGB24, Layout::rgb, 8},
+    Fourcc{V4L2_PIX_FMT_BGR24, Layout::bgr, 8},         Fourcc{V4L2_PIX_FMT_SRGGB8, Layout::bayer_rg, 8},
+    Fourcc{V4L2_PIX_FMT_SGRBG8, Layout::bayer_gr, 8},   Fourcc{V4L2_PIX_FMT_SGBRG8, Layout::bayer_gb, 8},
+    Fourcc{V4L2_PIX_FMT_SBGGR8, Layout::bayer_bg, 8},   Fourcc{V4L2_PIX_FMT_SRGGB10, Layout::bayer_rg, 10},
+    Fourcc{V4L2_PIX_FMT_SGRBG10, Layout::bayer_gr, 10}, Fourcc{V4L2_PIX_FMT_SGBRG10, Layout::bayer_gb, 10},
+    Fourcc{V4L2_PIX_FMT_SBGGR10, Layout::bayer_bg, 10}, Fourcc{V4L2_PIX_FMT_MJPEG, Layout::jpeg, 8},
+};
+
+/// "Y10" is the code "Y10 ".
+std::uint32_t code_of(std::string name) {
+  name.resize(4, ' ');
+  return v4l2_fourcc(name[0], name[1], name[2], name[3]);
+}
+
+const Fourcc* find_format(std::uint32_t code) {
+  const auto* format = std::ranges::find(kFormats, code, &Fourcc::code);
+  return format == kFormats.end() ? nullptr : format;
+}
+
+}  // namespace
+
+V4l2Sensor::V4l2Sensor(const std::string& side, const V4l2SensorOptions& sensor, const V4l2Options& options,
+                       VideoCalls& calls, Clock& clock)
+    : name_(fmt::format("{} camera {}", side, sensor.serial.empty() ? sensor.device : sensor.serial)),
+      sensor_(sensor),
+      options_(options),
+      calls_(calls),
+      clock_(clock) {}
+
+tl::unexpected<Error> V4l2Sensor::failed(const std::string& what, int reason) {
+  auto code = ErrorCode::io;
+  if (reason == ENOENT || reason == ENXIO) code = ErrorCode::not_found;
+  if (reason == EINVAL || reason == ERANGE) code = ErrorCode::invalid_input;
+  if (code != ErrorCode::invalid_input) lost_ = true;  // connected again by the next arm()
+  return fail(code, "{}: {}: {}", name_, what, std::strerror(reason));
+}
+
+Result<void> V4l2Sensor::call(unsigned long request, void* argument, const char* what) {
+  if (calls_.control(descriptor_, request, argument) < 0) return failed(what, errno);
+  return {};
+}
+
+Result<bool> V4l2Sensor::ready(Deadline deadline) {
+  if (descriptor_ >= 0 && !lost_) return false;
+  disconnect();
+  if (deadline.expired(clock_)) return fail(ErrorCode::timeout, "{}: no time left to connect", name_);
+  if (auto connected = connect(); !connected) {
+    disconnect();
+    return pass_on(connected);
+  }
+  return true;
+}
+
+Result<std::string> V4l2Sensor::find_device() const {
+  if (sensor_.serial.empty()) return sensor_.device;
+  // usb-MAKER_MODEL_SERIAL-video-index0 [udev, 60-persistent-v4l.rules]; index0 is the one that delivers images.
+  const std::string tail = "_" + sensor_.serial + "-video-index0";
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator(options_.by_id, none)) {
+    if (entry.path().filename().string().ends_with(tail)) return entry.path().string();
+  }
+  return fail(ErrorCode::not_found, "{}: no camera with this serial number in {}; check power and cable", name_,
+              options_.by_id.string());
+}
+
+Result<void> V4l2Sensor::connect() {
+  const auto device = find_device();
+  if (!device) return pass_on(device);
+  descriptor_ = calls_.open(*device);
+  if (descriptor_ < 0) return failed("open " + *device, errno);
+  lost_ = false;
+  v4l2_capability capability{};
+  if (auto asked = call(VIDIOC_QUERYCAP, &capability, "ask what it can do"); !asked) return asked;
+  const auto can = capability.capabilities & V4L2_CAP_DEVICE_CAPS ? capability.device_caps : capability.capabilities;
+  if (!(can & V4L2_CAP_VIDEO_CAPTURE) || !(can & V4L2_CAP_STREAMING)) {
+    return fail(ErrorCode::unsupported, "{}: {} delivers no stream of images", name_, *device);
+  }
+  if (auto set = set_format(); !set) return set;
+  if (auto set = set_controls(); !set) return set;
+  return start();
+}
+
+Result<void> V4l2Sensor::set_format() {
+  const std::uint32_t code = code_of(options_.pixel_format);
+  if (options_.pixel_format.size() > 4 || !find_format(code)) {
+    return fail(ErrorCode::unsupported, "{}: pixel format {} cannot be read", name_, options_.pixel_format);
+  }
+  v4l2_format format{};
+  format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  format.fmt.pix.width = static_cast<std::uint32_t>(options_.size.width);
+  format.fmt.pix.height = static_cast<std::uint32_t>(options_.size.height);
+  format.fmt.pix.pixelformat = code;
+  format.fmt.pix.field = V4L2_FIELD_NONE;
+  const v4l2_pix_format wanted = format.fmt.pix;
+  if (auto set = call(VIDIOC_S_FMT, &format, "set the image format"); !set) return set;
+  format_ = format.fmt.pix;
+  // The driver may answer with what it likes better.
+  if (format_.pixelformat != code || format_.width != wanted.width || format_.height != wanted.height) {
+    return fail(ErrorCode::unsupported, "{}: asked for {} of {}x{} it delivers {}x{} or another format", name_,
+                options_.pixel_format, wanted.width, wanted.height, format_.width, format_.height);
+  }
+  return {};
+}
+
+Result<void> V4l2Sensor::set_controls() {
+  constexpr int kExposureUnit = 100;  // us
+  const auto exposure = static_cast<int>(std::max<long>(1, options_.exposure.count() / kExposureUnit));
+  if (auto set = set_control(V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL, false); !set) return set;
+  if (auto set = set_control(V4L2_CID_EXPOSURE_ABSOLUTE, exposure, false); !set) return set;
+  if (auto set = set_control(V4L2_CID_AUTOGAIN, 0, false); !set) return set;
+  if (auto set = set_control(V4L2_CID_FOCUS_AUTO, 0, false); !set) return set;
+  if (options_.gain) {
+    if (auto set = set_control(V4L2_CID_GAIN, *options_.gain, true); !set) return set;
+  }
+  for (const auto& [id, value] : options_.controls) {
+    if (auto set = set_control(id, value, true); !set) return set;
+  }
+  return {};
+}
+
+Result<void> V4l2Sensor::set_control(std::uint32_t id, int value, bool must_exist) {
+  v4l2_queryctrl asked{};
+  asked.id = id;
+  if (calls_.control(descriptor_, VIDIOC_QUERYCTRL, &asked) < 0) {
+    if (errno != EINVAL) return failed(fmt::format("ask for control 0x{:08X}", id), errno);
+    if (!must_exist) return {};
+    return fail(ErrorCode::invalid_input, "{}: there is no control 0x{:08X}", name_, id);
+  }
+  v4l2_control control{id, value};
+  const std::string what = fmt::format("set control 0x{:08X} to {}", id, value);
+  return call(VIDIOC_S_CTRL, &control, what.c_str());
+}
+
+Result<void> V4l2Sensor::start() {
+  v4l2_requestbuffers request{};
+  request.count = kBuffers;
+  request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  request.memory = V4L2_MEMORY_MMAP;
+  if (auto asked = call(VIDIOC_REQBUFS, &request, "ask for buffers"); !asked) return asked;
+  for (std::uint32_t i = 0; i < request.count; ++i) {
+    v4l2_buffer buffer{};
+    buffer.index = i;
+    buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+    buffer.memory = V4L2_MEMORY_MMAP;
+    if (auto asked = call(VIDIOC_QUERYBUF, &buffer, "ask for a buffer"); !asked) return asked;
+    void* address = calls_.map(descriptor_, buffer.length, buffer.m.offset);
+    if (address == MAP_FAILED) return failed("map a buffer", errno);
+    buffers_.push_back({address, buffer.length});
+    if (auto queued = call(VIDIOC_QBUF, &buffer, "queue a buffer"); !queued) return queued;
+  }
+  int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  return call(VIDIOC_STREAMON, &type, "start the stream");
+}
+
+void V4l2Sensor::disconnect() {
+  if (descriptor_ < 0) return;
+  int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  calls_.control(descriptor_, VIDIOC_STREAMOFF, &type);
+  for (const Buffer& buffer : buffers_) calls_.unmap(buffer.address, buffer.length);
+  buffers_.clear();
+  calls_.close(descriptor_);
+  descriptor_ = -1;
+}
+
+Result<std::optional<SensorFrame>> V4l2Sensor::next(Deadline deadline) {
+  if (descriptor_ < 0) return fail(ErrorCode::io, "{}: not connected", name_);
+  for (;;) {
+    const auto wait = std::chrono::ceil<std::chrono::milliseconds>(deadline.left(clock_)).count();
+    const int ready = calls_.wait(descriptor_, static_cast<int>(std::min<long>(wait, 60'000)));
+    if (ready < 0 && errno != EINTR) return pass_on(Result<void>(failed("wait for a frame", errno)));
+    if (ready > 0) break;
+    if (deadline.expired(clock_)) return std::nullopt;
+  }
+  v4l2_buffer buffer{};
+  buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
+  buffer.memory = V4L2_MEMORY_MMAP;
+  if (calls_.control(descriptor_, VIDIOC_DQBUF, &buffer) < 0) {
+    if (errno == EAGAIN) return std::nullopt;
+    return pass_on(Result<void>(failed("take a frame", errno)));
+  }
+  auto frame = read(buffer);
+  if (auto queued = call(VIDIOC_QBUF, &buffer, "give a buffer back"); !queued) return pass_on(queued);
+  if (!frame) return pass_on(frame);
+  return std::optional(std::move(*frame));
+}
+
+Result<SensorFrame> V4l2Sensor::read(const v4l2_buffer& buffer) const {
+  if ((buffer.flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) != V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC) {
+    return fail(ErrorCode::unsupported, "{}: frames are not stamped with the monotonic clock", name_);
+  }
+  if (buffer.index >= buffers_.size() || buffer.bytesused > buffers_[buffer.index].length) {
+    return fail(ErrorCode::io, "{}: the driver names a buffer that is none", name_);
+  }
+  SensorFrame frame;
+  frame.arrival = clock_.now();
+  frame.stamp.id = buffer.sequence;
+  frame.stamp.time =
+      std::chrono::seconds(buffer.timestamp.tv_sec) + std::chrono::microseconds(buffer.timestamp.tv_usec);
+  const bool at_begin = (buffer.flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
+  if (!at_begin) frame.stamp.time -= options_.exposure;
+  if (buffer.flags & V4L2_BUF_FLAG_ERROR) {
+    frame.damage = "the driver marks it as damaged";
+    return frame;
+  }
+  const Fourcc* format = find_format(format_.pixelformat);
+  RawImage raw;
+  raw.layout = format->layout;
+  raw.bits = format->bits;
+  raw.size = options_.size;
+  raw.stride = format_.bytesperline;
+  raw.bytes = {static_cast<const std::uint8_t*>(buffers_[buffer.index].address), buffer.bytesused};
+  auto picture = to_picture(raw);
+  if (picture) {
+    frame.picture = std::move(*picture);
+  } else {
+    frame.damage = picture.error().message;
+  }
+  return frame;
+}
+
+Result<void> V4l2Sensor::listen_to_line(bool) {
+  return fail(ErrorCode::unsupported, "{}: V4L2 has no trigger to choose", name_);
+}
+
+Result<void> V4l2Sensor::trigger() { return fail(ErrorCode::unsupported, "{}: V4L2 has no software trigger", name_); }
+
+Result<std::unique_ptr<SensorCamera>> open_v4l2(const V4l2Options& options, VideoCalls& calls, Clock& clock,
+                                                Deadline deadline) {
+  std::vector<std::unique_ptr<Sensor>> sensors;
+  sensors.push_back(
+      std::make_unique<V4l2Sensor>(options.right ? "left" : "stereo", options.left, options, calls, clock));
+  if (options.right) {
+    sensors.push_back(std::make_unique<V4l2Sensor>("right", *options.right, options, calls, clock));
+  }
+  for (const auto& sensor : sensors) {
+    if (auto ready = sensor->ready(deadline); !ready) return pass_on(ready);
+  }
+  TriggeringOptions triggering;
+  triggering.by = options.external_trigger ? TriggeringOptions::By::line : TriggeringOptions::By::free_run;
+  triggering.frame_timeout = options.frame_timeout;
+  return std::make_unique<SensorCamera>(std::move(sensors), triggering, clock);
+}
+
+}  // namespace scanrig

@@ -1,0 +1,247 @@
+#include "drivers/projector/lightcrafter_projector.h"
+
+#include <cmath>
+
+namespace scanrig {
+namespace {
+
+using dlpc350::Command;
+using dlpc350::LutEntry;
+using std::chrono::milliseconds;
+
+constexpr int kAllWhite = 24;
+constexpr double kDelayStep = 107.2;                       // ns
+constexpr int kZeroDelay = 0xBB;                           // of the trigger output, in steps
+constexpr std::chrono::microseconds kShortest{235};        // exposure of a pattern of one bit [DLPU010, table 2-65]
+constexpr std::chrono::microseconds kLongest{10'000'000};  // long enough for any rig
+constexpr milliseconds kPoll{2};
+
+std::vector<std::uint8_t> little_endian(std::uint32_t value) {
+  return {static_cast<std::uint8_t>(value), static_cast<std::uint8_t>(value >> 8),
+          static_cast<std::uint8_t>(value >> 16), static_cast<std::uint8_t>(value >> 24)};
+}
+
+int steps(std::chrono::nanoseconds delay) {
+  return static_cast<int>(std::lround(static_cast<double>(delay.count()) / kDelayStep));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<LightCrafterProjector>> LightCrafterProjector::create(const LightCrafterOptions& options,
+                                                                             dlpc350::OpenTransport open,
+                                                                             Clock& clock) {
+  const auto outside = [](const char* what) {
+    return fail(ErrorCode::out_of_range, "projector: {} is outside what a LightCrafter 4500 can do", what);
+  };
+  if (options.image < 0 || options.image > 63) return outside("the image's index (0 to 63)");
+  if (options.pattern < 0 || options.pattern >= kAllWhite) return outside("the pattern (0 to 23)");
+  if (options.depth < 1 || options.depth > 8) return outside("the depth (1 to 8 bits)");
+  if (options.exposure < kShortest || options.exposure > kLongest) return outside("the exposure (235 us to 10 s)");
+  const int out_delay = kZeroDelay + steps(options.trigger_out_delay);
+  if (out_delay < 0 || out_delay > 0xD5) return outside("the trigger output's delay (-20 to 2.7 us)");
+  if (options.trigger_in_delay.count() < 0) return outside("the trigger input's delay (not negative)");
+  return std::unique_ptr<LightCrafterProjector>(new LightCrafterProjector(options, std::move(open), clock));
+}
+
+Result<void> LightCrafterProjector::fire(Light light, Deadline deadline) {
+  {
+    const std::scoped_lock lock(mutex_);
+    dark_requested_ = false;
+  }
+  if (auto connected = connect(deadline); !connected) return connected;
+  if (loaded_ != light) {
+    if (auto set = set_up(light, deadline); !set) return set;
+  }
+  if (deadline.left(clock_) < options_.exposure) {
+    return fail(ErrorCode::timeout, "projector: an exposure of {} us does not fit before the deadline",
+                options_.exposure.count());
+  }
+  if (auto started = write(Command::start_stop, {2}, deadline); !started) return started;
+  auto over = wait_until_over(deadline);
+  if (!over) {
+    const auto stopped = stop(Deadline::after(clock_, options_.reply_timeout));
+    return stopped ? over : pass_on(over, "the light may be on");
+  }
+  return expect_healthy(deadline);
+}
+
+Result<void> LightCrafterProjector::dark(Deadline deadline) {
+  if (auto connected = connect(deadline); !connected) return pass_on(connected, "the light may be on");
+  if (auto stopped = stop(deadline); !stopped) return pass_on(stopped, "the light may be on");
+  return {};
+}
+
+void LightCrafterProjector::request_dark() noexcept {
+  {
+    const std::scoped_lock lock(mutex_);
+    dark_requested_ = true;
+  }
+  clock_.notify_all(wake_);
+}
+
+Result<void> LightCrafterProjector::connect(Deadline deadline) {
+  if (transport_) return {};
+  auto opened = open_();
+  if (!opened) return pass_on(opened, "projector");
+  transport_ = std::move(*opened);
+  loaded_.reset();
+  if (auto awake = write(Command::power, {0}, deadline); !awake) return awake;
+  if (auto healthy = expect_healthy(deadline); !healthy) return healthy;
+  return write(Command::display_mode, {1}, deadline);
+}
+
+/// The order matters: the device checks nothing before it is told to validate, and takes settings only when stopped.
+Result<void> LightCrafterProjector::set_up(Light light, Deadline deadline) {
+  loaded_.reset();
+  if (auto stopped = stop(deadline); !stopped) return stopped;
+  const auto exposure = static_cast<std::uint32_t>(options_.exposure.count());
+  std::vector<std::uint8_t> exposure_and_period = little_endian(exposure);
+  for (const auto byte : little_endian(exposure)) exposure_and_period.push_back(byte);
+  const auto out_delay = static_cast<std::uint8_t>(kZeroDelay + steps(options_.trigger_out_delay));
+  const auto in_delay = static_cast<std::uint32_t>(steps(options_.trigger_in_delay));
+  const std::uint8_t by_sequencer = 0x08;
+  const Bytes currents(options_.led_current.begin(), options_.led_current.end());
+  const std::vector<std::pair<Command, Bytes>> settings{
+      {Command::led_current, currents},
+      {Command::led_enable, {by_sequencer}},
+      {Command::pattern_source, {3}},           // images in flash
+      {Command::trigger_mode, {1}},             // internal, or the trigger inputs
+      {Command::pattern_config, {0, 0, 0, 0}},  // one entry, once, one pattern to TRIG_OUT_2, one image
+      {Command::exposure_period, exposure_and_period},
+      {Command::trigger_out_1, {static_cast<std::uint8_t>(options_.trigger_out_inverted), out_delay, kZeroDelay}},
+      {Command::trigger_in_1_delay, little_endian(in_delay)},
+  };
+  for (const auto& [command, data] : settings) {
+    if (auto written = write(command, data, deadline); !written) return written;
+  }
+  LutEntry entry;
+  entry.trigger = options_.trigger_in;
+  entry.swap_buffer = true;
+  entry.pattern = light == Light::pattern ? options_.pattern : kAllWhite;
+  entry.depth = light == Light::pattern ? options_.depth : 1;
+  if (auto sent = send_table(entry, deadline); !sent) return sent;
+  if (auto valid = validate(deadline); !valid) return valid;
+  loaded_ = light;
+  return {};
+}
+
+Result<void> LightCrafterProjector::send_table(const LutEntry& entry, Deadline deadline) {
+  constexpr std::uint8_t kImages = 1, kPatterns = 2, kClosed = 0;
+  const auto word = dlpc350::encode(entry);
+  const std::vector<std::pair<std::uint8_t, Bytes>> tables{{kPatterns, {word.begin(), word.end()}},
+                                                           {kImages, {static_cast<std::uint8_t>(options_.image)}}};
+  for (const auto& [box, data] : tables) {
+    if (auto opened = write(Command::mailbox, {box}, deadline); !opened) return opened;
+    if (auto placed = write(Command::mailbox_address, {0}, deadline); !placed) return placed;
+    if (auto written = write(Command::mailbox_data, data, deadline); !written) return written;
+    if (auto closed = write(Command::mailbox, {kClosed}, deadline); !closed) return closed;
+  }
+  return {};
+}
+
+Result<void> LightCrafterProjector::validate(Deadline deadline) {
+  if (auto asked = write(Command::validate, {}, deadline); !asked) return asked;
+  for (;;) {
+    const auto result = read_byte(Command::validate, deadline);
+    if (!result) return pass_on(result);
+    if (!dlpc350::validating(*result)) {
+      const std::string faults = dlpc350::validation_faults(*result);
+      if (faults.empty()) return {};
+      return fail(ErrorCode::invalid_input, "projector: the LightCrafter does not accept its settings: {}", faults);
+    }
+    if (deadline.expired(clock_)) return fail(ErrorCode::timeout, "projector: validating its settings takes too long");
+    clock_.sleep_for(kPoll);
+  }
+}
+
+Result<void> LightCrafterProjector::expect_healthy(Deadline deadline) {
+  const auto hardware = read_byte(Command::hardware_status, deadline);
+  if (!hardware) return pass_on(hardware);
+  const auto system = read_byte(Command::system_status, deadline);
+  if (!system) return pass_on(system);
+  std::string faults = dlpc350::hardware_faults(*hardware);
+  if (const auto more = dlpc350::system_faults(*system); !more.empty()) faults += (faults.empty() ? "" : ", ") + more;
+  if (faults.empty()) return {};
+  loaded_.reset();
+  return fail(ErrorCode::device_alarm, "projector: the LightCrafter reports: {}; switch it off and on", faults);
+}
+
+Result<void> LightCrafterProjector::stop(Deadline deadline) {
+  if (auto told = write(Command::start_stop, {0}, deadline); !told) return told;
+  for (;;) {
+    const auto on = running(deadline);
+    if (!on) return pass_on(on);
+    if (!*on) return {};
+    if (deadline.expired(clock_)) return fail(ErrorCode::timeout, "projector: told to stop, still shows a pattern");
+    clock_.sleep_for(kPoll);
+  }
+}
+
+Result<bool> LightCrafterProjector::running(Deadline deadline) {
+  const auto status = read_byte(Command::main_status, deadline);
+  if (!status) return pass_on(status);
+  return dlpc350::runs(*status);
+}
+
+/// Waits a little; true if it is to go dark.
+bool LightCrafterProjector::pause() {
+  std::unique_lock lock(mutex_);
+  return clock_.wait_until(lock, wake_, clock_.now() + kPoll, [&] { return dark_requested_; });
+}
+
+Result<void> LightCrafterProjector::wait_until_over(Deadline deadline) {
+  for (;;) {
+    if (pause()) return fail(ErrorCode::io, "projector: went dark on request before the exposure was over");
+    const auto on = running(deadline);
+    if (!on) return pass_on(on);
+    if (!*on) return {};
+    if (deadline.expired(clock_)) {
+      return fail(ErrorCode::timeout, "projector: the exposure is not over in time{}",
+                  options_.trigger_in == LutEntry::Trigger::internal ? "" : "; is there an edge at its trigger input?");
+    }
+  }
+}
+
+Result<void> LightCrafterProjector::write(Command command, const Bytes& data, Deadline deadline) {
+  const auto reply = talk(command, false, data, deadline);
+  if (!reply) return pass_on(reply);
+  return {};
+}
+
+Result<std::uint8_t> LightCrafterProjector::read_byte(Command command, Deadline deadline) {
+  const auto reply = talk(command, true, {}, deadline);
+  if (!reply) return pass_on(reply);
+  if (reply->empty()) {
+    return fail(ErrorCode::protocol, "projector: command {:04X}: an empty reply", static_cast<std::uint16_t>(command));
+  }
+  return reply->front();
+}
+
+/// A device that is gone, or no longer makes sense, is connected and set up again by the next call.
+Result<LightCrafterProjector::Bytes> LightCrafterProjector::talk(Command command, bool read, const Bytes& data,
+                                                                 Deadline deadline) {
+  if (!transport_) return fail(ErrorCode::io, "projector: the LightCrafter is not connected");
+  auto reply = exchange(command, read, data, deadline.at_most(clock_, options_.reply_timeout));
+  if (reply) return reply;
+  transport_.reset();
+  return pass_on(reply, fmt::format("projector: command {:04X}", static_cast<std::uint16_t>(command)));
+}
+
+Result<LightCrafterProjector::Bytes> LightCrafterProjector::exchange(Command command, bool read, const Bytes& data,
+                                                                     Deadline deadline) {
+  const std::uint8_t sequence = ++sequence_;
+  for (const auto& report : dlpc350::encode(command, read, sequence, data)) {
+    if (auto sent = transport_->send(report, deadline); !sent) return pass_on(sent);
+  }
+  dlpc350::ReplyReader reader(sequence);
+  for (;;) {
+    const auto report = transport_->receive(deadline);
+    if (!report) return pass_on(report);
+    const auto whole = reader.add(*report);
+    if (!whole && reader.was_earlier() && !deadline.expired(clock_)) continue;  // a reply given up before
+    if (!whole) return pass_on(whole);
+    if (*whole) return reader.payload();
+  }
+}
+
+}  // namespace scanrig

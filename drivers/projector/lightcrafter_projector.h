@@ -1,0 +1,71 @@
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+
+#include "drivers/projector/lightcrafter_transport.h"
+#include "drivers/projector/projector.h"
+
+namespace scanrig {
+
+struct LightCrafterOptions {
+  int image = 0;    ///< the random dots: index of the image in the device's flash
+  int pattern = 0;  ///< and bit plane of that image, 0 to 23
+  int depth = 1;    ///< bits, 1 to 8
+  std::array<std::uint8_t, 3> led_current{100, 100,
+                                          100};  ///< red, green, blue; 0 to 255 of what the LEDs' driver gives
+  std::chrono::microseconds exposure{15000};     ///< of the light: at least the cameras' exposure
+  dlpc350::LutEntry::Trigger trigger_in = dlpc350::LutEntry::Trigger::internal;  ///< else waits for TRIG_IN_1
+  bool trigger_out_inverted = false;
+  std::chrono::nanoseconds trigger_out_delay{0};  ///< of TRIG_OUT_1 after the light, -20 to +2.7 us
+  std::chrono::nanoseconds trigger_in_delay{0};
+  std::chrono::milliseconds reply_timeout{2000};
+};
+
+/// A TI DLP LightCrafter 4500 that shows dots from its flash, or all white, once for each fire(); TRIG_OUT_1 is the
+/// cameras' trigger. Connected when first used, and again after a loss. request_dark() ends a running exposure, and
+/// fire() then fails with `io`. Faults the device reports are `device_alarm` in words; what it does not accept of the
+/// options is `invalid_input`.
+class LightCrafterProjector final : public Projector {
+ public:
+  /// Fails with `out_of_range` (an option outside what the device can do).
+  static Result<std::unique_ptr<LightCrafterProjector>> create(const LightCrafterOptions& options,
+                                                               dlpc350::OpenTransport open, Clock& clock);
+
+  Result<void> fire(Light light, Deadline deadline) override;
+  Result<void> dark(Deadline deadline) override;
+  void request_dark() noexcept override;
+
+ private:
+  using Bytes = std::vector<std::uint8_t>;
+
+  LightCrafterProjector(const LightCrafterOptions& options, dlpc350::OpenTransport open, Clock& clock)
+      : options_(options), open_(std::move(open)), clock_(clock) {}
+
+  Result<void> connect(Deadline deadline);
+  Result<void> set_up(Light light, Deadline deadline);
+  Result<void> send_table(const dlpc350::LutEntry& entry, Deadline deadline);
+  Result<void> validate(Deadline deadline);
+  Result<void> expect_healthy(Deadline deadline);
+  Result<void> stop(Deadline deadline);
+  Result<void> wait_until_over(Deadline deadline);
+  Result<bool> running(Deadline deadline);
+  bool pause();
+  Result<void> write(dlpc350::Command command, const Bytes& data, Deadline deadline);
+  Result<std::uint8_t> read_byte(dlpc350::Command command, Deadline deadline);
+  Result<Bytes> talk(dlpc350::Command command, bool read, const Bytes& data, Deadline deadline);
+  Result<Bytes> exchange(dlpc350::Command command, bool read, const Bytes& data, Deadline deadline);
+
+  const LightCrafterOptions options_;
+  const dlpc350::OpenTransport open_;
+  Clock& clock_;
+  std::unique_ptr<dlpc350::Transport> transport_;  // null while the device is lost
+  std::uint8_t sequence_ = 0;
+  std::optional<Light> loaded_;  // what the device's table shows
+
+  std::mutex mutex_;
+  std::condition_variable wake_;
+  bool dark_requested_ = false;  // guarded by mutex_
+};
+
+}  // namespace scanrig

@@ -1,0 +1,94 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "core/clock.h"
+#include "core/result.h"
+
+namespace scanrig::sim::wire {
+
+enum class Side { left, right };
+
+/// One trigger edge, as the sensors saw it.
+struct GigeExposure {
+  std::uint64_t number = 0;  ///< counts the edges since the start, from 1
+  bool pattern = false;      ///< the dots were on
+  Clock::TimePoint at;
+};
+
+/// Writes what a sensor sees into `image` (8 bit, one channel, of the size set up). From the cameras' threads.
+using FrameSource = std::function<void(Side side, const GigeExposure& exposure, cv::Mat& image)>;
+
+/// What can happen to the frame of an edge.
+enum class GigeFault {
+  none,
+  lost,     ///< exposed, never sent
+  missed,   ///< the edge was not seen: the camera does not count it
+  late,     ///< sent, long after
+  torn,     ///< some of its packets are lost
+  stale,    ///< the frame of the edge before is sent again
+  dark,     ///< without light
+  blurred,  ///< out of focus
+  swapped,  ///< what the other sensor sees
+};
+
+/// By the word of the enumerator; nothing if there is none.
+std::optional<GigeFault> parse_gige_fault(std::string_view word);
+
+struct GigeCamerasOptions {
+  std::string left_address = "127.0.0.1";
+  std::string right_address = "127.0.0.2";
+  std::string left_serial = "40012345";
+  std::string right_serial = "40012346";
+  cv::Size size{160, 120};
+  std::chrono::milliseconds late_by{150};
+  std::string trigger_selector = "FrameStart";  ///< what the trigger that starts a frame is called
+};
+
+/// Share of the frames each fault happens to, by chance, to one of the two sensors at a time.
+struct FaultRates {
+  double lost = 0.0, late = 0.0, torn = 0.0, stale = 0.0;
+  std::uint64_t seed = 1;
+};
+
+/// How often each fault happened by chance.
+struct FaultCounts {
+  std::uint64_t lost = 0, late = 0, torn = 0, stale = 0;
+};
+
+/// Two GigE Vision cameras that answer on the wire, with a line as their trigger input. Stamps are taken from each
+/// camera's own clock: neither begins with the other's or with the host's, and they drift apart. A trigger number is
+/// hidden in the upper left corner of every frame, see hidden_number().
+/// All such cameras on a host share one control port: run them in a network namespace of their own, see loopback.h.
+/// Threads: every function may be called from any thread.
+class GigeCameras {
+ public:
+  /// Fails with `io` (the addresses cannot be used, no temporary file).
+  static Result<std::unique_ptr<GigeCameras>> start(const GigeCamerasOptions& options, FrameSource source,
+                                                    Clock& clock);
+  virtual ~GigeCameras() = default;
+
+  /// The edge of the trigger line. Returns its number; a camera that is not waiting for a trigger counts nothing.
+  virtual std::uint64_t edge(bool pattern) = 0;
+  /// To the frames of the next `count` edges, of one sensor.
+  virtual void inject(Side side, GigeFault fault, int count) = 0;
+  virtual void happen(const FaultRates& rates) = 0;
+  [[nodiscard]] virtual FaultCounts happened() const = 0;
+  /// Pulls a camera's plug; puts it in again. Fails with `io`.
+  virtual Result<void> plug(Side side, bool in) = 0;
+  /// Sets a camera's clock forward (or back).
+  virtual void set_clock(Side side, std::chrono::nanoseconds by) = 0;
+};
+
+/// Grey texture that changes with every exposure; bright with the dots, dim without.
+void draw_test_image(Side side, const GigeExposure& exposure, cv::Mat& image);
+
+/// Writes a number into the upper left corner, 32 bits of 3x3 pixels each in 4 rows; reads it there. An image of fewer
+/// than 24x12 pixels holds none. For tests: no driver knows of it.
+void hide_number(std::uint32_t number, cv::Mat& image);
+std::uint32_t hidden_number(const cv::Mat& image);
+
+}  // namespace scanrig::sim::wire

@@ -1,0 +1,102 @@
+// scanrig-gige-camera: two GigE Vision cameras in a process of their own, for tests of the camera driver.
+//
+//   scanrig-gige-camera GPIO_SOCKET WIDTH HEIGHT LATE_MS [TRIGGER_SELECTOR]
+//
+// Serves the trigger lines DOTS and PLAIN on GPIO_SOCKET (see gpio_socket.h): a rising edge exposes both cameras. Says
+// "ready" when both answer on the wire. Obeys, one line each, answered by "ok" or words:
+//   fault left|right KIND COUNT        rates LOST LATE TORN STALE SEED      counts
+//   plug left|right 0|1                clock left|right MILLISECONDS        edge 0|1
+// Ends at the end of its input. Run it in a network namespace of its own.
+
+#include <iostream>
+#include <sstream>
+
+#include "sim/wire/gige_camera.h"
+#include "sim/wire/gpio_socket.h"
+
+namespace scanrig::sim::wire {
+namespace {
+
+std::string obey(GigeCameras& cameras, const std::string& line) {
+  std::istringstream words(line);
+  std::string verb, side_word, kind;
+  words >> verb;
+  const auto read_side = [&] {
+    words >> side_word;
+    return side_word == "left" ? Side::left : Side::right;
+  };
+  if (verb == "fault") {
+    const Side side = read_side();
+    int count = 0;
+    words >> kind >> count;
+    const auto fault = parse_gige_fault(kind);
+    if (!fault) return "unknown fault " + kind;
+    cameras.inject(side, *fault, count);
+    return "ok";
+  }
+  if (verb == "rates") {
+    FaultRates rates;
+    words >> rates.lost >> rates.late >> rates.torn >> rates.stale >> rates.seed;
+    cameras.happen(rates);
+    return "ok";
+  }
+  if (verb == "counts") {
+    const FaultCounts counts = cameras.happened();
+    return fmt::format("{} {} {} {}", counts.lost, counts.late, counts.torn, counts.stale);
+  }
+  if (verb == "plug") {
+    const Side side = read_side();
+    bool in = false;
+    words >> in;
+    const auto plugged = cameras.plug(side, in);
+    return plugged ? "ok" : plugged.error().message;
+  }
+  if (verb == "clock") {
+    const Side side = read_side();
+    long by = 0;
+    words >> by;
+    cameras.set_clock(side, std::chrono::milliseconds(by));
+    return "ok";
+  }
+  if (verb == "edge") {
+    bool pattern = false;
+    words >> pattern;
+    return fmt::format("{}", cameras.edge(pattern));
+  }
+  return "what?";
+}
+
+int run(const std::string& socket, const GigeCamerasOptions& options) {
+  RealClock clock;
+  const auto cameras = GigeCameras::start(options, &draw_test_image, clock);
+  if (!cameras) {
+    std::cerr << cameras.error().message << '\n';
+    return static_cast<int>(exit_code(cameras.error().code));
+  }
+  const auto lines = GpioSocket::start(socket, {{"DOTS", false}, {"PLAIN", false}}, clock);
+  if (!lines) {
+    std::cerr << lines.error().message << '\n';
+    return static_cast<int>(exit_code(lines.error().code));
+  }
+  (*lines)->on_edge([&](const GpioSocket::Edge& edge) {
+    if (edge.high) (*cameras)->edge(edge.line == "DOTS");
+  });
+  std::cout << "ready" << std::endl;
+  for (std::string line; std::getline(std::cin, line);) std::cout << obey(**cameras, line) << std::endl;
+  return 0;
+}
+
+}  // namespace
+}  // namespace scanrig::sim::wire
+
+int main(int argc, char** argv) {
+  if (argc < 5 || argc > 6) {
+    std::cerr << "usage: scanrig-gige-camera GPIO_SOCKET WIDTH HEIGHT LATE_MS [TRIGGER_SELECTOR]\n";
+    return static_cast<int>(scanrig::ExitCode::usage);
+  }
+  scanrig::sim::wire::GigeCamerasOptions options;
+  options.size = {std::atoi(argv[2]), std::atoi(argv[3])};
+  options.late_by = std::chrono::milliseconds(std::atoi(argv[4]));
+  if (argc == 6) options.trigger_selector = argv[5];
+  return scanrig::sim::wire::run(argv[1], options);
+}

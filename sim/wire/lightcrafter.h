@@ -1,0 +1,88 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "core/clock.h"
+
+namespace scanrig::sim::wire {
+
+/// A TI DLP LightCrafter 4500 as its programmer's guide has it, at the level of HID reports: settings, tables, checks,
+/// sequencer, light. Settings are taken only while it stands; nothing plays that has not been validated.
+/// Threads: every function may be called from any thread.
+class LightCrafter {
+ public:
+  using Report = std::array<std::uint8_t, 64>;
+
+  /// One exposure, as somebody in front of it would see it.
+  struct Flash {
+    Clock::TimePoint at;
+    std::chrono::microseconds exposure{0};
+    int image = 0, pattern = 0, depth = 0;
+    bool white = false;
+    std::array<std::uint8_t, 3> current{};
+    bool cut_short = false;
+  };
+  enum class Fault { none, silent, refuse, earlier_reply, endless_reply };
+
+  explicit LightCrafter(Clock& clock) : clock_(clock) {}
+
+  void hear(const Report& report);
+  /// The next report it has to send; nothing if there is none yet.
+  std::optional<Report> say();
+
+  void trigger_in();  ///< an edge at TRIG_IN_1
+  /// Called at the rising edge of TRIG_OUT_1, from the thread that calls hear() or trigger_in().
+  void on_trigger_out(std::function<void(const Flash&)> listener);
+  [[nodiscard]] std::vector<Flash> flashes() const;
+  [[nodiscard]] bool lit() const;
+  [[nodiscard]] std::vector<Report> heard() const;
+
+  void inject(Fault fault, int replies);
+  void set_hardware_status(std::uint8_t status);  ///< 0x01: nothing wrong
+  void power_cycle();
+
+ private:
+  struct State {
+    std::uint8_t hardware = 0x01;
+    bool pattern_mode = false;
+    std::uint8_t source = 0, trigger_mode = 0;
+    std::uint32_t exposure_us = 0, period_us = 0;
+    std::array<std::uint8_t, 4> config{};
+    std::array<std::uint8_t, 3> current{0x97, 0x78, 0x7D};
+    std::uint8_t open_box = 0, address = 0;
+    std::vector<std::uint8_t> patterns, images;
+    bool checked = false;
+    std::uint8_t check = 0;
+    Clock::TimePoint check_ready{};
+    bool started = false;
+    std::optional<Clock::TimePoint> lit_until;
+  };
+
+  void act();
+  bool write(std::uint16_t command, const std::vector<std::uint8_t>& data);
+  bool write_setting(std::uint16_t command, const std::vector<std::uint8_t>& data);
+  std::vector<std::uint8_t> read(std::uint16_t command);
+  void check_settings();
+  void light_up();
+  void settle();
+  void reply(std::uint8_t flags, std::uint8_t sequence, const std::vector<std::uint8_t>& data);
+
+  Clock& clock_;
+  mutable std::mutex mutex_;
+  State state_;
+  std::vector<std::uint8_t> message_;  // of the reports heard so far
+  std::deque<Report> to_say_;
+  std::vector<Report> heard_;
+  std::vector<Flash> flashes_;
+  std::function<void(const Flash&)> listener_;
+  Fault fault_ = Fault::none;
+  int fault_replies_ = 0;
+};
+
+}  // namespace scanrig::sim::wire

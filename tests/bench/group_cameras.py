@@ -1,0 +1,52 @@
+"""Cameras and the USB projector: triggers against frames on the wire, overhead, fuzzed replies."""
+import json
+import pathlib
+import shutil
+import tempfile
+
+import motion_fuzz
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+TRIGGERS, QUICK_TRIGGERS = 10000, 1000
+
+
+def triggers(bench):
+    count = QUICK_TRIGGERS if bench.quick else TRIGGERS
+    what = f"{count} triggers with 1 % lost, 1 % late, 1 % torn, 0.5 % stale: "
+    done = bench.run([bench.bin / "triggers", count], count // 10 + 120)
+    if done.returncode != 0:
+        measured = f"not measured: {(done.stderr or 'no answer').strip().splitlines()[-1]}"
+        bench.line(what + "mismatched or old pairs used", "0", measured, None if done.returncode == 77 else False)
+        return
+    seen = json.loads(done.stdout.strip().splitlines()[-1])
+    lost, late, torn, stale = (int(word) for word in seen["happened"].split())
+    bench.line(what + "mismatched or old pairs used", "0", str(seen["wrong"]),
+               seen["wrong"] == 0 and seen["good"] == count)
+    happened = lost + late + torn + stale
+    named = f"{seen['named']}: {seen['lost']} missing, {seen['torn']} torn, {seen['old']} old, {seen['odd']} other"
+    bench.line(what + "every one named and redone",
+               f"{happened}: {lost + late} missing, {torn} torn, {stale} old", named,
+               seen["named"] >= happened)
+    bench.at_most("arming and collecting one exposure over the wire, p95", 50, seen["overhead_p95_ms"], "ms")
+
+
+def replies(bench):
+    """The LightCrafter's replies under libFuzzer, as the other parsers are in the motion group."""
+    what = "fuzzed: LightCrafter 4500 replies"
+    seconds = motion_fuzz.QUICK_SECONDS if bench.quick else motion_fuzz.SECONDS
+    problem = motion_fuzz.build(ROOT, "dlpc350_fuzz")
+    scratch = pathlib.Path(tempfile.mkdtemp(prefix="scanrig-cameras-"))
+    try:
+        done = None if problem else motion_fuzz.fuzz(bench, ROOT, scratch, "dlpc350")
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+    if done is None:
+        bench.line(what, f"no crash in {seconds} s", f"not measured: {problem}", None)
+    else:
+        bench.line(what, f"no crash in {seconds} s", "no crash" if done.returncode == 0 else done.stderr[-200:],
+                   done.returncode == 0)
+
+
+def measure(bench):
+    triggers(bench)
+    replies(bench)

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <atomic>
+
+#include "drivers/projector/lightcrafter_projector.h"
+#include "sim/wire/lightcrafter.h"
+#include "tests/component/projector/projector_compliance.h"
+
+namespace scanrig {
+
+/// Between driver and simulated device instead of USB; each report is logged by the device.
+class SimulatedUsb final : public dlpc350::Transport {
+ public:
+  SimulatedUsb(sim::wire::LightCrafter& device, const std::atomic<bool>& plugged, Clock& clock)
+      : device_(device), plugged_(plugged), clock_(clock) {}
+
+  Result<void> send(const dlpc350::Report& report, Deadline) override {
+    if (!plugged_) return gone();
+    device_.hear(report);
+    return {};
+  }
+  Result<dlpc350::Report> receive(Deadline deadline) override {
+    for (;;) {
+      if (!plugged_) return pass_on(Result<void>(gone()));
+      if (const auto report = device_.say()) return *report;
+      if (deadline.expired(clock_)) return fail(ErrorCode::timeout, "no reply");
+      clock_.sleep_for(std::chrono::milliseconds(1));
+    }
+  }
+
+ private:
+  static tl::unexpected<Error> gone() { return fail(ErrorCode::io, "No such device (it may have been disconnected)"); }
+
+  sim::wire::LightCrafter& device_;
+  const std::atomic<bool>& plugged_;
+  Clock& clock_;
+};
+
+class LightCrafterBench : public ProjectorBench {
+ public:
+  using Change = std::function<void(LightCrafterOptions&)>;
+
+  explicit LightCrafterBench(const Change& change = [](auto&) {}) {
+    LightCrafterOptions options;
+    options.image = 5;
+    options.pattern = 3;
+    options.exposure = std::chrono::milliseconds(12);
+    options.reply_timeout = std::chrono::milliseconds(100);
+    change(options);
+    const auto open = [this]() -> Result<std::unique_ptr<dlpc350::Transport>> {
+      if (!plugged_) return fail(ErrorCode::not_found, "LightCrafter: no LightCrafter 4500 on USB");
+      return std::make_unique<SimulatedUsb>(device_, plugged_, clock_);
+    };
+    auto created = LightCrafterProjector::create(options, open, clock_);
+    EXPECT_TRUE(created) << created.error().message;
+    if (created) projector_ = std::move(*created);
+  }
+
+  LightCrafterProjector& projector() override { return *projector_; }
+  Clock& clock() override { return clock_; }
+  sim::wire::LightCrafter& device() { return device_; }
+  std::vector<Flash> seen() override {
+    std::vector<Flash> seen;
+    for (const auto& flash : device_.flashes()) seen.push_back({flash.white ? Light::plain : Light::pattern, flash.at});
+    return seen;
+  }
+  bool seen_lit() override { return device_.lit(); }
+  void when_lit(std::function<void()> act) override {
+    device_.on_trigger_out([this, act = std::move(act)](const auto&) {
+      act();
+      device_.on_trigger_out({});
+    });
+  }
+  Clock::Duration exposure() const override { return std::chrono::milliseconds(12); }
+  void plug(bool in) override { plugged_ = in; }
+
+ private:
+  RealClock clock_;
+  sim::wire::LightCrafter device_{clock_};
+  std::atomic<bool> plugged_ = true;
+  std::unique_ptr<LightCrafterProjector> projector_;
+};
+
+}  // namespace scanrig

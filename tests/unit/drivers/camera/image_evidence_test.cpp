@@ -1,0 +1,64 @@
+#include "drivers/camera/image_evidence.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace scanrig {
+namespace {
+
+/// Independent grains seen through a lens that blurs by `sigma` pixels.
+cv::Mat grains(double sigma) {
+  cv::Mat image(240, 320, CV_32F);
+  cv::RNG random(7);
+  random.fill(image, cv::RNG::NORMAL, 128.0, 30.0 * (1.0 + 3.0 * sigma));
+  cv::GaussianBlur(image, image, {}, sigma);
+  cv::Mat bytes;
+  image.convertTo(bytes, CV_8U);
+  return bytes;
+}
+
+TEST(ImageEvidence, BlurIsThatOfTheLens) {
+  for (const double sigma : {1.0, 1.5, 2.0, 3.0}) {
+    EXPECT_NEAR(measure(grains(sigma), PixelFormat::mono8).blur_px, sigma, 0.12 * sigma) << sigma;
+  }
+}
+
+TEST(ImageEvidence, BlurDoesNotDependOnTheLight) {
+  const cv::Mat bright = grains(2.0);
+  const cv::Mat dim = bright / 3;
+  EXPECT_NEAR(measure(bright, PixelFormat::mono8).blur_px, measure(dim, PixelFormat::mono8).blur_px, 0.15);
+}
+
+TEST(ImageEvidence, TheMosaicOfAColouredSensorIsNotTakenForTexture) {
+  cv::Mat mosaic = grains(3.0);
+  for (int y = 0; y < mosaic.rows; y += 2) {
+    for (int x = 0; x < mosaic.cols; x += 2) {
+      mosaic.at<std::uint8_t>(y, x) /= 4;
+      mosaic.at<std::uint8_t>(y + 1, x + 1) /= 2;
+    }
+  }
+  EXPECT_NEAR(measure(mosaic, PixelFormat::bayer_rggb8).blur_px, 3.0, 0.6);
+}
+
+TEST(ImageEvidence, SaturationIsTheShareOfFullPixels) {
+  cv::Mat image(10, 10, CV_8U, cv::Scalar(254));
+  EXPECT_EQ(measure(image, PixelFormat::mono8).saturated, 0.0);
+  image.row(3).setTo(255);
+  EXPECT_DOUBLE_EQ(measure(image, PixelFormat::mono8).saturated, 0.1);
+}
+
+TEST(ImageEvidence, BrightnessIsTheMeanOfTheScale) {
+  const cv::Mat colour(4, 4, CV_8UC3, cv::Scalar(0, 51, 102));
+  EXPECT_NEAR(measure(colour, PixelFormat::bgr8).brightness, 0.2, 1e-12);
+}
+
+TEST(ImageEvidence, AnImageWithoutTextureHasNoBlur) {
+  EXPECT_TRUE(std::isnan(measure(cv::Mat(8, 8, CV_8U, cv::Scalar(9)), PixelFormat::mono8).blur_px));
+  EXPECT_TRUE(std::isnan(measure({}, PixelFormat::mono8).brightness));
+}
+
+}  // namespace
+}  // namespace scanrig
