@@ -44,9 +44,9 @@ Result<grbl::Report> GrblDrive::exchange(Deadline deadline) {
   for (int attempt = 1;; ++attempt) {
     Result<grbl::Report> report = fail(ErrorCode::internal, "not asked yet");
     Result<void> probed;
-    // In a hold, or asleep, GRBL reads no lines.
+    // In a hold, asleep or after an alarm GRBL reads no lines, and nothing has arrived anyway.
     const auto probe = [&] {
-      if (last_ != State::hold && last_ != State::sleep && last_ != State::door) probed = link_.probe(deadline);
+      if (last_ == State::idle || last_ == State::run || last_ == State::jog) probed = link_.probe(deadline);
     };
     if (!report_first) probe();
     if (probed) report = link_.report(deadline);
