@@ -58,8 +58,12 @@ void GrblServer::handle(const std::stop_token& stop, Pty& pty, const std::string
   if (fault && fault->kind == Kind::refuse) {
     return send(stop, pty, bytes_of(fmt::format("error:{}\r\n", fault->exception)), fault);
   }
-  std::string answer = realtime ? controller_.realtime(request.front()) : std::string();
-  if (!realtime) controller_.line(request);
+  std::string answer = controller_.said();  // before: an alarm, for one
+  if (realtime) {
+    answer += controller_.realtime(request.front());
+  } else {
+    controller_.line(request);
+  }
   answer += controller_.said();
   send(stop, pty, bytes_of(answer), fault);
 }
