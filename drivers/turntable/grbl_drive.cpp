@@ -133,7 +133,11 @@ Result<void> GrblDrive::reset_alarm(Deadline deadline) {
 }
 
 Result<void> GrblDrive::check(Deadline deadline) {
-  if (auto left = leave_hold(deadline); !left) return left;
+  // Locked, or waiting for a reset after an alarm that was told before we listened: the reset settles it, unlocks
+  // nothing.
+  if (last_ == State::alarm || last_ == State::hold) {
+    if (auto restarted = link_.reset(deadline); !restarted) return restarted;
+  }
   const auto settings = link_.settings(deadline);
   if (!settings) return pass_on(settings);
   const auto value = [&](int number) {

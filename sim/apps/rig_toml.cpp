@@ -25,9 +25,10 @@ std::string turntable(const RigTomlOptions& o) {
   }
   return text + fmt::format(
                     "reply_timeout_ms = 60\ngear_ratio = {:.4f}\npositive = \"{}\"\n"
-                    "home = {{ mode = \"switch\", offset_deg = 0.0 }}\nspeed_deg_s = {}\nacceleration_deg_s2 = {}\n"
+                    "home = {{ mode = \"{}\", offset_deg = 0.0 }}\nspeed_deg_s = {}\nacceleration_deg_s2 = {}\n"
                     "backlash_deg = 0.5\ntolerance_deg = 0.02\nsettle_ms = 200\n\n",
-                    o.gear_ratio, o.positive_ccw ? "ccw" : "cw", o.speed_deg_s, o.acceleration_deg_s2);
+                    o.gear_ratio, o.positive_ccw ? "ccw" : "cw", o.drive == "oriental-az" ? "absolute" : "switch",
+                    o.speed_deg_s, o.acceleration_deg_s2);
 }
 
 std::string panel(const RigTomlOptions& o) {

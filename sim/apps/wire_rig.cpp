@@ -1,6 +1,10 @@
 #include "sim/apps/wire_rig.h"
 
 #include "core/files.h"
+#include "sim/wire/grbl_server.h"
+#include "sim/wire/leadshine_drive.h"
+#include "sim/wire/modbus_server.h"
+#include "sim/wire/oriental_drive.h"
 
 namespace scanrig::sim {
 namespace {
@@ -10,24 +14,39 @@ constexpr std::chrono::milliseconds kLineWatch{5};
 }  // namespace
 
 Result<std::unique_ptr<WireRig>> WireRig::start(const WireRigOptions& o, Clock& clock) {
-  if (o.toml.drive != "leadshine-rs") return fail(ErrorCode::unsupported, "no simulated drive {}", o.toml.drive);
   if (o.toml.panel != "gpio" && o.toml.panel != "modbus-io") {
     return fail(ErrorCode::unsupported, "no simulated panel {}", o.toml.panel);
   }
   if (auto made = create_directories_synced(o.toml.folder); !made) return pass_on(made);
   std::unique_ptr<WireRig> rig(new WireRig(o.toml.folder / "turntable"));
   rig->positive_ccw_ = o.positive_ccw;
-  rig->drive_ = std::make_unique<wire::LeadshineDrive>(o.axis, clock);
+  if (auto connected = rig->connect_drive(o, clock); !connected) return pass_on(connected);
   if (o.preload_counter) rig->drive_->preload_counter(*o.preload_counter);
-  auto server = wire::ModbusServer::start(o.toml.folder / "turntable", 1, *rig->drive_, clock);
-  if (!server) return pass_on(server);
-  rig->server_ = std::move(*server);
   auto panel = RigPanel::start(o.toml.folder, o.toml.panel == "modbus-io", clock);
   if (!panel) return pass_on(panel);
   rig->panel_ = std::move(*panel);
   if (auto written = write_rig_toml(o.toml); !written) return pass_on(written);
   rig->line_watch_ = std::jthread([&rig = *rig](const std::stop_token& stop) { rig.watch_line(stop); });
   return rig;
+}
+
+Result<void> WireRig::connect_drive(const WireRigOptions& o, Clock& clock) {
+  const auto serve = [&](auto drive, const auto& start) -> Result<void> {
+    auto server = start(*drive);
+    if (!server) return pass_on(server);
+    drive_ = std::move(drive);
+    server_ = std::move(*server);
+    return {};
+  };
+  const auto modbus = [&](auto& drive) { return wire::ModbusServer::start(port_, 1, drive, clock); };
+  if (o.toml.drive == "leadshine-rs") return serve(std::make_unique<wire::LeadshineDrive>(o.axis, clock), modbus);
+  if (o.toml.drive == "oriental-az") return serve(std::make_unique<wire::OrientalDrive>(o.axis, clock), modbus);
+  if (o.toml.drive == "grbl") {
+    const wire::GrblSettings settings{.acceleration_deg_s2 = o.toml.acceleration_deg_s2};
+    return serve(std::make_unique<wire::GrblController>(o.axis, settings, clock),
+                 [&](auto& controller) { return wire::GrblServer::start(port_, controller, clock); });
+  }
+  return fail(ErrorCode::unsupported, "no simulated drive {}", o.toml.drive);
 }
 
 RigTruth WireRig::truth() const {

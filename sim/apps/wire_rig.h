@@ -15,9 +15,9 @@
 #include "sim/apps/rig_panel.h"
 #include "sim/apps/rig_toml.h"
 #include "sim/wire/axis.h"
-#include "sim/wire/leadshine_drive.h"
 #include "sim/wire/line_settings.h"
-#include "sim/wire/modbus_server.h"
+#include "sim/wire/simulated_drive.h"
+#include "sim/wire/wire_server.h"
 
 namespace scanrig::sim {
 
@@ -58,10 +58,12 @@ class WireRig {
   /// How the drive's own port is set: it hears only who speaks like that.
   void set_line(const wire::LineSettings& settings);
   void set_positive_ccw(bool ccw);
-  [[nodiscard]] wire::LeadshineDrive& drive() { return *drive_; }
+  [[nodiscard]] wire::SimulatedDrive& drive() { return *drive_; }
 
  private:
   explicit WireRig(std::filesystem::path port) : port_(std::move(port)) {}
+  /// Puts the drive behind its port.
+  Result<void> connect_drive(const WireRigOptions& options, Clock& clock);
   void apply_fault();
   void watch_line(const std::stop_token& stop);
 
@@ -73,8 +75,8 @@ class WireRig {
   wire::LineSettings drive_settings_;
   bool understood_ = true;  ///< the port is set as the drive's own
   std::optional<wire::WireFault> fault_;
-  std::unique_ptr<wire::LeadshineDrive> drive_;
-  std::unique_ptr<wire::ModbusServer> server_;
+  std::unique_ptr<wire::SimulatedDrive> drive_;
+  std::unique_ptr<wire::WireServer> server_;
   std::unique_ptr<RigPanel> panel_;
   std::jthread line_watch_;  ///< last: it is joined before the rest goes
 };
