@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/result.h"
+#include "drivers/turntable/grbl_turntable.h"
 #include "drivers/turntable/modbus_turntable.h"
 
 namespace scanrig::config {
@@ -27,9 +28,18 @@ struct SafetyConfig {
 };
 
 struct TurntableConfig {
-  enum class Driver { modbus };
+  enum class Driver { modbus, grbl };
   Driver driver = Driver::modbus;
   ModbusTurntableOptions modbus;  ///< with the drive profile it names
+  GrblTurntableOptions grbl;
+
+  [[nodiscard]] const AxisTurntableOptions& motion() const {
+    if (driver == Driver::grbl) return grbl;
+    return modbus;
+  }
+  [[nodiscard]] const std::string& device() const {
+    return driver == Driver::grbl ? grbl.drive.link.device : modbus.line.device;
+  }
 };
 
 struct ProjectorConfig {

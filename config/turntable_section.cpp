@@ -29,7 +29,7 @@ void read_profile(Section& s, const std::vector<std::filesystem::path>& folders,
   s.report("profile", fmt::format("there is none of {}", fmt::join(tried, ", ")));
 }
 
-void check_against_drive(Section& s, const ModbusTurntableOptions& options) {
+void check_against_profile(Section& s, const ModbusTurntableOptions& options) {
   const auto& profile = options.profile;
   if (options.line.unit_id < profile.min_unit_id || options.line.unit_id > profile.max_unit_id) {
     s.report("unit_id", fmt::format("{} is not between {} and {}, as {} allows", options.line.unit_id,
@@ -40,11 +40,13 @@ void check_against_drive(Section& s, const ModbusTurntableOptions& options) {
   if (auto word = options.scale.acceleration_word(options.acceleration, profile); !word) {
     s.report("acceleration_deg_s2", word.error().message);
   }
-  if (options.tolerance.value * options.scale.pulses_per_degree() < kMinTolerancePulses) {
-    s.report("tolerance_deg",
-             fmt::format("{} is less than {} pulses of the motor; at least {:.4f} is possible", options.tolerance.value,
-                         kMinTolerancePulses, kMinTolerancePulses / options.scale.pulses_per_degree()));
-  }
+}
+
+void check_tolerance(Section& s, const AxisTurntableOptions& options) {
+  if (options.tolerance.value * options.scale.pulses_per_degree() >= kMinTolerancePulses) return;
+  s.report("tolerance_deg",
+           fmt::format("{} is less than {} pulses of the motor; at least {:.4f} is possible", options.tolerance.value,
+                       kMinTolerancePulses, kMinTolerancePulses / options.scale.pulses_per_degree()));
 }
 
 void read_soft_limits(Section& s, std::optional<AngleRange>& limits) {
@@ -56,6 +58,55 @@ void read_soft_limits(Section& s, std::optional<AngleRange>& limits) {
     if (range.max <= range.min) inner.report("max_deg", "must be more than min_deg");
   });
   limits = range;
+}
+
+/// How the table is to be turned, whatever turns it. `modes`: how the drive can home; empty if that is not known.
+void read_motion(Section& s, const std::vector<std::string>& modes, AxisTurntableOptions& options) {
+  s.number("gear_ratio", options.scale.gear_ratio, {0.1, 1000});
+  s.choice<bool>("positive", options.scale.positive_ccw, {{"ccw", true}, {"cw", false}});
+  s.section("home", [&](Section& home) {
+    std::vector<Choice<std::string>> choices{{"here", "here"}};
+    for (const auto& mode : modes) choices.push_back({mode, mode});
+    if (modes.empty()) {
+      home.text("mode", options.home_mode);
+    } else {
+      home.choice("mode", options.home_mode, choices);
+    }
+    home.number("offset_deg", options.scale.home_offset.value, {-360, 360});
+  });
+  s.number("speed_deg_s", options.speed.value, {0.1, 360});
+  s.number("acceleration_deg_s2", options.acceleration.value, {0.1, 3600});
+  s.number("backlash_deg", options.backlash.value, {0, 10});
+  s.number("tolerance_deg", options.tolerance.value, {0.0001, 1});
+  s.number("settle_ms", options.settle, {0, 10000});
+  read_soft_limits(s, options.soft_limits);
+}
+
+void read_modbus(Section& s, const std::vector<std::filesystem::path>& drive_folders, ModbusTurntableOptions& options) {
+  read_profile(s, drive_folders, options.profile);
+  read_modbus_line(s, options.line);
+  s.number("pulses_per_motor_rev", options.scale.pulses_per_motor_rev, {200, 65535});
+  std::vector<std::string> modes;
+  for (const auto& [mode, value] : options.profile.homing.modes) modes.push_back(mode);
+  read_motion(s, modes, options);
+  if (!s.sound()) return;
+  check_against_profile(s, options);
+  check_tolerance(s, options);
+}
+
+/// A controller's unit is a degree of its motor, or with gear_ratio = 1 of the table.
+void read_grbl(Section& s, GrblTurntableOptions& options) {
+  auto& link = options.drive.link;
+  s.text("device", link.device);
+  s.one_of("baud", link.baud, {9600, 19200, 38400, 57600, 115200, 230400});
+  s.number("reply_timeout_ms", link.reply_timeout, {10, 2000});
+  if (s.has("axis")) {
+    s.choice<char>("axis", options.drive.axis,
+                   {{"X", 'X'}, {"Y", 'Y'}, {"Z", 'Z'}, {"A", 'A'}, {"B", 'B'}, {"C", 'C'}});
+  }
+  read_motion(s, {"switch"}, options);
+  options.scale.pulses_per_motor_rev = GrblDrive::kPulsesPerMotorRev;
+  if (s.sound()) check_tolerance(s, options);
 }
 
 }  // namespace
@@ -70,30 +121,9 @@ void read_modbus_line(Section& s, modbus::LineOptions& line) {
 }
 
 void read_turntable(Section& s, const std::vector<std::filesystem::path>& drive_folders, TurntableConfig& turntable) {
-  auto& options = turntable.modbus;
-  s.choice<TurntableConfig::Driver>("driver", turntable.driver, {{"modbus", TurntableConfig::Driver::modbus}});
-  read_profile(s, drive_folders, options.profile);
-  read_modbus_line(s, options.line);
-  s.number("pulses_per_motor_rev", options.scale.pulses_per_motor_rev, {200, 65535});
-  s.number("gear_ratio", options.scale.gear_ratio, {0.1, 1000});
-  s.choice<bool>("positive", options.scale.positive_ccw, {{"ccw", true}, {"cw", false}});
-  s.section("home", [&](Section& home) {
-    std::vector<Choice<std::string>> modes{{"here", "here"}};
-    for (const auto& [mode, value] : options.profile.homing.modes) modes.push_back({mode, mode});
-    if (options.profile.name.empty()) {
-      home.text("mode", options.home_mode);  // which modes there are is not known
-    } else {
-      home.choice("mode", options.home_mode, modes);
-    }
-    home.number("offset_deg", options.scale.home_offset.value, {-360, 360});
-  });
-  s.number("speed_deg_s", options.speed.value, {0.1, 360});
-  s.number("acceleration_deg_s2", options.acceleration.value, {0.1, 3600});
-  s.number("backlash_deg", options.backlash.value, {0, 10});
-  s.number("tolerance_deg", options.tolerance.value, {0.0001, 1});
-  s.number("settle_ms", options.settle, {0, 10000});
-  read_soft_limits(s, options.soft_limits);
-  if (s.sound()) check_against_drive(s, options);
+  using Driver = TurntableConfig::Driver;
+  s.choice<Driver>("driver", turntable.driver, {{"modbus", Driver::modbus}, {"grbl", Driver::grbl}});
+  turntable.driver == Driver::grbl ? read_grbl(s, turntable.grbl) : read_modbus(s, drive_folders, turntable.modbus);
 }
 
 }  // namespace scanrig::config

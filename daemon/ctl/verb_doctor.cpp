@@ -20,7 +20,7 @@ ExitCode examine_rig(const DoctorVerb& verb) {
     return verb.yes_move || person.ask("May the table turn now, with nobody near it? [y/N]") == "y";
   };
   if (drive_answers && estop_works && may_turn()) doctor::examine_motion(*rig, person, clock, report);
-  doctor::print_missing_snippets(rig->turntable.modbus.line.device, verb.config, report);
+  doctor::print_missing_snippets(rig->turntable.device(), verb.config, report);
   fmt::print("{}", verb.json ? report.json() : report.text());
   return report.findings().empty() ? ExitCode::ok : ExitCode::device;
 }

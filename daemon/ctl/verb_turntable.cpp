@@ -96,11 +96,13 @@ ExitCode turntable(const TurntableVerb& verb) {
   const auto rig = free_rig(verb.config);
   if (!rig) return complain(rig.error());
   RealClock clock;
-  if (verb.what == "read") return read_registers(*rig, clock, verb.json);
+  // A GRBL controller has no registers: what it says is its status.
+  const bool registers = rig->turntable.driver == config::TurntableConfig::Driver::modbus;
+  if (verb.what == "read" && registers) return read_registers(*rig, clock, verb.json);
   const auto open = open_devices(*rig, clock);
   if (!open) return complain(open.error());
   auto& table = *open->turntable;
-  if (verb.what != "status") return move(verb, table, clock);
+  if (verb.what != "status" && verb.what != "read") return move(verb, table, clock);
   const auto status = table.status(Deadline::after(clock, kAskLimit));
   return status ? tell(*status, verb.json) : complain(status.error());
 }

@@ -6,6 +6,7 @@
 #include "drivers/panel/modbus_io_panel.h"
 #include "drivers/projector/gpio_projector.h"
 #include "drivers/projector/manual_projector.h"
+#include "drivers/turntable/grbl_turntable.h"
 #include "drivers/turntable/modbus_turntable.h"
 
 namespace scanrig {
@@ -37,9 +38,12 @@ std::string_view name_of(config::StereoCameraConfig::Driver driver) {
 
 /// The one place where a turntable's driver is chosen.
 Result<std::unique_ptr<Turntable>> make_turntable(const config::TurntableConfig& config, Clock& clock) {
-  auto turntable = ModbusTurntable::create(config.modbus, clock);
-  if (!turntable) return pass_on(turntable);
-  return std::move(*turntable);
+  const auto made = [](auto turntable) -> Result<std::unique_ptr<Turntable>> {
+    if (!turntable) return pass_on(turntable);
+    return std::move(*turntable);
+  };
+  if (config.driver == config::TurntableConfig::Driver::grbl) return made(GrblTurntable::create(config.grbl, clock));
+  return made(ModbusTurntable::create(config.modbus, clock));
 }
 
 Result<std::unique_ptr<Projector>> open_projector(const config::ProjectorConfig& config, gpio::Lines& lines,

@@ -85,6 +85,7 @@ Result<void> AxisTurntable::check_and_enable(Deadline deadline) {
   if (state->running) {
     if (auto stopped = stop(deadline); !stopped) return stopped;
   }
+  if (state->fault) return healthy(*state, deadline);  // with an alarm a device may answer nothing else
   if (auto fit = drive_->check(deadline); !fit) return fit;
   if (state = ask(deadline); !state) return pass_on(state);
   if (!state->fault && !state->enabled) {

@@ -44,9 +44,9 @@ Result<grbl::Report> GrblDrive::exchange(Deadline deadline) {
   for (int attempt = 1;; ++attempt) {
     Result<grbl::Report> report = fail(ErrorCode::internal, "not asked yet");
     Result<void> probed;
-    // In a hold, or asleep, GRBL reads no lines.
+    // In a hold, asleep or after an alarm GRBL reads no lines, and nothing has arrived anyway.
     const auto probe = [&] {
-      if (last_ != State::hold && last_ != State::sleep && last_ != State::door) probed = link_.probe(deadline);
+      if (last_ == State::idle || last_ == State::run || last_ == State::jog) probed = link_.probe(deadline);
     };
     if (!report_first) probe();
     if (probed) report = link_.report(deadline);
@@ -133,7 +133,11 @@ Result<void> GrblDrive::reset_alarm(Deadline deadline) {
 }
 
 Result<void> GrblDrive::check(Deadline deadline) {
-  if (auto left = leave_hold(deadline); !left) return left;
+  // Locked, or waiting for a reset after an alarm that was told before we listened: the reset settles it, unlocks
+  // nothing.
+  if (last_ == State::alarm || last_ == State::hold) {
+    if (auto restarted = link_.reset(deadline); !restarted) return restarted;
+  }
   const auto settings = link_.settings(deadline);
   if (!settings) return pass_on(settings);
   const auto value = [&](int number) {

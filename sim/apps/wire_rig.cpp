@@ -1,7 +1,9 @@
 #include "sim/apps/wire_rig.h"
 
 #include "core/files.h"
+#include "sim/wire/grbl_server.h"
 #include "sim/wire/leadshine_drive.h"
+#include "sim/wire/modbus_server.h"
 #include "sim/wire/oriental_drive.h"
 
 namespace scanrig::sim {
@@ -18,7 +20,7 @@ Result<std::unique_ptr<WireRig>> WireRig::start(const WireRigOptions& o, Clock& 
   if (auto made = create_directories_synced(o.toml.folder); !made) return pass_on(made);
   std::unique_ptr<WireRig> rig(new WireRig(o.toml.folder / "turntable"));
   rig->positive_ccw_ = o.positive_ccw;
-  if (auto started = rig->start_drive(o, clock); !started) return pass_on(started);
+  if (auto connected = rig->connect_drive(o, clock); !connected) return pass_on(connected);
   if (o.preload_counter) rig->drive_->preload_counter(*o.preload_counter);
   auto panel = RigPanel::start(o.toml.folder, o.toml.panel == "modbus-io", clock);
   if (!panel) return pass_on(panel);
@@ -28,16 +30,22 @@ Result<std::unique_ptr<WireRig>> WireRig::start(const WireRigOptions& o, Clock& 
   return rig;
 }
 
-Result<void> WireRig::start_drive(const WireRigOptions& o, Clock& clock) {
-  const auto on_modbus = [&](auto drive) -> Result<void> {
-    auto server = wire::ModbusServer::start(port_, 1, *drive, clock);
+Result<void> WireRig::connect_drive(const WireRigOptions& o, Clock& clock) {
+  const auto serve = [&](auto drive, const auto& start) -> Result<void> {
+    auto server = start(*drive);
     if (!server) return pass_on(server);
-    server_ = std::move(*server);
     drive_ = std::move(drive);
+    server_ = std::move(*server);
     return {};
   };
-  if (o.toml.drive == "leadshine-rs") return on_modbus(std::make_unique<wire::LeadshineDrive>(o.axis, clock));
-  if (o.toml.drive == "oriental-az") return on_modbus(std::make_unique<wire::OrientalDrive>(o.axis, clock));
+  const auto modbus = [&](auto& drive) { return wire::ModbusServer::start(port_, 1, drive, clock); };
+  if (o.toml.drive == "leadshine-rs") return serve(std::make_unique<wire::LeadshineDrive>(o.axis, clock), modbus);
+  if (o.toml.drive == "oriental-az") return serve(std::make_unique<wire::OrientalDrive>(o.axis, clock), modbus);
+  if (o.toml.drive == "grbl") {
+    const wire::GrblSettings settings{.acceleration_deg_s2 = o.toml.acceleration_deg_s2};
+    return serve(std::make_unique<wire::GrblController>(o.axis, settings, clock),
+                 [&](auto& controller) { return wire::GrblServer::start(port_, controller, clock); });
+  }
   return fail(ErrorCode::unsupported, "no simulated drive {}", o.toml.drive);
 }
 

@@ -16,8 +16,8 @@
 #include "sim/apps/rig_toml.h"
 #include "sim/wire/axis.h"
 #include "sim/wire/line_settings.h"
-#include "sim/wire/modbus_server.h"
 #include "sim/wire/simulated_drive.h"
+#include "sim/wire/wire_server.h"
 
 namespace scanrig::sim {
 
@@ -62,7 +62,8 @@ class WireRig {
 
  private:
   explicit WireRig(std::filesystem::path port) : port_(std::move(port)) {}
-  Result<void> start_drive(const WireRigOptions& options, Clock& clock);
+  /// Puts the drive behind its port.
+  Result<void> connect_drive(const WireRigOptions& options, Clock& clock);
   void apply_fault();
   void watch_line(const std::stop_token& stop);
 
@@ -75,7 +76,7 @@ class WireRig {
   bool understood_ = true;  ///< the port is set as the drive's own
   std::optional<wire::WireFault> fault_;
   std::unique_ptr<wire::SimulatedDrive> drive_;
-  std::unique_ptr<wire::WireServer> server_;  ///< before the drive goes
+  std::unique_ptr<wire::WireServer> server_;
   std::unique_ptr<RigPanel> panel_;
   std::jthread line_watch_;  ///< last: it is joined before the rest goes
 };

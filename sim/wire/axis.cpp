@@ -61,6 +61,10 @@ void Axis::quick_stop() {
   if (running()) mode_ = Mode::stopping;
 }
 
+void Axis::slow_down() {
+  if (running() && mode_ != Mode::stopping) mode_ = Mode::slowing;
+}
+
 void Axis::set_counter(std::int32_t value) {
   command_ = motor_;
   counter_zero_ = command_ - value;
@@ -76,8 +80,9 @@ void Axis::step() {
   const bool by_switch = mode_ == Mode::backing_off || mode_ == Mode::seeking_home;
   const double left = goal_ - (by_switch ? motor_ : command_);
   double wanted = 0.0;
-  double change = motion_.deceleration * kQuickStopFactor * kStepSeconds;
-  if (mode_ != Mode::stopping) {
+  const bool ending = mode_ == Mode::stopping || mode_ == Mode::slowing;
+  double change = motion_.deceleration * (mode_ == Mode::slowing ? 1.0 : kQuickStopFactor) * kStepSeconds;
+  if (!ending) {
     // The highest speed from which steps of equal deceleration end on the goal.
     const double slower = motion_.deceleration * kStepSeconds;
     const double steps = std::sqrt(0.25 + 2.0 * std::abs(left) / (slower * kStepSeconds)) - 0.5;
@@ -86,13 +91,13 @@ void Axis::step() {
   }
   velocity_ += std::clamp(wanted - velocity_, -change, change);
   double way = velocity_ * kStepSeconds;
-  const bool there = mode_ != Mode::stopping && way * left >= left * left;
+  const bool there = !ending && way * left >= left * left;
   if (there) way = left;
   command_ += way;
   if (!blocked_) motor_ += way;
   const double half_play = 0.5 * options_.backlash_deg * pulses_per_degree();
   table_ = std::clamp(table_, motor_ - half_play, motor_ + half_play);
-  if (mode_ == Mode::stopping ? velocity_ == 0.0 : there && !(by_switch && blocked_)) finish();
+  if (ending ? velocity_ == 0.0 : there && !(by_switch && blocked_)) finish();
 }
 
 void Axis::finish() {

@@ -52,6 +52,7 @@ class Axis {
   void seek_home(
       const AxisMotion& motion);  ///< negative, until the switch closes; first away from a closed one; then counter = 0
   void quick_stop();
+  void slow_down();                           ///< to a stand, at the deceleration of the motion
   void set_counter(std::int32_t value);       ///< declares where it is
   void follow_motor() { command_ = motor_; }  ///< a closed loop: what was lost does not count as done
 
@@ -68,7 +69,7 @@ class Axis {
   [[nodiscard]] const std::vector<AxisLeg>& legs() const { return legs_; }
 
  private:
-  enum class Mode { standing, moving, backing_off, seeking_home, stopping };
+  enum class Mode { standing, moving, backing_off, seeking_home, stopping, slowing };
 
   void begin(Mode mode, const AxisMotion& motion);
   void step();

@@ -64,6 +64,7 @@ void WireServer::send(const std::stop_token& stop, Pty& pty, Bytes answer, const
   const Bytes good = answer;
   if (fault && !answer.empty()) {
     switch (fault->kind) {
+      case Kind::deaf:
       case Kind::answer_lost: answer.clear(); break;
       case Kind::wrong_crc: answer[answer.size() - 1 - answer.size() / 4] ^= 0x9A; break;
       case Kind::cut_short: answer.resize(answer.size() / 2); break;
@@ -75,7 +76,6 @@ void WireServer::send(const std::stop_token& stop, Pty& pty, Bytes answer, const
         }
         break;
       }
-      case Kind::deaf:
       case Kind::refuse: break;
     }
   }

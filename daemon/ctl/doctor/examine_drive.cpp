@@ -105,9 +105,28 @@ void tell_registers(ModbusDrive& drive, const ModbusTurntableOptions& options, C
   }
 }
 
+bool examine_grbl(const config::RigConfig& rig, Clock& clock, Report& report) {
+  const std::string& device = rig.turntable.device();
+  report.section(fmt::format("Turntable: GRBL at {}", device));
+  if (!may_open(device, "turntable", report)) return false;
+  const auto table = GrblTurntable::create(rig.turntable.grbl, clock);
+  const auto status = table ? (*table)->status(Deadline::after(clock, kAskLimit)) : pass_on(table);
+  if (!status) {
+    report.find("silent", status.error().message + ".", "Check power, wiring and baud of the controller.");
+    return false;
+  }
+  report.note("it answers as GRBL 1.1 does");
+  if (!status->alarm.empty()) {
+    report.find("drive_alarm", fmt::format("The controller reports an alarm: {}.", status->alarm),
+                "Remove its cause; Reset at the panel clears it.");
+  }
+  return true;
+}
+
 }  // namespace
 
 bool examine_drive(const config::RigConfig& rig, Clock& clock, Report& report) {
+  if (rig.turntable.driver == config::TurntableConfig::Driver::grbl) return examine_grbl(rig, clock, report);
   const auto& options = rig.turntable.modbus;
   report.section(fmt::format("Turntable: {} at {}", options.profile.name, options.line.device));
   if (!may_open(options.line.device, "turntable", report)) return false;

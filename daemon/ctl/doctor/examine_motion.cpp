@@ -118,13 +118,13 @@ void check_sign(const config::RigConfig& rig, const Operator& person, Report& re
   if (!said || (*said != "ccw" && *said != "cw")) {
     return report.note("sign: not checked, nobody has said which way the table turned");
   }
-  const char* configured = rig.turntable.modbus.scale.positive_ccw ? "ccw" : "cw";
+  const char* configured = rig.turntable.motion().scale.positive_ccw ? "ccw" : "cw";
   report.note(fmt::format("sign: told counter-clockwise, seen {}", *said));
   if (*said == "ccw") return;
   report.find(
       "reversed_sign",
       fmt::format("The table turns clockwise where counter-clockwise is meant (positive = \"{}\").", configured),
-      fmt::format("Set positive = \"{}\" in [turntable].", rig.turntable.modbus.scale.positive_ccw ? "cw" : "ccw"));
+      fmt::format("Set positive = \"{}\" in [turntable].", rig.turntable.motion().scale.positive_ccw ? "cw" : "ccw"));
 }
 
 void check_gear(const ModbusTurntableOptions& options, double pulses, Report& report) {
@@ -148,7 +148,10 @@ void examine_motion(const config::RigConfig& rig, const Operator& person, Clock&
   if (auto shown = show_quarter_turn(rig, clock); !shown) return failed(shown.error());
   check_sign(rig, person, report);
   const auto& options = rig.turntable.modbus;
-  if (options.home_mode == "here") {
+  if (rig.turntable.driver == config::TurntableConfig::Driver::grbl) {
+    return report.note("gear: not measured, GRBL counts its own steps only: look whether a quarter turn is one");
+  }
+  if (options.home_mode == "here" || options.profile.homing.absolute) {
     return report.note("gear: not measured, this rig has no home switch to count from");
   }
   if (auto homed = go_home(rig, clock); !homed) return failed(homed.error());

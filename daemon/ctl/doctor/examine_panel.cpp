@@ -29,6 +29,8 @@ Result<bool> wait_for_estop(Panel& panel, bool ok, Clock& clock) {
 
 /// After the e-stop was pressed: does the drive still hold the motor?
 bool drive_still_enabled(const config::RigConfig& rig, Clock& clock) {
+  if (rig.turntable.driver == config::TurntableConfig::Driver::grbl)
+    return false;  // it does not know of the motor's power
   clock.sleep_for(kPowerGone);
   const auto& options = rig.turntable.modbus;
   ModbusDrive drive(options.line, options.profile, clock);

@@ -18,6 +18,8 @@ class TurntableBench {
   /// The table's angle as an onlooker sees it, counter-clockwise; its zero is arbitrary but fixed.
   virtual double seen_deg() = 0;
   virtual bool seen_moving() = 0;
+  /// Whether the device measures where the table is; without, a table that is in the way is not seen by a move.
+  virtual bool has_feedback() { return true; }
   /// Something is in the table's way.
   virtual void block(bool blocked) = 0;
   /// Does `act`, once, from another thread, as soon as the table is seen moving; finished when the bench is destroyed.

@@ -95,8 +95,23 @@ TEST_F(RigConfigTest, EachKindOfProblemIsToldWithItsLineAndWhatIsAllowed) {
   expect_problem("[recipe.default]", "[recipe.fast]", "[recipe] default: missing");
   expect_problem("views = 8", "views = 2", "[recipe.default] views: 2 is not between 3 and 72");
   expect_problem("schema = 1", "schema = 2", "schema: 2 is not one of 1");
-  expect_problem("driver = \"modbus\"", "driver = \"grbl\"", "[turntable] driver: \"grbl\" is not one of modbus");
+  expect_problem("driver = \"modbus\"", "driver = \"tmcl\"", "[turntable] driver: \"tmcl\" is not one of modbus, grbl");
   expect_problem("home = { mode = \"switch\", offset_deg = 0.0 }", "home = 3", "[turntable] home: must be a table");
+}
+
+TEST_F(RigConfigTest, AGrblTurntableHasItsOwnKeys) {
+  std::string text = replaced(example_, "driver = \"modbus\"", "driver = \"grbl\"\naxis = \"A\"");
+  for (const char* line :
+       {"profile = \"leadshine-rs\"", "parity = \"none\"", "unit_id = 1", "pulses_per_motor_rev = 10000"}) {
+    text = replaced(text, line, "");
+  }
+  const auto rig = read(text);
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->turntable.driver, TurntableConfig::Driver::grbl);
+  EXPECT_EQ(rig->turntable.grbl.drive.axis, 'A');
+  EXPECT_EQ(rig->turntable.device(), "/dev/scanrig/turntable");
+  EXPECT_EQ(rig->turntable.motion().speed, DegreesPerSecond{45});
+  EXPECT_EQ(rig->turntable.motion().settle, std::chrono::milliseconds(200));
 }
 
 TEST_F(RigConfigTest, UnknownKeysAndSectionsAreProblems) {
