@@ -51,7 +51,7 @@ class RigBench final : public TurntableBench {
 std::unique_ptr<TurntableBench> make_bench() {
   const char* file = std::getenv("SCANRIG_RIG_TOML");
   if (file == nullptr) return nullptr;
-  const auto rig = config::read_rig_config(file);
+  const auto rig = config::read_rig_config(file, {}, config::Cameras::or_simulated);
   EXPECT_TRUE(rig) << rig.error().message;
   return rig ? std::make_unique<RigBench>(*rig) : nullptr;
 }
