@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <utility>
 
 namespace scanrig {
 namespace {
@@ -251,12 +252,14 @@ Result<void> AxisTurntable::stop_drive(Deadline deadline) {
 /// After any failure: no known zero, and the motor is told to stop.
 tl::unexpected<Error> AxisTurntable::give_up(const Error& error) {
   homed_ = flank_loaded_ = false;
-  if (error.code == ErrorCode::stopped) {
+  ErrorCode code = error.code;
+  if (code == ErrorCode::stopped || code == ErrorCode::timeout) {
+    // Whoever asks to stop calls waiting requests off: that is no time-out.
     const std::scoped_lock lock(mutex_);
-    stop_requested_ = false;
+    if (std::exchange(stop_requested_, false)) code = ErrorCode::stopped;
   }
   stop_owed_ = !stop_drive(Deadline::after(clock_, kStopReplyTimeouts * reply_timeout_));
-  return fail(error.code, "turntable: {}; {}", error.message,
+  return fail(code, "turntable: {}; {}", error.message,
               stop_owed_ ? "the stop was not confirmed: the table may be moving" : "the motor was told to stop");
 }
 
