@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <utility>
 
 namespace scanrig {
 namespace {
@@ -200,7 +201,9 @@ Result<void> AxisTurntable::watch(std::string_view doing, const Look& look, Dead
       return fail(ErrorCode::stalled, "{}: no progress for 2 s, the axis reads {:.3f} deg; is something in the way?",
                   doing, options_.scale.angle(state->position).value);
     }
-    if (deadline.expired(clock_)) {
+    // Of a drive that is blind nothing is known: there must be time left for a stop that goes unheard.
+    const auto for_stop = state->blind ? kStopReplyTimeouts * reply_timeout_ : Clock::Duration::zero();
+    if (deadline.left(clock_) <= for_stop) {
       return fail(ErrorCode::timeout, "{}: not there by the deadline, the axis reads {:.3f} deg", doing,
                   options_.scale.angle(state->position).value);
     }
@@ -249,12 +252,14 @@ Result<void> AxisTurntable::stop_drive(Deadline deadline) {
 /// After any failure: no known zero, and the motor is told to stop.
 tl::unexpected<Error> AxisTurntable::give_up(const Error& error) {
   homed_ = flank_loaded_ = false;
-  if (error.code == ErrorCode::stopped) {
+  ErrorCode code = error.code;
+  if (code == ErrorCode::stopped || code == ErrorCode::timeout) {
+    // Whoever asks to stop calls waiting requests off: that is no time-out.
     const std::scoped_lock lock(mutex_);
-    stop_requested_ = false;
+    if (std::exchange(stop_requested_, false)) code = ErrorCode::stopped;
   }
   stop_owed_ = !stop_drive(Deadline::after(clock_, kStopReplyTimeouts * reply_timeout_));
-  return fail(error.code, "turntable: {}; {}", error.message,
+  return fail(code, "turntable: {}; {}", error.message,
               stop_owed_ ? "the stop was not confirmed: the table may be moving" : "the motor was told to stop");
 }
 

@@ -14,7 +14,7 @@ struct TurntableStatus {
   enum class Motion { standing, moving, unknown };
   Motion motion = Motion::unknown;  ///< `unknown`: the drive cannot be reached, the table may be moving
   bool homed = false;
-  std::optional<Degrees> angle;  ///< measured, where the device has feedback
+  std::optional<Degrees> angle;  ///< as the device says: measured, or its steps counted where it has no feedback
   std::string alarm;             ///< in words; empty when there is none
 };
 
@@ -57,7 +57,8 @@ class Turntable {
     return fail(ErrorCode::unsupported, "turntable: this drive's speed cannot be limited");
   }
 
-  /// Makes a running or the next home() or rotate_to() fail with `stopped` and stop the motor; cleared by home().
+  /// Ends one call with `stopped`, and stops the motor: the home() or rotate_to() that runs, or where none runs, the
+  /// next one, before it moves anything. With that the request is delivered: the home() after it is a new decision.
   virtual void request_stop() noexcept = 0;
 };
 

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "sim/devices/devices.h"
 #include "sim/scene/profile.h"
@@ -25,7 +26,7 @@ Result<void> SimTurntable::wait_for(std::unique_lock<std::mutex>& lock, Clock::T
   Bench& b = bench_;
   const auto disturbed = [&b] { return b.stop_requested || !b.estop_ok || b.stalled; };
   if (b.clock.wait_until(lock, b.changed, std::min(moment, deadline.at), disturbed)) {
-    if (b.stop_requested) return fail(ErrorCode::stopped, "turntable: stopped on request");
+    if (std::exchange(b.stop_requested, false)) return fail(ErrorCode::stopped, "turntable: stopped on request");
     if (!b.estop_ok) return fail(ErrorCode::device_alarm, "turntable: the drive has no power: E-stop");
     // Blocked: after two seconds without progress the drive's owner gives up.
     b.axis.freeze(b.clock.now());
@@ -64,15 +65,11 @@ Result<void> SimTurntable::home(Deadline deadline) {
   std::unique_lock lock(b.mutex);
   homed_ = false;
   // A table that still brakes is let come to a stand first.
-  if (auto standing = wait_for(lock, b.axis.still(), deadline); !standing) {
-    b.stop_requested = false;
-    return standing;
-  }
+  if (auto standing = wait_for(lock, b.axis.still(), deadline); !standing) return standing;
   const double turns = 360.0 * std::round(b.axis.angle(b.clock.now()) / 360.0);
   b.axis.rename(turns);
   Move move;
   const auto done = travel(lock, 0.0, deadline, move);
-  b.stop_requested = false;
   homed_ = done.has_value();
   return done;
 }

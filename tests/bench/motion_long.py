@@ -10,28 +10,33 @@ TURNS_LIMIT_S = 3000
 DRIFT_DEG = 0.01
 TOLERANCE_DEG = 0.02  # of the rig's configuration
 WOUND_UP = 2384       # turns from zero, two before the 32-bit counter is full: 10,000 pulses, 90:1
+WOUND_UP_GRBL = 64    # two before GRBL cannot report the position: 32 bits of thousandths of a motor degree
+TURNS_AT_ONCE = 3
 GOLDEN_TESTS = "turntable_driver_test"
 
 
 def turns(bench, root, scratch):
-    """From zero, and from near either end of the drive's counter."""
-    plan = [(100, 0, "up"), (30, WOUND_UP, "up"), (30, -WOUND_UP, "down")] if bench.quick else \
-        [(10000, 0, "up"), (500, WOUND_UP, "up"), (500, -WOUND_UP, "down")]
-    profile = root / "config" / "drives" / "leadshine-rs.toml"
+    """From zero, and from near either end of each drive's counter."""
+    drives = {profile.stem: (profile, WOUND_UP) for profile in sorted((root / "config" / "drives").glob("*.toml"))}
+    drives["grbl"] = ("grbl", WOUND_UP_GRBL)
+    plan = []
+    for name, (drive, wound_up) in drives.items():
+        lengths = (100, 30, 30) if bench.quick else (10000, 500, 500)
+        plan += [(name, drive, *run) for run in zip(lengths, (0, wound_up, -wound_up), ("up", "up", "down"))]
 
     def go(number):
-        count, preload, way = plan[number]
-        return bench.run([bench.bin / "turns", profile, scratch / f"turns{number}", count, preload, way], TURNS_LIMIT_S)
+        _, drive, count, preload, way = plan[number]
+        return bench.run([bench.bin / "turns", drive, scratch / f"turns{number}", count, preload, way], TURNS_LIMIT_S)
 
-    with concurrent.futures.ThreadPoolExecutor(len(plan)) as pool:
+    with concurrent.futures.ThreadPoolExecutor(TURNS_AT_ONCE) as pool:
         ended = list(pool.map(go, range(len(plan))))
-    for (count, preload, way), done in zip(plan, ended):
+    for (name, _, count, preload, way), done in zip(plan, ended):
         seen = json.loads(done.stdout) if done.stdout.startswith("{") else {}
         told = (f"{seen.get('turns', 0)} turns, drift {seen.get('drift_deg', float('nan')):.4f} deg, angle told within "
                 f"{seen.get('worst_angle_deg', float('nan')):.4f} deg, longest way {seen.get('longest_way_deg', 0):.0f} deg")
         ok = done.returncode == 0 and seen["turns"] >= count and seen["drift_deg"] <= DRIFT_DEG \
             and seen["worst_angle_deg"] <= DRIFT_DEG
-        bench.line(f"{count} turns {way}, counter begins {preload} turns from home",
+        bench.line(f"{name}: {count} turns {way}, counter begins {preload} turns from home",
                    f"no way longer than a turn, drift <= {DRIFT_DEG} deg", told + (done.stderr and f": {done.stderr.strip()}"),
                    ok)
 

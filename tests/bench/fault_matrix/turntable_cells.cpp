@@ -71,8 +71,12 @@ const std::map<std::string, Method>& methods() {
 }
 
 std::optional<std::string> why_not(const TurntableKind& kind, const std::string& method, Fault fault) {
+  const bool grbl = kind.driver == "GrblTurntable";
+  if (grbl && method == "stop" && fault == Fault::earlier_answer) {
+    return "in a hold GRBL answers nothing but '?': a report one question old is still true of a table that slows down";
+  }
   if (fault != Fault::stalled) return std::nullopt;
-  if (kind.driver == "GrblTurntable" && method != "home") {
+  if (grbl && method != "home") {
     return "GRBL counts its steps and measures nothing: a blocked table is found by the next homing, and by the views";
   }
   if (method == "stop") return "a blocked table stands: stop succeeds as it should";
@@ -97,6 +101,13 @@ std::vector<ErrorCode> named(const std::string& method, Fault fault) {
   return codes;
 }
 
+/// What GRBL says unasked, an alarm for one, is no wrong answer when it is said again: the right one is missing.
+std::vector<ErrorCode> named(const TurntableKind& kind, const std::string& method, Fault fault) {
+  auto codes = named(method, fault);
+  if (kind.driver == "GrblTurntable" && fault == Fault::earlier_answer) codes.push_back(ErrorCode::timeout);
+  return codes;
+}
+
 /// Whether the drive hears a stop while the fault lasts.
 bool reachable(Fault fault) {
   return fault != Fault::silent && fault != Fault::unplugged && fault != Fault::back_after_2s;
@@ -105,7 +116,7 @@ bool reachable(Fault fault) {
 class Trial {
  public:
   Trial(const TurntableKind& kind, std::string method, Fault fault)
-      : end_(kind.make(clock_)), method_(std::move(method)), fault_(fault) {}
+      : end_(kind.make(clock_)), named_(named(kind, method, fault)), method_(std::move(method)), fault_(fault) {}
 
   Outcome run() {
     if (auto ready = start_at_zero(); !ready) return broken(ready.error());
@@ -157,7 +168,7 @@ class Trial {
       begin();
     }
     return timed(clock_, method.moves ? Clock::Duration(kMotionLimit) : Clock::Duration(kAskLimit),
-                 named(method_, fault_), [&](Deadline by) { return method.call(end_->table(), by); });
+                 named_, [&](Deadline by) { return method.call(end_->table(), by); });
   }
 
   /// Standing, or owned up that it may not be.
@@ -198,6 +209,7 @@ class Trial {
 
   RealClock clock_;
   std::unique_ptr<TurntableEnd> end_;
+  const std::vector<ErrorCode> named_;
   const std::string method_;
   const Fault fault_;
   double zero_deg_ = 0;

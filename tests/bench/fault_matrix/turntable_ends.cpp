@@ -111,7 +111,7 @@ class GrblEnd final : public WireEnd {
     set_motion(options);
     options.drive.link.device = fresh_port(scratch);
     options.drive.link.reply_timeout = kReplyTimeout;
-    const sim::wire::GrblSettings settings{.homing_deg_s = 90, .acceleration_deg_s2 = kAccelerationDegS2};
+    const sim::wire::GrblSettings settings{.homing_deg_s = 200, .acceleration_deg_s2 = kAccelerationDegS2};
     serve<sim::wire::GrblServer>(std::make_unique<sim::wire::GrblController>(kAxis, settings, clock),
                                  options.drive.link.device, clock);
     table_ = GrblTurntable::create(options, clock).value();

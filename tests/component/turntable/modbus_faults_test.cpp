@@ -7,9 +7,7 @@
 namespace scanrig {
 namespace {
 
-using sim::wire::ModbusRequest;
-using sim::wire::WireFault;
-using sim::wire::WireFrame;
+using namespace sim::wire;
 using std::chrono::milliseconds;
 using testing::HasSubstr;
 

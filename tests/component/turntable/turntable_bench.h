@@ -20,7 +20,8 @@ class TurntableBench {
   virtual bool seen_moving() = 0;
   /// Whether the device measures where the table is; without, a table that is in the way is not seen by a move.
   virtual bool has_feedback() { return true; }
-  /// Something is in the table's way.
+  /// Something is in the table's way; nobody is there to put it there where the bench cannot block.
+  virtual bool can_block() { return true; }
   virtual void block(bool blocked) = 0;
   /// Does `act`, once, from another thread, as soon as the table is seen moving; finished when the bench is destroyed.
   virtual void when_moving(std::function<void()> act) = 0;

@@ -62,7 +62,34 @@ TEST_F(DriveProfileTest, WhatDoesNotFitIsTold) {
   expect_problem("reset = \"register\"", "reset = \"hope\"",
                  "[alarm] reset: \"hope\" is not one of register, power_cycle");
   expect_problem("speed_unit = \"rpm\"", "speed_unit = \"mph\"", "speed_unit: \"mph\" is not one of rpm, pulses_per_s");
-  expect_problem("value = 0x0040", "valeu = 0x0040", "[stop] valeu: unknown key; known here: register, value");
+  expect_problem("value = 0x0040", "valeu = 0x0040",
+                 "[stop] valeu: unknown key; known here: register, released, value");
+}
+
+TEST_F(DriveProfileTest, ValuesOf32BitsLieInTwoWordsAndInputsAreLetGo) {
+  const auto profile = read_drive_profile(SCANRIG_SOURCE_DIR "/config/drives/oriental-az.toml");
+  ASSERT_TRUE(profile) << profile.error().message;
+  using Word = DriveProfile::Block::Word;
+  EXPECT_EQ(profile->move.address, 0x0058);
+  EXPECT_EQ(profile->move.words.size(), 16u);
+  for (const Word word : {Word::position, Word::speed, Word::acceleration, Word::deceleration}) {
+    EXPECT_TRUE(profile->move.has(word, true) && profile->move.has(word, false));
+  }
+  EXPECT_TRUE(profile->stop.released);
+  EXPECT_FALSE(profile->enable);
+  EXPECT_FALSE(profile->soft_limits);
+  EXPECT_EQ(profile->status.enabled, 0);
+  EXPECT_EQ(profile->status.in_position, 1u << 5 | 1u << 14);
+  EXPECT_EQ(profile->pulses_per_motor_rev.base, 1000);
+}
+
+TEST_F(DriveProfileTest, AMoveThatSaysHalfAValueIsNone) {
+  expect_problem("\"acceleration\"", "\"acceleration_high\"",
+                 "[move] words: must contain \"acceleration\", or \"acceleration_high\" and \"acceleration_low\"");
+  expect_problem("\"acceleration\", \"dec", "\"acceleration_high\", \"acceleration_low\", \"dec",
+                 "[move] words: must hold acceleration and deceleration in the same number of bits");
+  expect_problem("\"speed\", \"acc", "\"slow_speed\", \"speed\", \"acc", "[move] words: holds \"slow_speed\"");
+  expect_problem("{ multiply_register = 0x0001 }", "{}", "[pulses_per_motor_rev] multiply_register: is missing");
 }
 
 TEST_F(DriveProfileTest, APowerCycleNeedsNoResetRegister) {

@@ -87,8 +87,7 @@ TEST_F(SimTurntable, StopsOnRequestFromElsewhere) {
   EXPECT_EQ(status->motion, TurntableStatus::Motion::standing);
   // One second: 11.25 degrees up to speed, 22.5 at speed, 11.25 braking.
   EXPECT_NEAR(status->angle->value, 45.0, 0.1);
-  EXPECT_TRUE(fails_with(rig_->turntable().rotate_to({0.0}, soon()), ErrorCode::stopped));
-  EXPECT_TRUE(fails_with(rig_->turntable().home(soon()), ErrorCode::stopped));
+  EXPECT_TRUE(fails_with(rig_->turntable().rotate_to({0.0}, soon()), ErrorCode::not_homed));
   EXPECT_TRUE(rig_->turntable().home(soon()));
 }
 
