@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kFaster = 100;
 constexpr double kStepDeg = 120;
-constexpr std::chrono::seconds kMoveLimit{60};
+constexpr std::chrono::minutes kMoveLimit{10};  ///< six of the wall's seconds: a busy machine is not the subject
 constexpr double kLongestWayDeg = 361;  ///< a way longer than a turn was not asked for by anybody
 
 /// The wall's clock, faster. The wire's own time-outs stay in the wall's time.
@@ -39,7 +39,7 @@ class FastClock final : public Clock {
 constexpr sim::wire::AxisOptions kAxis{.gear_ratio = 90, .vibration_decay_s = 0.005};
 constexpr double kPulsesPerTurn = 900'000;
 /// Of the fast clock: long enough that the wall's delays are no time-outs.
-constexpr std::chrono::milliseconds kGrblReply{2000};
+constexpr std::chrono::milliseconds kGrblReply{20000};
 
 /// A driver, and the drive at the other end of its wire.
 struct Rig {
