@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kFaster = 100;
 constexpr double kStepDeg = 120;
-constexpr std::chrono::seconds kMoveLimit{60};
+constexpr std::chrono::minutes kMoveLimit{10};
 constexpr double kLongestWayDeg = 361;  ///< a way longer than a turn was not asked for by anybody
 
 /// The wall's clock, faster. The wire's own time-outs stay in the wall's time.
@@ -38,8 +38,9 @@ class FastClock final : public Clock {
 
 constexpr sim::wire::AxisOptions kAxis{.gear_ratio = 90, .vibration_decay_s = 0.005};
 constexpr double kPulsesPerTurn = 900'000;
+constexpr std::chrono::milliseconds kModbusReply{1000};  ///< of the wall: a busy machine is no fault of the wire
 /// Of the fast clock: long enough that the wall's delays are no time-outs.
-constexpr std::chrono::milliseconds kGrblReply{2000};
+constexpr std::chrono::milliseconds kGrblReply{20000};
 
 /// A driver, and the drive at the other end of its wire.
 struct Rig {
@@ -77,6 +78,7 @@ Result<Rig> modbus_rig(const DriveProfile& profile, const std::filesystem::path&
   ModbusTurntableOptions options;
   set_motion(options);
   options.line.device = port;
+  options.line.reply_timeout = kModbusReply;
   options.profile = profile;
   if (profile.homing.absolute) options.home_mode = "absolute";
   auto table = ModbusTurntable::create(options, clock);
