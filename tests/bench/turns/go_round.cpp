@@ -38,6 +38,7 @@ class FastClock final : public Clock {
 
 constexpr sim::wire::AxisOptions kAxis{.gear_ratio = 90, .vibration_decay_s = 0.005};
 constexpr double kPulsesPerTurn = 900'000;
+constexpr std::chrono::milliseconds kModbusReply{1000};  ///< of the wall: a busy machine is no fault of the wire
 /// Of the fast clock: long enough that the wall's delays are no time-outs.
 constexpr std::chrono::milliseconds kGrblReply{20000};
 
@@ -77,6 +78,7 @@ Result<Rig> modbus_rig(const DriveProfile& profile, const std::filesystem::path&
   ModbusTurntableOptions options;
   set_motion(options);
   options.line.device = port;
+  options.line.reply_timeout = kModbusReply;
   options.profile = profile;
   if (profile.homing.absolute) options.home_mode = "absolute";
   auto table = ModbusTurntable::create(options, clock);
