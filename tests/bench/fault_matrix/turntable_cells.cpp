@@ -167,8 +167,8 @@ class Trial {
       }
       begin();
     }
-    return timed(clock_, method.moves ? Clock::Duration(kMotionLimit) : Clock::Duration(kAskLimit),
-                 named_, [&](Deadline by) { return method.call(end_->table(), by); });
+    return timed(clock_, method.moves ? Clock::Duration(kMotionLimit) : Clock::Duration(kAskLimit), named_,
+                 [&](Deadline by) { return method.call(end_->table(), by); });
   }
 
   /// Standing, or owned up that it may not be.

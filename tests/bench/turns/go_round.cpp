@@ -19,7 +19,7 @@ namespace {
 constexpr int kFaster = 100;
 constexpr double kStepDeg = 120;
 constexpr std::chrono::minutes kMoveLimit{10};  ///< six of the wall's seconds: a busy machine is not the subject
-constexpr double kLongestWayDeg = 361;  ///< a way longer than a turn was not asked for by anybody
+constexpr double kLongestWayDeg = 361;          ///< a way longer than a turn was not asked for by anybody
 
 /// The wall's clock, faster. The wire's own time-outs stay in the wall's time.
 class FastClock final : public Clock {
