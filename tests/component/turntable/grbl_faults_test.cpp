@@ -242,7 +242,11 @@ TEST_F(GrblFaults, TheLockIsNeverLiftedButByHoming) {
   EXPECT_FALSE(rotate_to(45));
   EXPECT_TRUE(bench_->turntable().reset_alarm(within(milliseconds(1000))));
   EXPECT_TRUE(home());
-  for (const auto& frame : bench_->server().log()) EXPECT_THAT(text_of(frame), Not(HasSubstr("$X")));
+  for (const auto& frame : bench_->server().log()) {
+    if (frame.from_master) {
+      EXPECT_THAT(text_of(frame), Not(HasSubstr("$X")));
+    }
+  }
 }
 
 TEST_F(GrblFaults, AControllerSetUpOtherwiseIsRefusedWithWhatToSet) {
