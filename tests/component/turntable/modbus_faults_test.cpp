@@ -1,7 +1,5 @@
 #include <gmock/gmock.h>
 
-#include <algorithm>
-
 #include "tests/component/turntable/modbus_bench.h"
 
 namespace scanrig {
@@ -356,10 +354,10 @@ TEST_P(ModbusFaults, SoftLimitsAreKeptByTheDriver) {
 TEST_P(LeadshineFaults, SoftLimitsAreToldToTheDrive) {
   start_at_zero([](auto& options) { options.soft_limits = AngleRange{{-10}, {200}}; });
   std::array<std::uint16_t, 4> limits{};
-  std::uint16_t control = 0;
+  std::array<std::uint16_t, 1> control{};
   bench_->registers().read(0x6006, limits);
-  bench_->registers().read(0x6000, {&control, 1});
-  EXPECT_EQ(control, 2);
+  bench_->registers().read(0x6000, control);
+  EXPECT_EQ(control[0], 2);
   EXPECT_THAT(limits, testing::ElementsAre(0, 50000, 0xFFFF, 0x10000 - 2500));
 }
 
