@@ -100,7 +100,7 @@ std::string to_table(const Scores& s) {
   text += row("measured area", s.measured);
   text += row("measured area, aligned", s.aligned);
   text += row("whole mesh", s.whole);
-  text += row("closed area, to the ideal carve", s.closed);
+  text += row("D closed area, to the ideal carve", s.closed);
   text += "\n";
   text += row("observable share of the truth", 100.0 * s.observable_share, "%");
   text += row("observable truth within 0.10 mm", 100.0 * s.covered_010, "%");

@@ -55,6 +55,13 @@ def demo_itself(bench, folder, done, seconds):
     bench.profile = report.get("profile_sha256", "")
     missing = truth_absent.report_gaps(report)
     bench.line("report.json holds all that is asked", "all", ", ".join(missing) or "all", not missing)
+    table = bench.run([bench.bin / "scanrig", "evaluate", folder], 300).stdout
+    gates = [gate for gate in "ABCDE" if any(line.startswith(f"{gate} ") for line in table.splitlines())]
+    bench.line("scanrig evaluate prints gates A to E", "A B C D E", " ".join(gates), len(gates) == 5)
+    help_text = bench.run(["python3", DEMO, "--help"], 30).stdout
+    options = ("--object", "--height-mm", "--seed", "--views", "--out", "--keep")
+    absent = [option for option in options if option not in help_text]
+    bench.line("demo takes its options", " ".join(options), "all" if not absent else f"not {absent}", not absent)
     bench.line("demo, Start to scores, this machine", "reported", f"{seconds:.0f} s on {bench.cores} cores", True)
 
 
