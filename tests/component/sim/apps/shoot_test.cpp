@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
+#include <ctime>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -105,12 +105,13 @@ TEST(View, RendersInTimeOnTwoCores) {
   with_threads(2, [] {
     auto scene = Scene::create({}).value();
     (void)scene->shoot(0, 0.0, true, 1);  // the light of the pose is gathered once
-    const auto begin = std::chrono::steady_clock::now();
+    const std::clock_t begin = std::clock();
     (void)scene->shoot(0, 1.0, true, 2);
     (void)scene->shoot(0, 1.0, false, 3);
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-    testing::Test::RecordProperty("seconds", std::to_string(seconds));
-    // 4 s is the promise on an idle machine (bench); here only something grossly wrong shall fail.
+    const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+    testing::Test::RecordProperty("processor_seconds", std::to_string(seconds));
+    // The promise, 4 s on two idle cores, is for the bench; here whatever else runs must not count, and only something
+    // grossly wrong shall fail.
     EXPECT_LT(seconds, 12.0);
   });
 }
