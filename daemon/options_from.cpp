@@ -12,7 +12,7 @@ DaemonOptions options_from(const config::RigConfig& config) {
                   .profile = "",
                   .poses = recipe.poses,
                   .views = recipe.views};
-  options.socket = config.api.socket;
+  options.api.socket = config.api.socket;
   options.remote = config.safety.remote_start;
   options.guard = config.safety.guard.has_value();
   options.home_guarded = config.safety.home_after_restart == config::SafetyConfig::HomeAfterRestart::guarded;

@@ -1,6 +1,5 @@
 #include "daemon/run_daemon.h"
 
-#include "daemon/api/server.h"
 #include "daemon/overloaded.h"
 #include "daemon/rig/panel_thread.h"
 #include "daemon/rig/rig_thread.h"
@@ -48,7 +47,9 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   ControlLoop loop(clock, {.rules = rules, .warning = options.warning}, std::move(*known));
   const auto tell = [&loop](Event event) { loop.post(std::move(event)); };
 
-  auto api = ApiServer::start(options.socket, loop);
+  auto api_options = options.api;
+  api_options.storage = options.jobs.root;
+  auto api = ApiServer::start(api_options, loop);
   if (!api) return pass_on(api);
 
   // Time stands until every thread is there. They end in reverse order: the panel shows the last lamps, the rig is
@@ -64,7 +65,8 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   starting.reset();
   return loop.run({.perform = [&](const Action& action) { perform(action, rig, jobs); },
                    .show = [&](const PanelOutputs& outputs) { panel.show(outputs); },
-                   .fresh_job_id = [&] { return fresh_job_id(options.jobs.root); }});
+                   .fresh_job_id = [&] { return fresh_job_id(options.jobs.root); },
+                   .published = [&] { (*api)->wake(); }});
 }
 
 }  // namespace scanrig

@@ -5,6 +5,7 @@
 
 #include "core/clock.h"
 #include "core/result.h"
+#include "daemon/api/server.h"
 #include "daemon/jobs/job_store.h"
 #include "daemon/jobs/job_thread.h"
 #include "daemon/jobs/reconstructor.h"
@@ -16,7 +17,7 @@ namespace scanrig {
 
 struct DaemonOptions {
   JobStoreOptions jobs;          ///< its poses and views are the recipe of every job
-  std::filesystem::path socket;  ///< of the API
+  ApiOptions api;
   bool remote = false;           ///< the API may start and home while the guard is closed
   bool guard = false;            ///< there is a guard
   bool home_guarded = false;     ///< after a restart a closed guard homes the table, without Reset

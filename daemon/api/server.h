@@ -2,21 +2,40 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <string>
 
 #include "core/result.h"
+#include "daemon/api/admission.h"
+#include "daemon/api/peer.h"
 #include "daemon/station/control_loop.h"
 
 namespace scanrig {
 
-/// The HTTP API on a Unix socket: one I/O thread, every request and answer with an absolute time limit.
+struct ApiOptions {
+  std::filesystem::path socket;
+  PeerRoles peers{};               ///< which groups may what over the socket
+  std::optional<int> http_port{};  ///< TCP, where every request needs a token; 0: any free port
+  std::string http_address = "127.0.0.1";
+  std::filesystem::path tokens{};   ///< the file of tokens
+  std::filesystem::path storage{};  ///< whose disk is watched
+  ApiLimits limits{};
+};
+
+/// The HTTP API on a Unix socket and, if wanted, on TCP: two I/O threads, a strand a connection, every step of a
+/// request with an absolute limit. It reads snapshots and posts to the control loop, and neither waits for the other.
 class ApiServer {
  public:
-  /// Fails as listen_on_socket(). `loop` must outlive the server.
-  static Result<std::unique_ptr<ApiServer>> start(const std::filesystem::path& socket, ControlLoop& loop);
+  /// Fails as listen_on_socket(), and with `io` or `invalid_input` for the address. `loop` must outlive the server.
+  static Result<std::unique_ptr<ApiServer>> start(const ApiOptions& options, ControlLoop& loop);
   /// Cuts all connections, removes the socket file and joins. The control loop must not run any more.
   ~ApiServer();
   ApiServer(const ApiServer&) = delete;
   ApiServer& operator=(const ApiServer&) = delete;
+
+  /// There is a new snapshot. From any thread; does not wait.
+  void wake();
+  [[nodiscard]] int http_port() const;  ///< 0 without TCP
 
  private:
   struct Impl;

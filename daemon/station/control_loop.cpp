@@ -56,9 +56,11 @@ void ControlLoop::handle(Message message, const StationPorts& ports) {
   auto step = next(state_, message.event, options_.rules);
   state_ = std::move(step.state);
   update(jobs_, message.event, options_.rules.poses, options_.rules.views);
+  tally_.see(message.event, clock_.now());
   for (const auto& action : step.actions) carry_out(action, ports);
   show(ports);
   publish();
+  ports.published();
   if (!message.reply) return;
   if (step.refused) {
     message.reply(tl::unexpected(*step.refused));
@@ -113,6 +115,7 @@ void ControlLoop::publish() {
       .devices = std::move(devices),
       .job = state_.job ? state_.job->id : std::string(),
       .jobs = jobs_,
+      .counters = tally_.counters(),
   }));
 }
 

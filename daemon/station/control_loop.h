@@ -9,6 +9,7 @@
 #include "daemon/mailbox.h"
 #include "daemon/station/events.h"
 #include "daemon/station/snapshot.h"
+#include "daemon/station/tally.h"
 #include "daemon/station/transition.h"
 #include "drivers/panel/panel.h"
 
@@ -19,6 +20,7 @@ struct StationPorts {
   std::function<void(const Action&)> perform;  ///< everything but Warn
   std::function<void(const PanelOutputs&)> show;
   std::function<std::string()> fresh_job_id;
+  std::function<void()> published = [] {};  ///< there is a new snapshot
 };
 
 struct ControlLoopOptions {
@@ -70,6 +72,7 @@ class ControlLoop {
   // Of run()'s thread only.
   StationState state_;
   JobTable jobs_;
+  Tally tally_;
   std::uint64_t revision_ = 0;
   struct Later {
     Clock::TimePoint at;

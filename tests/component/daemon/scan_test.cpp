@@ -24,7 +24,7 @@ class Daemon : public scan_samples::FolderTest {
     scan_samples::write_text(folder_ / "calibration.json", scan_samples::calibration_json());
     options.jobs = {
         .root = folder_ / "jobs", .calibration_file = folder_ / "calibration.json", .profile = {}, .views = 3};
-    options.socket = folder_ / "api.sock";
+    options.api.socket = folder_ / "api.sock";
     options.reconstructor = [this](const Calibration&, const Manifest&) {
       return std::make_unique<fakes::FakeReconstructor>(log);
     };
@@ -128,7 +128,7 @@ TEST_F(Daemon, MakesOneModelFromTwoPoses) {
                                      "pose 1", "finish"));
   for (const auto& [pattern, plain] : log.grey_levels) EXPECT_GT(pattern, plain);
   EXPECT_THAT(rig.turntable.targets, ElementsAre(0, 0, 120, 240, 360, 480, 600));
-  EXPECT_FALSE(fs::exists(options.socket)) << "the socket goes with the daemon";
+  EXPECT_FALSE(fs::exists(options.api.socket)) << "the socket goes with the daemon";
 }
 
 TEST_F(Daemon, NothingMovesBeforeResetAndTwoSecondsOfWarning) {
