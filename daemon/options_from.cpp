@@ -12,7 +12,11 @@ DaemonOptions options_from(const config::RigConfig& config) {
                   .profile = "",
                   .poses = recipe.poses,
                   .views = recipe.views};
-  options.api.socket = config.api.socket;
+  options.api = {.socket = config.api.socket,
+                 .groups = {config.api.viewer_group, config.api.operator_group, config.api.engineer_group},
+                 .http_port = config.api.http_port,
+                 .http_address = config.api.http_address,
+                 .tokens = config.api.tokens};
   options.remote = config.safety.remote_start;
   options.guard = config.safety.guard.has_value();
   options.home_guarded = config.safety.home_after_restart == config::SafetyConfig::HomeAfterRestart::guarded;

@@ -66,7 +66,7 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   return loop.run({.perform = [&](const Action& action) { perform(action, rig, jobs); },
                    .show = [&](const PanelOutputs& outputs) { panel.show(outputs); },
                    .fresh_job_id = [&] { return fresh_job_id(options.jobs.root); },
-                   .published = [&] { (*api)->wake(); }});
+                   .published = [&](const auto&) { (*api)->wake(); }});
 }
 
 }  // namespace scanrig

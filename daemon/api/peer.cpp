@@ -10,6 +10,21 @@
 #include <cstring>
 
 namespace scanrig {
+namespace {
+
+Result<gid_t> group_id(const std::string& name) {
+  group entry{};
+  group* found = nullptr;
+  std::vector<char> room(64 * 1024);
+  const int error = ::getgrnam_r(name.c_str(), &entry, room.data(), room.size(), &found);
+  if (error != 0 || found == nullptr) {
+    return fail(ErrorCode::not_found, "there is no group \"{}\" on this machine: add it, or name another in [api]",
+                name);
+  }
+  return entry.gr_gid;
+}
+
+}  // namespace
 
 Result<PeerCredentials> peer_credentials(int socket) {
   ucred credentials{};
@@ -40,16 +55,18 @@ std::optional<Role> PeerRoles::role_of(const PeerCredentials& peer) const {
   return std::nullopt;
 }
 
-Result<gid_t> group_id(const std::string& name) {
-  group entry{};
-  group* found = nullptr;
-  std::vector<char> room(64 * 1024);
-  const int error = ::getgrnam_r(name.c_str(), &entry, room.data(), room.size(), &found);
-  if (error != 0 || found == nullptr) {
-    return fail(ErrorCode::not_found, "there is no group \"{}\" on this machine: add it, or name another in [api]",
-                name);
+Result<PeerRoles> find_groups(const PeerGroups& groups) {
+  PeerRoles roles;
+  if (!groups.viewer && !groups.operating && !groups.engineer) roles.operating = ::getegid();
+  for (const auto& [name, id] :
+       {std::pair(&groups.viewer, &roles.viewer), std::pair(&groups.operating, &roles.operating),
+        std::pair(&groups.engineer, &roles.engineer)}) {
+    if (!*name) continue;
+    const auto found = group_id(**name);
+    if (!found) return pass_on(found);
+    *id = *found;
   }
-  return entry.gr_gid;
+  return roles;
 }
 
 }  // namespace scanrig

@@ -28,7 +28,12 @@ struct PeerRoles {
   [[nodiscard]] std::optional<Role> role_of(const PeerCredentials& peer) const;
 };
 
-/// The number of a group of this machine. Fails with `not_found`.
-Result<gid_t> group_id(const std::string& name);
+/// The same by the groups' names.
+struct PeerGroups {
+  std::optional<std::string> viewer{}, operating{}, engineer{};
+};
+
+/// Without any group named, the caller's own one operates. Fails with `not_found`.
+Result<PeerRoles> find_groups(const PeerGroups& groups);
 
 }  // namespace scanrig

@@ -1,6 +1,6 @@
 #include <nlohmann/json.hpp>
 
-#include "daemon/api/job_files.h"
+#include "daemon/api/folder_files.h"
 #include "daemon/api/json_words.h"
 #include "daemon/api/routes.h"
 

@@ -49,11 +49,11 @@ Result<Tcp::acceptor> listen_on_tcp(net::io_context& io, const std::string& addr
 }  // namespace
 
 struct ApiServer::Impl {
-  Impl(const ApiOptions& with, int listening, ControlLoop& control)
+  Impl(const ApiOptions& with, const PeerRoles& roles, int listening, ControlLoop& control)
       : options(with),
         loop(control),
-        local(io, Local(), listening),
-        core({control, [this] { return latest_facts(); }}, with.peers, with.tokens, with.limits, this_life()) {}
+        core({control, [this] { return latest_facts(); }}, roles, with.tokens, with.limits, this_life()),
+        local(io, Local(), listening) {}
 
   void run() {
     core.hub.see(loop.snapshot());
@@ -147,6 +147,7 @@ struct ApiServer::Impl {
 
   const ApiOptions options;
   ControlLoop& loop;
+  ServerCore core;  // outlives the sessions, the last of which end with the I/O context
   net::io_context io{kThreads};
   Local::acceptor local;
   std::optional<Tcp::acceptor> tcp;
@@ -156,14 +157,15 @@ struct ApiServer::Impl {
   const Steady::time_point begun = Steady::now();
   std::mutex facts_mutex;
   Facts facts;
-  ServerCore core;
   std::vector<std::thread> threads;
 };
 
 Result<std::unique_ptr<ApiServer>> ApiServer::start(const ApiOptions& options, ControlLoop& loop) {
+  const auto roles = find_groups(options.groups);
+  if (!roles) return pass_on(roles, "API");
   const auto listening = listen_on_socket(options.socket);
   if (!listening) return pass_on(listening, "API");
-  auto impl = std::make_unique<Impl>(options, *listening, loop);
+  auto impl = std::make_unique<Impl>(options, *roles, *listening, loop);
   if (options.http_port) {
     auto tcp = listen_on_tcp(impl->io, options.http_address, *options.http_port);
     if (!tcp) {

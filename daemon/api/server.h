@@ -14,7 +14,7 @@ namespace scanrig {
 
 struct ApiOptions {
   std::filesystem::path socket;
-  PeerRoles peers{};               ///< which groups may what over the socket
+  PeerGroups groups{};             ///< which may what over the socket
   std::optional<int> http_port{};  ///< TCP, where every request needs a token; 0: any free port
   std::string http_address = "127.0.0.1";
   std::filesystem::path tokens{};   ///< the file of tokens
@@ -26,7 +26,8 @@ struct ApiOptions {
 /// request with an absolute limit. It reads snapshots and posts to the control loop, and neither waits for the other.
 class ApiServer {
  public:
-  /// Fails as listen_on_socket(), and with `io` or `invalid_input` for the address. `loop` must outlive the server.
+  /// Fails as listen_on_socket(), with `io` or `invalid_input` for the address, with `not_found` for a group. `loop`
+  /// must outlive the server.
   static Result<std::unique_ptr<ApiServer>> start(const ApiOptions& options, ControlLoop& loop);
   /// Cuts all connections, removes the socket file and joins. The control loop must not run any more.
   ~ApiServer();

@@ -72,8 +72,7 @@ void Session::on_header(Error error) {
   const auto as = role();
   if (!as && !header(http::field::authorization).empty()) seat_->showed_bad_token(now);
   const bool may = seat_->may_ask(now);
-  auto found = core_.router.find(plain(parser_->get().method_string()),
-                                 plain(parser_->get().target()), as);
+  auto found = core_.router.find(plain(parser_->get().method_string()), plain(parser_->get().target()), as);
   if (!may || !found) {
     ++core_.refused;
     last_ = last_ || !parser_->is_done();  // a body that nobody has read is in the way
@@ -186,9 +185,7 @@ void Session::drain_more() {
   });
 }
 
-std::string_view Session::header(http::field name) const {
-  return plain(parser_->get()[name]);
-}
+std::string_view Session::header(http::field name) const { return plain(parser_->get()[name]); }
 
 std::optional<Role> Session::role() const { return core_.access.role_of(peer_, header(http::field::authorization)); }
 

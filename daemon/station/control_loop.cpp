@@ -60,7 +60,7 @@ void ControlLoop::handle(Message message, const StationPorts& ports) {
   for (const auto& action : step.actions) carry_out(action, ports);
   show(ports);
   publish();
-  ports.published();
+  ports.published(published_.get());
   if (!message.reply) return;
   if (step.refused) {
     message.reply(tl::unexpected(*step.refused));

@@ -20,7 +20,7 @@ struct StationPorts {
   std::function<void(const Action&)> perform;  ///< everything but Warn
   std::function<void(const PanelOutputs&)> show;
   std::function<std::string()> fresh_job_id;
-  std::function<void()> published = [] {};  ///< there is a new snapshot
+  std::function<void(const std::shared_ptr<const Snapshot>&)> published = [](const auto&) {};
 };
 
 struct ControlLoopOptions {

@@ -40,8 +40,12 @@ TEST(PeerCredentials, AreThoseOfTheOtherEnd) {
 }
 
 TEST(PeerCredentials, AGroupIsFoundByItsName) {
-  EXPECT_EQ(group_id("root").value(), 0u);
-  EXPECT_EQ(group_id("no-such-group-here").error().code, ErrorCode::not_found);
+  const auto roles = find_groups({.operating = "root"});
+  ASSERT_TRUE(roles) << roles.error().message;
+  EXPECT_EQ(roles->operating, 0u);
+  EXPECT_FALSE(roles->viewer || roles->engineer);
+  EXPECT_EQ(find_groups({.viewer = "no-such-group-here"}).error().code, ErrorCode::not_found);
+  EXPECT_EQ(find_groups({})->operating, ::getegid()) << "nobody named: the daemon's own group";
 }
 
 class AccessTest : public scan_samples::FolderTest {

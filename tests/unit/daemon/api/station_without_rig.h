@@ -22,7 +22,8 @@ class StationWithoutRig {
       const auto perform = [this](const Action& action) {
         if (std::holds_alternative<action::StopRig>(action)) loop.post(event::Stopped{});
       };
-      EXPECT_TRUE(loop.run({perform, [](const PanelOutputs&) {}, [] { return std::string("fresh"); }, published}));
+      EXPECT_TRUE(loop.run({perform, [](const PanelOutputs&) {}, [] { return std::string("fresh"); },
+                            [&published](const auto&) { published(); }}));
     });
   }
   ~StationWithoutRig() { end(); }

@@ -1,4 +1,4 @@
-#include "daemon/api/job_files.h"
+#include "daemon/api/folder_files.h"
 
 #include <gmock/gmock.h>
 #include <sys/stat.h>
@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 using testing::ElementsAre;
 using testing::Field;
 
-class JobFiles : public scan_samples::FolderTest {
+class FolderFiles : public scan_samples::FolderTest {
  protected:
   void SetUp() override {
     FolderTest::SetUp();
@@ -28,15 +28,16 @@ class JobFiles : public scan_samples::FolderTest {
   fs::path job() const { return folder_ / "job"; }
 };
 
-TEST_F(JobFiles, AreListedByNameWithoutLinks) {
+TEST_F(FolderFiles, AreListedByNameWithoutLinks) {
   const auto files = list_files(job());
   ASSERT_TRUE(files) << files.error().message;
-  EXPECT_THAT(*files, ElementsAre(Field(&JobFile::path, "pose1/view00/left.png"), Field(&JobFile::path, "scan.json")));
+  EXPECT_THAT(*files,
+              ElementsAre(Field(&FolderFile::path, "pose1/view00/left.png"), Field(&FolderFile::path, "scan.json")));
   EXPECT_EQ(files->front().bytes, 7u);
   EXPECT_EQ(list_files(folder_ / "nowhere").error().code, ErrorCode::io);
 }
 
-TEST_F(JobFiles, AreOpenedBelowTheirFolder) {
+TEST_F(FolderFiles, AreOpenedBelowTheirFolder) {
   const auto file = open_below(job(), "pose1/view00/left.png");
   ASSERT_TRUE(file) << file.error().message;
   EXPECT_EQ((*file)->size(), 7u);
@@ -45,7 +46,7 @@ TEST_F(JobFiles, AreOpenedBelowTheirFolder) {
   EXPECT_EQ(text, "picture");
 }
 
-TEST_F(JobFiles, NothingElseIsOpened) {
+TEST_F(FolderFiles, NothingElseIsOpened) {
   for (const auto* path : {"", "..", "../secret", "link", "up/secret", "pose1/../../secret", "pose1", "pose1//view00",
                            "/etc/passwd", "pipe", "nothing", "scan.json/x", "./scan.json"}) {
     const auto file = open_below(job(), path);
@@ -55,7 +56,7 @@ TEST_F(JobFiles, NothingElseIsOpened) {
   EXPECT_EQ(open_below(folder_ / "gone", "a").error().code, ErrorCode::not_found);
 }
 
-TEST_F(JobFiles, HaveTheMediaTypeOfTheirEnding) {
+TEST_F(FolderFiles, HaveTheMediaTypeOfTheirEnding) {
   EXPECT_EQ(media_type("model/model.glb"), "model/gltf-binary");
   EXPECT_EQ(media_type("left.png"), "image/png");
   EXPECT_EQ(media_type("README"), "application/octet-stream");

@@ -12,13 +12,13 @@
 
 namespace scanrig {
 
-struct JobFile {
+struct FolderFile {
   std::string path;  ///< within the job's folder
   std::uint64_t bytes = 0;
 };
 
 /// Every regular file below a job's folder, in order of name; links are not followed. Fails with `io`.
-Result<std::vector<JobFile>> list_files(const std::filesystem::path& folder);
+Result<std::vector<FolderFile>> list_files(const std::filesystem::path& folder);
 
 /// Opens a file below `folder`, component by component, following no link. Fails with `not_found`, `io`.
 Result<std::shared_ptr<OpenFile>> open_below(const std::filesystem::path& folder, std::string_view path);

@@ -1,4 +1,4 @@
-#include "daemon/api/job_files.h"
+#include "daemon/api/folder_files.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -38,8 +38,8 @@ Result<int> open_component(int folder, const std::string& name, bool last) {
 
 }  // namespace
 
-Result<std::vector<JobFile>> list_files(const fs::path& folder) {
-  std::vector<JobFile> files;
+Result<std::vector<FolderFile>> list_files(const fs::path& folder) {
+  std::vector<FolderFile> files;
   std::error_code error;
   for (fs::recursive_directory_iterator next(folder, error), end; !error && next != end; next.increment(error)) {
     std::error_code gone;
@@ -48,7 +48,7 @@ Result<std::vector<JobFile>> list_files(const fs::path& folder) {
     if (!gone) files.push_back({next->path().lexically_relative(folder).string(), bytes});
   }
   if (error) return fail(ErrorCode::io, "cannot list {}: {}", folder.string(), error.message());
-  std::ranges::sort(files, {}, &JobFile::path);
+  std::ranges::sort(files, {}, &FolderFile::path);
   return files;
 }
 
