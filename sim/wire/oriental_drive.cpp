@@ -106,7 +106,7 @@ void OrientalDrive::start_direct_data() {
     return;
   }
   const bool absolute = pair(kType) == 1;
-  homing_ = false;
+  homing_ = homed_ = false;  // HOME-END goes out with the next motion
   axis_.follow_motor();
   axis_.move_to(absolute ? pair(kPosition) : axis_.commanded() + pair(kPosition),
                 {static_cast<double>(pair(kSpeed)), static_cast<double>(pair(kAcceleration)),
