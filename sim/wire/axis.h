@@ -18,7 +18,7 @@ struct AxisOptions {
   double vibration_hz = 25.0;
   double encoder_step_deg = 0;  ///< at the table; 0: every pulse is read
   /// How far from the angle it was sent to (from home, at the table) the motor comes to rest; empty: not at all.
-  std::function<double(double sent_to_deg)> rest_error_deg;
+  std::function<double(double sent_to_deg)> rest_error_deg{};
 };
 
 /// How a motion is to be run, in motor units.
@@ -93,7 +93,7 @@ class Axis {
   double velocity_ = 0;  // pulses/s
   double command_ = 0;   // where the motor is sent, pulses
   double goal_ = 0;
-  double rest_error_ = 0;  // deg at the table; of a motor that stands
+  double rest_error_ = 0;    // deg at the table; of a motor that stands
   double motor_ = 0;         // where it is
   double table_ = 0;         // in motor pulses
   double counter_zero_ = 0;  // command_ at which the counter reads 0
