@@ -96,8 +96,10 @@ class WireStation:
         threading.Thread(target=self.hand.operate, daemon=True).start()
 
     def finish(self, job):
-        """The truth stands beside the scan only now: the daemon never saw it."""
-        self.hand.say(write_truth=str(job))
+        """The truth, which the daemon never saw, and when the simulated devices did what."""
+        self.hand.say(write_truth=str(job.resolve()))
+        stamps = {what: self.hand.say(get=what)[what] for what in ("exposures", "legs", "changes")}
+        (job / "stamps.json").write_text(json.dumps(stamps, indent=1) + "\n")
 
 
 def run(command, log, **options):
