@@ -1,5 +1,7 @@
 #include <unistd.h>
 
+#include <cstdio>
+#include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "daemon/ctl/stage_bars.h"
@@ -18,14 +20,20 @@ ExitCode reconstruct(const ReconstructVerb& verb) {
   if (!scan) return complain(scan.error());
 
   const SignalStop stop;
-  StageBars bars(stdout, ::isatty(STDOUT_FILENO) == 1);
+  std::FILE* told = verb.json ? stderr : stdout;  // bars beside the JSON, not in it
+  StageBars bars(told, ::isatty(::fileno(told)) == 1);
   const Context context{stop.token(),
                         [&](std::string_view stage, double fraction) { bars.update(std::string(stage), fraction); }};
   const auto model = scanrig::reconstruct(*scan, verb.options, context);
   bars.end(model.has_value());
   if (!model) return complain(model.error());
   if (const auto written = write_model(*model, out); !written) return complain(written.error());
-  fmt::print("{}\n{}\n", (out / "model.glb").string(), (out / "report.json").string());
+  const auto glb = out / "model.glb", report = out / "report.json";
+  if (verb.json) {
+    fmt::print("{}\n", nlohmann::ordered_json{{"model", glb}, {"report", report}}.dump());
+  } else {
+    fmt::print("{}\n{}\n", glb.string(), report.string());
+  }
   return ExitCode::ok;
 }
 
