@@ -3,15 +3,33 @@
 #include "daemon/jobs/pipeline_reconstructor.h"
 
 namespace scanrig {
+namespace {
+
+std::uintmax_t gib(double count) { return static_cast<std::uintmax_t>(count * (1u << 30)); }
+
+Recipe recipe_from(const std::string& name, const config::RecipeConfig& config) {
+  return {.name = name,
+          .poses = config.poses,
+          .views = config.views,
+          .flip_timeout = config.flip_timeout,
+          .flip_by_line = config.flip == config::RecipeConfig::Flip::line,
+          .start_on_part = config.start == config::RecipeConfig::Start::part_present,
+          .limits = {config.least_measured_share, config.most_residual_mm}};
+}
+
+}  // namespace
 
 DaemonOptions options_from(const config::RigConfig& config) {
-  const auto& recipe = config.recipes.at("default");
   DaemonOptions options;
   options.jobs = {.root = config.storage.root,
                   .calibration_file = config.calibration_file,
                   .profile = "",
-                  .poses = recipe.poses,
-                  .views = recipe.views};
+                  .reserve_bytes = gib(config.storage.reserve_gib)};
+  options.recipes.clear();
+  for (const auto& [name, recipe] : config.recipes) options.recipes[name] = recipe_from(name, recipe);
+  options.retention = {.keep_for = config.storage.keep_days, .keep_bytes = {}};
+  if (config.storage.keep_gib) options.retention.keep_bytes = gib(*config.storage.keep_gib);
+  if (config.quiet_hours) options.quiet_hours = QuietHours{config.quiet_hours->from, config.quiet_hours->to};
   options.socket = config.api.socket;
   options.remote = config.safety.remote_start;
   options.guard = config.safety.guard.has_value();

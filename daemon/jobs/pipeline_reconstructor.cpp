@@ -28,9 +28,12 @@ class PipelineReconstructor final : public Reconstructor {
 }  // namespace
 
 ReconstructorFactory pipeline_reconstructor(ReconstructOptions options) {
-  return [options = std::move(options)](const Calibration& calibration, const Manifest& manifest) {
-    const ScanIdentity identity{.id = manifest.id, .profile = manifest.profile};
-    return std::make_unique<PipelineReconstructor>(Reconstruction(calibration, options, identity));
+  return [options = std::move(options)](const ReconstructionTask& task) -> Result<std::unique_ptr<Reconstructor>> {
+    auto changed = options;
+    changed.voxel_mm = task.changes.voxel_mm.value_or(options.voxel_mm);
+    if (!task.changes.fusion.empty()) changed.fusion = task.changes.fusion;
+    const ScanIdentity identity{.id = task.manifest.id, .profile = task.manifest.profile};
+    return std::make_unique<PipelineReconstructor>(Reconstruction(task.calibration, changed, identity));
   };
 }
 
