@@ -1,6 +1,7 @@
 #include "daemon/options_from.h"
 
 #include "daemon/jobs/pipeline_reconstructor.h"
+#include "daemon/jobs/process_reconstructor.h"
 
 namespace scanrig {
 namespace {
@@ -15,6 +16,21 @@ Recipe recipe_from(const std::string& name, const config::RecipeConfig& config) 
           .flip_by_line = config.flip == config::RecipeConfig::Flip::line,
           .start_on_part = config.start == config::RecipeConfig::Start::part_present,
           .limits = {config.least_measured_share, config.most_residual_mm}};
+}
+
+ReconstructorFactory reconstructor_from(const config::ReconstructionConfig& config) {
+  if (config.executor == config::ReconstructionConfig::Executor::process) {
+    const auto outside = process_reconstructor(
+        {.program = {}, .limit = config.limit, .memory_bytes = gib(config.memory_gib), .voxel_mm = config.voxel_mm});
+    return [=](const ReconstructionTask& task) -> Result<std::unique_ptr<Reconstructor>> {
+      const auto voxel_mm = task.changes.voxel_mm.value_or(config.voxel_mm);
+      if (auto fits = check_memory(task, voxel_mm, gib(config.memory_gib)); !fits) return pass_on(fits);
+      return outside(task);
+    };
+  }
+  ReconstructOptions options;
+  options.voxel_mm = config.voxel_mm;
+  return pipeline_reconstructor(options, gib(config.memory_gib));
 }
 
 }  // namespace
@@ -35,9 +51,7 @@ DaemonOptions options_from(const config::RigConfig& config) {
   options.guard = config.safety.guard.has_value();
   options.home_guarded = config.safety.home_after_restart == config::SafetyConfig::HomeAfterRestart::guarded;
   options.manual_light = config.projector.driver == config::ProjectorConfig::Driver::manual;
-  ReconstructOptions reconstruct;
-  reconstruct.voxel_mm = config.reconstruction.voxel_mm;
-  options.reconstructor = pipeline_reconstructor(reconstruct);
+  options.reconstructor = reconstructor_from(config.reconstruction);
   return options;
 }
 

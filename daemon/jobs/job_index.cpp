@@ -6,6 +6,7 @@
 #include <memory>
 #include <system_error>
 
+#include "core/hash.h"
 #include "daemon/jobs/job_files.h"
 #include "daemon/jobs/job_record.h"
 
@@ -36,15 +37,15 @@ void bind(sqlite3_stmt* statement, int parameter, const std::string& value) {
   sqlite3_bind_text(statement, parameter, value.data(), static_cast<int>(value.size()), SQLITE_TRANSIENT);
 }
 
-/// Differs when any of the files that tell a job's state has been written since.
-std::string stamp(const fs::path& folder) {
+/// Differs when any of the files that tell a job's state has been written since, or the record is not what it was.
+std::string stamp(const fs::path& folder, const std::string& record) {
   std::string stamp;
   for (const char* name : {"scan.json", "job.json", "failure.json", "attempt.json", "model/report.json"}) {
     struct stat file {};
     if (::stat((folder / name).c_str(), &file) != 0) file = {};
     stamp += fmt::format("{}.{}.{}.{};", file.st_ino, file.st_size, file.st_mtim.tv_sec, file.st_mtim.tv_nsec);
   }
-  return stamp;
+  return stamp + sha256(record);
 }
 
 }  // namespace
@@ -82,9 +83,11 @@ std::optional<JobInfo> JobIndex::find(const fs::path& job_folder) const {
   const auto select = prepare(database_, "SELECT stamp, info FROM jobs WHERE id = ?");
   if (!select) return std::nullopt;
   bind(select.get(), 1, job_folder.filename());
-  if (sqlite3_step(select.get()) != SQLITE_ROW || text(select.get(), 0) != stamp(job_folder)) return std::nullopt;
+  if (sqlite3_step(select.get()) != SQLITE_ROW) return std::nullopt;
+  const auto record = text(select.get(), 1);
+  if (text(select.get(), 0) != stamp(job_folder, record)) return std::nullopt;
   JobInfo job;
-  if (!from_record(text(select.get(), 1), job) || job.folder != job_folder) return std::nullopt;
+  if (!from_record(record, job) || job.folder != job_folder) return std::nullopt;
   const auto order = read_job_file(job_folder);
   if (!order) return std::nullopt;
   job.recipe = order->recipe;
@@ -105,8 +108,9 @@ void JobIndex::replace(const JobTable& jobs) {
     bind(insert.get(), 2, std::string(to_string(job->state)));
     bind(insert.get(), 3, job->part);
     bind(insert.get(), 4, job->recipe.name);
-    bind(insert.get(), 5, stamp(job->folder));
-    bind(insert.get(), 6, to_record(*job));
+    const auto record = to_record(*job);
+    bind(insert.get(), 5, stamp(job->folder, record));
+    bind(insert.get(), 6, record);
     whole = sqlite3_step(insert.get()) == SQLITE_DONE;
     sqlite3_reset(insert.get());
   }
