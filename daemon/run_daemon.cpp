@@ -99,6 +99,7 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   ControlLoop loop(clock, {.rules = rules, .warning = options.warning}, *known);
   const auto tell = [&loop](Event event) { loop.post(std::move(event)); };
 
+  options.on_loop(loop);
   auto api = ApiServer::start(options.socket, loop);
   if (!api) return pass_on(api);
 

@@ -38,6 +38,8 @@ struct DaemonOptions {
   Clock::Duration warning = std::chrono::seconds(2);
   ReconstructorFactory reconstructor;
   JobThread::ScannedHook on_scanned;
+  /// Called once, before anything can move, with what takes presses and orders; it lives as long as the daemon runs.
+  std::function<void(ControlLoop&)> on_loop = [](ControlLoop&) {};
   /// Called with every snapshot from the control loop's thread; must not wait.
   std::function<void(const std::shared_ptr<const Snapshot>&)> published = [](const auto&) {};
 };

@@ -22,7 +22,7 @@ Result<void> write_json(const fs::path& file, const ordered_json& json) {
   return write_file_atomically(file, json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n");
 }
 
-void remove(const fs::path& file) {
+void remove_file(const fs::path& file) {
   std::error_code ignored;  // a file that stays is seen again at the next start
   fs::remove(file, ignored);
 }
@@ -117,7 +117,7 @@ std::optional<Error> read_failure(const fs::path& job_folder) {
   return Error{code.value_or(ErrorCode::internal), json["message"]};
 }
 
-void remove_failure(const fs::path& job_folder) { remove(job_folder / kFailure); }
+void remove_failure(const fs::path& job_folder) { remove_file(job_folder / kFailure); }
 
 int count_attempts(const fs::path& job_folder) {
   auto json = JsonFile::read(job_folder / kAttempt, "scanrig-attempt", 1);
@@ -130,7 +130,7 @@ Result<void> write_attempt(const fs::path& job_folder, int count) {
   return write_json(job_folder / kAttempt, {{"format", "scanrig-attempt"}, {"version", 1}, {"count", count}});
 }
 
-void remove_attempt(const fs::path& job_folder) { remove(job_folder / kAttempt); }
+void remove_attempt(const fs::path& job_folder) { remove_file(job_folder / kAttempt); }
 
 Error quarantine_error() {
   return {ErrorCode::internal,

@@ -8,8 +8,8 @@ namespace scanrig {
 
 /// What a model must reach to be passed.
 struct Limits {
-  std::optional<double> least_measured_share;  ///< of the model's area that cameras saw, 0 to 1
-  std::optional<double> most_residual_mm;      ///< median distance between a pose's views, the worst pose
+  std::optional<double> least_measured_share{};  ///< of the model's area that cameras saw, 0 to 1
+  std::optional<double> most_residual_mm{};      ///< median distance between a pose's views, the worst pose
   bool operator==(const Limits&) const = default;
 };
 

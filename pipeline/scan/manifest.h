@@ -24,10 +24,10 @@ struct ViewRecord {
   double measured_deg = 0.0;
   double moving_ms = 0.0;
   double settling_ms = 0.0;
-  std::string taken;         ///< ISO 8601
-  std::string pixel_format;  ///< "Mono8", "BayerRG8", "BGR8"; empty for range scans
-  std::map<std::string, FileRecord> files;
-  std::optional<Projection> grid;                      ///< range scans: orthographic
+  std::string taken{};         ///< ISO 8601
+  std::string pixel_format{};  ///< "Mono8", "BayerRG8", "BGR8"; empty for range scans
+  std::map<std::string, FileRecord> files{};
+  std::optional<Projection> grid{};                    ///< range scans: orthographic
   Transform camera_from_pose = Transform::Identity();  ///< range scans only
 };
 
@@ -35,7 +35,7 @@ struct ViewRecord {
 struct ClosureRecord {
   int after_views = 0;  ///< views the pose had then
   double measured_deg = 0.0;
-  std::string taken;      ///< ISO 8601
+  std::string taken{};    ///< ISO 8601
   double shift_px = 0.0;  ///< as pipeline/closure measures it, the worse of both cameras
   double changed = 0.0;   ///< 0 to 1
   bool unmoved = true;
