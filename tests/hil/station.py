@@ -1,6 +1,7 @@
 """The station in the virtual machine, with the simulated turntable of the host at its serial port."""
 import hashlib
 import json
+import os
 import pathlib
 import shutil
 import sys
@@ -24,7 +25,7 @@ class Unmet(RuntimeError):
 
 def make_tree(build, tree, images):
     """What lies over the base: the installed project, the scenario's own files, the images that the cameras show."""
-    image.run("cmake", "--install", build, "--prefix", "/usr", "--strip", env={**image.environment(), "DESTDIR": tree})
+    image.run("cmake", "--install", build, "--prefix", "/usr", "--strip", env={**os.environ, "DESTDIR": str(tree)})
     shutil.copytree(image.HERE / "guest", tree, symlinks=True, dirs_exist_ok=True)
     for program in ("scanrig-edge-camera", "scanrig-gige-camera"):
         image.run("strip", "-o", tree / "usr" / "lib" / "hil" / program, build / "bin" / program)
