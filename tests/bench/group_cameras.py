@@ -1,9 +1,10 @@
-"""Cameras and the USB projector: triggers against frames on the wire, overhead, fuzzed replies."""
+"""Cameras and the USB projector: triggers against frames on the wire, overhead, fuzzed replies, Debian 13."""
 import json
 import pathlib
 import shutil
 import tempfile
 
+import cameras_debian13
 import fuzz
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
@@ -41,3 +42,4 @@ def replies(bench):
 def measure(bench):
     triggers(bench)
     replies(bench)
+    cameras_debian13.measure(bench)
