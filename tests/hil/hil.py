@@ -64,7 +64,9 @@ def first_life(table, station, rendered, wanted):
         ("estop", "e-stop at the GPIO line", "named e-stop", scenario.estop),
         ("camera", "cameras lost and back", "named; back without a restart", scenario.cameras_lost),
         ("killed", "daemon killed while the table turns", "made safe, restarted, Halted", scenario.killed),
-        ("watchdog", "watchdog starved", "killed, made safe, restarted, Halted", scenario.watchdog)]
+        ("watchdog", "watchdog starved", "killed, made safe, restarted, Halted", scenario.watchdog),
+        ("gige", "one pose of 8 views: LightCrafter over USB/IP, two GigE cameras at its trigger output",
+         "whole scan folder", lambda s: scenario.usb_and_gige(s, rendered))]
     for name, what, asked, act in rows:
         if wanted and name not in wanted:
             continue
@@ -123,7 +125,7 @@ def run(options, work, table):
 def main():
     parser = argparse.ArgumentParser(prog="./dev hil", description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="+", metavar="ROW",
-                        help="unit, pose, serial, estop, camera, killed, watchdog, kills")
+                        help="unit, pose, serial, estop, camera, killed, watchdog, gige, kills")
     parser.add_argument("--bin", type=pathlib.Path, required=True, help=argparse.SUPPRESS)
     options = parser.parse_args()
     options.bin = options.bin.resolve()

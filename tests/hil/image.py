@@ -7,6 +7,7 @@ app.sqfs    what `cmake --install` installs, and tests/hil/guest; made anew ever
 """
 import hashlib
 import pathlib
+import platform
 import re
 import shutil
 import subprocess
@@ -14,10 +15,10 @@ import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-SUITE = "bookworm"
+SUITE = platform.freedesktop_os_release()["VERSION_CODENAME"]  # the programs were built with its libraries
 SYSTEM_PACKAGES = ["systemd-sysv", "udev", "kmod", "dbus", "iproute2", "procps", "usbip", "curl"]
 INITRD_MODULES = ["virtio_pci", "virtio_blk", "squashfs", "overlay", "ext4", "virtio_console"]
-MODULES = INITRD_MODULES + ["vivid", "vhci_hcd", "ftdi_sio", "xhci_pci", "virtio_net", "veth", "configfs",
+MODULES = INITRD_MODULES + ["vivid", "vhci_hcd", "usbhid", "ftdi_sio", "xhci_pci", "virtio_net", "veth", "configfs",
                             "gpio_sim", "v4l2loopback"]
 SQUASH = ["-comp", "lz4", "-noappend", "-no-progress", "-quiet", "-all-root"]
 

@@ -55,6 +55,19 @@ def pose(station, rendered):
     return f"{VIEWS} views, {len(names)} images byte for byte, {off:.4f} deg off at most, {took:.0f} s"
 
 
+def usb_and_gige(station, rendered):
+    """The same with a LightCrafter behind vhci-hcd, whose trigger output exposes two GigE cameras."""
+    trigger = 'TRIGGER=lightcrafter 3240\nCAMERAS=gige 10.77.0.11 10.77.0.12'
+    station.machine.do(f"echo '{trigger}' >/run/hil/cameras && systemctl restart hil-cameras && modprobe vhci_hcd")
+    station.told = None  # the angle has to be said again
+    attach = "ip netns exec cameras usbip attach -r 127.0.0.1 -b 1-1"
+    station.wait("the LightCrafter attached", lambda: station.machine.call(attach)[0] == 0, 20)
+    station.machine.do("cp /etc/scanrig/usb-and-gige.toml /etc/scanrig/rig.toml && systemctl restart scanrigd", 30)
+    for device in ("projector", "camera"):
+        station.wait(f"the {device} there", lambda name=device: device_is_there(station, name), 30)
+    return pose(station, rendered)
+
+
 def end_reconstruction(station):
     """The model of a scan is not this machine's business: emulated, it would take minutes."""
     station.machine.do("systemctl restart scanrigd", 30)

@@ -3,6 +3,7 @@ import hashlib
 import json
 import os
 import pathlib
+import re
 import shutil
 import sys
 import threading
@@ -27,9 +28,19 @@ def make_tree(build, tree, images):
     """What lies over the base: the installed project, the scenario's own files, the images that the cameras show."""
     image.run("cmake", "--install", build, "--prefix", "/usr", "--strip", env={**os.environ, "DESTDIR": str(tree)})
     shutil.copytree(image.HERE / "guest", tree, symlinks=True, dirs_exist_ok=True)
-    for program in ("scanrig-edge-camera", "scanrig-gige-camera"):
-        image.run("strip", "-o", tree / "usr" / "lib" / "hil" / program, build / "bin" / program)
+    image.run("strip", "-o", tree / "usr/lib/hil/scanrig-edge-camera", build / "bin" / "scanrig-edge-camera")
+    other = with_sections(tree / "etc/scanrig/rig.toml", tree / "usr/share/hil/usb-and-gige.toml")
+    (tree / "etc/scanrig/usb-and-gige.toml").write_text(other)
     shutil.copytree(images, tree / "usr" / "share" / "hil" / "images")
+
+
+def with_sections(config, sections):
+    """The configuration with these sections in the place of its own."""
+    def split(file):
+        parts = re.split(r"^(?=\[)", file.read_text(), flags=re.M)
+        return {part.split("]")[0]: part.rstrip() + "\n\n" for part in parts}
+
+    return "".join({**split(config), **split(sections)}.values())
 
 
 class Station:
