@@ -2,6 +2,8 @@
 
 #include <cstdio>
 
+#include "config/camera_section.h"
+#include "config/projector_section.h"
 #include "config/section.h"
 #include "config/turntable_section.h"
 
@@ -51,78 +53,6 @@ void read_safety(Section& s, const PanelConfig& panel, SafetyConfig& safety) {
   if (safety.guard) return;
   if (safety.remote_start) s.report("remote_start", "true needs a guard");
   if (safety.home_after_restart == Home::guarded) s.report("home_after_restart", "\"guarded\" needs a guard");
-}
-
-void read_projector(Section& s, std::chrono::microseconds exposure, ProjectorConfig& projector) {
-  using Driver = ProjectorConfig::Driver;
-  s.choice<Driver>(
-      "driver", projector.driver,
-      {{"gpio", Driver::gpio}, {"lightcrafter4500", Driver::lightcrafter4500}, {"manual", Driver::manual}});
-  if (projector.driver == Driver::gpio) {
-    s.text("line", projector.line);
-    if (s.has("plain_line")) s.text("plain_line", projector.plain_line.emplace());
-    if (s.has("active")) s.choice<bool>("active", projector.active_low, {{"low", true}, {"high", false}});
-  }
-  if (projector.driver != Driver::manual) {
-    s.number("pulse_us", projector.pulse, {10, 1'000'000});
-    if (projector.pulse < exposure) {
-      s.report("pulse_us", fmt::format("{} is shorter than the exposure_us of {} in [stereo_camera]",
-                                       projector.pulse.count(), exposure.count()));
-    }
-  }
-  s.number("warm_up_s", projector.warm_up, {0, 7200});
-}
-
-void read_path(Section& s, std::string_view key, const std::filesystem::path& base, std::filesystem::path& path) {
-  std::string text;
-  s.text(key, text);
-  if (text.find('\0') != std::string::npos) return s.report(key, "is not a path");
-  path = base / text;
-}
-
-void read_sensor(Section& section, std::string_view key, SensorConfig& sensor) {
-  section.section(key, [&](Section& s) {
-    s.text("serial", sensor.serial);
-    if (s.has("address")) s.text("address", sensor.address);
-  });
-}
-
-void read_stereo_camera(Section& s, const std::filesystem::path& base, Cameras cameras, StereoCameraConfig& camera) {
-  using Driver = StereoCameraConfig::Driver;
-  using Edge = StereoCameraConfig::Edge;
-  using FrameClock = StereoCameraConfig::FrameClock;
-  std::vector<Choice<Driver>> drivers{
-      {"aravis", Driver::aravis}, {"v4l2", Driver::v4l2}, {"v4l2-side-by-side", Driver::v4l2_side_by_side}};
-  if (cameras == Cameras::or_simulated) drivers.push_back({"simulated", Driver::simulated});
-  s.choice<Driver>("driver", camera.driver, drivers);
-  if (camera.driver == Driver::simulated) {
-    read_path(s, "truth", base, camera.truth);
-    return s.number("exposure_us", camera.exposure, {10, 1'000'000});
-  }
-  read_sensor(s, "left", camera.left);
-  if (camera.driver != Driver::v4l2_side_by_side) {
-    read_sensor(s, "right", camera.right);
-    if (!camera.left.serial.empty() && camera.left.serial == camera.right.serial) {
-      s.report("right", "has the same serial number as left");
-    }
-  }
-  s.section("trigger", [&](Section& trigger) {
-    trigger.text("source", camera.trigger_source);
-    trigger.choice<Edge>("edge", camera.trigger_edge, {{"rising", Edge::rising}, {"falling", Edge::falling}});
-  });
-  std::vector<Choice<std::string>> formats;
-  for (const char* format : {"Mono8", "Mono10", "Mono12", "BayerRG8", "RGB8", "BGR8"})
-    formats.push_back({format, format});
-  s.choice("pixel_format", camera.pixel_format, formats);
-  s.number("exposure_us", camera.exposure, {10, 1'000'000});
-  if (camera.driver == Driver::aravis) {
-    s.section("packet", [&](Section& packet) {
-      packet.number("size_bytes", camera.packet_bytes, {576, 16000});
-      packet.number("delay_us", camera.packet_delay, {0, 100'000});
-    });
-    s.choice<FrameClock>("clock", camera.frame_clock, {{"interval", FrameClock::interval}, {"ptp", FrameClock::ptp}});
-  }
-  s.number("frame_timeout_ms", camera.frame_timeout, {10, 10'000});
 }
 
 void read_panel(Section& s, PanelConfig& panel) {
@@ -184,7 +114,7 @@ void read_recipes(Section& s, const PanelConfig& panel, std::map<std::string, Re
 }
 
 void read_storage(Section& s, const std::filesystem::path& base, StorageConfig& storage) {
-  read_path(s, "root", base, storage.root);
+  s.path("root", base, storage.root);
   s.number("reserve_gib", storage.reserve_gib, {0, 100'000});
   if (s.has("keep_days")) s.number("keep_days", storage.keep_days.emplace(), {1, 36'500});
   if (s.has("keep_gib")) s.number("keep_gib", storage.keep_gib.emplace(), {1, 1'000'000});
@@ -220,7 +150,7 @@ void read_rig(Section& root, const std::filesystem::path& base, const std::vecto
   root.section("projector", [&](Section& s) { read_projector(s, rig.stereo_camera.exposure, rig.projector); });
   root.section("panel", [&](Section& s) { read_panel(s, rig.panel); });
   root.section("safety", [&](Section& s) { read_safety(s, rig.panel, rig.safety); });
-  root.section("calibration", [&](Section& s) { read_path(s, "file", base, rig.calibration_file); });
+  root.section("calibration", [&](Section& s) { s.path("file", base, rig.calibration_file); });
   root.section("recipe", [&](Section& s) { read_recipes(s, rig.panel, rig.recipes); });
   root.section("storage", [&](Section& s) { read_storage(s, base, rig.storage); });
   root.section("reconstruction", [&](Section& s) { read_reconstruction(s, rig.reconstruction); });
@@ -237,10 +167,10 @@ void read_rig(Section& root, const std::filesystem::path& base, const std::vecto
     });
   }
   if (root.has("gpio")) {
-    root.section("gpio", [&](Section& s) { read_path(s, "socket", base, rig.gpio_socket.emplace()); });
+    root.section("gpio", [&](Section& s) { s.path("socket", base, rig.gpio_socket.emplace()); });
   }
   root.section("api", [&](Section& s) {
-    read_path(s, "socket", base, rig.api.socket);
+    s.path("socket", base, rig.api.socket);
     if (s.has("http_port")) s.number("http_port", rig.api.http_port.emplace(), {1024, 65535});
   });
 }

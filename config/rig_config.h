@@ -7,6 +7,9 @@
 #include <string>
 
 #include "core/result.h"
+#include "drivers/camera/aravis_stereo_camera.h"
+#include "drivers/camera/v4l2_stereo_camera.h"
+#include "drivers/projector/lightcrafter_projector.h"
 #include "drivers/turntable/grbl_turntable.h"
 #include "drivers/turntable/modbus_turntable.h"
 
@@ -48,31 +51,19 @@ struct ProjectorConfig {
   std::string line;                        ///< gpio: fires the dots and both cameras
   std::optional<std::string> plain_line;   ///< gpio: fires the cameras and even light, without the dots
   bool active_low = false;                 ///< gpio: both lines
-  std::chrono::microseconds pulse{15000};  ///< at least the exposure
+  std::chrono::microseconds pulse{15000};  ///< gpio: at least the exposure
+  std::string serial;                      ///< lightcrafter4500: empty: the only one there is
+  LightCrafterOptions lightcrafter;
   std::chrono::seconds warm_up{600};
-};
-
-struct SensorConfig {
-  std::string serial;
-  std::string address;  ///< GigE cameras; empty: found by serial number
 };
 
 struct StereoCameraConfig {
   enum class Driver { aravis, v4l2, v4l2_side_by_side, simulated };
-  enum class Edge { rising, falling };
-  enum class FrameClock { interval, ptp };
   Driver driver = Driver::aravis;
-  SensorConfig left;
-  SensorConfig right;  ///< empty when one device delivers both side by side
-  std::string trigger_source;
-  Edge trigger_edge = Edge::rising;
-  std::string pixel_format;
-  std::chrono::microseconds exposure{12000};
-  int packet_bytes = 0;  ///< aravis only
-  std::chrono::microseconds packet_delay{0};
-  std::chrono::milliseconds frame_timeout{500};
-  FrameClock frame_clock = FrameClock::interval;
+  AravisOptions aravis;
+  V4l2Options v4l2;             ///< with `right` for v4l2, without for v4l2-side-by-side
   std::filesystem::path truth;  ///< simulated: the control socket that tells where the table is
+  std::chrono::microseconds exposure{12000};
 };
 
 struct PanelConfig {

@@ -57,6 +57,13 @@ void Section::flag(std::string_view key, bool& value) {
   }
 }
 
+void Section::path(std::string_view key, const std::filesystem::path& base, std::filesystem::path& value) {
+  std::string found;
+  text(key, found);
+  if (found.find('\0') != std::string::npos) return report(key, "is not a path");
+  value = base / found;
+}
+
 std::optional<std::int64_t> Section::integer(std::string_view key) {
   const toml::node* node = find(key);
   if (!node) return std::nullopt;

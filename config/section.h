@@ -55,6 +55,8 @@ class Section {
 
   void text(std::string_view key, std::string& value);
   void flag(std::string_view key, bool& value);
+  /// A path; a relative one starts at `base`.
+  void path(std::string_view key, const std::filesystem::path& base, std::filesystem::path& value);
 
   template <std::integral T>
   void number(std::string_view key, T& value, Range allowed) {

@@ -7,6 +7,7 @@
 #include "daemon/overloaded.h"
 #include "daemon/rig/panel_thread.h"
 #include "daemon/rig/rig_thread.h"
+#include "daemon/service_manager.h"
 #include "daemon/station/timestamp.h"
 
 namespace scanrig {
@@ -123,7 +124,9 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
     perform(action, workers);
     if (std::holds_alternative<action::BeginJob>(action)) housekeeping.sweep();
   };
-  return loop.run({.perform = perform_all,
+  ServiceManager manager;
+  return loop.run({.alive = [&] { manager.alive(loop.snapshot()->sentence); },
+                   .perform = perform_all,
                    .show = [&](const PanelOutputs& outputs) { panel.show(outputs); },
                    .fresh_job_id = [&] { return fresh_id(); },
                    .quiet_hours = [&] { return quiet_now(options.quiet_hours); },

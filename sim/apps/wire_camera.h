@@ -24,8 +24,11 @@ class WireCamera final : public StereoCamera {
   WireCamera(std::unique_ptr<Scene> scene, std::filesystem::path truth, Clock& clock)
       : scene_(std::move(scene)), truth_(std::move(truth)), clock_(clock) {}
 
+  Result<void> ready(Deadline deadline) override;
   Result<void> arm(Deadline deadline) override;
   Result<StereoFrame> collect(Deadline deadline) override;
+  /// Fails with `unsupported`: to render takes too long.
+  Result<StereoFrame> look(Deadline deadline) override;
 
   /// The trigger line: an exposure begins, and lasts as long as `fire` does.
   Result<void> expose(Light light, const std::function<Result<void>()>& fire);
@@ -42,8 +45,6 @@ class WireCamera final : public StereoCamera {
     Clock::TimePoint taken{};
   };
 
-  void remember(double angle_deg);
-
   const std::unique_ptr<Scene> scene_;
   TruthSocket truth_;
   Clock& clock_;
@@ -52,7 +53,7 @@ class WireCamera final : public StereoCamera {
   std::optional<Result<Exposure>> exposed_;
 
   mutable std::mutex mutex_;
-  std::vector<PoseTruth> history_ = {{}};  // guarded by mutex_: each time the object was put down
+  ExposureHistory history_;  // guarded by mutex_
 };
 
 /// In front of the real projector: what the trigger line does on a bench.

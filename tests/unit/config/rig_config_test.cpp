@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "tests/unit/config/file_under_test.h"
+#include "tests/unit/config/rig_file.h"
 
 namespace scanrig::config {
 namespace {
@@ -14,28 +14,7 @@ namespace {
 using testing::HasSubstr;
 using testing::StartsWith;
 
-const std::filesystem::path kDrives = std::filesystem::path(SCANRIG_SOURCE_DIR) / "config" / "drives";
-
-class RigConfigTest : public FileUnderTest {
- protected:
-  const std::string example_ = shipped("rigs/example.toml");
-
-  Result<RigConfig> read(const std::string& text) const {
-    write(text);
-    return read_rig_config(file_, kDrives);
-  }
-  /// The example with one text replaced has exactly one problem, on `line_with`'s line.
-  void expect_problem(const std::string& from, const std::string& to, const std::string& problem,
-                      const std::string& line_with = "") const {
-    SCOPED_TRACE(to);
-    const std::string text = replaced(example_, from, to);
-    const auto rig = read(text);
-    ASSERT_FALSE(rig);
-    EXPECT_EQ(rig.error().code, ErrorCode::invalid_input);
-    const int line = line_of(text, line_with.empty() ? to : line_with);
-    EXPECT_EQ(rig.error().message, fmt::format("{}:{}: {}", file_.string(), line, problem));
-  }
-};
+class RigConfigTest : public RigFile {};
 
 TEST_F(RigConfigTest, TheShippedExampleIsReadAsItIsWritten) {
   const auto read = read_rig_config(std::filesystem::path(SCANRIG_SOURCE_DIR) / "config/rigs/example.toml");
@@ -62,9 +41,9 @@ TEST_F(RigConfigTest, TheShippedExampleIsReadAsItIsWritten) {
   EXPECT_EQ(table.settle, std::chrono::milliseconds(200));
   EXPECT_EQ(rig.projector.driver, ProjectorConfig::Driver::gpio);
   EXPECT_EQ(rig.projector.pulse, std::chrono::microseconds(15000));
-  EXPECT_EQ(rig.stereo_camera.left.serial, "40012345");
-  EXPECT_EQ(rig.stereo_camera.right.address, "192.168.10.12");
-  EXPECT_EQ(rig.stereo_camera.packet_bytes, 8192);
+  EXPECT_EQ(rig.stereo_camera.aravis.left.serial, "40012345");
+  EXPECT_EQ(rig.stereo_camera.aravis.right.address, "192.168.10.12");
+  EXPECT_EQ(rig.stereo_camera.aravis.packet_bytes, 8192);
   EXPECT_EQ(rig.panel.inputs.at("start").line, "START");
   EXPECT_EQ(rig.panel.outputs.at("lamp_green").line, "LAMP_GREEN");
   EXPECT_EQ(rig.calibration_file, "/var/lib/scanrig/calibration.json");
@@ -158,7 +137,7 @@ TEST_F(RigConfigTest, AProfileThatIsNotThereOrWrongIsToldAtItsKey) {
   auto rig = read(missing);
   ASSERT_FALSE(rig);
   EXPECT_THAT(rig.error().message, HasSubstr("[turntable] profile: there is none of "));
-  EXPECT_THAT(rig.error().message, HasSubstr((kDrives / "none-such.toml").string()));
+  EXPECT_THAT(rig.error().message, HasSubstr((drives_ / "none-such.toml").string()));
   rig = read(replaced(example_, "\"leadshine-rs\"", "\"../../etc/passwd\""));
   ASSERT_FALSE(rig);
   EXPECT_THAT(rig.error().message, HasSubstr("[turntable] profile: must be a name, not a path"));
@@ -179,8 +158,7 @@ TEST_F(RigConfigTest, OtherDriversAreCheckedWithTheirOwnKeys) {
       "[panel]\ndriver = \"modbus-io\"\ndevice = \"/dev/ttyUSB1\"\nbaud = 9600\nparity = \"even\"\nunit_id = 3\n"
       "reply_timeout_ms = 100\npoll_ms = 25\nstart = { channel = 0 }\nreset = { channel = 1, active = \"low\" }\n"
       "lamp_red = { channel = 0 }\n";
-  const auto begin = example_.find("[panel]"), end = example_.find("[calibration]");
-  text = example_.substr(0, begin) + panel + example_.substr(end);
+  text = with_section("[panel]", "[calibration]", panel);
   rig = read(text);
   ASSERT_FALSE(rig) << "the module watches the e-stop, so it has a channel";
   EXPECT_THAT(rig.error().message, HasSubstr("[safety] estop.channel: missing"));
@@ -200,14 +178,12 @@ TEST_F(RigConfigTest, OtherDriversAreCheckedWithTheirOwnKeys) {
 }
 
 TEST_F(RigConfigTest, SimulatedCamerasAreKnownOnlyToThoseWhoAskForThem) {
-  const auto begin = example_.find("[stereo_camera]"), end = example_.find("[panel]");
-  write(example_.substr(0, begin) +
-        "[stereo_camera]\ndriver = \"simulated\"\ntruth = \"control.sock\"\nexposure_us = 12000\n\n" +
-        example_.substr(end));
-  const auto refused = read_rig_config(file_, kDrives);
+  write(with_section("[stereo_camera]", "[panel]",
+                     "[stereo_camera]\ndriver = \"simulated\"\ntruth = \"control.sock\"\nexposure_us = 12000\n"));
+  const auto refused = read_rig_config(file_, drives_);
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().message, HasSubstr("\"simulated\" is not one of aravis, v4l2, v4l2-side-by-side"));
-  const auto rig = read_rig_config(file_, kDrives, Cameras::or_simulated);
+  const auto rig = read_rig_config(file_, drives_, Cameras::or_simulated);
   ASSERT_TRUE(rig) << rig.error().message;
   EXPECT_EQ(rig->stereo_camera.driver, StereoCameraConfig::Driver::simulated);
   EXPECT_EQ(rig->stereo_camera.truth, folder_ / "control.sock");

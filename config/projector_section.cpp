@@ -1,0 +1,63 @@
+#include "config/projector_section.h"
+
+namespace scanrig::config {
+namespace {
+
+void expect_as_long_as(std::chrono::microseconds exposure, std::string_view key, std::chrono::microseconds light,
+                       Section& s) {
+  if (light >= exposure) return;
+  s.report(key,
+           fmt::format("{} is shorter than the exposure_us of {} in [stereo_camera]", light.count(), exposure.count()));
+}
+
+void read_gpio(Section& s, std::chrono::microseconds exposure, ProjectorConfig& projector) {
+  s.text("line", projector.line);
+  if (s.has("plain_line")) s.text("plain_line", projector.plain_line.emplace());
+  if (s.has("active")) s.choice<bool>("active", projector.active_low, {{"low", true}, {"high", false}});
+  s.number("pulse_us", projector.pulse, {10, 1'000'000});
+  expect_as_long_as(exposure, "pulse_us", projector.pulse, s);
+}
+
+/// The ranges are the device's, see LightCrafterProjector::create().
+void read_lightcrafter(Section& s, std::chrono::microseconds exposure, ProjectorConfig& projector) {
+  using Trigger = dlpc350::LutEntry::Trigger;
+  LightCrafterOptions& options = projector.lightcrafter;
+  if (s.has("serial")) s.text("serial", projector.serial);
+  s.number("image", options.image, {0, 63});
+  s.number("pattern", options.pattern, {0, 23});
+  s.number("depth_bits", options.depth, {1, 8});
+  s.section("led_current", [&](Section& led) {
+    led.number("red", options.led_current[0], {0, 255});
+    led.number("green", options.led_current[1], {0, 255});
+    led.number("blue", options.led_current[2], {0, 255});
+  });
+  s.number("exposure_us", options.exposure, {235, 10'000'000});
+  expect_as_long_as(exposure, "exposure_us", options.exposure, s);
+  if (s.has("trigger_out")) {
+    s.section("trigger_out", [&](Section& out) {
+      if (out.has("active")) out.choice<bool>("active", options.trigger_out_inverted, {{"low", true}, {"high", false}});
+      if (out.has("delay_ns")) out.number("delay_ns", options.trigger_out_delay, {-20'000, 2'700});
+    });
+  }
+  if (s.has("trigger_in")) {
+    s.section("trigger_in", [&](Section& in) {
+      in.choice<Trigger>("edge", options.trigger_in, {{"rising", Trigger::rising}, {"falling", Trigger::falling}});
+      if (in.has("delay_ns")) in.number("delay_ns", options.trigger_in_delay, {0, 1'000'000'000});
+    });
+  }
+  s.number("reply_timeout_ms", options.reply_timeout, {10, 5'000});
+}
+
+}  // namespace
+
+void read_projector(Section& s, std::chrono::microseconds exposure, ProjectorConfig& projector) {
+  using Driver = ProjectorConfig::Driver;
+  s.choice<Driver>(
+      "driver", projector.driver,
+      {{"gpio", Driver::gpio}, {"lightcrafter4500", Driver::lightcrafter4500}, {"manual", Driver::manual}});
+  if (projector.driver == Driver::gpio) read_gpio(s, exposure, projector);
+  if (projector.driver == Driver::lightcrafter4500) read_lightcrafter(s, exposure, projector);
+  s.number("warm_up_s", projector.warm_up, {0, 7200});
+}
+
+}  // namespace scanrig::config

@@ -1,0 +1,11 @@
+#pragma once
+
+#include "config/rig_config.h"
+#include "config/section.h"
+
+namespace scanrig::config {
+
+/// [projector]; its light is to last at least the cameras' `exposure`.
+void read_projector(Section& s, std::chrono::microseconds exposure, ProjectorConfig& projector);
+
+}  // namespace scanrig::config
