@@ -15,7 +15,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kTypes{{{".glb", "model/gltf-binary"},
+constexpr std::array<std::pair<std::string_view, std::string_view>, 10> kTypes{{{".gz", "application/gzip"},
+     {".glb", "model/gltf-binary"},
                                                                                {".ply", "application/octet-stream"},
                                                                                {".obj", "model/obj"},
                                                                                {".stl", "model/stl"},

@@ -25,10 +25,16 @@ ordered_json to_json(const std::optional<Error>& error) { return error ? to_json
 ordered_json to_json(const JobInfo& job) {
   return {{"id", job.id},
           {"state", to_string(job.state)},
+          {"recipe", job.recipe.name},
+          {"part", job.part},
           {"folder", job.folder},
-          {"poses", job.poses},
-          {"views", job.views},
+          {"poses", job.recipe.poses},
+          {"views", job.recipe.views},
           {"stored", job.stored.size()},
+          {"resumable", job.resumable},
+          {"quarantined", job.quarantined},
+          {"exported", job.exported},
+          {"passed", job.passed ? ordered_json(*job.passed) : ordered_json(nullptr)},
           {"model", job.model},
           {"report", job.report},
           {"error", to_json(job.error)}};
@@ -45,6 +51,11 @@ ordered_json to_detailed_json(const JobInfo& job) {
                               {"settling_ms", v.settling_ms},
                               {"redone", v.redone}});
   }
+  json["closures"] = ordered_json::array();
+  for (const auto& c : job.closures) {
+    json["closures"].push_back(
+        {{"pose", c.pose}, {"shift_px", c.shift_px}, {"changed", c.changed}, {"unmoved", c.unmoved}});
+  }
   json["stages"] = ordered_json::array();
   for (const auto& stage : job.stages) json["stages"].push_back({{"name", stage.name}, {"fraction", stage.fraction}});
   return json;
@@ -59,7 +70,8 @@ ordered_json to_json(const Snapshot& snapshot) {
           {"sentence", snapshot.sentence},
           {"next_action", snapshot.next_action},
           {"devices", devices_json(snapshot.devices)},
-          {"job", snapshot.job.empty() ? ordered_json(nullptr) : ordered_json(snapshot.job)}};
+          {"job", snapshot.job.empty() ? ordered_json(nullptr) : ordered_json(snapshot.job)},
+          {"queue", snapshot.queue}};
 }
 
 ordered_json io_table(const Snapshot& snapshot) {

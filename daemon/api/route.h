@@ -1,5 +1,7 @@
 #pragma once
 
+#include <chrono>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <string>
@@ -47,6 +49,8 @@ struct Facts;
 struct ApiStation {
   ControlLoop& loop;
   std::function<Facts()> facts;  ///< of the machine and of the API itself; the latest, without waiting
+  std::filesystem::path storage{};                      ///< absolute; where jobs are kept
+  std::function<void(std::function<void()>)> on_worker{};  ///< for what touches the disk
 };
 
 using Send = std::function<void(ApiResponse)>;
@@ -68,6 +72,7 @@ struct Route {
   Reply reply;
   std::vector<unsigned> errors{};  ///< beside those that every route has
   bool slow = false;               ///< touches the disk: done by a worker, not by an I/O thread
+  std::chrono::seconds patience{};  ///< for the answer; 0: as the limits say
   /// Calls `send` once, from this thread or, soon, from the control loop's.
   std::function<void(const ApiStation&, const Values&, Send)> handle;
 };

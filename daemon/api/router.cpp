@@ -67,7 +67,7 @@ Result<Values> read_parameters(const Route& route, const std::vector<std::string
 
 std::vector<Route> all_routes() {
   std::vector<Route> all;
-  for (auto part : {station_routes(), job_routes(), service_routes()}) {
+  for (auto part : {station_routes(), job_routes(), order_routes(), service_routes()}) {
     std::ranges::move(part, std::back_inserter(all));
   }
   return all;

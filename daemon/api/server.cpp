@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "daemon/api/facts.h"
+#include "daemon/api/job_bundle.h"
 #include "daemon/api/session.h"
 #include "daemon/api/socket_file.h"
 
@@ -52,7 +53,8 @@ struct ApiServer::Impl {
   Impl(const ApiOptions& with, const PeerRoles& roles, int listening, ControlLoop& control)
       : options(with),
         loop(control),
-        core({control, [this] { return latest_facts(); }}, roles, with.tokens, with.limits, this_life()),
+        core({control, [this] { return latest_facts(); }, with.storage,
+              [this](std::function<void()> work) { net::post(core.workers, std::move(work)); }}, roles, with.tokens, with.limits, this_life()),
         local(io, Local(), listening) {}
 
   void run() {
@@ -174,6 +176,7 @@ Result<std::unique_ptr<ApiServer>> ApiServer::start(const ApiOptions& options, C
     }
     impl->tcp = std::move(*tcp);
   }
+  remove_old_bundles(options.storage);
   impl->look_now();
   impl->run();
   return std::unique_ptr<ApiServer>(new ApiServer(std::move(impl)));

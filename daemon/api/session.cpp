@@ -95,7 +95,7 @@ void Session::on_body(Error error) {
 
 /// The answer may come from a worker or from the control loop; until then only the timer keeps this session.
 void Session::call() {
-  await_answer();
+  await_answer(match_->route->patience);
   const bool slow = match_->route->slow;
   auto work = [match = std::move(*match_), body = parser_->get().body(), &core = core_, send = sender()]() mutable {
     Router::call(std::move(match), body, core.station, std::move(send));
@@ -108,9 +108,9 @@ void Session::call() {
   }
 }
 
-void Session::await_answer() {
+void Session::await_answer(std::chrono::milliseconds patience) {
   waiting_ = true;
-  timer_.expires_after(core_.limits.answer_time);
+  timer_.expires_after(std::max(patience, core_.limits.answer_time));
   timer_.async_wait([self = shared_from_this()](Error error) {
     if (error || !self->waiting_) return;
     self->last_ = true;

@@ -34,7 +34,7 @@ class Session : public std::enable_shared_from_this<Session> {
   void on_header(Error error);
   void on_body(Error error);
   void call();
-  void await_answer();
+  void await_answer(std::chrono::milliseconds patience);
   [[nodiscard]] Send sender();
   void answer(ApiResponse response);
   void set_head(unsigned status, std::string_view type);

@@ -20,7 +20,8 @@ void add_reconstruct(CLI::App& app, Chosen& chosen) {
       ->check(CLI::IsMember({"evidence", "paper"}));
   sub->add_option("--rests", verb->options.rests, "how rests are found")->check(CLI::IsMember({"hull", "egi"}));
   sub->add_flag("!--no-texture", verb->options.texture, "shape only");
-  sub->add_flag("--json", verb->json, "print JSON");
+  auto* json = sub->add_flag("--json", verb->json, "print JSON");
+  sub->add_flag("--lines", verb->lines, "tell the progress in lines for a program")->excludes(json);
   sub->callback([&chosen, verb] { chosen = [verb] { return reconstruct(*verb); }; });
 }
 

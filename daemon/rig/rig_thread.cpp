@@ -26,7 +26,7 @@ void RigThread::stop() {
 }
 
 void RigThread::interrupt() noexcept {
-  ++interrupts_;
+  acquisition_.interrupt();
   devices_.turntable.request_stop();
   devices_.projector.request_dark();
 }
@@ -36,10 +36,10 @@ void RigThread::run() {
 }
 
 Result<void> RigThread::home_now() {
-  const unsigned before = interrupts_;
+  const unsigned before = acquisition_.interrupts();
   auto home = acquisition_.home();
   // A stop that found nothing running is still kept by the turntable, and ends the next move: that was this one.
-  const bool stale = !home && home.error().code == ErrorCode::stopped && interrupts_ == before;
+  const bool stale = !home && home.error().code == ErrorCode::stopped && acquisition_.interrupts() == before;
   return stale ? acquisition_.home() : home;
 }
 
@@ -52,7 +52,9 @@ Event RigThread::perform(const Command& command) {
   if (const auto* view = std::get_if<action::TakeView>(&command)) {
     auto taken = acquisition_.take_view(view->id, view->angle);
     if (!taken) return event::RigFailed{taken.error()};
-    return event::ViewTaken{std::make_shared<const TakenView>(std::move(*taken))};
+    auto shared = std::make_shared<const TakenView>(std::move(*taken));
+    if (view->closure) return event::ClosureTaken{std::move(shared)};
+    return event::ViewTaken{std::move(shared)};
   }
   if (const auto* jog = std::get_if<action::Jog>(&command)) {
     const auto measured = acquisition_.jog(*jog);

@@ -22,10 +22,10 @@ class Daemon : public scan_samples::FolderTest {
   void SetUp() override {
     FolderTest::SetUp();
     scan_samples::write_text(folder_ / "calibration.json", scan_samples::calibration_json());
-    options.jobs = {
-        .root = folder_ / "jobs", .calibration_file = folder_ / "calibration.json", .profile = {}, .views = 3};
+    options.jobs = {.root = folder_ / "jobs", .calibration_file = folder_ / "calibration.json"};
+    options.recipes["default"].views = 3;
     options.api.socket = folder_ / "api.sock";
-    options.reconstructor = [this](const Calibration&, const Manifest&) {
+    options.reconstructor = [this](const ReconstructionTask&) {
       return std::make_unique<fakes::FakeReconstructor>(log);
     };
   }
@@ -77,7 +77,9 @@ class Daemon : public scan_samples::FolderTest {
 
   std::vector<fs::path> job_folders() const {
     std::vector<fs::path> folders;
-    for (const auto& entry : fs::directory_iterator(folder_ / "jobs")) folders.push_back(entry.path());
+    for (const auto& entry : fs::directory_iterator(folder_ / "jobs")) {
+      if (entry.is_directory()) folders.push_back(entry.path());
+    }
     std::ranges::sort(folders);
     return folders;
   }
@@ -127,7 +129,7 @@ TEST_F(Daemon, MakesOneModelFromTwoPoses) {
   EXPECT_THAT(log.calls, ElementsAre("view 0/0", "view 0/1", "view 0/2", "pose 0", "view 1/0", "view 1/1", "view 1/2",
                                      "pose 1", "finish"));
   for (const auto& [pattern, plain] : log.grey_levels) EXPECT_GT(pattern, plain);
-  EXPECT_THAT(rig.turntable.targets, ElementsAre(0, 0, 120, 240, 360, 480, 600));
+  EXPECT_THAT(rig.turntable.targets, ElementsAre(0, 0, 120, 240, 360, 360, 480, 600, 720));
   EXPECT_FALSE(fs::exists(options.api.socket)) << "the socket goes with the daemon";
 }
 
@@ -162,7 +164,7 @@ TEST_F(Daemon, LostFramesAreRedoneWithoutAFault) {
   get_ready();
   scan_both_poses();
   ASSERT_TRUE(wait_pass());
-  EXPECT_EQ(rig.line.exposures, 12 + 3);
+  EXPECT_EQ(rig.line.exposures, 12 + 4 + 3) << "six views, two closures, three lost";
 }
 
 TEST_F(Daemon, ACameraThatGoesSilentInterruptsTheJobAndLatches) {
@@ -185,6 +187,48 @@ TEST_F(Daemon, ACameraThatGoesSilentInterruptsTheJobAndLatches) {
   EXPECT_EQ(only_job().manifest().state, "interrupted");
   EXPECT_EQ(only_job().manifest().poses.at(0).views.size(), 3u);
   EXPECT_THAT(read_failure(only_job().path())->message, HasSubstr("no frame"));
+}
+
+TEST_F(Daemon, AnAbsentCameraLeavesTheRestRunningAndIsUsedWhenItComes) {
+  rig.line.absent = -1;
+  boot();
+  get_ready();
+  clock.sleep_for(seconds(5));
+  rig.panel.press(&PanelInputs::start);
+  clock.sleep_for(seconds(60));
+  EXPECT_EQ(rig.line.exposures, 0);
+  EXPECT_TRUE(job_folders().empty()) << "no job without a camera";
+  {
+    const std::lock_guard guard(rig.line.mutex);
+    rig.line.absent = 0;
+  }
+  clock.sleep_for(seconds(5));
+  scan_both_poses();
+  EXPECT_TRUE(wait_pass());
+}
+
+TEST_F(Daemon, ACameraPulledInAScanInterruptsTheJobAndIsUsedWhenItIsBack) {
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_flip());
+  {
+    const std::lock_guard guard(rig.line.mutex);
+    rig.line.absent = -1;
+  }
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_fault());
+  {
+    const std::lock_guard guard(rig.line.mutex);
+    rig.line.absent = 0;
+  }
+  rig.panel.press(&PanelInputs::reset);
+  ASSERT_TRUE(wait_ready());
+  EXPECT_EQ(only_job().manifest().state, "interrupted");
+  EXPECT_THAT(read_failure(only_job().path())->message, HasSubstr("left camera 4711"));
+  clock.sleep_for(seconds(5));  // the next look after the devices
+  scan_both_poses();
+  EXPECT_TRUE(wait_pass());
 }
 
 TEST_F(Daemon, AStalledTableIsAFaultThatNamesIt) {
