@@ -16,15 +16,15 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array<std::pair<std::string_view, std::string_view>, 10> kTypes{{{".gz", "application/gzip"},
-     {".glb", "model/gltf-binary"},
-                                                                               {".ply", "application/octet-stream"},
-                                                                               {".obj", "model/obj"},
-                                                                               {".stl", "model/stl"},
-                                                                               {".png", "image/png"},
-                                                                               {".jpg", "image/jpeg"},
-                                                                               {".json", "application/json"},
-                                                                               {".html", "text/html; charset=utf-8"},
-                                                                               {".mtl", "text/plain; charset=utf-8"}}};
+                                                                                {".glb", "model/gltf-binary"},
+                                                                                {".ply", "application/octet-stream"},
+                                                                                {".obj", "model/obj"},
+                                                                                {".stl", "model/stl"},
+                                                                                {".png", "image/png"},
+                                                                                {".jpg", "image/jpeg"},
+                                                                                {".json", "application/json"},
+                                                                                {".html", "text/html; charset=utf-8"},
+                                                                                {".mtl", "text/plain; charset=utf-8"}}};
 
 Result<int> open_component(int folder, const std::string& name, bool last) {
   // O_NONBLOCK: whatever somebody has put there, opening it does not wait.

@@ -25,10 +25,11 @@ void send_bundle(const ApiStation& station, const Values& values, Send send) {
   const auto packed = station.storage / fmt::format("{}{}{}", kPrefix, ++number, kEnding);
   const event::JobAsked asked{.what = event::JobAsked::What::bundle, .job = *values.text("id"), .path = packed};
   // The answer comes on the control loop's thread, which must not touch the disk.
-  station.loop.ask(asked, [send = std::move(send), packed, on_worker = station.on_worker](const Result<std::string>& done) {
-    if (!done) return send(error_response(done.error()));
-    on_worker([send, packed] { send_packed(packed, send); });
-  });
+  station.loop.ask(asked,
+                   [send = std::move(send), packed, on_worker = station.on_worker](const Result<std::string>& done) {
+                     if (!done) return send(error_response(done.error()));
+                     on_worker([send, packed] { send_packed(packed, send); });
+                   });
 }
 
 void remove_old_bundles(const std::filesystem::path& storage) {

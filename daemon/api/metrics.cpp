@@ -36,9 +36,10 @@ class Text {
   std::string text_;
 };
 
-constexpr MachineState kMachineStates[] = {
-    MachineState::preoperational, MachineState::halted, MachineState::maintenance,     MachineState::error,
-    MachineState::initialized,    MachineState::ready,  MachineState::single_execution, MachineState::continuous_execution};
+constexpr MachineState kMachineStates[] = {MachineState::preoperational,   MachineState::halted,
+                                           MachineState::maintenance,      MachineState::error,
+                                           MachineState::initialized,      MachineState::ready,
+                                           MachineState::single_execution, MachineState::continuous_execution};
 
 void station(const Snapshot& snapshot, Text& text) {
   text.begin("machine_state", "gauge", "1 for the state the machine is in.");

@@ -48,8 +48,8 @@ struct Facts;
 /// What routes act on. All of it may be used from any thread.
 struct ApiStation {
   ControlLoop& loop;
-  std::function<Facts()> facts;  ///< of the machine and of the API itself; the latest, without waiting
-  std::filesystem::path storage{};                      ///< absolute; where jobs are kept
+  std::function<Facts()> facts;     ///< of the machine and of the API itself; the latest, without waiting
+  std::filesystem::path storage{};  ///< absolute; where jobs are kept
   std::function<void(std::function<void()>)> on_worker{};  ///< for what touches the disk
 };
 
@@ -70,8 +70,8 @@ struct Route {
   std::string_view about;
   std::vector<Field> in_path{}, in_query{}, in_body{};
   Reply reply;
-  std::vector<unsigned> errors{};  ///< beside those that every route has
-  bool slow = false;               ///< touches the disk: done by a worker, not by an I/O thread
+  std::vector<unsigned> errors{};   ///< beside those that every route has
+  bool slow = false;                ///< touches the disk: done by a worker, not by an I/O thread
   std::chrono::seconds patience{};  ///< for the answer; 0: as the limits say
   /// Calls `send` once, from this thread or, soon, from the control loop's.
   std::function<void(const ApiStation&, const Values&, Send)> handle;

@@ -29,11 +29,10 @@ void order(const ApiStation& station, const Values& values, Send send) {
 
 void ask(const ApiStation& station, const Values& values, What what, Send send) {
   const auto id = *values.text("id");
-  station.loop.ask(event::JobAsked{.what = what,
-                                   .job = id,
-                                   .voxel_mm = values.number("voxel_mm"),
-                                   .fusion = values.text("fusion").value_or("")},
-                   reply_with(id, std::move(send)));
+  station.loop.ask(
+      event::JobAsked{
+          .what = what, .job = id, .voxel_mm = values.number("voxel_mm"), .fusion = values.text("fusion").value_or("")},
+      reply_with(id, std::move(send)));
 }
 
 Route job_route(Method method, std::string_view path, Role role, What what, std::string_view about,
@@ -56,24 +55,26 @@ Route order_route() {
           .path = "/api/v1/jobs",
           .role = Role::operating,
           .about = "Queues scans; answered when their folders are durable, with the first one's id.",
-          .in_body = {{.name = "recipe", .about = "one of the configuration's; default without it", .min = 1, .max = 64},
-                      {.name = "part", .about = "of what is scanned: barcode or free text", .min = 0, .max = 200},
-                      {.name = "repeat", .type = Type::integer, .about = "so many jobs; 1 without it", .min = 1, .max = 100}},
+          .in_body =
+              {{.name = "recipe", .about = "one of the configuration's; default without it", .min = 1, .max = 64},
+               {.name = "part", .about = "of what is scanned: barcode or free text", .min = 0, .max = 200},
+               {.name = "repeat", .type = Type::integer, .about = "so many jobs; 1 without it", .min = 1, .max = 100}},
           .reply = kDone,
           .errors = {404, 409, 500},
           .handle = order};
 }
 
 Route bundle_route() {
-  return {.method = Method::get,
-          .path = "/api/v1/jobs/{id}/bundle",
-          .role = Role::operating,
-          .about = "The whole folder of a job that has ended, packed for whoever must help. The job counts as exported.",
-          .in_path = {kId},
-          .reply = {.about = "a compressed tar archive", .type = "application/gzip"},
-          .errors = {409, 500},
-          .patience = std::chrono::seconds(180),
-          .handle = send_bundle};
+  return {
+      .method = Method::get,
+      .path = "/api/v1/jobs/{id}/bundle",
+      .role = Role::operating,
+      .about = "The whole folder of a job that has ended, packed for whoever must help. The job counts as exported.",
+      .in_path = {kId},
+      .reply = {.about = "a compressed tar archive", .type = "application/gzip"},
+      .errors = {409, 500},
+      .patience = std::chrono::seconds(180),
+      .handle = send_bundle};
 }
 
 }  // namespace
@@ -89,10 +90,11 @@ std::vector<Route> order_routes() {
                 "The next Start begins this queued job."),
       job_route(Method::post, "/api/v1/jobs/{id}/exported", Role::operating, What::set_exported,
                 "Somebody has what he needs: retention may remove it."),
-      job_route(Method::post, "/api/v1/jobs/{id}/reprocess", Role::engineer, What::reprocess,
-                "Makes the model again, from the images.",
-                {{.name = "voxel_mm", .type = Type::number, .about = "as configured without it", .min = 0.02, .max = 5.0},
-                 {.name = "fusion", .about = "as configured without it", .words = {"evidence", "paper"}}}),
+      job_route(
+          Method::post, "/api/v1/jobs/{id}/reprocess", Role::engineer, What::reprocess,
+          "Makes the model again, from the images.",
+          {{.name = "voxel_mm", .type = Type::number, .about = "as configured without it", .min = 0.02, .max = 5.0},
+           {.name = "fusion", .about = "as configured without it", .words = {"evidence", "paper"}}}),
       job_route(Method::del, "/api/v1/jobs/{id}", Role::engineer, What::remove,
                 "Removes a job that has ended, with all its files."),
       bundle_route(),

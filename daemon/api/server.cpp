@@ -54,7 +54,8 @@ struct ApiServer::Impl {
       : options(with),
         loop(control),
         core({control, [this] { return latest_facts(); }, with.storage,
-              [this](std::function<void()> work) { net::post(core.workers, std::move(work)); }}, roles, with.tokens, with.limits, this_life()),
+              [this](std::function<void()> work) { net::post(core.workers, std::move(work)); }},
+             roles, with.tokens, with.limits, this_life()),
         local(io, Local(), listening) {}
 
   void run() {

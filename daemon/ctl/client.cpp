@@ -27,6 +27,7 @@ namespace http = boost::beast::http;
 using Answer = tl::expected<nlohmann::json, Refusal>;
 
 constexpr timeval kPatience{.tv_sec = 15, .tv_usec = 0};
+constexpr timeval kPackingPatience{.tv_sec = 200, .tv_usec = 0};  ///< a file may have to be made first
 
 Answer unreachable(std::string message) { return tl::unexpected(Refusal{ExitCode::unreachable, std::move(message)}); }
 
@@ -49,9 +50,9 @@ struct Removed {
 /// A connection whose every step has a limit.
 class Link {
  public:
-  explicit Link(int fd) : socket_(io_, net::local::stream_protocol(), fd) {
-    ::setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
-    ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &kPatience, sizeof kPatience);
+  Link(int fd, const timeval& patience) : socket_(io_, net::local::stream_protocol(), fd) {
+    ::setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
   }
   net::local::stream_protocol::socket& socket() { return socket_; }
 
@@ -101,7 +102,7 @@ Answer ask(const std::filesystem::path& path, const std::string& method, const s
            const std::string& body) {
   const auto connected = connect_to_socket(path);
   if (!connected) return unreachable(connected.error().message + "; is the daemon running?");
-  Link link(*connected);
+  Link link(*connected, kPatience);
   http::response<http::string_body> response;
   boost::beast::flat_buffer buffer;
   auto error = send(link, method, target, body);
@@ -114,7 +115,7 @@ tl::expected<void, Refusal> download(const std::filesystem::path& path, const st
                                      const std::filesystem::path& out, const Arrived& arrived) {
   const auto connected = connect_to_socket(path);
   if (!connected) return tl::unexpected(unreachable(connected.error().message + "; is the daemon running?").error());
-  Link link(*connected);
+  Link link(*connected, kPackingPatience);
   boost::beast::flat_buffer buffer;
   http::response_parser<http::buffer_body> parser;
   parser.body_limit(boost::none);

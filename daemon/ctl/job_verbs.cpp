@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "daemon/ctl/answers.h"
+#include "daemon/ctl/free_rig.h"
 #include "daemon/ctl/stage_bars.h"
 #include "daemon/ctl/verbs.h"
 
@@ -31,6 +32,23 @@ tl::expected<json, Refusal> list(const Connection& connection, const JobsVerb& v
     if (next.empty() || static_cast<int>(all.size()) >= verb.limit) return json{{"jobs", all}};
     before = "&before=" + segment(next);
   }
+}
+
+/// Copies what the daemon sends to a file here, with a bar.
+ExitCode fetch(const Connection& connection, const std::string& target, const std::string& name,
+               const std::string& out) {
+  std::FILE* told = connection.json ? stderr : stdout;
+  StageBars bars(told, ::isatty(::fileno(told)) == 1);
+  const auto done = download(connection.socket, target, out, [&](std::uint64_t bytes, std::uint64_t of) {
+    if (of > 0) bars.update(name, static_cast<double>(bytes) / static_cast<double>(of));
+  });
+  if (!done) return complain(done.error());
+  if (connection.json) {
+    print({{"file", out}});
+  } else {
+    fmt::print("{}\n", out);
+  }
+  return ExitCode::ok;
 }
 
 }  // namespace
@@ -63,18 +81,46 @@ ExitCode job_files(const Connection& connection, const std::string& id) {
 ExitCode export_file(const Connection& connection, const ExportVerb& verb) {
   const auto out =
       verb.out.empty() ? verb.id + "-" + std::filesystem::path(verb.file).filename().string() : verb.out.string();
-  std::FILE* told = connection.json ? stderr : stdout;
-  StageBars bars(told, ::isatty(::fileno(told)) == 1);
-  const auto target = "/api/v1/jobs/" + segment(verb.id) + "/files/" + segment(verb.file);
-  const auto done = download(connection.socket, target, out, [&](std::uint64_t bytes, std::uint64_t of) {
-    if (of > 0) bars.update(verb.file, static_cast<double>(bytes) / static_cast<double>(of));
-  });
-  if (!done) return complain(done.error());
-  if (connection.json) {
-    print({{"file", out}});
-  } else {
-    fmt::print("{}\n", out);
+  const auto job = "/api/v1/jobs/" + segment(verb.id);
+  if (const auto done = fetch(connection, job + "/files/" + segment(verb.file), verb.file, out); done != ExitCode::ok) {
+    return done;
   }
+  // Who may only look may copy, but retention goes on as if nobody had.
+  const auto noted = ask(connection.socket, "POST", job + "/exported");
+  return noted || noted.error().exit == ExitCode::refused ? ExitCode::ok : complain(noted.error());
+}
+
+ExitCode bundle(const Connection& connection, const BundleVerb& verb) {
+  const auto out = verb.out.empty() ? verb.id + ".tar.gz" : verb.out.string();
+  return fetch(connection, "/api/v1/jobs/" + segment(verb.id) + "/bundle", verb.id, out);
+}
+
+ExitCode queue(const Connection& connection, const QueueVerb& verb) {
+  nlohmann::json body{{"recipe", verb.recipe}, {"repeat", verb.repeat}};
+  if (!verb.part.empty()) body["part"] = verb.part;
+  const auto answer = ask(connection.socket, "POST", "/api/v1/jobs", body.dump());
+  if (!answer) return complain(answer.error());
+  if (connection.json) {
+    print(*answer);
+  } else {
+    fmt::print("{}\n", text(*answer, "job"));
+  }
+  return ExitCode::ok;
+}
+
+ExitCode change_job(const Connection& connection, const JobVerb& verb) {
+  const bool removes = verb.what == "delete";
+  const auto job = "/api/v1/jobs/" + segment(verb.id);
+  if (removes && !agreed(fmt::format("Job {} and all its files are removed for good?", verb.id), verb.yes)) {
+    return complain(ExitCode::refused, "nothing was removed: answer y, or say --yes where there is no terminal");
+  }
+  auto body = json::object();
+  if (verb.voxel_mm) body["voxel_mm"] = *verb.voxel_mm;
+  if (!verb.fusion.empty()) body["fusion"] = verb.fusion;
+  const auto answer = removes ? ask(connection.socket, "DELETE", job)
+                              : ask(connection.socket, "POST", job + "/" + verb.what, body.dump());
+  if (!answer) return complain(answer.error());
+  if (connection.json) print(*answer);
   return ExitCode::ok;
 }
 

@@ -54,6 +54,28 @@ struct ExportVerb {
 };
 ExitCode export_file(const Connection& connection, const ExportVerb& verb);
 
+struct QueueVerb {
+  std::string recipe = "default";
+  std::string part;
+  int repeat = 1;
+};
+ExitCode queue(const Connection& connection, const QueueVerb& verb);
+
+struct JobVerb {
+  std::string what;  ///< "cancel", "resume", "first", "reprocess", "delete"
+  std::string id;
+  std::optional<double> voxel_mm{};  ///< reprocess
+  std::string fusion{};              ///< reprocess
+  bool yes = false;                  ///< delete: do not ask
+};
+ExitCode change_job(const Connection& connection, const JobVerb& verb);
+
+struct BundleVerb {
+  std::string id;
+  std::filesystem::path out;  ///< empty: ID.tar.gz, here
+};
+ExitCode bundle(const Connection& connection, const BundleVerb& verb);
+
 struct MaintenanceVerb {
   std::string what = "on";  ///< on, off, home, jog, pulse, lamp_test, io
   std::optional<double> to_deg, by_deg;

@@ -94,6 +94,9 @@ std::vector<std::string> watch_lines(const json& status, const json& health, con
                                  text(status, "sentence"), "because: " + text(status, "cause")};
   if (const auto action = text(status, "next_action"); !action.empty()) lines.push_back("next:    " + action);
   if (status.at("may_be_moving").get<bool>()) lines.push_back("THE TABLE MAY BE MOVING");
+  if (const auto queued = status.value("queue", json::array()); !queued.empty()) {
+    lines.push_back(fmt::format("queued:  {} jobs, next {}", queued.size(), queued[0].get<std::string>()));
+  }
   add_job(job, lines);
   add_health(health, lines);
   return lines;
