@@ -5,7 +5,9 @@
 namespace scanrig {
 namespace {
 
-constexpr std::size_t kMostPeers = 1024;  ///< remembered
+constexpr std::size_t kMostPeers = 1024;     ///< remembered
+constexpr std::size_t kMostTurnedAway = 32;  ///< at once: they cost descriptors, which the rest of the daemon needs
+constexpr const char* kTurnedAway = "turned away";
 
 }  // namespace
 
@@ -19,6 +21,15 @@ std::unique_ptr<Admission::Seat> Admission::enter(const std::string& peer) {
   ++known.connections;
   ++connections_;
   return std::make_unique<Seat>(shared_from_this(), peer);
+}
+
+std::unique_ptr<Admission::Seat> Admission::enter_to_be_turned_away() {
+  const std::lock_guard guard(mutex_);
+  auto& door = peers_[kTurnedAway];
+  if (door.connections >= kMostTurnedAway) return nullptr;
+  ++door.connections;
+  ++connections_;
+  return std::make_unique<Seat>(shared_from_this(), kTurnedAway);
 }
 
 /// The peer stays known, or hanging up would buy new requests.

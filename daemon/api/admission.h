@@ -50,6 +50,8 @@ class Admission : public std::enable_shared_from_this<Admission> {
   };
   /// Nothing when too many are there.
   std::unique_ptr<Seat> enter(const std::string& peer);
+  /// For one that is only told so; nothing when too many of those are there already.
+  std::unique_ptr<Seat> enter_to_be_turned_away();
 
   [[nodiscard]] std::size_t connections() const;
 

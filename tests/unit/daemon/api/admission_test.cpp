@@ -23,6 +23,15 @@ TEST(Admission, APeerAndAllTogetherHaveSoManyPlaces) {
   EXPECT_TRUE(admission->enter("a"));
 }
 
+TEST(Admission, OnlySoManyAreTurnedAwayWithAWord) {
+  const auto admission = std::make_shared<Admission>(ApiLimits{.connections = 0});
+  std::vector<std::unique_ptr<Admission::Seat>> leaving;
+  while (auto seat = admission->enter_to_be_turned_away()) leaving.push_back(std::move(seat));
+  EXPECT_EQ(leaving.size(), 32u);
+  leaving.pop_back();
+  EXPECT_TRUE(admission->enter_to_be_turned_away());
+}
+
 TEST(Admission, RequestsAreSoManyAtOnceAndComeBackWithTime) {
   const auto admission = std::make_shared<Admission>(ApiLimits{.requests_a_second = 10, .requests_at_once = 3});
   auto seat = admission->enter("a");
