@@ -88,7 +88,8 @@ tl::unexpected<Refusal> refusal_of(Link& link, boost::beast::flat_buffer& buffer
   text.resize(text.size() - begun.get().body().size);
   http::response<http::string_body> response(status, 11, std::move(text));
   const auto answer = understand(response, target);
-  return tl::unexpected(answer ? Refusal{ExitCode::internal, target + ": no file came"} : answer.error());
+  if (!answer) return tl::unexpected(Refusal(answer.error()));
+  return tl::unexpected(Refusal{ExitCode::internal, target + ": no file came"});
 }
 
 tl::unexpected<Refusal> unwritten(const std::filesystem::path& path) {

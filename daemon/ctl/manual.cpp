@@ -44,7 +44,9 @@ std::string synopsis(const CommandWords& command) {
   std::string text = fmt::format(".B {}\n", roff(command.path));
   if (!command.verbs.empty()) text += ".I VERB\n";
   for (const auto& option : command.options) {
-    if (option.names.empty()) text += fmt::format(option.required ? ".I {}\n" : "[\\fI{}\\fR]\n", roff(option.label));
+    if (!option.names.empty()) continue;
+    text += option.required ? fmt::format(".I {}\n", roff(option.label))
+                            : fmt::format("[\\fI{}\\fR]\n", roff(option.label));
   }
   return text + "[options]\n";
 }
