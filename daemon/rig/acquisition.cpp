@@ -14,7 +14,11 @@ constexpr double kMostWound = 4 * 360.0;
 /// `angle` plus as many whole turns as bring it nearest to `to`.
 double nearest_turn(double angle, double to) { return angle + 360.0 * std::round((to - angle) / 360.0); }
 
-bool is_lost(const Error& error) { return error.code == ErrorCode::timeout || error.code == ErrorCode::protocol; }
+/// What the same exposure, taken again, may not have: frames are lost, plugs are pulled and put in.
+bool may_pass(const Error& error) {
+  return error.code == ErrorCode::timeout || error.code == ErrorCode::protocol || error.code == ErrorCode::io ||
+         error.code == ErrorCode::not_found;
+}
 
 }  // namespace
 
@@ -33,13 +37,14 @@ Result<void> Acquisition::home() {
 }
 
 Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle) {
+  const unsigned before = interrupts_;
   const auto move = turn_to(angle);
   if (!move) return pass_on(move);
 
   TakenView view{.id = id};
-  const auto pattern = expose(Light::pattern, view.redone);
+  const auto pattern = expose(Light::pattern, before, view.redone);
   if (!pattern) return pass_on(pattern);
-  const auto plain = expose(Light::plain, view.redone);
+  const auto plain = expose(Light::plain, before, view.redone);
   if (!plain) return pass_on(plain);
 
   view.record.index = id.view;
@@ -74,7 +79,8 @@ std::vector<DeviceHealth> Acquisition::check() {
     return DeviceHealth{name, answer ? std::nullopt : std::optional(answer.error())};
   };
   return {health("turntable", devices_.turntable.status(limit())),
-          health("projector", devices_.projector.dark(limit())), health("camera", devices_.camera.arm(limit()))};
+          health("projector", devices_.projector.dark(limit())),
+          health("camera", devices_.camera.ready(Deadline::after(clock_, options_.connect_limit)))};
 }
 
 Acquisition::Stop Acquisition::stop() {
@@ -95,13 +101,13 @@ Result<Move> Acquisition::turn_to(Degrees angle) {
   return move;
 }
 
-Result<StereoFrame> Acquisition::expose(Light light, int& redone) {
-  auto frame = expose_once(light);
-  for (int i = 0; i < options_.redo_limit && !frame && is_lost(frame.error()); ++i) {
+Result<StereoFrame> Acquisition::expose(Light light, unsigned before, int& redone) {
+  for (int i = 0;; ++i) {
+    if (interrupts_ != before) return fail(ErrorCode::stopped, "rig: stopped on request before the exposure");
+    auto frame = expose_once(light);
+    if (frame || !may_pass(frame.error()) || i == options_.redo_limit || interrupts_ != before) return frame;
     ++redone;
-    frame = expose_once(light);
   }
-  return frame;
 }
 
 Result<StereoFrame> Acquisition::expose_once(Light light) {

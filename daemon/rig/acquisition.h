@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
 
 #include "core/clock.h"
@@ -14,7 +15,8 @@ struct AcquisitionOptions {
   Clock::Duration exposure_limit = std::chrono::seconds(2);  ///< arm, fire and collect, each
   Clock::Duration stop_limit = std::chrono::seconds(3);
   Clock::Duration check_limit = std::chrono::milliseconds(500);  ///< for each device
-  int redo_limit = 3;                                            ///< lost exposures in a row before the view fails
+  Clock::Duration connect_limit = std::chrono::seconds(3);       ///< for cameras that have to be connected
+  int redo_limit = 3;                                            ///< spoilt exposures in a row before the view fails
 };
 
 /// The order in which the devices do one thing. Every wait has a deadline.
@@ -29,8 +31,8 @@ class Acquisition {
   /// Clears an alarm, darkens the projector, finds home. Fails as Turntable::home.
   Result<void> home();
 
-  /// Turns to `angle`, the shorter way, and takes the four images. An exposure whose frames are lost or torn is redone
-  /// and counted. A table wound up by several jobs is unwound on the way.
+  /// Turns to `angle`, the shorter way, and takes the four images. An exposure whose frames are lost or torn, or during
+  /// which camera or projector vanished, is redone and counted. A table wound up by several jobs is unwound on the way.
   /// Fails as the device that failed; the table has been told to stop then.
   Result<TakenView> take_view(const ViewId& id, Degrees angle);
 
@@ -51,14 +53,20 @@ class Acquisition {
   /// Both are tried, whatever the other says.
   Stop stop();
 
+  /// Nothing is redone in what runs now. From any thread.
+  void interrupt() noexcept { ++interrupts_; }
+  [[nodiscard]] unsigned interrupts() const { return interrupts_; }
+
  private:
   Result<Move> turn_to(Degrees angle);
-  Result<StereoFrame> expose(Light light, int& redone);
+  /// `before`: what interrupts() was when the view was begun.
+  Result<StereoFrame> expose(Light light, unsigned before, int& redone);
   Result<StereoFrame> expose_once(Light light);
 
   Devices devices_;
   Clock& clock_;
   AcquisitionOptions options_;
+  std::atomic<unsigned> interrupts_ = 0;
   double position_deg_ = 0.0;  ///< where the last move ended, turns counted from home
 };
 

@@ -2,39 +2,18 @@
 
 #include "config/gpio_options.h"
 #include "daemon/rig/retried_devices.h"
+#include "drivers/camera/aravis_stereo_camera.h"
+#include "drivers/camera/v4l2_stereo_camera.h"
 #include "drivers/panel/gpio_panel.h"
 #include "drivers/panel/modbus_io_panel.h"
 #include "drivers/projector/gpio_projector.h"
+#include "drivers/projector/lightcrafter_projector.h"
 #include "drivers/projector/manual_projector.h"
 #include "drivers/turntable/grbl_turntable.h"
 #include "drivers/turntable/modbus_turntable.h"
 
 namespace scanrig {
 namespace {
-
-tl::unexpected<Error> not_yet(const char* section, std::string_view driver) {
-  return fail(ErrorCode::unsupported, "[{}] driver = \"{}\": this version of scanrigd has no such driver", section,
-              driver);
-}
-
-std::string_view name_of(config::ProjectorConfig::Driver driver) {
-  switch (driver) {
-    case config::ProjectorConfig::Driver::gpio: return "gpio";
-    case config::ProjectorConfig::Driver::lightcrafter4500: return "lightcrafter4500";
-    case config::ProjectorConfig::Driver::manual: return "manual";
-  }
-  return "unknown";
-}
-
-std::string_view name_of(config::StereoCameraConfig::Driver driver) {
-  switch (driver) {
-    case config::StereoCameraConfig::Driver::aravis: return "aravis";
-    case config::StereoCameraConfig::Driver::v4l2: return "v4l2";
-    case config::StereoCameraConfig::Driver::v4l2_side_by_side: return "v4l2-side-by-side";
-    case config::StereoCameraConfig::Driver::simulated: return "simulated";
-  }
-  return "unknown";
-}
 
 /// The one place where a turntable's driver is chosen.
 Result<std::unique_ptr<Turntable>> make_turntable(const config::TurntableConfig& config, Clock& clock) {
@@ -46,14 +25,34 @@ Result<std::unique_ptr<Turntable>> make_turntable(const config::TurntableConfig&
   return made(ModbusTurntable::create(config.modbus, clock));
 }
 
-Result<std::unique_ptr<Projector>> open_projector(const config::ProjectorConfig& config, gpio::Lines& lines,
+/// A LightCrafter connects when it is used, GPIO lines are opened then.
+Result<std::unique_ptr<Projector>> make_projector(const config::ProjectorConfig& config, gpio::Lines& lines,
                                                   Clock& clock) {
   using Driver = config::ProjectorConfig::Driver;
   if (config.driver == Driver::manual) return std::make_unique<ManualProjector>();
-  if (config.driver != Driver::gpio) return not_yet("projector", name_of(config.driver));
-  auto projector = GpioProjector::open(config::gpio_projector_options(config), lines, clock);
-  if (!projector) return pass_on(projector);
-  return std::move(*projector);
+  if (config.driver == Driver::lightcrafter4500) {
+    auto projector =
+        LightCrafterProjector::create(config.lightcrafter, dlpc350::usb_transport(config.serial, clock), clock);
+    if (!projector) return pass_on(projector);
+    return std::move(*projector);
+  }
+  return std::make_unique<RetriedProjector>([&config, &lines, &clock]() -> Result<std::unique_ptr<Projector>> {
+    auto projector = GpioProjector::open(config::gpio_projector_options(config), lines, clock);
+    if (!projector) return pass_on(projector);
+    return std::move(*projector);
+  });
+}
+
+/// The cameras connect when they are used. Null for simulated ones.
+std::unique_ptr<StereoCamera> make_camera(const config::StereoCameraConfig& config, Clock& clock) {
+  using Driver = config::StereoCameraConfig::Driver;
+  switch (config.driver) {
+    case Driver::aravis: return aravis_camera(config.aravis, clock);
+    case Driver::v4l2:
+    case Driver::v4l2_side_by_side: return v4l2_camera(config.v4l2, kernel_video(), clock);
+    case Driver::simulated: break;
+  }
+  return nullptr;
 }
 
 Result<std::unique_ptr<Panel>> open_panel(const config::RigConfig& config, gpio::Lines& lines, Clock& clock) {
@@ -74,12 +73,11 @@ Result<OpenDevices> open_devices(const config::RigConfig& config, Clock& clock) 
   open.lines = config.gpio_socket ? gpio::socket_lines(*config.gpio_socket, clock) : gpio::chip_lines(clock);
   open.turntable = std::move(*turntable);
   gpio::Lines& lines = *open.lines;
-  open.projector = std::make_unique<RetriedProjector>(
-      [&config, &lines, &clock] { return open_projector(config.projector, lines, clock); });
+  auto projector = make_projector(config.projector, lines, clock);
+  if (!projector) return pass_on(projector);
+  open.projector = std::move(*projector);
   open.panel = std::make_unique<RetriedPanel>([&config, &lines, &clock] { return open_panel(config, lines, clock); });
-  open.camera = std::make_unique<RetriedCamera>([&config]() -> Result<std::unique_ptr<StereoCamera>> {
-    return not_yet("stereo_camera", name_of(config.stereo_camera.driver));
-  });
+  open.camera = make_camera(config.stereo_camera, clock);
   return open;
 }
 

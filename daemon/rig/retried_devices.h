@@ -4,7 +4,6 @@
 #include <memory>
 #include <mutex>
 
-#include "drivers/camera/stereo_camera.h"
 #include "drivers/panel/panel.h"
 #include "drivers/projector/projector.h"
 
@@ -81,20 +80,6 @@ class RetriedPanel final : public Panel {
 
  private:
   Retried<Panel> panel_;
-};
-
-class RetriedCamera final : public StereoCamera {
- public:
-  explicit RetriedCamera(Retried<StereoCamera>::Open open) : camera_(std::move(open)) {}
-  Result<void> arm(Deadline deadline) override {
-    return camera_.use([&](StereoCamera& c) { return c.arm(deadline); });
-  }
-  Result<StereoFrame> collect(Deadline deadline) override {
-    return camera_.use([&](StereoCamera& c) { return c.collect(deadline); });
-  }
-
- private:
-  Retried<StereoCamera> camera_;
 };
 
 }  // namespace scanrig

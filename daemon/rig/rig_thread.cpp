@@ -26,7 +26,7 @@ void RigThread::stop() {
 }
 
 void RigThread::interrupt() noexcept {
-  ++interrupts_;
+  acquisition_.interrupt();
   devices_.turntable.request_stop();
   devices_.projector.request_dark();
 }
@@ -36,10 +36,10 @@ void RigThread::run() {
 }
 
 Result<void> RigThread::home_now() {
-  const unsigned before = interrupts_;
+  const unsigned before = acquisition_.interrupts();
   auto home = acquisition_.home();
   // A stop that found nothing running is still kept by the turntable, and ends the next move: that was this one.
-  const bool stale = !home && home.error().code == ErrorCode::stopped && interrupts_ == before;
+  const bool stale = !home && home.error().code == ErrorCode::stopped && acquisition_.interrupts() == before;
   return stale ? acquisition_.home() : home;
 }
 

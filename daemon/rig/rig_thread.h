@@ -1,6 +1,5 @@
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <thread>
 #include <variant>
@@ -44,7 +43,6 @@ class RigThread {
   Devices devices_;
   Acquisition acquisition_;
   std::function<void(Event)> tell_;
-  std::atomic<unsigned> interrupts_ = 0;
   Mailbox<Command> inbox_;
   std::thread thread_;
 };

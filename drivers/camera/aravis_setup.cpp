@@ -176,19 +176,22 @@ Result<void> set_up(ArvCamera* camera, const AravisOptions& options, const std::
   return set_up_clock(camera, options, attempt);
 }
 
-Result<std::unique_ptr<SensorCamera>> open_aravis(const AravisOptions& options, Clock& clock, Deadline deadline) {
+std::unique_ptr<SensorCamera> aravis_camera(const AravisOptions& options, Clock& clock) {
   std::vector<std::unique_ptr<Sensor>> sensors;
   sensors.push_back(std::make_unique<AravisSensor>("left", options.left, options, clock));
   sensors.push_back(std::make_unique<AravisSensor>("right", options.right, options, clock));
-  for (const auto& sensor : sensors) {
-    if (auto ready = sensor->ready(deadline); !ready) return pass_on(ready);
-  }
   TriggeringOptions triggering;
   triggering.by = options.trigger_source == "Software" ? TriggeringOptions::By::software : TriggeringOptions::By::line;
   triggering.frame_clock = options.frame_clock;
   triggering.frame_timeout = options.frame_timeout;
   triggering.dead_air = options.dead_air;
   return std::make_unique<SensorCamera>(std::move(sensors), triggering, clock);
+}
+
+Result<std::unique_ptr<SensorCamera>> open_aravis(const AravisOptions& options, Clock& clock, Deadline deadline) {
+  auto camera = aravis_camera(options, clock);
+  if (auto ready = camera->ready(deadline); !ready) return pass_on(ready);
+  return camera;
 }
 
 std::optional<std::string> host_finding(CameraBus bus, std::size_t frame_bytes, const std::string& root) {

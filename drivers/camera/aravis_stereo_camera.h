@@ -35,7 +35,10 @@ struct AravisOptions {
   std::chrono::seconds dead_air{10};
 };
 
-/// Connects both cameras and sets them up. Fails with `not_found` (no such camera), `io`, `timeout`, `invalid_input`
+/// Two cameras that ready() or arm() connects. See open_aravis() for its errors.
+std::unique_ptr<SensorCamera> aravis_camera(const AravisOptions& options, Clock& clock);
+
+/// The same, connected and set up. Fails with `not_found` (no such camera), `io`, `timeout`, `invalid_input`
 /// (another serial number, a feature that does not take the value, packets larger than the network passes),
 /// `unsupported` (no trigger, no such pixel format).
 Result<std::unique_ptr<SensorCamera>> open_aravis(const AravisOptions& options, Clock& clock, Deadline deadline);

@@ -22,12 +22,17 @@ SensorCamera::SensorCamera(std::vector<std::unique_ptr<Sensor>> sensors, const T
   }
 }
 
-Result<void> SensorCamera::arm(Deadline deadline) {
-  if (std::exchange(armed_, false)) in_step_ = false;  // an exposure given up; its frames may be on their way
-  const bool dead_air = clock_.now() - last_exposure_ > options_.dead_air;
+Result<void> SensorCamera::ready(Deadline deadline) {
   for (Channel& channel : channels_) {
     if (auto ready = get_ready(channel, deadline); !ready) return ready;
   }
+  return {};
+}
+
+Result<void> SensorCamera::arm(Deadline deadline) {
+  if (std::exchange(armed_, false)) in_step_ = false;  // an exposure given up; its frames may be on their way
+  const bool dead_air = clock_.now() - last_exposure_ > options_.dead_air;
+  if (auto connected = ready(deadline); !connected) return connected;
   for (Channel& channel : channels_) {
     if (auto thrown = throw_away(channel, clock_.now()); !thrown) return thrown;
     if (in_step_ && !dead_air && channel.ledger.knows_id()) continue;
@@ -89,6 +94,7 @@ Result<void> SensorCamera::warm_up(Channel& channel, Deadline deadline) {
   // Nothing is known of a new clock: only a second exposure shows that the first frame was no earlier one.
   int wanted = channel.ledger.knows_clock() ? 1 : 2;
   for (int i = 0; i < kWarmUpTries && wanted > 0; ++i) {
+    ++counts_.warm_up;
     const auto exposed = expose_once(channel, deadline);
     if (!exposed) return pass_on(exposed);
     if (*exposed) --wanted;
@@ -101,30 +107,30 @@ Result<void> SensorCamera::warm_up(Channel& channel, Deadline deadline) {
   return channel.sensor->listen_to_line(options_.by == TriggeringOptions::By::line);
 }
 
-/// One exposure by software. False if its frame was torn, or did not come; the next one may.
-Result<bool> SensorCamera::expose_once(Channel& channel, Deadline deadline) {
-  ++counts_.warm_up;
+/// One exposure by software. Nothing if its frame was torn, or did not come; the next one may.
+Result<std::optional<SensorFrame>> SensorCamera::expose_once(Channel& channel, Deadline deadline) {
   last_exposure_ = clock_.now();
   const auto begin = last_exposure_;
   if (auto triggered = channel.sensor->trigger(); !triggered) return pass_on(triggered);
   const Deadline limit = deadline.at_most(clock_, options_.frame_timeout);
   for (;;) {
-    const auto frame = channel.sensor->next(limit);
+    auto frame = channel.sensor->next(limit);
     if (!frame) return pass_on(frame);
     if (!*frame) {
       if (deadline.expired(clock_)) {
         return fail(ErrorCode::timeout, "{}: no frame before the deadline although it was told to expose",
                     channel.sensor->name());
       }
-      return false;
+      return std::nullopt;
     }
-    if (!(*frame)->damage.empty()) return false;
+    if (!(*frame)->damage.empty()) return std::nullopt;
     const HostWindow window{begin, (*frame)->arrival};
     const auto finding = channel.ledger.check((*frame)->stamp, window);
     if (finding == Finding::old_frame) continue;  // of an exposure given up; ours is still to come
     if (finding == Finding::clock_jumped) forget(channel);
     channel.ledger.accept((*frame)->stamp, window);
-    return finding != Finding::clock_jumped;
+    if (finding == Finding::clock_jumped) return std::nullopt;
+    return frame;
   }
 }
 
@@ -146,6 +152,39 @@ Result<StereoFrame> SensorCamera::collect(Deadline deadline) {
   last_exposure_ = clock_.now();
   ++counts_.pairs;
   return hand_out(*frames);
+}
+
+Result<StereoFrame> SensorCamera::look(Deadline deadline) {
+  const bool running = options_.by == TriggeringOptions::By::free_run;
+  armed_ = false;
+  in_step_ = running;  // the next arm() begins counting anew
+  if (auto connected = ready(deadline); !connected) return pass_on(connected);
+  trigger_after_ = clock_.now();
+  std::vector<SensorFrame> frames;
+  for (Channel& channel : channels_) {
+    auto frame = running ? take_running(channel, deadline.at_most(clock_, options_.frame_timeout))
+                         : expose_by_software(channel, deadline);
+    if (!frame) return pass_on(frame);
+    frames.push_back(std::move(*frame));
+  }
+  return hand_out(frames);
+}
+
+Result<SensorFrame> SensorCamera::expose_by_software(Channel& channel, Deadline deadline) {
+  if (!channel.sensor->can_trigger()) {
+    return fail(ErrorCode::unsupported, "{}: exposes at an edge of its trigger input only", channel.sensor->name());
+  }
+  if (!channel.ledger.knows_clock()) {
+    if (auto warm = warm_up(channel, deadline); !warm) return pass_on(warm);
+  }
+  if (auto deaf = channel.sensor->listen_to_line(false); !deaf) return pass_on(deaf);
+  for (int i = 0; i < kWarmUpTries; ++i) {
+    auto frame = expose_once(channel, deadline);
+    if (!frame) return pass_on(frame);
+    if (*frame) return std::move(**frame);
+  }
+  return fail(ErrorCode::protocol, "{}: {} exposures gave no whole frame; check cable and load", channel.sensor->name(),
+              kWarmUpTries);
 }
 
 Result<std::vector<SensorFrame>> SensorCamera::take_all(Deadline deadline) {

@@ -46,11 +46,14 @@ class SensorCamera final : public StereoCamera {
   /// `sensors`: left and right, or one for both.
   SensorCamera(std::vector<std::unique_ptr<Sensor>> sensors, const TriggeringOptions& options, Clock& clock);
 
+  Result<void> ready(Deadline deadline) override;
   /// Fails with `timeout`, `protocol`, `io`, and with `not_found`, `unsupported`, `invalid_input` for a sensor that has
   /// to be connected again and is not what it was.
   Result<void> arm(Deadline deadline) override;
   /// Fails with `timeout` (a frame is missing), `protocol` (torn, old, skipped, too many, not one moment), `io`.
   Result<StereoFrame> collect(Deadline deadline) override;
+  /// By software, one sensor after the other; of freely running ones the next pair.
+  Result<StereoFrame> look(Deadline deadline) override;
 
   [[nodiscard]] const TriggerCounts& counts() const { return counts_; }
 
@@ -65,7 +68,8 @@ class SensorCamera final : public StereoCamera {
   void forget(Channel& channel);
   Result<void> throw_away(Channel& channel, Clock::TimePoint until);
   Result<void> warm_up(Channel& channel, Deadline deadline);
-  Result<bool> expose_once(Channel& channel, Deadline deadline);
+  Result<std::optional<SensorFrame>> expose_once(Channel& channel, Deadline deadline);
+  Result<SensorFrame> expose_by_software(Channel& channel, Deadline deadline);
   Result<SensorFrame> take(Channel& channel, Deadline deadline);
   Result<SensorFrame> take_running(Channel& channel, Deadline deadline);
   Result<void> expect_no_more(Channel& channel);

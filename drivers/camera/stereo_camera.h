@@ -42,6 +42,11 @@ class StereoCamera {
  public:
   virtual ~StereoCamera() = default;
 
+  /// Connected and set up; what was lost is connected again. Exposes nothing. A loss in quiet times is noticed within
+  /// seconds.
+  /// Fails with `not_found`, `timeout`, `io`, and with `unsupported`, `invalid_input` for what is not as it was told.
+  virtual Result<void> ready(Deadline deadline) = 0;
+
   /// Makes both sensors wait for the next edge; frames still in flight are thrown away.
   /// Fails with `timeout`, `protocol`, `io`.
   virtual Result<void> arm(Deadline deadline) = 0;
@@ -49,6 +54,10 @@ class StereoCamera {
   /// The pair that belongs to the edge after arm(). Fails with `timeout` (a frame is missing), `protocol` (torn, or the
   /// two frames do not belong together), `io`. After a failure arm() again and redo the exposure.
   virtual Result<StereoFrame> collect(Deadline deadline) = 0;
+
+  /// A pair without an edge, in whatever light there is, for looking only: left and right may be two moments. Ends what
+  /// arm() began. Fails as arm() and collect(), and with `unsupported` where only an edge exposes.
+  virtual Result<StereoFrame> look(Deadline deadline) = 0;
 };
 
 }  // namespace scanrig

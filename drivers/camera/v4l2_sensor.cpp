@@ -64,6 +64,10 @@ Result<void> V4l2Sensor::call(unsigned long request, void* argument, const char*
 }
 
 Result<bool> V4l2Sensor::ready(Deadline deadline) {
+  if (descriptor_ >= 0 && !lost_) {
+    v4l2_capability capability{};
+    std::ignore = call(VIDIOC_QUERYCAP, &capability, "ask whether it is there");  // notes the loss
+  }
   if (descriptor_ >= 0 && !lost_) return false;
   disconnect();
   if (deadline.expired(clock_)) return fail(ErrorCode::timeout, "{}: no time left to connect", name_);
@@ -247,21 +251,24 @@ Result<void> V4l2Sensor::listen_to_line(bool) {
 
 Result<void> V4l2Sensor::trigger() { return fail(ErrorCode::unsupported, "{}: V4L2 has no software trigger", name_); }
 
-Result<std::unique_ptr<SensorCamera>> open_v4l2(const V4l2Options& options, VideoCalls& calls, Clock& clock,
-                                                Deadline deadline) {
+std::unique_ptr<SensorCamera> v4l2_camera(const V4l2Options& options, VideoCalls& calls, Clock& clock) {
   std::vector<std::unique_ptr<Sensor>> sensors;
   sensors.push_back(
       std::make_unique<V4l2Sensor>(options.right ? "left" : "stereo", options.left, options, calls, clock));
   if (options.right) {
     sensors.push_back(std::make_unique<V4l2Sensor>("right", *options.right, options, calls, clock));
   }
-  for (const auto& sensor : sensors) {
-    if (auto ready = sensor->ready(deadline); !ready) return pass_on(ready);
-  }
   TriggeringOptions triggering;
   triggering.by = options.external_trigger ? TriggeringOptions::By::line : TriggeringOptions::By::free_run;
   triggering.frame_timeout = options.frame_timeout;
   return std::make_unique<SensorCamera>(std::move(sensors), triggering, clock);
+}
+
+Result<std::unique_ptr<SensorCamera>> open_v4l2(const V4l2Options& options, VideoCalls& calls, Clock& clock,
+                                                Deadline deadline) {
+  auto camera = v4l2_camera(options, calls, clock);
+  if (auto ready = camera->ready(deadline); !ready) return pass_on(ready);
+  return camera;
 }
 
 }  // namespace scanrig

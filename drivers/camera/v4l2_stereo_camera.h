@@ -30,7 +30,10 @@ struct V4l2Options {
   std::filesystem::path by_id = "/dev/v4l/by-id";
 };
 
-/// Opens the devices and starts them. Fails with `not_found`, `io` (in use, access refused), `unsupported` (no capture
+/// Devices that ready() or arm() opens. See open_v4l2() for its errors.
+std::unique_ptr<SensorCamera> v4l2_camera(const V4l2Options& options, VideoCalls& calls, Clock& clock);
+
+/// The same, opened and started. Fails with `not_found`, `io` (in use, access refused), `unsupported` (no capture
 /// device, no such pixel format or size, time stamps that are not monotonic), `invalid_input` (a control's value).
 Result<std::unique_ptr<SensorCamera>> open_v4l2(const V4l2Options& options, VideoCalls& calls, Clock& clock,
                                                 Deadline deadline);

@@ -6,8 +6,13 @@
 
 namespace scanrig::sim {
 
-Result<void> WireCamera::arm(Deadline) {
+Result<void> WireCamera::ready(Deadline) {
   if (const auto there = truth_.get(); !there) return pass_on(there);
+  return {};
+}
+
+Result<void> WireCamera::arm(Deadline deadline) {
+  if (auto there = ready(deadline); !there) return there;
   exposed_.reset();
   armed_ = true;
   return {};
@@ -50,6 +55,10 @@ Result<StereoFrame> WireCamera::collect(Deadline deadline) {
   if (!e) return pass_on(e);
   const auto images = scene_->shoot(e->placement, to_radians(e->angle_deg), e->pattern, ++exposures_);
   return StereoFrame{images.left, images.right, PixelFormat::bayer_rggb8, 1, e->taken};
+}
+
+Result<StereoFrame> WireCamera::look(Deadline) {
+  return fail(ErrorCode::unsupported, "camera: this simulated camera exposes at the projector's edge only");
 }
 
 void WireCamera::turned_over() {

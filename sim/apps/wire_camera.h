@@ -24,8 +24,11 @@ class WireCamera final : public StereoCamera {
   WireCamera(std::unique_ptr<Scene> scene, std::filesystem::path truth, Clock& clock)
       : scene_(std::move(scene)), truth_(std::move(truth)), clock_(clock) {}
 
+  Result<void> ready(Deadline deadline) override;
   Result<void> arm(Deadline deadline) override;
   Result<StereoFrame> collect(Deadline deadline) override;
+  /// Fails with `unsupported`: to render takes too long.
+  Result<StereoFrame> look(Deadline deadline) override;
 
   /// The trigger line: an exposure begins, and lasts as long as `fire` does.
   Result<void> expose(Light light, const std::function<Result<void>()>& fire);

@@ -61,6 +61,10 @@ Result<StereoFrame> SimStereoCamera::collect(Deadline deadline) {
   return StereoFrame{images.left, images.right, PixelFormat::bayer_rggb8, e.trigger, e.taken};
 }
 
+Result<StereoFrame> SimStereoCamera::look(Deadline) {
+  return fail(ErrorCode::unsupported, "camera: this simulated camera exposes at the projector's edge only");
+}
+
 Result<PanelInputs> SimPanel::wait_change(const PanelInputs& known, Deadline deadline) {
   Bench& b = bench_;
   std::unique_lock lock(b.mutex);

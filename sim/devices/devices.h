@@ -42,12 +42,15 @@ class SimProjector final : public Projector {
   Bench& bench_;
 };
 
-/// collect() fails with `timeout`, and with `protocol` if it was not armed.
+/// collect() fails with `timeout`, and with `protocol` if it was not armed; look() with `unsupported`: to render takes
+/// too long.
 class SimStereoCamera final : public StereoCamera {
  public:
   explicit SimStereoCamera(Bench& bench) : bench_(bench) {}
+  Result<void> ready(Deadline) override { return {}; }
   Result<void> arm(Deadline deadline) override;
   Result<StereoFrame> collect(Deadline deadline) override;
+  Result<StereoFrame> look(Deadline deadline) override;
 
  private:
   Bench& bench_;

@@ -118,6 +118,31 @@ TEST_P(StereoCameraCompliance, AnEdgeFromBeforeArmingIsNeverTheAnswer) {
   expect_good_exposure();
 }
 
+TEST_P(StereoCameraCompliance, BeingReadyExposesNothingAndDisturbsNothing) {
+  expect_good_exposure();
+  const auto ready = bench_->camera().ready(ample());
+  ASSERT_TRUE(ready) << ready.error().message;
+  expect_good_exposure();
+}
+
+TEST_P(StereoCameraCompliance, ALookNeedsNoEdgeAndSpoilsNoExposure) {
+  for (int i = 0; i < 3; ++i) {
+    const auto seen = bench_->camera().look(ample());
+    if (!seen && seen.error().code == ErrorCode::unsupported) GTEST_SKIP() << seen.error().message;
+    ASSERT_TRUE(seen) << seen.error().message;
+    EXPECT_EQ(seen->left.size(), bench_->size());
+    EXPECT_EQ(seen->right.size(), bench_->size());
+  }
+  ASSERT_FALSE(collect()) << "a look is no arm";
+  for (int i = 0; i < 3; ++i) expect_good_exposure();
+  ASSERT_TRUE(arm());
+  ASSERT_TRUE(bench_->camera().look(ample()));
+  const auto after = collect();
+  ASSERT_FALSE(after);
+  EXPECT_EQ(after.error().code, ErrorCode::protocol) << "a look ends what arm() began";
+  expect_good_exposure();
+}
+
 TEST_P(StereoCameraCompliance, ALostFrameIsATimeout) { expect_named_and_redone(CameraFault::lost, ErrorCode::timeout); }
 TEST_P(StereoCameraCompliance, ALateFrameIsATimeoutAndNeverTheNextAnswer) {
   expect_named_and_redone(CameraFault::late, ErrorCode::timeout);
@@ -133,6 +158,11 @@ TEST_P(StereoCameraCompliance, AnUnpluggedCameraIsAnErrorAndComesBack) {
   expect_good_exposure();
   if (!bench_->plug(false)) GTEST_SKIP() << "this bench cannot be unplugged";
   EXPECT_FALSE(expose());
+  const auto noticed = [&] { return !bench_->camera().ready(ample()); };
+  for (const auto by = ample(); !noticed() && !by.expired(bench_->clock());) {
+    bench_->clock().sleep_for(std::chrono::milliseconds(20));
+  }
+  EXPECT_TRUE(noticed());
   const auto armed = arm();
   ASSERT_FALSE(armed);
   EXPECT_TRUE(armed.error().code == ErrorCode::io || armed.error().code == ErrorCode::timeout ||

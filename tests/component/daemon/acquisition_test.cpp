@@ -67,6 +67,47 @@ TEST_F(AcquisitionTest, ACameraThatStaysSilentFailsTheView) {
   EXPECT_EQ(rig.line.exposures, 4) << "one and three redone";
 }
 
+TEST_F(AcquisitionTest, AnExposureDuringWhichTheCameraVanishedIsRedone) {
+  ASSERT_TRUE(acquisition.home());
+  rig.line.absent = 2;
+  const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
+  ASSERT_TRUE(view) << view.error().message;
+  EXPECT_EQ(view->redone, 2);
+}
+
+TEST_F(AcquisitionTest, ACameraThatStaysAwayFailsTheViewByItsName) {
+  ASSERT_TRUE(acquisition.home());
+  rig.line.absent = -1;
+  const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
+  ASSERT_FALSE(view);
+  EXPECT_EQ(view.error().message, "left camera 4711: no answer");
+  EXPECT_EQ(acquisition.check().at(2).problem->message, "left camera 4711: no answer");
+  rig.line.absent = 0;
+  EXPECT_FALSE(acquisition.check().at(2).problem);
+  EXPECT_TRUE(acquisition.take_view({"job", 0, 0}, {0.0}));
+}
+
+TEST_F(AcquisitionTest, AnInterruptedExposureIsNotRedone) {
+  ASSERT_TRUE(acquisition.home());
+  rig.line.at_fire = [&] {
+    acquisition.interrupt();
+    rig.projector.request_dark();
+  };
+  const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
+  ASSERT_FALSE(view);
+  EXPECT_EQ(view.error().code, ErrorCode::io);
+  EXPECT_EQ(rig.line.exposures, 1);
+}
+
+TEST_F(AcquisitionTest, NothingIsExposedAfterAnInterrupt) {
+  ASSERT_TRUE(acquisition.home());
+  rig.line.at_fire = [&] { acquisition.interrupt(); };
+  const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
+  ASSERT_FALSE(view);
+  EXPECT_EQ(view.error().code, ErrorCode::stopped);
+  EXPECT_EQ(rig.line.exposures, 1) << "the plain exposure was still to come";
+}
+
 TEST_F(AcquisitionTest, FailuresOfTheTurntableArePassedOn) {
   EXPECT_EQ(acquisition.take_view({"job", 0, 0}, {0.0}).error().code, ErrorCode::not_homed);
   ASSERT_TRUE(acquisition.home());

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <atomic>
+#include <functional>
 #include <mutex>
 #include <opencv2/core/mat.hpp>
 #include <string>
@@ -102,6 +104,8 @@ struct TriggerLine {
   bool armed = false;
   int exposures = 0;  ///< since the beginning
   int lose = 0;       ///< the next exposures whose frames never arrive
+  int absent = 0;     ///< how often more the camera does not answer when it is armed; -1: it is not there at all
+  std::function<void()> at_fire;  ///< happens during the next exposure
   Light last = Light::plain;
 };
 
@@ -109,10 +113,17 @@ class FakeProjector final : public Projector {
  public:
   explicit FakeProjector(TriggerLine& line) : line_(line) {}
   Result<void> fire(Light light, Deadline) override {
-    const std::lock_guard guard(line_.mutex);
-    ++line_.exposures;
-    line_.last = light;
-    line_.lit = false;  // the pulse is over when this returns
+    dark_requested_ = false;
+    std::function<void()> happens;
+    {
+      const std::lock_guard guard(line_.mutex);
+      ++line_.exposures;
+      line_.last = light;
+      line_.lit = false;  // the pulse is over when this returns
+      happens = std::exchange(line_.at_fire, nullptr);
+    }
+    if (happens) happens();
+    if (dark_requested_) return fail(ErrorCode::io, "projector: went dark on request");
     return {};
   }
   Result<void> dark(Deadline) override {
@@ -120,20 +131,30 @@ class FakeProjector final : public Projector {
     line_.lit = false;
     return {};
   }
-  void request_dark() noexcept override {}
+  void request_dark() noexcept override { dark_requested_ = true; }
 
  private:
   TriggerLine& line_;
+  std::atomic<bool> dark_requested_ = false;
 };
 
 class FakeCamera final : public StereoCamera {
  public:
   FakeCamera(TriggerLine& line, Clock& clock) : line_(line), clock_(clock) {}
-  Result<void> arm(Deadline) override {
+  Result<void> ready(Deadline) override {
     const std::lock_guard guard(line_.mutex);
+    if (line_.absent != 0) return fail(ErrorCode::io, "left camera 4711: no answer");
+    return {};
+  }
+  Result<void> arm(Deadline deadline) override {
+    auto there = ready(deadline);
+    const std::lock_guard guard(line_.mutex);
+    if (line_.absent > 0) --line_.absent;
+    if (!there) return there;
     line_.armed = true;
     return {};
   }
+  Result<StereoFrame> look(Deadline) override { return fail(ErrorCode::unsupported, "camera: no look"); }
   Result<StereoFrame> collect(Deadline deadline) override {
     bool lost = false;
     StereoFrame frame;

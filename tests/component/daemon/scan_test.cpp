@@ -187,6 +187,48 @@ TEST_F(Daemon, ACameraThatGoesSilentInterruptsTheJobAndLatches) {
   EXPECT_THAT(read_failure(only_job().path())->message, HasSubstr("no frame"));
 }
 
+TEST_F(Daemon, AnAbsentCameraLeavesTheRestRunningAndIsUsedWhenItComes) {
+  rig.line.absent = -1;
+  boot();
+  get_ready();
+  clock.sleep_for(seconds(5));
+  rig.panel.press(&PanelInputs::start);
+  clock.sleep_for(seconds(60));
+  EXPECT_EQ(rig.line.exposures, 0);
+  EXPECT_TRUE(job_folders().empty()) << "no job without a camera";
+  {
+    const std::lock_guard guard(rig.line.mutex);
+    rig.line.absent = 0;
+  }
+  clock.sleep_for(seconds(5));
+  scan_both_poses();
+  EXPECT_TRUE(wait_pass());
+}
+
+TEST_F(Daemon, ACameraPulledInAScanInterruptsTheJobAndIsUsedWhenItIsBack) {
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_flip());
+  {
+    const std::lock_guard guard(rig.line.mutex);
+    rig.line.absent = -1;
+  }
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_fault());
+  {
+    const std::lock_guard guard(rig.line.mutex);
+    rig.line.absent = 0;
+  }
+  rig.panel.press(&PanelInputs::reset);
+  ASSERT_TRUE(wait_ready());
+  EXPECT_EQ(only_job().manifest().state, "interrupted");
+  EXPECT_THAT(read_failure(only_job().path())->message, HasSubstr("left camera 4711"));
+  clock.sleep_for(seconds(5));  // the next look after the devices
+  scan_both_poses();
+  EXPECT_TRUE(wait_pass());
+}
+
 TEST_F(Daemon, AStalledTableIsAFaultThatNamesIt) {
   boot();
   ASSERT_TRUE(wait_halted());

@@ -150,6 +150,11 @@ class WireRig {
             "lamp_red = { line = \"RED\" }\nlamp_amber = { line = \"AMBER\" }\nlamp_green = { line = \"GREEN\" }\n"
             "busy = { line = \"BUSY\" }\nstart_lamp = { line = \"START_LAMP\" }\nflip_request = { line = \"FLIP\" }\n"
             "\n[gpio]\nsocket = \"gpio.sock\"");
+    const auto camera = text.find("\n[stereo_camera]"), panel = text.find("\n[panel]");
+    text.replace(camera, panel - camera,
+                 "\n[stereo_camera]\ndriver = \"v4l2-side-by-side\"\nboth = { device = \"no-camera\" }\n"
+                 "external_trigger = true\npixel_format = \"GREY\"\nsize = { width = 640, height = 240 }\n"
+                 "exposure_us = 12000\nframe_timeout_ms = 500\n");
     replace("/var/lib/scanrig/calibration.json", "calibration.json");
     replace("/var/lib/scanrig/jobs", "jobs");
     replace("/run/scanrig/api.sock", "api.sock");
