@@ -5,6 +5,7 @@ import shutil
 import tempfile
 
 import cameras_debian13
+import cameras_wire
 import fuzz
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
@@ -42,4 +43,5 @@ def replies(bench):
 def measure(bench):
     triggers(bench)
     replies(bench)
+    cameras_wire.measure(bench)
     cameras_debian13.measure(bench)
