@@ -106,7 +106,8 @@ void read_homing(Section& s, DriveProfile::Homing& homing) {
     for (const std::string& mode : modes.free_keys()) modes.number(mode, homing.modes[mode], kWord);
   });
   if (s.has("absolute")) s.flag("absolute", homing.absolute);
-  if (s.has("speeds")) s.section("speeds", [&](Section& speeds) { read_block(speeds, homing.speeds.emplace()); });
+  if (s.has("speeds"))
+    s.section("speeds", [&](Section& speeds) { read_block(speeds, homing.speeds.emplace(DriveProfile::Block{})); });
   read_trigger(s, "start", homing.start);
   read_trigger(s, "set_zero", homing.set_zero);
 }
@@ -176,13 +177,14 @@ Result<DriveProfile> read_drive_profile(const std::filesystem::path& file) {
         {{"ms_per_1000_rpm", Acceleration::ms_per_1000_rpm}, {"pulses_per_s2", Acceleration::pulses_per_s2}});
     root.section("pulses_per_motor_rev", [&](Section& s) { read_resolution(s, profile.pulses_per_motor_rev); });
     root.number("feedback_register", profile.feedback_address, kWord);
-    if (root.has("enable")) read_trigger(root, "enable", profile.enable.emplace());
+    if (root.has("enable")) read_trigger(root, "enable", profile.enable.emplace(DriveProfile::Trigger{}));
     read_trigger(root, "stop", profile.stop);
     root.section("move", [&](Section& s) { read_move(s, profile.move); });
     root.section("status", [&](Section& s) { read_status(s, profile.status); });
     root.section("homing", [&](Section& s) { read_homing(s, profile.homing); });
     if (root.has("soft_limits")) {
-      root.section("soft_limits", [&](Section& s) { read_soft_limits(s, profile.soft_limits.emplace()); });
+      root.section("soft_limits",
+                   [&](Section& s) { read_soft_limits(s, profile.soft_limits.emplace(DriveProfile::SoftLimits{})); });
     }
     root.section("alarm", [&](Section& s) { read_alarm(s, profile.alarm); });
   });

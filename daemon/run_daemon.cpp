@@ -4,6 +4,7 @@
 #include "daemon/overloaded.h"
 #include "daemon/rig/panel_thread.h"
 #include "daemon/rig/rig_thread.h"
+#include "daemon/service_manager.h"
 #include "daemon/station/timestamp.h"
 
 namespace scanrig {
@@ -67,7 +68,9 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   const std::stop_callback shut_down(stop, [&loop] { loop.post(event::Shutdown{}); });
   const Clock::Actor actor(clock);
   starting.reset();
-  return loop.run({.perform = [&](const Action& action) { perform(action, rig, jobs); },
+  ServiceManager manager;
+  return loop.run({.alive = [&] { manager.alive(loop.snapshot()->sentence); },
+                   .perform = [&](const Action& action) { perform(action, rig, jobs); },
                    .show = [&](const PanelOutputs& outputs) { panel.show(outputs); },
                    .fresh_job_id = [&] { return fresh_job_id(options.jobs.root); }});
 }

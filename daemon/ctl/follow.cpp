@@ -22,10 +22,8 @@ std::string view_line(const json& view, const json& job) {
 
 bool JobStory::tell(const json& status, const json& job) {
   const auto& stored = job.at("stored");
-  if (views_told_ == 0 && asked_.empty()) {
-    bars_.line(fmt::format("Job {}", job.at("id").get<std::string>()));
-    asked_ = "-";
-  }
+  if (!introduced_) bars_.line(fmt::format("Job {}", job.at("id").get<std::string>()));
+  introduced_ = true;
   for (; views_told_ < stored.size(); ++views_told_) bars_.line(view_line(stored[views_told_], job));
   const auto state = parse_job_state(job.at("state").get<std::string>());
   const std::string action = state == JobState::waiting_for_flip ? status.at("next_action").get<std::string>() : "-";

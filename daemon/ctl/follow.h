@@ -23,7 +23,8 @@ class JobStory {
  private:
   StageBars& bars_;
   std::size_t views_told_ = 0;
-  std::string asked_;  ///< what the operator was last asked to do
+  bool introduced_ = false;
+  std::string asked_ = "-";  ///< what the operator was last asked to do
   RealClock clock_;
   Clock::TimePoint begun_ = clock_.now();
 };

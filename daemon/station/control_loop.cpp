@@ -10,6 +10,7 @@
 namespace scanrig {
 namespace {
 
+constexpr auto kSignOfLife = std::chrono::seconds(1);
 constexpr auto kBlink = std::chrono::milliseconds(500);
 constexpr auto kLampTest = std::chrono::seconds(3);
 constexpr PanelOutputs kAllOn{true, true, true, true, true, true, true, true};
@@ -25,9 +26,10 @@ Result<void> ControlLoop::run(const StationPorts& ports) {
   wake_later(event::CheckDue{}, options_.check_period);
   show(ports);
   while (!state_.finished) {
+    ports.alive();
     auto next_later = std::ranges::min_element(later_, {}, [](const auto& one) { return one.second.at; });
     const auto later = next_later == later_.end() ? Clock::TimePoint::max() : next_later->second.at;
-    auto message = inbox_.take(std::min({later, next_blink_, give_up_}));
+    auto message = inbox_.take(std::min({later, next_blink_, give_up_, clock_.now() + kSignOfLife}));
     if (message) {
       handle(std::move(*message), ports);
     } else if (clock_.now() >= give_up_) {

@@ -69,7 +69,8 @@ Result<DriveState> ModbusDrive::read_state(Deadline deadline) {
       state.enabled = all_set(profile_.status.enabled);
       state.running = all_set(profile_.status.running);
       state.in_position = all_set(profile_.status.in_position);
-      state.homed = all_set(profile_.status.homed);
+      homed_ = all_set(profile_.status.homed) || (profile_.homing.absolute && homed_);
+      state.homed = homed_;
     }
     return state;
   });
@@ -178,6 +179,16 @@ Result<void> ModbusDrive::reset_alarm(Deadline deadline) {
     return fail(ErrorCode::device_alarm, "{} clears an alarm only when switched off and on again", profile_.name);
   }
   return repeat([&] { return pull(profile_.alarm.reset_trigger, deadline); });
+}
+
+Result<void> ModbusDrive::start_homing(Deadline deadline) {
+  homed_ = false;
+  return pull(profile_.homing.start, deadline);
+}
+
+Result<void> ModbusDrive::set_zero(Deadline deadline) {
+  homed_ = false;
+  return pull(profile_.homing.set_zero, deadline);
 }
 
 Result<void> ModbusDrive::start_move(std::int32_t target, const DriveMotion& motion, Deadline deadline) {

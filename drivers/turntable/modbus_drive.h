@@ -54,8 +54,8 @@ class ModbusDrive {
   Result<void> reset_alarm(Deadline deadline);
 
   Result<void> start_move(std::int32_t target, const DriveMotion& motion, Deadline deadline);
-  Result<void> start_homing(Deadline deadline) { return pull(profile_.homing.start, deadline); }
-  Result<void> set_zero(Deadline deadline) { return pull(profile_.homing.set_zero, deadline); }
+  Result<void> start_homing(Deadline deadline);
+  Result<void> set_zero(Deadline deadline);
   [[nodiscard]] bool knows_zero() const { return profile_.homing.absolute; }
 
   /// Whether the last request may have been carried out although it failed.
@@ -75,6 +75,7 @@ class ModbusDrive {
   modbus::Line line_;
   DriveProfile profile_;
   std::optional<std::uint16_t> to_release_;  // the register of a trigger that is still pulled
+  bool homed_ = false;                       // where the encoder knows the zero: since the last homing
 };
 
 }  // namespace scanrig

@@ -1,16 +1,12 @@
 #include "pipeline/mesh/surface_index.h"
 
-#if __has_include(<embree4/rtcore.h>)
-#include <embree4/rtcore.h>
-#else
-#include <embree3/rtcore.h>
-#endif
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <utility>
+
+#include "core/embree.h"
 
 namespace scanrig {
 
@@ -109,13 +105,7 @@ std::optional<SurfaceIndex::Hit> SurfaceIndex::first_hit(const Eigen::Vector3d& 
   set_ray(ray.ray, origin, direction, kEverywhere);
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-#if RTC_VERSION_MAJOR >= 4
-  rtcIntersect1(scene_->scene, &ray);
-#else
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcIntersect1(scene_->scene, &context, &ray);
-#endif
+  intersect(scene_->scene, ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
   return Hit{ray.ray.tfar, scene_->numbers[ray.hit.primID], {1.0F - ray.hit.u - ray.hit.v, ray.hit.u, ray.hit.v}};
 }
@@ -123,14 +113,7 @@ std::optional<SurfaceIndex::Hit> SurfaceIndex::first_hit(const Eigen::Vector3d& 
 bool SurfaceIndex::blocked(const Eigen::Vector3d& from, const Eigen::Vector3d& to) const {
   RTCRay ray{};
   set_ray(ray, from, to - from, 1.0F);
-#if RTC_VERSION_MAJOR >= 4
-  rtcOccluded1(scene_->scene, &ray);
-#else
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcOccluded1(scene_->scene, &context, &ray);
-#endif
-  return ray.tfar < 0.0F;
+  return occluded(scene_->scene, ray);
 }
 
 SurfaceIndex::Nearest SurfaceIndex::nearest(const Eigen::Vector3d& point, double limit) const {

@@ -8,9 +8,15 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 
+from hand import Hand
+
 START_LIMIT_S = 60
+RENDER_LIMIT_S = 900
+VOXEL_MM = 0.25
+INSIDE = "SCANRIG_DEMO_NETWORK"  # set: this program has its network
 JOB_LIMIT_S = 3600
 
 
@@ -24,6 +30,9 @@ def arguments():
     parser.add_argument("--keep", action="store_true", help="leave the daemon running")
     parser.add_argument("--same-rest", action="store_true", help="the operator forgets to turn the object over")
     parser.add_argument("--scale", type=float, default=1.0, help="of the images: 0.25 gives 320x240")
+    parser.add_argument("--no-noise", action="store_true", help="sensors without noise")
+    parser.add_argument("--wire", action="store_true",
+                        help="the shipped daemon over wires: Modbus drive, GPIO lines, two GigE cameras")
     parser.add_argument("--bin", type=pathlib.Path, required=True, help=argparse.SUPPRESS)
     return parser.parse_args()
 
@@ -43,14 +52,77 @@ def make_room(folder):
     return None
 
 
-def daemon_command(options, socket, jobs):
-    command = [options.bin / "scanrigd-sim", "--socket", socket, "--jobs", jobs, "--seed", options.seed,
-               "--views", options.views, "--height-mm", options.height_mm, "--scale", options.scale]
+def scene(options):
+    """What is on the table, in the words of both simulators."""
+    words = ["--seed", options.seed, "--views", options.views, "--height-mm", options.height_mm,
+             "--scale", options.scale]
     if options.object:
-        command += ["--object", options.object]
-    if options.same_rest:
-        command += ["--same-rest"]
-    return [str(word) for word in command]
+        words += ["--object", options.object]
+    words += [flag for flag, on in (("--same-rest", options.same_rest), ("--no-noise", options.no_noise)) if on]
+    return words
+
+
+class SimulatedStation:
+    """One program: daemon, rig and operator."""
+
+    def __init__(self, folder):
+        self.jobs = folder / "jobs"
+        self.socket = folder / "api.sock"
+        self.processes = []
+
+    def start(self, options, log):
+        """Returns the process that is the daemon."""
+        command = [options.bin / "scanrigd-sim", "--socket", self.socket, "--jobs", self.jobs, *scene(options)]
+        self.processes.append(run(command, log))
+        return self.processes[0]
+
+    def finish(self, job):
+        pass
+
+
+class WireStation:
+    """The shipped daemon, and at the other ends of its wires the simulated rig, whose panel this program operates."""
+
+    def __init__(self, folder):
+        self.rig = folder / "rig"
+        self.jobs = self.rig / "jobs"
+        self.socket = self.rig / "api.sock"
+        self.processes = []  # in the order in which they are to end
+
+    def start(self, options, log):
+        """Returns the process that is the daemon; the rig where it ended instead of becoming ready."""
+        print("Rendering what the cameras will see", flush=True)
+        rig = run([options.bin / "scanrig-sim", "rig", "--dir", self.rig, "--cameras", "gige", "--voxel-mm", VOXEL_MM,
+                   *scene(options)], log, stdout=subprocess.PIPE, text=True)
+        self.processes.append(rig)
+        if not said_ready(rig):
+            return rig
+        daemon = run([options.bin / "scanrigd", "--config", self.rig / "rig.toml"], log)
+        self.processes.insert(0, daemon)
+        self.hand = Hand(self.rig / "control.sock")
+        threading.Thread(target=self.hand.operate, daemon=True).start()
+        return daemon
+
+    def finish(self, job):
+        """The truth, which the daemon never saw, and when the simulated devices did what."""
+        self.hand.say(write_truth=str(job.resolve()))
+        stamps = {what: self.hand.say(get=what)[what] for what in ("exposures", "legs", "changes")}
+        (job / "stamps.json").write_text(json.dumps(stamps, indent=1) + "\n")
+
+
+def run(command, log, **options):
+    return subprocess.Popen([str(word) for word in command], **{"stdout": log, "stderr": log, **options})
+
+
+def said_ready(rig):
+    """The rig's one line; False when it ends without, or takes too long."""
+    alarm = threading.Timer(RENDER_LIMIT_S, rig.kill)
+    alarm.start()
+    line = rig.stdout.readline()
+    alarm.cancel()
+    if not line:
+        rig.wait()
+    return bool(line)
 
 
 def wait_for_socket(daemon, socket):
@@ -62,18 +134,23 @@ def wait_for_socket(daemon, socket):
     return False
 
 
-def stop(daemon):
-    if daemon.poll() is None:
-        daemon.send_signal(signal.SIGTERM)
-        try:
-            daemon.wait(timeout=20)
-        except subprocess.TimeoutExpired:
-            daemon.kill()
+def stop(station):
+    for process in station.processes:
+        if process.poll() is None:
+            process.send_signal(signal.SIGTERM)
+            try:
+                process.wait(timeout=20)
+            except subprocess.TimeoutExpired:
+                process.kill()
 
 
-def link_results(jobs, folder):
-    """The one job's files directly under `folder`, while they stay where the daemon knows them."""
-    job = max((p for p in jobs.iterdir() if p.is_dir()), key=lambda p: p.name)
+def job_folder(jobs):
+    """Of the one job."""
+    return max((p for p in jobs.iterdir() if p.is_dir()), key=lambda p: p.name)
+
+
+def link_results(job, folder):
+    """The job's files directly under `folder`, while they stay where the daemon knows them."""
     for entry in job.iterdir():
         (folder / entry.name).symlink_to(os.path.relpath(entry, folder))
 
@@ -96,6 +173,8 @@ def scores_of(options, folder):
 
 def main():
     options = arguments()
+    if options.wire and INSIDE not in os.environ:
+        in_own_network(options)
     began = time.monotonic()
     folder = options.out
     if options.object and not options.object.is_file():
@@ -103,33 +182,42 @@ def main():
     in_the_way = make_room(folder)
     if in_the_way:
         return complain(in_the_way, 3)
-    socket, jobs = folder / "api.sock", folder / "jobs"
-    with open(folder / "demo.log", "w") as log:
-        daemon = subprocess.Popen(daemon_command(options, socket, jobs), stdout=log, stderr=log)
+    log = open(folder / "demo.log", "w")
+    station = (WireStation if options.wire else SimulatedStation)(folder)
     try:
-        if not wait_for_socket(daemon, socket):
-            stop(daemon)
+        daemon = station.start(options, log)
+        if not wait_for_socket(daemon, station.socket):
+            stop(station)
             print((folder / "demo.log").read_text(), end="", file=sys.stderr)
             return daemon.returncode or 1
         try:
-            followed = subprocess.run([options.bin / "scanrig", "status", "--follow", "--socket", socket],
+            followed = subprocess.run([options.bin / "scanrig", "status", "--follow", "--socket", station.socket],
                                       timeout=JOB_LIMIT_S).returncode
         except subprocess.TimeoutExpired:
             return complain(f"the job is not done after {JOB_LIMIT_S} s; see {folder}/demo.log", 1)
         if followed != 0:
             return followed
+        job = job_folder(station.jobs)
+        station.finish(job)
         if not options.keep:
-            stop(daemon)
-        link_results(jobs, folder)
+            stop(station)
+        link_results(job, folder)
         scored = scores_of(options, folder)
         print(f"Model   {folder}/model/model.glb\nReport  {folder}/model/report.json")
         print(f"Wall time {time.monotonic() - began:.1f} s")
         if options.keep:
-            print(f"The daemon keeps running (process {daemon.pid}); ask it with: scanrig status --socket {socket}")
+            print(f"The daemon keeps running (process {daemon.pid}); ask it with: "
+                  f"scanrig status --socket {station.socket}")
         return scored
     finally:
         if not options.keep:
-            stop(daemon)
+            stop(station)
+
+
+def in_own_network(options):
+    """The simulated cameras want a network of their own: this program once more, inside of one."""
+    command = [options.bin / "scanrig-sim", "own-network", "--", sys.executable, *sys.argv]
+    os.execve(command[0], [str(word) for word in command], {**os.environ, INSIDE: "1"})
 
 
 if __name__ == "__main__":

@@ -73,6 +73,25 @@ json to_json(const RigPanel::Change& change, std::size_t number) {
   return {{"n", number}, {"at_ns", nanoseconds(change.at)}, {"name", change.name}, {"on", change.on}};
 }
 
+json to_json(const RigExposure& exposure, std::size_t number) {
+  return {{"n", number},
+          {"at_ns", nanoseconds(exposure.at)},
+          {"ended_ns", nanoseconds(exposure.ended)},
+          {"read_ns", nanoseconds(exposure.read)},
+          {"pattern", exposure.pattern},
+          {"lit", exposure.lit},
+          {"angle_deg", exposure.place.angle_deg},
+          {"placement", exposure.place.placement}};
+}
+
+json to_json(const wire::AxisLeg& leg, std::size_t number) {
+  return {{"n", number},
+          {"begun_ns", nanoseconds(leg.begun)},
+          {"ended_ns", nanoseconds(leg.ended)},
+          {"from_deg", leg.from_deg},
+          {"to_deg", leg.to_deg}};
+}
+
 /// Those from number `since` on; "next" is the number to ask for the time after.
 template <class Entry>
 json since(const char* name, const std::vector<Entry>& all, std::size_t since) {
@@ -109,7 +128,17 @@ Result<json> RigControl::obey(const json& request) {
     if (!at) return pass_on(at);
     return json{{"ok", true}, {"at_ns", nanoseconds(*at)}};
   }
-  return fail(ErrorCode::invalid_input, "a request has one of: get, set, press, release");
+  if (request.contains("turn_over") || request.contains("write_truth")) {
+    const auto cameras = this->cameras();
+    if (!cameras) return pass_on(cameras);
+    if (request.contains("turn_over")) {
+      (*cameras)->turned_over();
+    } else if (auto done = (*cameras)->write_truth(request["write_truth"].get<std::string>()); !done) {
+      return pass_on(done);
+    }
+    return json{{"ok", true}};
+  }
+  return fail(ErrorCode::invalid_input, "a request has one of: get, set, press, release, turn_over, write_truth");
 }
 
 Result<json> RigControl::get(const json& request) {
@@ -121,10 +150,40 @@ Result<json> RigControl::get(const json& request) {
     return since("frames", rig_.panel().module_port()->log(), from);
   }
   if (what == "changes") return since("changes", rig_.panel().changes(), from);
+  if (what == "legs") return since("legs", rig_.drive().legs(), from);
+  if (what == "exposures") {
+    const auto cameras = this->cameras();
+    if (!cameras) return pass_on(cameras);
+    return since("exposures", (*cameras)->exposures(), from);
+  }
   if (what == "inputs") return json(rig_.panel().inputs());
   if (what == "outputs") return json(rig_.panel().outputs());
   return fail(ErrorCode::invalid_input,
-              "get one of: truth, frames, panel_frames (of a module), changes, inputs, outputs; not \"{}\"", what);
+              "get one of: truth, frames, panel_frames (of a module), changes, inputs, outputs, legs, exposures; not "
+              "\"{}\"",
+              what);
+}
+
+Result<RigCameras*> RigControl::cameras() {
+  if (rig_.cameras()) return rig_.cameras();
+  return fail(ErrorCode::invalid_input, "this rig has no cameras on the wire: start it with --cameras gige");
+}
+
+/// Knobs of one camera, "camera": "left" or "right"; nothing for a name that is none of them.
+std::optional<Result<void>> RigControl::set_camera(const std::string& knob, const json& value, const json& all) {
+  if (knob != "camera_fault" && knob != "camera_unplugged") return std::nullopt;
+  const auto cameras = this->cameras();
+  if (!cameras) return pass_on(cameras);
+  const auto name = all.value("camera", "");
+  if (name != "left" && name != "right") {
+    return fail(ErrorCode::invalid_input, "beside {} say which \"camera\": left or right", knob);
+  }
+  const auto side = name == "left" ? wire::Side::left : wire::Side::right;
+  if (knob == "camera_unplugged") return (*cameras)->wire().plug(side, !value.get<bool>());
+  const auto fault = wire::parse_gige_fault(value.get<std::string>());
+  if (!fault) return fail(ErrorCode::invalid_input, "there is no fault {} of a camera", value.dump());
+  (*cameras)->wire().inject(side, *fault, all.value("fault_count", 1));
+  return Result<void>();
 }
 
 /// Knobs of the panel and of the wiring; nothing for a name that is none of them.
@@ -173,10 +232,11 @@ std::optional<Result<void>> RigControl::set_port(const std::string& knob, const 
 
 Result<void> RigControl::set(const std::string& knob, const json& value, const json& all) {
   static const std::vector<std::string> companions{"fault_count", "fault_delay_ms", "fault_function",
-                                                   "alarm_can_be_reset"};
+                                                   "alarm_can_be_reset", "camera"};
   if (std::ranges::find(companions, knob) != companions.end()) return {};
   if (auto done = set_panel(knob, value, all)) return *done;
   if (auto done = set_port(knob, value, all)) return *done;
+  if (auto done = set_camera(knob, value, all)) return *done;
   auto& drive = rig_.drive();
   const std::map<std::string, std::function<void()>> knobs{
       {"blocked", [&] { drive.block(value.get<bool>()); }},

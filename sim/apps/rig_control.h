@@ -20,6 +20,9 @@ class RigControl {
  private:
   Result<nlohmann::json> obey(const nlohmann::json& request);
   Result<nlohmann::json> get(const nlohmann::json& request);
+  Result<RigCameras*> cameras();
+  std::optional<Result<void>> set_camera(const std::string& knob, const nlohmann::json& value,
+                                         const nlohmann::json& all);
   std::optional<Result<void>> set_panel(const std::string& knob, const nlohmann::json& value,
                                         const nlohmann::json& all);
   std::optional<Result<void>> set_port(const std::string& knob, const nlohmann::json& value, const nlohmann::json& all);

@@ -1,6 +1,7 @@
 #include "sim/apps/rig_toml.h"
 
 #include "core/files.h"
+#include "sim/apps/rig_cameras.h"
 
 namespace scanrig::sim {
 namespace {
@@ -49,6 +50,17 @@ std::string panel(const RigTomlOptions& o) {
   return text + "\n";
 }
 
+std::string cameras(const RigTomlOptions& o) {
+  std::string text = fmt::format("[stereo_camera]\ndriver = \"{}\"\n", o.cameras == "gige" ? "aravis" : "simulated");
+  if (o.cameras != "gige") return text + "truth = \"control.sock\"\nexposure_us = 12000\n\n";
+  const RigGeometry rig = default_rig();
+  text += fmt::format("left = {{ serial = \"{}\", address = \"{}\" }}\n", rig.left.serial, RigCameras::kLeftAddress);
+  text += fmt::format("right = {{ serial = \"{}\", address = \"{}\" }}\n", rig.right.serial, RigCameras::kRightAddress);
+  return text +
+         "trigger = { source = \"Line0\", edge = \"rising\" }\npixel_format = \"BayerRG8\"\nexposure_us = 12000\n"
+         "packet = { size_bytes = 8192, delay_us = 0 }\nframe_timeout_ms = 500\nclock = \"interval\"\n\n";
+}
+
 std::string safety(const RigTomlOptions& o) {
   const char* low = ", active = \"low\"";
   return fmt::format("[safety]\nestop = {}\nguard = {}\nhome_after_restart = \"on_reset\"\nremote_start = false\n\n",
@@ -62,12 +74,10 @@ Result<void> write_rig_toml(const RigTomlOptions& o) {
       "# The simulated rig on the wire, as scanrig-sim made it.\nschema = 1\n\n" + safety(o) + turntable(o) +
       "[projector]\ndriver = \"gpio\"\nline = \"PROJ_TRIG\"\nplain_line = \"PROJ_PLAIN\"\npulse_us = 15000\n"
       "warm_up_s = 0\n\n" +
-      "[stereo_camera]\ndriver = \"simulated\"\ntruth = \"control.sock\"\nexposure_us = 12000\n\n" + panel(o) +
-      "[calibration]\nfile = \"calibration.json\"\n\n" +
+      cameras(o) + panel(o) + "[calibration]\nfile = \"calibration.json\"\n\n" +
       fmt::format("[recipe.default]\nviews = {}\nposes = {}\nflip_timeout_min = 30\n\n", o.views, o.poses) +
-      "[storage]\nroot = \"jobs\"\nreserve_gib = 1\n\n"
-      "[reconstruction]\nexecutor = \"in_process\"\nmemory_gib = 6\nvoxel_mm = 1.0\n\n"
-      "[gpio]\nsocket = \"gpio.sock\"\n\n[api]\nsocket = \"api.sock\"\n";
+      "[storage]\nroot = \"jobs\"\nreserve_gib = 1\n\n[reconstruction]\nexecutor = \"in_process\"\nmemory_gib = 6\n" +
+      fmt::format("voxel_mm = {}\n\n", o.voxel_mm) + "[gpio]\nsocket = \"gpio.sock\"\n\n[api]\nsocket = \"api.sock\"\n";
   std::error_code error;
   const auto profiles = o.folder / "drives";
   if (!std::filesystem::is_symlink(profiles, error)) {

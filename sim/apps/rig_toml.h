@@ -9,9 +9,10 @@ namespace scanrig::sim {
 
 /// What rig.toml says of the simulated rig.
 struct RigTomlOptions {
-  std::filesystem::path folder;  ///< where rig.toml, the sockets and the ports are
-  std::string drive;             ///< "leadshine-rs", "oriental-az", "grbl"
-  std::string panel;             ///< "gpio", "modbus-io"
+  std::filesystem::path folder;       ///< where rig.toml, the sockets and the ports are
+  std::string drive;                  ///< "leadshine-rs", "oriental-az", "grbl"
+  std::string panel;                  ///< "gpio", "modbus-io"
+  std::string cameras = "simulated";  ///< "gige": those of RigCameras; "simulated": scanrigd-sim renders by itself
   bool positive_ccw = true;
   double gear_ratio = 90;
   double pulses_per_motor_rev = 10000;
@@ -19,6 +20,7 @@ struct RigTomlOptions {
   double acceleration_deg_s2 = 90;
   int views = 8;
   int poses = 2;
+  double voxel_mm = 1.0;
 };
 
 /// Writes FOLDER/rig.toml for scanrigd and scanrigd-sim, and FOLDER/drives, where the profiles are found. Fails with

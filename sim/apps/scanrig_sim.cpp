@@ -10,6 +10,7 @@
 #include "sim/apps/shoot.h"
 #include "sim/apps/wire_rig.h"
 #include "sim/wire/control_socket.h"
+#include "sim/wire/loopback.h"
 
 namespace {
 
@@ -23,19 +24,24 @@ struct ShootVerb {
   std::string folder;
 };
 
+/// What is on the table and how it is seen.
+void add_scene(CLI::App& app, sim::SceneOptions& scene) {
+  app.add_option("--object", scene.object, "OBJ, PLY or GLB file; the built-in figurine if not given");
+  app.add_option("--height-mm", scene.height_mm, "Largest extent of the object")->capture_default_str();
+  app.add_option("--seed", scene.seed, "Placements, noise and table errors")->capture_default_str();
+  app.add_option("--scale", scene.image_scale, "Resolution, as a share of 1280x960")->capture_default_str();
+  app.add_flag("--same-rest", scene.same_rest_twice, "The operator forgets to turn the object over");
+  app.add_flag("--any-size", scene.any_size, "Put the object down although it is too large");
+  app.add_flag("!--no-noise", scene.noise, "Leave the sensors' noise out");
+}
+
 void add_shoot(CLI::App& app, ShootVerb& verb, Chosen& chosen) {
   auto& options = verb.options;
   auto* shoot = app.add_subcommand("shoot", "Render a whole scan, with its truth, into a folder");
   shoot->add_option("--out", verb.folder, "The scan folder to make")->required();
-  shoot->add_option("--object", options.scene.object, "OBJ, PLY or GLB file; the built-in figurine if not given");
-  shoot->add_option("--height-mm", options.scene.height_mm, "Largest extent of the object")->capture_default_str();
-  shoot->add_option("--seed", options.scene.seed, "Placements, noise and table errors")->capture_default_str();
+  add_scene(*shoot, options.scene);
   shoot->add_option("--poses", options.scene.poses, "How often the object is put down")->capture_default_str();
   shoot->add_option("--views", options.views, "Table angles a pose")->check(CLI::Range(1, 99))->capture_default_str();
-  shoot->add_option("--scale", options.scene.image_scale, "Resolution, as a share of 1280x960")->capture_default_str();
-  shoot->add_flag("--same-rest", options.scene.same_rest_twice, "The operator forgets to turn the object over");
-  shoot->add_flag("--any-size", options.scene.any_size, "Put the object down although it is too large");
-  shoot->add_flag("!--no-noise", options.scene.noise, "Leave the sensors' noise out");
   shoot->callback([&] { chosen = [&] { return sim::shoot(verb.options, verb.folder); }; });
 }
 
@@ -48,16 +54,18 @@ Result<void> serve_rig(const sim::WireRigOptions& options) {
   const auto socket = sim::wire::ControlSocket::start(options.toml.folder / "control.sock",
                                                       [&](const std::string& line) { return control.answer(line); });
   if (!socket) return pass_on(socket);
+  const auto stopped = stop.token();
+  if ((*rig)->cameras() && !(*rig)->cameras()->wait_until_ready(stopped)) return {};
   std::printf("rig ready: %s\n", (options.toml.folder / "rig.toml").c_str());
   std::fflush(stdout);
   std::mutex mutex;
   std::condition_variable_any changed;
   std::unique_lock lock(mutex);
-  changed.wait(lock, stop.token(), [] { return false; });
+  changed.wait(lock, stopped, [] { return false; });
   return {};
 }
 
-void add_rig(CLI::App& app, sim::WireRigOptions& o, Chosen& chosen) {
+void add_rig(CLI::App& app, sim::WireRigOptions& o, sim::SceneOptions& scene, Chosen& chosen) {
   auto* rig = app.add_subcommand("rig", "The simulated rig on the wire, until SIGTERM; see sim/wire/README.md");
   rig->add_option("--dir", o.toml.folder, "folder for rig.toml, ports and sockets")->required();
   rig->add_option("--drive", o.toml.drive, "leadshine-rs, oriental-az, grbl")->capture_default_str();
@@ -71,9 +79,18 @@ void add_rig(CLI::App& app, sim::WireRigOptions& o, Chosen& chosen) {
   rig->add_option("--start-deg", o.axis.start_deg, "where the table stands, from the switch")->capture_default_str();
   rig->add_option("--backlash-deg", o.axis.backlash_deg, "play of the gear")->capture_default_str();
   rig->add_option("--vibration-deg", o.axis.vibration_deg, "of the table, when a motion ends")->capture_default_str();
+  rig->add_option("--voxel-mm", o.toml.voxel_mm, "in rig.toml")->capture_default_str();
+  rig->add_option("--cameras", o.toml.cameras,
+                  "simulated: scanrigd-sim renders; gige: two cameras on 127.0.0.1 and 127.0.0.2, see own-network")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"simulated", "gige"}));
+  rig->add_flag("--number-frames", o.numbered_frames, "gige: hide the number of the edge in every frame");
+  add_scene(*rig, scene);
   rig->callback([&] {
     o.axis.gear_ratio = o.toml.gear_ratio;
     o.axis.pulses_per_motor_rev = o.toml.pulses_per_motor_rev;
+    scene.poses = o.toml.poses;
+    if (o.toml.cameras == "gige") o.scene = scene;
     chosen = [&] { return serve_rig(o); };
   });
 }
@@ -98,6 +115,13 @@ void add_control(CLI::App& app, ControlVerb& verb, Chosen& chosen) {
   ctl->callback([&] { chosen = [&] { return control(verb); }; });
 }
 
+void add_own_network(CLI::App& app, std::vector<std::string>& command, Chosen& chosen) {
+  auto* network = app.add_subcommand(
+      "own-network", "Run COMMAND in a network namespace that has 127.0.0.1 and 127.0.0.2 and nothing else");
+  network->add_option("COMMAND", command, "with its arguments, after --")->required();
+  network->callback([&] { chosen = [&] { return sim::wire::run_in_own_loopback(command); }; });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -108,10 +132,13 @@ int main(int argc, char** argv) {
   sim::WireRigOptions rig_options;
   rig_options.toml.drive = "leadshine-rs";
   rig_options.toml.panel = "gpio";
+  sim::SceneOptions scene;
   ControlVerb control_verb;
+  std::vector<std::string> command;
   add_shoot(app, shoot_verb, chosen);
-  add_rig(app, rig_options, chosen);
+  add_rig(app, rig_options, scene, chosen);
   add_control(app, control_verb, chosen);
+  add_own_network(app, command, chosen);
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp& help) {

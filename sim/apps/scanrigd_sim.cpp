@@ -49,6 +49,7 @@ void add_options(CLI::App& app, SimOptions& o) {
   app.add_option("--scale", o.rig.image_scale, "of the images: 0.25 gives 320x240")
       ->capture_default_str()
       ->check(CLI::Range(0.05, 1.0));
+  app.add_flag("!--no-noise", o.rig.noise, "leave the sensors' noise out");
   app.add_flag("--same-rest", o.rig.same_rest_twice, "the operator forgets to turn the object over");
   app.add_option("--voxel-mm", o.voxel_mm, "size of a voxel")->capture_default_str()->check(CLI::Range(0.05, 10.0));
   app.add_option("--threads", o.threads, "of the reconstruction; 0: all")->check(CLI::Range(0, 1024));
@@ -109,7 +110,8 @@ Result<void> run_on_wires(const SimOptions& o, const config::RigConfig& config, 
                                    .seed = o.rig.seed,
                                    .poses = options.jobs.poses,
                                    .image_scale = o.rig.image_scale,
-                                   .same_rest_twice = o.rig.same_rest_twice});
+                                   .same_rest_twice = o.rig.same_rest_twice,
+                                   .noise = o.rig.noise});
   if (!scene) return pass_on(scene);
   if (auto made = create_directories_synced(config.calibration_file.parent_path()); !made) return made;
   if (auto written = sim::write_calibration(**scene, config.calibration_file); !written) return written;

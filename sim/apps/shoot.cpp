@@ -91,7 +91,7 @@ Result<void> shoot(const ShootOptions& options, const fs::path& folder) {
     truth.push_back({pose, {}});
     for (int index = 0; index < options.views; ++index, exposure += 2) {
       const double commanded = 360.0 * index / options.views;
-      const double true_deg = resting_angle(commanded, mix(options.scene.seed, 7, pose, index));
+      const double true_deg = resting_angle(commanded + 360.0 * pose, options.scene.seed) - 360.0 * pose;
       const auto view = shoot_view(**scene, pose, index, commanded, true_deg, folder, exposure);
       if (!view) return pass_on(view);
       views.push_back(*view);

@@ -1,7 +1,5 @@
 #include "sim/apps/wire_camera.h"
 
-#include <algorithm>
-#include <cmath>
 #include <future>
 
 #include "core/units.h"
@@ -41,9 +39,9 @@ Result<void> WireCamera::expose(Light light, const std::function<Result<void>()>
     exposed_ = pass_on(middle);
     return fired;
   }
-  remember(middle->angle_deg);
   const std::scoped_lock lock(mutex_);
-  exposed_ = Exposure{history_.back().placement, middle->angle_deg, light == Light::pattern && lit, clock_.now()};
+  history_.exposed(middle->angle_deg);
+  exposed_ = Exposure{history_.placement(), middle->angle_deg, light == Light::pattern && lit, clock_.now()};
   return fired;
 }
 
@@ -63,35 +61,17 @@ Result<StereoFrame> WireCamera::look(Deadline) {
   return fail(ErrorCode::unsupported, "camera: this simulated camera exposes at the projector's edge only");
 }
 
-/// A view that is taken again replaces the one before.
-void WireCamera::remember(double angle_deg) {
-  constexpr double kSameView = 0.5;  // deg
-  const std::scoped_lock lock(mutex_);
-  auto& angles = history_.back().angles_deg;
-  const auto same = [&](double other) { return std::abs(std::remainder(other - angle_deg, 360.0)) < kSameView; };
-  const auto known = std::ranges::find_if(angles, same);
-  if (known != angles.end()) {
-    *known = angle_deg;
-  } else {
-    angles.push_back(angle_deg);
-  }
-}
-
 void WireCamera::turned_over() {
   const std::scoped_lock lock(mutex_);
-  const int next = history_.back().placement + 1;
-  history_.push_back({next % static_cast<int>(scene_->placements().size()), {}});
+  history_.turned_over(*scene_);
 }
 
 Result<void> WireCamera::write_truth(const std::filesystem::path& folder) const {
   std::vector<PoseTruth> taken;
   {
     const std::scoped_lock lock(mutex_);
-    std::ranges::copy_if(history_, std::back_inserter(taken), [](const auto& p) { return !p.angles_deg.empty(); });
+    taken = history_.latest(*scene_);
   }
-  const auto poses = static_cast<std::size_t>(scene_->options().poses);
-  if (taken.size() > poses) taken.erase(taken.begin(), taken.end() - static_cast<std::ptrdiff_t>(poses));
-  if (taken.empty()) return fail(ErrorCode::degenerate, "truth: no exposure has been taken yet");
   return sim::write_truth(*scene_, taken, folder);
 }
 

@@ -45,8 +45,6 @@ class WireCamera final : public StereoCamera {
     Clock::TimePoint taken{};
   };
 
-  void remember(double angle_deg);
-
   const std::unique_ptr<Scene> scene_;
   TruthSocket truth_;
   Clock& clock_;
@@ -55,7 +53,7 @@ class WireCamera final : public StereoCamera {
   std::optional<Result<Exposure>> exposed_;
 
   mutable std::mutex mutex_;
-  std::vector<PoseTruth> history_ = {{}};  // guarded by mutex_: each time the object was put down
+  ExposureHistory history_;  // guarded by mutex_
 };
 
 /// In front of the real projector: what the trigger line does on a bench.

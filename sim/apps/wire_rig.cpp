@@ -1,6 +1,9 @@
 #include "sim/apps/wire_rig.h"
 
+#include <cmath>
+
 #include "core/files.h"
+#include "sim/scene/standing.h"
 #include "sim/wire/grbl_server.h"
 #include "sim/wire/leadshine_drive.h"
 #include "sim/wire/modbus_server.h"
@@ -10,6 +13,33 @@ namespace scanrig::sim {
 namespace {
 
 constexpr std::chrono::milliseconds kLineWatch{5};
+
+/// Where the table will stand for the views of the first job: it is wound up from pose to pose.
+std::vector<Place> places_of_first_job(const WireRigOptions& o) {
+  const double pulses_per_deg = o.toml.pulses_per_motor_rev * o.toml.gear_ratio / 360.0;
+  std::vector<Place> places;
+  for (int pose = 0; pose < o.toml.poses; ++pose) {
+    for (int view = 0; view < o.toml.views; ++view) {
+      const double wanted = 360.0 * (pose + static_cast<double>(view) / o.toml.views);
+      const double sent_to = std::round(wanted * pulses_per_deg) / pulses_per_deg;
+      places.push_back({pose, resting_angle(sent_to, o.scene->seed)});
+    }
+  }
+  return places;
+}
+
+/// The mechanics of the profile instead of the given ones, as sim/devices has them: what a scan sees must not depend on
+/// how the rig is simulated.
+wire::AxisOptions axis_of(const WireRigOptions& o) {
+  wire::AxisOptions axis = o.axis;
+  if (!o.scene) return axis;
+  constexpr double kDecays = 5.0;  // in which the vibration is gone
+  axis.vibration_deg = profile().vibration_deg;
+  axis.vibration_decay_s = profile().settling_s / kDecays;
+  axis.encoder_step_deg = profile().encoder_step_deg;
+  axis.rest_error_deg = [seed = o.scene->seed](double sent_to) { return rest_error_deg(sent_to, seed); };
+  return axis;
+}
 
 }  // namespace
 
@@ -25,12 +55,29 @@ Result<std::unique_ptr<WireRig>> WireRig::start(const WireRigOptions& o, Clock& 
   auto panel = RigPanel::start(o.toml.folder, o.toml.panel == "modbus-io", clock);
   if (!panel) return pass_on(panel);
   rig->panel_ = std::move(*panel);
+  if (auto started = rig->start_cameras(o, clock); !started) return pass_on(started);
   if (auto written = write_rig_toml(o.toml); !written) return pass_on(written);
   rig->line_watch_ = std::jthread([&rig = *rig](const std::stop_token& stop) { rig.watch_line(stop); });
   return rig;
 }
 
+WireRig::~WireRig() {
+  if (cameras_) panel_->on_light({});
+}
+
+Result<void> WireRig::start_cameras(const WireRigOptions& o, Clock& clock) {
+  if (!o.scene) return {};
+  auto cameras = RigCameras::start(
+      {.scene = *o.scene, .expected = places_of_first_job(o), .numbered = o.numbered_frames},
+      [this] { return truth(); }, clock);
+  if (!cameras) return pass_on(cameras);
+  cameras_ = std::move(*cameras);
+  panel_->on_light([&cameras = *cameras_](bool pattern) { cameras.edge(pattern); });
+  return cameras_->write_calibration(o.toml.folder / "calibration.json");
+}
+
 Result<void> WireRig::connect_drive(const WireRigOptions& o, Clock& clock) {
+  const wire::AxisOptions axis = axis_of(o);
   const auto serve = [&](auto drive, const auto& start) -> Result<void> {
     auto server = start(*drive);
     if (!server) return pass_on(server);
@@ -39,11 +86,11 @@ Result<void> WireRig::connect_drive(const WireRigOptions& o, Clock& clock) {
     return {};
   };
   const auto modbus = [&](auto& drive) { return wire::ModbusServer::start(port_, 1, drive, clock); };
-  if (o.toml.drive == "leadshine-rs") return serve(std::make_unique<wire::LeadshineDrive>(o.axis, clock), modbus);
-  if (o.toml.drive == "oriental-az") return serve(std::make_unique<wire::OrientalDrive>(o.axis, clock), modbus);
+  if (o.toml.drive == "leadshine-rs") return serve(std::make_unique<wire::LeadshineDrive>(axis, clock), modbus);
+  if (o.toml.drive == "oriental-az") return serve(std::make_unique<wire::OrientalDrive>(axis, clock), modbus);
   if (o.toml.drive == "grbl") {
     const wire::GrblSettings settings{.acceleration_deg_s2 = o.toml.acceleration_deg_s2};
-    return serve(std::make_unique<wire::GrblController>(o.axis, settings, clock),
+    return serve(std::make_unique<wire::GrblController>(axis, settings, clock),
                  [&](auto& controller) { return wire::GrblServer::start(port_, controller, clock); });
   }
   return fail(ErrorCode::unsupported, "no simulated drive {}", o.toml.drive);

@@ -12,6 +12,7 @@
 
 #include "core/clock.h"
 #include "core/result.h"
+#include "sim/apps/rig_cameras.h"
 #include "sim/apps/rig_panel.h"
 #include "sim/apps/rig_toml.h"
 #include "sim/wire/axis.h"
@@ -26,6 +27,8 @@ struct WireRigOptions {
   wire::AxisOptions axis;    ///< what the mechanics are
   bool positive_ccw = true;  ///< which way positive pulses turn the table, seen from above
   std::optional<std::int32_t> preload_counter;
+  std::optional<SceneOptions> scene;  ///< what two GigE cameras see; nothing: there are none
+  bool numbered_frames = false;       ///< see RigCamerasOptions
 };
 
 /// How far and how fast things really are.
@@ -38,16 +41,18 @@ struct RigTruth {
   bool powered = true;        ///< the drive has power: no e-stop is pressed
 };
 
-/// The simulated rig on the wire: drive, panel and projector behind their ports in one folder, and rig.toml that points
-/// at them. A pressed e-stop takes the drive's power away, as the relay of a real rig does.
-/// Threads: every function may be called from any thread.
+/// The simulated rig on the wire: drive, panel and projector behind their ports in one folder, cameras on the loopback,
+/// and rig.toml that points at them; with cameras calibration.json beside it. A pressed e-stop takes the drive's power
+/// away, as the relay of a real rig does. Threads: every function may be called from any thread.
 class WireRig {
  public:
-  /// Creates the folder. Fails with `io`, `unsupported` (no such drive or panel).
+  /// Creates the folder. Fails with `io`, `unsupported` (no such drive or panel), as RigCameras::start.
   static Result<std::unique_ptr<WireRig>> start(const WireRigOptions& options, Clock& clock);
+  ~WireRig();
 
   [[nodiscard]] RigTruth truth() const;
   [[nodiscard]] RigPanel& panel() { return *panel_; }
+  [[nodiscard]] RigCameras* cameras() { return cameras_.get(); }  ///< null if there are none
   Result<Clock::TimePoint> press(const std::string& input, bool pressed);
   [[nodiscard]] std::vector<wire::WireFrame> frames() const { return server_->log(); }
 
@@ -64,6 +69,7 @@ class WireRig {
   explicit WireRig(std::filesystem::path port) : port_(std::move(port)) {}
   /// Puts the drive behind its port.
   Result<void> connect_drive(const WireRigOptions& options, Clock& clock);
+  Result<void> start_cameras(const WireRigOptions& options, Clock& clock);
   void apply_fault();
   void watch_line(const std::stop_token& stop);
 
@@ -78,6 +84,7 @@ class WireRig {
   std::unique_ptr<wire::SimulatedDrive> drive_;
   std::unique_ptr<wire::WireServer> server_;
   std::unique_ptr<RigPanel> panel_;
+  std::unique_ptr<RigCameras> cameras_;
   std::jthread line_watch_;  ///< last: it is joined before the rest goes
 };
 

@@ -26,6 +26,7 @@ Axis::State Axis::state(double t) const {
 void Axis::go(double target, double speed_deg_s, Clock::TimePoint now) {
   const Profile& p = profile();
   from_ = angle(now);
+  rest_ = target;
   start_ = now;
   const double way = std::abs(target - from_);
   sign_ = target < from_ ? -1.0 : 1.0;
@@ -44,20 +45,23 @@ void Axis::brake(Clock::TimePoint now) {
   first_speed_ = s.speed;
   accelerating_ = cruising_ = 0.0;
   braking_ = s.speed / profile().acceleration_deg_s2;
+  rest_ = from_ + sign_ * 0.5 * s.speed * braking_;
 }
 
 void Axis::freeze(Clock::TimePoint now) {
-  from_ = angle(now);
+  from_ = rest_ = angle(now);
   start_ = now;
   first_speed_ = accelerating_ = cruising_ = braking_ = 0.0;
   vibrates_ = false;
 }
 
-void Axis::rename(double degrees) { from_ -= degrees; }
+void Axis::rename(double degrees) {
+  from_ -= degrees;
+  rest_ -= degrees;
+}
 
 double Axis::angle(Clock::TimePoint now) const {
-  const double t = seconds(now - start_);
-  const double standing = from_ + sign_ * state(t).way;
+  const double standing = now < arrival() ? from_ + sign_ * state(seconds(now - start_)).way : rest_;
   const double since = seconds(now - arrival());
   if (!vibrates_ || since < 0.0 || now >= still()) return standing;
   constexpr double kFrequency = 18.0;  // Hz, of an object on its table

@@ -31,6 +31,7 @@ class Axis {
 
   Clock::TimePoint start_{};
   double from_ = 0.0;
+  double rest_ = 0.0;  // where it stands in the end
   double sign_ = 1.0;
   double first_speed_ = 0.0;                                    // deg/s at the start
   double accelerating_ = 0.0, cruising_ = 0.0, braking_ = 0.0;  // s

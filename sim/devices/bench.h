@@ -60,8 +60,7 @@ struct Bench {
   bool estop_ok = true;
   PanelOutputs lamps;
 
-  // Each time the object was put down, and the table angles at which it was then taken.
-  std::vector<PoseTruth> history = {{}};
+  ExposureHistory history;
 
   /// The trigger edge, at the beginning of an exposure. Call with `mutex` held.
   void edge(Light light);

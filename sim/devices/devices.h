@@ -28,7 +28,6 @@ class SimTurntable final : public Turntable {
   Bench& bench_;
   bool homed_ = false;
   double speed_;  // deg/s
-  std::uint64_t moves_ = 0;
 };
 
 /// Fails with `timeout`, and with `io` if request_dark() cut the pulse short.

@@ -1,7 +1,5 @@
 #include "sim/devices/sim_rig.h"
 
-#include <algorithm>
-
 #include "sim/devices/devices.h"
 #include "sim/scene/profile.h"
 
@@ -26,8 +24,7 @@ class Rig final : public SimRig {
 
   void turn_over() override {
     const std::scoped_lock lock(bench_.mutex);
-    const int next = bench_.history.back().placement + 1;
-    bench_.history.push_back({next % static_cast<int>(bench_.scene->placements().size()), {}});
+    bench_.history.turned_over(*bench_.scene);
   }
 
   PanelOutputs lamps() const override {
@@ -43,12 +40,8 @@ class Rig final : public SimRig {
     std::vector<PoseTruth> taken;
     {
       const std::scoped_lock lock(bench_.mutex);
-      std::copy_if(bench_.history.begin(), bench_.history.end(), std::back_inserter(taken),
-                   [](const PoseTruth& p) { return !p.angles_deg.empty(); });
+      taken = bench_.history.latest(*bench_.scene);
     }
-    const auto poses = static_cast<std::size_t>(bench_.scene->options().poses);
-    if (taken.size() > poses) taken.erase(taken.begin(), taken.end() - static_cast<std::ptrdiff_t>(poses));
-    if (taken.empty()) return fail(ErrorCode::degenerate, "truth: no exposure has been taken yet");
     return sim::write_truth(*bench_.scene, taken, folder);
   }
 

@@ -46,7 +46,7 @@ Result<void> SimTurntable::travel(std::unique_lock<std::mutex>& lock, double tar
   Bench& b = bench_;
   const auto begin = b.clock.now();
   if (!b.stop_requested && b.estop_ok) {
-    b.axis.go(resting_angle(target, mix(b.scene->options().seed, 8, ++moves_)), speed_, begin);
+    b.axis.go(resting_angle(target, b.scene->options().seed), speed_, begin);
   }
   auto done = wait_for(lock, b.axis.arrival(), deadline);
   const auto arrived = b.clock.now();

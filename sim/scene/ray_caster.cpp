@@ -1,8 +1,8 @@
 #include "sim/scene/ray_caster.h"
 
-#include <embree3/rtcore.h>
-
 #include <limits>
+
+#include "core/embree.h"
 
 namespace scanrig::sim {
 
@@ -52,21 +52,16 @@ RayCaster::RayCaster(const TriangleMesh& mesh) : embree_(std::make_unique<Embree
 RayCaster::~RayCaster() = default;
 
 RayCaster::Hit RayCaster::first_hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
   RTCRayHit query{ray(origin, direction, std::numeric_limits<float>::infinity()), {}};
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(embree_->scene, &context, &query);
+  intersect(embree_->scene, query);
   if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
   return {static_cast<int>(query.hit.primID), query.hit.u, query.hit.v};
 }
 
 bool RayCaster::blocked(const Eigen::Vector3d& from, const Eigen::Vector3d& way) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
   RTCRay query = ray(from, way, 1.0F);
-  rtcOccluded1(embree_->scene, &context, &query);
-  return query.tfar < 0.0F;
+  return occluded(embree_->scene, query);
 }
 
 }  // namespace scanrig::sim

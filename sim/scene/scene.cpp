@@ -1,6 +1,8 @@
 #include "sim/scene/scene.h"
 
+#include <bit>
 #include <cassert>
+#include <tuple>
 
 #include "sim/scene/random.h"
 #include "sim/scene/rests.h"
@@ -37,19 +39,32 @@ const RoomLight& Scene::light_of(int pose) {
   return *light;
 }
 
-StereoImages Scene::shoot(int pose, double angle, bool pattern, std::uint64_t exposure) {
+View Scene::look(int pose, double angle) {
   assert(pose >= 0 && pose < static_cast<int>(placements_.size()));
-  if (pose != pose_ || angle != angle_) {
-    const Placed placed{object_, rays_, light_of(pose), placements_[pose]};
-    left_ = render(placed, rig_.left, rig_.projector, dots_, angle, mix(exposure, 0));
-    right_ = render(placed, rig_.right, rig_.projector, dots_, angle, mix(exposure, 1));
-    pose_ = pose;
-    angle_ = angle;
-  }
+  const Placed placed{object_, rays_, light_of(pose), placements_[pose]};
+  const auto seen_by = [&](const Eye& eye, int camera) {
+    const std::uint64_t sampling = mix(static_cast<std::uint64_t>(pose), std::bit_cast<std::uint64_t>(angle), camera);
+    const Radiance light = render(placed, eye, rig_.projector, dots_, angle, sampling);
+    const double scale = options_.image_scale;
+    return std::pair(through_lens(light.pattern, scale), through_lens(light.plain, scale));
+  };
+  View view;
+  std::tie(view.left_pattern, view.left_plain) = seen_by(rig_.left, 0);
+  std::tie(view.right_pattern, view.right_plain) = seen_by(rig_.right, 1);
+  return view;
+}
+
+StereoImages Scene::expose(const View& view, bool pattern, std::uint64_t exposure) const {
   const auto key = [&](int camera) { return options_.noise ? mix(options_.seed, exposure, camera) | 1 : 0; };
-  const double scale = options_.image_scale;
-  return {expose(pattern ? left_.pattern : left_.plain, scale, key(0)),
-          expose(pattern ? right_.pattern : right_.plain, scale, key(1))};
+  return {sim::expose(pattern ? view.left_pattern : view.left_plain, key(0)),
+          sim::expose(pattern ? view.right_pattern : view.right_plain, key(1))};
+}
+
+StereoImages Scene::shoot(int pose, double angle, bool pattern, std::uint64_t exposure) {
+  if (pose != pose_ || angle != angle_) view_ = look(pose, angle);
+  pose_ = pose;
+  angle_ = angle;
+  return expose(view_, pattern, exposure);
 }
 
 }  // namespace scanrig::sim

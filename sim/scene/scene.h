@@ -28,8 +28,13 @@ struct StereoImages {
   cv::Mat right;
 };
 
+/// What falls on both sensors, in both lights; see through_lens().
+struct View {
+  cv::Mat left_pattern, right_pattern, left_plain, right_plain;
+};
+
 /// The object in all its poses under the default rig.
-/// Threads: one at a time.
+/// Threads: look() and shoot() one at a time, the rest from any.
 class Scene {
  public:
   /// Fails as load_object and draw_placements, and with `out_of_range` (image_scale outside 0.1 to 1, poses below 1).
@@ -37,8 +42,11 @@ class Scene {
   /// For tests: a given object in given placements.
   Scene(Object object, std::vector<Transform> placements, const SceneOptions& options);
 
-  /// The table stands at `angle` (radians). `exposure` counts exposures; with the seed it names the noise.
-  /// The second light of the same pose and angle costs next to nothing.
+  /// The table stands at `angle` (radians). Same pose and angle, same bits. Takes about 2 s in full size.
+  View look(int pose, double angle);
+  /// `exposure` counts exposures; with the seed it names the noise.
+  [[nodiscard]] StereoImages expose(const View& view, bool pattern, std::uint64_t exposure) const;
+  /// Both; the second light of the same pose and angle costs next to nothing.
   StereoImages shoot(int pose, double angle, bool pattern, std::uint64_t exposure);
 
   [[nodiscard]] const Object& object() const { return object_; }
@@ -58,11 +66,10 @@ class Scene {
   DotPattern dots_;
   std::vector<std::unique_ptr<RoomLight>> lights_;  // made when a pose is first seen
 
-  // The last thing rendered.
+  // The last thing shot.
   int pose_ = -1;
   double angle_ = 0.0;
-  Radiance left_;
-  Radiance right_;
+  View view_;
 };
 
 }  // namespace scanrig::sim

@@ -7,15 +7,21 @@
 
 namespace scanrig::sim {
 
-/// Where the table comes to rest when told to go to `commanded_deg`; `key` names the move.
-inline double resting_angle(double commanded_deg, std::uint64_t key) {
-  return commanded_deg + profile().repeatability_deg * normal(key);
+/// How far from the angle it was sent to the table of the rig `seed` comes to rest, turns counted from home. Sent there
+/// again it comes to rest at the same place, whatever moved it: so every simulation of one rig stands alike.
+inline double rest_error_deg(double commanded_deg, std::uint64_t seed) {
+  const auto place = std::llround(1000.0 * commanded_deg);
+  return profile().repeatability_deg * normal(mix(seed, 8, place));
 }
 
-/// What the table's encoder reads.
+inline double resting_angle(double commanded_deg, std::uint64_t seed) {
+  return commanded_deg + rest_error_deg(commanded_deg, seed);
+}
+
+/// What the table's encoder reads: a whole number of its steps.
 inline double encoder_reading(double true_deg) {
   const double step = profile().encoder_step_deg;
-  return step * std::round(true_deg / step);
+  return std::round(true_deg / step) / std::round(1.0 / step);
 }
 
 }  // namespace scanrig::sim

@@ -1,5 +1,7 @@
 #include "sim/scene/truth.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 #include <nlohmann/json.hpp>
 
@@ -58,7 +60,32 @@ Result<void> write_calibration(const Scene& scene, const std::filesystem::path& 
   return write_file_atomically(file, json.dump(2) + "\n");
 }
 
+void ExposureHistory::exposed(double angle_deg) {
+  constexpr double kSameView = 0.5;  // deg
+  auto& angles = poses_.back().angles_deg;
+  const auto same = [&](double other) { return std::abs(std::remainder(other - angle_deg, 360.0)) < kSameView; };
+  const auto known = std::ranges::find_if(angles, same);
+  if (known != angles.end()) {
+    *known = angle_deg;
+  } else {
+    angles.push_back(angle_deg);
+  }
+}
+
+void ExposureHistory::turned_over(const Scene& scene) {
+  poses_.push_back({(placement() + 1) % static_cast<int>(scene.placements().size()), {}});
+}
+
+std::vector<PoseTruth> ExposureHistory::latest(const Scene& scene) const {
+  std::vector<PoseTruth> taken;
+  std::ranges::copy_if(poses_, std::back_inserter(taken), [](const PoseTruth& p) { return !p.angles_deg.empty(); });
+  const auto poses = static_cast<std::size_t>(scene.options().poses);
+  if (taken.size() > poses) taken.erase(taken.begin(), taken.end() - static_cast<std::ptrdiff_t>(poses));
+  return taken;
+}
+
 Result<void> write_truth(const Scene& scene, const std::vector<PoseTruth>& poses, const std::filesystem::path& folder) {
+  if (poses.empty()) return fail(ErrorCode::degenerate, "truth: no exposure has been taken yet");
   const auto table_from_object = [&](std::size_t pose) { return scene.placements()[poses[pose].placement]; };
   const Transform truth_from_object = table_from_object(0);
   ordered_json projector = lens(scene.rig().projector);

@@ -11,6 +11,7 @@ constexpr std::chrono::microseconds kStep{500};
 constexpr double kStepSeconds = std::chrono::duration<double>(kStep).count();
 constexpr double kQuickStopFactor = 4.0;
 constexpr double kStillDeg = 0.001;
+constexpr double kDecays = 5.0;      ///< of a vibration, until it is gone
 constexpr double kBackOffDeg = 2.0;  ///< closer than this to the home switch it is closed already
 
 /// Two's complement, as the drive's counter wraps.
@@ -41,6 +42,7 @@ void Axis::begin(Mode mode, const AxisMotion& motion) {
   mode_ = mode;
   motion_ = motion;
   legs_.push_back({truth().table_deg, truth().table_deg, now_, now_});
+  rest_error_ = 0.0;
 }
 
 void Axis::move_to(std::int32_t counter, const AxisMotion& motion) {
@@ -95,8 +97,7 @@ void Axis::step() {
   if (there) way = left;
   command_ += way;
   if (!blocked_) motor_ += way;
-  const double half_play = 0.5 * options_.backlash_deg * pulses_per_degree();
-  table_ = std::clamp(table_, motor_ - half_play, motor_ + half_play);
+  table_ = std::clamp(table_, motor_, motor_ + options_.backlash_deg * pulses_per_degree());
   if (ending ? velocity_ == 0.0 : there && !(by_switch && blocked_)) finish();
 }
 
@@ -110,6 +111,8 @@ void Axis::finish() {
   if (mode_ == Mode::seeking_home) {
     reached_switch_ = true;
     set_counter(0);
+  } else if (mode_ == Mode::moving && options_.rest_error_deg && !blocked_) {
+    rest_error_ = options_.rest_error_deg((command_ - counter_zero_) / pulses_per_degree());
   }
   end();
 }
@@ -126,20 +129,26 @@ void Axis::end() {
 double Axis::vibration() const {
   if (running() || !shaking_) return 0.0;
   const double t = std::chrono::duration<double>(now_ - ended_).count();
-  return options_.vibration_deg * pulses_per_degree() * std::exp(-t / options_.vibration_decay_s) *
+  if (t >= kDecays * options_.vibration_decay_s) return 0.0;
+  return options_.vibration_deg * std::exp(-t / options_.vibration_decay_s) *
          std::cos(2.0 * std::numbers::pi * options_.vibration_hz * t);
 }
 
 std::int32_t Axis::commanded() const { return wrapped(command_ - counter_zero_); }
 
-std::int32_t Axis::measured() const { return wrapped(motor_ + vibration() - counter_zero_); }
+std::int32_t Axis::measured() const {
+  const double deg = (motor_ - counter_zero_) / pulses_per_degree() + off_deg();
+  const double step = options_.encoder_step_deg;
+  return wrapped((step > 0 ? step * std::round(deg / step) : deg) * pulses_per_degree());
+}
 
 AxisTruth Axis::truth() const {
   AxisTruth truth;
-  truth.table_deg = (table_ + vibration()) / pulses_per_degree();
+  truth.table_deg = table_ / pulses_per_degree() + off_deg();
   truth.speed_deg_s = blocked_ ? 0.0 : velocity_ / pulses_per_degree();
   const double t = std::chrono::duration<double>(now_ - ended_).count();
-  const bool shakes = shaking_ && options_.vibration_deg * std::exp(-t / options_.vibration_decay_s) > kStillDeg;
+  const bool shakes = shaking_ && t < kDecays * options_.vibration_decay_s &&
+                      options_.vibration_deg * std::exp(-t / options_.vibration_decay_s) > kStillDeg;
   truth.moving = running() ? !blocked_ : shakes;
   return truth;
 }

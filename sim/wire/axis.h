@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "core/clock.h"
@@ -12,9 +13,12 @@ struct AxisOptions {
   double gear_ratio = 90;       ///< motor turns per table turn
   double backlash_deg = 0.3;    ///< play between motor and table, at the table
   double start_deg = 137.0;     ///< of the table when switched on, from the home switch
-  double vibration_deg = 0.05;  ///< of the table, when a motion ends
+  double vibration_deg = 0.05;  ///< of the table, when a motion ends; gone after five times the decay
   double vibration_decay_s = 0.015;
   double vibration_hz = 25.0;
+  double encoder_step_deg = 0;  ///< at the table; 0: every pulse is read
+  /// How far from the angle it was sent to (from home, at the table) the motor comes to rest; empty: not at all.
+  std::function<double(double sent_to_deg)> rest_error_deg{};
 };
 
 /// How a motion is to be run, in motor units.
@@ -39,7 +43,8 @@ struct AxisLeg {
   Clock::TimePoint ended;
 };
 
-/// Motor, gear with play, table. A step motor: where it is sent and where it is differ when it is blocked or loses
+/// Motor, gear with play, table. Turned in the positive direction the table follows the motor exactly, turned back it
+/// lags behind by the play. A step motor: where it is sent and where it is differ when it is blocked or loses
 /// steps. Computed in steps of half a millisecond up to the time asked for.
 /// Threads: one user at a time.
 class Axis {
@@ -77,7 +82,8 @@ class Axis {
   void end();
   [[nodiscard]] double pulses_per_degree() const;
   [[nodiscard]] double turn() const;       ///< of the table, pulses
-  [[nodiscard]] double vibration() const;  ///< pulses
+  [[nodiscard]] double vibration() const;  ///< deg
+  [[nodiscard]] double off_deg() const { return rest_error_ + vibration(); }
 
   AxisOptions options_;
   Clock::TimePoint now_;
@@ -87,6 +93,7 @@ class Axis {
   double velocity_ = 0;  // pulses/s
   double command_ = 0;   // where the motor is sent, pulses
   double goal_ = 0;
+  double rest_error_ = 0;    // deg at the table; of a motor that stands
   double motor_ = 0;         // where it is
   double table_ = 0;         // in motor pulses
   double counter_zero_ = 0;  // command_ at which the counter reads 0

@@ -105,6 +105,9 @@ Result<std::unique_ptr<GigeCameras>> GigeCameras::start(const GigeCamerasOptions
     own.size = options.size;
     own.late_by = options.late_by;
     own.trigger_selector = options.trigger_selector;
+    own.frame_after = options.frame_after;
+    own.ready = options.ready;
+    own.numbered = options.numbered;
     // No two crystals agree.
     own.clock_ahead = side == Side::left ? std::chrono::seconds(4711) : std::chrono::seconds(-123);
     own.clock_drift = side == Side::left ? 30e-6 : -40e-6;

@@ -19,7 +19,8 @@ struct GigeExposure {
   Clock::TimePoint at;
 };
 
-/// Writes what a sensor sees into `image` (8 bit, one channel, of the size set up). From the cameras' threads.
+/// Writes what a sensor sees into `image` (8 bit, one channel, of the size set up), just before it is sent. From the
+/// cameras' threads.
 using FrameSource = std::function<void(Side side, const GigeExposure& exposure, cv::Mat& image)>;
 
 /// What can happen to the frame of an edge.
@@ -46,6 +47,10 @@ struct GigeCamerasOptions {
   cv::Size size{160, 120};
   std::chrono::milliseconds late_by{150};
   std::string trigger_selector = "FrameStart";  ///< what the trigger that starts a frame is called
+  std::chrono::microseconds frame_after{0};     ///< from the edge to the frame: exposure and readout
+  /// Whether a frame that is due can be read out; empty: always.
+  std::function<bool(const GigeExposure& exposure)> ready;
+  bool numbered = true;  ///< hide the number of the edge in every frame
 };
 
 /// Share of the frames each fault happens to, by chance, to one of the two sensors at a time.
@@ -60,10 +65,10 @@ struct FaultCounts {
 };
 
 /// Two GigE Vision cameras that answer on the wire, with a line as their trigger input. Stamps are taken from each
-/// camera's own clock: neither begins with the other's or with the host's, and they drift apart. A trigger number is
-/// hidden in the upper left corner of every frame, see hidden_number().
-/// All such cameras on a host share one control port: run them in a network namespace of their own, see loopback.h.
-/// Threads: every function may be called from any thread.
+/// camera's own clock: neither begins with the other's or with the host's, and they drift apart. A trigger number may
+/// be hidden in the upper left corner of every frame, see hidden_number(). All such cameras on a host share one control
+/// port: run them in a network namespace of their own, see loopback.h. Threads: every function may be called from any
+/// thread.
 class GigeCameras {
  public:
   /// Fails with `io` (the addresses cannot be used, no temporary file).

@@ -156,6 +156,7 @@ void GigeSensor::expose(const GigeExposure& exposure, GigeFault fault) {
   if (!streaming() || fault == GigeFault::missed) return;
   Frame frame = new_frame(exposure);
   frame.fault = fault;
+  frame.due += options_.frame_after;
   if (fault == GigeFault::late) frame.due += options_.late_by;
   if (fault == GigeFault::stale && last_) {
     const auto id = frame.id;  // ids are given when sent
@@ -183,14 +184,15 @@ void GigeSensor::send_frames(const std::stop_token& stop) {
     }
     const auto first = std::ranges::min_element(queue_, {}, &Frame::due);
     const bool due = first != queue_.end() && first->due <= now && !triggered_;
-    if (due) {
+    const bool developing = due && options_.ready && !options_.ready(first->exposure);
+    if (due && !developing) {
       triggered_ = *first;
       queue_.erase(first);
       arv_fake_camera_write_register(core_, ARV_FAKE_CAMERA_REGISTER_TRIGGER_SOFTWARE, 1);
     }
     if (triggered_) nudge(nudge_socket_);
-    auto wake = now + std::chrono::milliseconds(triggered_ ? 2 : 100);
-    if (!triggered_) {
+    auto wake = now + std::chrono::milliseconds(triggered_ || developing ? 2 : 100);
+    if (!triggered_ && !developing) {
       for (const Frame& frame : queue_) wake = std::min(wake, frame.due);
     }
     const std::size_t waiting = queue_.size();
@@ -247,7 +249,7 @@ void GigeSensor::draw(const Frame& frame, cv::Mat& image) const {
   if (frame.fault == GigeFault::blurred) {
     for (int pass = 0; pass < 2; ++pass) blur(image);
   }
-  hide_number(static_cast<std::uint32_t>(frame.exposure.number), image);
+  if (options_.numbered) hide_number(static_cast<std::uint32_t>(frame.exposure.number), image);
 }
 
 }  // namespace scanrig::sim::wire

@@ -22,6 +22,9 @@ struct GigeSensorOptions {
   std::string trigger_selector;
   std::chrono::nanoseconds clock_ahead{0};
   double clock_drift = 0.0;
+  std::chrono::microseconds frame_after{0};
+  std::function<bool(const GigeExposure&)> ready;
+  bool numbered = true;
 };
 
 /// One of GigeCameras: Aravis' GigE Vision camera on the wire, frames, ids and stamps of our own. Line0 has the value

@@ -83,7 +83,7 @@ std::vector<GpioSocket::Edge> GpioSocket::edges() const {
 }
 
 void GpioSocket::on_edge(std::function<void(const Edge&)> listener) {
-  const std::scoped_lock lock(mutex_);
+  const std::scoped_lock lock(telling_);
   on_edge_ = std::move(listener);
 }
 
@@ -146,16 +146,15 @@ std::string GpioSocket::obey(Client& client, const std::string& words) {
 
 std::string GpioSocket::drive(const std::string& name, bool high) {
   std::optional<Edge> edge;
-  std::function<void(const Edge&)> listener;
+  const std::scoped_lock telling(telling_);
   {
     const std::scoped_lock lock(mutex_);
     const auto line = lines_.find(name);
     if (line == lines_.end()) return "unknown " + name;
     if (line->second != high) edges_.push_back(edge.emplace(Edge{clock_.now(), name, high}));
     line->second = high;
-    listener = on_edge_;
   }
-  if (edge && listener) listener(*edge);
+  if (edge && on_edge_) on_edge_(*edge);
   return "ok";
 }
 

@@ -35,7 +35,8 @@ class GpioSocket {
   void set(const std::string& line, bool high);  ///< what a hand on a button does
   [[nodiscard]] bool level(const std::string& line) const;
   [[nodiscard]] std::vector<Edge> edges() const;
-  /// Called with every edge of an output, before the client hears "ok"; from the server's thread.
+  /// Called with every edge of an output, before the client hears "ok"; from the server's thread. Once this returns the
+  /// listener of before is not called any more.
   void on_edge(std::function<void(const Edge&)> listener);
 
  private:
@@ -55,7 +56,8 @@ class GpioSocket {
   mutable std::mutex mutex_;
   std::map<std::string, bool> lines_;
   std::vector<Edge> edges_;
-  std::function<void(const Edge&)> on_edge_;
+  std::mutex telling_;                        // held while the listener is called; before mutex_
+  std::function<void(const Edge&)> on_edge_;  // guarded by telling_
   std::jthread thread_;
 };
 

@@ -1,41 +1,33 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 
 #include "core/clock.h"
-#include "sim/wire/modbus_server.h"
-#include "sim/wire/simulated_drive.h"
+#include "sim/wire/register_drive.h"
 
 namespace scanrig::sim::wire {
 
 /// A Leadshine RS drive with its motor and table: registers as in docs, "Turntable, Leadshine RS family".
 /// Threads: every function may be called from any thread.
-class LeadshineDrive final : public RegisterDevice, public SimulatedDrive {
+class LeadshineDrive final : public RegisterDrive {
  public:
   LeadshineDrive(const AxisOptions& axis, Clock& clock);
-
-  std::uint8_t read(std::uint16_t address, std::span<std::uint16_t> values) override;
-  std::uint8_t write(std::uint16_t address, std::span<const std::uint16_t> values) override;
 
   using SimulatedDrive::raise_alarm;
   void raise_alarm(std::uint16_t code, bool can_be_reset) override;
   void power_cycle() override;  ///< alarm, home and enable are gone, the counter starts at 0
   void send(std::int32_t pulses) override;
 
-  [[nodiscard]] std::uint16_t peek(std::uint16_t address) const;
-
  private:
+  [[nodiscard]] std::uint8_t refuses(std::uint16_t /*address*/,
+                                     std::span<const std::uint16_t> /*values*/) const override {
+    return 0;
+  }
+  void written(std::uint16_t address, std::uint16_t before) override;
   void trigger(std::uint16_t value);
-  void control(std::uint16_t value);
   [[nodiscard]] std::uint16_t status() const;
   [[nodiscard]] AxisMotion motion(std::uint16_t rpm, std::uint16_t acceleration, std::uint16_t deceleration) const;
   void follow() const override;
-
-  mutable std::map<std::uint16_t, std::uint16_t> registers_;
-  mutable bool homed_ = false;
-  mutable bool homing_ = false;
-  bool alarm_can_be_reset_ = true;
 };
 
 }  // namespace scanrig::sim::wire

@@ -47,4 +47,13 @@ Result<void> enter_own_loopback() {
   return {};
 }
 
+Result<void> run_in_own_loopback(const std::vector<std::string>& command) {
+  if (auto own = enter_own_loopback(); !own) return own;
+  std::vector<char*> words;
+  for (const auto& word : command) words.push_back(const_cast<char*>(word.c_str()));
+  words.push_back(nullptr);
+  ::execvp(words[0], words.data());
+  return failed(words[0]);
+}
+
 }  // namespace scanrig::sim::wire

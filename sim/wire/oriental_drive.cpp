@@ -20,70 +20,39 @@ constexpr double kFactoryPulses = 1000;
 
 }  // namespace
 
-OrientalDrive::OrientalDrive(const AxisOptions& axis, Clock& clock) : SimulatedDrive(axis, clock) {
-  const auto add = [&](unsigned first, unsigned last) {
-    for (unsigned address = first; address <= last; ++address) registers_[static_cast<std::uint16_t>(address)] = 0;
-  };
-  add(kDirectData, kTrigger + 1);
-  add(0x007C, kAlarm + 1);
-  add(kCommandPosition, kCommandPosition + 1);
-  add(kFeedback, kFeedback + 1);
-  add(kPreset, kPreset + 1);
-  add(kGearA, kGearB + 1);
+OrientalDrive::OrientalDrive(const AxisOptions& axis, Clock& clock) : RegisterDrive(axis, clock) {
+  add_registers(kDirectData, kTrigger + 1);
+  add_registers(0x007C, kAlarm + 1);
+  add_registers(kCommandPosition, kCommandPosition + 1);
+  add_registers(kFeedback, kFeedback + 1);
+  add_registers(kPreset, kPreset + 1);
+  add_registers(kGearA, kGearB + 1);
   put_pair(kGearA, 1);
   put_pair(kGearB, static_cast<std::int32_t>(axis.pulses_per_motor_rev / kFactoryPulses));
   axis_.set_counter(
       static_cast<std::int32_t>(std::lround(axis.start_deg * axis.pulses_per_motor_rev * axis.gear_ratio / 360.0)));
 }
 
-std::int32_t OrientalDrive::pair(std::uint16_t upper) const {
-  return static_cast<std::int32_t>(std::uint32_t{registers_[upper]} << 16 |
-                                   registers_[static_cast<std::uint16_t>(upper + 1)]);
+std::uint8_t OrientalDrive::refuses(std::uint16_t address, std::span<const std::uint16_t> values) const {
+  for (const std::uint16_t told : {kStatus, kFeedback}) {
+    if (told >= address && told < address + values.size()) return kIllegalAddress;
+  }
+  return address == kDirectData && values.size() == 16 && (values[3] < 1 || values[3] > 3) ? kIllegalValue : 0;
 }
 
-void OrientalDrive::put_pair(std::uint16_t upper, std::int32_t value) const {
-  registers_[upper] = static_cast<std::uint16_t>(static_cast<std::uint32_t>(value) >> 16);
-  registers_[static_cast<std::uint16_t>(upper + 1)] =
-      static_cast<std::uint16_t>(static_cast<std::uint32_t>(value) & 0xFFFF);
-}
-
-std::uint8_t OrientalDrive::read(std::uint16_t address, std::span<std::uint16_t> values) {
-  const std::scoped_lock lock(mutex_);
-  refresh();
-  for (std::uint16_t& value : values) {
-    const auto found = registers_.find(address++);
-    if (found == registers_.end()) return kIllegalAddress;
-    value = found->second;
+void OrientalDrive::written(std::uint16_t address, std::uint16_t before) {
+  const std::uint16_t value = registers_[address];
+  if (address == kInput) input(before, value);
+  if (address == kTrigger + 1 && value == 1) start_direct_data();
+  if (address == kPreset + 1 && value == 1 && before == 0) {
+    axis_.set_counter(0);
+    homed_ = true;
   }
-  return 0;
-}
-
-std::uint8_t OrientalDrive::write(std::uint16_t address, std::span<const std::uint16_t> values) {
-  const std::scoped_lock lock(mutex_);
-  refresh();
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    const auto at = static_cast<std::uint16_t>(address + i);
-    if (!registers_.contains(at) || at == kStatus || at == kFeedback) return kIllegalAddress;
-  }
-  if (address == kDirectData && values.size() == 16 && (values[3] < 1 || values[3] > 3)) return kIllegalValue;
-  for (const std::uint16_t value : values) {
-    const std::uint16_t before = registers_[address];
-    if (address == kInput) input(value);
-    registers_[address] = value;
-    if (address == kTrigger + 1 && value == 1) start_direct_data();
-    if (address == kPreset + 1 && value == 1 && before == 0) {
-      axis_.set_counter(0);
-      homed_ = true;
-    }
-    ++address;
-  }
-  refresh();
-  return 0;
 }
 
 /// STOP is a level, the others act on their edge.
-void OrientalDrive::input(std::uint16_t now) {
-  const auto risen = static_cast<std::uint16_t>(now & ~registers_[kInput]);
+void OrientalDrive::input(std::uint16_t before, std::uint16_t now) {
+  const auto risen = static_cast<std::uint16_t>(now & ~before);
   if ((risen & kAlarmReset) != 0 && alarm_can_be_reset_) put_pair(kAlarm, 0);
   if ((now & kStop) != 0) {
     homing_ = false;
@@ -106,7 +75,7 @@ void OrientalDrive::start_direct_data() {
     return;
   }
   const bool absolute = pair(kType) == 1;
-  homing_ = false;
+  homing_ = homed_ = false;  // HOME-END goes out with the next motion
   axis_.follow_motor();
   axis_.move_to(absolute ? pair(kPosition) : axis_.commanded() + pair(kPosition),
                 {static_cast<double>(pair(kSpeed)), static_cast<double>(pair(kAcceleration)),

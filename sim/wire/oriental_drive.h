@@ -1,10 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 
-#include "sim/wire/modbus_server.h"
-#include "sim/wire/simulated_drive.h"
+#include "sim/wire/register_drive.h"
 
 namespace scanrig::sim::wire {
 
@@ -12,12 +10,9 @@ namespace scanrig::sim::wire {
 /// words of every pair; an absolute encoder that keeps its count without power. The motor's own zero is where the table
 /// stands at the home switch.
 /// Threads: every function may be called from any thread.
-class OrientalDrive final : public RegisterDevice, public SimulatedDrive {
+class OrientalDrive final : public RegisterDrive {
  public:
   OrientalDrive(const AxisOptions& axis, Clock& clock);
-
-  std::uint8_t read(std::uint16_t address, std::span<std::uint16_t> values) override;
-  std::uint8_t write(std::uint16_t address, std::span<const std::uint16_t> values) override;
 
   using SimulatedDrive::raise_alarm;
   void raise_alarm(std::uint16_t code, bool can_be_reset) override;
@@ -25,17 +20,12 @@ class OrientalDrive final : public RegisterDevice, public SimulatedDrive {
   void send(std::int32_t pulses) override;
 
  private:
-  void input(std::uint16_t now);
+  [[nodiscard]] std::uint8_t refuses(std::uint16_t address, std::span<const std::uint16_t> values) const override;
+  void written(std::uint16_t address, std::uint16_t before) override;
+  void input(std::uint16_t before, std::uint16_t now);
   void start_direct_data();
-  [[nodiscard]] std::int32_t pair(std::uint16_t upper) const;
-  void put_pair(std::uint16_t upper, std::int32_t value) const;
   [[nodiscard]] std::uint16_t status() const;
   void follow() const override;
-
-  mutable std::map<std::uint16_t, std::uint16_t> registers_;
-  mutable bool homed_ = false;
-  mutable bool homing_ = false;
-  bool alarm_can_be_reset_ = true;
 };
 
 }  // namespace scanrig::sim::wire

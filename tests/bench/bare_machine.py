@@ -1,7 +1,8 @@
-"""A bare Debian in a folder, and what the project's own commands do there, on two cores, from nothing."""
+"""A bare Debian in a folder, and what the project's own commands do there."""
 import contextlib
 import os
 import pathlib
+import shlex
 import shutil
 import subprocess
 import tempfile
@@ -35,26 +36,40 @@ def why_not():
     return None if archive() else "not measured: no Debian archive is configured here"
 
 
+def make(suite, root):
+    """A machine with nothing but essential packages and apt."""
+    subprocess.run(["mmdebstrap", "--quiet", "--variant=minbase", suite, root, archive()], check=True, timeout=600)
+    shutil.copy("/etc/resolv.conf", root / "etc/resolv.conf")
+
+
 @contextlib.contextmanager
 def bare_machine(suite):
-    """The root folder of a machine with nothing but essential packages and apt; gone afterwards."""
+    """The root folder of a bare machine; gone afterwards."""
     root = pathlib.Path(tempfile.mkdtemp(prefix="scanrig-bare-"))
     try:
-        subprocess.run(["mmdebstrap", "--quiet", "--variant=minbase", suite, root, archive()], check=True, timeout=600)
-        shutil.copy("/etc/resolv.conf", root / "etc/resolv.conf")
+        make(suite, root)
         yield root
     finally:
         shutil.rmtree(root)
 
 
+def entrance(root, command, binds=()):
+    """The command line that runs `command` (a shell line) inside `root` with its own /proc and /dev.
+    `binds`: pairs of a folder here and where it is to be seen inside. Every mount ends with the command."""
+    mounts = [f"mount -t proc proc {root}/proc", f"mount --rbind /dev {root}/dev"]
+    for source, target in binds:
+        inside = shlex.quote(f"{root}/{target}")
+        mounts.append(f"mkdir -p {inside} && mount --bind {shlex.quote(str(source))} {inside}")
+    enter = (f"exec chroot {root} /usr/bin/env -i PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 "
+             f"sh -c {shlex.quote(command)}")
+    return ["unshare", "--mount", "--pid", "--fork", "--kill-child", "sh", "-c", " && ".join([*mounts, enter])]
+
+
 def run_inside(root, command, timeout):
-    """Runs `command` (a shell line) inside, on two cores, with its own /proc and /dev. Returns (process, seconds)."""
-    inside = ("mount -t proc proc {0}/proc && mount --rbind /dev {0}/dev && exec chroot {0} /usr/bin/env -i "
-              "PATH=/usr/sbin:/usr/bin:/sbin:/bin HOME=/root LANG=C.UTF-8 sh -c {1}")
-    quoted = "'" + command.replace("'", "'\\''") + "'"
+    """Runs `command` (a shell line) inside, on two cores. Returns (process, seconds)."""
     began = time.monotonic()
-    done = subprocess.run(["taskset", "-c", CORES, "unshare", "--mount", "--pid", "--fork", "--kill-child", "sh", "-c",
-                           inside.format(root, quoted)], capture_output=True, text=True, timeout=timeout)
+    done = subprocess.run(["taskset", "-c", CORES, *entrance(root, command)], capture_output=True, text=True,
+                          timeout=timeout)
     return done, time.monotonic() - began
 
 

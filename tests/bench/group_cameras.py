@@ -1,10 +1,13 @@
-"""Cameras and the USB projector: triggers against frames on the wire, overhead, fuzzed replies."""
+"""Cameras and the USB projector: triggers against frames on the wire, overhead, fuzzed replies, Debian 13."""
 import json
 import pathlib
 import shutil
 import tempfile
 
-import motion_fuzz
+import cameras_debian13
+import cameras_hil
+import cameras_wire
+import fuzz
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 TRIGGERS, QUICK_TRIGGERS = 10000, 1000
@@ -31,22 +34,16 @@ def triggers(bench):
 
 
 def replies(bench):
-    """The LightCrafter's replies under libFuzzer, as the other parsers are in the motion group."""
-    what = "fuzzed: LightCrafter 4500 replies"
-    seconds = motion_fuzz.QUICK_SECONDS if bench.quick else motion_fuzz.SECONDS
-    problem = motion_fuzz.build(ROOT, "dlpc350_fuzz")
     scratch = pathlib.Path(tempfile.mkdtemp(prefix="scanrig-cameras-"))
     try:
-        done = None if problem else motion_fuzz.fuzz(bench, ROOT, scratch, "dlpc350")
+        fuzz.measure(bench, ROOT, scratch, [fuzz.Parser("dlpc350", "LightCrafter 4500 replies")])
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
-    if done is None:
-        bench.line(what, f"no crash in {seconds} s", f"not measured: {problem}", None)
-    else:
-        bench.line(what, f"no crash in {seconds} s", "no crash" if done.returncode == 0 else done.stderr[-200:],
-                   done.returncode == 0)
 
 
 def measure(bench):
     triggers(bench)
     replies(bench)
+    cameras_hil.measure(bench)
+    cameras_wire.measure(bench)
+    cameras_debian13.measure(bench)

@@ -3,12 +3,14 @@ import pathlib
 import shutil
 import tempfile
 
+import fuzz
 import motion_doctor
-import motion_fuzz
 import motion_long
 import motion_matrix
 import motion_safety
 
+PARSERS = [fuzz.Parser("grbl", "GRBL"), fuzz.Parser("drive_profile", "profile files"),
+           fuzz.Parser("modbus_io", "Modbus I/O", processes=32)]
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 
 
@@ -21,6 +23,6 @@ def measure(bench):
         motion_safety.measure(bench, scratch)
         motion_long.measure(bench, ROOT, scratch)
         motion_doctor.measure(bench, scratch)
-        motion_fuzz.measure(bench, ROOT, scratch)
+        fuzz.measure(bench, ROOT, scratch, PARSERS)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)

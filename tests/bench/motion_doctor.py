@@ -9,7 +9,7 @@ import motion_rig
 FAST = ("--speed-deg-s", "180", "--acceleration-deg-s2", "1000")
 LIMIT_S = 120
 PROMPT_PRESS, PROMPT_RELEASE, PROMPT_ENTER = "Press the emergency stop", "Release the emergency stop", "press Enter"
-PROMPT_SIGN = "which way"
+PROMPT_SIGN, PROMPT_MARK, PROMPT_MARK_OFF = "which way", "Put a mark", "By how many degrees"
 
 
 def consult(rig, present=True, as_user=None):
@@ -26,19 +26,27 @@ def consult(rig, present=True, as_user=None):
 
     process = subprocess.Popen([str(word) for word in command], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                                stderr=subprocess.PIPE, text=True, preexec_fn=become)
+    def answer(text):
+        process.stdin.write(text + "\n")
+        process.stdin.flush()
+
+    marked_deg = 0.0
     for prompt in process.stderr:
         if PROMPT_PRESS in prompt:
             rig.press("estop")
         elif PROMPT_RELEASE in prompt:
             rig.release("estop")
             if PROMPT_ENTER in prompt:
-                process.stdin.write("\n")
-                process.stdin.flush()
+                answer("")
         elif PROMPT_SIGN in prompt:
             # The operator has watched the table: home is 0, the quarter turn ends at +90 or at -90 (or, from there, at
             # 270) as the world sees it.
-            process.stdin.write("ccw\n" if rig.truth()["angle_deg"] % 360 < 180 else "cw\n")
-            process.stdin.flush()
+            answer("ccw" if rig.truth()["angle_deg"] % 360 < 180 else "cw")
+        elif PROMPT_MARK in prompt:
+            marked_deg = rig.truth()["angle_deg"]
+            answer("")
+        elif PROMPT_MARK_OFF in prompt:
+            answer(f"{(rig.truth()['angle_deg'] - marked_deg + 180) % 360 - 180:.0f}")
         if process.poll() is not None:
             break
     text = process.stdout.read()
@@ -56,8 +64,16 @@ def cases():
         os.symlink(os.readlink(rig.folder / "panel"), rig.folder / "other")
         rig.edit_config(f'device = "{rig.folder}/turntable"', f'device = "{rig.folder}/other"')
 
+    def wrong_gear(rig):
+        rig.edit_config("gear_ratio = 90", "gear_ratio = 72")
+        if rig.drive == "grbl":  # keeps its acceleration in motor units: as whoever believes 72 would have set it
+            rig.edit_config("acceleration_deg_s2 = 1000", "acceleration_deg_s2 = 1250")
+
     yield "a sound rig", None, lambda rig: None, {}, ()
-    yield "wrong gear ratio", "gear_ratio", lambda rig: rig.edit_config("gear_ratio = 90", "gear_ratio = 72"), {}, ()
+    yield "wrong gear ratio", "gear_ratio", wrong_gear, {}, ()
+    for drive in motion_rig.DRIVES[1:]:
+        yield f"a sound rig, {drive}", None, lambda rig: None, {}, ("--drive", drive)
+        yield f"wrong gear ratio, {drive}", "gear_ratio", wrong_gear, {}, ("--drive", drive)
     yield "reversed sign", "reversed_sign", lambda rig: rig.set(positive="cw"), {}, ()
     yield "wrong parity", "wrong_parity", lambda rig: rig.set(line={"parity": "even"}), {}, ()
     yield "swapped adapter", "swapped_adapter", swap, {}, ("--panel", "modbus-io")

@@ -6,7 +6,8 @@ LIMIT_S = 900
 WORKERS = 8  # the cells mostly wait
 INTERFACES = {"Turntable": "drivers/turntable/turntable.h", "Projector": "drivers/projector/projector.h",
               "Panel": "drivers/panel/panel.h", "StereoCamera": "drivers/camera/stereo_camera.h"}
-SHARED = {"AxisTurntable": "Turntable"}  # what several drivers have in common
+SHARED = {"AxisTurntable": "Turntable", "SensorCamera": "StereoCamera"}  # what several drivers have in common
+CAMERAS = ("StereoCamera", "LightCrafterProjector")  # interfaces and drivers whose rows are the cameras group's
 
 
 def methods(root, interface):
@@ -31,9 +32,10 @@ def devices(root, driver):
     return sorted(profile.stem for profile in (root / "config" / "drives").glob("*.toml"))
 
 
-def rows(root):
-    return [(name, device, method) for interface, name in shipped(root) for device in devices(root, name)
-            for method in methods(root, interface)]
+def rows(root, cameras):
+    """Of the cameras group, or of the motion group."""
+    return [(name, device, method) for interface, name in shipped(root) if bool({interface, name} & set(CAMERAS)) == cameras
+            for device in devices(root, name) for method in methods(root, interface)]
 
 
 def write(path, wanted, cells, faults):
@@ -56,7 +58,7 @@ def write(path, wanted, cells, faults):
     path.write_text("\n".join(lines))
 
 
-def measure(bench, root, scratch):
+def measure(bench, root, scratch, cameras=False):
     ports = scratch / "matrix"
     ports.mkdir(parents=True, exist_ok=True)
     done = bench.run([bench.bin / "fault_matrix", root / "config" / "drives", ports, WORKERS], LIMIT_S)
@@ -66,7 +68,8 @@ def measure(bench, root, scratch):
         cells[cell["driver"], cell["device"], cell["method"], cell["fault"]] = cell
         if cell["fault"] not in faults:
             faults.append(cell["fault"])
-    wanted = rows(root)
+    wanted = rows(root, cameras)
+    cells = {key: cell for key, cell in cells.items() if key[:3] in wanted}
     write(bench.out / "fault_matrix.md", wanted, cells, faults)
     missing = [row for row in wanted if any((*row, fault) not in cells for fault in faults)]
     tried = [cell for cell in cells.values() if cell["applicable"]]

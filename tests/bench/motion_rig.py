@@ -11,21 +11,13 @@ READY_S = 10
 DAEMON_READY_S = 60
 TAP_S = 0.2  # as a hand does; the panel debounces for 50 ms
 
-# Frames of a Leadshine RS drive that start or end a motion [docs of the family: block 0x6200, trigger 0x6002].
-MOVE, TRIGGER = "10 62 00", "06 60 02"
-STOP_WORD, HOME_WORD = "00 40", "00 20"
-
-
-def kind(frame):
-    """"move", "home", "stop" or "" of a frame that the drive heard."""
-    words = frame["bytes"]
-    if not frame["from_master"]:
-        return ""
-    if words[3:11] == MOVE:
-        return "move"
-    if words[3:11] == TRIGGER:
-        return {STOP_WORD: "stop", HOME_WORD: "home"}.get(words[12:17], "")
-    return ""
+# How a frame begins that starts or ends a motion, after the unit id where there is one [manuals of the drives; GRBL 1.1].
+MOTIONS = {
+    "leadshine-rs": {"10 62 00": "move", "06 60 02 00 20": "home", "06 60 02 00 40": "stop"},
+    "oriental-az": {"10 00 58": "move", "06 00 7D 00 10": "home", "06 00 7D 00 20": "stop"},
+    "grbl": {"47": "move", "24 48": "home", "21": "stop", "18": "stop"},  # G, $H, !, 0x18
+}
+DRIVES = tuple(MOTIONS)
 
 
 class Rig:
@@ -33,6 +25,7 @@ class Rig:
 
     def __init__(self, binaries, folder, *options):
         self.bin = pathlib.Path(binaries)
+        self.drive = options[options.index("--drive") + 1] if "--drive" in options else DRIVES[0]
         self.folder = pathlib.Path(folder)
         shutil.rmtree(self.folder, ignore_errors=True)
         self.folder.mkdir(parents=True)
@@ -90,6 +83,13 @@ class Rig:
                 return found, since
             found += answer["frames"]
             since = answer["next"]
+
+    def kind(self, frame):
+        """"move", "home", "stop" or "" of a frame that the drive heard."""
+        if not frame["from_master"]:
+            return ""
+        words = frame["bytes"] if self.drive == "grbl" else frame["bytes"][3:]
+        return next((what for begins, what in MOTIONS[self.drive].items() if words.startswith(begins)), "")
 
     def edit_config(self, before, after):
         text = self.config.read_text()

@@ -7,17 +7,18 @@ import time
 import motion_rig
 
 FAST = ("--speed-deg-s", "90", "--acceleration-deg-s2", "400", "--views", "8", "--poses", "1")
-RIGS = 4
+RIGS = 2 * len(motion_rig.DRIVES)
 SCAN_LIMIT_S = 30
 STOP_LIMIT_MS = 100
 SAFE_LIMIT_S = 1.0
 
 
 def in_parallel(bench, scratch, name, jobs, work, *options):
-    """`work(rig, n)` for each job number, over a few rigs at once; the results of all."""
+    """`work(rig, n)` for each job number, over rigs with each of the drives at once; the results of all."""
     def crew(member):
         results = []
-        with motion_rig.Rig(bench.bin, scratch / f"{name}{member}", *FAST, *options) as rig:
+        drive = motion_rig.DRIVES[member % len(motion_rig.DRIVES)]
+        with motion_rig.Rig(bench.bin, scratch / f"{name}{member}", "--drive", drive, *FAST, *options) as rig:
             for n in range(member, jobs, RIGS):
                 results.append(work(rig, n))
         return results
@@ -37,7 +38,7 @@ def stop_after(rig, at_ns, since, limit_s=1.0):
     while time.monotonic() < end:
         frames, _ = rig.frames(since)
         for frame in frames:
-            if frame["at_ns"] >= at_ns and motion_rig.kind(frame) == "stop":
+            if frame["at_ns"] >= at_ns and rig.kind(frame) == "stop":
                 return (frame["at_ns"] - at_ns) / 1e6
         time.sleep(0.01)
     return None
@@ -110,13 +111,15 @@ def scan_once(rig):
 
 def estop_reconstruction(bench, scratch):
     """Edges for as long as reconstructions run; every one needs Reset and home before the next."""
-    wanted = 2 if bench.quick else 100
-    crew_share = -(-wanted // 2)
+    crews = len(motion_rig.DRIVES)
+    wanted = crews if bench.quick else 100
+    crew_share = -(-wanted // crews)
 
     def crew(member):
         took = []
-        with motion_rig.Rig(bench.bin, scratch / f"rec{member}", "--speed-deg-s", "180", "--acceleration-deg-s2", "1000",
-                            "--views", "4" if bench.quick else "8", "--poses", "2") as rig:
+        with motion_rig.Rig(bench.bin, scratch / f"rec{member}", "--drive", motion_rig.DRIVES[member], "--speed-deg-s",
+                            "180", "--acceleration-deg-s2", "1000", "--views", "4" if bench.quick else "8", "--poses",
+                            "2") as rig:
             rig.edit_config("voxel_mm = 1.0", "voxel_mm = 0.2")
             rig.set(estop_cuts_power=False)
             rig.start_daemon(scale=0.25 if bench.quick else 0.5)
@@ -130,8 +133,8 @@ def estop_reconstruction(bench, scratch):
                 recover(rig)
         return took
 
-    with concurrent.futures.ThreadPoolExecutor(2) as pool:
-        took = [ms for results in pool.map(crew, range(2)) for ms in results]
+    with concurrent.futures.ThreadPoolExecutor(crews) as pool:
+        took = [ms for results in pool.map(crew, range(crews)) for ms in results]
     report_edges(bench, "e-stop edge to stop frame, during a reconstruction", wanted, took)
 
 
@@ -183,7 +186,7 @@ def restarted(rig, n):
     unasked = homeless = moves = 0
     homed = False
     for frame in frames:
-        what = motion_rig.kind(frame)
+        what = rig.kind(frame)
         moves += what in ("move", "home")
         unasked += what in ("move", "home") and (reset_at is None or frame["at_ns"] < reset_at)
         homeless += what == "move" and not homed

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <cstdlib>
 
 #include "daemon/ctl/doctor/examine.h"
@@ -127,15 +128,55 @@ void check_sign(const config::RigConfig& rig, const Operator& person, Report& re
       fmt::format("Set positive = \"{}\" in [turntable].", rig.turntable.motion().scale.positive_ccw ? "cw" : "ccw"));
 }
 
-void check_gear(const ModbusTurntableOptions& options, double pulses, Report& report) {
-  const double ratio = pulses / options.scale.pulses_per_motor_rev;
-  report.note(fmt::format("gear: one turn of the table, switch to switch, is {:.0f} pulses, {:.3f} motor turns", pulses,
-                          ratio));
-  if (std::abs(ratio / options.scale.gear_ratio - 1.0) <= kRatioTolerance) return;
-  report.find("gear_ratio",
-              fmt::format("One turn of the table takes {:.2f} motor turns, the configuration says {:.2f}.", ratio,
-                          options.scale.gear_ratio),
-              fmt::format("Set gear_ratio = {:.2f} (or the gear's exact ratio near it) in [turntable].", ratio));
+void compare_gear(double configured, double ratio, Report& report) {
+  if (std::abs(ratio / configured - 1.0) <= kRatioTolerance) return;
+  report.find(
+      "gear_ratio",
+      fmt::format("One turn of the table takes {:.2f} motor turns, the configuration says {:.2f}.", ratio, configured),
+      fmt::format("Set gear_ratio = {:.2f} (or the gear's exact ratio near it) in [turntable].", ratio));
+}
+
+/// By the drive's own counter, from the home switch to the home switch.
+Result<void> check_gear_by_switch(const config::RigConfig& rig, Clock& clock, Report& report) {
+  const auto& options = rig.turntable.modbus;
+  if (auto homed = go_home(rig, clock); !homed) return homed;
+  const auto pulses = Revolution(options, clock).pulses();
+  if (!pulses) return pass_on(pulses);
+  const double ratio = *pulses / options.scale.pulses_per_motor_rev;
+  report.note(fmt::format("gear: one turn of the table, switch to switch, is {:.0f} pulses, {:.3f} motor turns",
+                          *pulses, ratio));
+  compare_gear(options.scale.gear_ratio, ratio, report);
+  return {};
+}
+
+/// By a mark that somebody puts on the table: for drives that cannot count from a switch.
+Result<void> check_gear_by_mark(const config::RigConfig& rig, const Operator& person, Clock& clock, Report& report) {
+  if (!person.there()) {
+    report.note("gear: not checked, nobody is here to watch a mark on the table");
+    return {};
+  }
+  const auto open = open_devices(rig, clock);
+  if (!open) return pass_on(open);
+  auto& table = *open->turntable;
+  if (auto homed = table.home(Deadline::after(clock, kMoveLimit)); !homed) return homed;
+  const auto turn_to = [&](double deg) { return table.rotate_to({deg}, Deadline::after(clock, kMoveLimit)); };
+  if (const auto moved = turn_to(0); !moved) return pass_on(moved);
+  std::ignore = person.ask("Put a mark on the table and one on the base beside it, then press Enter.");
+  for (const double deg : {120.0, 240.0, 0.0}) {
+    if (const auto moved = turn_to(deg); !moved) return pass_on(moved);
+  }
+  const auto said = person.ask(
+      "The table was told to make one whole turn. By how many degrees is its mark away from the other one? [0; -10: "
+      "it stopped 10 degrees short; 10: it went 10 degrees too far]");
+  double off_deg = 0.0;
+  if (!said || std::sscanf(said->c_str(), "%lf", &off_deg) != 1 || std::abs(off_deg) >= 360.0) {
+    report.note("gear: not checked, nobody has said where the mark stopped");
+    return {};
+  }
+  const double configured = rig.turntable.motion().scale.gear_ratio;
+  report.note(fmt::format("gear: told to turn 360 degrees, the table was seen to turn {:.1f}", 360.0 + off_deg));
+  compare_gear(configured, configured * 360.0 / (360.0 + off_deg), report);
+  return {};
 }
 
 }  // namespace
@@ -148,16 +189,11 @@ void examine_motion(const config::RigConfig& rig, const Operator& person, Clock&
   if (auto shown = show_quarter_turn(rig, clock); !shown) return failed(shown.error());
   check_sign(rig, person, report);
   const auto& options = rig.turntable.modbus;
-  if (rig.turntable.driver == config::TurntableConfig::Driver::grbl) {
-    return report.note("gear: not measured, GRBL counts its own steps only: look whether a quarter turn is one");
-  }
-  if (options.home_mode == "here" || options.profile.homing.absolute) {
-    return report.note("gear: not measured, this rig has no home switch to count from");
-  }
-  if (auto homed = go_home(rig, clock); !homed) return failed(homed.error());
-  const auto pulses = Revolution(options, clock).pulses();
-  if (!pulses) return failed(pulses.error());
-  check_gear(options, *pulses, report);
+  const bool counts_from_switch = rig.turntable.driver == config::TurntableConfig::Driver::modbus &&
+                                  options.home_mode != "here" && !options.profile.homing.absolute;
+  const auto checked =
+      counts_from_switch ? check_gear_by_switch(rig, clock, report) : check_gear_by_mark(rig, person, clock, report);
+  if (!checked) return failed(checked.error());
 }
 
 }  // namespace scanrig::ctl::doctor

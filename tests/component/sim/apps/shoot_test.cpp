@@ -54,7 +54,7 @@ TEST_F(Shoot, WritesAWholeScanFolder) {
       for (const auto& file : view["files"]) {
         const auto bytes = read_file(folder_ / file["path"].get<std::string>());
         ASSERT_TRUE(bytes);
-        EXPECT_EQ(sha256(*bytes), file["sha256"]);
+        EXPECT_EQ(sha256(*bytes), file["sha256"].get<std::string>());
       }
       const cv::Mat image = cv::imread((folder_ / view["files"]["left_plain"]["path"]).string(), cv::IMREAD_UNCHANGED);
       EXPECT_EQ(image.size(), cv::Size(128, 96));

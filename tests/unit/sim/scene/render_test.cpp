@@ -145,7 +145,7 @@ TEST(Scene, RepeatsAnExposureAndChangesTheNoiseOfTheNext) {
 
 TEST(Sensor, HasTwoGreyLevelsOfNoiseAtMidGrey) {
   const cv::Mat light(200, 200, CV_32FC3, cv::Scalar::all(128.0 / 255.0));
-  const cv::Mat raw = expose(light, 1.0, 77);
+  const cv::Mat raw = expose(through_lens(light, 1.0), 77);
   cv::Scalar mean, deviation;
   cv::meanStdDev(raw(cv::Rect(80, 80, 40, 40)), mean, deviation);  // the middle, free of vignetting
   EXPECT_NEAR(mean[0], 128.0, 1.0);
@@ -154,7 +154,7 @@ TEST(Sensor, HasTwoGreyLevelsOfNoiseAtMidGrey) {
 
 TEST(Sensor, HasRedAtItsFirstPixel) {
   const cv::Mat light(64, 64, CV_32FC3, cv::Scalar(0.6, 0.4, 0.2));  // RGB
-  const cv::Mat raw = expose(light, 1.0, 0);
+  const cv::Mat raw = expose(through_lens(light, 1.0), 0);
   EXPECT_NEAR(raw.at<std::uint8_t>(32, 32), 153, 1);
   EXPECT_NEAR(raw.at<std::uint8_t>(32, 33), 102, 1);
   EXPECT_NEAR(raw.at<std::uint8_t>(33, 32), 102, 1);

@@ -1,0 +1,129 @@
+#include "sim/apps/rig_cameras.h"
+
+#include "sim/apps/wire_rig.h"
+#include "sim/scene/profile.h"
+
+namespace scanrig::sim {
+namespace {
+
+constexpr std::chrono::milliseconds kReadout{25};  // as the cameras of sim/devices
+constexpr std::size_t kPictures = 8;
+
+Clock::Duration exposure_time() {
+  return std::chrono::round<Clock::Duration>(std::chrono::duration<double>(profile().exposure_s));
+}
+
+}  // namespace
+
+Result<std::unique_ptr<RigCameras>> RigCameras::start(const RigCamerasOptions& options, std::function<RigTruth()> truth,
+                                                      Clock& clock) {
+  auto scene = Scene::create(options.scene);
+  if (!scene) return pass_on(scene);
+  std::unique_ptr<RigCameras> rig(new RigCameras(std::move(*scene), options.expected, std::move(truth), clock));
+  const Eye &left = rig->scene_->rig().left, &right = rig->scene_->rig().right;
+  wire::GigeCamerasOptions cameras;
+  cameras.left_address = kLeftAddress;
+  cameras.right_address = kRightAddress;
+  cameras.left_serial = left.serial;
+  cameras.right_serial = right.serial;
+  cameras.size = {left.width, left.height};
+  cameras.frame_after = std::chrono::round<std::chrono::microseconds>(exposure_time() + kReadout);
+  cameras.late_by = std::chrono::milliseconds(1000);
+  cameras.numbered = options.numbered;
+  cameras.ready = [&rig = *rig](const wire::GigeExposure& exposure) { return rig.ready(exposure); };
+  const auto source = [&rig = *rig](wire::Side side, const wire::GigeExposure& exposure, cv::Mat& image) {
+    rig.read_out(side, exposure, image);
+  };
+  auto started = wire::GigeCameras::start(cameras, source, clock);
+  if (!started) return pass_on(started);
+  rig->wire_ = std::move(*started);
+  rig->developer_ = std::jthread([&rig = *rig](const std::stop_token& stop) { rig.develop(stop); });
+  return rig;
+}
+
+RigCameras::RigCameras(std::unique_ptr<Scene> scene, const std::vector<Place>& expected,
+                       std::function<RigTruth()> truth, Clock& clock)
+    : truth_(std::move(truth)), clock_(clock), scene_(std::move(scene)), views_(*scene_, expected) {}
+
+RigCameras::~RigCameras() {
+  developer_.request_stop();
+  views_.end();
+  if (developer_.joinable()) developer_.join();
+}
+
+void RigCameras::edge(bool pattern) {
+  const auto at = clock_.now();
+  const auto number = wire_->edge(pattern);  // its threads call ready(): not with mutex_ held
+  const std::scoped_lock lock(mutex_);
+  exposures_.push_back({.number = number, .pattern = pattern, .at = at, .ended = at + exposure_time()});
+  exposed_.notify_all();
+}
+
+void RigCameras::turned_over() {
+  const std::scoped_lock lock(mutex_);
+  history_.turned_over(*scene_);
+}
+
+/// One exposure after the other: what it saw is noted while it lasts, then becomes two images.
+void RigCameras::develop(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  while (exposed_.wait(lock, stop, [&] { return developed_ < exposures_.size(); })) {
+    RigExposure exposure = exposures_[developed_];
+    exposure.place.placement = history_.placement();
+    lock.unlock();
+    StereoImages images = picture(exposure);
+    lock.lock();
+    history_.exposed(exposure.place.angle_deg);
+    exposures_[developed_++] = exposure;
+    pictures_[exposure.number] = std::move(images);
+    if (pictures_.size() > kPictures) pictures_.erase(pictures_.begin());
+  }
+}
+
+StereoImages RigCameras::picture(RigExposure& exposure) {
+  clock_.sleep_until(exposure.at + exposure_time() / 2);
+  exposure.place.angle_deg = truth_().angle_deg;
+  clock_.sleep_until(exposure.ended);
+  exposure.lit = truth_().projector_on;
+  if (!exposure.lit) return {};
+  const auto view = views_.get(exposure.place);
+  return view ? scene_->expose(*view, exposure.pattern, exposure.number) : StereoImages{};
+}
+
+bool RigCameras::ready(const wire::GigeExposure& exposure) const {
+  const std::scoped_lock lock(mutex_);
+  return exposure.number <= developed_;
+}
+
+void RigCameras::read_out(wire::Side side, const wire::GigeExposure& exposure, cv::Mat& image) {
+  const std::scoped_lock lock(mutex_);
+  const auto found = pictures_.find(exposure.number);
+  const bool left = side == wire::Side::left;
+  const cv::Mat picture = found == pictures_.end() ? cv::Mat() : left ? found->second.left : found->second.right;
+  if (picture.empty()) {
+    image.setTo(0);
+  } else {
+    picture.copyTo(image);
+  }
+  if (exposure.number <= exposures_.size()) exposures_[exposure.number - 1].read = clock_.now();
+}
+
+std::vector<RigExposure> RigCameras::exposures() const {
+  const std::scoped_lock lock(mutex_);
+  return {exposures_.begin(), exposures_.begin() + static_cast<std::ptrdiff_t>(developed_)};
+}
+
+Result<void> RigCameras::write_calibration(const std::filesystem::path& file) const {
+  return sim::write_calibration(*scene_, file);
+}
+
+Result<void> RigCameras::write_truth(const std::filesystem::path& folder) const {
+  std::vector<PoseTruth> taken;
+  {
+    const std::scoped_lock lock(mutex_);
+    taken = history_.latest(*scene_);
+  }
+  return sim::write_truth(*scene_, taken, folder);
+}
+
+}  // namespace scanrig::sim

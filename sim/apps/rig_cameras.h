@@ -1,0 +1,87 @@
+#pragma once
+
+#include <condition_variable>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "core/clock.h"
+#include "core/result.h"
+#include "sim/apps/view_cache.h"
+#include "sim/scene/truth.h"
+#include "sim/wire/gige_camera.h"
+
+namespace scanrig::sim {
+
+struct RigTruth;
+
+struct RigCamerasOptions {
+  SceneOptions scene;
+  std::vector<Place> expected;  ///< what is rendered before it is asked for
+  bool numbered = false;        ///< hide the number of the edge in every frame; then frames are not the scene's
+};
+
+/// One edge of the light, and what became of it.
+struct RigExposure {
+  std::uint64_t number = 0;  ///< counts the edges
+  bool pattern = false;
+  bool lit = false;  ///< the light burned as long as the exposure lasted
+  Place place{};     ///< in the middle of the exposure
+  Clock::TimePoint at{}, ended{};
+  Clock::TimePoint read{};  ///< both frames were read out and their sending began
+};
+
+/// Two GigE cameras that look at the rendered scene: every edge of the light exposes both. A frame shows the object as
+/// it lay and where the table stood in the middle of the exposure, and is on its way 37 ms after the edge; or when it
+/// is rendered, which for a view nobody expected takes as long as it takes. An exposure whose light went out early is
+/// dark; so is one by software.
+/// Threads: every function may be called from any thread, edge() from one at a time.
+class RigCameras {
+ public:
+  static constexpr const char* kLeftAddress = "127.0.0.1";
+  static constexpr const char* kRightAddress = "127.0.0.2";
+
+  /// `truth` is called from a thread of the cameras. Fails as Scene::create and GigeCameras::start.
+  static Result<std::unique_ptr<RigCameras>> start(const RigCamerasOptions& options, std::function<RigTruth()> truth,
+                                                   Clock& clock);
+  ~RigCameras();
+
+  void edge(bool pattern);
+  void turned_over();
+  /// All that is expected is rendered; false when `stop` came first.
+  bool wait_until_ready(const std::stop_token& stop) { return views_.wait_until_ready(stop); }
+
+  [[nodiscard]] std::vector<RigExposure> exposures() const;
+  /// Calibration, and truth.json and truth.ply of the poses taken last. Fail with `degenerate` (nothing taken), `io`.
+  Result<void> write_calibration(const std::filesystem::path& file) const;
+  Result<void> write_truth(const std::filesystem::path& folder) const;
+  [[nodiscard]] wire::GigeCameras& wire() { return *wire_; }
+
+ private:
+  RigCameras(std::unique_ptr<Scene> scene, const std::vector<Place>& expected, std::function<RigTruth()> truth,
+             Clock& clock);
+  void develop(const std::stop_token& stop);
+  StereoImages picture(RigExposure& exposure);
+  bool ready(const wire::GigeExposure& exposure) const;
+  void read_out(wire::Side side, const wire::GigeExposure& exposure, cv::Mat& image);
+
+  const std::function<RigTruth()> truth_;
+  Clock& clock_;
+  const std::unique_ptr<Scene> scene_;
+
+  mutable std::mutex mutex_;
+  std::condition_variable_any exposed_;
+  ExposureHistory history_;
+  std::vector<RigExposure> exposures_;              // by number, from 1
+  std::size_t developed_ = 0;                       // of them
+  std::map<std::uint64_t, StereoImages> pictures_;  // the last few, by number
+
+  ViewCache views_;
+  std::unique_ptr<wire::GigeCameras> wire_;
+  std::jthread developer_;
+};
+
+}  // namespace scanrig::sim

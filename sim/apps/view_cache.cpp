@@ -1,0 +1,59 @@
+#include "sim/apps/view_cache.h"
+
+#include "core/units.h"
+
+namespace scanrig::sim {
+
+ViewCache::ViewCache(Scene& scene, const std::vector<Place>& expected)
+    : scene_(scene),
+      expected_(expected.begin(), expected.end()),
+      thread_([this](const std::stop_token& stop) { run(stop); }) {}
+
+void ViewCache::end() {
+  {
+    const std::scoped_lock lock(mutex_);
+    ended_ = true;
+  }
+  thread_.request_stop();
+  changed_.notify_all();
+}
+
+std::shared_ptr<const View> ViewCache::get(const Place& place) {
+  std::unique_lock lock(mutex_);
+  if (!views_.contains(place)) wanted_.push_back(place);
+  changed_.notify_all();
+  changed_.wait(lock, [&] { return ended_ || views_.contains(place); });
+  return ended_ ? nullptr : views_.at(place);
+}
+
+bool ViewCache::wait_until_ready(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  return changed_.wait(lock, stop, [&] { return expected_.empty() && wanted_.empty(); });
+}
+
+void ViewCache::run(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  while (changed_.wait(lock, stop, [&] { return !wanted_.empty() || !expected_.empty(); })) {
+    const bool surprise = !wanted_.empty();
+    auto& queue = surprise ? wanted_ : expected_;
+    const Place place = queue.front();
+    if (!views_.contains(place)) {
+      lock.unlock();
+      auto view = std::make_shared<const View>(scene_.look(place.placement, to_radians(place.angle_deg)));
+      lock.lock();
+      views_[place] = std::move(view);
+      if (surprise) surprises_.push_back(place);
+      keep_few();
+    }
+    queue.pop_front();
+    changed_.notify_all();
+  }
+}
+
+/// With `mutex_` held: a view in full size has 20 MB.
+void ViewCache::keep_few() {
+  constexpr std::size_t kFew = 8;
+  for (; surprises_.size() > kFew; surprises_.pop_front()) views_.erase(surprises_.front());
+}
+
+}  // namespace scanrig::sim

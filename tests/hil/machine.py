@@ -1,0 +1,152 @@
+"""One QEMU machine: software emulation, Debian's kernel, systemd, and a way to have commands run in it."""
+import base64
+import json
+import os
+import pathlib
+import socket
+import subprocess
+import time
+
+BOOT_S = 180
+COMMAND_S = 60
+
+
+class Gone(RuntimeError):
+    """The machine does not answer any more."""
+
+
+class Wire:
+    """Lines over a Unix socket that QEMU connects to."""
+
+    def __init__(self, path):
+        path.unlink(missing_ok=True)
+        self.listener = socket.socket(socket.AF_UNIX)
+        self.listener.bind(str(path))
+        self.listener.listen(1)
+        self.peer = None
+        self.pending = b""
+
+    def accept(self, timeout):
+        self.listener.settimeout(timeout)
+        self.peer, _ = self.listener.accept()
+
+    def send(self, line):
+        try:
+            self.peer.sendall(line.encode() + b"\n")
+        except OSError as problem:
+            raise Gone(f"the machine hung up: {problem}") from problem
+
+    def receive(self, timeout):
+        end = time.monotonic() + timeout
+        while b"\n" not in self.pending:
+            self.peer.settimeout(max(0.01, end - time.monotonic()))
+            try:
+                part = self.peer.recv(65536)
+            except TimeoutError:
+                raise Gone(f"no answer in {timeout} s") from None
+            except OSError as problem:
+                raise Gone(f"the machine hung up: {problem}") from problem
+            if not part:
+                raise Gone("the machine hung up")
+            self.pending += part
+        line, self.pending = self.pending.split(b"\n", 1)
+        return line.decode()
+
+    def close(self):
+        for end in (self.peer, self.listener):
+            if end:
+                end.close()
+
+
+class Machine:
+    """`folder` keeps its disk, its sockets and what its console said. `cached`: vmlinuz, initrd, base.sqfs."""
+
+    def __init__(self, folder, cached, app, turntable_port, more=(), cores=2):
+        self.folder = pathlib.Path(folder)
+        self.console = self.folder / "console.log"
+        self.agent = Wire(self.folder / "agent.sock")
+        self.eyes = Wire(self.folder / "eyes.sock")
+        self.monitor = Wire(self.folder / "qmp.sock")
+
+        def drive(file, options=""):
+            return ["-drive", f"file={file},format=raw,if=virtio,{options}"]
+
+        command = [
+            "qemu-system-x86_64", "-accel", "tcg,thread=multi", "-machine", "q35", "-cpu", "max", "-smp", cores,
+            "-m", 2048, "-nodefaults", "-no-user-config", "-display", "none", "-no-reboot",
+            "-kernel", cached / "vmlinuz", "-initrd", cached / "initrd",
+            "-append", "console=ttyS0 quiet panic=-1 mitigations=off systemd.show_status=0 systemd.log_target=journal",
+            *drive(cached / "base.sqfs", "readonly=on"), *drive(app, "readonly=on"),
+            # The host's page cache survives the machine: what it holds back is only what the guest never wrote out.
+            *drive(self.folder / "disk.ext4", "cache=writeback"),
+            "-chardev", f"file,id=console,path={self.console},append=on", "-serial", "chardev:console",
+            "-chardev", f"socket,id=qmp,path={self.folder / 'qmp.sock'}", "-mon", "chardev=qmp,mode=control",
+            "-device", "virtio-serial-pci",
+            "-chardev", f"socket,id=agent,path={self.folder / 'agent.sock'}",
+            "-device", "virtserialport,chardev=agent,name=agent",
+            "-chardev", f"socket,id=eyes,path={self.folder / 'eyes.sock'}",
+            "-device", "virtserialport,chardev=eyes,name=eyes",
+            "-device", "qemu-xhci,id=usb",
+            "-chardev", f"serial,id=turntable,path={turntable_port}",
+            "-netdev", "user,id=net,restrict=off", "-device", "virtio-net-pci,netdev=net", *more]
+        self.process = subprocess.Popen([str(word) for word in command], stdin=subprocess.DEVNULL,
+                                        stderr=open(self.folder / "qemu.log", "a"))
+        try:
+            for wire in (self.monitor, self.agent, self.eyes):
+                wire.accept(10)
+            self.monitor.receive(10)
+            self.qmp("qmp_capabilities")
+        except (OSError, Gone) as problem:
+            self.kill()
+            log = (self.folder / "qemu.log").read_text()[-800:]
+            raise RuntimeError(f"qemu did not start ({problem}): {log}") from problem
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.kill()
+
+    def kill(self):
+        """As when somebody pulls the mains plug."""
+        self.process.kill()
+        self.process.wait()
+        for wire in (self.agent, self.eyes, self.monitor):
+            wire.close()
+
+    def qmp(self, command, **arguments):
+        self.monitor.send(json.dumps({"execute": command, "arguments": arguments}))
+        while True:
+            answer = json.loads(self.monitor.receive(20))
+            if "error" in answer:
+                raise RuntimeError(f"{command}: {answer['error']['desc']}")
+            if "return" in answer:
+                return answer["return"]
+
+    def wait_for_boot(self):
+        """Until its agent says that it is there."""
+        try:
+            self.agent.receive(BOOT_S)
+        except Gone as problem:
+            tail = self.console.read_text(errors="replace")[-1500:]
+            raise RuntimeError(f"the machine did not come up ({problem}); its console said:\n{tail}") from problem
+
+    def call(self, command, timeout=COMMAND_S):
+        """Exit code and output of a shell command in the machine."""
+        self.agent.send(base64.b64encode(command.encode()).decode())
+        code, _, output = self.agent.receive(timeout).partition(" ")
+        return int(code), base64.b64decode(output).decode(errors="replace")
+
+    def do(self, command, timeout=COMMAND_S):
+        code, output = self.call(command, timeout)
+        if code != 0:
+            raise RuntimeError(f"in the machine, {command}: exit code {code}: {output.strip()[-800:]}")
+        return output.strip()
+
+
+def make_disk(file, mebibytes=256):
+    """An empty ext4 disk that outlives the machine."""
+    file.unlink(missing_ok=True)
+    with file.open("wb") as disk:
+        os.truncate(disk.fileno(), mebibytes << 20)
+    subprocess.run(["mke2fs", "-q", "-t", "ext4", "-L", "scans", str(file)], check=True)

@@ -1,0 +1,82 @@
+// The unit file as systemd itself judges it, without a systemd that runs.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+namespace {
+
+const std::filesystem::path kUnit = std::filesystem::path(SCANRIG_SOURCE_DIR) / "systemd" / "scanrigd.service";
+
+struct Ran {
+  int code = -1;
+  std::string output;
+};
+
+Ran run(const std::string& command) {
+  Ran ran;
+  FILE* pipe = ::popen((command + " 2>&1").c_str(), "r");
+  if (!pipe) return ran;
+  std::array<char, 4096> part{};
+  while (const std::size_t count = ::fread(part.data(), 1, part.size(), pipe)) ran.output.append(part.data(), count);
+  const int status = ::pclose(pipe);
+  ran.code = WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return ran;
+}
+
+class UnitFile : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (run("systemd-analyze --version").code != 0) GTEST_SKIP() << "systemd-analyze is not installed here";
+    folder_ = std::filesystem::temp_directory_path() / ("scanrig-unit-" + std::to_string(::getpid()));
+    std::filesystem::create_directories(folder_);
+  }
+  void TearDown() override {
+    if (!folder_.empty()) std::filesystem::remove_all(folder_);
+  }
+
+  /// The unit with every `before` replaced, as a file of its own.
+  std::filesystem::path changed(const std::string& before, const std::string& after) const {
+    std::stringstream text;
+    text << std::ifstream(kUnit).rdbuf();
+    std::string unit = text.str();
+    for (std::size_t at = 0; (at = unit.find(before, at)) != std::string::npos; at += after.size()) {
+      unit.replace(at, before.size(), after);
+    }
+    const auto file = folder_ / "scanrigd.service";
+    std::ofstream(file) << unit;
+    return file;
+  }
+
+  std::filesystem::path folder_;
+};
+
+TEST_F(UnitFile, IsVerifiedBySystemdWithoutAWord) {
+  // systemd looks whether the programs are there: they are those of this build.
+  const auto verified = run("systemd-analyze verify " + changed("/usr/bin", SCANRIG_PROGRAMS).string());
+  EXPECT_EQ(verified.code, 0);
+  EXPECT_EQ(verified.output, "");
+}
+
+TEST_F(UnitFile, AMistakeInItWouldBeNoticed) {
+  const auto verified = run("systemd-analyze verify " + changed("Type=notify", "Type=whatever").string());
+  EXPECT_NE(verified.output, "");
+}
+
+TEST_F(UnitFile, ItsExposureIsAtMostTwo) {
+  const auto judged = run("systemd-analyze security --no-pager --offline=true --threshold=20 " + kUnit.string());
+  EXPECT_EQ(judged.code, 0) << judged.output;
+}
+
+TEST_F(UnitFile, WithCapabilitiesTheExposureWouldBeTooHigh) {
+  const auto open = changed("CapabilityBoundingSet=\n", "CapabilityBoundingSet=~\n");
+  EXPECT_NE(run("systemd-analyze security --no-pager --offline=true --threshold=20 " + open.string()).code, 0);
+}
+
+}  // namespace
