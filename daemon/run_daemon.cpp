@@ -49,6 +49,10 @@ void keep(const action::KeepJob& task, const Workers& workers) {
   workers.jobs.post(task);
 }
 
+bool cameras_are_free(const Snapshot& snapshot) {
+  return snapshot.activity == Activity::none || snapshot.activity == Activity::waiting_for_flip;
+}
+
 void perform(const Action& action, const Workers& workers) {
   auto& rig = workers.rig;
   std::visit(
@@ -100,8 +104,12 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   const auto tell = [&loop](Event event) { loop.post(std::move(event)); };
 
   options.on_loop(loop);
+  Preview preview(clock, [&loop] { return cameras_are_free(*loop.snapshot()); });
   auto api_options = options.api;
   api_options.storage = store->options().root;
+  api_options.preview_jpeg = [&preview](std::string_view side) {
+    return preview.jpeg(side == "left" ? Side::left : Side::right);
+  };
   auto api = ApiServer::start(api_options, loop);
   if (!api) return pass_on(api);
 
@@ -113,7 +121,7 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   HousekeepingThread housekeeping(clock, *store, options.retention, tell);
   housekeeping.sweep();
   JobThread jobs(clock, *store, reconstruction, options.on_scanned, tell);
-  RigThread rig(devices, clock, options.acquisition, tell);
+  RigThread rig(devices, clock, options.acquisition, preview, tell);
   PanelThread panel(devices.panel, clock, tell, [&rig] { rig.interrupt(); });
 
   const std::stop_callback shut_down(stop, [&loop] { loop.post(event::Shutdown{}); });

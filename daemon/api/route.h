@@ -50,6 +50,8 @@ struct ApiStation {
   ControlLoop& loop;
   std::function<Facts()> facts;     ///< of the machine and of the API itself; the latest, without waiting
   std::filesystem::path storage{};  ///< absolute; where jobs are kept
+  std::function<Result<std::string>(std::string_view side)> preview_jpeg{};  ///< of "left" or "right"
+  std::function<Result<void>()> check_config{};            ///< of the file that the daemon was started with
   std::function<void(std::function<void()>)> on_worker{};  ///< for what touches the disk
 };
 

@@ -1,4 +1,5 @@
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "core/version.h"
 #include "daemon/api/facts.h"
@@ -51,6 +52,21 @@ void metrics(const ApiStation& station, const Values&, const Send& send) {
   send({.body = metrics_text(*station.loop.snapshot(), station.facts()), .type = "text/plain; version=0.0.4"});
 }
 
+/// A camera that does not answer now may do so later.
+void preview(const ApiStation& station, const Values& values, const Send& send) {
+  auto jpeg = station.preview_jpeg(*values.text("side"));
+  send(jpeg ? ApiResponse{.body = std::move(*jpeg), .type = "image/jpeg"} : error_response(503, jpeg.error()));
+}
+
+void check_config(const ApiStation& station, const Values&, const Send& send) {
+  const auto checked = station.check_config();
+  if (!checked && checked.error().code == ErrorCode::refused) return send(error_response(checked.error()));
+  ordered_json problems = ordered_json::array();
+  std::istringstream lines(checked ? std::string() : checked.error().message);
+  for (std::string line; std::getline(lines, line);) problems.push_back(line);
+  send({.body = to_text({{"ok", checked.has_value()}, {"problems", std::move(problems)}})});
+}
+
 void document(const ApiStation&, const Values&, const Send& send) {
   static const std::string text = openapi_document(all_routes());
   send({.body = text});
@@ -65,6 +81,22 @@ std::vector<Route> service_routes() {
            .about = "Devices, disk, temperatures, deadlines missed, retries.",
            .reply = {.about = "`ok` is false when something is wrong", .schema = "Health"},
            .handle = health},
+          {.method = Method::get,
+           .path = "/api/v1/preview/{side}",
+           .role = Role::viewer,
+           .about = "What a camera sees: the latest picture; asks for a newer one while the rig is idle.",
+           .in_path = {{.name = "side", .about = "of the rig", .required = true, .words = {"left", "right"}}},
+           .reply = {.about = "a picture", .type = "image/jpeg"},
+           .slow = true,
+           .handle = preview},
+          {.method = Method::post,
+           .path = "/api/v1/config/check",
+           .role = Role::engineer,
+           .about = "Reads the daemon's configuration file again and tells what is wrong with it. Changes nothing.",
+           .reply = {.about = "every problem, with its line", .schema = "ConfigCheck"},
+           .errors = {409},
+           .slow = true,
+           .handle = check_config},
           {.method = Method::get,
            .path = "/api/v1/openapi.json",
            .role = Role::viewer,

@@ -94,6 +94,8 @@ const char* const kSchemas = R"({
     "additionalProperties": false, "properties": {"sensor": {"type": "string"}, "celsius": {"type": "number"}}}},
   "deadlines_missed": {"type": "integer"}, "retries": {"type": "integer"}, "faults": {"type": "integer"},
   "connections": {"type": "integer"}, "event_streams": {"type": "integer"}}},
+"ConfigCheck": {"type": "object", "required": ["ok", "problems"], "additionalProperties": false, "properties": {
+  "ok": {"type": "boolean"}, "problems": {"type": "array", "items": {"type": "string"}}}},
 "OpenApi": {"type": "object", "required": ["openapi", "paths"]}
 })";
 

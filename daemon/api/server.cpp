@@ -53,7 +53,7 @@ struct ApiServer::Impl {
   Impl(const ApiOptions& with, const PeerRoles& roles, int listening, ControlLoop& control)
       : options(with),
         loop(control),
-        core({control, [this] { return latest_facts(); }, with.storage,
+        core({control, [this] { return latest_facts(); }, with.storage, with.preview_jpeg, with.check_config,
               [this](std::function<void()> work) { net::post(core.workers, std::move(work)); }},
              roles, with.tokens, with.limits, this_life()),
         local(io, Local(), listening) {}

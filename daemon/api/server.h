@@ -1,9 +1,11 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "core/result.h"
 #include "daemon/api/admission.h"
@@ -17,9 +19,16 @@ struct ApiOptions {
   PeerGroups groups{};             ///< which may what over the socket
   std::optional<int> http_port{};  ///< TCP, where every request needs a token; 0: any free port
   std::string http_address = "127.0.0.1";
-  std::filesystem::path tokens{};   ///< the file of tokens
-  std::filesystem::path storage{};  ///< whose disk is watched
+  std::filesystem::path tokens{};                                                       ///< the file of tokens
+  std::filesystem::path storage{};                                                      ///< whose disk is watched
+  std::function<Result<std::string>(std::string_view side)> preview_jpeg = no_preview;  ///< from any thread
+  std::function<Result<void>()> check_config = no_config;  ///< of the file that the daemon was started with; likewise
   ApiLimits limits{};
+
+  static Result<std::string> no_preview(std::string_view) { return fail(ErrorCode::not_found, "there are no cameras"); }
+  static Result<void> no_config() {
+    return fail(ErrorCode::refused, "the daemon was started without a configuration file");
+  }
 };
 
 /// The HTTP API on a Unix socket and, if wanted, on TCP: two I/O threads, a strand a connection, every step of a

@@ -78,6 +78,20 @@ tl::unexpected<Refusal> silent(const std::filesystem::path& path, const boost::s
                                 fmt::format("{}: the daemon does not answer: {}", path.string(), error.message())});
 }
 
+tl::expected<http::response<http::string_body>, Refusal> exchange(const std::filesystem::path& path,
+                                                                  const std::string& method, const std::string& target,
+                                                                  const std::string& body) {
+  const auto connected = connect_to_socket(path);
+  if (!connected) return tl::unexpected(unreachable(connected.error().message + "; is the daemon running?").error());
+  Link link(*connected, kPatience);
+  http::response<http::string_body> response;
+  boost::beast::flat_buffer buffer;
+  auto error = send(link, method, target, body);
+  if (!error) http::read(link.socket(), buffer, response, error);
+  if (error) return silent(path, error);
+  return response;
+}
+
 tl::unexpected<Refusal> refusal_of(Link& link, boost::beast::flat_buffer& buffer,
                                    http::response_parser<http::buffer_body>&& begun, const std::string& target) {
   const auto status = begun.get().result();
@@ -99,17 +113,18 @@ tl::unexpected<Refusal> unwritten(const std::filesystem::path& path) {
 
 }  // namespace
 
-Answer ask(const std::filesystem::path& path, const std::string& method, const std::string& target,
+Answer ask(const std::filesystem::path& socket, const std::string& method, const std::string& target,
            const std::string& body) {
-  const auto connected = connect_to_socket(path);
-  if (!connected) return unreachable(connected.error().message + "; is the daemon running?");
-  Link link(*connected, kPatience);
-  http::response<http::string_body> response;
-  boost::beast::flat_buffer buffer;
-  auto error = send(link, method, target, body);
-  if (!error) http::read(link.socket(), buffer, response, error);
-  if (error) return silent(path, error);
-  return understand(response, target);
+  const auto response = exchange(socket, method, target, body);
+  if (!response) return tl::unexpected(response.error());
+  return understand(*response, target);
+}
+
+tl::expected<std::string, Refusal> fetch(const std::filesystem::path& socket, const std::string& target) {
+  const auto response = exchange(socket, "GET", target, "");
+  if (!response) return tl::unexpected(response.error());
+  if (response->result() == http::status::ok) return response->body();
+  return tl::unexpected(understand(*response, target).error());
 }
 
 tl::expected<void, Refusal> download(const std::filesystem::path& path, const std::string& target,

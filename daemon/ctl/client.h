@@ -22,6 +22,9 @@ struct Refusal {
 tl::expected<nlohmann::json, Refusal> ask(const std::filesystem::path& socket, const std::string& method,
                                           const std::string& target, const std::string& body = "");
 
+/// The same for an answer that is no JSON: its bytes, such as a picture.
+tl::expected<std::string, Refusal> fetch(const std::filesystem::path& socket, const std::string& target);
+
 /// How much of how much has come.
 using Arrived = std::function<void(std::uint64_t bytes, std::uint64_t of)>;
 
@@ -32,5 +35,8 @@ tl::expected<void, Refusal> download(const std::filesystem::path& socket, const 
 
 /// `text` as one segment of a target: what is no letter, digit or one of ._- is escaped.
 std::string segment(std::string_view text);
+
+/// The same for an answer that is no JSON: its bytes, such as a picture.
+tl::expected<std::string, Refusal> fetch(const std::filesystem::path& socket, const std::string& target);
 
 }  // namespace scanrig::ctl

@@ -35,8 +35,8 @@ tl::expected<json, Refusal> list(const Connection& connection, const JobsVerb& v
 }
 
 /// Copies what the daemon sends to a file here, with a bar.
-ExitCode fetch(const Connection& connection, const std::string& target, const std::string& name,
-               const std::string& out) {
+ExitCode save(const Connection& connection, const std::string& target, const std::string& name,
+              const std::string& out) {
   std::FILE* told = connection.json ? stderr : stdout;
   StageBars bars(told, ::isatty(::fileno(told)) == 1);
   const auto done = download(connection.socket, target, out, [&](std::uint64_t bytes, std::uint64_t of) {
@@ -82,7 +82,7 @@ ExitCode export_file(const Connection& connection, const ExportVerb& verb) {
   const auto out =
       verb.out.empty() ? verb.id + "-" + std::filesystem::path(verb.file).filename().string() : verb.out.string();
   const auto job = "/api/v1/jobs/" + segment(verb.id);
-  if (const auto done = fetch(connection, job + "/files/" + segment(verb.file), verb.file, out); done != ExitCode::ok) {
+  if (const auto done = save(connection, job + "/files/" + segment(verb.file), verb.file, out); done != ExitCode::ok) {
     return done;
   }
   // Who may only look may copy, but retention goes on as if nobody had.
@@ -92,7 +92,7 @@ ExitCode export_file(const Connection& connection, const ExportVerb& verb) {
 
 ExitCode bundle(const Connection& connection, const BundleVerb& verb) {
   const auto out = verb.out.empty() ? verb.id + ".tar.gz" : verb.out.string();
-  return fetch(connection, "/api/v1/jobs/" + segment(verb.id) + "/bundle", verb.id, out);
+  return save(connection, "/api/v1/jobs/" + segment(verb.id) + "/bundle", verb.id, out);
 }
 
 ExitCode queue(const Connection& connection, const QueueVerb& verb) {

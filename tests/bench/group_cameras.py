@@ -6,6 +6,7 @@ import tempfile
 
 import cameras_debian13
 import cameras_hil
+import cameras_wire
 import fuzz
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
@@ -44,4 +45,5 @@ def measure(bench):
     triggers(bench)
     replies(bench)
     cameras_hil.measure(bench)
+    cameras_wire.measure(bench)
     cameras_debian13.measure(bench)

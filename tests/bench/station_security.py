@@ -7,7 +7,7 @@ import motion_rig
 import station_load
 
 ROLES = ("viewer", "operator", "engineer")
-GOOD = {"id": "no-such-job", "file": "scan.json"}
+GOOD = {"id": "no-such-job", "file": "scan.json", "side": "left"}
 TRAVERSALS = ("..", "%2e%2e", "..%2f..%2fetc%2fpasswd", "%2fetc%2fpasswd", "..%5c..", "a%00b", "%252e%252e", "%c0%ae%c0%ae")
 BAD_BODIES = ("{", "[]", "null", '{"no_such_key": 1}', '{"a":1,"a":2}', "\xff", "[" * 5000, '{"a":' * 5000)
 OVERSIZED = " " * 100_000
