@@ -57,7 +57,7 @@ std::optional<Role> PeerRoles::role_of(const PeerCredentials& peer) const {
 
 Result<PeerRoles> find_groups(const PeerGroups& groups) {
   PeerRoles roles;
-  if (!groups.viewer && !groups.operating && !groups.engineer) roles.operating = ::getegid();
+  if (!groups.any()) roles.operating = ::getegid();
   for (const auto& [name, id] :
        {std::pair(&groups.viewer, &roles.viewer), std::pair(&groups.operating, &roles.operating),
         std::pair(&groups.engineer, &roles.engineer)}) {

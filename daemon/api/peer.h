@@ -31,6 +31,7 @@ struct PeerRoles {
 /// The same by the groups' names.
 struct PeerGroups {
   std::optional<std::string> viewer{}, operating{}, engineer{};
+  [[nodiscard]] bool any() const { return viewer || operating || engineer; }
 };
 
 /// Without any group named, the caller's own one operates. Fails with `not_found`.

@@ -168,7 +168,8 @@ struct ApiServer::Impl {
 Result<std::unique_ptr<ApiServer>> ApiServer::start(const ApiOptions& options, ControlLoop& loop) {
   const auto roles = find_groups(options.groups);
   if (!roles) return pass_on(roles, "API");
-  const auto listening = listen_on_socket(options.socket);
+  // Where groups are named the peer's credentials decide, not the file's one group.
+  const auto listening = listen_on_socket(options.socket, options.groups.any() ? 0666 : 0660);
   if (!listening) return pass_on(listening, "API");
   auto impl = std::make_unique<Impl>(options, *roles, *listening, loop);
   if (options.http_port) {

@@ -243,7 +243,7 @@ TEST_F(Daemon, ACameraPulledInAScanInterruptsTheJobAndIsUsedWhenItIsBack) {
 TEST_F(Daemon, ThePreviewLooksInQuietTimesAndNeverDuringAScan) {
   boot();
   get_ready();
-  const auto left = [&] { return ctl::fetch(options.socket, "/api/v1/preview/left"); };
+  const auto left = [&] { return ctl::fetch(options.api.socket, "/api/v1/preview/left"); };
   const auto looks = [&] {
     const std::lock_guard guard(rig.line.mutex);
     return rig.line.looks;

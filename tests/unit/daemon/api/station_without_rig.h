@@ -22,8 +22,10 @@ class StationWithoutRig {
       const auto perform = [this](const Action& action) {
         if (std::holds_alternative<action::StopRig>(action)) loop.post(event::Stopped{});
       };
-      EXPECT_TRUE(loop.run({perform, [](const PanelOutputs&) {}, [] { return std::string("fresh"); },
-                            [&published](const auto&) { published(); }}));
+      EXPECT_TRUE(loop.run({.perform = perform,
+                            .show = [](const PanelOutputs&) {},
+                            .fresh_job_id = [] { return std::string("fresh"); },
+                            .published = [&published](const auto&) { published(); }}));
     });
   }
   ~StationWithoutRig() { end(); }

@@ -70,8 +70,12 @@ TEST_F(Pages, WhatIsHiddenIsNotOffered) {
 
 TEST_F(Pages, EveryShellReadsItsCompletion) {
   EXPECT_EQ(output_of("bash -n " + file("c.bash", completion(app, "bash"))), "");
-  if (installed("zsh")) EXPECT_EQ(output_of("zsh -n " + file("_c", completion(app, "zsh"))), "");
-  if (installed("fish")) EXPECT_EQ(output_of("fish -n " + file("c.fish", completion(app, "fish"))), "");
+  if (installed("zsh")) {
+    EXPECT_EQ(output_of("zsh -n " + file("_c", completion(app, "zsh"))), "");
+  }
+  if (installed("fish")) {
+    EXPECT_EQ(output_of("fish -n " + file("c.fish", completion(app, "fish"))), "");
+  }
   EXPECT_THAT(completion(app, "zsh"), testing::StartsWith("#compdef scanrig\n"));
   EXPECT_THAT(completion(app, "fish"), HasSubstr("__scanrig_path scanrig token add\" -l role"));
 }
@@ -102,7 +106,9 @@ TEST_F(Pages, TheManualIsReadWithoutComplaint) {
   if (!installed("man") && !installed("mandoc")) GTEST_SKIP() << "neither man nor mandoc is installed";
   for (const auto& [name, text] : manual_pages(app)) {
     const auto path = file(name, text);
-    if (installed("mandoc")) EXPECT_EQ(output_of("mandoc -Tlint -W warning " + path), "") << name;
+    if (installed("mandoc")) {
+      EXPECT_EQ(output_of("mandoc -Tlint -W warning " + path), "") << name;
+    }
     if (!installed("man")) continue;
     const auto shown = output_of("LC_ALL=C MANWIDTH=80 man --warnings -l " + path + " | cat");
     EXPECT_THAT(shown, HasSubstr("EXIT STATUS")) << name;

@@ -1,5 +1,6 @@
 #include "daemon/ctl/screen.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <sys/ioctl.h>
 #include <termios.h>
