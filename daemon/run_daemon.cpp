@@ -20,6 +20,10 @@ std::string fresh_job_id(const std::filesystem::path& root) {
   }
 }
 
+bool cameras_are_free(const Snapshot& snapshot) {
+  return snapshot.activity == Activity::none || snapshot.activity == Activity::waiting_for_flip;
+}
+
 void perform(const Action& action, RigThread& rig, JobThread& jobs) {
   std::visit(
       Overloaded{[](const action::Warn&) {},  // these are the control loop's own
@@ -49,7 +53,8 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   ControlLoop loop(clock, {.rules = rules, .warning = options.warning}, std::move(*known));
   const auto tell = [&loop](Event event) { loop.post(std::move(event)); };
 
-  auto api = ApiServer::start(options.socket, loop);
+  Preview preview(clock, [&loop] { return cameras_are_free(*loop.snapshot()); });
+  auto api = ApiServer::start(options.socket, loop, preview);
   if (!api) return pass_on(api);
 
   // Time stands until every thread is there. They end in reverse order: the panel shows the last lamps, the rig is
@@ -57,7 +62,7 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   std::optional<Clock::Busy> starting(clock);
   ReconstructionThread reconstruction(clock, options.reconstructor, rules.poses, rules.views, tell);
   JobThread jobs(clock, *store, reconstruction, options.on_scanned, tell);
-  RigThread rig(devices, clock, options.acquisition, tell);
+  RigThread rig(devices, clock, options.acquisition, preview, tell);
   PanelThread panel(devices.panel, clock, tell, [&rig] { rig.interrupt(); });
 
   const std::stop_callback shut_down(stop, [&loop] { loop.post(event::Shutdown{}); });

@@ -88,7 +88,7 @@ ordered_json io_table(const Snapshot& snapshot) {
 
 ApiResponse respond(unsigned status, const ordered_json& json) {
   // Paths come from the file system and need not be UTF-8.
-  return {status, json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n"};
+  return {.status = status, .body = json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n"};
 }
 
 ApiResponse respond(unsigned status, const Error& error) {
@@ -113,6 +113,16 @@ ApiResponse get(const std::string& what, const Snapshot& snapshot, const std::st
     return respond(404, Error{ErrorCode::not_found, "there is no job " + what.substr(5)});
   }
   return unknown(target);
+}
+
+/// A camera that does not answer now may do so later.
+ApiResponse picture(const std::string& side, Preview& preview) {
+  if (side != "left" && side != "right") {
+    return respond(404, Error{ErrorCode::not_found, "there is a left and a right camera, no " + side});
+  }
+  auto jpeg = preview.jpeg(side == "left" ? Side::left : Side::right);
+  if (jpeg) return {200, std::move(*jpeg), "image/jpeg"};
+  return respond(503, jpeg.error());
 }
 
 std::optional<Button> button_of(const std::string& what) {
@@ -167,7 +177,7 @@ Result<event::MaintenanceAsked> maintenance_of(const std::string& text) {
 
 }  // namespace
 
-void answer(const ApiRequest& request, ControlLoop& loop, std::function<void(ApiResponse)> send) {
+void answer(const ApiRequest& request, ControlLoop& loop, Preview& preview, std::function<void(ApiResponse)> send) {
   const std::string prefix = "/api/v1/";
   if (!request.target.starts_with(prefix)) return send(unknown(request.target));
   const std::string what = request.target.substr(prefix.size());
@@ -183,6 +193,7 @@ void answer(const ApiRequest& request, ControlLoop& loop, std::function<void(Api
       send(done ? respond(200, ordered_json::object()) : respond(409, done.error()));
     });
   }
+  if (what.starts_with("preview/")) return send(picture(what.substr(8), preview));
   if (!button) return send(get(what, *loop.snapshot(), request.target));
   loop.press(*button, Origin::remote, [send = std::move(send)](const Result<std::string>& job) {
     send(job ? respond(200, ordered_json{{"job", job->empty() ? ordered_json(nullptr) : ordered_json(*job)}})

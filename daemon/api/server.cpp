@@ -31,8 +31,9 @@ constexpr std::size_t kMostSessions = 64;
 /// One connection. Owned by the server's set: an answer that comes when the connection is gone finds nobody.
 class Session : public std::enable_shared_from_this<Session> {
  public:
-  Session(Local::socket socket, ControlLoop& loop, std::function<void(std::shared_ptr<Session>)> forget)
-      : stream_(std::move(socket)), loop_(loop), forget_(std::move(forget)) {}
+  Session(Local::socket socket, ControlLoop& loop, Preview& preview,
+          std::function<void(std::shared_ptr<Session>)> forget)
+      : stream_(std::move(socket)), loop_(loop), preview_(preview), forget_(std::move(forget)) {}
 
   void read() {
     parser_.emplace();
@@ -55,13 +56,13 @@ class Session : public std::enable_shared_from_this<Session> {
         });
       }
     };
-    answer(plain, loop_, send);
+    answer(plain, loop_, preview_, send);
   }
 
   void write(const ApiResponse& response) {
     const auto& request = parser_->get();
     response_ = {static_cast<http::status>(response.status), request.version()};
-    response_.set(http::field::content_type, "application/json");
+    response_.set(http::field::content_type, response.content_type);
     response_.keep_alive(request.keep_alive());
     response_.body() = response.body;
     response_.prepare_payload();
@@ -74,6 +75,7 @@ class Session : public std::enable_shared_from_this<Session> {
 
   beast::basic_stream<Local> stream_;
   ControlLoop& loop_;
+  Preview& preview_;
   std::function<void(std::shared_ptr<Session>)> forget_;
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::string_body>> parser_;
@@ -83,15 +85,15 @@ class Session : public std::enable_shared_from_this<Session> {
 }  // namespace
 
 struct ApiServer::Impl {
-  Impl(std::filesystem::path socket, int listening, ControlLoop& control)
-      : path(std::move(socket)), acceptor(io, Local(), listening), loop(control) {}
+  Impl(std::filesystem::path socket, int listening, ControlLoop& control, Preview& pictures)
+      : path(std::move(socket)), acceptor(io, Local(), listening), loop(control), preview(pictures) {}
 
   void accept() {
     acceptor.async_accept([this](beast::error_code error, Local::socket socket) {
       if (!acceptor.is_open()) return;
       if (!error && sessions.size() < kMostSessions) {
         const auto session = std::make_shared<Session>(
-            std::move(socket), loop, [this](const std::shared_ptr<Session>& gone) { sessions.erase(gone); });
+            std::move(socket), loop, preview, [this](const std::shared_ptr<Session>& gone) { sessions.erase(gone); });
         sessions.insert(session);
         session->read();
       }
@@ -103,14 +105,16 @@ struct ApiServer::Impl {
   std::filesystem::path path;
   Local::acceptor acceptor;
   ControlLoop& loop;
+  Preview& preview;
   std::set<std::shared_ptr<Session>> sessions;  // of the I/O thread
   std::thread thread;
 };
 
-Result<std::unique_ptr<ApiServer>> ApiServer::start(const std::filesystem::path& socket, ControlLoop& loop) {
+Result<std::unique_ptr<ApiServer>> ApiServer::start(const std::filesystem::path& socket, ControlLoop& loop,
+                                                    Preview& preview) {
   const auto listening = listen_on_socket(socket);
   if (!listening) return pass_on(listening, "API");
-  auto impl = std::make_unique<Impl>(socket, *listening, loop);
+  auto impl = std::make_unique<Impl>(socket, *listening, loop, preview);
   impl->accept();
   impl->thread = std::thread([io = &impl->io] { io->run(); });
   return std::unique_ptr<ApiServer>(new ApiServer(std::move(impl)));

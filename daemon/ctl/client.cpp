@@ -17,14 +17,16 @@ namespace {
 namespace net = boost::asio;
 namespace http = boost::beast::http;
 using Answer = tl::expected<nlohmann::json, Refusal>;
+using Response = http::response<http::string_body>;
 
 constexpr timeval kPatience{.tv_sec = 15, .tv_usec = 0};
 
-Answer unreachable(std::string message) { return tl::unexpected(Refusal{ExitCode::unreachable, std::move(message)}); }
+tl::unexpected<Refusal> unreachable(std::string message) {
+  return tl::unexpected(Refusal{ExitCode::unreachable, std::move(message)});
+}
 
-Answer understand(const http::response<http::string_body>& response, const std::string& target) {
-  auto json = nlohmann::json::parse(response.body(), nullptr, false);
-  if (response.result() == http::status::ok && json.is_object()) return json;
+/// What the API says is wrong.
+tl::unexpected<Refusal> refusal(const Response& response, const nlohmann::json& json, const std::string& target) {
   if (!json.is_object() || !json.contains("error") || !json["error"].is_object()) {
     return unreachable(fmt::format("{}: an answer that is not the API's (HTTP {})", target, response.result_int()));
   }
@@ -32,9 +34,8 @@ Answer understand(const http::response<http::string_body>& response, const std::
   return tl::unexpected(Refusal{exit_code(code.value_or(ErrorCode::internal)), json["error"].value("message", "")});
 }
 
-}  // namespace
-
-Answer ask(const std::filesystem::path& path, const std::string& method, const std::string& target) {
+tl::expected<Response, Refusal> exchange(const std::filesystem::path& path, const std::string& method,
+                                         const std::string& target) {
   const auto connected = connect_to_socket(path);
   if (!connected) return unreachable(connected.error().message + "; is the daemon running?");
   ::setsockopt(*connected, SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
@@ -45,13 +46,30 @@ Answer ask(const std::filesystem::path& path, const std::string& method, const s
   http::request<http::empty_body> request(http::string_to_verb(method), target, 11);
   request.set(http::field::host, "localhost");
   request.keep_alive(false);
-  http::response<http::string_body> response;
+  Response response;
   boost::beast::flat_buffer buffer;
   boost::system::error_code error;
   http::write(socket, request, error);
   if (!error) http::read(socket, buffer, response, error);
   if (error) return unreachable(fmt::format("{}: the daemon does not answer: {}", path.string(), error.message()));
-  return understand(response, target);
+  return response;
+}
+
+}  // namespace
+
+Answer ask(const std::filesystem::path& socket, const std::string& method, const std::string& target) {
+  const auto response = exchange(socket, method, target);
+  if (!response) return tl::unexpected(response.error());
+  auto json = nlohmann::json::parse(response->body(), nullptr, false);
+  if (response->result() == http::status::ok && json.is_object()) return json;
+  return refusal(*response, json, target);
+}
+
+tl::expected<std::string, Refusal> fetch(const std::filesystem::path& socket, const std::string& target) {
+  const auto response = exchange(socket, "GET", target);
+  if (!response) return tl::unexpected(response.error());
+  if (response->result() == http::status::ok) return response->body();
+  return refusal(*response, nlohmann::json::parse(response->body(), nullptr, false), target);
 }
 
 }  // namespace scanrig::ctl

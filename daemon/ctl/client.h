@@ -19,4 +19,7 @@ struct Refusal {
 tl::expected<nlohmann::json, Refusal> ask(const std::filesystem::path& socket, const std::string& method,
                                           const std::string& target);
 
+/// The same for an answer that is no JSON: its bytes, such as a picture.
+tl::expected<std::string, Refusal> fetch(const std::filesystem::path& socket, const std::string& target);
+
 }  // namespace scanrig::ctl

@@ -119,6 +119,39 @@ void add_panel(CLI::App& app, PanelVerb& verb, Chosen& chosen) {
   watch->callback([&] { chosen = [&] { return watch_panel(verb); }; });
 }
 
+void add_camera(CLI::App& app, CameraVerb& verb, Chosen& chosen) {
+  auto* sub = app.add_subcommand("camera", "the cameras themselves");
+  sub->require_subcommand(1);
+  const auto add = [&](const char* name, const char* about) {
+    auto* action = sub->add_subcommand(name, about);
+    action->callback([&verb, &chosen, name] {
+      verb.what = name;
+      chosen = [&verb] { return camera(verb); };
+    });
+    return action;
+  };
+  add("list", "every camera on network, USB and V4L2, with its serial number")
+      ->add_flag("--json", verb.json, "print JSON");
+  auto* tune = add("tune", "brightness, saturation and blur of what the cameras see");
+  auto* grab = add("grab", "one pair as PNG files");
+  auto* preview = add("preview", "two JPEG files that follow the cameras, through the daemon where one runs");
+  for (auto* action : {tune, grab, preview}) {
+    action->add_option("--config", verb.config, "the rig's configuration")->capture_default_str();
+    action->add_option("--light", verb.light, "what the projector does; without a daemon")
+        ->check(CLI::IsMember({"none", "pattern", "plain"}))
+        ->capture_default_str();
+    action->add_option("--exposure-us", verb.exposure_us, "instead of the configuration's; without a daemon")
+        ->check(CLI::Range(10, 1'000'000));
+    action->add_option("--gain", verb.gain, "instead of the configuration's; without a daemon");
+  }
+  for (auto* action : {grab, preview}) {
+    action->add_option("--out", verb.out, "folder for left and right")->capture_default_str();
+  }
+  for (auto* action : {tune, preview}) {
+    action->add_option("--count", verb.count, "how many pairs; 0: until interrupted")->check(CLI::Range(0, 1'000'000));
+  }
+}
+
 void add_doctor(CLI::App& app, DoctorVerb& verb, Chosen& chosen) {
   auto* sub = app.add_subcommand("doctor", "try everything the configuration names and tell what is wrong");
   sub->add_option("--config", verb.config, "the rig's configuration")->capture_default_str();
@@ -147,8 +180,10 @@ int main(int argc, char** argv) {
   TurntableVerb turntable_verb;
   PanelVerb panel_verb;
   DoctorVerb doctor_verb;
+  CameraVerb camera_verb;
   add_turntable(app, turntable_verb, chosen);
   add_panel(app, panel_verb, chosen);
+  add_camera(app, camera_verb, chosen);
   add_doctor(app, doctor_verb, chosen);
   try {
     app.parse(argc, argv);

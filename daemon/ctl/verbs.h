@@ -81,6 +81,19 @@ struct PanelVerb {
 };
 ExitCode watch_panel(const PanelVerb& verb);
 
+struct CameraVerb {
+  std::string what;  ///< "list", "tune", "grab", "preview"
+  std::filesystem::path config = "/etc/scanrig/rig.toml";
+  std::filesystem::path out = ".";  ///< grab, preview: folder of the pictures
+  std::string light = "none";       ///< what the projector does: none, pattern, plain
+  std::optional<int> exposure_us;   ///< instead of the configuration's
+  std::optional<double> gain;
+  int count = 0;  ///< tune, preview: how many pairs; 0: until interrupted
+  bool json = false;
+};
+/// `preview` asks the daemon where one runs; the others want the cameras for themselves.
+ExitCode camera(const CameraVerb& verb);
+
 struct DoctorVerb {
   std::filesystem::path config = "/etc/scanrig/rig.toml";
   bool yes_move = false;  ///< the table may be turned

@@ -3,6 +3,7 @@
 #include <thread>
 
 #include "core/virtual_clock.h"
+#include "daemon/ctl/client.h"
 #include "daemon/run_daemon.h"
 #include "tests/component/daemon/fake_reconstructor.h"
 #include "tests/component/daemon/fake_rig.h"
@@ -75,6 +76,14 @@ class Daemon : public scan_samples::FolderTest {
     rig.panel.press(&PanelInputs::start);
   }
 
+  /// Looks again and again, for a virtual minute at most.
+  bool clock_waits_for(const std::function<bool()>& as_wanted) {
+    for (const auto by = Deadline::after(clock, seconds(60)); !by.expired(clock);
+         clock.sleep_for(std::chrono::milliseconds(10))) {
+      if (as_wanted()) return true;
+    }
+    return false;
+  }
   std::vector<fs::path> job_folders() const {
     std::vector<fs::path> folders;
     for (const auto& entry : fs::directory_iterator(folder_ / "jobs")) folders.push_back(entry.path());
@@ -227,6 +236,29 @@ TEST_F(Daemon, ACameraPulledInAScanInterruptsTheJobAndIsUsedWhenItIsBack) {
   clock.sleep_for(seconds(5));  // the next look after the devices
   scan_both_poses();
   EXPECT_TRUE(wait_pass());
+}
+
+TEST_F(Daemon, ThePreviewLooksInQuietTimesAndNeverDuringAScan) {
+  boot();
+  get_ready();
+  const auto left = [&] { return ctl::fetch(options.socket, "/api/v1/preview/left"); };
+  const auto looks = [&] {
+    const std::lock_guard guard(rig.line.mutex);
+    return rig.line.looks;
+  };
+  EXPECT_FALSE(left()) << "the first to ask makes the cameras look";
+  ASSERT_TRUE(clock_waits_for([&] { return left().has_value(); }));
+  EXPECT_GT(looks(), 0);
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_busy());
+  ASSERT_TRUE(clock_waits_for([&] { return rig.line.exposures > 0; }));
+  const int before = looks();
+  while (!rig.panel.lamps().flip_request) {
+    const auto picture = left();
+    EXPECT_TRUE(picture) << picture.error().message;
+    clock.sleep_for(std::chrono::milliseconds(100));
+  }
+  EXPECT_LE(looks(), before + 1) << "one at most, asked for when the pose had been stored";
 }
 
 TEST_F(Daemon, AStalledTableIsAFaultThatNamesIt) {

@@ -35,13 +35,17 @@ class Api : public testing::Test {
     loop_->post(event::Shutdown{});
     thread_.join();
   }
-  std::pair<unsigned, nlohmann::json> ask(const std::string& method, const std::string& target) {
+  ApiResponse get(const std::string& method, const std::string& target) {
     std::promise<ApiResponse> response;
-    answer({method, target}, *loop_, [&](ApiResponse r) { response.set_value(std::move(r)); });
-    const auto got = response.get_future().get();
+    answer({method, target}, *loop_, preview_, [&](ApiResponse r) { response.set_value(std::move(r)); });
+    return response.get_future().get();
+  }
+  std::pair<unsigned, nlohmann::json> ask(const std::string& method, const std::string& target) {
+    const auto got = get(method, target);
     return {got.status, nlohmann::json::parse(got.body)};
   }
   RealClock clock_;
+  Preview preview_{clock_, [] { return true; }};
   std::unique_ptr<ControlLoop> loop_;
   std::thread thread_;
 };
@@ -98,6 +102,22 @@ TEST_F(Api, TheInputsAndOutputsOfThePanelAreATable) {
   }
   EXPECT_EQ(io["inputs"]["estop_ok"], true);
   EXPECT_EQ(io["outputs"]["lamp_red"], false);
+}
+
+TEST_F(Api, APictureOfEachCameraIsAJpeg) {
+  EXPECT_EQ(ask("GET", "/api/v1/preview/left").first, 503u) << "no picture yet";
+  StereoFrame pair;
+  pair.left = cv::Mat(8, 8, CV_8UC1, cv::Scalar(50));
+  pair.right = cv::Mat(8, 8, CV_8UC1, cv::Scalar(50));
+  preview_.keep(pair);
+  for (const auto* side : {"left", "right"}) {
+    const auto got = get("GET", std::string("/api/v1/preview/") + side);
+    EXPECT_EQ(got.status, 200u);
+    EXPECT_EQ(got.content_type, "image/jpeg");
+    EXPECT_TRUE(got.body.starts_with("\xFF\xD8\xFF"));
+  }
+  EXPECT_EQ(ask("GET", "/api/v1/preview/middle").first, 404u);
+  EXPECT_EQ(ask("POST", "/api/v1/preview/left").first, 405u);
 }
 
 TEST_F(Api, AJobThatIsNotThereIsNotFound) {
