@@ -1,6 +1,6 @@
 #include "daemon/station/lamps.h"
 
-#include <ranges>
+#include <algorithm>
 
 namespace scanrig {
 
@@ -16,11 +16,11 @@ PanelOutputs lamps(const StationState& state, const JobTable& jobs, bool blink) 
       state.machine == MachineState::ready || (out.busy && !state.maintenance && !warning && !out.red && !out.amber);
   out.start_lamp = state.machine == MachineState::ready || flip;
   out.flip_request = flip;
-  for (const auto& [id, job] : jobs | std::views::reverse) {
-    if (!is_final(job->state)) continue;
-    out.pass = job->state == JobState::done;
+  const auto last =
+      std::find_if(jobs.rbegin(), jobs.rend(), [](const auto& job) { return is_final(job.second->state); });
+  if (last != jobs.rend()) {
+    out.pass = last->second->state == JobState::done;
     out.fail = !out.pass;
-    break;
   }
   return out;
 }

@@ -253,7 +253,8 @@ Result<MeshFile> read_ply(const fs::path& file) {
 }
 
 void weld(MeshFile& file) {
-  auto& [vertices, triangles] = file.mesh;
+  auto& vertices = file.mesh.vertices;
+  auto& triangles = file.mesh.triangles;
   const auto before = [&](int a, int b) {
     return std::lexicographical_compare(vertices[a].data(), vertices[a].data() + 3, vertices[b].data(),
                                         vertices[b].data() + 3);

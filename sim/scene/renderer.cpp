@@ -223,7 +223,8 @@ Pixel render_pixel(const Shot& shot, int x, int y, std::uint64_t bits) {
   }
   for (int i = 0; i < 16; ++i) {
     bits = mix(bits);
-    const double u = (i % 4 + uniform(bits)) / 4.0 - 0.5, v = (i / 4 + uniform(mix(bits + 1))) / 4.0 - 0.5;
+    const int column = i % 4, row = i / 4;
+    const double u = (column + uniform(bits)) / 4.0 - 0.5, v = (row + uniform(mix(bits + 1))) / 4.0 - 0.5;
     const Sample s = shot.sample(x + u, y + v, 0.25);
     pixel.plain += s.plain / 16.0F, pixel.pattern += s.pattern / 16.0F;
   }

@@ -5,6 +5,7 @@ import shutil
 import tempfile
 
 import cameras_debian13
+import cameras_hil
 import cameras_wire
 import fuzz
 
@@ -44,4 +45,5 @@ def measure(bench):
     triggers(bench)
     replies(bench)
     cameras_wire.measure(bench)
+    cameras_hil.measure(bench)
     cameras_debian13.measure(bench)

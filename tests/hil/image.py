@@ -7,6 +7,7 @@ app.sqfs    what `cmake --install` installs, and tests/hil/guest; made anew ever
 """
 import hashlib
 import pathlib
+import platform
 import re
 import shutil
 import subprocess
@@ -14,11 +15,11 @@ import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
-SUITE = "bookworm"
-SYSTEM_PACKAGES = ["systemd-sysv", "udev", "kmod", "dbus", "iproute2", "procps", "usbip"]
+SUITE = platform.freedesktop_os_release()["VERSION_CODENAME"]  # the programs were built with its libraries
+SYSTEM_PACKAGES = ["systemd-sysv", "udev", "kmod", "dbus", "iproute2", "procps", "usbip", "curl"]
 INITRD_MODULES = ["virtio_pci", "virtio_blk", "squashfs", "overlay", "ext4", "virtio_console"]
-MODULES = INITRD_MODULES + ["vivid", "vhci_hcd", "ftdi_sio", "xhci_pci", "virtio_net", "veth", "configfs",
-                            "gpio_sim"]
+MODULES = INITRD_MODULES + ["vivid", "vhci_hcd", "usbhid", "ftdi_sio", "xhci_pci", "virtio_net", "veth", "configfs",
+                            "gpio_sim", "v4l2loopback"]
 SQUASH = ["-comp", "lz4", "-noappend", "-no-progress", "-quiet", "-all-root"]
 
 
@@ -56,6 +57,24 @@ def make_base(folder, packages):
     root.unlink()
 
 
+def build_module(build, version, name, sources):
+    objects = " ".join(f"{pathlib.Path(source).stem}.o" for source in sources)
+    (build / "Kbuild").write_text(f"obj-m := {name}.o\n" + (f"{name}-y := {objects}\n" if len(sources) > 1 else ""))
+    run("make", "-s", "-C", f"/usr/src/linux-headers-{version}", f"M={build}", "modules")
+    return build / f"{name}.ko"
+
+
+def build_v4l2loopback(folder, version):
+    """A video device whose frames a program writes. Its stamps are the monotonic clock's, but it does not say so."""
+    run("apt-get", "download", "-qq", "v4l2loopback-dkms", cwd=folder)
+    package = next(folder.glob("v4l2loopback-dkms_*.deb"))
+    run("dpkg-deb", "-x", package, folder / "v4l2loopback")
+    source = next((folder / "v4l2loopback").rglob("v4l2loopback.c"))
+    text = source.read_text().replace("b->flags = 0;", "b->flags = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC;")
+    source.write_text(text)
+    return build_module(source.parent, version, "v4l2loopback", [source.name])
+
+
 def build_gpio_sim(folder, version):
     """Debian's kernel comes without gpio-sim. Its source and that of the simulated interrupts become one module."""
     build = folder / "gpio-sim"
@@ -71,9 +90,7 @@ def build_gpio_sim(folder, version):
     irq.write_text(text.replace("handle_simple_irq(irq_to_desc(irqnum))", "generic_handle_irq(irqnum)"))
     gpio = build / "gpio-sim.c"
     gpio.rename(build / "gpio-sim-main.c")
-    (build / "Kbuild").write_text("obj-m := gpio-sim.o\ngpio-sim-y := gpio-sim-main.o irq_sim.o\n")
-    run("make", "-s", "-C", f"/usr/src/linux-headers-{version}", f"M={build}", "modules")
-    return build / "gpio-sim.ko"
+    return build_module(build, version, "gpio-sim", ["gpio-sim-main.c", "irq_sim.c"])
 
 
 def make_kernel(folder, version):
@@ -83,7 +100,8 @@ def make_kernel(folder, version):
     run("dpkg-deb", "-x", next(folder.glob("linux-image-*.deb")), package)
     shutil.copy(package / "boot" / f"vmlinuz-{version}", folder / "vmlinuz")
     modules = package / "lib" / "modules" / version
-    shutil.copy(build_gpio_sim(folder, version), modules / "kernel" / "gpio-sim.ko")
+    for build in (build_gpio_sim, build_v4l2loopback):
+        shutil.copy(build(folder, version), modules / "kernel")
     run("depmod", "-b", package, version)
 
     def needed(names):
@@ -104,10 +122,10 @@ def make_kernel(folder, version):
     run("depmod", "-b", kept, version)
     for_initrd = needed(INITRD_MODULES)
     make_initrd(folder, for_initrd)
-    for deb in folder.glob("linux-image-*.deb"):
+    for deb in folder.glob("*.deb"):
         deb.unlink()
-    shutil.rmtree(package)
-    shutil.rmtree(folder / "gpio-sim")
+    for used in (package, folder / "gpio-sim", folder / "v4l2loopback"):
+        shutil.rmtree(used)
 
 
 def make_initrd(folder, modules):

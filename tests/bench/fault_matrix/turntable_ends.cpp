@@ -62,7 +62,7 @@ class WireEnd : public TurntableEnd {
   }
 
  protected:
-  static constexpr sim::wire::AxisOptions kAxis{.gear_ratio = kGear, .start_deg = 20};
+  inline static const sim::wire::AxisOptions kAxis{.gear_ratio = kGear, .start_deg = 20};
 
   WireEnd(std::uint8_t asks, std::uint16_t alarm) : asks_(asks), alarm_(alarm) {}
   static void set_motion(AxisTurntableOptions& options) {

@@ -36,7 +36,7 @@ class FastClock final : public Clock {
   TimePoint origin_ = wall_.now();
 };
 
-constexpr sim::wire::AxisOptions kAxis{.gear_ratio = 90, .vibration_decay_s = 0.005};
+const sim::wire::AxisOptions kAxis{.gear_ratio = 90, .vibration_decay_s = 0.005};
 constexpr double kPulsesPerTurn = 900'000;
 constexpr std::chrono::milliseconds kModbusReply{1000};  ///< of the wall: a busy machine is no fault of the wire
 /// Of the fast clock: long enough that the wall's delays are no time-outs.

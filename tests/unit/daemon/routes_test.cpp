@@ -26,7 +26,9 @@ class Api : public testing::Test {
       const auto perform = [this](const Action& action) {
         if (std::holds_alternative<action::StopRig>(action)) loop_->post(event::Stopped{});
       };
-      EXPECT_TRUE(loop_->run({perform, [](const PanelOutputs&) {}, [] { return std::string("fresh"); }}));
+      EXPECT_TRUE(loop_->run({.perform = perform,
+                              .show = [](const PanelOutputs&) {},
+                              .fresh_job_id = [] { return std::string("fresh"); }}));
     });
   }
   ~Api() override {

@@ -1,0 +1,22 @@
+"""The virtual machine's lines: ./dev hil, run as a person would."""
+import json
+import pathlib
+import subprocess
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
+LIMIT_S = 1500
+
+
+def measure(bench):
+    packages = subprocess.run(["./dev", "deps", "hil"], cwd=ROOT, capture_output=True, text=True)
+    if packages.returncode != 0:
+        bench.line("virtual machine", "its rows", f"not measured: {packages.stderr.strip()[-200:]}", None)
+        return
+    written = ROOT / "out" / "hil.json"
+    written.unlink(missing_ok=True)
+    done = bench.run(["python3", ROOT / "tests" / "hil" / "hil.py", "--bin", bench.bin], LIMIT_S)
+    if not written.is_file():
+        bench.line("virtual machine", "its rows", f"none: {done.stderr.strip()[-200:]}", False)
+        return
+    for line in json.loads(written.read_text()):
+        bench.line(f"virtual machine: {line['what']}", line["asked"], line["measured"], line["ok"])

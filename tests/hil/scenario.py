@@ -1,0 +1,214 @@
+"""One pose through the kernel's interfaces, and the faults; each function is a row of the table."""
+import json
+import random
+import time
+
+from station import IMAGES, VIEWS, Unmet
+
+SCAN_S = 120
+RECOVERY_S = 60
+
+
+def expect(true, what):
+    if not true:
+        raise Unmet(what)
+
+
+def unit(station):
+    """The daemon under its own unit."""
+    station.wait("active", lambda: station.machine.call("systemctl is-active scanrigd")[1].strip() == "active", 60)
+    text = station.machine.do("systemctl show scanrigd -p StatusText --value")
+    expect("Reset" in text or "homed" in text, f"STATUS is {text!r}")
+    failed = station.machine.do("systemctl --failed --plain --no-legend")
+    expect(not failed, f"failed units: {failed}")
+    judged = station.machine.do("systemd-analyze security --no-pager scanrigd | tail -1")
+    user = station.machine.do("ps -o user= -C scanrigd")
+    expect(user.split() == ["scanrig"], f"it runs as {user}")
+    return judged.split(":", 1)[1].split()[0] + " exposure, user scanrig"
+
+
+def wait_for_views(station, job, count, limit_s=SCAN_S):
+    def stored():
+        known = station.ask(f"jobs/{job}")
+        if known and known["state"] in ("failed", "interrupted", "cancelled"):
+            raise Unmet(f"job {job} is {known['state']}: {(known['error'] or {}).get('message', 'no reason given')}")
+        return known and len(known["stored"]) >= count
+
+    station.wait(f"{count} views stored", stored, limit_s)
+
+
+def pose(station, rendered):
+    """Start pressed at the panel; one pose of 8 views. `rendered`: sha256 by file of what the cameras show."""
+    station.get_ready()
+    begin = time.monotonic()
+    job = station.start()
+    wait_for_views(station, job, VIEWS)
+    took = time.monotonic() - begin
+    manifest = station.manifest(job)
+    expect([p["complete"] for p in manifest["poses"]] == [True], f"poses: {json.dumps(manifest['poses'])[:300]}")
+    stored = station.image_hashes(job)
+    names = [f"pose1/view{view:02}/{image}" for view in range(VIEWS) for image in IMAGES]
+    wrong = [name for name in names if stored.get(name) != rendered[name]]
+    expect(not wrong, f"{len(wrong)} of {len(names)} images are not those that were shown: {', '.join(wrong[:4])}")
+    off = max(abs(view["measured_deg"] - view["commanded_deg"]) for view in station.views(job))
+    end_reconstruction(station)
+    return f"{VIEWS} views, {len(names)} images byte for byte, {off:.4f} deg off at most, {took:.0f} s"
+
+
+def usb_and_gige(station, rendered):
+    """The same with a LightCrafter behind vhci-hcd, whose trigger output exposes two GigE cameras."""
+    trigger = 'TRIGGER=lightcrafter 3240\nCAMERAS=gige 10.77.0.11 10.77.0.12'
+    station.machine.do(f"echo '{trigger}' >/run/hil/cameras && systemctl restart hil-cameras && modprobe vhci_hcd")
+    station.told = None  # the angle has to be said again
+    attach = "ip netns exec cameras usbip attach -r 127.0.0.1 -b 1-1"
+    station.wait("the LightCrafter attached", lambda: station.machine.call(attach)[0] == 0, 20)
+    station.machine.do("cp /etc/scanrig/usb-and-gige.toml /etc/scanrig/rig.toml && systemctl restart scanrigd", 30)
+    for device in ("projector", "camera"):
+        station.wait(f"the {device} there", lambda name=device: device_is_there(station, name), 30)
+    return pose(station, rendered)
+
+
+def end_reconstruction(station):
+    """The model of a scan is not this machine's business: emulated, it would take minutes."""
+    station.machine.do("systemctl restart scanrigd", 30)
+
+
+def scanning(station, views=1):
+    """A job with so many views stored, while it goes on."""
+    station.get_ready()
+    job = station.start()
+    wait_for_views(station, job, views)
+    return job
+
+
+def job_ends(station, job, words):
+    """The job's sentence, once it has failed and said one of `words`."""
+    def ended():
+        known = station.ask(f"jobs/{job}")
+        return known if known and known["state"] in ("failed", "interrupted") else None
+
+    known = station.wait("the job's end", ended, RECOVERY_S)
+    sentence = (known["error"] or {}).get("message", "")
+    expect(any(word in sentence for word in words), f"the job ended as: {sentence}")
+    return known["state"], sentence
+
+
+def recovers(station):
+    """A Reset at the panel, and the next job takes a view."""
+    job = scanning(station)
+    station.tap("STOP")
+    station.wait("stopped", lambda: station.status()["machine"] != "Operational.SingleExecution", 20)
+    return job
+
+
+def serial_unplugged(station):
+    job = scanning(station)
+    station.plug_serial(False)
+    state, sentence = job_ends(station, job, ("turntable",))
+    station.wait("no port", lambda: station.machine.call("test -e /dev/scanrig/turntable")[0] != 0, 10)
+    station.plug_serial(True)
+    station.wait("the turntable back", lambda: device_is_there(station, "turntable"), 30)
+    recovers(station)
+    return f"job {state}: {sentence}"
+
+
+def device_is_there(station, name):
+    status = station.status()
+    return status and any(device["name"] == name and device["ok"] for device in status["devices"])
+
+
+def estop(station):
+    job = scanning(station)
+    station.press_estop(True)
+    state, sentence = job_ends(station, job, ("e-stop",))
+    station.wait("the red lamp", lambda: station.lamp("LAMP_RED"), 5)
+    station.press_estop(False)
+    recovers(station)
+    return f"job {state}: {sentence}"
+
+
+def cameras_lost(station):
+    """Both cameras stop delivering; then they are back."""
+    job = scanning(station)
+    station.machine.do("systemctl stop hil-cameras")
+    state, sentence = job_ends(station, job, ("camera",))
+    station.machine.do("systemctl start hil-cameras")
+    station.told = None  # the angle has to be said again
+    recovers(station)
+    return f"job {state}: {sentence}"
+
+
+def turning(station):
+    """A job whose table is turning now."""
+    job = scanning(station)
+    station.wait("the table turning", lambda: station.rig.truth()["speed_deg_s"] > 20, 20)
+    return job
+
+
+def seen_safe(station):
+    """Seconds until the table stands and the light is off, by the simulation and the lines."""
+    begin = time.monotonic()
+    station.wait("the table standing", lambda: station.rig.truth()["standing"], 30)
+    took = time.monotonic() - begin
+    dark = station.machine.do("cat /run/hil/PROJ_TRIG/value /run/hil/PROJ_PLAIN/value").split()
+    expect(dark == ["0", "0"], f"the light is on: {dark}")
+    return took
+
+
+def killed(station):
+    job = turning(station)
+    station.machine.do("systemctl kill -s SIGKILL --kill-whom=main scanrigd")
+    took = seen_safe(station)
+    station.wait("the red lamp", lambda: station.lamp("LAMP_RED"), 5)
+    station.wait_for_words("next_action", "Reset", RECOVERY_S)
+    known = station.ask(f"jobs/{job}")
+    expect(known["state"] == "interrupted", f"the job is {known['state']}")
+    recovers(station)
+    return f"standing and dark {took:.1f} s later, red lamp; restarted: Halted, job interrupted"
+
+
+def watchdog(station):
+    job = turning(station)
+    station.machine.do("systemctl kill -s SIGSTOP --kill-whom=main scanrigd")
+    begin = time.monotonic()
+    station.wait("killed by the watchdog", lambda: "watchdog" in station.journal("-u scanrigd -u init.scope", 80).lower(),
+                 30)
+    took = time.monotonic() - begin
+    seen_safe(station)
+    station.wait_for_words("next_action", "Reset", RECOVERY_S)
+    known = station.ask(f"jobs/{job}")
+    expect(known["state"] == "interrupted", f"the job is {known['state']}")
+    recovers(station)
+    return f"systemd's watchdog ended it after {took:.1f} s; made safe, restarted: Halted, job interrupted"
+
+
+class Acknowledged:
+    """Views that the station said were stored, and whether they still are after the machine was killed."""
+
+    def __init__(self):
+        self.job, self.views, self.lost, self.checked = None, {}, 0, 0
+
+    def scan_until_killed(self, station, most_s):
+        station.get_ready()
+        self.job, self.views = station.start(), {}
+        end = time.monotonic() + random.uniform(0.5, most_s)
+        while time.monotonic() < end:
+            known = station.ask(f"jobs/{self.job}")
+            for view in (known or {}).get("stored", []):
+                self.views[view["view"]] = True
+        station.machine.kill()
+
+    def check(self, station):
+        """In the next life. The manifest has every view that was acknowledged, the files are what it says."""
+        station.wait("the daemon", station.status, 60)
+        manifest = {view["index"]: view for view in station.views(self.job)}
+        hashes = station.image_hashes(self.job)
+        for index in self.views:
+            files = manifest.get(index, {}).get("files", {})
+            whole = len(files) == len(IMAGES) and all(hashes.get(f["path"]) == f["sha256"] for f in files.values())
+            self.lost += not whole
+            self.checked += 1
+        state = (station.ask(f"jobs/{self.job}") or {}).get("state")
+        # A job that was killed before its first view has no folder that says anything.
+        expect(state in ("interrupted", "scanned", "reconstructing", "failed", "done") or not self.views,
+               f"after the kill the job is {state}")

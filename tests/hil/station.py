@@ -1,0 +1,176 @@
+"""The station in the virtual machine, with the simulated turntable of the host at its serial port."""
+import hashlib
+import json
+import os
+import pathlib
+import re
+import shutil
+import sys
+import threading
+import time
+
+import image
+import machine
+
+sys.path.insert(0, str(image.ROOT / "tests" / "bench"))
+import motion_rig  # noqa: E402
+
+VIEWS = 8
+JOBS = "/var/lib/scanrig/jobs"
+IMAGES = [f"{side}_{light}.png" for side in ("left", "right") for light in ("pattern", "plain")]
+
+
+class Unmet(RuntimeError):
+    """What had to happen did not."""
+
+
+def make_tree(build, tree, images):
+    """What lies over the base: the installed project, the scenario's own files, the images that the cameras show."""
+    image.run("cmake", "--install", build, "--prefix", "/usr", "--strip", env={**os.environ, "DESTDIR": str(tree)})
+    shutil.copytree(image.HERE / "guest", tree, symlinks=True, dirs_exist_ok=True)
+    image.run("strip", "-o", tree / "usr/lib/hil/scanrig-edge-camera", build / "bin" / "scanrig-edge-camera")
+    other = with_sections(tree / "etc/scanrig/rig.toml", tree / "usr/share/hil/usb-and-gige.toml")
+    (tree / "etc/scanrig/usb-and-gige.toml").write_text(other)
+    shutil.copytree(images, tree / "usr" / "share" / "hil" / "images")
+
+
+def with_sections(config, sections):
+    """The configuration with these sections in the place of its own."""
+    def split(file):
+        parts = re.split(r"^(?=\[)", file.read_text(), flags=re.M)
+        return {part.split("]")[0]: part.rstrip() + "\n\n" for part in parts}
+
+    return "".join({**split(config), **split(sections)}.values())
+
+
+class Station:
+    """One boot of the machine, until it is left."""
+
+    def __init__(self, folder, cached, app, rig, more=()):
+        self.rig = rig
+        self.machine = machine.Machine(folder, cached, app, rig.folder / "turntable", more)
+        self.told = None
+        self.leaving = threading.Event()
+        self.teller = threading.Thread(target=self.tell_angle, daemon=True)
+
+    def __enter__(self):
+        try:
+            self.machine.wait_for_boot()
+            self.plug_serial(True)
+        except BaseException:
+            self.machine.kill()
+            raise
+        self.teller.start()
+        return self
+
+    def __exit__(self, *_):
+        self.leaving.set()
+        if self.teller.is_alive():
+            self.teller.join()
+        self.machine.kill()
+
+    def tell_angle(self):
+        """The cameras in the machine see the table where the host's simulation says that it is."""
+        while not self.leaving.wait(0.02):
+            angle = round(self.rig.truth()["angle_deg"], 1)
+            if angle != self.told:
+                try:
+                    self.machine.eyes.send(str(angle))
+                except machine.Gone:
+                    return
+                self.told = angle
+
+    def plug_serial(self, plugged):
+        if plugged:
+            self.machine.qmp("device_add", driver="usb-serial", id="adapter", bus="usb.0", chardev="turntable")
+        else:
+            self.machine.qmp("device_del", id="adapter")
+
+    # The operator's hands
+
+    def pull(self, line, up):
+        self.machine.do(f"echo pull-{'up' if up else 'down'} >/run/hil/{line}/pull")
+
+    def tap(self, line):
+        self.machine.do(f"cd /run/hil/{line} && echo pull-down >pull && sleep 0.2 && echo pull-up >pull")
+
+    def press_estop(self, pressed):
+        """The contact opens, and the relay takes the motor's power."""
+        self.pull("ESTOP_OK", pressed)
+        (self.rig.press if pressed else self.rig.release)("estop")
+
+    def lamp(self, name):
+        return self.machine.do(f"cat /run/hil/{name}/value") == "1"
+
+    # The daemon
+
+    def ask(self, what):
+        code, text = self.machine.call(f"curl -s -m 5 --unix-socket /run/scanrig/api.sock http://rig/api/v1/{what}")
+        try:
+            return json.loads(text) if code == 0 else None
+        except ValueError:
+            return None
+
+    def status(self):
+        return self.ask("status")
+
+    def wait(self, what, ready, limit_s):
+        """What `ready` returned, once it is true. Fails with Unmet."""
+        end = time.monotonic() + limit_s
+        while True:
+            found = ready()
+            if found:
+                return found
+            if time.monotonic() > end:
+                status = self.status() or {}
+                raise Unmet(f"not {what} within {limit_s} s; the station says: {status.get('machine', 'nothing')}, "
+                            f"{status.get('sentence', '')}")
+            time.sleep(0.1)
+
+    def wait_for_state(self, state, limit_s):
+        def ready():
+            status = self.status()
+            return status if status and status["machine"] == state else None
+
+        return self.wait(state, ready, limit_s)
+
+    def wait_for_words(self, key, words, limit_s):
+        def ready():
+            status = self.status()
+            return status if status and words in status.get(key, "") else None
+
+        return self.wait(f'"{words}" in {key}', ready, limit_s)
+
+    def get_ready(self):
+        """Halted until somebody presses Reset; then it homes."""
+        self.wait_for_words("next_action", "Reset", 60)
+        self.tap("RESET")
+        self.wait_for_state("Operational.Ready", 60)
+
+    def start(self):
+        """The new job's id."""
+        before = set(self.jobs())
+        self.tap("START")
+        return self.wait("a new job", lambda: next(iter(set(self.jobs()) - before), None), 10)
+
+    def jobs(self):
+        return self.machine.do(f"ls {JOBS} 2>/dev/null || true").split()
+
+    def manifest(self, job):
+        """scan.json as it is on the disk; empty before the first view."""
+        text = self.machine.do(f"cat {JOBS}/{job}/scan.json 2>/dev/null || echo '{{}}'")
+        return json.loads(text)
+
+    def views(self, job):
+        return [view for pose in self.manifest(job).get("poses", []) for view in pose["views"]]
+
+    def image_hashes(self, job):
+        lines = self.machine.do(f"cd {JOBS}/{job} && find . -name '*.png' -exec sha256sum {{}} +").splitlines()
+        return {name.removeprefix("./"): digest for digest, name in (line.split() for line in lines)}
+
+    def journal(self, words="-u scanrigd", lines=40):
+        return self.machine.do(f"journalctl --no-pager -o cat {words} -n {lines}")
+
+
+def pixels_hash(file):
+    return hashlib.sha256(pathlib.Path(file).read_bytes()).hexdigest()
