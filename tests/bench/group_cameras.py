@@ -44,6 +44,6 @@ def replies(bench):
 def measure(bench):
     triggers(bench)
     replies(bench)
-    cameras_hil.measure(bench)
     cameras_wire.measure(bench)
+    cameras_hil.measure(bench)
     cameras_debian13.measure(bench)
