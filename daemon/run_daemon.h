@@ -16,6 +16,7 @@
 #include "daemon/rig/acquisition.h"
 #include "daemon/rig/devices.h"
 #include "daemon/station/control_loop.h"
+#include "daemon/webhook/http_post.h"
 
 namespace scanrig {
 
@@ -29,11 +30,12 @@ struct DaemonOptions {
   std::map<std::string, Recipe> recipes{{"default", {}}};  ///< "default" is what Start scans when nothing is queued
   std::optional<QuietHours> quiet_hours{};                 ///< no job begins by itself then
   RetentionOptions retention{};
-  std::filesystem::path socket;  ///< of the API
-  bool remote = false;           ///< the API may start and home while the guard is closed
-  bool guard = false;            ///< there is a guard
-  bool home_guarded = false;     ///< after a restart a closed guard homes the table, without Reset
-  bool manual_light = false;     ///< a hand switches the projector
+  std::optional<HttpAddress> webhook{};  ///< whom failures are told
+  std::filesystem::path socket;          ///< of the API
+  bool remote = false;                   ///< the API may start and home while the guard is closed
+  bool guard = false;                    ///< there is a guard
+  bool home_guarded = false;             ///< after a restart a closed guard homes the table, without Reset
+  bool manual_light = false;             ///< a hand switches the projector
   AcquisitionOptions acquisition;
   Clock::Duration warning = std::chrono::seconds(2);
   ReconstructorFactory reconstructor;
