@@ -68,7 +68,10 @@ std::string absolute(int folder, const char* path) {
   return (::getcwd(here, sizeof here) ? std::string(here) : std::string()) + "/" + path;
 }
 
-bool watched(const std::string& path) { return !settings().root.empty() && path.starts_with(settings().root + "/"); }
+bool watched(const std::string& path) {
+  const auto& root = settings().root;
+  return !root.empty() && path.starts_with(root) && (path.size() == root.size() || path[root.size()] == '/');
+}
 
 void log_line(const char* kind, const std::string& path, const std::string& other, const void* data, std::size_t size) {
   std::string line = std::string(kind) + "\t" + path + "\t" + other + "\t";
