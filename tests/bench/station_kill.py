@@ -4,6 +4,7 @@ The job is a two-pose job of three views over devices that only pretend (tests/s
 daemon's own file handling, in a fraction of a second. After each start every job found must come to its end, by resuming
 or by being ended, and every view that was acknowledged must be there and whole.
 """
+import errno
 import os
 import pathlib
 import random
@@ -105,6 +106,25 @@ def power_cuts(rig, home, log, share=1.0, seed=3):
         yield f"power cut after call {calls} ({kind} {pathlib.Path(path).name})", rig.recovers(cut)
 
 
+def bad_disks(rig, calls, share=1.0, seed=5):
+    """A disk that is full, or read-only, from some call on: the job must be named as interrupted or failed, nothing that
+    was acknowledged may be lost, and with a good disk everything must go on."""
+    chance = random.Random(seed)
+    for number in range(1, calls + 1):
+        if chance.random() > share:
+            continue
+        error = chance.choice([errno.ENOSPC, errno.EROFS, errno.EIO])
+        home = rig.fresh("bad_disk")
+        end = rig.run("scan", home, fail=number, error=error)
+        what = f"{errno.errorcode[error]} from call {number} on"
+        if end.returncode not in (0, 1):
+            yield what, f"the daemon ended with {end.returncode}: {end.stdout}{end.stderr}"
+        elif end.returncode == 1 and os.strerror(error) not in end.stdout:
+            yield what, f"not told by its name: {end.stdout}"
+        else:
+            yield what, rig.recovers(home)
+
+
 def damaged_index(rig, home, count, seed=4):
     """The index deleted, cut short or overwritten; nothing may be lost."""
     chance = random.Random(seed)
@@ -135,6 +155,7 @@ def measure(bench, scratch):
     report(bench, "SIGKILL before and after every write, fsync, rename of a job", kills(rig, calls, share))
     report(bench, "SIGKILL again during the recovery", second_kills(rig, calls, count))
     report(bench, "power cut after every write, fsync, rename of a job", power_cuts(rig, home, log, share))
+    report(bench, "full, read-only and failing disk from every call on, then a good one", bad_disks(rig, calls, share))
     report(bench, "index deleted, cut short, overwritten", damaged_index(rig, home, count // 3))
 
 

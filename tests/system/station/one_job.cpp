@@ -104,7 +104,9 @@ class Shift {
     do {
       rig_.panel.press(&PanelInputs::start);
       if (!wait([](const auto& l) { return !l.start_lamp; })) return false;
-      if (!wait([](const auto& l) { return l.start_lamp; })) return false;
+      if (!wait([](const auto& l) { return l.start_lamp || (l.red && !l.busy); })) return false;
+      said_ = loop_->snapshot()->cause;
+      if (loop_->snapshot()->machine == MachineState::error) return false;
     } while (loop_->snapshot()->activity == Activity::waiting_for_flip);
     return true;
   }
