@@ -46,9 +46,7 @@ DaemonOptions options_from(const config::RigConfig& config) {
   options.retention = {.keep_for = config.storage.keep_days, .keep_bytes = {}};
   if (config.storage.keep_gib) options.retention.keep_bytes = gib(*config.storage.keep_gib);
   if (config.quiet_hours) options.quiet_hours = QuietHours{config.quiet_hours->from, config.quiet_hours->to};
-  if (config.webhook) {
-    if (auto address = HttpAddress::parse(config.webhook->url)) options.webhook = std::move(*address);
-  }
+  if (config.webhook) options.webhook = HttpAddress{config.webhook->host, config.webhook->port, config.webhook->path};
   options.socket = config.api.socket;
   options.remote = config.safety.remote_start;
   options.guard = config.safety.guard.has_value();
