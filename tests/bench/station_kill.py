@@ -28,8 +28,10 @@ class Rig:
         (home / "jobs").mkdir(parents=True)
         return home
 
-    def run(self, verb, home, **watch):
+    def run(self, verb, home, crash=False, **watch):
         environment = dict(os.environ)
+        if crash:
+            environment["ONE_JOB_CRASH"] = "1"
         if watch:
             environment["LD_PRELOAD"] = str(self.watcher)
             environment["DISK_CALLS_ROOT"] = str(home / "jobs")
@@ -125,6 +127,21 @@ def bad_disks(rig, calls, share=1.0, seed=5):
             yield what, rig.recovers(home)
 
 
+def crashes(rig):
+    """A model whose making kills the daemon: tried twice, then in quarantine; the station goes on."""
+    home = rig.fresh("crash")
+    for verb in ("scan", "recover"):
+        end = rig.run(verb, home, crash=True)
+        if end.returncode != -11:
+            yield f"{verb} with a stage that crashes", f"ended with {end.returncode}: {end.stdout}{end.stderr}"
+            return
+    end = rig.run("recover", home, crash=True)
+    said = "in quarantine" in end.stdout and "lost" not in end.stdout
+    yield "the third start leaves the job alone", None if said else f"{end.returncode}: {end.stdout}{end.stderr}"
+    end = rig.run("scan", home)
+    yield "the next job runs", None if end.returncode == 0 else f"{end.returncode}: {end.stdout}{end.stderr}"
+
+
 def damaged_index(rig, home, count, seed=4):
     """The index deleted, cut short or overwritten; nothing may be lost."""
     chance = random.Random(seed)
@@ -156,10 +173,15 @@ def measure(bench, scratch):
     report(bench, "SIGKILL again during the recovery", second_kills(rig, calls, count))
     report(bench, "power cut after every write, fsync, rename of a job", power_cuts(rig, home, log, share))
     report(bench, "full, read-only and failing disk from every call on, then a good one", bad_disks(rig, calls, share))
+    report(bench, "a reconstruction that takes the daemon with it, twice", crashes(rig),
+           "quarantine after the second, next job runs")
     report(bench, "index deleted, cut short, overwritten", damaged_index(rig, home, count // 3))
 
 
-def report(bench, what, points):
+NOTHING_LOST = "0 acknowledged views lost, 0 unreadable folders, 0 jobs without an end"
+
+
+def report(bench, what, points, asked=NOTHING_LOST):
     faults, done = [], 0
     for where, fault in points:
         done += 1
@@ -167,5 +189,4 @@ def report(bench, what, points):
             faults.append(f"{where}: {fault}")
     for fault in faults[:10]:
         bench.note(fault)
-    bench.line(what, "0 acknowledged views lost, 0 unreadable folders, 0 jobs without an end",
-               f"{len(faults)} faults at {done} points", done > 0 and not faults)
+    bench.line(what, asked, f"{len(faults)} faults at {done} points", done > 0 and not faults)

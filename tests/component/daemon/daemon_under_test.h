@@ -38,6 +38,8 @@ class Daemon : public scan_samples::FolderTest {
   void shut_down() {
     stop.request_stop();
     thread.join();
+    rig.panel.detach();
+    stop = std::stop_source();
   }
 
   bool wait_ready() {
@@ -105,10 +107,10 @@ class Daemon : public scan_samples::FolderTest {
       std::optional<Result<std::string>> answer{};
     };
     const auto waiting = std::make_shared<Waiting>();
-    const auto reply = [this, waiting](const Result<std::string>& result) {
+    const auto reply = [this, waiting](const Result<std::string>& answer) {
       {
         const std::lock_guard guard(waiting->mutex);
-        waiting->answer = result;
+        waiting->answer = answer;
       }
       clock.notify_all(waiting->changed);
     };
