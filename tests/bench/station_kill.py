@@ -77,6 +77,23 @@ def kills(rig, calls, share=1.0, seed=1):
             yield f"killed {when} call {number}", fault
 
 
+def random_kills(rig, count, seed=6):
+    """SIGKILL at any moment, also between two calls."""
+    chance = random.Random(seed)
+    for _ in range(count):
+        home = rig.fresh("killed_at_random")
+        after = chance.uniform(0.0, 0.5)
+        daemon = subprocess.Popen([rig.program, "scan", home], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            daemon.wait(timeout=after)
+        except subprocess.TimeoutExpired:
+            daemon.kill()
+            daemon.wait()
+        # Too early for a calibration there is no rig at all.
+        if (home / "calibration.json").exists():
+            yield f"killed after {1000 * after:.0f} ms", rig.recovers(home)
+
+
 def second_kills(rig, calls, count, seed=2):
     """A second kill during the recovery from a first one."""
     chance = random.Random(seed)
@@ -170,6 +187,7 @@ def measure(bench, scratch):
     bench.note(f"one job changes its files by {calls} calls")
     count = 30 if bench.quick else 300
     report(bench, "SIGKILL before and after every write, fsync, rename of a job", kills(rig, calls, share))
+    report(bench, "SIGKILL at random moments", random_kills(rig, 10 if bench.quick else 120))
     report(bench, "SIGKILL again during the recovery", second_kills(rig, calls, count))
     report(bench, "power cut after every write, fsync, rename of a job", power_cuts(rig, home, log, share))
     report(bench, "full, read-only and failing disk from every call on, then a good one", bad_disks(rig, calls, share))
