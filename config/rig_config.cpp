@@ -1,5 +1,6 @@
 #include "config/rig_config.h"
 
+#include <algorithm>
 #include <cstdio>
 
 #include "config/camera_section.h"
@@ -132,6 +133,21 @@ void read_time_of_day(Section& s, std::string_view key, std::chrono::minutes& ti
   time = std::chrono::hours(hour) + std::chrono::minutes(minute);
 }
 
+void read_webhook(Section& s, WebhookConfig& webhook) {
+  std::string url;
+  s.text("url", url);
+  constexpr std::string_view kScheme = "http://";
+  const auto rest = url.starts_with(kScheme) ? url.substr(kScheme.size()) : std::string();
+  const auto slash = std::min(rest.find('/'), rest.size());
+  const auto place = rest.substr(0, slash);
+  const auto colon = std::min(place.rfind(':'), place.size());
+  webhook.host = place.substr(0, colon);
+  webhook.port = colon == place.size() ? "80" : place.substr(colon + 1);
+  webhook.path = slash == rest.size() ? "/" : rest.substr(slash);
+  const bool number = !webhook.port.empty() && webhook.port.find_first_not_of("0123456789") == std::string::npos;
+  if (webhook.host.empty() || !number) s.report("url", fmt::format("\"{}\" is no http://HOST:PORT/PATH", url));
+}
+
 void read_reconstruction(Section& s, ReconstructionConfig& reconstruction) {
   using Executor = ReconstructionConfig::Executor;
   s.choice<Executor>("executor", reconstruction.executor,
@@ -177,10 +193,7 @@ void read_rig(Section& root, const std::filesystem::path& base, const std::vecto
     });
   }
   if (root.has("webhook")) {
-    root.section("webhook", [&](Section& s) {
-      s.text("url", rig.webhook.emplace().url);
-      if (!rig.webhook->url.starts_with("http://")) s.report("url", "must begin with http://");
-    });
+    root.section("webhook", [&](Section& s) { read_webhook(s, rig.webhook.emplace()); });
   }
   if (root.has("gpio")) {
     root.section("gpio", [&](Section& s) { s.path("socket", base, rig.gpio_socket.emplace()); });

@@ -94,7 +94,7 @@ struct QuietHoursConfig {
 
 /// Whom a failed job is told: `http://HOST[:PORT]/PATH`.
 struct WebhookConfig {
-  std::string url;
+  std::string host, port, path;
 };
 
 struct StorageConfig {

@@ -51,6 +51,7 @@ DaemonOptions options_from(const config::RigConfig& config) {
                  .http_port = config.api.http_port,
                  .http_address = config.api.http_address,
                  .tokens = config.api.tokens};
+  if (config.webhook) options.webhook = HttpAddress{config.webhook->host, config.webhook->port, config.webhook->path};
   options.remote = config.safety.remote_start;
   options.guard = config.safety.guard.has_value();
   options.home_guarded = config.safety.home_after_restart == config::SafetyConfig::HomeAfterRestart::guarded;

@@ -8,6 +8,7 @@
 #include "daemon/rig/rig_thread.h"
 #include "daemon/service_manager.h"
 #include "daemon/station/timestamp.h"
+#include "daemon/webhook/webhook.h"
 
 namespace scanrig {
 namespace {
@@ -122,6 +123,8 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   housekeeping.sweep();
   JobThread jobs(clock, *store, reconstruction, options.on_scanned, tell);
   RigThread rig(devices, clock, options.acquisition, preview, tell);
+  std::optional<Webhook> webhook;
+  if (options.webhook) webhook.emplace(clock, *options.webhook);
   PanelThread panel(devices.panel, clock, tell, [&rig] { rig.interrupt(); });
 
   const std::stop_callback shut_down(stop, [&loop] { loop.post(event::Shutdown{}); });
@@ -133,17 +136,18 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
     perform(action, workers);
     if (std::holds_alternative<action::BeginJob>(action)) housekeeping.sweep();
   };
+  const auto published = [&](const std::shared_ptr<const Snapshot>& snapshot) {
+    if (webhook) webhook->look(snapshot);
+    options.published(snapshot);
+    (*api)->wake();
+  };
   ServiceManager manager;
   return loop.run({.alive = [&] { manager.alive(loop.snapshot()->sentence); },
                    .perform = perform_all,
                    .show = [&](const PanelOutputs& outputs) { panel.show(outputs); },
                    .fresh_job_id = [&] { return fresh_id(); },
                    .quiet_hours = [&] { return quiet_now(options.quiet_hours); },
-                   .published =
-                       [&](const std::shared_ptr<const Snapshot>& snapshot) {
-                         options.published(snapshot);
-                         (*api)->wake();
-                       }});
+                   .published = published});
 }
 
 }  // namespace scanrig

@@ -17,6 +17,7 @@
 #include "daemon/rig/acquisition.h"
 #include "daemon/rig/devices.h"
 #include "daemon/station/control_loop.h"
+#include "daemon/webhook/http_post.h"
 
 namespace scanrig {
 
@@ -30,11 +31,12 @@ struct DaemonOptions {
   std::map<std::string, Recipe> recipes{{"default", {}}};  ///< "default" is what Start scans when nothing is queued
   std::optional<QuietHours> quiet_hours{};                 ///< no job begins by itself then
   RetentionOptions retention{};
+  std::optional<HttpAddress> webhook{};  ///< whom failures are told
   ApiOptions api;
-  bool remote = false;           ///< the API may start and home while the guard is closed
-  bool guard = false;            ///< there is a guard
-  bool home_guarded = false;     ///< after a restart a closed guard homes the table, without Reset
-  bool manual_light = false;     ///< a hand switches the projector
+  bool remote = false;                   ///< the API may start and home while the guard is closed
+  bool guard = false;                    ///< there is a guard
+  bool home_guarded = false;             ///< after a restart a closed guard homes the table, without Reset
+  bool manual_light = false;             ///< a hand switches the projector
   AcquisitionOptions acquisition;
   Clock::Duration warning = std::chrono::seconds(2);
   ReconstructorFactory reconstructor;

@@ -33,7 +33,7 @@ std::string text(sqlite3_stmt* statement, int column) {
   return bytes ? std::string(static_cast<const char*>(bytes), size) : std::string();
 }
 
-void bind(sqlite3_stmt* statement, int parameter, const std::string& value) {
+void set_text(sqlite3_stmt* statement, int parameter, const std::string& value) {
   sqlite3_bind_text(statement, parameter, value.data(), static_cast<int>(value.size()), SQLITE_TRANSIENT);
 }
 
@@ -82,7 +82,7 @@ std::optional<JobInfo> JobIndex::find(const fs::path& job_folder) const {
   if (!database_) return std::nullopt;
   const auto select = prepare(database_, "SELECT stamp, info FROM jobs WHERE id = ?");
   if (!select) return std::nullopt;
-  bind(select.get(), 1, job_folder.filename());
+  set_text(select.get(), 1, job_folder.filename());
   if (sqlite3_step(select.get()) != SQLITE_ROW) return std::nullopt;
   const auto record = text(select.get(), 1);
   if (text(select.get(), 0) != stamp(job_folder, record)) return std::nullopt;
@@ -104,13 +104,13 @@ void JobIndex::replace(const JobTable& jobs) {
   for (const auto& [id, job] : jobs) {
     if (!whole) break;
     if (!is_final(job->state) || job->quarantined) continue;  // these are looked at in their folders
-    bind(insert.get(), 1, id);
-    bind(insert.get(), 2, std::string(to_string(job->state)));
-    bind(insert.get(), 3, job->part);
-    bind(insert.get(), 4, job->recipe.name);
+    set_text(insert.get(), 1, id);
+    set_text(insert.get(), 2, std::string(to_string(job->state)));
+    set_text(insert.get(), 3, job->part);
+    set_text(insert.get(), 4, job->recipe.name);
     const auto record = to_record(*job);
-    bind(insert.get(), 5, stamp(job->folder, record));
-    bind(insert.get(), 6, record);
+    set_text(insert.get(), 5, stamp(job->folder, record));
+    set_text(insert.get(), 6, record);
     whole = sqlite3_step(insert.get()) == SQLITE_DONE;
     sqlite3_reset(insert.get());
   }

@@ -34,6 +34,10 @@ class Disk:
         return self._find(folder), name
 
     def apply(self, kind, path, other, data):
+        if path == self.root_path:
+            assert kind == "sync", f"{kind} of the root"
+            self.root.durable = dict(self.root.entries)
+            return
         folder, name = self._parent(path)
         if kind in ("create", "truncate"):
             node = folder.entries.setdefault(name, File())
