@@ -18,7 +18,7 @@ ExitCode complain(ExitCode code, const std::string& message);
 // Clients of the daemon.
 
 struct Connection {
-  std::filesystem::path socket;
+  std::filesystem::path socket = "/run/scanrig/api.sock";
   bool json = false;  ///< print the API's answer as it is
 };
 
