@@ -79,6 +79,10 @@ struct Route {
   std::function<void(const ApiStation&, const Values&, Send)> handle;
 };
 
+/// The job that the value `id` names; null where there is none. What is no job's name gets no further than this.
+std::shared_ptr<const JobInfo> find_job(const ApiStation& station, const Values& values);
+ApiResponse no_such_job();
+
 /// Status of an answer that is an error.
 unsigned http_status(ErrorCode code);
 /// {"error": {"code", "message"}}

@@ -17,14 +17,6 @@ const Field kFile{.name = "file",
                   .max = 512};
 constexpr std::int64_t kPage = 50, kMostAPage = 500;
 
-std::shared_ptr<const JobInfo> find_job(const ApiStation& station, const Values& values) {
-  const auto snapshot = station.loop.snapshot();
-  const auto found = snapshot->jobs.find(values.text("id").value_or(""));
-  return found == snapshot->jobs.end() ? nullptr : found->second;
-}
-
-ApiResponse no_such_job() { return error_response({ErrorCode::not_found, "there is no job of that name"}); }
-
 /// Newest first; `before` is the last one of the page before.
 void list(const ApiStation& station, const Values& values, const Send& send) {
   const auto snapshot = station.loop.snapshot();

@@ -29,6 +29,7 @@ void order(const ApiStation& station, const Values& values, Send send) {
 
 void ask(const ApiStation& station, const Values& values, What what, Send send) {
   const auto id = *values.text("id");
+  if (!find_job(station, values)) return send(no_such_job());
   station.loop.ask(
       event::JobAsked{
           .what = what, .job = id, .voxel_mm = values.number("voxel_mm"), .fusion = values.text("fusion").value_or("")},
