@@ -76,14 +76,32 @@ struct PanelConfig {
 };
 
 struct RecipeConfig {
+  enum class Flip { button, line };
+  enum class Start { button, part_present };
   int views = 8;
   int poses = 2;
   std::chrono::minutes flip_timeout{30};
+  Flip flip = Flip::button;     ///< `line` needs the panel's `flipped` input
+  Start start = Start::button;  ///< `part_present` needs the panel's input of that name
+  std::optional<double> least_measured_share;
+  std::optional<double> most_residual_mm;
+};
+
+/// Minutes of the day; over midnight where `from` is the later one.
+struct QuietHoursConfig {
+  std::chrono::minutes from{}, to{};
+};
+
+/// Whom a failed job is told: `http://HOST[:PORT]/PATH`.
+struct WebhookConfig {
+  std::string url;
 };
 
 struct StorageConfig {
   std::filesystem::path root;
   double reserve_gib = 20;
+  std::optional<std::chrono::days> keep_days;  ///< then ended jobs are removed
+  std::optional<double> keep_gib;              ///< of all jobs
 };
 
 struct ReconstructionConfig {
@@ -91,6 +109,7 @@ struct ReconstructionConfig {
   Executor executor = Executor::in_process;
   double memory_gib = 6;
   double voxel_mm = 0.25;
+  std::chrono::minutes limit{60};  ///< of the executor `process`
 };
 
 struct ApiConfig {
@@ -109,6 +128,8 @@ struct RigConfig {
   std::map<std::string, RecipeConfig> recipes;  ///< `default` is always there
   StorageConfig storage;
   ReconstructionConfig reconstruction;
+  std::optional<QuietHoursConfig> quiet_hours;
+  std::optional<WebhookConfig> webhook;
   ApiConfig api;
   std::optional<std::filesystem::path> gpio_socket;  ///< tests only: GPIO lines behind a socket instead of chips
 };

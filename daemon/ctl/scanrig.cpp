@@ -59,6 +59,7 @@ void add_reconstruct(CLI::App& app, ReconstructVerb& verb, Chosen& chosen) {
       ->check(CLI::IsMember({"evidence", "paper"}));
   sub->add_option("--rests", verb.options.rests, "how rests are found")->check(CLI::IsMember({"hull", "egi"}));
   sub->add_flag("!--no-texture", verb.options.texture, "shape only");
+  sub->add_flag("--lines", verb.lines, "tell the progress in lines for a program");
   sub->callback([&] { chosen = [&] { return reconstruct(verb); }; });
 }
 

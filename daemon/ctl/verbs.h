@@ -41,6 +41,7 @@ struct ReconstructVerb {
   std::filesystem::path scan;
   std::filesystem::path out;  ///< empty: `model` in the scan folder
   ReconstructOptions options;
+  bool lines = false;  ///< for programs: "STAGE<tab>FRACTION", and "failed<tab>CODE<tab>MESSAGE" at the end
 };
 ExitCode reconstruct(const ReconstructVerb& verb);
 

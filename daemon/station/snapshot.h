@@ -4,6 +4,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "daemon/station/job_table.h"
 #include "daemon/station/states.h"
@@ -23,6 +24,7 @@ struct Snapshot {
   PanelOutputs outputs{};
   std::vector<DeviceHealth> devices{};  ///< as of the last check
   std::string job;                      ///< the one that has the rig; empty: none
+  std::vector<std::string> queue{};     ///< ids of the jobs to come, the next one first
   JobTable jobs;
 };
 

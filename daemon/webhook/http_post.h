@@ -1,0 +1,21 @@
+#pragma once
+
+#include <chrono>
+#include <string>
+
+#include "core/result.h"
+
+namespace scanrig {
+
+/// `http://HOST[:PORT][/PATH]`, taken apart.
+struct HttpAddress {
+  std::string host, port, target;
+  /// Fails with `invalid_input`.
+  static Result<HttpAddress> parse(const std::string& url);
+};
+
+/// Sends `json` by POST. Fails with `timeout` (of the whole exchange), `io` (cannot connect, cut off), `protocol` (an
+/// answer other than 2xx).
+Result<void> http_post(const HttpAddress& address, const std::string& json, std::chrono::milliseconds limit);
+
+}  // namespace scanrig
