@@ -1,5 +1,6 @@
 #include "config/rig_config.h"
 
+#include <algorithm>
 #include <cstdio>
 
 #include "config/camera_section.h"
@@ -132,6 +133,21 @@ void read_time_of_day(Section& s, std::string_view key, std::chrono::minutes& ti
   time = std::chrono::hours(hour) + std::chrono::minutes(minute);
 }
 
+void read_webhook(Section& s, WebhookConfig& webhook) {
+  std::string url;
+  s.text("url", url);
+  constexpr std::string_view kScheme = "http://";
+  const auto rest = url.starts_with(kScheme) ? url.substr(kScheme.size()) : std::string();
+  const auto slash = std::min(rest.find('/'), rest.size());
+  const auto place = rest.substr(0, slash);
+  const auto colon = std::min(place.rfind(':'), place.size());
+  webhook.host = place.substr(0, colon);
+  webhook.port = colon == place.size() ? "80" : place.substr(colon + 1);
+  webhook.path = slash == rest.size() ? "/" : rest.substr(slash);
+  const bool number = !webhook.port.empty() && webhook.port.find_first_not_of("0123456789") == std::string::npos;
+  if (webhook.host.empty() || !number) s.report("url", fmt::format("\"{}\" is no http://HOST:PORT/PATH", url));
+}
+
 void read_reconstruction(Section& s, ReconstructionConfig& reconstruction) {
   using Executor = ReconstructionConfig::Executor;
   s.choice<Executor>("executor", reconstruction.executor,
@@ -139,6 +155,22 @@ void read_reconstruction(Section& s, ReconstructionConfig& reconstruction) {
   s.number("memory_gib", reconstruction.memory_gib, {1, 1024});
   s.number("voxel_mm", reconstruction.voxel_mm, {0.02, 5});
   if (s.has("limit_min")) s.number("limit_min", reconstruction.limit, {1, 1440});
+}
+
+void read_api(Section& s, const std::filesystem::path& base, ApiConfig& api) {
+  s.path("socket", base, api.socket);
+  if (s.has("tokens")) s.path("tokens", base, api.tokens);
+  if (s.has("http_port")) {
+    s.number("http_port", api.http_port.emplace(), {1024, 65535});
+    if (api.tokens.empty()) s.report("http_port", "needs tokens, the file that scanrig token add writes");
+  }
+  if (s.has("http_address")) {
+    s.text("http_address", api.http_address);
+    if (!api.http_port) s.report("http_address", "needs http_port");
+  }
+  if (s.has("viewer_group")) s.text("viewer_group", api.viewer_group.emplace());
+  if (s.has("operator_group")) s.text("operator_group", api.operator_group.emplace());
+  if (s.has("engineer_group")) s.text("engineer_group", api.engineer_group.emplace());
 }
 
 void read_rig(Section& root, const std::filesystem::path& base, const std::vector<std::filesystem::path>& drives,
@@ -161,18 +193,12 @@ void read_rig(Section& root, const std::filesystem::path& base, const std::vecto
     });
   }
   if (root.has("webhook")) {
-    root.section("webhook", [&](Section& s) {
-      s.text("url", rig.webhook.emplace().url);
-      if (!rig.webhook->url.starts_with("http://")) s.report("url", "must begin with http://");
-    });
+    root.section("webhook", [&](Section& s) { read_webhook(s, rig.webhook.emplace()); });
   }
   if (root.has("gpio")) {
     root.section("gpio", [&](Section& s) { s.path("socket", base, rig.gpio_socket.emplace()); });
   }
-  root.section("api", [&](Section& s) {
-    s.path("socket", base, rig.api.socket);
-    if (s.has("http_port")) s.number("http_port", rig.api.http_port.emplace(), {1024, 65535});
-  });
+  root.section("api", [&](Section& s) { read_api(s, base, rig.api); });
 }
 
 }  // namespace

@@ -2,7 +2,6 @@
 
 #include <ctime>
 
-#include "daemon/api/server.h"
 #include "daemon/jobs/housekeeping_thread.h"
 #include "daemon/overloaded.h"
 #include "daemon/rig/panel_thread.h"
@@ -107,7 +106,12 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
 
   options.on_loop(loop);
   Preview preview(clock, [&loop] { return cameras_are_free(*loop.snapshot()); });
-  auto api = ApiServer::start(options.socket, loop, preview);
+  auto api_options = options.api;
+  api_options.storage = store->options().root;
+  api_options.preview_jpeg = [&preview](std::string_view side) {
+    return preview.jpeg(side == "left" ? Side::left : Side::right);
+  };
+  auto api = ApiServer::start(api_options, loop);
   if (!api) return pass_on(api);
 
   // Time stands until every thread is there. They end in reverse order: the panel shows the last lamps, the rig is
@@ -135,6 +139,7 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   const auto published = [&](const std::shared_ptr<const Snapshot>& snapshot) {
     if (webhook) webhook->look(snapshot);
     options.published(snapshot);
+    (*api)->wake();
   };
   ServiceManager manager;
   return loop.run({.alive = [&] { manager.alive(loop.snapshot()->sentence); },

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <random>
 #include <system_error>
 
 #include "core/files.h"
@@ -56,6 +57,15 @@ Recipe read_recipe(JsonObject object) {
   limits.close();
   object.close();
   return recipe;
+}
+
+/// Tells this run of the daemon from all others; process ids come again.
+const std::string& this_process() {
+  static const std::string name = [] {
+    std::random_device random;
+    return fmt::format("{:08x}{:08x}", random(), random());
+  }();
+  return name;
 }
 
 std::optional<double> number_at(const nlohmann::json& json, const char* pointer) {
@@ -119,18 +129,23 @@ std::optional<Error> read_failure(const fs::path& job_folder) {
 
 void remove_failure(const fs::path& job_folder) { remove_file(job_folder / kFailure); }
 
-int count_attempts(const fs::path& job_folder) {
+Attempts read_attempts(const fs::path& job_folder) {
   auto json = JsonFile::read(job_folder / kAttempt, "scanrig-attempt", 1);
-  if (!json) return 0;
-  const int count = json->root().integer("count", 0, 1000);
-  return json->finish() ? count : 0;
+  if (!json) return {};
+  const int count = json->root().integer("count", 1, 1000);
+  const bool running = json->root().text("process") == this_process();
+  if (!json->finish()) return {};
+  return {running ? count - 1 : count, running};
 }
 
-Result<void> write_attempt(const fs::path& job_folder, int count) {
-  return write_json(job_folder / kAttempt, {{"format", "scanrig-attempt"}, {"version", 1}, {"count", count}});
+Result<void> begin_attempt(const fs::path& job_folder) {
+  return write_json(job_folder / kAttempt, {{"format", "scanrig-attempt"},
+                                            {"version", 1},
+                                            {"count", read_attempts(job_folder).ended_by_death + 1},
+                                            {"process", this_process()}});
 }
 
-void remove_attempt(const fs::path& job_folder) { remove_file(job_folder / kAttempt); }
+void forget_attempts(const fs::path& job_folder) { remove_file(job_folder / kAttempt); }
 
 Error quarantine_error() {
   return {ErrorCode::internal,

@@ -38,9 +38,14 @@ void remove_failure(const std::filesystem::path& job_folder);
 /// So many reconstructions in a row that began and never ended make a quarantine: the daemon died with each.
 constexpr int kAttemptsThatQuarantine = 2;
 /// attempt.json, written before a reconstruction begins and removed when it ends in any way but the daemon's death.
-int count_attempts(const std::filesystem::path& job_folder);
-Result<void> write_attempt(const std::filesystem::path& job_folder, int count);
-void remove_attempt(const std::filesystem::path& job_folder);
+struct Attempts {
+  int ended_by_death = 0;
+  bool running = false;  ///< in this process, now
+};
+Attempts read_attempts(const std::filesystem::path& job_folder);
+/// Another one begins. Fails with `io`.
+Result<void> begin_attempt(const std::filesystem::path& job_folder);
+void forget_attempts(const std::filesystem::path& job_folder);
 /// What is said of a job in quarantine.
 Error quarantine_error();
 

@@ -46,11 +46,12 @@ void settle_scanned(JobInfo& job) {
     job.model = model_file(job.folder);
     job.report = report_file(job.folder);
   }
-  job.quarantined = count_attempts(job.folder) >= kAttemptsThatQuarantine;
+  const auto attempts = read_attempts(job.folder);
+  job.quarantined = !attempts.running && attempts.ended_by_death >= kAttemptsThatQuarantine;
   job.error = job.quarantined ? quarantine_error() : read_failure(job.folder);
   if (job.error) {
     job.state = JobState::failed;
-  } else if (job.report.empty()) {
+  } else if (job.report.empty() || attempts.running) {
     job.state = JobState::reconstructing;
   } else {
     job.state = JobState::done;

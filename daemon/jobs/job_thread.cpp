@@ -73,11 +73,11 @@ void JobThread::handle(const action::CreateJobs& task) {
 
 void JobThread::handle(const action::BeginJob& task) {
   auto job = store_.read(task.job);
-  if (!job && job.error().code == ErrorCode::not_found) return;  // it could not be created, and that was told
   auto room = job ? store_.check_room(*job) : Result<void>(pass_on(job));
   if (room) room = begin(*job);
   if (room) return;
   tell_(event::JobNotBegun{task.job, room.error()});
+  if (!job && job.error().code == ErrorCode::not_found) return tell_(event::JobRemoved{task.job});
   tell_known(task.job);
 }
 
@@ -122,6 +122,7 @@ void JobThread::handle(const action::KeepJob& task) { answer(task.asked.ticket, 
 Result<void> JobThread::keep(const event::JobAsked& asked) {
   auto job = store_.read(asked.job);
   if (!job) return pass_on(job);
+  if (job->state == JobState::reconstructing) return fail(ErrorCode::busy, "job {} is being reconstructed", asked.job);
   if (asked.what == What::reprocess) return reprocess(std::move(*job), asked);
   if (asked.what == What::set_exported) {
     auto order = read_job_file(job->folder);
@@ -149,8 +150,7 @@ Result<void> JobThread::reprocess(JobInfo job, const event::JobAsked& asked) {
     return fail(ErrorCode::refused, "job {} has only {} of {} poses: there is nothing to make a model of", asked.job,
                 job.complete, job.recipe.poses);
   }
-  if (job.state == JobState::reconstructing) return fail(ErrorCode::busy, "job {} is being reconstructed", asked.job);
-  remove_attempt(job.folder);
+  forget_attempts(job.folder);
   remove_failure(job.folder);
   job.state = JobState::reconstructing;
   job.quarantined = false;
@@ -230,12 +230,11 @@ void JobThread::handle(const action::ResumeJob& task) {
 
 void JobThread::handle(const action::CloseJob& task) {
   reconstruction_.abandon(task.job);
-  if (scan_) {
-    auto closed = scan_->set_state(std::string(to_string(task.state)));
-    if (closed) closed = write_failure(scan_->path(), task.why);
-    // On a disk that takes nothing more the job is found unfinished at the next start, and interrupted then.
-    scan_.reset();
-  }
+  if (!scan_) return tell_known(task.job);  // it was not begun
+  auto closed = scan_->set_state(std::string(to_string(task.state)));
+  if (closed) closed = write_failure(scan_->path(), task.why);
+  // On a disk that takes nothing more the job is found unfinished at the next start, and interrupted then.
+  scan_.reset();
   const auto job = store_.read(task.job);
   tell_(event::JobClosed{task.job, task.state, task.why, job && job->resumable});
 }

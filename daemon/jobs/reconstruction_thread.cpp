@@ -90,12 +90,11 @@ void ReconstructionThread::handle(const Begin& message) {
 }
 
 Result<void> ReconstructionThread::start(const Begin& message, const ScanFolder& scan) {
-  const int attempts = count_attempts(message.folder);
-  current_->quarantined = attempts >= kAttemptsThatQuarantine;
+  current_->quarantined = read_attempts(message.folder).ended_by_death >= kAttemptsThatQuarantine;
   if (current_->quarantined) return {};
   const auto calibration = scan.load_calibration();
   if (!calibration) return pass_on(calibration);
-  if (auto marked = write_attempt(message.folder, attempts + 1); !marked) return marked;
+  if (auto marked = begin_attempt(message.folder); !marked) return marked;
   return guarded([&]() -> Result<void> {
     auto made = factory_({.calibration = *calibration,
                           .manifest = scan.manifest(),
@@ -183,7 +182,7 @@ void ReconstructionThread::handle(const Abandon& message) {
 
 /// The mark of a job in quarantine stays, until somebody asks for another try.
 void ReconstructionThread::end() {
-  if (!current_->quarantined) remove_attempt(current_->folder);
+  if (!current_->quarantined) forget_attempts(current_->folder);
   current_.reset();
 }
 

@@ -20,7 +20,7 @@ using Tcp = net::ip::tcp;
 class Exchange {
  public:
   Exchange(net::io_context& io, const HttpAddress& address, const std::string& json) : resolver_(io), stream_(io) {
-    request_ = {http::verb::post, address.target, 11};
+    request_ = {http::verb::post, address.path, 11};
     request_.set(http::field::host, address.host);
     request_.set(http::field::content_type, "application/json");
     request_.keep_alive(false);
@@ -61,20 +61,6 @@ class Exchange {
 };
 
 }  // namespace
-
-Result<HttpAddress> HttpAddress::parse(const std::string& url) {
-  const std::string scheme = "http://";
-  if (!url.starts_with(scheme)) return fail(ErrorCode::invalid_input, "\"{}\" does not begin with http://", url);
-  const auto rest = url.substr(scheme.size());
-  const auto slash = rest.find('/');
-  const auto place = rest.substr(0, slash);
-  const auto colon = place.rfind(':');
-  HttpAddress address{place.substr(0, colon), colon == std::string::npos ? "80" : place.substr(colon + 1),
-                      slash == std::string::npos ? "/" : rest.substr(slash)};
-  const bool number = !address.port.empty() && address.port.find_first_not_of("0123456789") == std::string::npos;
-  if (address.host.empty() || !number) return fail(ErrorCode::invalid_input, "\"{}\" is no http://HOST:PORT/PATH", url);
-  return address;
-}
 
 Result<void> http_post(const HttpAddress& address, const std::string& json, std::chrono::milliseconds limit) {
   try {

@@ -7,11 +7,8 @@
 
 namespace scanrig {
 
-/// `http://HOST[:PORT][/PATH]`, taken apart.
 struct HttpAddress {
-  std::string host, port, target;
-  /// Fails with `invalid_input`.
-  static Result<HttpAddress> parse(const std::string& url);
+  std::string host, port, path;
 };
 
 /// Sends `json` by POST. Fails with `timeout` (of the whole exchange), `io` (cannot connect, cut off), `protocol` (an

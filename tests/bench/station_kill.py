@@ -4,6 +4,7 @@ The job is a two-pose job of three views over devices that only pretend (tests/s
 daemon's own file handling, in a fraction of a second. After each start every job found must come to its end, by resuming
 or by being ended, and every view that was acknowledged must be there and whole.
 """
+import errno
 import os
 import pathlib
 import random
@@ -27,8 +28,10 @@ class Rig:
         (home / "jobs").mkdir(parents=True)
         return home
 
-    def run(self, verb, home, **watch):
+    def run(self, verb, home, crash=False, **watch):
         environment = dict(os.environ)
+        if crash:
+            environment["ONE_JOB_CRASH"] = "1"
         if watch:
             environment["LD_PRELOAD"] = str(self.watcher)
             environment["DISK_CALLS_ROOT"] = str(home / "jobs")
@@ -74,6 +77,23 @@ def kills(rig, calls, share=1.0, seed=1):
             yield f"killed {when} call {number}", fault
 
 
+def random_kills(rig, count, seed=6):
+    """SIGKILL at any moment, also between two calls."""
+    chance = random.Random(seed)
+    for _ in range(count):
+        home = rig.fresh("killed_at_random")
+        after = chance.uniform(0.0, 0.5)
+        daemon = subprocess.Popen([rig.program, "scan", home], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        try:
+            daemon.wait(timeout=after)
+        except subprocess.TimeoutExpired:
+            daemon.kill()
+            daemon.wait()
+        # Too early for a calibration there is no rig at all.
+        if (home / "calibration.json").exists():
+            yield f"killed after {1000 * after:.0f} ms", rig.recovers(home)
+
+
 def second_kills(rig, calls, count, seed=2):
     """A second kill during the recovery from a first one."""
     chance = random.Random(seed)
@@ -105,6 +125,40 @@ def power_cuts(rig, home, log, share=1.0, seed=3):
         yield f"power cut after call {calls} ({kind} {pathlib.Path(path).name})", rig.recovers(cut)
 
 
+def bad_disks(rig, calls, share=1.0, seed=5):
+    """A disk that is full, or read-only, from some call on: the job must be named as interrupted or failed, nothing that
+    was acknowledged may be lost, and with a good disk everything must go on."""
+    chance = random.Random(seed)
+    for number in range(1, calls + 1):
+        if chance.random() > share:
+            continue
+        error = chance.choice([errno.ENOSPC, errno.EROFS, errno.EIO])
+        home = rig.fresh("bad_disk")
+        end = rig.run("scan", home, fail=number, error=error)
+        what = f"{errno.errorcode[error]} from call {number} on"
+        if end.returncode not in (0, 1):
+            yield what, f"the daemon ended with {end.returncode}: {end.stdout}{end.stderr}"
+        elif end.returncode == 1 and os.strerror(error) not in end.stdout:
+            yield what, f"not told by its name: {end.stdout}"
+        else:
+            yield what, rig.recovers(home)
+
+
+def crashes(rig):
+    """A model whose making kills the daemon: tried twice, then in quarantine; the station goes on."""
+    home = rig.fresh("crash")
+    for verb in ("scan", "recover"):
+        end = rig.run(verb, home, crash=True)
+        if end.returncode != -11:
+            yield f"{verb} with a stage that crashes", f"ended with {end.returncode}: {end.stdout}{end.stderr}"
+            return
+    end = rig.run("recover", home, crash=True)
+    said = "in quarantine" in end.stdout and "lost" not in end.stdout
+    yield "the third start leaves the job alone", None if said else f"{end.returncode}: {end.stdout}{end.stderr}"
+    end = rig.run("scan", home)
+    yield "the next job runs", None if end.returncode == 0 else f"{end.returncode}: {end.stdout}{end.stderr}"
+
+
 def damaged_index(rig, home, count, seed=4):
     """The index deleted, cut short or overwritten; nothing may be lost."""
     chance = random.Random(seed)
@@ -133,12 +187,19 @@ def measure(bench, scratch):
     bench.note(f"one job changes its files by {calls} calls")
     count = 30 if bench.quick else 300
     report(bench, "SIGKILL before and after every write, fsync, rename of a job", kills(rig, calls, share))
+    report(bench, "SIGKILL at random moments", random_kills(rig, 10 if bench.quick else 120))
     report(bench, "SIGKILL again during the recovery", second_kills(rig, calls, count))
     report(bench, "power cut after every write, fsync, rename of a job", power_cuts(rig, home, log, share))
+    report(bench, "full, read-only and failing disk from every call on, then a good one", bad_disks(rig, calls, share))
+    report(bench, "a reconstruction that takes the daemon with it, twice", crashes(rig),
+           "quarantine after the second, next job runs")
     report(bench, "index deleted, cut short, overwritten", damaged_index(rig, home, count // 3))
 
 
-def report(bench, what, points):
+NOTHING_LOST = "0 acknowledged views lost, 0 unreadable folders, 0 jobs without an end"
+
+
+def report(bench, what, points, asked=NOTHING_LOST):
     faults, done = [], 0
     for where, fault in points:
         done += 1
@@ -146,5 +207,4 @@ def report(bench, what, points):
             faults.append(f"{where}: {fault}")
     for fault in faults[:10]:
         bench.note(fault)
-    bench.line(what, "0 acknowledged views lost, 0 unreadable folders, 0 jobs without an end",
-               f"{len(faults)} faults at {done} points", done > 0 and not faults)
+    bench.line(what, asked, f"{len(faults)} faults at {done} points", done > 0 and not faults)

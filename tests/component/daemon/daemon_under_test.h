@@ -20,7 +20,7 @@ class Daemon : public scan_samples::FolderTest {
     scan_samples::write_text(folder_ / "calibration.json", scan_samples::calibration_json());
     options.jobs = {.root = folder_ / "jobs", .calibration_file = folder_ / "calibration.json"};
     options.recipes["default"].views = 3;
-    options.socket = folder_ / "api.sock";
+    options.api.socket = folder_ / "api.sock";
     options.on_loop = [this](ControlLoop& l) { loop = &l; };
     options.reconstructor = [this](const ReconstructionTask&) {
       return std::make_unique<fakes::FakeReconstructor>(log);
@@ -38,6 +38,8 @@ class Daemon : public scan_samples::FolderTest {
   void shut_down() {
     stop.request_stop();
     thread.join();
+    rig.panel.detach();
+    stop = std::stop_source();
   }
 
   bool wait_ready() {
@@ -113,10 +115,10 @@ class Daemon : public scan_samples::FolderTest {
       std::optional<Result<std::string>> answer{};
     };
     const auto waiting = std::make_shared<Waiting>();
-    const auto reply = [this, waiting](const Result<std::string>& result) {
+    const auto reply = [this, waiting](const Result<std::string>& answer) {
       {
         const std::lock_guard guard(waiting->mutex);
-        waiting->answer = result;
+        waiting->answer = answer;
       }
       clock.notify_all(waiting->changed);
     };

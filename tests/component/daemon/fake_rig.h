@@ -227,6 +227,13 @@ class FakePanel final : public Panel {
     attach_.wait(lock, [&] { return attached_; });
   }
 
+  /// Nobody drives it any more.
+  void detach() {
+    const std::lock_guard guard(mutex_);
+    attached_ = false;
+    outputs_ = {};
+  }
+
   /// Looks at the lamps until `as_wanted`, for a virtual hour at most.
   bool wait_for_lamps(const std::function<bool(const PanelOutputs&)>& as_wanted) {
     std::unique_lock lock(mutex_);

@@ -16,8 +16,6 @@ class Jobs : public Daemon {
  protected:
   void restart() {
     shut_down();
-    loop = nullptr;
-    stop = std::stop_source();
     boot();
     get_ready();
   }

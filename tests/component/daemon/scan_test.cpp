@@ -33,7 +33,7 @@ TEST_F(Daemon, MakesOneModelFromTwoPoses) {
                                      "pose 1", "finish"));
   for (const auto& [pattern, plain] : log.grey_levels) EXPECT_GT(pattern, plain);
   EXPECT_THAT(rig.turntable.targets, ElementsAre(0, 0, 120, 240, 360, 360, 480, 600, 720));
-  EXPECT_FALSE(fs::exists(options.socket)) << "the socket goes with the daemon";
+  EXPECT_FALSE(fs::exists(options.api.socket)) << "the socket goes with the daemon";
 }
 
 TEST_F(Daemon, NothingMovesBeforeResetAndTwoSecondsOfWarning) {
@@ -137,7 +137,7 @@ TEST_F(Daemon, ACameraPulledInAScanInterruptsTheJobAndIsUsedWhenItIsBack) {
 TEST_F(Daemon, ThePreviewLooksInQuietTimesAndNeverDuringAScan) {
   boot();
   get_ready();
-  const auto left = [&] { return ctl::fetch(options.socket, "/api/v1/preview/left"); };
+  const auto left = [&] { return ctl::fetch(options.api.socket, "/api/v1/preview/left"); };
   const auto looks = [&] {
     const std::lock_guard guard(rig.line.mutex);
     return rig.line.looks;

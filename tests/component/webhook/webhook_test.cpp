@@ -113,18 +113,6 @@ TEST(HttpPost, SaysWhatIsWrong) {
   EXPECT_EQ(http_post({"127.0.0.1", "1", "/"}, "{}", milliseconds(5000)).error().code, ErrorCode::io);
 }
 
-TEST(HttpAddress, IsTakenApart) {
-  const auto address = HttpAddress::parse("http://line.example:8080/a/b");
-  ASSERT_TRUE(address);
-  EXPECT_EQ(address->host, "line.example");
-  EXPECT_EQ(address->port, "8080");
-  EXPECT_EQ(address->target, "/a/b");
-  EXPECT_EQ(HttpAddress::parse("http://host")->port, "80");
-  for (const char* wrong : {"https://host/", "http://", "http://host:", "http://host:x/", "host"}) {
-    EXPECT_EQ(HttpAddress::parse(wrong).error().code, ErrorCode::invalid_input) << wrong;
-  }
-}
-
 TEST(Webhook, TellsWhatGoesWrongAfterItsStart) {
   Listener listener;
   auto request = listener.answer("HTTP/1.1 200 OK\r\nContent-Length: 0\r\n\r\n");

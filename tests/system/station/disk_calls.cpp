@@ -1,5 +1,6 @@
 // LD_PRELOAD: watches every call by which a program changes files below $DISK_CALLS_ROOT.
 //   $DISK_CALLS_KILL=N, $DISK_CALLS_WHEN=before|after   SIGKILL at the N-th of them, counted from 1
+//   $DISK_CALLS_FAIL=N, $DISK_CALLS_ERROR=ERRNO           from the N-th on everything but removing fails like that
 //   $DISK_CALLS_LOG=FILE                                what was done, one line a call; data as hexadecimal digits
 //   $DISK_CALLS_ACKS=FILE                               writes to this file are logged too, as acknowledgements
 // A log line: KIND, PATH, OTHER (second path, offset, size or flags), DATA; separated by tabs. Calls that fail are left
@@ -16,6 +17,7 @@
 #include <cstdarg>
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 #include <mutex>
 #include <string>
 
@@ -30,6 +32,8 @@ struct Settings {
   std::string root = environment("DISK_CALLS_ROOT");
   std::string acks = environment("DISK_CALLS_ACKS");
   long kill_at = std::atol(environment("DISK_CALLS_KILL").c_str());
+  long fail_from = std::atol(environment("DISK_CALLS_FAIL").c_str());
+  int error = std::atoi(environment("DISK_CALLS_ERROR").c_str());
   bool before = environment("DISK_CALLS_WHEN") == "before";
   int log = -1;
   Settings() {
@@ -92,6 +96,10 @@ auto change(const char* kind, const std::string& path, const std::string& other,
   if (!watched(path)) return call();
   const auto& s = settings();
   const long mine = ++count;
+  if (s.fail_from > 0 && mine >= s.fail_from && std::strcmp(kind, "remove") != 0) {
+    errno = s.error;
+    return static_cast<decltype(call())>(-1);
+  }
   if (mine == s.kill_at && s.before) ::kill(::getpid(), SIGKILL);
   std::unique_lock<std::mutex> lock(in_order, std::defer_lock);
   if (s.log >= 0) lock.lock();

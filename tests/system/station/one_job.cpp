@@ -4,10 +4,13 @@
 //   station_one_job recover FOLDER   starts again, brings every job it finds to its end, checks that no acknowledged
 //   view
 //                                    is lost; prints what it saw, exits 1 when something is not as it should be
+// With $ONE_JOB_CRASH set the making of the model ends in a segmentation fault.
 #include <fcntl.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <csignal>
+#include <cstdlib>
 #include <fstream>
 #include <map>
 #include <optional>
@@ -31,6 +34,7 @@ class TriangleMaker final : public Reconstructor {
   Result<void> add_view(std::size_t, const ViewImages&, const Context&) override { return {}; }
   Result<void> finish_pose(std::size_t, const Context&) override { return {}; }
   Result<void> finish(const fs::path& folder, const Context&) override {
+    if (std::getenv("ONE_JOB_CRASH")) std::raise(SIGSEGV);
     TexturedMesh triangle;
     triangle.mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
     triangle.mesh.faces = {{0, 1, 2}};
@@ -67,7 +71,7 @@ class Shift {
   explicit Shift(const fs::path& folder) : folder_(folder), acknowledged_(folder / "acks") {
     options_.jobs = {.root = folder / "jobs", .calibration_file = folder / "calibration.json"};
     options_.recipes["default"].views = 3;
-    options_.socket = folder / "api.sock";
+    options_.api.socket = folder / "api.sock";
     options_.reconstructor = [](const ReconstructionTask&) { return std::make_unique<TriangleMaker>(); };
     options_.published = [this](const auto& snapshot) { acknowledged_.note(*snapshot); };
     options_.on_loop = [this](ControlLoop& loop) { loop_ = &loop; };
@@ -104,7 +108,9 @@ class Shift {
     do {
       rig_.panel.press(&PanelInputs::start);
       if (!wait([](const auto& l) { return !l.start_lamp; })) return false;
-      if (!wait([](const auto& l) { return l.start_lamp; })) return false;
+      if (!wait([](const auto& l) { return l.start_lamp || (l.red && !l.busy); })) return false;
+      said_ = loop_->snapshot()->cause;
+      if (loop_->snapshot()->machine == MachineState::error) return false;
     } while (loop_->snapshot()->activity == Activity::waiting_for_flip);
     return true;
   }

@@ -88,8 +88,14 @@ TEST_F(RecipeConfigTest, StorageMayBeLimitedAndFailuresTold) {
   ASSERT_TRUE(rig) << rig.error().message;
   EXPECT_EQ(rig->storage.keep_days, std::chrono::days(90));
   EXPECT_EQ(rig->storage.keep_gib, 400.0);
-  EXPECT_EQ(rig->webhook->url, "http://line:8080/failed");
-  expect_problem(text + "\n[webhook]\nurl = \"line:8080\"\n", "[webhook] url: must begin with http://");
+  EXPECT_EQ(rig->webhook->host, "line");
+  EXPECT_EQ(rig->webhook->port, "8080");
+  EXPECT_EQ(rig->webhook->path, "/failed");
+  EXPECT_EQ(read(text + "\n[webhook]\nurl = \"http://line\"\n")->webhook->port, "80");
+  for (const char* wrong : {"line:8080", "https://line/", "http://", "http://line:", "http://line:x/"}) {
+    expect_problem(text + fmt::format("\n[webhook]\nurl = \"{}\"\n", wrong),
+                   fmt::format("[webhook] url: \"{}\" is no http://HOST:PORT/PATH", wrong));
+  }
 }
 
 }  // namespace

@@ -38,6 +38,12 @@ class JobStoreTest : public scan_samples::FolderTest {
     EXPECT_TRUE(jobs && jobs->contains(id));
     return *jobs->at(id);
   }
+  /// As daemons leave it that died over the model.
+  static void write_attempts(const fs::path& folder, int count) {
+    scan_samples::write_text(
+        folder / "attempt.json",
+        fmt::format(R"({{"format": "scanrig-attempt", "version": 1, "count": {}, "process": "x"}})", count));
+  }
   JobStoreOptions options;
 };
 
@@ -116,14 +122,16 @@ TEST_F(JobStoreTest, AScannedJobWithoutAModelIsToBeReconstructed) {
 TEST_F(JobStoreTest, AJobThatTookTwoDaemonsWithItIsInQuarantineWithItsImages) {
   const auto store = open();
   const auto folder = make_job(store, "job", "scanned");
-  ASSERT_TRUE(write_attempt(folder, 1));
+  write_attempts(folder, 1);
   EXPECT_EQ(recovered(store, "job").state, JobState::reconstructing) << "once may be bad luck";
-  ASSERT_TRUE(write_attempt(folder, 2));
+  write_attempts(folder, 2);
   const auto job = recovered(store, "job");
   EXPECT_EQ(job.state, JobState::failed);
   EXPECT_TRUE(job.quarantined);
   EXPECT_THAT(job.error->message, HasSubstr("quarantine"));
   EXPECT_EQ(job.stored.size(), 1u);
+  ASSERT_TRUE(begin_attempt(folder));
+  EXPECT_EQ(recovered(store, "job").state, JobState::reconstructing) << "somebody has asked for another try";
 }
 
 TEST_F(JobStoreTest, AQueuedJobKeepsItsOrderAndItsPlace) {
