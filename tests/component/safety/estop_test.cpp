@@ -40,7 +40,7 @@ class DaemonOnWires : public testing::Test {
     options.api.socket = config->api.socket;
     options.warning = milliseconds(100);
     options.guard = true;
-    options.reconstructor = [this](const Calibration&, const Manifest&) {
+    options.reconstructor = [this](const ReconstructionTask&) {
       return std::make_unique<fakes::FakeReconstructor>(log);
     };
     thread = std::thread([this, options] {
