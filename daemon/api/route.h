@@ -70,7 +70,7 @@ struct Route {
   std::string_view path;  ///< "/api/v1/jobs/{id}"
   Role role;              ///< that is enough
   std::string_view about;
-  std::vector<Field> in_path{}, in_query{}, in_body{};
+  std::vector<RequestField> in_path{}, in_query{}, in_body{};
   Reply reply;
   std::vector<unsigned> errors{};   ///< beside those that every route has
   bool slow = false;                ///< touches the disk: done by a worker, not by an I/O thread
