@@ -157,6 +157,22 @@ void read_reconstruction(Section& s, ReconstructionConfig& reconstruction) {
   if (s.has("limit_min")) s.number("limit_min", reconstruction.limit, {1, 1440});
 }
 
+void read_api(Section& s, const std::filesystem::path& base, ApiConfig& api) {
+  s.path("socket", base, api.socket);
+  if (s.has("tokens")) s.path("tokens", base, api.tokens);
+  if (s.has("http_port")) {
+    s.number("http_port", api.http_port.emplace(), {1024, 65535});
+    if (api.tokens.empty()) s.report("http_port", "needs tokens, the file that scanrig token add writes");
+  }
+  if (s.has("http_address")) {
+    s.text("http_address", api.http_address);
+    if (!api.http_port) s.report("http_address", "needs http_port");
+  }
+  if (s.has("viewer_group")) s.text("viewer_group", api.viewer_group.emplace());
+  if (s.has("operator_group")) s.text("operator_group", api.operator_group.emplace());
+  if (s.has("engineer_group")) s.text("engineer_group", api.engineer_group.emplace());
+}
+
 void read_rig(Section& root, const std::filesystem::path& base, const std::vector<std::filesystem::path>& drives,
               Cameras cameras, RigConfig& rig) {
   int schema = 0;
@@ -182,10 +198,7 @@ void read_rig(Section& root, const std::filesystem::path& base, const std::vecto
   if (root.has("gpio")) {
     root.section("gpio", [&](Section& s) { s.path("socket", base, rig.gpio_socket.emplace()); });
   }
-  root.section("api", [&](Section& s) {
-    s.path("socket", base, rig.api.socket);
-    if (s.has("http_port")) s.number("http_port", rig.api.http_port.emplace(), {1024, 65535});
-  });
+  root.section("api", [&](Section& s) { read_api(s, base, rig.api); });
 }
 
 }  // namespace

@@ -114,7 +114,11 @@ struct ReconstructionConfig {
 
 struct ApiConfig {
   std::filesystem::path socket;
-  std::optional<int> http_port;  ///< on the loopback interface
+  std::optional<int> http_port;  ///< TCP; every request over it needs a token
+  std::string http_address = "127.0.0.1";
+  std::filesystem::path tokens;  ///< the file of tokens; empty: there are none
+  /// Groups of local users by what they may do over the socket. Without any, the daemon's own group operates.
+  std::optional<std::string> viewer_group, operator_group, engineer_group;
 };
 
 /// rig.toml, checked; relative paths are made relative to the file's folder.

@@ -46,8 +46,12 @@ DaemonOptions options_from(const config::RigConfig& config) {
   options.retention = {.keep_for = config.storage.keep_days, .keep_bytes = {}};
   if (config.storage.keep_gib) options.retention.keep_bytes = gib(*config.storage.keep_gib);
   if (config.quiet_hours) options.quiet_hours = QuietHours{config.quiet_hours->from, config.quiet_hours->to};
+  options.api = {.socket = config.api.socket,
+                 .groups = {config.api.viewer_group, config.api.operator_group, config.api.engineer_group},
+                 .http_port = config.api.http_port,
+                 .http_address = config.api.http_address,
+                 .tokens = config.api.tokens};
   if (config.webhook) options.webhook = HttpAddress{config.webhook->host, config.webhook->port, config.webhook->path};
-  options.socket = config.api.socket;
   options.remote = config.safety.remote_start;
   options.guard = config.safety.guard.has_value();
   options.home_guarded = config.safety.home_after_restart == config::SafetyConfig::HomeAfterRestart::guarded;

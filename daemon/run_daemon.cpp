@@ -2,7 +2,6 @@
 
 #include <ctime>
 
-#include "daemon/api/server.h"
 #include "daemon/jobs/housekeeping_thread.h"
 #include "daemon/overloaded.h"
 #include "daemon/rig/panel_thread.h"
@@ -49,6 +48,10 @@ void keep(const action::KeepJob& task, const Workers& workers) {
   const auto what = task.asked.what;
   if (what == What::remove || what == What::bundle) return workers.housekeeping.post(task.asked);
   workers.jobs.post(task);
+}
+
+bool cameras_are_free(const Snapshot& snapshot) {
+  return snapshot.activity == Activity::none || snapshot.activity == Activity::waiting_for_flip;
 }
 
 void perform(const Action& action, const Workers& workers) {
@@ -102,7 +105,13 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   const auto tell = [&loop](Event event) { loop.post(std::move(event)); };
 
   options.on_loop(loop);
-  auto api = ApiServer::start(options.socket, loop);
+  Preview preview(clock, [&loop] { return cameras_are_free(*loop.snapshot()); });
+  auto api_options = options.api;
+  api_options.storage = store->options().root;
+  api_options.preview_jpeg = [&preview](std::string_view side) {
+    return preview.jpeg(side == "left" ? Side::left : Side::right);
+  };
+  auto api = ApiServer::start(api_options, loop);
   if (!api) return pass_on(api);
 
   // Time stands until every thread is there. They end in reverse order: the panel shows the last lamps, the rig is
@@ -113,7 +122,7 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   HousekeepingThread housekeeping(clock, *store, options.retention, tell);
   housekeeping.sweep();
   JobThread jobs(clock, *store, reconstruction, options.on_scanned, tell);
-  RigThread rig(devices, clock, options.acquisition, tell);
+  RigThread rig(devices, clock, options.acquisition, preview, tell);
   std::optional<Webhook> webhook;
   if (options.webhook) webhook.emplace(clock, *options.webhook);
   PanelThread panel(devices.panel, clock, tell, [&rig] { rig.interrupt(); });
@@ -130,6 +139,7 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   const auto published = [&](const std::shared_ptr<const Snapshot>& snapshot) {
     if (webhook) webhook->look(snapshot);
     options.published(snapshot);
+    (*api)->wake();
   };
   ServiceManager manager;
   return loop.run({.alive = [&] { manager.alive(loop.snapshot()->sentence); },

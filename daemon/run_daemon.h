@@ -9,6 +9,7 @@
 
 #include "core/clock.h"
 #include "core/result.h"
+#include "daemon/api/server.h"
 #include "daemon/jobs/job_store.h"
 #include "daemon/jobs/job_thread.h"
 #include "daemon/jobs/reconstructor.h"
@@ -31,7 +32,7 @@ struct DaemonOptions {
   std::optional<QuietHours> quiet_hours{};                 ///< no job begins by itself then
   RetentionOptions retention{};
   std::optional<HttpAddress> webhook{};  ///< whom failures are told
-  std::filesystem::path socket;          ///< of the API
+  ApiOptions api;
   bool remote = false;                   ///< the API may start and home while the guard is closed
   bool guard = false;                    ///< there is a guard
   bool home_guarded = false;             ///< after a restart a closed guard homes the table, without Reset

@@ -1,6 +1,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "daemon/ctl/stage_bars.h"
@@ -30,7 +31,8 @@ ExitCode reconstruct(const ReconstructVerb& verb) {
   if (!scan) return complain(scan.error());
 
   const SignalStop stop;
-  StageBars bars(stdout, ::isatty(STDOUT_FILENO) == 1);
+  std::FILE* told = verb.json ? stderr : stdout;  // bars beside the JSON, not in it
+  StageBars bars(told, ::isatty(::fileno(told)) == 1);
   const auto progress = [&](std::string_view stage, double fraction) {
     if (!verb.lines) return bars.update(std::string(stage), fraction);
     fmt::print("{}\t{:.3f}\n", stage, fraction);
@@ -42,7 +44,12 @@ ExitCode reconstruct(const ReconstructVerb& verb) {
     if (verb.lines) fmt::print("failed\t{}\t{}\n", to_string(made.error().code), made.error().message);
     return complain(made.error());
   }
-  fmt::print("{}\n{}\n", (out / "model.glb").string(), (out / "report.json").string());
+  const auto glb = out / "model.glb", report = out / "report.json";
+  if (verb.json) {
+    fmt::print("{}\n", nlohmann::ordered_json{{"model", glb}, {"report", report}}.dump());
+  } else {
+    fmt::print("{}\n{}\n", glb.string(), report.string());
+  }
   return ExitCode::ok;
 }
 

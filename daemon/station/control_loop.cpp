@@ -56,6 +56,7 @@ void ControlLoop::handle(Message message, const StationPorts& ports) {
   auto step = next(state_, message.event, options_.rules);
   state_ = std::move(step.state);
   update(jobs_, message.event);
+  tally_.see(message.event, clock_.now());
   for (const auto& action : step.actions) carry_out(action, ports);
   show(ports);
   publish(ports);
@@ -153,6 +154,7 @@ void ControlLoop::publish(const StationPorts& ports) {
       .job = state_.job ? state_.job->id : std::string(),
       .queue = std::move(queue),
       .jobs = jobs_,
+      .counters = tally_.counters(),
   });
   published_.set(snapshot);
   ports.published(snapshot);

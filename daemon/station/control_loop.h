@@ -9,6 +9,7 @@
 #include "daemon/mailbox.h"
 #include "daemon/station/events.h"
 #include "daemon/station/snapshot.h"
+#include "daemon/station/tally.h"
 #include "daemon/station/transition.h"
 #include "drivers/panel/panel.h"
 
@@ -82,6 +83,7 @@ class ControlLoop {
   // Of run()'s thread only.
   StationState state_;
   JobTable jobs_;
+  Tally tally_;
   std::uint64_t revision_ = 0;
   Ticket last_ticket_ = 0;
   std::map<Ticket, Reply> waiting_;  // for what takes a while

@@ -65,12 +65,16 @@ def scene(options):
 class SimulatedStation:
     """One program: daemon, rig and operator."""
 
-    def __init__(self, options, folder, log):
+    def __init__(self, folder):
         self.jobs = folder / "jobs"
         self.socket = folder / "api.sock"
-        self.daemon = run([options.bin / "scanrigd-sim", "--socket", self.socket, "--jobs", self.jobs, *scene(options)],
-                          log)
-        self.processes = [self.daemon]
+        self.processes = []
+
+    def start(self, options, log):
+        """Returns the process that is the daemon."""
+        command = [options.bin / "scanrigd-sim", "--socket", self.socket, "--jobs", self.jobs, *scene(options)]
+        self.processes.append(run(command, log))
+        return self.processes[0]
 
     def finish(self, job):
         pass
@@ -79,21 +83,25 @@ class SimulatedStation:
 class WireStation:
     """The shipped daemon, and at the other ends of its wires the simulated rig, whose panel this program operates."""
 
-    def __init__(self, options, folder, log):
+    def __init__(self, folder):
         self.rig = folder / "rig"
         self.jobs = self.rig / "jobs"
         self.socket = self.rig / "api.sock"
+        self.processes = []  # in the order in which they are to end
+
+    def start(self, options, log):
+        """Returns the process that is the daemon; the rig where it ended instead of becoming ready."""
         print("Rendering what the cameras will see", flush=True)
         rig = run([options.bin / "scanrig-sim", "rig", "--dir", self.rig, "--cameras", "gige", "--voxel-mm", VOXEL_MM,
                    *scene(options)], log, stdout=subprocess.PIPE, text=True)
-        self.processes = [rig]
-        self.daemon = rig
+        self.processes.append(rig)
         if not said_ready(rig):
-            return
-        self.daemon = run([options.bin / "scanrigd", "--config", self.rig / "rig.toml"], log)
-        self.processes = [self.daemon, rig]
+            return rig
+        daemon = run([options.bin / "scanrigd", "--config", self.rig / "rig.toml"], log)
+        self.processes.insert(0, daemon)
         self.hand = Hand(self.rig / "control.sock")
         threading.Thread(target=self.hand.operate, daemon=True).start()
+        return daemon
 
     def finish(self, job):
         """The truth, which the daemon never saw, and when the simulated devices did what."""
@@ -175,12 +183,13 @@ def main():
     if in_the_way:
         return complain(in_the_way, 3)
     log = open(folder / "demo.log", "w")
-    station = (WireStation if options.wire else SimulatedStation)(options, folder, log)
+    station = (WireStation if options.wire else SimulatedStation)(folder)
     try:
-        if not wait_for_socket(station.daemon, station.socket):
+        daemon = station.start(options, log)
+        if not wait_for_socket(daemon, station.socket):
             stop(station)
             print((folder / "demo.log").read_text(), end="", file=sys.stderr)
-            return station.daemon.returncode or 1
+            return daemon.returncode or 1
         try:
             followed = subprocess.run([options.bin / "scanrig", "status", "--follow", "--socket", station.socket],
                                       timeout=JOB_LIMIT_S).returncode
@@ -197,7 +206,7 @@ def main():
         print(f"Model   {folder}/model/model.glb\nReport  {folder}/model/report.json")
         print(f"Wall time {time.monotonic() - began:.1f} s")
         if options.keep:
-            print(f"The daemon keeps running (process {station.daemon.pid}); ask it with: "
+            print(f"The daemon keeps running (process {daemon.pid}); ask it with: "
                   f"scanrig status --socket {station.socket}")
         return scored
     finally:

@@ -83,7 +83,7 @@ Result<void> run(const SimOptions& o, const SignalStop& stop) {
   DaemonOptions options;
   options.jobs = {.root = o.jobs, .calibration_file = calibration, .profile = r.profile_sha256()};
   options.recipes["default"] = {.poses = o.rig.poses, .views = o.views};
-  options.socket = o.socket;
+  options.api.socket = o.socket;
   options.remote = options.guard = true;  // nobody can reach a simulated table
   options.reconstructor = pipeline_reconstructor(reconstruct);
   options.on_scanned = [&r](const std::filesystem::path& folder) { return r.write_truth(folder); };

@@ -20,7 +20,7 @@ class Daemon : public scan_samples::FolderTest {
     scan_samples::write_text(folder_ / "calibration.json", scan_samples::calibration_json());
     options.jobs = {.root = folder_ / "jobs", .calibration_file = folder_ / "calibration.json"};
     options.recipes["default"].views = 3;
-    options.socket = folder_ / "api.sock";
+    options.api.socket = folder_ / "api.sock";
     options.on_loop = [this](ControlLoop& l) { loop = &l; };
     options.reconstructor = [this](const ReconstructionTask&) {
       return std::make_unique<fakes::FakeReconstructor>(log);
@@ -74,6 +74,14 @@ class Daemon : public scan_samples::FolderTest {
     rig.panel.press(&PanelInputs::start);
   }
 
+  /// Looks again and again, for a virtual minute at most.
+  bool clock_waits_for(const std::function<bool()>& as_wanted) {
+    for (const auto by = Deadline::after(clock, std::chrono::seconds(60)); !by.expired(clock);
+         clock.sleep_for(std::chrono::milliseconds(10))) {
+      if (as_wanted()) return true;
+    }
+    return false;
+  }
   std::vector<std::filesystem::path> job_folders() const {
     std::vector<std::filesystem::path> folders;
     for (const auto& entry : std::filesystem::directory_iterator(folder_ / "jobs")) {

@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 
+#include "daemon/ctl/client.h"
 #include "tests/component/daemon/daemon_under_test.h"
 
 namespace scanrig {
@@ -32,7 +33,7 @@ TEST_F(Daemon, MakesOneModelFromTwoPoses) {
                                      "pose 1", "finish"));
   for (const auto& [pattern, plain] : log.grey_levels) EXPECT_GT(pattern, plain);
   EXPECT_THAT(rig.turntable.targets, ElementsAre(0, 0, 120, 240, 360, 360, 480, 600, 720));
-  EXPECT_FALSE(fs::exists(options.socket)) << "the socket goes with the daemon";
+  EXPECT_FALSE(fs::exists(options.api.socket)) << "the socket goes with the daemon";
 }
 
 TEST_F(Daemon, NothingMovesBeforeResetAndTwoSecondsOfWarning) {
@@ -131,6 +132,29 @@ TEST_F(Daemon, ACameraPulledInAScanInterruptsTheJobAndIsUsedWhenItIsBack) {
   clock.sleep_for(seconds(5));  // the next look after the devices
   scan_both_poses();
   EXPECT_TRUE(wait_pass());
+}
+
+TEST_F(Daemon, ThePreviewLooksInQuietTimesAndNeverDuringAScan) {
+  boot();
+  get_ready();
+  const auto left = [&] { return ctl::fetch(options.api.socket, "/api/v1/preview/left"); };
+  const auto looks = [&] {
+    const std::lock_guard guard(rig.line.mutex);
+    return rig.line.looks;
+  };
+  EXPECT_FALSE(left()) << "the first to ask makes the cameras look";
+  ASSERT_TRUE(clock_waits_for([&] { return left().has_value(); }));
+  EXPECT_GT(looks(), 0);
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_busy());
+  ASSERT_TRUE(clock_waits_for([&] { return rig.line.exposures > 0; }));
+  const int before = looks();
+  while (!rig.panel.lamps().flip_request) {
+    const auto picture = left();
+    EXPECT_TRUE(picture) << picture.error().message;
+    clock.sleep_for(std::chrono::milliseconds(100));
+  }
+  EXPECT_LE(looks(), before + 1) << "one at most, asked for when the pose had been stored";
 }
 
 TEST_F(Daemon, AStalledTableIsAFaultThatNamesIt) {

@@ -71,7 +71,7 @@ class Shift {
   explicit Shift(const fs::path& folder) : folder_(folder), acknowledged_(folder / "acks") {
     options_.jobs = {.root = folder / "jobs", .calibration_file = folder / "calibration.json"};
     options_.recipes["default"].views = 3;
-    options_.socket = folder / "api.sock";
+    options_.api.socket = folder / "api.sock";
     options_.reconstructor = [](const ReconstructionTask&) { return std::make_unique<TriangleMaker>(); };
     options_.published = [this](const auto& snapshot) { acknowledged_.note(*snapshot); };
     options_.on_loop = [this](ControlLoop& loop) { loop_ = &loop; };
