@@ -21,7 +21,7 @@
 #include "daemon/run_daemon.h"
 #include "pipeline/scan/model/model_files.h"
 #include "tests/component/daemon/fake_rig.h"
-#include "tests/unit/pipeline/scan/scan_samples.h"
+#include "tests/unit/pipeline/scan/sample_files.h"
 
 namespace {
 
