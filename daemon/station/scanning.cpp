@@ -54,6 +54,7 @@ void take_next_view(Machine& m) {
 void view_taken(Machine& m, const event::ViewTaken& e) {
   if (m.s().activity != Activity::scanning) return;  // a view that came after Stop is not kept
   auto& job = *m.s().job;
+  if (job.taken == job.asked) return;
   ++job.taken;
   m.act(action::StoreView{e.view});
   job.closure_due = job.taken == job.recipe.views;
@@ -61,7 +62,7 @@ void view_taken(Machine& m, const event::ViewTaken& e) {
 }
 
 void view_stored(Machine& m, const event::ViewStored& e) {
-  if (!m.has(e.id.job) || e.id.pose != m.s().job->pose) return;
+  if (!m.has(e.id.job) || e.id.pose != m.s().job->pose || m.s().job->stored == m.s().job->taken) return;
   ++m.s().job->stored;
   take_next_view(m);
 }

@@ -21,7 +21,7 @@
 #include "daemon/run_daemon.h"
 #include "pipeline/scan/model/model_files.h"
 #include "tests/component/daemon/fake_rig.h"
-#include "tests/unit/pipeline/scan/scan_samples.h"
+#include "tests/unit/pipeline/scan/sample_files.h"
 
 namespace {
 
@@ -129,6 +129,7 @@ class Shift {
     if (!get_ready()) return false;
     for (const auto& [id, job] : loop_->snapshot()->jobs) {
       if (job->state == JobState::interrupted) ask(job->resumable ? What::resume : What::cancel, id);
+      if (job->quarantined && !std::getenv("ONE_JOB_CRASH")) ask(What::reprocess, id);
     }
     while (!loop_->snapshot()->queue.empty()) {
       if (!start()) return false;
