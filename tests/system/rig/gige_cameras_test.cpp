@@ -89,7 +89,8 @@ TEST_F(CamerasOnWires, PicturesThatAreDarkBlurredOrOfTheOtherSideAreRedone) {
   spoil("blurred", 2);
   ASSERT_TRUE(soon([&] { return lamp("flip_request"); })) << log();
   int redone = 0;
-  for (const auto& view : job()["stored"]) redone += view["redone"].get<int>();
+  const auto stored = job()["stored"];
+  for (const auto& view : stored) redone += view["redone"].get<int>();
   EXPECT_GE(redone, 4) << "of two spoilt exposures at least one was with dots";
 }
 
