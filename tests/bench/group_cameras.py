@@ -57,6 +57,6 @@ def measure(bench):
     matrix(bench)
     cameras_memory.measure(bench)
     replies(bench)
-    cameras_hil.measure(bench)
     cameras_wire.measure(bench)
+    cameras_hil.measure(bench)
     cameras_debian13.measure(bench)
