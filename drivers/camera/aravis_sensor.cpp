@@ -106,9 +106,11 @@ Result<bool> AravisSensor::ready(Deadline deadline) {
 /// The library's own heartbeat takes many seconds to give a camera up.
 void AravisSensor::ask_whether_there() {
   constexpr auto kSilence = std::chrono::seconds(1);
+  constexpr guint64 kVersion = 0;  // a register every GigE Vision and USB3 Vision device has [GigE Vision 1.2, 28]
   if (clock_.now() - heard_ < kSilence) return;
   const auto asked = attempt_("ask whether it is there", [&](GError** error) {
-    std::ignore = arv_camera_get_string(camera_.get(), "TriggerSource", error);
+    guint32 value = 0;
+    arv_device_read_register(arv_camera_get_device(camera_.get()), kVersion, &value, error);
   });
   if (asked) heard_ = clock_.now();
   if (!asked) lost_ = true;
