@@ -33,7 +33,8 @@ class CamerasOnWires : public RigOnWires {
   }
   /// What is wrong with the cameras; empty: nothing.
   std::string camera_problem() {
-    for (const auto& device : ask("status")["devices"]) {
+    const auto devices = ask("status")["devices"];
+    for (const auto& device : devices) {
       if (device["name"] == "camera" && !device["ok"]) return device["problem"]["message"];
     }
     return "";
