@@ -13,7 +13,7 @@ using std::chrono::seconds;
 using Spoil = StereoCameraBench::Fault;
 
 constexpr milliseconds kFrameLimit{1000};
-constexpr seconds kConnectLimit{10};    ///< a request to a GigE camera that is gone takes the library 2.5 s
+constexpr seconds kConnectLimit{15};    ///< to give up a GigE camera takes the library four requests of 2.5 s each
 constexpr milliseconds kNoticed{1100};  ///< a camera is asked whether it is there when it was silent for a second
 constexpr seconds kAbsence{2};
 
