@@ -21,7 +21,7 @@ struct RigTruth;
 struct RigCamerasOptions {
   SceneOptions scene;
   std::vector<Place> expected;  ///< what is rendered before it is asked for
-  bool numbered = false;        ///< hide the number of the edge in every frame; then frames are not the scene's
+  bool numbered = false;        ///< note the number of the edge in every frame, see faint_number()
 };
 
 /// One edge of the light, and what became of it.
@@ -33,6 +33,9 @@ struct RigExposure {
   Clock::TimePoint at{}, ended{};
   Clock::TimePoint read{};  ///< both frames were read out and their sending began
 };
+
+/// Which edge a frame with `numbered` is of: the lowest bits of its first 32 pixels. For tests: no driver knows of it.
+std::uint32_t faint_number(const cv::Mat& frame);
 
 /// Two GigE cameras that look at the rendered scene: every edge of the light exposes both. A frame shows the object as
 /// it lay and where the table stood in the middle of the exposure, and is on its way 37 ms after the edge; or when it
@@ -61,7 +64,7 @@ class RigCameras {
   [[nodiscard]] wire::GigeCameras& wire() { return *wire_; }
 
  private:
-  RigCameras(std::unique_ptr<Scene> scene, const std::vector<Place>& expected, std::function<RigTruth()> truth,
+  RigCameras(std::unique_ptr<Scene> scene, const RigCamerasOptions& options, std::function<RigTruth()> truth,
              Clock& clock);
   void develop(const std::stop_token& stop);
   StereoImages picture(RigExposure& exposure);
@@ -70,6 +73,7 @@ class RigCameras {
 
   const std::function<RigTruth()> truth_;
   Clock& clock_;
+  const bool numbered_;
   const std::unique_ptr<Scene> scene_;
 
   mutable std::mutex mutex_;
