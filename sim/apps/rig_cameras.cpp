@@ -78,6 +78,11 @@ void RigCameras::edge(bool pattern) {
   exposed_.notify_all();
 }
 
+void RigCameras::light_out() {
+  const std::scoped_lock lock(mutex_);
+  if (!exposures_.empty() && clock_.now() < exposures_.back().ended) exposures_.back().lit = false;
+}
+
 void RigCameras::turned_over() {
   const std::scoped_lock lock(mutex_);
   history_.turned_over(*scene_);
@@ -87,23 +92,26 @@ void RigCameras::turned_over() {
 void RigCameras::develop(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (exposed_.wait(lock, stop, [&] { return developed_ < exposures_.size(); })) {
-    RigExposure exposure = exposures_[developed_];
-    exposure.place.placement = history_.placement();
+    const RigExposure begun = exposures_[developed_];
     lock.unlock();
-    StereoImages images = picture(exposure);
+    clock_.sleep_until(begun.at + exposure_time() / 2);
+    const double angle_deg = truth_().angle_deg;
+    clock_.sleep_until(begun.ended);
     lock.lock();
-    history_.exposed(exposure.place.angle_deg);
-    exposures_[developed_++] = exposure;
-    pictures_[exposure.number] = std::move(images);
+    RigExposure& exposure = exposures_[developed_];
+    exposure.place = {history_.placement(), angle_deg};
+    history_.exposed(angle_deg);
+    const RigExposure ended = exposure;
+    lock.unlock();
+    StereoImages images = picture(ended);
+    lock.lock();
+    ++developed_;
+    pictures_[ended.number] = std::move(images);
     if (pictures_.size() > kPictures) pictures_.erase(pictures_.begin());
   }
 }
 
-StereoImages RigCameras::picture(RigExposure& exposure) {
-  clock_.sleep_until(exposure.at + exposure_time() / 2);
-  exposure.place.angle_deg = truth_().angle_deg;
-  clock_.sleep_until(exposure.ended);
-  exposure.lit = truth_().projector_on;
+StereoImages RigCameras::picture(const RigExposure& exposure) {
   if (!exposure.lit) return {};
   const auto view = views_.get(exposure.place);
   return view ? scene_->expose(*view, exposure.pattern, exposure.number) : StereoImages{};

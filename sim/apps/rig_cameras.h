@@ -28,8 +28,8 @@ struct RigCamerasOptions {
 struct RigExposure {
   std::uint64_t number = 0;  ///< counts the edges
   bool pattern = false;
-  bool lit = false;  ///< the light burned as long as the exposure lasted
-  Place place{};     ///< in the middle of the exposure
+  bool lit = true;  ///< the light burned as long as the exposure lasted
+  Place place{};    ///< in the middle of the exposure
   Clock::TimePoint at{}, ended{};
   Clock::TimePoint read{};  ///< both frames were read out and their sending began
 };
@@ -41,7 +41,7 @@ std::uint32_t faint_number(const cv::Mat& frame);
 /// it lay and where the table stood in the middle of the exposure, and is on its way 37 ms after the edge; or when it
 /// is rendered, which for a view nobody expected takes as long as it takes. An exposure whose light went out early is
 /// dark; so is one by software.
-/// Threads: every function may be called from any thread, edge() from one at a time.
+/// Threads: every function may be called from any thread, edge() and light_out() from one at a time.
 class RigCameras {
  public:
   static constexpr const char* kLeftAddress = "127.0.0.1";
@@ -53,6 +53,7 @@ class RigCameras {
   ~RigCameras();
 
   void edge(bool pattern);
+  void light_out();
   void turned_over();
   /// All that is expected is rendered; false when `stop` came first.
   bool wait_until_ready(const std::stop_token& stop) { return views_.wait_until_ready(stop); }
@@ -67,7 +68,7 @@ class RigCameras {
   RigCameras(std::unique_ptr<Scene> scene, const RigCamerasOptions& options, std::function<RigTruth()> truth,
              Clock& clock);
   void develop(const std::stop_token& stop);
-  StereoImages picture(RigExposure& exposure);
+  StereoImages picture(const RigExposure& exposure);
   bool ready(const wire::GigeExposure& exposure) const;
   void read_out(wire::Side side, const wire::GigeExposure& exposure, cv::Mat& image);
 
