@@ -1,28 +1,14 @@
 #pragma once
 
-#include <functional>
-#include <string>
+#include <vector>
 
-#include "daemon/station/control_loop.h"
+#include "daemon/api/route.h"
 
 namespace scanrig {
 
-struct ApiRequest {
-  std::string method;  ///< "GET"
-  std::string target;  ///< "/api/v1/status"
-};
-
-struct ApiResponse {
-  unsigned status = 200;
-  std::string body;  ///< JSON
-};
-
-/// Version 1 of the API:
-///   GET /api/v1/status, /api/v1/io, /api/v1/jobs, /api/v1/jobs/ID
-///   POST /api/v1/start, /api/v1/stop, /api/v1/reset
-///   POST /api/v1/maintenance/on, off, home, pulse, lamp_test, jog?to_deg=90, jog?by_deg=-5&speed_deg_s=2
-/// Reads the latest snapshot or posts to the control loop; never waits. `send` is called once, from this thread or
-/// from the control loop's. An error is {"error": {"code", "message"}} with status 400, 404, 405 or 409.
-void answer(const ApiRequest& request, ControlLoop& loop, std::function<void(ApiResponse)> send);
+std::vector<Route> station_routes();  ///< status, events, buttons, maintenance, inputs and outputs
+std::vector<Route> job_routes();      ///< jobs as they are, their files and models
+std::vector<Route> order_routes();    ///< what is done with jobs: queued, cancelled, bundled, removed, ...
+std::vector<Route> service_routes();  ///< health, metrics, the OpenAPI document
 
 }  // namespace scanrig

@@ -1,6 +1,7 @@
 #include "daemon/rig/acquisition.h"
 
 #include <cmath>
+#include <utility>
 
 #include "daemon/station/timestamp.h"
 
@@ -38,6 +39,7 @@ Result<void> Acquisition::home() {
 
 Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle) {
   const unsigned before = interrupts_;
+  if (id.job != std::exchange(job_, id.job)) judge_.begin();
   const auto move = turn_to(angle);
   if (!move) return pass_on(move);
 
@@ -71,6 +73,10 @@ Result<Degrees> Acquisition::jog(const action::Jog& jog) {
 
 Result<void> Acquisition::pulse() {
   return devices_.projector.fire(Light::pattern, Deadline::after(clock_, options_.exposure_limit));
+}
+
+Result<StereoFrame> Acquisition::look() {
+  return devices_.camera.look(Deadline::after(clock_, options_.exposure_limit));
 }
 
 std::vector<DeviceHealth> Acquisition::check() {
@@ -117,7 +123,11 @@ Result<StereoFrame> Acquisition::expose_once(Light light) {
   if (auto fired = devices_.projector.fire(light, Deadline::after(clock_, options_.exposure_limit)); !fired) {
     return pass_on(fired);
   }
-  return devices_.camera.collect(Deadline::after(clock_, options_.exposure_limit));
+  auto frame = devices_.camera.collect(Deadline::after(clock_, options_.exposure_limit));
+  if (!frame) return frame;
+  if (auto good = judge_.judge(light, *frame); !good) return pass_on(good);
+  seen_(*frame);
+  return frame;
 }
 
 }  // namespace scanrig

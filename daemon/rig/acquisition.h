@@ -2,9 +2,11 @@
 
 #include <atomic>
 #include <chrono>
+#include <functional>
 
 #include "core/clock.h"
 #include "daemon/rig/devices.h"
+#include "daemon/rig/picture_judge.h"
 #include "daemon/rig/taken_view.h"
 
 namespace scanrig {
@@ -23,17 +25,20 @@ struct AcquisitionOptions {
 /// Threads: one owner, which owns turntable, projector and camera too.
 class Acquisition {
  public:
-  Acquisition(const Devices& devices, Clock& clock, AcquisitionOptions options)
-      : devices_(devices), clock_(clock), options_(options) {}
+  /// `seen` is told of every pair fit for use.
+  Acquisition(
+      const Devices& devices, Clock& clock, AcquisitionOptions options,
+      std::function<void(const StereoFrame&)> seen = [](const auto&) {})
+      : devices_(devices), clock_(clock), options_(options), seen_(std::move(seen)) {}
 
   // Errors are passed on as the devices say them: each names itself.
 
   /// Clears an alarm, darkens the projector, finds home. Fails as Turntable::home.
   Result<void> home();
 
-  /// Turns to `angle`, the shorter way, and takes the four images. An exposure whose frames are lost or torn, or during
-  /// which camera or projector vanished, is redone and counted. A table wound up by several jobs is unwound on the way.
-  /// Fails as the device that failed; the table has been told to stop then.
+  /// Turns to `angle`, the shorter way, and takes the four images. An exposure whose frames are lost, torn or not fit
+  /// for use (see PictureJudge), or during which camera or projector vanished, is redone and counted. A table wound up
+  /// by several jobs is unwound on the way. Fails as the device that failed; the table has been told to stop then.
   Result<TakenView> take_view(const ViewId& id, Degrees angle);
 
   /// Turns an engineer's way, no faster than asked; the angle measured. Fails as Turntable::rotate_to, and with
@@ -42,6 +47,9 @@ class Acquisition {
 
   /// One flash of the dots. Fails as Projector::fire.
   Result<void> pulse();
+
+  /// A pair without an exposure of the projector. Fails as StereoCamera::look.
+  Result<StereoFrame> look();
 
   /// Asks each device something that does no harm.
   std::vector<DeviceHealth> check();
@@ -66,7 +74,10 @@ class Acquisition {
   Devices devices_;
   Clock& clock_;
   AcquisitionOptions options_;
+  const std::function<void(const StereoFrame&)> seen_;
   std::atomic<unsigned> interrupts_ = 0;
+  PictureJudge judge_;
+  std::string job_;            ///< whose pictures it knows
   double position_deg_ = 0.0;  ///< where the last move ended, turns counted from home
 };
 

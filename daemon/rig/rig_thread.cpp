@@ -6,15 +6,20 @@
 
 namespace scanrig {
 
-RigThread::RigThread(const Devices& devices, Clock& clock, AcquisitionOptions options, std::function<void(Event)> tell)
+RigThread::RigThread(const Devices& devices, Clock& clock, AcquisitionOptions options, Preview& preview,
+                     std::function<void(Event)> tell)
     : turntable_(devices.turntable, clock),
       devices_{turntable_, devices.projector, devices.camera, devices.panel},
-      acquisition_(devices_, clock, options),
+      acquisition_(devices_, clock, options, [&preview](const StereoFrame& pair) { preview.keep(pair); }),
+      preview_(preview),
       tell_(std::move(tell)),
       inbox_(clock),
-      thread_(start_actor(clock, [this] { run(); })) {}
+      thread_(start_actor(clock, [this] { run(); })) {
+  preview_.on_wanted([this] { inbox_.post(Look{}); });
+}
 
 RigThread::~RigThread() {
+  preview_.on_wanted(nullptr);
   interrupt();
   inbox_.close();
   thread_.join();
@@ -32,7 +37,18 @@ void RigThread::interrupt() noexcept {
 }
 
 void RigThread::run() {
-  while (auto command = inbox_.take()) tell_(perform(*command));
+  while (auto command = inbox_.take()) {
+    if (std::holds_alternative<Look>(*command)) {
+      look();
+    } else {
+      tell_(perform(*command));
+    }
+  }
+}
+
+void RigThread::look() {
+  const auto pair = acquisition_.look();
+  pair ? preview_.keep(*pair) : preview_.failed(pair.error());
 }
 
 Result<void> RigThread::home_now() {
@@ -52,7 +68,9 @@ Event RigThread::perform(const Command& command) {
   if (const auto* view = std::get_if<action::TakeView>(&command)) {
     auto taken = acquisition_.take_view(view->id, view->angle);
     if (!taken) return event::RigFailed{taken.error()};
-    return event::ViewTaken{std::make_shared<const TakenView>(std::move(*taken))};
+    auto shared = std::make_shared<const TakenView>(std::move(*taken));
+    if (view->closure) return event::ClosureTaken{std::move(shared)};
+    return event::ViewTaken{std::move(shared)};
   }
   if (const auto* jog = std::get_if<action::Jog>(&command)) {
     const auto measured = acquisition_.jog(*jog);

@@ -6,6 +6,7 @@
 
 #include "daemon/mailbox.h"
 #include "daemon/rig/acquisition.h"
+#include "daemon/rig/preview.h"
 #include "daemon/rig/turntable_thread.h"
 
 namespace scanrig {
@@ -14,7 +15,9 @@ namespace scanrig {
 /// tells the station how it went.
 class RigThread {
  public:
-  RigThread(const Devices& devices, Clock& clock, AcquisitionOptions options, std::function<void(Event)> tell);
+  /// `preview` outlives it, is given every pair and is served with looks.
+  RigThread(const Devices& devices, Clock& clock, AcquisitionOptions options, Preview& preview,
+            std::function<void(Event)> tell);
   /// Stops what moves and joins.
   ~RigThread();
   RigThread(const RigThread&) = delete;
@@ -32,16 +35,19 @@ class RigThread {
   void interrupt() noexcept;
 
  private:
-  using Command =
-      std::variant<action::Home, action::TakeView, action::Jog, action::Pulse, action::CheckDevices, action::StopRig>;
+  struct Look {};
+  using Command = std::variant<action::Home, action::TakeView, action::Jog, action::Pulse, action::CheckDevices,
+                               action::StopRig, Look>;
 
   void run();
   Event perform(const Command& command);
+  void look();
   Result<void> home_now();
 
   TurntableThread turntable_;
   Devices devices_;
   Acquisition acquisition_;
+  Preview& preview_;
   std::function<void(Event)> tell_;
   Mailbox<Command> inbox_;
   std::thread thread_;

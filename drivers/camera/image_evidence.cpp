@@ -1,6 +1,8 @@
 #include "drivers/camera/image_evidence.h"
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 namespace scanrig {
 namespace {
@@ -27,6 +29,11 @@ Plane plane_of(const cv::Mat& image, PixelFormat format) {
   return {image, 0, 1, 1};
 }
 
+/// Laplacian at sample x of three neighbouring rows.
+int bend_at(const std::uint8_t* above, const std::uint8_t* here, const std::uint8_t* below, int i, int pitch) {
+  return here[i + pitch] + here[i - pitch] + below[i] + above[i] - 4 * here[i];
+}
+
 /// For independent grains seen through a Gaussian blur of standard deviation s, the spectrum falls as exp(-s^2 w^2),
 /// and the mean squares of gradient and Laplacian are as s^2 to 2.
 double blur_px(const Plane& plane) {
@@ -37,7 +44,7 @@ double blur_px(const Plane& plane) {
     for (int x = 1; x + 1 < plane.cols(); ++x) {
       const int i = x * plane.pitch(), left = i - plane.pitch(), right = i + plane.pitch();
       const int across = here[right] - here[left], down = below[i] - above[i];
-      const int bend = here[right] + here[left] + below[i] + above[i] - 4 * here[i];
+      const int bend = bend_at(above, here, below, i, plane.pitch());
       row_gradient += across * across + down * down;
       row_laplacian += bend * bend;
     }
@@ -64,6 +71,34 @@ ImageEvidence measure(const cv::Mat& image, PixelFormat format) {
   const double count = static_cast<double>(image.rows) * bytes;
   return {static_cast<double>(sum) / (255.0 * count), static_cast<double>(full) / count,
           blur_px(plane_of(image, format))};
+}
+
+double likeness(const cv::Mat& left, const cv::Mat& right, PixelFormat format) {
+  if (left.empty() || left.size() != right.size() || left.type() != right.type()) {
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  const Plane a = plane_of(left, format), b = plane_of(right, format);
+  // Row by row: a mark in one corner, or an edge that lies along a row, says nothing about the pictures.
+  constexpr int kEveryRow = 4;
+  std::vector<double> rows;
+  for (int y = 1; y + 1 < a.rows(); y += kEveryRow) {
+    std::int64_t both = 0, only_a = 0, only_b = 0;
+    for (int x = 1; x + 1 < a.cols(); ++x) {
+      const int i = x * a.pitch();
+      const int bend_a = bend_at(a.row(y - 1), a.row(y), a.row(y + 1), i, a.pitch());
+      const int bend_b = bend_at(b.row(y - 1), b.row(y), b.row(y + 1), i, b.pitch());
+      both += bend_a * bend_b;
+      only_a += bend_a * bend_a;
+      only_b += bend_b * bend_b;
+    }
+    if (only_a > 0 && only_b > 0) {
+      rows.push_back(static_cast<double>(both) / std::sqrt(static_cast<double>(only_a) * static_cast<double>(only_b)));
+    }
+  }
+  if (rows.empty()) return std::numeric_limits<double>::quiet_NaN();
+  const auto upper = rows.begin() + static_cast<std::ptrdiff_t>(rows.size() * 3 / 4);
+  std::ranges::nth_element(rows, upper);
+  return *upper;
 }
 
 }  // namespace scanrig

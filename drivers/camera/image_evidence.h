@@ -9,4 +9,7 @@ namespace scanrig {
 /// image without any.
 ImageEvidence measure(const cv::Mat& image, PixelFormat format);
 
+/// StereoFrame::likeness of two images of one size; NaN without any texture.
+double likeness(const cv::Mat& left, const cv::Mat& right, PixelFormat format);
+
 }  // namespace scanrig

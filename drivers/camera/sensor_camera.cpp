@@ -295,6 +295,7 @@ StereoFrame SensorCamera::hand_out(std::vector<SensorFrame>& frames) {
   pair.taken = channels_.front().ledger.host_time(frames.front().stamp, {trigger_after_, frames.front().arrival});
   pair.left_evidence = measure(pair.left, pair.format);
   pair.right_evidence = measure(pair.right, pair.format);
+  pair.likeness = likeness(pair.left, pair.right, pair.format);
   return pair;
 }
 

@@ -33,6 +33,9 @@ struct StereoFrame {
   Clock::TimePoint taken;
   ImageEvidence left_evidence = {};
   ImageEvidence right_evidence = {};
+  /// Correlation of the fine texture at the same places of both images, upper quartile of the rows: near 1 when both
+  /// show one picture, near 0 for two viewpoints; NaN where it is not measured.
+  double likeness = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// Two synchronised sensors, bound by serial number, triggered by the projector's edge.

@@ -15,6 +15,7 @@ constexpr int kZeroDelay = 0xBB;                           // of the trigger out
 constexpr std::chrono::microseconds kShortest{235};        // exposure of a pattern of one bit [DLPU010, table 2-65]
 constexpr std::chrono::microseconds kLongest{10'000'000};  // long enough for any rig
 constexpr milliseconds kPoll{2};
+constexpr std::uint8_t kImages = 1, kPatterns = 2;  // mailboxes
 
 std::vector<std::uint8_t> little_endian(std::uint32_t value) {
   return {static_cast<std::uint8_t>(value), static_cast<std::uint8_t>(value >> 8),
@@ -49,8 +50,11 @@ Result<void> LightCrafterProjector::fire(Light light, Deadline deadline) {
     dark_requested_ = false;
   }
   if (auto connected = connect(deadline); !connected) return connected;
+  if (!set_up_) {
+    if (auto set = set_up(deadline); !set) return set;
+  }
   if (loaded_ != light) {
-    if (auto set = set_up(light, deadline); !set) return set;
+    if (auto loaded = load(light, deadline); !loaded) return loaded;
   }
   if (deadline.left(clock_) < options_.exposure) {
     return fail(ErrorCode::timeout, "projector: an exposure of {} us does not fit before the deadline",
@@ -84,14 +88,16 @@ Result<void> LightCrafterProjector::connect(Deadline deadline) {
   auto opened = open_();
   if (!opened) return pass_on(opened, "projector");
   transport_ = std::move(*opened);
-  loaded_.reset();
+  set_up_ = false;
   if (auto awake = write(Command::power, {0}, deadline); !awake) return awake;
   if (auto healthy = expect_healthy(deadline); !healthy) return healthy;
   return write(Command::display_mode, {1}, deadline);
 }
 
-/// The order matters: the device checks nothing before it is told to validate, and takes settings only when stopped.
-Result<void> LightCrafterProjector::set_up(Light light, Deadline deadline) {
+/// Whatever does not depend on the light: once for each connection. The order matters; the device takes settings only
+/// when stopped.
+Result<void> LightCrafterProjector::set_up(Deadline deadline) {
+  set_up_ = false;
   loaded_.reset();
   if (auto stopped = stop(deadline); !stopped) return stopped;
   const auto exposure = static_cast<std::uint32_t>(options_.exposure.count());
@@ -111,32 +117,35 @@ Result<void> LightCrafterProjector::set_up(Light light, Deadline deadline) {
       {Command::trigger_out_1, {static_cast<std::uint8_t>(options_.trigger_out_inverted), out_delay, kZeroDelay}},
       {Command::trigger_in_1_delay, little_endian(in_delay)},
   };
-  for (const auto& [command, data] : settings) {
-    if (auto written = write(command, data, deadline); !written) return written;
-  }
+  if (auto written = write_all(settings, deadline); !written) return written;
+  if (auto sent = send_table(kImages, {static_cast<std::uint8_t>(options_.image)}, deadline); !sent) return sent;
+  set_up_ = true;
+  return {};
+}
+
+/// The one entry of the pattern table, six commands: the device checks nothing before it is told to validate, and each
+/// exposure before this one has been seen to be over.
+Result<void> LightCrafterProjector::load(Light light, Deadline deadline) {
+  loaded_.reset();
   LutEntry entry;
   entry.trigger = options_.trigger_in;
   entry.swap_buffer = true;
   entry.pattern = light == Light::pattern ? options_.pattern : kAllWhite;
   entry.depth = light == Light::pattern ? options_.depth : 1;
-  if (auto sent = send_table(entry, deadline); !sent) return sent;
+  const auto word = dlpc350::encode(entry);
+  if (auto sent = send_table(kPatterns, {word.begin(), word.end()}, deadline); !sent) return sent;
   if (auto valid = validate(deadline); !valid) return valid;
   loaded_ = light;
   return {};
 }
 
-Result<void> LightCrafterProjector::send_table(const LutEntry& entry, Deadline deadline) {
-  constexpr std::uint8_t kImages = 1, kPatterns = 2, kClosed = 0;
-  const auto word = dlpc350::encode(entry);
-  const std::vector<std::pair<std::uint8_t, Bytes>> tables{{kPatterns, {word.begin(), word.end()}},
-                                                           {kImages, {static_cast<std::uint8_t>(options_.image)}}};
-  for (const auto& [box, data] : tables) {
-    if (auto opened = write(Command::mailbox, {box}, deadline); !opened) return opened;
-    if (auto placed = write(Command::mailbox_address, {0}, deadline); !placed) return placed;
-    if (auto written = write(Command::mailbox_data, data, deadline); !written) return written;
-    if (auto closed = write(Command::mailbox, {kClosed}, deadline); !closed) return closed;
-  }
-  return {};
+Result<void> LightCrafterProjector::send_table(std::uint8_t mailbox, const Bytes& data, Deadline deadline) {
+  constexpr std::uint8_t kClosed = 0;
+  const std::vector<std::pair<Command, Bytes>> steps{{Command::mailbox, {mailbox}},
+                                                     {Command::mailbox_address, {0}},
+                                                     {Command::mailbox_data, data},
+                                                     {Command::mailbox, {kClosed}}};
+  return write_all(steps, deadline);
 }
 
 Result<void> LightCrafterProjector::validate(Deadline deadline) {
@@ -162,7 +171,7 @@ Result<void> LightCrafterProjector::expect_healthy(Deadline deadline) {
   std::string faults = dlpc350::hardware_faults(*hardware);
   if (const auto more = dlpc350::system_faults(*system); !more.empty()) faults += (faults.empty() ? "" : ", ") + more;
   if (faults.empty()) return {};
-  loaded_.reset();
+  set_up_ = false;
   return fail(ErrorCode::device_alarm, "projector: the LightCrafter reports: {}; switch it off and on", faults);
 }
 
@@ -172,7 +181,10 @@ Result<void> LightCrafterProjector::stop(Deadline deadline) {
     const auto on = running(deadline);
     if (!on) return pass_on(on);
     if (!*on) return {};
-    if (deadline.expired(clock_)) return fail(ErrorCode::timeout, "projector: told to stop, still shows a pattern");
+    if (deadline.expired(clock_)) {
+      set_up_ = false;
+      return fail(ErrorCode::timeout, "projector: told to stop, still shows a pattern");
+    }
     clock_.sleep_for(kPoll);
   }
 }
@@ -183,15 +195,16 @@ Result<bool> LightCrafterProjector::running(Deadline deadline) {
   return dlpc350::runs(*status);
 }
 
-/// Waits a little; true if it is to go dark.
-bool LightCrafterProjector::pause() {
+/// True, and at once, if it is to go dark.
+bool LightCrafterProjector::pause(Clock::Duration time) {
   std::unique_lock lock(mutex_);
-  return clock_.wait_until(lock, wake_, clock_.now() + kPoll, [&] { return dark_requested_; });
+  return clock_.wait_until(lock, wake_, clock_.now() + time, [&] { return dark_requested_; });
 }
 
 Result<void> LightCrafterProjector::wait_until_over(Deadline deadline) {
-  for (;;) {
-    if (pause()) return fail(ErrorCode::io, "projector: went dark on request before the exposure was over");
+  // Not asked before it can be over.
+  for (Clock::Duration time = options_.exposure;; time = kPoll) {
+    if (pause(time)) return fail(ErrorCode::io, "projector: went dark on request before the exposure was over");
     const auto on = running(deadline);
     if (!on) return pass_on(on);
     if (!*on) return {};
@@ -200,6 +213,13 @@ Result<void> LightCrafterProjector::wait_until_over(Deadline deadline) {
                   options_.trigger_in == LutEntry::Trigger::internal ? "" : "; is there an edge at its trigger input?");
     }
   }
+}
+
+Result<void> LightCrafterProjector::write_all(const std::vector<std::pair<Command, Bytes>>& steps, Deadline deadline) {
+  for (const auto& [command, data] : steps) {
+    if (auto written = write(command, data, deadline); !written) return written;
+  }
+  return {};
 }
 
 Result<void> LightCrafterProjector::write(Command command, const Bytes& data, Deadline deadline) {

@@ -43,14 +43,16 @@ class LightCrafterProjector final : public Projector {
       : options_(options), open_(std::move(open)), clock_(clock) {}
 
   Result<void> connect(Deadline deadline);
-  Result<void> set_up(Light light, Deadline deadline);
-  Result<void> send_table(const dlpc350::LutEntry& entry, Deadline deadline);
+  Result<void> set_up(Deadline deadline);
+  Result<void> load(Light light, Deadline deadline);
+  Result<void> send_table(std::uint8_t mailbox, const Bytes& data, Deadline deadline);
   Result<void> validate(Deadline deadline);
   Result<void> expect_healthy(Deadline deadline);
   Result<void> stop(Deadline deadline);
   Result<void> wait_until_over(Deadline deadline);
   Result<bool> running(Deadline deadline);
-  bool pause();
+  bool pause(Clock::Duration time);
+  Result<void> write_all(const std::vector<std::pair<dlpc350::Command, Bytes>>& steps, Deadline deadline);
   Result<void> write(dlpc350::Command command, const Bytes& data, Deadline deadline);
   Result<std::uint8_t> read_byte(dlpc350::Command command, Deadline deadline);
   Result<Bytes> talk(dlpc350::Command command, bool read, const Bytes& data, Deadline deadline);
@@ -61,6 +63,7 @@ class LightCrafterProjector final : public Projector {
   Clock& clock_;
   std::unique_ptr<dlpc350::Transport> transport_;  // null while the device is lost
   std::uint8_t sequence_ = 0;
+  bool set_up_ = false;          // since it was connected
   std::optional<Light> loaded_;  // what the device's table shows
 
   std::mutex mutex_;

@@ -104,6 +104,9 @@ Result<int> open_video(const std::string& device, cv::Size size) {
   if (descriptor < 0 || ::ioctl(descriptor, VIDIOC_S_FMT, &format) < 0) {
     return fail(ErrorCode::io, "{}: {}", device, std::strerror(errno));
   }
+  // Nobody can read before something has been written: a dark frame, as of a sensor that is switched on.
+  const std::vector<std::uint8_t> dark(static_cast<std::size_t>(size.area()));
+  if (::write(descriptor, dark.data(), dark.size()) < 0) return fail(ErrorCode::io, "{}: no frame taken", device);
   return descriptor;
 }
 

@@ -19,6 +19,7 @@ import station as stations
 from station import Station
 
 KILLS = 5
+MOST_S = 10  # of a scan until the machine is killed: four views or so
 COLD_S, CACHED_S = 600, 240
 
 
@@ -85,7 +86,7 @@ def kills(table, boot):
                 if life > 0:
                     seen.check(station)
                 if life < KILLS:
-                    seen.scan_until_killed(station, 15)
+                    seen.scan_until_killed(station, MOST_S)
                     counts.append(len(seen.views))
             except (stations.Unmet, machine.Gone) as unmet:
                 problem = f"life {life + 1}: {unmet}"

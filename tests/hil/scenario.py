@@ -1,5 +1,4 @@
 """One pose through the kernel's interfaces, and the faults; each function is a row of the table."""
-import json
 import random
 import time
 
@@ -39,19 +38,19 @@ def wait_for_views(station, job, count, limit_s=SCAN_S):
 
 def pose(station, rendered):
     """Start pressed at the panel; one pose of 8 views. `rendered`: sha256 by file of what the cameras show."""
+    stop_job(station)
     station.get_ready()
     begin = time.monotonic()
     job = station.start()
     wait_for_views(station, job, VIEWS)
     took = time.monotonic() - begin
-    manifest = station.manifest(job)
-    expect([p["complete"] for p in manifest["poses"]] == [True], f"poses: {json.dumps(manifest['poses'])[:300]}")
+    station.wait("a complete pose", lambda: [p["complete"] for p in station.manifest(job)["poses"]] == [True], 20)
     stored = station.image_hashes(job)
     names = [f"pose1/view{view:02}/{image}" for view in range(VIEWS) for image in IMAGES]
     wrong = [name for name in names if stored.get(name) != rendered[name]]
     expect(not wrong, f"{len(wrong)} of {len(names)} images are not those that were shown: {', '.join(wrong[:4])}")
     off = max(abs(view["measured_deg"] - view["commanded_deg"]) for view in station.views(job))
-    end_reconstruction(station)
+    stop_job(station)
     return f"{VIEWS} views, {len(names)} images byte for byte, {off:.4f} deg off at most, {took:.0f} s"
 
 
@@ -68,17 +67,21 @@ def usb_and_gige(station, rendered):
     return pose(station, rendered)
 
 
-def end_reconstruction(station):
-    """The model of a scan is not this machine's business: emulated, it would take minutes."""
-    station.machine.do("systemctl restart scanrigd", 30)
+def stop_job(station):
+    """A restart ends a scan, and a reconstruction, which in an emulated machine would take minutes."""
+    if station.job:
+        station.machine.do("systemctl restart scanrigd", 30)
+        station.job = None
 
 
-def scanning(station, views=1):
-    """A job with so many views stored, while it goes on."""
-    station.get_ready()
-    job = station.start()
-    wait_for_views(station, job, views)
-    return job
+def scanning(station):
+    """A job with a view stored, while it goes on: the one that has shown that the rig recovered, or a new one."""
+    known = station.job and station.ask(f"jobs/{station.job}")
+    if not known or known["state"] != "scanning" or len(known["stored"]) > VIEWS / 2:
+        station.get_ready()
+        station.start()
+    wait_for_views(station, station.job, 1)
+    return station.job
 
 
 def job_ends(station, job, words):
@@ -94,11 +97,9 @@ def job_ends(station, job, words):
 
 
 def recovers(station):
-    """A Reset at the panel, and the next job takes a view."""
-    job = scanning(station)
-    station.tap("STOP")
-    station.wait("stopped", lambda: station.status()["machine"] != "Operational.SingleExecution", 20)
-    return job
+    """A Reset at the panel, and the next job takes a view. It goes on, for the next fault to meet."""
+    station.get_ready()
+    wait_for_views(station, station.start(), 1)
 
 
 def serial_unplugged(station):

@@ -16,6 +16,7 @@ sys.path.insert(0, str(image.ROOT / "tests" / "bench"))
 import motion_rig  # noqa: E402
 
 VIEWS = 8
+READY = "Operational.Ready"
 JOBS = "/var/lib/scanrig/jobs"
 IMAGES = [f"{side}_{light}.png" for side in ("left", "right") for light in ("pattern", "plain")]
 
@@ -49,7 +50,8 @@ class Station:
     def __init__(self, folder, cached, app, rig, more=()):
         self.rig = rig
         self.machine = machine.Machine(folder, cached, app, rig.folder / "turntable", more)
-        self.told = None
+        self.told = None  # the angle that the cameras know of
+        self.job = None  # the last one that was started
         self.leaving = threading.Event()
         self.teller = threading.Thread(target=self.tell_angle, daemon=True)
 
@@ -114,6 +116,14 @@ class Station:
     def status(self):
         return self.ask("status")
 
+    def says(self):
+        """The station's state, and what is wrong with its devices."""
+        status = self.status()
+        if not status:
+            return "the station does not answer"
+        wrong = [device["problem"]["message"] for device in status["devices"] if not device["ok"]]
+        return "; ".join([f"the station says: {status['machine']}, {status['sentence']}", *wrong])
+
     def wait(self, what, ready, limit_s):
         """What `ready` returned, once it is true. Fails with Unmet."""
         end = time.monotonic() + limit_s
@@ -122,17 +132,8 @@ class Station:
             if found:
                 return found
             if time.monotonic() > end:
-                status = self.status() or {}
-                raise Unmet(f"not {what} within {limit_s} s; the station says: {status.get('machine', 'nothing')}, "
-                            f"{status.get('sentence', '')}")
+                raise Unmet(f"not {what} within {limit_s} s; {self.says()}")
             time.sleep(0.1)
-
-    def wait_for_state(self, state, limit_s):
-        def ready():
-            status = self.status()
-            return status if status and status["machine"] == state else None
-
-        return self.wait(state, ready, limit_s)
 
     def wait_for_words(self, key, words, limit_s):
         def ready():
@@ -143,15 +144,20 @@ class Station:
 
     def get_ready(self):
         """Halted until somebody presses Reset; then it homes."""
-        self.wait_for_words("next_action", "Reset", 60)
-        self.tap("RESET")
-        self.wait_for_state("Operational.Ready", 60)
+        def asks():
+            status = self.status()
+            return status and ("Reset" in status["next_action"] or status["machine"] == READY) and status["machine"]
+
+        if self.wait("asking for Reset", asks, 60) != READY:
+            self.tap("RESET")
+            self.wait(READY, lambda: (self.status() or {}).get("machine") == READY, 60)
 
     def start(self):
         """The new job's id."""
         before = set(self.jobs())
         self.tap("START")
-        return self.wait("a new job", lambda: next(iter(set(self.jobs()) - before), None), 10)
+        self.job = self.wait("a new job", lambda: next(iter(set(self.jobs()) - before), None), 10)
+        return self.job
 
     def jobs(self):
         return self.machine.do(f"ls {JOBS} 2>/dev/null || true").split()

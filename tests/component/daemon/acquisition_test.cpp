@@ -67,6 +67,20 @@ TEST_F(AcquisitionTest, ACameraThatStaysSilentFailsTheView) {
   EXPECT_EQ(rig.line.exposures, 4) << "one and three redone";
 }
 
+TEST_F(AcquisitionTest, ADarkPictureIsRedoneAndFailsTheViewByNameWhenItStaysDark) {
+  ASSERT_TRUE(acquisition.home());
+  rig.line.dark = 3;
+  const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
+  ASSERT_TRUE(view) << view.error().message;
+  EXPECT_EQ(view->redone, 3);
+  rig.line.dark = 100;
+  const auto next = acquisition.take_view({"job", 0, 1}, {45.0});
+  ASSERT_FALSE(next);
+  EXPECT_EQ(next.error().code, ErrorCode::protocol);
+  EXPECT_TRUE(next.error().message.starts_with("right camera: the picture in the dots is dark"))
+      << next.error().message;
+}
+
 TEST_F(AcquisitionTest, AnExposureDuringWhichTheCameraVanishedIsRedone) {
   ASSERT_TRUE(acquisition.home());
   rig.line.absent = 2;

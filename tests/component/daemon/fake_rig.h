@@ -104,9 +104,12 @@ struct TriggerLine {
   bool armed = false;
   int exposures = 0;  ///< since the beginning
   int lose = 0;       ///< the next exposures whose frames never arrive
+  int looks = 0;      ///< since the beginning
+  int dark = 0;       ///< the next exposures whose right picture is dark
   int absent = 0;     ///< how often more the camera does not answer when it is armed; -1: it is not there at all
   std::function<void()> at_fire;  ///< happens during the next exposure
   Light last = Light::plain;
+  int scene = 0;  ///< what the cameras look at: another number, another picture
 };
 
 class FakeProjector final : public Projector {
@@ -154,7 +157,14 @@ class FakeCamera final : public StereoCamera {
     line_.armed = true;
     return {};
   }
-  Result<StereoFrame> look(Deadline) override { return fail(ErrorCode::unsupported, "camera: no look"); }
+  Result<StereoFrame> look(Deadline deadline) override {
+    if (auto there = ready(deadline); !there) return pass_on(there);
+    const std::lock_guard guard(line_.mutex);
+    ++line_.looks;
+    StereoFrame frame;
+    frame.left = frame.right = cv::Mat(48, 64, CV_8UC1, cv::Scalar(30));
+    return frame;
+  }
   Result<StereoFrame> collect(Deadline deadline) override {
     bool lost = false;
     StereoFrame frame;
@@ -164,10 +174,15 @@ class FakeCamera final : public StereoCamera {
       line_.armed = false;
       lost = line_.lose > 0;
       if (lost) --line_.lose;
-      const cv::Scalar grey(line_.last == Light::pattern ? 200 : 100);
+      const cv::Scalar grey((line_.last == Light::pattern ? 200 : 100) + line_.scene);
       frame.left = cv::Mat(48, 64, CV_8UC1, grey);
       frame.right = cv::Mat(48, 64, CV_8UC1, grey);
       frame.taken = clock_.now();
+      frame.left_evidence.brightness = frame.right_evidence.brightness = grey[0] / 255;
+      if (line_.dark > 0) {
+        --line_.dark;
+        frame.right_evidence.brightness = 0.0;
+      }
     }
     if (lost) {
       clock_.sleep_until(deadline.at);
@@ -212,10 +227,21 @@ class FakePanel final : public Panel {
     attach_.wait(lock, [&] { return attached_; });
   }
 
+  /// Nobody drives it any more.
+  void detach() {
+    const std::lock_guard guard(mutex_);
+    attached_ = false;
+    outputs_ = {};
+  }
+
   /// Looks at the lamps until `as_wanted`, for a virtual hour at most.
   bool wait_for_lamps(const std::function<bool(const PanelOutputs&)>& as_wanted) {
     std::unique_lock lock(mutex_);
     return clock_.wait_until(lock, changed_, clock_.now() + std::chrono::hours(1), [&] { return as_wanted(outputs_); });
+  }
+  PanelOutputs lamps() {
+    const std::lock_guard guard(mutex_);
+    return outputs_;
   }
   /// Presses until the panel's owner has seen it, then lets go.
   void press(bool PanelInputs::*button) {

@@ -42,10 +42,26 @@ TEST_F(LightCrafterTest, ShowsTheDotsOfTheImageInItsFlashWithTheCurrentsAskedFor
   EXPECT_THAT(flash.current, ElementsAre(100, 100, 100));
 }
 
-TEST_F(LightCrafterTest, IsSetUpAgainOnlyWhenTheLightChanges) {
+/// Each command is a report there and one back, a few milliseconds on USB.
+TEST_F(LightCrafterTest, AnotherLightTakesAFewCommandsMoreThanTheSame) {
+  const auto first = reports_for(Light::pattern);
+  EXPECT_GT(first, 20u) << "set up when connected";
+  const auto same = reports_for(Light::pattern);
+  const auto other = reports_for(Light::plain);
+  EXPECT_LE(same, 6u) << "start, over, two states";
+  EXPECT_LE(other, same + 11u) << "table, validate";
+  const auto flashes = bench_.device().flashes();
+  ASSERT_EQ(flashes.size(), 3u);
+  EXPECT_FALSE(flashes[1].white);
+  EXPECT_TRUE(flashes[2].white);
+}
+
+TEST_F(LightCrafterTest, AfterAFaultItIsSetUpAnew) {
   expect_fires();
-  EXPECT_LT(reports_for(Light::pattern), 20u);
-  EXPECT_GT(reports_for(Light::plain), 20u);
+  bench_.device().set_hardware_status(0x05);
+  ASSERT_FALSE(fire());
+  bench_.device().set_hardware_status(0x01);
+  EXPECT_GT(reports_for(Light::pattern), 20u);
 }
 
 TEST_F(LightCrafterTest, AFaultItReportsIsAnAlarmInWords) {

@@ -108,6 +108,11 @@ class WireRig {
     ASSERT_NE(at, std::string::npos) << from;
     text.replace(at, from.size(), to);
   }
+  /// Another text from the heading `begin` to the heading `end`.
+  static std::string replace_section(const std::string& text, const std::string& begin, const std::string& end,
+                                     const std::string& section) {
+    return text.substr(0, text.find("\n" + begin) + 1) + section + text.substr(text.find("\n" + end) + 1);
+  }
   void plug_in() {
     auto server = sim::wire::ModbusServer::start(device(), 1, drive, clock);
     EXPECT_TRUE(server) << server.error().message;
@@ -150,11 +155,10 @@ class WireRig {
             "lamp_red = { line = \"RED\" }\nlamp_amber = { line = \"AMBER\" }\nlamp_green = { line = \"GREEN\" }\n"
             "busy = { line = \"BUSY\" }\nstart_lamp = { line = \"START_LAMP\" }\nflip_request = { line = \"FLIP\" }\n"
             "\n[gpio]\nsocket = \"gpio.sock\"");
-    const auto camera = text.find("\n[stereo_camera]"), panel = text.find("\n[panel]");
-    text.replace(camera, panel - camera,
-                 "\n[stereo_camera]\ndriver = \"v4l2-side-by-side\"\nboth = { device = \"no-camera\" }\n"
-                 "external_trigger = true\npixel_format = \"GREY\"\nsize = { width = 640, height = 240 }\n"
-                 "exposure_us = 12000\nframe_timeout_ms = 500\n");
+    text = replace_section(text, "[stereo_camera]", "[panel]",
+                           "[stereo_camera]\ndriver = \"v4l2-side-by-side\"\nboth = { device = \"no-camera\" }\n"
+                           "external_trigger = true\npixel_format = \"GREY\"\n"
+                           "size = { width = 640, height = 240 }\nexposure_us = 12000\nframe_timeout_ms = 500\n\n");
     replace("/var/lib/scanrig/calibration.json", "calibration.json");
     replace("/var/lib/scanrig/jobs", "jobs");
     replace("/run/scanrig/api.sock", "api.sock");

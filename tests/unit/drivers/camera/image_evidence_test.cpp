@@ -55,6 +55,31 @@ TEST(ImageEvidence, BrightnessIsTheMeanOfTheScale) {
   EXPECT_NEAR(measure(colour, PixelFormat::bgr8).brightness, 0.2, 1e-12);
 }
 
+TEST(ImageEvidence, OnePictureOnBothSidesIsAlikeDespiteNoiseAndTwoViewpointsAreNot) {
+  const cv::Mat left = grains(1.2);
+  cv::Mat noise(left.size(), CV_8U), other;
+  cv::RNG(3).fill(noise, cv::RNG::NORMAL, 0.0, 6.0);
+  EXPECT_GT(likeness(left, left + noise, PixelFormat::mono8), 0.5);
+  cv::Mat shifted = cv::Mat::zeros(left.size(), CV_8U);
+  left.colRange(7, left.cols).copyTo(shifted.colRange(0, left.cols - 7));
+  EXPECT_LT(likeness(left, shifted, PixelFormat::mono8), 0.15);
+}
+
+TEST(ImageEvidence, AMarkInTheCornerOfBothImagesDoesNotMakeThemAlike) {
+  cv::Mat left = grains(1.2), right = left.clone();
+  cv::flip(right, right, 1);
+  for (cv::Mat* image : {&left, &right}) {
+    for (int x = 0; x < 24; x += 6) (*image)(cv::Rect(x, 0, 3, 12)).setTo(255);
+  }
+  EXPECT_LT(likeness(left, right, PixelFormat::mono8), 0.15);
+}
+
+TEST(ImageEvidence, ImagesOfTwoKindsCannotBeCompared) {
+  EXPECT_TRUE(std::isnan(likeness(grains(1.0), cv::Mat(8, 8, CV_8U), PixelFormat::mono8)));
+  EXPECT_TRUE(std::isnan(
+      likeness(cv::Mat(8, 8, CV_8U, cv::Scalar(9)), cv::Mat(8, 8, CV_8U, cv::Scalar(9)), PixelFormat::mono8)));
+}
+
 TEST(ImageEvidence, AnImageWithoutTextureHasNoBlur) {
   EXPECT_TRUE(std::isnan(measure(cv::Mat(8, 8, CV_8U, cv::Scalar(9)), PixelFormat::mono8).blur_px));
   EXPECT_TRUE(std::isnan(measure({}, PixelFormat::mono8).brightness));

@@ -1,0 +1,209 @@
+#include <cmath>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <opencv2/imgcodecs.hpp>
+
+#include "core/files.h"
+#include "daemon/ctl/client.h"
+#include "daemon/ctl/free_rig.h"
+#include "daemon/ctl/verbs.h"
+#include "daemon/rig/open_devices.h"
+#include "daemon/rig/preview.h"
+#include "daemon/signal_stop.h"
+#include "drivers/camera/camera_list.h"
+
+namespace scanrig::ctl {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+
+constexpr seconds kConnectLimit{10};
+constexpr seconds kExposureLimit{2};
+constexpr milliseconds kPeriod{200};
+
+/// The cameras, and the light that goes with them, of a rig that no daemon has its hands on.
+class Bench {
+ public:
+  static Result<std::unique_ptr<Bench>> open(const CameraVerb& verb) {
+    auto rig = free_rig(verb.config);
+    if (!rig) return pass_on(rig);
+    auto& camera = rig->stereo_camera;
+    if (camera.driver == config::StereoCameraConfig::Driver::simulated) {
+      return fail(ErrorCode::unsupported, "{}: simulated cameras belong to scanrigd-sim", verb.config.string());
+    }
+    if (verb.exposure_us) camera.aravis.exposure = camera.v4l2.exposure = std::chrono::microseconds(*verb.exposure_us);
+    if (verb.gain) {
+      camera.aravis.gain = verb.gain;
+      camera.v4l2.gain = static_cast<int>(std::lround(*verb.gain));
+    }
+    std::unique_ptr<Bench> bench(new Bench(std::move(*rig)));
+    auto devices = open_devices(bench->rig_, bench->clock_);
+    if (!devices) return pass_on(devices);
+    bench->devices_ = std::move(*devices);
+    const auto ready = bench->devices_.camera->ready(Deadline::after(bench->clock_, kConnectLimit));
+    if (!ready) return pass_on(ready);
+    return bench;
+  }
+
+  /// `light`: none, pattern or plain.
+  Result<StereoFrame> expose(const std::string& light) {
+    auto& camera = *devices_.camera;
+    if (light == "none") return camera.look(deadline());
+    if (auto armed = camera.arm(deadline()); !armed) return pass_on(armed);
+    const auto fired = devices_.projector->fire(light == "plain" ? Light::plain : Light::pattern, deadline());
+    if (!fired) return pass_on(fired);
+    return camera.collect(deadline());
+  }
+  Clock& clock() { return clock_; }
+
+ private:
+  explicit Bench(config::RigConfig rig) : rig_(std::move(rig)) {}
+  Deadline deadline() { return Deadline::after(clock_, kExposureLimit); }
+
+  const config::RigConfig rig_;
+  RealClock clock_;
+  OpenDevices devices_;
+};
+
+ExitCode list(const CameraVerb& verb) {
+  auto found = find_aravis_cameras();
+  for (auto& camera : find_v4l2_cameras(kernel_video())) found.push_back(std::move(camera));
+  if (verb.json) {
+    auto all = nlohmann::ordered_json::array();
+    for (const auto& c : found) {
+      all.push_back({{"kind", c.kind}, {"name", c.name}, {"serial", c.serial}, {"where", c.where}});
+    }
+    fmt::print("{}\n", all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    return ExitCode::ok;
+  }
+  if (found.empty()) fmt::print("no camera found; check power, cable and network\n");
+  for (const auto& c : found) fmt::print("{:<11} {:<16} {:<16} {}\n", c.kind, c.serial, c.where, c.name);
+  return ExitCode::ok;
+}
+
+/// What to do about a picture, or nothing.
+const char* advice(const ImageEvidence& evidence) {
+  constexpr double kDim = 0.03, kFull = 0.01;
+  if (evidence.saturated > kFull) return "  too bright: lower exposure_us or gain";
+  if (evidence.brightness < kDim) return "  dim: raise exposure_us, gain or light";
+  return "";
+}
+
+void tell(const char* side, const ImageEvidence& evidence) {
+  fmt::print("{:<5}  brightness {:5.1f} %  at full scale {:5.2f} %  blur {:4.2f} px{}\n", side,
+             100 * evidence.brightness, 100 * evidence.saturated, evidence.blur_px, advice(evidence));
+}
+
+ExitCode tune(const CameraVerb& verb, Bench& bench) {
+  const SignalStop signal;
+  for (int i = 0; (verb.count == 0 || i < verb.count) && !signal.token().stop_requested(); ++i) {
+    if (i > 0) bench.clock().sleep_for(kPeriod);
+    const auto pair = bench.expose(verb.light);
+    if (!pair) return complain(pair.error());
+    tell("left", pair->left_evidence);
+    tell("right", pair->right_evidence);
+    std::fflush(stdout);
+  }
+  return ExitCode::ok;
+}
+
+Result<void> write_png(const std::filesystem::path& file, const cv::Mat& image) {
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".png", image, bytes);
+  return write_file_atomically(file, std::as_bytes(std::span(bytes)));
+}
+
+ExitCode grab(const CameraVerb& verb, Bench& bench) {
+  const auto left = verb.out / "left.png", right = verb.out / "right.png";
+  for (const auto& file : {left, right}) {
+    if (!std::filesystem::exists(file)) continue;
+    return complain({ErrorCode::exists, file.string() + " is already there: name another folder"});
+  }
+  const auto pair = bench.expose(verb.light);
+  if (!pair) return complain(pair.error());
+  if (auto made = create_directories_synced(verb.out); !made) return complain(made.error());
+  for (const auto& [file, image] : {std::pair(left, pair->left), std::pair(right, pair->right)}) {
+    if (auto written = write_png(file, image); !written) return complain(written.error());
+    fmt::print("{}\n", file.string());
+  }
+  return ExitCode::ok;
+}
+
+/// One picture of each side, newer than the last; what went wrong where there is none.
+using TakePictures = std::function<tl::expected<std::array<std::string, 2>, Refusal>()>;
+
+ExitCode preview(const CameraVerb& verb, const TakePictures& take, Clock& clock) {
+  if (auto made = create_directories_synced(verb.out); !made) return complain(made.error());
+  fmt::print("{} and {} follow the cameras\n", (verb.out / "left.jpg").string(), (verb.out / "right.jpg").string());
+  std::fflush(stdout);
+  const SignalStop signal;
+  for (int i = 0; (verb.count == 0 || i < verb.count) && !signal.token().stop_requested(); ++i) {
+    if (i > 0) clock.sleep_for(kPeriod);
+    const auto pictures = take();
+    if (!pictures) return complain(pictures.error().exit, pictures.error().message);
+    for (const auto& [name, jpeg] : {std::pair("left.jpg", (*pictures)[0]), std::pair("right.jpg", (*pictures)[1])}) {
+      if (auto written = write_file_atomically(verb.out / name, jpeg); !written) return complain(written.error());
+    }
+  }
+  return ExitCode::ok;
+}
+
+/// The daemon's first answer only asks the cameras for a picture.
+ExitCode preview_of_daemon(const CameraVerb& verb, const std::filesystem::path& socket) {
+  RealClock clock;
+  const auto fetch_side = [&](const char* side) {
+    const auto target = std::string("/api/v1/preview/") + side;
+    auto picture = fetch(socket, target);
+    for (const auto by = Deadline::after(clock, kConnectLimit);
+         !picture && picture.error().exit == ExitCode::bad_input && !by.expired(clock);
+         picture = fetch(socket, target)) {
+      clock.sleep_for(kPeriod);
+    }
+    return picture;
+  };
+  return preview(
+      verb,
+      [&]() -> tl::expected<std::array<std::string, 2>, Refusal> {
+        auto left = fetch_side("left");
+        if (!left) return tl::unexpected(left.error());
+        auto right = fetch_side("right");
+        if (!right) return tl::unexpected(right.error());
+        return std::array{std::move(*left), std::move(*right)};
+      },
+      clock);
+}
+
+ExitCode preview_of_cameras(const CameraVerb& verb, Bench& bench) {
+  Preview pictures(bench.clock(), [] { return true; });
+  const auto told = [](const Error& error) { return tl::unexpected(Refusal{exit_code(error.code), error.message}); };
+  return preview(
+      verb,
+      [&]() -> tl::expected<std::array<std::string, 2>, Refusal> {
+        const auto pair = bench.expose(verb.light);
+        if (!pair) return told(pair.error());
+        pictures.keep(*pair);
+        auto left = pictures.jpeg(Side::left), right = pictures.jpeg(Side::right);
+        if (!left) return told(left.error());
+        if (!right) return told(right.error());
+        return std::array{std::move(*left), std::move(*right)};
+      },
+      bench.clock());
+}
+
+}  // namespace
+
+ExitCode camera(const CameraVerb& verb) {
+  if (verb.what == "list") return list(verb);
+  if (verb.what == "preview") {
+    const auto rig = config::read_rig_config(verb.config, {}, config::Cameras::or_simulated);
+    if (!rig) return complain(rig.error());
+    if (ask(rig->api.socket, "GET", "/api/v1/status")) return preview_of_daemon(verb, rig->api.socket);
+  }
+  const auto bench = Bench::open(verb);
+  if (!bench) return complain(bench.error());
+  if (verb.what == "preview") return preview_of_cameras(verb, **bench);
+  return verb.what == "tune" ? tune(verb, **bench) : grab(verb, **bench);
+}
+
+}  // namespace scanrig::ctl

@@ -1,0 +1,74 @@
+#include "daemon/rig/preview.h"
+
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+namespace scanrig {
+namespace {
+
+constexpr auto kAgain = std::chrono::seconds(2);  ///< after cameras that did not answer
+constexpr int kQuality = 80;                      ///< of a JPEG, per cent
+
+Result<std::string> encode(const cv::Mat& image, PixelFormat format) {
+  try {
+    cv::Mat colour = image;
+    if (format == PixelFormat::bayer_rggb8) cv::cvtColor(image, colour, cv::COLOR_BayerRGGB2BGR);
+    std::vector<std::uint8_t> bytes;
+    cv::imencode(".jpg", colour, bytes, {cv::IMWRITE_JPEG_QUALITY, kQuality});
+    return std::string(bytes.begin(), bytes.end());
+  } catch (const cv::Exception& error) {
+    return fail(ErrorCode::internal, "preview: {}", error.what());
+  }
+}
+
+}  // namespace
+
+Result<std::string> Preview::jpeg(Side side) {
+  const bool quiet = quiet_();
+  std::unique_lock lock(mutex_);
+  if (quiet) ask_for_more();
+  // Where only the projector's edge exposes, the latest exposure stays.
+  const bool blind = problem_ && (problem_->code != ErrorCode::unsupported || pairs_ == 0);
+  if (quiet && blind) return tl::unexpected(*problem_);
+  if (pairs_ == 0) return fail(ErrorCode::not_found, "preview: the cameras have taken no picture yet; ask again");
+  Encoded& encoded = encoded_[static_cast<std::size_t>(side)];
+  if (encoded.pair == pairs_) return encoded.bytes;
+  const std::uint64_t pair = pairs_;
+  const cv::Mat image = side == Side::left ? latest_.left : latest_.right;
+  const PixelFormat format = latest_.format;
+  lock.unlock();
+  auto bytes = encode(image, format);
+  lock.lock();
+  if (bytes) encoded = {pair, *bytes};
+  return bytes;
+}
+
+/// One look at a time.
+void Preview::ask_for_more() {
+  if (!look_ || asked_ || clock_.now() < not_before_) return;
+  asked_ = true;
+  look_();
+}
+
+void Preview::on_wanted(std::function<void()> look) {
+  const std::scoped_lock lock(mutex_);
+  look_ = std::move(look);
+}
+
+void Preview::keep(const StereoFrame& pair) {
+  const std::scoped_lock lock(mutex_);
+  latest_ = pair;
+  ++pairs_;
+  asked_ = false;
+  problem_.reset();
+}
+
+void Preview::failed(const Error& error) {
+  const std::scoped_lock lock(mutex_);
+  problem_ = error;
+  asked_ = false;
+  not_before_ = clock_.now() + kAgain;
+}
+
+}  // namespace scanrig

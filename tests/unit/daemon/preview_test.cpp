@@ -1,0 +1,106 @@
+#include "daemon/rig/preview.h"
+
+#include <gtest/gtest.h>
+
+#include <opencv2/imgcodecs.hpp>
+
+#include "core/virtual_clock.h"
+
+namespace scanrig {
+namespace {
+
+class PreviewTest : public testing::Test {
+ protected:
+  PreviewTest() {
+    preview_.on_wanted([this] { ++looks_; });
+  }
+  static StereoFrame pair(int left, int right) {
+    StereoFrame frame;
+    frame.left = cv::Mat(48, 64, CV_8UC1, cv::Scalar(left));
+    frame.right = cv::Mat(48, 64, CV_8UC1, cv::Scalar(right));
+    return frame;
+  }
+  /// The grey value of the picture's middle; -1 without a picture.
+  int grey(Side side) {
+    const auto jpeg = preview_.jpeg(side);
+    if (!jpeg) return -1;
+    const cv::Mat image = cv::imdecode(std::vector<char>(jpeg->begin(), jpeg->end()), cv::IMREAD_GRAYSCALE);
+    return image.size() == cv::Size(64, 48) ? image.at<std::uint8_t>(24, 32) : -2;
+  }
+  void expect_error(ErrorCode code) {
+    const auto jpeg = preview_.jpeg(Side::left);
+    ASSERT_FALSE(jpeg);
+    EXPECT_EQ(jpeg.error().code, code) << jpeg.error().message;
+  }
+
+  VirtualClock clock_;
+  bool quiet_ = true;
+  int looks_ = 0;
+  Preview preview_{clock_, [this] { return quiet_; }};
+};
+
+TEST_F(PreviewTest, TheFirstToAskMakesTheCamerasLook) {
+  expect_error(ErrorCode::not_found);
+  expect_error(ErrorCode::not_found);
+  EXPECT_EQ(looks_, 1) << "one look at a time";
+  preview_.keep(pair(40, 90));
+  EXPECT_NEAR(grey(Side::left), 40, 2);
+  EXPECT_EQ(looks_, 2) << "and the next one is on its way";
+  EXPECT_NEAR(grey(Side::right), 90, 2);
+  EXPECT_EQ(looks_, 2);
+}
+
+TEST_F(PreviewTest, DuringAScanItsPicturesAreShownAndNobodyLooks) {
+  quiet_ = false;
+  expect_error(ErrorCode::not_found);
+  preview_.keep(pair(40, 90));
+  EXPECT_NEAR(grey(Side::left), 40, 2);
+  preview_.keep(pair(70, 90));
+  EXPECT_NEAR(grey(Side::left), 70, 2);
+  EXPECT_EQ(looks_, 0);
+}
+
+TEST_F(PreviewTest, CamerasThatDoNotAnswerAreTold) {
+  preview_.keep(pair(40, 90));
+  EXPECT_NEAR(grey(Side::left), 40, 2);
+  preview_.failed({ErrorCode::io, "left camera 4711: no answer"});
+  expect_error(ErrorCode::io);
+  EXPECT_EQ(looks_, 1) << "not again at once";
+  clock_.sleep_for(std::chrono::seconds(3));
+  expect_error(ErrorCode::io);
+  EXPECT_EQ(looks_, 2);
+  preview_.keep(pair(60, 90));
+  EXPECT_NEAR(grey(Side::left), 60, 2);
+}
+
+TEST_F(PreviewTest, WhereOnlyAnEdgeExposesTheLatestExposureStays) {
+  preview_.failed({ErrorCode::unsupported, "left camera: edges only"});
+  expect_error(ErrorCode::unsupported);
+  preview_.keep(pair(40, 90));
+  preview_.failed({ErrorCode::unsupported, "left camera: edges only"});
+  EXPECT_NEAR(grey(Side::left), 40, 2);
+}
+
+TEST_F(PreviewTest, AMosaicIsShownInColour) {
+  StereoFrame frame = pair(0, 0);
+  frame.format = PixelFormat::bayer_rggb8;
+  for (int y = 0; y < 48; y += 2) {
+    for (int x = 0; x < 64; x += 2) frame.left.at<std::uint8_t>(y, x) = 200;
+  }
+  preview_.keep(frame);
+  const auto jpeg = preview_.jpeg(Side::left);
+  ASSERT_TRUE(jpeg);
+  const cv::Mat image = cv::imdecode(std::vector<char>(jpeg->begin(), jpeg->end()), cv::IMREAD_COLOR);
+  const auto bgr = image.at<cv::Vec3b>(24, 32);
+  EXPECT_GT(bgr[2], 150) << "red";
+  EXPECT_LT(bgr[0], 60);
+}
+
+TEST_F(PreviewTest, AfterTheRigHasGoneNobodyIsAsked) {
+  preview_.on_wanted(nullptr);
+  expect_error(ErrorCode::not_found);
+  EXPECT_EQ(looks_, 0);
+}
+
+}  // namespace
+}  // namespace scanrig
