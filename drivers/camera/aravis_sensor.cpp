@@ -150,16 +150,19 @@ Result<void> AravisSensor::start_stream() {
     stream_.reset(arv_camera_create_stream(camera_.get(), nullptr, nullptr, error));
   });
   if (!created) return created;
+  guint payload = 0;
+  const auto asked =
+      attempt_("read PayloadSize", [&](GError** error) { payload = arv_camera_get_payload(camera_.get(), error); });
+  if (!asked) return asked;
   if (ARV_IS_GV_STREAM(stream_.get())) {
     // A frame with packets missing is given up early enough to be told from one that never came.
     const auto retention = std::chrono::microseconds(options_.frame_timeout) / 2;
     g_object_set(stream_.get(), "frame-retention", static_cast<guint>(retention.count()), "packet-timeout",
                  static_cast<guint>(retention.count() / 5), nullptr);
+    // A whole frame, with what the kernel adds to it, may wait until this process has the processor.
+    g_object_set(stream_.get(), "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
+                 static_cast<gint>(2 * payload), nullptr);
   }
-  guint payload = 0;
-  const auto asked =
-      attempt_("read PayloadSize", [&](GError** error) { payload = arv_camera_get_payload(camera_.get(), error); });
-  if (!asked) return asked;
   finding_ = host_finding(ARV_IS_GV_STREAM(stream_.get()) ? CameraBus::gige : CameraBus::usb3, payload);
   for (int i = 0; i < kBuffers; ++i) arv_stream_push_buffer(stream_.get(), arv_buffer_new_allocate(payload));
   listens_to_line_ = options_.trigger_source != "Software";
