@@ -194,9 +194,11 @@ class Acknowledged:
         """During a scan, `most_s` after the view that is stored by now at the latest."""
         self.job, self.views = scanning(station), set()
         end = time.monotonic() + random.uniform(0, most_s)
-        while not self.views or time.monotonic() < end:
+        while True:
             known = station.ask(f"jobs/{self.job}") or {}
             self.views |= {view["view"] for view in known.get("stored", [])}
+            if time.monotonic() > end:
+                break
         station.machine.kill()
         self.kills += 1
 
