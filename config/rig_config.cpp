@@ -1,5 +1,8 @@
 #include "config/rig_config.h"
 
+#include <algorithm>
+#include <cstdio>
+
 #include "config/camera_section.h"
 #include "config/projector_section.h"
 #include "config/section.h"
@@ -74,19 +77,75 @@ void read_panel(Section& s, PanelConfig& panel) {
   report_shared(s, panel.outputs, {});
 }
 
-void read_recipes(Section& s, std::map<std::string, RecipeConfig>& recipes) {
+void read_limits(Section& s, RecipeConfig& recipe) {
+  if (s.has("least_measured_share")) {
+    s.number("least_measured_share", recipe.least_measured_share.emplace(), {0, 1});
+  }
+  if (s.has("most_residual_mm")) s.number("most_residual_mm", recipe.most_residual_mm.emplace(), {0.001, 10});
+}
+
+void read_recipe(Section& s, const PanelConfig& panel, RecipeConfig& recipe) {
+  using Flip = RecipeConfig::Flip;
+  using Start = RecipeConfig::Start;
+  s.number("views", recipe.views, {3, 72});
+  s.number("poses", recipe.poses, {1, 2});
+  s.number("flip_timeout_min", recipe.flip_timeout, {1, 1440});
+  if (s.has("flip")) s.choice<Flip>("flip", recipe.flip, {{"button", Flip::button}, {"line", Flip::line}});
+  if (s.has("start")) {
+    s.choice<Start>("start", recipe.start, {{"button", Start::button}, {"part_present", Start::part_present}});
+  }
+  if (s.has("limits")) s.section("limits", [&](Section& limits) { read_limits(limits, recipe); });
+  if (recipe.flip == Flip::line && !panel.inputs.contains("flipped")) {
+    s.report("flip", "\"line\" needs the input flipped in [panel]");
+  }
+  if (recipe.start == Start::part_present && !panel.inputs.contains("part_present")) {
+    s.report("start", "\"part_present\" needs the input part_present in [panel]");
+  }
+}
+
+void read_recipes(Section& s, const PanelConfig& panel, std::map<std::string, RecipeConfig>& recipes) {
   const auto read = [&](const std::string& name) {
     auto& recipe = recipes[name];
-    s.section(name, [&](Section& r) {
-      r.number("views", recipe.views, {3, 72});
-      r.number("poses", recipe.poses, {1, 2});
-      r.number("flip_timeout_min", recipe.flip_timeout, {1, 1440});
-    });
+    s.section(name, [&](Section& r) { read_recipe(r, panel, recipe); });
   };
   read("default");
   for (const std::string& name : s.free_keys()) {
     if (name != "default") read(name);
   }
+}
+
+void read_storage(Section& s, const std::filesystem::path& base, StorageConfig& storage) {
+  s.path("root", base, storage.root);
+  s.number("reserve_gib", storage.reserve_gib, {0, 100'000});
+  if (s.has("keep_days")) s.number("keep_days", storage.keep_days.emplace(), {1, 36'500});
+  if (s.has("keep_gib")) s.number("keep_gib", storage.keep_gib.emplace(), {1, 1'000'000});
+}
+
+/// "22:30"
+void read_time_of_day(Section& s, std::string_view key, std::chrono::minutes& time) {
+  std::string text;
+  s.text(key, text);
+  int hour = -1, minute = -1, end = 0;
+  const bool read = std::sscanf(text.c_str(), "%2d:%2d%n", &hour, &minute, &end) == 2;
+  if (!read || end != static_cast<int>(text.size()) || hour < 0 || hour > 23 || minute < 0 || minute > 59) {
+    return s.report(key, fmt::format("\"{}\" is no time of day such as \"22:30\"", text));
+  }
+  time = std::chrono::hours(hour) + std::chrono::minutes(minute);
+}
+
+void read_webhook(Section& s, WebhookConfig& webhook) {
+  std::string url;
+  s.text("url", url);
+  constexpr std::string_view kScheme = "http://";
+  const auto rest = url.starts_with(kScheme) ? url.substr(kScheme.size()) : std::string();
+  const auto slash = std::min(rest.find('/'), rest.size());
+  const auto place = rest.substr(0, slash);
+  const auto colon = std::min(place.rfind(':'), place.size());
+  webhook.host = place.substr(0, colon);
+  webhook.port = colon == place.size() ? "80" : place.substr(colon + 1);
+  webhook.path = slash == rest.size() ? "/" : rest.substr(slash);
+  const bool number = !webhook.port.empty() && webhook.port.find_first_not_of("0123456789") == std::string::npos;
+  if (webhook.host.empty() || !number) s.report("url", fmt::format("\"{}\" is no http://HOST:PORT/PATH", url));
 }
 
 void read_reconstruction(Section& s, ReconstructionConfig& reconstruction) {
@@ -95,6 +154,23 @@ void read_reconstruction(Section& s, ReconstructionConfig& reconstruction) {
                      {{"in_process", Executor::in_process}, {"process", Executor::process}});
   s.number("memory_gib", reconstruction.memory_gib, {1, 1024});
   s.number("voxel_mm", reconstruction.voxel_mm, {0.02, 5});
+  if (s.has("limit_min")) s.number("limit_min", reconstruction.limit, {1, 1440});
+}
+
+void read_api(Section& s, const std::filesystem::path& base, ApiConfig& api) {
+  s.path("socket", base, api.socket);
+  if (s.has("tokens")) s.path("tokens", base, api.tokens);
+  if (s.has("http_port")) {
+    s.number("http_port", api.http_port.emplace(), {1024, 65535});
+    if (api.tokens.empty()) s.report("http_port", "needs tokens, the file that scanrig token add writes");
+  }
+  if (s.has("http_address")) {
+    s.text("http_address", api.http_address);
+    if (!api.http_port) s.report("http_address", "needs http_port");
+  }
+  if (s.has("viewer_group")) s.text("viewer_group", api.viewer_group.emplace());
+  if (s.has("operator_group")) s.text("operator_group", api.operator_group.emplace());
+  if (s.has("engineer_group")) s.text("engineer_group", api.engineer_group.emplace());
 }
 
 void read_rig(Section& root, const std::filesystem::path& base, const std::vector<std::filesystem::path>& drives,
@@ -107,19 +183,22 @@ void read_rig(Section& root, const std::filesystem::path& base, const std::vecto
   root.section("panel", [&](Section& s) { read_panel(s, rig.panel); });
   root.section("safety", [&](Section& s) { read_safety(s, rig.panel, rig.safety); });
   root.section("calibration", [&](Section& s) { s.path("file", base, rig.calibration_file); });
-  root.section("recipe", [&](Section& s) { read_recipes(s, rig.recipes); });
-  root.section("storage", [&](Section& s) {
-    s.path("root", base, rig.storage.root);
-    s.number("reserve_gib", rig.storage.reserve_gib, {0, 100'000});
-  });
+  root.section("recipe", [&](Section& s) { read_recipes(s, rig.panel, rig.recipes); });
+  root.section("storage", [&](Section& s) { read_storage(s, base, rig.storage); });
   root.section("reconstruction", [&](Section& s) { read_reconstruction(s, rig.reconstruction); });
+  if (root.has("quiet_hours")) {
+    root.section("quiet_hours", [&](Section& s) {
+      read_time_of_day(s, "from", rig.quiet_hours.emplace().from);
+      read_time_of_day(s, "to", rig.quiet_hours->to);
+    });
+  }
+  if (root.has("webhook")) {
+    root.section("webhook", [&](Section& s) { read_webhook(s, rig.webhook.emplace()); });
+  }
   if (root.has("gpio")) {
     root.section("gpio", [&](Section& s) { s.path("socket", base, rig.gpio_socket.emplace()); });
   }
-  root.section("api", [&](Section& s) {
-    s.path("socket", base, rig.api.socket);
-    if (s.has("http_port")) s.number("http_port", rig.api.http_port.emplace(), {1024, 65535});
-  });
+  root.section("api", [&](Section& s) { read_api(s, base, rig.api); });
 }
 
 }  // namespace

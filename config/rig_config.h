@@ -76,14 +76,32 @@ struct PanelConfig {
 };
 
 struct RecipeConfig {
+  enum class Flip { button, line };
+  enum class Start { button, part_present };
   int views = 8;
   int poses = 2;
   std::chrono::minutes flip_timeout{30};
+  Flip flip = Flip::button;     ///< `line` needs the panel's `flipped` input
+  Start start = Start::button;  ///< `part_present` needs the panel's input of that name
+  std::optional<double> least_measured_share;
+  std::optional<double> most_residual_mm;
+};
+
+/// Minutes of the day; over midnight where `from` is the later one.
+struct QuietHoursConfig {
+  std::chrono::minutes from{}, to{};
+};
+
+/// Whom a failed job is told: `http://HOST[:PORT]/PATH`.
+struct WebhookConfig {
+  std::string host, port, path;
 };
 
 struct StorageConfig {
   std::filesystem::path root;
   double reserve_gib = 20;
+  std::optional<std::chrono::days> keep_days;  ///< then ended jobs are removed
+  std::optional<double> keep_gib;              ///< of all jobs
 };
 
 struct ReconstructionConfig {
@@ -91,11 +109,16 @@ struct ReconstructionConfig {
   Executor executor = Executor::in_process;
   double memory_gib = 6;
   double voxel_mm = 0.25;
+  std::chrono::minutes limit{60};  ///< of the executor `process`
 };
 
 struct ApiConfig {
   std::filesystem::path socket;
-  std::optional<int> http_port;  ///< on the loopback interface
+  std::optional<int> http_port;  ///< TCP; every request over it needs a token
+  std::string http_address = "127.0.0.1";
+  std::filesystem::path tokens;  ///< the file of tokens; empty: there are none
+  /// Groups of local users by what they may do over the socket. Without any, the daemon's own group operates.
+  std::optional<std::string> viewer_group, operator_group, engineer_group;
 };
 
 /// rig.toml, checked; relative paths are made relative to the file's folder.
@@ -109,6 +132,8 @@ struct RigConfig {
   std::map<std::string, RecipeConfig> recipes;  ///< `default` is always there
   StorageConfig storage;
   ReconstructionConfig reconstruction;
+  std::optional<QuietHoursConfig> quiet_hours;
+  std::optional<WebhookConfig> webhook;
   ApiConfig api;
   std::optional<std::filesystem::path> gpio_socket;  ///< tests only: GPIO lines behind a socket instead of chips
 };

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <fstream>
 #include <sstream>
+#include <tuple>
 #include <vector>
 
 namespace scanrig {
@@ -100,7 +101,13 @@ Result<void> write_files_synced(const std::filesystem::path& folder, std::span<c
 
 Result<void> create_directories_synced(const std::filesystem::path& path) {
   std::error_code error;
-  if (path.empty() || std::filesystem::exists(path, error)) return {};
+  if (path.empty()) return {};
+  if (std::filesystem::exists(path, error)) {
+    // A crash between making a folder and syncing its name leaves it like this; where that may not be read, it is
+    // somebody else's folder.
+    std::ignore = sync_folder(path.parent_path());
+    return {};
+  }
   if (auto parent = create_directories_synced(path.parent_path()); !parent) return parent;
   if (!std::filesystem::create_directory(path, error) && error) {
     return fail(ErrorCode::io, "cannot create the folder {}: {}", path.string(), error.message());

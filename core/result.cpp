@@ -23,6 +23,8 @@ std::string_view to_string(ErrorCode code) {
     case ErrorCode::no_overlap: return "no_overlap";
     case ErrorCode::ambiguous: return "ambiguous";
     case ErrorCode::same_rest: return "same_rest";
+    case ErrorCode::moved: return "moved";
+    case ErrorCode::below_limits: return "below_limits";
     case ErrorCode::internal: return "internal";
   }
   return "unknown";
@@ -56,7 +58,9 @@ ExitCode exit_code(ErrorCode code) {
     case ErrorCode::degenerate:
     case ErrorCode::no_overlap:
     case ErrorCode::ambiguous:
-    case ErrorCode::same_rest: return ExitCode::no_model;
+    case ErrorCode::same_rest:
+    case ErrorCode::moved: return ExitCode::no_model;
+    case ErrorCode::below_limits: return ExitCode::below_limits;
     case ErrorCode::stopped: return ExitCode::stopped;
     case ErrorCode::internal: return ExitCode::internal;
   }

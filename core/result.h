@@ -31,6 +31,8 @@ enum class ErrorCode {
   no_overlap,     ///< two data sets share no surface
   ambiguous,      ///< more than one answer fits the data
   same_rest,      ///< the object was not turned over
+  moved,          ///< the object or a camera moved during a pose
+  below_limits,   ///< a model that does not reach what its recipe asks for
   internal,       ///< a bug
 };
 

@@ -1,25 +1,62 @@
 #include "daemon/options_from.h"
 
 #include "daemon/jobs/pipeline_reconstructor.h"
+#include "daemon/jobs/process_reconstructor.h"
 
 namespace scanrig {
+namespace {
+
+std::uintmax_t gib(double count) { return static_cast<std::uintmax_t>(count * (1u << 30)); }
+
+Recipe recipe_from(const std::string& name, const config::RecipeConfig& config) {
+  return {.name = name,
+          .poses = config.poses,
+          .views = config.views,
+          .flip_timeout = config.flip_timeout,
+          .flip_by_line = config.flip == config::RecipeConfig::Flip::line,
+          .start_on_part = config.start == config::RecipeConfig::Start::part_present,
+          .limits = {config.least_measured_share, config.most_residual_mm}};
+}
+
+ReconstructorFactory reconstructor_from(const config::ReconstructionConfig& config) {
+  if (config.executor == config::ReconstructionConfig::Executor::process) {
+    const auto outside = process_reconstructor(
+        {.program = {}, .limit = config.limit, .memory_bytes = gib(config.memory_gib), .voxel_mm = config.voxel_mm});
+    return [=](const ReconstructionTask& task) -> Result<std::unique_ptr<Reconstructor>> {
+      const auto voxel_mm = task.changes.voxel_mm.value_or(config.voxel_mm);
+      if (auto fits = check_memory(task, voxel_mm, gib(config.memory_gib)); !fits) return pass_on(fits);
+      return outside(task);
+    };
+  }
+  ReconstructOptions options;
+  options.voxel_mm = config.voxel_mm;
+  return pipeline_reconstructor(options, gib(config.memory_gib));
+}
+
+}  // namespace
 
 DaemonOptions options_from(const config::RigConfig& config) {
-  const auto& recipe = config.recipes.at("default");
   DaemonOptions options;
   options.jobs = {.root = config.storage.root,
                   .calibration_file = config.calibration_file,
                   .profile = "",
-                  .poses = recipe.poses,
-                  .views = recipe.views};
-  options.socket = config.api.socket;
+                  .reserve_bytes = gib(config.storage.reserve_gib)};
+  options.recipes.clear();
+  for (const auto& [name, recipe] : config.recipes) options.recipes[name] = recipe_from(name, recipe);
+  options.retention = {.keep_for = config.storage.keep_days, .keep_bytes = {}};
+  if (config.storage.keep_gib) options.retention.keep_bytes = gib(*config.storage.keep_gib);
+  if (config.quiet_hours) options.quiet_hours = QuietHours{config.quiet_hours->from, config.quiet_hours->to};
+  options.api = {.socket = config.api.socket,
+                 .groups = {config.api.viewer_group, config.api.operator_group, config.api.engineer_group},
+                 .http_port = config.api.http_port,
+                 .http_address = config.api.http_address,
+                 .tokens = config.api.tokens};
+  if (config.webhook) options.webhook = HttpAddress{config.webhook->host, config.webhook->port, config.webhook->path};
   options.remote = config.safety.remote_start;
   options.guard = config.safety.guard.has_value();
   options.home_guarded = config.safety.home_after_restart == config::SafetyConfig::HomeAfterRestart::guarded;
   options.manual_light = config.projector.driver == config::ProjectorConfig::Driver::manual;
-  ReconstructOptions reconstruct;
-  reconstruct.voxel_mm = config.reconstruction.voxel_mm;
-  options.reconstructor = pipeline_reconstructor(reconstruct);
+  options.reconstructor = reconstructor_from(config.reconstruction);
   return options;
 }
 

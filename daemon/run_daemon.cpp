@@ -1,39 +1,91 @@
 #include "daemon/run_daemon.h"
 
-#include "daemon/api/server.h"
+#include <ctime>
+
+#include "daemon/jobs/housekeeping_thread.h"
 #include "daemon/overloaded.h"
 #include "daemon/rig/panel_thread.h"
 #include "daemon/rig/rig_thread.h"
 #include "daemon/service_manager.h"
 #include "daemon/station/timestamp.h"
+#include "daemon/webhook/webhook.h"
 
 namespace scanrig {
 namespace {
 
 /// The serial number tells apart jobs of one second; a folder that is already there is never taken.
-std::string fresh_job_id(const std::filesystem::path& root) {
-  const auto now = std::chrono::system_clock::now();
-  std::error_code ignored;
-  for (int serial = 1;; ++serial) {
-    auto id = job_id(now, serial);
-    if (!std::filesystem::exists(root / id, ignored)) return id;
+class FreshIds {
+ public:
+  explicit FreshIds(std::filesystem::path root) : root_(std::move(root)) {}
+  std::string operator()() {
+    using namespace std::chrono;
+    const auto now = floor<seconds>(system_clock::now());
+    if (now != second_) serial_ = 0;
+    second_ = now;
+    std::error_code ignored;
+    std::string id;
+    do {
+      id = job_id(now, ++serial_);
+    } while (std::filesystem::exists(root_ / id, ignored));
+    return id;
   }
+
+ private:
+  std::filesystem::path root_;
+  std::chrono::sys_seconds second_{};
+  int serial_ = 0;
+};
+
+struct Workers {
+  RigThread& rig;
+  JobThread& jobs;
+  HousekeepingThread& housekeeping;
+};
+
+/// What takes its time is kept away from the thread that stores views.
+void keep(const action::KeepJob& task, const Workers& workers) {
+  using What = event::JobAsked::What;
+  const auto what = task.asked.what;
+  if (what == What::remove || what == What::bundle) return workers.housekeeping.post(task.asked);
+  workers.jobs.post(task);
 }
 
 bool cameras_are_free(const Snapshot& snapshot) {
   return snapshot.activity == Activity::none || snapshot.activity == Activity::waiting_for_flip;
 }
 
-void perform(const Action& action, RigThread& rig, JobThread& jobs) {
+void perform(const Action& action, const Workers& workers) {
+  auto& rig = workers.rig;
   std::visit(
       Overloaded{[](const action::Warn&) {},  // these are the control loop's own
                  [](const action::WaitForEstop&) {}, [](const action::RetryStopLater&) {},
-                 [](const action::CheckLater&) {}, [](const action::TestLamps&) {},
+                 [](const action::CheckLater&) {}, [](const action::TestLamps&) {}, [](const action::WaitForFlip&) {},
                  [&](const action::Home&) { rig.home(); }, [&](const action::StopRig&) { rig.stop(); },
                  [&](const action::TakeView& a) { rig.take_view(a); }, [&](const action::Jog& a) { rig.jog(a); },
                  [&](const action::Pulse&) { rig.pulse(); }, [&](const action::CheckDevices&) { rig.check_devices(); },
-                 [&](const auto& task) { jobs.post(task); }},
+                 [&](const action::KeepJob& a) { keep(a, workers); },
+                 [&](const auto& task) { workers.jobs.post(task); }},
       action);
+}
+
+/// What the last daemon left to be reconstructed.
+void go_on_reconstructing(const JobTable& jobs, ReconstructionThread& reconstruction) {
+  for (const auto& [id, job] : jobs) {
+    if (job->state == JobState::reconstructing) reconstruction.rebuild(id, job->folder, job->recipe, {});
+  }
+}
+
+bool within(const QuietHours& hours, std::chrono::minutes of_day) {
+  return hours.from <= hours.to ? of_day >= hours.from && of_day < hours.to : of_day >= hours.from || of_day < hours.to;
+}
+
+/// By the clock on the wall of this machine.
+bool quiet_now(const std::optional<QuietHours>& hours) {
+  if (!hours) return false;
+  const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm local{};
+  ::localtime_r(&now, &local);
+  return within(*hours, std::chrono::hours(local.tm_hour) + std::chrono::minutes(local.tm_min));
 }
 
 }  // namespace
@@ -44,35 +96,58 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   auto known = store->recover();
   if (!known) return pass_on(known);
 
-  const StationRules rules{.poses = options.jobs.poses,
-                           .views = options.jobs.views,
+  const StationRules rules{.recipes = options.recipes,
                            .remote = options.remote,
                            .guard = options.guard,
                            .home_guarded = options.home_guarded,
                            .manual_light = options.manual_light};
-  ControlLoop loop(clock, {.rules = rules, .warning = options.warning}, std::move(*known));
+  ControlLoop loop(clock, {.rules = rules, .warning = options.warning}, *known);
   const auto tell = [&loop](Event event) { loop.post(std::move(event)); };
 
+  options.on_loop(loop);
   Preview preview(clock, [&loop] { return cameras_are_free(*loop.snapshot()); });
-  auto api = ApiServer::start(options.socket, loop, preview);
+  auto api_options = options.api;
+  api_options.storage = store->options().root;
+  api_options.preview_jpeg = [&preview](std::string_view side) {
+    return preview.jpeg(side == "left" ? Side::left : Side::right);
+  };
+  auto api = ApiServer::start(api_options, loop);
   if (!api) return pass_on(api);
 
   // Time stands until every thread is there. They end in reverse order: the panel shows the last lamps, the rig is
   // seen standing, what was taken goes to disk, then the reconstruction that all of them feed is stopped.
   std::optional<Clock::Busy> starting(clock);
-  ReconstructionThread reconstruction(clock, options.reconstructor, rules.poses, rules.views, tell);
+  ReconstructionThread reconstruction(clock, options.reconstructor, tell);
+  go_on_reconstructing(*known, reconstruction);
+  HousekeepingThread housekeeping(clock, *store, options.retention, tell);
+  housekeeping.sweep();
   JobThread jobs(clock, *store, reconstruction, options.on_scanned, tell);
   RigThread rig(devices, clock, options.acquisition, preview, tell);
+  std::optional<Webhook> webhook;
+  if (options.webhook) webhook.emplace(clock, *options.webhook);
   PanelThread panel(devices.panel, clock, tell, [&rig] { rig.interrupt(); });
 
   const std::stop_callback shut_down(stop, [&loop] { loop.post(event::Shutdown{}); });
   const Clock::Actor actor(clock);
   starting.reset();
+  const Workers workers{rig, jobs, housekeeping};
+  FreshIds fresh_id(store->options().root);
+  const auto perform_all = [&](const Action& action) {
+    perform(action, workers);
+    if (std::holds_alternative<action::BeginJob>(action)) housekeeping.sweep();
+  };
+  const auto published = [&](const std::shared_ptr<const Snapshot>& snapshot) {
+    if (webhook) webhook->look(snapshot);
+    options.published(snapshot);
+    (*api)->wake();
+  };
   ServiceManager manager;
   return loop.run({.alive = [&] { manager.alive(loop.snapshot()->sentence); },
-                   .perform = [&](const Action& action) { perform(action, rig, jobs); },
+                   .perform = perform_all,
                    .show = [&](const PanelOutputs& outputs) { panel.show(outputs); },
-                   .fresh_job_id = [&] { return fresh_job_id(options.jobs.root); }});
+                   .fresh_job_id = [&] { return fresh_id(); },
+                   .quiet_hours = [&] { return quiet_now(options.quiet_hours); },
+                   .published = published});
 }
 
 }  // namespace scanrig

@@ -1,30 +1,50 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
 #include <stop_token>
 
 #include "core/clock.h"
 #include "core/result.h"
+#include "daemon/api/server.h"
 #include "daemon/jobs/job_store.h"
 #include "daemon/jobs/job_thread.h"
 #include "daemon/jobs/reconstructor.h"
+#include "daemon/jobs/retention.h"
 #include "daemon/rig/acquisition.h"
 #include "daemon/rig/devices.h"
 #include "daemon/station/control_loop.h"
+#include "daemon/webhook/http_post.h"
 
 namespace scanrig {
 
+/// By the clock on the wall; `from` later than `to` means over midnight.
+struct QuietHours {
+  std::chrono::minutes from{}, to{};  ///< of the day
+};
+
 struct DaemonOptions {
-  JobStoreOptions jobs;          ///< its poses and views are the recipe of every job
-  std::filesystem::path socket;  ///< of the API
-  bool remote = false;           ///< the API may start and home while the guard is closed
-  bool guard = false;            ///< there is a guard
-  bool home_guarded = false;     ///< after a restart a closed guard homes the table, without Reset
-  bool manual_light = false;     ///< a hand switches the projector
+  JobStoreOptions jobs;
+  std::map<std::string, Recipe> recipes{{"default", {}}};  ///< "default" is what Start scans when nothing is queued
+  std::optional<QuietHours> quiet_hours{};                 ///< no job begins by itself then
+  RetentionOptions retention{};
+  std::optional<HttpAddress> webhook{};  ///< whom failures are told
+  ApiOptions api;
+  bool remote = false;                   ///< the API may start and home while the guard is closed
+  bool guard = false;                    ///< there is a guard
+  bool home_guarded = false;             ///< after a restart a closed guard homes the table, without Reset
+  bool manual_light = false;             ///< a hand switches the projector
   AcquisitionOptions acquisition;
   Clock::Duration warning = std::chrono::seconds(2);
   ReconstructorFactory reconstructor;
   JobThread::ScannedHook on_scanned;
+  /// Called once, before anything can move, with what takes presses and orders; it lives as long as the daemon runs.
+  std::function<void(ControlLoop&)> on_loop = [](ControlLoop&) {};
+  /// Called with every snapshot from the control loop's thread; must not wait.
+  std::function<void(const std::shared_ptr<const Snapshot>&)> published = [](const auto&) {};
 };
 
 /// The daemon from start-up to a clean stop: owns all threads but the caller's, which becomes the control loop.

@@ -17,7 +17,12 @@ Result<void> run(const std::filesystem::path& file, const SignalStop& stop) {
   RealClock clock;
   const auto open = open_devices(*config, clock);
   if (!open) return pass_on(open, file.string());
-  return run_daemon(open->devices(), options_from(*config), clock, stop.token());
+  auto options = options_from(*config);
+  options.api.check_config = [file] {
+    const auto checked = config::read_rig_config(file);
+    return checked ? Result<void>() : pass_on(checked);
+  };
+  return run_daemon(open->devices(), options, clock, stop.token());
 }
 
 }  // namespace

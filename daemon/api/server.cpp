@@ -3,120 +3,186 @@
 #include <unistd.h>
 
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/local/stream_protocol.hpp>
 #include <boost/asio/post.hpp>
-#include <boost/beast/core/basic_stream.hpp>
-#include <boost/beast/core/flat_buffer.hpp>
-#include <boost/beast/http.hpp>
-#include <optional>
-#include <set>
+#include <boost/asio/strand.hpp>
 #include <thread>
+#include <vector>
 
-#include "daemon/api/routes.h"
+#include "daemon/api/facts.h"
+#include "daemon/api/job_bundle.h"
+#include "daemon/api/session.h"
 #include "daemon/api/socket_file.h"
 
 namespace scanrig {
 namespace {
 
 namespace net = boost::asio;
-namespace beast = boost::beast;
-namespace http = beast::http;
 using Local = net::local::stream_protocol;
+using Tcp = net::ip::tcp;
+using Steady = std::chrono::steady_clock;
+using ErrorCondition = boost::system::error_code;
 
-constexpr auto kTimeLimit = std::chrono::seconds(10);  ///< for a whole request and for a whole answer
-constexpr std::uint64_t kBodyLimit = 64 * 1024;
-constexpr std::uint32_t kHeaderLimit = 8 * 1024;
-constexpr std::size_t kMostSessions = 64;
+constexpr int kThreads = 2;
+constexpr auto kEventPeriod = std::chrono::milliseconds(50);   ///< changes closer together become one event
+constexpr auto kLookPeriod = std::chrono::seconds(1);          ///< at disk, sensors and the file of tokens
+constexpr auto kAcceptPause = std::chrono::milliseconds(100);  ///< when there are no descriptors left
 
-/// One connection. Owned by the server's set: an answer that comes when the connection is gone finds nobody.
-class Session : public std::enable_shared_from_this<Session> {
- public:
-  Session(Local::socket socket, ControlLoop& loop, Preview& preview,
-          std::function<void(std::shared_ptr<Session>)> forget)
-      : stream_(std::move(socket)), loop_(loop), preview_(preview), forget_(std::move(forget)) {}
+std::string this_life() {
+  return fmt::format("{:x}", std::chrono::system_clock::now().time_since_epoch() / std::chrono::milliseconds(1));
+}
 
-  void read() {
-    parser_.emplace();
-    parser_->body_limit(kBodyLimit);
-    parser_->header_limit(kHeaderLimit);
-    stream_.expires_after(kTimeLimit);
-    http::async_read(stream_, buffer_, *parser_,
-                     [self = shared_from_this()](beast::error_code error, std::size_t) { self->on_read(error); });
-  }
-
- private:
-  void on_read(beast::error_code error) {
-    if (error) return forget_(shared_from_this());
-    const auto& request = parser_->get();
-    const ApiRequest plain{std::string(request.method_string()), std::string(request.target())};
-    const auto send = [weak = weak_from_this()](ApiResponse response) {
-      if (const auto self = weak.lock()) {
-        net::post(self->stream_.get_executor(), [weak, response = std::move(response)] {
-          if (const auto session = weak.lock()) session->write(response);
-        });
-      }
-    };
-    answer(plain, loop_, preview_, send);
-  }
-
-  void write(const ApiResponse& response) {
-    const auto& request = parser_->get();
-    response_ = {static_cast<http::status>(response.status), request.version()};
-    response_.set(http::field::content_type, response.content_type);
-    response_.keep_alive(request.keep_alive());
-    response_.body() = response.body;
-    response_.prepare_payload();
-    stream_.expires_after(kTimeLimit);
-    http::async_write(stream_, response_, [self = shared_from_this()](beast::error_code error, std::size_t) {
-      if (error || !self->response_.keep_alive()) return self->forget_(self);
-      self->read();
-    });
-  }
-
-  beast::basic_stream<Local> stream_;
-  ControlLoop& loop_;
-  Preview& preview_;
-  std::function<void(std::shared_ptr<Session>)> forget_;
-  beast::flat_buffer buffer_;
-  std::optional<http::request_parser<http::string_body>> parser_;
-  http::response<http::string_body> response_;
-};
+Result<Tcp::acceptor> listen_on_tcp(net::io_context& io, const std::string& address, int port) {
+  ErrorCondition error;
+  const auto ip = net::ip::make_address(address, error);
+  if (error) return fail(ErrorCode::invalid_input, "{}: not an IP address", address);
+  const Tcp::endpoint here(ip, static_cast<unsigned short>(port));
+  Tcp::acceptor acceptor(io);
+  acceptor.open(here.protocol(), error);
+  if (!error) acceptor.set_option(net::socket_base::reuse_address(true), error);
+  if (!error) acceptor.bind(here, error);
+  if (!error) acceptor.listen(net::socket_base::max_listen_connections, error);
+  if (error) return fail(ErrorCode::io, "cannot listen on {} port {}: {}", address, port, error.message());
+  return acceptor;
+}
 
 }  // namespace
 
 struct ApiServer::Impl {
-  Impl(std::filesystem::path socket, int listening, ControlLoop& control, Preview& pictures)
-      : path(std::move(socket)), acceptor(io, Local(), listening), loop(control), preview(pictures) {}
+  Impl(const ApiOptions& with, const PeerRoles& roles, int listening, ControlLoop& control)
+      : options(with),
+        loop(control),
+        core({control, [this] { return latest_facts(); }, with.storage, with.preview_jpeg, with.check_config,
+              [this](std::function<void()> work) { net::post(core.workers, std::move(work)); }},
+             roles, with.tokens, with.limits, this_life()),
+        local(io, Local(), listening) {}
 
-  void accept() {
-    acceptor.async_accept([this](beast::error_code error, Local::socket socket) {
-      if (!acceptor.is_open()) return;
-      if (!error && sessions.size() < kMostSessions) {
-        const auto session = std::make_shared<Session>(
-            std::move(socket), loop, preview, [this](const std::shared_ptr<Session>& gone) { sessions.erase(gone); });
-        sessions.insert(session);
-        session->read();
+  void run() {
+    core.hub.see(loop.snapshot());
+    accept_local();
+    if (tcp) accept_tcp();
+    look();
+    for (int i = 0; i < kThreads; ++i) threads.emplace_back([this] { io.run(); });
+  }
+
+  void accept_local() {
+    local.async_accept(net::make_strand(io), [this](ErrorCondition error, auto socket) {
+      if (!local.is_open()) return;
+      if (error) return pause([this] { accept_local(); });
+      const auto peer = peer_credentials(socket.native_handle());
+      if (peer) {
+        begin(std::move(socket), fmt::format("user {}", peer->uid), core.access.peers().role_of(*peer));
       }
-      accept();
+      accept_local();
     });
   }
 
-  net::io_context io{1};
-  std::filesystem::path path;
-  Local::acceptor acceptor;
+  void accept_tcp() {
+    tcp->async_accept(net::make_strand(io), [this](ErrorCondition error, auto socket) {
+      if (!tcp->is_open()) return;
+      if (error) return pause([this] { accept_tcp(); });
+      ErrorCondition gone;
+      const auto peer = socket.remote_endpoint(gone);
+      if (!gone) socket.set_option(Tcp::no_delay(true), gone);
+      if (!gone) begin(std::move(socket), peer.address().to_string(), std::nullopt);
+      accept_tcp();
+    });
+  }
+
+  template <class Again>
+  void pause(Again again) {
+    accept_pause.expires_after(kAcceptPause);
+    accept_pause.async_wait([again](ErrorCondition) { again(); });
+  }
+
+  void begin(Session::Protocol::socket socket, const std::string& peer, std::optional<Role> role) {
+    auto seat = core.admission->enter(peer);
+    const bool welcome = seat != nullptr;
+    if (!welcome) seat = core.admission->enter_to_be_turned_away();
+    if (!seat) return;
+    const auto session = std::make_shared<Session>(std::move(socket), core, std::move(seat), role);
+    welcome ? session->start() : session->turn_away();
+  }
+
+  /// On a worker, again and again.
+  void look() {
+    look_timer.expires_after(kLookPeriod);
+    look_timer.async_wait([this](ErrorCondition) {
+      net::post(core.workers, [this] {
+        look_now();
+        net::post(io, [this] { look(); });
+      });
+    });
+  }
+
+  void look_now() {
+    core.access.refresh();
+    auto machine = read_machine(options.storage);
+    const std::lock_guard guard(facts_mutex);
+    facts = std::move(machine);
+  }
+
+  Facts latest_facts() {
+    Facts now;
+    {
+      const std::lock_guard guard(facts_mutex);
+      now = facts;
+    }
+    now.uptime_s = std::chrono::duration<double>(Steady::now() - begun).count();
+    now.tokens_problem = core.access.problem();
+    now.connections = core.admission->connections();
+    now.event_streams = core.hub.subscribers();
+    now.requests = core.requests;
+    now.refused = core.refused;
+    return now;
+  }
+
+  void wake() {
+    if (feed_due.exchange(true)) return;
+    net::post(feed_timer.get_executor(), [this] {
+      feed_timer.expires_at(fed + kEventPeriod);
+      feed_timer.async_wait([this](ErrorCondition) {
+        fed = Steady::now();
+        feed_due = false;
+        core.hub.see(loop.snapshot());
+      });
+    });
+  }
+
+  const ApiOptions options;
   ControlLoop& loop;
-  Preview& preview;
-  std::set<std::shared_ptr<Session>> sessions;  // of the I/O thread
-  std::thread thread;
+  ServerCore core;  // outlives the sessions, the last of which end with the I/O context
+  net::io_context io{kThreads};
+  Local::acceptor local;
+  std::optional<Tcp::acceptor> tcp;
+  net::steady_timer accept_pause{net::make_strand(io)}, look_timer{io}, feed_timer{net::make_strand(io)};
+  std::atomic<bool> feed_due = false;
+  Steady::time_point fed{};
+  const Steady::time_point begun = Steady::now();
+  std::mutex facts_mutex;
+  Facts facts;
+  std::vector<std::thread> threads;
 };
 
-Result<std::unique_ptr<ApiServer>> ApiServer::start(const std::filesystem::path& socket, ControlLoop& loop,
-                                                    Preview& preview) {
-  const auto listening = listen_on_socket(socket);
+Result<std::unique_ptr<ApiServer>> ApiServer::start(const ApiOptions& options, ControlLoop& loop) {
+  const auto roles = find_groups(options.groups);
+  if (!roles) return pass_on(roles, "API");
+  // Where groups are named the peer's credentials decide, not the file's one group.
+  const auto listening = listen_on_socket(options.socket, options.groups.any() ? 0666 : 0660);
   if (!listening) return pass_on(listening, "API");
-  auto impl = std::make_unique<Impl>(socket, *listening, loop, preview);
-  impl->accept();
-  impl->thread = std::thread([io = &impl->io] { io->run(); });
+  auto impl = std::make_unique<Impl>(options, *roles, *listening, loop);
+  if (options.http_port) {
+    auto tcp = listen_on_tcp(impl->io, options.http_address, *options.http_port);
+    if (!tcp) {
+      ::unlink(options.socket.c_str());
+      return pass_on(tcp, "API");
+    }
+    impl->tcp = std::move(*tcp);
+  }
+  remove_old_bundles(options.storage);
+  impl->look_now();
+  impl->run();
   return std::unique_ptr<ApiServer>(new ApiServer(std::move(impl)));
 }
 
@@ -124,8 +190,13 @@ ApiServer::ApiServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
 ApiServer::~ApiServer() {
   impl_->io.stop();
-  impl_->thread.join();
-  ::unlink(impl_->path.c_str());
+  for (auto& thread : impl_->threads) thread.join();
+  impl_->core.workers.join();
+  ::unlink(impl_->options.socket.c_str());
 }
+
+void ApiServer::wake() { impl_->wake(); }
+
+int ApiServer::http_port() const { return impl_->tcp ? impl_->tcp->local_endpoint().port() : 0; }
 
 }  // namespace scanrig

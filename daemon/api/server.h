@@ -1,24 +1,51 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
 
 #include "core/result.h"
-#include "daemon/rig/preview.h"
+#include "daemon/api/admission.h"
+#include "daemon/api/peer.h"
 #include "daemon/station/control_loop.h"
 
 namespace scanrig {
 
-/// The HTTP API on a Unix socket: one I/O thread, every request and answer with an absolute time limit.
+struct ApiOptions {
+  std::filesystem::path socket;
+  PeerGroups groups{};             ///< which may what over the socket
+  std::optional<int> http_port{};  ///< TCP, where every request needs a token; 0: any free port
+  std::string http_address = "127.0.0.1";
+  std::filesystem::path tokens{};                                                       ///< the file of tokens
+  std::filesystem::path storage{};                                                      ///< whose disk is watched
+  std::function<Result<std::string>(std::string_view side)> preview_jpeg = no_preview;  ///< from any thread
+  std::function<Result<void>()> check_config = no_config;  ///< of the file that the daemon was started with; likewise
+  ApiLimits limits{};
+
+  static Result<std::string> no_preview(std::string_view) { return fail(ErrorCode::not_found, "there are no cameras"); }
+  static Result<void> no_config() {
+    return fail(ErrorCode::refused, "the daemon was started without a configuration file");
+  }
+};
+
+/// The HTTP API on a Unix socket and, if wanted, on TCP: two I/O threads, a strand a connection, every step of a
+/// request with an absolute limit. It reads snapshots and posts to the control loop, and neither waits for the other.
 class ApiServer {
  public:
-  /// Fails as listen_on_socket(). `loop` and `preview` must outlive the server.
-  static Result<std::unique_ptr<ApiServer>> start(const std::filesystem::path& socket, ControlLoop& loop,
-                                                  Preview& preview);
+  /// Fails as listen_on_socket(), with `io` or `invalid_input` for the address, with `not_found` for a group. `loop`
+  /// must outlive the server.
+  static Result<std::unique_ptr<ApiServer>> start(const ApiOptions& options, ControlLoop& loop);
   /// Cuts all connections, removes the socket file and joins. The control loop must not run any more.
   ~ApiServer();
   ApiServer(const ApiServer&) = delete;
   ApiServer& operator=(const ApiServer&) = delete;
+
+  /// There is a new snapshot. From any thread; does not wait.
+  void wake();
+  [[nodiscard]] int http_port() const;  ///< 0 without TCP
 
  private:
   struct Impl;

@@ -64,7 +64,7 @@ Result<int> connect_to_socket(const fs::path& path) {
   return fail(ErrorCode::io, "{}: nobody answers", path.string());
 }
 
-Result<int> listen_on_socket(const fs::path& path) {
+Result<int> listen_on_socket(const fs::path& path, mode_t mode) {
   if (auto address = address_of(path); !address) return pass_on(address);
   if (path.has_parent_path()) {
     if (auto made = create_directories_synced(path.parent_path()); !made) return pass_on(made);
@@ -79,7 +79,7 @@ Result<int> listen_on_socket(const fs::path& path) {
   const int fd = open_socket();
   if (fd < 0) return fail_errno("make", path, fd);
   if (::bind(fd, plain(*address), sizeof *address) != 0) return fail_errno("bind", path, fd);
-  if (::chmod(temporary.c_str(), 0660) != 0 || ::listen(fd, SOMAXCONN) != 0 ||
+  if (::chmod(temporary.c_str(), mode) != 0 || ::listen(fd, SOMAXCONN) != 0 ||
       ::rename(temporary.c_str(), path.c_str()) != 0) {
     auto error = fail_errno("open", path, fd);
     ::unlink(temporary.c_str());

@@ -1,15 +1,17 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <filesystem>
 
 #include "core/result.h"
 
 namespace scanrig {
 
-/// A listening Unix socket at `path` with mode 0660 from its first moment there. A stale socket file is replaced.
+/// A listening Unix socket at `path` with `mode` from its first moment there. A stale socket file is replaced.
 /// Returns its descriptor. Fails with `refused` (another daemon answers there), `exists` (a file that is no socket),
 /// `invalid_input` (the path is too long for a socket), `io`.
-Result<int> listen_on_socket(const std::filesystem::path& path);
+Result<int> listen_on_socket(const std::filesystem::path& path, mode_t mode = 0660);
 
 /// A connection to the daemon at `path`. Fails with `not_found` (no such file), `io` (nobody answers), `invalid_input`.
 Result<int> connect_to_socket(const std::filesystem::path& path);

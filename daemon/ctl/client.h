@@ -1,8 +1,11 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <string_view>
 
 #include "core/result.h"
 
@@ -17,7 +20,21 @@ struct Refusal {
 /// One request to the daemon behind `socket` and its JSON answer. Fails with `unreachable` (no daemon, or it does not
 /// answer within 15 s) or with the exit code of the API's error.
 tl::expected<nlohmann::json, Refusal> ask(const std::filesystem::path& socket, const std::string& method,
-                                          const std::string& target);
+                                          const std::string& target, const std::string& body = "");
+
+/// The same for an answer that is no JSON: its bytes, such as a picture.
+tl::expected<std::string, Refusal> fetch(const std::filesystem::path& socket, const std::string& target);
+
+/// How much of how much has come.
+using Arrived = std::function<void(std::uint64_t bytes, std::uint64_t of)>;
+
+/// Writes what the daemon sends for GET `target` to `out`, which must not be there; after a failure it is not there.
+/// Fails as ask(), with `bad_input` (the file is there) and `disk`.
+tl::expected<void, Refusal> download(const std::filesystem::path& socket, const std::string& target,
+                                     const std::filesystem::path& out, const Arrived& arrived);
+
+/// `text` as one segment of a target: what is no letter, digit or one of ._- is escaped.
+std::string segment(std::string_view text);
 
 /// The same for an answer that is no JSON: its bytes, such as a picture.
 tl::expected<std::string, Refusal> fetch(const std::filesystem::path& socket, const std::string& target);

@@ -3,7 +3,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "daemon/ctl/client.h"
+#include "daemon/ctl/answers.h"
 #include "daemon/ctl/follow.h"
 #include "daemon/ctl/verbs.h"
 
@@ -13,14 +13,6 @@ namespace {
 using nlohmann::json;
 
 constexpr auto kPoll = std::chrono::milliseconds(100);
-
-ExitCode complain(const Refusal& refusal) { return ctl::complain(refusal.exit, refusal.message); }
-
-void print(const json& answer) { fmt::print("{}\n", answer.dump(2, ' ', false, json::error_handler_t::replace)); }
-
-std::string text(const json& object, const char* key) {
-  return object.contains(key) && object[key].is_string() ? object[key].get<std::string>() : std::string();
-}
 
 /// `id` empty: the job that has the rig, now or as soon as there is one.
 ExitCode follow(const Connection& connection, std::string id) {
@@ -45,15 +37,11 @@ ExitCode follow(const Connection& connection, std::string id) {
   }
 }
 
-void print_job(const json& job) {
-  fmt::print("{:<22} {:<16} {:>2} views  {}\n", text(job, "id"), text(job, "state"), job.at("stored").get<int>(),
-             job.at("error").is_object() ? text(job.at("error"), "message") : text(job, "model"));
-}
-
 }  // namespace
 
-ExitCode status(const Connection& connection, bool follow_job) {
-  if (follow_job) return follow(connection, "");
+ExitCode status(const Connection& connection, const StatusVerb& verb) {
+  if (verb.watch) return watch(connection);
+  if (verb.follow) return follow(connection, "");
   const auto answer = ask(connection.socket, "GET", "/api/v1/status");
   if (!answer) return complain(answer.error());
   if (connection.json) {
@@ -69,22 +57,31 @@ ExitCode status(const Connection& connection, bool follow_job) {
   return ExitCode::ok;
 }
 
-ExitCode jobs(const Connection& connection, const std::string& id) {
-  const auto answer = ask(connection.socket, "GET", "/api/v1/jobs" + (id.empty() ? "" : "/" + id));
+ExitCode health(const Connection& connection) {
+  const auto answer = ask(connection.socket, "GET", "/api/v1/health");
   if (!answer) return complain(answer.error());
-  if (connection.json || !id.empty()) {
+  if (connection.json) {
     print(*answer);
-  } else {
-    for (const auto& job : answer->at("jobs")) print_job(job);
+    return ExitCode::ok;
   }
+  fmt::print("{}\n", answer->at("ok").get<bool>() ? "nothing is wrong" : "problems:");
+  for (const auto& problem : answer->at("problems")) fmt::print("  {}\n", text(problem, "message"));
+  const auto& disk = answer->at("disk");
+  fmt::print("disk: {} free of {}\n", bytes_text(disk.at("free_bytes")), bytes_text(disk.at("bytes")));
+  for (const auto& one : answer->at("temperatures")) {
+    fmt::print("{}: {:.1f} degrees Celsius\n", text(one, "sensor"), one.at("celsius").get<double>());
+  }
+  fmt::print("since {:.0f} s: {} deadlines missed, {} exposures retried, {} faults\n",
+             answer->at("uptime_s").get<double>(), answer->at("deadlines_missed").get<int>(),
+             answer->at("retries").get<int>(), answer->at("faults").get<int>());
   return ExitCode::ok;
 }
 
-ExitCode start(const Connection& connection, bool follow_job) {
+ExitCode start(const Connection& connection, const StartVerb& verb) {
   const auto answer = ask(connection.socket, "POST", "/api/v1/start");
   if (!answer) return complain(answer.error());
   const auto id = text(*answer, "job");
-  if (follow_job) return follow(connection, id);
+  if (verb.follow) return follow(connection, id);
   if (connection.json) {
     print(*answer);
   } else {

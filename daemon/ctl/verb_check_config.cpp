@@ -1,3 +1,6 @@
+#include <nlohmann/json.hpp>
+#include <sstream>
+
 #include "config/rig_config.h"
 #include "daemon/ctl/verbs.h"
 
@@ -5,8 +8,15 @@ namespace scanrig::ctl {
 
 ExitCode check_config(const CheckConfigVerb& verb) {
   const auto config = config::read_rig_config(verb.file, verb.drives);
-  if (!config) return complain(config.error());
-  fmt::print("{}: no problems\n", verb.file.string());
+  if (verb.json) {
+    auto problems = nlohmann::ordered_json::array();
+    std::istringstream lines(config ? std::string() : config.error().message);
+    for (std::string line; std::getline(lines, line);) problems.push_back(line);
+    fmt::print("{}\n",
+               nlohmann::ordered_json{{"file", verb.file}, {"ok", config.has_value()}, {"problems", problems}}.dump(2));
+  }
+  if (!config) return verb.json ? exit_code(config.error().code) : complain(config.error());
+  if (!verb.json) fmt::print("{}: no problems\n", verb.file.string());
   return ExitCode::ok;
 }
 

@@ -1,3 +1,5 @@
+#include <nlohmann/json.hpp>
+
 #include "daemon/ctl/verbs.h"
 #include "pipeline/scan/import_stanford.h"
 
@@ -7,7 +9,11 @@ ExitCode import_stanford(const ImportVerb& verb) {
   const auto pose2 = verb.conf.size() > 1 ? std::optional(verb.conf[1]) : std::nullopt;
   const auto imported = scanrig::import_stanford(verb.conf[0], pose2, verb.out);
   if (!imported) return complain(imported.error());
-  fmt::print("{}\n", verb.out.string());
+  if (verb.json) {
+    fmt::print("{}\n", nlohmann::json{{"scan", verb.out}}.dump());
+  } else {
+    fmt::print("{}\n", verb.out.string());
+  }
   return ExitCode::ok;
 }
 

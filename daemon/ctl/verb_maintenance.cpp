@@ -13,12 +13,12 @@ void print_io(const nlohmann::json& io) {
   }
 }
 
-std::string target_of(const MaintenanceVerb& verb) {
-  const std::string target = "/api/v1/maintenance/" + verb.what;
-  if (verb.what != "jog") return target;
+std::string body_of(const MaintenanceVerb& verb) {
+  if (verb.what != "jog") return "";
   const bool to = verb.to_deg.has_value();
-  return fmt::format("{}?{}={}&speed_deg_s={}", target, to ? "to_deg" : "by_deg",
-                     to ? *verb.to_deg : verb.by_deg.value_or(0.0), verb.speed_deg_s);
+  return nlohmann::json{{to ? "to_deg" : "by_deg", to ? *verb.to_deg : verb.by_deg.value_or(0.0)},
+                        {"speed_deg_s", verb.speed_deg_s}}
+      .dump();
 }
 
 }  // namespace
@@ -28,8 +28,8 @@ ExitCode maintenance(const Connection& connection, const MaintenanceVerb& verb) 
   if (verb.what == "jog" && verb.to_deg.has_value() == verb.by_deg.has_value()) {
     return complain(ExitCode::usage, "maintenance jog needs --to or --by");
   }
-  const auto answer =
-      io ? ask(connection.socket, "GET", "/api/v1/io") : ask(connection.socket, "POST", target_of(verb));
+  const auto answer = io ? ask(connection.socket, "GET", "/api/v1/io")
+                         : ask(connection.socket, "POST", "/api/v1/maintenance/" + verb.what, body_of(verb));
   if (!answer) return complain(answer.error().exit, answer.error().message);
   if (connection.json) {
     fmt::print("{}\n", answer->dump(2));

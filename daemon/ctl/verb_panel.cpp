@@ -1,4 +1,5 @@
 #include <cstdio>
+#include <nlohmann/json.hpp>
 
 #include "daemon/ctl/free_rig.h"
 #include "daemon/ctl/verbs.h"
@@ -17,6 +18,19 @@ void tell(const PanelInputs& now, Clock::Duration since) {
   std::fflush(stdout);
 }
 
+void tell_json(const PanelInputs& now, Clock::Duration since) {
+  fmt::print("{}\n", nlohmann::ordered_json{{"after_s", std::chrono::duration<double>(since).count()},
+                                            {"estop_ok", now.estop_ok},
+                                            {"guard_closed", now.guard_closed},
+                                            {"part_present", now.part_present},
+                                            {"flipped", now.flipped},
+                                            {"start", now.start},
+                                            {"stop", now.stop},
+                                            {"reset", now.reset}}
+                         .dump());
+  std::fflush(stdout);
+}
+
 }  // namespace
 
 ExitCode watch_panel(const PanelVerb& verb) {
@@ -32,7 +46,7 @@ ExitCode watch_panel(const PanelVerb& verb) {
   for (bool first = true; !signal.token().stop_requested() && clock.now() < end; first = false) {
     const auto now = open->panel->wait_change(known, Deadline::after(clock, first ? Clock::Duration{} : kGlance));
     if (!now) return complain(now.error());
-    if (first || *now != known) tell(*now, clock.now() - begun);
+    if (first || *now != known) (verb.json ? tell_json : tell)(*now, clock.now() - begun);
     known = *now;
   }
   return ExitCode::ok;

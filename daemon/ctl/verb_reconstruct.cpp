@@ -1,5 +1,7 @@
 #include <unistd.h>
 
+#include <cstdio>
+#include <nlohmann/json.hpp>
 #include <system_error>
 
 #include "daemon/ctl/stage_bars.h"
@@ -7,6 +9,17 @@
 #include "daemon/signal_stop.h"
 
 namespace scanrig::ctl {
+
+namespace {
+
+Result<void> make_model(const ScanFolder& scan, const ReconstructVerb& verb, const Context& context,
+                        const std::filesystem::path& out) {
+  const auto model = scanrig::reconstruct(scan, verb.options, context);
+  if (!model) return pass_on(model);
+  return write_model(*model, out);
+}
+
+}  // namespace
 
 ExitCode reconstruct(const ReconstructVerb& verb) {
   const auto out = verb.out.empty() ? verb.scan / "model" : verb.out;
@@ -18,14 +31,25 @@ ExitCode reconstruct(const ReconstructVerb& verb) {
   if (!scan) return complain(scan.error());
 
   const SignalStop stop;
-  StageBars bars(stdout, ::isatty(STDOUT_FILENO) == 1);
-  const Context context{stop.token(),
-                        [&](std::string_view stage, double fraction) { bars.update(std::string(stage), fraction); }};
-  const auto model = scanrig::reconstruct(*scan, verb.options, context);
-  bars.end(model.has_value());
-  if (!model) return complain(model.error());
-  if (const auto written = write_model(*model, out); !written) return complain(written.error());
-  fmt::print("{}\n{}\n", (out / "model.glb").string(), (out / "report.json").string());
+  std::FILE* told = verb.json ? stderr : stdout;  // bars beside the JSON, not in it
+  StageBars bars(told, ::isatty(::fileno(told)) == 1);
+  const auto progress = [&](std::string_view stage, double fraction) {
+    if (!verb.lines) return bars.update(std::string(stage), fraction);
+    fmt::print("{}\t{:.3f}\n", stage, fraction);
+    std::fflush(stdout);
+  };
+  const auto made = make_model(*scan, verb, {stop.token(), progress}, out);
+  if (!verb.lines) bars.end(made.has_value());
+  if (!made) {
+    if (verb.lines) fmt::print("failed\t{}\t{}\n", to_string(made.error().code), made.error().message);
+    return complain(made.error());
+  }
+  const auto glb = out / "model.glb", report = out / "report.json";
+  if (verb.json) {
+    fmt::print("{}\n", nlohmann::ordered_json{{"model", glb}, {"report", report}}.dump());
+  } else {
+    fmt::print("{}\n{}\n", glb.string(), report.string());
+  }
   return ExitCode::ok;
 }
 

@@ -52,12 +52,19 @@ ExitCode move(const TurntableVerb& verb, Turntable& table, Clock& clock) {
   const std::stop_callback stop(token, [&] { table.request_stop(); });
   if (auto homed = home(table, clock); !homed) return complain(homed.error());
   if (verb.what == "home") {
-    fmt::print("home\n");
+    fmt::print("{}\n", verb.json ? R"({"homed": true})" : "home");
     return ExitCode::ok;
   }
   const auto moved = table.rotate_to({verb.angle_deg}, Deadline::after(clock, kMoveLimit));
   if (!moved) return complain(moved.error());
   const auto ms = [](Clock::Duration time) { return std::chrono::duration_cast<milliseconds>(time).count(); };
+  if (verb.json) {
+    fmt::print("{}\n", nlohmann::ordered_json{{"measured_deg", moved->measured.value},
+                                              {"moving_ms", ms(moved->moving)},
+                                              {"settling_ms", ms(moved->settling)}}
+                           .dump());
+    return ExitCode::ok;
+  }
   fmt::print("{:.3f} deg, {} ms moving, {} ms settling\n", moved->measured.value, ms(moved->moving),
              ms(moved->settling));
   return ExitCode::ok;

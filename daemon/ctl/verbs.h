@@ -18,15 +18,63 @@ ExitCode complain(ExitCode code, const std::string& message);
 // Clients of the daemon.
 
 struct Connection {
-  std::filesystem::path socket;
+  std::filesystem::path socket = "/run/scanrig/api.sock";
   bool json = false;  ///< print the API's answer as it is
 };
 
-ExitCode status(const Connection& connection, bool follow);
-ExitCode jobs(const Connection& connection, const std::string& id);
-ExitCode start(const Connection& connection, bool follow);
+struct StatusVerb {
+  bool follow = false;
+  bool watch = false;
+};
+ExitCode status(const Connection& connection, const StatusVerb& verb);
+/// One screen, redrawn when something changes, until SIGINT; on what is no terminal the lines that change. With JSON
+/// a line a change.
+ExitCode watch(const Connection& connection);
+ExitCode health(const Connection& connection);
+
+struct StartVerb {
+  bool follow = false;
+};
+ExitCode start(const Connection& connection, const StartVerb& verb);
 /// `button`: "stop" or "reset".
 ExitCode press(const Connection& connection, const std::string& button);
+
+struct JobsVerb {
+  std::string id;  ///< empty: all jobs
+  std::string state;
+  int limit = 50;
+};
+ExitCode jobs(const Connection& connection, const JobsVerb& verb);
+ExitCode job_files(const Connection& connection, const std::string& id);
+
+struct ExportVerb {
+  std::string id;
+  std::string file = "model/model.glb";
+  std::filesystem::path out;
+};
+ExitCode export_file(const Connection& connection, const ExportVerb& verb);
+
+struct QueueVerb {
+  std::string recipe = "default";
+  std::string part;
+  int repeat = 1;
+};
+ExitCode queue(const Connection& connection, const QueueVerb& verb);
+
+struct JobVerb {
+  std::string what;  ///< "cancel", "resume", "first", "reprocess", "delete"
+  std::string id;
+  std::optional<double> voxel_mm{};  ///< reprocess
+  std::string fusion{};              ///< reprocess
+  bool yes = false;                  ///< delete: do not ask
+};
+ExitCode change_job(const Connection& connection, const JobVerb& verb);
+
+struct BundleVerb {
+  std::string id;
+  std::filesystem::path out;  ///< empty: ID.tar.gz, here
+};
+ExitCode bundle(const Connection& connection, const BundleVerb& verb);
 
 struct MaintenanceVerb {
   std::string what = "on";  ///< on, off, home, jog, pulse, lamp_test, io
@@ -41,6 +89,8 @@ struct ReconstructVerb {
   std::filesystem::path scan;
   std::filesystem::path out;  ///< empty: `model` in the scan folder
   ReconstructOptions options;
+  bool json = false;
+  bool lines = false;  ///< for programs: "STAGE<tab>FRACTION", and "failed<tab>CODE<tab>MESSAGE" at the end
 };
 ExitCode reconstruct(const ReconstructVerb& verb);
 
@@ -54,14 +104,26 @@ ExitCode evaluate(const EvaluateVerb& verb);
 struct ImportVerb {
   std::vector<std::filesystem::path> conf;  ///< one a pose
   std::filesystem::path out;
+  bool json = false;
 };
 ExitCode import_stanford(const ImportVerb& verb);
 
 struct CheckConfigVerb {
-  std::filesystem::path file;
+  std::filesystem::path file = "/etc/scanrig/rig.toml";
   std::filesystem::path drives;  ///< empty: where the daemon looks
+  bool json = false;
 };
 ExitCode check_config(const CheckConfigVerb& verb);
+
+struct TokenVerb {
+  std::string what;  ///< "add", "list", "revoke"
+  std::string name;
+  std::string role = "viewer";
+  std::filesystem::path file;  ///< empty: the one that `config` names
+  std::filesystem::path config = "/etc/scanrig/rig.toml";
+  bool json = false;
+};
+ExitCode token(const TokenVerb& verb);
 
 // At the rig, on the devices themselves, while no daemon runs.
 
@@ -78,6 +140,7 @@ ExitCode turntable(const TurntableVerb& verb);
 struct PanelVerb {
   std::filesystem::path config = "/etc/scanrig/rig.toml";
   int seconds = 0;  ///< 0: until interrupted
+  bool json = false;
 };
 ExitCode watch_panel(const PanelVerb& verb);
 

@@ -4,13 +4,14 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
-#include <nlohmann/json.hpp>
 #include <system_error>
 #include <utility>
 
 #include "core/files.h"
+#include "daemon/jobs/job_index.h"
 #include "daemon/station/timestamp.h"
 
 namespace scanrig {
@@ -18,54 +19,96 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kFailure = "failure.json";
+// Names of folders that are being made or removed; no job's id begins with a dot.
+constexpr const char* kNew = ".new-";
+constexpr const char* kGone = ".gone-";
+constexpr std::uintmax_t kModelBytes = 128u
+                                       << 20;  ///< mesh in all formats, textures, report: the largest seen is 90 MiB
 
-std::vector<StoredView> stored_views(const Manifest& manifest) {
-  std::vector<StoredView> views;
-  for (std::size_t pose = 0; pose < manifest.poses.size(); ++pose) {
-    for (const auto& view : manifest.poses[pose].views) {
-      views.push_back({static_cast<int>(pose), view.index, view.measured_deg, 0, view.commanded_deg, view.settling_ms});
+void take_views(JobInfo& job, const Manifest& manifest) {
+  for (std::size_t p = 0; p < manifest.poses.size(); ++p) {
+    const auto& pose = manifest.poses[p];
+    const int number = static_cast<int>(p);
+    for (const auto& view : pose.views) {
+      job.stored.push_back({number, view.index, view.measured_deg, 0, view.commanded_deg, view.settling_ms});
     }
+    for (const auto& closure : pose.closures) {
+      job.closures.push_back({number, closure.shift_px, closure.changed, closure.unmoved});
+    }
+    if (pose.complete) job.complete = number + 1;
   }
-  return views;
 }
 
-/// The state of a job nobody works on, from its files; `job.error` says why where it is not done.
-void settle(JobInfo& job, const std::string& manifest_state, const fs::path& folder) {
+/// The state of a scan that has all its views.
+void settle_scanned(JobInfo& job) {
   std::error_code ignored;
-  if (fs::exists(report_file(folder), ignored)) {
-    job.state = JobState::done;
-    job.model = model_file(folder);
-    job.report = report_file(folder);
-  } else if (manifest_state == "scanned") {
-    job.error = read_failure(folder);
-    job.state = job.error ? JobState::failed : JobState::interrupted;
-    if (!job.error) {
-      job.error = Error{ErrorCode::stopped, fmt::format("the daemon ended before the model was made: run scanrig "
-                                                        "reconstruct {}",
-                                                        folder.string())};
-    }
+  if (fs::exists(report_file(job.folder), ignored)) {
+    job.model = model_file(job.folder);
+    job.report = report_file(job.folder);
+  }
+  const auto attempts = read_attempts(job.folder);
+  job.quarantined = !attempts.running && attempts.ended_by_death >= kAttemptsThatQuarantine;
+  job.error = job.quarantined ? quarantine_error() : read_failure(job.folder);
+  if (job.error) {
+    job.state = JobState::failed;
+  } else if (job.report.empty() || attempts.running) {
+    job.state = JobState::reconstructing;
   } else {
-    job.state = parse_job_state(manifest_state).value_or(JobState::interrupted);
-    job.error = read_failure(folder).value_or(Error{ErrorCode::stopped, "the scan was " + manifest_state});
+    job.state = JobState::done;
+    job.error = beyond_limits(job.report, job.recipe.limits);
+    job.passed = !job.error;
   }
 }
 
-Result<JobInfo> recover_job(const fs::path& folder, const JobStoreOptions& options) {
-  auto scan = ScanFolder::open(folder);
-  if (!scan) return pass_on(scan);
-  JobInfo job{.id = folder.filename(), .folder = folder, .poses = options.poses, .views = options.views};
-  job.stored = stored_views(scan->manifest());
-  const std::string state = scan->manifest().state;
-  if (state == "queued" || state == "scanning" || state == "waiting_for_flip") {
-    if (auto marked = scan->set_state("interrupted"); !marked) return pass_on(marked);
+/// The state of one that has not. What was being scanned when the daemon ended is interrupted.
+void settle_unfinished(JobInfo& job, const std::string& manifest_state) {
+  job.state = parse_job_state(manifest_state).value_or(JobState::interrupted);
+  if (job.state == JobState::queued) return;
+  if (job.state == JobState::scanning || job.state == JobState::waiting_for_flip) {
     job.state = JobState::interrupted;
     job.error = Error{ErrorCode::stopped, "the daemon ended during the scan"};
   } else {
-    settle(job, state, folder);
+    job.error = read_failure(job.folder).value_or(Error{ErrorCode::stopped, "the scan was " + manifest_state});
+  }
+  const bool moved = std::ranges::any_of(job.closures, [](const auto& closure) { return !closure.unmoved; });
+  job.resumable = job.state == JobState::interrupted && !moved;
+}
+
+Result<JobInfo> read_folder(const fs::path& folder, const ScanFolder& scan) {
+  auto order = read_job_file(folder);
+  if (!order) return pass_on(order);
+  JobInfo job{.id = folder.filename(),
+              .folder = folder,
+              .recipe = std::move(order->recipe),
+              .part = std::move(order->part),
+              .place = order->place,
+              .exported = order->exported};
+  take_views(job, scan.manifest());
+  if (scan.manifest().state == "scanned") {
+    settle_scanned(job);
+  } else {
+    settle_unfinished(job, scan.manifest().state);
   }
   return job;
 }
+
+JobInfo recover_job(const fs::path& folder) {
+  auto scan = ScanFolder::open(folder);
+  auto job = scan ? read_folder(folder, *scan) : pass_on(scan);
+  if (job && job->state == JobState::interrupted && scan->manifest().state != "interrupted") {
+    if (auto marked = scan->set_state("interrupted"); !marked) job = pass_on(marked);
+  }
+  if (job) return *job;
+  return {.id = folder.filename(), .folder = folder, .state = JobState::failed, .error = job.error()};
+}
+
+void remove_remains(const fs::path& root, const std::string& name) {
+  if (!name.starts_with(kNew) && !name.starts_with(kGone)) return;
+  std::error_code ignored;
+  fs::remove_all(root / name, ignored);
+}
+
+double gib(std::uintmax_t bytes) { return static_cast<double>(bytes) / (1u << 30); }
 
 }  // namespace
 
@@ -91,50 +134,82 @@ JobStore::JobStore(JobStore&& other) noexcept
     : options_(std::move(other.options_)), lock_(std::exchange(other.lock_, -1)) {}
 
 Result<JobTable> JobStore::recover() const {
+  JobIndex index(options_.root / "index.sqlite");
   JobTable jobs;
   std::error_code error;
   for (fs::directory_iterator next(options_.root, error), end; !error && next != end; next.increment(error)) {
     std::error_code ignored;
     if (!next->is_directory(ignored)) continue;
-    const fs::path folder = next->path();
-    auto job = recover_job(folder, options_);
-    if (!job) {
-      job = JobInfo{.id = folder.filename(), .folder = folder, .state = JobState::failed, .error = job.error()};
+    const std::string id = next->path().filename();
+    if (id.starts_with('.')) {
+      remove_remains(options_.root, id);
+      continue;
     }
-    jobs.emplace(job->id, std::make_shared<const JobInfo>(*job));
+    auto known = index.find(next->path());
+    const auto job = std::make_shared<const JobInfo>(known ? std::move(*known) : recover_job(next->path()));
+    jobs.emplace(id, job);
   }
   if (error) return fail(ErrorCode::io, "cannot list {}: {}", options_.root.string(), error.message());
+  index.replace(jobs);
   return jobs;
 }
 
-Result<ScanFolder> JobStore::create(const std::string& id) const {
+Result<JobInfo> JobStore::read(const std::string& id) const {
+  const auto scan = ScanFolder::open(folder(id));
+  if (!scan) return pass_on(scan);
+  return read_folder(folder(id), *scan);
+}
+
+Result<JobInfo> JobStore::create(const std::string& id, const JobFile& job) const {
+  std::error_code ignored;
+  if (fs::exists(folder(id), ignored)) {
+    return fail(ErrorCode::exists, "{}: already there; name another folder or remove this one", folder(id).string());
+  }
   Manifest manifest;
   manifest.id = id;
   manifest.created = iso_time(std::chrono::system_clock::now());
-  manifest.state = "scanning";
+  manifest.state = "queued";
   manifest.profile = options_.profile;
-  return ScanFolder::create(options_.root / id, std::move(manifest), options_.calibration_file);
+  const fs::path prepared = options_.root / (kNew + id);
+  auto scan = ScanFolder::create(prepared, std::move(manifest), options_.calibration_file);
+  auto made = scan ? write_job_file(prepared, job) : Result<void>(pass_on(scan));
+  if (made) made = replace_folder(prepared, folder(id));
+  if (!made) {
+    fs::remove_all(prepared, ignored);
+    return pass_on(made);
+  }
+  return read(id);
 }
 
-fs::path model_folder(const fs::path& job_folder) { return job_folder / "model"; }
-fs::path model_file(const fs::path& job_folder) { return model_folder(job_folder) / "model.glb"; }
-fs::path report_file(const fs::path& job_folder) { return model_folder(job_folder) / "report.json"; }
-
-Result<void> write_failure(const fs::path& job_folder, const Error& error) {
-  const nlohmann::ordered_json json = {{"code", to_string(error.code)}, {"message", error.message}};
-  return write_file_atomically(job_folder / kFailure,
-                               json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+Result<void> JobStore::check_room(const JobInfo& job) const {
+  const auto calibration = read_calibration(options_.calibration_file);
+  if (!calibration) return pass_on(calibration);
+  const auto pixels = [](const Camera& camera) {
+    return static_cast<std::uintmax_t>(camera.projection.width) * static_cast<std::uintmax_t>(camera.projection.height);
+  };
+  const auto views = static_cast<std::uintmax_t>(job.recipe.poses * job.recipe.views) - job.stored.size();
+  const auto view_bytes = 2 * (pixels(calibration->left) + pixels(calibration->right)) *
+                          static_cast<std::uintmax_t>(options_.bytes_per_pixel);
+  const auto needed = views * view_bytes + kModelBytes;
+  std::error_code error;
+  const auto space = fs::space(options_.root, error);
+  if (error) return fail(ErrorCode::io, "cannot see the free space of {}: {}", options_.root.string(), error.message());
+  if (space.available >= needed + options_.reserve_bytes) return {};
+  return fail(
+      ErrorCode::io,
+      "the disk of {} has {:.1f} GiB left: the job needs {:.2f} and {:.1f} are kept free; remove or export jobs",
+      options_.root.string(), gib(space.available), gib(needed), gib(options_.reserve_bytes));
 }
 
-std::optional<Error> read_failure(const fs::path& job_folder) {
-  const auto text = read_file(job_folder / kFailure);
-  if (!text) return std::nullopt;
-  const auto json = nlohmann::json::parse(*text, nullptr, false);
-  if (!json.is_object() || !json.contains("message") || !json["message"].is_string()) return std::nullopt;
-  const auto code = json.contains("code") && json["code"].is_string()
-                        ? parse_error_code(json["code"].get<std::string>())
-                        : std::nullopt;
-  return Error{code.value_or(ErrorCode::internal), json["message"]};
+Result<void> JobStore::remove(const std::string& id) const {
+  std::error_code error;
+  if (id.empty() || id.starts_with('.') || id.find('/') != std::string::npos || !fs::exists(folder(id), error)) {
+    return fail(ErrorCode::not_found, "there is no job {}", id);
+  }
+  const fs::path gone = options_.root / (kGone + id);
+  if (auto moved = replace_folder(folder(id), gone); !moved) return moved;
+  fs::remove_all(gone, error);  // what stays goes at the next start
+  return {};
 }
 
 }  // namespace scanrig

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
 #include "core/result.h"
+#include "daemon/jobs/job_files.h"
 #include "daemon/station/job_table.h"
 #include "pipeline/scan/scan_folder.h"
 
@@ -12,13 +14,13 @@ namespace scanrig {
 struct JobStoreOptions {
   std::filesystem::path root;              ///< one folder a job
   std::filesystem::path calibration_file;  ///< copied into every job
-  std::string profile;                     ///< of a simulated rig; empty otherwise
-  int poses = 2;
-  int views = 8;
+  std::string profile{};                   ///< of a simulated rig; empty otherwise
+  std::uintmax_t reserve_bytes = 0;        ///< of the disk: a job that would eat into it is not begun
+  int bytes_per_pixel = 1;                 ///< of the sensors
 };
 
 /// The folders of all jobs. They are the truth: nothing else remembers a job.
-/// Threads: one user at a time.
+/// Threads: every function but recover() may be called from any, for different jobs.
 class JobStore {
  public:
   /// Creates the root where it is missing and keeps a second daemon out of it for as long as this object lives.
@@ -28,13 +30,25 @@ class JobStore {
   JobStore(JobStore&& other) noexcept;
   JobStore& operator=(JobStore&&) = delete;
 
-  /// What the folders say. A job that was being scanned when the daemon died is marked interrupted.
-  /// A folder that cannot be read is a failed job that says why.
+  /// What the folders say, through the index. A job that was being scanned when the daemon died is marked interrupted;
+  /// what was left of folders half made or half removed goes. A folder that cannot be read is a failed job that says
+  /// why. Before anything else uses the store.
   Result<JobTable> recover() const;
 
-  /// Fails with `exists`, `io`, `not_found` and `invalid_input` (the calibration).
-  Result<ScanFolder> create(const std::string& id) const;
+  /// What one folder says. Fails with `not_found`, `invalid_input`, `unsupported`.
+  [[nodiscard]] Result<JobInfo> read(const std::string& id) const;
 
+  /// A queued job. The folder appears under its name when it is whole and durable.
+  /// Fails with `exists`, `io`, `not_found` and `invalid_input` (the calibration).
+  [[nodiscard]] Result<JobInfo> create(const std::string& id, const JobFile& job) const;
+
+  /// Whether the views still to be taken and the model fit on the disk. Fails with `io`, saying how much is missing.
+  [[nodiscard]] Result<void> check_room(const JobInfo& job) const;
+
+  /// The folder is gone at once, its files soon. Fails with `not_found`, `io`.
+  [[nodiscard]] Result<void> remove(const std::string& id) const;
+
+  [[nodiscard]] std::filesystem::path folder(const std::string& id) const { return options_.root / id; }
   [[nodiscard]] const JobStoreOptions& options() const { return options_; }
 
  private:
@@ -42,15 +56,5 @@ class JobStore {
   JobStoreOptions options_;
   int lock_;  ///< descriptor of the locked root, -1 when moved from
 };
-
-/// Where a job's model and report are, and where it is noted that there is none.
-std::filesystem::path model_folder(const std::filesystem::path& job_folder);
-std::filesystem::path model_file(const std::filesystem::path& job_folder);
-std::filesystem::path report_file(const std::filesystem::path& job_folder);
-
-/// Notes durably that the reconstruction failed: failure.json beside scan.json. Fails with `io`.
-Result<void> write_failure(const std::filesystem::path& job_folder, const Error& error);
-/// Of an earlier run; nothing where there is no such file.
-std::optional<Error> read_failure(const std::filesystem::path& job_folder);
 
 }  // namespace scanrig

@@ -1,10 +1,30 @@
 #include "daemon/jobs/job_thread.h"
 
+#include <algorithm>
 #include <utility>
 
+#include "core/files.h"
 #include "daemon/actor_thread.h"
+#include "pipeline/closure/compare_views.h"
 
 namespace scanrig {
+namespace {
+
+using What = event::JobAsked::What;
+
+/// Images without a match are what a person looks at first: kept beside the views.
+Result<void> keep_images(const ScanFolder& scan, int pose, std::size_t number, const RawView& again) {
+  const auto folder = scan.path() / scan.manifest().poses[static_cast<std::size_t>(pose)].name;
+  std::vector<FileContent> files;
+  const auto left = encode_png(again.left_plain), right = encode_png(again.right_plain);
+  if (!left) return pass_on(left);
+  if (!right) return pass_on(right);
+  files.push_back({fmt::format("closure{:02}_left.png", number), *left});
+  files.push_back({fmt::format("closure{:02}_right.png", number), *right});
+  return write_files_synced(folder, files);
+}
+
+}  // namespace
 
 JobThread::JobThread(Clock& clock, const JobStore& store, ReconstructionThread& reconstruction, ScannedHook on_scanned,
                      std::function<void(Event)> tell)
@@ -26,12 +46,119 @@ void JobThread::run() {
   }
 }
 
-void JobThread::handle(const action::CreateJob& task) {
-  auto scan = store_.create(task.job);
-  if (!scan) return tell_(event::StoreFailed{task.job, scan.error().in("cannot begin the job")});
+void JobThread::answer(Ticket ticket, const Result<void>& done, const std::string& result) {
+  if (ticket == 0) return;
+  if (done) return tell_(event::Answered{ticket, result});
+  tell_(event::Answered{ticket, pass_on(done)});
+}
+
+void JobThread::tell_known(const std::string& job) {
+  if (auto info = store_.read(job)) tell_(event::JobKnown{std::make_shared<const JobInfo>(std::move(*info))});
+}
+
+void JobThread::handle(const action::CreateJobs& task) {
+  Result<void> done;
+  auto place = task.place;
+  for (const auto& id : task.ids) {
+    auto job = store_.create(id, {.recipe = task.recipe, .part = task.part, .place = place++});
+    if (!job) {
+      done = pass_on(job);
+      tell_(event::StoreFailed{id, job.error().in("cannot begin the job")});
+      break;
+    }
+    tell_(event::JobKnown{std::make_shared<const JobInfo>(std::move(*job))});
+  }
+  answer(task.ticket, done, task.ids.front());
+}
+
+void JobThread::handle(const action::BeginJob& task) {
+  auto job = store_.read(task.job);
+  auto room = job ? store_.check_room(*job) : Result<void>(pass_on(job));
+  if (room) room = begin(*job);
+  if (room) return;
+  tell_(event::JobNotBegun{task.job, room.error()});
+  if (!job && job.error().code == ErrorCode::not_found) return tell_(event::JobRemoved{task.job});
+  tell_known(task.job);
+}
+
+/// Goes on where the manifest ends.
+Result<void> JobThread::begin(const JobInfo& job) {
+  auto scan = ScanFolder::open(job.folder);
+  if (!scan) return pass_on(scan);
+  if (auto state = scan->set_state("scanning"); !state) return state;
+  remove_failure(job.folder);
   scan_ = std::move(*scan);
-  reconstruction_.begin(task.job, scan_->path());
-  tell_(event::JobCreated{task.job, scan_->path()});
+  reconstruction_.begin(job.id, scan_->path(), job.recipe);
+  const auto& poses = scan_->manifest().poses;
+  const auto pose = static_cast<std::size_t>(job.complete);
+  tell_(event::JobBegun{job.id, job.complete, pose < poses.size() ? static_cast<int>(poses[pose].views.size()) : 0});
+  return {};
+}
+
+void JobThread::handle(const action::MoveJob& task) { answer(task.ticket, move(task), task.job); }
+
+Result<void> JobThread::move(const action::MoveJob& task) {
+  auto job = store_.read(task.job);
+  if (!job) return pass_on(job);
+  if (task.resume && !job->resumable) {
+    return fail(ErrorCode::refused, "job {} is {} and cannot be resumed: order a new one", task.job,
+                to_string(job->state));
+  }
+  auto order = read_job_file(job->folder);
+  if (!order) return pass_on(order);
+  order->place = task.place;
+  if (auto written = write_job_file(job->folder, *order); !written) return written;
+  if (task.resume) {
+    auto scan = ScanFolder::open(job->folder);
+    if (!scan) return pass_on(scan);
+    if (auto queued = scan->set_state("queued"); !queued) return queued;
+  }
+  tell_known(task.job);
+  return {};
+}
+
+void JobThread::handle(const action::KeepJob& task) { answer(task.asked.ticket, keep(task.asked), task.asked.job); }
+
+Result<void> JobThread::keep(const event::JobAsked& asked) {
+  auto job = store_.read(asked.job);
+  if (!job) return pass_on(job);
+  if (job->state == JobState::reconstructing) return fail(ErrorCode::busy, "job {} is being reconstructed", asked.job);
+  if (asked.what == What::reprocess) return reprocess(std::move(*job), asked);
+  if (asked.what == What::set_exported) {
+    auto order = read_job_file(job->folder);
+    if (!order) return pass_on(order);
+    order->exported = true;
+    if (auto written = write_job_file(job->folder, *order); !written) return written;
+  } else {
+    if (job->state != JobState::queued && job->state != JobState::interrupted) {
+      return fail(ErrorCode::refused, "job {} is {}: only what is queued or interrupted can be cancelled", asked.job,
+                  to_string(job->state));
+    }
+    auto scan = ScanFolder::open(job->folder);
+    if (!scan) return pass_on(scan);
+    if (auto ended = scan->set_state("cancelled"); !ended) return ended;
+    const Error why{ErrorCode::stopped, "cancelled on request"};
+    if (auto noted = write_failure(job->folder, why); !noted) return noted;
+  }
+  tell_known(asked.job);
+  return {};
+}
+
+/// The images are all that is needed; an older model stays until the new one is there.
+Result<void> JobThread::reprocess(JobInfo job, const event::JobAsked& asked) {
+  if (job.complete < job.recipe.poses) {
+    return fail(ErrorCode::refused, "job {} has only {} of {} poses: there is nothing to make a model of", asked.job,
+                job.complete, job.recipe.poses);
+  }
+  forget_attempts(job.folder);
+  remove_failure(job.folder);
+  job.state = JobState::reconstructing;
+  job.quarantined = false;
+  job.error.reset();
+  job.passed.reset();
+  reconstruction_.rebuild(job.id, job.folder, job.recipe, {asked.voxel_mm, asked.fusion});
+  tell_(event::JobKnown{std::make_shared<const JobInfo>(std::move(job))});
+  return {};
 }
 
 void JobThread::handle(const action::StoreView& task) {
@@ -44,9 +171,42 @@ void JobThread::handle(const action::StoreView& task) {
                           view.record.settling_ms});
 }
 
+void JobThread::handle(const action::JudgeClosure& task) {
+  if (!scan_) return;
+  const auto closure = judge(*task.view);
+  if (!closure) return tell_(event::StoreFailed{task.view->id.job, closure.error()});
+  tell_(event::ClosureJudged{task.view->id.job, *closure});
+}
+
+/// Compares the plain images with those of the first time, and keeps the verdict as evidence.
+Result<Closure> JobThread::judge(const TakenView& again) {
+  const auto pose = static_cast<std::size_t>(again.id.pose);
+  const auto first = scan_->load_images(pose, 0);
+  if (!first) return pass_on(first);
+  const auto now = to_view_images(again.images, again.record);
+  if (!now) return pass_on(now);
+  const auto left = compare_views(first->left_plain, now->left_plain);
+  if (!left) return pass_on(left);
+  const auto right = compare_views(first->right_plain, now->right_plain);
+  if (!right) return pass_on(right);
+
+  const Closure closure{again.id.pose, std::max(left->shift_px, right->shift_px),
+                        std::max(left->changed, right->changed), left->unmoved && right->unmoved};
+  const auto& record = scan_->manifest().poses[pose];
+  if (!closure.unmoved) {
+    if (auto kept = keep_images(*scan_, again.id.pose, record.closures.size(), again.images); !kept) {
+      return pass_on(kept);
+    }
+  }
+  const auto added = scan_->add_closure(pose, {static_cast<int>(record.views.size()), again.record.measured_deg,
+                                               again.record.taken, closure.shift_px, closure.changed, closure.unmoved});
+  if (!added) return pass_on(added);
+  return closure;
+}
+
 Result<void> JobThread::finish_pose(const action::FinishPose& task) {
-  if (auto complete = scan_->set_pose_complete(static_cast<std::size_t>(task.pose)); !complete) return complete;
-  if (auto state = scan_->set_state(task.last ? "scanned" : "waiting_for_flip"); !state) return state;
+  const auto pose = static_cast<std::size_t>(task.pose);
+  if (auto done = scan_->complete_pose(pose, task.last ? "scanned" : "waiting_for_flip"); !done) return done;
   return task.last && on_scanned_ ? on_scanned_(scan_->path()) : Result<void>{};
 }
 
@@ -70,13 +230,13 @@ void JobThread::handle(const action::ResumeJob& task) {
 
 void JobThread::handle(const action::CloseJob& task) {
   reconstruction_.abandon(task.job);
-  if (scan_) {
-    auto closed = scan_->set_state(std::string(to_string(task.state)));
-    if (closed) closed = write_failure(scan_->path(), task.why);
-    // On a disk that takes nothing more the job is found unfinished at the next start, and interrupted then.
-    scan_.reset();
-  }
-  tell_(event::JobClosed{task.job, task.state, task.why});
+  if (!scan_) return tell_known(task.job);  // it was not begun
+  auto closed = scan_->set_state(std::string(to_string(task.state)));
+  if (closed) closed = write_failure(scan_->path(), task.why);
+  // On a disk that takes nothing more the job is found unfinished at the next start, and interrupted then.
+  scan_.reset();
+  const auto job = store_.read(task.job);
+  tell_(event::JobClosed{task.job, task.state, task.why, job && job->resumable});
 }
 
 }  // namespace scanrig

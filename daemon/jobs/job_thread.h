@@ -17,8 +17,8 @@ namespace scanrig {
 /// when it survives a power cut.
 class JobThread {
  public:
-  using Task =
-      std::variant<action::CreateJob, action::StoreView, action::FinishPose, action::ResumeJob, action::CloseJob>;
+  using Task = std::variant<action::CreateJobs, action::BeginJob, action::MoveJob, action::KeepJob, action::StoreView,
+                            action::JudgeClosure, action::FinishPose, action::ResumeJob, action::CloseJob>;
   using ScannedHook = std::function<Result<void>(const std::filesystem::path& job_folder)>;
 
   /// `on_scanned` (may be empty) is called when all views of a job are on disk, before anybody is told.
@@ -33,12 +33,24 @@ class JobThread {
 
  private:
   void run();
-  void handle(const action::CreateJob& task);
+  void handle(const action::CreateJobs& task);
+  void handle(const action::BeginJob& task);
+  void handle(const action::MoveJob& task);
+  void handle(const action::KeepJob& task);
   void handle(const action::StoreView& task);
+  void handle(const action::JudgeClosure& task);
   void handle(const action::FinishPose& task);
   void handle(const action::ResumeJob& task);
   void handle(const action::CloseJob& task);
+
+  Result<void> begin(const JobInfo& job);
+  Result<void> move(const action::MoveJob& task);
+  Result<void> keep(const event::JobAsked& asked);
   Result<void> finish_pose(const action::FinishPose& task);
+  Result<Closure> judge(const TakenView& again);
+  Result<void> reprocess(JobInfo job, const event::JobAsked& asked);
+  void tell_known(const std::string& job);
+  void answer(Ticket ticket, const Result<void>& done, const std::string& result);
 
   const JobStore& store_;
   ReconstructionThread& reconstruction_;

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "pipeline/reconstruct/memory.h"
+
 namespace scanrig {
 namespace {
 
@@ -25,12 +27,27 @@ class PipelineReconstructor final : public Reconstructor {
   Reconstruction reconstruction_;
 };
 
+double gib(std::uintmax_t bytes) { return static_cast<double>(bytes) / (1u << 30); }
+
 }  // namespace
 
-ReconstructorFactory pipeline_reconstructor(ReconstructOptions options) {
-  return [options = std::move(options)](const Calibration& calibration, const Manifest& manifest) {
-    const ScanIdentity identity{.id = manifest.id, .profile = manifest.profile};
-    return std::make_unique<PipelineReconstructor>(Reconstruction(calibration, options, identity));
+Result<void> check_memory(const ReconstructionTask& task, double voxel_mm, std::uintmax_t memory_bytes) {
+  const auto needed = estimated_memory(task.calibration, task.views, voxel_mm);
+  if (needed <= memory_bytes) return {};
+  return fail(ErrorCode::out_of_range,
+              "the reconstruction with voxels of {} mm would need about {:.1f} GiB, [reconstruction] memory_gib allows "
+              "{:.1f}: use larger voxels or allow more",
+              voxel_mm, gib(needed), gib(memory_bytes));
+}
+
+ReconstructorFactory pipeline_reconstructor(ReconstructOptions options, std::uintmax_t memory_bytes) {
+  return [=](const ReconstructionTask& task) -> Result<std::unique_ptr<Reconstructor>> {
+    auto changed = options;
+    changed.voxel_mm = task.changes.voxel_mm.value_or(options.voxel_mm);
+    if (!task.changes.fusion.empty()) changed.fusion = task.changes.fusion;
+    if (auto fits = check_memory(task, changed.voxel_mm, memory_bytes); !fits) return pass_on(fits);
+    const ScanIdentity identity{.id = task.manifest.id, .profile = task.manifest.profile};
+    return std::make_unique<PipelineReconstructor>(Reconstruction(task.calibration, changed, identity));
   };
 }
 

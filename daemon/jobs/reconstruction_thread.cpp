@@ -4,19 +4,34 @@
 #include <unistd.h>
 
 #include <cmath>
-#include <system_error>
+#include <new>
 #include <utility>
 
 #include "daemon/actor_thread.h"
-#include "daemon/jobs/job_store.h"
+#include "daemon/jobs/job_files.h"
 
 namespace scanrig {
+namespace {
 
-ReconstructionThread::ReconstructionThread(Clock& clock, ReconstructorFactory factory, int poses, int views,
-                                           std::function<void(Event)> tell)
+/// More views are not kept in memory while an earlier job is being worked on.
+constexpr int kMostViewsWaiting = 4;
+
+/// The libraries below may throw what nobody foresaw, or run out of memory; that is one job's bad luck.
+template <class Work>
+Result<void> guarded(const Work& work) {
+  try {
+    return work();
+  } catch (const std::bad_alloc&) {
+    return fail(ErrorCode::out_of_range, "the reconstruction ran out of memory: use larger voxels");
+  } catch (const std::exception& e) {
+    return fail(ErrorCode::internal, "the reconstruction failed: {}", e.what());
+  }
+}
+
+}  // namespace
+
+ReconstructionThread::ReconstructionThread(Clock& clock, ReconstructorFactory factory, std::function<void(Event)> tell)
     : factory_(std::move(factory)),
-      poses_(poses),
-      views_(views),
       tell_(std::move(tell)),
       inbox_(clock),
       thread_(start_actor(clock, [this] { run(); })) {}
@@ -27,68 +42,155 @@ ReconstructionThread::~ReconstructionThread() {
   thread_.join();
 }
 
+void ReconstructionThread::begin(std::string job, std::filesystem::path folder, Recipe recipe) {
+  inbox_.post(Begin{std::move(job), std::move(folder), std::move(recipe)});
+}
+
+void ReconstructionThread::rebuild(std::string job, std::filesystem::path folder, Recipe recipe,
+                                   ReconstructionChanges changes) {
+  inbox_.post(Rebuild{{std::move(job), std::move(folder), std::move(recipe), std::move(changes)}});
+}
+
+void ReconstructionThread::add_view(std::shared_ptr<const TakenView> view) {
+  const auto id = view->id;
+  if (++views_waiting_ > kMostViewsWaiting) {
+    --views_waiting_;
+    view.reset();
+  }
+  inbox_.post(AddView{id, std::move(view)});
+}
+
 void ReconstructionThread::run() {
   // Linux: of this thread and of the workers it will start. Without the right to be nice it works all the same.
   ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), 10);
   while (auto message = inbox_.take()) {
     if (stop_.stop_requested()) continue;
     std::visit([this](const auto& m) { handle(m); }, *message);
+    while (!current_ && !rebuilds_.empty() && !stop_.stop_requested()) {
+      const auto next = std::move(rebuilds_.front());
+      rebuilds_.pop_front();
+      handle(next);
+      handle(Finish{next.job});
+    }
   }
+  if (current_) end();  // told to stop: that is not the job's fault
+}
+
+bool ReconstructionThread::works_on(const std::string& job) const {
+  return current_ && current_->job == job && !current_->error && !current_->quarantined;
 }
 
 void ReconstructionThread::handle(const Begin& message) {
-  current_ = Current{.job = message.job, .folder = message.folder};
+  current_ = Current{.job = message.job, .folder = message.folder, .recipe = message.recipe};
   told_stage_.clear();
   const auto scan = ScanFolder::open(message.folder);
   if (!scan) return check(pass_on(scan));
-  const auto calibration = scan->load_calibration();
-  if (!calibration) return check(pass_on(calibration));
-  current_->reconstructor = factory_(*calibration, scan->manifest());
+  check(start(message, *scan));
+  if (works_on(message.job)) check(catch_up(*scan));
+}
+
+Result<void> ReconstructionThread::start(const Begin& message, const ScanFolder& scan) {
+  current_->quarantined = read_attempts(message.folder).ended_by_death >= kAttemptsThatQuarantine;
+  if (current_->quarantined) return {};
+  const auto calibration = scan.load_calibration();
+  if (!calibration) return pass_on(calibration);
+  if (auto marked = begin_attempt(message.folder); !marked) return marked;
+  return guarded([&]() -> Result<void> {
+    auto made = factory_({.calibration = *calibration,
+                          .manifest = scan.manifest(),
+                          .folder = message.folder,
+                          .views = message.recipe.poses * message.recipe.views,
+                          .changes = message.changes});
+    if (!made) return pass_on(made);
+    current_->reconstructor = std::move(*made);
+    return {};
+  });
+}
+
+/// What was taken before: of a job that is resumed or reprocessed.
+Result<void> ReconstructionThread::catch_up(const ScanFolder& scan) {
+  const auto& poses = scan.manifest().poses;
+  for (std::size_t pose = 0; pose < poses.size(); ++pose) {
+    for (std::size_t view = 0; view < poses[pose].views.size(); ++view) {
+      if (stop_.stop_requested()) return fail(ErrorCode::stopped, "stopped by request");
+      if (auto added = add(static_cast<int>(pose), scan.load_images(pose, view)); !added) return added;
+    }
+    if (!poses[pose].complete) break;
+    if (auto closed = close_pose(static_cast<int>(pose)); !closed) return closed;
+  }
+  return {};
+}
+
+void ReconstructionThread::handle(const Rebuild& message) { rebuilds_.push_back(message.begin); }
+
+Result<void> ReconstructionThread::add(int pose, const Result<ViewImages>& images) {
+  if (!images) return pass_on(images);
+  // One stage for all views of the scan: the bar of the time in which the table turns.
+  const int views = current_->recipe.poses * current_->recipe.views;
+  const auto progress = [&](std::string_view, double fraction) {
+    tell_progress("range", (current_->views_done + fraction) / views);
+  };
+  auto added = guarded(
+      [&] { return current_->reconstructor->add_view(static_cast<std::size_t>(pose), *images, context(progress)); });
+  ++current_->views_done;
+  progress("range", 0.0);
+  return added;
 }
 
 void ReconstructionThread::handle(const AddView& message) {
-  const TakenView& view = *message.view;
-  if (!works_on(view.id.job)) return;
-  const auto images = to_view_images(view.images, view.record);
-  if (!images) return check(pass_on(images));
-  // One stage for all views of the scan: the bar of the time in which the table turns.
-  const auto progress = [this](std::string_view, double fraction) {
-    tell_progress("range", (current_->views_done + fraction) / (poses_ * views_));
+  if (message.view) --views_waiting_;
+  if (!works_on(message.id.job)) return;
+  if (message.view) return check(add(message.id.pose, to_view_images(message.view->images, message.view->record)));
+  const auto scan = ScanFolder::open(current_->folder);
+  if (!scan) return check(pass_on(scan));
+  check(add(message.id.pose,
+            scan->load_images(static_cast<std::size_t>(message.id.pose), static_cast<std::size_t>(message.id.view))));
+}
+
+Result<void> ReconstructionThread::close_pose(int pose) {
+  const auto progress = [&](std::string_view stage, double fraction) {
+    tell_progress(fmt::format("{} pose {}", stage, pose + 1), fraction);
   };
-  check(current_->reconstructor->add_view(static_cast<std::size_t>(view.id.pose), *images, context(progress)));
-  ++current_->views_done;
-  progress("range", 0.0);
+  return guarded(
+      [&] { return current_->reconstructor->finish_pose(static_cast<std::size_t>(pose), context(progress)); });
 }
 
 void ReconstructionThread::handle(const FinishPose& message) {
-  if (!works_on(message.job)) return;
-  const auto progress = [&](std::string_view stage, double fraction) {
-    tell_progress(fmt::format("{} pose {}", stage, message.pose + 1), fraction);
-  };
-  check(current_->reconstructor->finish_pose(static_cast<std::size_t>(message.pose), context(progress)));
+  if (works_on(message.job)) check(close_pose(message.pose));
 }
 
 void ReconstructionThread::handle(const Finish& message) {
   if (!current_ || current_->job != message.job) return;
+  if (current_->quarantined) check(tl::unexpected(quarantine_error()));
   if (!current_->error) check(make_model());
+  if (stop_.stop_requested()) return;
   if (!current_->error) {
-    tell_(event::ModelReady{current_->job, model_file(current_->folder), report_file(current_->folder)});
-  } else if (!stop_.stop_requested()) {
+    remove_failure(current_->folder);
+    const auto report = report_file(current_->folder);
+    tell_(event::ModelReady{current_->job, model_file(current_->folder), report,
+                            beyond_limits(report, current_->recipe.limits)});
+  } else if (!current_->quarantined) {
     // A note that cannot be written costs the reason after a restart, nothing else.
     std::ignore = write_failure(current_->folder, *current_->error);
   }
-  current_.reset();
+  end();
 }
 
 void ReconstructionThread::handle(const Abandon& message) {
-  if (current_ && current_->job == message.job) current_.reset();
+  if (current_ && current_->job == message.job) end();
+}
+
+/// The mark of a job in quarantine stays, until somebody asks for another try.
+void ReconstructionThread::end() {
+  if (!current_->quarantined) forget_attempts(current_->folder);
+  current_.reset();
 }
 
 Result<void> ReconstructionThread::make_model() {
   const auto progress = [this](std::string_view stage, double fraction) {
     tell_progress(std::string(stage), fraction);
   };
-  return current_->reconstructor->finish(model_folder(current_->folder), context(progress));
+  return guarded([&] { return current_->reconstructor->finish(model_folder(current_->folder), context(progress)); });
 }
 
 void ReconstructionThread::check(const Result<void>& done) {

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <atomic>
+#include <deque>
 #include <filesystem>
 #include <functional>
 #include <memory>
@@ -16,29 +18,38 @@
 namespace scanrig {
 
 /// Makes models, one job after the other, while the rig goes on; at nice +10, so that acquisition comes first.
-/// Work on a job ends with its first error.
+/// Work on a job ends with its first error; nothing that is thrown here leaves the thread. A job is marked on disk
+/// before work on it begins and until it ends: what is found marked at the next start took the daemon with it.
 class ReconstructionThread {
  public:
-  ReconstructionThread(Clock& clock, ReconstructorFactory factory, int poses, int views,
-                       std::function<void(Event)> tell);
+  ReconstructionThread(Clock& clock, ReconstructorFactory factory, std::function<void(Event)> tell);
   /// Asks the running stage to stop, drops the rest and joins.
   ~ReconstructionThread();
   ReconstructionThread(const ReconstructionThread&) = delete;
   ReconstructionThread& operator=(const ReconstructionThread&) = delete;
 
-  void begin(std::string job, std::filesystem::path folder) { inbox_.post(Begin{std::move(job), std::move(folder)}); }
-  void add_view(std::shared_ptr<const TakenView> view) { inbox_.post(AddView{std::move(view)}); }
+  /// A scan begins or goes on; what its folder holds is taken first.
+  void begin(std::string job, std::filesystem::path folder, Recipe recipe);
+  void add_view(std::shared_ptr<const TakenView> view);
   void finish_pose(std::string job, int pose) { inbox_.post(FinishPose{std::move(job), pose}); }
   void finish(std::string job) { inbox_.post(Finish{std::move(job)}); }
   void abandon(std::string job) { inbox_.post(Abandon{std::move(job)}); }
+  /// A whole scan, from its folder, when no scan is being followed.
+  void rebuild(std::string job, std::filesystem::path folder, Recipe recipe, ReconstructionChanges changes);
 
  private:
   struct Begin {
     std::string job;
     std::filesystem::path folder;
+    Recipe recipe;
+    ReconstructionChanges changes{};
+  };
+  struct Rebuild {
+    Begin begin;
   };
   struct AddView {
-    std::shared_ptr<const TakenView> view;
+    ViewId id;
+    std::shared_ptr<const TakenView> view;  ///< null: it is read from the disk when its turn comes
   };
   struct FinishPose {
     std::string job;
@@ -50,39 +61,47 @@ class ReconstructionThread {
   struct Abandon {
     std::string job;
   };
-  using Message = std::variant<Begin, AddView, FinishPose, Finish, Abandon>;
+  using Message = std::variant<Begin, Rebuild, AddView, FinishPose, Finish, Abandon>;
 
   struct Current {
     std::string job;
     std::filesystem::path folder;
+    Recipe recipe;
     std::unique_ptr<Reconstructor> reconstructor{};
+    bool quarantined = false;  ///< the scan goes on without
     int views_done = 0;
     std::optional<Error> error{};
   };
 
   void run();
   void handle(const Begin& message);
+  void handle(const Rebuild& message);
   void handle(const AddView& message);
   void handle(const FinishPose& message);
   void handle(const Finish& message);
   void handle(const Abandon& message);
 
-  bool works_on(const std::string& job) const { return current_ && current_->job == job && !current_->error; }
+  bool works_on(const std::string& job) const;
+  Result<void> start(const Begin& message, const ScanFolder& scan);
+  Result<void> catch_up(const ScanFolder& scan);
+  Result<void> add(int pose, const Result<ViewImages>& images);
+  Result<void> close_pose(int pose);
   void check(const Result<void>& done);
   Result<void> make_model();
+  void end();
   Context context(std::function<void(std::string_view, double)> progress) const {
     return {stop_.get_token(), progress};
   }
   void tell_progress(std::string stage, double fraction);
 
   ReconstructorFactory factory_;
-  int poses_;
-  int views_;
   std::function<void(Event)> tell_;
   Mailbox<Message> inbox_;
   std::stop_source stop_;
+  std::atomic<int> views_waiting_ = 0;  ///< in the inbox, with their images
   // Of the thread only.
   std::optional<Current> current_;
+  std::deque<Begin> rebuilds_;
   std::string told_stage_;
   double told_fraction_ = 0.0;
   std::thread thread_;

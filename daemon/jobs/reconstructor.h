@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
+#include <string>
 
 #include "core/context.h"
 #include "core/result.h"
@@ -24,6 +26,21 @@ class Reconstructor {
   virtual Result<void> finish(const std::filesystem::path& folder, const Context& context) = 0;
 };
 
-using ReconstructorFactory = std::function<std::unique_ptr<Reconstructor>(const Calibration&, const Manifest&)>;
+/// What a reprocessing changes; what is empty is as configured.
+struct ReconstructionChanges {
+  std::optional<double> voxel_mm{};
+  std::string fusion{};
+};
+
+struct ReconstructionTask {
+  const Calibration& calibration;
+  const Manifest& manifest;
+  std::filesystem::path folder;  ///< of the job
+  int views = 0;                 ///< of all poses, once they are there
+  ReconstructionChanges changes{};
+};
+
+/// Fails with `out_of_range` when the work would need more memory than it may have.
+using ReconstructorFactory = std::function<Result<std::unique_ptr<Reconstructor>>(const ReconstructionTask&)>;
 
 }  // namespace scanrig

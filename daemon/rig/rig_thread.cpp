@@ -68,7 +68,9 @@ Event RigThread::perform(const Command& command) {
   if (const auto* view = std::get_if<action::TakeView>(&command)) {
     auto taken = acquisition_.take_view(view->id, view->angle);
     if (!taken) return event::RigFailed{taken.error()};
-    return event::ViewTaken{std::make_shared<const TakenView>(std::move(*taken))};
+    auto shared = std::make_shared<const TakenView>(std::move(*taken));
+    if (view->closure) return event::ClosureTaken{std::move(shared)};
+    return event::ViewTaken{std::move(shared)};
   }
   if (const auto* jog = std::get_if<action::Jog>(&command)) {
     const auto measured = acquisition_.jog(*jog);

@@ -19,7 +19,10 @@ constexpr PanelOutputs kAllOn{true, true, true, true, true, true, true, true};
 
 ControlLoop::ControlLoop(Clock& clock, ControlLoopOptions options, JobTable known_jobs)
     : clock_(clock), options_(options), inbox_(clock), jobs_(std::move(known_jobs)) {
-  publish();
+  for (const auto& [id, job] : jobs_) {
+    state_ = next(state_, event::JobKnown{job}, options_.rules).state;
+  }
+  publish({});
 }
 
 Result<void> ControlLoop::run(const StationPorts& ports) {
@@ -49,24 +52,56 @@ Result<void> ControlLoop::run(const StationPorts& ports) {
 }
 
 void ControlLoop::handle(Message message, const StationPorts& ports) {
-  if (auto* pressed = std::get_if<event::Pressed>(&message.event)) {
-    if (pressed->button == Button::start) pressed->fresh_job_id = ports.fresh_job_id();
-  }
-  if (std::holds_alternative<event::Shutdown>(message.event) && !state_.shutting_down) {
-    give_up_ = clock_.now() + options_.shutdown_limit;
-  }
+  prepare(message, ports);
   auto step = next(state_, message.event, options_.rules);
   state_ = std::move(step.state);
-  update(jobs_, message.event, options_.rules.poses, options_.rules.views);
+  update(jobs_, message.event);
+  tally_.see(message.event, clock_.now());
   for (const auto& action : step.actions) carry_out(action, ports);
   show(ports);
-  publish();
+  publish(ports);
+  answer(message, step);
+  if (std::holds_alternative<event::CheckDue>(message.event)) look_at_the_time(ports);
+}
+
+/// Adds to the event what only this loop knows.
+void ControlLoop::prepare(Message& message, const StationPorts& ports) {
+  auto& event = message.event;
+  if (auto* pressed = std::get_if<event::Pressed>(&event)) {
+    if (pressed->button == Button::start) pressed->fresh_job_id = ports.fresh_job_id();
+  } else if (auto* ordered = std::get_if<event::Ordered>(&event)) {
+    ordered->ticket = ++last_ticket_;
+    for (int i = 0; i < std::clamp(ordered->order.repeat, 0, 100); ++i) {
+      ordered->fresh_ids.push_back(ports.fresh_job_id());
+    }
+  } else if (auto* asked = std::get_if<event::JobAsked>(&event)) {
+    asked->ticket = ++last_ticket_;
+  } else if (std::holds_alternative<event::Shutdown>(event) && !state_.shutting_down) {
+    give_up_ = clock_.now() + options_.shutdown_limit;
+  }
+}
+
+/// Whoever asked for something that takes a while is answered when it is done.
+void ControlLoop::answer(Message& message, const Step& step) {
+  if (const auto* answered = std::get_if<event::Answered>(&message.event)) {
+    if (auto waiting = waiting_.extract(answered->ticket)) waiting.mapped()(answered->result);
+  }
   if (!message.reply) return;
+  const bool takes_a_while =
+      std::holds_alternative<event::Ordered>(message.event) || std::holds_alternative<event::JobAsked>(message.event);
   if (step.refused) {
     message.reply(tl::unexpected(*step.refused));
+  } else if (takes_a_while) {
+    waiting_[last_ticket_] = std::move(message.reply);
   } else {
     message.reply(state_.job ? state_.job->id : std::string());
   }
+}
+
+/// Quiet hours come and go by the clock on the wall.
+void ControlLoop::look_at_the_time(const StationPorts& ports) {
+  const bool quiet = ports.quiet_hours();
+  if (quiet != state_.quiet) handle({event::QuietHours{quiet}, {}}, ports);
 }
 
 void ControlLoop::carry_out(const Action& action, const StationPorts& ports) {
@@ -74,6 +109,7 @@ void ControlLoop::carry_out(const Action& action, const StationPorts& ports) {
       Overloaded{[&](const action::Warn&) { wake_later(event::WarningOver{}, options_.warning); },
                  [&](const action::WaitForEstop&) { wake_later(event::EstopWindowOver{}, options_.estop_window); },
                  [&](const action::RetryStopLater&) { wake_later(event::StopRetryDue{}, options_.stop_retry); },
+                 [&](const action::WaitForFlip& flip) { wake_later(event::FlipTimedOut{flip.job}, flip.limit); },
                  [&](const action::CheckLater&) { wake_later(event::CheckDue{}, options_.check_period); },
                  [&](const action::TestLamps&) { lamps_tested_ = clock_.now() + kLampTest; },
                  [&](const auto& other) { ports.perform(other); }},
@@ -98,11 +134,13 @@ void ControlLoop::show(const StationPorts& ports) {
   ports.show(shown_);
 }
 
-void ControlLoop::publish() {
+void ControlLoop::publish(const StationPorts& ports) {
   auto words = describe(state_, options_.rules);
   auto devices = state_.devices;
   devices.push_back({"panel", state_.panel_problem});
-  published_.set(std::make_shared<const Snapshot>(Snapshot{
+  std::vector<std::string> queue;
+  for (const auto& job : state_.queue) queue.push_back(job->id);
+  auto snapshot = std::make_shared<const Snapshot>(Snapshot{
       .revision = ++revision_,
       .machine = state_.machine,
       .activity = state_.activity,
@@ -114,8 +152,12 @@ void ControlLoop::publish() {
       .outputs = shown_,
       .devices = std::move(devices),
       .job = state_.job ? state_.job->id : std::string(),
+      .queue = std::move(queue),
       .jobs = jobs_,
-  }));
+      .counters = tally_.counters(),
+  });
+  published_.set(snapshot);
+  ports.published(snapshot);
 }
 
 }  // namespace scanrig

@@ -9,6 +9,7 @@
 #include "daemon/mailbox.h"
 #include "daemon/station/events.h"
 #include "daemon/station/snapshot.h"
+#include "daemon/station/tally.h"
 #include "daemon/station/transition.h"
 #include "drivers/panel/panel.h"
 
@@ -19,7 +20,9 @@ struct StationPorts {
   std::function<void()> alive = [] {};  ///< the loop goes round; at least once a second
   std::function<void(const Action&)> perform;  ///< everything but Warn
   std::function<void(const PanelOutputs&)> show;
-  std::function<std::string()> fresh_job_id;
+  std::function<std::string()> fresh_job_id;  ///< another one each time
+  std::function<bool()> quiet_hours = [] { return false; };
+  std::function<void(const std::shared_ptr<const Snapshot>&)> published = [](const auto&) {};
 };
 
 struct ControlLoopOptions {
@@ -46,6 +49,12 @@ class ControlLoop {
   }
   /// The same for what an engineer asks for.
   void ask(event::MaintenanceAsked what, Reply reply) { inbox_.post({what, std::move(reply)}); }
+  /// Queues jobs. `reply` comes when their folders are durable, with the id of the first one. Fails with `not_found`
+  /// (the recipe), `invalid_input`, `refused`, `io`.
+  void order(Order order, Reply reply) { inbox_.post({event::Ordered{std::move(order)}, std::move(reply)}); }
+  /// What event::JobAsked lists. `reply` comes when it is done (a bundle: after a while), with the job's id or the
+  /// bundle's path. Fails with `not_found`, `busy`, `refused`, `exists`, `io`.
+  void ask(event::JobAsked what, Reply reply) { inbox_.post({std::move(what), std::move(reply)}); }
   [[nodiscard]] std::shared_ptr<const Snapshot> snapshot() const { return published_.get(); }
 
   /// Runs until a Shutdown is done. Fails with `timeout` when the rig was not seen stopped by then.
@@ -58,11 +67,14 @@ class ControlLoop {
   };
 
   void handle(Message message, const StationPorts& ports);
+  void prepare(Message& message, const StationPorts& ports);
+  void answer(Message& message, const Step& step);
+  void look_at_the_time(const StationPorts& ports);
   void carry_out(const Action& action, const StationPorts& ports);
   void wake_later(Event event, Clock::Duration after);
   void blink(const StationPorts& ports);
   void show(const StationPorts& ports);
-  void publish();
+  void publish(const StationPorts& ports);
 
   Clock& clock_;
   ControlLoopOptions options_;
@@ -71,7 +83,10 @@ class ControlLoop {
   // Of run()'s thread only.
   StationState state_;
   JobTable jobs_;
+  Tally tally_;
   std::uint64_t revision_ = 0;
+  Ticket last_ticket_ = 0;
+  std::map<Ticket, Reply> waiting_;  // for what takes a while
   struct Later {
     Clock::TimePoint at;
     Event event;

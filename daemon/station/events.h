@@ -1,5 +1,7 @@
 #pragma once
 
+#include <chrono>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
@@ -8,6 +10,7 @@
 
 #include "core/result.h"
 #include "core/units.h"
+#include "daemon/station/job_info.h"
 #include "daemon/station/states.h"
 #include "drivers/panel/panel.h"
 
@@ -22,6 +25,16 @@ struct ViewId {
 };
 
 struct TakenView;  // daemon/rig/taken_view.h
+
+/// Scans to be done: one job each.
+struct Order {
+  std::string recipe = "default";
+  std::string part{};  ///< free text, at most 200 bytes
+  int repeat = 1;      ///< 1 to 100
+};
+
+/// Names whoever waits for an answer; 0: nobody.
+using Ticket = std::uint64_t;
 
 /// Whether a device answers. One that does not leaves the rest running.
 struct DeviceHealth {
@@ -56,6 +69,9 @@ struct WarningOver {};
 struct EstopWindowOver {};  ///< an e-stop would have been seen by now
 struct StopRetryDue {};
 struct CheckDue {};
+struct QuietHours {
+  bool quiet;
+};  ///< they have begun or ended
 struct DevicesSeen {
   std::vector<DeviceHealth> devices;
 };
@@ -87,8 +103,61 @@ struct StopFailed {
 struct PanelFailed {
   Error error;
 };
-struct JobCreated {
-  std::string job, folder;
+/// Somebody wants scans. Answered when every job's folder is durable, with the first one's id.
+struct Ordered {
+  Order order;
+  std::vector<std::string> fresh_ids{};  ///< one a job
+  Ticket ticket = 0;
+};
+/// Somebody wants something done with one job. Answered when it is done.
+struct JobAsked {
+  enum class What {
+    cancel,        ///< queued or interrupted: ends cancelled, with its evidence
+    resume,        ///< interrupted: the next Start goes on with it
+    to_front,      ///< queued: the next Start begins it
+    remove,        ///< the folder goes; only of a job that has ended
+    reprocess,     ///< the reconstruction again, from the images; `options` may change it
+    set_exported,  ///< retention may remove it
+    bundle,        ///< packed into the file `path`, for whoever must help; counts as exported
+  };
+  What what;
+  std::string job;
+  std::string path{};                ///< bundle: absolute, .tar.gz, must not be there
+  std::optional<double> voxel_mm{};  ///< reprocess
+  std::string fusion{};              ///< reprocess: `evidence`, `paper`; empty: as configured
+  Ticket ticket = 0;
+};
+/// What was asked for under `ticket` has been done, or why not.
+struct Answered {
+  Ticket ticket;
+  Result<std::string> result;
+};
+/// What a job's folder says now; a new job, or one that changed in other ways than by being scanned.
+struct JobKnown {
+  std::shared_ptr<const JobInfo> info;
+};
+struct JobRemoved {
+  std::string job;
+};
+/// The job has the rig: it goes on after `stored` views of `pose`.
+struct JobBegun {
+  std::string job;
+  int pose, stored;
+};
+/// The job was not begun: the disk is too full, the folder is damaged. It stays queued.
+struct JobNotBegun {
+  std::string job;
+  Error why;
+};
+struct ClosureTaken {
+  std::shared_ptr<const TakenView> view;
+};
+struct ClosureJudged {
+  std::string job;
+  Closure closure;
+};
+struct FlipTimedOut {
+  std::string job;
 };
 struct ViewStored {
   ViewId id;
@@ -105,6 +174,7 @@ struct JobClosed {
   std::string job;
   JobState state;
   Error why;
+  bool resumable = false;
 };
 struct StoreFailed {
   std::string job;
@@ -119,16 +189,19 @@ struct ReconstructionFailed {
   Error error;
 };
 struct ModelReady {
-  std::string job, model, report;
-};  ///< paths of the files
+  std::string job, model, report;        ///< paths of the files
+  std::optional<Error> beyond_limits{};  ///< why it does not pass
+};
 struct Shutdown {};
 }  // namespace event
 
 using Event =
     std::variant<event::PanelFound, event::InputsSeen, event::Pressed, event::EstopChanged, event::GuardChanged,
-                 event::WarningOver, event::EstopWindowOver, event::StopRetryDue, event::CheckDue, event::DevicesSeen,
-                 event::MaintenanceAsked, event::Jogged, event::Pulsed, event::Homed, event::ViewTaken, event::Stopped,
-                 event::RigFailed, event::StopFailed, event::PanelFailed, event::JobCreated, event::ViewStored,
+                 event::WarningOver, event::EstopWindowOver, event::StopRetryDue, event::CheckDue, event::QuietHours,
+                 event::DevicesSeen, event::MaintenanceAsked, event::Jogged, event::Pulsed, event::Homed,
+                 event::ViewTaken, event::Stopped, event::RigFailed, event::StopFailed, event::PanelFailed,
+                 event::Ordered, event::JobAsked, event::Answered, event::JobKnown, event::JobRemoved, event::JobBegun,
+                 event::JobNotBegun, event::ClosureTaken, event::ClosureJudged, event::FlipTimedOut, event::ViewStored,
                  event::PoseStored, event::JobClosed, event::StoreFailed, event::StageProgress,
                  event::ReconstructionFailed, event::ModelReady, event::Shutdown>;
 
@@ -151,9 +224,35 @@ struct TestLamps {};
 struct TakeView {
   ViewId id;
   Degrees angle;
+  bool closure = false;  ///< view 0 again, for comparison: answered by ClosureTaken instead of ViewTaken
 };
-struct CreateJob {
+struct WaitForFlip {
   std::string job;
+  std::chrono::minutes limit;
+};  ///< FlipTimedOut comes after it
+/// Job folders in the state queued, one after the other. Each is told as JobKnown.
+struct CreateJobs {
+  std::vector<std::string> ids;
+  Recipe recipe;
+  std::string part;
+  std::int64_t place;  ///< of the first
+  Ticket ticket;
+};
+struct BeginJob {
+  std::string job;
+};  ///< answered by JobBegun or JobNotBegun
+struct MoveJob {
+  std::string job;
+  std::int64_t place;
+  bool resume;  ///< an interrupted job is queued again
+  Ticket ticket;
+};
+/// Everything else somebody wants done with a job that does not have the rig.
+struct KeepJob {
+  event::JobAsked asked;
+};
+struct JudgeClosure {
+  std::shared_ptr<const TakenView> view;
 };
 struct StoreView {
   std::shared_ptr<const TakenView> view;
@@ -165,7 +264,7 @@ struct FinishPose {
 };  ///< the manifest says: complete; waiting or scanned
 struct ResumeJob {
   std::string job;
-};  ///< the manifest says: scanning again
+};  ///< after the flip the manifest says: scanning again
 struct CloseJob {
   std::string job;
   JobState state;
@@ -176,6 +275,7 @@ struct CloseJob {
 using Action =
     std::variant<action::Warn, action::WaitForEstop, action::RetryStopLater, action::CheckLater, action::CheckDevices,
                  action::Home, action::StopRig, action::Jog, action::Pulse, action::TestLamps, action::TakeView,
-                 action::CreateJob, action::StoreView, action::FinishPose, action::ResumeJob, action::CloseJob>;
+                 action::WaitForFlip, action::CreateJobs, action::BeginJob, action::MoveJob, action::KeepJob,
+                 action::JudgeClosure, action::StoreView, action::FinishPose, action::ResumeJob, action::CloseJob>;
 
 }  // namespace scanrig

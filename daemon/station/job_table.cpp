@@ -27,19 +27,28 @@ void set_progress(JobInfo& job, const event::StageProgress& e) {
 }
 
 void set_pose_stored(JobInfo& job, int pose) {
-  const bool last = pose + 1 == job.poses;
+  const bool last = pose + 1 == job.recipe.poses;
+  job.complete = pose + 1;
   job.state = last ? JobState::reconstructing : JobState::waiting_for_flip;
   if (last && job.error) job.state = JobState::failed;  // the reconstruction gave up earlier
 }
 
 }  // namespace
 
-void update(JobTable& table, const Event& event, int poses, int views) {
+void update(JobTable& table, const Event& event) {
   std::visit(
       Overloaded{
-          [&](const event::JobCreated& e) {
-            table[e.job] = std::make_shared<JobInfo>(
-                JobInfo{.id = e.job, .folder = e.folder, .state = JobState::scanning, .poses = poses, .views = views});
+          [&](const event::JobKnown& e) { table[e.info->id] = e.info; },
+          [&](const event::JobRemoved& e) { table.erase(e.job); },
+          [&](const event::JobBegun& e) {
+            change(table, e.job, [](JobInfo& job) {
+              job.state = JobState::scanning;
+              job.resumable = false;
+              job.error.reset();
+            });
+          },
+          [&](const event::ClosureJudged& e) {
+            change(table, e.job, [&](JobInfo& job) { job.closures.push_back(e.closure); });
           },
           [&](const event::ViewStored& e) {
             change(table, e.id.job, [&](JobInfo& job) {
@@ -51,7 +60,9 @@ void update(JobTable& table, const Event& event, int poses, int views) {
             change(table, e.job, [&](JobInfo& job) { set_pose_stored(job, e.pose); });
           },
           [&](const event::JobClosed& e) {
-            change(table, e.job, [&](JobInfo& job) { std::tie(job.state, job.error) = std::tuple(e.state, e.why); });
+            change(table, e.job, [&](JobInfo& job) {
+              std::tie(job.state, job.error, job.resumable) = std::tuple(e.state, e.why, e.resumable);
+            });
           },
           [&](const event::StageProgress& e) { change(table, e.job, [&](JobInfo& job) { set_progress(job, e); }); },
           [&](const event::ReconstructionFailed& e) {
@@ -63,6 +74,8 @@ void update(JobTable& table, const Event& event, int poses, int views) {
           [&](const event::ModelReady& e) {
             change(table, e.job, [&](JobInfo& job) {
               std::tie(job.state, job.model, job.report) = std::tuple(JobState::done, e.model, e.report);
+              job.passed = !e.beyond_limits;
+              job.error = e.beyond_limits;
             });
           },
           [](const auto&) {},  // concerns the machine only

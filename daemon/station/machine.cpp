@@ -77,6 +77,19 @@ bool Machine::safe_to_move() {
   return !why_not;
 }
 
+const DeviceHealth* Machine::absent_device() {
+  for (const auto& device : s().devices) {
+    if (device.problem) return &device;
+  }
+  return nullptr;
+}
+
+bool Machine::all_there() {
+  const auto* const absent = absent_device();
+  if (absent) refuse(absent->problem->code, "The {} is not there: {}.", absent->name, absent->problem->message);
+  return !absent;
+}
+
 bool Machine::remote_may_move(std::string_view what) {
   if (!rules_.remote || !rules_.guard) {
     refuse(ErrorCode::refused, "Remote {} is switched off: do it at the panel.", what);

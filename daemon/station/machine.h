@@ -14,6 +14,7 @@ class Machine {
  public:
   Machine(const StationState& state, const StationRules& rules) : rules_(rules) { step_.state = state; }
 
+  bool has(const std::string& job) { return s().job && s().job->id == job; }
   Step take() && { return std::move(step_); }
   StationState& s() { return step_.state; }
   [[nodiscard]] const StationRules& rules() const { return rules_; }
@@ -46,6 +47,10 @@ class Machine {
   bool safe_to_move();
   /// The same for whoever is not at the panel: he needs a guard between him and the table.
   bool remote_may_move(std::string_view what);
+  /// The first device that is known to be absent; null: all are there.
+  const DeviceHealth* absent_device();
+  /// Refuses, and says why, unless all devices are there. What is absent does not let a job begin.
+  bool all_there();
   /// Homing, after the warning.
   void begin_homing(std::string cause);
   /// After a restart, where a closed guard stands for Reset.
@@ -56,10 +61,38 @@ class Machine {
   Step step_;
 };
 
+// maintenance.cpp
 void ask_maintenance(Machine& m, const event::MaintenanceAsked& asked);
 void reset_in_maintenance(Machine& m, Origin origin);
 void stop_in_maintenance(Machine& m);
 /// The warning is over: what was asked for begins.
 void move_in_maintenance(Machine& m);
+
+// queue.cpp: which job has the rig next
+void take_order(Machine& m, const event::Ordered& asked);
+void ask_job(Machine& m, const event::JobAsked& asked);
+void job_known(Machine& m, const std::shared_ptr<const JobInfo>& info);
+void job_removed(Machine& m, const std::string& job);
+/// The head of the queue gets the rig; where nothing is queued, a new job of the default recipe. Warns first.
+void begin_next_job(Machine& m, const std::string& fresh_job_id, std::string cause);
+void job_not_begun(Machine& m, const event::JobNotBegun& e);
+/// The rig is free again: ready, or on to the next part.
+void free_rig(Machine& m, std::string cause);
+void count_result(Machine& m, bool good);
+void inputs_seen(Machine& m, const PanelInputs& inputs);
+/// The queue goes on by itself where a new part lies on the table and every rule allows it.
+void begin_on_part(Machine& m);
+
+// scanning.cpp: the job that has the rig, view by view
+void job_begun(Machine& m, const event::JobBegun& e);
+void take_next_view(Machine& m);
+void view_taken(Machine& m, const event::ViewTaken& e);
+void view_stored(Machine& m, const event::ViewStored& e);
+void closure_taken(Machine& m, const event::ClosureTaken& e);
+void closure_judged(Machine& m, const event::ClosureJudged& e);
+void pose_stored(Machine& m, const event::PoseStored& e);
+/// The object was turned over.
+void continue_after_flip(Machine& m, std::string cause);
+void flip_timed_out(Machine& m, const event::FlipTimedOut& e);
 
 }  // namespace scanrig

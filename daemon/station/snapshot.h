@@ -4,9 +4,11 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "daemon/station/job_table.h"
 #include "daemon/station/states.h"
+#include "daemon/station/tally.h"
 
 namespace scanrig {
 
@@ -15,15 +17,17 @@ struct Snapshot {
   std::uint64_t revision = 0;
   MachineState machine = MachineState::preoperational;
   Activity activity = Activity::none;
-  std::string cause;
-  std::string sentence;
-  std::string next_action;
+  std::string cause{};
+  std::string sentence{};
+  std::string next_action{};
   bool may_be_moving = false;  ///< the last stop was not confirmed
   PanelInputs inputs{};
   PanelOutputs outputs{};
   std::vector<DeviceHealth> devices{};  ///< as of the last check
-  std::string job;                      ///< the one that has the rig; empty: none
-  JobTable jobs;
+  std::string job{};                    ///< the one that has the rig; empty: none
+  std::vector<std::string> queue{};     ///< ids of the jobs to come, the next one first
+  JobTable jobs{};
+  Counters counters{};
 };
 
 /// The latest snapshot, from one writer to any number of readers.

@@ -11,6 +11,7 @@ std::string_view to_string(MachineState state) {
     case MachineState::initialized: return "Operational.Initialized";
     case MachineState::ready: return "Operational.Ready";
     case MachineState::single_execution: return "Operational.SingleExecution";
+    case MachineState::continuous_execution: return "Operational.ContinuousExecution";
   }
   return "unknown";
 }
@@ -39,6 +40,7 @@ std::string_view to_string(Activity activity) {
     case Activity::scanning: return "scanning";
     case Activity::storing: return "storing";
     case Activity::waiting_for_flip: return "waiting_for_flip";
+    case Activity::waiting_for_part: return "waiting_for_part";
     case Activity::stopping: return "stopping";
   }
   return "unknown";

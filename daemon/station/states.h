@@ -6,8 +6,17 @@
 namespace scanrig {
 
 /// The machine, in the words of OPC 40100-1. `initialized` covers homing, `maintenance` is halted with
-/// an engineer at the rig.
-enum class MachineState { preoperational, halted, maintenance, error, initialized, ready, single_execution };
+/// an engineer at the rig, `continuous_execution` goes from job to job as parts come.
+enum class MachineState {
+  preoperational,
+  halted,
+  maintenance,
+  error,
+  initialized,
+  ready,
+  single_execution,
+  continuous_execution
+};
 
 enum class JobState { queued, scanning, waiting_for_flip, reconstructing, done, failed, interrupted, cancelled };
 
@@ -21,6 +30,7 @@ enum class Activity {
   scanning,          ///< turning and exposing
   storing,           ///< all views of the pose are taken, the last ones go to disk
   waiting_for_flip,  ///< standing, dark
+  waiting_for_part,  ///< continuous: the next job begins when a new part is seen
   stopping,          ///< told to stop, not yet seen standing and dark
 };
 

@@ -5,8 +5,6 @@
 namespace scanrig {
 namespace {
 
-constexpr int kMostUnstored = 2;  ///< views in memory only; a power cut costs no more
-
 class Transition : public Machine {
  public:
   using Machine::Machine;
@@ -23,7 +21,7 @@ class Transition : public Machine {
     if (!e.estop_ok && !s().latched) fault("The e-stop is pressed.");
   }
 
-  void operator()(const event::InputsSeen& e) { s().inputs = e.inputs; }
+  void operator()(const event::InputsSeen& e) { inputs_seen(*this, e.inputs); }
 
   void operator()(const event::Pressed& e) {
     if (s().shutting_down) return refuse(ErrorCode::refused, "The daemon is shutting down.");
@@ -50,6 +48,7 @@ class Transition : public Machine {
     s().guard_closed = e.closed;
     if (!e.closed && may_move()) return fault("The guard was opened while the table was moving.");
     home_if_guarded();
+    begin_on_part(*this);
   }
 
   void operator()(const event::WarningOver&) {
@@ -60,7 +59,7 @@ class Transition : public Machine {
       act(action::Home{});
     } else {
       s().activity = Activity::scanning;
-      take_next_view();
+      take_next_view(*this);
     }
   }
 
@@ -91,8 +90,8 @@ class Transition : public Machine {
 
   /// Asking devices is for quiet times only.
   void operator()(const event::CheckDue&) {
-    const bool quiet = s().activity == Activity::none && !s().may_be_moving && !s().shutting_down;
-    if (quiet) {
+    const bool standing = s().activity == Activity::none || s().activity == Activity::waiting_for_part;
+    if (standing && !s().may_be_moving && !s().shutting_down) {
       act(action::CheckDevices{});
     } else {
       act(action::CheckLater{});
@@ -102,14 +101,12 @@ class Transition : public Machine {
   void operator()(const event::DevicesSeen& e) {
     s().devices = e.devices;
     act(action::CheckLater{});
+    begin_on_part(*this);
   }
 
-  void operator()(const event::ViewTaken& e) {
-    if (s().activity != Activity::scanning) return;  // a view that came after Stop is not kept
-    ++s().job->taken;
-    act(action::StoreView{e.view});
-    if (s().job->taken == rules().views) s().activity = Activity::storing;
-    take_next_view();
+  void operator()(const event::QuietHours& e) {
+    s().quiet = e.quiet;
+    begin_on_part(*this);
   }
 
   /// A projector that cannot be reached is an absent device; it does not make the table move.
@@ -145,45 +142,32 @@ class Transition : public Machine {
     if (s().machine != MachineState::error) fault(e.error.message + ".");
   }
 
-  void operator()(const event::JobCreated& e) {
-    if (!has(e.job)) return;
-    s().job->state = JobState::scanning;
-    take_next_view();
-  }
+  void operator()(const event::Ordered& e) { take_order(*this, e); }
+  void operator()(const event::JobAsked& e) { ask_job(*this, e); }
+  void operator()(const event::JobKnown& e) { job_known(*this, e.info); }
+  void operator()(const event::JobRemoved& e) { job_removed(*this, e.job); }
+  void operator()(const event::JobBegun& e) { job_begun(*this, e); }
+  void operator()(const event::JobNotBegun& e) { job_not_begun(*this, e); }
+  void operator()(const event::ViewTaken& e) { view_taken(*this, e); }
+  void operator()(const event::ViewStored& e) { view_stored(*this, e); }
+  void operator()(const event::ClosureTaken& e) { closure_taken(*this, e); }
+  void operator()(const event::ClosureJudged& e) { closure_judged(*this, e); }
+  void operator()(const event::PoseStored& e) { pose_stored(*this, e); }
+  void operator()(const event::FlipTimedOut& e) { flip_timed_out(*this, e); }
 
-  void operator()(const event::ViewStored& e) {
-    if (!has(e.id.job) || e.id.pose != s().job->pose) return;
-    ++s().job->stored;
-    if (s().activity == Activity::storing && s().job->stored == rules().views) {
-      act(action::FinishPose{e.id.job, e.id.pose, e.id.pose + 1 == rules().poses});
-    }
-    take_next_view();
-  }
-
-  void operator()(const event::PoseStored& e) {
-    if (!has(e.job) || s().activity != Activity::storing) return;
-    if (e.pose + 1 == rules().poses) {
-      s().job.reset();
-      enter(MachineState::ready, fmt::format("Job {} has all its views.", e.job));
-    } else if (s().job->reconstruction) {  // no use turning the object over
-      close_job(JobState::failed, *s().job->reconstruction);
-      enter(MachineState::ready, fmt::format("Job {} failed.", e.job));
-    } else {
-      s().job->state = JobState::waiting_for_flip;
-      s().activity = Activity::waiting_for_flip;
-      s().cause = fmt::format("Pose {} is complete.", e.pose + 1);
-    }
-  }
-
+  /// What is on disk stays; with room again the job can be resumed.
   void operator()(const event::StoreFailed& e) {
     if (!has(e.job)) return;
-    close_job(JobState::failed, e.error);
+    close_job(JobState::interrupted, e.error);
     fault(e.error.message + ".");
   }
 
   void operator()(const event::ReconstructionFailed& e) {
     if (has(e.job)) s().job->reconstruction = e.error;
+    count_result(*this, false);
   }
+
+  void operator()(const event::ModelReady& e) { count_result(*this, !e.beyond_limits); }
 
   void operator()(const event::Shutdown&) {
     if (s().shutting_down) return;
@@ -198,26 +182,16 @@ class Transition : public Machine {
     stop_rig();
   }
 
-  // These concern the list of jobs only.
+  // These concern the list of jobs or whoever asked.
   void operator()(const event::JobClosed&) {}
   void operator()(const event::StageProgress&) {}
-  void operator()(const event::ModelReady&) {}
+  void operator()(const event::Answered&) {}
 
  private:
-  bool has(const std::string& job) { return s().job && s().job->id == job; }
-
   void stopped() {
     if (s().activity != Activity::stopping) return;
     s().activity = Activity::none;
     s().finished = s().shutting_down;
-  }
-
-  void take_next_view() {
-    if (s().activity != Activity::scanning || s().job->state != JobState::scanning) return;
-    auto& job = *s().job;
-    if (job.asked > job.taken || job.taken - job.stored >= kMostUnstored) return;
-    act(action::TakeView{{job.id, job.pose, job.asked}, {360.0 * job.asked / rules().views}});
-    ++job.asked;
   }
 
   void set_problem(const std::string& name, const Error& error) {
@@ -230,16 +204,6 @@ class Transition : public Machine {
     s().devices.push_back({name, error});
   }
 
-  /// What is absent is told, and does not let a job begin.
-  bool all_there() {
-    for (const auto& device : s().devices) {
-      if (!device.problem) continue;
-      refuse(device.problem->code, "The {} is not there: {}.", device.name, device.problem->message);
-      return false;
-    }
-    return true;
-  }
-
   void start(const std::string& fresh_job_id) {
     const bool flipped = s().activity == Activity::waiting_for_flip;
     if (s().maintenance)
@@ -248,26 +212,19 @@ class Transition : public Machine {
         s().machine == MachineState::preoperational) {
       return refuse(ErrorCode::refused, "The station is {}: {} Press Reset first.", to_string(s().machine), s().cause);
     }
-    if (s().machine != MachineState::ready && !flipped) {
+    const bool free = s().machine == MachineState::ready || s().activity == Activity::waiting_for_part;
+    if (!free && !flipped) {
       return refuse(ErrorCode::busy, "The station is busy ({}).", to_string(s().activity));
     }
     if (!safe_to_move() || !all_there()) return;
-    if (flipped) {
-      s().job = ActiveJob{.id = s().job->id, .state = JobState::scanning, .pose = s().job->pose + 1};
-      s().cause = "The object was turned over.";
-      act(action::ResumeJob{s().job->id});
-    } else {
-      s().machine = MachineState::single_execution;
-      s().cause = "Start was pressed.";
-      s().job = ActiveJob{.id = fresh_job_id};
-      act(action::CreateJob{fresh_job_id});
-    }
-    warn();
+    s().failures = 0;
+    if (flipped) return continue_after_flip(*this, "The object was turned over.");
+    begin_next_job(*this, fresh_job_id, "Start was pressed.");
   }
 
   void stop() {
     const Error why{ErrorCode::stopped, "Stop was pressed"};
-    if (s().activity == Activity::waiting_for_flip) {
+    if (s().activity == Activity::waiting_for_flip || s().activity == Activity::waiting_for_part) {
       close_job(JobState::cancelled, why);
       return enter(MachineState::ready, "Stop was pressed.");
     }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,8 +13,7 @@
 namespace scanrig {
 
 struct StationRules {
-  int poses = 2;
-  int views = 8;              ///< a pose, at equal angles
+  std::map<std::string, Recipe> recipes{{"default", {}}};  ///< "default" is what Start scans when nothing is queued
   bool remote = false;        ///< the API may start and home while the guard is closed; needs a guard
   bool guard = false;         ///< there is a guard whose contact is wired
   bool home_guarded = false;  ///< after a restart a closed guard homes the table, without Reset
@@ -21,14 +22,19 @@ struct StationRules {
 
 constexpr DegreesPerSecond kMaxJogSpeed{10};
 
+constexpr int kFailuresThatStop = 3;  ///< in a row: something is wrong with the line, not with a part
+
 /// The job that has the rig.
 struct ActiveJob {
   std::string id;
+  Recipe recipe{};
   JobState state = JobState::queued;
   int pose = 0;
   int asked = 0;                          ///< views of this pose the rig was told to take
   int taken = 0;                          ///< views whose four images are in memory
   int stored = 0;                         ///< views that survive a power cut
+  bool closure_due = false;               ///< view 0 has to be taken again before anything else
+  bool closing = false;                   ///< it is being taken or judged
   std::optional<Error> reconstruction{};  ///< why there will be no model
 };
 
@@ -59,6 +65,10 @@ struct StationState {
   bool may_be_moving = false;                     ///< the last stop was not confirmed
   std::string cause = "The daemon has started.";  ///< why the machine is in this state
   std::optional<ActiveJob> job;
+  std::vector<std::shared_ptr<const JobInfo>> queue{};  ///< by place
+  int failures = 0;                                     ///< jobs in a row without a model that passes
+  bool quiet = false;                                   ///< quiet hours: no job begins by itself
+  bool part_gone = false;                               ///< the part of the last job was taken away
 };
 
 struct Step {

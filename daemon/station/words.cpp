@@ -32,16 +32,48 @@ std::string fault_sentence(const StationState& state) {
   return "A fault stopped the rig.";
 }
 
-std::string working(const StationState& state, const StationRules& rules) {
+std::string working(const StationState& state) {
   const auto& job = *state.job;
   switch (state.activity) {
     case Activity::warning: return "The table is about to move.";
     case Activity::scanning:
-      return fmt::format("Pose {} of {}: {} of {} views taken, {} stored.", job.pose + 1, rules.poses, job.taken,
-                         rules.views, job.stored);
+      if (job.closing) return fmt::format("Pose {} of {}: view 0 is taken again.", job.pose + 1, job.recipe.poses);
+      return fmt::format("Pose {} of {}: {} of {} views taken, {} stored.", job.pose + 1, job.recipe.poses, job.taken,
+                         job.recipe.views, job.stored);
     case Activity::storing: return fmt::format("Storing the last views of pose {}.", job.pose + 1);
     default: return "";
   }
+}
+
+/// What Start would do: the head of the queue tells, and what of it is there already.
+std::string how_to_start(const StationState& state) {
+  if (state.queue.empty()) return "Put an object on the table, then press Start.";
+  const auto& head = *state.queue.front();
+  const bool has_views = !head.stored.empty() && head.stored.back().pose == head.complete;
+  const auto name = head.part.empty() ? "job " + head.id : head.part;
+  if (has_views) return fmt::format("{} goes on where it stopped: leave its object as it lies, press Start.", name);
+  if (head.complete > 0) return fmt::format("Put the object of {} on the table, turned over, then press Start.", name);
+  return fmt::format("Put the object for {} on the table, then press Start.", name);
+}
+
+Words when_ready(const StationState& state, const StationRules& rules) {
+  const auto queued = state.queue.size();
+  return {queued == 0 ? "The rig is ready." : fmt::format("The rig is ready, {} in the queue.", queued),
+          with_light(rules, "Switch the projector on. ", how_to_start(state))};
+}
+
+Words when_executing(const StationState& state) {
+  if (state.activity == Activity::waiting_for_flip) {
+    return {fmt::format("Pose {} of {} is complete.", state.job->pose + 1, state.job->recipe.poses),
+            state.job->recipe.flip_by_line
+                ? "The line is asked to turn the object over."
+                : "Turn the object over so that its underside faces the cameras, then press Start."};
+  }
+  if (state.activity == Activity::waiting_for_part) {
+    return {fmt::format("Waiting for the next part, {} in the queue.", state.queue.size()),
+            state.quiet ? "Quiet hours: the queue goes on when they end." : ""};
+  }
+  return {working(state), ""};
 }
 
 }  // namespace
@@ -57,15 +89,9 @@ Words describe(const StationState& state, const StationRules& rules) {
       return {fault_sentence(state), with_light(rules, "Switch the projector off. ", how_to_reset(state))};
     case MachineState::initialized:
       return {state.activity == Activity::warning ? "The table is about to move." : "The table is finding home.", ""};
-    case MachineState::ready:
-      return {"The rig is ready.",
-              with_light(rules, "Switch the projector on. ", "Put an object on the table, then press Start.")};
+    case MachineState::ready: return when_ready(state, rules);
     case MachineState::single_execution:
-      if (state.activity == Activity::waiting_for_flip) {
-        return {fmt::format("Pose {} of {} is complete.", state.job->pose + 1, rules.poses),
-                "Turn the object over so that its underside faces the cameras, then press Start."};
-      }
-      return {working(state, rules), ""};
+    case MachineState::continuous_execution: return when_executing(state);
   }
   return {};
 }

@@ -87,7 +87,7 @@ Result<View> make_view(const Rectification& rectification, const StereoImages& i
   } else {
     cut_at_table(view.range, rectification, options.table_clearance_mm);
     if (cv::countNonZero(view.range.depth == view.range.depth) == 0) {
-      return fail(ErrorCode::degenerate, "range: nothing was measured above the table");
+      return fail(ErrorCode::degenerate, "range: nothing was measured above the table; is it empty?");
     }
   }
   return view;

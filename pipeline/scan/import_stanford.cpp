@@ -149,9 +149,10 @@ Result<void> import_stanford(const std::filesystem::path& pose1_conf,
     for (PlacedView& view : poses[pose]) {
       if (auto added = scan->add_range_view(pose, std::move(view.record), view.depth); !added) return added;
     }
-    if (auto complete = scan->set_pose_complete(pose); !complete) return complete;
+    const bool last = pose + 1 == poses.size();
+    if (auto complete = scan->complete_pose(pose, last ? "scanned" : "scanning"); !complete) return complete;
   }
-  return scan->set_state("scanned");
+  return {};
 }
 
 }  // namespace scanrig

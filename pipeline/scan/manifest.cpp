@@ -13,6 +13,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
+constexpr int kVersion = 2;
 constexpr std::array kStates = {"queued",    "scanning", "waiting_for_flip", "scanned", "interrupted",
                                 "cancelled", "failed"};
 constexpr std::array kSources = {"stereo", "range"};
@@ -47,6 +48,11 @@ ordered_json to_json(const ViewRecord& view) {
     json["camera_from_pose"] = to_json(view.camera_from_pose);
   }
   return json;
+}
+
+ordered_json to_json(const ClosureRecord& closure) {
+  return {{"after_views", closure.after_views}, {"measured_deg", closure.measured_deg}, {"taken", closure.taken},
+          {"shift_px", closure.shift_px},       {"changed", closure.changed},           {"unmoved", closure.unmoved}};
 }
 
 FileRecord read_file_record(JsonObject object, std::string_view key = "path") {
@@ -90,6 +96,18 @@ ViewRecord read_view(JsonObject object, bool stereo) {
   return view;
 }
 
+ClosureRecord read_closure(JsonObject object) {
+  ClosureRecord closure;
+  closure.after_views = object.integer("after_views", 0, 9999);
+  closure.measured_deg = object.number("measured_deg", -3600, 3600);
+  closure.taken = object.text("taken");
+  closure.shift_px = object.number("shift_px", 0, 1e6);
+  closure.changed = object.number("changed", 0, 1);
+  closure.unmoved = object.flag("unmoved");
+  object.close();
+  return closure;
+}
+
 /// The first index that is not there before the last one (0 where there is no view at all).
 std::optional<int> first_gap(const PoseRecord& pose) {
   if (pose.views.empty()) return 0;
@@ -99,7 +117,7 @@ std::optional<int> first_gap(const PoseRecord& pose) {
   return std::nullopt;
 }
 
-PoseRecord read_pose(JsonObject object, bool stereo) {
+PoseRecord read_pose(JsonObject object, bool stereo, int version) {
   PoseRecord pose;
   pose.name = object.text("name");
   if (pose.name.empty() || pose.name.front() == '.' || pose.name.find('/') != std::string::npos) {
@@ -112,6 +130,9 @@ PoseRecord read_pose(JsonObject object, bool stereo) {
       view.reject("index", "views must be listed by ascending index, each once");
     }
   }
+  if (version >= 2) {
+    for (const JsonObject& closure : object.objects("closures")) pose.closures.push_back(read_closure(closure));
+  }
   if (const auto gap = first_gap(pose); pose.complete && gap) {
     object.reject("views", fmt::format("view {} is missing, though the pose is complete", *gap));
   }
@@ -122,22 +143,24 @@ PoseRecord read_pose(JsonObject object, bool stereo) {
 }  // namespace
 
 std::string to_json(const Manifest& manifest) {
-  ordered_json json = {{"format", "scanrig-scan"},   {"version", 1},
-                       {"id", manifest.id},          {"created", manifest.created},
-                       {"state", manifest.state},    {"source", manifest.source},
+  ordered_json json = {{"format", "scanrig-scan"},    {"version", kVersion},     {"id", manifest.id},
+                       {"created", manifest.created}, {"state", manifest.state}, {"source", manifest.source},
                        {"profile", manifest.profile}};
   if (manifest.calibration) json["calibration"] = to_json(*manifest.calibration, "file");
   json["poses"] = ordered_json::array();
   for (const PoseRecord& pose : manifest.poses) {
     ordered_json views = ordered_json::array();
     for (const ViewRecord& view : pose.views) views.push_back(to_json(view));
-    json["poses"].push_back({{"name", pose.name}, {"complete", pose.complete}, {"views", views}});
+    ordered_json closures = ordered_json::array();
+    for (const ClosureRecord& closure : pose.closures) closures.push_back(to_json(closure));
+    json["poses"].push_back(
+        {{"name", pose.name}, {"complete", pose.complete}, {"views", views}, {"closures", closures}});
   }
   return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
 }
 
 Result<Manifest> read_manifest(const std::filesystem::path& file) {
-  auto json = JsonFile::read(file, "scanrig-scan", 1);
+  auto json = JsonFile::read(file, "scanrig-scan", kVersion, 1);
   if (!json) return pass_on(json);
   JsonObject& root = json->root();
   Manifest manifest;
@@ -150,7 +173,7 @@ Result<Manifest> read_manifest(const std::filesystem::path& file) {
   if (root.has("calibration")) manifest.calibration = read_file_record(root.object("calibration"), "file");
   std::set<std::string> names;
   for (JsonObject& pose : root.objects("poses")) {
-    manifest.poses.push_back(read_pose(pose, manifest.source == "stereo"));
+    manifest.poses.push_back(read_pose(pose, manifest.source == "stereo", json->version()));
     if (!names.insert(manifest.poses.back().name).second) pose.reject("name", "is that of another pose");
   }
   if (const auto whole = json->finish(); !whole) return pass_on(whole);

@@ -24,17 +24,28 @@ struct ViewRecord {
   double measured_deg = 0.0;
   double moving_ms = 0.0;
   double settling_ms = 0.0;
-  std::string taken;         ///< ISO 8601
-  std::string pixel_format;  ///< "Mono8", "BayerRG8", "BGR8"; empty for range scans
-  std::map<std::string, FileRecord> files;
-  std::optional<Projection> grid;                      ///< range scans: orthographic
+  std::string taken{};         ///< ISO 8601
+  std::string pixel_format{};  ///< "Mono8", "BayerRG8", "BGR8"; empty for range scans
+  std::map<std::string, FileRecord> files{};
+  std::optional<Projection> grid{};                    ///< range scans: orthographic
   Transform camera_from_pose = Transform::Identity();  ///< range scans only
+};
+
+/// View 0 taken again: whether the views since belong together.
+struct ClosureRecord {
+  int after_views = 0;  ///< views the pose had then
+  double measured_deg = 0.0;
+  std::string taken{};    ///< ISO 8601
+  double shift_px = 0.0;  ///< as pipeline/closure measures it, the worse of both cameras
+  double changed = 0.0;   ///< 0 to 1
+  bool unmoved = true;
 };
 
 struct PoseRecord {
   std::string name;
   bool complete = false;
   std::vector<ViewRecord> views;  ///< by ascending index
+  std::vector<ClosureRecord> closures{};
 };
 
 struct Manifest {
@@ -50,6 +61,7 @@ struct Manifest {
 /// The text of scan.json.
 std::string to_json(const Manifest& manifest);
 
+/// Reads version 1 too, which knew no closures; what is written is version 2.
 /// Fails with `not_found`, `io`, `invalid_input` (naming file and key), `unsupported` (version). Sizes of range grids
 /// are those of their files and stay 0 here.
 Result<Manifest> read_manifest(const std::filesystem::path& file);

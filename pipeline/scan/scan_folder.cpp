@@ -97,7 +97,7 @@ Result<void> ScanFolder::change_manifest(Manifest changed) {
 Result<void> ScanFolder::store_view(std::size_t pose, ViewRecord record, std::span<const NamedImage> images,
                                     std::string_view extension) {
   Manifest changed = manifest_;
-  if (pose == changed.poses.size()) changed.poses.push_back({fmt::format("pose{}", pose + 1), false, {}});
+  if (pose == changed.poses.size()) changed.poses.push_back({fmt::format("pose{}", pose + 1), false, {}, {}});
   if (pose > changed.poses.size()) return fail(ErrorCode::invalid_input, "{}: no pose {}", path_.string(), pose + 1);
   std::vector<ViewRecord>& views = changed.poses[pose].views;
   auto place = std::lower_bound(views.begin(), views.end(), record.index,
@@ -158,10 +158,19 @@ Result<void> ScanFolder::add_range_view(std::size_t pose, ViewRecord record, con
   return store_view(pose, std::move(record), {&image, 1}, ".tiff");
 }
 
-Result<void> ScanFolder::set_pose_complete(std::size_t pose) {
+Result<void> ScanFolder::complete_pose(std::size_t pose, std::string state) {
   if (pose >= manifest_.poses.size()) return fail(ErrorCode::invalid_input, "{}: no pose {}", path_.string(), pose + 1);
   Manifest changed = manifest_;
   changed.poses[pose].complete = true;
+  changed.state = std::move(state);
+  if (auto words = check_words(changed); !words) return words;
+  return change_manifest(std::move(changed));
+}
+
+Result<void> ScanFolder::add_closure(std::size_t pose, ClosureRecord record) {
+  if (pose >= manifest_.poses.size()) return fail(ErrorCode::invalid_input, "{}: no pose {}", path_.string(), pose + 1);
+  Manifest changed = manifest_;
+  changed.poses[pose].closures.push_back(std::move(record));
   return change_manifest(std::move(changed));
 }
 

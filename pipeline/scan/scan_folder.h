@@ -38,7 +38,9 @@ class ScanFolder {
   /// The same for an imported range scan; `depth` in mm, NaN where unknown.
   Result<void> add_range_view(std::size_t pose, ViewRecord record, const cv::Mat1f& depth);
 
-  Result<void> set_pose_complete(std::size_t pose);
+  /// The last view of the pose is there; `state` is the scan's from then on.
+  Result<void> complete_pose(std::size_t pose, std::string state);
+  Result<void> add_closure(std::size_t pose, ClosureRecord record);
   Result<void> set_state(std::string state);
 
   /// Fails with `not_found`, `invalid_input` (unreadable, truncated, wrong size, hash differs), naming the file.

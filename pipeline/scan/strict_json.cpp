@@ -214,7 +214,7 @@ JsonFile::~JsonFile() = default;
 JsonFile::JsonFile(JsonFile&&) noexcept = default;
 JsonFile& JsonFile::operator=(JsonFile&&) noexcept = default;
 
-Result<JsonFile> JsonFile::read(const std::filesystem::path& file, std::string_view format, int version) {
+Result<JsonFile> JsonFile::read(const std::filesystem::path& file, std::string_view format, int newest, int oldest) {
   const auto text = read_file(file);
   if (!text) return pass_on(text);
   JsonFile result;
@@ -231,8 +231,10 @@ Result<JsonFile> JsonFile::read(const std::filesystem::path& file, std::string_v
   if (!result.document_->is_object()) return fail(ErrorCode::invalid_input, "{}: not a JSON object", result.name_);
   JsonObject& root = result.root_.emplace(result.document_.get(), "", result.fault_.get());
   root.one_of("format", {format});
-  if (const int found = root.integer("version", 1, 1'000'000); found != version) {
-    root.reject("version", fmt::format("{} is not supported, only {}", found, version), ErrorCode::unsupported);
+  result.version_ = root.integer("version", 1, 1'000'000);
+  if (result.version_ < oldest || result.version_ > newest) {
+    root.reject("version", fmt::format("{} is not supported, only up to {}", result.version_, newest),
+                ErrorCode::unsupported);
   }
   if (*result.fault_) return tl::unexpected<Error>((*result.fault_)->in(result.name_));
   return result;

@@ -61,13 +61,18 @@ class JsonFile {
  public:
   /// Fails with `not_found`, `io`, `invalid_input` (not JSON, another format), `unsupported` (a version not known
   /// here).
-  static Result<JsonFile> read(const std::filesystem::path& file, std::string_view format, int version);
+  static Result<JsonFile> read(const std::filesystem::path& file, std::string_view format, int version) {
+    return read(file, format, version, version);
+  }
+  /// The same where versions back to `oldest` can still be read.
+  static Result<JsonFile> read(const std::filesystem::path& file, std::string_view format, int newest, int oldest);
   ~JsonFile();
   JsonFile(JsonFile&&) noexcept;
   JsonFile& operator=(JsonFile&&) noexcept;
 
   JsonObject& root() { return *root_; }
   [[nodiscard]] const std::string& sha256() const { return sha256_; }
+  [[nodiscard]] int version() const { return version_; }
   /// Closes the root and returns the first fault, if any.
   Result<void> finish();
 
@@ -78,6 +83,7 @@ class JsonFile {
   std::optional<JsonObject> root_;
   std::string name_;
   std::string sha256_;
+  int version_ = 0;
 };
 
 }  // namespace scanrig

@@ -142,7 +142,7 @@ Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const BlueScreenOpti
   cv::compare(key, options.object_key, object, cv::CMP_LT);
   const int largest = largest_part(object);
   if (largest < options.smallest_hole_px) {
-    return fail(ErrorCode::degenerate, "silhouette: no object before the blue screen");
+    return fail(ErrorCode::degenerate, "silhouette: no object before the blue screen; is the table empty?");
   }
   remove_parts(object, std::max<double>(options.smallest_hole_px, options.smallest_part_share * largest), 8);
   cv::Mat1b screen(255 - object);

@@ -81,12 +81,9 @@ Result<void> run(const SimOptions& o, const SignalStop& stop) {
   reconstruct.voxel_mm = o.voxel_mm;
   reconstruct.threads = o.threads;
   DaemonOptions options;
-  options.jobs = {.root = o.jobs,
-                  .calibration_file = calibration,
-                  .profile = r.profile_sha256(),
-                  .poses = o.rig.poses,
-                  .views = o.views};
-  options.socket = o.socket;
+  options.jobs = {.root = o.jobs, .calibration_file = calibration, .profile = r.profile_sha256()};
+  options.recipes["default"] = {.poses = o.rig.poses, .views = o.views};
+  options.api.socket = o.socket;
   options.remote = options.guard = true;  // nobody can reach a simulated table
   options.reconstructor = pipeline_reconstructor(reconstruct);
   options.on_scanned = [&r](const std::filesystem::path& folder) { return r.write_truth(folder); };
@@ -108,7 +105,7 @@ Result<void> run_on_wires(const SimOptions& o, const config::RigConfig& config, 
   auto scene = sim::Scene::create({.object = o.rig.object,
                                    .height_mm = o.rig.height_mm,
                                    .seed = o.rig.seed,
-                                   .poses = options.jobs.poses,
+                                   .poses = options.recipes.at("default").poses,
                                    .image_scale = o.rig.image_scale,
                                    .same_rest_twice = o.rig.same_rest_twice,
                                    .noise = o.rig.noise});

@@ -1,8 +1,15 @@
 #include "sim/apps/view_cache.h"
 
+#include <cmath>
+
 #include "core/units.h"
 
 namespace scanrig::sim {
+
+std::pair<int, long long> LooksAlike::key(const Place& place) {
+  constexpr long long kTurn = 360'000'000'000;  // in units of 1e-9 deg
+  return {place.placement, (std::llround(1e9 * place.angle_deg) % kTurn + kTurn) % kTurn};
+}
 
 ViewCache::ViewCache(Scene& scene, const std::vector<Place>& expected)
     : scene_(scene),

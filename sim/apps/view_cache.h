@@ -15,8 +15,13 @@ namespace scanrig::sim {
 /// How the object lies and where the table stands.
 struct Place {
   int placement = 0;
-  double angle_deg = 0.0;
-  auto operator<=>(const Place&) const = default;
+  double angle_deg = 0.0;  ///< turns counted
+};
+
+/// Whole turns and what rounding leaves of them are no difference.
+struct LooksAlike {
+  bool operator()(const Place& a, const Place& b) const { return key(a) < key(b); }
+  static std::pair<int, long long> key(const Place& place);
 };
 
 /// Views of a scene, each rendered once, by a thread of its own: what somebody waits for, then what is expected.
@@ -41,7 +46,7 @@ class ViewCache {
   Scene& scene_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
-  std::map<Place, std::shared_ptr<const View>> views_;
+  std::map<Place, std::shared_ptr<const View>, LooksAlike> views_;
   std::deque<Place> wanted_, expected_;  // not yet rendered
   std::deque<Place> surprises_;          // rendered although not expected, oldest first
   bool ended_ = false;

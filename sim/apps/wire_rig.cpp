@@ -14,12 +14,13 @@ namespace {
 
 constexpr std::chrono::milliseconds kLineWatch{5};
 
-/// Where the table will stand for the views of the first job: it is wound up from pose to pose.
-std::vector<Place> places_of_first_job(const WireRigOptions& o) {
+/// Where the table will stand in a job: it is wound up from pose to pose, and each pose may end with its first view
+/// once more. What comes after two turns looks alike, see rest_error_deg().
+std::vector<Place> places_of_job(const WireRigOptions& o) {
   const double pulses_per_deg = o.toml.pulses_per_motor_rev * o.toml.gear_ratio / 360.0;
   std::vector<Place> places;
   for (int pose = 0; pose < o.toml.poses; ++pose) {
-    for (int view = 0; view < o.toml.views; ++view) {
+    for (int view = 0; view <= o.toml.views; ++view) {
       const double wanted = 360.0 * (pose + static_cast<double>(view) / o.toml.views);
       const double sent_to = std::round(wanted * pulses_per_deg) / pulses_per_deg;
       places.push_back({pose, resting_angle(sent_to, o.scene->seed)});
@@ -68,8 +69,8 @@ WireRig::~WireRig() {
 Result<void> WireRig::start_cameras(const WireRigOptions& o, Clock& clock) {
   if (!o.scene) return {};
   auto cameras = RigCameras::start(
-      {.scene = *o.scene, .expected = places_of_first_job(o), .numbered = o.numbered_frames},
-      [this] { return truth(); }, clock);
+      {.scene = *o.scene, .expected = places_of_job(o), .numbered = o.numbered_frames}, [this] { return truth(); },
+      clock);
   if (!cameras) return pass_on(cameras);
   cameras_ = std::move(*cameras);
   panel_->on_light([&cameras = *cameras_](bool pattern) { cameras.edge(pattern); });

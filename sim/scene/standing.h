@@ -7,10 +7,12 @@
 
 namespace scanrig::sim {
 
-/// How far from the angle it was sent to the table of the rig `seed` comes to rest, turns counted from home. Sent there
-/// again it comes to rest at the same place, whatever moved it: so every simulation of one rig stands alike.
+/// How far from the angle it was sent to the table of the rig `seed` comes to rest. Sent there again, or two turns
+/// further, it is as far off, whatever moved it: so every simulation of one rig stands alike, and so does the next job,
+/// whose two poses are two turns.
 inline double rest_error_deg(double commanded_deg, std::uint64_t seed) {
-  const auto place = std::llround(1000.0 * commanded_deg);
+  constexpr long long kTwoTurns = 72000;  // hundredths of a degree
+  const auto place = (std::llround(100.0 * commanded_deg) % kTwoTurns + kTwoTurns) % kTwoTurns;
   return profile().repeatability_deg * normal(mix(seed, 8, place));
 }
 

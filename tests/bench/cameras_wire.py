@@ -23,20 +23,23 @@ def views(stamps):
 
 
 def overheads_ms(stamps):
-    """Of each view: from the last frame of the view before (of the pose's first: from the table's first motion) to its
-    own last frame, without motion, settling, exposure and readout as the simulator stamped them."""
+    """Of each view the table was turned for: from the last frame of the view before (of a pose's first: from the last
+    motion) to its own last frame, without motion, settling, exposure and readout as the simulator stamped them."""
     found, before = [], None
     for view in views(stamps):
         begin = before[-1]["read_ns"] if before else 0
         end = view[-1]["read_ns"]
         legs = [leg for leg in stamps["legs"] if begin <= leg["begun_ns"] < view[0]["at_ns"]]
-        if not before or before[0]["placement"] != view[0]["placement"]:
+        first = not before or before[0]["placement"] != view[0]["placement"]
+        before = view
+        if not legs:
+            continue
+        if first:
             legs = legs[-1:]
             begin = legs[0]["begun_ns"]
         moving = sum(leg["ended_ns"] - leg["begun_ns"] for leg in legs)
         seen = sum(each["read_ns"] - each["at_ns"] for each in view)
         found.append((end - begin - moving - seen) / 1e6 - 1e3 * SETTLING_S)
-        before = view
     return found
 
 

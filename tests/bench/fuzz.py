@@ -11,6 +11,7 @@ CPU_S, QUICK_CPU_S = 600, 5
 WALL_LIMIT_S = 1500
 BUILD_LIMIT_S = 900
 LOOK_S = 0.5
+HANG_S = 60  # for one input, on a machine that has more to do than it can
 CRASH = re.compile(r"SUMMARY: .*")
 TICKS = os.sysconf("SC_CLK_TCK")
 
@@ -48,7 +49,7 @@ def run(bench, root, scratch, parser):
     grown, log = scratch / f"corpus-{parser.target}", scratch / f"{parser.target}-{{}}.log"
     grown.mkdir(parents=True)
     corpus = root / "tests" / "fuzz" / "corpus" / parser.target
-    command = [root / "build" / "fuzz" / "bin" / f"{parser.target}_fuzz", grown, corpus, "-print_final_stats=1",
+    command = [root / "build" / "fuzz" / "bin" / f"{parser.target}_fuzz", grown, corpus, "-print_final_stats=1", f"-timeout={HANG_S}",
                f"-artifact_prefix={bench.out}/{parser.target}-"]
     logs = [open(str(log).format(n), "w+") for n in range(parser.processes)]
     crew = [subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL, stderr=out) for out in logs]

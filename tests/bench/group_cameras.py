@@ -1,4 +1,5 @@
-"""Cameras and the USB projector: triggers against frames on the wire, overhead, fuzzed replies, Debian 13."""
+"""Cameras and the USB projector: triggers against frames on the wire, overhead, fault matrix, memory, fuzzed
+replies, Debian 13."""
 import json
 import pathlib
 import shutil
@@ -6,8 +7,10 @@ import tempfile
 
 import cameras_debian13
 import cameras_hil
+import cameras_memory
 import cameras_wire
 import fuzz
+import motion_matrix
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 TRIGGERS, QUICK_TRIGGERS = 10000, 1000
@@ -33,6 +36,14 @@ def triggers(bench):
     bench.at_most("arming and collecting one exposure over the wire, p95", 50, seen["overhead_p95_ms"], "ms")
 
 
+def matrix(bench):
+    scratch = pathlib.Path(tempfile.mkdtemp(prefix="scanrig-cameras-"))
+    try:
+        motion_matrix.measure(bench, ROOT, scratch, cameras=True)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
 def replies(bench):
     scratch = pathlib.Path(tempfile.mkdtemp(prefix="scanrig-cameras-"))
     try:
@@ -43,7 +54,9 @@ def replies(bench):
 
 def measure(bench):
     triggers(bench)
+    matrix(bench)
+    cameras_memory.measure(bench)
     replies(bench)
-    cameras_hil.measure(bench)
     cameras_wire.measure(bench)
+    cameras_hil.measure(bench)
     cameras_debian13.measure(bench)

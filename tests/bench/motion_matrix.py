@@ -26,7 +26,9 @@ def shipped(root):
 
 
 def devices(root, driver):
-    """The variants of one driver class: a profile each of the Modbus turntable."""
+    """The variants of one driver class: a profile each of the Modbus turntable, a kind of sensor each of the camera."""
+    if driver == "SensorCamera":
+        return ["aravis", "v4l2", "v4l2-side-by-side"]
     if driver != "ModbusTurntable":
         return [""]
     return sorted(profile.stem for profile in (root / "config" / "drives").glob("*.toml"))
@@ -61,7 +63,8 @@ def write(path, wanted, cells, faults):
 def measure(bench, root, scratch, cameras=False):
     ports = scratch / "matrix"
     ports.mkdir(parents=True, exist_ok=True)
-    done = bench.run([bench.bin / "fault_matrix", root / "config" / "drives", ports, WORKERS], LIMIT_S)
+    done = bench.run([bench.bin / "fault_matrix", root / "config" / "drives", ports, WORKERS,
+                      "cameras" if cameras else "motion"], LIMIT_S)
     cells, faults = {}, []
     for line in done.stdout.splitlines():
         cell = json.loads(line)

@@ -12,7 +12,7 @@
 
 // The panel's driver against a module that answers anything. The input is a row of answers: a byte that says how many
 // bytes follow, and whether (top bit) they get a unit and a checksum that fit, so that they are read at all.
-// Whatever comes: no crash, an answer within the limits, and a panel that reads again when the module is sane again.
+// Whatever comes: no crash, and no wait without end (libFuzzer's own limit).
 
 namespace {
 
@@ -68,11 +68,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                        .outputs = {{&PanelOutputs::red, {1}}, {&PanelOutputs::green, {4}}},
                        .poll = milliseconds(1)},
                       clock);
-  const auto begun = clock.now();
   for (int i = 0; i < 3; ++i) {
     std::ignore = panel.wait_change({}, Deadline::after(clock, milliseconds(2)));
     std::ignore = panel.show({.red = i % 2 == 0}, Deadline::after(clock, milliseconds(20)));
   }
-  if (clock.now() - begun > std::chrono::seconds(2)) std::abort();  // a wait without end
   return 0;
 }

@@ -52,6 +52,9 @@ inline Outcome not_applicable(std::string reason) { return {.applicable = false,
 std::vector<Cell> turntable_cells(const std::filesystem::path& scratch, const std::filesystem::path& profiles);
 std::vector<Cell> projector_cells(const std::filesystem::path& scratch);
 std::vector<Cell> panel_cells(const std::filesystem::path& scratch);
+/// In a network namespace of this process, see sim/wire/loopback.h.
+std::vector<Cell> camera_cells();
+std::vector<Cell> lightcrafter_cells();
 
 constexpr std::chrono::milliseconds kGrace{50};  ///< past its deadline a call may still need this
 

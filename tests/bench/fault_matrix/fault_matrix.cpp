@@ -9,9 +9,11 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
+#include "sim/wire/loopback.h"
 #include "tests/bench/fault_matrix/cells.h"
 
-/// fault_matrix PROFILES SCRATCH [WORKERS]: every cell of the fault matrix, one line of JSON each.
+/// fault_matrix PROFILES SCRATCH WORKERS motion|cameras: every cell of that part of the fault matrix, one line of JSON
+/// each.
 namespace scanrig::bench {
 
 Outcome timed(Clock& clock, Clock::Duration limit, const std::vector<ErrorCode>& named,
@@ -49,10 +51,20 @@ std::string line_of(const Cell& cell, const Outcome& outcome) {
   return line.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-int run(const std::filesystem::path& profiles, const std::filesystem::path& scratch, int workers) {
+std::vector<Cell> motion_cells(const std::filesystem::path& profiles, const std::filesystem::path& scratch) {
   std::vector<Cell> cells = turntable_cells(scratch, profiles);
   std::ranges::move(projector_cells(scratch), std::back_inserter(cells));
   std::ranges::move(panel_cells(scratch), std::back_inserter(cells));
+  return cells;
+}
+
+std::vector<Cell> eye_cells() {
+  std::vector<Cell> cells = camera_cells();
+  std::ranges::move(lightcrafter_cells(), std::back_inserter(cells));
+  return cells;
+}
+
+void run(const std::vector<Cell>& cells, int workers) {
   std::atomic<std::size_t> next = 0;
   std::mutex output;
   std::vector<std::jthread> crew;
@@ -66,16 +78,24 @@ int run(const std::filesystem::path& profiles, const std::filesystem::path& scra
       }
     });
   }
-  return 0;
 }
 
 }  // namespace
 }  // namespace scanrig::bench
 
 int main(int argc, char** argv) {
-  if (argc < 3) {
-    std::fputs("usage: fault_matrix PROFILES SCRATCH [WORKERS]\n", stderr);
-    return 2;
+  using namespace scanrig;
+  if (argc != 5) {
+    std::fputs("usage: fault_matrix PROFILES SCRATCH WORKERS motion|cameras\n", stderr);
+    return static_cast<int>(ExitCode::usage);
   }
-  return scanrig::bench::run(argv[1], argv[2], argc > 3 ? std::max(1, std::atoi(argv[3])) : 4);
+  const bool cameras = argv[4] == std::string_view("cameras");
+  if (cameras) {
+    if (const auto own = sim::wire::enter_own_loopback(); !own) {
+      fmt::print(stderr, "{}\n", own.error().message);
+      return 77;
+    }
+  }
+  bench::run(cameras ? bench::eye_cells() : bench::motion_cells(argv[1], argv[2]), std::max(1, std::atoi(argv[3])));
+  return 0;
 }

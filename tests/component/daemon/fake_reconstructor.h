@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <mutex>
 #include <vector>
 
@@ -15,6 +16,7 @@ struct ReconstructionLog {
   std::vector<std::pair<int, int>> grey_levels;  ///< of pattern and plain, a view
   Result<void> answer_to_view{};
   Result<void> answer_to_finish{};
+  std::function<void()> at_finish = [] {};  ///< may throw
 };
 
 class FakeReconstructor final : public Reconstructor {
@@ -36,6 +38,7 @@ class FakeReconstructor final : public Reconstructor {
   }
   Result<void> finish(const std::filesystem::path& folder, const Context& context) override {
     context.report("texture", 1.0);
+    log_.at_finish();
     const std::lock_guard guard(log_.mutex);
     log_.calls.emplace_back("finish");
     if (!log_.answer_to_finish) return log_.answer_to_finish;

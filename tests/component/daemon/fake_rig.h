@@ -109,6 +109,7 @@ struct TriggerLine {
   int absent = 0;     ///< how often more the camera does not answer when it is armed; -1: it is not there at all
   std::function<void()> at_fire;  ///< happens during the next exposure
   Light last = Light::plain;
+  int scene = 0;  ///< what the cameras look at: another number, another picture
 };
 
 class FakeProjector final : public Projector {
@@ -173,7 +174,7 @@ class FakeCamera final : public StereoCamera {
       line_.armed = false;
       lost = line_.lose > 0;
       if (lost) --line_.lose;
-      const cv::Scalar grey(line_.last == Light::pattern ? 200 : 100);
+      const cv::Scalar grey((line_.last == Light::pattern ? 200 : 100) + line_.scene);
       frame.left = cv::Mat(48, 64, CV_8UC1, grey);
       frame.right = cv::Mat(48, 64, CV_8UC1, grey);
       frame.taken = clock_.now();
@@ -224,6 +225,13 @@ class FakePanel final : public Panel {
   void wait_attached() {
     std::unique_lock lock(mutex_);
     attach_.wait(lock, [&] { return attached_; });
+  }
+
+  /// Nobody drives it any more.
+  void detach() {
+    const std::lock_guard guard(mutex_);
+    attached_ = false;
+    outputs_ = {};
   }
 
   /// Looks at the lamps until `as_wanted`, for a virtual hour at most.

@@ -1,13 +1,7 @@
 #include <gmock/gmock.h>
 
-#include <thread>
-
-#include "core/virtual_clock.h"
 #include "daemon/ctl/client.h"
-#include "daemon/run_daemon.h"
-#include "tests/component/daemon/fake_reconstructor.h"
-#include "tests/component/daemon/fake_rig.h"
-#include "tests/unit/pipeline/scan/scan_samples.h"
+#include "tests/component/daemon/daemon_under_test.h"
 
 namespace scanrig {
 namespace {
@@ -16,104 +10,6 @@ namespace fs = std::filesystem;
 using std::chrono::seconds;
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-/// A whole daemon over fake devices on a virtual clock; the test is the operator.
-class Daemon : public scan_samples::FolderTest {
- protected:
-  void SetUp() override {
-    FolderTest::SetUp();
-    scan_samples::write_text(folder_ / "calibration.json", scan_samples::calibration_json());
-    options.jobs = {
-        .root = folder_ / "jobs", .calibration_file = folder_ / "calibration.json", .profile = {}, .views = 3};
-    options.socket = folder_ / "api.sock";
-    options.reconstructor = [this](const Calibration&, const Manifest&) {
-      return std::make_unique<fakes::FakeReconstructor>(log);
-    };
-  }
-  void TearDown() override {
-    if (thread.joinable()) shut_down();
-    FolderTest::TearDown();
-  }
-  void boot() {
-    const Clock::Busy until_it_runs(clock);
-    thread = std::thread([this] { result = run_daemon(rig.devices(), options, clock, stop.get_token()); });
-    rig.panel.wait_attached();
-  }
-  void shut_down() {
-    stop.request_stop();
-    thread.join();
-  }
-
-  bool wait_ready() {
-    return rig.panel.wait_for_lamps([](const auto& l) { return l.start_lamp && !l.flip_request; });
-  }
-  bool wait_flip() {
-    return rig.panel.wait_for_lamps([](const auto& l) { return l.flip_request; });
-  }
-  bool wait_halted() {
-    return rig.panel.wait_for_lamps([](const auto& l) { return l.amber && !l.busy && !l.start_lamp; });
-  }
-  bool wait_fault() {
-    return rig.panel.wait_for_lamps([](const auto& l) { return l.red && !l.busy; });
-  }
-  bool wait_busy() {
-    return rig.panel.wait_for_lamps([](const auto& l) { return l.busy && l.green; });
-  }
-  bool wait_pass() {
-    return rig.panel.wait_for_lamps([](const auto& l) { return l.pass && l.start_lamp; });
-  }
-  bool wait_fail() {
-    return rig.panel.wait_for_lamps([](const auto& l) { return l.fail && l.start_lamp; });
-  }
-  void get_ready() {
-    ASSERT_TRUE(wait_halted());
-    rig.panel.press(&PanelInputs::reset);
-    ASSERT_TRUE(wait_ready());
-  }
-  void scan_both_poses() {
-    rig.panel.press(&PanelInputs::start);
-    ASSERT_TRUE(wait_flip());
-    rig.panel.press(&PanelInputs::start);
-  }
-
-  /// Looks again and again, for a virtual minute at most.
-  bool clock_waits_for(const std::function<bool()>& as_wanted) {
-    for (const auto by = Deadline::after(clock, seconds(60)); !by.expired(clock);
-         clock.sleep_for(std::chrono::milliseconds(10))) {
-      if (as_wanted()) return true;
-    }
-    return false;
-  }
-  std::vector<fs::path> job_folders() const {
-    std::vector<fs::path> folders;
-    for (const auto& entry : fs::directory_iterator(folder_ / "jobs")) folders.push_back(entry.path());
-    std::ranges::sort(folders);
-    return folders;
-  }
-  ScanFolder only_job() const {
-    const auto folders = job_folders();
-    EXPECT_EQ(folders.size(), 1u);
-    auto scan = ScanFolder::open(folders.at(0));
-    EXPECT_TRUE(scan) << scan.error().message;
-    return std::move(*scan);
-  }
-  void expect_all_stored_views_readable(const ScanFolder& scan) {
-    for (std::size_t pose = 0; pose < scan.manifest().poses.size(); ++pose) {
-      for (std::size_t view = 0; view < scan.manifest().poses[pose].views.size(); ++view) {
-        // The sample calibration is for images of the fakes' size.
-        EXPECT_TRUE(scan.load_images(pose, view)) << pose << "/" << view;
-      }
-    }
-  }
-
-  VirtualClock clock;
-  fakes::FakeRig rig{clock};
-  fakes::ReconstructionLog log;
-  DaemonOptions options;
-  std::stop_source stop;
-  Result<void> result;
-  std::thread thread;
-};
 
 TEST_F(Daemon, MakesOneModelFromTwoPoses) {
   boot();
@@ -136,8 +32,8 @@ TEST_F(Daemon, MakesOneModelFromTwoPoses) {
   EXPECT_THAT(log.calls, ElementsAre("view 0/0", "view 0/1", "view 0/2", "pose 0", "view 1/0", "view 1/1", "view 1/2",
                                      "pose 1", "finish"));
   for (const auto& [pattern, plain] : log.grey_levels) EXPECT_GT(pattern, plain);
-  EXPECT_THAT(rig.turntable.targets, ElementsAre(0, 0, 120, 240, 360, 480, 600));
-  EXPECT_FALSE(fs::exists(options.socket)) << "the socket goes with the daemon";
+  EXPECT_THAT(rig.turntable.targets, ElementsAre(0, 0, 120, 240, 360, 360, 480, 600, 720));
+  EXPECT_FALSE(fs::exists(options.api.socket)) << "the socket goes with the daemon";
 }
 
 TEST_F(Daemon, NothingMovesBeforeResetAndTwoSecondsOfWarning) {
@@ -171,7 +67,7 @@ TEST_F(Daemon, LostFramesAreRedoneWithoutAFault) {
   get_ready();
   scan_both_poses();
   ASSERT_TRUE(wait_pass());
-  EXPECT_EQ(rig.line.exposures, 12 + 3);
+  EXPECT_EQ(rig.line.exposures, 12 + 4 + 3) << "six views, two closures, three lost";
 }
 
 TEST_F(Daemon, ACameraThatGoesSilentInterruptsTheJobAndLatches) {
@@ -241,7 +137,7 @@ TEST_F(Daemon, ACameraPulledInAScanInterruptsTheJobAndIsUsedWhenItIsBack) {
 TEST_F(Daemon, ThePreviewLooksInQuietTimesAndNeverDuringAScan) {
   boot();
   get_ready();
-  const auto left = [&] { return ctl::fetch(options.socket, "/api/v1/preview/left"); };
+  const auto left = [&] { return ctl::fetch(options.api.socket, "/api/v1/preview/left"); };
   const auto looks = [&] {
     const std::lock_guard guard(rig.line.mutex);
     return rig.line.looks;

@@ -37,10 +37,10 @@ class DaemonOnWires : public testing::Test {
     open = std::make_unique<OpenDevices>(std::move(*opened));
     DaemonOptions options;
     options.jobs = {.root = config->storage.root, .calibration_file = config->calibration_file, .profile = {}};
-    options.socket = config->api.socket;
+    options.api.socket = config->api.socket;
     options.warning = milliseconds(100);
     options.guard = true;
-    options.reconstructor = [this](const Calibration&, const Manifest&) {
+    options.reconstructor = [this](const ReconstructionTask&) {
       return std::make_unique<fakes::FakeReconstructor>(log);
     };
     thread = std::thread([this, options] {

@@ -16,6 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 using testing::HasSubstr;
+using testing::Not;
 
 /// The programs as they are shipped, against each other; small images, and a rig that costs no waiting.
 class Programs : public scan_samples::FolderTest {
@@ -121,6 +122,69 @@ TEST_F(Programs, AnObjectLargerThanTheWorkingVolumeWritesNothing) {
             3);
   EXPECT_FALSE(fs::exists(folder_ / "jobs"));
   EXPECT_THAT(*read_file(folder_ / "output"), HasSubstr("scanrigd-sim: "));
+}
+
+TEST_F(Programs, AJobIsQueuedShownCancelledAndRemovedFromTheCommandLine) {
+  boot("none");
+  ask_until("status", [](const json& status) { return status["machine"] == "Halted"; });
+  ASSERT_EQ(scanrig({"queue", "--part", "bolt 7", "--repeat", "2", "--socket", socket()}), 0) << output;
+  const std::string id = output.substr(0, output.find('\n'));
+  EXPECT_EQ(ask_until("status", [](const json& s) { return s["queue"].size() == 2; })["queue"][0], id);
+  ASSERT_EQ(scanrig({"jobs", id, "--json", "--socket", socket()}), 0) << output;
+  EXPECT_EQ(json::parse(output)["part"], "bolt 7");
+  EXPECT_EQ(scanrig({"files", id, "--socket", socket()}), 0);
+  EXPECT_THAT(output, HasSubstr("scan.json"));
+  EXPECT_EQ(scanrig({"export", id, "--file", "scan.json", "--out", folder_ / "copy.json", "--socket", socket()}), 0)
+      << output;
+  EXPECT_EQ(json::parse(*read_file(folder_ / "copy.json"))["id"], id);
+  EXPECT_EQ(scanrig({"delete", id, "--yes", "--socket", socket()}), 6) << "it has not ended: " << output;
+  EXPECT_EQ(scanrig({"cancel", id, "--socket", socket()}), 0) << output;
+  EXPECT_EQ(scanrig({"jobs", "--state", "cancelled", "--socket", socket()}), 0);
+  EXPECT_THAT(output, HasSubstr(id));
+  EXPECT_EQ(scanrig({"bundle", id, "--out", folder_ / "job.tar.gz", "--socket", socket()}), 0) << output;
+  EXPECT_GT(fs::file_size(folder_ / "job.tar.gz"), 100u);
+  EXPECT_EQ(scanrig({"delete", id, "--socket", socket()}), 6) << "nobody said yes";
+  EXPECT_EQ(scanrig({"delete", id, "--yes", "--socket", socket()}), 0) << output;
+  EXPECT_EQ(scanrig({"jobs", id, "--socket", socket()}), 3);
+  EXPECT_EQ(scanrig({"queue", "--recipe", "no-such", "--socket", socket()}), 3) << output;
+  for (const auto& entry : fs::directory_iterator(folder_ / "jobs")) {
+    EXPECT_FALSE(entry.path().filename().string().starts_with(".bundle")) << entry.path();
+  }
+}
+
+TEST_F(Programs, WatchTellsWhatChangesUntilItIsInterrupted) {
+  boot("none");
+  ask_until("status", [](const json& status) { return status["machine"] == "Halted"; });
+  Process watch({SCANRIG_PROGRAM, "status", "--watch", "--socket", socket()}, folder_ / "watched");
+  const auto watched = [&](const std::string& words) {
+    RealClock clock;
+    for (const auto end = Deadline::after(clock, std::chrono::seconds(20)); !end.expired(clock);
+         clock.sleep_for(std::chrono::milliseconds(20))) {
+      if (const auto text = read_file(folder_ / "watched"); text && text->find(words) != std::string::npos) return true;
+    }
+    return false;
+  };
+  EXPECT_TRUE(watched("Halted  (none)"));
+  EXPECT_TRUE(watched("disk "));
+  daemon->signal(SIGTERM);
+  daemon->wait();
+  EXPECT_TRUE(watched("is the daemon running?")) << "it goes on without one";
+  watch.signal(SIGINT);
+  EXPECT_EQ(watch.wait(), 0);
+  EXPECT_THAT(*read_file(folder_ / "watched"), Not(HasSubstr("\x1b"))) << "a file is no terminal";
+}
+
+TEST_F(Programs, TokensAreMadeListedAndRevoked) {
+  const std::string file = folder_ / "tokens.json";
+  ASSERT_EQ(scanrig({"token", "add", "tablet", "--role", "operator", "--file", file}), 0) << output;
+  const auto token = output.substr(0, output.find('\n'));
+  EXPECT_THAT(token, testing::StartsWith("scanrig_"));
+  EXPECT_EQ(scanrig({"token", "add", "tablet", "--file", file}), 3) << "the name is taken";
+  EXPECT_EQ(scanrig({"token", "list", "--json", "--file", file}), 0);
+  EXPECT_EQ(json::parse(output)["tokens"][0]["role"], "operator");
+  EXPECT_THAT(output + *read_file(file), Not(HasSubstr(token.substr(8))));
+  EXPECT_EQ(scanrig({"token", "revoke", "tablet", "--file", file}), 0) << output;
+  EXPECT_EQ(scanrig({"token", "revoke", "tablet", "--file", file}), 3);
 }
 
 TEST_F(Programs, EndWithTheDocumentedCodeAndOneSentence) {

@@ -117,20 +117,20 @@ TEST_F(MakeSafe, AbsentCamerasLeaveTheRestRunningAndShown) {
 
 TEST_F(MakeSafe, MaintenanceThroughTheApiHomesJogsAndLeavesTheTableUnhomed) {
   boot();
-  const auto post = [&](const std::string& what) {
-    const auto answer = ctl::ask(rig.api(), "POST", "/api/v1/maintenance/" + what);
+  const auto post = [&](const std::string& what, const std::string& body = "") {
+    const auto answer = ctl::ask(rig.api(), "POST", "/api/v1/maintenance/" + what, body);
     return answer ? std::string() : answer.error().message;
   };
-  EXPECT_THAT(post("jog?by_deg=5"), HasSubstr("off"));
+  EXPECT_THAT(post("jog", R"({"by_deg": 5})"), HasSubstr("off"));
   EXPECT_EQ(post("on"), "");
-  EXPECT_THAT(post("jog?to_deg=5&by_deg=5"), HasSubstr("to_deg or by_deg"));
-  EXPECT_THAT(post("dance"), HasSubstr("dance"));
+  EXPECT_THAT(post("jog", R"({"to_deg": 5, "by_deg": 5})"), HasSubstr("to_deg or by_deg"));
+  EXPECT_THAT(post("dance"), HasSubstr("nothing of that name"));
   EXPECT_THAT(post("home"), HasSubstr("panel"));
   rig.press("RESET");
   const auto activity = [&] { return (*ctl::ask(rig.api(), "GET", "/api/v1/status"))["activity"]; };
   ASSERT_TRUE(rig.wait_for([&] { return activity() == "homing"; }));
   ASSERT_TRUE(rig.wait_for([&] { return activity() == "none"; }));
-  EXPECT_EQ(post("jog?by_deg=-10&speed_deg_s=5"), "");
+  EXPECT_EQ(post("jog", R"({"by_deg": -10, "speed_deg_s": 5})"), "");
   double fastest = 0.0;
   ASSERT_TRUE(rig.wait_for([&] {
     fastest = std::max(fastest, std::abs(rig.drive.truth().speed_deg_s));

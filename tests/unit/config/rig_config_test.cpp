@@ -132,6 +132,24 @@ TEST_F(RigConfigTest, RulesBetweenKeysAreChecked) {
   EXPECT_TRUE(read(no_guard));
 }
 
+TEST_F(RigConfigTest, TcpNeedsTokensAndIsOnThisMachineUnlessToldOtherwise) {
+  const std::string socket = "socket = \"/run/scanrig/api.sock\"\n";
+  auto rig = read(replaced(example_, socket, socket + "http_port = 8080\n"));
+  ASSERT_FALSE(rig);
+  EXPECT_THAT(rig.error().message, HasSubstr("[api] http_port: needs tokens"));
+  rig = read(replaced(example_, socket, socket + "http_address = \"0.0.0.0\"\n"));
+  ASSERT_FALSE(rig);
+  EXPECT_THAT(rig.error().message, HasSubstr("[api] http_address: needs http_port"));
+  rig = read(replaced(example_, socket,
+                      socket + "tokens = \"tokens.json\"\nhttp_port = 8080\noperator_group = \"scanners\"\n"));
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->api.http_port, 8080);
+  EXPECT_EQ(rig->api.http_address, "127.0.0.1");
+  EXPECT_EQ(rig->api.tokens, folder_ / "tokens.json");
+  EXPECT_EQ(rig->api.operator_group, "scanners");
+  EXPECT_FALSE(rig->api.engineer_group);
+}
+
 TEST_F(RigConfigTest, AProfileThatIsNotThereOrWrongIsToldAtItsKey) {
   const std::string missing = replaced(example_, "\"leadshine-rs\"", "\"none-such\"");
   auto rig = read(missing);

@@ -24,8 +24,9 @@ class JobStoreTest : public scan_samples::FolderTest {
   }
   /// A job with one view in the state `state`.
   fs::path make_job(const JobStore& store, const std::string& id, const std::string& state) {
-    auto scan = store.create(id);
-    EXPECT_TRUE(scan) << scan.error().message;
+    const auto job = store.create(id, {});
+    EXPECT_TRUE(job) << job.error().message;
+    auto scan = ScanFolder::open(store.folder(id));
     ViewRecord view;
     view.measured_deg = 0.25;
     EXPECT_TRUE(scan->add_view(0, view, scan_samples::raw_view(1)));
@@ -36,6 +37,12 @@ class JobStoreTest : public scan_samples::FolderTest {
     const auto jobs = store.recover();
     EXPECT_TRUE(jobs && jobs->contains(id));
     return *jobs->at(id);
+  }
+  /// As daemons leave it that died over the model.
+  static void write_attempts(const fs::path& folder, int count) {
+    scan_samples::write_text(
+        folder / "attempt.json",
+        fmt::format(R"({{"format": "scanrig-attempt", "version": 1, "count": {}, "process": "x"}})", count));
   }
   JobStoreOptions options;
 };
@@ -69,7 +76,7 @@ TEST_F(JobStoreTest, ARootThatCannotBeMadeIsAnIoError) {
 TEST_F(JobStoreTest, AMissingCalibrationIsSaidByName) {
   options.calibration_file = folder_ / "nowhere.json";
   const auto store = open();
-  const auto scan = store.create("job");
+  const auto scan = store.create("job", {});
   ASSERT_FALSE(scan);
   EXPECT_EQ(scan.error().code, ErrorCode::not_found);
   EXPECT_THAT(scan.error().message, HasSubstr("nowhere.json"));
@@ -79,14 +86,14 @@ TEST_F(JobStoreTest, AMissingCalibrationIsSaidByName) {
 TEST_F(JobStoreTest, AnIdThatIsTakenIsNotOverwritten) {
   const auto store = open();
   make_job(store, "job", "scanned");
-  const auto again = store.create("job");
+  const auto again = store.create("job", {});
   ASSERT_FALSE(again);
   EXPECT_EQ(again.error().code, ErrorCode::exists);
 }
 
 TEST_F(JobStoreTest, AJobThatWasBeingScannedIsMarkedInterruptedWithItsViews) {
   const auto store = open();
-  for (const std::string state : {"queued", "scanning", "waiting_for_flip"}) {
+  for (const std::string state : {"scanning", "waiting_for_flip"}) {
     const auto folder = make_job(store, state, state);
     const auto job = recovered(store, state);
     EXPECT_EQ(job.state, JobState::interrupted);
@@ -106,12 +113,98 @@ TEST_F(JobStoreTest, AScannedJobWithAReportIsDone) {
   EXPECT_EQ(job.model, model_file(folder).string());
 }
 
-TEST_F(JobStoreTest, AScannedJobWithoutAModelSaysHowToMakeIt) {
+TEST_F(JobStoreTest, AScannedJobWithoutAModelIsToBeReconstructed) {
   const auto store = open();
   make_job(store, "job", "scanned");
+  EXPECT_EQ(recovered(store, "job").state, JobState::reconstructing);
+}
+
+TEST_F(JobStoreTest, AJobThatTookTwoDaemonsWithItIsInQuarantineWithItsImages) {
+  const auto store = open();
+  const auto folder = make_job(store, "job", "scanned");
+  write_attempts(folder, 1);
+  EXPECT_EQ(recovered(store, "job").state, JobState::reconstructing) << "once may be bad luck";
+  write_attempts(folder, 2);
   const auto job = recovered(store, "job");
-  EXPECT_EQ(job.state, JobState::interrupted);
-  EXPECT_THAT(job.error->message, HasSubstr("scanrig reconstruct"));
+  EXPECT_EQ(job.state, JobState::failed);
+  EXPECT_TRUE(job.quarantined);
+  EXPECT_THAT(job.error->message, HasSubstr("quarantine"));
+  EXPECT_EQ(job.stored.size(), 1u);
+  ASSERT_TRUE(begin_attempt(folder));
+  EXPECT_EQ(recovered(store, "job").state, JobState::reconstructing) << "somebody has asked for another try";
+}
+
+TEST_F(JobStoreTest, AQueuedJobKeepsItsOrderAndItsPlace) {
+  const auto store = open();
+  const JobFile order{.recipe = {.name = "small", .poses = 1, .views = 5, .limits = {.least_measured_share = 0.9}},
+                      .part = "4711",
+                      .place = 7};
+  ASSERT_TRUE(store.create("job", order));
+  const auto job = recovered(store, "job");
+  EXPECT_EQ(job.state, JobState::queued);
+  EXPECT_EQ(job.recipe, order.recipe);
+  EXPECT_EQ(job.part, "4711");
+  EXPECT_EQ(job.place, 7);
+}
+
+TEST_F(JobStoreTest, AnInterruptedJobIsResumableUnlessItsObjectMoved) {
+  const auto store = open();
+  const auto folder = make_job(store, "job", "interrupted");
+  EXPECT_TRUE(recovered(store, "job").resumable);
+  ASSERT_TRUE(ScanFolder::open(folder)->add_closure(0, {.after_views = 1, .shift_px = 9, .unmoved = false}));
+  EXPECT_FALSE(recovered(store, "job").resumable);
+  make_job(store, "ended", "cancelled");
+  EXPECT_FALSE(recovered(store, "ended").resumable);
+}
+
+TEST_F(JobStoreTest, WhatWasLeftOfFoldersHalfMadeOrHalfRemovedGoes) {
+  const auto store = open();
+  fs::create_directories(options.root / ".new-a" / "pose1");
+  fs::create_directories(options.root / ".gone-b");
+  EXPECT_TRUE(store.recover()->empty());
+  EXPECT_FALSE(fs::exists(options.root / ".new-a"));
+  EXPECT_FALSE(fs::exists(options.root / ".gone-b"));
+}
+
+TEST_F(JobStoreTest, ARemovedJobIsGone) {
+  const auto store = open();
+  make_job(store, "job", "cancelled");
+  EXPECT_EQ(store.remove("../job").error().code, ErrorCode::not_found);
+  ASSERT_TRUE(store.remove("job"));
+  EXPECT_FALSE(fs::exists(options.root / "job"));
+  EXPECT_EQ(store.remove("job").error().code, ErrorCode::not_found);
+}
+
+TEST_F(JobStoreTest, AJobThatDoesNotFitIsRefusedWithFigures) {
+  options.reserve_bytes = std::uintmax_t{1} << 60;
+  const auto store = open();
+  const auto job = store.create("job", {});
+  ASSERT_TRUE(job) << job.error().message;
+  const auto room = store.check_room(*job);
+  ASSERT_FALSE(room);
+  EXPECT_EQ(room.error().code, ErrorCode::io);
+  EXPECT_THAT(room.error().message, HasSubstr("GiB left"));
+}
+
+TEST_F(JobStoreTest, AModelIsJudgedByTheLimitsOfTheRecipe) {
+  const auto store = open();
+  ASSERT_TRUE(store.create("job", {.recipe = {.limits = {.least_measured_share = 0.9, .most_residual_mm = 0.1}}}));
+  const auto folder = store.folder("job");
+  ASSERT_TRUE(ScanFolder::open(folder)->set_state("scanned"));
+  fs::create_directories(model_folder(folder));
+  const auto with = [&](const char* share, const char* residual) {
+    scan_samples::write_text(report_file(folder), fmt::format(R"({{"mesh": {{"measured_share": {}}}, "poses":
+                             [{{"residual_median_mm": 0.01}}, {{"residual_median_mm": {}}}]}})",
+                                                              share, residual));
+    return recovered(store, "job");
+  };
+  EXPECT_EQ(with("0.95", "0.05").passed, true);
+  EXPECT_EQ(with("0.85", "0.05").passed, false);
+  EXPECT_THAT(with("0.85", "0.05").error->message, HasSubstr("85.0 %"));
+  EXPECT_EQ(with("0.95", "0.15").passed, false);
+  EXPECT_EQ(with("0.95", "null").passed, false);
+  scan_samples::write_text(report_file(folder), "not json");
+  EXPECT_EQ(recovered(store, "job").passed, false);
 }
 
 TEST_F(JobStoreTest, AFailedReconstructionIsRemembered) {

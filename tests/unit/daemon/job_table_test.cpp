@@ -7,7 +7,11 @@ namespace {
 
 class Jobs : public testing::Test {
  protected:
-  void tell(const Event& event) { update(table, event, 2, 8); }
+  void tell(const Event& event) { update(table, event); }
+  void begin() {
+    tell(event::JobKnown{std::make_shared<const JobInfo>(JobInfo{.id = "a", .folder = "/jobs/a"})});
+    tell(event::JobBegun{"a", 0, 0});
+  }
   const JobInfo& job() const { return *table.at("a"); }
   JobTable table;
 };
@@ -15,13 +19,15 @@ class Jobs : public testing::Test {
 TEST_F(Jobs, AJobAppearsWhenItsFolderIsThere) {
   tell(event::ViewStored{{"a", 0, 0}, 0.0, 0});
   EXPECT_TRUE(table.empty());
-  tell(event::JobCreated{"a", "/jobs/a"});
-  EXPECT_EQ(job().state, JobState::scanning);
+  tell(event::JobKnown{std::make_shared<const JobInfo>(JobInfo{.id = "a", .folder = "/jobs/a"})});
+  EXPECT_EQ(job().state, JobState::queued);
   EXPECT_EQ(job().folder, "/jobs/a");
+  tell(event::JobBegun{"a", 0, 0});
+  EXPECT_EQ(job().state, JobState::scanning);
 }
 
 TEST_F(Jobs, EntriesAlreadyHandedOutDoNotChange) {
-  tell(event::JobCreated{"a", "/jobs/a"});
+  begin();
   const auto held = table.at("a");
   tell(event::ViewStored{{"a", 0, 0}, 0.5, 1});
   EXPECT_TRUE(held->stored.empty());
@@ -31,7 +37,7 @@ TEST_F(Jobs, EntriesAlreadyHandedOutDoNotChange) {
 }
 
 TEST_F(Jobs, AJobGoesThroughFlipAndReconstructionToDone) {
-  tell(event::JobCreated{"a", "/jobs/a"});
+  begin();
   tell(event::PoseStored{"a", 0});
   EXPECT_EQ(job().state, JobState::waiting_for_flip);
   tell(event::ViewStored{{"a", 1, 0}, 0.0, 0});
@@ -50,7 +56,7 @@ TEST_F(Jobs, AJobGoesThroughFlipAndReconstructionToDone) {
 }
 
 TEST_F(Jobs, AReconstructionThatFailsEarlyFailsTheJobAfterItsLastView) {
-  tell(event::JobCreated{"a", "/jobs/a"});
+  begin();
   tell(event::ReconstructionFailed{"a", {ErrorCode::degenerate, "nothing seen"}});
   EXPECT_EQ(job().state, JobState::scanning);
   tell(event::PoseStored{"a", 1});
@@ -58,8 +64,29 @@ TEST_F(Jobs, AReconstructionThatFailsEarlyFailsTheJobAfterItsLastView) {
   EXPECT_EQ(job().error->message, "nothing seen");
 }
 
+TEST_F(Jobs, AModelBeyondTheLimitsIsDoneAndDoesNotPass) {
+  begin();
+  tell(event::ModelReady{"a", "m", "r", Error{ErrorCode::below_limits, "80 % was measured"}});
+  EXPECT_EQ(job().state, JobState::done);
+  EXPECT_EQ(job().passed, false);
+  EXPECT_EQ(job().error->message, "80 % was measured");
+}
+
+TEST_F(Jobs, ClosureShotsAreKept) {
+  begin();
+  tell(event::ClosureJudged{"a", {.pose = 0, .shift_px = 3.0, .unmoved = false}});
+  ASSERT_EQ(job().closures.size(), 1u);
+  EXPECT_EQ(job().closures[0].shift_px, 3.0);
+}
+
+TEST_F(Jobs, ARemovedJobIsGone) {
+  begin();
+  tell(event::JobRemoved{"a"});
+  EXPECT_TRUE(table.empty());
+}
+
 TEST_F(Jobs, AClosedJobSaysWhy) {
-  tell(event::JobCreated{"a", "/jobs/a"});
+  begin();
   tell(event::JobClosed{"a", JobState::cancelled, {ErrorCode::stopped, "Stop was pressed"}});
   EXPECT_EQ(job().state, JobState::cancelled);
   EXPECT_EQ(job().error->message, "Stop was pressed");

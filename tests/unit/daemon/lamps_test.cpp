@@ -25,6 +25,8 @@ TEST(Lamps, TellIdleWorkingActNowAndFaultApart) {
   EXPECT_EQ(ready, (PanelOutputs{.green = true, .start_lamp = true}));
   EXPECT_EQ(flip, (PanelOutputs{.amber = true, .start_lamp = true, .flip_request = true}));
   EXPECT_EQ(fault, (PanelOutputs{.red = true}));
+  EXPECT_EQ(of(MachineState::continuous_execution, Activity::waiting_for_part),
+            (PanelOutputs{.green = true, .start_lamp = true}));
 }
 
 TEST(Lamps, AFaultIsRedOnlyEvenWhileStopping) {
@@ -38,6 +40,8 @@ TEST(Lamps, PassAndFailTellHowTheNewestFinishedJobEnded) {
   jobs["4"] = job(JobState::failed);
   EXPECT_TRUE(of(MachineState::ready, Activity::none, jobs).fail);
   EXPECT_FALSE(of(MachineState::ready, Activity::none, jobs).pass);
+  jobs["5"] = std::make_shared<const JobInfo>(JobInfo{.state = JobState::done, .passed = false});
+  EXPECT_TRUE(of(MachineState::ready, Activity::none, jobs).fail) << "a model beyond the limits";
 }
 
 }  // namespace

@@ -42,26 +42,37 @@ class Station : public testing::Test {
   void begin_scan() {
     get_ready();
     press(Button::start);
-    tell(event::JobCreated{"job", "/jobs/job"});
+    tell(event::JobBegun{"job", 0, 0});
     tell(event::WarningOver{});
   }
   void take(int pose, int view) {
     tell(event::ViewTaken{std::make_shared<TakenView>(TakenView{.id = {"job", pose, view}})});
   }
   void store(int pose, int view) { tell(event::ViewStored{{"job", pose, view}, 0.0, 0}); }
+  int views() const { return rules.recipes.at("default").views; }
   void take_and_store_all(int pose) {
-    for (int view = 0; view < rules.views; ++view) {
+    for (int view = 0; view < views(); ++view) {
       take(pose, view);
       store(pose, view);
     }
+    close_pose(pose);
   }
+  /// View 0 again, and nothing has moved.
+  void close_pose(int pose, bool unmoved = true) {
+    tell(event::ClosureTaken{std::make_shared<TakenView>(TakenView{.id = {"job", pose, 0}})});
+    tell(event::ClosureJudged{"job", {.pose = pose, .unmoved = unmoved}});
+  }
+  static JobInfo queued(const std::string& id, std::int64_t place, Recipe recipe = {}) {
+    return {.id = id, .folder = "/jobs/" + id, .recipe = std::move(recipe), .place = place};
+  }
+  void know(JobInfo job) { tell(event::JobKnown{std::make_shared<const JobInfo>(std::move(job))}); }
   void reach_flip() {
     begin_scan();
     take_and_store_all(0);
     tell(event::PoseStored{"job", 0});
   }
 
-  StationRules rules{.poses = 2, .views = 4, .remote = false};
+  StationRules rules{.recipes = {{"default", {.poses = 2, .views = 4}}}};
   StationState state;
   std::vector<Action> actions;
   std::optional<Error> refused;

@@ -39,11 +39,11 @@ TEST_F(Station, HomesOnlyAfterResetAndTheWarning) {
 TEST_F(Station, MovesForAJobOnlyWhenWarnedAndTheFolderIsThere) {
   get_ready();
   press(Button::start);
-  EXPECT_NE(asked_for<action::CreateJob>(), nullptr);
+  EXPECT_NE(asked_for<action::CreateJobs>(), nullptr);
   EXPECT_NE(asked_for<action::Warn>(), nullptr);
   tell(event::WarningOver{});
   EXPECT_EQ(asked_for<action::TakeView>(), nullptr) << "the job's folder is not there yet";
-  tell(event::JobCreated{"job", "/jobs/job"});
+  tell(event::JobBegun{"job", 0, 0});
   ASSERT_NE(asked_for<action::TakeView>(), nullptr);
   EXPECT_EQ(asked_for<action::TakeView>()->id, (ViewId{"job", 0, 0}));
 }
@@ -57,7 +57,9 @@ TEST_F(Station, TakesViewsAtEqualAngles) {
     if (view > 0) store(0, view - 1);
     take(0, view);
   }
-  EXPECT_EQ(asked_for<action::TakeView>(), nullptr) << "a fifth view of four";
+  ASSERT_NE(asked_for<action::TakeView>(), nullptr);
+  EXPECT_TRUE(asked_for<action::TakeView>()->closure) << "a fifth view of four";
+  EXPECT_EQ(asked_for<action::TakeView>()->angle.value, 0.0);
 }
 
 TEST_F(Station, KeepsAtMostTwoViewsInMemoryOnly) {
@@ -77,9 +79,11 @@ TEST_F(Station, AsksForTheFlipWhenThePoseIsOnDisk) {
     take(0, view);
     if (view < 3) store(0, view);
   }
+  tell(event::ClosureTaken{});
   EXPECT_EQ(state.activity, Activity::storing);
-  EXPECT_EQ(asked_for<action::FinishPose>(), nullptr);
   store(0, 3);
+  EXPECT_EQ(asked_for<action::FinishPose>(), nullptr) << "nobody knows yet whether something moved";
+  tell(event::ClosureJudged{"job", {.unmoved = true}});
   ASSERT_NE(asked_for<action::FinishPose>(), nullptr);
   EXPECT_FALSE(asked_for<action::FinishPose>()->last);
   EXPECT_EQ(state.activity, Activity::storing) << "not before the manifest says so";
@@ -224,13 +228,13 @@ TEST_F(Station, ATableThatCannotBeSeenStandingIsSaidToMayBeMoving) {
   EXPECT_EQ(state.activity, Activity::none) << "or Reset could never be pressed";
 }
 
-TEST_F(Station, AFullDiskFailsTheJobAndIsAFault) {
+TEST_F(Station, AFullDiskInterruptsTheJobAndIsAFault) {
   begin_scan();
   take(0, 0);
   tell(event::StoreFailed{"job", {ErrorCode::io, "cannot write: No space left on device"}});
   EXPECT_EQ(state.machine, MachineState::error);
   ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
-  EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::failed);
+  EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::interrupted) << "with room again it can be resumed";
 }
 
 TEST_F(Station, AFailedReconstructionSparesTheFlip) {

@@ -76,7 +76,7 @@ TEST_F(ScanFolderTest, WhatIsWrittenIsReadBack) {
   {
     ScanFolder scan = create();
     for (int i : {0, 1}) ASSERT_TRUE(scan.add_view(0, record(i), raw_view(i)));
-    ASSERT_TRUE(scan.set_pose_complete(0));
+    ASSERT_TRUE(scan.complete_pose(0, "scanning"));
     ASSERT_TRUE(scan.add_view(1, record(0), raw_view(7)));
     ASSERT_TRUE(scan.set_state("waiting_for_flip"));
   }
@@ -106,11 +106,38 @@ TEST_F(ScanFolderTest, WhatIsWrittenIsReadBack) {
   EXPECT_EQ(calibration->sha256, manifest.calibration->sha256);
 }
 
+TEST_F(ScanFolderTest, AClosureShotIsKeptAsEvidence) {
+  ScanFolder scan = with_one_view();
+  ASSERT_TRUE(scan.add_closure(0, {1, 360.01, "2026-11-21T09:31:00Z", 1.25, 0.1, false}));
+  EXPECT_EQ(scan.add_closure(1, {}).error().code, ErrorCode::invalid_input) << "there is no such pose";
+  const auto again = ScanFolder::open(scan_);
+  ASSERT_TRUE(again) << again.error().message;
+  ASSERT_EQ(again->manifest().poses[0].closures.size(), 1u);
+  const auto& closure = again->manifest().poses[0].closures[0];
+  EXPECT_EQ(closure.after_views, 1);
+  EXPECT_EQ(closure.shift_px, 1.25);
+  EXPECT_FALSE(closure.unmoved);
+}
+
+TEST_F(ScanFolderTest, AnOlderFolderIsReadAndBecomesANewOneWithItsNextChange) {
+  ScanFolder scan = with_one_view();
+  const std::string now = *read_file(scan_ / "scan.json");
+  auto old = replaced(now, "\"version\": 2", "\"version\": 1");
+  const auto closures = old.find(",\n      \"closures\": []");
+  ASSERT_NE(closures, std::string::npos);
+  old.erase(closures, std::string(",\n      \"closures\": []").size());
+  write_text(scan_ / "scan.json", old);
+  auto again = ScanFolder::open(scan_);
+  ASSERT_TRUE(again) << again.error().message;
+  ASSERT_TRUE(again->set_state(again->manifest().state));
+  EXPECT_EQ(*read_file(scan_ / "scan.json"), now);
+}
+
 // The example of docs/scan-folder.md, shortened to one view.
 TEST_F(ScanFolderTest, TheDocumentedManifestIsRead) {
   const std::string zeros(64, '0');
   std::string text = R"({
-    "format": "scanrig-scan", "version": 1, "id": "20261121-093000-1", "created": "2026-11-21T09:30:00Z",
+    "format": "scanrig-scan", "version": 2, "id": "20261121-093000-1", "created": "2026-11-21T09:30:00Z",
     "state": "scanning", "source": "stereo", "profile": "",
     "calibration": { "file": "calibration.json", "sha256": "HASH" },
     "poses": [
@@ -122,8 +149,10 @@ TEST_F(ScanFolderTest, TheDocumentedManifestIsRead) {
               "left_pattern":  { "path": "pose1/view00/left_pattern.png",  "sha256": "HASH" },
               "right_pattern": { "path": "pose1/view00/right_pattern.png", "sha256": "HASH" },
               "left_plain":    { "path": "pose1/view00/left_plain.png",    "sha256": "HASH" },
-              "right_plain":   { "path": "pose1/view00/right_plain.png",   "sha256": "HASH" } } } ] },
-      { "name": "pose2", "complete": false, "views": [] } ] })";
+              "right_plain":   { "path": "pose1/view00/right_plain.png",   "sha256": "HASH" } } } ],
+        "closures": [ { "after_views": 1, "measured_deg": 0.002, "taken": "2026-11-21T09:31:10Z",
+                        "shift_px": 0.11, "changed": 0.01, "unmoved": true } ] },
+      { "name": "pose2", "complete": false, "views": [], "closures": [] } ] })";
   for (auto at = text.find("HASH"); at != std::string::npos; at = text.find("HASH")) text.replace(at, 4, zeros);
   write_text(folder_ / "scan.json", text);
   const auto manifest = read_manifest(folder_ / "scan.json");
@@ -240,7 +269,7 @@ TEST_F(ScanFolderTest, AMissingKeyIsNamedWithItsPath) {
 
 TEST_F(ScanFolderTest, AFutureVersionIsUnsupported) {
   with_one_view();
-  edit_manifest("\"version\": 1", "\"version\": 2");
+  edit_manifest("\"version\": 2", "\"version\": 3");
   expect_refused(ErrorCode::unsupported, {"scan.json", "version"});
 }
 

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "core/result.h"
+
+namespace scanrig {
+
+/// One value a request may carry: in its path, behind its question mark, or in its JSON body. The same description
+/// checks requests and is printed in the OpenAPI document.
+struct Field {
+  enum class Type { text, number, integer, flag };
+  std::string_view name;
+  Type type = Type::text;
+  std::string_view about;
+  bool required = false;
+  double min = 0.0, max = 0.0;            ///< of a number; of the length of a text, in bytes
+  std::vector<std::string_view> words{};  ///< a text must be one of these; empty: any
+};
+
+/// What a request carries, checked against its fields; all their names in one list.
+class Values {
+ public:
+  using Value = std::variant<std::string, double, std::int64_t, bool>;
+  void set(std::string_view name, Value value) { values_.insert_or_assign(std::string(name), std::move(value)); }
+  [[nodiscard]] bool has(std::string_view name) const { return values_.contains(name); }
+  /// Of the field's type; nothing when the request does not carry it.
+  [[nodiscard]] std::optional<std::string> text(std::string_view name) const { return get<std::string>(name); }
+  [[nodiscard]] std::optional<double> number(std::string_view name) const { return get<double>(name); }
+  [[nodiscard]] std::optional<std::int64_t> integer(std::string_view name) const { return get<std::int64_t>(name); }
+  [[nodiscard]] bool flag(std::string_view name) const { return get<bool>(name).value_or(false); }
+
+ private:
+  template <class T>
+  std::optional<T> get(std::string_view name) const {
+    const auto found = values_.find(name);
+    if (found == values_.end() || !std::holds_alternative<T>(found->second)) return std::nullopt;
+    return std::get<T>(found->second);
+  }
+  std::map<std::string, Value, std::less<>> values_;
+};
+
+/// Reads the text of a parameter as what `field` describes. Fails with `invalid_input`, naming the field.
+Result<Values::Value> parse_value(const Field& field, const std::string& text);
+
+/// Reads a JSON body into `values`: an object of known keys, each as its field describes. An empty body is an empty
+/// object. Fails with `invalid_input`.
+Result<void> read_body(std::string_view body, const std::vector<Field>& fields, Values& values);
+
+}  // namespace scanrig

@@ -1,0 +1,84 @@
+#include "daemon/api/folder_files.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+namespace scanrig {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::array<std::pair<std::string_view, std::string_view>, 10> kTypes{{{".gz", "application/gzip"},
+                                                                                {".glb", "model/gltf-binary"},
+                                                                                {".ply", "application/octet-stream"},
+                                                                                {".obj", "model/obj"},
+                                                                                {".stl", "model/stl"},
+                                                                                {".png", "image/png"},
+                                                                                {".jpg", "image/jpeg"},
+                                                                                {".json", "application/json"},
+                                                                                {".html", "text/html; charset=utf-8"},
+                                                                                {".mtl", "text/plain; charset=utf-8"}}};
+
+Result<int> open_component(int folder, const std::string& name, bool last) {
+  // O_NONBLOCK: whatever somebody has put there, opening it does not wait.
+  const int flags = O_RDONLY | O_CLOEXEC | O_NOFOLLOW | (last ? O_NONBLOCK : O_DIRECTORY);
+  const int fd = ::openat(folder, name.c_str(), flags);
+  if (fd >= 0) return fd;
+  if (errno == EMFILE || errno == ENFILE || errno == EIO || errno == EACCES) {
+    return fail(ErrorCode::io, "{}: cannot be opened: {}", name, std::strerror(errno));
+  }
+  return fail(ErrorCode::not_found, "the job has no such file");
+}
+
+}  // namespace
+
+Result<std::vector<FolderFile>> list_files(const fs::path& folder) {
+  std::vector<FolderFile> files;
+  std::error_code error;
+  for (fs::recursive_directory_iterator next(folder, error), end; !error && next != end; next.increment(error)) {
+    std::error_code gone;
+    if (!fs::is_regular_file(next->symlink_status(gone))) continue;
+    const auto bytes = next->file_size(gone);
+    if (!gone) files.push_back({next->path().lexically_relative(folder).string(), bytes});
+  }
+  if (error) return fail(ErrorCode::io, "cannot list {}: {}", folder.string(), error.message());
+  std::ranges::sort(files, {}, &FolderFile::path);
+  return files;
+}
+
+Result<std::shared_ptr<OpenFile>> open_below(const fs::path& folder, std::string_view path) {
+  int at = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (at < 0) return fail(ErrorCode::not_found, "the job's folder is not there any more");
+  for (bool last = false; !last;) {
+    const auto slash = path.find('/');
+    last = slash == std::string_view::npos;
+    const std::string name(path.substr(0, slash));
+    if (!last) path.remove_prefix(slash + 1);
+    const auto next = name.empty() || name == "." || name == ".."
+                          ? Result<int>(fail(ErrorCode::not_found, "the job has no such file"))
+                          : open_component(at, name, last);
+    ::close(at);
+    if (!next) return pass_on(next);
+    at = *next;
+  }
+  struct stat status {};
+  if (::fstat(at, &status) != 0 || !S_ISREG(status.st_mode)) {
+    ::close(at);
+    return fail(ErrorCode::not_found, "the job has no such file");
+  }
+  return std::make_shared<OpenFile>(at, static_cast<std::uint64_t>(status.st_size));
+}
+
+std::string_view media_type(std::string_view path) {
+  const auto found = std::ranges::find_if(kTypes, [&](const auto& type) { return path.ends_with(type.first); });
+  return found == kTypes.end() ? "application/octet-stream" : found->second;
+}
+
+}  // namespace scanrig

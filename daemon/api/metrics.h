@@ -1,0 +1,13 @@
+#pragma once
+
+#include <string>
+
+#include "daemon/api/facts.h"
+#include "daemon/station/snapshot.h"
+
+namespace scanrig {
+
+/// In the text format 0.0.4 of Prometheus. Names begin with scanrig_, units are base units.
+std::string metrics_text(const Snapshot& snapshot, const Facts& facts);
+
+}  // namespace scanrig

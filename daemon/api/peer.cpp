@@ -1,0 +1,72 @@
+#include "daemon/api/peer.h"
+
+#include <grp.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+
+namespace scanrig {
+namespace {
+
+Result<gid_t> group_id(const std::string& name) {
+  group entry{};
+  group* found = nullptr;
+  std::vector<char> room(64 * 1024);
+  const int error = ::getgrnam_r(name.c_str(), &entry, room.data(), room.size(), &found);
+  if (error != 0 || found == nullptr) {
+    return fail(ErrorCode::not_found, "there is no group \"{}\" on this machine: add it, or name another in [api]",
+                name);
+  }
+  return entry.gr_gid;
+}
+
+}  // namespace
+
+Result<PeerCredentials> peer_credentials(int socket) {
+  ucred credentials{};
+  socklen_t size = sizeof credentials;
+  if (::getsockopt(socket, SOL_SOCKET, SO_PEERCRED, &credentials, &size) != 0) {
+    return fail(ErrorCode::io, "the kernel does not tell who connected: {}", std::strerror(errno));
+  }
+  PeerCredentials peer{credentials.uid, {credentials.gid}};
+  std::vector<gid_t> groups(64);
+  socklen_t bytes = static_cast<socklen_t>(groups.size() * sizeof(gid_t));
+  int got = ::getsockopt(socket, SOL_SOCKET, SO_PEERGROUPS, groups.data(), &bytes);
+  if (got != 0 && errno == ERANGE) {
+    groups.resize(bytes / sizeof(gid_t));
+    got = ::getsockopt(socket, SOL_SOCKET, SO_PEERGROUPS, groups.data(), &bytes);
+  }
+  if (got == 0) peer.groups.insert(peer.groups.end(), groups.begin(), groups.begin() + bytes / sizeof(gid_t));
+  return peer;
+}
+
+std::optional<Role> PeerRoles::role_of(const PeerCredentials& peer) const {
+  if (peer.uid == 0 || peer.uid == ::geteuid()) return Role::engineer;
+  const auto in = [&](const std::optional<gid_t>& group) {
+    return group && std::ranges::find(peer.groups, *group) != peer.groups.end();
+  };
+  if (in(engineer)) return Role::engineer;
+  if (in(operating)) return Role::operating;
+  if (in(viewer)) return Role::viewer;
+  return std::nullopt;
+}
+
+Result<PeerRoles> find_groups(const PeerGroups& groups) {
+  PeerRoles roles;
+  if (!groups.any()) roles.operating = ::getegid();
+  for (const auto& [name, id] :
+       {std::pair(&groups.viewer, &roles.viewer), std::pair(&groups.operating, &roles.operating),
+        std::pair(&groups.engineer, &roles.engineer)}) {
+    if (!*name) continue;
+    const auto found = group_id(**name);
+    if (!found) return pass_on(found);
+    *id = *found;
+  }
+  return roles;
+}
+
+}  // namespace scanrig

@@ -1,0 +1,40 @@
+#include "daemon/api/route.h"
+
+#include <unistd.h>
+
+#include <nlohmann/json.hpp>
+
+#include "daemon/api/json_words.h"
+
+namespace scanrig {
+
+OpenFile::~OpenFile() { ::close(fd_); }
+
+std::string_view to_string(Method method) {
+  switch (method) {
+    case Method::get: return "GET";
+    case Method::post: return "POST";
+    case Method::del: break;
+  }
+  return "DELETE";
+}
+
+unsigned http_status(ErrorCode code) {
+  switch (code) {
+    case ErrorCode::invalid_input:
+    case ErrorCode::out_of_range:
+    case ErrorCode::unsupported: return 400;
+    case ErrorCode::not_found: return 404;
+    case ErrorCode::io:
+    case ErrorCode::internal: return 500;
+    default: return 409;  // a rule or the state of the rig is against it
+  }
+}
+
+ApiResponse error_response(const Error& error) { return error_response(http_status(error.code), error); }
+
+ApiResponse error_response(unsigned status, const Error& error) {
+  return {status, to_text({{"error", to_json(error)}})};
+}
+
+}  // namespace scanrig

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "core/result.h"
+#include "daemon/api/field.h"
+#include "daemon/api/role.h"
+#include "daemon/station/control_loop.h"
+
+namespace scanrig {
+
+enum class Method { get, post, del };
+std::string_view to_string(Method method);  ///< "GET", "POST", "DELETE"
+
+/// A file to be sent: open already, so that what is checked is what is sent.
+class OpenFile {
+ public:
+  OpenFile(int fd, std::uint64_t size) : fd_(fd), size_(size) {}
+  ~OpenFile();
+  OpenFile(const OpenFile&) = delete;
+  OpenFile& operator=(const OpenFile&) = delete;
+  [[nodiscard]] int fd() const { return fd_; }
+  [[nodiscard]] std::uint64_t size() const { return size_; }
+
+ private:
+  int fd_;
+  std::uint64_t size_;
+};
+
+/// The events from then on, for as long as the client stays.
+struct EventStream {};
+
+struct ApiResponse {
+  unsigned status = 200;
+  std::variant<std::string, std::shared_ptr<OpenFile>, EventStream> body{};
+  std::string_view type = "application/json";
+};
+
+struct Facts;
+
+/// What routes act on. All of it may be used from any thread.
+struct ApiStation {
+  ControlLoop& loop;
+  std::function<Facts()> facts;     ///< of the machine and of the API itself; the latest, without waiting
+  std::filesystem::path storage{};  ///< absolute; where jobs are kept
+  std::function<Result<std::string>(std::string_view side)> preview_jpeg{};  ///< of "left" or "right"
+  std::function<Result<void>()> check_config{};            ///< of the file that the daemon was started with
+  std::function<void(std::function<void()>)> on_worker{};  ///< for what touches the disk
+};
+
+using Send = std::function<void(ApiResponse)>;
+
+struct Reply {
+  unsigned status = 200;
+  std::string_view about;
+  std::string_view schema{};  ///< a name in schemas.h; empty: not JSON
+  std::string_view type = "application/json";
+};
+
+/// One thing the API does. Dispatch, checks and the OpenAPI document all read this and nothing else.
+struct Route {
+  Method method;
+  std::string_view path;  ///< "/api/v1/jobs/{id}"
+  Role role;              ///< that is enough
+  std::string_view about;
+  std::vector<Field> in_path{}, in_query{}, in_body{};
+  Reply reply;
+  std::vector<unsigned> errors{};   ///< beside those that every route has
+  bool slow = false;                ///< touches the disk: done by a worker, not by an I/O thread
+  std::chrono::seconds patience{};  ///< for the answer; 0: as the limits say
+  /// Calls `send` once, from this thread or, soon, from the control loop's.
+  std::function<void(const ApiStation&, const Values&, Send)> handle;
+};
+
+/// Status of an answer that is an error.
+unsigned http_status(ErrorCode code);
+/// {"error": {"code", "message"}}
+ApiResponse error_response(const Error& error);
+ApiResponse error_response(unsigned status, const Error& error);
+
+}  // namespace scanrig

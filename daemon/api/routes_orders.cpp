@@ -1,0 +1,104 @@
+#include <nlohmann/json.hpp>
+
+#include "daemon/api/job_bundle.h"
+#include "daemon/api/json_words.h"
+#include "daemon/api/routes.h"
+
+namespace scanrig {
+namespace {
+
+using What = event::JobAsked::What;
+using Type = Field::Type;
+
+const Field kId{.name = "id", .about = "the job", .required = true, .min = 1, .max = 128};
+constexpr Reply kDone{.about = "done, and durable", .schema = "JobDone"};
+
+ControlLoop::Reply reply_with(std::string job, Send send) {
+  return [job = std::move(job), send = std::move(send)](const Result<std::string>& done) {
+    if (!done) return send(error_response(done.error()));
+    send({.body = to_text({{"job", job.empty() ? *done : job}})});
+  };
+}
+
+void order(const ApiStation& station, const Values& values, Send send) {
+  station.loop.order({.recipe = values.text("recipe").value_or("default"),
+                      .part = values.text("part").value_or(""),
+                      .repeat = static_cast<int>(values.integer("repeat").value_or(1))},
+                     reply_with("", std::move(send)));
+}
+
+void ask(const ApiStation& station, const Values& values, What what, Send send) {
+  const auto id = *values.text("id");
+  station.loop.ask(
+      event::JobAsked{
+          .what = what, .job = id, .voxel_mm = values.number("voxel_mm"), .fusion = values.text("fusion").value_or("")},
+      reply_with(id, std::move(send)));
+}
+
+Route job_route(Method method, std::string_view path, Role role, What what, std::string_view about,
+                std::vector<Field> body = {}) {
+  return {.method = method,
+          .path = path,
+          .role = role,
+          .about = about,
+          .in_path = {kId},
+          .in_body = std::move(body),
+          .reply = kDone,
+          .errors = {409, 500},
+          .handle = [what](const ApiStation& station, const Values& values, Send send) {
+            ask(station, values, what, std::move(send));
+          }};
+}
+
+Route order_route() {
+  return {.method = Method::post,
+          .path = "/api/v1/jobs",
+          .role = Role::operating,
+          .about = "Queues scans; answered when their folders are durable, with the first one's id.",
+          .in_body =
+              {{.name = "recipe", .about = "one of the configuration's; default without it", .min = 1, .max = 64},
+               {.name = "part", .about = "of what is scanned: barcode or free text", .min = 0, .max = 200},
+               {.name = "repeat", .type = Type::integer, .about = "so many jobs; 1 without it", .min = 1, .max = 100}},
+          .reply = kDone,
+          .errors = {404, 409, 500},
+          .handle = order};
+}
+
+Route bundle_route() {
+  return {
+      .method = Method::get,
+      .path = "/api/v1/jobs/{id}/bundle",
+      .role = Role::operating,
+      .about = "The whole folder of a job that has ended, packed for whoever must help. The job counts as exported.",
+      .in_path = {kId},
+      .reply = {.about = "a compressed tar archive", .type = "application/gzip"},
+      .errors = {409, 500},
+      .patience = std::chrono::seconds(180),
+      .handle = send_bundle};
+}
+
+}  // namespace
+
+std::vector<Route> order_routes() {
+  return {
+      order_route(),
+      job_route(Method::post, "/api/v1/jobs/{id}/cancel", Role::operating, What::cancel,
+                "Ends a queued or interrupted job."),
+      job_route(Method::post, "/api/v1/jobs/{id}/resume", Role::operating, What::resume,
+                "The next Start goes on with this interrupted job."),
+      job_route(Method::post, "/api/v1/jobs/{id}/first", Role::operating, What::to_front,
+                "The next Start begins this queued job."),
+      job_route(Method::post, "/api/v1/jobs/{id}/exported", Role::operating, What::set_exported,
+                "Somebody has what he needs: retention may remove it."),
+      job_route(
+          Method::post, "/api/v1/jobs/{id}/reprocess", Role::engineer, What::reprocess,
+          "Makes the model again, from the images.",
+          {{.name = "voxel_mm", .type = Type::number, .about = "as configured without it", .min = 0.02, .max = 5.0},
+           {.name = "fusion", .about = "as configured without it", .words = {"evidence", "paper"}}}),
+      job_route(Method::del, "/api/v1/jobs/{id}", Role::engineer, What::remove,
+                "Removes a job that has ended, with all its files."),
+      bundle_route(),
+  };
+}
+
+}  // namespace scanrig

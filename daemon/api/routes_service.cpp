@@ -1,0 +1,114 @@
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "core/version.h"
+#include "daemon/api/facts.h"
+#include "daemon/api/json_words.h"
+#include "daemon/api/metrics.h"
+#include "daemon/api/openapi.h"
+#include "daemon/api/router.h"
+#include "daemon/api/routes.h"
+
+namespace scanrig {
+namespace {
+
+using nlohmann::ordered_json;
+
+/// What is wrong now, of whatever kind.
+ordered_json problems_of(const Snapshot& snapshot, const Facts& facts) {
+  ordered_json problems = ordered_json::array();
+  for (const auto& device : snapshot.devices) {
+    if (device.problem) problems.push_back(to_json(*device.problem));
+  }
+  if (snapshot.may_be_moving) problems.push_back(to_json(Error{ErrorCode::timeout, snapshot.cause}));
+  if (facts.tokens_problem) problems.push_back(to_json(*facts.tokens_problem));
+  return problems;
+}
+
+void health(const ApiStation& station, const Values&, const Send& send) {
+  const auto snapshot = station.loop.snapshot();
+  const Facts facts = station.facts();
+  auto problems = problems_of(*snapshot, facts);
+  ordered_json temperatures = ordered_json::array();
+  for (const auto& one : facts.temperatures) {
+    temperatures.push_back({{"sensor", one.sensor}, {"celsius", one.celsius}});
+  }
+  const auto status = to_json(*snapshot);
+  send({.body = to_text({{"ok", problems.empty()},
+                         {"problems", std::move(problems)},
+                         {"version", kVersion},
+                         {"uptime_s", facts.uptime_s},
+                         {"devices", status["devices"]},
+                         {"disk", {{"bytes", facts.disk_bytes}, {"free_bytes", facts.disk_free_bytes}}},
+                         {"temperatures", std::move(temperatures)},
+                         {"deadlines_missed", snapshot->counters.deadlines_missed},
+                         {"retries", snapshot->counters.exposures_redone},
+                         {"faults", snapshot->counters.faults},
+                         {"connections", facts.connections},
+                         {"event_streams", facts.event_streams}})});
+}
+
+void metrics(const ApiStation& station, const Values&, const Send& send) {
+  send({.body = metrics_text(*station.loop.snapshot(), station.facts()), .type = "text/plain; version=0.0.4"});
+}
+
+/// A camera that does not answer now may do so later.
+void preview(const ApiStation& station, const Values& values, const Send& send) {
+  auto jpeg = station.preview_jpeg(*values.text("side"));
+  send(jpeg ? ApiResponse{.body = std::move(*jpeg), .type = "image/jpeg"} : error_response(503, jpeg.error()));
+}
+
+void check_config(const ApiStation& station, const Values&, const Send& send) {
+  const auto checked = station.check_config();
+  if (!checked && checked.error().code == ErrorCode::refused) return send(error_response(checked.error()));
+  ordered_json problems = ordered_json::array();
+  std::istringstream lines(checked ? std::string() : checked.error().message);
+  for (std::string line; std::getline(lines, line);) problems.push_back(line);
+  send({.body = to_text({{"ok", checked.has_value()}, {"problems", std::move(problems)}})});
+}
+
+void document(const ApiStation&, const Values&, const Send& send) {
+  static const std::string text = openapi_document(all_routes());
+  send({.body = text});
+}
+
+}  // namespace
+
+std::vector<Route> service_routes() {
+  return {{.method = Method::get,
+           .path = "/api/v1/health",
+           .role = Role::viewer,
+           .about = "Devices, disk, temperatures, deadlines missed, retries.",
+           .reply = {.about = "`ok` is false when something is wrong", .schema = "Health"},
+           .handle = health},
+          {.method = Method::get,
+           .path = "/api/v1/preview/{side}",
+           .role = Role::viewer,
+           .about = "What a camera sees: the latest picture; asks for a newer one while the rig is idle.",
+           .in_path = {{.name = "side", .about = "of the rig", .required = true, .words = {"left", "right"}}},
+           .reply = {.about = "a picture", .type = "image/jpeg"},
+           .slow = true,
+           .handle = preview},
+          {.method = Method::post,
+           .path = "/api/v1/config/check",
+           .role = Role::engineer,
+           .about = "Reads the daemon's configuration file again and tells what is wrong with it. Changes nothing.",
+           .reply = {.about = "every problem, with its line", .schema = "ConfigCheck"},
+           .errors = {409},
+           .slow = true,
+           .handle = check_config},
+          {.method = Method::get,
+           .path = "/api/v1/openapi.json",
+           .role = Role::viewer,
+           .about = "This document.",
+           .reply = {.about = "OpenAPI 3.0", .schema = "OpenApi"},
+           .handle = document},
+          {.method = Method::get,
+           .path = "/metrics",
+           .role = Role::viewer,
+           .about = "For Prometheus.",
+           .reply = {.about = "text format 0.0.4", .type = "text/plain; version=0.0.4"},
+           .handle = metrics}};
+}
+
+}  // namespace scanrig

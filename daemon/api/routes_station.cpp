@@ -1,0 +1,122 @@
+#include <nlohmann/json.hpp>
+
+#include "daemon/api/json_words.h"
+#include "daemon/api/routes.h"
+
+namespace scanrig {
+namespace {
+
+using nlohmann::ordered_json;
+using What = event::MaintenanceAsked::What;
+
+constexpr Reply kPressed{.about = "obeyed", .schema = "Pressed"};
+constexpr Reply kDone{.about = "obeyed; the state tells how it goes on", .schema = "Nothing"};
+
+ApiResponse pressed(const Result<std::string>& job) {
+  if (!job) return error_response(job.error());
+  return {.body = to_text({{"job", job->empty() ? ordered_json(nullptr) : ordered_json(*job)}})};
+}
+
+Route press(std::string_view path, Button button, Role role, std::string_view about) {
+  return {.method = Method::post,
+          .path = path,
+          .role = role,
+          .about = about,
+          .reply = kPressed,
+          .errors = {409},
+          .handle = [button](const ApiStation& station, const Values&, Send send) {
+            station.loop.press(button, Origin::remote,
+                               [send = std::move(send)](const Result<std::string>& job) { send(pressed(job)); });
+          }};
+}
+
+void ask(const ApiStation& station, const event::MaintenanceAsked& asked, Send send) {
+  station.loop.ask(asked, [send = std::move(send)](const Result<std::string>& done) {
+    send(done ? ApiResponse{.body = to_text(ordered_json::object())} : error_response(done.error()));
+  });
+}
+
+Route maintenance(std::string_view path, What what, std::string_view about) {
+  return {.method = Method::post,
+          .path = path,
+          .role = Role::engineer,
+          .about = about,
+          .reply = kDone,
+          .errors = {409},
+          .handle = [what](const ApiStation& station, const Values&, Send send) {
+            ask(station, {.what = what, .speed = kMaxJogSpeed}, std::move(send));
+          }};
+}
+
+void jog(const ApiStation& station, const Values& values, Send send) {
+  const auto to = values.number("to_deg"), by = values.number("by_deg");
+  if (to.has_value() == by.has_value()) {
+    return send(error_response({ErrorCode::invalid_input, "a jog takes to_deg or by_deg, one of them"}));
+  }
+  ask(station,
+      {.what = What::jog,
+       .angle = {to ? *to : *by},
+       .relative = by.has_value(),
+       .speed = {values.number("speed_deg_s").value_or(kMaxJogSpeed.value)}},
+      std::move(send));
+}
+
+Route jog_route() {
+  constexpr double kTurns = 3600.0;
+  return {.method = Method::post,
+          .path = "/api/v1/maintenance/jog",
+          .role = Role::engineer,
+          .about = "Turns the table while maintenance is on: to an angle, or by one.",
+          .in_body =
+              {{.name = "to_deg", .type = Field::Type::number, .about = "where to", .min = -kTurns, .max = kTurns},
+               {.name = "by_deg", .type = Field::Type::number, .about = "by how much", .min = -kTurns, .max = kTurns},
+               {.name = "speed_deg_s",
+                .type = Field::Type::number,
+                .about = "how fast; without it as fast as maintenance may",
+                .min = 0.0,
+                .max = 360.0}},
+          .reply = kDone,
+          .errors = {409},
+          .handle = jog};
+}
+
+Route look(std::string_view path, std::string_view about, Reply reply, ordered_json (*what)(const Snapshot&)) {
+  return {.method = Method::get,
+          .path = path,
+          .role = Role::viewer,
+          .about = about,
+          .reply = reply,
+          .handle = [what](const ApiStation& station, const Values&, const Send& send) {
+            send({.body = to_text(what(*station.loop.snapshot()))});
+          }};
+}
+
+}  // namespace
+
+std::vector<Route> station_routes() {
+  return {
+      look("/api/v1/status", "What the station does, why, and what to do next.",
+           {.about = "the latest snapshot", .schema = "Status"}, [](const Snapshot& s) { return to_json(s); }),
+      look("/api/v1/io", "The panel's inputs and outputs.", {.about = "as last seen", .schema = "Io"}, io_table),
+      {.method = Method::get,
+       .path = "/api/v1/events",
+       .role = Role::viewer,
+       .about =
+           "Server-sent events: `status` and `job` as they change, each with the shapes of Status and JobDetail, and "
+           "`job_deleted` with {\"id\"}. A client that comes back with Last-Event-ID gets what it missed, or `lost` "
+           "and the present status when that is too long ago. A comment every 10 s is the heartbeat.",
+       .reply = {.about = "events without end", .type = "text/event-stream"},
+       .handle = [](const ApiStation&, const Values&, const Send& send) { send({.body = EventStream{}}); }},
+      press("/api/v1/start", Button::start, Role::operating, "Starts a scan; after the flip: goes on."),
+      press("/api/v1/stop", Button::stop, Role::viewer, "Stops the table and cancels the scan. Anybody may."),
+      press("/api/v1/reset", Button::reset, Role::operating, "Clears a fault and homes the table."),
+      maintenance("/api/v1/maintenance/on", What::on, "Maintenance mode begins: no jobs."),
+      maintenance("/api/v1/maintenance/off", What::off, "Maintenance mode ends."),
+      maintenance("/api/v1/maintenance/home", What::home, "Homes the table while maintenance is on."),
+      jog_route(),
+      maintenance("/api/v1/maintenance/pulse", What::pulse, "One flash of the projector."),
+      maintenance("/api/v1/maintenance/lamp_test", What::lamp_test, "All lamps on for three seconds."),
+  };
+}
+
+}  // namespace scanrig

@@ -1,0 +1,102 @@
+#include "daemon/api/schemas.h"
+
+namespace scanrig {
+
+const char* const kSchemas = R"({
+"Error": {"type": "object", "required": ["error"], "additionalProperties": false, "properties": {
+  "error": {"$ref": "#/components/schemas/Problem"}}},
+"Problem": {"type": "object", "required": ["code", "message"], "additionalProperties": false, "properties": {
+  "code": {"type": "string", "description": "one of the error codes of docs/exit-codes.md"},
+  "message": {"type": "string", "description": "who, doing what, what happened, what to do"}}},
+"MaybeProblem": {"allOf": [{"$ref": "#/components/schemas/Problem"}], "nullable": true},
+"Nothing": {"type": "object", "additionalProperties": false, "properties": {}},
+"Pressed": {"type": "object", "required": ["job"], "additionalProperties": false, "properties": {
+  "job": {"type": "string", "nullable": true, "description": "the job that has the rig now"}}},
+"Status": {"type": "object", "additionalProperties": false,
+  "required": ["revision", "machine", "activity", "may_be_moving", "cause", "sentence", "next_action", "devices", "job",
+  "queue"],
+  "properties": {
+  "revision": {"type": "integer"},
+  "machine": {"type": "string", "description": "in the words of OPC 40100-1, such as Operational.Ready"},
+  "activity": {"type": "string", "description": "what the rig is busy with inside that state"},
+  "may_be_moving": {"type": "boolean"},
+  "cause": {"type": "string", "description": "why the machine is in this state"},
+  "sentence": {"type": "string", "description": "what is going on"},
+  "next_action": {"type": "string", "description": "what the operator should do; empty: nothing"},
+  "devices": {"type": "array", "items": {"$ref": "#/components/schemas/Device"}},
+  "job": {"type": "string", "nullable": true, "description": "the job that has the rig"},
+  "queue": {"type": "array", "items": {"type": "string"}, "description": "jobs to come, the next one first"}}},
+"Device": {"type": "object", "required": ["name", "ok", "problem"], "additionalProperties": false, "properties": {
+  "name": {"type": "string"}, "ok": {"type": "boolean"}, "problem": {"$ref": "#/components/schemas/MaybeProblem"}}},
+"Io": {"type": "object", "required": ["inputs", "outputs"], "additionalProperties": false, "properties": {
+  "inputs": {"type": "object", "additionalProperties": {"type": "boolean"}},
+  "outputs": {"type": "object", "additionalProperties": {"type": "boolean"}}}},
+"Job": {"type": "object", "additionalProperties": false,
+  "required": ["id", "state", "recipe", "part", "folder", "poses", "views", "stored", "resumable", "quarantined",
+  "exported", "passed", "model", "report", "error"], "properties": {
+  "id": {"type": "string"}, "state": {"type": "string"},
+  "recipe": {"type": "string"}, "part": {"type": "string", "description": "of the order: barcode or free text"},
+  "resumable": {"type": "boolean", "description": "interrupted, and the missing views may still be taken"},
+  "quarantined": {"type": "boolean", "description": "two daemons died over its reconstruction"},
+  "exported": {"type": "boolean"},
+  "passed": {"type": "boolean", "nullable": true, "description": "done: within the limits of its recipe"},
+  "folder": {"type": "string"},
+  "poses": {"type": "integer"}, "views": {"type": "integer", "description": "a pose"},
+  "stored": {"type": "integer", "description": "views that survive a power cut"},
+  "model": {"type": "string", "description": "path of the model; empty until it is there"},
+  "report": {"type": "string"}, "error": {"$ref": "#/components/schemas/MaybeProblem"}}},
+"JobPage": {"type": "object", "required": ["jobs", "next"], "additionalProperties": false, "properties": {
+  "jobs": {"type": "array", "items": {"$ref": "#/components/schemas/Job"}},
+  "next": {"type": "string", "nullable": true, "description": "`before` of the next page; null on the last"}}},
+"JobDetail": {"type": "object", "additionalProperties": false,
+  "required": ["id", "state", "recipe", "part", "folder", "poses", "views", "stored", "closures", "stages", "resumable", "quarantined",
+  "exported", "passed", "model", "report", "error"], "properties": {
+  "id": {"type": "string"}, "state": {"type": "string"},
+  "recipe": {"type": "string"}, "part": {"type": "string", "description": "of the order: barcode or free text"},
+  "resumable": {"type": "boolean", "description": "interrupted, and the missing views may still be taken"},
+  "quarantined": {"type": "boolean", "description": "two daemons died over its reconstruction"},
+  "exported": {"type": "boolean"},
+  "passed": {"type": "boolean", "nullable": true, "description": "done: within the limits of its recipe"},
+  "folder": {"type": "string"},
+  "poses": {"type": "integer"}, "views": {"type": "integer", "description": "a pose"},
+  "stored": {"type": "array", "items": {"$ref": "#/components/schemas/StoredView"}},
+  "closures": {"type": "array", "items": {"$ref": "#/components/schemas/Closure"}},
+  "stages": {"type": "array", "items": {"$ref": "#/components/schemas/Stage"}},
+  "model": {"type": "string"}, "report": {"type": "string"}, "error": {"$ref": "#/components/schemas/MaybeProblem"}}},
+"StoredView": {"type": "object", "additionalProperties": false,
+  "required": ["pose", "view", "measured_deg", "error_deg", "settling_ms", "redone"], "properties": {
+  "pose": {"type": "integer"}, "view": {"type": "integer"}, "measured_deg": {"type": "number"},
+  "error_deg": {"type": "number", "description": "measured less commanded"}, "settling_ms": {"type": "number"},
+  "redone": {"type": "integer", "description": "exposures that were lost and taken again"}}},
+"Closure": {"type": "object", "required": ["pose", "shift_px", "changed", "unmoved"], "additionalProperties": false,
+  "description": "view 0, taken again, against the first one", "properties": {
+  "pose": {"type": "integer"}, "shift_px": {"type": "number"}, "changed": {"type": "number"},
+  "unmoved": {"type": "boolean"}}},
+"Stage": {"type": "object", "required": ["name", "fraction"], "additionalProperties": false, "properties": {
+  "name": {"type": "string"}, "fraction": {"type": "number", "minimum": 0, "maximum": 1}}},
+"JobDone": {"type": "object", "required": ["job"], "additionalProperties": false, "properties": {
+  "job": {"type": "string"}}},
+"FileList": {"type": "object", "required": ["files"], "additionalProperties": false, "properties": {
+  "files": {"type": "array", "items": {"type": "object", "required": ["path", "bytes", "type"],
+    "additionalProperties": false, "properties": {
+    "path": {"type": "string"}, "bytes": {"type": "integer"}, "type": {"type": "string"}}}}}},
+"Report": {"type": "object", "description": "report.json of the model"},
+"Health": {"type": "object", "additionalProperties": false,
+  "required": ["ok", "problems", "version", "uptime_s", "devices", "disk", "temperatures", "deadlines_missed", "retries",
+  "faults", "connections", "event_streams"], "properties": {
+  "ok": {"type": "boolean", "description": "nothing is wrong"},
+  "problems": {"type": "array", "items": {"$ref": "#/components/schemas/Problem"}},
+  "version": {"type": "string"}, "uptime_s": {"type": "number"},
+  "devices": {"type": "array", "items": {"$ref": "#/components/schemas/Device"}},
+  "disk": {"type": "object", "required": ["bytes", "free_bytes"], "additionalProperties": false, "properties": {
+    "bytes": {"type": "integer"}, "free_bytes": {"type": "integer"}}},
+  "temperatures": {"type": "array", "items": {"type": "object", "required": ["sensor", "celsius"],
+    "additionalProperties": false, "properties": {"sensor": {"type": "string"}, "celsius": {"type": "number"}}}},
+  "deadlines_missed": {"type": "integer"}, "retries": {"type": "integer"}, "faults": {"type": "integer"},
+  "connections": {"type": "integer"}, "event_streams": {"type": "integer"}}},
+"ConfigCheck": {"type": "object", "required": ["ok", "problems"], "additionalProperties": false, "properties": {
+  "ok": {"type": "boolean"}, "problems": {"type": "array", "items": {"type": "string"}}}},
+"OpenApi": {"type": "object", "required": ["openapi", "paths"]}
+})";
+
+}  // namespace scanrig

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <atomic>
+#include <boost/asio/thread_pool.hpp>
+#include <memory>
+
+#include "daemon/api/access.h"
+#include "daemon/api/admission.h"
+#include "daemon/api/event_hub.h"
+#include "daemon/api/router.h"
+
+namespace scanrig {
+
+/// What all connections share. Outlives them.
+struct ServerCore {
+  ServerCore(ApiStation what, PeerRoles peers, const std::filesystem::path& tokens, ApiLimits most, std::string life)
+      : station(std::move(what)),
+        access(peers, tokens),
+        limits(most),
+        admission(std::make_shared<Admission>(most)),
+        hub(std::move(life)) {}
+
+  const Router router;
+  const ApiStation station;
+  Access access;
+  const ApiLimits limits;
+  const std::shared_ptr<Admission> admission;
+  EventHub hub;
+  std::atomic<std::uint64_t> requests = 0, refused = 0;
+  boost::asio::thread_pool workers{2};  ///< for what touches the disk
+};
+
+}  // namespace scanrig

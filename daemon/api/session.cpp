@@ -1,0 +1,192 @@
+#include "daemon/api/session.h"
+
+#include <unistd.h>
+
+#include <boost/asio/post.hpp>
+#include <boost/asio/write.hpp>
+
+namespace scanrig {
+namespace {
+
+namespace net = boost::asio;
+namespace http = boost::beast::http;
+
+const scanrig::Error kTooMany{ErrorCode::busy, "there are too many connections: try again later"};
+const scanrig::Error kTooOften{ErrorCode::busy, "too many requests: wait a moment"};
+const scanrig::Error kNoAnswer{ErrorCode::timeout, "the station did not answer in time: see scanrig status"};
+constexpr auto kDrainTime = std::chrono::seconds(1);
+
+std::string_view plain(boost::beast::string_view text) { return {text.data(), text.size()}; }
+
+std::optional<ApiResponse> understand(boost::beast::error_code error) {
+  if (error == http::error::header_limit) {
+    return error_response(431, {ErrorCode::invalid_input, "the request's header is too large"});
+  }
+  if (error == http::error::body_limit) {
+    return error_response(413, {ErrorCode::invalid_input, "the request's body is too large"});
+  }
+  if (error.category() == make_error_code(http::error::end_of_stream).category() &&
+      error != http::error::end_of_stream && error != http::error::partial_message) {
+    return error_response(400, {ErrorCode::invalid_input, "this is not an HTTP request"});
+  }
+  return std::nullopt;  // gone, or too slow
+}
+
+}  // namespace
+
+Session::~Session() {
+  if (subscription_) core_.hub.unsubscribe(*subscription_);
+}
+
+void Session::start() {
+  net::post(stream_.get_executor(), [self = shared_from_this()] { self->read_header(); });
+}
+
+void Session::turn_away() {
+  net::post(stream_.get_executor(), [self = shared_from_this()] {
+    ++self->core_.refused;
+    self->last_ = true;
+    self->write_text(error_response(503, kTooMany));
+  });
+}
+
+void Session::read_header() {
+  parser_.emplace();
+  parser_->header_limit(core_.limits.header_bytes);
+  parser_->body_limit(core_.limits.body_bytes);
+  stream_.expires_after(core_.limits.header_time);
+  http::async_read_header(stream_, buffer_, *parser_,
+                          [self = shared_from_this()](Error error, std::size_t) { self->on_header(error); });
+}
+
+void Session::on_header(Error error) {
+  if (error) {
+    auto complaint = understand(error);
+    if (!complaint) return hang_up();
+    last_ = true;
+    return write_text(std::move(*complaint));
+  }
+  ++core_.requests;
+  last_ = !parser_->get().keep_alive();
+  const auto now = Admission::Clock::now();
+  const auto as = role();
+  if (!as && !header(http::field::authorization).empty()) seat_->showed_bad_token(now);
+  const bool may = seat_->may_ask(now);
+  auto found = core_.router.find(plain(parser_->get().method_string()), plain(parser_->get().target()), as);
+  if (!may || !found) {
+    ++core_.refused;
+    last_ = last_ || !parser_->is_done();  // a body that nobody has read is in the way
+    return write_text(may ? std::move(found.error()) : error_response(429, kTooOften));
+  }
+  match_ = std::move(*found);
+  if (parser_->is_done()) return call();
+  stream_.expires_after(core_.limits.body_time);
+  http::async_read(stream_, buffer_, *parser_,
+                   [self = shared_from_this()](Error failed, std::size_t) { self->on_body(failed); });
+}
+
+void Session::on_body(Error error) {
+  if (!error) return call();
+  last_ = true;
+  auto complaint = understand(error);
+  if (!complaint) return hang_up();
+  write_text(std::move(*complaint));
+}
+
+/// The answer may come from a worker or from the control loop; until then only the timer keeps this session.
+void Session::call() {
+  await_answer(match_->route->patience);
+  const bool slow = match_->route->slow;
+  auto work = [match = std::move(*match_), body = parser_->get().body(), &core = core_, send = sender()]() mutable {
+    Router::call(std::move(match), body, core.station, std::move(send));
+  };
+  match_.reset();
+  if (slow) {
+    net::post(core_.workers, std::move(work));
+  } else {
+    work();
+  }
+}
+
+void Session::await_answer(std::chrono::milliseconds patience) {
+  waiting_ = true;
+  timer_.expires_after(std::max(patience, core_.limits.answer_time));
+  timer_.async_wait([self = shared_from_this()](Error error) {
+    if (error || !self->waiting_) return;
+    self->last_ = true;
+    self->answer(error_response(503, kNoAnswer));
+  });
+}
+
+Send Session::sender() {
+  return [weak = weak_from_this()](ApiResponse response) {
+    const auto self = weak.lock();
+    if (!self) return;
+    net::post(self->stream_.get_executor(), [weak, response = std::move(response)]() mutable {
+      if (const auto session = weak.lock()) session->answer(std::move(response));
+    });
+  };
+}
+
+void Session::answer(ApiResponse response) {
+  if (!waiting_) return;  // it was given up
+  waiting_ = false;
+  timer_.cancel();
+  if (const auto* file = std::get_if<std::shared_ptr<OpenFile>>(&response.body)) {
+    begin_file(*file, response.type);
+  } else if (std::holds_alternative<EventStream>(response.body)) {
+    begin_events();
+  } else {
+    write_text(std::move(response));
+  }
+}
+
+/// The same for all answers. What comes out of a job's folder is shown, never run.
+void Session::set_head(unsigned status, std::string_view type) {
+  response_ = {static_cast<http::status>(status), 11};
+  response_.set(http::field::content_type, {type.data(), type.size()});
+  response_.set(http::field::cache_control, "no-store");
+  response_.set("X-Content-Type-Options", "nosniff");
+  response_.set("Content-Security-Policy", "default-src 'none'; img-src data:; style-src 'unsafe-inline'; sandbox");
+  if (status == 401) response_.set(http::field::www_authenticate, "Bearer");
+  response_.keep_alive(!last_);
+}
+
+void Session::write_text(ApiResponse response) {
+  set_head(response.status, response.type);
+  response_.body() = std::move(std::get<std::string>(response.body));
+  response_.prepare_payload();
+  stream_.expires_after(core_.limits.answer_time);
+  http::async_write(stream_, response_,
+                    [self = shared_from_this()](Error error, std::size_t) { self->on_written(error); });
+}
+
+void Session::on_written(Error error) {
+  if (error) return hang_up();
+  if (last_) return drain();
+  read_header();
+}
+
+void Session::hang_up() { stream_.close(); }
+
+/// A socket closed while the client still sends would take the answer with it.
+void Session::drain() {
+  Error ignored;
+  stream_.socket().shutdown(net::socket_base::shutdown_send, ignored);
+  chunk_.resize(4096);
+  stream_.expires_after(kDrainTime);
+  drain_more();
+}
+
+void Session::drain_more() {
+  stream_.async_read_some(net::buffer(chunk_), [self = shared_from_this()](Error error, std::size_t) {
+    if (error) return self->hang_up();
+    self->drain_more();
+  });
+}
+
+std::string_view Session::header(http::field name) const { return plain(parser_->get()[name]); }
+
+std::optional<Role> Session::role() const { return core_.access.role_of(peer_, header(http::field::authorization)); }
+
+}  // namespace scanrig

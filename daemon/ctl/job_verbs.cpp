@@ -1,0 +1,127 @@
+#include <unistd.h>
+
+#include <cstdio>
+
+#include "daemon/ctl/answers.h"
+#include "daemon/ctl/free_rig.h"
+#include "daemon/ctl/stage_bars.h"
+#include "daemon/ctl/verbs.h"
+
+namespace scanrig::ctl {
+namespace {
+
+using nlohmann::json;
+
+constexpr int kPage = 500;
+
+void print_job(const json& job) {
+  fmt::print("{:<22} {:<16} {:>2} views  {}\n", text(job, "id"), text(job, "state"), job.at("stored").get<int>(),
+             job.at("error").is_object() ? text(job.at("error"), "message") : text(job, "model"));
+}
+
+/// As many as are wanted, over as many pages as that takes.
+tl::expected<json, Refusal> list(const Connection& connection, const JobsVerb& verb) {
+  auto all = json::array();
+  const std::string filter = verb.state.empty() ? "" : "&state=" + verb.state;
+  for (std::string before;;) {
+    const int wanted = std::min(kPage, verb.limit - static_cast<int>(all.size()));
+    const auto page = ask(connection.socket, "GET", fmt::format("/api/v1/jobs?limit={}{}{}", wanted, filter, before));
+    if (!page) return tl::unexpected(page.error());
+    for (const auto& job : page->at("jobs")) all.push_back(job);
+    const auto next = text(*page, "next");
+    if (next.empty() || static_cast<int>(all.size()) >= verb.limit) return json{{"jobs", all}};
+    before = "&before=" + segment(next);
+  }
+}
+
+/// Copies what the daemon sends to a file here, with a bar.
+ExitCode save(const Connection& connection, const std::string& target, const std::string& name,
+              const std::string& out) {
+  std::FILE* told = connection.json ? stderr : stdout;
+  StageBars bars(told, ::isatty(::fileno(told)) == 1);
+  const auto done = download(connection.socket, target, out, [&](std::uint64_t bytes, std::uint64_t of) {
+    if (of > 0) bars.update(name, static_cast<double>(bytes) / static_cast<double>(of));
+  });
+  if (!done) return complain(done.error());
+  if (connection.json) {
+    print({{"file", out}});
+  } else {
+    fmt::print("{}\n", out);
+  }
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+ExitCode jobs(const Connection& connection, const JobsVerb& verb) {
+  const auto answer =
+      verb.id.empty() ? list(connection, verb) : ask(connection.socket, "GET", "/api/v1/jobs/" + segment(verb.id));
+  if (!answer) return complain(answer.error());
+  if (connection.json || !verb.id.empty()) {
+    print(*answer);
+  } else {
+    for (const auto& job : answer->at("jobs")) print_job(job);
+  }
+  return ExitCode::ok;
+}
+
+ExitCode job_files(const Connection& connection, const std::string& id) {
+  const auto answer = ask(connection.socket, "GET", "/api/v1/jobs/" + segment(id) + "/files");
+  if (!answer) return complain(answer.error());
+  if (connection.json) {
+    print(*answer);
+    return ExitCode::ok;
+  }
+  for (const auto& file : answer->at("files")) {
+    fmt::print("{:>10}  {}\n", bytes_text(file.at("bytes")), text(file, "path"));
+  }
+  return ExitCode::ok;
+}
+
+ExitCode export_file(const Connection& connection, const ExportVerb& verb) {
+  const auto out =
+      verb.out.empty() ? verb.id + "-" + std::filesystem::path(verb.file).filename().string() : verb.out.string();
+  const auto job = "/api/v1/jobs/" + segment(verb.id);
+  if (const auto done = save(connection, job + "/files/" + segment(verb.file), verb.file, out); done != ExitCode::ok) {
+    return done;
+  }
+  // Who may only look may copy, but retention goes on as if nobody had.
+  const auto noted = ask(connection.socket, "POST", job + "/exported");
+  return noted || noted.error().exit == ExitCode::refused ? ExitCode::ok : complain(noted.error());
+}
+
+ExitCode bundle(const Connection& connection, const BundleVerb& verb) {
+  const auto out = verb.out.empty() ? verb.id + ".tar.gz" : verb.out.string();
+  return save(connection, "/api/v1/jobs/" + segment(verb.id) + "/bundle", verb.id, out);
+}
+
+ExitCode queue(const Connection& connection, const QueueVerb& verb) {
+  nlohmann::json body{{"recipe", verb.recipe}, {"repeat", verb.repeat}};
+  if (!verb.part.empty()) body["part"] = verb.part;
+  const auto answer = ask(connection.socket, "POST", "/api/v1/jobs", body.dump());
+  if (!answer) return complain(answer.error());
+  if (connection.json) {
+    print(*answer);
+  } else {
+    fmt::print("{}\n", text(*answer, "job"));
+  }
+  return ExitCode::ok;
+}
+
+ExitCode change_job(const Connection& connection, const JobVerb& verb) {
+  const bool removes = verb.what == "delete";
+  const auto job = "/api/v1/jobs/" + segment(verb.id);
+  if (removes && !agreed(fmt::format("Job {} and all its files are removed for good?", verb.id), verb.yes)) {
+    return complain(ExitCode::refused, "nothing was removed: answer y, or say --yes where there is no terminal");
+  }
+  auto body = json::object();
+  if (verb.voxel_mm) body["voxel_mm"] = *verb.voxel_mm;
+  if (!verb.fusion.empty()) body["fusion"] = verb.fusion;
+  const auto answer = removes ? ask(connection.socket, "DELETE", job)
+                              : ask(connection.socket, "POST", job + "/" + verb.what, body.dump());
+  if (!answer) return complain(answer.error());
+  if (connection.json) print(*answer);
+  return ExitCode::ok;
+}
+
+}  // namespace scanrig::ctl

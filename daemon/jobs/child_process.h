@@ -1,0 +1,34 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/result.h"
+
+namespace scanrig {
+
+struct ChildCommand {
+  std::vector<std::string> words;                      ///< the program's path first
+  std::chrono::seconds limit = std::chrono::hours(1);  ///< then it is killed
+  std::optional<std::uintmax_t> memory_bytes{};        ///< of private memory; more is refused to it
+  std::function<void(std::string_view)> on_line = [](std::string_view) {};  ///< each line of its standard output
+};
+
+struct ChildEnd {
+  int code = 0;            ///< exit code; where a signal ended it -1
+  int signal = 0;          ///< 0: it ended by itself
+  std::string last_words;  ///< the last line of its standard error
+};
+
+/// Runs a program at nice +10 to its end. It dies with this process and is killed when `stop` is asked for or the limit
+/// passes. Nothing is inherited but the two outputs. Fails with `io` (cannot be started), `stopped`, `timeout`.
+Result<ChildEnd> run_child(const ChildCommand& command, const std::stop_token& stop);
+
+}  // namespace scanrig

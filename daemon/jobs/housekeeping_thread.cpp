@@ -1,0 +1,103 @@
+#include "daemon/jobs/housekeeping_thread.h"
+
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <system_error>
+#include <utility>
+
+#include "daemon/actor_thread.h"
+#include "daemon/jobs/bundle.h"
+
+namespace scanrig {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::uintmax_t bytes_in(const fs::path& folder) {
+  std::uintmax_t total = 0;
+  std::error_code error;
+  for (fs::recursive_directory_iterator next(folder, error), end; !error && next != end; next.increment(error)) {
+    std::error_code ignored;
+    const auto size = next->file_size(ignored);
+    if (!ignored) total += size;
+  }
+  return total;
+}
+
+/// When the manifest was last written, or the report.
+std::chrono::system_clock::time_point ended(const fs::path& folder) {
+  std::time_t newest = 0;
+  for (const auto& file : {folder / "scan.json", report_file(folder)}) {
+    struct stat info {};
+    if (::stat(file.c_str(), &info) == 0) newest = std::max(newest, info.st_mtim.tv_sec);
+  }
+  return std::chrono::system_clock::from_time_t(newest);
+}
+
+}  // namespace
+
+HousekeepingThread::HousekeepingThread(Clock& clock, const JobStore& store, RetentionOptions retention,
+                                       std::function<void(Event)> tell)
+    : store_(store),
+      retention_(retention),
+      tell_(std::move(tell)),
+      inbox_(clock),
+      thread_(start_actor(clock, [this] { run(); })) {}
+
+HousekeepingThread::~HousekeepingThread() {
+  stop_.request_stop();
+  inbox_.close();
+  thread_.join();
+}
+
+void HousekeepingThread::run() {
+  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), 10);
+  while (auto message = inbox_.take()) {
+    if (stop_.stop_requested()) continue;
+    std::visit([this](const auto& m) { handle(m); }, *message);
+  }
+}
+
+void HousekeepingThread::handle(const event::JobAsked& asked) { tell_(event::Answered{asked.ticket, keep(asked)}); }
+
+Result<std::string> HousekeepingThread::keep(const event::JobAsked& asked) {
+  const auto job = store_.read(asked.job);
+  if (asked.what == event::JobAsked::What::bundle) {
+    // A folder that cannot be read is what somebody wants to see.
+    if (!job && job.error().code == ErrorCode::not_found) return fail(ErrorCode::not_found, "no job {}", asked.job);
+    if (auto packed = bundle(store_.folder(asked.job), asked.path, {stop_.get_token(), {}}); !packed) {
+      return pass_on(packed);
+    }
+    return asked.path;
+  }
+  if (job && !is_final(job->state)) {
+    return fail(ErrorCode::busy, "job {} is {}: only what has ended can be removed", asked.job, to_string(job->state));
+  }
+  if (auto removed = remove(asked.job); !removed) return pass_on(removed);
+  return asked.job;
+}
+
+Result<void> HousekeepingThread::remove(const std::string& job) {
+  auto removed = store_.remove(job);
+  if (removed) tell_(event::JobRemoved{job});
+  return removed;
+}
+
+void HousekeepingThread::handle(const Sweep&) {
+  if (!retention_.keep_for && !retention_.keep_bytes) return;
+  std::vector<KeptJob> kept;
+  std::error_code error;
+  for (fs::directory_iterator next(store_.options().root, error), end; !error && next != end; next.increment(error)) {
+    const auto job = store_.read(next->path().filename());
+    if (!job || !is_final(job->state)) continue;
+    kept.push_back({job->id, ended(next->path()), bytes_in(next->path()), job->exported});
+  }
+  for (const auto& job : jobs_to_remove(std::move(kept), retention_, std::chrono::system_clock::now())) {
+    // One that cannot be removed is tried again at the next sweep.
+    std::ignore = remove(job);
+  }
+}
+
+}  // namespace scanrig

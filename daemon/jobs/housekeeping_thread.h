@@ -1,0 +1,46 @@
+#pragma once
+
+#include <functional>
+#include <stop_token>
+#include <thread>
+#include <variant>
+
+#include "daemon/jobs/job_store.h"
+#include "daemon/jobs/retention.h"
+#include "daemon/mailbox.h"
+#include "daemon/station/events.h"
+
+namespace scanrig {
+
+/// What takes its time and concerns ended jobs only: removing, bundling, retention; at nice +10.
+class HousekeepingThread {
+ public:
+  HousekeepingThread(Clock& clock, const JobStore& store, RetentionOptions retention, std::function<void(Event)> tell);
+  /// Stops a bundle that is being packed, drops the rest and joins.
+  ~HousekeepingThread();
+  HousekeepingThread(const HousekeepingThread&) = delete;
+  HousekeepingThread& operator=(const HousekeepingThread&) = delete;
+
+  /// `remove` or `bundle`.
+  void post(event::JobAsked asked) { inbox_.post(std::move(asked)); }
+  /// Time for retention.
+  void sweep() { inbox_.post(Sweep{}); }
+
+ private:
+  struct Sweep {};
+
+  void run();
+  void handle(const event::JobAsked& asked);
+  void handle(const Sweep& sweep);
+  Result<std::string> keep(const event::JobAsked& asked);
+  Result<void> remove(const std::string& job);
+
+  const JobStore& store_;
+  RetentionOptions retention_;
+  std::function<void(Event)> tell_;
+  Mailbox<std::variant<event::JobAsked, Sweep>> inbox_;
+  std::stop_source stop_;
+  std::thread thread_;
+};
+
+}  // namespace scanrig

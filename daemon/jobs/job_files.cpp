@@ -1,0 +1,176 @@
+#include "daemon/jobs/job_files.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <random>
+#include <system_error>
+
+#include "core/files.h"
+#include "pipeline/scan/strict_json.h"
+
+namespace scanrig {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+constexpr const char* kJob = "job.json";
+constexpr const char* kFailure = "failure.json";
+constexpr const char* kAttempt = "attempt.json";
+
+/// Part ids and messages come from outside and need not be UTF-8.
+Result<void> write_json(const fs::path& file, const ordered_json& json) {
+  return write_file_atomically(file, json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n");
+}
+
+void remove_file(const fs::path& file) {
+  std::error_code ignored;  // a file that stays is seen again at the next start
+  fs::remove(file, ignored);
+}
+
+ordered_json to_json(const Recipe& recipe) {
+  ordered_json limits = ordered_json::object();
+  if (recipe.limits.least_measured_share) limits["least_measured_share"] = *recipe.limits.least_measured_share;
+  if (recipe.limits.most_residual_mm) limits["most_residual_mm"] = *recipe.limits.most_residual_mm;
+  return {{"name", recipe.name},
+          {"poses", recipe.poses},
+          {"views", recipe.views},
+          {"flip_timeout_min", recipe.flip_timeout.count()},
+          {"flip_by_line", recipe.flip_by_line},
+          {"start_on_part", recipe.start_on_part},
+          {"limits", limits}};
+}
+
+Recipe read_recipe(JsonObject object) {
+  Recipe recipe;
+  recipe.name = object.text("name");
+  recipe.poses = object.integer("poses", 1, 2);
+  recipe.views = object.integer("views", 1, 360);
+  recipe.flip_timeout = std::chrono::minutes(object.integer("flip_timeout_min", 1, 1440));
+  recipe.flip_by_line = object.flag("flip_by_line");
+  recipe.start_on_part = object.flag("start_on_part");
+  JsonObject limits = object.object("limits");
+  if (limits.has("least_measured_share")) {
+    recipe.limits.least_measured_share = limits.number("least_measured_share", 0, 1);
+  }
+  if (limits.has("most_residual_mm")) recipe.limits.most_residual_mm = limits.number("most_residual_mm", 0, 1000);
+  limits.close();
+  object.close();
+  return recipe;
+}
+
+/// Tells this run of the daemon from all others; process ids come again.
+const std::string& this_process() {
+  static const std::string name = [] {
+    std::random_device random;
+    return fmt::format("{:08x}{:08x}", random(), random());
+  }();
+  return name;
+}
+
+std::optional<double> number_at(const nlohmann::json& json, const char* pointer) {
+  const auto value = json.value(nlohmann::json::json_pointer(pointer), nlohmann::json());
+  return value.is_number() ? std::optional(value.get<double>()) : std::nullopt;
+}
+
+/// The worst pose's median distance between its views.
+std::optional<double> residual_mm(const nlohmann::json& report) {
+  std::optional<double> worst;
+  for (const auto& pose : report.value("poses", nlohmann::json::array())) {
+    const auto here = number_at(pose, "/residual_median_mm");
+    if (!here) return std::nullopt;
+    worst = std::max(worst.value_or(0.0), *here);
+  }
+  return worst;
+}
+
+}  // namespace
+
+fs::path model_folder(const fs::path& job_folder) { return job_folder / "model"; }
+fs::path model_file(const fs::path& job_folder) { return model_folder(job_folder) / "model.glb"; }
+fs::path report_file(const fs::path& job_folder) { return model_folder(job_folder) / "report.json"; }
+
+Result<void> write_job_file(const fs::path& job_folder, const JobFile& job) {
+  return write_json(job_folder / kJob, {{"format", "scanrig-job"},
+                                        {"version", 1},
+                                        {"part", job.part},
+                                        {"place", job.place},
+                                        {"exported", job.exported},
+                                        {"recipe", to_json(job.recipe)}});
+}
+
+Result<JobFile> read_job_file(const fs::path& job_folder) {
+  auto json = JsonFile::read(job_folder / kJob, "scanrig-job", 1);
+  if (!json && json.error().code == ErrorCode::not_found) return JobFile{};
+  if (!json) return pass_on(json);
+  JobFile job;
+  job.part = json->root().text("part");
+  job.place = json->root().integer("place", -1'000'000'000, 1'000'000'000);
+  job.exported = json->root().flag("exported");
+  job.recipe = read_recipe(json->root().object("recipe"));
+  if (const auto whole = json->finish(); !whole) return pass_on(whole);
+  return job;
+}
+
+Result<void> write_failure(const fs::path& job_folder, const Error& error) {
+  return write_json(job_folder / kFailure, {{"code", to_string(error.code)}, {"message", error.message}});
+}
+
+std::optional<Error> read_failure(const fs::path& job_folder) {
+  const auto text = read_file(job_folder / kFailure);
+  if (!text) return std::nullopt;
+  const auto json = nlohmann::json::parse(*text, nullptr, false);
+  if (!json.is_object() || !json.contains("message") || !json["message"].is_string()) return std::nullopt;
+  const auto code = json.contains("code") && json["code"].is_string()
+                        ? parse_error_code(json["code"].get<std::string>())
+                        : std::nullopt;
+  return Error{code.value_or(ErrorCode::internal), json["message"]};
+}
+
+void remove_failure(const fs::path& job_folder) { remove_file(job_folder / kFailure); }
+
+Attempts read_attempts(const fs::path& job_folder) {
+  auto json = JsonFile::read(job_folder / kAttempt, "scanrig-attempt", 1);
+  if (!json) return {};
+  const int count = json->root().integer("count", 1, 1000);
+  const bool running = json->root().text("process") == this_process();
+  if (!json->finish()) return {};
+  return {running ? count - 1 : count, running};
+}
+
+Result<void> begin_attempt(const fs::path& job_folder) {
+  return write_json(job_folder / kAttempt, {{"format", "scanrig-attempt"},
+                                            {"version", 1},
+                                            {"count", read_attempts(job_folder).ended_by_death + 1},
+                                            {"process", this_process()}});
+}
+
+void forget_attempts(const fs::path& job_folder) { remove_file(job_folder / kAttempt); }
+
+Error quarantine_error() {
+  return {ErrorCode::internal,
+          fmt::format("in quarantine: {} times the daemon ended while it made the model of this job; the images are "
+                      "whole: bundle the job for whoever must help, or reprocess it",
+                      kAttemptsThatQuarantine)};
+}
+
+std::optional<Error> beyond_limits(const fs::path& report, const Limits& limits) {
+  if (limits == Limits{}) return std::nullopt;
+  const auto text = read_file(report);
+  const auto json = text ? nlohmann::json::parse(*text, nullptr, false) : nlohmann::json();
+  if (!json.is_object()) return Error{ErrorCode::invalid_input, report.string() + ": cannot be read"};
+  const auto residual = residual_mm(json), share = number_at(json, "/mesh/measured_share");
+  if (limits.least_measured_share && share.value_or(0.0) < *limits.least_measured_share) {
+    return Error{ErrorCode::below_limits,
+                 fmt::format("{:.1f} % of the surface was measured, the recipe asks for {:.1f}",
+                             100 * share.value_or(0.0), 100 * *limits.least_measured_share)};
+  }
+  if (limits.most_residual_mm && residual.value_or(1e9) > *limits.most_residual_mm) {
+    return Error{ErrorCode::below_limits,
+                 fmt::format("the views of a pose are {:.3f} mm apart, the recipe allows {:.3f}",
+                             residual.value_or(1e9), *limits.most_residual_mm)};
+  }
+  return std::nullopt;
+}
+
+}  // namespace scanrig

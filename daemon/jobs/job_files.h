@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "core/result.h"
+#include "daemon/station/recipe.h"
+
+namespace scanrig {
+
+/// The files of a job beside scan.json, docs/scan-folder.md.
+
+/// Where a job's model and report are.
+std::filesystem::path model_folder(const std::filesystem::path& job_folder);
+std::filesystem::path model_file(const std::filesystem::path& job_folder);
+std::filesystem::path report_file(const std::filesystem::path& job_folder);
+
+/// job.json: how the job was ordered.
+struct JobFile {
+  Recipe recipe{};
+  std::string part{};
+  std::int64_t place = 0;
+  bool exported = false;
+};
+/// Fails with `io`.
+Result<void> write_job_file(const std::filesystem::path& job_folder, const JobFile& job);
+/// What a folder from elsewhere does not have is the default. Fails with `invalid_input`, `unsupported`, `io`.
+Result<JobFile> read_job_file(const std::filesystem::path& job_folder);
+
+/// Notes durably that the job has no model, and why: failure.json. Fails with `io`.
+Result<void> write_failure(const std::filesystem::path& job_folder, const Error& error);
+/// Of an earlier run; nothing where there is no such file.
+std::optional<Error> read_failure(const std::filesystem::path& job_folder);
+void remove_failure(const std::filesystem::path& job_folder);
+
+/// So many reconstructions in a row that began and never ended make a quarantine: the daemon died with each.
+constexpr int kAttemptsThatQuarantine = 2;
+/// attempt.json, written before a reconstruction begins and removed when it ends in any way but the daemon's death.
+struct Attempts {
+  int ended_by_death = 0;
+  bool running = false;  ///< in this process, now
+};
+Attempts read_attempts(const std::filesystem::path& job_folder);
+/// Another one begins. Fails with `io`.
+Result<void> begin_attempt(const std::filesystem::path& job_folder);
+void forget_attempts(const std::filesystem::path& job_folder);
+/// What is said of a job in quarantine.
+Error quarantine_error();
+
+/// Why the model of report.json is beyond the limits; nothing when it is within, or when none are set. A report that
+/// cannot be read passes nothing.
+std::optional<Error> beyond_limits(const std::filesystem::path& report, const Limits& limits);
+
+}  // namespace scanrig

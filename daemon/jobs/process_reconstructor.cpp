@@ -1,0 +1,104 @@
+#include "daemon/jobs/process_reconstructor.h"
+
+#include <charconv>
+#include <cstring>
+#include <system_error>
+#include <utility>
+
+#include "core/files.h"
+#include "daemon/jobs/child_process.h"
+
+namespace scanrig {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// What `scanrig reconstruct --lines` writes: "STAGE<tab>FRACTION", and at last "failed<tab>CODE<tab>MESSAGE".
+class ProgressLines {
+ public:
+  explicit ProgressLines(const Context& context) : context_(context) {}
+
+  void operator()(std::string_view line) {
+    const auto tab = line.find('\t');
+    if (tab == std::string_view::npos) return;
+    const auto first = line.substr(0, tab), rest = line.substr(tab + 1);
+    double fraction = 0.0;
+    if (first == "failed") {
+      const auto end = std::min(rest.find('\t'), rest.size());
+      failure = Error{parse_error_code(rest.substr(0, end)).value_or(ErrorCode::internal),
+                      std::string(rest.substr(std::min(end + 1, rest.size())))};
+    } else if (std::from_chars(rest.data(), rest.data() + rest.size(), fraction).ec == std::errc()) {
+      context_.report(first, fraction);
+    }
+  }
+
+  std::optional<Error> failure{};
+
+ private:
+  const Context& context_;
+};
+
+Error told_by(const ChildEnd& end, const std::optional<Error>& failure) {
+  if (failure) return *failure;
+  if (end.signal != 0) {
+    return {ErrorCode::internal, fmt::format("the reconstruction crashed ({}); bundle the job for whoever must help",
+                                             ::strsignal(end.signal))};
+  }
+  return {ErrorCode::internal, fmt::format("the reconstruction ended with {}: {}", end.code, end.last_words)};
+}
+
+class ProcessReconstructor final : public Reconstructor {
+ public:
+  ProcessReconstructor(ProcessExecutorOptions options, fs::path folder, ReconstructionChanges changes)
+      : options_(std::move(options)), folder_(std::move(folder)), changes_(std::move(changes)) {}
+
+  Result<void> add_view(std::size_t, const ViewImages&, const Context&) override { return {}; }
+  Result<void> finish_pose(std::size_t, const Context&) override { return {}; }
+
+  Result<void> finish(const fs::path& folder, const Context& context) override {
+    fs::path prepared = folder;
+    prepared += ".new";
+    std::error_code ignored;
+    fs::remove_all(prepared, ignored);
+    ProgressLines lines(context);
+    const auto end = run_child(command(prepared, lines), context.stop);
+    Result<void> done;
+    if (!end) {
+      done = pass_on(end, "reconstruction");
+    } else if (end->code != 0) {
+      done = tl::unexpected(told_by(*end, lines.failure));
+    } else {
+      done = replace_folder(prepared, folder);
+    }
+    if (!done) fs::remove_all(prepared, ignored);
+    return done;
+  }
+
+ private:
+  [[nodiscard]] ChildCommand command(const fs::path& out, ProgressLines& lines) const {
+    ChildCommand command{
+        .words = {options_.program.string(), "reconstruct", folder_.string(), "--lines", "--out", out.string(),
+                  "--voxel-mm", fmt::format("{}", changes_.voxel_mm.value_or(options_.voxel_mm))},
+        .limit = options_.limit,
+        .memory_bytes = options_.memory_bytes,
+        .on_line = [&lines](std::string_view line) { lines(line); }};
+    if (!changes_.fusion.empty()) command.words.insert(command.words.end(), {"--fusion", changes_.fusion});
+    return command;
+  }
+
+  ProcessExecutorOptions options_;
+  fs::path folder_;
+  ReconstructionChanges changes_;
+};
+
+}  // namespace
+
+ReconstructorFactory process_reconstructor(ProcessExecutorOptions options) {
+  std::error_code ignored;
+  if (options.program.empty()) options.program = fs::read_symlink("/proc/self/exe", ignored).parent_path() / "scanrig";
+  return [options = std::move(options)](const ReconstructionTask& task) -> Result<std::unique_ptr<Reconstructor>> {
+    return std::make_unique<ProcessReconstructor>(options, task.folder, task.changes);
+  };
+}
+
+}  // namespace scanrig

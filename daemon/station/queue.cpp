@@ -1,0 +1,143 @@
+#include <algorithm>
+
+#include "daemon/station/machine.h"
+
+namespace scanrig {
+namespace {
+
+using Queue = std::vector<std::shared_ptr<const JobInfo>>;
+using What = event::JobAsked::What;
+
+constexpr int kMostRepeats = 100;
+constexpr std::size_t kLongestPart = 200;
+
+Queue::iterator find(Queue& queue, const std::string& job) {
+  return std::ranges::find_if(queue, [&](const auto& queued) { return queued->id == job; });
+}
+
+void leave_queue(StationState& s, const std::string& job) {
+  const auto found = find(s.queue, job);
+  if (found != s.queue.end()) s.queue.erase(found);
+}
+
+std::int64_t last_place(const StationState& s) { return s.queue.empty() ? 0 : s.queue.back()->place; }
+std::int64_t first_place(const StationState& s) { return s.queue.empty() ? 0 : s.queue.front()->place; }
+
+bool goes_on_by_itself(const StationState& s) { return !s.queue.empty() && s.queue.front()->recipe.start_on_part; }
+
+/// Waiting for a part is of use only while a job is there for it.
+void look_at_queue(Machine& m) {
+  auto& s = m.s();
+  if (s.activity != Activity::waiting_for_part) return;
+  if (s.failures >= kFailuresThatStop) {
+    m.enter(MachineState::ready, fmt::format("{} jobs in a row failed, so the queue stopped.", s.failures));
+  } else if (!goes_on_by_itself(s)) {
+    m.enter(MachineState::ready, s.cause);
+  }
+}
+
+}  // namespace
+
+void take_order(Machine& m, const event::Ordered& asked) {
+  if (m.s().shutting_down) return m.refuse(ErrorCode::refused, "The daemon is shutting down.");
+  const auto recipe = m.rules().recipes.find(asked.order.recipe);
+  if (recipe == m.rules().recipes.end()) {
+    return m.refuse(ErrorCode::not_found, "There is no recipe \"{}\": name one of rig.toml.", asked.order.recipe);
+  }
+  if (asked.order.repeat < 1 || asked.order.repeat > kMostRepeats) {
+    return m.refuse(ErrorCode::invalid_input, "repeat is {}, but must be 1 to {}.", asked.order.repeat, kMostRepeats);
+  }
+  if (asked.order.part.size() > kLongestPart) {
+    return m.refuse(ErrorCode::invalid_input, "The part id is longer than {} bytes.", kLongestPart);
+  }
+  m.act(action::CreateJobs{asked.fresh_ids, recipe->second, asked.order.part, last_place(m.s()) + 1, asked.ticket});
+}
+
+void ask_job(Machine& m, const event::JobAsked& asked) {
+  auto& s = m.s();
+  if (s.shutting_down) return m.refuse(ErrorCode::refused, "The daemon is shutting down.");
+  if (m.has(asked.job)) {
+    return m.refuse(ErrorCode::busy, "Job {} has the rig: press Stop first, or wait.", asked.job);
+  }
+  const bool queued = find(s.queue, asked.job) != s.queue.end();
+  const bool for_waiting = asked.what == What::to_front || asked.what == What::cancel;
+  if (asked.what == What::to_front && !queued) {
+    return m.refuse(ErrorCode::refused, "Job {} is not in the queue.", asked.job);
+  }
+  if (queued && !for_waiting)
+    return m.refuse(ErrorCode::refused, "Job {} is in the queue: cancel it first.", asked.job);
+  if (asked.what == What::to_front || asked.what == What::resume) {
+    return m.act(action::MoveJob{asked.job, first_place(s) - 1, asked.what == What::resume, asked.ticket});
+  }
+  m.act(action::KeepJob{asked});
+}
+
+void job_known(Machine& m, const std::shared_ptr<const JobInfo>& info) {
+  auto& s = m.s();
+  if (m.has(info->id)) return;  // a fresh job that already has the rig
+  leave_queue(s, info->id);
+  if (info->state != JobState::queued) return look_at_queue(m);
+  const auto behind =
+      std::ranges::upper_bound(s.queue, info->place, {}, [](const auto& queued) { return queued->place; });
+  s.queue.insert(behind, info);
+}
+
+void job_removed(Machine& m, const std::string& job) {
+  leave_queue(m.s(), job);
+  look_at_queue(m);
+}
+
+void begin_next_job(Machine& m, const std::string& fresh_job_id, std::string cause) {
+  auto& s = m.s();
+  if (s.queue.empty()) {
+    s.job = ActiveJob{.id = fresh_job_id, .recipe = m.rules().recipes.at("default")};
+    m.act(action::CreateJobs{{fresh_job_id}, s.job->recipe, "", 0, 0});
+  } else {
+    s.job = ActiveJob{.id = s.queue.front()->id, .recipe = s.queue.front()->recipe};
+    s.queue.erase(s.queue.begin());
+  }
+  s.machine = s.job->recipe.start_on_part ? MachineState::continuous_execution : MachineState::single_execution;
+  s.cause = std::move(cause);
+  m.act(action::BeginJob{s.job->id});
+  m.warn();
+}
+
+void job_not_begun(Machine& m, const event::JobNotBegun& e) {
+  if (!m.has(e.job)) return;
+  m.s().job.reset();
+  m.enter(MachineState::ready, fmt::format("Job {} was not begun: {}.", e.job, e.why.message));
+}
+
+void free_rig(Machine& m, std::string cause) {
+  auto& s = m.s();
+  if (s.machine != MachineState::continuous_execution) return m.enter(MachineState::ready, std::move(cause));
+  s.activity = Activity::waiting_for_part;
+  s.part_gone = !s.inputs.part_present;
+  s.cause = std::move(cause);
+  look_at_queue(m);
+}
+
+void count_result(Machine& m, bool good) {
+  m.s().failures = good ? 0 : m.s().failures + 1;
+  look_at_queue(m);
+}
+
+void inputs_seen(Machine& m, const PanelInputs& inputs) {
+  auto& s = m.s();
+  const bool turned_over = inputs.flipped && !s.inputs.flipped;
+  s.inputs = inputs;
+  if (!inputs.part_present) s.part_gone = true;
+  if (s.activity == Activity::waiting_for_flip && s.job->recipe.flip_by_line && turned_over) {
+    if (m.safe_to_move() && m.all_there()) continue_after_flip(m, "The line says that the object was turned over.");
+  }
+  begin_on_part(m);
+}
+
+void begin_on_part(Machine& m) {
+  auto& s = m.s();
+  if (s.activity != Activity::waiting_for_part || !s.part_gone || !s.inputs.part_present || s.quiet) return;
+  if (!goes_on_by_itself(s) || s.shutting_down || m.unsafe() || m.absent_device()) return;
+  begin_next_job(m, {}, "A new part is on the table.");
+}
+
+}  // namespace scanrig

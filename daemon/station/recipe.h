@@ -1,0 +1,28 @@
+#pragma once
+
+#include <chrono>
+#include <optional>
+#include <string>
+
+namespace scanrig {
+
+/// What a model must reach to be passed.
+struct Limits {
+  std::optional<double> least_measured_share{};  ///< of the model's area that cameras saw, 0 to 1
+  std::optional<double> most_residual_mm{};      ///< median distance between a pose's views, the worst pose
+  bool operator==(const Limits&) const = default;
+};
+
+/// How one kind of object is scanned. A job keeps the recipe it was queued with.
+struct Recipe {
+  std::string name = "default";
+  int poses = 2;
+  int views = 8;                          ///< a pose, at equal angles
+  std::chrono::minutes flip_timeout{30};  ///< then the job is parked and the rig is free
+  bool flip_by_line = false;              ///< the panel's `flipped` input says that the object was turned over
+  bool start_on_part = false;             ///< the queue goes on when `part_present` falls and rises again
+  Limits limits{};
+  bool operator==(const Recipe&) const = default;
+};
+
+}  // namespace scanrig

@@ -1,0 +1,120 @@
+#include "daemon/station/machine.h"
+
+namespace scanrig {
+namespace {
+
+constexpr int kMostUnstored = 2;  ///< views in memory only; a power cut costs no more
+
+void finish_pose(Machine& m) {
+  const auto& job = *m.s().job;
+  m.s().activity = Activity::storing;
+  m.act(action::FinishPose{job.id, job.pose, job.pose + 1 == job.recipe.poses});
+}
+
+/// What the views of this pose show does not belong together: no model can come of them.
+void moved(Machine& m, const Closure& closure) {
+  const auto& job = *m.s().job;
+  const bool resuming = job.taken < job.recipe.views;
+  const Error why{
+      ErrorCode::moved,
+      fmt::format("the object, the table or a camera has moved during pose {}: view 0, taken again, is off by {:.2f} "
+                  "px and differs on {:.0f} % of what it shows; scan the object again",
+                  job.pose + 1, closure.shift_px, 100 * closure.changed)};
+  const std::string cause = fmt::format("Job {}: {}.", job.id, why.message);
+  if (!resuming && !job.reconstruction) count_result(m, false);
+  m.close_job(resuming ? JobState::interrupted : JobState::failed, why);
+  free_rig(m, cause);
+}
+
+}  // namespace
+
+void job_begun(Machine& m, const event::JobBegun& e) {
+  if (!m.has(e.job)) return;
+  auto& job = *m.s().job;
+  job.state = JobState::scanning;
+  job.pose = e.pose;
+  job.asked = job.taken = job.stored = e.stored;
+  job.closure_due = e.stored > 0;  // is the object still where the stored views saw it?
+  take_next_view(m);
+}
+
+void take_next_view(Machine& m) {
+  if (m.s().activity != Activity::scanning || m.s().job->state != JobState::scanning) return;
+  auto& job = *m.s().job;
+  if (job.closing || job.asked > job.taken || job.taken - job.stored >= kMostUnstored) return;
+  if (job.closure_due) {
+    job.closure_due = false;
+    job.closing = true;
+    return m.act(action::TakeView{{job.id, job.pose, 0}, {0.0}, true});
+  }
+  m.act(action::TakeView{{job.id, job.pose, job.asked}, {360.0 * job.asked / job.recipe.views}});
+  ++job.asked;
+}
+
+void view_taken(Machine& m, const event::ViewTaken& e) {
+  if (m.s().activity != Activity::scanning) return;  // a view that came after Stop is not kept
+  auto& job = *m.s().job;
+  ++job.taken;
+  m.act(action::StoreView{e.view});
+  job.closure_due = job.taken == job.recipe.views;
+  take_next_view(m);
+}
+
+void view_stored(Machine& m, const event::ViewStored& e) {
+  if (!m.has(e.id.job) || e.id.pose != m.s().job->pose) return;
+  ++m.s().job->stored;
+  take_next_view(m);
+}
+
+void closure_taken(Machine& m, const event::ClosureTaken& e) {
+  if (m.s().activity != Activity::scanning) return;
+  if (m.s().job->taken == m.s().job->recipe.views) m.s().activity = Activity::storing;
+  m.act(action::JudgeClosure{e.view});
+}
+
+void closure_judged(Machine& m, const event::ClosureJudged& e) {
+  if (!m.has(e.job) || !m.s().job->closing) return;
+  m.s().job->closing = false;
+  if (!e.closure.unmoved) return moved(m, e.closure);
+  if (m.s().job->stored == m.s().job->recipe.views) return finish_pose(m);
+  take_next_view(m);
+}
+
+void pose_stored(Machine& m, const event::PoseStored& e) {
+  auto& s = m.s();
+  if (!m.has(e.job) || s.activity != Activity::storing) return;
+  if (e.pose + 1 == s.job->recipe.poses) {
+    s.job.reset();
+    free_rig(m, fmt::format("Job {} has all its views.", e.job));
+  } else if (s.job->reconstruction) {  // no use turning the object over
+    m.close_job(JobState::failed, *s.job->reconstruction);
+    free_rig(m, fmt::format("Job {} failed.", e.job));
+  } else {
+    s.job->state = JobState::waiting_for_flip;
+    s.activity = Activity::waiting_for_flip;
+    s.cause = fmt::format("Pose {} is complete.", e.pose + 1);
+    m.act(action::WaitForFlip{e.job, s.job->recipe.flip_timeout});
+  }
+}
+
+void continue_after_flip(Machine& m, std::string cause) {
+  auto& job = *m.s().job;
+  job.state = JobState::scanning;
+  ++job.pose;
+  job.asked = job.taken = job.stored = 0;
+  m.s().cause = std::move(cause);
+  m.act(action::ResumeJob{job.id});
+  m.warn();
+}
+
+void flip_timed_out(Machine& m, const event::FlipTimedOut& e) {
+  if (!m.has(e.job) || m.s().activity != Activity::waiting_for_flip) return;
+  const auto limit = m.s().job->recipe.flip_timeout;
+  m.close_job(JobState::interrupted,
+              {ErrorCode::timeout, fmt::format("parked: nobody turned the object over within {} min; resume the job to "
+                                               "scan its other side",
+                                               limit.count())});
+  free_rig(m, fmt::format("Job {} is parked: nobody turned the object over.", e.job));
+}
+
+}  // namespace scanrig

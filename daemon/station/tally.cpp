@@ -1,0 +1,39 @@
+#include "daemon/station/tally.h"
+
+#include "daemon/overloaded.h"
+
+namespace scanrig {
+
+void Tally::fault(const Error& error) {
+  ++counters_.faults;
+  if (error.code == ErrorCode::timeout) ++counters_.deadlines_missed;
+}
+
+void Tally::see(const Event& event, Clock::TimePoint now) {
+  const auto ended = [&](const std::string& job, JobState state) {
+    ++counters_.jobs_ended[std::string(to_string(state))];
+    std::erase_if(running_, [&](const auto& stage) { return stage.first.first == job; });
+  };
+  std::visit(Overloaded{[&](const event::ViewStored& e) {
+                          ++counters_.views_stored;
+                          counters_.exposures_redone += static_cast<std::uint64_t>(e.redone);
+                        },
+                        [&](const event::StageProgress& e) {
+                          const auto since = running_.try_emplace({e.job, e.stage}, now).first;
+                          if (e.fraction < 1.0) return;
+                          const std::chrono::duration<double> spent = now - since->second;
+                          counters_.stage_seconds[e.stage] += spent.count();
+                          running_.erase(since);
+                        },
+                        [&](const event::RigFailed& e) { fault(e.error); },
+                        [&](const event::StopFailed& e) { fault(e.error); },
+                        [&](const event::PanelFailed& e) { fault(e.error); },
+                        [&](const event::StoreFailed& e) { fault(e.error); },
+                        [&](const event::EstopChanged& e) { counters_.faults += e.ok ? 0 : 1; },
+                        [&](const event::JobClosed& e) { ended(e.job, e.state); },
+                        [&](const event::ReconstructionFailed& e) { ended(e.job, JobState::failed); },
+                        [&](const event::ModelReady& e) { ended(e.job, JobState::done); }, [](const auto&) {}},
+             event);
+}
+
+}  // namespace scanrig

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "core/clock.h"
+#include "daemon/mailbox.h"
+#include "daemon/station/snapshot.h"
+#include "daemon/webhook/http_post.h"
+
+namespace scanrig {
+
+/// What between two snapshots is worth a message, as JSON: a job that failed, was interrupted or does not pass, and a
+/// fault of the machine.
+std::vector<std::string> bad_news(const Snapshot& before, const Snapshot& now);
+
+/// Tells one address over HTTP what goes wrong; tries three times, then drops the message: whoever must not miss
+/// anything asks the API.
+class Webhook {
+ public:
+  Webhook(Clock& clock, HttpAddress address);
+  /// What has not been sent is dropped.
+  ~Webhook();
+  Webhook(const Webhook&) = delete;
+  Webhook& operator=(const Webhook&) = delete;
+
+  /// From one thread. Does not wait.
+  void look(std::shared_ptr<const Snapshot> now);
+
+ private:
+  void run();
+
+  Clock& clock_;
+  HttpAddress address_;
+  std::shared_ptr<const Snapshot> before_;  ///< of look()'s thread
+  Mailbox<std::string> inbox_;
+  std::stop_source stop_;
+  std::thread thread_;
+};
+
+}  // namespace scanrig

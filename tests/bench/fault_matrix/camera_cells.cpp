@@ -1,0 +1,131 @@
+#include <map>
+#include <mutex>
+
+#include "tests/bench/fault_matrix/cells.h"
+#include "tests/component/camera/aravis_bench.h"
+#include "tests/component/camera/v4l2_bench.h"
+
+namespace scanrig::bench {
+namespace {
+
+using std::chrono::milliseconds;
+using std::chrono::seconds;
+using Spoil = StereoCameraBench::Fault;
+
+constexpr milliseconds kFrameLimit{1000};
+constexpr seconds kConnectLimit{8};  ///< a request to a GigE camera that is gone takes the library 2.5 s
+constexpr seconds kNoticed{5};       ///< the library asks a GigE camera every second whether it is there
+constexpr seconds kAbsence{2};
+
+std::unique_ptr<StereoCameraBench> make_bench(const std::string& device) {
+  if (device == "aravis") return std::make_unique<AravisBench>();
+  return std::make_unique<V4l2Bench>(device == "v4l2-side-by-side");
+}
+
+/// One method of a camera under one fault, and good exposures afterwards: never those of an earlier edge.
+class CameraTrial {
+ public:
+  explicit CameraTrial(const std::string& device) : device_(device), bench_(make_bench(device)) {}
+
+  Outcome run(const std::string& method, Fault fault) {
+    if (auto good = expose(); !good) return {.told = good.error().message, .wrongs = {"could not begin"}};
+    const bool absent = fault == Fault::unplugged || fault == Fault::back_after_2s;
+    auto outcome = absent ? run_absent(method, fault) : run_spoilt(fault);
+    for (int i = 0; i < 3; ++i) {
+      const auto good = expose();
+      outcome.expect(good.has_value(), good ? "" : "no good exposure afterwards: " + good.error().message);
+      outcome.expect(!good || *good, "a frame of another edge was handed out");
+      outcome.wrong_position |= good && !*good;
+    }
+    return outcome;
+  }
+
+ private:
+  Outcome run_spoilt(Fault fault) {
+    static const std::map<Fault, std::pair<Spoil, ErrorCode>> kSpoils{
+        {Fault::silent, {Spoil::lost, ErrorCode::timeout}},
+        {Fault::late, {Spoil::late, ErrorCode::timeout}},
+        {Fault::damaged, {Spoil::torn, ErrorCode::protocol}},
+        {Fault::earlier_answer, {Spoil::stale, ErrorCode::protocol}}};
+    const auto& [spoil, code] = kSpoils.at(fault);
+    if (auto armed = camera().arm(ample()); !armed) return {.told = armed.error().message, .wrongs = {"not armed"}};
+    bench_->spoil(spoil);
+    bench_->fire();
+    return timed(clock(), kFrameLimit, {code}, [&](Deadline by) { return ended(camera().collect(by)); });
+  }
+
+  Outcome run_absent(const std::string& method, Fault fault) {
+    const bool collects = method == "collect";
+    if (collects) std::ignore = camera().arm(ample());
+    const auto begun = clock().now();
+    bench_->plug(false);
+    if (device_ == "aravis" && method == "ready") clock().sleep_for(kNoticed);
+    if (collects) bench_->fire();
+    auto outcome = timed(clock(), collects ? Clock::Duration(kFrameLimit) : kConnectLimit,
+                         {ErrorCode::io, ErrorCode::timeout, ErrorCode::not_found}, [&](Deadline by) -> Result<void> {
+                           if (method == "ready") return camera().ready(by);
+                           if (method == "arm") return camera().arm(by);
+                           return ended(collects ? camera().collect(by) : camera().look(by));
+                         });
+    if (fault == Fault::back_after_2s) clock().sleep_until(begun + kAbsence);
+    outcome.expect(bench_->plug(true), "the bench cannot plug it in");
+    return outcome;
+  }
+
+  static Result<void> ended(const Result<StereoFrame>& frame) {
+    if (!frame) return pass_on(frame);
+    return {};
+  }
+  /// False if another edge's frames were handed out. An exposure that fails is redone, as the daemon does.
+  Result<bool> expose() {
+    Result<bool> last = false;
+    for (int i = 0; i < 4; ++i) {
+      last = expose_once();
+      if (last) return last;
+    }
+    return last;
+  }
+  Result<bool> expose_once() {
+    if (auto armed = camera().arm(ample()); !armed) return pass_on(armed);
+    const auto number = bench_->fire();
+    const auto frame = camera().collect(ample());
+    if (!frame) return pass_on(frame);
+    return bench_->number_in(frame->left) == number && bench_->number_in(frame->right) == number;
+  }
+  StereoCamera& camera() { return bench_->camera(); }
+  Clock& clock() { return bench_->clock(); }
+  Deadline ample() { return Deadline::after(clock(), seconds(10)); }
+
+  const std::string device_;
+  std::unique_ptr<StereoCameraBench> bench_;
+};
+
+std::optional<std::string> why_not(const std::string& device, const std::string& method, Fault fault) {
+  if (fault == Fault::stalled) return "nothing moves";
+  if (fault == Fault::device_error) return "a camera raises no alarm";
+  if (method == "look" && device != "aravis") return "exposes at the edge of its trigger input only";
+  if (fault == Fault::unplugged || fault == Fault::back_after_2s || method == "collect") return std::nullopt;
+  return method == "look" ? "frames are spoilt at edges only: see collect" : "brings no frame";
+}
+
+}  // namespace
+
+std::vector<Cell> camera_cells() {
+  static std::mutex gige;  // all GigE cameras of a network share one port
+  std::vector<Cell> cells;
+  for (const std::string device : {"aravis", "v4l2", "v4l2-side-by-side"}) {
+    for (const std::string method : {"ready", "arm", "collect", "look"}) {
+      for (const auto& [fault, name] : kFaults) {
+        cells.push_back({"SensorCamera", device, method, fault, [device, method, fault] {
+                           if (auto reason = why_not(device, method, fault)) return not_applicable(*reason);
+                           std::unique_lock lock(gige, std::defer_lock);
+                           if (device == "aravis") lock.lock();
+                           return CameraTrial(device).run(method, fault);
+                         }});
+      }
+    }
+  }
+  return cells;
+}
+
+}  // namespace scanrig::bench

@@ -1,0 +1,114 @@
+"""The API under load during scans and reconstructions: how late status is, how old, and what it costs the scan."""
+import json
+import pathlib
+import socket
+import statistics
+import subprocess
+import sys
+import time
+
+import motion_rig
+
+HERE = pathlib.Path(__file__).resolve().parent
+OPTIONS = ("--poses", "1", "--speed-deg-s", "90", "--acceleration-deg-s2", "400")
+FULL = {"jobs": 3, "views": "8", "scale": 0.5, "voxel": "0.5"}
+QUICK = {"jobs": 1, "views": "4", "scale": 0.25, "voxel": "1"}
+JOB_LIMIT_S = 300
+P99_LIMIT_MS, AGE_LIMIT_MS, SLOWER_LIMIT_PERCENT = 20, 200, 2
+
+
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
+
+
+def open_api(bench, rig):
+    """Adds TCP to the rig's configuration; the port and a viewer's token."""
+    port, tokens = free_port(), rig.folder / "tokens.json"
+    made = bench.run([bench.bin / "scanrig", "token", "add", "bench", "--role", "viewer", "--file", tokens], 10)
+    rig.edit_config("[api]\n", f'[api]\nhttp_port = {port}\ntokens = "tokens.json"\n')
+    return port, made.stdout.strip()
+
+
+class Load:
+    """http_load.py beside the daemon, for as long as the block lasts."""
+
+    def __init__(self, rig, port, token):
+        self.command = [sys.executable, HERE / "http_load.py", "--socket", rig.api, "--port", port, "--token", token]
+        self.seen = {}
+
+    def __enter__(self):
+        self.process = subprocess.Popen([str(word) for word in self.command], stdin=subprocess.PIPE,
+                                        stdout=subprocess.PIPE, text=True)
+        return self
+
+    def __exit__(self, *_):
+        out, _ = self.process.communicate(timeout=60)
+        self.seen = json.loads(out)
+
+
+def age_ms(rig):
+    """From an edge at the panel until the API shows it."""
+    pressed = not rig.ask("io")["inputs"]["part_present"]
+    at_ns = rig.press("part") if pressed else rig.release("part")
+    end = time.monotonic() + 5
+    while time.monotonic() < end:
+        if rig.ask("io")["inputs"]["part_present"] == pressed:
+            return (time.monotonic_ns() - at_ns) / 1e6
+    return 5000.0
+
+
+def one_job(rig, ages):
+    """Seconds of acquisition of one job that is followed to its end; notes how old snapshots are meanwhile."""
+    before = {job["id"] for job in rig.ask("jobs")["jobs"]}
+    rig.tap("start")
+    rig.wait(lambda: rig.status()["activity"] == "scanning", 30)
+    begun, taken = time.monotonic(), None
+    while time.monotonic() < begun + JOB_LIMIT_S:
+        if taken is None and rig.status()["machine"] == "Operational.Ready":
+            taken = time.monotonic() - begun
+        jobs = [job for job in rig.ask("jobs")["jobs"] if job["id"] not in before]
+        if taken is not None and jobs and jobs[0]["state"] in ("done", "failed", "interrupted", "cancelled"):
+            return taken if jobs[0]["state"] == "done" else None
+        if ages is not None:
+            ages.append(age_ms(rig))
+        time.sleep(0.05)
+    return None
+
+
+def percentile(values, share):
+    ordered = sorted(values)
+    return ordered[min(len(ordered) - 1, int(share * len(ordered)))] if ordered else None
+
+
+def measure(bench, scratch):
+    size = QUICK if bench.quick else FULL
+    ages, quiet, loaded = [], [], []
+    with motion_rig.Rig(bench.bin, scratch / "load", *OPTIONS, "--views", size["views"], "--voxel-mm",
+                        size["voxel"]) as rig:
+        port, token = open_api(bench, rig)
+        rig.start_daemon(size["scale"])
+        rig.get_ready()
+        one_job(rig, None)  # caches of the renderer
+        for _ in range(size["jobs"]):
+            quiet.append(one_job(rig, None))
+        with Load(rig, port, token) as load:
+            for _ in range(size["jobs"]):
+                loaded.append(one_job(rig, ages))
+    seen = load.seen
+    what = "50 event streams, 200 requests/s, 20 slow clients, during scan and reconstruction"
+    done = f"{sum(t is not None for t in loaded)} of {size['jobs']} jobs done"
+    bench.line(f"{what}: jobs", "all done", done, None not in loaded)
+    bench.note(f"{len(seen['status_ms'])} status, {len(seen['others_ms'])} other requests, {seen['events']} events, "
+               f"{seen['loris_cut']} slow clients cut off")
+    bench.at_most(f"{what}: status, p99", P99_LIMIT_MS, percentile(seen["status_ms"], 0.99), "ms", 1)
+    bench.at_most(f"{what}: other requests, p99", 5 * P99_LIMIT_MS, percentile(seen["others_ms"], 0.99), "ms", 1)
+    bench.at_most(f"{what}: edge at the panel to the API, worst", AGE_LIMIT_MS, max(ages, default=None), "ms", 0)
+    bench.line(f"{what}: refused or failed", "0", ", ".join(sorted(set(seen["failed"]))[:3]) or "0", not seen["failed"])
+    bench.line(f"{what}: streams lost", "0", seen["streams_lost"], seen["streams_lost"] == 0)
+    if None in quiet + loaded:
+        bench.at_most(f"{what}: acquisition slower by", SLOWER_LIMIT_PERCENT, None, "%")
+    else:
+        slower = 100 * (statistics.median(loaded) / statistics.median(quiet) - 1)
+        bench.at_most(f"{what}: acquisition slower by", SLOWER_LIMIT_PERCENT, slower, "%", 1)

@@ -1,0 +1,80 @@
+#include "daemon/ctl/client.h"
+
+#include "tests/component/api/api_bench.h"
+
+namespace scanrig {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+class Client : public api_bench::ApiBench {
+ protected:
+  static void nobody(std::uint64_t, std::uint64_t) {}
+  static constexpr const char* kModel = "/api/v1/jobs/old/model";
+  fs::path out() const { return folder_ / "copy.glb"; }
+  /// Files beside the server's own.
+  bool left_something() const {
+    for (const auto& entry : fs::directory_iterator(folder_)) {
+      if (entry.path().filename().string().starts_with("copy")) return true;
+    }
+    return false;
+  }
+};
+
+TEST_F(Client, DownloadsAFileWholeAndTellsHowFarItIs) {
+  serve();
+  std::uint64_t last = 0, whole = 0;
+  const auto done = ctl::download(options.socket, kModel, out(), [&](std::uint64_t bytes, std::uint64_t of) {
+    EXPECT_GE(bytes, last);
+    last = bytes;
+    whole = of;
+  });
+  ASSERT_TRUE(done) << done.error().message;
+  EXPECT_EQ(*read_file(out()), "glTF" + std::string(300'000, 'x'));
+  EXPECT_EQ(last, 300'004u);
+  EXPECT_EQ(whole, 300'004u);
+}
+
+TEST_F(Client, OverwritesNothing) {
+  serve();
+  scan_samples::write_text(out(), "precious");
+  const auto done = ctl::download(options.socket, kModel, out(), nobody);
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().exit, ExitCode::bad_input);
+  EXPECT_EQ(*read_file(out()), "precious");
+}
+
+TEST_F(Client, LeavesNothingWhereThereIsNoFile) {
+  serve();
+  const auto done = ctl::download(options.socket, "/api/v1/jobs/other/model", out(), nobody);
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().exit, ExitCode::bad_input);
+  EXPECT_THAT(done.error().message, HasSubstr("no job"));
+  EXPECT_FALSE(left_something());
+  const auto unwritable = ctl::download(options.socket, kModel, folder_ / "nowhere" / "x", nobody);
+  ASSERT_FALSE(unwritable);
+  EXPECT_EQ(unwritable.error().exit, ExitCode::disk);
+}
+
+TEST_F(Client, SaysThatNobodyAnswers) {
+  const auto done = ctl::download(options.socket, kModel, out(), nobody);
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().exit, ExitCode::unreachable);
+  EXPECT_EQ(ctl::ask(options.socket, "GET", "/api/v1/status").error().exit, ExitCode::unreachable);
+}
+
+TEST_F(Client, SendsABodyAndHearsWhy) {
+  serve();
+  const auto answer = ctl::ask(options.socket, "POST", "/api/v1/maintenance/jog", R"({"by_deg": 5})");
+  ASSERT_FALSE(answer);
+  EXPECT_EQ(answer.error().exit, ExitCode::refused);
+}
+
+TEST(ClientSegment, EscapesWhatWouldBeMoreThanAName) {
+  EXPECT_EQ(ctl::segment("pose1/view 0.png"), "pose1%2Fview%200.png");
+  EXPECT_EQ(ctl::segment("20261121-093000-1"), "20261121-093000-1");
+}
+
+}  // namespace
+}  // namespace scanrig

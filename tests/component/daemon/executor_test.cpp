@@ -1,0 +1,168 @@
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+
+#include <new>
+
+#include "daemon/jobs/process_reconstructor.h"
+#include "tests/component/daemon/daemon_under_test.h"
+
+namespace scanrig {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using What = event::JobAsked::What;
+
+/// Reconstructions that go wrong: the rig goes on, and the job says what happened.
+class Executor : public Daemon {
+ protected:
+  /// A program in the place of the scanrig command: `script` finds the model's folder in $out.
+  void execute(const std::string& script) {
+    const auto program = folder_ / "scanrig";
+    scan_samples::write_text(program, "#!/bin/sh\nout=$5\n" + script);
+    ::chmod(program.c_str(), 0755);
+    options.reconstructor = process_reconstructor({.program = program, .limit = std::chrono::seconds(20)});
+  }
+  std::string scan() {
+    scan_both_poses();
+    EXPECT_TRUE(wait_ready());
+    return newest()->id;
+  }
+  void expect_failed(const std::string& id, ErrorCode code, const std::string& words) {
+    EXPECT_TRUE(wait_state(id, JobState::failed));
+    EXPECT_EQ(job(id)->error->code, code);
+    EXPECT_THAT(job(id)->error->message, HasSubstr(words));
+    EXPECT_FALSE(fs::exists(model_folder(job(id)->folder)));
+    EXPECT_FALSE(fs::exists(fs::path(job(id)->folder) / "attempt.json"));
+  }
+  /// As daemons leave it that died over the model.
+  static void write_attempts(const fs::path& folder, int count) {
+    scan_samples::write_text(
+        folder / "attempt.json",
+        fmt::format(R"({{"format": "scanrig-attempt", "version": 1, "count": {}, "process": "x"}})", count));
+  }
+};
+
+TEST_F(Executor, WhatIsThrownFailsTheJobOnly) {
+  log.at_finish = [] { throw std::runtime_error("out of the blue"); };
+  boot();
+  get_ready();
+  expect_failed(scan(), ErrorCode::internal, "out of the blue");
+  log.at_finish = [] { throw std::bad_alloc(); };
+  expect_failed(scan(), ErrorCode::out_of_range, "memory");
+  log.at_finish = [] {};
+  EXPECT_TRUE(wait_state(scan(), JobState::done));
+}
+
+TEST_F(Executor, AJobIsMarkedWhileItsModelIsMade) {
+  bool marked = false;
+  log.at_finish = [&] { marked = read_attempts(job_folders().at(0)).running; };
+  boot();
+  get_ready();
+  const auto id = scan();
+  EXPECT_TRUE(wait_state(id, JobState::done));
+  EXPECT_TRUE(marked);
+  EXPECT_FALSE(read_attempts(job(id)->folder).running);
+}
+
+TEST_F(Executor, TheDaemonsDeathIsTriedOnceMoreThenTheJobIsInQuarantine) {
+  boot();
+  get_ready();
+  const auto id = scan();
+  ASSERT_TRUE(wait_state(id, JobState::done));
+  shut_down();
+  const auto folder = job_folders().at(0);
+  write_attempts(folder, 1);
+  boot();
+  EXPECT_TRUE(wait_state(id, JobState::done)) << "once may be bad luck";
+  shut_down();
+  write_attempts(folder, 2);
+  boot();
+  get_ready();
+  EXPECT_TRUE(job(id)->quarantined);
+  EXPECT_THAT(job(id)->error->message, HasSubstr("quarantine"));
+  EXPECT_TRUE(ask(event::JobAsked{.what = What::reprocess, .job = id}));
+  EXPECT_TRUE(wait_state(id, JobState::done)) << "somebody asked for another try";
+}
+
+TEST_F(Executor, AModelIsMadeAgainWithOtherOptions) {
+  std::vector<std::pair<std::optional<double>, std::string>> asked;
+  const auto fake = options.reconstructor;
+  options.reconstructor = [&](const ReconstructionTask& task) {
+    asked.emplace_back(task.changes.voxel_mm, task.changes.fusion);
+    return fake(task);
+  };
+  boot();
+  get_ready();
+  const auto id = scan();
+  ASSERT_TRUE(wait_state(id, JobState::done));
+  ASSERT_TRUE(ask(event::JobAsked{.what = What::reprocess, .job = id, .voxel_mm = 0.5, .fusion = "paper"}));
+  EXPECT_TRUE(wait_state(id, JobState::done));
+  ASSERT_EQ(asked.size(), 2u);
+  EXPECT_EQ(asked[1].first, 0.5);
+  EXPECT_EQ(asked[1].second, "paper");
+  EXPECT_EQ(ask(event::JobAsked{.what = What::reprocess, .job = "none"}).error().code, ErrorCode::not_found);
+}
+
+TEST_F(Executor, AJobThatWouldNeedTooMuchMemoryIsRefusedBeforeItStarts) {
+  options.reconstructor = [](const ReconstructionTask&) -> Result<std::unique_ptr<Reconstructor>> {
+    return fail(ErrorCode::out_of_range, "would need 12 GiB");
+  };
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_fail()) << "and nobody turns the object over for nothing";
+  EXPECT_THAT(newest()->error->message, HasSubstr("12 GiB"));
+}
+
+TEST_F(Executor, AProcessMakesTheModelAndTellsItsProgress) {
+  execute("printf 'volume\\t0.5\\n'; mkdir $out; echo glTF > $out/model.glb; echo '{}' > $out/report.json");
+  boot();
+  get_ready();
+  const auto id = scan();
+  EXPECT_TRUE(wait_state(id, JobState::done));
+  EXPECT_EQ(job(id)->stages.back().name, "volume");
+  EXPECT_EQ(*read_file(job(id)->model), "glTF\n");
+}
+
+TEST_F(Executor, AProcessThatCrashesFailsItsJobAndLeavesNothing) {
+  execute("mkdir $out; echo half > $out/model.glb; kill -SEGV $$");
+  boot();
+  get_ready();
+  const auto id = scan();
+  expect_failed(id, ErrorCode::internal, "Segmentation fault");
+  EXPECT_FALSE(fs::exists(fs::path(job(id)->folder) / "model.new"));
+}
+
+TEST_F(Executor, AProcessThatFailsSaysWhy) {
+  execute("printf 'failed\\tsame_rest\\tthe object was not turned over\\n'; exit 7");
+  boot();
+  get_ready();
+  expect_failed(scan(), ErrorCode::same_rest, "was not turned over");
+}
+
+TEST_F(Executor, AProcessWithoutAWordIsQuoted) {
+  execute("echo 'it is raining' >&2; exit 3");
+  boot();
+  get_ready();
+  expect_failed(scan(), ErrorCode::internal, "ended with 3: it is raining");
+}
+
+TEST_F(Executor, AProcessIsKilledWhenTheDaemonEndsAndItsJobIsDoneAfterTheRestart) {
+  execute("[ -e $out.again ] && mkdir $out && echo '{}' > $out/report.json && exit 0; touch $out.again; sleep 600");
+  boot();
+  get_ready();
+  scan_both_poses();
+  while (!newest() || newest()->state != JobState::reconstructing) clock.sleep_for(std::chrono::milliseconds(10));
+  const auto id = newest()->id;
+  const auto again = fs::path(newest()->folder) / "model.new.again";
+  while (!fs::exists(again)) std::this_thread::yield();
+  shut_down();
+  EXPECT_TRUE(result) << result.error().message;
+  boot();
+  EXPECT_TRUE(wait_state(id, JobState::done));
+}
+
+}  // namespace
+}  // namespace scanrig

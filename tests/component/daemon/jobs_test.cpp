@@ -1,0 +1,227 @@
+#include <gmock/gmock.h>
+
+#include "tests/component/daemon/daemon_under_test.h"
+
+namespace scanrig {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using What = event::JobAsked::What;
+
+/// Jobs that are ordered, interrupted, resumed, kept: over fake devices, with real folders.
+class Jobs : public Daemon {
+ protected:
+  void restart() {
+    shut_down();
+    boot();
+    get_ready();
+  }
+  Result<std::string> ask_for(What what, const std::string& id) {
+    return ask(event::JobAsked{.what = what, .job = id});
+  }
+  /// Interrupts a scan of three views a pose after `views` of its first pose.
+  std::string interrupted_after(int views) {
+    rig.panel.press(&PanelInputs::start);
+    const auto enough = [&] { return newest() && static_cast<int>(newest()->stored.size()) >= views; };
+    while (!enough()) clock.sleep_for(std::chrono::milliseconds(10));
+    rig.panel.set(&PanelInputs::estop_ok, false);
+    EXPECT_TRUE(wait_fault());
+    rig.panel.set(&PanelInputs::estop_ok, true);
+    const auto id = newest()->id;
+    EXPECT_TRUE(wait_state(id, JobState::interrupted));
+    rig.panel.press(&PanelInputs::reset);
+    EXPECT_TRUE(wait_ready());
+    return id;
+  }
+  void finish(const std::string& id) {
+    rig.panel.press(&PanelInputs::start);
+    ASSERT_TRUE(wait_flip());
+    rig.panel.press(&PanelInputs::start);
+    EXPECT_TRUE(wait_state(id, JobState::done));
+  }
+  void look_at(int scene) {
+    const std::lock_guard guard(rig.line.mutex);
+    rig.line.scene = scene;
+  }
+};
+
+TEST_F(Jobs, AnOrderIsAFolderBeforeItIsAnswered) {
+  options.recipes["small"] = {.name = "small", .poses = 1, .views = 3};
+  boot();
+  get_ready();
+  const auto first = ask(Order{.recipe = "small", .part = "4711", .repeat = 2});
+  ASSERT_TRUE(first) << first.error().message;
+  EXPECT_EQ(ScanFolder::open(folder_ / "jobs" / *first)->manifest().state, "queued");
+  EXPECT_EQ(job_folders().size(), 2u);
+  EXPECT_EQ(job(*first)->part, "4711");
+  EXPECT_EQ(loop->snapshot()->queue.size(), 2u);
+  EXPECT_EQ(ask(Order{.recipe = "none"}).error().code, ErrorCode::not_found);
+
+  rig.panel.press(&PanelInputs::start);
+  EXPECT_TRUE(wait_state(*first, JobState::done));
+  EXPECT_EQ(job(*first)->stored.size(), 3u) << "one pose of three views, as its recipe says";
+  EXPECT_EQ(loop->snapshot()->queue.size(), 1u);
+}
+
+TEST_F(Jobs, TheQueueOutlivesTheDaemonInItsOrder) {
+  boot();
+  get_ready();
+  const auto a = ask(Order{.part = "a"}), b = ask(Order{.part = "b"});
+  ASSERT_TRUE(a && b);
+  ASSERT_TRUE(ask_for(What::to_front, *b));
+  EXPECT_THAT(loop->snapshot()->queue, ElementsAre(*b, *a));
+  restart();
+  EXPECT_THAT(loop->snapshot()->queue, ElementsAre(*b, *a));
+  ASSERT_TRUE(ask_for(What::cancel, *b));
+  EXPECT_EQ(job(*b)->state, JobState::cancelled);
+  EXPECT_THAT(loop->snapshot()->queue, ElementsAre(*a));
+}
+
+TEST_F(Jobs, AnInterruptedScanGoesOnWhereItStopped) {
+  boot();
+  get_ready();
+  const auto id = interrupted_after(2);
+  EXPECT_TRUE(job(id)->resumable);
+  const auto before = rig.line.exposures;
+  ASSERT_TRUE(ask_for(What::resume, id));
+  finish(id);
+  const auto scan = only_job();
+  EXPECT_EQ(scan.manifest().poses[0].closures.size(), 2u) << "before it went on, and after the last view";
+  EXPECT_EQ(scan.manifest().poses[0].closures[0].after_views, 2);
+  EXPECT_LE(rig.line.exposures - before, 2 * (1 + 1 + 1 + 3 + 1)) << "no view that was there is taken again";
+  expect_all_stored_views_readable(scan);
+  EXPECT_FALSE(read_failure(scan.path())) << "why it was interrupted is history";
+}
+
+TEST_F(Jobs, AScanGoesOnAfterTheDaemonDiedToo) {
+  boot();
+  get_ready();
+  const auto id = interrupted_after(1);
+  restart();
+  EXPECT_TRUE(job(id)->resumable);
+  EXPECT_EQ(rig.turntable.moving, false);
+  ASSERT_TRUE(ask_for(What::resume, id));
+  finish(id);
+  EXPECT_THAT(log.calls, testing::IsSupersetOf({"view 0/0", "view 0/1", "view 0/2", "pose 0", "pose 1", "finish"}));
+}
+
+TEST_F(Jobs, AnObjectThatWasTouchedIsNotGoneOnWith) {
+  boot();
+  get_ready();
+  const auto id = interrupted_after(2);
+  look_at(40);
+  ASSERT_TRUE(ask_for(What::resume, id));
+  rig.panel.press(&PanelInputs::start);
+  EXPECT_TRUE(wait_state(id, JobState::interrupted));
+  EXPECT_EQ(job(id)->error->code, ErrorCode::moved);
+  EXPECT_FALSE(job(id)->resumable);
+  EXPECT_TRUE(fs::exists(job_folders()[0] / "pose1" / "closure00_left.png")) << "evidence";
+  ASSERT_TRUE(wait_ready());
+  EXPECT_EQ(ask_for(What::resume, id).error().code, ErrorCode::refused);
+  ASSERT_TRUE(ask_for(What::cancel, id)) << "it can be ended";
+  EXPECT_EQ(job(id)->state, JobState::cancelled);
+  EXPECT_EQ(job(id)->stored.size(), 2u);
+}
+
+TEST_F(Jobs, AnObjectThatSlipsDuringThePoseIsNoticed) {
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  while (!newest() || newest()->stored.size() < 2) clock.sleep_for(std::chrono::milliseconds(10));
+  look_at(40);
+  EXPECT_TRUE(wait_state(newest()->id, JobState::failed));
+  EXPECT_EQ(newest()->error->code, ErrorCode::moved);
+  EXPECT_TRUE(wait_ready()) << "one bad part stops no line";
+}
+
+TEST_F(Jobs, APartNobodyTurnsOverIsParkedAndCanBeFinishedLater) {
+  options.recipes["default"].flip_timeout = std::chrono::minutes(5);
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_flip());
+  const auto id = newest()->id;
+  ASSERT_TRUE(wait_ready());
+  EXPECT_TRUE(wait_state(id, JobState::interrupted));
+  EXPECT_THAT(job(id)->error->message, HasSubstr("parked"));
+  ASSERT_TRUE(ask_for(What::resume, id));
+  rig.panel.press(&PanelInputs::start);
+  EXPECT_TRUE(wait_state(id, JobState::done));
+  EXPECT_TRUE(only_job().manifest().poses[1].complete);
+}
+
+TEST_F(Jobs, AJobThatDoesNotFitOnTheDiskIsNotBegun) {
+  options.jobs.reserve_bytes = std::uintmax_t{1} << 60;
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  while (!newest() || loop->snapshot()->machine != MachineState::ready) clock.sleep_for(std::chrono::milliseconds(10));
+  EXPECT_THAT(loop->snapshot()->cause, HasSubstr("GiB"));
+  EXPECT_EQ(loop->snapshot()->queue.size(), 1u);
+  clock.sleep_for(std::chrono::minutes(1));
+  EXPECT_EQ(rig.line.exposures, 0);
+}
+
+TEST_F(Jobs, ALineRunsItsQueueByPartsAndByTheFlipSignal) {
+  options.recipes["line"] = {.name = "line", .views = 3, .flip_by_line = true, .start_on_part = true};
+  boot();
+  get_ready();
+  ASSERT_TRUE(ask(Order{.recipe = "line", .repeat = 2}));
+  const auto ids = loop->snapshot()->queue;
+  const auto turn_over = [&] {
+    ASSERT_TRUE(wait_flip());
+    rig.panel.set(&PanelInputs::flipped, true);
+    rig.panel.set(&PanelInputs::flipped, false);
+  };
+  rig.panel.press(&PanelInputs::start);
+  turn_over();
+  EXPECT_TRUE(wait_state(ids[0], JobState::done));
+  rig.panel.set(&PanelInputs::part_present, false);
+  rig.panel.set(&PanelInputs::part_present, true);
+  turn_over();
+  EXPECT_TRUE(wait_state(ids[1], JobState::done));
+  EXPECT_EQ(loop->snapshot()->machine, MachineState::ready);
+}
+
+TEST_F(Jobs, AnEndedJobIsBundledExportedAndRemoved) {
+  boot();
+  get_ready();
+  scan_both_poses();
+  ASSERT_TRUE(wait_pass());
+  const auto id = newest()->id;
+  const auto file = folder_ / "bundle.tar.gz";
+  EXPECT_EQ(ask(event::JobAsked{.what = What::bundle, .job = id, .path = file}).value_or("no"), file.string());
+  EXPECT_GT(fs::file_size(file), 1000u);
+  EXPECT_EQ(ask(event::JobAsked{.what = What::bundle, .job = id, .path = file}).error().code, ErrorCode::exists);
+  EXPECT_EQ(ask(event::JobAsked{.what = What::bundle, .job = id, .path = "here.tar.gz"}).error().code,
+            ErrorCode::invalid_input);
+  EXPECT_EQ(ask(event::JobAsked{.what = What::bundle, .job = id, .path = folder_ / "no" / "b.tar.gz"}).error().code,
+            ErrorCode::io);
+  EXPECT_EQ(ask(event::JobAsked{.what = What::bundle, .job = "none", .path = file}).error().code, ErrorCode::not_found);
+  ASSERT_TRUE(ask_for(What::set_exported, id));
+  EXPECT_TRUE(job(id)->exported);
+  ASSERT_TRUE(ask_for(What::remove, id));
+  EXPECT_EQ(job(id), nullptr);
+  EXPECT_THAT(job_folders(), IsEmpty());
+  EXPECT_EQ(ask_for(What::remove, id).error().code, ErrorCode::not_found);
+}
+
+TEST_F(Jobs, RetentionRemovesWhatIsExportedWhenTheNextJobBegins) {
+  options.retention.keep_bytes = 1;
+  boot();
+  get_ready();
+  scan_both_poses();
+  ASSERT_TRUE(wait_pass());
+  const auto id = newest()->id;
+  ASSERT_TRUE(ask_for(What::set_exported, id));
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_flip());
+  while (job(id)) clock.sleep_for(std::chrono::seconds(1));
+  EXPECT_EQ(job_folders().size(), 1u) << "the one being scanned";
+}
+
+}  // namespace
+}  // namespace scanrig

@@ -1,0 +1,128 @@
+#include "daemon/webhook/webhook.h"
+
+#include <gmock/gmock.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <future>
+
+namespace scanrig {
+namespace {
+
+using std::chrono::milliseconds;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+/// Somebody who takes one request on the loopback interface and answers as told.
+class Listener {
+ public:
+  Listener() : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in address{};
+    address.sin_family = AF_INET;
+    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    socklen_t size = sizeof address;
+    ::bind(socket_, reinterpret_cast<sockaddr*>(&address), size);
+    ::getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size);
+    port = std::to_string(ntohs(address.sin_port));
+    ::listen(socket_, 4);
+  }
+  ~Listener() { ::close(socket_); }
+  Listener(const Listener&) = delete;
+  Listener& operator=(const Listener&) = delete;
+
+  /// The request's text.
+  std::future<std::string> answer(const std::string& with) {
+    return std::async(std::launch::async, [this, with] {
+      const int peer = ::accept(socket_, nullptr, nullptr);
+      std::string text;
+      char buffer[2048];
+      while (text.find('}') == std::string::npos) {
+        const auto got = ::recv(peer, buffer, sizeof buffer, 0);
+        if (got <= 0) break;
+        text.append(buffer, static_cast<std::size_t>(got));
+      }
+      ::send(peer, with.data(), with.size(), MSG_NOSIGNAL);
+      ::close(peer);
+      return text;
+    });
+  }
+  std::string port;
+
+ private:
+  int socket_;
+};
+
+std::shared_ptr<const JobInfo> job(const std::string& id, JobState state, std::optional<bool> passed = {}) {
+  return std::make_shared<const JobInfo>(JobInfo{
+      .id = id, .state = state, .part = "4711", .passed = passed, .error = Error{ErrorCode::moved, "it \"moved\""}});
+}
+
+Snapshot with(JobTable jobs, MachineState machine = MachineState::ready) {
+  Snapshot snapshot;
+  snapshot.jobs = std::move(jobs);
+  snapshot.machine = machine;
+  snapshot.cause = "The guard was opened.";
+  return snapshot;
+}
+
+TEST(BadNews, IsAJobThatFailsIsInterruptedOrDoesNotPass) {
+  const auto before = with({{"a", job("a", JobState::scanning)}});
+  for (const auto state : {JobState::failed, JobState::interrupted}) {
+    const auto news = bad_news(before, with({{"a", job("a", state)}}));
+    ASSERT_EQ(news.size(), 1u);
+    EXPECT_THAT(news[0], HasSubstr(R"("job":"a","part":"4711")"));
+    EXPECT_THAT(news[0], HasSubstr(R"("code":"moved","message":"it \"moved\"")"));
+  }
+  EXPECT_EQ(bad_news(before, with({{"a", job("a", JobState::done, false)}})).size(), 1u);
+  EXPECT_THAT(bad_news(before, with({{"a", job("a", JobState::done, true)}})), IsEmpty());
+  EXPECT_THAT(bad_news(before, with({{"a", job("a", JobState::cancelled)}})), IsEmpty());
+}
+
+TEST(BadNews, IsToldOnce) {
+  const auto failed = with({{"a", job("a", JobState::failed)}});
+  EXPECT_THAT(bad_news(failed, with({{"a", job("a", JobState::failed)}})), IsEmpty());
+}
+
+TEST(BadNews, IsAFaultOfTheMachine) {
+  const auto news = bad_news(with({}), with({}, MachineState::error));
+  EXPECT_THAT(news, ElementsAre(HasSubstr("The guard was opened.")));
+}
+
+TEST(HttpPost, SendsJson) {
+  Listener listener;
+  auto request = listener.answer("HTTP/1.1 204 No Content\r\n\r\n");
+  const auto sent = http_post({"127.0.0.1", listener.port, "/hook?a=1"}, R"({"job":"a"})", milliseconds(5000));
+  EXPECT_TRUE(sent) << sent.error().message;
+  const auto text = request.get();
+  EXPECT_THAT(text, HasSubstr("POST /hook?a=1 HTTP/1.1"));
+  EXPECT_THAT(text, HasSubstr("application/json"));
+  EXPECT_THAT(text, HasSubstr(R"({"job":"a"})"));
+}
+
+TEST(HttpPost, SaysWhatIsWrong) {
+  Listener listener;
+  auto refused = listener.answer("HTTP/1.1 500 Oops\r\nContent-Length: 0\r\n\r\n");
+  EXPECT_EQ(http_post({"127.0.0.1", listener.port, "/"}, "{}", milliseconds(5000)).error().code, ErrorCode::protocol);
+  refused.wait();
+  auto cut = listener.answer("");
+  EXPECT_EQ(http_post({"127.0.0.1", listener.port, "/"}, "{}", milliseconds(5000)).error().code, ErrorCode::io);
+  cut.wait();
+  EXPECT_EQ(http_post({"127.0.0.1", listener.port, "/"}, "{}", milliseconds(50)).error().code, ErrorCode::timeout);
+  EXPECT_EQ(http_post({"127.0.0.1", "1", "/"}, "{}", milliseconds(5000)).error().code, ErrorCode::io);
+}
+
+TEST(Webhook, TellsWhatGoesWrongAfterItsStart) {
+  Listener listener;
+  auto request = listener.answer("HTTP/1.1 200 OK\r\nContent-Length: 0\r\n\r\n");
+  RealClock clock;
+  Webhook webhook(clock, {"127.0.0.1", listener.port, "/"});
+  webhook.look(std::make_shared<Snapshot>(with({{"old", job("old", JobState::failed)}})));
+  webhook.look(
+      std::make_shared<Snapshot>(with({{"old", job("old", JobState::failed)}, {"new", job("new", JobState::failed)}})));
+  EXPECT_THAT(request.get(), HasSubstr(R"("job":"new")"));
+}
+
+}  // namespace
+}  // namespace scanrig

@@ -1,0 +1,102 @@
+#include <gmock/gmock.h>
+
+#include "config/rig_config.h"
+#include "tests/unit/config/file_under_test.h"
+
+namespace scanrig::config {
+namespace {
+
+using testing::HasSubstr;
+
+/// What rig.toml says about jobs: recipes, storage, quiet hours, whom failures are told.
+class RecipeConfigTest : public FileUnderTest {
+ protected:
+  Result<RigConfig> read(const std::string& text) {
+    write(text);
+    return read_rig_config(file_, std::filesystem::path(SCANRIG_SOURCE_DIR) / "config/drives");
+  }
+  void expect_problem(const std::string& text, const std::string& problem) {
+    const auto rig = read(text);
+    ASSERT_FALSE(rig) << problem;
+    EXPECT_EQ(rig.error().code, ErrorCode::invalid_input);
+    EXPECT_THAT(rig.error().message, HasSubstr(problem));
+  }
+  std::string with_inputs() const {
+    return replaced(
+        example_, "start = { line = \"START\", active = \"low\" }",
+        "start = { line = \"START\" }\npart_present = { line = \"PART\" }\nflipped = { line = \"FLIPPED\" }");
+  }
+  const std::string example_ = shipped("rigs/example.toml");
+  const std::string line_ = R"(
+[recipe.line]
+views = 6
+poses = 2
+flip_timeout_min = 2
+flip = "line"
+start = "part_present"
+limits = { least_measured_share = 0.9, most_residual_mm = 0.05 }
+)";
+};
+
+TEST_F(RecipeConfigTest, ARecipeMayLeaveEverythingButTheScanToTheButton) {
+  const auto rig = read(example_);
+  ASSERT_TRUE(rig) << rig.error().message;
+  const auto& recipe = rig->recipes.at("default");
+  EXPECT_EQ(recipe.flip, RecipeConfig::Flip::button);
+  EXPECT_EQ(recipe.start, RecipeConfig::Start::button);
+  EXPECT_FALSE(recipe.least_measured_share);
+  EXPECT_FALSE(rig->quiet_hours);
+  EXPECT_FALSE(rig->webhook);
+  EXPECT_FALSE(rig->storage.keep_days);
+}
+
+TEST_F(RecipeConfigTest, ALineHasSignalsAndLimits) {
+  const auto rig = read(with_inputs() + line_);
+  ASSERT_TRUE(rig) << rig.error().message;
+  const auto& recipe = rig->recipes.at("line");
+  EXPECT_EQ(recipe.views, 6);
+  EXPECT_EQ(recipe.flip, RecipeConfig::Flip::line);
+  EXPECT_EQ(recipe.start, RecipeConfig::Start::part_present);
+  EXPECT_EQ(recipe.least_measured_share, 0.9);
+  EXPECT_EQ(recipe.most_residual_mm, 0.05);
+}
+
+TEST_F(RecipeConfigTest, SignalsNeedTheirInputs) {
+  expect_problem(example_ + line_, "[recipe.line] flip: \"line\" needs the input flipped in [panel]");
+  expect_problem(example_ + line_, "[recipe.line] start: \"part_present\" needs the input part_present in [panel]");
+}
+
+TEST_F(RecipeConfigTest, LimitsAreChecked) {
+  const auto text = replaced(with_inputs() + line_, "least_measured_share = 0.9", "least_measured_share = 90");
+  expect_problem(text, "limits.least_measured_share: 90 is not between 0 and 1");
+}
+
+TEST_F(RecipeConfigTest, QuietHoursAreTimesOfTheDay) {
+  const auto rig = read(example_ + "\n[quiet_hours]\nfrom = \"22:30\"\nto = \"06:00\"\n");
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->quiet_hours->from, std::chrono::minutes(22 * 60 + 30));
+  EXPECT_EQ(rig->quiet_hours->to, std::chrono::hours(6));
+  for (const char* wrong : {"24:00", "12:60", "noon", "1:2:3", "-1:00", "7"}) {
+    expect_problem(example_ + fmt::format("\n[quiet_hours]\nfrom = \"{}\"\nto = \"06:00\"\n", wrong),
+                   fmt::format("[quiet_hours] from: \"{}\" is no time of day", wrong));
+  }
+}
+
+TEST_F(RecipeConfigTest, StorageMayBeLimitedAndFailuresTold) {
+  const auto text = replaced(example_, "reserve_gib = 20", "reserve_gib = 20\nkeep_days = 90\nkeep_gib = 400");
+  const auto rig = read(text + "\n[webhook]\nurl = \"http://line:8080/failed\"\n");
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->storage.keep_days, std::chrono::days(90));
+  EXPECT_EQ(rig->storage.keep_gib, 400.0);
+  EXPECT_EQ(rig->webhook->host, "line");
+  EXPECT_EQ(rig->webhook->port, "8080");
+  EXPECT_EQ(rig->webhook->path, "/failed");
+  EXPECT_EQ(read(text + "\n[webhook]\nurl = \"http://line\"\n")->webhook->port, "80");
+  for (const char* wrong : {"line:8080", "https://line/", "http://", "http://line:", "http://line:x/"}) {
+    expect_problem(text + fmt::format("\n[webhook]\nurl = \"{}\"\n", wrong),
+                   fmt::format("[webhook] url: \"{}\" is no http://HOST:PORT/PATH", wrong));
+  }
+}
+
+}  // namespace
+}  // namespace scanrig::config

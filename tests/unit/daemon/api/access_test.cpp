@@ -1,0 +1,87 @@
+#include "daemon/api/access.h"
+
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "tests/unit/pipeline/scan/scan_samples.h"
+
+namespace scanrig {
+namespace {
+
+TEST(PeerRoles, RootAndTheDaemonsUserAreEngineers) {
+  EXPECT_EQ(PeerRoles{}.role_of({0, {}}), Role::engineer);
+  EXPECT_EQ(PeerRoles{}.role_of({::geteuid(), {}}), Role::engineer);
+}
+
+TEST(PeerRoles, AGroupDecidesForOthersAndTheHighestCounts) {
+  const PeerRoles roles{.viewer = 10, .operating = 20, .engineer = 30};
+  constexpr uid_t kSomebody = 54321;
+  EXPECT_EQ(roles.role_of({kSomebody, {99, 10}}), Role::viewer);
+  EXPECT_EQ(roles.role_of({kSomebody, {10, 20}}), Role::operating);
+  EXPECT_EQ(roles.role_of({kSomebody, {30, 10}}), Role::engineer);
+  EXPECT_FALSE(roles.role_of({kSomebody, {99}})) << "in none of the groups";
+  EXPECT_FALSE(PeerRoles{}.role_of({kSomebody, {0}})) << "no group is told";
+}
+
+TEST(PeerCredentials, AreThoseOfTheOtherEnd) {
+  int ends[2];
+  ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM, 0, ends), 0);
+  const auto peer = peer_credentials(ends[0]);
+  ASSERT_TRUE(peer) << peer.error().message;
+  EXPECT_EQ(peer->uid, ::geteuid());
+  EXPECT_NE(std::ranges::find(peer->groups, ::getegid()), peer->groups.end());
+  ::close(ends[0]);
+  ::close(ends[1]);
+  EXPECT_EQ(peer_credentials(-1).error().code, ErrorCode::io);
+}
+
+TEST(PeerCredentials, AGroupIsFoundByItsName) {
+  const auto roles = find_groups({.operating = "root"});
+  ASSERT_TRUE(roles) << roles.error().message;
+  EXPECT_EQ(roles->operating, 0u);
+  EXPECT_FALSE(roles->viewer || roles->engineer);
+  EXPECT_EQ(find_groups({.viewer = "no-such-group-here"}).error().code, ErrorCode::not_found);
+  EXPECT_EQ(find_groups({})->operating, ::getegid()) << "nobody named: the daemon's own group";
+}
+
+class AccessTest : public scan_samples::FolderTest {
+ protected:
+  std::filesystem::path path() const { return folder_ / "tokens.json"; }
+};
+
+TEST_F(AccessTest, ATokenThatIsShownDecidesAndNotThePeer) {
+  TokenFile tokens;
+  const auto token = *tokens.add("tablet", Role::operating, "now");
+  ASSERT_TRUE(tokens.write(path()));
+  const Access access({}, path());
+  EXPECT_EQ(access.role_of(std::nullopt, ""), std::nullopt);
+  EXPECT_EQ(access.role_of(Role::viewer, ""), Role::viewer);
+  EXPECT_EQ(access.role_of(std::nullopt, "Bearer " + token), Role::operating);
+  EXPECT_EQ(access.role_of(std::nullopt, "bearer " + token), Role::operating);
+  EXPECT_EQ(access.role_of(Role::engineer, "Bearer wrong"), std::nullopt);
+  EXPECT_EQ(access.role_of(Role::engineer, "Basic " + token), std::nullopt);
+  EXPECT_EQ(access.role_of(Role::engineer, "Bearer"), std::nullopt);
+}
+
+TEST_F(AccessTest, TokensThatBecomeUnreadableAreVoidAndThatIsSaid) {
+  TokenFile tokens;
+  const auto token = "Bearer " + *tokens.add("tablet", Role::operating, "now");
+  ASSERT_TRUE(tokens.write(path()));
+  Access access({}, path());
+  EXPECT_FALSE(access.problem());
+  ::chmod(path().c_str(), 0644);
+  access.refresh();
+  EXPECT_FALSE(access.role_of(std::nullopt, token));
+  ASSERT_TRUE(access.problem());
+  EXPECT_EQ(access.problem()->code, ErrorCode::refused);
+  ::chmod(path().c_str(), 0600);
+  access.refresh();
+  EXPECT_EQ(access.role_of(std::nullopt, token), Role::operating);
+}
+
+}  // namespace
+}  // namespace scanrig

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <future>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <thread>
+
+#include "daemon/api/facts.h"
+#include "daemon/api/router.h"
+
+namespace scanrig {
+
+/// A control loop without devices: its rig stops at once, and nothing else ever answers.
+class StationWithoutRig {
+ public:
+  explicit StationWithoutRig(
+      JobTable jobs, std::function<void()> published = [] {})
+      : loop(clock_, ControlLoopOptions{.rules = {.remote = true, .guard = true}}, std::move(jobs)) {
+    thread_ = std::thread([this, published = std::move(published)] {
+      const auto perform = [this](const Action& action) {
+        if (std::holds_alternative<action::StopRig>(action)) loop.post(event::Stopped{});
+      };
+      EXPECT_TRUE(loop.run({.perform = perform,
+                            .show = [](const PanelOutputs&) {},
+                            .fresh_job_id = [] { return std::string("fresh"); },
+                            .published = [&published](const auto&) { published(); }}));
+    });
+  }
+  ~StationWithoutRig() { end(); }
+  void end() {
+    if (!thread_.joinable()) return;
+    loop.post(event::Shutdown{});
+    thread_.join();
+  }
+  StationWithoutRig(const StationWithoutRig&) = delete;
+  StationWithoutRig& operator=(const StationWithoutRig&) = delete;
+
+  RealClock clock_;
+  ControlLoop loop;
+
+ private:
+  std::thread thread_;
+};
+
+/// A job that failed, in a folder.
+inline JobTable one_job(const std::string& id, const std::string& folder) {
+  auto job = std::make_shared<JobInfo>();
+  job->id = id;
+  job->state = JobState::failed;
+  job->folder = folder;
+  job->stored = {{0, 3, 135.01, 1, 135.0, 212.0}};
+  job->stages = {{"volume", 0.5}};
+  job->error = Error{ErrorCode::same_rest, "not turned over"};
+  return {{id, std::move(job)}};
+}
+
+}  // namespace scanrig

@@ -1,0 +1,88 @@
+#include "daemon/ctl/screen.h"
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <sys/ioctl.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <memory>
+
+namespace scanrig::ctl {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::Not;
+using testing::StartsWith;
+
+TEST(Screen, LinesAreCutToTheWindow) {
+  EXPECT_THAT(fitted({"abcdef", "ab"}, {.width = 4, .height = 2}), ElementsAre("abcd", "ab"));
+  EXPECT_THAT(fitted({"\xc3\xa4\xc3\xb6\xc3\xbc"}, {.width = 2, .height = 1}), ElementsAre("\xc3\xa4\xc3\xb6"))
+      << "letters are not torn";
+  EXPECT_THAT(fitted({"1", "2", "3", "4"}, {.width = 80, .height = 3}), ElementsAre("1", "2", "(2 more lines)"));
+}
+
+/// A terminal whose other end the test reads.
+class Terminal : public testing::Test {
+ protected:
+  void SetUp() override {
+    master = ::posix_openpt(O_RDWR | O_NOCTTY);
+    ASSERT_GE(master, 0);
+    ASSERT_EQ(::grantpt(master), 0);
+    ASSERT_EQ(::unlockpt(master), 0);
+    out.reset(std::fopen(::ptsname(master), "w"));
+    ASSERT_TRUE(out);
+    const winsize size{.ws_row = 3, .ws_col = 10, .ws_xpixel = 0, .ws_ypixel = 0};
+    ::ioctl(master, TIOCSWINSZ, &size);
+    termios raw{};
+    ::tcgetattr(::fileno(out.get()), &raw);
+    ::cfmakeraw(&raw);
+    ::tcsetattr(::fileno(out.get()), TCSANOW, &raw);
+  }
+  void TearDown() override { ::close(master); }
+  std::string seen() const {
+    int waiting = 0;
+    ::ioctl(master, FIONREAD, &waiting);
+    std::string text(static_cast<std::size_t>(waiting), '\0');
+    if (waiting > 0) text.resize(static_cast<std::size_t>(::read(master, text.data(), text.size())));
+    return text;
+  }
+  int master = -1;
+  std::unique_ptr<std::FILE, int (*)(std::FILE*)> out{nullptr, std::fclose};
+};
+
+TEST_F(Terminal, IsDrawnOverWithoutBeingErasedFirst) {
+  ::setenv("TERM", "xterm", 1);
+  Screen screen(out.get());
+  EXPECT_THAT(seen(), HasSubstr("\x1b[?1049h"));
+  screen.show({"one", "two"});
+  const auto first = seen();
+  EXPECT_EQ(first, "\x1b[Hone\x1b[K\r\ntwo\x1b[K\x1b[J");
+  EXPECT_THAT(first, Not(HasSubstr("\x1b[2J")));
+  screen.show({"one", "two"});
+  EXPECT_EQ(seen(), "") << "nothing is different";
+  screen.show({"one", "three"});
+  EXPECT_THAT(seen(), StartsWith("\x1b[Hone"));
+}
+
+TEST_F(Terminal, IsLeftAsItWas) {
+  ::setenv("TERM", "xterm", 1);
+  { const Screen screen(out.get()); }
+  EXPECT_THAT(seen(), testing::EndsWith("\x1b[?25h\x1b[?1049l"));
+}
+
+TEST_F(Terminal, ADumbOneGetsTheLinesThatChange) {
+  ::setenv("TERM", "dumb", 1);
+  {
+    Screen screen(out.get());
+    screen.show({"one", "two"});
+    screen.show({"one", "two"});
+    screen.show({"one", "three"});
+  }
+  EXPECT_EQ(seen(), "one\ntwo\nthree\n");
+}
+
+}  // namespace
+}  // namespace scanrig::ctl

@@ -1,0 +1,278 @@
+#include <gmock/gmock.h>
+
+#include "daemon/station/words.h"
+#include "tests/unit/daemon/station_under_test.h"
+
+namespace scanrig {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using What = event::JobAsked::What;
+
+/// The rules of which job has the rig next.
+class Queue : public Station {
+ protected:
+  void order(const std::string& recipe, int repeat = 1, const std::string& part = {}) {
+    event::Ordered ordered{{recipe, part, repeat}, {}, 7};
+    for (int i = 0; i < repeat; ++i) ordered.fresh_ids.push_back(fmt::format("new{}", i));
+    tell(ordered);
+  }
+  void ask(What what, const std::string& job) { tell(event::JobAsked{.what = what, .job = job, .ticket = 7}); }
+  void see(bool part_present, bool flipped = false) {
+    PanelInputs inputs;
+    inputs.part_present = part_present;
+    inputs.flipped = flipped;
+    tell(event::InputsSeen{inputs});
+  }
+  std::vector<std::string> waiting() const {
+    std::vector<std::string> ids;
+    for (const auto& job : state.queue) ids.push_back(job->id);
+    return ids;
+  }
+  static Recipe by_parts() { return {.name = "line", .poses = 1, .views = 1, .start_on_part = true}; }
+  /// All of a one-view job of by_parts().
+  void scan(const std::string& job) {
+    tell(event::JobBegun{job, 0, 0});
+    tell(event::WarningOver{});
+    tell(event::ViewTaken{std::make_shared<TakenView>(TakenView{.id = {job, 0, 0}})});
+    tell(event::ViewStored{{job, 0, 0}, 0.0, 0});
+    tell(event::ClosureTaken{});
+    tell(event::ClosureJudged{job, {.unmoved = true}});
+    tell(event::PoseStored{job, 0});
+  }
+  void run_a_line_of(int jobs) {
+    get_ready();
+    for (int i = 0; i < jobs; ++i) know(queued(fmt::format("{}", i), i, by_parts()));
+    press(Button::start);
+  }
+};
+
+TEST_F(Queue, AnOrderMakesOneFolderAJobBehindTheOthers) {
+  rules.recipes["small"] = {.name = "small", .views = 5};
+  know(queued("a", 4));
+  order("small", 3, "4711");
+  const auto* create = asked_for<action::CreateJobs>();
+  ASSERT_NE(create, nullptr);
+  EXPECT_THAT(create->ids, ElementsAre("new0", "new1", "new2"));
+  EXPECT_EQ(create->recipe.views, 5);
+  EXPECT_EQ(create->part, "4711");
+  EXPECT_EQ(create->place, 5);
+  EXPECT_EQ(create->ticket, 7u);
+}
+
+TEST_F(Queue, AnOrderThatCannotBeUnderstoodIsRefused) {
+  order("nothing");
+  EXPECT_EQ(refused->code, ErrorCode::not_found);
+  EXPECT_THAT(refused->message, HasSubstr("\"nothing\""));
+  for (const int repeat : {0, 101}) {
+    order("default", repeat);
+    EXPECT_EQ(refused->code, ErrorCode::invalid_input);
+  }
+  order("default", 1, std::string(201, 'x'));
+  EXPECT_EQ(refused->code, ErrorCode::invalid_input);
+  EXPECT_TRUE(actions.empty());
+}
+
+TEST_F(Queue, StandsInTheOrderOfPlaces) {
+  know(queued("b", 2));
+  know(queued("a", 1));
+  know(queued("c", 2));
+  EXPECT_THAT(waiting(), ElementsAre("a", "b", "c"));
+  know(queued("c", -1));
+  EXPECT_THAT(waiting(), ElementsAre("c", "a", "b"));
+  auto ended = queued("a", 1);
+  ended.state = JobState::cancelled;
+  know(ended);
+  EXPECT_THAT(waiting(), ElementsAre("c", "b"));
+  tell(event::JobRemoved{"c"});
+  EXPECT_THAT(waiting(), ElementsAre("b"));
+}
+
+TEST_F(Queue, StartTakesTheFirstJobAndItsRecipe) {
+  get_ready();
+  know(queued("a", 1, {.name = "small", .poses = 1, .views = 3}));
+  know(queued("b", 2));
+  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("job a"));
+  press(Button::start);
+  EXPECT_EQ(asked_for<action::CreateJobs>(), nullptr);
+  ASSERT_NE(asked_for<action::BeginJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::BeginJob>()->job, "a");
+  EXPECT_EQ(state.job->recipe.views, 3);
+  EXPECT_EQ(state.machine, MachineState::single_execution);
+  EXPECT_THAT(waiting(), ElementsAre("b"));
+}
+
+TEST_F(Queue, AJobThatDoesNotFitIsNotBegunAndWaits) {
+  get_ready();
+  know(queued("a", 1));
+  press(Button::start);
+  tell(event::JobNotBegun{"a", {ErrorCode::io, "the disk is full"}});
+  know(queued("a", 1));
+  EXPECT_EQ(state.machine, MachineState::ready);
+  EXPECT_EQ(state.activity, Activity::none) << "nothing is about to move";
+  EXPECT_THAT(state.cause, HasSubstr("the disk is full"));
+  EXPECT_THAT(waiting(), ElementsAre("a"));
+  tell(event::WarningOver{});
+  EXPECT_TRUE(actions.empty());
+}
+
+TEST_F(Queue, JobsAreMovedResumedAndKept) {
+  know(queued("a", 3));
+  know(queued("b", 4));
+  ask(What::to_front, "b");
+  ASSERT_NE(asked_for<action::MoveJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::MoveJob>()->place, 2);
+  EXPECT_FALSE(asked_for<action::MoveJob>()->resume);
+  ask(What::resume, "old");
+  ASSERT_NE(asked_for<action::MoveJob>(), nullptr);
+  EXPECT_TRUE(asked_for<action::MoveJob>()->resume);
+  for (const auto what : {What::cancel, What::remove, What::reprocess, What::set_exported, What::bundle}) {
+    ask(what, "old");
+    EXPECT_NE(asked_for<action::KeepJob>(), nullptr);
+  }
+  ask(What::cancel, "a");
+  EXPECT_NE(asked_for<action::KeepJob>(), nullptr);
+}
+
+TEST_F(Queue, WhatTheStateForbidsIsRefused) {
+  ask(What::to_front, "old");
+  EXPECT_EQ(refused->code, ErrorCode::refused);
+  know(queued("a", 1));
+  ask(What::remove, "a");
+  EXPECT_EQ(refused->code, ErrorCode::refused);
+  begin_scan();
+  ask(What::cancel, "a");
+  EXPECT_EQ(refused->code, ErrorCode::busy) << "it has the rig: Stop is for that";
+  tell(event::Shutdown{});
+  ask(What::cancel, "b");
+  EXPECT_EQ(refused->code, ErrorCode::refused);
+  order("default");
+  EXPECT_EQ(refused->code, ErrorCode::refused);
+}
+
+TEST_F(Queue, ANewPartBeginsTheNextJobAfterTheWarning) {
+  run_a_line_of(2);
+  EXPECT_EQ(state.machine, MachineState::continuous_execution);
+  scan("0");
+  EXPECT_EQ(state.activity, Activity::waiting_for_part);
+  see(true);
+  EXPECT_EQ(state.activity, Activity::waiting_for_part) << "that is still the old part";
+  see(false);
+  EXPECT_TRUE(actions.empty());
+  see(true);
+  ASSERT_NE(asked_for<action::BeginJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::BeginJob>()->job, "1");
+  EXPECT_NE(asked_for<action::Warn>(), nullptr);
+  scan("1");
+  EXPECT_EQ(state.machine, MachineState::ready) << "the queue is empty";
+}
+
+TEST_F(Queue, NothingBeginsByItselfBeforeAPersonsStart) {
+  get_ready();
+  know(queued("a", 1, by_parts()));
+  see(false);
+  see(true);
+  EXPECT_TRUE(actions.empty());
+  EXPECT_EQ(state.machine, MachineState::ready);
+}
+
+TEST_F(Queue, AJobThatIsNotForTheLineWaitsForItsStart) {
+  run_a_line_of(1);
+  know(queued("by hand", 5));
+  scan("0");
+  EXPECT_EQ(state.machine, MachineState::ready);
+}
+
+TEST_F(Queue, StopEndsTheLineAndStartIsAPartToo) {
+  run_a_line_of(3);
+  scan("0");
+  press(Button::start);
+  EXPECT_NE(asked_for<action::BeginJob>(), nullptr) << "somebody says that the part is there";
+  scan("1");
+  press(Button::stop);
+  EXPECT_EQ(state.machine, MachineState::ready);
+  see(false);
+  see(true);
+  EXPECT_EQ(state.machine, MachineState::ready);
+}
+
+TEST_F(Queue, AnOpenGuardAnAbsentDeviceAndQuietHoursHoldTheLine) {
+  run_a_line_of(2);
+  scan("0");
+  tell(event::QuietHours{true});
+  tell(event::GuardChanged{false});
+  tell(event::DevicesSeen{{{"camera", Error{ErrorCode::io, "unplugged"}}}});
+  see(false);
+  see(true);
+  tell(event::QuietHours{false});
+  EXPECT_EQ(state.activity, Activity::waiting_for_part);
+  tell(event::GuardChanged{true});
+  EXPECT_EQ(state.activity, Activity::waiting_for_part);
+  tell(event::DevicesSeen{{{"camera", std::nullopt}}});
+  EXPECT_NE(asked_for<action::BeginJob>(), nullptr) << "the part has been there all the time";
+}
+
+TEST_F(Queue, ThreeFailuresInARowStopTheLineAndStartForgivesThem) {
+  run_a_line_of(5);
+  scan("0");
+  const auto failed = [&](const std::string& job) {
+    tell(event::ReconstructionFailed{job, {ErrorCode::degenerate, "nothing seen"}});
+  };
+  failed("0");
+  failed("0");
+  tell(event::ModelReady{"0", "m", "r"});
+  failed("0");
+  failed("0");
+  EXPECT_EQ(state.activity, Activity::waiting_for_part) << "a good one lay between";
+  tell(event::ModelReady{"0", "m", "r", Error{ErrorCode::below_limits, "beyond"}});
+  EXPECT_EQ(state.machine, MachineState::ready);
+  EXPECT_THAT(state.cause, HasSubstr("3 jobs in a row failed"));
+  press(Button::start);
+  scan("1");
+  EXPECT_EQ(state.activity, Activity::waiting_for_part);
+}
+
+TEST_F(Queue, AFlipNobodyMakesParksTheJobAndFreesTheRig) {
+  reach_flip();
+  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("Turn the object over"));
+  tell(event::FlipTimedOut{"another"});
+  EXPECT_EQ(state.activity, Activity::waiting_for_flip);
+  tell(event::FlipTimedOut{"job"});
+  ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::interrupted) << "it can be resumed";
+  EXPECT_THAT(asked_for<action::CloseJob>()->why.message, HasSubstr("30 min"));
+  EXPECT_EQ(state.machine, MachineState::ready);
+}
+
+TEST_F(Queue, TheFlipTimeComesFromTheRecipe) {
+  rules.recipes["default"].flip_timeout = std::chrono::minutes(5);
+  reach_flip();
+  ASSERT_NE(asked_for<action::WaitForFlip>(), nullptr);
+  EXPECT_EQ(asked_for<action::WaitForFlip>()->limit, std::chrono::minutes(5));
+}
+
+TEST_F(Queue, ALineTurnsTheObjectOverByItsSignal) {
+  rules.recipes["default"].flip_by_line = true;
+  reach_flip();
+  see(true, false);
+  EXPECT_TRUE(actions.empty());
+  tell(event::GuardChanged{false});
+  see(true, true);
+  EXPECT_EQ(state.activity, Activity::waiting_for_flip) << "not with an open guard";
+  tell(event::GuardChanged{true});
+  see(true, false);
+  see(true, true);
+  EXPECT_NE(asked_for<action::ResumeJob>(), nullptr);
+  EXPECT_NE(asked_for<action::Warn>(), nullptr);
+  EXPECT_EQ(state.job->pose, 1);
+}
+
+TEST_F(Queue, TheSignalMeansNothingWhereAPersonTurnsTheObjectOver) {
+  reach_flip();
+  see(true, true);
+  EXPECT_EQ(state.activity, Activity::waiting_for_flip);
+}
+
+}  // namespace
+}  // namespace scanrig

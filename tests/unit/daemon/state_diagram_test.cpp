@@ -1,0 +1,246 @@
+// Walks through the transition function from its first state with every kind of event, and draws what it finds.
+// SCANRIG_WRITE_DOCS=1 writes docs/states.md; without it the test says when the file is not what the code does.
+#include <gmock/gmock.h>
+
+#include <cstdlib>
+#include <deque>
+#include <set>
+
+#include "core/files.h"
+#include "daemon/rig/taken_view.h"
+#include "daemon/station/job_table.h"
+#include "daemon/station/transition.h"
+#include "daemon/station/words.h"
+
+namespace scanrig {
+namespace {
+
+struct Named {
+  const char* name;
+  Event event;
+};
+
+struct Node {
+  StationState state;
+  JobTable jobs;
+};
+
+const Error kError{ErrorCode::io, "something failed"};
+
+std::shared_ptr<const JobInfo> job(JobState state) {
+  JobInfo info{.id = "job", .state = state};
+  info.recipe = {.poses = 2, .views = 1, .start_on_part = true};
+  return std::make_shared<const JobInfo>(info);
+}
+
+event::InputsSeen inputs(bool part) {
+  event::InputsSeen seen{};
+  seen.inputs.part_present = part;
+  return seen;
+}
+
+/// Every kind of thing that can happen, as far as it makes a difference.
+std::vector<Named> everything() {
+  using What = event::MaintenanceAsked::What;
+  const auto view = std::make_shared<TakenView>(TakenView{.id = {"job", 0, 0}});
+  return {
+      {"the panel answers", event::PanelFound{true, true}},
+      {"Start", event::Pressed{Button::start, Origin::panel, "job"}},
+      {"Stop", event::Pressed{Button::stop, Origin::panel, {}}},
+      {"Reset", event::Pressed{Button::reset, Origin::panel, {}}},
+      {"e-stop", event::EstopChanged{false}},
+      {"e-stop released", event::EstopChanged{true}},
+      {"guard opened", event::GuardChanged{false}},
+      {"guard closed", event::GuardChanged{true}},
+      {"2 s of warning", event::WarningOver{}},
+      {"homed", event::Homed{}},
+      {"seen standing", event::Stopped{}},
+      {"not seen standing", event::StopFailed{kError}},
+      {"device failed", event::RigFailed{kError}},
+      {"no e-stop", event::EstopWindowOver{}},
+      {"panel failed", event::PanelFailed{kError}},
+      {"ordered", event::JobKnown{job(JobState::queued)}},
+      {"begun", event::JobBegun{"job", 0, 0}},
+      {"does not fit", event::JobNotBegun{"job", kError}},
+      {"view taken", event::ViewTaken{view}},
+      {"view stored", event::ViewStored{{"job", 0, 0}, 0.0, 0}},
+      {"view stored", event::ViewStored{{"job", 1, 0}, 0.0, 0}},
+      {"view 0 taken again", event::ClosureTaken{view}},
+      {"unmoved", event::ClosureJudged{"job", {.unmoved = true}}},
+      {"moved", event::ClosureJudged{"job", {.unmoved = false}}},
+      {"pose stored", event::PoseStored{"job", 0}},
+      {"last pose stored", event::PoseStored{"job", 1}},
+      {"flip time-out", event::FlipTimedOut{"job"}},
+      {"disk failed", event::StoreFailed{"job", kError}},
+      {"part taken away", inputs(false)},
+      {"new part", inputs(true)},
+      {"no model", event::ReconstructionFailed{"job", kError}},
+      {"model ready", event::ModelReady{"job", "model", "report"}},
+      {"maintenance on", event::MaintenanceAsked{.what = What::on}},
+      {"maintenance off", event::MaintenanceAsked{.what = What::off}},
+      {"jog", event::MaintenanceAsked{.what = What::jog, .speed = {5}}},
+      {"jogged", event::Jogged{}},
+      {"pulse", event::MaintenanceAsked{.what = What::pulse}},
+      {"pulsed", event::Pulsed{}},
+  };
+}
+
+std::string job_state(const Node& node) {
+  const auto found = node.jobs.find("job");
+  return found == node.jobs.end() ? "[*]" : std::string(to_string(found->second->state));
+}
+
+std::string machine_state(const Node& node) {
+  const auto machine = std::string(to_string(node.state.machine));
+  if (node.state.activity == Activity::none) return machine;
+  return machine + ": " + std::string(to_string(node.state.activity));
+}
+
+/// What of a state makes a difference to what comes next.
+std::string key(const Node& node) {
+  const auto& s = node.state;
+  std::string key = machine_state(node) + job_state(node);
+  const bool line = s.machine == MachineState::continuous_execution;  // parts matter to nobody else
+  for (const bool flag : {s.panel_known, s.estop_ok, s.guard_closed, s.latched, s.unnamed.has_value(), s.may_be_moving,
+                          line && s.part_gone, line && s.inputs.part_present, !s.queue.empty()}) {
+    key += flag ? '1' : '0';
+  }
+  if (s.maintenance) {
+    key += fmt::format("m{}{}{}{}", static_cast<int>(s.maintenance->before), s.maintenance->moved, s.maintenance->homed,
+                       s.maintenance->jog.has_value());
+  }
+  if (s.job) {
+    const auto& j = *s.job;
+    key += fmt::format("j{}{}{}{}{}{}{}{}{}", to_string(j.state), j.pose, j.asked, j.taken, j.stored, j.closure_due,
+                       j.closing, j.reconstruction.has_value(), j.recipe.start_on_part);
+  }
+  return key + (s.activity == Activity::waiting_for_part ? std::to_string(s.failures) : "");
+}
+
+using Edges = std::map<std::pair<std::string, std::string>, std::set<std::string>>;
+
+struct Walk {
+  Edges machine, job;
+  std::size_t states = 0;
+};
+
+/// The rest of the station answers as it would: a job that is closed is closed on disk.
+void close_jobs(Node& node, const std::vector<Action>& actions) {
+  for (const auto& action : actions) {
+    if (const auto* close = std::get_if<action::CloseJob>(&action)) {
+      update(node.jobs, event::JobClosed{close->job, close->state, close->why});
+    }
+    if (std::holds_alternative<action::CreateJobs>(action)) node.jobs["job"] = job(JobState::queued);
+  }
+}
+
+Walk walk() {
+  StationRules rules{.recipes = {{"default", {.poses = 2, .views = 1}}}, .guard = true};
+  const auto events = everything();
+  Walk walk;
+  std::deque<Node> open{Node{}};
+  std::set<std::string> seen{key(open.front())};
+  while (!open.empty()) {
+    const Node before = std::move(open.front());
+    open.pop_front();
+    for (const auto& [name, event] : events) {
+      auto step = next(before.state, event, rules);
+      Node after{std::move(step.state), before.jobs};
+      if (step.refused) continue;
+      update(after.jobs, event);
+      close_jobs(after, step.actions);
+      if (machine_state(before) != machine_state(after)) {
+        walk.machine[{machine_state(before), machine_state(after)}].insert(name);
+      }
+      // A late event of a job that has ended is no way of a job.
+      const bool alive = !before.jobs.contains("job") || !is_final(before.jobs.at("job")->state);
+      if (alive && job_state(before) != job_state(after)) walk.job[{job_state(before), job_state(after)}].insert(name);
+      if (seen.insert(key(after)).second) open.push_back(std::move(after));
+    }
+  }
+  walk.states = seen.size();
+  return walk;
+}
+
+std::string id_of(std::string name) {
+  if (name == "[*]") return name;
+  for (char& c : name) {
+    if (std::isalnum(static_cast<unsigned char>(c)) == 0) c = '_';
+  }
+  return name;
+}
+
+std::string draw(const Edges& edges) {
+  std::set<std::string> names;
+  for (const auto& [ends, why] : edges) names.insert({ends.first, ends.second});
+  std::string text = "```mermaid\nstateDiagram-v2\n";
+  for (const auto& name : names) {
+    if (name != id_of(name)) text += fmt::format("  state \"{}\" as {}\n", name, id_of(name));
+  }
+  for (const auto& [ends, why] : edges) {
+    text += fmt::format("  {} --> {} : {}\n", id_of(ends.first), id_of(ends.second), fmt::join(why, ", "));
+  }
+  return text + "```\n";
+}
+
+std::string document(const Walk& walk) {
+  return fmt::format(
+      "# States of the station\n\nDrawn by `tests/unit/daemon/state_diagram_test.cpp`, which walks through the {} "
+      "states "
+      "that `next()` in `daemon/station` can reach with one two-pose job; do not edit. What each state says to the "
+      "operator is in `daemon/station/words.cpp`.\n\n## A job\nHow it goes on after its last view is up to the "
+      "reconstruction; what is interrupted can be resumed, unless its object moved, and then is queued "
+      "again.\n\n{}\n## "
+      "The machine\nFaults lead to Error from wherever something moves or is about to; only what is obeyed is drawn, "
+      "not "
+      "what is refused.\n\n{}",
+      walk.states, draw(walk.job), draw(walk.machine));
+}
+
+class StateDiagram : public testing::Test {
+ protected:
+  static const Walk& whole() {
+    static const Walk result = walk();
+    return result;
+  }
+};
+
+TEST_F(StateDiagram, IsTheOneInTheDocuments) {
+  const auto file = std::filesystem::path(SCANRIG_SOURCE_DIR) / "docs" / "states.md";
+  const auto drawn = document(whole());
+  if (std::getenv("SCANRIG_WRITE_DOCS")) {
+    ASSERT_TRUE(write_file_atomically(file, drawn));
+  }
+  EXPECT_EQ(read_file(file).value_or(""), drawn) << "run SCANRIG_WRITE_DOCS=1 "
+                                                 << "daemon_unit_test";
+}
+
+TEST_F(StateDiagram, EveryStateIsLeftAgain) {
+  std::set<std::string> entered, left;
+  for (const auto& [ends, why] : whole().machine) {
+    left.insert(ends.first);
+    entered.insert(ends.second);
+  }
+  for (const auto& state : entered) EXPECT_TRUE(left.contains(state)) << state << " is a dead end";
+}
+
+TEST_F(StateDiagram, NothingMovesWithoutResetStartOrANewPart) {
+  const std::set<std::string> allowed{"Reset", "Start", "new part", "jog"};
+  for (const auto& [ends, why] : whole().machine) {
+    const bool about_to_move = ends.second.ends_with(": warning") && !ends.first.ends_with(": warning");
+    if (!about_to_move) continue;
+    for (const auto& name : why) EXPECT_TRUE(allowed.contains(name)) << ends.first << " by " << name;
+  }
+}
+
+TEST_F(StateDiagram, TheTableMovesOnlyAfterTheWarning) {
+  for (const auto& [ends, why] : whole().machine) {
+    const bool moves = ends.second.ends_with(": homing") || ends.second.ends_with(": jogging");
+    if (moves) {
+      EXPECT_TRUE(ends.first.ends_with(": warning")) << ends.first << " to " << ends.second;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace scanrig

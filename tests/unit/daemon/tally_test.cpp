@@ -1,0 +1,47 @@
+#include "daemon/station/tally.h"
+
+#include <gtest/gtest.h>
+
+namespace scanrig {
+namespace {
+
+using std::chrono::seconds;
+
+TEST(Tally, CountsViewsRetriesAndFaults) {
+  Tally tally;
+  const Clock::TimePoint now{};
+  tally.see(event::ViewStored{{"job", 0, 0}, 0.0, 2}, now);
+  tally.see(event::ViewStored{{"job", 0, 1}, 45.0, 0}, now);
+  tally.see(event::EstopChanged{false}, now);
+  tally.see(event::EstopChanged{true}, now);
+  tally.see(event::RigFailed{{ErrorCode::timeout, "late"}}, now);
+  tally.see(event::RigFailed{{ErrorCode::stalled, "stuck"}}, now);
+  EXPECT_EQ(tally.counters().views_stored, 2u);
+  EXPECT_EQ(tally.counters().exposures_redone, 2u);
+  EXPECT_EQ(tally.counters().faults, 3u) << "an e-stop that is released is none";
+  EXPECT_EQ(tally.counters().deadlines_missed, 1u);
+}
+
+TEST(Tally, AStageLastsFromItsFirstWordToItsLast) {
+  Tally tally;
+  const Clock::TimePoint begun{};
+  tally.see(event::StageProgress{"job", "volume", 0.0}, begun);
+  tally.see(event::StageProgress{"job", "volume", 0.5}, begun + seconds(1));
+  EXPECT_TRUE(tally.counters().stage_seconds.empty()) << "it is not over";
+  tally.see(event::StageProgress{"job", "volume", 1.0}, begun + seconds(3));
+  tally.see(event::StageProgress{"next", "volume", 0.0}, begun + seconds(10));
+  tally.see(event::StageProgress{"next", "volume", 1.0}, begun + seconds(12));
+  EXPECT_DOUBLE_EQ(tally.counters().stage_seconds.at("volume"), 5.0);
+}
+
+TEST(Tally, JobsAreCountedByTheirEnd) {
+  Tally tally;
+  tally.see(event::ModelReady{"a", "model", "report"}, {});
+  tally.see(event::ReconstructionFailed{"b", {ErrorCode::no_overlap, "no"}}, {});
+  tally.see(event::JobClosed{"c", JobState::cancelled, {ErrorCode::stopped, "Stop"}}, {});
+  EXPECT_EQ(tally.counters().jobs_ended,
+            (std::map<std::string, std::uint64_t>{{"done", 1}, {"failed", 1}, {"cancelled", 1}}));
+}
+
+}  // namespace
+}  // namespace scanrig
