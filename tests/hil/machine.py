@@ -145,8 +145,8 @@ class Machine:
         return output.strip()
 
 
-def make_disk(file, mebibytes=256):
-    """An empty ext4 disk that outlives the machine."""
+def make_disk(file, mebibytes=4096):
+    """An empty ext4 disk, sparse, that outlives the machine."""
     file.unlink(missing_ok=True)
     with file.open("wb") as disk:
         os.truncate(disk.fileno(), mebibytes << 20)

@@ -2,7 +2,7 @@
 import random
 import time
 
-from station import IMAGES, VIEWS, Unmet
+from station import IMAGES, JOBS, VIEWS, Unmet
 
 SCAN_S = 120
 RECOVERY_S = 60
@@ -68,9 +68,9 @@ def usb_and_gige(station, rendered):
 
 
 def stop_job(station):
-    """A restart ends a scan, and a reconstruction, which in an emulated machine would take minutes."""
+    """Ends a scan and takes its folder away: in an emulated machine its reconstruction would take minutes."""
     if station.job:
-        station.machine.do("systemctl restart scanrigd", 30)
+        station.machine.do(f"systemctl stop scanrigd && rm -r {JOBS}/{station.job} && systemctl start scanrigd", 60)
         station.job = None
 
 
