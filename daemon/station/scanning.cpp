@@ -47,6 +47,7 @@ void take_next_view(Machine& m) {
     job.closing = true;
     return m.act(action::TakeView{{job.id, job.pose, 0}, {0.0}, true});
   }
+  if (job.asked == job.recipe.views) return;
   m.act(action::TakeView{{job.id, job.pose, job.asked}, {360.0 * job.asked / job.recipe.views}});
   ++job.asked;
 }
@@ -83,7 +84,7 @@ void closure_judged(Machine& m, const event::ClosureJudged& e) {
 
 void pose_stored(Machine& m, const event::PoseStored& e) {
   auto& s = m.s();
-  if (!m.has(e.job) || s.activity != Activity::storing) return;
+  if (!m.has(e.job) || s.activity != Activity::storing || e.pose != s.job->pose) return;
   if (e.pose + 1 == s.job->recipe.poses) {
     s.job.reset();
     free_rig(m, fmt::format("Job {} has all its views.", e.job));

@@ -156,6 +156,9 @@ void close_jobs(Node& node, const std::vector<Action>& actions) {
   }
 }
 
+/// Only who is told to stop answers whether it stands.
+bool told_to_stop(const StationState& state) { return state.activity == Activity::stopping || state.may_be_moving; }
+
 /// `with_jobs`: what the list of jobs says makes a difference too.
 void walk(const std::vector<Named>& events, bool with_jobs, Walk& walk) {
   StationRules rules{.recipes = {{"default", {.poses = 2, .views = 1}}}, .guard = true};
@@ -165,6 +168,7 @@ void walk(const std::vector<Named>& events, bool with_jobs, Walk& walk) {
     const Node before = std::move(open.front());
     open.pop_front();
     for (const auto& [name, event] : events) {
+      if (std::string_view(name).ends_with("seen standing") && !told_to_stop(before.state)) continue;
       auto step = next(before.state, event, rules);
       if (step.refused) continue;
       Node after{std::move(step.state), before.jobs};
