@@ -75,7 +75,8 @@ void closure_taken(Machine& m, const event::ClosureTaken& e) {
 }
 
 void closure_judged(Machine& m, const event::ClosureJudged& e) {
-  if (!m.has(e.job) || !m.s().job->closing) return;
+  const bool executing = m.s().activity == Activity::scanning || m.s().activity == Activity::storing;
+  if (!m.has(e.job) || !m.s().job->closing || !executing) return;
   m.s().job->closing = false;
   if (!e.closure.unmoved) return moved(m, e.closure);
   if (m.s().job->stored == m.s().job->recipe.views) return finish_pose(m);
