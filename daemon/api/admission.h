@@ -14,9 +14,9 @@ namespace scanrig {
 struct ApiLimits {
   std::size_t connections = 256;
   std::size_t connections_a_peer = 128;  ///< a peer is a user of this machine, or an address
-  double requests_a_second = 400.0;      ///< a peer, on average
-  double requests_at_once = 400.0;       ///< a peer, after a pause
-  double price_of_a_bad_token = 40.0;    ///< in requests: 10 guesses a second
+  double requests_a_second = 1000.0;     ///< a peer, on average
+  double requests_at_once = 1000.0;      ///< a peer, after a pause
+  double price_of_a_bad_token = 100.0;   ///< in requests: 10 guesses a second
   std::uint32_t header_bytes = 8 * 1024;
   std::uint64_t body_bytes = 64 * 1024;
   // Absolute: a client that sends or reads a byte now and then gains nothing.

@@ -16,16 +16,16 @@ using nlohmann::json;
 
 constexpr int kDeepest = 8;  ///< of a body; no route takes nested values
 
-tl::unexpected<Error> bad(const Field& field, std::string_view problem) {
+tl::unexpected<Error> bad(const RequestField& field, std::string_view problem) {
   return fail(ErrorCode::invalid_input, "{}: {}", field.name, problem);
 }
 
-Result<void> check_range(const Field& field, double value) {
+Result<void> check_range(const RequestField& field, double value) {
   if (std::isfinite(value) && value >= field.min && value <= field.max) return {};
   return bad(field, fmt::format("must be {} to {}", field.min, field.max));
 }
 
-Result<Values::Value> check_text(const Field& field, const std::string& text) {
+Result<Values::Value> check_text(const RequestField& field, const std::string& text) {
   if (!field.words.empty() && std::ranges::find(field.words, text) == field.words.end()) {
     return bad(field, fmt::format("is not one of {}", fmt::join(field.words, ", ")));
   }
@@ -39,7 +39,7 @@ Result<Values::Value> check_text(const Field& field, const std::string& text) {
 }
 
 template <class Number>
-Result<Values::Value> parse_number(const Field& field, const std::string& text, std::string_view kind) {
+Result<Values::Value> parse_number(const RequestField& field, const std::string& text, std::string_view kind) {
   Number value{};
   const auto read = std::from_chars(text.data(), text.data() + text.size(), value);
   if (read.ec != std::errc() || read.ptr != text.data() + text.size()) return bad(field, kind);
@@ -50,17 +50,18 @@ Result<Values::Value> parse_number(const Field& field, const std::string& text, 
 constexpr std::string_view kNoNumber = "is not a number", kNoInteger = "is not a whole number",
                            kNoFlag = "is not true or false", kNoText = "is not a text";
 
-Result<Values::Value> value_of(const Field& field, const json& value) {
+Result<Values::Value> value_of(const RequestField& field, const json& value) {
   switch (field.type) {
-    case Field::Type::text:
+    case RequestField::Type::text:
       return value.is_string() ? check_text(field, value.get<std::string>()) : bad(field, kNoText);
-    case Field::Type::flag: return value.is_boolean() ? Result<Values::Value>(value.get<bool>()) : bad(field, kNoFlag);
-    case Field::Type::number: {
+    case RequestField::Type::flag:
+      return value.is_boolean() ? Result<Values::Value>(value.get<bool>()) : bad(field, kNoFlag);
+    case RequestField::Type::number: {
       if (!value.is_number()) return bad(field, kNoNumber);
       if (auto fits = check_range(field, value.get<double>()); !fits) return pass_on(fits);
       return value.get<double>();
     }
-    case Field::Type::integer: break;
+    case RequestField::Type::integer: break;
   }
   if (!value.is_number_integer()) return bad(field, kNoInteger);
   if (auto fits = check_range(field, value.get<double>()); !fits) return pass_on(fits);
@@ -85,28 +86,28 @@ json parse_strictly(std::string_view body) {
 
 }  // namespace
 
-Result<Values::Value> parse_value(const Field& field, const std::string& text) {
+Result<Values::Value> parse_value(const RequestField& field, const std::string& text) {
   switch (field.type) {
-    case Field::Type::text: return check_text(field, text);
-    case Field::Type::number: return parse_number<double>(field, text, kNoNumber);
-    case Field::Type::integer: return parse_number<std::int64_t>(field, text, kNoInteger);
-    case Field::Type::flag: break;
+    case RequestField::Type::text: return check_text(field, text);
+    case RequestField::Type::number: return parse_number<double>(field, text, kNoNumber);
+    case RequestField::Type::integer: return parse_number<std::int64_t>(field, text, kNoInteger);
+    case RequestField::Type::flag: break;
   }
   if (text != "true" && text != "false") return bad(field, kNoFlag);
   return text == "true";
 }
 
-Result<void> read_body(std::string_view body, const std::vector<Field>& fields, Values& values) {
+Result<void> read_body(std::string_view body, const std::vector<RequestField>& fields, Values& values) {
   const auto blank = body.find_first_not_of(" \t\r\n") == std::string_view::npos;
   const auto object = blank ? json::object() : parse_strictly(body);
   if (!object.is_object()) {
     return fail(ErrorCode::invalid_input, "the body is not a JSON object with every key once");
   }
   for (const auto& [key, value] : object.items()) {
-    const auto field = std::ranges::find(fields, key, &Field::name);
+    const auto field = std::ranges::find(fields, key, &RequestField::name);
     if (field == fields.end()) {
       return fail(ErrorCode::invalid_input, "the body has an unknown key; known here: {}",
-                  fmt::join(std::views::transform(fields, &Field::name), ", "));
+                  fmt::join(std::views::transform(fields, &RequestField::name), ", "));
     }
     auto read = value_of(*field, value);
     if (!read) return pass_on(read);

@@ -14,7 +14,7 @@ namespace scanrig {
 
 /// One value a request may carry: in its path, behind its question mark, or in its JSON body. The same description
 /// checks requests and is printed in the OpenAPI document.
-struct Field {
+struct RequestField {
   enum class Type { text, number, integer, flag };
   std::string_view name;
   Type type = Type::text;
@@ -47,10 +47,10 @@ class Values {
 };
 
 /// Reads the text of a parameter as what `field` describes. Fails with `invalid_input`, naming the field.
-Result<Values::Value> parse_value(const Field& field, const std::string& text);
+Result<Values::Value> parse_value(const RequestField& field, const std::string& text);
 
 /// Reads a JSON body into `values`: an object of known keys, each as its field describes. An empty body is an empty
 /// object. Fails with `invalid_input`.
-Result<void> read_body(std::string_view body, const std::vector<Field>& fields, Values& values);
+Result<void> read_body(std::string_view body, const std::vector<RequestField>& fields, Values& values);
 
 }  // namespace scanrig

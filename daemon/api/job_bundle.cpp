@@ -22,6 +22,7 @@ void send_packed(const std::filesystem::path& packed, const Send& send) {
 
 void send_bundle(const ApiStation& station, const Values& values, Send send) {
   static std::atomic<unsigned> number = 0;
+  if (!find_job(station, values)) return send(no_such_job());
   const auto packed = station.storage / fmt::format("{}{}{}", kPrefix, ++number, kEnding);
   const event::JobAsked asked{.what = event::JobAsked::What::bundle, .job = *values.text("id"), .path = packed};
   // The answer comes on the control loop's thread, which must not touch the disk.

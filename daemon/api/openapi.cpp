@@ -13,20 +13,20 @@ namespace {
 
 using nlohmann::ordered_json;
 
-ordered_json schema_of(const Field& field) {
+ordered_json schema_of(const RequestField& field) {
   ordered_json schema;
   switch (field.type) {
-    case Field::Type::text: schema["type"] = "string"; break;
-    case Field::Type::flag: schema["type"] = "boolean"; break;
-    case Field::Type::number: schema["type"] = "number"; break;
-    case Field::Type::integer: schema["type"] = "integer"; break;
+    case RequestField::Type::text: schema["type"] = "string"; break;
+    case RequestField::Type::flag: schema["type"] = "boolean"; break;
+    case RequestField::Type::number: schema["type"] = "number"; break;
+    case RequestField::Type::integer: schema["type"] = "integer"; break;
   }
   if (!field.words.empty()) {
     schema["enum"] = field.words;
-  } else if (field.type == Field::Type::text) {
+  } else if (field.type == RequestField::Type::text) {
     schema["minLength"] = static_cast<int>(field.min);
     schema["maxLength"] = static_cast<int>(field.max);
-  } else if (field.type != Field::Type::flag) {
+  } else if (field.type != RequestField::Type::flag) {
     schema["minimum"] = field.min;
     schema["maximum"] = field.max;
   }
@@ -34,14 +34,14 @@ ordered_json schema_of(const Field& field) {
   return schema;
 }
 
-void add_parameters(const std::vector<Field>& fields, std::string_view in, ordered_json& parameters) {
+void add_parameters(const std::vector<RequestField>& fields, std::string_view in, ordered_json& parameters) {
   for (const auto& field : fields) {
     parameters.push_back(
         {{"name", field.name}, {"in", in}, {"required", in == "path" || field.required}, {"schema", schema_of(field)}});
   }
 }
 
-ordered_json body_of(const std::vector<Field>& fields) {
+ordered_json body_of(const std::vector<RequestField>& fields) {
   ordered_json schema{{"type", "object"}, {"additionalProperties", false}, {"properties", ordered_json::object()}};
   for (const auto& field : fields) {
     schema["properties"][std::string(field.name)] = schema_of(field);

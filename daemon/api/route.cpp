@@ -19,6 +19,14 @@ std::string_view to_string(Method method) {
   return "DELETE";
 }
 
+std::shared_ptr<const JobInfo> find_job(const ApiStation& station, const Values& values) {
+  const auto snapshot = station.loop.snapshot();
+  const auto found = snapshot->jobs.find(values.text("id").value_or(""));
+  return found == snapshot->jobs.end() ? nullptr : found->second;
+}
+
+ApiResponse no_such_job() { return error_response({ErrorCode::not_found, "there is no job of that name"}); }
+
 unsigned http_status(ErrorCode code) {
   switch (code) {
     case ErrorCode::invalid_input:

@@ -70,7 +70,7 @@ struct Route {
   std::string_view path;  ///< "/api/v1/jobs/{id}"
   Role role;              ///< that is enough
   std::string_view about;
-  std::vector<Field> in_path{}, in_query{}, in_body{};
+  std::vector<RequestField> in_path{}, in_query{}, in_body{};
   Reply reply;
   std::vector<unsigned> errors{};   ///< beside those that every route has
   bool slow = false;                ///< touches the disk: done by a worker, not by an I/O thread
@@ -78,6 +78,10 @@ struct Route {
   /// Calls `send` once, from this thread or, soon, from the control loop's.
   std::function<void(const ApiStation&, const Values&, Send)> handle;
 };
+
+/// The job that the value `id` names; null where there is none. What is no job's name gets no further than this.
+std::shared_ptr<const JobInfo> find_job(const ApiStation& station, const Values& values);
+ApiResponse no_such_job();
 
 /// Status of an answer that is an error.
 unsigned http_status(ErrorCode code);

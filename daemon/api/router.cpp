@@ -32,9 +32,9 @@ bool more_exact(const std::vector<std::string_view>& one, const std::vector<std:
   return std::ranges::count_if(one, is_parameter) < std::ranges::count_if(other, is_parameter);
 }
 
-Result<void> read_parameter(const std::vector<Field>& fields, std::string_view name, const std::string& text,
+Result<void> read_parameter(const std::vector<RequestField>& fields, std::string_view name, const std::string& text,
                             Values& values) {
-  const auto field = std::ranges::find(fields, name, &Field::name);
+  const auto field = std::ranges::find(fields, name, &RequestField::name);
   if (field == fields.end()) {
     return fail(ErrorCode::invalid_input, "this request takes no parameter of that name after the question mark");
   }

@@ -9,21 +9,13 @@ namespace {
 
 using nlohmann::ordered_json;
 
-const Field kId{.name = "id", .about = "the job", .required = true, .min = 1, .max = 128};
-const Field kFile{.name = "file",
-                  .about = "path within the job's folder, its slashes written %2F",
-                  .required = true,
-                  .min = 1,
-                  .max = 512};
+const RequestField kId{.name = "id", .about = "the job", .required = true, .min = 1, .max = 128};
+const RequestField kFile{.name = "file",
+                         .about = "path within the job's folder, its slashes written %2F",
+                         .required = true,
+                         .min = 1,
+                         .max = 512};
 constexpr std::int64_t kPage = 50, kMostAPage = 500;
-
-std::shared_ptr<const JobInfo> find_job(const ApiStation& station, const Values& values) {
-  const auto snapshot = station.loop.snapshot();
-  const auto found = snapshot->jobs.find(values.text("id").value_or(""));
-  return found == snapshot->jobs.end() ? nullptr : found->second;
-}
-
-ApiResponse no_such_job() { return error_response({ErrorCode::not_found, "there is no job of that name"}); }
 
 /// Newest first; `before` is the last one of the page before.
 void list(const ApiStation& station, const Values& values, const Send& send) {
@@ -73,7 +65,7 @@ Route list_route() {
           .role = Role::viewer,
           .about = "All jobs, newest first, a page at a time.",
           .in_query = {{.name = "limit",
-                        .type = Field::Type::integer,
+                        .type = RequestField::Type::integer,
                         .about = "jobs a page, 50 without it",
                         .min = 1,
                         .max = kMostAPage},

@@ -8,9 +8,9 @@ namespace scanrig {
 namespace {
 
 using What = event::JobAsked::What;
-using Type = Field::Type;
+using Type = RequestField::Type;
 
-const Field kId{.name = "id", .about = "the job", .required = true, .min = 1, .max = 128};
+const RequestField kId{.name = "id", .about = "the job", .required = true, .min = 1, .max = 128};
 constexpr Reply kDone{.about = "done, and durable", .schema = "JobDone"};
 
 ControlLoop::Reply reply_with(std::string job, Send send) {
@@ -29,6 +29,7 @@ void order(const ApiStation& station, const Values& values, Send send) {
 
 void ask(const ApiStation& station, const Values& values, What what, Send send) {
   const auto id = *values.text("id");
+  if (!find_job(station, values)) return send(no_such_job());
   station.loop.ask(
       event::JobAsked{
           .what = what, .job = id, .voxel_mm = values.number("voxel_mm"), .fusion = values.text("fusion").value_or("")},
@@ -36,7 +37,7 @@ void ask(const ApiStation& station, const Values& values, What what, Send send) 
 }
 
 Route job_route(Method method, std::string_view path, Role role, What what, std::string_view about,
-                std::vector<Field> body = {}) {
+                std::vector<RequestField> body = {}) {
   return {.method = method,
           .path = path,
           .role = role,

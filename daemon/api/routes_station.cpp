@@ -63,21 +63,26 @@ void jog(const ApiStation& station, const Values& values, Send send) {
 
 Route jog_route() {
   constexpr double kTurns = 3600.0;
-  return {.method = Method::post,
-          .path = "/api/v1/maintenance/jog",
-          .role = Role::engineer,
-          .about = "Turns the table while maintenance is on: to an angle, or by one.",
-          .in_body =
-              {{.name = "to_deg", .type = Field::Type::number, .about = "where to", .min = -kTurns, .max = kTurns},
-               {.name = "by_deg", .type = Field::Type::number, .about = "by how much", .min = -kTurns, .max = kTurns},
-               {.name = "speed_deg_s",
-                .type = Field::Type::number,
-                .about = "how fast; without it as fast as maintenance may",
-                .min = 0.0,
-                .max = 360.0}},
-          .reply = kDone,
-          .errors = {409},
-          .handle = jog};
+  return {
+      .method = Method::post,
+      .path = "/api/v1/maintenance/jog",
+      .role = Role::engineer,
+      .about = "Turns the table while maintenance is on: to an angle, or by one.",
+      .in_body =
+          {{.name = "to_deg", .type = RequestField::Type::number, .about = "where to", .min = -kTurns, .max = kTurns},
+           {.name = "by_deg",
+            .type = RequestField::Type::number,
+            .about = "by how much",
+            .min = -kTurns,
+            .max = kTurns},
+           {.name = "speed_deg_s",
+            .type = RequestField::Type::number,
+            .about = "how fast; without it as fast as maintenance may",
+            .min = 0.0,
+            .max = 360.0}},
+      .reply = kDone,
+      .errors = {409},
+      .handle = jog};
 }
 
 Route look(std::string_view path, std::string_view about, Reply reply, ordered_json (*what)(const Snapshot&)) {

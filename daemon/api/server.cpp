@@ -96,12 +96,12 @@ struct ApiServer::Impl {
     accept_pause.async_wait([again](ErrorCondition) { again(); });
   }
 
-  void begin(Session::Protocol::socket socket, const std::string& peer, std::optional<Role> role) {
+  void begin(ApiSession::Protocol::socket socket, const std::string& peer, std::optional<Role> role) {
     auto seat = core.admission->enter(peer);
     const bool welcome = seat != nullptr;
     if (!welcome) seat = core.admission->enter_to_be_turned_away();
     if (!seat) return;
-    const auto session = std::make_shared<Session>(std::move(socket), core, std::move(seat), role);
+    const auto session = std::make_shared<ApiSession>(std::move(socket), core, std::move(seat), role);
     welcome ? session->start() : session->turn_away();
   }
 

@@ -34,15 +34,15 @@ std::optional<ApiResponse> understand(boost::beast::error_code error) {
 
 }  // namespace
 
-Session::~Session() {
+ApiSession::~ApiSession() {
   if (subscription_) core_.hub.unsubscribe(*subscription_);
 }
 
-void Session::start() {
+void ApiSession::start() {
   net::post(stream_.get_executor(), [self = shared_from_this()] { self->read_header(); });
 }
 
-void Session::turn_away() {
+void ApiSession::turn_away() {
   net::post(stream_.get_executor(), [self = shared_from_this()] {
     ++self->core_.refused;
     self->last_ = true;
@@ -50,7 +50,7 @@ void Session::turn_away() {
   });
 }
 
-void Session::read_header() {
+void ApiSession::read_header() {
   parser_.emplace();
   parser_->header_limit(core_.limits.header_bytes);
   parser_->body_limit(core_.limits.body_bytes);
@@ -59,7 +59,7 @@ void Session::read_header() {
                           [self = shared_from_this()](Error error, std::size_t) { self->on_header(error); });
 }
 
-void Session::on_header(Error error) {
+void ApiSession::on_header(Error error) {
   if (error) {
     auto complaint = understand(error);
     if (!complaint) return hang_up();
@@ -85,7 +85,7 @@ void Session::on_header(Error error) {
                    [self = shared_from_this()](Error failed, std::size_t) { self->on_body(failed); });
 }
 
-void Session::on_body(Error error) {
+void ApiSession::on_body(Error error) {
   if (!error) return call();
   last_ = true;
   auto complaint = understand(error);
@@ -94,7 +94,7 @@ void Session::on_body(Error error) {
 }
 
 /// The answer may come from a worker or from the control loop; until then only the timer keeps this session.
-void Session::call() {
+void ApiSession::call() {
   await_answer(match_->route->patience);
   const bool slow = match_->route->slow;
   auto work = [match = std::move(*match_), body = parser_->get().body(), &core = core_, send = sender()]() mutable {
@@ -108,7 +108,7 @@ void Session::call() {
   }
 }
 
-void Session::await_answer(std::chrono::milliseconds patience) {
+void ApiSession::await_answer(std::chrono::milliseconds patience) {
   waiting_ = true;
   timer_.expires_after(std::max(patience, core_.limits.answer_time));
   timer_.async_wait([self = shared_from_this()](Error error) {
@@ -118,7 +118,7 @@ void Session::await_answer(std::chrono::milliseconds patience) {
   });
 }
 
-Send Session::sender() {
+Send ApiSession::sender() {
   return [weak = weak_from_this()](ApiResponse response) {
     const auto self = weak.lock();
     if (!self) return;
@@ -128,7 +128,7 @@ Send Session::sender() {
   };
 }
 
-void Session::answer(ApiResponse response) {
+void ApiSession::answer(ApiResponse response) {
   if (!waiting_) return;  // it was given up
   waiting_ = false;
   timer_.cancel();
@@ -142,7 +142,7 @@ void Session::answer(ApiResponse response) {
 }
 
 /// The same for all answers. What comes out of a job's folder is shown, never run.
-void Session::set_head(unsigned status, std::string_view type) {
+void ApiSession::set_head(unsigned status, std::string_view type) {
   response_ = {static_cast<http::status>(status), 11};
   response_.set(http::field::content_type, {type.data(), type.size()});
   response_.set(http::field::cache_control, "no-store");
@@ -152,7 +152,7 @@ void Session::set_head(unsigned status, std::string_view type) {
   response_.keep_alive(!last_);
 }
 
-void Session::write_text(ApiResponse response) {
+void ApiSession::write_text(ApiResponse response) {
   set_head(response.status, response.type);
   response_.body() = std::move(std::get<std::string>(response.body));
   response_.prepare_payload();
@@ -161,16 +161,16 @@ void Session::write_text(ApiResponse response) {
                     [self = shared_from_this()](Error error, std::size_t) { self->on_written(error); });
 }
 
-void Session::on_written(Error error) {
+void ApiSession::on_written(Error error) {
   if (error) return hang_up();
   if (last_) return drain();
   read_header();
 }
 
-void Session::hang_up() { stream_.close(); }
+void ApiSession::hang_up() { stream_.close(); }
 
 /// A socket closed while the client still sends would take the answer with it.
-void Session::drain() {
+void ApiSession::drain() {
   Error ignored;
   stream_.socket().shutdown(net::socket_base::shutdown_send, ignored);
   chunk_.resize(4096);
@@ -178,15 +178,15 @@ void Session::drain() {
   drain_more();
 }
 
-void Session::drain_more() {
+void ApiSession::drain_more() {
   stream_.async_read_some(net::buffer(chunk_), [self = shared_from_this()](Error error, std::size_t) {
     if (error) return self->hang_up();
     self->drain_more();
   });
 }
 
-std::string_view Session::header(http::field name) const { return plain(parser_->get()[name]); }
+std::string_view ApiSession::header(http::field name) const { return plain(parser_->get()[name]); }
 
-std::optional<Role> Session::role() const { return core_.access.role_of(peer_, header(http::field::authorization)); }
+std::optional<Role> ApiSession::role() const { return core_.access.role_of(peer_, header(http::field::authorization)); }
 
 }  // namespace scanrig

@@ -14,14 +14,14 @@ namespace scanrig {
 
 /// One connection, over TCP or a Unix socket: reads a request, answers, reads the next. Lives as long as something
 /// is under way on it, each with an absolute limit. All of it runs on the socket's strand.
-class Session : public std::enable_shared_from_this<Session> {
+class ApiSession : public std::enable_shared_from_this<ApiSession> {
  public:
   using Protocol = boost::asio::generic::stream_protocol;
 
   /// `peer`: the role that the kernel's word for the peer gives it; nothing over TCP.
-  Session(Protocol::socket socket, ServerCore& core, std::unique_ptr<Admission::Seat> seat, std::optional<Role> peer)
+  ApiSession(Protocol::socket socket, ServerCore& core, std::unique_ptr<Admission::Seat> seat, std::optional<Role> peer)
       : stream_(std::move(socket)), timer_(stream_.get_executor()), core_(core), seat_(std::move(seat)), peer_(peer) {}
-  ~Session();
+  ~ApiSession();
 
   void start();
   /// Tells a client for whom there is no place, and hangs up.

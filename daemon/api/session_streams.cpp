@@ -18,14 +18,14 @@ constexpr std::size_t kChunk = 64 * 1024;
 
 }  // namespace
 
-std::string Session::head_text() const {
+std::string ApiSession::head_text() const {
   std::ostringstream text;
   text << response_.base();
   return text.str();
 }
 
 /// One limit for all of it, long enough for the slowest client that is served.
-void Session::begin_file(std::shared_ptr<OpenFile> file, std::string_view type) {
+void ApiSession::begin_file(std::shared_ptr<OpenFile> file, std::string_view type) {
   file_ = std::move(file);
   sent_ = 0;
   set_head(200, type);
@@ -37,7 +37,7 @@ void Session::begin_file(std::shared_ptr<OpenFile> file, std::string_view type) 
   write_chunk();
 }
 
-void Session::write_chunk() {
+void ApiSession::write_chunk() {
   net::async_write(stream_, net::buffer(chunk_), [self = shared_from_this()](Error error, std::size_t) {
     if (error) return self->hang_up();
     if (self->sent_ < self->file_->size()) return self->read_chunk();
@@ -47,7 +47,7 @@ void Session::write_chunk() {
 }
 
 /// On a worker: a slow disk keeps no connection waiting but this one.
-void Session::read_chunk() {
+void ApiSession::read_chunk() {
   net::post(core_.workers, [self = shared_from_this()] {
     self->chunk_.resize(std::min<std::uint64_t>(kChunk, self->file_->size() - self->sent_));
     const auto got =
@@ -61,7 +61,7 @@ void Session::read_chunk() {
   });
 }
 
-void Session::begin_events() {
+void ApiSession::begin_events() {
   last_ = true;
   subscription_ = core_.hub.subscribe([weak = weak_from_this(), strand = stream_.get_executor()] {
     net::post(strand, [weak] {
@@ -75,11 +75,11 @@ void Session::begin_events() {
   send_events(std::move(batch));
 }
 
-void Session::events_due() {
+void ApiSession::events_due() {
   if (!writing_events_) send_events(core_.hub.after(last_event_));
 }
 
-void Session::send_events(EventHub::Batch batch) {
+void ApiSession::send_events(EventHub::Batch batch) {
   last_event_ = batch.last;
   batch_ = std::move(batch.texts);
   if (batch_.empty()) return wait_for_events();
@@ -94,7 +94,7 @@ void Session::send_events(EventHub::Batch batch) {
   });
 }
 
-void Session::wait_for_events() {
+void ApiSession::wait_for_events() {
   timer_.expires_after(core_.limits.heartbeat);
   timer_.async_wait([self = shared_from_this()](Error error) {
     if (!error) self->beat();
@@ -102,7 +102,7 @@ void Session::wait_for_events() {
 }
 
 /// A heartbeat; whoever has lost the right to listen is cut off with it.
-void Session::beat() {
+void ApiSession::beat() {
   if (writing_events_) return;
   if (!role()) return hang_up();
   send_events({last_event_, {std::make_shared<const std::string>(":\n\n")}});

@@ -13,10 +13,12 @@
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "core/clock.h"
 #include "daemon/api/socket_file.h"
 
 namespace scanrig::ctl {
@@ -27,6 +29,8 @@ namespace http = boost::beast::http;
 using Answer = tl::expected<nlohmann::json, Refusal>;
 
 constexpr timeval kPatience{.tv_sec = 15, .tv_usec = 0};
+constexpr auto kTooOftenPause = std::chrono::milliseconds(50);
+constexpr auto kTooOftenLimit = std::chrono::seconds(10);
 constexpr timeval kPackingPatience{.tv_sec = 200, .tv_usec = 0};  ///< a file may have to be made first
 
 Answer unreachable(std::string message) { return tl::unexpected(Refusal{ExitCode::unreachable, std::move(message)}); }
@@ -78,18 +82,30 @@ tl::unexpected<Refusal> silent(const std::filesystem::path& path, const boost::s
                                 fmt::format("{}: the daemon does not answer: {}", path.string(), error.message())});
 }
 
-tl::expected<http::response<http::string_body>, Refusal> exchange(const std::filesystem::path& path,
-                                                                  const std::string& method, const std::string& target,
-                                                                  const std::string& body) {
+using Response = http::response<http::string_body>;
+
+tl::expected<Response, Refusal> exchange_once(const std::filesystem::path& path, const std::string& method,
+                                              const std::string& target, const std::string& body) {
   const auto connected = connect_to_socket(path);
   if (!connected) return tl::unexpected(unreachable(connected.error().message + "; is the daemon running?").error());
   Link link(*connected, kPatience);
-  http::response<http::string_body> response;
+  Response response;
   boost::beast::flat_buffer buffer;
   auto error = send(link, method, target, body);
   if (!error) http::read(link.socket(), buffer, response, error);
   if (error) return silent(path, error);
   return response;
+}
+
+/// Who asks too often is told so, and asks again a little later.
+tl::expected<Response, Refusal> exchange(const std::filesystem::path& path, const std::string& method,
+                                         const std::string& target, const std::string& body) {
+  RealClock clock;
+  const auto by = Deadline::after(clock, kTooOftenLimit);
+  for (;; clock.sleep_for(kTooOftenPause)) {
+    auto response = exchange_once(path, method, target, body);
+    if (!response || response->result() != http::status::too_many_requests || by.expired(clock)) return response;
+  }
 }
 
 tl::unexpected<Refusal> refusal_of(Link& link, boost::beast::flat_buffer& buffer,
@@ -134,7 +150,7 @@ tl::expected<void, Refusal> download(const std::filesystem::path& path, const st
   Link link(*connected, kPackingPatience);
   boost::beast::flat_buffer buffer;
   http::response_parser<http::buffer_body> parser;
-  parser.body_limit(boost::none);
+  parser.body_limit(std::numeric_limits<std::uint64_t>::max());
   auto error = send(link, "GET", target, "");
   if (!error) http::read_header(link.socket(), buffer, parser, error);
   if (error) return silent(path, error);

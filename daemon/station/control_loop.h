@@ -83,7 +83,7 @@ class ControlLoop {
   // Of run()'s thread only.
   StationState state_;
   JobTable jobs_;
-  Tally tally_;
+  EventTally tally_;
   std::uint64_t revision_ = 0;
   Ticket last_ticket_ = 0;
   std::map<Ticket, Reply> waiting_;  // for what takes a while

@@ -4,12 +4,12 @@
 
 namespace scanrig {
 
-void Tally::fault(const Error& error) {
+void EventTally::fault(const Error& error) {
   ++counters_.faults;
   if (error.code == ErrorCode::timeout) ++counters_.deadlines_missed;
 }
 
-void Tally::see(const Event& event, Clock::TimePoint now) {
+void EventTally::see(const Event& event, Clock::TimePoint now) {
   const auto ended = [&](const std::string& job, JobState state) {
     ++counters_.jobs_ended[std::string(to_string(state))];
     std::erase_if(running_, [&](const auto& stage) { return stage.first.first == job; });

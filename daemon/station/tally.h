@@ -14,14 +14,14 @@ namespace scanrig {
 struct Counters {
   std::uint64_t views_stored = 0;
   std::uint64_t exposures_redone = 0;
-  std::uint64_t faults = 0;                         ///< of rig, panel and disk, e-stops included
-  std::uint64_t deadlines_missed = 0;               ///< faults that were a deadline passed
+  std::uint64_t faults = 0;                           ///< of rig, panel and disk, e-stops included
+  std::uint64_t deadlines_missed = 0;                 ///< faults that were a deadline passed
   std::map<std::string, std::uint64_t> jobs_ended{};  ///< by state
-  std::map<std::string, double> stage_seconds{};     ///< of reconstruction stages, by name
+  std::map<std::string, double> stage_seconds{};      ///< of reconstruction stages, by name
 };
 
 /// Counts the control loop's events. Threads: one user.
-class Tally {
+class EventTally {
  public:
   void see(const Event& event, Clock::TimePoint now);
   [[nodiscard]] const Counters& counters() const { return counters_; }

@@ -11,7 +11,7 @@ namespace {
 
 using namespace scanrig;
 
-void check(const Field& field, const Values& values) {
+void check(const RequestField& field, const Values& values) {
   const auto number = values.number(field.name);
   const auto integer = values.integer(field.name);
   const auto text = values.text(field.name);
@@ -27,15 +27,16 @@ void check(const Field& field, const Values& values) {
 // A body of any bytes: every field is what the route describes, or nothing is taken. Tried with the body of every
 // route and with one that has fields of all types.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using Type = Field::Type;
-  static const std::vector<Field> all_types{{.name = "t", .about = "", .required = true, .min = 1, .max = 8},
-                                            {.name = "w", .about = "", .words = {"a", "b"}},
-                                            {.name = "n", .type = Type::number, .about = "", .min = -1, .max = 1},
-                                            {.name = "i", .type = Type::integer, .about = "", .min = -5, .max = 5},
-                                            {.name = "f", .type = Type::flag, .about = ""}};
+  using Type = RequestField::Type;
+  static const std::vector<RequestField> all_types{
+      {.name = "t", .about = "", .required = true, .min = 1, .max = 8},
+      {.name = "w", .about = "", .words = {"a", "b"}},
+      {.name = "n", .type = Type::number, .about = "", .min = -1, .max = 1},
+      {.name = "i", .type = Type::integer, .about = "", .min = -5, .max = 5},
+      {.name = "f", .type = Type::flag, .about = ""}};
   static const Router router;
   const std::string_view body(reinterpret_cast<const char*>(data), size);
-  const auto attempt = [&](const std::vector<Field>& fields) {
+  const auto attempt = [&](const std::vector<RequestField>& fields) {
     Values values;
     const auto read = read_body(body, fields, values);
     if (!read && (read.error().code != ErrorCode::invalid_input || read.error().message.empty())) std::abort();

@@ -7,8 +7,8 @@ namespace {
 
 using std::chrono::seconds;
 
-TEST(Tally, CountsViewsRetriesAndFaults) {
-  Tally tally;
+TEST(EventTally, CountsViewsRetriesAndFaults) {
+  EventTally tally;
   const Clock::TimePoint now{};
   tally.see(event::ViewStored{{"job", 0, 0}, 0.0, 2}, now);
   tally.see(event::ViewStored{{"job", 0, 1}, 45.0, 0}, now);
@@ -22,8 +22,8 @@ TEST(Tally, CountsViewsRetriesAndFaults) {
   EXPECT_EQ(tally.counters().deadlines_missed, 1u);
 }
 
-TEST(Tally, AStageLastsFromItsFirstWordToItsLast) {
-  Tally tally;
+TEST(EventTally, AStageLastsFromItsFirstWordToItsLast) {
+  EventTally tally;
   const Clock::TimePoint begun{};
   tally.see(event::StageProgress{"job", "volume", 0.0}, begun);
   tally.see(event::StageProgress{"job", "volume", 0.5}, begun + seconds(1));
@@ -34,8 +34,8 @@ TEST(Tally, AStageLastsFromItsFirstWordToItsLast) {
   EXPECT_DOUBLE_EQ(tally.counters().stage_seconds.at("volume"), 5.0);
 }
 
-TEST(Tally, JobsAreCountedByTheirEnd) {
-  Tally tally;
+TEST(EventTally, JobsAreCountedByTheirEnd) {
+  EventTally tally;
   tally.see(event::ModelReady{"a", "model", "report"}, {});
   tally.see(event::ReconstructionFailed{"b", {ErrorCode::no_overlap, "no"}}, {});
   tally.see(event::JobClosed{"c", JobState::cancelled, {ErrorCode::stopped, "Stop"}}, {});

@@ -6,13 +6,13 @@ namespace scanrig {
 namespace {
 
 using testing::HasSubstr;
-using Type = Field::Type;
+using Type = RequestField::Type;
 
-const std::vector<Field> kFields{{.name = "name", .about = "", .required = true, .min = 1, .max = 4},
-                                 {.name = "kind", .about = "", .words = {"good", "bad"}},
-                                 {.name = "share", .type = Type::number, .about = "", .min = 0, .max = 1},
-                                 {.name = "count", .type = Type::integer, .about = "", .min = 0, .max = 10},
-                                 {.name = "fast", .type = Type::flag, .about = ""}};
+const std::vector<RequestField> kFields{{.name = "name", .about = "", .required = true, .min = 1, .max = 4},
+                                        {.name = "kind", .about = "", .words = {"good", "bad"}},
+                                        {.name = "share", .type = Type::number, .about = "", .min = 0, .max = 1},
+                                        {.name = "count", .type = Type::integer, .about = "", .min = 0, .max = 10},
+                                        {.name = "fast", .type = Type::flag, .about = ""}};
 
 TEST(RequestBody, IsReadIntoTypedValues) {
   Values values;

@@ -118,6 +118,17 @@ TEST_F(Api, WhatIsNotThereIsNotFound) {
   }
 }
 
+TEST_F(Api, OnlyAJobsOwnNameReachesTheDisk) {
+  for (const auto* id : {"old%2Fmodel", "nothing", "old%2F..%2Fa", ".."}) {
+    const auto job = std::string("/api/v1/jobs/") + id;
+    for (const auto& [method, target] : {std::pair("DELETE", job), std::pair("GET", job + "/bundle"),
+                                         std::pair("POST", job + "/cancel"), std::pair("POST", job + "/reprocess")}) {
+      const auto status = ask(method, target).first;
+      EXPECT_TRUE(status == 404 || status == 400) << method << " " << target << " " << status;
+    }
+  }
+}
+
 TEST_F(Api, AnotherMethodIsNotTaken) {
   EXPECT_EQ(ask("GET", "/api/v1/start").first, 405u);
   EXPECT_EQ(ask("POST", "/api/v1/status").first, 405u);

@@ -12,7 +12,7 @@
 
 namespace scanrig {
 
-/// A control loop without devices: its rig stops at once, and nothing else ever answers.
+/// A control loop without devices: its rig stops at once, and nothing can be done with jobs.
 class StationWithoutRig {
  public:
   explicit StationWithoutRig(
@@ -21,6 +21,9 @@ class StationWithoutRig {
     thread_ = std::thread([this, published = std::move(published)] {
       const auto perform = [this](const Action& action) {
         if (std::holds_alternative<action::StopRig>(action)) loop.post(event::Stopped{});
+        if (const auto* task = std::get_if<action::CreateJobs>(&action)) answer(task->ticket);
+        if (const auto* task = std::get_if<action::MoveJob>(&action)) answer(task->ticket);
+        if (const auto* task = std::get_if<action::KeepJob>(&action)) answer(task->asked.ticket);
       };
       EXPECT_TRUE(loop.run({.perform = perform,
                             .show = [](const PanelOutputs&) {},
@@ -41,6 +44,9 @@ class StationWithoutRig {
   ControlLoop loop;
 
  private:
+  /// Nobody keeps jobs here.
+  void answer(Ticket ticket) { loop.post(event::Answered{ticket, fail(ErrorCode::refused, "there is no rig")}); }
+
   std::thread thread_;
 };
 

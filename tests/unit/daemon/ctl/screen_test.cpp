@@ -2,10 +2,12 @@
 
 #include <fcntl.h>
 #include <gmock/gmock.h>
+#include <poll.h>
 #include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
 
+#include <array>
 #include <cstdlib>
 #include <memory>
 
@@ -42,11 +44,15 @@ class Terminal : public testing::Test {
     ::tcsetattr(::fileno(out.get()), TCSANOW, &raw);
   }
   void TearDown() override { ::close(master); }
+  /// What has come since the last look; the kernel hands it over soon after it was written.
   std::string seen() const {
-    int waiting = 0;
-    ::ioctl(master, FIONREAD, &waiting);
-    std::string text(static_cast<std::size_t>(waiting), '\0');
-    if (waiting > 0) text.resize(static_cast<std::size_t>(::read(master, text.data(), text.size())));
+    std::string text;
+    std::array<char, 4096> room{};
+    for (pollfd watched{master, POLLIN, 0}; ::poll(&watched, 1, 100) == 1 && (watched.revents & POLLIN) != 0;) {
+      const auto got = ::read(master, room.data(), room.size());
+      if (got <= 0) break;
+      text.append(room.data(), static_cast<std::size_t>(got));
+    }
     return text;
   }
   int master = -1;
