@@ -95,7 +95,7 @@ class Shift {
  private:
   bool wait(const std::function<bool(const PanelOutputs&)>& lamps) {
     const bool seen = rig_.panel.wait_for_lamps(lamps);
-    if (!seen) said_ = loop_->snapshot()->sentence;
+    if (!seen) said_ = loop_->snapshot()->cause + " " + loop_->snapshot()->sentence;
     return seen;
   }
   bool get_ready() {
