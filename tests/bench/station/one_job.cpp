@@ -95,7 +95,7 @@ class Shift {
  private:
   bool wait(const std::function<bool(const PanelOutputs&)>& lamps) {
     const bool seen = rig_.panel.wait_for_lamps(lamps);
-    if (!seen) said_ = loop_->snapshot()->sentence;
+    if (!seen) said_ = loop_->snapshot()->cause + " " + loop_->snapshot()->sentence;
     return seen;
   }
   bool get_ready() {
@@ -127,7 +127,8 @@ class Shift {
 
   bool finish_all() {
     if (!get_ready()) return false;
-    for (const auto& [id, job] : loop_->snapshot()->jobs) {
+    const auto found = loop_->snapshot();
+    for (const auto& [id, job] : found->jobs) {
       if (job->state == JobState::interrupted) ask(job->resumable ? What::resume : What::cancel, id);
       if (job->quarantined && !std::getenv("ONE_JOB_CRASH")) ask(What::reprocess, id);
     }
