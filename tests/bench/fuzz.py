@@ -49,10 +49,11 @@ def run(bench, root, scratch, parser):
     grown, log = scratch / f"corpus-{parser.target}", scratch / f"{parser.target}-{{}}.log"
     grown.mkdir(parents=True)
     corpus = root / "tests" / "fuzz" / "corpus" / parser.target
-    command = [root / "build" / "fuzz" / "bin" / f"{parser.target}_fuzz", grown, corpus, "-print_final_stats=1", f"-timeout={HANG_S}",
-               f"-artifact_prefix={bench.out}/{parser.target}-"]
+    command = [root / "build" / "fuzz" / "bin" / f"{parser.target}_fuzz", grown, corpus, "-print_final_stats=1",
+               f"-timeout={HANG_S}", f"-artifact_prefix={bench.out}/{parser.target}-"]
     logs = [open(str(log).format(n), "w+") for n in range(parser.processes)]
-    crew = [subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL, stderr=out) for out in logs]
+    crew = [subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL, stderr=out,
+                             preexec_fn=lambda: os.nice(10)) for out in logs]
     begun, spent = time.monotonic(), 0.0
     while spent < wanted and time.monotonic() - begun < WALL_LIMIT_S:
         time.sleep(LOOK_S)

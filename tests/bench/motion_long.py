@@ -1,4 +1,4 @@
-"""Ten thousand turns, words for every alarm, the frames of the manuals, and what a job tells of its moves."""
+"""Words for every alarm, the frames of the manuals, what a job tells of its moves; and ten thousand turns."""
 import concurrent.futures
 import json
 import re
@@ -99,4 +99,3 @@ def measure(bench, root, scratch):
     golden(bench, root)
     alarms(bench, root, scratch)
     job_tells(bench, scratch)
-    turns(bench, root, scratch)

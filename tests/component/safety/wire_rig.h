@@ -121,6 +121,14 @@ class WireRig {
   }
 
  public:
+  /// The folder of the one job there is.
+  [[nodiscard]] std::filesystem::path only_job() const {
+    for (const auto& entry : std::filesystem::directory_iterator(folder / "jobs")) {
+      if (entry.is_directory()) return entry.path();
+    }
+    ADD_FAILURE() << "no job";
+    return {};
+  }
   void plug_in_lines() {
     auto socket = sim::wire::GpioSocket::start(folder / "gpio.sock",
                                                {{"START", false},

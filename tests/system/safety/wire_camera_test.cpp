@@ -49,7 +49,7 @@ TEST_F(CameraOnWires, AScanShowsTheObjectAtTheTrueAngleAndInTheLightThereWas) {
   ASSERT_TRUE(rig.wait_for([&] { return rig.lamp("FLIP"); })) << *read_file(rig.folder / "daemon.log");
   EXPECT_EQ(truth.last_question(), "{\"get\":\"truth\"}\n");
 
-  const auto job = std::filesystem::directory_iterator(rig.folder / "jobs")->path();
+  const auto job = rig.only_job();
   const auto scan = ScanFolder::open(job);
   ASSERT_TRUE(scan) << scan.error().message;
   const auto& views = scan->manifest().poses.at(0).views;
