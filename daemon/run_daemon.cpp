@@ -51,7 +51,8 @@ void keep(const action::KeepJob& task, const Workers& workers) {
 }
 
 bool cameras_are_free(const Snapshot& snapshot) {
-  return snapshot.activity == Activity::none || snapshot.activity == Activity::waiting_for_flip;
+  return snapshot.activity == Activity::none || snapshot.activity == Activity::waiting_for_flip ||
+         snapshot.activity == Activity::waiting_for_part;
 }
 
 void perform(const Action& action, const Workers& workers) {

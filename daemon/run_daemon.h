@@ -33,10 +33,10 @@ struct DaemonOptions {
   RetentionOptions retention{};
   std::optional<HttpAddress> webhook{};  ///< whom failures are told
   ApiOptions api;
-  bool remote = false;                   ///< the API may start and home while the guard is closed
-  bool guard = false;                    ///< there is a guard
-  bool home_guarded = false;             ///< after a restart a closed guard homes the table, without Reset
-  bool manual_light = false;             ///< a hand switches the projector
+  bool remote = false;        ///< the API may start and home while the guard is closed
+  bool guard = false;         ///< there is a guard
+  bool home_guarded = false;  ///< after a restart a closed guard homes the table, without Reset
+  bool manual_light = false;  ///< a hand switches the projector
   AcquisitionOptions acquisition;
   Clock::Duration warning = std::chrono::seconds(2);
   ReconstructorFactory reconstructor;

@@ -21,6 +21,7 @@ using std::chrono::seconds;
 constexpr seconds kConnectLimit{10};
 constexpr seconds kExposureLimit{2};
 constexpr milliseconds kPeriod{200};
+constexpr int kTries = 4;
 
 /// The cameras, and the light that goes with them, of a rig that no daemon has its hands on.
 class Bench {
@@ -46,8 +47,22 @@ class Bench {
     return bench;
   }
 
-  /// `light`: none, pattern or plain.
+  /// `light`: none, pattern or plain. A spoilt exposure is repeated, as the daemon does.
   Result<StereoFrame> expose(const std::string& light) {
+    auto pair = expose_once(light);
+    for (int i = 1; i < kTries && !pair; ++i) {
+      if (pair.error().code != ErrorCode::timeout && pair.error().code != ErrorCode::protocol) break;
+      pair = expose_once(light);
+    }
+    return pair;
+  }
+  Clock& clock() { return clock_; }
+
+ private:
+  explicit Bench(config::RigConfig rig) : rig_(std::move(rig)) {}
+  Deadline deadline() { return Deadline::after(clock_, kExposureLimit); }
+
+  Result<StereoFrame> expose_once(const std::string& light) {
     auto& camera = *devices_.camera;
     if (light == "none") return camera.look(deadline());
     if (auto armed = camera.arm(deadline()); !armed) return pass_on(armed);
@@ -55,11 +70,6 @@ class Bench {
     if (!fired) return pass_on(fired);
     return camera.collect(deadline());
   }
-  Clock& clock() { return clock_; }
-
- private:
-  explicit Bench(config::RigConfig rig) : rig_(std::move(rig)) {}
-  Deadline deadline() { return Deadline::after(clock_, kExposureLimit); }
 
   const config::RigConfig rig_;
   RealClock clock_;

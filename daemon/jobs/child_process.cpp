@@ -55,6 +55,7 @@ void set_limit(int resource, rlim_t value) {
 /// In the child, between fork and exec: only what is safe in a process that had threads.
 [[noreturn]] void become(char* const* words, int out, int error, const ChildCommand& command, pid_t parent) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  ::setpgid(0, 0);
   if (::getppid() != parent) ::_exit(kNotStarted);  // it died before we said so
   const int nothing = ::open("/dev/null", O_RDONLY);
   ::dup2(nothing, STDIN_FILENO);
@@ -109,7 +110,8 @@ Result<ChildEnd> run_child(const ChildCommand& command, const std::stop_token& s
     stopped = stop.stop_requested();
     late = SteadyClock::now() > give_up;
     if (stopped || late) {
-      ::kill(child, SIGKILL);
+      ::kill(-child, SIGKILL);  // and what it started
+      ::kill(child, SIGKILL);   // before it has a group of its own
       ::waitpid(child, &status, 0);
       break;
     }

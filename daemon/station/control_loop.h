@@ -17,7 +17,7 @@ namespace scanrig {
 
 /// Where the decisions of the control loop go. Called from its thread; none may wait.
 struct StationPorts {
-  std::function<void()> alive = [] {};  ///< the loop goes round; at least once a second
+  std::function<void()> alive = [] {};         ///< the loop goes round; at least once a second
   std::function<void(const Action&)> perform;  ///< everything but Warn
   std::function<void(const PanelOutputs&)> show;
   std::function<std::string()> fresh_job_id;  ///< another one each time

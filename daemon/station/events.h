@@ -116,9 +116,9 @@ struct JobAsked {
     resume,        ///< interrupted: the next Start goes on with it
     to_front,      ///< queued: the next Start begins it
     remove,        ///< the folder goes; only of a job that has ended
-    reprocess,     ///< the reconstruction again, from the images; `options` may change it
+    reprocess,     ///< the reconstruction again, from the images; `voxel_mm` and `fusion` may change it
     set_exported,  ///< retention may remove it
-    bundle,        ///< packed into the file `path`, for whoever must help; counts as exported
+    bundle,        ///< packed into the file `path`, for whoever must help
   };
   What what;
   std::string job;

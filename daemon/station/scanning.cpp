@@ -47,6 +47,7 @@ void take_next_view(Machine& m) {
     job.closing = true;
     return m.act(action::TakeView{{job.id, job.pose, 0}, {0.0}, true});
   }
+  if (job.asked == job.recipe.views) return;
   m.act(action::TakeView{{job.id, job.pose, job.asked}, {360.0 * job.asked / job.recipe.views}});
   ++job.asked;
 }
@@ -54,6 +55,7 @@ void take_next_view(Machine& m) {
 void view_taken(Machine& m, const event::ViewTaken& e) {
   if (m.s().activity != Activity::scanning) return;  // a view that came after Stop is not kept
   auto& job = *m.s().job;
+  if (job.taken == job.asked) return;
   ++job.taken;
   m.act(action::StoreView{e.view});
   job.closure_due = job.taken == job.recipe.views;
@@ -61,7 +63,7 @@ void view_taken(Machine& m, const event::ViewTaken& e) {
 }
 
 void view_stored(Machine& m, const event::ViewStored& e) {
-  if (!m.has(e.id.job) || e.id.pose != m.s().job->pose) return;
+  if (!m.has(e.id.job) || e.id.pose != m.s().job->pose || m.s().job->stored == m.s().job->taken) return;
   ++m.s().job->stored;
   take_next_view(m);
 }
@@ -73,7 +75,8 @@ void closure_taken(Machine& m, const event::ClosureTaken& e) {
 }
 
 void closure_judged(Machine& m, const event::ClosureJudged& e) {
-  if (!m.has(e.job) || !m.s().job->closing) return;
+  const bool executing = m.s().activity == Activity::scanning || m.s().activity == Activity::storing;
+  if (!m.has(e.job) || !m.s().job->closing || !executing) return;
   m.s().job->closing = false;
   if (!e.closure.unmoved) return moved(m, e.closure);
   if (m.s().job->stored == m.s().job->recipe.views) return finish_pose(m);
@@ -82,7 +85,7 @@ void closure_judged(Machine& m, const event::ClosureJudged& e) {
 
 void pose_stored(Machine& m, const event::PoseStored& e) {
   auto& s = m.s();
-  if (!m.has(e.job) || s.activity != Activity::storing) return;
+  if (!m.has(e.job) || s.activity != Activity::storing || e.pose != s.job->pose) return;
   if (e.pose + 1 == s.job->recipe.poses) {
     s.job.reset();
     free_rig(m, fmt::format("Job {} has all its views.", e.job));

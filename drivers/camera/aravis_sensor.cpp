@@ -90,6 +90,7 @@ AravisSensor::~AravisSensor() { disconnect(); }
 std::uint64_t AravisSensor::id_ring() const { return camera_ && arv_camera_is_uv_device(camera_.get()) ? 0 : kGigeIds; }
 
 Result<bool> AravisSensor::ready(Deadline deadline) {
+  if (camera_ && !lost_) ask_whether_there();
   if (camera_ && !lost_) return false;
   disconnect();
   if (deadline.expired(clock_)) return fail(ErrorCode::timeout, "{}: no time left to connect", name());
@@ -100,6 +101,19 @@ Result<bool> AravisSensor::ready(Deadline deadline) {
     return pass_on(connected);
   }
   return true;
+}
+
+/// The library's own heartbeat takes many seconds to give a camera up.
+void AravisSensor::ask_whether_there() {
+  constexpr auto kSilence = std::chrono::seconds(1);
+  constexpr guint64 kVersion = 0;  // a register every GigE Vision and USB3 Vision device has [GigE Vision 1.2, 28]
+  if (clock_.now() - heard_ < kSilence) return;
+  const auto asked = attempt_("ask whether it is there", [&](GError** error) {
+    guint32 value = 0;
+    arv_device_read_register(arv_camera_get_device(camera_.get()), kVersion, &value, error);
+  });
+  if (asked) heard_ = clock_.now();
+  if (!asked) lost_ = true;
 }
 
 Result<void> AravisSensor::connect() {
@@ -136,19 +150,23 @@ Result<void> AravisSensor::start_stream() {
     stream_.reset(arv_camera_create_stream(camera_.get(), nullptr, nullptr, error));
   });
   if (!created) return created;
+  guint payload = 0;
+  const auto asked =
+      attempt_("read PayloadSize", [&](GError** error) { payload = arv_camera_get_payload(camera_.get(), error); });
+  if (!asked) return asked;
   if (ARV_IS_GV_STREAM(stream_.get())) {
     // A frame with packets missing is given up early enough to be told from one that never came.
     const auto retention = std::chrono::microseconds(options_.frame_timeout) / 2;
     g_object_set(stream_.get(), "frame-retention", static_cast<guint>(retention.count()), "packet-timeout",
                  static_cast<guint>(retention.count() / 5), nullptr);
+    // A whole frame, with what the kernel adds to it, may wait until this process has the processor.
+    g_object_set(stream_.get(), "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
+                 static_cast<gint>(2 * payload), nullptr);
   }
-  guint payload = 0;
-  const auto asked =
-      attempt_("read PayloadSize", [&](GError** error) { payload = arv_camera_get_payload(camera_.get(), error); });
-  if (!asked) return asked;
   finding_ = host_finding(ARV_IS_GV_STREAM(stream_.get()) ? CameraBus::gige : CameraBus::usb3, payload);
   for (int i = 0; i < kBuffers; ++i) arv_stream_push_buffer(stream_.get(), arv_buffer_new_allocate(payload));
   listens_to_line_ = options_.trigger_source != "Software";
+  heard_ = clock_.now();
   return attempt_("start the acquisition", [&](GError** error) { arv_camera_start_acquisition(camera_.get(), error); });
 }
 
@@ -172,6 +190,7 @@ Result<std::optional<SensorFrame>> AravisSensor::next(Deadline deadline) {
     return std::nullopt;
   }
   auto frame = read(buffer);
+  heard_ = clock_.now();
   arv_stream_push_buffer(stream_.get(), buffer);
   if (!frame) return pass_on(frame);
   return std::optional(std::move(*frame));

@@ -62,6 +62,7 @@ class AravisSensor final : public Sensor {
   Result<void> start_stream();
   void disconnect();
   Result<SensorFrame> read(ArvBuffer* buffer) const;
+  void ask_whether_there();
 
   const AravisSensorOptions sensor_;
   const AravisOptions options_;
@@ -71,6 +72,7 @@ class AravisSensor final : public Sensor {
   GRef<ArvStream> stream_;
   std::optional<std::string> finding_;  // about this machine, see host_finding()
   std::atomic<bool> lost_ = false;      // set by a thread of the library
+  Clock::TimePoint heard_{};            // the last answer or frame
   bool listens_to_line_ = true;
 };
 

@@ -60,13 +60,12 @@ Result<void> LightCrafterProjector::fire(Light light, Deadline deadline) {
     return fail(ErrorCode::timeout, "projector: an exposure of {} us does not fit before the deadline",
                 options_.exposure.count());
   }
-  if (auto started = write(Command::start_stop, {2}, deadline); !started) return started;
-  auto over = wait_until_over(deadline);
-  if (!over) {
-    const auto stopped = stop(Deadline::after(clock_, options_.reply_timeout));
-    return stopped ? over : pass_on(over, "the light may be on");
-  }
-  return expect_healthy(deadline);
+  auto over = write(Command::start_stop, {2}, deadline);
+  if (over) over = wait_until_over(deadline);
+  if (over) return expect_healthy(deadline);
+  // It may have started although its reply was lost.
+  const auto darkened = dark(Deadline::after(clock_, options_.reply_timeout));
+  return darkened ? over : pass_on(over, "the light may be on");
 }
 
 Result<void> LightCrafterProjector::dark(Deadline deadline) {
@@ -91,6 +90,7 @@ Result<void> LightCrafterProjector::connect(Deadline deadline) {
   set_up_ = false;
   if (auto awake = write(Command::power, {0}, deadline); !awake) return awake;
   if (auto healthy = expect_healthy(deadline); !healthy) return healthy;
+  if (auto stopped = stop(deadline); !stopped) return stopped;  // what it showed when it was lost
   return write(Command::display_mode, {1}, deadline);
 }
 
@@ -99,7 +99,6 @@ Result<void> LightCrafterProjector::connect(Deadline deadline) {
 Result<void> LightCrafterProjector::set_up(Deadline deadline) {
   set_up_ = false;
   loaded_.reset();
-  if (auto stopped = stop(deadline); !stopped) return stopped;
   const auto exposure = static_cast<std::uint32_t>(options_.exposure.count());
   std::vector<std::uint8_t> exposure_and_period = little_endian(exposure);
   for (const auto byte : little_endian(exposure)) exposure_and_period.push_back(byte);

@@ -13,13 +13,28 @@ Clock::Duration exposure_time() {
   return std::chrono::round<Clock::Duration>(std::chrono::duration<double>(profile().exposure_s));
 }
 
+constexpr int kNumberBits = 32;
+
+void number_faintly(std::uint32_t number, cv::Mat& frame) {
+  auto* pixel = frame.ptr<std::uint8_t>(0);
+  for (int bit = 0; bit < kNumberBits; ++bit) {
+    pixel[bit] = static_cast<std::uint8_t>((pixel[bit] & ~1U) | (number >> bit & 1U));
+  }
+}
+
 }  // namespace
+
+std::uint32_t faint_number(const cv::Mat& frame) {
+  std::uint32_t number = 0;
+  for (int bit = 0; bit < kNumberBits; ++bit) number |= (frame.ptr<std::uint8_t>(0)[bit] & 1U) << bit;
+  return number;
+}
 
 Result<std::unique_ptr<RigCameras>> RigCameras::start(const RigCamerasOptions& options, std::function<RigTruth()> truth,
                                                       Clock& clock) {
   auto scene = Scene::create(options.scene);
   if (!scene) return pass_on(scene);
-  std::unique_ptr<RigCameras> rig(new RigCameras(std::move(*scene), options.expected, std::move(truth), clock));
+  std::unique_ptr<RigCameras> rig(new RigCameras(std::move(*scene), options, std::move(truth), clock));
   const Eye &left = rig->scene_->rig().left, &right = rig->scene_->rig().right;
   wire::GigeCamerasOptions cameras;
   cameras.left_address = kLeftAddress;
@@ -29,7 +44,7 @@ Result<std::unique_ptr<RigCameras>> RigCameras::start(const RigCamerasOptions& o
   cameras.size = {left.width, left.height};
   cameras.frame_after = std::chrono::round<std::chrono::microseconds>(exposure_time() + kReadout);
   cameras.late_by = std::chrono::milliseconds(1000);
-  cameras.numbered = options.numbered;
+  cameras.numbered = false;
   cameras.ready = [&rig = *rig](const wire::GigeExposure& exposure) { return rig.ready(exposure); };
   const auto source = [&rig = *rig](wire::Side side, const wire::GigeExposure& exposure, cv::Mat& image) {
     rig.read_out(side, exposure, image);
@@ -41,9 +56,13 @@ Result<std::unique_ptr<RigCameras>> RigCameras::start(const RigCamerasOptions& o
   return rig;
 }
 
-RigCameras::RigCameras(std::unique_ptr<Scene> scene, const std::vector<Place>& expected,
-                       std::function<RigTruth()> truth, Clock& clock)
-    : truth_(std::move(truth)), clock_(clock), scene_(std::move(scene)), views_(*scene_, expected) {}
+RigCameras::RigCameras(std::unique_ptr<Scene> scene, const RigCamerasOptions& options, std::function<RigTruth()> truth,
+                       Clock& clock)
+    : truth_(std::move(truth)),
+      clock_(clock),
+      numbered_(options.numbered),
+      scene_(std::move(scene)),
+      views_(*scene_, options.expected) {}
 
 RigCameras::~RigCameras() {
   developer_.request_stop();
@@ -59,6 +78,11 @@ void RigCameras::edge(bool pattern) {
   exposed_.notify_all();
 }
 
+void RigCameras::light_out() {
+  const std::scoped_lock lock(mutex_);
+  if (!exposures_.empty() && clock_.now() < exposures_.back().ended) exposures_.back().lit = false;
+}
+
 void RigCameras::turned_over() {
   const std::scoped_lock lock(mutex_);
   history_.turned_over(*scene_);
@@ -68,23 +92,26 @@ void RigCameras::turned_over() {
 void RigCameras::develop(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (exposed_.wait(lock, stop, [&] { return developed_ < exposures_.size(); })) {
-    RigExposure exposure = exposures_[developed_];
-    exposure.place.placement = history_.placement();
+    const RigExposure begun = exposures_[developed_];
     lock.unlock();
-    StereoImages images = picture(exposure);
+    clock_.sleep_until(begun.at + exposure_time() / 2);
+    const double angle_deg = truth_().angle_deg;
+    clock_.sleep_until(begun.ended);
     lock.lock();
-    history_.exposed(exposure.place.angle_deg);
-    exposures_[developed_++] = exposure;
-    pictures_[exposure.number] = std::move(images);
+    RigExposure& exposure = exposures_[developed_];
+    exposure.place = {history_.placement(), angle_deg};
+    history_.exposed(angle_deg);
+    const RigExposure ended = exposure;
+    lock.unlock();
+    StereoImages images = picture(ended);
+    lock.lock();
+    ++developed_;
+    pictures_[ended.number] = std::move(images);
     if (pictures_.size() > kPictures) pictures_.erase(pictures_.begin());
   }
 }
 
-StereoImages RigCameras::picture(RigExposure& exposure) {
-  clock_.sleep_until(exposure.at + exposure_time() / 2);
-  exposure.place.angle_deg = truth_().angle_deg;
-  clock_.sleep_until(exposure.ended);
-  exposure.lit = truth_().projector_on;
+StereoImages RigCameras::picture(const RigExposure& exposure) {
   if (!exposure.lit) return {};
   const auto view = views_.get(exposure.place);
   return view ? scene_->expose(*view, exposure.pattern, exposure.number) : StereoImages{};
@@ -105,6 +132,7 @@ void RigCameras::read_out(wire::Side side, const wire::GigeExposure& exposure, c
   } else {
     picture.copyTo(image);
   }
+  if (numbered_) number_faintly(static_cast<std::uint32_t>(exposure.number), image);
   if (exposure.number <= exposures_.size()) exposures_[exposure.number - 1].read = clock_.now();
 }
 

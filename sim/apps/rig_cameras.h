@@ -21,24 +21,27 @@ struct RigTruth;
 struct RigCamerasOptions {
   SceneOptions scene;
   std::vector<Place> expected;  ///< what is rendered before it is asked for
-  bool numbered = false;        ///< hide the number of the edge in every frame; then frames are not the scene's
+  bool numbered = false;        ///< note the number of the edge in every frame, see faint_number()
 };
 
 /// One edge of the light, and what became of it.
 struct RigExposure {
   std::uint64_t number = 0;  ///< counts the edges
   bool pattern = false;
-  bool lit = false;  ///< the light burned as long as the exposure lasted
-  Place place{};     ///< in the middle of the exposure
+  bool lit = true;  ///< the light burned as long as the exposure lasted
+  Place place{};    ///< in the middle of the exposure
   Clock::TimePoint at{}, ended{};
   Clock::TimePoint read{};  ///< both frames were read out and their sending began
 };
+
+/// Which edge a frame with `numbered` is of: the lowest bits of its first 32 pixels. For tests: no driver knows of it.
+std::uint32_t faint_number(const cv::Mat& frame);
 
 /// Two GigE cameras that look at the rendered scene: every edge of the light exposes both. A frame shows the object as
 /// it lay and where the table stood in the middle of the exposure, and is on its way 37 ms after the edge; or when it
 /// is rendered, which for a view nobody expected takes as long as it takes. An exposure whose light went out early is
 /// dark; so is one by software.
-/// Threads: every function may be called from any thread, edge() from one at a time.
+/// Threads: every function may be called from any thread, edge() and light_out() from one at a time.
 class RigCameras {
  public:
   static constexpr const char* kLeftAddress = "127.0.0.1";
@@ -50,6 +53,7 @@ class RigCameras {
   ~RigCameras();
 
   void edge(bool pattern);
+  void light_out();
   void turned_over();
   /// All that is expected is rendered; false when `stop` came first.
   bool wait_until_ready(const std::stop_token& stop) { return views_.wait_until_ready(stop); }
@@ -61,15 +65,16 @@ class RigCameras {
   [[nodiscard]] wire::GigeCameras& wire() { return *wire_; }
 
  private:
-  RigCameras(std::unique_ptr<Scene> scene, const std::vector<Place>& expected, std::function<RigTruth()> truth,
+  RigCameras(std::unique_ptr<Scene> scene, const RigCamerasOptions& options, std::function<RigTruth()> truth,
              Clock& clock);
   void develop(const std::stop_token& stop);
-  StereoImages picture(RigExposure& exposure);
+  StereoImages picture(const RigExposure& exposure);
   bool ready(const wire::GigeExposure& exposure) const;
   void read_out(wire::Side side, const wire::GigeExposure& exposure, cv::Mat& image);
 
   const std::function<RigTruth()> truth_;
   Clock& clock_;
+  const bool numbered_;
   const std::unique_ptr<Scene> scene_;
 
   mutable std::mutex mutex_;

@@ -105,11 +105,11 @@ bool RigPanel::light() const {
   return std::ranges::any_of(kLights, [&](const Signal& light) { return gpio_->level(light.line); });
 }
 
-void RigPanel::on_light(std::function<void(bool pattern)> listener) {
+void RigPanel::on_light(std::function<void(bool pattern, bool on)> listener) {
   if (!listener) return gpio_->on_edge({});
   gpio_->on_edge([listener = std::move(listener)](const wire::GpioSocket::Edge& edge) {
     const auto light = std::ranges::find_if(kLights, [&](const Signal& signal) { return edge.line == signal.line; });
-    if (edge.high && light != kLights.end()) listener(light == kLights.begin());
+    if (light != kLights.end()) listener(light == kLights.begin(), edge.high);
   });
 }
 

@@ -43,8 +43,8 @@ class RigPanel {
   [[nodiscard]] std::map<std::string, bool> outputs() const;  ///< by the keys of rig.toml: "lamp_red"
   [[nodiscard]] bool pressed(const std::string& input) const;
   [[nodiscard]] bool light() const;  ///< dots or even light
-  /// Called when dots (`pattern`) or even light come on, from the line's thread; empty: nobody any more.
-  void on_light(std::function<void(bool pattern)> listener);
+  /// Called when dots (`pattern`) or even light go on or out, from the line's thread; empty: nobody any more.
+  void on_light(std::function<void(bool pattern, bool on)> listener);
   [[nodiscard]] std::vector<Change> changes() const;
   [[nodiscard]] wire::ModbusServer* module_port() { return server_.get(); }  ///< null on GPIO
 

@@ -84,7 +84,8 @@ void add_rig(CLI::App& app, sim::WireRigOptions& o, sim::SceneOptions& scene, Ch
                   "simulated: scanrigd-sim renders; gige: two cameras on 127.0.0.1 and 127.0.0.2, see own-network")
       ->capture_default_str()
       ->check(CLI::IsMember({"simulated", "gige"}));
-  rig->add_flag("--number-frames", o.numbered_frames, "gige: hide the number of the edge in every frame");
+  rig->add_flag("--number-frames", o.numbered_frames,
+                "gige: note the number of the edge in every frame's first pixels");
   add_scene(*rig, scene);
   rig->callback([&] {
     o.axis.gear_ratio = o.toml.gear_ratio;

@@ -73,7 +73,7 @@ Result<void> WireRig::start_cameras(const WireRigOptions& o, Clock& clock) {
       clock);
   if (!cameras) return pass_on(cameras);
   cameras_ = std::move(*cameras);
-  panel_->on_light([&cameras = *cameras_](bool pattern) { cameras.edge(pattern); });
+  panel_->on_light([&cameras = *cameras_](bool pattern, bool on) { on ? cameras.edge(pattern) : cameras.light_out(); });
   return cameras_->write_calibration(o.toml.folder / "calibration.json");
 }
 

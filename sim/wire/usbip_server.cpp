@@ -27,17 +27,19 @@ constexpr std::int32_t kStall = -EPIPE, kUnlinkedInTime = -ECONNRESET;
 constexpr std::uint32_t kFullSpeed = 2;
 
 // USB 2.0, chapter 9; HID 1.11, chapter 6.
-constexpr std::array<std::uint8_t, 18> kDeviceDescriptor{18, 1, 0x00, 0x02, 0, 0, 0, 64,  // of endpoint 0
-                                                         0x51, 0x04, 0x01, 0x64, 0x00, 0x01, 1, 2, 3, 1};
+constexpr std::array<std::uint8_t, 18> kDeviceDescriptor{18,   1,    0x00, 0x02, 0,    0,    0, 64,  // of endpoint 0
+                                                         0x51, 0x04, 0x01, 0x64, 0x00, 0x01, 1, 2,  3, 1};
 constexpr std::array<std::uint8_t, 29> kReportDescriptor{
-    0x06, 0x00, 0xFF, 0x09, 0x01, 0xA1, 0x01,                                      // a collection of the maker's own
-    0x15, 0x00, 0x26, 0xFF, 0x00, 0x75, 0x08, 0x95, 0x40,                          // 64 bytes
-    0x09, 0x01, 0x81, 0x02, 0x09, 0x01, 0x91, 0x02, 0x09, 0x01, 0xB1, 0x02, 0xC0}; // in, out, feature
-constexpr std::array<std::uint8_t, 41> kConfiguration{9, 2, 41, 0, 1, 1, 0, 0xC0, 50,                      //
-                                                      9, 4, 0, 0, 2, 3, 0, 0, 0,                           // HID
-                                                      9, 0x21, 0x11, 0x01, 0, 1, 0x22, kReportDescriptor.size(), 0,
-                                                      7, 5, 0x81, 3, 64, 0, 1,                             //
-                                                      7, 5, 0x01, 3, 64, 0, 1};
+    0x06, 0x00, 0xFF, 0x09, 0x01, 0xA1, 0x01,                                       // a collection of the maker's own
+    0x15, 0x00, 0x26, 0xFF, 0x00, 0x75, 0x08, 0x95, 0x40,                           // 64 bytes
+    0x09, 0x01, 0x81, 0x02, 0x09, 0x01, 0x91, 0x02, 0x09, 0x01, 0xB1, 0x02, 0xC0};  // in, out, feature
+constexpr std::array<std::uint8_t, 41> kConfiguration{9,  2,    41,   0,    1,  1,  0,    0xC0,
+                                                      50,  //
+                                                      9,  4,    0,    0,    2,  3,  0,    0,
+                                                      0,  // HID
+                                                      9,  0x21, 0x11, 0x01, 0,  1,  0x22, kReportDescriptor.size(),
+                                                      0,  7,    5,    0x81, 3,  64, 0,    1,  //
+                                                      7,  5,    0x01, 3,    64, 0,  1};
 
 Bytes string_descriptor(std::string_view text) {
   Bytes bytes{static_cast<std::uint8_t>(2 + 2 * text.size()), 3};

@@ -1,4 +1,4 @@
-"""A disk that has lost its power: replays the calls that tests/system/station/disk_calls.cpp has logged and keeps only
+"""A disk that has lost its power: replays the calls that tests/bench/station/disk_calls.cpp has logged and keeps only
 what was synced.
 
 A file's content is durable as of its last fsync; a folder's entries, its files' names, as of the folder's own last fsync.

@@ -1,6 +1,6 @@
 """Kills a daemon before and after every call by which it changes its files, and cuts the power there; then starts again.
 
-The job is a two-pose job of three views over devices that only pretend (tests/system/station/one_job.cpp): all of the
+The job is a two-pose job of three views over devices that only pretend (tests/bench/station/one_job.cpp): all of the
 daemon's own file handling, in a fraction of a second. After each start every job found must come to its end, by resuming
 or by being ended, and every view that was acknowledged must be there and whole.
 """

@@ -75,7 +75,8 @@ class Machine:
             "qemu-system-x86_64", "-accel", "tcg,thread=multi", "-machine", "q35", "-cpu", "max", "-smp", cores,
             "-m", 2048, "-nodefaults", "-no-user-config", "-display", "none", "-no-reboot",
             "-kernel", cached / "vmlinuz", "-initrd", cached / "initrd",
-            "-append", "console=ttyS0 quiet panic=-1 mitigations=off systemd.show_status=0 systemd.log_target=journal",
+            "-append", "console=ttyS0 quiet panic=-1 mitigations=off systemd.show_status=0 systemd.log_target=journal "
+            "systemd.mask=e2scrub_reap.service",
             *drive(cached / "base.sqfs", "readonly=on"), *drive(app, "readonly=on"),
             # The host's page cache survives the machine: what it holds back is only what the guest never wrote out.
             *drive(self.folder / "disk.ext4", "cache=writeback"),
@@ -144,8 +145,8 @@ class Machine:
         return output.strip()
 
 
-def make_disk(file, mebibytes=256):
-    """An empty ext4 disk that outlives the machine."""
+def make_disk(file, mebibytes=4096):
+    """An empty ext4 disk, sparse, that outlives the machine."""
     file.unlink(missing_ok=True)
     with file.open("wb") as disk:
         os.truncate(disk.fileno(), mebibytes << 20)

@@ -150,7 +150,11 @@ class Station:
 
         if self.wait("asking for Reset", asks, 60) != READY:
             self.tap("RESET")
-            self.wait(READY, lambda: (self.status() or {}).get("machine") == READY, 60)
+        self.wait("ready with all its devices", lambda: self.is_ready(self.status()), 60)
+
+    @staticmethod
+    def is_ready(status):
+        return status and status["machine"] == READY and all(device["ok"] for device in status["devices"])
 
     def start(self):
         """The new job's id."""

@@ -13,8 +13,8 @@ using std::chrono::seconds;
 using Spoil = StereoCameraBench::Fault;
 
 constexpr milliseconds kFrameLimit{1000};
-constexpr seconds kConnectLimit{8};  ///< a request to a GigE camera that is gone takes the library 2.5 s
-constexpr seconds kNoticed{5};       ///< the library asks a GigE camera every second whether it is there
+constexpr seconds kConnectLimit{15};    ///< to give up a GigE camera takes the library four requests of 2.5 s each
+constexpr milliseconds kNoticed{1100};  ///< a camera is asked whether it is there when it was silent for a second
 constexpr seconds kAbsence{2};
 
 std::unique_ptr<StereoCameraBench> make_bench(const std::string& device) {
@@ -59,7 +59,7 @@ class CameraTrial {
     if (collects) std::ignore = camera().arm(ample());
     const auto begun = clock().now();
     bench_->plug(false);
-    if (device_ == "aravis" && method == "ready") clock().sleep_for(kNoticed);
+    if (method == "ready" || method == "arm") clock().sleep_for(kNoticed);
     if (collects) bench_->fire();
     auto outcome = timed(clock(), collects ? Clock::Duration(kFrameLimit) : kConnectLimit,
                          {ErrorCode::io, ErrorCode::timeout, ErrorCode::not_found}, [&](Deadline by) -> Result<void> {

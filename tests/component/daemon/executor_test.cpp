@@ -149,19 +149,24 @@ TEST_F(Executor, AProcessWithoutAWordIsQuoted) {
   expect_failed(scan(), ErrorCode::internal, "ended with 3: it is raining");
 }
 
-TEST_F(Executor, AProcessIsKilledWhenTheDaemonEndsAndItsJobIsDoneAfterTheRestart) {
-  execute("[ -e $out.again ] && mkdir $out && echo '{}' > $out/report.json && exit 0; touch $out.again; sleep 600");
-  boot();
-  get_ready();
-  scan_both_poses();
-  while (!newest() || newest()->state != JobState::reconstructing) clock.sleep_for(std::chrono::milliseconds(10));
-  const auto id = newest()->id;
-  const auto again = fs::path(newest()->folder) / "model.new.again";
-  while (!fs::exists(again)) std::this_thread::yield();
-  shut_down();
-  EXPECT_TRUE(result) << result.error().message;
-  boot();
-  EXPECT_TRUE(wait_state(id, JobState::done));
+TEST_F(Executor, AProcessIsStoppedOnRequestWithAllItStartedAndLeavesNothing) {
+  execute("mkdir $out; echo $$ > $out/pid; sleep 600");
+  const auto calibration = read_calibration(options.jobs.calibration_file);
+  ASSERT_TRUE(calibration) << calibration.error().message;
+  const Manifest manifest;
+  const auto made = options.reconstructor({.calibration = *calibration, .manifest = manifest, .folder = folder_});
+  ASSERT_TRUE(made) << made.error().message;
+  std::stop_source asked;
+  const auto begun = folder_ / "model.new" / "pid";
+  std::jthread impatient([&] {
+    while (!fs::exists(begun) || fs::file_size(begun) == 0) std::this_thread::yield();
+    asked.request_stop();
+  });
+  const auto done = (*made)->finish(folder_ / "model", {asked.get_token(), {}});
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().code, ErrorCode::stopped);
+  EXPECT_FALSE(fs::exists(folder_ / "model"));
+  EXPECT_FALSE(fs::exists(folder_ / "model.new"));
 }
 
 }  // namespace

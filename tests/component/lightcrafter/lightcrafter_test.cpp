@@ -84,6 +84,17 @@ TEST_F(LightCrafterTest, SilenceIsATimeoutAndTheNextFireBeginsAnew) {
   expect_fires();
 }
 
+/// The device may have started, and only its answer was lost.
+TEST_F(LightCrafterTest, AStartWhoseReplyIsLostIsMadeDark) {
+  expect_fires();
+  const auto before = bench_.device().flashes().size();
+  bench_.device().inject(Fault::silent, 1);
+  ASSERT_FALSE(fire());
+  ASSERT_EQ(bench_.device().flashes().size(), before + 1) << "it did start";
+  EXPECT_FALSE(bench_.device().lit());
+  expect_fires();
+}
+
 TEST_F(LightCrafterTest, ARefusedCommandIsAProtocolErrorThatNamesIt) {
   bench_.device().inject(Fault::refuse, 1);
   const auto fired = fire();

@@ -170,8 +170,9 @@ TEST_F(DaemonOnWires, AnEstopThatSilencesTheDriveReadsAsAnEstop) {
   ASSERT_TRUE(rig.wait_fault());
   rig.serial->clear_faults();
   rig.set_estop(true);
-  const auto jobs = std::filesystem::directory_iterator(config->storage.root);
-  const auto failure = read_file(jobs->path() / "failure.json");
+  const auto entries = std::filesystem::directory_iterator(config->storage.root);
+  const auto job = std::ranges::find_if(entries, [](const auto& entry) { return entry.is_directory(); });
+  const auto failure = read_file(job->path() / "failure.json");
   ASSERT_TRUE(failure);
   EXPECT_THAT(*failure, testing::HasSubstr("e-stop"));
 }

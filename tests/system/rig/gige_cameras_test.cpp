@@ -1,13 +1,14 @@
 #include <gmock/gmock.h>
 
-#include "pipeline/scan/scan_folder.h"
-#include "sim/wire/gige_camera.h"
+#include <opencv2/imgcodecs.hpp>
+
+#include "sim/apps/rig_cameras.h"
 #include "tests/system/rig/rig_on_wires.h"
 
 namespace scanrig {
 namespace {
 
-using sim::wire::hidden_number;
+using sim::faint_number;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -33,7 +34,8 @@ class CamerasOnWires : public RigOnWires {
   }
   /// What is wrong with the cameras; empty: nothing.
   std::string camera_problem() {
-    for (const auto& device : ask("status")["devices"]) {
+    const auto devices = ask("status")["devices"];
+    for (const auto& device : devices) {
       if (device["name"] == "camera" && !device["ok"]) return device["problem"]["message"];
     }
     return "";
@@ -58,22 +60,20 @@ TEST_F(CamerasOnWires, AScanRedoesALostExposureUsesTheFramesOfOneEdgeOnlyAndEnds
   ASSERT_TRUE(soon([&] { return !jobs().empty() && jobs()[0]["state"] == "done"; })) << log() << jobs();
 
   const auto job = ask("jobs/" + jobs()[0]["id"].get<std::string>());
-  const auto scan = ScanFolder::open(job["folder"].get<std::string>());
-  ASSERT_TRUE(scan) << scan.error().message;
-  std::uint32_t edge = 1;  // the first one's right frame was lost
-  std::size_t stored = 0;
-  for (std::size_t pose = 0; pose < 2; ++pose) {
-    for (std::size_t view = 0; view < 4; ++view, ++stored) {
-      EXPECT_EQ(job["stored"][stored]["redone"], stored == 0 ? 1 : 0);
-      const auto images = scan->load_images(pose, view);
-      ASSERT_TRUE(images) << images.error().message;
-      ++edge;
-      EXPECT_EQ(hidden_number(images->left_pattern), edge);
-      EXPECT_EQ(hidden_number(images->right_pattern), edge);
-      ++edge;
-      EXPECT_EQ(hidden_number(images->left_plain), edge);
-      EXPECT_EQ(hidden_number(images->right_plain), edge);
-    }
+  const std::filesystem::path folder(job["folder"].get<std::string>());
+  std::uint32_t last = 1;  // the right frame of the first edge was lost
+  for (std::size_t i = 0; i < 8; ++i) {
+    const auto& stored = job["stored"][i];
+    EXPECT_EQ(stored["redone"], i == 0 ? 1 : 0);
+    const auto view =
+        folder / fmt::format("pose{}/view{:02}", stored["pose"].get<int>() + 1, stored["view"].get<int>());
+    const auto edge_of = [&](const char* name) { return faint_number(cv::imread(view / name, cv::IMREAD_UNCHANGED)); };
+    const auto edge = edge_of("left_pattern.png");
+    EXPECT_TRUE(edge == last + 1 || (i == 4 && edge > last)) << edge;  // view 0 may be looked at again after a pose
+    EXPECT_EQ(edge_of("right_pattern.png"), edge);
+    EXPECT_EQ(edge_of("left_plain.png"), edge + 1);
+    EXPECT_EQ(edge_of("right_plain.png"), edge + 1);
+    last = edge + 1;
   }
   EXPECT_TRUE(std::filesystem::exists(job["model"].get<std::string>()));
 }
@@ -89,7 +89,8 @@ TEST_F(CamerasOnWires, PicturesThatAreDarkBlurredOrOfTheOtherSideAreRedone) {
   spoil("blurred", 2);
   ASSERT_TRUE(soon([&] { return lamp("flip_request"); })) << log();
   int redone = 0;
-  for (const auto& view : job()["stored"]) redone += view["redone"].get<int>();
+  const auto stored = job()["stored"];
+  for (const auto& view : stored) redone += view["redone"].get<int>();
   EXPECT_GE(redone, 4) << "of two spoilt exposures at least one was with dots";
 }
 
@@ -121,7 +122,7 @@ TEST_F(CamerasOnWires, TheCommandListsTunesGrabsAndPreviews) {
   start_rig({"--cameras", "gige", "--scale", "0.25"});
   const auto pictures = folder_ / "pictures";
   EXPECT_EQ(Process({SCANRIG_PROGRAM, "camera", "list"}, folder_ / "output").wait(), 0);
-  EXPECT_THAT(*read_file(folder_ / "output"), AllOf(HasSubstr("40012345"), HasSubstr("40012346")));
+  EXPECT_THAT(*read_file(folder_ / "output"), AllOf(HasSubstr("SIM-L"), HasSubstr("SIM-R")));
   EXPECT_EQ(scanrig({"camera", "tune", "--count", "2"}), 0) << output_;
   EXPECT_THAT(output_, HasSubstr("right  brightness"));
   EXPECT_EQ(scanrig({"camera", "grab", "--light", "pattern", "--out", pictures}), 0) << output_;

@@ -110,8 +110,8 @@ TEST_F(MakeSafe, AbsentCamerasLeaveTheRestRunningAndShown) {
     return devices.size() == 4 && ok(0) && ok(1) && ok(3);  // one that was slow to answer is asked again
   }));
   EXPECT_EQ(devices[2]["name"], "camera");
-  EXPECT_EQ(devices[2]["problem"]["code"], "unsupported");
-  EXPECT_THAT(devices[2]["problem"]["message"].get<std::string>(), HasSubstr("aravis"));
+  EXPECT_EQ(devices[2]["problem"]["code"], "not_found");
+  EXPECT_THAT(devices[2]["problem"]["message"].get<std::string>(), HasSubstr("no-camera"));
   EXPECT_TRUE(rig.lamp("START_LAMP")) << "no job began";
 }
 

@@ -16,14 +16,10 @@ namespace {
 using testing::HasSubstr;
 
 const WireRig::Changes kSimulatedCamera{
-    {"driver = \"aravis\"                       # aravis | v4l2 | v4l2-side-by-side\n"
-     "left = { serial = \"40012345\", address = \"192.168.10.11\" }\n"
-     "right = { serial = \"40012346\", address = \"192.168.10.12\" }\n"
-     "trigger = { source = \"Line0\", edge = \"rising\" }\npixel_format = \"Mono8\"\n",
+    {"driver = \"v4l2-side-by-side\"\nboth = { device = \"no-camera\" }\nexternal_trigger = true\n"
+     "pixel_format = \"GREY\"\nsize = { width = 640, height = 240 }\n",
      "driver = \"simulated\"\ntruth = \"control.sock\"\n"},
-    {"packet = { size_bytes = 8192, delay_us = 20 }   # MTU 9000, shared link\nframe_timeout_ms = 500\n"
-     "clock = \"interval\"                      # interval | ptp\n",
-     ""},
+    {"frame_timeout_ms = 500\n", ""},
     {"views = 8", "views = 3"},
     {"speed_deg_s = 45", "speed_deg_s = 180"},
     {"acceleration_deg_s2 = 90", "acceleration_deg_s2 = 720"}};

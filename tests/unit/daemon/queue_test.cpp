@@ -117,6 +117,16 @@ TEST_F(Queue, AJobThatDoesNotFitIsNotBegunAndWaits) {
   EXPECT_TRUE(actions.empty());
 }
 
+TEST_F(Queue, AJobThatDoesNotFitClearsNoFault) {
+  get_ready();
+  know(queued("a", 1));
+  press(Button::start);
+  tell(event::RigFailed{{ErrorCode::timeout, "turntable: no reply"}});
+  tell(event::JobNotBegun{"a", {ErrorCode::io, "the disk is full"}});
+  EXPECT_EQ(state.machine, MachineState::error);
+  EXPECT_EQ(state.activity, Activity::stopping);
+}
+
 TEST_F(Queue, JobsAreMovedResumedAndKept) {
   know(queued("a", 3));
   know(queued("b", 4));

@@ -90,6 +90,19 @@ TEST_F(Resume, AnObjectThatSlippedDuringThePoseFailsTheJob) {
   EXPECT_EQ(state.failures, 1);
 }
 
+TEST_F(Resume, AVerdictThatComesAfterAFaultClearsNothing) {
+  for (const bool unmoved : {true, false}) {
+    state = {};
+    resume(0, 2);
+    tell(event::ClosureTaken{});
+    tell(event::RigFailed{{ErrorCode::timeout, "turntable: no reply"}});
+    tell(event::ClosureJudged{"job", {.unmoved = unmoved}});
+    EXPECT_EQ(state.machine, MachineState::error);
+    EXPECT_EQ(state.activity, Activity::stopping);
+    EXPECT_TRUE(actions.empty());
+  }
+}
+
 TEST_F(Resume, AClosureThatComesAfterStopChangesNothing) {
   resume(0, 2);
   press(Button::stop);

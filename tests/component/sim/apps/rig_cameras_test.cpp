@@ -145,13 +145,13 @@ TEST_F(RigCamerasTest, ALostFrameIsNamedAndTheNextExposureIsSound) {
   EXPECT_TRUE(expose(Light::pattern));
 }
 
-TEST_F(RigCamerasTest, HidesTheNumberOfTheEdgeWhereItIsAsked) {
+TEST_F(RigCamerasTest, NotesTheNumberOfTheEdgeInEveryFrameWhereItIsAsked) {
   start(true);
   ASSERT_TRUE(expose(Light::plain));
   const auto second = expose(Light::plain);
   ASSERT_TRUE(second) << second.error().message;
-  EXPECT_EQ(wire::hidden_number(second->left), 2u);
-  EXPECT_EQ(wire::hidden_number(second->right), 2u);
+  EXPECT_EQ(faint_number(second->left), 2u);
+  EXPECT_EQ(faint_number(second->right), 2u);
 }
 
 TEST_F(RigCamerasTest, ShowsTheOtherSideOfAnObjectTurnedOverAndWritesTheTruthOfBoth) {

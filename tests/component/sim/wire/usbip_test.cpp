@@ -172,9 +172,7 @@ TEST_F(UsbIp, WhoDoesNotAskForTheDeviceIsHungUpOn) {
   EXPECT_TRUE(host.receive(1).empty());
 }
 
-TEST_F(UsbIp, APortThatIsTakenIsAnError) {
-  EXPECT_EQ(UsbIpServer::start(kPort, device_).error().code, ErrorCode::io);
-}
+TEST_F(UsbIp, APortThatIsTakenIsAnError) { EXPECT_EQ(UsbIpServer::start(kPort, device_).error().code, ErrorCode::io); }
 
 }  // namespace
 }  // namespace scanrig::sim::wire

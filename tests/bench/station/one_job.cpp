@@ -21,7 +21,7 @@
 #include "daemon/run_daemon.h"
 #include "pipeline/scan/model/model_files.h"
 #include "tests/component/daemon/fake_rig.h"
-#include "tests/unit/pipeline/scan/scan_samples.h"
+#include "tests/unit/pipeline/scan/sample_files.h"
 
 namespace {
 
@@ -95,7 +95,7 @@ class Shift {
  private:
   bool wait(const std::function<bool(const PanelOutputs&)>& lamps) {
     const bool seen = rig_.panel.wait_for_lamps(lamps);
-    if (!seen) said_ = loop_->snapshot()->sentence;
+    if (!seen) said_ = loop_->snapshot()->cause + " " + loop_->snapshot()->sentence;
     return seen;
   }
   bool get_ready() {
@@ -127,8 +127,10 @@ class Shift {
 
   bool finish_all() {
     if (!get_ready()) return false;
-    for (const auto& [id, job] : loop_->snapshot()->jobs) {
+    const auto found = loop_->snapshot();
+    for (const auto& [id, job] : found->jobs) {
       if (job->state == JobState::interrupted) ask(job->resumable ? What::resume : What::cancel, id);
+      if (job->quarantined && !std::getenv("ONE_JOB_CRASH")) ask(What::reprocess, id);
     }
     while (!loop_->snapshot()->queue.empty()) {
       if (!start()) return false;
