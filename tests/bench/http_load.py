@@ -77,9 +77,11 @@ class Load:
             reader, writer = await self.connect(number)
             try:
                 writer.write(b"GET /api/v1/status HTTP/1.1\r\nX-Slow: ")
-                while not self.ended.is_set() and not reader.at_eof():
+                cut_off = asyncio.ensure_future(reader.read(1))
+                while not self.ended.is_set() and not cut_off.done():
                     writer.write(b"x")
-                    await asyncio.wait({asyncio.ensure_future(reader.read(1))}, timeout=LORIS_PAUSE_S)
+                    await asyncio.wait({cut_off}, timeout=LORIS_PAUSE_S)
+                cut_off.cancel()
             except OSError:
                 pass
             self.loris_cut += not self.ended.is_set()

@@ -14,6 +14,7 @@ OPTIONS = ("--poses", "1", "--speed-deg-s", "90", "--acceleration-deg-s2", "400"
 FULL = {"jobs": 3, "views": "8", "scale": 0.5, "voxel": "0.5"}
 QUICK = {"jobs": 1, "views": "4", "scale": 0.25, "voxel": "1"}
 JOB_LIMIT_S = 300
+LOOK_S = 0.005  # more often would be too often for the API
 P99_LIMIT_MS, AGE_LIMIT_MS, SLOWER_LIMIT_PERCENT = 20, 200, 2
 
 
@@ -56,6 +57,7 @@ def age_ms(rig):
     while time.monotonic() < end:
         if rig.ask("io")["inputs"]["part_present"] == pressed:
             return (time.monotonic_ns() - at_ns) / 1e6
+        time.sleep(LOOK_S)
     return 5000.0
 
 
