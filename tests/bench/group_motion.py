@@ -11,7 +11,7 @@ import motion_matrix
 import motion_safety
 
 PARSERS = [fuzz.Parser("grbl", "GRBL"), fuzz.Parser("drive_profile", "profile files"),
-           fuzz.Parser("modbus_io", "Modbus I/O", processes=32)]
+           fuzz.Parser("modbus_io", "Modbus I/O", processes=16)]
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 
 
