@@ -84,7 +84,12 @@ void read_limits(Section& s, RecipeConfig& recipe) {
   if (s.has("most_residual_mm")) s.number("most_residual_mm", recipe.most_residual_mm.emplace(), {0.001, 10});
 }
 
-void read_recipe(Section& s, const PanelConfig& panel, RecipeConfig& recipe) {
+/// What begins by a signal begins without a person: nobody may be able to reach the table then.
+void expect_guard(Section& s, const RigConfig& rig, std::string_view key, std::string_view value) {
+  if (!rig.safety.guard) s.report(key, fmt::format("\"{}\" needs a guard in [safety]", value));
+}
+
+void read_recipe(Section& s, const RigConfig& rig, RecipeConfig& recipe) {
   using Flip = RecipeConfig::Flip;
   using Start = RecipeConfig::Start;
   s.number("views", recipe.views, {3, 72});
@@ -95,18 +100,22 @@ void read_recipe(Section& s, const PanelConfig& panel, RecipeConfig& recipe) {
     s.choice<Start>("start", recipe.start, {{"button", Start::button}, {"part_present", Start::part_present}});
   }
   if (s.has("limits")) s.section("limits", [&](Section& limits) { read_limits(limits, recipe); });
-  if (recipe.flip == Flip::line && !panel.inputs.contains("flipped")) {
-    s.report("flip", "\"line\" needs the input flipped in [panel]");
+  if (recipe.flip == Flip::line) {
+    if (!rig.panel.inputs.contains("flipped")) s.report("flip", "\"line\" needs the input flipped in [panel]");
+    expect_guard(s, rig, "flip", "line");
   }
-  if (recipe.start == Start::part_present && !panel.inputs.contains("part_present")) {
-    s.report("start", "\"part_present\" needs the input part_present in [panel]");
+  if (recipe.start == Start::part_present) {
+    if (!rig.panel.inputs.contains("part_present")) {
+      s.report("start", "\"part_present\" needs the input part_present in [panel]");
+    }
+    expect_guard(s, rig, "start", "part_present");
   }
 }
 
-void read_recipes(Section& s, const PanelConfig& panel, std::map<std::string, RecipeConfig>& recipes) {
+void read_recipes(Section& s, RigConfig& rig) {
   const auto read = [&](const std::string& name) {
-    auto& recipe = recipes[name];
-    s.section(name, [&](Section& r) { read_recipe(r, panel, recipe); });
+    auto& recipe = rig.recipes[name];
+    s.section(name, [&](Section& r) { read_recipe(r, rig, recipe); });
   };
   read("default");
   for (const std::string& name : s.free_keys()) {
@@ -183,7 +192,7 @@ void read_rig(Section& root, const std::filesystem::path& base, const std::vecto
   root.section("panel", [&](Section& s) { read_panel(s, rig.panel); });
   root.section("safety", [&](Section& s) { read_safety(s, rig.panel, rig.safety); });
   root.section("calibration", [&](Section& s) { s.path("file", base, rig.calibration_file); });
-  root.section("recipe", [&](Section& s) { read_recipes(s, rig.panel, rig.recipes); });
+  root.section("recipe", [&](Section& s) { read_recipes(s, rig); });
   root.section("storage", [&](Section& s) { read_storage(s, base, rig.storage); });
   root.section("reconstruction", [&](Section& s) { read_reconstruction(s, rig.reconstruction); });
   if (root.has("quiet_hours")) {

@@ -66,6 +66,12 @@ TEST_F(RecipeConfigTest, SignalsNeedTheirInputs) {
   expect_problem(example_ + line_, "[recipe.line] start: \"part_present\" needs the input part_present in [panel]");
 }
 
+TEST_F(RecipeConfigTest, WhatBeginsByASignalNeedsAGuard) {
+  const auto open = replaced(with_inputs() + line_, "guard = { line = \"GUARD_OK\", active = \"low\" }", "#");
+  expect_problem(open, "[recipe.line] flip: \"line\" needs a guard in [safety]");
+  expect_problem(open, "[recipe.line] start: \"part_present\" needs a guard in [safety]");
+}
+
 TEST_F(RecipeConfigTest, LimitsAreChecked) {
   const auto text = replaced(with_inputs() + line_, "least_measured_share = 0.9", "least_measured_share = 90");
   expect_problem(text, "limits.least_measured_share: 90 is not between 0 and 1");
