@@ -31,6 +31,14 @@ TEST_F(AcquisitionTest, AViewIsFourImagesAtTheAngleMeasured) {
   EXPECT_TRUE(view->record.spoilt.empty());
 }
 
+TEST_F(AcquisitionTest, TheCamerasGetReadyBeforeTheTableTurnsAndNotWhenItStands) {
+  ASSERT_TRUE(acquisition.home());
+  clock.sleep_for(std::chrono::seconds(1));
+  const auto begun = clock.now();
+  ASSERT_TRUE(acquisition.take_view({"job", 0, 1}, {45.0}));
+  EXPECT_EQ(rig.line.ready_at, begun);
+}
+
 TEST_F(AcquisitionTest, TheSecondPoseGoesOnInTheNextTurn) {
   ASSERT_TRUE(acquisition.home());
   for (const double angle : {0.0, 120.0, 240.0}) ASSERT_TRUE(acquisition.take_view({"job", 0, 0}, {angle}));
