@@ -297,8 +297,10 @@ TEST(HostFinding, WhatWouldLoseFramesIsSaidInASentence) {
 
 TEST(AravisTriggers, WithoutTheTimeToBeginAnewArmingIsATimeout) {
   AravisBench bench;
-  ASSERT_TRUE(bench.opened());
-  const auto armed = bench.camera().arm(Deadline::after(bench.clock(), milliseconds(5)));
+  ASSERT_TRUE(expose(bench));
+  bench.far().tell("fault left lost 1");
+  ASSERT_FALSE(expose(bench));
+  const auto armed = bench.camera().arm(Deadline::after(bench.clock(), milliseconds(1)));
   ASSERT_FALSE(armed);
   EXPECT_EQ(armed.error().code, ErrorCode::timeout) << armed.error().message;
   EXPECT_TRUE(expose(bench));

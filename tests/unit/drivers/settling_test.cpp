@@ -47,7 +47,7 @@ class PromptDrive final : public AxisDrive {
 class PromptTable final : public AxisTurntable {
  public:
   PromptTable(const AxisTurntableOptions& options, Clock& clock)
-      : AxisTurntable(options, std::make_unique<PromptDrive>(clock), milliseconds(10), {}, clock) {}
+      : AxisTurntable(options, std::make_unique<PromptDrive>(clock), milliseconds(10), {-1e9, 1e9}, clock) {}
 };
 
 TEST(Settling, AMoveEndsWithTheSettleTimeAndNotWithAPeriodOfPollingMore) {
