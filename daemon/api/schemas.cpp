@@ -49,10 +49,11 @@ const char* const kSchemas = R"({
   "jobs": {"type": "array", "items": {"$ref": "#/components/schemas/Job"}},
   "next": {"type": "string", "nullable": true, "description": "`before` of the next page; null on the last"}}},
 "StoredView": {"type": "object", "additionalProperties": false,
-  "required": ["pose", "view", "measured_deg", "error_deg", "settling_ms", "redone"], "properties": {
+  "required": ["pose", "view", "measured_deg", "error_deg", "settling_ms", "redone", "spoilt"], "properties": {
   "pose": {"type": "integer"}, "view": {"type": "integer"}, "measured_deg": {"type": "number"},
   "error_deg": {"type": "number", "description": "measured less commanded"}, "settling_ms": {"type": "number"},
-  "redone": {"type": "integer", "description": "exposures that were lost and taken again"}}},
+  "redone": {"type": "integer", "description": "exposures that were lost or spoilt and taken again"},
+  "spoilt": {"type": "array", "items": {"$ref": "#/components/schemas/Problem"}, "description": "what was wrong with each"}}},
 "Closure": {"type": "object", "required": ["pose", "shift_px", "changed", "unmoved"], "additionalProperties": false,
   "description": "view 0, taken again, against the first one", "properties": {
   "pose": {"type": "integer"}, "shift_px": {"type": "number"}, "changed": {"type": "number"},
