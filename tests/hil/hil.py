@@ -67,7 +67,9 @@ def rows(rendered):
         [("killed", "daemon killed while the table turns", "made safe, restarted, Halted", scenario.killed)],
         [("watchdog", "watchdog starved", "killed, made safe, restarted, Halted", scenario.watchdog)],
         [("gige", "one pose of 8 views: LightCrafter over USB/IP, two GigE cameras at its trigger output",
-          "whole scan folder", lambda s: scenario.usb_and_gige(s, rendered))]]
+          "whole scan folder", lambda s: scenario.usb_and_gige(s, rendered)),
+         ("uart", "table homed and turned: Modbus on the kernel's 8250", "at its angle", scenario.uart),
+         ("vivid", "two vivid devices as a pair: V4L2", "pictures, a pair on disk", scenario.vivid)]]
 
 
 def live(table, station, acts):
@@ -127,7 +129,7 @@ def run(options, work, table):
 def main():
     parser = argparse.ArgumentParser(prog="./dev hil", description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="+", metavar="ROW",
-                        help="unit, pose, serial, estop, camera, killed, watchdog, gige; without the kills of the machine")
+                        help="unit, pose, serial, estop, camera, killed, watchdog, gige, uart, vivid; without the kills of the machine")
     parser.add_argument("--bin", type=pathlib.Path, required=True, help=argparse.SUPPRESS)
     options = parser.parse_args()
     options.bin = options.bin.resolve()

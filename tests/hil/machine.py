@@ -9,6 +9,7 @@ import time
 
 BOOT_S = 180
 COMMAND_S = 60
+UNPLUG_S = 10
 
 
 class Gone(RuntimeError):
@@ -81,6 +82,7 @@ class Machine:
             # The host's page cache survives the machine: what it holds back is only what the guest never wrote out.
             *drive(self.folder / "disk.ext4", "cache=writeback"),
             "-chardev", f"file,id=console,path={self.console},append=on", "-serial", "chardev:console",
+            "-chardev", "null,id=uart", "-serial", "chardev:uart",
             "-chardev", f"socket,id=qmp,path={self.folder / 'qmp.sock'}", "-mon", "chardev=qmp,mode=control",
             "-device", "virtio-serial-pci",
             "-chardev", f"socket,id=agent,path={self.folder / 'agent.sock'}",
@@ -123,6 +125,17 @@ class Machine:
                 raise RuntimeError(f"{command}: {answer['error']['desc']}")
             if "return" in answer:
                 return answer["return"]
+
+    def unplug_chardev(self, name):
+        """Once the device that used it has let go of it."""
+        end = time.monotonic() + UNPLUG_S
+        while True:
+            try:
+                return self.qmp("chardev-remove", id=name)
+            except RuntimeError:
+                if time.monotonic() > end:
+                    raise
+                time.sleep(0.1)
 
     def wait_for_boot(self):
         """Until its agent says that it is there."""

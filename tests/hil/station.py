@@ -30,8 +30,9 @@ def make_tree(build, tree, images):
     image.run("cmake", "--install", build, "--prefix", "/usr", "--strip", env={**os.environ, "DESTDIR": str(tree)})
     shutil.copytree(image.HERE / "guest", tree, symlinks=True, dirs_exist_ok=True)
     image.run("strip", "-o", tree / "usr/lib/hil/scanrig-edge-camera", build / "bin" / "scanrig-edge-camera")
-    other = with_sections(tree / "etc/scanrig/rig.toml", tree / "usr/share/hil/usb-and-gige.toml")
-    (tree / "etc/scanrig/usb-and-gige.toml").write_text(other)
+    for name in ("usb-and-gige.toml", "vivid.toml"):
+        other = with_sections(tree / "etc/scanrig/rig.toml", tree / "usr/share/hil" / name)
+        (tree / "etc/scanrig" / name).write_text(other)
     shutil.copytree(images, tree / "usr" / "share" / "hil" / "images")
 
 
@@ -87,6 +88,13 @@ class Station:
             self.machine.qmp("device_add", driver="usb-serial", id="adapter", bus="usb.0", chardev="turntable")
         else:
             self.machine.qmp("device_del", id="adapter")
+
+    def wire_uart(self):
+        """The drive's cable goes from the USB adapter to the machine's second 16550A."""
+        self.plug_serial(False)
+        self.machine.unplug_chardev("turntable")
+        self.machine.qmp("chardev-change", id="uart",
+                         backend={"type": "serial", "data": {"device": str(self.rig.folder / "turntable")}})
 
     # The operator's hands
 
