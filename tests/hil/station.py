@@ -1,5 +1,6 @@
 """The station in the virtual machine, with the simulated turntable of the host at its serial port."""
 import hashlib
+import http.client
 import json
 import os
 import pathlib
@@ -48,9 +49,10 @@ def with_sections(config, sections):
 class Station:
     """One boot of the machine, until it is left."""
 
-    def __init__(self, folder, cached, app, rig, more=()):
+    def __init__(self, folder, cached, app, rig):
         self.rig = rig
-        self.machine = machine.Machine(folder, cached, app, rig.folder / "turntable", more)
+        self.booted = folder / "booted"
+        self.machine = machine.Machine(folder, cached, app, rig.folder / "turntable", self.booted)
         self.told = None  # the angle that the cameras know of
         self.job = None  # the last one that was started
         self.leaving = threading.Event()
@@ -59,7 +61,11 @@ class Station:
     def __enter__(self):
         try:
             self.machine.wait_for_boot()
+            if not self.booted.is_file():
+                self.machine.do("systemctl start hil.target", 60)  # returns when it is reached
+                self.machine.keep(self.booted)
             self.plug_serial(True)
+            self.machine.do(f"date -s @{time.time():.3f} && systemctl start --no-block multi-user.target")
         except BaseException:
             self.machine.kill()
             raise
@@ -115,11 +121,15 @@ class Station:
     # The daemon
 
     def ask(self, what):
-        code, text = self.machine.call(f"curl -s -m 5 --unix-socket /run/scanrig/api.sock http://rig/api/v1/{what}")
+        wire = http.client.HTTPConnection("127.0.0.1", self.machine.http_port, timeout=5)
         try:
-            return json.loads(text) if code == 0 else None
-        except ValueError:
+            wire.request("GET", f"/api/v1/{what}", headers={"Host": "rig"})
+            answer = wire.getresponse()
+            return json.loads(answer.read()) if answer.status == 200 else None
+        except (OSError, http.client.HTTPException, ValueError):
             return None
+        finally:
+            wire.close()
 
     def status(self):
         return self.ask("status")
@@ -141,7 +151,7 @@ class Station:
                 return found
             if time.monotonic() > end:
                 raise Unmet(f"not {what} within {limit_s} s; {self.says()}")
-            time.sleep(0.1)
+            time.sleep(0.2)
 
     def wait_for_words(self, key, words, limit_s):
         def ready():
