@@ -196,7 +196,7 @@ Result<void> ReconstructionThread::make_model() {
 void ReconstructionThread::check(const Result<void>& done) {
   if (done) return;
   current_->error = done.error();
-  if (!stop_.stop_requested()) tell_(event::ReconstructionFailed{current_->job, done.error()});
+  if (!stop_.stop_requested()) tell_(event::ReconstructionFailed{current_->job, done.error(), current_->quarantined});
 }
 
 void ReconstructionThread::tell_progress(std::string stage, double fraction) {

@@ -155,12 +155,7 @@ class Transition : public Machine {
   void operator()(const event::PoseStored& e) { pose_stored(*this, e); }
   void operator()(const event::FlipTimedOut& e) { flip_timed_out(*this, e); }
 
-  /// What is on disk stays; with room again the job can be resumed.
-  void operator()(const event::StoreFailed& e) {
-    if (!has(e.job)) return;
-    close_job(JobState::interrupted, e.error);
-    fault(e.error.message + ".");
-  }
+  void operator()(const event::StoreFailed& e) { store_failed(*this, e); }
 
   void operator()(const event::ReconstructionFailed& e) {
     if (has(e.job)) s().job->reconstruction = e.error;
