@@ -131,6 +131,7 @@ class Transition : public Machine {
     s().home_by_guard = false;
     s().maintenance.reset();
     s().may_be_moving = true;
+    set_problem("turntable", e.error);  // nobody else will ask it now
     stopped();  // no more evidence will come by itself
     if (!s().shutting_down) act(action::RetryStopLater{});
   }

@@ -226,6 +226,9 @@ TEST_F(Station, ATableThatCannotBeSeenStandingIsSaidToMayBeMoving) {
   EXPECT_EQ(state.machine, MachineState::error);
   EXPECT_THAT(state.cause, HasSubstr("may be moving"));
   EXPECT_EQ(state.activity, Activity::none) << "or Reset could never be pressed";
+  ASSERT_EQ(state.devices.size(), 1u) << "shown as absent too, although nobody checks devices now";
+  EXPECT_EQ(state.devices[0].name, "turntable");
+  EXPECT_EQ(state.devices[0].problem->message, "turntable: no reply");
 }
 
 TEST_F(Station, AFullDiskInterruptsTheJobAndStopsTheTableButLatchesNothing) {
