@@ -61,14 +61,14 @@ def rows(rendered):
     """Name, what, asked, act; a life of the machine a list. Each life but the last is ended by a kill."""
     return [
         [("unit", "installed daemon under its unit", "active, exposure <= 2.0", scenario.unit),
-         ("pose", "one pose of 8 views: libgpiod, Modbus on ftdi_sio, V4L2", "whole scan folder",
-          lambda s: scenario.pose(s, rendered)),
          ("serial", "serial adapter unplugged and back", "named; back without a restart", scenario.serial_unplugged)],
         [("estop", "e-stop at the GPIO line", "named e-stop", scenario.estop)],
         [("camera", "cameras lost and back", "named; back without a restart", scenario.cameras_lost)],
         [("killed", "daemon killed while the table turns", "made safe, restarted, Halted", scenario.killed)],
         [("watchdog", "watchdog starved", "killed, made safe, restarted, Halted", scenario.watchdog)],
-        [("gige", "one pose of 8 views: LightCrafter over USB/IP, two GigE cameras at its trigger output",
+        [("pose", "one pose of 8 views: libgpiod, Modbus on ftdi_sio, V4L2", "whole scan folder",
+          lambda s: scenario.pose(s, rendered)),
+         ("gige", "one pose of 8 views: LightCrafter over USB/IP, two GigE cameras at its trigger output",
           "whole scan folder", lambda s: scenario.usb_and_gige(s, rendered)),
          ("uart", "table homed and turned: Modbus on the kernel's 8250", "at its angle", scenario.uart),
          ("vivid", "two vivid devices as a pair: V4L2", "pictures, a pair on disk", scenario.vivid)]]

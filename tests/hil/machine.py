@@ -84,7 +84,7 @@ class Machine:
             return ["-drive", f"file={file},format=raw,if=virtio,{options}"]
 
         command = [
-            "qemu-system-x86_64", "-accel", "tcg,thread=multi", "-machine", "q35", "-cpu", "max", "-smp", cores,
+            "qemu-system-x86_64", "-accel", "tcg,thread=multi", "-machine", "q35", "-cpu", "Nehalem", "-smp", cores,
             "-m", 2048, "-nodefaults", "-no-user-config", "-display", "none", "-no-reboot",
             "-kernel", cached / "vmlinuz", "-initrd", cached / "initrd",
             "-append", "console=ttyS0 quiet panic=-1 net.ifnames=0 mitigations=off systemd.show_status=0 systemd.log_target=journal "
