@@ -8,6 +8,7 @@ import argparse
 import json
 import os
 import pathlib
+import resource
 import shutil
 import sys
 import time
@@ -100,6 +101,12 @@ def live_and_die(table, boot, lives):
                held)
 
 
+def cpu_s():
+    """Of what this program started and saw the end of; far below cores times seconds: the machine was busy elsewhere."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def run(options, work, table):
     cache = image.ROOT / "build" / "hil"
     build = options.bin.parent
@@ -127,7 +134,7 @@ def run(options, work, table):
     if not options.only:
         limit = CACHED_S if was_there else COLD_S
         table.line(f"the whole of it, images {'cached' if was_there else 'made'}, {CORES} cores", f"<= {limit} s",
-                   f"{took:.0f} s", took <= limit)
+                   f"{took:.0f} s, {cpu_s():.0f} s of processor", took <= limit)
 
 
 def main():
