@@ -102,7 +102,7 @@ def live_and_die(table, boot, lives):
 
 
 def cpu_s():
-    """Of what this program started and saw the end of; far below cores times seconds: the machine was busy elsewhere."""
+    """Of all that this program started and saw the end of."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
@@ -140,7 +140,8 @@ def run(options, work, table):
 def main():
     parser = argparse.ArgumentParser(prog="./dev hil", description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="+", metavar="ROW",
-                        help="unit, pose, serial, estop, camera, killed, watchdog, gige, uart, vivid; without the kills of the machine")
+                        help="unit, serial, estop, camera, killed, watchdog, pose, gige, uart, vivid; "
+                        "without the kills of the machine")
     parser.add_argument("--cold", action="store_true", help="make the machine's images anew, and render what it sees")
     parser.add_argument("--bin", type=pathlib.Path, required=True, help=argparse.SUPPRESS)
     options = parser.parse_args()

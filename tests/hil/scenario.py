@@ -83,7 +83,8 @@ def uart(station):
     station.machine.do("ln -sf /dev/ttyS1 /dev/scanrig/turntable")
     port = station.machine.do("grep ^1: /proc/tty/driver/serial")
     expect("16550A" in port, f"the port is {port}")
-    moved = json.loads(station.machine.do(f"scanrig turntable move {UART_DEG} --yes --json --config {CONFIGS}/rig.toml"))
+    move = f"scanrig turntable move {UART_DEG} --yes --json --config {CONFIGS}/rig.toml"
+    moved = json.loads(station.machine.do(move))
     off = abs(moved["measured_deg"] - UART_DEG)
     truth = station.rig.truth()["angle_deg"] % 360
     expect(off < 0.02 and abs(truth - UART_DEG) < 0.1, f"asked for {UART_DEG} deg: {moved}, truth {truth:.3f} deg")
