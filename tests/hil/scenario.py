@@ -44,7 +44,9 @@ def wait_for_views(station, job, count, limit_s=SCAN_S):
 
 def pose(station, rendered):
     """Start pressed at the panel; one pose of 8 views. `rendered`: sha256 by file of what the cameras show."""
-    stop_job(station)
+    if station.job:
+        end_job(station)
+        station.machine.do("systemctl start scanrigd", 60)
     station.get_ready()
     begin = time.monotonic()
     job = station.start()
@@ -56,7 +58,6 @@ def pose(station, rendered):
     wrong = [name for name in names if stored.get(name) != rendered[name]]
     expect(not wrong, f"{len(wrong)} of {len(names)} images are not those that were shown: {', '.join(wrong[:4])}")
     off = max(abs(view["measured_deg"] - view["commanded_deg"]) for view in station.views(job))
-    stop_job(station)
     return f"{VIEWS} views, {len(names)} images byte for byte, {off:.4f} deg off at most, {took:.0f} s"
 
 
@@ -67,7 +68,8 @@ def usb_and_gige(station, rendered):
     station.told = None  # the angle has to be said again
     attach = "ip netns exec cameras usbip attach -r 127.0.0.1 -b 1-1"
     station.wait("the LightCrafter attached", lambda: station.machine.call(attach)[0] == 0, 20)
-    station.machine.do("cp /etc/scanrig/usb-and-gige.toml /etc/scanrig/rig.toml && systemctl restart scanrigd", 30)
+    end_job(station)
+    station.machine.do(f"cp {CONFIGS}/usb-and-gige.toml {CONFIGS}/rig.toml && systemctl start scanrigd", 60)
     for device in ("projector", "camera"):
         station.wait(f"the {device} there", lambda name=device: device_is_there(station, name), 30)
     return pose(station, rendered)
@@ -75,22 +77,24 @@ def usb_and_gige(station, rendered):
 
 def uart(station):
     """The table homed and turned with the command line, at a serial port of the machine's own."""
-    station.machine.do("systemctl stop scanrigd", 30)
+    end_job(station)
     station.wire_uart()
     station.wait("the USB adapter's port gone", lambda: station.machine.call("test -e /dev/ttyUSB0")[0] != 0, 10)
     station.machine.do("ln -sf /dev/ttyS1 /dev/scanrig/turntable")
     port = station.machine.do("grep ^1: /proc/tty/driver/serial")
     expect("16550A" in port, f"the port is {port}")
-    moved = json.loads(station.machine.do(f"scanrig turntable move {UART_DEG} --yes --json --config {CONFIGS}/rig.toml"))
+    move = f"scanrig turntable move {UART_DEG} --yes --json --config {CONFIGS}/rig.toml"
+    moved = json.loads(station.machine.do(move))
     off = abs(moved["measured_deg"] - UART_DEG)
-    truth = station.rig.truth()["angle_deg"]
+    truth = station.rig.truth()["angle_deg"] % 360
     expect(off < 0.02 and abs(truth - UART_DEG) < 0.1, f"asked for {UART_DEG} deg: {moved}, truth {truth:.3f} deg")
     return f"ttyS1, 16550A: home, then {moved['measured_deg']:.3f} deg; truth {truth:.3f} deg"
 
 
 def vivid(station):
     """The V4L2 driver on a capture driver of the kernel's own, frames by a timer."""
-    station.machine.do("systemctl stop scanrigd && modprobe vivid && udevadm settle -t 10", 60)
+    end_job(station)
+    station.machine.do("modprobe vivid && udevadm settle -t 10")
     config = f"--light none --config {CONFIGS}/vivid.toml"
     tuned = station.machine.do(f"scanrig camera tune --count {PAIRS} {config}")
     bright = [float(percent) for percent in re.findall(r"brightness +([\d.]+) %", tuned)]
@@ -103,11 +107,11 @@ def vivid(station):
     return f"{PAIRS} pairs seen, brightness {min(bright):.0f} to {max(bright):.0f} %; one grabbed, {size[0]}x{size[1]}"
 
 
-def stop_job(station):
-    """Ends a scan and takes its folder away: in an emulated machine its reconstruction would take minutes."""
-    if station.job:
-        station.machine.do(f"systemctl stop scanrigd && rm -r {JOBS}/{station.job} && systemctl start scanrigd", 60)
-        station.job = None
+def end_job(station):
+    """The station stopped, its job's folder taken away: in an emulated machine a reconstruction would take minutes."""
+    away = f" && rm -rf {JOBS}/{station.job}" if station.job else ""
+    station.machine.do(f"systemctl stop scanrigd{away}", 60)
+    station.job = None
 
 
 def scanning(station):
