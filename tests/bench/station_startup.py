@@ -14,7 +14,7 @@ import motion_rig
 
 API_LIMIT_S, DEVICES_LIMIT_S, STATE_LIMIT_S = 1.0, 10.0, 60.0
 OLD_JOBS = 500
-OPTIONS = ("--cameras", "gige", "--scale", "0.25", "--views", "1", "--poses", "1")
+OPTIONS = ("--cameras", "gige", "--scale", "0.25", "--views", "4", "--poses", "1")
 
 
 def boot(rig, devices, state):
