@@ -44,12 +44,15 @@ ordered_json to_detailed_json(const JobInfo& job) {
   auto json = to_json(job);
   json["stored"] = ordered_json::array();
   for (const auto& v : job.stored) {
+    auto spoilt = ordered_json::array();
+    for (const auto& why : v.spoilt) spoilt.push_back(to_json(why));
     json["stored"].push_back({{"pose", v.pose},
                               {"view", v.view},
                               {"measured_deg", v.measured_deg},
                               {"error_deg", v.measured_deg - v.commanded_deg},
                               {"settling_ms", v.settling_ms},
-                              {"redone", v.redone}});
+                              {"redone", v.spoilt.size()},
+                              {"spoilt", std::move(spoilt)}});
   }
   json["closures"] = ordered_json::array();
   for (const auto& c : job.closures) {

@@ -12,10 +12,12 @@ using nlohmann::json;
 
 std::string view_line(const json& view, const json& job) {
   const int redone = view.at("redone");
-  return fmt::format("  pose {}/{}  view {}/{}  {:8.3f} deg  stored{}", view.at("pose").get<int>() + 1,
-                     job.at("poses").get<int>(), view.at("view").get<int>() + 1, job.at("views").get<int>(),
-                     view.at("measured_deg").get<double>(),
-                     redone == 0 ? "" : fmt::format(", {} exposure{} redone", redone, redone == 1 ? "" : "s"));
+  std::string line = fmt::format(
+      "  pose {}/{}  view {}/{}  {:8.3f} deg  stored{}", view.at("pose").get<int>() + 1, job.at("poses").get<int>(),
+      view.at("view").get<int>() + 1, job.at("views").get<int>(), view.at("measured_deg").get<double>(),
+      redone == 0 ? "" : fmt::format(", {} exposure{} redone", redone, redone == 1 ? "" : "s"));
+  for (const auto& why : view.at("spoilt")) line += "\n      redone: " + why.at("message").get<std::string>();
+  return line;
 }
 
 }  // namespace

@@ -28,6 +28,12 @@ void add_job(const json& job, std::vector<std::string>& lines) {
   lines.push_back(fmt::format("job {}: {}", text(job, "id"), text(job, "state")));
   lines.push_back(fmt::format("  {:<22} {}  {} of {}", "views stored",
                               share(static_cast<double>(stored) / static_cast<double>(all)), stored, all));
+  for (const auto& view : job.at("stored")) {
+    for (const auto& why : view.value("spoilt", json::array())) {
+      lines.push_back(fmt::format("  pose {} view {}: an exposure was redone: {}", view.at("pose").get<int>() + 1,
+                                  view.at("view").get<int>() + 1, text(why, "message")));
+    }
+  }
   for (const auto& stage : job.at("stages")) {
     lines.push_back(fmt::format("  {:<22} {}", text(stage, "name"), share(stage.at("fraction"))));
   }

@@ -9,11 +9,17 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kLayout = 1;  ///< to be raised with every change below
+constexpr int kLayout = 2;  ///< to be raised with every change below
 
 json to_json(const std::optional<Error>& error) {
   if (!error) return nullptr;
   return {to_string(error->code), error->message};
+}
+
+json to_json(const std::vector<Error>& errors) {
+  json list = json::array();
+  for (const auto& error : errors) list.push_back(to_json(std::optional(error)));
+  return list;
 }
 
 std::optional<Error> error_from(const json& j) {
@@ -21,9 +27,17 @@ std::optional<Error> error_from(const json& j) {
   return Error{parse_error_code(j.at(0).get<std::string>()).value_or(ErrorCode::internal), j.at(1)};
 }
 
+std::vector<Error> errors_from(const json& list) {
+  std::vector<Error> errors;
+  for (const auto& error : list) errors.push_back(error_from(error).value());
+  return errors;
+}
+
 json views_of(const JobInfo& job) {
   json views = json::array();
-  for (const auto& v : job.stored) views.push_back({v.pose, v.view, v.measured_deg, v.commanded_deg, v.settling_ms});
+  for (const auto& v : job.stored) {
+    views.push_back({v.pose, v.view, v.measured_deg, to_json(v.spoilt), v.commanded_deg, v.settling_ms});
+  }
   return views;
 }
 
@@ -44,7 +58,9 @@ void read(const json& j, JobInfo& job) {
   job.error = error_from(j.at("error"));
   job.model = j.at("model");
   job.report = j.at("report");
-  for (const auto& v : j.at("stored")) job.stored.push_back({v.at(0), v.at(1), v.at(2), 0, v.at(3), v.at(4)});
+  for (const auto& v : j.at("stored")) {
+    job.stored.push_back({v.at(0), v.at(1), v.at(2), errors_from(v.at(3)), v.at(4), v.at(5)});
+  }
   for (const auto& c : j.at("closures")) job.closures.push_back({c.at(0), c.at(1), c.at(2), c.at(3)});
 }
 

@@ -30,7 +30,7 @@ void take_views(JobInfo& job, const Manifest& manifest) {
     const auto& pose = manifest.poses[p];
     const int number = static_cast<int>(p);
     for (const auto& view : pose.views) {
-      job.stored.push_back({number, view.index, view.measured_deg, 0, view.commanded_deg, view.settling_ms});
+      job.stored.push_back({number, view.index, view.measured_deg, view.spoilt, view.commanded_deg, view.settling_ms});
     }
     for (const auto& closure : pose.closures) {
       job.closures.push_back({number, closure.shift_px, closure.changed, closure.unmoved});

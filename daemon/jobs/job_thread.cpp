@@ -167,7 +167,7 @@ void JobThread::handle(const action::StoreView& task) {
   const auto stored = scan_->add_view(static_cast<std::size_t>(view.id.pose), view.record, view.images);
   if (!stored) return tell_(event::StoreFailed{view.id.job, stored.error()});
   reconstruction_.add_view(task.view);
-  tell_(event::ViewStored{view.id, view.record.measured_deg, view.redone, view.record.commanded_deg,
+  tell_(event::ViewStored{view.id, view.record.measured_deg, view.record.spoilt, view.record.commanded_deg,
                           view.record.settling_ms});
 }
 

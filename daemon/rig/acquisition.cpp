@@ -40,13 +40,15 @@ Result<void> Acquisition::home() {
 Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle) {
   const unsigned before = interrupts_;
   if (id.job != std::exchange(job_, id.job)) judge_.begin();
+  // What the cameras need before they can expose is done before the table stands; if they fail, the exposure says so.
+  std::ignore = devices_.camera.ready(Deadline::after(clock_, options_.exposure_limit));
   const auto move = turn_to(angle);
   if (!move) return pass_on(move);
 
   TakenView view{.id = id};
-  const auto pattern = expose(Light::pattern, before, view.redone);
+  const auto pattern = expose(Light::pattern, before, view.record.spoilt);
   if (!pattern) return pass_on(pattern);
-  const auto plain = expose(Light::plain, before, view.redone);
+  const auto plain = expose(Light::plain, before, view.record.spoilt);
   if (!plain) return pass_on(plain);
 
   view.record.index = id.view;
@@ -107,12 +109,12 @@ Result<Move> Acquisition::turn_to(Degrees angle) {
   return move;
 }
 
-Result<StereoFrame> Acquisition::expose(Light light, unsigned before, int& redone) {
+Result<StereoFrame> Acquisition::expose(Light light, unsigned before, std::vector<Error>& spoilt) {
   for (int i = 0;; ++i) {
     if (interrupts_ != before) return fail(ErrorCode::stopped, "rig: stopped on request before the exposure");
     auto frame = expose_once(light);
     if (frame || !may_pass(frame.error()) || i == options_.redo_limit || interrupts_ != before) return frame;
-    ++redone;
+    spoilt.push_back(frame.error());
   }
 }
 

@@ -37,8 +37,9 @@ class Acquisition {
   Result<void> home();
 
   /// Turns to `angle`, the shorter way, and takes the four images. An exposure whose frames are lost, torn or not fit
-  /// for use (see PictureJudge), or during which camera or projector vanished, is redone and counted. A table wound up
-  /// by several jobs is unwound on the way. Fails as the device that failed; the table has been told to stop then.
+  /// for use (see PictureJudge), or during which camera or projector vanished, is redone, and what was wrong with it
+  /// noted. A table wound up by several jobs is unwound on the way. Fails as the device that failed; the table has been
+  /// told to stop then.
   Result<TakenView> take_view(const ViewId& id, Degrees angle);
 
   /// Turns an engineer's way, no faster than asked; the angle measured. Fails as Turntable::rotate_to, and with
@@ -68,7 +69,7 @@ class Acquisition {
  private:
   Result<Move> turn_to(Degrees angle);
   /// `before`: what interrupts() was when the view was begun.
-  Result<StereoFrame> expose(Light light, unsigned before, int& redone);
+  Result<StereoFrame> expose(Light light, unsigned before, std::vector<Error>& spoilt);
   Result<StereoFrame> expose_once(Light light);
 
   Devices devices_;

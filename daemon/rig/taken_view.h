@@ -10,7 +10,6 @@ struct TakenView {
   ViewId id;
   ViewRecord record{};  ///< `files` still empty
   RawView images{};
-  int redone = 0;  ///< exposures that were lost and taken again
 };
 
 }  // namespace scanrig

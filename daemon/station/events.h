@@ -162,7 +162,7 @@ struct FlipTimedOut {
 struct ViewStored {
   ViewId id;
   double measured_deg;
-  int redone;
+  std::vector<Error> spoilt{};  ///< exposures that were taken again, and why
   double commanded_deg = 0.0;
   double settling_ms = 0.0;
 };  ///< it survives a power cut

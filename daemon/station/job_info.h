@@ -15,7 +15,7 @@ struct StoredView {
   int pose = 0;
   int view = 0;
   double measured_deg = 0.0;
-  int redone = 0;  ///< exposures that were lost and taken again
+  std::vector<Error> spoilt{};  ///< exposures that were taken again, and why
   double commanded_deg = 0.0;
   double settling_ms = 0.0;  ///< from in-position to still
 };

@@ -53,7 +53,7 @@ void update(JobTable& table, const Event& event) {
           [&](const event::ViewStored& e) {
             change(table, e.id.job, [&](JobInfo& job) {
               job.state = JobState::scanning;
-              job.stored.push_back({e.id.pose, e.id.view, e.measured_deg, e.redone, e.commanded_deg, e.settling_ms});
+              job.stored.push_back({e.id.pose, e.id.view, e.measured_deg, e.spoilt, e.commanded_deg, e.settling_ms});
             });
           },
           [&](const event::PoseStored& e) {

@@ -16,7 +16,7 @@ void EventTally::see(const Event& event, Clock::TimePoint now) {
   };
   std::visit(Overloaded{[&](const event::ViewStored& e) {
                           ++counters_.views_stored;
-                          counters_.exposures_redone += static_cast<std::uint64_t>(e.redone);
+                          counters_.exposures_redone += e.spoilt.size();
                         },
                         [&](const event::StageProgress& e) {
                           const auto since = running_.try_emplace({e.job, e.stage}, now).first;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <thread>
 
 namespace scanrig {
 namespace {
@@ -85,33 +86,39 @@ AravisSensor::AravisSensor(const std::string& side, const AravisSensorOptions& s
                            Clock& clock)
     : sensor_(sensor), options_(options), clock_(clock), attempt_(fmt::format("{} camera {}", side, sensor.serial)) {}
 
-AravisSensor::~AravisSensor() { disconnect(); }
+AravisSensor::~AravisSensor() {
+  if (!lost_) stop_stream();
+  std::ignore = let_go({clock_.now()});
+  // Nobody waits longer for a device that is gone: the thread owns all it needs.
+  constexpr auto kLastWait = std::chrono::seconds(3);
+  if (giving_up_.valid()) giving_up_.wait_for(kLastWait);
+}
 
 std::uint64_t AravisSensor::id_ring() const { return camera_ && arv_camera_is_uv_device(camera_.get()) ? 0 : kGigeIds; }
 
 Result<bool> AravisSensor::ready(Deadline deadline) {
   if (camera_ && !lost_) ask_whether_there();
   if (camera_ && !lost_) return false;
-  disconnect();
+  if (auto free = let_go(deadline); !free) return pass_on(free);
   if (deadline.expired(clock_)) return fail(ErrorCode::timeout, "{}: no time left to connect", name());
   auto connected = connect();
   if (connected) connected = start_stream();
-  if (!connected) {
-    disconnect();
-    return pass_on(connected);
-  }
-  return true;
+  if (connected) return true;
+  lost_ = true;
+  std::ignore = let_go({clock_.now()});  // if that has to wait, the next call does
+  return pass_on(connected);
 }
 
 /// The library's own heartbeat takes many seconds to give a camera up.
 void AravisSensor::ask_whether_there() {
-  constexpr auto kSilence = std::chrono::seconds(1);
+  constexpr auto kSilence = std::chrono::seconds(3);  // longer than a move: while all is well a scan asks nothing
   constexpr guint64 kVersion = 0;  // a register every GigE Vision and USB3 Vision device has [GigE Vision 1.2, 28]
-  if (clock_.now() - heard_ < kSilence) return;
+  if (!in_doubt_ && clock_.now() - heard_ < kSilence) return;
   const auto asked = attempt_("ask whether it is there", [&](GError** error) {
     guint32 value = 0;
     arv_device_read_register(arv_camera_get_device(camera_.get()), kVersion, &value, error);
   });
+  in_doubt_ = false;
   if (asked) heard_ = clock_.now();
   if (!asked) lost_ = true;
 }
@@ -170,13 +177,28 @@ Result<void> AravisSensor::start_stream() {
   return attempt_("start the acquisition", [&](GError** error) { arv_camera_start_acquisition(camera_.get(), error); });
 }
 
-void AravisSensor::disconnect() {
-  if (camera_ && stream_ && !lost_) {
-    std::ignore = attempt_("stop", [&](GError** error) { arv_camera_stop_acquisition(camera_.get(), error); });
+void AravisSensor::stop_stream() {
+  if (!camera_ || !stream_) return;
+  std::ignore = attempt_("stop", [&](GError** error) { arv_camera_stop_acquisition(camera_.get(), error); });
+}
+
+/// The library takes some ten seconds to give up a device that does not answer: on a thread of its own, one at a time.
+/// Fails with `timeout` while the one before is still being given up.
+Result<void> AravisSensor::let_go(Deadline deadline) {
+  if (!camera_) return {};
+  if (giving_up_.valid() && giving_up_.wait_for(deadline.left(clock_)) != std::future_status::ready) {
+    return fail(ErrorCode::timeout, "{}: lost twice, the first connection is still being given up; try again in 10 s",
+                name());
   }
-  if (camera_) g_signal_handlers_disconnect_by_data(arv_camera_get_device(camera_.get()), &lost_);
-  stream_.reset();
-  camera_.reset();
+  g_signal_handlers_disconnect_by_data(arv_camera_get_device(camera_.get()), &lost_);
+  std::promise<void> gone;
+  giving_up_ = gone.get_future();
+  std::thread([camera = std::move(camera_), stream = std::move(stream_), gone = std::move(gone)]() mutable {
+    stream.reset();
+    camera.reset();
+    gone.set_value();
+  }).detach();
+  return {};
 }
 
 Result<std::optional<SensorFrame>> AravisSensor::next(Deadline deadline) {
@@ -187,6 +209,7 @@ Result<std::optional<SensorFrame>> AravisSensor::next(Deadline deadline) {
                           : arv_stream_try_pop_buffer(stream_.get());
   if (!buffer) {
     if (lost_) return fail(ErrorCode::io, "{}: the connection is lost; check power and cable", name());
+    in_doubt_ = in_doubt_ || wait.count() > 0;
     return std::nullopt;
   }
   auto frame = read(buffer);

@@ -3,6 +3,7 @@
 #include <arv.h>
 
 #include <atomic>
+#include <future>
 #include <memory>
 
 #include "drivers/camera/aravis_stereo_camera.h"
@@ -60,7 +61,8 @@ class AravisSensor final : public Sensor {
  private:
   Result<void> connect();
   Result<void> start_stream();
-  void disconnect();
+  void stop_stream();
+  Result<void> let_go(Deadline deadline);
   Result<SensorFrame> read(ArvBuffer* buffer) const;
   void ask_whether_there();
 
@@ -70,9 +72,11 @@ class AravisSensor final : public Sensor {
   const Attempts attempt_;
   GRef<ArvCamera> camera_;
   GRef<ArvStream> stream_;
+  std::future<void> giving_up_;         // ready when the connection lost last is given up
   std::optional<std::string> finding_;  // about this machine, see host_finding()
   std::atomic<bool> lost_ = false;      // set by a thread of the library
   Clock::TimePoint heard_{};            // the last answer or frame
+  bool in_doubt_ = false;               // a frame was waited for and did not come
   bool listens_to_line_ = true;
 };
 

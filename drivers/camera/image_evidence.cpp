@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core.hpp>
 #include <vector>
 
 namespace scanrig {
@@ -34,11 +35,14 @@ int bend_at(const std::uint8_t* above, const std::uint8_t* here, const std::uint
   return here[i + pitch] + here[i - pitch] + below[i] + above[i] - 4 * here[i];
 }
 
+/// Enough for statistics, and the exposure that follows waits for them. Rows of a mosaic are rows of one colour.
+constexpr int kEveryRow = 4;
+
 /// For independent grains seen through a Gaussian blur of standard deviation s, the spectrum falls as exp(-s^2 w^2),
 /// and the mean squares of gradient and Laplacian are as s^2 to 2.
 double blur_px(const Plane& plane) {
   double gradient = 0.0, laplacian = 0.0;
-  for (int y = 1; y + 1 < plane.rows(); ++y) {
+  for (int y = 1; y + 1 < plane.rows(); y += kEveryRow) {
     const std::uint8_t *above = plane.row(y - 1), *here = plane.row(y), *below = plane.row(y + 1);
     std::int64_t row_gradient = 0, row_laplacian = 0;
     for (int x = 1; x + 1 < plane.cols(); ++x) {
@@ -59,17 +63,9 @@ double blur_px(const Plane& plane) {
 
 ImageEvidence measure(const cv::Mat& image, PixelFormat format) {
   if (image.empty()) return {};
-  std::int64_t sum = 0, full = 0;
-  const int bytes = image.cols * image.channels();
-  for (int y = 0; y < image.rows; ++y) {
-    const std::uint8_t* row = image.ptr<std::uint8_t>(y);
-    for (int x = 0; x < bytes; ++x) {
-      sum += row[x];
-      full += row[x] == 255;
-    }
-  }
-  const double count = static_cast<double>(image.rows) * bytes;
-  return {static_cast<double>(sum) / (255.0 * count), static_cast<double>(full) / count,
+  const cv::Mat bytes = image.reshape(1);
+  const auto count = static_cast<double>(bytes.total());
+  return {cv::sum(bytes)[0] / (255.0 * count), cv::countNonZero(bytes == 255) / count,
           blur_px(plane_of(image, format))};
 }
 
@@ -79,7 +75,6 @@ double likeness(const cv::Mat& left, const cv::Mat& right, PixelFormat format) {
   }
   const Plane a = plane_of(left, format), b = plane_of(right, format);
   // Row by row: a mark in one corner, or an edge that lies along a row, says nothing about the pictures.
-  constexpr int kEveryRow = 4;
   std::vector<double> rows;
   for (int y = 1; y + 1 < a.rows(); y += kEveryRow) {
     std::int64_t both = 0, only_a = 0, only_b = 0;

@@ -8,7 +8,7 @@ namespace {
 using Finding = TriggerLedger::Finding;
 
 constexpr int kWarmUpTries = 4;
-constexpr const char* kRedo = "arm again and repeat the exposure";
+constexpr const char* kRedo = "repeat the exposure, and if this goes on check the cable and the load on the line";
 
 double milliseconds(std::chrono::nanoseconds time) { return std::chrono::duration<double, std::milli>(time).count(); }
 
@@ -18,35 +18,38 @@ SensorCamera::SensorCamera(std::vector<std::unique_ptr<Sensor>> sensors, const T
     : options_(options), clock_(clock) {
   for (auto& sensor : sensors) {
     const TriggerLedger ledger(sensor->id_ring(), sensor->shares_host_clock());
-    channels_.push_back({std::move(sensor), ledger, std::nullopt});
+    channels_.push_back({std::move(sensor), ledger});
   }
 }
 
 Result<void> SensorCamera::ready(Deadline deadline) {
-  for (Channel& channel : channels_) {
-    if (auto ready = get_ready(channel, deadline); !ready) return ready;
-  }
-  return {};
+  if (auto connected = connect(deadline); !connected || armed_) return connected;
+  return get_in_step(deadline);
 }
 
 Result<void> SensorCamera::arm(Deadline deadline) {
   if (std::exchange(armed_, false)) in_step_ = false;  // an exposure given up; its frames may be on their way
-  const bool dead_air = clock_.now() - last_exposure_ > options_.dead_air;
-  if (auto connected = ready(deadline); !connected) return connected;
+  if (auto connected = connect(deadline); !connected) return connected;
   for (Channel& channel : channels_) {
     if (auto thrown = throw_away(channel, clock_.now()); !thrown) return thrown;
-    if (in_step_ && !dead_air && channel.ledger.knows_id()) continue;
-    if (auto warm = warm_up(channel, deadline); !warm) {
-      in_step_ = false;
-      return warm;
-    }
   }
-  in_step_ = armed_ = true;
+  if (auto in_step = get_in_step(deadline); !in_step) return in_step;
+  for (Channel& channel : channels_) {
+    if (auto listens = listen(channel); !listens) return listens;
+  }
+  armed_ = true;
   trigger_after_ = clock_.now();
   return {};
 }
 
-Result<void> SensorCamera::get_ready(Channel& channel, Deadline deadline) {
+Result<void> SensorCamera::connect(Deadline deadline) {
+  for (Channel& channel : channels_) {
+    if (auto connected = connect(channel, deadline); !connected) return connected;
+  }
+  return {};
+}
+
+Result<void> SensorCamera::connect(Channel& channel, Deadline deadline) {
   const auto connected_anew = channel.sensor->ready(deadline);
   if (!connected_anew) return pass_on(connected_anew);
   if (*connected_anew) {
@@ -59,6 +62,7 @@ Result<void> SensorCamera::get_ready(Channel& channel, Deadline deadline) {
 /// Its clock may have begun again, so neither it nor the pair's common time is known.
 void SensorCamera::forget(Channel& channel) {
   channel.ledger.forget();
+  channel.warm = false;
   for (Channel& each : channels_) each.last_pair.reset();
 }
 
@@ -72,6 +76,20 @@ Result<void> SensorCamera::throw_away(Channel& channel, Clock::TimePoint until) 
     ++counts_.strays;
     in_step_ = false;
   }
+}
+
+/// Nothing to do while one good exposure follows the other.
+Result<void> SensorCamera::get_in_step(Deadline deadline) {
+  const bool all = !in_step_ || clock_.now() - last_in_step_ > options_.dead_air;
+  for (Channel& channel : channels_) {
+    if (!all && channel.warm) continue;
+    in_step_ = false;
+    if (auto warm = warm_up(channel, deadline); !warm) return warm;
+    channel.warm = true;
+    last_in_step_ = clock_.now();
+  }
+  in_step_ = true;
+  return {};
 }
 
 Result<void> SensorCamera::warm_up(Channel& channel, Deadline deadline) {
@@ -104,13 +122,18 @@ Result<void> SensorCamera::warm_up(Channel& channel, Deadline deadline) {
     return fail(ErrorCode::protocol, "{}: {} exposures for warming up gave no frame in order; check cable and load",
                 channel.sensor->name(), kWarmUpTries);
   }
+  return listen(channel);
+}
+
+/// To the projector's edge again, after exposures by software.
+Result<void> SensorCamera::listen(Channel& channel) {
+  if (!channel.sensor->can_trigger()) return {};
   return channel.sensor->listen_to_line(options_.by == TriggeringOptions::By::line);
 }
 
 /// One exposure by software. Nothing if its frame was torn, or did not come; the next one may.
 Result<std::optional<SensorFrame>> SensorCamera::expose_once(Channel& channel, Deadline deadline) {
-  last_exposure_ = clock_.now();
-  const auto begin = last_exposure_;
+  const auto begin = clock_.now();
   if (auto triggered = channel.sensor->trigger(); !triggered) return pass_on(triggered);
   const Deadline limit = deadline.at_most(clock_, options_.frame_timeout);
   for (;;) {
@@ -149,16 +172,20 @@ Result<StereoFrame> SensorCamera::collect(Deadline deadline) {
   if (!frames) return pass_on(frames);
   if (auto together = expect_one_moment(*frames); !together) return pass_on(together);
   in_step_ = true;
-  last_exposure_ = clock_.now();
+  last_in_step_ = clock_.now();
   ++counts_.pairs;
   return hand_out(*frames);
 }
 
 Result<StereoFrame> SensorCamera::look(Deadline deadline) {
   const bool running = options_.by == TriggeringOptions::By::free_run;
-  armed_ = false;
-  in_step_ = running;  // the next arm() begins counting anew
-  if (auto connected = ready(deadline); !connected) return pass_on(connected);
+  if (std::exchange(armed_, false)) in_step_ = running;  // its frames may be on their way
+  if (auto connected = connect(deadline); !connected) return pass_on(connected);
+  for (const Channel& channel : channels_) {
+    if (running || channel.sensor->can_trigger()) continue;
+    return fail(ErrorCode::unsupported, "{}: exposes at an edge of its trigger input only", channel.sensor->name());
+  }
+  const bool in_step = std::exchange(in_step_, false) || running;  // false until it is seen to go well
   trigger_after_ = clock_.now();
   std::vector<SensorFrame> frames;
   for (Channel& channel : channels_) {
@@ -167,13 +194,12 @@ Result<StereoFrame> SensorCamera::look(Deadline deadline) {
     if (!frame) return pass_on(frame);
     frames.push_back(std::move(*frame));
   }
+  in_step_ = in_step;
+  if (in_step_) last_in_step_ = clock_.now();
   return hand_out(frames);
 }
 
 Result<SensorFrame> SensorCamera::expose_by_software(Channel& channel, Deadline deadline) {
-  if (!channel.sensor->can_trigger()) {
-    return fail(ErrorCode::unsupported, "{}: exposes at an edge of its trigger input only", channel.sensor->name());
-  }
   if (!channel.ledger.knows_clock()) {
     if (auto warm = warm_up(channel, deadline); !warm) return pass_on(warm);
   }

@@ -38,14 +38,15 @@ struct TriggerCounts {
 
 /// A stereo camera of two sensors, or of one that delivers both images side by side. Every exposure is counted: one
 /// trigger, one whole frame from each sensor, ids without a gap, each sensor's interval since its last trigger in step
-/// with the host's and with the other sensor's. After a failure, a return or dead air arm() waits for what may be on
-/// its way and makes an exposure of its own (with sensors that have a software trigger) from which the count begins
-/// again.
+/// with the host's and with the other sensor's. After a failure, a return or dead air ready(), or else arm(), waits for
+/// what may be on its way and makes an exposure of its own (with sensors that have a software trigger) from which the
+/// count begins again.
 class SensorCamera final : public StereoCamera {
  public:
   /// `sensors`: left and right, or one for both.
   SensorCamera(std::vector<std::unique_ptr<Sensor>> sensors, const TriggeringOptions& options, Clock& clock);
 
+  /// Fails with `protocol` too, for a sensor that exposes and gives no frame in order.
   Result<void> ready(Deadline deadline) override;
   /// Fails with `timeout`, `protocol`, `io`, and with `not_found`, `unsupported`, `invalid_input` for a sensor that has
   /// to be connected again and is not what it was.
@@ -61,10 +62,14 @@ class SensorCamera final : public StereoCamera {
   struct Channel {
     std::unique_ptr<Sensor> sensor;
     TriggerLedger ledger;
-    std::optional<std::chrono::nanoseconds> last_pair;  // on its own clock
+    std::optional<std::chrono::nanoseconds> last_pair{};  // on its own clock
+    bool warm = false;                                    // warmed up since it was connected
   };
 
-  Result<void> get_ready(Channel& channel, Deadline deadline);
+  Result<void> connect(Deadline deadline);
+  Result<void> connect(Channel& channel, Deadline deadline);
+  Result<void> get_in_step(Deadline deadline);
+  Result<void> listen(Channel& channel);
   void forget(Channel& channel);
   Result<void> throw_away(Channel& channel, Clock::TimePoint until);
   Result<void> warm_up(Channel& channel, Deadline deadline);
@@ -83,7 +88,7 @@ class SensorCamera final : public StereoCamera {
   bool armed_ = false;
   bool in_step_ = false;  // nothing has failed since the ledgers were last known to be right
   Clock::TimePoint trigger_after_{};
-  Clock::TimePoint last_exposure_{};
+  Clock::TimePoint last_in_step_{};  // a good exposure, or a warm-up
   TriggerCounts counts_;
 };
 

@@ -45,9 +45,11 @@ class StereoCamera {
  public:
   virtual ~StereoCamera() = default;
 
-  /// Connected and set up; what was lost is connected again. Exposes nothing. A loss in quiet times is noticed within
-  /// seconds.
-  /// Fails with `not_found`, `timeout`, `io`, and with `unsupported`, `invalid_input` for what is not as it was told.
+  /// Connected, set up and warm; what was lost is connected again, and exposures that the next arm() would otherwise
+  /// make and throw away are made here. A loss in quiet times is noticed within seconds. Between arm() and collect() it
+  /// exposes nothing.
+  /// Fails with `not_found`, `timeout`, `io`, `protocol`, and with `unsupported`, `invalid_input` for what is not as it
+  /// was told.
   virtual Result<void> ready(Deadline deadline) = 0;
 
   /// Makes both sensors wait for the next edge; frames still in flight are thrown away.

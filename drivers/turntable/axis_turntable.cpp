@@ -10,7 +10,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPollPeriod{10};
+constexpr milliseconds kPollPeriod{5};  ///< between an answer and the next question
 constexpr milliseconds kStalledAfter{2000};
 constexpr milliseconds kEnableTime{1000};
 constexpr milliseconds kStandingTime{50};  ///< the position must not change for this long to be called standing
@@ -66,7 +66,7 @@ Result<void> AxisTurntable::find_home(Deadline deadline) {
   auto still_since = clock_.now();
   const auto homed = watch(
       "homing",
-      [&](const DriveState& state) {
+      [&](const DriveState& state, Clock::TimePoint&) {
         const bool at_home = begins(state) && state.homed && !state.running && near(state.position, 0);
         const bool moved = !near(state.position, anchor);
         if (moved) anchor = state.position;
@@ -149,7 +149,7 @@ Result<AxisTurntable::Arrival> AxisTurntable::run_to(std::int32_t target, const 
   std::int64_t least_left = std::abs(std::int64_t{target} - before.position);
   const auto arrived = watch(
       fmt::format("turning to {:.2f} deg", options_.scale.angle(target).value),
-      [&](const DriveState& state) {
+      [&](const DriveState& state, Clock::TimePoint& again) {
         if (!state.homed) return Seen::homeless;
         const auto now = clock_.now();
         const std::int64_t left = std::abs(std::int64_t{target} - state.position);
@@ -160,7 +160,10 @@ Result<AxisTurntable::Arrival> AxisTurntable::run_to(std::int32_t target, const 
           return nearer ? Seen::progress : Seen::waiting;
         }
         if (!in_position) in_position = now;
-        if (now - *in_position < settle) return Seen::progress;
+        if (now - *in_position < settle) {
+          again = std::min(again, *in_position + settle);  // not a period too late
+          return Seen::progress;
+        }
         arrival = {*in_position, now, state.position};
         return Seen::done;
       },
@@ -191,7 +194,8 @@ Result<void> AxisTurntable::watch(std::string_view doing, const Look& look, Dead
     const auto state = ask(deadline);
     if (!state) return pass_on(state);
     if (auto fit = healthy(*state, deadline); !fit) return fit;
-    const Seen seen = look(*state);
+    auto again = clock_.now() + kPollPeriod;
+    const Seen seen = look(*state, again);
     if (seen == Seen::done) return {};
     if (seen == Seen::homeless) {
       return fail(ErrorCode::not_homed, "{}: the drive has lost its home (switched off, reset?)", doing);
@@ -207,7 +211,7 @@ Result<void> AxisTurntable::watch(std::string_view doing, const Look& look, Dead
       return fail(ErrorCode::timeout, "{}: not there by the deadline, the axis reads {:.3f} deg", doing,
                   options_.scale.angle(state->position).value);
     }
-    pause();
+    pause(again);
   }
 }
 
@@ -264,9 +268,9 @@ tl::unexpected<Error> AxisTurntable::give_up(const Error& error) {
 }
 
 /// Waits until the next poll is due or someone asks to stop.
-void AxisTurntable::pause() {
+void AxisTurntable::pause(Clock::TimePoint until) {
   std::unique_lock lock(mutex_);
-  clock_.wait_until(lock, wake_, clock_.now() + kPollPeriod, [&] { return stop_requested_; });
+  clock_.wait_until(lock, wake_, until, [&] { return stop_requested_; });
 }
 
 Result<void> AxisTurntable::stop(Deadline deadline) {
@@ -278,7 +282,7 @@ Result<void> AxisTurntable::stop(Deadline deadline) {
   stop_owed_ = false;
   flank_loaded_ = false;
   auto since = clock_.now();
-  for (std::optional<std::int32_t> last; !deadline.expired(clock_); pause()) {
+  for (std::optional<std::int32_t> last; !deadline.expired(clock_); pause(clock_.now() + kPollPeriod)) {
     const auto state = drive_->read_state(deadline);
     if (!state) return failed(state.error());
     if (state->running || !last || !near(*last, state->position)) {

@@ -51,7 +51,8 @@ class AxisTurntable : public Turntable {
     Clock::TimePoint still;
     std::int32_t position = 0;
   };
-  using Look = std::function<Seen(const DriveState&)>;
+  /// `again`: when the drive is asked the next time, unless it is brought forward.
+  using Look = std::function<Seen(const DriveState&, Clock::TimePoint& again)>;
 
   Result<void> find_home(Deadline deadline);
   Result<void> check_and_enable(Deadline deadline);
@@ -67,7 +68,7 @@ class AxisTurntable : public Turntable {
   Result<DriveState> read_after_owed_stop(Deadline deadline);
   Result<void> stop_drive(Deadline deadline);
   tl::unexpected<Error> give_up(const Error& error);
-  void pause();
+  void pause(Clock::TimePoint until);
 
   [[nodiscard]] std::int32_t tolerance_pulses() const;
   [[nodiscard]] bool near(std::int32_t a, std::int32_t b) const;

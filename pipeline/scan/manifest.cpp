@@ -43,6 +43,8 @@ ordered_json to_json(const ViewRecord& view) {
                        {"taken", view.taken},
                        {"pixel_format", view.pixel_format},
                        {"files", files}};
+  for (const Error& why : view.spoilt)
+    json["spoilt"].push_back({{"code", to_string(why.code)}, {"message", why.message}});
   if (view.grid) {
     json["grid"] = {{"fx", view.grid->fx}, {"fy", view.grid->fy}, {"cx", view.grid->cx}, {"cy", view.grid->cy}};
     json["camera_from_pose"] = to_json(view.camera_from_pose);
@@ -72,6 +74,14 @@ Projection read_grid(JsonObject object) {
   return grid;
 }
 
+Error read_error(JsonObject object) {
+  const auto code = parse_error_code(object.text("code"));
+  if (!code) object.reject("code", "no error code of this program");
+  Error error{code.value_or(ErrorCode::internal), object.text("message")};
+  object.close();
+  return error;
+}
+
 ViewRecord read_view(JsonObject object, bool stereo) {
   ViewRecord view;
   view.index = object.integer("index", 0, 9999);
@@ -88,6 +98,9 @@ ViewRecord read_view(JsonObject object, bool stereo) {
              : std::vector<std::string>{"range"};
   for (const std::string& role : roles) view.files[role] = read_file_record(files.object(role));
   files.close();
+  if (object.has("spoilt")) {
+    for (const JsonObject& why : object.objects("spoilt")) view.spoilt.push_back(read_error(why));
+  }
   if (!stereo) {
     view.grid = read_grid(object.object("grid"));
     view.camera_from_pose = object.transform("camera_from_pose");

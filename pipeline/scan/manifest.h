@@ -27,6 +27,7 @@ struct ViewRecord {
   std::string taken{};         ///< ISO 8601
   std::string pixel_format{};  ///< "Mono8", "BayerRG8", "BGR8"; empty for range scans
   std::map<std::string, FileRecord> files{};
+  std::vector<Error> spoilt{};                         ///< exposures that were taken again, and why
   std::optional<Projection> grid{};                    ///< range scans: orthographic
   Transform camera_from_pose = Transform::Identity();  ///< range scans only
 };

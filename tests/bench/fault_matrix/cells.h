@@ -58,6 +58,9 @@ std::vector<Cell> lightcrafter_cells();
 
 constexpr std::chrono::milliseconds kGrace{50};  ///< past its deadline a call may still need this
 
+/// Whether `holds` becomes true within `limit`; looks every millisecond.
+bool soon(Clock& clock, Clock::Duration limit, const std::function<bool()>& holds);
+
 /// Runs `call` and notes how it ended: in time or not, in one of `named` (none: success is meant) or not.
 Outcome timed(Clock& clock, Clock::Duration limit, const std::vector<ErrorCode>& named,
               const std::function<Result<void>(Deadline)>& call);

@@ -16,6 +16,13 @@
 /// each.
 namespace scanrig::bench {
 
+bool soon(Clock& clock, Clock::Duration limit, const std::function<bool()>& holds) {
+  for (const auto by = Deadline::after(clock, limit); !holds(); clock.sleep_for(std::chrono::milliseconds(1))) {
+    if (by.expired(clock)) return false;
+  }
+  return true;
+}
+
 Outcome timed(Clock& clock, Clock::Duration limit, const std::vector<ErrorCode>& named,
               const std::function<Result<void>(Deadline)>& call) {
   Outcome outcome;

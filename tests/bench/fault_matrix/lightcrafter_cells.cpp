@@ -12,7 +12,6 @@ using DeviceFault = sim::wire::LightCrafter::Fault;
 
 constexpr milliseconds kLimit{1000};
 constexpr milliseconds kExposure{200};
-constexpr milliseconds kMiddle{80};  ///< of the exposure: the fault comes while the light burns
 constexpr milliseconds kAbsence{2000};
 
 class LightCrafterTrial {
@@ -23,7 +22,7 @@ class LightCrafterTrial {
     std::jthread meanwhile;
     if (method == "request_dark") {
       meanwhile = std::jthread([&] {
-        clock().sleep_for(kMiddle);
+        soon(clock(), kLimit, [&] { return bench_.device().lit(); });  // the fault comes while the light burns
         begin(fault);
         bench_.projector().request_dark();
       });

@@ -13,7 +13,6 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kLimit{1000};
 constexpr milliseconds kPulse{200};
-constexpr milliseconds kMiddle{80};  ///< of the pulse: the fault comes while the light burns
 constexpr milliseconds kAbsence{2000};
 constexpr const char* kLine = "PROJ_TRIG";
 
@@ -29,7 +28,7 @@ class Trial {
       far_end_.reset();
     } else {
       meanwhile = std::jthread([&] {
-        clock_.sleep_for(kMiddle);
+        soon(clock_, kLimit, [&] { return far_end_->level(kLine); });  // the fault comes while the light burns
         begun = clock_.now();
         far_end_.reset();
         if (method == "request_dark") projector_->request_dark();

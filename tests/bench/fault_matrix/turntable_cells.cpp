@@ -19,21 +19,29 @@ constexpr double kFarDeg = 170;
 constexpr milliseconds kDeceleration{static_cast<int>(1000 * kSpeedDegS / kAccelerationDegS2)};
 constexpr milliseconds kRestGrace{100};
 
-/// Does something once the table is seen turning, from another thread.
+/// Whether the table comes to turn, and then no faster any more.
+bool at_full_speed(TurntableEnd& end, Clock& clock, Clock::Duration limit, const std::stop_token& stop = {}) {
+  constexpr milliseconds kApart{20};
+  double before = 0;
+  auto next = clock.now();
+  return soon(clock, limit, [&] {
+    if (stop.stop_requested()) return true;
+    if (clock.now() < next) return false;
+    next = clock.now() + kApart;
+    const double speed = std::abs(end.truth().speed_deg_s);
+    return speed > 0 && speed <= std::exchange(before, speed);
+  });
+}
+
+/// Does something once the table turns at full speed, from another thread.
 class Onlooker {
  public:
   Onlooker(TurntableEnd& end, Clock& clock, std::function<void()> act)
       : thread_([&end, &clock, act = std::move(act)](const std::stop_token& stop) {
-          while (!end.truth().moving) {
-            if (stop.stop_requested()) return;
-            clock.sleep_for(milliseconds(1));
-          }
-          clock.sleep_for(kUnderWay);
-          if (!stop.stop_requested()) act();
+          if (at_full_speed(end, clock, kMotionLimit, stop) && !stop.stop_requested()) act();
         }) {}
 
  private:
-  static constexpr milliseconds kUnderWay{150};  ///< full speed by then
   std::jthread thread_;
 };
 
@@ -163,12 +171,16 @@ class Trial {
         end_->raise_alarm(fault_ != Fault::device_error);
       } else {
         end_->send_round();
-        clock_.sleep_for(milliseconds(200));
+        at_full_speed(*end_, clock_, kMotionLimit);
       }
       begin();
     }
     return timed(clock_, method.moves ? Clock::Duration(kMotionLimit) : Clock::Duration(kAskLimit), named_,
                  [&](Deadline by) { return method.call(end_->table(), by); });
+  }
+
+  bool comes_to_rest() {
+    return soon(clock_, kDeceleration + kRestGrace, [&] { return !end_->truth().moving; });
   }
 
   /// Standing, or owned up that it may not be.
@@ -179,9 +191,7 @@ class Trial {
       const bool owned_up = outcome.told.find("may be moving") != std::string::npos;
       return outcome.expect(owned_up, "does not say that the table may be moving");
     }
-    const auto by = within(kDeceleration + kRestGrace);
-    while (end_->truth().moving && !by.expired(clock_)) clock_.sleep_for(milliseconds(1));
-    outcome.expect(!end_->truth().moving, "the table still turns");
+    outcome.expect(comes_to_rest(), "the table still turns");
   }
 
   /// The fault is over: reset, home, a move that ends where it says.
@@ -201,7 +211,7 @@ class Trial {
     if (!homed) return fail_with("home", homed.error());
     const auto moved = table.rotate_to({45}, within(kAmple));
     if (!moved) return fail_with("the next move", moved.error());
-    clock_.sleep_for(milliseconds(50));
+    outcome.expect(comes_to_rest(), "the next move ends turning");
     const double off = std::remainder(end_->truth().table_deg - zero_deg_ - 45, 360.0);
     outcome.wrong_position = std::abs(off) > 2 * kToleranceDeg;
     outcome.expect(!outcome.wrong_position, fmt::format("the next move ended {:.3f} deg off", off));

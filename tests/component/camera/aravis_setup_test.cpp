@@ -153,12 +153,60 @@ TEST(AravisTriggers, AfterDeadAirAnExposureIsMadeAndThrownAway) {
   EXPECT_EQ(bench.camera().counts().warm_up, before + 2);
 }
 
+TEST(AravisTriggers, CamerasThatAreReadyNeedNoExposureBeforeTheFirst) {
+  AravisBench bench;  // ready, when it is open
+  ASSERT_TRUE(bench.opened()) << bench.opened().error().message;
+  const auto before = bench.camera().counts().warm_up;
+  EXPECT_GT(before, 0u);
+  ASSERT_TRUE(expose(bench));
+  EXPECT_EQ(bench.camera().counts().warm_up, before);
+}
+
+TEST(AravisTriggers, AfterDeadAirReadyMakesTheExposureThatArmNeedsNot) {
+  AravisBench bench([](auto& options) { options.dead_air = std::chrono::seconds(1); });
+  ASSERT_TRUE(expose(bench));
+  const auto before = bench.camera().counts().warm_up;
+  const auto deadline = Deadline::after(bench.clock(), std::chrono::seconds(5));
+  ASSERT_TRUE(bench.camera().ready(deadline));
+  EXPECT_EQ(bench.camera().counts().warm_up, before) << "no dead air yet";
+  bench.clock().sleep_for(milliseconds(1100));  // the dead air itself
+  ASSERT_TRUE(bench.camera().ready(deadline));
+  EXPECT_EQ(bench.camera().counts().warm_up, before + 2);
+  ASSERT_TRUE(expose(bench));
+  EXPECT_EQ(bench.camera().counts().warm_up, before + 2);
+}
+
+TEST(AravisTriggers, ALookCostsTheNextExposureNothing) {
+  AravisBench bench;
+  ASSERT_TRUE(expose(bench));
+  ASSERT_TRUE(bench.camera().look(Deadline::after(bench.clock(), std::chrono::seconds(5))));
+  const auto before = bench.camera().counts().warm_up;
+  ASSERT_TRUE(expose(bench));
+  EXPECT_EQ(bench.camera().counts().warm_up, before);
+}
+
 TEST(AravisTriggers, WithoutDeadAirNoneIs) {
   AravisBench bench;
   ASSERT_TRUE(expose(bench));
   const auto before = bench.camera().counts().warm_up;
   ASSERT_TRUE(expose(bench));
   EXPECT_EQ(bench.camera().counts().warm_up, before);
+}
+
+TEST(AravisLoss, NobodyWaitsUntilTheLibraryHasGivenALostCameraUp) {
+  AravisBench bench;
+  ASSERT_TRUE(expose(bench));
+  ASSERT_TRUE(bench.plug(false));
+  EXPECT_FALSE(expose(bench));  // a frame that does not come makes the next call ask
+  const auto begun = bench.clock().now();
+  const auto lost = bench.camera().ready(Deadline::after(bench.clock(), std::chrono::seconds(10)));
+  ASSERT_FALSE(lost);
+  EXPECT_THAT(lost.error().message, HasSubstr("right camera 40012346"));
+  EXPECT_LT(bench.clock().now() - begun, std::chrono::seconds(9)) << "giving it up alone takes ten";
+  ASSERT_TRUE(bench.plug(true));
+  const auto again = bench.camera().ready(Deadline::after(bench.clock(), std::chrono::seconds(10)));
+  EXPECT_TRUE(again) << again.error().message;
+  EXPECT_TRUE(expose(bench));
 }
 
 TEST(AravisTriggers, ACameraThatMissedTheEdgeIsNamed) {
@@ -249,8 +297,10 @@ TEST(HostFinding, WhatWouldLoseFramesIsSaidInASentence) {
 
 TEST(AravisTriggers, WithoutTheTimeToBeginAnewArmingIsATimeout) {
   AravisBench bench;
-  ASSERT_TRUE(bench.opened());
-  const auto armed = bench.camera().arm(Deadline::after(bench.clock(), milliseconds(5)));
+  ASSERT_TRUE(expose(bench));
+  bench.far().tell("fault left lost 1");
+  ASSERT_FALSE(expose(bench));
+  const auto armed = bench.camera().arm(Deadline::after(bench.clock(), milliseconds(1)));
   ASSERT_FALSE(armed);
   EXPECT_EQ(armed.error().code, ErrorCode::timeout) << armed.error().message;
   EXPECT_TRUE(expose(bench));

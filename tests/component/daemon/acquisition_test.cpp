@@ -28,7 +28,15 @@ TEST_F(AcquisitionTest, AViewIsFourImagesAtTheAngleMeasured) {
   EXPECT_EQ(view->record.pixel_format, "Mono8");
   EXPECT_EQ(view->images.left_pattern.at<unsigned char>(0, 0), 200);
   EXPECT_EQ(view->images.right_plain.at<unsigned char>(0, 0), 100);
-  EXPECT_EQ(view->redone, 0);
+  EXPECT_TRUE(view->record.spoilt.empty());
+}
+
+TEST_F(AcquisitionTest, TheCamerasGetReadyBeforeTheTableTurnsAndNotWhenItStands) {
+  ASSERT_TRUE(acquisition.home());
+  clock.sleep_for(std::chrono::seconds(1));
+  const auto begun = clock.now();
+  ASSERT_TRUE(acquisition.take_view({"job", 0, 1}, {45.0}));
+  EXPECT_EQ(rig.line.ready_at, begun);
 }
 
 TEST_F(AcquisitionTest, TheSecondPoseGoesOnInTheNextTurn) {
@@ -48,12 +56,14 @@ TEST_F(AcquisitionTest, ATableWoundUpByManyJobsIsUnwound) {
   EXPECT_LE(std::ranges::max(rig.turntable.targets), 4 * 360.0);
 }
 
-TEST_F(AcquisitionTest, ALostExposureIsRedoneAndCounted) {
+TEST_F(AcquisitionTest, ALostExposureIsRedoneAndNamed) {
   ASSERT_TRUE(acquisition.home());
   rig.line.lose = 2;
   const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
   ASSERT_TRUE(view);
-  EXPECT_EQ(view->redone, 2);
+  ASSERT_EQ(view->record.spoilt.size(), 2u);
+  EXPECT_EQ(view->record.spoilt[0].code, ErrorCode::timeout);
+  EXPECT_FALSE(view->record.spoilt[0].message.empty());
   EXPECT_EQ(rig.line.exposures, 4);
   EXPECT_EQ(view->images.left_pattern.at<unsigned char>(0, 0), 200) << "the redone exposure is the pattern again";
 }
@@ -72,7 +82,8 @@ TEST_F(AcquisitionTest, ADarkPictureIsRedoneAndFailsTheViewByNameWhenItStaysDark
   rig.line.dark = 3;
   const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
   ASSERT_TRUE(view) << view.error().message;
-  EXPECT_EQ(view->redone, 3);
+  ASSERT_EQ(view->record.spoilt.size(), 3u);
+  EXPECT_TRUE(view->record.spoilt.back().message.starts_with("right camera: the picture in the dots is dark"));
   rig.line.dark = 100;
   const auto next = acquisition.take_view({"job", 0, 1}, {45.0});
   ASSERT_FALSE(next);
@@ -86,7 +97,8 @@ TEST_F(AcquisitionTest, AnExposureDuringWhichTheCameraVanishedIsRedone) {
   rig.line.absent = 2;
   const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
   ASSERT_TRUE(view) << view.error().message;
-  EXPECT_EQ(view->redone, 2);
+  ASSERT_EQ(view->record.spoilt.size(), 2u);
+  EXPECT_EQ(view->record.spoilt[0].message, "left camera 4711: no answer");
 }
 
 TEST_F(AcquisitionTest, ACameraThatStaysAwayFailsTheViewByItsName) {

@@ -108,6 +108,7 @@ struct TriggerLine {
   int dark = 0;       ///< the next exposures whose right picture is dark
   int absent = 0;     ///< how often more the camera does not answer when it is armed; -1: it is not there at all
   std::function<void()> at_fire;  ///< happens during the next exposure
+  Clock::TimePoint ready_at{};    ///< when the cameras were asked to get ready last
   Light last = Light::plain;
   int scene = 0;  ///< what the cameras look at: another number, another picture
 };
@@ -146,20 +147,20 @@ class FakeCamera final : public StereoCamera {
   FakeCamera(TriggerLine& line, Clock& clock) : line_(line), clock_(clock) {}
   Result<void> ready(Deadline) override {
     const std::lock_guard guard(line_.mutex);
-    if (line_.absent != 0) return fail(ErrorCode::io, "left camera 4711: no answer");
-    return {};
+    line_.ready_at = clock_.now();
+    return there();
   }
-  Result<void> arm(Deadline deadline) override {
-    auto there = ready(deadline);
+  Result<void> arm(Deadline) override {
     const std::lock_guard guard(line_.mutex);
+    auto answers = there();
     if (line_.absent > 0) --line_.absent;
-    if (!there) return there;
+    if (!answers) return answers;
     line_.armed = true;
     return {};
   }
-  Result<StereoFrame> look(Deadline deadline) override {
-    if (auto there = ready(deadline); !there) return pass_on(there);
+  Result<StereoFrame> look(Deadline) override {
     const std::lock_guard guard(line_.mutex);
+    if (auto answers = there(); !answers) return pass_on(answers);
     ++line_.looks;
     StereoFrame frame;
     frame.left = frame.right = cv::Mat(48, 64, CV_8UC1, cv::Scalar(30));
@@ -192,6 +193,11 @@ class FakeCamera final : public StereoCamera {
   }
 
  private:
+  Result<void> there() const {
+    if (line_.absent != 0) return fail(ErrorCode::io, "left camera 4711: no answer");
+    return {};
+  }
+
   TriggerLine& line_;
   Clock& clock_;
 };

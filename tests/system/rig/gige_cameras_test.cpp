@@ -61,19 +61,24 @@ TEST_F(CamerasOnWires, AScanRedoesALostExposureUsesTheFramesOfOneEdgeOnlyAndEnds
 
   const auto job = ask("jobs/" + jobs()[0]["id"].get<std::string>());
   const std::filesystem::path folder(job["folder"].get<std::string>());
-  std::uint32_t last = 1;  // the right frame of the first edge was lost
+  ASSERT_GE(job["stored"][0]["redone"], 1);
+  EXPECT_THAT(job["stored"][0]["spoilt"].dump(), HasSubstr("right camera SIM-R: no frame"));
+  EXPECT_THAT(*read_file(folder / "scan.json"), HasSubstr("right camera SIM-R: no frame"));
+  std::uint32_t last = 0;
   for (std::size_t i = 0; i < 8; ++i) {
     const auto& stored = job["stored"][i];
-    EXPECT_EQ(stored["redone"], i == 0 ? 1 : 0);
+    const auto redone = stored["redone"].get<std::uint32_t>();  // on a busy machine more than the one that was lost
+    EXPECT_EQ(stored["spoilt"].size(), redone);
     const auto view =
         folder / fmt::format("pose{}/view{:02}", stored["pose"].get<int>() + 1, stored["view"].get<int>());
     const auto edge_of = [&](const char* name) { return faint_number(cv::imread(view / name, cv::IMREAD_UNCHANGED)); };
-    const auto edge = edge_of("left_pattern.png");
-    EXPECT_TRUE(edge == last + 1 || (i == 4 && edge > last)) << edge;  // view 0 may be looked at again after a pose
-    EXPECT_EQ(edge_of("right_pattern.png"), edge);
-    EXPECT_EQ(edge_of("left_plain.png"), edge + 1);
-    EXPECT_EQ(edge_of("right_plain.png"), edge + 1);
-    last = edge + 1;
+    const auto pattern = edge_of("left_pattern.png"), plain = edge_of("left_plain.png");
+    EXPECT_EQ(edge_of("right_pattern.png"), pattern);
+    EXPECT_EQ(edge_of("right_plain.png"), plain);
+    EXPECT_GT(pattern, last);
+    EXPECT_GT(plain, pattern);
+    if (i != 4) EXPECT_LE(plain, last + 2 + redone);  // after a pose view 0 was looked at again
+    last = plain;
   }
   EXPECT_TRUE(std::filesystem::exists(job["model"].get<std::string>()));
 }
@@ -83,7 +88,8 @@ TEST_F(CamerasOnWires, PicturesThatAreDarkBlurredOrOfTheOtherSideAreRedone) {
   spoil("dark", 2);
   begin_scan();
   ASSERT_TRUE(wait_stored(1)) << log();
-  EXPECT_EQ(job()["stored"][0]["redone"], 2);
+  EXPECT_GE(job()["stored"][0]["redone"], 2);
+  EXPECT_THAT(job()["stored"][0]["spoilt"].dump(), HasSubstr("right camera: the picture in the dots is dark"));
   spoil("swapped", 2);
   ASSERT_TRUE(wait_stored(3)) << log();
   spoil("blurred", 2);

@@ -23,7 +23,12 @@ class Follow : public testing::Test {
     return all;
   }
   static json view(int pose, int index, int redone) {
-    return {{"pose", pose}, {"view", index}, {"measured_deg", 45.01}, {"redone", redone}};
+    const json why = {{"code", "timeout"}, {"message", "left camera: no frame in time"}};
+    return {{"pose", pose},
+            {"view", index},
+            {"measured_deg", 45.01},
+            {"redone", redone},
+            {"spoilt", std::vector<json>(static_cast<std::size_t>(redone), why)}};
   }
   static json job(const std::string& state) {
     return {{"id", "J"},
@@ -53,7 +58,9 @@ TEST_F(Follow, EachViewIsToldOnce) {
   EXPECT_EQ(text(),
             "Job J\n"
             "  pose 1/2  view 1/8    45.010 deg  stored\n"
-            "  pose 1/2  view 2/8    45.010 deg  stored, 2 exposures redone\n");
+            "  pose 1/2  view 2/8    45.010 deg  stored, 2 exposures redone\n"
+            "      redone: left camera: no frame in time\n"
+            "      redone: left camera: no frame in time\n");
 }
 
 TEST_F(Follow, TheFlipIsAskedForOnce) {

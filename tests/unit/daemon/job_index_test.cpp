@@ -18,10 +18,11 @@ class Index : public scan_samples::FolderTest {
     FolderTest::SetUp();
     scan_samples::write_text(folder_ / "calibration.json", scan_samples::calibration_json());
     store.emplace(*JobStore::open({.root = folder_ / "jobs", .calibration_file = folder_ / "calibration.json"}));
+    const ViewRecord view{.index = 0, .measured_deg = 0.25, .spoilt = {{ErrorCode::timeout, "left camera: no frame"}}};
     for (const char* id : {"a", "b", "queued"}) {
       ASSERT_TRUE(store->create(id, {.part = std::string("part ") + id}));
       auto scan = ScanFolder::open(store->folder(id));
-      ASSERT_TRUE(scan->add_view(0, {.index = 0, .measured_deg = 0.25}, scan_samples::raw_view(1)));
+      ASSERT_TRUE(scan->add_view(0, view, scan_samples::raw_view(1)));
       if (id != std::string("queued")) {
         ASSERT_TRUE(scan->set_state("failed"));
         ASSERT_TRUE(write_failure(scan->path(), {ErrorCode::moved, "it moved"}));
@@ -38,6 +39,8 @@ class Index : public scan_samples::FolderTest {
     EXPECT_EQ(jobs->at("a")->error->code, ErrorCode::moved);
     EXPECT_EQ(jobs->at("b")->part, "part b");
     EXPECT_EQ(jobs->at("b")->stored.at(0).measured_deg, 0.25);
+    EXPECT_EQ(jobs->at("b")->stored.at(0).spoilt.at(0).code, ErrorCode::timeout);
+    EXPECT_EQ(jobs->at("b")->stored.at(0).spoilt.at(0).message, "left camera: no frame");
     EXPECT_EQ(jobs->at("queued")->state, JobState::queued);
   }
   bool knows(const std::string& id) { return JobIndex(file()).find(store->folder(id)).has_value(); }

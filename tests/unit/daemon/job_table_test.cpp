@@ -17,7 +17,7 @@ class Jobs : public testing::Test {
 };
 
 TEST_F(Jobs, AJobAppearsWhenItsFolderIsThere) {
-  tell(event::ViewStored{{"a", 0, 0}, 0.0, 0});
+  tell(event::ViewStored{{"a", 0, 0}, 0.0});
   EXPECT_TRUE(table.empty());
   tell(event::JobKnown{std::make_shared<const JobInfo>(JobInfo{.id = "a", .folder = "/jobs/a"})});
   EXPECT_EQ(job().state, JobState::queued);
@@ -29,18 +29,19 @@ TEST_F(Jobs, AJobAppearsWhenItsFolderIsThere) {
 TEST_F(Jobs, EntriesAlreadyHandedOutDoNotChange) {
   begin();
   const auto held = table.at("a");
-  tell(event::ViewStored{{"a", 0, 0}, 0.5, 1});
+  tell(event::ViewStored{{"a", 0, 0}, 0.5, {{ErrorCode::timeout, "left camera: no frame"}}});
   EXPECT_TRUE(held->stored.empty());
   ASSERT_EQ(job().stored.size(), 1u);
   EXPECT_EQ(job().stored[0].measured_deg, 0.5);
-  EXPECT_EQ(job().stored[0].redone, 1);
+  ASSERT_EQ(job().stored[0].spoilt.size(), 1u);
+  EXPECT_EQ(job().stored[0].spoilt[0].message, "left camera: no frame");
 }
 
 TEST_F(Jobs, AJobGoesThroughFlipAndReconstructionToDone) {
   begin();
   tell(event::PoseStored{"a", 0});
   EXPECT_EQ(job().state, JobState::waiting_for_flip);
-  tell(event::ViewStored{{"a", 1, 0}, 0.0, 0});
+  tell(event::ViewStored{{"a", 1, 0}, 0.0});
   EXPECT_EQ(job().state, JobState::scanning);
   tell(event::PoseStored{"a", 1});
   EXPECT_EQ(job().state, JobState::reconstructing);

@@ -36,7 +36,7 @@ class Queue : public Station {
     tell(event::JobBegun{job, 0, 0});
     tell(event::WarningOver{});
     tell(event::ViewTaken{std::make_shared<TakenView>(TakenView{.id = {job, 0, 0}})});
-    tell(event::ViewStored{{job, 0, 0}, 0.0, 0});
+    tell(event::ViewStored{{job, 0, 0}, 0.0});
     tell(event::ClosureTaken{});
     tell(event::ClosureJudged{job, {.unmoved = true}});
     tell(event::PoseStored{job, 0});

@@ -48,7 +48,7 @@ class Station : public testing::Test {
   void take(int pose, int view) {
     tell(event::ViewTaken{std::make_shared<TakenView>(TakenView{.id = {"job", pose, view}})});
   }
-  void store(int pose, int view) { tell(event::ViewStored{{"job", pose, view}, 0.0, 0}); }
+  void store(int pose, int view) { tell(event::ViewStored{{"job", pose, view}, 0.0}); }
   int views() const { return rules.recipes.at("default").views; }
   void take_and_store_all(int pose) {
     for (int view = 0; view < views(); ++view) {

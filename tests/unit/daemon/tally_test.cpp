@@ -10,8 +10,8 @@ using std::chrono::seconds;
 TEST(EventTally, CountsViewsRetriesAndFaults) {
   EventTally tally;
   const Clock::TimePoint now{};
-  tally.see(event::ViewStored{{"job", 0, 0}, 0.0, 2}, now);
-  tally.see(event::ViewStored{{"job", 0, 1}, 45.0, 0}, now);
+  tally.see(event::ViewStored{{"job", 0, 0}, 0.0, {2, {ErrorCode::timeout, "left camera: no frame"}}}, now);
+  tally.see(event::ViewStored{{"job", 0, 1}, 45.0}, now);
   tally.see(event::EstopChanged{false}, now);
   tally.see(event::EstopChanged{true}, now);
   tally.see(event::RigFailed{{ErrorCode::timeout, "late"}}, now);

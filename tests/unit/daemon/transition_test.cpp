@@ -307,7 +307,7 @@ TEST_F(Station, ShutdownInterruptsTheJobAndEndsWhenTheRigIsSeenStopped) {
 TEST_F(Station, LateEventsOfAnOldJobChangeNothing) {
   get_ready();
   const auto before = state.cause;
-  tell(event::ViewStored{{"old", 0, 0}, 0.0, 0});
+  tell(event::ViewStored{{"old", 0, 0}, 0.0});
   tell(event::PoseStored{"old", 0});
   tell(event::StoreFailed{"old", {ErrorCode::io, "late"}});
   tell(event::WarningOver{});

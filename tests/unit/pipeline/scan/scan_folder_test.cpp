@@ -119,6 +119,23 @@ TEST_F(ScanFolderTest, AClosureShotIsKeptAsEvidence) {
   EXPECT_FALSE(closure.unmoved);
 }
 
+TEST_F(ScanFolderTest, WhatWasWrongWithExposuresThatWereTakenAgainIsKept) {
+  ScanFolder scan = create();
+  auto view = record(0);
+  view.spoilt = {{ErrorCode::timeout, "left camera: no frame"}, {ErrorCode::protocol, "right camera: torn"}};
+  ASSERT_TRUE(scan.add_view(0, view, raw_view(0)));
+  const auto again = ScanFolder::open(scan_);
+  ASSERT_TRUE(again) << again.error().message;
+  const auto& kept = again->manifest().poses[0].views[0].spoilt;
+  ASSERT_EQ(kept.size(), 2u);
+  EXPECT_EQ(kept[0].code, ErrorCode::timeout);
+  EXPECT_EQ(kept[1].message, "right camera: torn");
+  edit_manifest("\"timeout\"", "\"tired\"");
+  const auto unknown = ScanFolder::open(scan_);
+  ASSERT_FALSE(unknown);
+  EXPECT_NE(unknown.error().message.find("spoilt[0].code"), std::string::npos) << unknown.error().message;
+}
+
 TEST_F(ScanFolderTest, AnOlderFolderIsReadAndBecomesANewOneWithItsNextChange) {
   ScanFolder scan = with_one_view();
   const std::string now = *read_file(scan_ / "scan.json");
