@@ -82,9 +82,9 @@ def unplugged(section, key):
     """What the section names is not there."""
     def change(rig):
         before, after = rig.config.read_text().split(f"[{section}]", 1)
-        lines = [f'{key} = "{rig.folder / "unplugged"}"' if line.startswith(key + " =") else line
-                 for line in after.split("\n")]
-        rig.config.write_text(f"{before}[{section}]" + "\n".join(lines))
+        head, line = after.split(f"\n{key} =", 1)
+        line, tail = line.split("\n", 1)
+        rig.config.write_text(f'{before}[{section}]{head}\n{key} = "{rig.folder / "unplugged"}"\n{tail}')
     return change
 
 
