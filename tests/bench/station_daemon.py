@@ -8,6 +8,7 @@ import time
 import sigkill
 
 LIMIT_S = 120
+TRIES = 3
 ENDED = ("done", "failed", "interrupted", "cancelled")
 
 
@@ -33,10 +34,17 @@ class Daemon:
         with open(home / "daemon.log", "a") as log:
             self.process = subprocess.Popen([str(word) for word in command], stdout=log, stderr=log,
                                             env=dict(os.environ, **(environment or {})))
+        self.unanswered = 0
         self.wait(self.status, "the daemon does not answer")
+        self.unanswered = 0
 
     def ask(self, target):
-        return sigkill.ask(self.socket, target)
+        """None where nobody answers, asked more than once."""
+        for _ in range(TRIES):
+            if (answer := sigkill.ask(self.socket, target)) is not None:
+                return answer
+            self.unanswered += 1
+        return None
 
     def status(self):
         return self.ask("status")

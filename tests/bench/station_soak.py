@@ -89,7 +89,8 @@ def report(bench, part, shift, seconds, stuck):
     jobs = sum(shift.ended.values())
     wanted = QUICK[part] if bench.quick else PARTS[part][0]
     told = ", ".join(f"{count} {state}" for state, count in sorted(shift.ended.items()))
-    bench.note(f"{part}: {seconds / max(1, jobs):.1f} s a job, {shift.resumed} interruptions resumed")
+    bench.note(f"{part}: {seconds / max(1, jobs):.1f} s a job, {shift.resumed} interruptions resumed, "
+               f"{shift.daemon.unanswered} requests without an answer")
     bench.line(f"soak, {wanted} {part} jobs, {100 * TROUBLE:.0f} % of exposures in trouble", "all end, no stuck state",
                "; ".join(filter(None, [told, stuck])), not stuck and jobs == wanted)
     what = f"soak, {part}: memory, last quarter against second"

@@ -14,7 +14,7 @@ import motion_rig
 
 API_LIMIT_S, DEVICES_LIMIT_S, STATE_LIMIT_S = 1.0, 10.0, 60.0
 OLD_JOBS = 500
-OPTIONS = ("--cameras", "gige", "--scale", "0.25", "--views", "1", "--poses", "1")
+OPTIONS = ("--cameras", "gige", "--scale", "0.25", "--views", "4", "--poses", "1")
 
 
 def boot(rig, devices, state):
@@ -82,9 +82,9 @@ def unplugged(section, key):
     """What the section names is not there."""
     def change(rig):
         before, after = rig.config.read_text().split(f"[{section}]", 1)
-        lines = [f'{key} = "{rig.folder / "unplugged"}"' if line.startswith(key + " =") else line
-                 for line in after.split("\n")]
-        rig.config.write_text(f"{before}[{section}]" + "\n".join(lines))
+        head, line = after.split(f"\n{key} =", 1)
+        line, tail = line.split("\n", 1)
+        rig.config.write_text(f'{before}[{section}]{head}\n{key} = "{rig.folder / "unplugged"}"\n{tail}')
     return change
 
 

@@ -18,7 +18,7 @@
 
 namespace {
 
-constexpr std::size_t kLarge = 64u << 10;
+constexpr std::size_t kLarge = 256u << 10;  ///< libraries take less when they are loaded
 constexpr std::size_t kBite = 16u << 20;
 
 struct Bite {
