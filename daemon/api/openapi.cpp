@@ -98,6 +98,16 @@ std::string name_of(const Route& route) {
   return name;
 }
 
+ordered_json schemas() {
+  auto all = ordered_json::parse(kSchemas);
+  auto more = ordered_json::parse(kJobDetail);
+  ordered_json detail = all["Job"];
+  for (auto& name : more["required"]) detail["required"].push_back(std::move(name));
+  detail["properties"].merge_patch(more["properties"]);
+  all["JobDetail"] = std::move(detail);
+  return all;
+}
+
 }  // namespace
 
 std::string openapi_document(const std::vector<Route>& routes) {
@@ -122,7 +132,7 @@ std::string openapi_document(const std::vector<Route>& routes) {
     operation["responses"] = replies_of(route);
     paths[std::string(route.path)][lower(to_string(route.method))] = std::move(operation);
   }
-  document["components"]["schemas"] = ordered_json::parse(kSchemas);
+  document["components"]["schemas"] = schemas();
   document["components"]["securitySchemes"]["token"] = {{"type", "http"}, {"scheme", "bearer"}};
   return to_text(document);
 }

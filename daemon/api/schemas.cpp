@@ -48,21 +48,6 @@ const char* const kSchemas = R"({
 "JobPage": {"type": "object", "required": ["jobs", "next"], "additionalProperties": false, "properties": {
   "jobs": {"type": "array", "items": {"$ref": "#/components/schemas/Job"}},
   "next": {"type": "string", "nullable": true, "description": "`before` of the next page; null on the last"}}},
-"JobDetail": {"type": "object", "additionalProperties": false,
-  "required": ["id", "state", "recipe", "part", "folder", "poses", "views", "stored", "closures", "stages", "resumable", "quarantined",
-  "exported", "passed", "model", "report", "error"], "properties": {
-  "id": {"type": "string"}, "state": {"type": "string"},
-  "recipe": {"type": "string"}, "part": {"type": "string", "description": "of the order: barcode or free text"},
-  "resumable": {"type": "boolean", "description": "interrupted, and the missing views may still be taken"},
-  "quarantined": {"type": "boolean", "description": "two daemons died over its reconstruction"},
-  "exported": {"type": "boolean"},
-  "passed": {"type": "boolean", "nullable": true, "description": "done: within the limits of its recipe"},
-  "folder": {"type": "string"},
-  "poses": {"type": "integer"}, "views": {"type": "integer", "description": "a pose"},
-  "stored": {"type": "array", "items": {"$ref": "#/components/schemas/StoredView"}},
-  "closures": {"type": "array", "items": {"$ref": "#/components/schemas/Closure"}},
-  "stages": {"type": "array", "items": {"$ref": "#/components/schemas/Stage"}},
-  "model": {"type": "string"}, "report": {"type": "string"}, "error": {"$ref": "#/components/schemas/MaybeProblem"}}},
 "StoredView": {"type": "object", "additionalProperties": false,
   "required": ["pose", "view", "measured_deg", "error_deg", "settling_ms", "redone", "spoilt"], "properties": {
   "pose": {"type": "integer"}, "view": {"type": "integer"}, "measured_deg": {"type": "number"},
@@ -99,5 +84,12 @@ const char* const kSchemas = R"({
   "ok": {"type": "boolean"}, "problems": {"type": "array", "items": {"type": "string"}}}},
 "OpenApi": {"type": "object", "required": ["openapi", "paths"]}
 })";
+
+const char* const kJobDetail = R"({
+"required": ["closures", "stages"],
+"properties": {
+  "stored": {"type": "array", "description": null, "items": {"$ref": "#/components/schemas/StoredView"}},
+  "closures": {"type": "array", "items": {"$ref": "#/components/schemas/Closure"}},
+  "stages": {"type": "array", "items": {"$ref": "#/components/schemas/Stage"}}}})";
 
 }  // namespace scanrig

@@ -4,10 +4,10 @@
 #include <unistd.h>
 
 #include <cmath>
-#include <new>
 #include <utility>
 
 #include "daemon/actor_thread.h"
+#include "daemon/guarded.h"
 #include "daemon/jobs/job_files.h"
 
 namespace scanrig {
@@ -15,18 +15,6 @@ namespace {
 
 /// More views are not kept in memory while an earlier job is being worked on.
 constexpr int kMostViewsWaiting = 4;
-
-/// The libraries below may throw what nobody foresaw, or run out of memory; that is one job's bad luck.
-template <class Work>
-Result<void> guarded(const Work& work) {
-  try {
-    return work();
-  } catch (const std::bad_alloc&) {
-    return fail(ErrorCode::out_of_range, "the reconstruction ran out of memory: use larger voxels");
-  } catch (const std::exception& e) {
-    return fail(ErrorCode::internal, "the reconstruction failed: {}", e.what());
-  }
-}
 
 }  // namespace
 
@@ -196,7 +184,7 @@ Result<void> ReconstructionThread::make_model() {
 void ReconstructionThread::check(const Result<void>& done) {
   if (done) return;
   current_->error = done.error();
-  if (!stop_.stop_requested()) tell_(event::ReconstructionFailed{current_->job, done.error()});
+  if (!stop_.stop_requested()) tell_(event::ReconstructionFailed{current_->job, done.error(), current_->quarantined});
 }
 
 void ReconstructionThread::tell_progress(std::string stage, double fraction) {

@@ -187,6 +187,7 @@ struct StageProgress {
 struct ReconstructionFailed {
   std::string job;
   Error error;
+  bool quarantined = false;  ///< it was not tried
 };
 struct ModelReady {
   std::string job, model, report;        ///< paths of the files

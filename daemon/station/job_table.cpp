@@ -68,6 +68,7 @@ void update(JobTable& table, const Event& event) {
           [&](const event::ReconstructionFailed& e) {
             change(table, e.job, [&](JobInfo& job) {
               job.error = e.error;
+              job.quarantined = e.quarantined;
               if (job.state == JobState::reconstructing) job.state = JobState::failed;
             });
           },

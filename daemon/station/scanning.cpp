@@ -110,6 +110,21 @@ void continue_after_flip(Machine& m, std::string cause) {
   m.warn();
 }
 
+/// A disk that takes nothing more is no fault of the rig: what moves is stopped, as by Stop, and nothing latches. What
+/// is stored stays, and with room again the job can be resumed.
+void store_failed(Machine& m, const event::StoreFailed& e) {
+  if (!m.has(e.job)) return;
+  m.close_job(JobState::interrupted, e.error);
+  if (m.s().machine == MachineState::error) return;  // a fault came first and has the word
+  std::string cause =
+      fmt::format("Job {} is interrupted: {}; see to the disk, then resume it.", e.job, e.error.message);
+  if (m.s().activity != Activity::scanning) return m.enter(MachineState::ready, std::move(cause));  // nothing moves
+  m.s().machine = MachineState::halted;
+  m.s().home_by_guard = false;
+  m.s().cause = std::move(cause);
+  m.stop_rig();
+}
+
 void flip_timed_out(Machine& m, const event::FlipTimedOut& e) {
   if (!m.has(e.job) || m.s().activity != Activity::waiting_for_flip) return;
   const auto limit = m.s().job->recipe.flip_timeout;

@@ -131,6 +131,7 @@ class Transition : public Machine {
     s().home_by_guard = false;
     s().maintenance.reset();
     s().may_be_moving = true;
+    set_problem("turntable", e.error);  // nobody else will ask it now
     stopped();  // no more evidence will come by itself
     if (!s().shutting_down) act(action::RetryStopLater{});
   }
@@ -155,12 +156,7 @@ class Transition : public Machine {
   void operator()(const event::PoseStored& e) { pose_stored(*this, e); }
   void operator()(const event::FlipTimedOut& e) { flip_timed_out(*this, e); }
 
-  /// What is on disk stays; with room again the job can be resumed.
-  void operator()(const event::StoreFailed& e) {
-    if (!has(e.job)) return;
-    close_job(JobState::interrupted, e.error);
-    fault(e.error.message + ".");
-  }
+  void operator()(const event::StoreFailed& e) { store_failed(*this, e); }
 
   void operator()(const event::ReconstructionFailed& e) {
     if (has(e.job)) s().job->reconstruction = e.error;

@@ -1,5 +1,7 @@
 #include "sim/apps/operator.h"
 
+#include <utility>
+
 namespace scanrig::sim {
 namespace {
 
@@ -19,14 +21,21 @@ void Operator::look(const PanelOutputs& lamps) {
   if (lamps.flip_request && !flip_was_requested_) {
     rig_.turn_over();
     rig_.press_start();
-  } else if (lamps.start_lamp && !lamps.flip_request && !has_started_) {
+  } else if (role_ == Role::alone && lamps.start_lamp && !lamps.flip_request && !has_started_) {
     has_started_ = true;
     rig_.press_start();
-  } else if (lamps.amber && !lamps.busy && !lamps.start_lamp && !has_reset_) {
-    has_reset_ = true;
-    rig_.press_reset();
+  } else if ((lamps.amber || lamps.red) && !lamps.busy && !lamps.start_lamp) {
+    reset();
   }
   flip_was_requested_ = lamps.flip_request;
+}
+
+void Operator::reset() {
+  if (role_ == Role::alone && std::exchange(has_reset_, true)) return;
+  rig_.lose_frames(0);
+  rig_.stall_turntable(false);
+  rig_.set_estop(true);
+  rig_.press_reset();
 }
 
 }  // namespace scanrig::sim

@@ -7,19 +7,23 @@
 
 namespace scanrig::sim {
 
-/// Somebody at the simulated rig who looks at nothing but the lamps: presses Reset once, Start once, and turns the
-/// object over and presses Start each time the flip lamp comes on.
+/// Somebody at the simulated rig who looks at nothing but the lamps: turns the object over and presses Start each time
+/// the flip lamp comes on. Alone he also presses Reset once and Start once. As a helper he begins no job, but sees to
+/// whatever is wrong with the rig and presses Reset as often as it is asked for.
 class Operator {
  public:
-  Operator(SimRig& rig, Clock& clock)
-      : rig_(rig), clock_(clock), thread_([this](const std::stop_token& stop) { run(stop); }) {}
+  enum class Role { alone, helper };
+  Operator(SimRig& rig, Clock& clock, Role role)
+      : rig_(rig), clock_(clock), role_(role), thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
  private:
   void run(const std::stop_token& stop);
   void look(const PanelOutputs& lamps);
+  void reset();
 
   SimRig& rig_;
   Clock& clock_;
+  Role role_;
   bool has_reset_ = false;
   bool has_started_ = false;
   bool flip_was_requested_ = false;

@@ -12,6 +12,7 @@
 #include "daemon/run_daemon.h"
 #include "daemon/signal_stop.h"
 #include "sim/apps/operator.h"
+#include "sim/apps/troubled_camera.h"
 #include "sim/apps/wire_camera.h"
 #include "sim/devices/sim_rig.h"
 #include "sim/scene/profile.h"
@@ -29,6 +30,7 @@ struct SimOptions {
   int threads = 0;
   std::string clock = "real";
   std::string operator_at_rig = "auto";
+  double trouble = 0.0;
   std::filesystem::path config;  ///< a rig of real drivers on simulated wires
   bool make_safe = false;
 };
@@ -56,9 +58,15 @@ void add_options(CLI::App& app, SimOptions& o) {
   app.add_option("--clock", o.clock, "real, or virtual: no waiting for the rig")
       ->capture_default_str()
       ->check(CLI::IsMember({"real", "virtual"}));
-  app.add_option("--operator", o.operator_at_rig, "auto: somebody scans one object; none: use the API")
+  app.add_option("--operator", o.operator_at_rig,
+                 "auto: somebody scans one object; helper: somebody turns objects over, sees to faults and presses "
+                 "Reset, the rest is for the API; none: all of it is")
       ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "none"}));
+      ->check(CLI::IsMember({"auto", "helper", "none"}));
+  app.add_option("--trouble", o.trouble,
+                 "share of the exposures before which a frame is lost, the camera falls silent, the table is blocked "
+                 "or the e-stop is pressed")
+      ->check(CLI::Range(0.0, 1.0));
 }
 
 /// The object must be one that the rig can take before anything is written.
@@ -89,8 +97,11 @@ Result<void> run(const SimOptions& o, const SignalStop& stop) {
   options.on_scanned = [&r](const std::filesystem::path& folder) { return r.write_truth(folder); };
 
   std::optional<sim::Operator> somebody;
-  if (o.operator_at_rig == "auto") somebody.emplace(r, *clock);
-  return run_daemon({r.turntable(), r.projector(), r.camera(), r.panel()}, options, *clock, stop.token());
+  using Role = sim::Operator::Role;
+  if (o.operator_at_rig != "none")
+    somebody.emplace(r, *clock, o.operator_at_rig == "auto" ? Role::alone : Role::helper);
+  sim::TroubledCamera camera(r, o.trouble, o.rig.seed);
+  return run_daemon({r.turntable(), r.projector(), camera, r.panel()}, options, *clock, stop.token());
 }
 
 /// The shipped drivers on the wires that the configuration names, with rendered images where it says so.

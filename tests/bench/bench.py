@@ -82,7 +82,8 @@ def main():
         parser.error("--record wants the full measurement, not --quick")
 
     bench = Bench(options.bin, options.quick)
-    print(f"commit {commit()}, {bench.cores} cores{', quick' if options.quick else ''}")
+    measured_commit = commit()
+    print(f"commit {measured_commit}, {bench.cores} cores{', quick' if options.quick else ''}")
     print("what | asked | measured | ok")
     sys.path.insert(0, str(HERE))
     for group in options.groups:
@@ -92,7 +93,7 @@ def main():
     held = [line["ok"] for line in bench.lines]
     print(f"profile {bench.profile or '-'}")
     print(f"{held.count(True)} held, {held.count(False)} fell short, {held.count(None)} not measured")
-    record = {"commit": commit(), "cores": bench.cores, "quick": options.quick, "profile": bench.profile,
+    record = {"commit": measured_commit, "cores": bench.cores, "quick": options.quick, "profile": bench.profile,
               "lines": bench.lines}
     (ROOT / "out" / "bench.json").write_text(json.dumps(record, indent=1) + "\n")
     if options.record:

@@ -1,5 +1,6 @@
 """The simulated rig on the wire, the daemon beside it, and the hand of an operator, for the groups of the bench."""
 import json
+import os
 import pathlib
 import shutil
 import signal
@@ -99,11 +100,12 @@ class Rig:
 
     # The daemon
 
-    def start_daemon(self, scale=0.25, wait=True):
+    def start_daemon(self, scale=0.25, wait=True, environment=None):
         self.api.unlink(missing_ok=True)
         output = open(self.folder / "daemon.log", "a")
         command = [self.bin / "scanrigd-sim", "--config", self.config, "--scale", scale]
-        self.daemon = subprocess.Popen([str(word) for word in command], stdout=output, stderr=output)
+        self.daemon = subprocess.Popen([str(word) for word in command], stdout=output, stderr=output,
+                                       env=dict(os.environ, **(environment or {})))
         if wait and not self.wait(self.asks_for_reset, DAEMON_READY_S):
             raise RuntimeError(f"the daemon did not start, see {self.folder / 'daemon.log'}")
 

@@ -16,7 +16,7 @@ import tempfile
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
 SUITE = platform.freedesktop_os_release()["VERSION_CODENAME"]  # the programs were built with its libraries
-SYSTEM_PACKAGES = ["systemd-sysv", "udev", "kmod", "dbus", "iproute2", "procps", "usbip", "curl"]
+SYSTEM_PACKAGES = ["systemd-sysv", "udev", "kmod", "dbus", "iproute2", "procps", "usbip"]
 INITRD_MODULES = ["virtio_pci", "virtio_blk", "squashfs", "overlay", "ext4", "virtio_console"]
 MODULES = INITRD_MODULES + ["vivid", "vhci_hcd", "usbhid", "ftdi_sio", "xhci_pci", "virtio_net", "veth", "configfs",
                             "gpio_sim", "v4l2loopback"]

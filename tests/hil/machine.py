@@ -7,8 +7,10 @@ import socket
 import subprocess
 import time
 
-BOOT_S = 180
+BOOT_S = 90
+KEEP_S = 60
 COMMAND_S = 60
+UNPLUG_S = 10
 
 
 class Gone(RuntimeError):
@@ -58,15 +60,25 @@ class Wire:
                 end.close()
 
 
-class Machine:
-    """`folder` keeps its disk, its sockets and what its console said. `cached`: vmlinuz, initrd, base.sqfs."""
+def free_port():
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
 
-    def __init__(self, folder, cached, app, turntable_port, more=(), cores=2):
+
+class Machine:
+    """`folder` keeps its disk, its sockets and what its console said. `cached`: vmlinuz, initrd, base.sqfs.
+
+    `booted`: what keep() wrote; the machine begins there where the file exists."""
+
+    def __init__(self, folder, cached, app, turntable_port, booted, cores=2):
         self.folder = pathlib.Path(folder)
         self.console = self.folder / "console.log"
         self.agent = Wire(self.folder / "agent.sock")
         self.eyes = Wire(self.folder / "eyes.sock")
         self.monitor = Wire(self.folder / "qmp.sock")
+        self.http_port = free_port()
+        self.booted = booted if booted.is_file() else None
 
         def drive(file, options=""):
             return ["-drive", f"file={file},format=raw,if=virtio,{options}"]
@@ -75,12 +87,13 @@ class Machine:
             "qemu-system-x86_64", "-accel", "tcg,thread=multi", "-machine", "q35", "-cpu", "max", "-smp", cores,
             "-m", 2048, "-nodefaults", "-no-user-config", "-display", "none", "-no-reboot",
             "-kernel", cached / "vmlinuz", "-initrd", cached / "initrd",
-            "-append", "console=ttyS0 quiet panic=-1 mitigations=off systemd.show_status=0 systemd.log_target=journal "
-            "systemd.mask=e2scrub_reap.service",
+            "-append", "console=ttyS0 quiet panic=-1 net.ifnames=0 mitigations=off systemd.show_status=0 systemd.log_target=journal "
+            "systemd.unit=hil.target systemd.mask=e2scrub_reap.service systemd.mask=getty.target",
             *drive(cached / "base.sqfs", "readonly=on"), *drive(app, "readonly=on"),
             # The host's page cache survives the machine: what it holds back is only what the guest never wrote out.
             *drive(self.folder / "disk.ext4", "cache=writeback"),
             "-chardev", f"file,id=console,path={self.console},append=on", "-serial", "chardev:console",
+            "-chardev", "null,id=uart", "-serial", "chardev:uart",
             "-chardev", f"socket,id=qmp,path={self.folder / 'qmp.sock'}", "-mon", "chardev=qmp,mode=control",
             "-device", "virtio-serial-pci",
             "-chardev", f"socket,id=agent,path={self.folder / 'agent.sock'}",
@@ -89,7 +102,8 @@ class Machine:
             "-device", "virtserialport,chardev=eyes,name=eyes",
             "-device", "qemu-xhci,id=usb",
             "-chardev", f"serial,id=turntable,path={turntable_port}",
-            "-netdev", "user,id=net,restrict=off", "-device", "virtio-net-pci,netdev=net", *more]
+            "-netdev", f"user,id=net,restrict=on,hostfwd=tcp:127.0.0.1:{self.http_port}-:80",
+            "-device", "virtio-net-pci,netdev=net", *(["-incoming", f"exec:cat {booted}"] if self.booted else [])]
         self.process = subprocess.Popen([str(word) for word in command], stdin=subprocess.DEVNULL,
                                         stderr=open(self.folder / "qemu.log", "a"))
         try:
@@ -124,8 +138,40 @@ class Machine:
             if "return" in answer:
                 return answer["return"]
 
+    def unplug_chardev(self, name):
+        """Once the device that used it has let go of it."""
+        end = time.monotonic() + UNPLUG_S
+        while True:
+            try:
+                return self.qmp("chardev-remove", id=name)
+            except RuntimeError:
+                if time.monotonic() > end:
+                    raise
+                time.sleep(0.1)
+
+    def keep(self, file):
+        """Writes to `file` what another machine can begin with, and goes on."""
+        part = file.with_suffix(".part")
+        self.qmp("stop")
+        self.qmp("migrate-set-parameters", **{"max-bandwidth": 1 << 40})
+        self.qmp("migrate", uri=f"exec:cat >{part}")
+        self.wait_for("query-migrate", "completed", KEEP_S)
+        part.rename(file)
+        self.qmp("cont")
+
+    def wait_for(self, query, status, limit_s):
+        end = time.monotonic() + limit_s
+        while (answer := self.qmp(query)).get("status") != status:
+            if answer.get("status") == "failed" or time.monotonic() > end:
+                raise RuntimeError(f"{query}: not {status} within {limit_s} s: {answer}")
+            time.sleep(0.05)
+
     def wait_for_boot(self):
         """Until its agent says that it is there."""
+        if self.booted:
+            self.wait_for("query-status", "paused", KEEP_S)  # as it was when it was kept
+            self.qmp("cont")
+            return
         try:
             self.agent.receive(BOOT_S)
         except Gone as problem:

@@ -1,11 +1,17 @@
 """One pose through the kernel's interfaces, and the faults; each function is a row of the table."""
+import json
 import random
+import re
+import struct
 import time
 
 from station import IMAGES, JOBS, VIEWS, Unmet
 
 SCAN_S = 120
 RECOVERY_S = 60
+CONFIGS = "/etc/scanrig"
+UART_DEG = 40.0
+PAIRS, VIVID_SIZE = 8, (320, 180)
 
 
 def expect(true, what):
@@ -65,6 +71,36 @@ def usb_and_gige(station, rendered):
     for device in ("projector", "camera"):
         station.wait(f"the {device} there", lambda name=device: device_is_there(station, name), 30)
     return pose(station, rendered)
+
+
+def uart(station):
+    """The table homed and turned with the command line, at a serial port of the machine's own."""
+    station.machine.do("systemctl stop scanrigd", 30)
+    station.wire_uart()
+    station.wait("the USB adapter's port gone", lambda: station.machine.call("test -e /dev/ttyUSB0")[0] != 0, 10)
+    station.machine.do("ln -sf /dev/ttyS1 /dev/scanrig/turntable")
+    port = station.machine.do("grep ^1: /proc/tty/driver/serial")
+    expect("16550A" in port, f"the port is {port}")
+    moved = json.loads(station.machine.do(f"scanrig turntable move {UART_DEG} --yes --json --config {CONFIGS}/rig.toml"))
+    off = abs(moved["measured_deg"] - UART_DEG)
+    truth = station.rig.truth()["angle_deg"]
+    expect(off < 0.02 and abs(truth - UART_DEG) < 0.1, f"asked for {UART_DEG} deg: {moved}, truth {truth:.3f} deg")
+    return f"ttyS1, 16550A: home, then {moved['measured_deg']:.3f} deg; truth {truth:.3f} deg"
+
+
+def vivid(station):
+    """The V4L2 driver on a capture driver of the kernel's own, frames by a timer."""
+    station.machine.do("systemctl stop scanrigd && modprobe vivid && udevadm settle -t 10", 60)
+    config = f"--light none --config {CONFIGS}/vivid.toml"
+    tuned = station.machine.do(f"scanrig camera tune --count {PAIRS} {config}")
+    bright = [float(percent) for percent in re.findall(r"brightness +([\d.]+) %", tuned)]
+    expect(len(bright) == 2 * PAIRS and min(bright) > 20, f"the command line says: {tuned}")
+    station.machine.do(f"rm -rf /run/hil/grab && scanrig camera grab --out /run/hil/grab {config}")
+    for side in ("left", "right"):
+        head = bytes.fromhex(station.machine.do(f"head -c 24 /run/hil/grab/{side}.png | od -An -v -tx1"))
+        size = struct.unpack(">II", head[16:])
+        expect(head[:4] == b"\x89PNG" and size == VIVID_SIZE, f"{side}.png is not an image of {VIVID_SIZE}: {head}")
+    return f"{PAIRS} pairs seen, brightness {min(bright):.0f} to {max(bright):.0f} %; one grabbed, {size[0]}x{size[1]}"
 
 
 def stop_job(station):

@@ -1,5 +1,6 @@
 """The station in the virtual machine, with the simulated turntable of the host at its serial port."""
 import hashlib
+import http.client
 import json
 import os
 import pathlib
@@ -30,8 +31,9 @@ def make_tree(build, tree, images):
     image.run("cmake", "--install", build, "--prefix", "/usr", "--strip", env={**os.environ, "DESTDIR": str(tree)})
     shutil.copytree(image.HERE / "guest", tree, symlinks=True, dirs_exist_ok=True)
     image.run("strip", "-o", tree / "usr/lib/hil/scanrig-edge-camera", build / "bin" / "scanrig-edge-camera")
-    other = with_sections(tree / "etc/scanrig/rig.toml", tree / "usr/share/hil/usb-and-gige.toml")
-    (tree / "etc/scanrig/usb-and-gige.toml").write_text(other)
+    for name in ("usb-and-gige.toml", "vivid.toml"):
+        other = with_sections(tree / "etc/scanrig/rig.toml", tree / "usr/share/hil" / name)
+        (tree / "etc/scanrig" / name).write_text(other)
     shutil.copytree(images, tree / "usr" / "share" / "hil" / "images")
 
 
@@ -47,9 +49,10 @@ def with_sections(config, sections):
 class Station:
     """One boot of the machine, until it is left."""
 
-    def __init__(self, folder, cached, app, rig, more=()):
+    def __init__(self, folder, cached, app, rig):
         self.rig = rig
-        self.machine = machine.Machine(folder, cached, app, rig.folder / "turntable", more)
+        self.booted = folder / "booted"
+        self.machine = machine.Machine(folder, cached, app, rig.folder / "turntable", self.booted)
         self.told = None  # the angle that the cameras know of
         self.job = None  # the last one that was started
         self.leaving = threading.Event()
@@ -58,7 +61,11 @@ class Station:
     def __enter__(self):
         try:
             self.machine.wait_for_boot()
+            if not self.booted.is_file():
+                self.machine.do("systemctl start hil.target", 60)  # returns when it is reached
+                self.machine.keep(self.booted)
             self.plug_serial(True)
+            self.machine.do(f"date -s @{time.time():.3f} && systemctl start --no-block multi-user.target")
         except BaseException:
             self.machine.kill()
             raise
@@ -88,6 +95,13 @@ class Station:
         else:
             self.machine.qmp("device_del", id="adapter")
 
+    def wire_uart(self):
+        """The drive's cable goes from the USB adapter to the machine's second 16550A."""
+        self.plug_serial(False)
+        self.machine.unplug_chardev("turntable")
+        self.machine.qmp("chardev-change", id="uart",
+                         backend={"type": "serial", "data": {"device": str(self.rig.folder / "turntable")}})
+
     # The operator's hands
 
     def pull(self, line, up):
@@ -107,11 +121,15 @@ class Station:
     # The daemon
 
     def ask(self, what):
-        code, text = self.machine.call(f"curl -s -m 5 --unix-socket /run/scanrig/api.sock http://rig/api/v1/{what}")
+        wire = http.client.HTTPConnection("127.0.0.1", self.machine.http_port, timeout=5)
         try:
-            return json.loads(text) if code == 0 else None
-        except ValueError:
+            wire.request("GET", f"/api/v1/{what}", headers={"Host": "rig"})
+            answer = wire.getresponse()
+            return json.loads(answer.read()) if answer.status == 200 else None
+        except (OSError, http.client.HTTPException, ValueError):
             return None
+        finally:
+            wire.close()
 
     def status(self):
         return self.ask("status")
@@ -133,7 +151,7 @@ class Station:
                 return found
             if time.monotonic() > end:
                 raise Unmet(f"not {what} within {limit_s} s; {self.says()}")
-            time.sleep(0.1)
+            time.sleep(0.2)
 
     def wait_for_words(self, key, words, limit_s):
         def ready():

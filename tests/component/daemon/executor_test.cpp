@@ -86,6 +86,26 @@ TEST_F(Executor, TheDaemonsDeathIsTriedOnceMoreThenTheJobIsInQuarantine) {
   EXPECT_TRUE(wait_state(id, JobState::done)) << "somebody asked for another try";
 }
 
+TEST_F(Executor, AScanThatGoesOnInQuarantineTakesItsViewsAndSaysSo) {
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(clock_waits_for([&] { return newest() && !newest()->stored.empty(); }));
+  const auto id = newest()->id;
+  shut_down();
+  write_attempts(job_folders().at(0), 2);
+  boot();
+  get_ready();
+  ASSERT_TRUE(ask(event::JobAsked{.what = What::resume, .job = id}));
+  scan_both_poses();
+  EXPECT_TRUE(wait_state(id, JobState::failed));
+  EXPECT_TRUE(job(id)->quarantined);
+  EXPECT_THAT(job(id)->error->message, HasSubstr("quarantine"));
+  ASSERT_TRUE(ask(event::JobAsked{.what = What::reprocess, .job = id}));
+  EXPECT_TRUE(wait_state(id, JobState::done));
+  EXPECT_FALSE(job(id)->quarantined);
+}
+
 TEST_F(Executor, AModelIsMadeAgainWithOtherOptions) {
   std::vector<std::pair<std::optional<double>, std::string>> asked;
   const auto fake = options.reconstructor;

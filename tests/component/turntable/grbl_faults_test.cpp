@@ -1,32 +1,27 @@
 #include <gmock/gmock.h>
 
-#include <algorithm>
-
 #include "tests/component/turntable/grbl_bench.h"
+#include "tests/component/turntable/turntable_faults.h"
 
 namespace scanrig {
 namespace {
 
-using sim::wire::WireFault;
-using sim::wire::WireFrame;
-using std::chrono::milliseconds;
 using testing::HasSubstr;
 using testing::Not;
 
 constexpr std::uint8_t kReport = '?', kLine = 'G';
 
-std::string text_of(const WireFrame& frame) { return {frame.bytes.begin(), frame.bytes.end()}; }
-bool is_move(const WireFrame& frame) { return frame.from_master && text_of(frame).starts_with("G"); }
-bool is_hold(const WireFrame& frame) { return frame.from_master && text_of(frame) == "!"; }
-bool is_report(const WireFrame& frame) { return frame.from_master && text_of(frame) == "?"; }
-
-class GrblFaults : public testing::Test {
+class GrblFaults : public testing::Test, protected TurntableFaults {
  protected:
   static void slow(GrblTurntableOptions& options, sim::wire::GrblSettings&) { options.speed = {450}; }
 
-  Deadline within(milliseconds time) { return Deadline::after(bench_->clock(), time); }
-  Result<void> home() { return bench_->turntable().home(within(milliseconds(5000))); }
-  Result<Move> rotate_to(double deg) { return bench_->turntable().rotate_to(Degrees{deg}, within(milliseconds(3000))); }
+  static std::string text_of(const WireFrame& frame) { return {frame.bytes.begin(), frame.bytes.end()}; }
+  bool is_move(const WireFrame& frame) const override { return frame.from_master && text_of(frame).starts_with("G"); }
+  bool is_read(const WireFrame& frame) const override { return frame.from_master && text_of(frame) == "?"; }
+  bool is_stop(const WireFrame& frame) const override { return frame.from_master && text_of(frame) == "!"; }
+  std::uint8_t moving() const override { return kLine; }
+  std::uint8_t reading() const override { return kReport; }
+  WireBench& bench() override { return *bench_; }
 
   void start(const GrblBench::Change& change = [](auto&, auto&) {}) {
     bench_.reset();
@@ -34,107 +29,43 @@ class GrblFaults : public testing::Test {
   }
   void start_at_zero(const GrblBench::Change& change = [](auto&, auto&) {}) {
     start(change);
-    const auto homed = home();
-    ASSERT_TRUE(homed) << homed.error().message;
-    const auto moved = rotate_to(0);
-    ASSERT_TRUE(moved) << moved.error().message;
-    bench_->server().clear_log();
-  }
-  void expect_rest(double by_deg) {
-    for (const auto by = within(milliseconds(2000)); bench_->seen_moving() && !by.expired(bench_->clock());) {
-      bench_->clock().sleep_for(milliseconds(2));
-    }
-    EXPECT_FALSE(bench_->seen_moving());
-    EXPECT_LT(bench_->seen_deg(), by_deg);
-  }
-  void expect_home_is_needed_and_helps() {
-    const auto refused = rotate_to(10);
-    ASSERT_FALSE(refused);
-    EXPECT_EQ(refused.error().code, ErrorCode::not_homed) << refused.error().message;
-    const auto homed = home();
-    ASSERT_TRUE(homed) << homed.error().message;
-    const auto moved = rotate_to(10);
-    ASSERT_TRUE(moved) << moved.error().message;
-  }
-  auto moves_sent() {
-    const auto log = bench_->server().log();
-    return std::ranges::count_if(log, is_move);
+    go_to_zero();
   }
 
   std::unique_ptr<GrblBench> bench_ = std::make_unique<GrblBench>();
 };
 
-struct Spoiled {
-  const char* name;
-  WireFault fault;
-  ErrorCode code;
-  bool hears_stop;
-};
-
-class GrblSpoiledAnswers : public GrblFaults, public testing::WithParamInterface<Spoiled> {};
-
-TEST_P(GrblSpoiledAnswers, EndInTheirErrorWithinTheDeadlineWithTheTableAtRest) {
-  const Spoiled& spoiled = GetParam();
-  start_at_zero(slow);
-  bench_->when_moving([&] { bench_->server().inject(spoiled.fault); });
-  const auto began = bench_->clock().now();
-  const auto moved = rotate_to(175);
-  EXPECT_LT(bench_->clock().now() - began, milliseconds(3000));
-  ASSERT_FALSE(moved);
-  EXPECT_EQ(moved.error().code, spoiled.code) << moved.error().message;
-  EXPECT_THAT(moved.error().message, HasSubstr(spoiled.hears_stop ? "told to stop" : "may be moving"));
-  bench_->server().clear_faults();
-  if (!spoiled.hears_stop) {
-    // The first thing the controller hears when it listens again.
-    bench_->server().clear_log();
-    EXPECT_TRUE(bench_->turntable().status(within(milliseconds(2000))));
-    ASSERT_FALSE(bench_->server().log().empty());
-    EXPECT_TRUE(is_hold(bench_->server().log().front()));
+TEST_F(GrblFaults, SpoiledAnswersEndInTheirErrorWithinTheDeadlineWithTheTableAtRest) {
+  constexpr auto forever = -1;
+  const std::vector<Spoiled> all{
+      {"Silent", {WireFault::Kind::deaf}, ErrorCode::timeout, false},
+      {"AnswersLost", {WireFault::Kind::answer_lost, forever, kReport}, ErrorCode::timeout, true},
+      {"Late", {WireFault::Kind::late, forever, kReport, milliseconds(50)}, ErrorCode::timeout, true},
+      {"Damaged", {WireFault::Kind::wrong_crc, forever, kReport}, ErrorCode::protocol, true},
+      {"CutShort", {WireFault::Kind::cut_short, forever, kReport}, ErrorCode::timeout, true},
+      {"EarlierAnswers", {WireFault::Kind::earlier_answer, forever, kReport}, ErrorCode::protocol, true}};
+  for (const Spoiled& spoiled : all) {
+    SCOPED_TRACE(spoiled.name);
+    start_at_zero(slow);
+    bench_->when_moving([&] { bench_->server().inject(spoiled.fault); });
+    expect_named_end(spoiled);
+    expect_home_is_needed_and_helps();
   }
-  expect_rest(spoiled.hears_stop ? 174.0 : 176.0);
-  expect_home_is_needed_and_helps();
 }
-
-INSTANTIATE_TEST_SUITE_P(
-    All, GrblSpoiledAnswers,
-    testing::Values(Spoiled{"Silent", {WireFault::Kind::deaf}, ErrorCode::timeout, false},
-                    Spoiled{"AnswersLost", {WireFault::Kind::answer_lost, -1, kReport}, ErrorCode::timeout, true},
-                    Spoiled{"Late", {WireFault::Kind::late, -1, kReport, milliseconds(50)}, ErrorCode::timeout, true},
-                    Spoiled{"Damaged", {WireFault::Kind::wrong_crc, -1, kReport}, ErrorCode::protocol, true},
-                    Spoiled{"CutShort", {WireFault::Kind::cut_short, -1, kReport}, ErrorCode::timeout, true},
-                    Spoiled{
-                        "EarlierAnswers", {WireFault::Kind::earlier_answer, -1, kReport}, ErrorCode::protocol, true}),
-    [](const auto& spoiled) { return spoiled.param.name; });
 
 TEST_F(GrblFaults, OneDamagedReportIsAskedForAgainAndCounted) {
   start_at_zero();
-  const auto before = bench_->turntable().statistics();
-  bench_->server().inject({WireFault::Kind::wrong_crc, 1, kReport});
-  ASSERT_TRUE(rotate_to(45));
-  const auto after = bench_->turntable().statistics();
-  EXPECT_EQ(after.corrupt - before.corrupt, 1u);
-  EXPECT_GE(after.retries - before.retries, 1u);
+  expect_one_damaged_answer_asked_for_again();
 }
 
 TEST_F(GrblFaults, AMoveWhoseAnswerIsLostIsNotSentAgainOnceSeenRunning) {
   start_at_zero(slow);
-  bench_->server().inject({WireFault::Kind::answer_lost, 1, kLine});
-  const auto moved = rotate_to(45);
-  ASSERT_TRUE(moved) << moved.error().message;
-  EXPECT_NEAR(moved->measured.value, 45, 0.05);
-  EXPECT_EQ(moves_sent(), 1);
+  expect_move_not_sent_again_once_seen_running();
 }
 
 TEST_F(GrblFaults, AMoveThatWasNotHeardIsSentAgainOnlyAfterReading) {
   start_at_zero();
-  bench_->server().inject({WireFault::Kind::deaf, 1, kLine});
-  const auto moved = rotate_to(45);
-  ASSERT_TRUE(moved) << moved.error().message;
-  ASSERT_EQ(moves_sent(), 2);
-  const auto log = bench_->server().log();
-  const auto first = std::ranges::find_if(log, is_move);
-  const auto second = std::find_if(first + 1, log.end(), is_move);
-  EXPECT_TRUE(std::any_of(first, second, is_report));
+  expect_move_sent_again_only_after_reading();
 }
 
 TEST_F(GrblFaults, AMoveThatIsRefusedIsToldInWordsAndNotSentAgain) {
@@ -160,19 +91,7 @@ TEST_F(GrblFaults, OkIsQueuedNotArrived) {
 
 TEST_F(GrblFaults, APulledAdapterIsAnIoErrorAndTheControllerHearsStopFirstWhenItIsBack) {
   start_at_zero(slow);
-  bench_->when_moving([&] { bench_->server().vanish(); });
-  const auto moved = rotate_to(90);
-  ASSERT_FALSE(moved);
-  EXPECT_EQ(moved.error().code, ErrorCode::io) << moved.error().message;
-  EXPECT_THAT(moved.error().message, HasSubstr("may be moving"));
-  EXPECT_FALSE(bench_->turntable().status(within(milliseconds(500))));
-  bench_->server().clear_log();
-  ASSERT_TRUE(bench_->server().come_back());
-  const auto back = bench_->turntable().status(within(milliseconds(500)));
-  ASSERT_TRUE(back) << back.error().message;
-  EXPECT_FALSE(back->homed);
-  EXPECT_TRUE(is_hold(bench_->server().log().front()));
-  expect_rest(180.0);
+  expect_stop_first_after_a_pulled_adapter();
   expect_home_is_needed_and_helps();
 }
 
@@ -188,26 +107,14 @@ TEST_F(GrblFaults, TwoProgramsCannotShareALine) {
 
 TEST_F(GrblFaults, AnAlarmIsToldInWordsAndHoldsUntilItIsReset) {
   start_at_zero(slow);
-  bench_->when_moving([&] { bench_->drive().raise_alarm(1); });
-  const auto moved = rotate_to(90);
-  ASSERT_FALSE(moved);
-  EXPECT_EQ(moved.error().code, ErrorCode::device_alarm) << moved.error().message;
-  EXPECT_THAT(moved.error().message, HasSubstr("a limit switch was hit"));
-  expect_rest(89.0);
-  const auto status = bench_->turntable().status(within(milliseconds(1000)));
-  ASSERT_TRUE(status) << status.error().message;
-  EXPECT_THAT(status->alarm, HasSubstr("a limit switch was hit"));
-  const auto homed = home();
-  ASSERT_FALSE(homed);
-  EXPECT_EQ(homed.error().code, ErrorCode::device_alarm);
-  ASSERT_TRUE(bench_->turntable().reset_alarm(within(milliseconds(1000))));
+  expect_alarm_until_reset(1, "a limit switch was hit");
   expect_home_is_needed_and_helps();
 }
 
 TEST_F(GrblFaults, AnAlarmThatStaysIsSaid) {
   start_at_zero();
   bench_->drive().raise_alarm(1, false);
-  const auto reset = bench_->turntable().reset_alarm(within(milliseconds(1000)));
+  const auto reset = reset_alarm();
   ASSERT_FALSE(reset);
   EXPECT_EQ(reset.error().code, ErrorCode::device_alarm) << reset.error().message;
 }
@@ -240,7 +147,7 @@ TEST_F(GrblFaults, TheLockIsNeverLiftedButByHoming) {
   start_at_zero();
   bench_->drive().raise_alarm(3);
   EXPECT_FALSE(rotate_to(45));
-  EXPECT_TRUE(bench_->turntable().reset_alarm(within(milliseconds(1000))));
+  EXPECT_TRUE(reset_alarm());
   EXPECT_TRUE(home());
   for (const auto& frame : bench_->server().log()) {
     if (!frame.from_master) continue;

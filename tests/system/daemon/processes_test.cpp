@@ -187,6 +187,27 @@ TEST_F(Programs, TokensAreMadeListedAndRevoked) {
   EXPECT_EQ(scanrig({"token", "revoke", "tablet", "--file", file}), 3);
 }
 
+#ifdef SICK_STAGE_LIBRARY
+TEST_F(Programs, AReconstructionWhoseStageThrowsSaysSoInsteadOfCrashing) {
+  ASSERT_EQ(Process({SCANRIG_SIM_PROGRAM, "shoot", "--poses", "1", "--views", "2", "--scale", "0.25", "--out",
+                     folder_ / "scan"},
+                    folder_ / "output")
+                .wait(),
+            0)
+      << *read_file(folder_ / "output");
+  scan_samples::write_text(folder_ / "sick", "throw");
+  const int code = Process({"/usr/bin/env", std::string("LD_PRELOAD=") + SICK_STAGE_LIBRARY,
+                            "SICK_STAGE=" + (folder_ / "sick").string(), SCANRIG_PROGRAM, "reconstruct",
+                            folder_ / "scan", "--lines"},
+                           folder_ / "output")
+                       .wait();
+  EXPECT_EQ(code, static_cast<int>(exit_code(ErrorCode::internal)));
+  EXPECT_THAT(*read_file(folder_ / "output"),
+              HasSubstr("failed\tinternal\tthe reconstruction failed: a stage that throws"));
+  EXPECT_FALSE(fs::exists(folder_ / "scan" / "model"));
+}
+#endif
+
 TEST_F(Programs, EndWithTheDocumentedCodeAndOneSentence) {
   const auto sentences = [&] { return std::ranges::count(output, '\n'); };
   EXPECT_EQ(scanrig({"no-such-verb"}), 2);

@@ -226,15 +226,51 @@ TEST_F(Station, ATableThatCannotBeSeenStandingIsSaidToMayBeMoving) {
   EXPECT_EQ(state.machine, MachineState::error);
   EXPECT_THAT(state.cause, HasSubstr("may be moving"));
   EXPECT_EQ(state.activity, Activity::none) << "or Reset could never be pressed";
+  ASSERT_EQ(state.devices.size(), 1u) << "shown as absent too, although nobody checks devices now";
+  EXPECT_EQ(state.devices[0].name, "turntable");
+  EXPECT_EQ(state.devices[0].problem->message, "turntable: no reply");
 }
 
-TEST_F(Station, AFullDiskInterruptsTheJobAndIsAFault) {
+TEST_F(Station, AFullDiskInterruptsTheJobAndStopsTheTableButLatchesNothing) {
   begin_scan();
   take(0, 0);
   tell(event::StoreFailed{"job", {ErrorCode::io, "cannot write: No space left on device"}});
-  EXPECT_EQ(state.machine, MachineState::error);
+  EXPECT_EQ(state.machine, MachineState::halted);
+  EXPECT_FALSE(state.latched);
+  EXPECT_NE(asked_for<action::StopRig>(), nullptr);
+  EXPECT_THAT(state.cause, HasSubstr("No space left on device; see to the disk"));
   ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
   EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::interrupted) << "with room again it can be resumed";
+  tell(event::Stopped{});
+  EXPECT_EQ(state.activity, Activity::none) << "and homes by itself no more than after Stop";
+}
+
+TEST_F(Station, AFullDiskWhileNothingMovesKeepsTheTableHomed) {
+  const event::StoreFailed full{"job", {ErrorCode::io, "cannot write: No space left on device"}};
+  get_ready();
+  press(Button::start);
+  tell(full);  // the job's folder could not be made
+  EXPECT_EQ(state.machine, MachineState::ready);
+  tell(event::WarningOver{});
+  EXPECT_EQ(asked_for<action::TakeView>(), nullptr);
+
+  press(Button::start);
+  tell(event::JobBegun{"job", 0, 0});
+  tell(event::WarningOver{});
+  take_and_store_all(0);
+  tell(full);  // the end of the pose could not be written
+  EXPECT_EQ(state.machine, MachineState::ready);
+  EXPECT_FALSE(state.job);
+}
+
+TEST_F(Station, AFaultIsNotForgottenOverAFullDisk) {
+  begin_scan();
+  tell(event::RigFailed{{ErrorCode::timeout, "turntable: no reply"}});
+  tell(event::StoreFailed{"job", {ErrorCode::io, "cannot write: No space left on device"}});
+  tell(event::EstopWindowOver{});
+  EXPECT_EQ(state.machine, MachineState::error);
+  EXPECT_TRUE(state.latched);
+  EXPECT_EQ(state.cause, "turntable: no reply.");
 }
 
 TEST_F(Station, AFailedReconstructionSparesTheFlip) {

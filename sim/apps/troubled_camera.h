@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+
+#include "sim/devices/sim_rig.h"
+
+namespace scanrig::sim {
+
+/// The rig's camera; before a `share` of its exposures something goes wrong with the rig: one pair of frames is lost,
+/// all frames from now on are, the table is blocked, or the e-stop is pressed. What and when follows from `seed`.
+/// But for the first, it stays until somebody sees to it.
+class TroubledCamera final : public StereoCamera {
+ public:
+  TroubledCamera(SimRig& rig, double share, std::uint64_t seed) : rig_(rig), share_(share), seed_(seed) {}
+  Result<void> ready(Deadline deadline) override { return rig_.camera().ready(deadline); }
+  Result<void> arm(Deadline deadline) override;
+  Result<StereoFrame> collect(Deadline deadline) override { return rig_.camera().collect(deadline); }
+  Result<StereoFrame> look(Deadline deadline) override { return rig_.camera().look(deadline); }
+
+ private:
+  SimRig& rig_;
+  double share_;
+  std::uint64_t seed_;
+  std::uint64_t exposures_ = 0;
+};
+
+}  // namespace scanrig::sim
