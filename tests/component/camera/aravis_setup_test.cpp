@@ -193,9 +193,14 @@ TEST(AravisTriggers, WithoutDeadAirNoneIs) {
   EXPECT_EQ(bench.camera().counts().warm_up, before);
 }
 
+std::ptrdiff_t descriptors() {
+  return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator());
+}
+
 TEST(AravisLoss, NobodyWaitsUntilTheLibraryHasGivenALostCameraUp) {
   AravisBench bench;
   ASSERT_TRUE(expose(bench));
+  const auto open = descriptors();
   ASSERT_TRUE(bench.plug(false));
   EXPECT_FALSE(expose(bench));  // a frame that does not come makes the next call ask
   const auto begun = bench.clock().now();
@@ -207,6 +212,9 @@ TEST(AravisLoss, NobodyWaitsUntilTheLibraryHasGivenALostCameraUp) {
   const auto again = bench.camera().ready(Deadline::after(bench.clock(), std::chrono::seconds(10)));
   EXPECT_TRUE(again) << again.error().message;
   EXPECT_TRUE(expose(bench));
+  const auto given_up = Deadline::after(bench.clock(), std::chrono::seconds(20));
+  while (descriptors() > open && !given_up.expired(bench.clock())) bench.clock().sleep_for(milliseconds(20));
+  EXPECT_LE(descriptors(), open) << "the lost connection is closed";
 }
 
 TEST(AravisTriggers, ACameraThatMissedTheEdgeIsNamed) {

@@ -27,12 +27,16 @@ class RigOnWires : public testing::Test {
     rig_.reset();
     std::filesystem::remove_all(folder_);
   }
+  /// What its cameras will see is rendered when this returns: a frame that is not there in time is a lost one.
   void start_rig(std::vector<std::string> more = {}) {
     std::vector<std::string> command{SCANRIG_SIM_PROGRAM,     "rig",  "--dir",   folder_, "--speed-deg-s", "180",
                                      "--acceleration-deg-s2", "1000", "--views", "4"};
     command.insert(command.end(), more.begin(), more.end());
     rig_.emplace(command, folder_ / "rig.log");
-    ASSERT_TRUE(soon([&] { return say({{"get", "truth"}}).contains("angle_deg"); }));
+    const auto ready = [&] {
+      return read_file(folder_ / "rig.log").value_or("").find("rig ready") != std::string::npos;
+    };
+    ASSERT_TRUE(soon(ready, std::chrono::seconds(120))) << read_file(folder_ / "rig.log").value_or("");
   }
   void start_daemon(const std::vector<std::string>& program = {SCANRIGD_SIM_PROGRAM, "--scale", "0.25"}) {
     std::vector<std::string> command = program;
