@@ -132,7 +132,7 @@ class Transition : public Machine {
     s().maintenance.reset();
     s().may_be_moving = true;
     set_problem("turntable", e.error);  // nobody else will ask it now
-    stopped();  // no more evidence will come by itself
+    stopped();                          // no more evidence will come by itself
     if (!s().shutting_down) act(action::RetryStopLater{});
   }
 
