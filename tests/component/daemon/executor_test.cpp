@@ -179,7 +179,11 @@ TEST_F(Executor, AProcessIsStoppedOnRequestWithAllItStartedAndLeavesNothing) {
   std::stop_source asked;
   const auto begun = folder_ / "model.new" / "pid";
   std::jthread impatient([&] {
-    while (!fs::exists(begun) || fs::file_size(begun) == 0) std::this_thread::yield();
+    RealClock real;
+    for (const auto by = Deadline::after(real, std::chrono::seconds(10)); !by.expired(real);) {
+      if (fs::exists(begun) && fs::file_size(begun) > 0) break;
+      real.sleep_for(std::chrono::milliseconds(1));
+    }
     asked.request_stop();
   });
   const auto done = (*made)->finish(folder_ / "model", {asked.get_token(), {}});

@@ -107,7 +107,8 @@ struct TriggerLine {
   int looks = 0;      ///< since the beginning
   int dark = 0;       ///< the next exposures whose right picture is dark
   int absent = 0;     ///< how often more the camera does not answer when it is armed; -1: it is not there at all
-  std::function<void()> at_fire;  ///< happens during the next exposure
+  std::function<void()> at_fire;  ///< happens during the next exposure, or
+  int fires_before = 0;           ///< after so many more
   Clock::TimePoint ready_at{};    ///< when the cameras were asked to get ready last
   Light last = Light::plain;
   int scene = 0;  ///< what the cameras look at: another number, another picture
@@ -124,7 +125,11 @@ class FakeProjector final : public Projector {
       ++line_.exposures;
       line_.last = light;
       line_.lit = false;  // the pulse is over when this returns
-      happens = std::exchange(line_.at_fire, nullptr);
+      if (line_.fires_before > 0) {
+        --line_.fires_before;
+      } else {
+        happens = std::exchange(line_.at_fire, nullptr);
+      }
     }
     if (happens) happens();
     if (dark_requested_) return fail(ErrorCode::io, "projector: went dark on request");

@@ -22,12 +22,14 @@ class Jobs : public Daemon {
   Result<std::string> ask_for(What what, const std::string& id) {
     return ask(event::JobAsked{.what = what, .job = id});
   }
-  /// Interrupts a scan of three views a pose after `views` of its first pose.
+  /// Interrupts a scan of three views a pose by the e-stop, in the exposure that follows `views` of its first pose.
   std::string interrupted_after(int views) {
+    rig.line.fires_before = 2 * views;
+    rig.line.at_fire = [this] {
+      rig.panel.set(&PanelInputs::estop_ok, false);
+      clock_waits_for([this] { return loop->snapshot()->machine == MachineState::error; });
+    };
     rig.panel.press(&PanelInputs::start);
-    const auto enough = [&] { return newest() && static_cast<int>(newest()->stored.size()) >= views; };
-    while (!enough()) clock.sleep_for(std::chrono::milliseconds(10));
-    rig.panel.set(&PanelInputs::estop_ok, false);
     EXPECT_TRUE(wait_fault());
     rig.panel.set(&PanelInputs::estop_ok, true);
     const auto id = newest()->id;
@@ -129,9 +131,10 @@ TEST_F(Jobs, AnObjectThatWasTouchedIsNotGoneOnWith) {
 TEST_F(Jobs, AnObjectThatSlipsDuringThePoseIsNoticed) {
   boot();
   get_ready();
+  rig.line.fires_before = 2 * 2;  // two views
+  rig.line.at_fire = [this] { look_at(40); };
   rig.panel.press(&PanelInputs::start);
-  while (!newest() || newest()->stored.size() < 2) clock.sleep_for(std::chrono::milliseconds(10));
-  look_at(40);
+  ASSERT_TRUE(clock_waits_for([this] { return newest() != nullptr; }));
   EXPECT_TRUE(wait_state(newest()->id, JobState::failed));
   EXPECT_EQ(newest()->error->code, ErrorCode::moved);
   EXPECT_TRUE(wait_ready()) << "one bad part stops no line";
@@ -158,7 +161,7 @@ TEST_F(Jobs, AJobThatDoesNotFitOnTheDiskIsNotBegun) {
   boot();
   get_ready();
   rig.panel.press(&PanelInputs::start);
-  while (!newest() || loop->snapshot()->machine != MachineState::ready) clock.sleep_for(std::chrono::milliseconds(10));
+  ASSERT_TRUE(clock_waits_for([this] { return newest() && loop->snapshot()->machine == MachineState::ready; }));
   EXPECT_THAT(loop->snapshot()->cause, HasSubstr("GiB"));
   EXPECT_EQ(loop->snapshot()->queue.size(), 1u);
   clock.sleep_for(std::chrono::minutes(1));
@@ -219,7 +222,7 @@ TEST_F(Jobs, RetentionRemovesWhatIsExportedWhenTheNextJobBegins) {
   ASSERT_TRUE(ask_for(What::set_exported, id));
   rig.panel.press(&PanelInputs::start);
   ASSERT_TRUE(wait_flip());
-  while (job(id)) clock.sleep_for(std::chrono::seconds(1));
+  ASSERT_TRUE(clock_waits_for([&] { return !job(id); }));
   EXPECT_EQ(job_folders().size(), 1u) << "the one being scanned";
 }
 

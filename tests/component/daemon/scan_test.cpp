@@ -149,11 +149,11 @@ TEST_F(Daemon, ThePreviewLooksInQuietTimesAndNeverDuringAScan) {
   ASSERT_TRUE(wait_busy());
   ASSERT_TRUE(clock_waits_for([&] { return rig.line.exposures > 0; }));
   const int before = looks();
-  while (!rig.panel.lamps().flip_request) {
+  EXPECT_TRUE(clock_waits_for([&] {
     const auto picture = left();
     EXPECT_TRUE(picture) << picture.error().message;
-    clock.sleep_for(std::chrono::milliseconds(100));
-  }
+    return rig.panel.lamps().flip_request;
+  }));
   EXPECT_LE(looks(), before + 1) << "one at most, asked for when the pose had been stored";
 }
 
