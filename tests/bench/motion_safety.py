@@ -119,8 +119,7 @@ def estop_reconstruction(bench, scratch):
         took = []
         with motion_rig.Rig(bench.bin, scratch / f"rec{member}", "--drive", motion_rig.DRIVES[member], "--speed-deg-s",
                             "180", "--acceleration-deg-s2", "1000", "--views", "4" if bench.quick else "8", "--poses",
-                            "2") as rig:
-            rig.edit_config("voxel_mm = 1.0", "voxel_mm = 0.2")
+                            "2", "--voxel-mm", "0.2") as rig:
             rig.set(estop_cuts_power=False)
             rig.start_daemon(scale=0.25 if bench.quick else 0.5)
             end = time.monotonic() + (150 if bench.quick else 1800)
