@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""The one place where figures are made: ./dev bench GROUP... [--quick] [--record]
+"""The one place where figures are made: ./dev bench GROUP... [--quick] [--only PART...] [--record]
 
 Every group is a module beside this file with `measure(bench)`; it calls bench.line() for each figure that an issue or a
-design page asks for. Prints what | asked | measured | ok, writes out/bench.json, exits 1 when a line falls short.
+design page asks for. A group with PARTS can be measured in parts: it asks bench.wants() before each. Prints what | asked | measured | ok, writes out/bench.json, exits 1 when a line falls short.
 A line that this machine cannot measure says so and does not count as held.
 """
 import argparse
@@ -23,6 +23,7 @@ class Bench:
     def __init__(self, binaries, quick):
         self.bin = pathlib.Path(binaries).resolve()
         self.quick = quick
+        self.only = set()
         self.out = ROOT / "out" / "bench"
         self.out.mkdir(parents=True, exist_ok=True)
         self.cores = len(os.sched_getaffinity(0))
@@ -35,6 +36,9 @@ class Bench:
         """Real captures beside the project, or None."""
         path = pathlib.Path(os.environ.get("SCANRIG_SHARED_DATA", ROOT.parent / "shared" / "data"))
         return path if path.is_dir() else None
+
+    def wants(self, part):
+        return not self.only or part in self.only
 
     def line(self, what, asked, measured, ok):
         """`ok` is True, False or None (not measured; `measured` says why)."""
@@ -75,20 +79,28 @@ def main():
     parser = argparse.ArgumentParser(prog="./dev bench", description=__doc__.splitlines()[0])
     parser.add_argument("groups", nargs="+", choices=groups, metavar="GROUP", help=f"one of: {', '.join(groups)}")
     parser.add_argument("--quick", action="store_true", help="fewer repetitions; for a first look, not for the record")
+    parser.add_argument("--only", nargs="+", metavar="PART", default=[], help="parts of the group; --record then puts "
+                        "their lines into the table that is there, and says so")
     parser.add_argument("--record", action="store_true", help="put the full table into docs/measured.md")
     parser.add_argument("--bin", required=True, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.record and options.quick:
         parser.error("--record wants the full measurement, not --quick")
 
+    sys.path.insert(0, str(HERE))
+    modules = {group: importlib.import_module(f"group_{group}") for group in options.groups}
+    known = [part for module in modules.values() for part in getattr(module, "PARTS", ())]
+    if unknown := set(options.only) - set(known):
+        parser.error(f"no such part: {', '.join(sorted(unknown))}; there are: {', '.join(known) or 'none'}")
+
     bench = Bench(options.bin, options.quick)
+    bench.only = set(options.only)
     measured_commit = commit()
     print(f"commit {measured_commit}, {bench.cores} cores{', quick' if options.quick else ''}")
     print("what | asked | measured | ok")
-    sys.path.insert(0, str(HERE))
-    for group in options.groups:
+    for group, module in modules.items():
         bench.group = group
-        importlib.import_module(f"group_{group}").measure(bench)
+        module.measure(bench)
 
     held = [line["ok"] for line in bench.lines]
     print(f"profile {bench.profile or '-'}")
@@ -97,7 +109,7 @@ def main():
               "lines": bench.lines}
     (ROOT / "out" / "bench.json").write_text(json.dumps(record, indent=1) + "\n")
     if options.record:
-        record_file.write(ROOT / "docs" / "measured.md", options.groups, record)
+        record_file.write(ROOT / "docs" / "measured.md", options.groups, record, again=bool(options.only))
     return 1 if False in held else 0
 
 

@@ -13,6 +13,7 @@ import cameras_wire
 import fuzz
 import motion_matrix
 
+PARTS = ("triggers", "matrix", "wire", "hil", "debian13", "memory", "fuzz")
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 TRIGGERS, QUICK_TRIGGERS = 10000, 1000
 
@@ -40,17 +41,23 @@ def triggers(bench):
 def measure(bench):
     scratch = pathlib.Path(tempfile.mkdtemp(prefix="scanrig-cameras-"))
     try:
-        # What takes an hour, or processor time only, runs beside the rest: that has to hold on a busy machine too.
+        # What takes an hour runs beside the rest: that has to hold on a busy machine too.
         with concurrent.futures.ThreadPoolExecutor() as pool:
-            beside = [pool.submit(cameras_memory.measure, bench),
-                      pool.submit(fuzz.measure, bench, ROOT, scratch,
-                                  [fuzz.Parser("dlpc350", "LightCrafter 4500 replies")])]
-            triggers(bench)
-            motion_matrix.measure(bench, ROOT, scratch, cameras=True)
-            cameras_wire.measure(bench)
-            cameras_hil.measure(bench)
-            cameras_debian13.measure(bench)
-            for strand in beside:
-                strand.result()
+            hour = pool.submit(cameras_memory.measure, bench) if bench.wants("memory") else None
+            if bench.wants("triggers"):
+                triggers(bench)
+            if bench.wants("matrix"):
+                motion_matrix.measure(bench, ROOT, scratch, cameras=True)
+            if bench.wants("wire"):
+                cameras_wire.measure(bench)
+            if bench.wants("hil"):
+                cameras_hil.measure(bench)
+            if bench.wants("debian13"):
+                cameras_debian13.measure(bench)
+            if bench.wants("fuzz"):
+                fuzz.measure(bench, ROOT, scratch,
+                             [fuzz.Parser("dlpc350", "LightCrafter 4500 replies", processes=bench.cores)])
+            if hour:
+                hour.result()
     finally:
         shutil.rmtree(scratch, ignore_errors=True)

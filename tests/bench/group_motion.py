@@ -12,6 +12,7 @@ import motion_safety
 
 PARSERS = [fuzz.Parser("grbl", "GRBL"), fuzz.Parser("drive_profile", "profile files"),
            fuzz.Parser("modbus_io", "Modbus I/O", processes=48)]
+PARTS = ("matrix", "estop", "killed", "restarts", "turns", "words", "doctor", "fuzz")
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 
 
@@ -21,13 +22,23 @@ def measure(bench):
     scratch.chmod(0o755)
     try:
         with concurrent.futures.ThreadPoolExecutor() as pool:
-            turns = pool.submit(motion_long.turns, bench, ROOT, scratch)
-            motion_matrix.measure(bench, ROOT, scratch)
-            motion_safety.measure(bench, scratch)
-            motion_long.measure(bench, ROOT, scratch)
-            motion_doctor.measure(bench, scratch)
-            turns.result()
-        # Dozens of processes: not beside what is measured in milliseconds.
-        fuzz.measure(bench, ROOT, scratch, PARSERS)
+            turns = pool.submit(motion_long.turns, bench, ROOT, scratch) if bench.wants("turns") else None
+            if bench.wants("matrix"):
+                motion_matrix.measure(bench, ROOT, scratch)
+            if bench.wants("estop"):
+                motion_safety.estop_scan(bench, scratch)
+                motion_safety.estop_reconstruction(bench, scratch)
+            if bench.wants("killed"):
+                motion_safety.killed(bench, scratch)
+            if bench.wants("restarts"):
+                motion_safety.restarts(bench, scratch)
+            if bench.wants("words"):
+                motion_long.words(bench, ROOT, scratch)
+            if bench.wants("doctor"):
+                motion_doctor.measure(bench, scratch)
+            if turns:
+                turns.result()
+        if bench.wants("fuzz"):  # dozens of processes: not beside what is measured in milliseconds
+            fuzz.measure(bench, ROOT, scratch, PARSERS)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)

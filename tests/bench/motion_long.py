@@ -95,7 +95,7 @@ def job_tells(bench, scratch):
                len(whole) == 4 and max(off) <= TOLERANCE_DEG)
 
 
-def measure(bench, root, scratch):
+def words(bench, root, scratch):
     golden(bench, root)
     alarms(bench, root, scratch)
     job_tells(bench, scratch)

@@ -203,9 +203,3 @@ def restarts(bench, scratch):
     bench.line("no move without home", "0 frames", f"{homeless} in {len(lives)} random restarts", homeless == 0)
     bench.line("standing after every end and make-safe", "all", f"{len(lives) - still} of {len(lives)}", still == 0)
 
-
-def measure(bench, scratch):
-    estop_scan(bench, scratch)
-    estop_reconstruction(bench, scratch)
-    killed(bench, scratch)
-    restarts(bench, scratch)

@@ -3,23 +3,50 @@ import pathlib
 
 HEAD = """# What was measured
 
-Each table is what `./dev bench GROUP --record` printed the last time it ran in full. Nothing here is written by hand.
+Each table is what `./dev bench GROUP --record` printed the last time it ran in full; a line measured again by itself
+(`--only PART`) names its commit. Nothing here is written by hand.
 """
 
 
+MARK = {True: "yes", False: "**NO**", None: "-"}
+
+
+def row(line):
+    return [str(line["what"]), str(line["asked"]), str(line["measured"]), MARK[line["ok"]]]
+
+
+def counted(rows):
+    held = [mark for *_, mark in rows]
+    return f"{held.count('yes')} held, {held.count('**NO**')} fell short, {held.count('-')} not measured."
+
+
+def table(rows):
+    return "\n\n| what | asked | measured | ok |\n|---|---|---|---|\n" + "".join(f"| {' | '.join(r)} |\n" for r in rows)
+
+
 def section(group, record):
-    lines = [line for line in record["lines"] if line["group"] == group]
-    mark = {True: "yes", False: "**NO**", None: "-"}
-    held = [line["ok"] for line in lines]
-    rows = "".join(f"| {line['what']} | {line['asked']} | {line['measured']} | {mark[line['ok']]} |\n" for line in lines)
+    rows = [row(line) for line in record["lines"] if line["group"] == group]
     return (f"\n## {group}\n\n`./dev bench {group}` on commit {record['commit']}, {record['cores']} cores, simulation profile "
-            f"{(record['profile'] or 'none')[:12]}: {held.count(True)} held, {held.count(False)} fell short, "
-            f"{held.count(None)} not measured.\n\n| what | asked | measured | ok |\n|---|---|---|---|\n{rows}")
+            f"{(record['profile'] or 'none')[:12]}: {counted(rows)}{table(rows)}")
 
 
-def write(path: pathlib.Path, groups, record):
-    """Replaces the sections of `groups`, keeps the others."""
+def amended(text, group, record):
+    """The section `text` with the lines of `record` in the place of those of the same name; what came later says so."""
+    head, _, body = text.partition("\n\n| what | asked | measured | ok |\n|---|---|---|---|\n")
+    rows = [line.strip("| ").split(" | ") for line in body.splitlines() if line.startswith("| ")]
+    later = {line["what"]: row(line) for line in record["lines"] if line["group"] == group}
+    mark = f" (on {record['commit']})"
+    rows = [later.pop(name[0].split(" (on ")[0], None) or name for name in rows] + list(later.values())
+    named = {line["what"] for line in record["lines"]}
+    rows = [[name + mark if name in named else name, *rest] for name, *rest in rows]
+    return head.rsplit(": ", 1)[0] + ": " + counted(rows) + table(rows)
+
+
+def write(path: pathlib.Path, groups, record, again=False):
+    """Replaces the sections of `groups`, or, measured `again` in part, their lines; keeps the others."""
     parts = path.read_text().split("\n## ") if path.is_file() else [""]
     kept = {part.split("\n", 1)[0]: "\n## " + part for part in parts[1:]}
-    kept.update({group: section(group, record) for group in groups})
+    for group in groups:
+        whole = not again or group not in kept
+        kept[group] = section(group, record) if whole else amended(kept[group], group, record)
     path.write_text(HEAD + "".join(kept[group].rstrip("\n") + "\n" for group in sorted(kept)))
