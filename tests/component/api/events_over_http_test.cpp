@@ -17,6 +17,15 @@ class EventsOverHttp : public ApiBench {
     EXPECT_THAT(wire.hear("\r\n\r\n"), AllOf(HasSubstr("200 OK"), HasSubstr("Content-Type: text/event-stream")));
     return wire;
   }
+  /// The next event of that kind; a status may be told in more steps than one.
+  static std::string hear_of(Wire& wire, const std::string& kind, const std::string& words) {
+    std::string event;
+    for (int i = 0; i < 10; ++i) {
+      event = wire.hear("\n\n");
+      if (event.find("event: " + kind + "\n") != std::string::npos && event.find(words) != std::string::npos) break;
+    }
+    return event;
+  }
   static std::string id_of(const std::string& event) { return event.substr(4, event.find('\n') - 4); }
 };
 
@@ -25,9 +34,9 @@ TEST_F(EventsOverHttp, BeginWithThePresentStatusAndGoOnWithWhatChanges) {
   auto wire = listen();
   EXPECT_THAT(wire.hear("\n\n"), AllOf(HasSubstr("event: status\n"), HasSubstr("Preoperational")));
   station->loop.post(event::PanelFound{true, true});
-  EXPECT_THAT(wire.hear("\n\n"), AllOf(HasSubstr("event: status\n"), HasSubstr("Halted")));
+  EXPECT_THAT(hear_of(wire, "status", "Halted"), HasSubstr("Halted"));
   station->loop.post(event::StageProgress{"old", "volume", 0.9});
-  EXPECT_THAT(wire.hear("\n\n"), AllOf(HasSubstr("event: job\n"), HasSubstr("0.9")));
+  EXPECT_THAT(hear_of(wire, "job", "0.9"), HasSubstr("0.9"));
 }
 
 TEST_F(EventsOverHttp, AClientThatWasCutOffGetsWhatItMissed) {
