@@ -20,6 +20,14 @@ std::string share(double fraction) {
                      std::string(static_cast<std::size_t>(kWidth - full), '-'), 100.0 * fraction);
 }
 
+/// `taken`: a view or a closure shot.
+void add_redone(const json& taken, const std::string& name, std::vector<std::string>& lines) {
+  for (const auto& why : taken.value("spoilt", json::array())) {
+    lines.push_back(fmt::format("  pose {} {}: an exposure was redone: {}", taken.at("pose").get<int>() + 1, name,
+                                text(why, "message")));
+  }
+}
+
 void add_job(const json& job, std::vector<std::string>& lines) {
   if (!job.is_object()) return;
   const auto stored = job.at("stored").size();
@@ -29,11 +37,9 @@ void add_job(const json& job, std::vector<std::string>& lines) {
   lines.push_back(fmt::format("  {:<22} {}  {} of {}", "views stored",
                               share(static_cast<double>(stored) / static_cast<double>(all)), stored, all));
   for (const auto& view : job.at("stored")) {
-    for (const auto& why : view.value("spoilt", json::array())) {
-      lines.push_back(fmt::format("  pose {} view {}: an exposure was redone: {}", view.at("pose").get<int>() + 1,
-                                  view.at("view").get<int>() + 1, text(why, "message")));
-    }
+    add_redone(view, fmt::format("view {}", view.value("view", 0) + 1), lines);
   }
+  for (const auto& closure : job.at("closures")) add_redone(closure, "view 1 again", lines);
   for (const auto& stage : job.at("stages")) {
     lines.push_back(fmt::format("  {:<22} {}", text(stage, "name"), share(stage.at("fraction"))));
   }

@@ -191,15 +191,16 @@ Result<Closure> JobThread::judge(const TakenView& again) {
   if (!right) return pass_on(right);
 
   const Closure closure{again.id.pose, std::max(left->shift_px, right->shift_px),
-                        std::max(left->changed, right->changed), left->unmoved && right->unmoved};
+                        std::max(left->changed, right->changed), left->unmoved && right->unmoved, again.record.spoilt};
   const auto& record = scan_->manifest().poses[pose];
   if (!closure.unmoved) {
     if (auto kept = keep_images(*scan_, again.id.pose, record.closures.size(), again.images); !kept) {
       return pass_on(kept);
     }
   }
-  const auto added = scan_->add_closure(pose, {static_cast<int>(record.views.size()), again.record.measured_deg,
-                                               again.record.taken, closure.shift_px, closure.changed, closure.unmoved});
+  const auto added = scan_->add_closure(
+      pose, {static_cast<int>(record.views.size()), again.record.measured_deg, again.record.taken, closure.shift_px,
+             closure.changed, closure.unmoved, closure.spoilt});
   if (!added) return pass_on(added);
   return closure;
 }

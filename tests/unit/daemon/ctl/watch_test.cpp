@@ -22,6 +22,7 @@ const json kHealth = json::parse(R"({"devices": [{"name": "turntable", "ok": tru
   "deadlines_missed": 1, "retries": 2, "faults": 3})");
 const json kJob = json::parse(R"({"id": "j1", "state": "scanning", "poses": 2, "views": 8, "stored": [{}, {}, {},
   {"pose": 0, "view": 3, "spoilt": [{"code": "timeout", "message": "left camera: no frame in time"}]}],
+  "closures": [{"pose": 1, "spoilt": [{"code": "protocol", "message": "right camera: torn"}]}],
   "stages": [{"name": "range", "fraction": 0.5}], "error": null, "model": ""})");
 
 TEST(Watch, ShowsStateJobStagesAndHealthOnOneScreen) {
@@ -30,6 +31,7 @@ TEST(Watch, ShowsStateJobStagesAndHealthOnOneScreen) {
   EXPECT_THAT(lines, Contains("Pose 1, view 3 of 8."));
   EXPECT_THAT(lines, Contains(AllOf(HasSubstr("views stored"), HasSubstr("25 %"), HasSubstr("4 of 16"))));
   EXPECT_THAT(lines, Contains("  pose 1 view 4: an exposure was redone: left camera: no frame in time"));
+  EXPECT_THAT(lines, Contains("  pose 2 view 1 again: an exposure was redone: right camera: torn"));
   EXPECT_THAT(lines, Contains(AllOf(HasSubstr("range"), HasSubstr("50 %"))));
   EXPECT_THAT(lines, Contains(AllOf(StartsWith("camera"), HasSubstr("no answer"))));
   EXPECT_THAT(lines, Contains("disk 1.0 GiB free, cpu 51 C"));
