@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "daemon/station/job_words.h"
+
 namespace scanrig {
 
 using nlohmann::ordered_json;
@@ -23,8 +25,11 @@ ordered_json to_json(const Error& error) { return {{"code", to_string(error.code
 ordered_json to_json(const std::optional<Error>& error) { return error ? to_json(*error) : ordered_json(nullptr); }
 
 ordered_json to_json(const JobInfo& job) {
+  const auto words = describe(job);
   return {{"id", job.id},
           {"state", to_string(job.state)},
+          {"sentence", words.sentence},
+          {"next_action", words.next_action},
           {"recipe", job.recipe.name},
           {"part", job.part},
           {"folder", job.folder},

@@ -32,9 +32,11 @@ const char* const kSchemas = R"({
   "inputs": {"type": "object", "additionalProperties": {"type": "boolean"}},
   "outputs": {"type": "object", "additionalProperties": {"type": "boolean"}}}},
 "Job": {"type": "object", "additionalProperties": false,
-  "required": ["id", "state", "recipe", "part", "folder", "poses", "views", "stored", "resumable", "quarantined",
+  "required": ["id", "state", "sentence", "next_action", "recipe", "part", "folder", "poses", "views", "stored", "resumable", "quarantined",
   "exported", "passed", "model", "report", "error"], "properties": {
   "id": {"type": "string"}, "state": {"type": "string"},
+  "sentence": {"type": "string", "description": "what becomes of it, and why"},
+  "next_action": {"type": "string", "description": "what the operator should do; empty: nothing"},
   "recipe": {"type": "string"}, "part": {"type": "string", "description": "of the order: barcode or free text"},
   "resumable": {"type": "boolean", "description": "interrupted, and the missing views may still be taken"},
   "quarantined": {"type": "boolean", "description": "two daemons died over its reconstruction"},

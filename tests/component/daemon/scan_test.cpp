@@ -72,7 +72,10 @@ TEST_F(Daemon, LostFramesAreRedoneWithoutAFault) {
 
 TEST_F(Daemon, WhatIsRedoneInAClosureShotIsTold) {
   rig.line.fires_before = 3 * 2;  // the views of the first pose
-  rig.line.at_fire = [this] { rig.line.lose = 2; };
+  rig.line.at_fire = [this] {
+    const std::lock_guard guard(rig.line.mutex);
+    rig.line.lose = 2;
+  };
   boot();
   get_ready();
   scan_both_poses();
