@@ -32,9 +32,9 @@ std::vector<std::string> job_lines(const json& job) {
   const auto stored = job.at("stored").size();
   const auto all = static_cast<std::size_t>(std::max(1, job.at("poses").get<int>() * job.at("views").get<int>()));
   const auto part = text(job, "part");
-  std::vector<std::string> lines{fmt::format("job {}{}: {}", text(job, "id"), part.empty() ? "" : " of " + part,
-                                             text(job, "state")),
-                                 "  " + text(job, "sentence")};
+  std::vector<std::string> lines{
+      fmt::format("job {}{}: {}", text(job, "id"), part.empty() ? "" : " of " + part, text(job, "state")),
+      "  " + text(job, "sentence")};
   if (const auto action = text(job, "next_action"); !action.empty()) lines.push_back("  next: " + action);
   lines.push_back(fmt::format("  {:<22} {}  {} of {}", "views stored",
                               share(static_cast<double>(stored) / static_cast<double>(all)), stored, all));

@@ -31,8 +31,8 @@ Words when_failed(const JobInfo& job) {
   if (job.quarantined) return {sentence, "Bundle it for whoever must help, or reprocess it."};
   const bool images_are_good = job.error && job.complete == job.recipe.poses && job.error->code != ErrorCode::moved &&
                                job.error->code != ErrorCode::same_rest;
-  return {sentence, images_are_good ? "Reprocess it with other options, or scan the object again."
-                                    : "Scan the object again."};
+  return {sentence,
+          images_are_good ? "Reprocess it with other options, or scan the object again." : "Scan the object again."};
 }
 
 Words when_interrupted(const JobInfo& job) {

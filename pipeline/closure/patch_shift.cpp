@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -9,26 +10,30 @@
 namespace scanrig {
 namespace {
 
-constexpr int kPatch = 24;         ///< px
-constexpr double kSmoothing = 1.0; ///< px: noise goes, and the demosaicing's own edges
-constexpr double kSharp = 0.05;    ///< px: a direction in which the noise hides more than that is not looked at
-constexpr double kCorrelated = 15.0;  ///< pixels that share their noise after smoothing and demosaicing
+constexpr int kSmallest = 24, kLargest = 96;  ///< px: sides of the squares
+constexpr std::size_t kEnough = 8;            ///< squares that speak for the whole picture
+constexpr double kSmoothing = 1.0;            ///< px: against noise and the traces of demosaicing
+constexpr double kSharp = 0.05;  ///< px: a direction in which noise alone would shift a square by more is not looked at
+constexpr double kCorrelated = 15.0;    ///< pixels that share their noise after smoothing and demosaicing
+constexpr double kQuantisation = 0.01;  ///< grey levels squared: no picture has less noise
 
-/// Sums over a patch of the products of 1, brightness, gradient (2) and change, free of what a gain and an offset of
-/// the light explain: of gradient and change only.
-struct Patch {
+/// Sums over a square of products of gradient (2) and change, free of what another gain and offset of the light
+/// explain.
+struct Square {
   Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
-  int pixels = 0;
+  int values = 0;
 
   [[nodiscard]] Eigen::Matrix2d gradients() const { return products.topLeftCorner<2, 2>(); }
-  [[nodiscard]] Eigen::Vector2d solve() const {
+  /// Least squares: change = -gradient . shift
+  [[nodiscard]] Eigen::Vector2d shift() const {
     return -(gradients() + 1e-9 * Eigen::Matrix2d::Identity()).inverse() * products.block<2, 1>(0, 2);
   }
-  /// Of the change, what no shift explains.
   [[nodiscard]] double unexplained() const {
-    const Eigen::Vector2d d = solve();
+    const Eigen::Vector2d d = shift();
     return std::max(0.0, products(2, 2) - d.dot(gradients() * d));
   }
+  /// How much it shows: gradient squared, a value.
+  [[nodiscard]] double contrast() const { return gradients().trace() / values; }
 };
 
 struct Channel {
@@ -49,7 +54,7 @@ Channel channel(const cv::Mat& before, const cv::Mat& after) {
   return c;
 }
 
-void add(const Channel& c, const cv::Rect& where, Patch& patch) {
+void add(const Channel& c, const cv::Rect& where, Square& square) {
   Eigen::Matrix<double, 5, 5> sums = Eigen::Matrix<double, 5, 5>::Zero();
   for (int y = where.y; y < where.y + where.height; ++y) {
     for (int x = where.x; x < where.x + where.width; ++x) {
@@ -58,21 +63,47 @@ void add(const Channel& c, const cv::Rect& where, Patch& patch) {
     }
   }
   Eigen::Matrix2d light = sums.topLeftCorner<2, 2>();
-  light(1, 1) += where.area();  // an even patch has no gain
+  light(1, 1) += where.area();  // where all is one grey, gain and offset are the same
   const Eigen::Matrix<double, 2, 3> by_light = sums.topRightCorner<2, 3>();
-  patch.products += sums.bottomRightCorner<3, 3>() - by_light.transpose() * light.inverse() * by_light;
-  patch.pixels += where.area();
+  square.products += sums.bottomRightCorner<3, 3>() - by_light.transpose() * light.inverse() * by_light;
+  square.values += where.area();
 }
 
-/// Variance of the noise of a pixel's change: what the quarter of the patches that shows least is left with.
-double noise_of(const std::vector<Patch>& patches) {
-  std::vector<std::pair<double, double>> by_contrast;
-  for (const auto& p : patches) by_contrast.emplace_back(p.gradients().trace() / p.pixels, p.unexplained() / p.pixels);
-  std::ranges::sort(by_contrast);
-  by_contrast.resize(std::max<std::size_t>(1, by_contrast.size() / 4));
-  const auto middle = by_contrast.begin() + static_cast<std::ptrdiff_t>(by_contrast.size() / 2);
-  std::ranges::nth_element(by_contrast, middle, {}, [](const auto& p) { return p.second; });
-  return std::max(middle->second, 0.01);
+std::vector<Square> squares(const std::vector<Channel>& channels, int side) {
+  std::vector<Square> all;
+  const cv::Size size = channels.front().mean.size();
+  for (int y = 0; y + side <= size.height; y += side) {
+    for (int x = 0; x + side <= size.width; x += side) {
+      all.emplace_back();
+      for (const auto& c : channels) add(c, {x, y, side, side}, all.back());
+    }
+  }
+  return all;
+}
+
+/// Variance of a value's change where nothing happened: what is left in those squares that show least.
+double noise_of(std::vector<Square> all) {
+  std::ranges::sort(all, {}, &Square::contrast);
+  all.resize((all.size() + 3) / 4);
+  const auto left = [](const Square& square) { return square.unexplained() / square.values; };
+  std::ranges::nth_element(all, all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), {}, left);
+  return std::max(left(all[all.size() / 2]), kQuantisation);
+}
+
+std::vector<PatchShift> shifts_of(const std::vector<Square>& all) {
+  std::vector<PatchShift> shifts;
+  if (all.empty()) return shifts;
+  const double noise = noise_of(all);
+  const double least = kCorrelated * noise / (kSharp * kSharp);
+  for (const auto& square : all) {
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(square.gradients());
+    if (axes.eigenvalues()(1) < least) continue;
+    Eigen::Vector2d across = axes.eigenvectors().transpose() * square.shift();
+    if (axes.eigenvalues()(0) < least) across(0) = 0.0;
+    const double misfit = std::max(0.0, square.unexplained() - noise * square.values);
+    shifts.push_back({across.norm(), std::sqrt(misfit / square.gradients().trace())});
+  }
+  return shifts;
 }
 
 }  // namespace
@@ -83,25 +114,10 @@ std::vector<PatchShift> patch_shifts(const cv::Mat& before, const cv::Mat& after
   cv::split(after, b);
   std::vector<Channel> channels;
   for (std::size_t i = 0; i < a.size(); ++i) channels.push_back(channel(a[i], b[i]));
-  std::vector<Patch> patches;
-  for (int y = 0; y + kPatch <= before.rows; y += kPatch) {
-    for (int x = 0; x + kPatch <= before.cols; x += kPatch) {
-      patches.emplace_back();
-      for (const auto& c : channels) add(c, {x, y, kPatch, kPatch}, patches.back());
-    }
-  }
   std::vector<PatchShift> shifts;
-  if (patches.empty()) return shifts;
-  const double noise = noise_of(patches);
-  const double least = kCorrelated * noise / (kSharp * kSharp);
-  for (const auto& patch : patches) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(patch.gradients());
-    const Eigen::Vector2d shift = patch.solve();
-    Eigen::Vector2d seen = axes.eigenvectors().transpose() * shift;
-    if (axes.eigenvalues()(1) < least) continue;
-    if (axes.eigenvalues()(0) < least) seen(0) = 0.0;
-    const double more = std::max(0.0, patch.unexplained() - noise * patch.pixels);
-    shifts.push_back({seen.norm(), std::sqrt(more / patch.gradients().trace())});
+  for (int side = kSmallest; side <= kLargest && shifts.size() < kEnough; side *= 2) {
+    auto larger = shifts_of(squares(channels, side));
+    if (larger.size() > shifts.size() || shifts.empty()) shifts = std::move(larger);
   }
   return shifts;
 }

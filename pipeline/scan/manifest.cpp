@@ -57,9 +57,9 @@ ordered_json to_json(const ViewRecord& view) {
 }
 
 ordered_json to_json(const ClosureRecord& closure) {
-  ordered_json json = {{"after_views", closure.after_views}, {"measured_deg", closure.measured_deg},
-                       {"taken", closure.taken},             {"shift_px", closure.shift_px},
-                       {"changed", closure.changed},         {"unmoved", closure.unmoved}};
+  ordered_json json = {
+      {"after_views", closure.after_views}, {"measured_deg", closure.measured_deg}, {"taken", closure.taken},
+      {"shift_px", closure.shift_px},       {"changed", closure.changed},           {"unmoved", closure.unmoved}};
   add_spoilt(json, closure.spoilt);
   return json;
 }

@@ -3,6 +3,7 @@ import pathlib
 import shutil
 import tempfile
 
+import station_closure
 import station_disturbed
 import station_fuzz
 import station_kill
@@ -13,7 +14,7 @@ import station_stages
 import station_startup
 import station_view_cost
 
-PARTS = (station_startup, station_kill, station_disturbed, station_stages, station_view_cost, station_load,
+PARTS = (station_startup, station_closure, station_kill, station_disturbed, station_stages, station_view_cost, station_load,
          station_security, station_soak, station_fuzz)
 
 

@@ -1,63 +1,102 @@
+// closure_shots SCALE OBJECT...: what the closure shot says of rendered views, for each object (`figurine`, `pebble` or
+// a file), of everything that may have happened since view 0. A line: object, sensor, what happened, how much, the
+// shift in px, the changed share, moved or unmoved; of both cameras the worse.
 #include <fmt/format.h>
-#include <opencv2/imgcodecs.hpp>
-#include <filesystem>
+
+#include <algorithm>
+#include <cstdio>
 #include <cstdlib>
 
 #include "core/units.h"
-#include "tests/component/closure/shot_scene.h"
 #include "pipeline/closure/compare_views.h"
+#include "tests/component/closure/shot_scene.h"
 
-using namespace scanrig;
-using namespace scanrig::sim;
+namespace scanrig::sim {
+namespace {
 
-std::vector<Disturbance> all() {
-  std::vector<Disturbance> d{{.name = "unmoved"}, {.name = "unmoved_b"}, {.name="table0.006", .table_deg=0.006},{.name="table0.02", .table_deg=0.02}};
-  for (double mm : {0.03, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0}) {
-    d.push_back({.name = fmt::format("x{}mm", mm), .object = small_motion({0,0,0}, {mm,0,0})});
-    d.push_back({.name = fmt::format("z{}mm", mm), .object = small_motion({0,0,0}, {0,0,mm})});
+struct Case {
+  std::string what;
+  double amount;  ///< mm or degrees
+  Disturbance since;
+};
+
+std::vector<Case> cases() {
+  std::vector<Case> all;
+  for (const double deg : {0.0, 0.006, 0.02}) all.push_back({"unmoved, table off by deg", deg, {.table_deg = deg}});
+  for (const double mm : {0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0}) {
+    all.push_back({"slipped along x, mm", mm, {.object = small_motion({0, 0, 0}, {mm, 0, 0})}});
+    all.push_back({"slipped along z, mm", mm, {.object = small_motion({0, 0, 0}, {0, 0, mm})}});
   }
-  for (double deg : {0.03, 0.05, 0.1, 0.2, 0.5, 1.0}) {
-    d.push_back({.name = fmt::format("turn{}deg", deg), .object = small_motion({0,to_radians(deg),0}, {0,0,0})});
-    d.push_back({.name = fmt::format("tip{}deg", deg), .object = small_motion({to_radians(deg),0,0}, {0,0,0})});
-    d.push_back({.name = fmt::format("table{}deg", deg), .table_deg = deg});
+  for (const double deg : {0.05, 0.1, 0.2, 0.5, 1.0}) {
+    all.push_back({"turned, deg", deg, {.object = small_motion({0, to_radians(deg), 0}, {0, 0, 0})}});
+    all.push_back({"tipped, deg", deg, {.object = small_motion({to_radians(deg), 0, 0}, {0, 0, 0})}});
+    all.push_back({"lost steps, deg", deg, {.table_deg = deg}});
   }
-  for (double deg : {0.002, 0.005, 0.01, 0.05, 0.2}) d.push_back({.name = fmt::format("camera{}deg", deg), .camera = small_motion({0, to_radians(deg), 0}, {0,0,0})});
-  d.push_back({.name = "camera_roll0.05", .camera = small_motion({0,0,to_radians(0.05)}, {0,0,0})});
-  d.push_back({.name = "x20mm", .object = small_motion({0,0,0}, {20,0,0})});
-  return d;
+  for (const double deg : {0.002, 0.005, 0.01, 0.02}) {
+    all.push_back({"camera knocked, deg", deg, {.camera = small_motion({0, to_radians(deg), 0}, {0, 0, 0})}});
+  }
+  return all;
 }
 
-int main(int argc, char** argv) {
-  if (argc != 4) return 2;
-  const std::string what = argv[1];
-  const double scale = std::atof(argv[2]);
-  const std::filesystem::path out = argv[3];
-  std::filesystem::create_directories(out);
-  Object object = what == "pebble" ? pebble() : *load_object(what == "figurine" ? "" : what, 100);
-  if (what == "figurine_grey") return 2;
-  ShotScene scene(std::move(object), scale);
-  for (bool left : {true, false}) {
-    const std::string side = left ? "L" : "R";
-    const cv::Mat first = scene.look({}, left);
-    const Sensor sensors[] = {{}, {.blur_px = 1.5}, {.noise_grey = 6}, {.light = 0.95}};
-    const char* names[] = {"good", "blur", "noisy", "dim"};
-    for (int s = 0; s < 4; ++s)
-      cv::imwrite(out / fmt::format("{}_{}_before.png", side, names[s]), ShotScene::shoot(first, 1, s == 3 ? Sensor{} : sensors[s]));
-    std::uint64_t noise = 100;
-    for (const auto& d : all()) {
-      const cv::Mat now = scene.look(d, left);
-      for (int s = 0; s < 4; ++s) {
-        const bool wanted = s == 0 || d.name.starts_with("unmoved") || d.name.ends_with("0.1mm") || d.name.ends_with("0.05mm") || d.name == "table0.006" || d.name.ends_with("n0.05deg");
-        if (!wanted) continue;
-        for (int k = 0; k < (d.name == "unmoved" ? 20 : 1); ++k) {
-          const cv::Mat after = ShotScene::shoot(now, ++noise, sensors[s]);
-          const cv::Mat before = cv::imread(out / fmt::format("{}_{}_before.png", side, names[s]));
-          const auto c = compare_views(before, after);
-          fmt::print("{} {} {} {} {:.3f} {:.3f} {}\n", what, side, names[s], d.name, c->shift_px, c->changed, c->features);
-          cv::imwrite(out / fmt::format("{}_{}_{}_{}.png", side, names[s], d.name, k), after);
-        }
+struct NamedSensor {
+  const char* name;
+  Sensor sensor;
+};
+
+constexpr NamedSensor kSensors[] = {{"as simulated", {}},
+                                    {"blurred by 1.5 px", {.blur_px = 1.5}},
+                                    {"4 grey more noise", {.noise_grey = 4.0}},
+                                    {"5 % less light", {.light = 0.95}}};
+
+/// Of both cameras the worse; `noise` names the exposures.
+ViewChange worse(const cv::Mat (&before)[2], const cv::Mat (&now)[2], std::uint64_t noise, const NamedSensor& with) {
+  ViewChange worst;
+  const Sensor first{.blur_px = with.sensor.blur_px, .noise_grey = with.sensor.noise_grey};
+  for (const int side : {0, 1}) {
+    const auto change = compare_views(ShotScene::shoot(before[side], 2 * noise + 1, first),
+                                      ShotScene::shoot(now[side], 2 * noise + 2, with.sensor));
+    if (!change) std::exit(1);
+    worst.shift_px = std::max(worst.shift_px, change->shift_px);
+    worst.changed = std::max(worst.changed, change->changed);
+    worst.unmoved = worst.unmoved && change->unmoved;
+  }
+  return worst;
+}
+
+void measure(const std::string& name, double scale) {
+  auto object = name == "pebble" ? Result<Object>(pebble()) : load_object(name == "figurine" ? "" : name, 100.0);
+  if (!object) {
+    fmt::print(stderr, "{}\n", object.error().message);
+    std::exit(1);
+  }
+  const std::string title = object->name;
+  const ShotScene scene(std::move(*object), scale);
+  const cv::Mat before[2] = {scene.look({}, true), scene.look({}, false)};
+  std::uint64_t noise = 0;
+  for (const auto& one : cases()) {
+    const cv::Mat now[2] = {scene.look(one.since, true), scene.look(one.since, false)};
+    const bool still = one.what.starts_with("unmoved");
+    for (const auto& with : kSensors) {
+      if (!still && &with != &kSensors[0]) break;
+      for (int i = 0; i < (still ? 10 : 2); ++i) {
+        const auto change = worse(before, now, ++noise, with);
+        fmt::print("{}\t{}\t{}\t{}\t{:.3f}\t{:.3f}\t{}\n", title, with.name, one.what, one.amount, change.shift_px,
+                   change.changed, change.unmoved ? "unmoved" : "moved");
       }
     }
     std::fflush(stdout);
   }
+}
+
+}  // namespace
+}  // namespace scanrig::sim
+
+int main(int count, char** words) {
+  const double scale = count > 2 ? std::atof(words[1]) : 0.0;
+  if (scale <= 0.0) {
+    fmt::print(stderr, "usage: closure_shots SCALE OBJECT...\n");
+    return 2;
+  }
+  for (int i = 2; i < count; ++i) scanrig::sim::measure(words[i], scale);
+  return 0;
 }

@@ -10,17 +10,19 @@
 #include "sim/scene/polygonise.h"
 #include "sim/scene/random.h"
 #include "sim/scene/renderer.h"
-#include "sim/scene/rests.h"
 #include "sim/scene/room_light.h"
 #include "sim/scene/sensor.h"
 
 namespace scanrig::sim {
 namespace {
 
-Transform first_rest(const TriangleMesh& mesh, std::uint64_t seed) {
-  const auto placements = draw_placements(mesh, seed, 1, true);
-  if (!placements) throw std::runtime_error(placements.error().message);
-  return placements->front();
+/// As the file has it up, over the axis, its lowest point on the table.
+Transform put_down(const TriangleMesh& mesh) {
+  Eigen::AlignedBox3d box;
+  for (const auto& v : mesh.vertices) box.extend(v);
+  Transform placement = Transform::Identity();
+  placement.translation() = Eigen::Vector3d(-box.center().x(), -box.min().y(), -box.center().z());
+  return placement;
 }
 
 /// Blurs each colour of the mosaic by itself.
@@ -29,7 +31,9 @@ cv::Mat blurred(const cv::Mat& mosaic, double sigma_px) {
   for (int y : {0, 1}) {
     for (int x : {0, 1}) {
       cv::Mat1f colour(mosaic.rows / 2, mosaic.cols / 2);
-      const auto at = [&](const cv::Mat& all, int r, int c) { return const_cast<cv::Mat&>(all).ptr<float>(2 * r + y) + 2 * c + x; };
+      const auto at = [&](const cv::Mat& all, int r, int c) {
+        return const_cast<cv::Mat&>(all).ptr<float>(2 * r + y) + 2 * c + x;
+      };
       for (int r = 0; r < colour.rows; ++r)
         for (int c = 0; c < colour.cols; ++c) colour(r, c) = *at(mosaic, r, c);
       cv::GaussianBlur(colour, colour, {}, sigma_px / 2, sigma_px / 2, cv::BORDER_REPLICATE);
@@ -42,10 +46,10 @@ cv::Mat blurred(const cv::Mat& mosaic, double sigma_px) {
 
 }  // namespace
 
-ShotScene::ShotScene(Object object, double image_scale, std::uint64_t seed)
+ShotScene::ShotScene(Object object, double image_scale)
     : object_(std::move(object)),
       image_scale_(image_scale),
-      placement_(first_rest(object_.mesh, seed)),
+      placement_(put_down(object_.mesh)),
       rig_(default_rig(image_scale)),
       rays_(object_.mesh) {}
 
@@ -80,7 +84,8 @@ Object pebble() {
     // An egg, 70 x 50 x 40 mm, blunter at one end.
     const double width = 1.0 + 0.004 * p.x();
     return 20.0 * (std::sqrt(std::pow(p.x() / 35.0, 2) + std::pow(p.y() / (20.0 * width), 2) +
-                             std::pow(p.z() / (25.0 * width), 2)) - 1.0);
+                             std::pow(p.z() / (25.0 * width), 2)) -
+                   1.0);
   };
   Object object;
   object.name = "pebble";

@@ -27,8 +27,7 @@ struct Sensor {
 /// The plain pictures of view 0 for closure shots: the simulated scene, rendered, under the default rig.
 class ShotScene {
  public:
-  /// The object stands in the first of the rests drawn for `seed`.
-  ShotScene(Object object, double image_scale, std::uint64_t seed = 1);
+  ShotScene(Object object, double image_scale);
 
   /// What falls on a camera's sensor: its mosaic, 32-bit float. Takes a second or two in full size.
   [[nodiscard]] cv::Mat look(const Disturbance& since, bool left = true) const;

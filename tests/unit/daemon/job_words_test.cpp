@@ -31,8 +31,7 @@ TEST(JobWords, TheFlipIsAskedForAsTheStationAsks) {
   auto j = job(JobState::waiting_for_flip);
   j.complete = 1;
   EXPECT_EQ(describe(j).sentence, "Pose 1 of 2 is complete.");
-  EXPECT_EQ(describe(j).next_action,
-            "Turn the object over so that its underside faces the cameras, then press Start.");
+  EXPECT_EQ(describe(j).next_action, "Turn the object over so that its underside faces the cameras, then press Start.");
   j.recipe.flip_by_line = true;
   EXPECT_EQ(describe(j).next_action, "The line is asked to turn the object over.");
 }
