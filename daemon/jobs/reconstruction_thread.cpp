@@ -1,5 +1,6 @@
 #include "daemon/jobs/reconstruction_thread.h"
 
+#include <malloc.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -15,6 +16,14 @@ namespace {
 
 /// More views are not kept in memory while an earlier job is being worked on.
 constexpr int kMostViewsWaiting = 4;
+
+/// A job takes hundreds of megabytes from many threads, of which the C library keeps what fits nowhere: in months of
+/// jobs that grows. Given back between them, the process is as large after each.
+void give_memory_back() {
+#ifdef __GLIBC__
+  ::malloc_trim(0);
+#endif
+}
 
 }  // namespace
 
@@ -155,9 +164,12 @@ void ReconstructionThread::handle(const Finish& message) {
   if (!current_->error) {
     remove_failure(current_->folder);
     const auto report = report_file(current_->folder);
-    tell_(event::ModelReady{current_->job, model_file(current_->folder), report,
-                            beyond_limits(report, current_->recipe.limits)});
-  } else if (!current_->quarantined) {
+    const event::ModelReady ready{current_->job, model_file(current_->folder), report,
+                                  beyond_limits(report, current_->recipe.limits)};
+    end();
+    return tell_(ready);
+  }
+  if (!current_->quarantined) {
     // A note that cannot be written costs the reason after a restart, nothing else.
     std::ignore = write_failure(current_->folder, *current_->error);
   }
@@ -172,6 +184,7 @@ void ReconstructionThread::handle(const Abandon& message) {
 void ReconstructionThread::end() {
   if (!current_->quarantined) forget_attempts(current_->folder);
   current_.reset();
+  give_memory_back();
 }
 
 Result<void> ReconstructionThread::make_model() {
