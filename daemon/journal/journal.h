@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <string>
+#include <vector>
 
 #include "daemon/journal/entry.h"
 
@@ -35,6 +37,9 @@ class Journal {
 /// Under systemd, where stderr is the journal's own stream [systemd.exec(5), JOURNAL_STREAM]: entries with their
 /// fields. Otherwise lines of text on stderr.
 Journal::Sink standard_sink();
+
+/// "NAME=value", as the journal takes them; those that do not apply are left out.
+std::vector<std::string> journal_fields(const JournalEntry& entry);
 
 /// "2026-11-21T13:00:00Z notice job 20261121-130000-1 pose 0 view 3: ...", without an end of line.
 std::string text_line(const JournalEntry& entry, std::chrono::system_clock::time_point now);

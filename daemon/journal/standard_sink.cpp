@@ -3,10 +3,8 @@
 #include <sys/uio.h>
 #include <unistd.h>
 
-#include <array>
 #include <cstdio>
 #include <cstdlib>
-#include <string_view>
 #include <vector>
 
 #define SD_JOURNAL_SUPPRESS_LOCATION  // a line of our code tells the operator nothing
@@ -36,12 +34,7 @@ bool stderr_is_the_journal() {
 }
 
 void send_to_journal(const JournalEntry& entry) {
-  std::vector<std::string> fields{"MESSAGE=" + entry.message,
-                                  fmt::format("PRIORITY={}", static_cast<int>(entry.priority))};
-  if (!entry.job.empty()) fields.push_back("JOB=" + entry.job);
-  if (entry.pose) fields.push_back(fmt::format("POSE={}", *entry.pose));
-  if (entry.view) fields.push_back(fmt::format("VIEW={}", *entry.view));
-  if (!entry.device.empty()) fields.push_back("DEVICE=" + entry.device);
+  auto fields = journal_fields(entry);
   std::vector<iovec> parts;
   for (auto& field : fields) parts.push_back({field.data(), field.size()});
   ::sd_journal_sendv(parts.data(), static_cast<int>(parts.size()));
@@ -52,6 +45,16 @@ void print_line(const JournalEntry& entry) {
 }
 
 }  // namespace
+
+std::vector<std::string> journal_fields(const JournalEntry& entry) {
+  std::vector<std::string> fields{"MESSAGE=" + entry.message,
+                                  fmt::format("PRIORITY={}", static_cast<int>(entry.priority))};
+  if (!entry.job.empty()) fields.push_back("JOB=" + entry.job);
+  if (entry.pose) fields.push_back(fmt::format("POSE={}", *entry.pose));
+  if (entry.view) fields.push_back(fmt::format("VIEW={}", *entry.view));
+  if (!entry.device.empty()) fields.push_back("DEVICE=" + entry.device);
+  return fields;
+}
 
 std::string text_line(const JournalEntry& entry, std::chrono::system_clock::time_point now) {
   std::string about;
