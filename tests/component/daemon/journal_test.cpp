@@ -9,6 +9,10 @@
 #include "tests/component/daemon/daemon_under_test.h"
 
 namespace scanrig {
+
+/// For messages of failed expectations.
+void PrintTo(const JournalEntry& entry, std::ostream* out) { *out << text_line(entry, {}); }
+
 namespace {
 
 using std::chrono::seconds;
@@ -68,7 +72,8 @@ TEST_F(LoggedDaemon, TellsAWholeJobOfTwoPoses) {
     EXPECT_THAT(lines,
                 Contains(AllOf(says("View 0 again: nothing has moved"), Field(&JournalEntry::pose, Optional(pose)))));
   }
-  for (const auto* stage : {"Stage registration begins", "Stage registration ends after", "Stage texture ends after"}) {
+  for (const auto* stage :
+       {"Stage range begins", "registration begins", "registration ends after", "Stage texture ends after"}) {
     EXPECT_THAT(lines, Contains(AllOf(says(stage), Field(&JournalEntry::job, id)))) << stage;
   }
   for (const auto* machine : {"Halted: ", "Operational.Initialized: Reset was pressed.",

@@ -19,7 +19,8 @@ class Reload : public RigOnWires {
  protected:
   void start(const std::vector<std::string>& program = {SCANRIGD_SIM_PROGRAM, "--scale", "0.25"}) {
     start_rig({"--scale", "0.25"});
-    systemd_.emplace();
+    systemd_ = std::jthread([this](const std::stop_token& end) { listen(end); });
+    ASSERT_TRUE(soon([&] { return listening_to_daemon_.load(); }));
     start_daemon(program);
   }
   void configure(const std::string& more) const { std::ofstream(config(), std::ios::app) << more; }
@@ -27,7 +28,8 @@ class Reload : public RigOnWires {
   /// What systemd has heard since RELOADING=1, once `words` are in it.
   bool hears(const std::string& words) {
     return soon([&] {
-      for (auto& message : systemd_->heard()) {
+      const std::lock_guard guard(mutex_);
+      for (auto& message : std::exchange(heard_, {})) {
         if (message.starts_with("RELOADING=1")) since_.clear();
         since_.push_back(std::move(message));
       }
@@ -51,11 +53,27 @@ class Reload : public RigOnWires {
   }
   std::string socket() const { return folder_ / "api.sock"; }
 
-  std::optional<Listener> systemd_;
+  /// Always, or the daemon would have to wait until somebody does.
+  void listen(const std::stop_token& end) {
+    Listener listener;
+    listening_to_daemon_ = true;
+    while (!end.stop_requested()) {
+      for (auto& message : listener.heard()) {
+        const std::lock_guard guard(mutex_);
+        heard_.push_back(std::move(message));
+      }
+      clock_.sleep_for(std::chrono::milliseconds(2));
+    }
+  }
+
+  std::atomic<bool> listening_to_daemon_ = false;
+  std::mutex mutex_;
+  std::vector<std::string> heard_;
   std::vector<std::string> since_;
+  std::jthread systemd_;
 };
 
-constexpr const char* kQuick = "\n[recipe.quick]\nviews = 2\nposes = 1\n";
+constexpr const char* kQuick = "\n[recipe.quick]\nviews = 3\nposes = 1\nflip_timeout_min = 30\n";
 
 TEST_F(Reload, WhileIdleTheNewConfigurationIsTakenAndTheStationWaitsForReset) {
   start();
