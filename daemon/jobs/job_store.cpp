@@ -50,7 +50,7 @@ void settle_scanned(JobInfo& job) {
   job.quarantined = !attempts.running && attempts.ended_by_death >= kAttemptsThatQuarantine;
   job.error = job.quarantined ? quarantine_error() : read_failure(job.folder);
   if (job.error) {
-    job.state = JobState::failed;
+    job.state = job.error->code == ErrorCode::stopped ? JobState::cancelled : JobState::failed;
   } else if (job.report.empty() || attempts.running) {
     job.state = JobState::reconstructing;
   } else {

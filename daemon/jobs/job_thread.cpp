@@ -122,25 +122,30 @@ void JobThread::handle(const action::KeepJob& task) { answer(task.asked.ticket, 
 Result<void> JobThread::keep(const event::JobAsked& asked) {
   auto job = store_.read(asked.job);
   if (!job) return pass_on(job);
+  if (asked.what == What::cancel) return cancel(*job);
   if (job->state == JobState::reconstructing) return fail(ErrorCode::busy, "job {} is being reconstructed", asked.job);
   if (asked.what == What::reprocess) return reprocess(std::move(*job), asked);
-  if (asked.what == What::set_exported) {
-    auto order = read_job_file(job->folder);
-    if (!order) return pass_on(order);
-    order->exported = true;
-    if (auto written = write_job_file(job->folder, *order); !written) return written;
-  } else {
-    if (job->state != JobState::queued && job->state != JobState::interrupted) {
-      return fail(ErrorCode::refused, "job {} is {}: only what is queued or interrupted can be cancelled", asked.job,
-                  to_string(job->state));
-    }
-    auto scan = ScanFolder::open(job->folder);
+  auto order = read_job_file(job->folder);
+  if (!order) return pass_on(order);
+  order->exported = true;
+  if (auto written = write_job_file(job->folder, *order); !written) return written;
+  tell_known(asked.job);
+  return {};
+}
+
+/// Its evidence stays, and of a scan that has all its views a model can be made later.
+Result<void> JobThread::cancel(const JobInfo& job) {
+  if (job.state == JobState::queued || job.state == JobState::interrupted) {
+    auto scan = ScanFolder::open(job.folder);
     if (!scan) return pass_on(scan);
     if (auto ended = scan->set_state("cancelled"); !ended) return ended;
-    const Error why{ErrorCode::stopped, "cancelled on request"};
-    if (auto noted = write_failure(job->folder, why); !noted) return noted;
+  } else if (!reconstruction_.cancel(job.id)) {
+    return fail(ErrorCode::refused,
+                "job {} is {}: only what is queued, interrupted or being reconstructed can be cancelled", job.id,
+                to_string(job.state));
   }
-  tell_known(asked.job);
+  if (auto noted = write_failure(job.folder, {ErrorCode::stopped, "cancelled on request"}); !noted) return noted;
+  tell_known(job.id);
   return {};
 }
 

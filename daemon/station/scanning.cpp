@@ -31,6 +31,7 @@ void moved(Machine& m, const Closure& closure) {
 void job_begun(Machine& m, const event::JobBegun& e) {
   if (!m.has(e.job)) return;
   auto& job = *m.s().job;
+  m.s().disk_trouble = false;
   job.state = JobState::scanning;
   job.pose = e.pose;
   job.asked = job.taken = job.stored = e.stored;
@@ -115,6 +116,7 @@ void continue_after_flip(Machine& m, std::string cause) {
 void store_failed(Machine& m, const event::StoreFailed& e) {
   if (!m.has(e.job)) return;
   const bool begun = m.s().job->state != JobState::queued;
+  m.s().disk_trouble = true;
   m.close_job(JobState::interrupted, e.error);
   if (m.s().machine == MachineState::error) return;  // a fault came first and has the word
   auto cause = fmt::format("Job {} {}: {}{}.", e.job, begun ? "is interrupted" : "was not begun", e.error.message,

@@ -62,6 +62,12 @@ Words when_ready(const StationState& state, const StationRules& rules) {
           with_light(rules, "Switch the projector on. ", how_to_start(state))};
 }
 
+/// What has to be seen to besides: the next action alone would lead into the same trouble again.
+Words with_disk(const StationState& state, Words words) {
+  if (state.disk_trouble) words.next_action.insert(0, "See to the disk of the jobs. ");
+  return words;
+}
+
 Words when_executing(const StationState& state) {
   if (state.activity == Activity::waiting_for_flip) {
     return {fmt::format("Pose {} of {} is complete.", state.job->pose + 1, state.job->recipe.poses),
@@ -84,13 +90,13 @@ Words describe(const StationState& state, const StationRules& rules) {
     case MachineState::halted:
       if (state.reloading) return {"The daemon begins again with a new configuration.", ""};
       if (state.shutting_down) return {"The daemon is shutting down.", ""};
-      return {"The table is not homed.", how_to_reset(state)};
+      return with_disk(state, {"The table is not homed.", how_to_reset(state)});
     case MachineState::maintenance: return in_maintenance(state);
     case MachineState::error:
       return {fault_sentence(state), with_light(rules, "Switch the projector off. ", how_to_reset(state))};
     case MachineState::initialized:
       return {state.activity == Activity::warning ? "The table is about to move." : "The table is finding home.", ""};
-    case MachineState::ready: return when_ready(state, rules);
+    case MachineState::ready: return with_disk(state, when_ready(state, rules));
     case MachineState::single_execution:
     case MachineState::continuous_execution: return when_executing(state);
   }
