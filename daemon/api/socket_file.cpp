@@ -75,7 +75,11 @@ fs::path socket_path(int listening) {
 Result<int> take_over_socket(int passed, mode_t mode) {
   const auto path = socket_path(passed);
   const int own = ::fcntl(passed, F_DUPFD_CLOEXEC, 0);
-  if (own < 0 || ::chmod(path.c_str(), mode) != 0) return fail_errno("use the passed", path, own);
+  struct stat file {};
+  if (own < 0 || ::stat(path.c_str(), &file) != 0) return fail_errno("use the passed", path, own);
+  // Whoever made it has most likely said so already, and may be another user.
+  if ((file.st_mode & 0777) != mode && ::chmod(path.c_str(), mode) != 0)
+    return fail_errno("set the mode of", path, own);
   return own;
 }
 

@@ -7,6 +7,7 @@
 #include "daemon/api/socket_file.h"
 #include "tests/system/rig/rig_on_wires.h"
 #include "tests/system/service/notify_listener.h"
+#include "tests/unit/daemon/passed_socket.h"
 
 namespace scanrig {
 namespace {
@@ -146,7 +147,7 @@ class PassedSocket : public Reload {
  protected:
   void SetUp() override {
     Reload::SetUp();
-    listening_ = listen_on_socket(socket()).value_or(-1);
+    listening_ = make_passed_socket(socket());
     ASSERT_GE(listening_, 0);
   }
   void TearDown() override {
