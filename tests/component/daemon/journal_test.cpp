@@ -72,8 +72,8 @@ TEST_F(LoggedDaemon, TellsAWholeJobOfTwoPoses) {
     EXPECT_THAT(lines,
                 Contains(AllOf(says("View 0 again: nothing has moved"), Field(&JournalEntry::pose, Optional(pose)))));
   }
-  for (const auto* stage :
-       {"Stage range begins", "registration begins", "registration ends after", "Stage texture ends after"}) {
+  for (const auto* stage : {"Stage range begins", "Stage registration pose 1 begins",
+                            "Stage registration pose 2 ends after", "Stage texture ends after"}) {
     EXPECT_THAT(lines, Contains(AllOf(says(stage), Field(&JournalEntry::job, id)))) << stage;
   }
   for (const auto* machine : {"Halted: ", "Operational.Initialized: Reset was pressed.",
