@@ -33,7 +33,7 @@ void take_views(JobInfo& job, const Manifest& manifest) {
       job.stored.push_back({number, view.index, view.measured_deg, view.spoilt, view.commanded_deg, view.settling_ms});
     }
     for (const auto& closure : pose.closures) {
-      job.closures.push_back({number, closure.shift_px, closure.changed, closure.unmoved});
+      job.closures.push_back({number, closure.shift_px, closure.changed, closure.unmoved, closure.spoilt});
     }
     if (pose.complete) job.complete = number + 1;
   }

@@ -17,9 +17,11 @@ void moved(Machine& m, const Closure& closure) {
   const bool resuming = job.taken < job.recipe.views;
   const Error why{
       ErrorCode::moved,
-      fmt::format("the object, the table or a camera has moved during pose {}: view 0, taken again, is off by {:.2f} "
-                  "px and differs on {:.0f} % of what it shows; scan the object again",
-                  job.pose + 1, closure.shift_px, 100 * closure.changed)};
+      fmt::format(
+          "the object, the table or a camera has moved during pose {}: view 0, taken again, is off by {} px and "
+          "differs on {:.0f} % of what it shows; scan the object again",
+          job.pose + 1, closure.shift_px > 1.0 ? "more than 1" : fmt::format("{:.2f}", closure.shift_px),
+          100 * closure.changed)};
   const std::string cause = fmt::format("Job {}: {}.", job.id, why.message);
   if (!resuming && !job.reconstruction) count_result(m, false);
   m.close_job(resuming ? JobState::interrupted : JobState::failed, why);

@@ -71,9 +71,7 @@ Words with_disk(const StationState& state, Words words) {
 Words when_executing(const StationState& state) {
   if (state.activity == Activity::waiting_for_flip) {
     return {fmt::format("Pose {} of {} is complete.", state.job->pose + 1, state.job->recipe.poses),
-            state.job->recipe.flip_by_line
-                ? "The line is asked to turn the object over."
-                : "Turn the object over so that its underside faces the cameras, then press Start."};
+            how_to_flip(state.job->recipe)};
   }
   if (state.activity == Activity::waiting_for_part) {
     return {fmt::format("Waiting for the next part, {} in the queue.", state.queue.size()),
@@ -83,6 +81,11 @@ Words when_executing(const StationState& state) {
 }
 
 }  // namespace
+
+std::string how_to_flip(const Recipe& recipe) {
+  return recipe.flip_by_line ? "The line is asked to turn the object over."
+                             : "Turn the object over so that its underside faces the cameras, then press Start.";
+}
 
 Words describe(const StationState& state, const StationRules& rules) {
   switch (state.machine) {
