@@ -7,6 +7,7 @@ import station_disturbed
 import station_fuzz
 import station_kill
 import station_load
+import station_sanitize
 import station_security
 import station_soak
 import station_stages
@@ -14,7 +15,7 @@ import station_startup
 import station_view_cost
 
 PARTS = (station_startup, station_kill, station_disturbed, station_stages, station_view_cost, station_load,
-         station_security, station_soak, station_fuzz)
+         station_security, station_soak, station_fuzz, station_sanitize)
 
 
 def measure(bench):
