@@ -1,5 +1,5 @@
-// The loops of a build for the thread sanitizer, which cannot see how TBB hands work from thread to thread: threads that
-// are started and joined here, and nothing else between the bodies that could hide a race.
+// The loops of a build for the thread sanitizer, which cannot see how TBB hands work from thread to thread: threads
+// that are started and joined here, and nothing else between the bodies that could hide a race.
 
 #include <algorithm>
 #include <atomic>
