@@ -76,17 +76,13 @@ void go_on_reconstructing(const JobTable& jobs, ReconstructionThread& reconstruc
   }
 }
 
-bool within(const QuietHours& hours, std::chrono::minutes of_day) {
-  return hours.from <= hours.to ? of_day >= hours.from && of_day < hours.to : of_day >= hours.from || of_day < hours.to;
-}
-
 /// By the clock on the wall of this machine.
 bool quiet_now(const std::optional<QuietHours>& hours) {
   if (!hours) return false;
   const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   std::tm local{};
   ::localtime_r(&now, &local);
-  return within(*hours, std::chrono::hours(local.tm_hour) + std::chrono::minutes(local.tm_min));
+  return hours->contain(std::chrono::hours(local.tm_hour) + std::chrono::minutes(local.tm_min));
 }
 
 }  // namespace

@@ -24,6 +24,11 @@ namespace scanrig {
 /// By the clock on the wall; `from` later than `to` means over midnight.
 struct QuietHours {
   std::chrono::minutes from{}, to{};  ///< of the day
+
+  /// Up to `to`, which is no longer one of them.
+  [[nodiscard]] constexpr bool contain(std::chrono::minutes of_day) const {
+    return from <= to ? of_day >= from && of_day < to : of_day >= from || of_day < to;
+  }
 };
 
 struct DaemonOptions {

@@ -2,6 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
+#include "daemon/station/job_words.h"
+
 namespace scanrig {
 
 using nlohmann::ordered_json;
@@ -23,8 +25,11 @@ ordered_json to_json(const Error& error) { return {{"code", to_string(error.code
 ordered_json to_json(const std::optional<Error>& error) { return error ? to_json(*error) : ordered_json(nullptr); }
 
 ordered_json to_json(const JobInfo& job) {
+  const auto words = describe(job);
   return {{"id", job.id},
           {"state", to_string(job.state)},
+          {"sentence", words.sentence},
+          {"next_action", words.next_action},
           {"recipe", job.recipe.name},
           {"part", job.part},
           {"folder", job.folder},
@@ -40,24 +45,36 @@ ordered_json to_json(const JobInfo& job) {
           {"error", to_json(job.error)}};
 }
 
+namespace {
+
+ordered_json to_json(const std::vector<Error>& errors) {
+  auto list = ordered_json::array();
+  for (const auto& error : errors) list.push_back(scanrig::to_json(error));
+  return list;
+}
+
+}  // namespace
+
 ordered_json to_detailed_json(const JobInfo& job) {
   auto json = to_json(job);
   json["stored"] = ordered_json::array();
   for (const auto& v : job.stored) {
-    auto spoilt = ordered_json::array();
-    for (const auto& why : v.spoilt) spoilt.push_back(to_json(why));
     json["stored"].push_back({{"pose", v.pose},
                               {"view", v.view},
                               {"measured_deg", v.measured_deg},
                               {"error_deg", v.measured_deg - v.commanded_deg},
                               {"settling_ms", v.settling_ms},
                               {"redone", v.spoilt.size()},
-                              {"spoilt", std::move(spoilt)}});
+                              {"spoilt", to_json(v.spoilt)}});
   }
   json["closures"] = ordered_json::array();
   for (const auto& c : job.closures) {
-    json["closures"].push_back(
-        {{"pose", c.pose}, {"shift_px", c.shift_px}, {"changed", c.changed}, {"unmoved", c.unmoved}});
+    json["closures"].push_back({{"pose", c.pose},
+                                {"shift_px", c.shift_px},
+                                {"changed", c.changed},
+                                {"unmoved", c.unmoved},
+                                {"redone", c.spoilt.size()},
+                                {"spoilt", to_json(c.spoilt)}});
   }
   json["stages"] = ordered_json::array();
   for (const auto& stage : job.stages) json["stages"].push_back({{"name", stage.name}, {"fraction", stage.fraction}});

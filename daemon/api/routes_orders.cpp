@@ -84,7 +84,7 @@ std::vector<Route> order_routes() {
   return {
       order_route(),
       job_route(Method::post, "/api/v1/jobs/{id}/cancel", Role::operating, What::cancel,
-                "Ends a queued or interrupted job."),
+                "Ends a job that is queued, interrupted or being reconstructed."),
       job_route(Method::post, "/api/v1/jobs/{id}/resume", Role::operating, What::resume,
                 "The next Start goes on with this interrupted job."),
       job_route(Method::post, "/api/v1/jobs/{id}/first", Role::operating, What::to_front,

@@ -32,9 +32,11 @@ const char* const kSchemas = R"({
   "inputs": {"type": "object", "additionalProperties": {"type": "boolean"}},
   "outputs": {"type": "object", "additionalProperties": {"type": "boolean"}}}},
 "Job": {"type": "object", "additionalProperties": false,
-  "required": ["id", "state", "recipe", "part", "folder", "poses", "views", "stored", "resumable", "quarantined",
+  "required": ["id", "state", "sentence", "next_action", "recipe", "part", "folder", "poses", "views", "stored", "resumable", "quarantined",
   "exported", "passed", "model", "report", "error"], "properties": {
   "id": {"type": "string"}, "state": {"type": "string"},
+  "sentence": {"type": "string", "description": "what becomes of it, and why"},
+  "next_action": {"type": "string", "description": "what the operator should do; empty: nothing"},
   "recipe": {"type": "string"}, "part": {"type": "string", "description": "of the order: barcode or free text"},
   "resumable": {"type": "boolean", "description": "interrupted, and the missing views may still be taken"},
   "quarantined": {"type": "boolean", "description": "two daemons died over its reconstruction"},
@@ -54,10 +56,13 @@ const char* const kSchemas = R"({
   "error_deg": {"type": "number", "description": "measured less commanded"}, "settling_ms": {"type": "number"},
   "redone": {"type": "integer", "description": "exposures that were lost or spoilt and taken again"},
   "spoilt": {"type": "array", "items": {"$ref": "#/components/schemas/Problem"}, "description": "what was wrong with each"}}},
-"Closure": {"type": "object", "required": ["pose", "shift_px", "changed", "unmoved"], "additionalProperties": false,
+"Closure": {"type": "object", "additionalProperties": false,
+  "required": ["pose", "shift_px", "changed", "unmoved", "redone", "spoilt"],
   "description": "view 0, taken again, against the first one", "properties": {
   "pose": {"type": "integer"}, "shift_px": {"type": "number"}, "changed": {"type": "number"},
-  "unmoved": {"type": "boolean"}}},
+  "unmoved": {"type": "boolean"},
+  "redone": {"type": "integer", "description": "exposures that were lost or spoilt and taken again"},
+  "spoilt": {"type": "array", "items": {"$ref": "#/components/schemas/Problem"}, "description": "what was wrong with each"}}},
 "Stage": {"type": "object", "required": ["name", "fraction"], "additionalProperties": false, "properties": {
   "name": {"type": "string"}, "fraction": {"type": "number", "minimum": 0, "maximum": 1}}},
 "JobDone": {"type": "object", "required": ["job"], "additionalProperties": false, "properties": {

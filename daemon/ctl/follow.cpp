@@ -10,14 +10,24 @@ namespace {
 
 using nlohmann::json;
 
+/// Of a view or a closure shot.
+std::string redone(const json& taken) {
+  const int count = taken.at("redone");
+  std::string text = count == 0 ? "" : fmt::format(", {} exposure{} redone", count, count == 1 ? "" : "s");
+  for (const auto& why : taken.at("spoilt")) text += "\n      redone: " + why.at("message").get<std::string>();
+  return text;
+}
+
 std::string view_line(const json& view, const json& job) {
-  const int redone = view.at("redone");
-  std::string line = fmt::format(
-      "  pose {}/{}  view {}/{}  {:8.3f} deg  stored{}", view.at("pose").get<int>() + 1, job.at("poses").get<int>(),
-      view.at("view").get<int>() + 1, job.at("views").get<int>(), view.at("measured_deg").get<double>(),
-      redone == 0 ? "" : fmt::format(", {} exposure{} redone", redone, redone == 1 ? "" : "s"));
-  for (const auto& why : view.at("spoilt")) line += "\n      redone: " + why.at("message").get<std::string>();
-  return line;
+  return fmt::format("  pose {}/{}  view {}/{}  {:8.3f} deg  stored{}", view.at("pose").get<int>() + 1,
+                     job.at("poses").get<int>(), view.at("view").get<int>() + 1, job.at("views").get<int>(),
+                     view.at("measured_deg").get<double>(), redone(view));
+}
+
+std::string closure_line(const json& closure, const json& job) {
+  return fmt::format("  pose {}/{}  view 1 again  {}, off by {:.2f} px{}", closure.at("pose").get<int>() + 1,
+                     job.at("poses").get<int>(), closure.at("unmoved").get<bool>() ? "nothing moved" : "MOVED",
+                     closure.at("shift_px").get<double>(), redone(closure));
 }
 
 }  // namespace
@@ -27,6 +37,8 @@ bool JobStory::tell(const json& status, const json& job) {
   if (!introduced_) bars_.line(fmt::format("Job {}", job.at("id").get<std::string>()));
   introduced_ = true;
   for (; views_told_ < stored.size(); ++views_told_) bars_.line(view_line(stored[views_told_], job));
+  const auto& closures = job.at("closures");
+  for (; closures_told_ < closures.size(); ++closures_told_) bars_.line(closure_line(closures[closures_told_], job));
   const auto state = parse_job_state(job.at("state").get<std::string>());
   const std::string action = state == JobState::waiting_for_flip ? status.at("next_action").get<std::string>() : "-";
   if (action != asked_ && action != "-" && !action.empty()) bars_.line("  " + action);

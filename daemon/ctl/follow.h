@@ -23,6 +23,7 @@ class JobStory {
  private:
   StageBars& bars_;
   std::size_t views_told_ = 0;
+  std::size_t closures_told_ = 0;
   bool introduced_ = false;
   std::string asked_ = "-";  ///< what the operator was last asked to do
   RealClock clock_;

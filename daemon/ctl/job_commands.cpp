@@ -16,7 +16,7 @@ CLI::App* add_change(CLI::App& app, Chosen& chosen, const char* name, const char
 
 void add_changes(CLI::App& app, Chosen& chosen) {
   const auto verb = [] { return std::make_shared<JobVerb>(); };
-  add_change(app, chosen, "cancel", "end a queued or interrupted job", verb());
+  add_change(app, chosen, "cancel", "end a job that is queued, interrupted or being reconstructed", verb());
   add_change(app, chosen, "resume", "let the next Start go on with an interrupted job", verb());
   add_change(app, chosen, "first", "let the next Start begin this queued job", verb());
   const auto again = verb();

@@ -4,6 +4,7 @@
 
 #include "daemon/ctl/answers.h"
 #include "daemon/ctl/free_rig.h"
+#include "daemon/ctl/job_lines.h"
 #include "daemon/ctl/stage_bars.h"
 #include "daemon/ctl/verbs.h"
 
@@ -15,8 +16,8 @@ using nlohmann::json;
 constexpr int kPage = 500;
 
 void print_job(const json& job) {
-  fmt::print("{:<22} {:<16} {:>2} views  {}\n", text(job, "id"), text(job, "state"), job.at("stored").get<int>(),
-             job.at("error").is_object() ? text(job.at("error"), "message") : text(job, "model"));
+  fmt::print("{:<22} {:<16} {:>2} views  {:<12} {}\n", text(job, "id"), text(job, "state"), job.at("stored").get<int>(),
+             text(job, "part"), job.at("error").is_object() ? text(job.at("error"), "message") : text(job, "model"));
 }
 
 /// As many as are wanted, over as many pages as that takes.
@@ -57,8 +58,10 @@ ExitCode jobs(const Connection& connection, const JobsVerb& verb) {
   const auto answer =
       verb.id.empty() ? list(connection, verb) : ask(connection.socket, "GET", "/api/v1/jobs/" + segment(verb.id));
   if (!answer) return complain(answer.error());
-  if (connection.json || !verb.id.empty()) {
+  if (connection.json) {
     print(*answer);
+  } else if (!verb.id.empty()) {
+    for (const auto& line : job_lines(*answer)) fmt::print("{}\n", line);
   } else {
     for (const auto& job : answer->at("jobs")) print_job(job);
   }

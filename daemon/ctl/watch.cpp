@@ -2,6 +2,7 @@
 
 #include "core/clock.h"
 #include "daemon/ctl/answers.h"
+#include "daemon/ctl/job_lines.h"
 #include "daemon/ctl/screen.h"
 #include "daemon/ctl/verbs.h"
 #include "daemon/signal_stop.h"
@@ -12,34 +13,6 @@ namespace {
 using nlohmann::json;
 
 constexpr auto kGlance = std::chrono::milliseconds(250);
-
-std::string share(double fraction) {
-  constexpr int kWidth = 30;
-  const int full = static_cast<int>(std::clamp(fraction, 0.0, 1.0) * kWidth);
-  return fmt::format("[{}{}] {:3.0f} %", std::string(static_cast<std::size_t>(full), '#'),
-                     std::string(static_cast<std::size_t>(kWidth - full), '-'), 100.0 * fraction);
-}
-
-void add_job(const json& job, std::vector<std::string>& lines) {
-  if (!job.is_object()) return;
-  const auto stored = job.at("stored").size();
-  const auto all = static_cast<std::size_t>(std::max(1, job.at("poses").get<int>() * job.at("views").get<int>()));
-  lines.push_back("");
-  lines.push_back(fmt::format("job {}: {}", text(job, "id"), text(job, "state")));
-  lines.push_back(fmt::format("  {:<22} {}  {} of {}", "views stored",
-                              share(static_cast<double>(stored) / static_cast<double>(all)), stored, all));
-  for (const auto& view : job.at("stored")) {
-    for (const auto& why : view.value("spoilt", json::array())) {
-      lines.push_back(fmt::format("  pose {} view {}: an exposure was redone: {}", view.at("pose").get<int>() + 1,
-                                  view.at("view").get<int>() + 1, text(why, "message")));
-    }
-  }
-  for (const auto& stage : job.at("stages")) {
-    lines.push_back(fmt::format("  {:<22} {}", text(stage, "name"), share(stage.at("fraction"))));
-  }
-  if (job.at("error").is_object()) lines.push_back("  " + text(job.at("error"), "message"));
-  if (const auto model = text(job, "model"); !model.empty()) lines.push_back("  model " + model);
-}
 
 void add_health(const json& health, std::vector<std::string>& lines) {
   lines.push_back("");
@@ -103,7 +76,10 @@ std::vector<std::string> watch_lines(const json& status, const json& health, con
   if (const auto queued = status.value("queue", json::array()); !queued.empty()) {
     lines.push_back(fmt::format("queued:  {} jobs, next {}", queued.size(), queued[0].get<std::string>()));
   }
-  add_job(job, lines);
+  if (job.is_object()) {
+    lines.push_back("");
+    for (auto& line : job_lines(job)) lines.push_back(std::move(line));
+  }
   add_health(health, lines);
   return lines;
 }

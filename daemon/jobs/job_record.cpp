@@ -9,7 +9,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kLayout = 2;  ///< to be raised with every change below
+constexpr int kLayout = 3;  ///< to be raised with every change below
 
 json to_json(const std::optional<Error>& error) {
   if (!error) return nullptr;
@@ -43,7 +43,9 @@ json views_of(const JobInfo& job) {
 
 json closures_of(const JobInfo& job) {
   json closures = json::array();
-  for (const auto& c : job.closures) closures.push_back({c.pose, c.shift_px, c.changed, c.unmoved});
+  for (const auto& c : job.closures) {
+    closures.push_back({c.pose, c.shift_px, c.changed, c.unmoved, to_json(c.spoilt)});
+  }
   return closures;
 }
 
@@ -61,7 +63,9 @@ void read(const json& j, JobInfo& job) {
   for (const auto& v : j.at("stored")) {
     job.stored.push_back({v.at(0), v.at(1), v.at(2), errors_from(v.at(3)), v.at(4), v.at(5)});
   }
-  for (const auto& c : j.at("closures")) job.closures.push_back({c.at(0), c.at(1), c.at(2), c.at(3)});
+  for (const auto& c : j.at("closures")) {
+    job.closures.push_back({c.at(0), c.at(1), c.at(2), c.at(3), errors_from(c.at(4))});
+  }
 }
 
 }  // namespace

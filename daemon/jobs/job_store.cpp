@@ -33,7 +33,7 @@ void take_views(JobInfo& job, const Manifest& manifest) {
       job.stored.push_back({number, view.index, view.measured_deg, view.spoilt, view.commanded_deg, view.settling_ms});
     }
     for (const auto& closure : pose.closures) {
-      job.closures.push_back({number, closure.shift_px, closure.changed, closure.unmoved});
+      job.closures.push_back({number, closure.shift_px, closure.changed, closure.unmoved, closure.spoilt});
     }
     if (pose.complete) job.complete = number + 1;
   }
@@ -50,7 +50,7 @@ void settle_scanned(JobInfo& job) {
   job.quarantined = !attempts.running && attempts.ended_by_death >= kAttemptsThatQuarantine;
   job.error = job.quarantined ? quarantine_error() : read_failure(job.folder);
   if (job.error) {
-    job.state = JobState::failed;
+    job.state = job.error->code == ErrorCode::stopped ? JobState::cancelled : JobState::failed;
   } else if (job.report.empty() || attempts.running) {
     job.state = JobState::reconstructing;
   } else {

@@ -1,9 +1,11 @@
 #include "daemon/jobs/job_thread.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "core/files.h"
+#include "core/units.h"
 #include "daemon/actor_thread.h"
 #include "pipeline/closure/compare_views.h"
 
@@ -22,6 +24,16 @@ Result<void> keep_images(const ScanFolder& scan, int pose, std::size_t number, c
   files.push_back({fmt::format("closure{:02}_left.png", number), *left});
   files.push_back({fmt::format("closure{:02}_right.png", number), *right});
   return write_files_synced(folder, files);
+}
+
+/// What view 0 may have moved where the table itself says that it stands `turned_deg` off its first angle: views are
+/// placed by what it says, so that is no slip.
+CompareViewsOptions allowing_for(double turned_deg, const Camera& camera) {
+  constexpr double kReachMm = 60.0;  // of the largest object, from the axis
+  const double mm_per_px = camera.projection.mm_per_pixel(camera.camera_from_turntable.translation().norm());
+  CompareViewsOptions options;
+  options.most_shift_px += to_radians(std::abs(std::remainder(turned_deg, 360.0))) * kReachMm / mm_per_px;
+  return options;
 }
 
 }  // namespace
@@ -122,25 +134,30 @@ void JobThread::handle(const action::KeepJob& task) { answer(task.asked.ticket, 
 Result<void> JobThread::keep(const event::JobAsked& asked) {
   auto job = store_.read(asked.job);
   if (!job) return pass_on(job);
+  if (asked.what == What::cancel) return cancel(*job);
   if (job->state == JobState::reconstructing) return fail(ErrorCode::busy, "job {} is being reconstructed", asked.job);
   if (asked.what == What::reprocess) return reprocess(std::move(*job), asked);
-  if (asked.what == What::set_exported) {
-    auto order = read_job_file(job->folder);
-    if (!order) return pass_on(order);
-    order->exported = true;
-    if (auto written = write_job_file(job->folder, *order); !written) return written;
-  } else {
-    if (job->state != JobState::queued && job->state != JobState::interrupted) {
-      return fail(ErrorCode::refused, "job {} is {}: only what is queued or interrupted can be cancelled", asked.job,
-                  to_string(job->state));
-    }
-    auto scan = ScanFolder::open(job->folder);
+  auto order = read_job_file(job->folder);
+  if (!order) return pass_on(order);
+  order->exported = true;
+  if (auto written = write_job_file(job->folder, *order); !written) return written;
+  tell_known(asked.job);
+  return {};
+}
+
+/// Its evidence stays, and of a scan that has all its views a model can be made later.
+Result<void> JobThread::cancel(const JobInfo& job) {
+  if (job.state == JobState::queued || job.state == JobState::interrupted) {
+    auto scan = ScanFolder::open(job.folder);
     if (!scan) return pass_on(scan);
     if (auto ended = scan->set_state("cancelled"); !ended) return ended;
-    const Error why{ErrorCode::stopped, "cancelled on request"};
-    if (auto noted = write_failure(job->folder, why); !noted) return noted;
+  } else if (!reconstruction_.cancel(job.id)) {
+    return fail(ErrorCode::refused,
+                "job {} is {}: only what is queued, interrupted or being reconstructed can be cancelled", job.id,
+                to_string(job.state));
   }
-  tell_known(asked.job);
+  if (auto noted = write_failure(job.folder, {ErrorCode::stopped, "cancelled on request"}); !noted) return noted;
+  tell_known(job.id);
   return {};
 }
 
@@ -185,21 +202,25 @@ Result<Closure> JobThread::judge(const TakenView& again) {
   if (!first) return pass_on(first);
   const auto now = to_view_images(again.images, again.record);
   if (!now) return pass_on(now);
-  const auto left = compare_views(first->left_plain, now->left_plain);
+  const auto calibration = scan_->load_calibration();
+  if (!calibration) return pass_on(calibration);
+  const auto& record = scan_->manifest().poses[pose];
+  const double turned = again.record.measured_deg - record.views[0].measured_deg;
+  const auto left = compare_views(first->left_plain, now->left_plain, allowing_for(turned, calibration->left));
   if (!left) return pass_on(left);
-  const auto right = compare_views(first->right_plain, now->right_plain);
+  const auto right = compare_views(first->right_plain, now->right_plain, allowing_for(turned, calibration->right));
   if (!right) return pass_on(right);
 
   const Closure closure{again.id.pose, std::max(left->shift_px, right->shift_px),
-                        std::max(left->changed, right->changed), left->unmoved && right->unmoved};
-  const auto& record = scan_->manifest().poses[pose];
+                        std::max(left->changed, right->changed), left->unmoved && right->unmoved, again.record.spoilt};
   if (!closure.unmoved) {
     if (auto kept = keep_images(*scan_, again.id.pose, record.closures.size(), again.images); !kept) {
       return pass_on(kept);
     }
   }
-  const auto added = scan_->add_closure(pose, {static_cast<int>(record.views.size()), again.record.measured_deg,
-                                               again.record.taken, closure.shift_px, closure.changed, closure.unmoved});
+  const auto added =
+      scan_->add_closure(pose, {static_cast<int>(record.views.size()), again.record.measured_deg, again.record.taken,
+                                closure.shift_px, closure.changed, closure.unmoved, closure.spoilt});
   if (!added) return pass_on(added);
   return closure;
 }

@@ -45,6 +45,7 @@ class JobThread {
 
   Result<void> begin(const JobInfo& job);
   Result<void> move(const action::MoveJob& task);
+  Result<void> cancel(const JobInfo& job);
   Result<void> keep(const event::JobAsked& asked);
   Result<void> finish_pose(const action::FinishPose& task);
   Result<Closure> judge(const TakenView& again);

@@ -1,5 +1,6 @@
 #include "daemon/jobs/reconstruction_thread.h"
 
+#include <malloc.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -16,6 +17,14 @@ namespace {
 /// More views are not kept in memory while an earlier job is being worked on.
 constexpr int kMostViewsWaiting = 4;
 
+/// A job takes hundreds of megabytes from many threads, of which the C library keeps what fits nowhere: in months of
+/// jobs that grows. Given back between them, the process is as large after each.
+void give_memory_back() {
+#ifdef __GLIBC__
+  ::malloc_trim(0);
+#endif
+}
+
 }  // namespace
 
 ReconstructionThread::ReconstructionThread(Clock& clock, ReconstructorFactory factory, std::function<void(Event)> tell)
@@ -25,18 +34,45 @@ ReconstructionThread::ReconstructionThread(Clock& clock, ReconstructorFactory fa
       thread_(start_actor(clock, [this] { run(); })) {}
 
 ReconstructionThread::~ReconstructionThread() {
-  stop_.request_stop();
+  ending_ = true;
+  {
+    const std::lock_guard guard(mutex_);
+    for (auto& run : runs_) run.stop.request_stop();
+  }
   inbox_.close();
   thread_.join();
 }
 
 void ReconstructionThread::begin(std::string job, std::filesystem::path folder, Recipe recipe) {
-  inbox_.post(Begin{std::move(job), std::move(folder), std::move(recipe)});
+  inbox_.post(enlist(std::move(job), std::move(folder), std::move(recipe), {}));
 }
 
 void ReconstructionThread::rebuild(std::string job, std::filesystem::path folder, Recipe recipe,
                                    ReconstructionChanges changes) {
-  inbox_.post(Rebuild{{std::move(job), std::move(folder), std::move(recipe), std::move(changes)}});
+  inbox_.post(Rebuild{enlist(std::move(job), std::move(folder), std::move(recipe), std::move(changes))});
+}
+
+bool ReconstructionThread::cancel(const std::string& job) {
+  const std::lock_guard guard(mutex_);
+  bool found = false;
+  for (auto& run : runs_) {
+    if (run.job == job) found = run.stop.request_stop() || found;
+  }
+  return found;
+}
+
+ReconstructionThread::Begin ReconstructionThread::enlist(std::string job, std::filesystem::path folder, Recipe recipe,
+                                                         ReconstructionChanges changes) {
+  const std::lock_guard guard(mutex_);
+  const auto& run = runs_.emplace_back(Run{job, {}});
+  return {std::move(job), std::move(folder), std::move(recipe), std::move(changes), run.stop};
+}
+
+/// The work has ended; false when somebody had cancelled it before. From then on it cannot be.
+bool ReconstructionThread::dismiss(const std::stop_source& stop) {
+  const std::lock_guard guard(mutex_);
+  runs_.remove_if([&](const Run& run) { return run.stop == stop; });
+  return !stop.stop_requested();
 }
 
 void ReconstructionThread::add_view(std::shared_ptr<const TakenView> view) {
@@ -52,9 +88,9 @@ void ReconstructionThread::run() {
   // Linux: of this thread and of the workers it will start. Without the right to be nice it works all the same.
   ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), 10);
   while (auto message = inbox_.take()) {
-    if (stop_.stop_requested()) continue;
+    if (ending_) continue;
     std::visit([this](const auto& m) { handle(m); }, *message);
-    while (!current_ && !rebuilds_.empty() && !stop_.stop_requested()) {
+    while (!current_ && !rebuilds_.empty() && !ending_) {
       const auto next = std::move(rebuilds_.front());
       rebuilds_.pop_front();
       handle(next);
@@ -65,11 +101,12 @@ void ReconstructionThread::run() {
 }
 
 bool ReconstructionThread::works_on(const std::string& job) const {
-  return current_ && current_->job == job && !current_->error && !current_->quarantined;
+  return current_ && current_->job == job && !current_->error && !current_->quarantined &&
+         !current_->stop.stop_requested();
 }
 
 void ReconstructionThread::handle(const Begin& message) {
-  current_ = Current{.job = message.job, .folder = message.folder, .recipe = message.recipe};
+  current_ = Current{.job = message.job, .folder = message.folder, .recipe = message.recipe, .stop = message.stop};
   told_stage_.clear();
   const auto scan = ScanFolder::open(message.folder);
   if (!scan) return check(pass_on(scan));
@@ -100,7 +137,7 @@ Result<void> ReconstructionThread::catch_up(const ScanFolder& scan) {
   const auto& poses = scan.manifest().poses;
   for (std::size_t pose = 0; pose < poses.size(); ++pose) {
     for (std::size_t view = 0; view < poses[pose].views.size(); ++view) {
-      if (stop_.stop_requested()) return fail(ErrorCode::stopped, "stopped by request");
+      if (current_->stop.stop_requested()) return fail(ErrorCode::stopped, "stopped by request");
       if (auto added = add(static_cast<int>(pose), scan.load_images(pose, view)); !added) return added;
     }
     if (!poses[pose].complete) break;
@@ -150,14 +187,18 @@ void ReconstructionThread::handle(const FinishPose& message) {
 void ReconstructionThread::handle(const Finish& message) {
   if (!current_ || current_->job != message.job) return;
   if (current_->quarantined) check(tl::unexpected(quarantine_error()));
-  if (!current_->error) check(make_model());
-  if (stop_.stop_requested()) return;
+  if (works_on(message.job)) check(make_model());
+  if (ending_) return;
+  if (!dismiss(current_->stop)) return end();
   if (!current_->error) {
     remove_failure(current_->folder);
     const auto report = report_file(current_->folder);
-    tell_(event::ModelReady{current_->job, model_file(current_->folder), report,
-                            beyond_limits(report, current_->recipe.limits)});
-  } else if (!current_->quarantined) {
+    const event::ModelReady ready{current_->job, model_file(current_->folder), report,
+                                  beyond_limits(report, current_->recipe.limits)};
+    end();
+    return tell_(ready);
+  }
+  if (!current_->quarantined) {
     // A note that cannot be written costs the reason after a restart, nothing else.
     std::ignore = write_failure(current_->folder, *current_->error);
   }
@@ -171,7 +212,9 @@ void ReconstructionThread::handle(const Abandon& message) {
 /// The mark of a job in quarantine stays, until somebody asks for another try.
 void ReconstructionThread::end() {
   if (!current_->quarantined) forget_attempts(current_->folder);
+  std::ignore = dismiss(current_->stop);
   current_.reset();
+  give_memory_back();
 }
 
 Result<void> ReconstructionThread::make_model() {
@@ -184,7 +227,8 @@ Result<void> ReconstructionThread::make_model() {
 void ReconstructionThread::check(const Result<void>& done) {
   if (done) return;
   current_->error = done.error();
-  if (!stop_.stop_requested()) tell_(event::ReconstructionFailed{current_->job, done.error(), current_->quarantined});
+  if (!current_->stop.stop_requested())
+    tell_(event::ReconstructionFailed{current_->job, done.error(), current_->quarantined});
 }
 
 void ReconstructionThread::tell_progress(std::string stage, double fraction) {

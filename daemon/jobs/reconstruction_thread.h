@@ -4,7 +4,9 @@
 #include <deque>
 #include <filesystem>
 #include <functional>
+#include <list>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -36,13 +38,17 @@ class ReconstructionThread {
   void abandon(std::string job) { inbox_.post(Abandon{std::move(job)}); }
   /// A whole scan, from its folder, when no scan is being followed.
   void rebuild(std::string job, std::filesystem::path folder, Recipe recipe, ReconstructionChanges changes);
+  /// Ends the work on this job, begun or waiting, soon: nothing more is told of it and its folder is left alone, but
+  /// for the model that may be there. False when nothing was to be done on it: then it has ended, and that was told.
+  bool cancel(const std::string& job);
 
  private:
   struct Begin {
     std::string job;
     std::filesystem::path folder;
     Recipe recipe;
-    ReconstructionChanges changes{};
+    ReconstructionChanges changes;
+    std::stop_source stop;
   };
   struct Rebuild {
     Begin begin;
@@ -67,6 +73,7 @@ class ReconstructionThread {
     std::string job;
     std::filesystem::path folder;
     Recipe recipe;
+    std::stop_source stop;
     std::unique_ptr<Reconstructor> reconstructor{};
     bool quarantined = false;  ///< the scan goes on without
     int views_done = 0;
@@ -81,6 +88,8 @@ class ReconstructionThread {
   void handle(const Finish& message);
   void handle(const Abandon& message);
 
+  Begin enlist(std::string job, std::filesystem::path folder, Recipe recipe, ReconstructionChanges changes);
+  bool dismiss(const std::stop_source& stop);
   bool works_on(const std::string& job) const;
   Result<void> start(const Begin& message, const ScanFolder& scan);
   Result<void> catch_up(const ScanFolder& scan);
@@ -90,14 +99,20 @@ class ReconstructionThread {
   Result<void> make_model();
   void end();
   Context context(std::function<void(std::string_view, double)> progress) const {
-    return {stop_.get_token(), progress};
+    return {current_->stop.get_token(), progress};
   }
   void tell_progress(std::string stage, double fraction);
 
   ReconstructorFactory factory_;
   std::function<void(Event)> tell_;
   Mailbox<Message> inbox_;
-  std::stop_source stop_;
+  struct Run {
+    std::string job;
+    std::stop_source stop;
+  };
+  std::mutex mutex_;
+  std::list<Run> runs_;  ///< asked for and not ended; under mutex_
+  std::atomic<bool> ending_ = false;
   std::atomic<int> views_waiting_ = 0;  ///< in the inbox, with their images
   // Of the thread only.
   std::optional<Current> current_;

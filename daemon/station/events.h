@@ -112,7 +112,7 @@ struct Ordered {
 /// Somebody wants something done with one job. Answered when it is done.
 struct JobAsked {
   enum class What {
-    cancel,        ///< queued or interrupted: ends cancelled, with its evidence
+    cancel,        ///< queued, interrupted or reconstructing: ends cancelled, with its evidence
     resume,        ///< interrupted: the next Start goes on with it
     to_front,      ///< queued: the next Start begins it
     remove,        ///< the folder goes; only of a job that has ended

@@ -28,9 +28,10 @@ struct StageShare {
 /// What view 0, taken again, says about the views since: a closure shot, or the check before a job is resumed.
 struct Closure {
   int pose = 0;
-  double shift_px = 0.0;  ///< of what is seen, the larger of both cameras
-  double changed = 0.0;   ///< share of what is seen that looks different, 0 to 1
-  bool unmoved = true;    ///< object, table and cameras are where they were
+  double shift_px = 0.0;        ///< of what is seen, the larger of both cameras
+  double changed = 0.0;         ///< share of what is seen that looks different, 0 to 1
+  bool unmoved = true;          ///< object, table and cameras are where they were
+  std::vector<Error> spoilt{};  ///< exposures that were taken again, and why
 };
 
 /// What is known of one job.

@@ -105,6 +105,7 @@ void begin_next_job(Machine& m, const std::string& fresh_job_id, std::string cau
 void job_not_begun(Machine& m, const event::JobNotBegun& e) {
   if (!m.has(e.job)) return;
   m.s().job.reset();
+  m.s().disk_trouble = e.why.code == ErrorCode::io;
   if (m.s().activity != Activity::warning && m.s().activity != Activity::scanning) return;  // a fault came first
   m.enter(MachineState::ready, fmt::format("Job {} was not begun: {}.", e.job, e.why.message));
 }

@@ -17,9 +17,11 @@ void moved(Machine& m, const Closure& closure) {
   const bool resuming = job.taken < job.recipe.views;
   const Error why{
       ErrorCode::moved,
-      fmt::format("the object, the table or a camera has moved during pose {}: view 0, taken again, is off by {:.2f} "
-                  "px and differs on {:.0f} % of what it shows; scan the object again",
-                  job.pose + 1, closure.shift_px, 100 * closure.changed)};
+      fmt::format(
+          "the object, the table or a camera has moved during pose {}: view 0, taken again, is off by {} px and "
+          "differs on {:.0f} % of what it shows; scan the object again",
+          job.pose + 1, closure.shift_px > 1.0 ? "more than 1" : fmt::format("{:.2f}", closure.shift_px),
+          100 * closure.changed)};
   const std::string cause = fmt::format("Job {}: {}.", job.id, why.message);
   if (!resuming && !job.reconstruction) count_result(m, false);
   m.close_job(resuming ? JobState::interrupted : JobState::failed, why);
@@ -31,6 +33,7 @@ void moved(Machine& m, const Closure& closure) {
 void job_begun(Machine& m, const event::JobBegun& e) {
   if (!m.has(e.job)) return;
   auto& job = *m.s().job;
+  m.s().disk_trouble = false;
   job.state = JobState::scanning;
   job.pose = e.pose;
   job.asked = job.taken = job.stored = e.stored;
@@ -115,6 +118,7 @@ void continue_after_flip(Machine& m, std::string cause) {
 void store_failed(Machine& m, const event::StoreFailed& e) {
   if (!m.has(e.job)) return;
   const bool begun = m.s().job->state != JobState::queued;
+  m.s().disk_trouble = true;
   m.close_job(JobState::interrupted, e.error);
   if (m.s().machine == MachineState::error) return;  // a fault came first and has the word
   auto cause = fmt::format("Job {} {}: {}{}.", e.job, begun ? "is interrupted" : "was not begun", e.error.message,

@@ -18,6 +18,7 @@ void EventTally::see(const Event& event, Clock::TimePoint now) {
                           ++counters_.views_stored;
                           counters_.exposures_redone += e.spoilt.size();
                         },
+                        [&](const event::ClosureJudged& e) { counters_.exposures_redone += e.closure.spoilt.size(); },
                         [&](const event::StageProgress& e) {
                           const auto since = running_.try_emplace({e.job, e.stage}, now).first;
                           if (e.fraction < 1.0) return;

@@ -68,6 +68,7 @@ struct StationState {
   std::vector<std::shared_ptr<const JobInfo>> queue{};  ///< by place
   int failures = 0;                                     ///< jobs in a row without a model that passes
   bool quiet = false;                                   ///< quiet hours: no job begins by itself
+  bool disk_trouble = false;                            ///< the jobs' disk refused something; until a job begins
   bool part_gone = false;                               ///< the part of the last job was taken away
 };
 

@@ -62,12 +62,16 @@ Words when_ready(const StationState& state, const StationRules& rules) {
           with_light(rules, "Switch the projector on. ", how_to_start(state))};
 }
 
+/// What has to be seen to besides: the next action alone would lead into the same trouble again.
+Words with_disk(const StationState& state, Words words) {
+  if (state.disk_trouble) words.next_action.insert(0, "See to the disk of the jobs. ");
+  return words;
+}
+
 Words when_executing(const StationState& state) {
   if (state.activity == Activity::waiting_for_flip) {
     return {fmt::format("Pose {} of {} is complete.", state.job->pose + 1, state.job->recipe.poses),
-            state.job->recipe.flip_by_line
-                ? "The line is asked to turn the object over."
-                : "Turn the object over so that its underside faces the cameras, then press Start."};
+            how_to_flip(state.job->recipe)};
   }
   if (state.activity == Activity::waiting_for_part) {
     return {fmt::format("Waiting for the next part, {} in the queue.", state.queue.size()),
@@ -78,18 +82,23 @@ Words when_executing(const StationState& state) {
 
 }  // namespace
 
+std::string how_to_flip(const Recipe& recipe) {
+  return recipe.flip_by_line ? "The line is asked to turn the object over."
+                             : "Turn the object over so that its underside faces the cameras, then press Start.";
+}
+
 Words describe(const StationState& state, const StationRules& rules) {
   switch (state.machine) {
     case MachineState::preoperational: return {"The devices are being opened.", ""};
     case MachineState::halted:
       if (state.shutting_down) return {"The daemon is shutting down.", ""};
-      return {"The table is not homed.", how_to_reset(state)};
+      return with_disk(state, {"The table is not homed.", how_to_reset(state)});
     case MachineState::maintenance: return in_maintenance(state);
     case MachineState::error:
       return {fault_sentence(state), with_light(rules, "Switch the projector off. ", how_to_reset(state))};
     case MachineState::initialized:
       return {state.activity == Activity::warning ? "The table is about to move." : "The table is finding home.", ""};
-    case MachineState::ready: return when_ready(state, rules);
+    case MachineState::ready: return with_disk(state, when_ready(state, rules));
     case MachineState::single_execution:
     case MachineState::continuous_execution: return when_executing(state);
   }

@@ -13,4 +13,7 @@ struct Words {
 
 Words describe(const StationState& state, const StationRules& rules);
 
+/// What is to be done when a pose is complete.
+std::string how_to_flip(const Recipe& recipe);
+
 }  // namespace scanrig

@@ -32,6 +32,11 @@ ordered_json to_json(const Transform& transform) {
   return {{"rotation", rows}, {"translation", {t.x(), t.y(), t.z()}}};
 }
 
+/// Nothing at all where nothing was taken again.
+void add_spoilt(ordered_json& json, const std::vector<Error>& spoilt) {
+  for (const Error& why : spoilt) json["spoilt"].push_back({{"code", to_string(why.code)}, {"message", why.message}});
+}
+
 ordered_json to_json(const ViewRecord& view) {
   ordered_json files = ordered_json::object();
   for (const auto& [role, file] : view.files) files[role] = to_json(file);
@@ -43,8 +48,7 @@ ordered_json to_json(const ViewRecord& view) {
                        {"taken", view.taken},
                        {"pixel_format", view.pixel_format},
                        {"files", files}};
-  for (const Error& why : view.spoilt)
-    json["spoilt"].push_back({{"code", to_string(why.code)}, {"message", why.message}});
+  add_spoilt(json, view.spoilt);
   if (view.grid) {
     json["grid"] = {{"fx", view.grid->fx}, {"fy", view.grid->fy}, {"cx", view.grid->cx}, {"cy", view.grid->cy}};
     json["camera_from_pose"] = to_json(view.camera_from_pose);
@@ -53,8 +57,11 @@ ordered_json to_json(const ViewRecord& view) {
 }
 
 ordered_json to_json(const ClosureRecord& closure) {
-  return {{"after_views", closure.after_views}, {"measured_deg", closure.measured_deg}, {"taken", closure.taken},
-          {"shift_px", closure.shift_px},       {"changed", closure.changed},           {"unmoved", closure.unmoved}};
+  ordered_json json = {
+      {"after_views", closure.after_views}, {"measured_deg", closure.measured_deg}, {"taken", closure.taken},
+      {"shift_px", closure.shift_px},       {"changed", closure.changed},           {"unmoved", closure.unmoved}};
+  add_spoilt(json, closure.spoilt);
+  return json;
 }
 
 FileRecord read_file_record(JsonObject object, std::string_view key = "path") {
@@ -82,6 +89,13 @@ Error read_error(JsonObject object) {
   return error;
 }
 
+std::vector<Error> read_spoilt(JsonObject& object) {
+  std::vector<Error> spoilt;
+  if (!object.has("spoilt")) return spoilt;
+  for (const JsonObject& why : object.objects("spoilt")) spoilt.push_back(read_error(why));
+  return spoilt;
+}
+
 ViewRecord read_view(JsonObject object, bool stereo) {
   ViewRecord view;
   view.index = object.integer("index", 0, 9999);
@@ -98,9 +112,7 @@ ViewRecord read_view(JsonObject object, bool stereo) {
              : std::vector<std::string>{"range"};
   for (const std::string& role : roles) view.files[role] = read_file_record(files.object(role));
   files.close();
-  if (object.has("spoilt")) {
-    for (const JsonObject& why : object.objects("spoilt")) view.spoilt.push_back(read_error(why));
-  }
+  view.spoilt = read_spoilt(object);
   if (!stereo) {
     view.grid = read_grid(object.object("grid"));
     view.camera_from_pose = object.transform("camera_from_pose");
@@ -117,6 +129,7 @@ ClosureRecord read_closure(JsonObject object) {
   closure.shift_px = object.number("shift_px", 0, 1e6);
   closure.changed = object.number("changed", 0, 1);
   closure.unmoved = object.flag("unmoved");
+  closure.spoilt = read_spoilt(object);
   object.close();
   return closure;
 }

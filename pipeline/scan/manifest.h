@@ -40,6 +40,7 @@ struct ClosureRecord {
   double shift_px = 0.0;  ///< as pipeline/closure measures it, the worse of both cameras
   double changed = 0.0;   ///< 0 to 1
   bool unmoved = true;
+  std::vector<Error> spoilt{};  ///< exposures that were taken again, and why
 };
 
 struct PoseRecord {

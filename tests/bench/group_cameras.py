@@ -7,11 +7,11 @@ import shutil
 import tempfile
 
 import cameras_debian13
-import cameras_hil
 import cameras_memory
 import cameras_wire
 import fuzz
 import motion_matrix
+import virtual_machine
 
 PARTS = ("triggers", "matrix", "wire", "hil", "debian13", "memory", "fuzz")
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
@@ -51,7 +51,7 @@ def measure(bench):
             if bench.wants("wire"):
                 cameras_wire.measure(bench)
             if bench.wants("hil"):
-                cameras_hil.measure(bench)
+                virtual_machine.measure(bench)
             if bench.wants("debian13"):
                 cameras_debian13.measure(bench)
             if bench.wants("fuzz"):

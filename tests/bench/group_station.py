@@ -3,6 +3,7 @@ import pathlib
 import shutil
 import tempfile
 
+import station_closure
 import station_disturbed
 import station_fuzz
 import station_kill
@@ -14,14 +15,18 @@ import station_stages
 import station_startup
 import station_view_cost
 
-PARTS = (station_startup, station_kill, station_disturbed, station_stages, station_view_cost, station_load,
-         station_security, station_soak, station_fuzz, station_sanitize)
+MEASURED = {"startup": station_startup, "closure": station_closure, "kill": station_kill,
+            "disturbed": station_disturbed, "stages": station_stages, "view_cost": station_view_cost,
+            "load": station_load, "security": station_security, "soak": station_soak, "fuzz": station_fuzz,
+            "sanitize": station_sanitize}
+PARTS = tuple(MEASURED)
 
 
 def measure(bench):
     scratch = pathlib.Path(tempfile.mkdtemp(prefix="scanrig-station-"))
     try:
-        for part in PARTS:
-            part.measure(bench, scratch)
+        for name, part in MEASURED.items():
+            if bench.wants(name):
+                part.measure(bench, scratch)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)

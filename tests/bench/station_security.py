@@ -1,10 +1,11 @@
-"""The API's doors, generated from the document it serves: roles, tokens, traversal, bodies; and no secret in a log."""
+"""The API's doors, generated from the document it serves: roles, tokens, traversal, bodies; no secret in a log; the unit's exposure."""
 import re
 import socket
 import time
 
 import motion_rig
 import station_load
+import virtual_machine
 
 ROLES = ("viewer", "operator", "engineer")
 GOOD = {"id": "no-such-job", "file": "scan.json", "side": "left"}
@@ -119,3 +120,5 @@ def measure(bench, scratch):
         written = b"".join(path.read_bytes() for path in rig.folder.rglob("*") if path.is_file())
     leaks = [role for role, token in tokens.items() if token.encode() in written]
     bench.line("security: tokens in logs or files", "none", ", ".join(leaks) or "none", not leaks)
+    if not bench.quick:
+        virtual_machine.rows(bench, "security of the unit while the wired rig works", "--only", "unit", "pose")

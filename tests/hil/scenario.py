@@ -11,6 +11,7 @@ SCAN_S = 120
 RECOVERY_S = 60
 CONFIGS = "/etc/scanrig"
 UART_DEG = 40.0
+MOST_EXPOSURE = 2.0
 PAIRS, VIVID_SIZE = 8, (320, 180)
 
 
@@ -29,7 +30,9 @@ def unit(station):
     judged = station.machine.do("systemd-analyze security --no-pager scanrigd | tail -1")
     user = station.machine.do("ps -o user= -C scanrigd")
     expect(user.split() == ["scanrig"], f"it runs as {user}")
-    return judged.split(":", 1)[1].split()[0] + " exposure, user scanrig"
+    exposure = float(judged.split(":", 1)[1].split()[0])
+    expect(exposure <= MOST_EXPOSURE, f"its exposure is {exposure}")
+    return f"{exposure} exposure, user scanrig"
 
 
 def wait_for_views(station, job, count, limit_s=SCAN_S):

@@ -39,6 +39,7 @@ class FakeReconstructor final : public Reconstructor {
   Result<void> finish(const std::filesystem::path& folder, const Context& context) override {
     context.report("texture", 1.0);
     log_.at_finish();
+    if (context.stopped()) return fail(ErrorCode::stopped, "stopped by request");
     const std::lock_guard guard(log_.mutex);
     log_.calls.emplace_back("finish");
     if (!log_.answer_to_finish) return log_.answer_to_finish;

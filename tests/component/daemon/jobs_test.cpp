@@ -82,6 +82,52 @@ TEST_F(Jobs, TheQueueOutlivesTheDaemonInItsOrder) {
   EXPECT_THAT(loop->snapshot()->queue, ElementsAre(*a));
 }
 
+TEST_F(Jobs, AReconstructionCanBeCancelledAndTheModelBeMadeLater) {
+  Result<std::string> answer = fail(ErrorCode::internal, "not asked");
+  log.at_finish = [&] { answer = ask_for(What::cancel, newest()->id); };
+  boot();
+  get_ready();
+  scan_both_poses();
+  const auto id = newest()->id;
+  ASSERT_TRUE(wait_state(id, JobState::cancelled)) << to_string(job(id)->state);
+  EXPECT_TRUE(answer) << answer.error().message;
+  restart();
+  EXPECT_EQ(job(id)->state, JobState::cancelled) << "it does not begin again by itself";
+  EXPECT_EQ(job(id)->error->message, "cancelled on request");
+
+  log.at_finish = [] {};
+  ASSERT_TRUE(ask_for(What::reprocess, id));
+  EXPECT_TRUE(wait_state(id, JobState::done));
+  EXPECT_EQ(ask_for(What::cancel, id).error().code, ErrorCode::refused) << "it has ended";
+  restart();
+  EXPECT_EQ(job(id)->state, JobState::done);
+}
+
+TEST_F(Jobs, AReconstructionThatWaitsForAnotherCanBeCancelledToo) {
+  boot();
+  get_ready();
+  scan_both_poses();
+  const auto first = newest()->id;
+  ASSERT_TRUE(wait_state(first, JobState::done));
+  ASSERT_TRUE(wait_ready());
+  scan_both_poses();
+  const auto second = newest()->id;
+  ASSERT_TRUE(wait_state(second, JobState::done));
+  const auto is_finish = [](const std::string& call) { return call == "finish"; };
+  ASSERT_EQ(std::ranges::count_if(log.calls, is_finish), 2);
+
+  log.at_finish = [&, asked = false]() mutable {
+    if (std::exchange(asked, true)) return;
+    EXPECT_TRUE(ask_for(What::reprocess, second));
+    EXPECT_TRUE(ask_for(What::cancel, second));
+  };
+  ASSERT_TRUE(ask_for(What::reprocess, first));
+  EXPECT_TRUE(wait_state(first, JobState::done));
+  EXPECT_TRUE(wait_state(second, JobState::cancelled));
+  shut_down();
+  EXPECT_EQ(std::ranges::count_if(log.calls, is_finish), 3) << "no work is done on what was cancelled";
+}
+
 TEST_F(Jobs, AnInterruptedScanGoesOnWhereItStopped) {
   boot();
   get_ready();

@@ -70,6 +70,23 @@ TEST_F(Daemon, LostFramesAreRedoneWithoutAFault) {
   EXPECT_EQ(rig.line.exposures, 12 + 4 + 3) << "six views, two closures, three lost";
 }
 
+TEST_F(Daemon, WhatIsRedoneInAClosureShotIsTold) {
+  rig.line.fires_before = 3 * 2;  // the views of the first pose
+  rig.line.at_fire = [this] {
+    const std::lock_guard guard(rig.line.mutex);
+    rig.line.lose = 2;
+  };
+  boot();
+  get_ready();
+  scan_both_poses();
+  ASSERT_TRUE(wait_pass());
+  const auto scan = only_job();
+  const auto& closure = scan.manifest().poses[0].closures.at(0);
+  EXPECT_EQ(closure.spoilt.size(), 2u);
+  EXPECT_EQ(loop->snapshot()->jobs.begin()->second->closures.at(0).spoilt.size(), 2u);
+  EXPECT_TRUE(scan.manifest().poses[1].closures.at(0).spoilt.empty());
+}
+
 TEST_F(Daemon, ACameraThatGoesSilentInterruptsTheJobAndLatches) {
   boot();
   get_ready();

@@ -36,6 +36,7 @@ class Follow : public testing::Test {
             {"poses", 2},
             {"views", 8},
             {"stored", json::array()},
+            {"closures", json::array()},
             {"stages", json::array()},
             {"error", nullptr},
             {"folder", "/j"},
@@ -61,6 +62,19 @@ TEST_F(Follow, EachViewIsToldOnce) {
             "  pose 1/2  view 2/8    45.010 deg  stored, 2 exposures redone\n"
             "      redone: left camera: no frame in time\n"
             "      redone: left camera: no frame in time\n");
+}
+
+TEST_F(Follow, AClosureShotIsToldWithWhatWasRedone) {
+  auto j = job("scanning");
+  const json why = {{"code", "timeout"}, {"message", "left camera: no frame in time"}};
+  j["closures"] = {{{"pose", 0}, {"shift_px", 0.04}, {"unmoved", true}, {"redone", 1}, {"spoilt", {why}}},
+                   {{"pose", 1}, {"shift_px", 3.5}, {"unmoved", false}, {"redone", 0}, {"spoilt", json::array()}}};
+  for (int i = 0; i < 2; ++i) story.tell(status, j);
+  EXPECT_EQ(text(),
+            "Job J\n"
+            "  pose 1/2  view 1 again  nothing moved, off by 0.04 px, 1 exposure redone\n"
+            "      redone: left camera: no frame in time\n"
+            "  pose 2/2  view 1 again  MOVED, off by 3.50 px\n");
 }
 
 TEST_F(Follow, TheFlipIsAskedForOnce) {

@@ -24,6 +24,7 @@ class Index : public scan_samples::FolderTest {
       auto scan = ScanFolder::open(store->folder(id));
       ASSERT_TRUE(scan->add_view(0, view, scan_samples::raw_view(1)));
       if (id != std::string("queued")) {
+        ASSERT_TRUE(scan->add_closure(0, {.shift_px = 3, .spoilt = {{ErrorCode::protocol, "right camera: torn"}}}));
         ASSERT_TRUE(scan->set_state("failed"));
         ASSERT_TRUE(write_failure(scan->path(), {ErrorCode::moved, "it moved"}));
       }
@@ -41,6 +42,7 @@ class Index : public scan_samples::FolderTest {
     EXPECT_EQ(jobs->at("b")->stored.at(0).measured_deg, 0.25);
     EXPECT_EQ(jobs->at("b")->stored.at(0).spoilt.at(0).code, ErrorCode::timeout);
     EXPECT_EQ(jobs->at("b")->stored.at(0).spoilt.at(0).message, "left camera: no frame");
+    EXPECT_EQ(jobs->at("b")->closures.at(0).spoilt.at(0).message, "right camera: torn");
     EXPECT_EQ(jobs->at("queued")->state, JobState::queued);
   }
   bool knows(const std::string& id) { return JobIndex(file()).find(store->folder(id)).has_value(); }

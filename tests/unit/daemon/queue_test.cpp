@@ -8,6 +8,7 @@ namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::StartsWith;
 using What = event::JobAsked::What;
 
 /// The rules of which job has the rig next.
@@ -112,6 +113,7 @@ TEST_F(Queue, AJobThatDoesNotFitIsNotBegunAndWaits) {
   EXPECT_EQ(state.machine, MachineState::ready);
   EXPECT_EQ(state.activity, Activity::none) << "nothing is about to move";
   EXPECT_THAT(state.cause, HasSubstr("the disk is full"));
+  EXPECT_THAT(describe(state, rules).next_action, StartsWith("See to the disk of the jobs. "));
   EXPECT_THAT(waiting(), ElementsAre("a"));
   tell(event::WarningOver{});
   EXPECT_TRUE(actions.empty());

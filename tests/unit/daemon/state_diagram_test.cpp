@@ -70,6 +70,7 @@ std::vector<Named> of_jobs() {
   const auto view = std::make_shared<TakenView>(TakenView{.id = {"job", 0, 0}});
   return {
       {"ordered", event::JobKnown{job(JobState::queued)}},
+      {"cancelled", event::JobKnown{job(JobState::cancelled)}},
       {"begun", event::JobBegun{"job", 0, 0}},
       {"does not fit", event::JobNotBegun{"job", kError}},
       {"view taken", event::ViewTaken{view}},
@@ -153,9 +154,13 @@ void close_jobs(Node& node, const std::vector<Action>& actions) {
     if (const auto* close = std::get_if<action::CloseJob>(&action)) {
       update(node.jobs, event::JobClosed{close->job, close->state, close->why});
     }
-    if (std::holds_alternative<action::CreateJobs>(action) && !node.jobs.contains("job"))
-      node.jobs["job"] = job(JobState::queued);
+    if (std::holds_alternative<action::CreateJobs>(action)) node.jobs["job"] = job(JobState::queued);
   }
+}
+
+/// A fresh job takes the place of the last one in the walk; that is no way of a job.
+bool is_another_job(const std::vector<Action>& actions) {
+  return std::ranges::any_of(actions, [](const Action& a) { return std::holds_alternative<action::CreateJobs>(a); });
 }
 
 /// Nobody answers what was not asked.
@@ -168,7 +173,11 @@ bool can_happen(const Node& node, const Event& event) {
       Overloaded{
           [&](const event::Stopped&) { return s.activity == Activity::stopping || s.may_be_moving; },
           [&](const event::StopFailed&) { return s.activity == Activity::stopping; },
-          [&](const event::JobKnown&) { return !job && (!listed || state == JobState::interrupted); },
+          [&](const event::JobKnown& e) {
+            const bool waits = state == JobState::queued || state == JobState::interrupted;
+            if (e.info->state == JobState::queued) return !job && (!listed || state == JobState::interrupted);
+            return !job && listed && (waits || state == JobState::reconstructing);
+          },
           [&](const event::JobBegun&) { return job && job->state == JobState::queued; },
           [&](const event::JobNotBegun&) { return job && job->state == JobState::queued; },
           [&](const event::ViewTaken&) { return job && job->taken < job->asked; },
@@ -205,7 +214,8 @@ void walk(const std::vector<Named>& events, bool with_jobs, Walk& walk) {
         walk.machine[{machine_state(before), machine_state(after)}].insert(name);
       }
       // A late event of a job that has ended is no way of a job.
-      const bool alive = !before.jobs.contains("job") || !is_final(before.jobs.at("job")->state);
+      const bool alive =
+          !before.jobs.contains("job") || (!is_final(before.jobs.at("job")->state) && !is_another_job(step.actions));
       if (with_jobs && alive && job_state(before) != job_state(after)) {
         walk.job[{job_state(before), job_state(after)}].insert(name);
       }

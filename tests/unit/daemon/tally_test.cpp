@@ -12,12 +12,13 @@ TEST(EventTally, CountsViewsRetriesAndFaults) {
   const Clock::TimePoint now{};
   tally.see(event::ViewStored{{"job", 0, 0}, 0.0, {2, {ErrorCode::timeout, "left camera: no frame"}}}, now);
   tally.see(event::ViewStored{{"job", 0, 1}, 45.0}, now);
+  tally.see(event::ClosureJudged{"job", {.spoilt = {{ErrorCode::protocol, "right camera: torn"}}}}, now);
   tally.see(event::EstopChanged{false}, now);
   tally.see(event::EstopChanged{true}, now);
   tally.see(event::RigFailed{{ErrorCode::timeout, "late"}}, now);
   tally.see(event::RigFailed{{ErrorCode::stalled, "stuck"}}, now);
   EXPECT_EQ(tally.counters().views_stored, 2u);
-  EXPECT_EQ(tally.counters().exposures_redone, 2u);
+  EXPECT_EQ(tally.counters().exposures_redone, 3u);
   EXPECT_EQ(tally.counters().faults, 3u) << "an e-stop that is released is none";
   EXPECT_EQ(tally.counters().deadlines_missed, 1u);
 }

@@ -243,6 +243,7 @@ TEST_F(Station, AFullDiskInterruptsTheJobAndStopsTheTableButLatchesNothing) {
   EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::interrupted) << "with room again it can be resumed";
   tell(event::Stopped{});
   EXPECT_EQ(state.activity, Activity::none) << "and homes by itself no more than after Stop";
+  EXPECT_EQ(describe(state, rules).next_action, "See to the disk of the jobs. Press Reset.");
 }
 
 TEST_F(Station, AFullDiskWhileNothingMovesKeepsTheTableHomed) {
@@ -257,6 +258,7 @@ TEST_F(Station, AFullDiskWhileNothingMovesKeepsTheTableHomed) {
 
   press(Button::start);
   tell(event::JobBegun{"job", 0, 0});
+  EXPECT_FALSE(state.disk_trouble) << "its folder could be written";
   tell(event::WarningOver{});
   take_and_store_all(0);
   tell(full);  // the end of the pose could not be written

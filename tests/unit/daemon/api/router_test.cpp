@@ -73,6 +73,8 @@ TEST_F(Api, OneJobIsToldInDetail) {
   EXPECT_EQ(job["stored"][0]["spoilt"][0]["message"], "left camera: no frame in time");
   EXPECT_NEAR(job["stored"][0]["error_deg"].get<double>(), 0.01, 1e-9);
   EXPECT_EQ(job["stored"][0]["settling_ms"], 212.0);
+  EXPECT_EQ(job["closures"][0]["redone"], 1);
+  EXPECT_EQ(job["closures"][0]["spoilt"][0]["message"], "right camera: torn");
   EXPECT_EQ(job["stages"][0]["name"], "volume");
   EXPECT_EQ(job["error"]["code"], "same_rest");
 }

@@ -57,6 +57,7 @@ inline JobTable one_job(const std::string& id, const std::string& folder) {
   job->state = JobState::failed;
   job->folder = folder;
   job->stored = {{0, 3, 135.01, {{ErrorCode::timeout, "left camera: no frame in time"}}, 135.0, 212.0}};
+  job->closures = {{0, 0.04, 0.0, true, {{ErrorCode::protocol, "right camera: torn"}}}};
   job->stages = {{"volume", 0.5}};
   job->error = Error{ErrorCode::same_rest, "not turned over"};
   return {{id, std::move(job)}};

@@ -20,16 +20,21 @@ const json kHealth = json::parse(R"({"devices": [{"name": "turntable", "ok": tru
   {"name": "camera", "ok": false, "problem": {"code": "timeout", "message": "no answer"}}],
   "disk": {"bytes": 4294967296, "free_bytes": 1073741824}, "temperatures": [{"sensor": "cpu", "celsius": 51.4}],
   "deadlines_missed": 1, "retries": 2, "faults": 3})");
-const json kJob = json::parse(R"({"id": "j1", "state": "scanning", "poses": 2, "views": 8, "stored": [{}, {}, {},
+const json kJob = json::parse(R"({"id": "j1", "state": "scanning", "part": "4711",
+  "sentence": "Pose 1 of 2: 4 of 8 views stored.", "next_action": "", "poses": 2, "views": 8, "stored": [{}, {}, {},
   {"pose": 0, "view": 3, "spoilt": [{"code": "timeout", "message": "left camera: no frame in time"}]}],
+  "closures": [{"pose": 1, "spoilt": [{"code": "protocol", "message": "right camera: torn"}]}],
   "stages": [{"name": "range", "fraction": 0.5}], "error": null, "model": ""})");
 
 TEST(Watch, ShowsStateJobStagesAndHealthOnOneScreen) {
   const auto lines = watch_lines(kStatus, kHealth, kJob);
   EXPECT_THAT(lines, Contains("Operational.SingleExecution  (scanning)"));
   EXPECT_THAT(lines, Contains("Pose 1, view 3 of 8."));
+  EXPECT_THAT(lines, Contains("job j1 of 4711: scanning"));
+  EXPECT_THAT(lines, Contains("  Pose 1 of 2: 4 of 8 views stored."));
   EXPECT_THAT(lines, Contains(AllOf(HasSubstr("views stored"), HasSubstr("25 %"), HasSubstr("4 of 16"))));
   EXPECT_THAT(lines, Contains("  pose 1 view 4: an exposure was redone: left camera: no frame in time"));
+  EXPECT_THAT(lines, Contains("  pose 2 view 1 again: an exposure was redone: right camera: torn"));
   EXPECT_THAT(lines, Contains(AllOf(HasSubstr("range"), HasSubstr("50 %"))));
   EXPECT_THAT(lines, Contains(AllOf(StartsWith("camera"), HasSubstr("no answer"))));
   EXPECT_THAT(lines, Contains("disk 1.0 GiB free, cpu 51 C"));

@@ -108,7 +108,8 @@ TEST_F(ScanFolderTest, WhatIsWrittenIsReadBack) {
 
 TEST_F(ScanFolderTest, AClosureShotIsKeptAsEvidence) {
   ScanFolder scan = with_one_view();
-  ASSERT_TRUE(scan.add_closure(0, {1, 360.01, "2026-11-21T09:31:00Z", 1.25, 0.1, false}));
+  ASSERT_TRUE(scan.add_closure(
+      0, {1, 360.01, "2026-11-21T09:31:00Z", 1.25, 0.1, false, {{ErrorCode::timeout, "left camera: no frame"}}}));
   EXPECT_EQ(scan.add_closure(1, {}).error().code, ErrorCode::invalid_input) << "there is no such pose";
   const auto again = ScanFolder::open(scan_);
   ASSERT_TRUE(again) << again.error().message;
@@ -117,6 +118,8 @@ TEST_F(ScanFolderTest, AClosureShotIsKeptAsEvidence) {
   EXPECT_EQ(closure.after_views, 1);
   EXPECT_EQ(closure.shift_px, 1.25);
   EXPECT_FALSE(closure.unmoved);
+  ASSERT_EQ(closure.spoilt.size(), 1u);
+  EXPECT_EQ(closure.spoilt[0].message, "left camera: no frame");
 }
 
 TEST_F(ScanFolderTest, WhatWasWrongWithExposuresThatWereTakenAgainIsKept) {
