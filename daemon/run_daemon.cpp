@@ -3,10 +3,10 @@
 #include <ctime>
 
 #include "daemon/jobs/housekeeping_thread.h"
+#include "daemon/journal/news.h"
 #include "daemon/overloaded.h"
 #include "daemon/rig/panel_thread.h"
 #include "daemon/rig/rig_thread.h"
-#include "daemon/service_manager.h"
 #include "daemon/station/timestamp.h"
 #include "daemon/webhook/webhook.h"
 
@@ -34,6 +34,18 @@ class FreshIds {
   std::filesystem::path root_;
   std::chrono::sys_seconds second_{};
   int serial_ = 0;
+};
+
+/// For as long as it lives the loop may be asked by others.
+class OnLoop {
+ public:
+  OnLoop(const DaemonOptions& options, ControlLoop& loop) : options_(options) { options.on_loop(loop); }
+  ~OnLoop() { options_.loop_ends(); }
+  OnLoop(const OnLoop&) = delete;
+  OnLoop& operator=(const OnLoop&) = delete;
+
+ private:
+  const DaemonOptions& options_;
 };
 
 struct Workers {
@@ -87,7 +99,7 @@ bool quiet_now(const std::optional<QuietHours>& hours) {
 
 }  // namespace
 
-Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Clock& clock, std::stop_token stop) {
+Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, Clock& clock, std::stop_token stop) {
   auto store = JobStore::open(options.jobs);
   if (!store) return pass_on(store);
   auto known = store->recover();
@@ -101,7 +113,7 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
   ControlLoop loop(clock, {.rules = rules, .warning = options.warning}, *known);
   const auto tell = [&loop](Event event) { loop.post(std::move(event)); };
 
-  options.on_loop(loop);
+  const OnLoop reachable(options, loop);
   Preview preview(clock, [&loop] { return cameras_are_free(*loop.snapshot()); });
   auto api_options = options.api;
   api_options.storage = store->options().root;
@@ -133,13 +145,13 @@ Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Cl
     perform(action, workers);
     if (std::holds_alternative<action::BeginJob>(action)) housekeeping.sweep();
   };
-  const auto published = [&](const std::shared_ptr<const Snapshot>& snapshot) {
+  const auto published = [&, told = loop.snapshot()](const std::shared_ptr<const Snapshot>& snapshot) mutable {
+    for (auto& line : news(*std::exchange(told, snapshot), *snapshot)) options.journal(std::move(line));
     if (webhook) webhook->look(snapshot);
     options.published(snapshot);
     (*api)->wake();
   };
-  ServiceManager manager;
-  return loop.run({.alive = [&] { manager.alive(loop.snapshot()->sentence); },
+  return loop.run({.alive = [&] { options.alive(loop.snapshot()->sentence); },
                    .perform = perform_all,
                    .show = [&](const PanelOutputs& outputs) { panel.show(outputs); },
                    .fresh_job_id = [&] { return fresh_id(); },

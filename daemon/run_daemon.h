@@ -14,6 +14,7 @@
 #include "daemon/jobs/job_thread.h"
 #include "daemon/jobs/reconstructor.h"
 #include "daemon/jobs/retention.h"
+#include "daemon/journal/entry.h"
 #include "daemon/rig/acquisition.h"
 #include "daemon/rig/devices.h"
 #include "daemon/station/control_loop.h"
@@ -46,16 +47,21 @@ struct DaemonOptions {
   Clock::Duration warning = std::chrono::seconds(2);
   ReconstructorFactory reconstructor;
   JobThread::ScannedHook on_scanned;
-  /// Called once, before anything can move, with what takes presses and orders; it lives as long as the daemon runs.
+  /// Called once, before anything can move, with what takes presses and orders; it lives until `loop_ends` is called.
   std::function<void(ControlLoop&)> on_loop = [](ControlLoop&) {};
+  std::function<void()> loop_ends = [] {};
+  /// The control loop goes round, at least once a second; for the watchdog. From its thread; must not wait.
+  std::function<void(const std::string& sentence)> alive = [](const auto&) {};
+  /// Lines of the log. From the control loop's thread; must not wait.
+  std::function<void(JournalEntry)> journal = [](const auto&) {};
   /// Called with every snapshot from the control loop's thread; must not wait.
   std::function<void(const std::shared_ptr<const Snapshot>&)> published = [](const auto&) {};
 };
 
 /// The daemon from start-up to a clean stop: owns all threads but the caller's, which becomes the control loop.
-/// Returns after `stop` with the motor stopped, the projector dark and an unfinished job marked interrupted.
-/// Fails with `io`, `refused` (another daemon), `invalid_input` before it begins, `timeout` when the rig was not seen
-/// stopped at the end. The devices outlive the call.
-Result<void> run_daemon(const Devices& devices, const DaemonOptions& options, Clock& clock, std::stop_token stop);
+/// Returns after `stop` with the motor stopped, the projector dark and an unfinished job marked interrupted, or when a
+/// reload was asked for. Fails with `io`, `refused` (another daemon), `invalid_input` before it begins, `timeout` when
+/// the rig was not seen stopped at the end. The devices outlive the call.
+Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, Clock& clock, std::stop_token stop);
 
 }  // namespace scanrig

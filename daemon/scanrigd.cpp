@@ -1,28 +1,22 @@
 #include <CLI/CLI.hpp>
 
 #include "config/rig_config.h"
-#include "daemon/options_from.h"
 #include "daemon/rig/make_safe.h"
 #include "daemon/rig/open_devices.h"
-#include "daemon/run_daemon.h"
-#include "daemon/signal_stop.h"
+#include "daemon/service.h"
 
 namespace {
 
 using namespace scanrig;
 
-Result<void> run(const std::filesystem::path& file, const SignalStop& stop) {
-  const auto config = config::read_rig_config(file);
-  if (!config) return pass_on(config);
-  RealClock clock;
-  const auto open = open_devices(*config, clock);
-  if (!open) return pass_on(open, file.string());
-  auto options = options_from(*config);
-  options.api.check_config = [file] {
-    const auto checked = config::read_rig_config(file);
-    return checked ? Result<void>() : pass_on(checked);
-  };
-  return run_daemon(open->devices(), options, clock, stop.token());
+Result<void> run(const std::filesystem::path& file, SignalStop& stop) {
+  Service service("scanrigd", [file] { return config::read_rig_config(file); });
+  return service.run(stop, [&](const config::RigConfig& config, const DaemonOptions& options) -> Result<Ended> {
+    RealClock clock;
+    const auto open = open_devices(config, clock);
+    if (!open) return pass_on(open, file.string());
+    return run_daemon(open->devices(), options, clock, stop.token());
+  });
 }
 
 }  // namespace
@@ -42,7 +36,7 @@ int main(int argc, char** argv) {
     return static_cast<int>(ExitCode::usage);
   }
   if (make_safe) return static_cast<int>(make_safe_now(config::read_rig_config(config), "scanrigd"));
-  const SignalStop stop;
+  SignalStop stop(SignalStop::Hangup::is_told);
   const auto done = run(config, stop);
   if (done) return static_cast<int>(ExitCode::ok);
   fmt::print(stderr, "scanrigd: {}\n", done.error().message);

@@ -1,12 +1,13 @@
 #pragma once
 
+#include <mutex>
 #include <string>
 
 namespace scanrig {
 
 /// What systemd is told of the service (sd_notify(3)): ready, that it makes progress (the watchdog), what it does, that
-/// it ends. Where the daemon was not started by systemd, nobody is told.
-/// Threads: one owner, whose progress it is.
+/// it reads its configuration again, that it ends. Where the daemon was not started by systemd, nobody is told.
+/// Threads: any.
 class ServiceManager {
  public:
   ServiceManager() = default;
@@ -14,11 +15,19 @@ class ServiceManager {
   ServiceManager(const ServiceManager&) = delete;
   ServiceManager& operator=(const ServiceManager&) = delete;
 
-  /// The owner goes round; the first time, the service is ready. `sentence`: for `systemctl status`.
+  /// The control loop goes round; the first time, the service is ready. `sentence`: for `systemctl status`.
   void alive(const std::string& sentence);
+  /// The configuration is being read again: not ready until it stays(), or the daemon has begun again.
+  void reloading();
+  /// The daemon goes on as it was; `sentence` says why.
+  void stays(const std::string& sentence);
+  /// Another daemon begins in this process: ready when it goes round.
+  void begins_again();
 
  private:
-  bool ready_ = false;
+  std::mutex mutex_;
+  enum class State { starting, ready, reloading } state_ = State::starting;
+  bool ever_ready_ = false;
   std::string told_;
 };
 

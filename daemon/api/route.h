@@ -52,6 +52,7 @@ struct ApiStation {
   std::filesystem::path storage{};  ///< absolute; where jobs are kept
   std::function<Result<std::string>(std::string_view side)> preview_jpeg{};  ///< of "left" or "right"
   std::function<Result<void>()> check_config{};            ///< of the file that the daemon was started with
+  std::function<void(ControlLoop::Reply)> reload{};        ///< of it; reads the disk
   std::function<void(std::function<void()>)> on_worker{};  ///< for what touches the disk
 };
 

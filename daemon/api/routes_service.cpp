@@ -67,6 +67,12 @@ void check_config(const ApiStation& station, const Values&, const Send& send) {
   send({.body = to_text({{"ok", checked.has_value()}, {"problems", std::move(problems)}})});
 }
 
+void reload(const ApiStation& station, const Values&, Send send) {
+  station.reload([send = std::move(send)](const Result<std::string>& taken) {
+    send(taken ? ApiResponse{.body = to_text(ordered_json::object())} : error_response(taken.error()));
+  });
+}
+
 void document(const ApiStation&, const Values&, const Send& send) {
   static const std::string text = openapi_document(all_routes());
   send({.body = text});
@@ -97,6 +103,15 @@ std::vector<Route> service_routes() {
            .errors = {409},
            .slow = true,
            .handle = check_config},
+          {.method = Method::post,
+           .path = "/api/v1/reload",
+           .role = Role::engineer,
+           .about = "The daemon begins again with its configuration file as it is now, if that is valid and nothing is "
+                    "being done; otherwise everything stays. Afterwards it waits for Reset. Connections are cut.",
+           .reply = {.about = "it begins again", .schema = "Nothing"},
+           .errors = {404, 409, 500},
+           .slow = true,
+           .handle = reload},
           {.method = Method::get,
            .path = "/api/v1/openapi.json",
            .role = Role::viewer,

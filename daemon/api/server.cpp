@@ -1,5 +1,7 @@
 #include "daemon/api/server.h"
 
+#include <fcntl.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <boost/asio/io_context.hpp>
@@ -7,6 +9,7 @@
 #include <boost/asio/local/stream_protocol.hpp>
 #include <boost/asio/post.hpp>
 #include <boost/asio/strand.hpp>
+#include <system_error>
 #include <thread>
 #include <vector>
 
@@ -25,8 +28,9 @@ using Steady = std::chrono::steady_clock;
 using ErrorCondition = boost::system::error_code;
 
 constexpr int kThreads = 2;
-constexpr auto kEventPeriod = std::chrono::milliseconds(50);   ///< changes closer together become one event
-constexpr auto kLookPeriod = std::chrono::seconds(1);          ///< at disk, sensors and the file of tokens
+constexpr auto kEventPeriod = std::chrono::milliseconds(50);  ///< changes closer together become one event
+constexpr auto kLookPeriod = std::chrono::seconds(1);         ///< at disk, sensors and the file of tokens
+constexpr auto kLastAnswers = std::chrono::milliseconds(200), kLookAgain = std::chrono::milliseconds(1);
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);  ///< when there are no descriptors left
 
 std::string this_life() {
@@ -47,6 +51,22 @@ Result<Tcp::acceptor> listen_on_tcp(net::io_context& io, const std::string& addr
   return acceptor;
 }
 
+Result<Tcp::acceptor> take_over_tcp(net::io_context& io, int passed) {
+  sockaddr_storage address{};
+  socklen_t size = sizeof address;
+  const int own = ::fcntl(passed, F_DUPFD_CLOEXEC, 0);
+  if (own < 0 || ::getsockname(own, reinterpret_cast<sockaddr*>(&address), &size) != 0) {
+    const auto why = std::system_category().message(errno);
+    if (own >= 0) ::close(own);
+    return fail(ErrorCode::io, "cannot use the TCP socket that was passed: {}", why);
+  }
+  return Tcp::acceptor(io, address.ss_family == AF_INET6 ? Tcp::v6() : Tcp::v4(), own);
+}
+
+void remove_own_socket(const ApiOptions& options) {
+  if (!options.passed_socket) ::unlink(options.socket.c_str());
+}
+
 }  // namespace
 
 struct ApiServer::Impl {
@@ -54,7 +74,7 @@ struct ApiServer::Impl {
       : options(with),
         loop(control),
         core({control, [this] { return latest_facts(); }, with.storage, with.preview_jpeg, with.check_config,
-              [this](std::function<void()> work) { net::post(core.workers, std::move(work)); }},
+              with.reload, [this](std::function<void()> work) { net::post(core.workers, std::move(work)); }},
              roles, with.tokens, with.limits, this_life()),
         local(io, Local(), listening) {}
 
@@ -169,13 +189,16 @@ Result<std::unique_ptr<ApiServer>> ApiServer::start(const ApiOptions& options, C
   const auto roles = find_groups(options.groups);
   if (!roles) return pass_on(roles, "API");
   // Where groups are named the peer's credentials decide, not the file's one group.
-  const auto listening = listen_on_socket(options.socket, options.groups.any() ? 0666 : 0660);
+  const mode_t mode = options.groups.any() ? 0666 : 0660;
+  const auto listening =
+      options.passed_socket ? take_over_socket(*options.passed_socket, mode) : listen_on_socket(options.socket, mode);
   if (!listening) return pass_on(listening, "API");
   auto impl = std::make_unique<Impl>(options, *roles, *listening, loop);
-  if (options.http_port) {
-    auto tcp = listen_on_tcp(impl->io, options.http_address, *options.http_port);
+  if (options.http_port || options.passed_tcp) {
+    auto tcp = options.passed_tcp ? take_over_tcp(impl->io, *options.passed_tcp)
+                                  : listen_on_tcp(impl->io, options.http_address, *options.http_port);
     if (!tcp) {
-      ::unlink(options.socket.c_str());
+      remove_own_socket(options);
       return pass_on(tcp, "API");
     }
     impl->tcp = std::move(*tcp);
@@ -188,11 +211,14 @@ Result<std::unique_ptr<ApiServer>> ApiServer::start(const ApiOptions& options, C
 
 ApiServer::ApiServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
+/// What the control loop has answered last still reaches who asked, such as for the reload that ends this server.
 ApiServer::~ApiServer() {
+  const auto last = Steady::now() + kLastAnswers;
+  while (impl_->core.answers.use_count() > 1 && Steady::now() < last) std::this_thread::sleep_for(kLookAgain);
   impl_->io.stop();
   for (auto& thread : impl_->threads) thread.join();
   impl_->core.workers.join();
-  ::unlink(impl_->options.socket.c_str());
+  remove_own_socket(impl_->options);
 }
 
 void ApiServer::wake() { impl_->wake(); }

@@ -19,16 +19,21 @@ struct ApiOptions {
   PeerGroups groups{};             ///< which may what over the socket
   std::optional<int> http_port{};  ///< TCP, where every request needs a token; 0: any free port
   std::string http_address = "127.0.0.1";
-  std::filesystem::path tokens{};                                                       ///< the file of tokens
+  std::filesystem::path tokens{};  ///< the file of tokens
+  /// Listening sockets of the caller, used instead of an own one and left open and in place at the end.
+  std::optional<int> passed_socket{}, passed_tcp{};
   std::filesystem::path storage{};                                                      ///< whose disk is watched
   std::function<Result<std::string>(std::string_view side)> preview_jpeg = no_preview;  ///< from any thread
   std::function<Result<void>()> check_config = no_config;  ///< of the file that the daemon was started with; likewise
+  /// Reads that file again and begins anew with it, where nothing is being done; the reply as ControlLoop::ask().
+  std::function<void(ControlLoop::Reply)> reload = no_reload;  ///< may take its time; from any thread
   ApiLimits limits{};
 
   static Result<std::string> no_preview(std::string_view) { return fail(ErrorCode::not_found, "there are no cameras"); }
   static Result<void> no_config() {
     return fail(ErrorCode::refused, "the daemon was started without a configuration file");
   }
+  static void no_reload(const ControlLoop::Reply& reply) { reply(pass_on(no_config())); }
 };
 
 /// The HTTP API on a Unix socket and, if wanted, on TCP: two I/O threads, a strand a connection, every step of a

@@ -27,7 +27,8 @@ struct ServerCore {
   const std::shared_ptr<Admission> admission;
   EventHub hub;
   std::atomic<std::uint64_t> requests = 0, refused = 0;
-  boost::asio::thread_pool workers{2};  ///< for what touches the disk
+  const std::shared_ptr<int> answers = std::make_shared<int>();  ///< one more owner for every answer on its way out
+  boost::asio::thread_pool workers{2};                           ///< for what touches the disk
 };
 
 }  // namespace scanrig

@@ -122,13 +122,19 @@ Send ApiSession::sender() {
   return [weak = weak_from_this()](ApiResponse response) {
     const auto self = weak.lock();
     if (!self) return;
-    net::post(self->stream_.get_executor(), [weak, response = std::move(response)]() mutable {
-      if (const auto session = weak.lock()) session->answer(std::move(response));
-    });
+    net::post(self->stream_.get_executor(),
+              [weak, response = std::move(response), on_its_way = self->core_.answers]() mutable {
+                const auto session = weak.lock();
+                if (!session) return;
+                session->on_its_way_ = std::move(on_its_way);
+                session->answer(std::move(response));
+              });
   };
 }
 
 void ApiSession::answer(ApiResponse response) {
+  const bool soon_written = waiting_ && std::holds_alternative<std::string>(response.body);
+  if (!soon_written) on_its_way_.reset();
   if (!waiting_) return;  // it was given up
   waiting_ = false;
   timer_.cancel();
@@ -162,6 +168,7 @@ void ApiSession::write_text(ApiResponse response) {
 }
 
 void ApiSession::on_written(Error error) {
+  on_its_way_.reset();
   if (error) return hang_up();
   if (last_) return drain();
   read_header();

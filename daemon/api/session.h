@@ -65,8 +65,9 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::string_body>> parser_;
   std::optional<Router::Match> match_;
-  bool waiting_ = false;  ///< for an answer to the request
-  bool last_ = false;     ///< no request can follow
+  bool waiting_ = false;             ///< for an answer to the request
+  bool last_ = false;                ///< no request can follow
+  std::shared_ptr<int> on_its_way_;  ///< while an answer is being written
   boost::beast::http::response<boost::beast::http::string_body> response_;
   std::string chunk_;  ///< head or part of a file, or what is left of a drained request
 

@@ -1,5 +1,6 @@
 #include "daemon/api/socket_file.h"
 
+#include <fcntl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
@@ -62,6 +63,24 @@ Result<int> connect_to_socket(const fs::path& path) {
   ::close(fd);
   if (missing) return fail(ErrorCode::not_found, "{}: no such socket", path.string());
   return fail(ErrorCode::io, "{}: nobody answers", path.string());
+}
+
+fs::path socket_path(int listening) {
+  sockaddr_un address{};
+  socklen_t size = sizeof address;
+  if (::getsockname(listening, reinterpret_cast<sockaddr*>(&address), &size) != 0) return {};
+  return {std::string(address.sun_path, ::strnlen(address.sun_path, sizeof address.sun_path))};
+}
+
+Result<int> take_over_socket(int passed, mode_t mode) {
+  const auto path = socket_path(passed);
+  const int own = ::fcntl(passed, F_DUPFD_CLOEXEC, 0);
+  struct stat file {};
+  if (own < 0 || ::stat(path.c_str(), &file) != 0) return fail_errno("use the passed", path, own);
+  // Whoever made it has most likely said so already, and may be another user.
+  if ((file.st_mode & 0777) != mode && ::chmod(path.c_str(), mode) != 0)
+    return fail_errno("set the mode of", path, own);
+  return own;
 }
 
 Result<int> listen_on_socket(const fs::path& path, mode_t mode) {

@@ -13,6 +13,12 @@ namespace scanrig {
 /// `invalid_input` (the path is too long for a socket), `io`.
 Result<int> listen_on_socket(const std::filesystem::path& path, mode_t mode = 0660);
 
+/// A descriptor of its own for the listening socket `passed`, whose file gets `mode`. Fails with `io`.
+Result<int> take_over_socket(int passed, mode_t mode);
+
+/// Where a listening Unix socket is; empty where it has no path.
+std::filesystem::path socket_path(int listening);
+
 /// A connection to the daemon at `path`. Fails with `not_found` (no such file), `io` (nobody answers), `invalid_input`.
 Result<int> connect_to_socket(const std::filesystem::path& path);
 

@@ -33,6 +33,7 @@ void add_station_commands(CLI::App& app, Chosen& chosen) {
       ->add_flag("--follow", begin->follow, "follow the job to its end");
   add_button(app, chosen, "stop", "stop the table and cancel the scan");
   add_button(app, chosen, "reset", "clear a fault and home the table");
+  add_button(app, chosen, "reload", "begin again with the configuration file as it is now, while the rig is idle");
   add_client(app, chosen, "health", "devices, disk, temperatures, deadlines missed, retries", std::make_shared<int>(),
              [](const Connection& connection, int) { return health(connection); });
   add_maintenance(app, chosen);

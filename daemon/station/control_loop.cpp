@@ -25,7 +25,7 @@ ControlLoop::ControlLoop(Clock& clock, ControlLoopOptions options, JobTable know
   publish({});
 }
 
-Result<void> ControlLoop::run(const StationPorts& ports) {
+Result<Ended> ControlLoop::run(const StationPorts& ports) {
   wake_later(event::CheckDue{}, options_.check_period);
   show(ports);
   while (!state_.finished) {
@@ -45,15 +45,17 @@ Result<void> ControlLoop::run(const StationPorts& ports) {
     }
   }
   inbox_.close();
+  if (state_.reloading) return Ended::reload;
   if (!state_.finished || state_.may_be_moving) {
     return fail(ErrorCode::timeout, "the rig was not seen stopped before the daemon ended: the table may be moving");
   }
-  return {};
+  return Ended::shut_down;
 }
 
 void ControlLoop::handle(Message message, const StationPorts& ports) {
   prepare(message, ports);
   auto step = next(state_, message.event, options_.rules);
+  if (step.state.shutting_down && !state_.shutting_down) give_up_ = clock_.now() + options_.shutdown_limit;
   state_ = std::move(step.state);
   update(jobs_, message.event);
   tally_.see(message.event, clock_.now());
@@ -76,9 +78,17 @@ void ControlLoop::prepare(Message& message, const StationPorts& ports) {
     }
   } else if (auto* asked = std::get_if<event::JobAsked>(&event)) {
     asked->ticket = ++last_ticket_;
-  } else if (std::holds_alternative<event::Shutdown>(event) && !state_.shutting_down) {
-    give_up_ = clock_.now() + options_.shutdown_limit;
+  } else if (auto* reload = std::get_if<event::ReloadAsked>(&event)) {
+    reload->still_doing = still_doing();
   }
+}
+
+/// Of jobs that do not have the rig.
+std::string ControlLoop::still_doing() const {
+  for (const auto& [id, job] : jobs_) {
+    if (job->state == JobState::reconstructing) return fmt::format("job {} is being reconstructed", id);
+  }
+  return waiting_.empty() ? "" : "something that was asked of a job is being done";
 }
 
 /// Whoever asked for something that takes a while is answered when it is done.

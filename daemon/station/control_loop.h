@@ -25,6 +25,9 @@ struct StationPorts {
   std::function<void(const std::shared_ptr<const Snapshot>&)> published = [](const auto&) {};
 };
 
+/// Why the control loop ended.
+enum class Ended { shut_down, reload };
+
 struct ControlLoopOptions {
   StationRules rules;
   Clock::Duration warning = std::chrono::seconds(2);              ///< lamp before the first move
@@ -55,10 +58,13 @@ class ControlLoop {
   /// What event::JobAsked lists. `reply` comes when it is done (a bundle: after a while), with the job's id or the
   /// bundle's path. Fails with `not_found`, `busy`, `refused`, `exists`, `io`.
   void ask(event::JobAsked what, Reply reply) { inbox_.post({std::move(what), std::move(reply)}); }
+  /// Ends the loop if nothing is being done. Fails with `busy`, `refused`.
+  void ask(event::ReloadAsked what, Reply reply) { inbox_.post({std::move(what), std::move(reply)}); }
   [[nodiscard]] std::shared_ptr<const Snapshot> snapshot() const { return published_.get(); }
 
-  /// Runs until a Shutdown is done. Fails with `timeout` when the rig was not seen stopped by then.
-  Result<void> run(const StationPorts& ports);
+  /// Runs until a Shutdown or a reload is done. Fails with `timeout` when the rig was not seen stopped by a Shutdown;
+  /// before a reload it stood, and whoever comes next stops it first.
+  Result<Ended> run(const StationPorts& ports);
 
  private:
   struct Message {
@@ -69,6 +75,7 @@ class ControlLoop {
   void handle(Message message, const StationPorts& ports);
   void prepare(Message& message, const StationPorts& ports);
   void answer(Message& message, const Step& step);
+  [[nodiscard]] std::string still_doing() const;
   void look_at_the_time(const StationPorts& ports);
   void carry_out(const Action& action, const StationPorts& ports);
   void wake_later(Event event, Clock::Duration after);

@@ -193,6 +193,10 @@ struct ModelReady {
   std::string job, model, report;        ///< paths of the files
   std::optional<Error> beyond_limits{};  ///< why it does not pass
 };
+/// The daemon is to begin again under a new configuration; taken only while nothing is being done.
+struct ReloadAsked {
+  std::string still_doing{};  ///< what goes on beside the rig; empty: nothing
+};
 struct Shutdown {};
 }  // namespace event
 
@@ -204,7 +208,7 @@ using Event =
                  event::Ordered, event::JobAsked, event::Answered, event::JobKnown, event::JobRemoved, event::JobBegun,
                  event::JobNotBegun, event::ClosureTaken, event::ClosureJudged, event::FlipTimedOut, event::ViewStored,
                  event::PoseStored, event::JobClosed, event::StoreFailed, event::StageProgress,
-                 event::ReconstructionFailed, event::ModelReady, event::Shutdown>;
+                 event::ReconstructionFailed, event::ModelReady, event::ReloadAsked, event::Shutdown>;
 
 /// What is to be done about it. None of them waits.
 namespace action {

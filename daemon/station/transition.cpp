@@ -165,7 +165,27 @@ class Transition : public Machine {
 
   void operator()(const event::ModelReady& e) { count_result(*this, !e.beyond_limits); }
 
+  /// A latched fault is not to be got rid of by a reload.
+  void operator()(const event::ReloadAsked& e) {
+    constexpr const char* kStays = "The configuration is not read now";
+    if (s().shutting_down) return refuse(ErrorCode::busy, "{}: the daemon is ending or reloading.", kStays);
+    if (s().machine == MachineState::error) {
+      return refuse(ErrorCode::refused, "{}: see to the fault and press Reset, or restart the daemon.", kStays);
+    }
+    const bool idle = s().machine == MachineState::halted || s().machine == MachineState::ready;
+    if (!idle || s().activity != Activity::none) {
+      return refuse(ErrorCode::busy, "{}: the station is {} ({}). Try again when it stands idle.", kStays,
+                    to_string(s().machine), to_string(s().activity));
+    }
+    if (!e.still_doing.empty()) return refuse(ErrorCode::busy, "{}: {}. Try again later.", kStays, e.still_doing);
+    s().shutting_down = s().reloading = true;
+    s().machine = MachineState::halted;
+    s().cause = "The configuration is read again.";
+    stop_rig();
+  }
+
   void operator()(const event::Shutdown&) {
+    s().reloading = false;
     if (s().shutting_down) return;
     s().shutting_down = true;
     name_fault();

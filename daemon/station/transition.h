@@ -61,6 +61,7 @@ struct StationState {
   std::optional<Error> panel_problem{};
   std::vector<DeviceHealth> devices{};  ///< as of the last check
   bool shutting_down = false;
+  bool reloading = false;                         ///< shutting down to begin again
   bool finished = false;                          ///< shut down, the rig asked to stop
   bool may_be_moving = false;                     ///< the last stop was not confirmed
   std::string cause = "The daemon has started.";  ///< why the machine is in this state

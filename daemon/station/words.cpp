@@ -91,6 +91,7 @@ Words describe(const StationState& state, const StationRules& rules) {
   switch (state.machine) {
     case MachineState::preoperational: return {"The devices are being opened.", ""};
     case MachineState::halted:
+      if (state.reloading) return {"The daemon begins again with a new configuration.", ""};
       if (state.shutting_down) return {"The daemon is shutting down.", ""};
       return with_disk(state, {"The table is not homed.", how_to_reset(state)});
     case MachineState::maintenance: return in_maintenance(state);

@@ -8,7 +8,7 @@ namespace scanrig {
 
 /// The limits stand on rendered views, see the README.
 struct CompareViewsOptions {
-  double most_shift_px = 0.25;  ///< noise alone stays below 0.12 px; at full size this is 0.04 mm on the object
+  double most_shift_px = 0.25;  ///< unmoved views stayed below 0.16 px; at full size this is 0.04 mm on the object
   double most_changed = 0.2;    ///< share of the squares that may show something else: gloss, dust, a reflection
   double most_grey_step = 4.0;  ///< mean difference of images that show nothing, in grey levels
 };

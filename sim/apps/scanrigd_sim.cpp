@@ -6,11 +6,9 @@
 #include "core/files.h"
 #include "core/virtual_clock.h"
 #include "daemon/jobs/pipeline_reconstructor.h"
-#include "daemon/options_from.h"
 #include "daemon/rig/make_safe.h"
 #include "daemon/rig/open_devices.h"
-#include "daemon/run_daemon.h"
-#include "daemon/signal_stop.h"
+#include "daemon/service.h"
 #include "sim/apps/operator.h"
 #include "sim/apps/troubled_camera.h"
 #include "sim/apps/wire_camera.h"
@@ -101,15 +99,18 @@ Result<void> run(const SimOptions& o, const SignalStop& stop) {
   if (o.operator_at_rig != "none")
     somebody.emplace(r, *clock, o.operator_at_rig == "auto" ? Role::alone : Role::helper);
   sim::TroubledCamera camera(r, o.trouble, o.rig.seed);
-  return run_daemon({r.turntable(), r.projector(), camera, r.panel()}, options, *clock, stop.token());
+  Journal journal(standard_sink());
+  options.journal = [&journal](JournalEntry entry) { journal.write(std::move(entry)); };
+  const auto ended = run_daemon({r.turntable(), r.projector(), camera, r.panel()}, options, *clock, stop.token());
+  return ended ? Result<void>() : pass_on(ended);
 }
 
 /// The shipped drivers on the wires that the configuration names, with rendered images where it says so.
-Result<void> run_on_wires(const SimOptions& o, const config::RigConfig& config, const SignalStop& stop) {
+Result<Ended> run_on_wires(const SimOptions& o, const config::RigConfig& config, DaemonOptions options,
+                           const SignalStop& stop) {
   RealClock clock;
   auto open = open_devices(config, clock);
   if (!open) return pass_on(open, o.config.string());
-  auto options = options_from(config);
   if (config.stereo_camera.driver != config::StereoCameraConfig::Driver::simulated) {
     return run_daemon(open->devices(), options, clock, stop.token());
   }
@@ -121,8 +122,8 @@ Result<void> run_on_wires(const SimOptions& o, const config::RigConfig& config, 
                                    .same_rest_twice = o.rig.same_rest_twice,
                                    .noise = o.rig.noise});
   if (!scene) return pass_on(scene);
-  if (auto made = create_directories_synced(config.calibration_file.parent_path()); !made) return made;
-  if (auto written = sim::write_calibration(**scene, config.calibration_file); !written) return written;
+  if (auto made = create_directories_synced(config.calibration_file.parent_path()); !made) return pass_on(made);
+  if (auto written = sim::write_calibration(**scene, config.calibration_file); !written) return pass_on(written);
   options.jobs.profile = sim::profile_sha256();
   sim::WireCamera camera(std::move(*scene), config.stereo_camera.truth, clock);
   options.on_scanned = [&camera](const std::filesystem::path& folder) { return camera.write_truth(folder); };
@@ -131,11 +132,13 @@ Result<void> run_on_wires(const SimOptions& o, const config::RigConfig& config, 
   return run_daemon({*open->turntable, projector, camera, panel}, options, clock, stop.token());
 }
 
-Result<void> run_as_told(const SimOptions& o, const SignalStop& stop) {
+Result<void> run_as_told(const SimOptions& o, SignalStop& stop) {
   if (o.config.empty()) return run(o, stop);
-  const auto config = config::read_rig_config(o.config, {}, config::Cameras::or_simulated);
-  if (!config) return pass_on(config);
-  return run_on_wires(o, *config, stop);
+  Service service("scanrigd-sim",
+                  [&o] { return config::read_rig_config(o.config, {}, config::Cameras::or_simulated); });
+  return service.run(stop, [&](const config::RigConfig& config, const DaemonOptions& options) {
+    return run_on_wires(o, config, options, stop);
+  });
 }
 
 }  // namespace
@@ -156,7 +159,7 @@ int main(int argc, char** argv) {
     const auto config = config::read_rig_config(options.config, {}, config::Cameras::or_simulated);
     return static_cast<int>(make_safe_now(config, "scanrigd-sim"));
   }
-  const SignalStop stop;
+  SignalStop stop(options.config.empty() ? SignalStop::Hangup::ends : SignalStop::Hangup::is_told);
   const auto done = run_as_told(options, stop);
   if (done) return static_cast<int>(ExitCode::ok);
   fmt::print(stderr, "scanrigd-sim: {}\n", done.error().message);

@@ -80,7 +80,7 @@ class Shift {
   /// `resume`: jobs found unfinished are brought to their end; otherwise a new one is made.
   Result<void> work(bool resume) {
     std::stop_source stop;
-    Result<void> ended;
+    Result<Ended> ended;
     std::optional<Clock::Busy> until_it_runs(clock_);
     std::thread daemon([&] { ended = run_daemon(rig_.devices(), options_, clock_, stop.get_token()); });
     rig_.panel.wait_attached();
@@ -89,7 +89,7 @@ class Shift {
     stop.request_stop();
     daemon.join();
     if (ended && !done) return fail(ErrorCode::timeout, "the job did not come to its end: {}", said_);
-    return ended;
+    return ended ? Result<void>() : pass_on(ended);
   }
 
  private:

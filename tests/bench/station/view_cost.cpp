@@ -89,7 +89,7 @@ class Shift {
 
   Result<void> work(int jobs) {
     std::stop_source stop;
-    Result<void> ended;
+    Result<Ended> ended;
     std::thread daemon([&] {
       ended = run_daemon({table_, rig_.projector(), camera_, rig_.panel()}, options_, clock_, stop.get_token());
       over_ = true;
@@ -105,7 +105,7 @@ class Shift {
     stop.request_stop();
     daemon.join();
     if (ended && !done) return fail(ErrorCode::timeout, "a job did not come to its end");
-    return ended;
+    return ended ? Result<void>() : pass_on(ended);
   }
 
  private:

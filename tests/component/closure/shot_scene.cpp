@@ -1,5 +1,6 @@
 #include "tests/component/closure/shot_scene.h"
 
+#include <bit>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
@@ -44,6 +45,17 @@ cv::Mat blurred(const cv::Mat& mosaic, double sigma_px) {
   return result;
 }
 
+/// Another sampling of the scene for everything that happened to it, as no two exposures sample it alike; the same for
+/// the same.
+std::uint64_t sampling_of(const Disturbance& since, bool left) {
+  std::uint64_t seed = left ? 1 : 2;
+  const auto stir = [&seed](double value) { seed = mix(seed, std::bit_cast<std::uint64_t>(value)); };
+  for (const double value : since.object.matrix().reshaped()) stir(value);
+  for (const double value : since.camera.matrix().reshaped()) stir(value);
+  stir(since.table_deg);
+  return seed;
+}
+
 }  // namespace
 
 ShotScene::ShotScene(Object object, double image_scale)
@@ -59,10 +71,9 @@ cv::Mat ShotScene::look(const Disturbance& since, bool left) const {
   const RoomLight light(object_, rays_, placement);
   Eye eye = left ? rig_.left : rig_.right;
   eye.eye_from_turntable = since.camera * eye.eye_from_turntable;
-  // Another seed for every picture: no two exposures sample the scene alike.
-  static std::uint64_t sampling = 0;
   const Placed placed{object_, rays_, light, placement};
-  const auto radiance = render(placed, eye, rig_.projector, dots, to_radians(since.table_deg), ++sampling);
+  const auto radiance =
+      render(placed, eye, rig_.projector, dots, to_radians(since.table_deg), sampling_of(since, left));
   return through_lens(radiance.plain, image_scale_);
 }
 

@@ -156,7 +156,7 @@ class Daemon : public scan_samples::FolderTest {
   DaemonOptions options;
   ControlLoop* loop = nullptr;
   std::stop_source stop;
-  Result<void> result;
+  Result<Ended> result;
   std::thread thread;
 };
 

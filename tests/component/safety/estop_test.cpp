@@ -67,7 +67,7 @@ class DaemonOnWires : public testing::Test {
   std::unique_ptr<config::RigConfig> config;
   std::unique_ptr<OpenDevices> open;
   std::stop_source stop;
-  Result<void> result;
+  Result<Ended> result;
   std::thread thread;
 };
 

@@ -3,57 +3,15 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/socket.h>
-#include <sys/un.h>
-#include <unistd.h>
-
-#include <array>
-#include <cstdlib>
-#include <filesystem>
-#include <thread>
 
 #include "core/virtual_clock.h"
 #include "daemon/station/control_loop.h"
+#include "tests/system/service/notify_listener.h"
 
 namespace scanrig {
 namespace {
 
 using ::testing::HasSubstr;
-using ::testing::Not;
-
-/// The far end of NOTIFY_SOCKET.
-class Listener {
- public:
-  Listener() : file_(std::filesystem::temp_directory_path() / ("scanrig-notify-" + std::to_string(::getpid()))) {
-    std::filesystem::remove(file_);
-    socket_ = ::socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    file_.string().copy(address.sun_path, sizeof address.sun_path - 1);
-    EXPECT_EQ(::bind(socket_, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-    ::setenv("NOTIFY_SOCKET", file_.c_str(), 1);
-  }
-  ~Listener() {
-    ::unsetenv("NOTIFY_SOCKET");
-    ::close(socket_);
-    std::filesystem::remove(file_);
-  }
-
-  /// What has been said, in order; one message each.
-  std::vector<std::string> heard() {
-    std::vector<std::string> messages;
-    std::array<char, 4096> text{};
-    for (;;) {
-      const auto size = ::recv(socket_, text.data(), text.size(), MSG_DONTWAIT);
-      if (size < 0) return messages;
-      messages.emplace_back(text.data(), static_cast<std::size_t>(size));
-    }
-  }
-
- private:
-  std::filesystem::path file_;
-  int socket_ = -1;
-};
 
 TEST(ServiceManager, IsToldOnceThatTheServiceIsReadyAndEveryTimeThatItLives) {
   Listener systemd;
@@ -83,6 +41,35 @@ TEST(ServiceManager, IsToldThatTheServiceEndsOnlyIfItEverBegan) {
     manager.alive("");
   }
   EXPECT_EQ(systemd.heard().back(), "STOPPING=1");
+}
+
+TEST(ServiceManager, IsToldOfAReloadAndOfReadinessOnlyWhenTheDaemonHasBegunAgain) {
+  Listener systemd;
+  ServiceManager manager;
+  manager.alive("The rig is ready.");
+  manager.reloading();
+  manager.alive("The daemon begins again.");
+  manager.begins_again();
+  manager.alive("The table is not homed.");
+  const auto heard = systemd.heard();
+  ASSERT_EQ(heard.size(), 5u);
+  EXPECT_THAT(heard[1], testing::MatchesRegex("RELOADING=1\nMONOTONIC_USEC=[0-9]+\nSTATUS=.*"));
+  EXPECT_EQ(heard[2], "WATCHDOG=1") << "it lives, but is not ready";
+  EXPECT_EQ(heard[3], "WATCHDOG=1");
+  EXPECT_EQ(heard[4], "WATCHDOG=1\nREADY=1\nSTATUS=The table is not homed.");
+}
+
+TEST(ServiceManager, IsToldWhyAReloadChangedNothing) {
+  Listener systemd;
+  ServiceManager manager;
+  manager.alive("Scanning.");
+  manager.reloading();
+  manager.stays("The configuration stays.");
+  manager.alive("Scanning.");
+  const auto heard = systemd.heard();
+  ASSERT_EQ(heard.size(), 4u);
+  EXPECT_EQ(heard[2], "READY=1\nSTATUS=The configuration stays.");
+  EXPECT_EQ(heard[3], "WATCHDOG=1") << "the reason stays to be read";
 }
 
 TEST(ServiceManager, AnIdleControlLoopSaysEverySecondThatItLives) {

@@ -13,6 +13,7 @@
 namespace {
 
 const std::filesystem::path kUnit = std::filesystem::path(SCANRIG_SOURCE_DIR) / "systemd" / "scanrigd.service";
+const std::filesystem::path kSocket = kUnit.parent_path() / "scanrigd.socket";
 
 struct Ran {
   int code = -1;
@@ -60,6 +61,14 @@ class UnitFile : public ::testing::Test {
 TEST_F(UnitFile, IsVerifiedBySystemdWithoutAWord) {
   // systemd looks whether the programs are there: they are those of this build.
   const auto verified = run("systemd-analyze verify " + changed("/usr/bin", SCANRIG_PROGRAMS).string());
+  EXPECT_EQ(verified.code, 0);
+  EXPECT_EQ(verified.output, "");
+}
+
+TEST_F(UnitFile, TheSocketIsVerifiedBySystemdWithoutAWord) {
+  changed("/usr/bin", SCANRIG_PROGRAMS);  // the service that it starts, beside it
+  std::filesystem::copy(kSocket, folder_ / "scanrigd.socket");
+  const auto verified = run("systemd-analyze verify " + (folder_ / "scanrigd.socket").string());
   EXPECT_EQ(verified.code, 0);
   EXPECT_EQ(verified.output, "");
 }

@@ -3,6 +3,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "tests/unit/daemon/passed_socket.h"
 #include "tests/unit/pipeline/scan/scan_samples.h"
 
 namespace scanrig {
@@ -25,6 +26,24 @@ TEST_F(SocketFile, HasMode0660AndAnswers) {
   ASSERT_TRUE(connected);
   ::close(*connected);
   ::close(*listening);
+}
+
+TEST_F(SocketFile, APassedOneIsSharedAndGetsTheMode) {
+  const int passed = make_passed_socket(path());
+  ASSERT_GE(passed, 0);
+  EXPECT_EQ(socket_path(passed), path());
+  const auto own = take_over_socket(passed, 0660);
+  ASSERT_TRUE(own) << own.error().message;
+  struct stat status {};
+  ASSERT_EQ(::stat(path().c_str(), &status), 0);
+  EXPECT_EQ(status.st_mode & 0777, 0660u);
+  ::close(*own);
+  const auto connected = connect_to_socket(path());
+  EXPECT_TRUE(connected) << "the passed one still listens";
+  if (connected) ::close(*connected);
+  fs::remove(path());
+  EXPECT_EQ(take_over_socket(passed, 0660).error().code, ErrorCode::io) << "its file has gone";
+  ::close(passed);
 }
 
 TEST_F(SocketFile, AStaleSocketIsReplaced) {

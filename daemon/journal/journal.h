@@ -1,0 +1,47 @@
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "daemon/journal/entry.h"
+
+namespace scanrig {
+
+/// Takes the log's lines away from those who must not wait: its own thread writes them. What does not fit while the
+/// sink is stalled is dropped, counted, and the number is told when the sink takes lines again.
+class Journal {
+ public:
+  /// Called from the journal's thread only; may take its time.
+  using Sink = std::function<void(const JournalEntry&)>;
+
+  explicit Journal(Sink sink, std::size_t most_waiting = 1024);
+  /// Writes what is waiting, for at most `kLastWords`; a sink that still stalls then is left behind.
+  ~Journal();
+  Journal(const Journal&) = delete;
+  Journal& operator=(const Journal&) = delete;
+
+  /// From any thread. Does not wait.
+  void write(JournalEntry entry);
+
+  static constexpr auto kLastWords = std::chrono::seconds(1);
+
+ private:
+  struct Shared;
+  std::shared_ptr<Shared> shared_;
+};
+
+/// Under systemd, where stderr is the journal's own stream [systemd.exec(5), JOURNAL_STREAM]: entries with their
+/// fields. Otherwise lines of text on stderr.
+Journal::Sink standard_sink();
+
+/// "NAME=value", as the journal takes them; those that do not apply are left out.
+std::vector<std::string> journal_fields(const JournalEntry& entry);
+
+/// "2026-11-21T13:00:00Z notice job 20261121-130000-1 pose 0 view 3: ...", without an end of line.
+std::string text_line(const JournalEntry& entry, std::chrono::system_clock::time_point now);
+
+}  // namespace scanrig

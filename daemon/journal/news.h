@@ -1,0 +1,15 @@
+#pragma once
+
+#include <vector>
+
+#include "daemon/journal/entry.h"
+#include "daemon/station/snapshot.h"
+
+namespace scanrig {
+
+/// What the log says of the change from one published snapshot to the next: states of machine and jobs with their
+/// causes, faults with what to do, views acknowledged and exposures redone, devices lost and back, stages of the
+/// reconstruction. The one place where the log's lines about the station are made.
+std::vector<JournalEntry> news(const Snapshot& before, const Snapshot& now);
+
+}  // namespace scanrig
