@@ -1,5 +1,5 @@
 #pragma once
-// Embree 3 (Debian 12) and 4 (Debian 13): the two places where they differ for us. Link scanrig::embree.
+// Embree 3 (Debian 12) and 4 (Debian 13): the places where they differ for us. Link scanrig::embree.
 
 #if __has_include(<embree4/rtcore.h>)
 #include <embree4/rtcore.h>
@@ -8,6 +8,16 @@
 #endif
 
 namespace scanrig {
+
+/// Null where it cannot be had. Under the thread sanitizer, which cannot see how Embree's threads hand work to each
+/// other, scenes are built by the thread that asks for it.
+inline RTCDevice new_embree_device() {
+#ifdef __SANITIZE_THREAD__
+  return rtcNewDevice("threads=1");
+#else
+  return rtcNewDevice(nullptr);
+#endif
+}
 
 /// The first triangle `ray` meets is written into it; ray.hit.geomID is to be RTC_INVALID_GEOMETRY_ID beforehand.
 inline void intersect(RTCScene scene, RTCRayHit& ray) {

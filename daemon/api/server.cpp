@@ -89,7 +89,7 @@ struct ApiServer::Impl {
   void accept_local() {
     local.async_accept(net::make_strand(io), [this](ErrorCondition error, auto socket) {
       if (!local.is_open()) return;
-      if (error) return pause([this] { accept_local(); });
+      if (error) return pause(local_pause, [this] { accept_local(); });
       const auto peer = peer_credentials(socket.native_handle());
       if (peer) {
         begin(std::move(socket), fmt::format("user {}", peer->uid), core.access.peers().role_of(*peer));
@@ -101,7 +101,7 @@ struct ApiServer::Impl {
   void accept_tcp() {
     tcp->async_accept(net::make_strand(io), [this](ErrorCondition error, auto socket) {
       if (!tcp->is_open()) return;
-      if (error) return pause([this] { accept_tcp(); });
+      if (error) return pause(tcp_pause, [this] { accept_tcp(); });
       ErrorCondition gone;
       const auto peer = socket.remote_endpoint(gone);
       if (!gone) socket.set_option(Tcp::no_delay(true), gone);
@@ -111,9 +111,9 @@ struct ApiServer::Impl {
   }
 
   template <class Again>
-  void pause(Again again) {
-    accept_pause.expires_after(kAcceptPause);
-    accept_pause.async_wait([again](ErrorCondition) { again(); });
+  void pause(net::steady_timer& timer, Again again) {
+    timer.expires_after(kAcceptPause);
+    timer.async_wait([again](ErrorCondition) { again(); });
   }
 
   void begin(ApiSession::Protocol::socket socket, const std::string& peer, std::optional<Role> role) {
@@ -176,7 +176,7 @@ struct ApiServer::Impl {
   net::io_context io{kThreads};
   Local::acceptor local;
   std::optional<Tcp::acceptor> tcp;
-  net::steady_timer accept_pause{net::make_strand(io)}, look_timer{io}, feed_timer{net::make_strand(io)};
+  net::steady_timer local_pause{io}, tcp_pause{io}, look_timer{io}, feed_timer{net::make_strand(io)};
   std::atomic<bool> feed_due = false;
   Steady::time_point fed{};
   const Steady::time_point begun = Steady::now();

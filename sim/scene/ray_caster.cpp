@@ -7,7 +7,7 @@
 namespace scanrig::sim {
 
 struct RayCaster::Embree {
-  RTCDevice device = rtcNewDevice(nullptr);
+  RTCDevice device = new_embree_device();
   RTCScene scene = rtcNewScene(device);
 
   ~Embree() {

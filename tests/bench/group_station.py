@@ -8,6 +8,7 @@ import station_disturbed
 import station_fuzz
 import station_kill
 import station_load
+import station_sanitize
 import station_security
 import station_soak
 import station_stages
@@ -16,7 +17,8 @@ import station_view_cost
 
 MEASURED = {"startup": station_startup, "closure": station_closure, "kill": station_kill,
             "disturbed": station_disturbed, "stages": station_stages, "view_cost": station_view_cost,
-            "load": station_load, "security": station_security, "soak": station_soak, "fuzz": station_fuzz}
+            "load": station_load, "security": station_security, "soak": station_soak, "fuzz": station_fuzz,
+            "sanitize": station_sanitize}
 PARTS = tuple(MEASURED)
 
 

@@ -24,7 +24,7 @@ class WireBench : public TurntableBench {
   void block(bool blocked) override { drive_->block(blocked); }
   void when_moving(std::function<void()> act) override {
     onlooker_ = std::jthread([this, act = std::move(act)](const std::stop_token& stop) {
-      while (!seen_moving()) {
+      while (!WireBench::seen_moving()) {  // not through the table of virtual functions: it changes when the bench goes
         if (stop.stop_requested()) return;
         clock_.sleep_for(std::chrono::milliseconds(1));
       }

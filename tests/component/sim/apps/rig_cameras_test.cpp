@@ -15,6 +15,7 @@
 #include "sim/apps/rig_control.h"
 #include "sim/apps/wire_rig.h"
 #include "sim/scene/standing.h"
+#include "tests/slowness.h"
 
 namespace scanrig::sim {
 namespace {
@@ -63,13 +64,14 @@ class RigCamerasTest : public testing::Test {
     const auto config = config::read_rig_config(folder_ / "rig.toml");
     ASSERT_TRUE(config) << config.error().message;
     config_ = *config;
+    config_.stereo_camera.aravis.frame_timeout *= kSlowness;  // a frame is sent when it is rendered
     lines_ = gpio::socket_lines(folder_ / "gpio.sock", clock_);
     projector_ = GpioProjector::open(config::gpio_projector_options(config_.projector), *lines_, clock_).value();
     auto camera = open_aravis(config_.stereo_camera.aravis, clock_, within(seconds(10)));
     ASSERT_TRUE(camera) << camera.error().message;
     camera_ = std::move(*camera);
   }
-  Deadline within(Clock::Duration time) { return Deadline::after(clock_, time); }
+  Deadline within(Clock::Duration time) { return Deadline::after(clock_, kSlowness * time); }
   Result<StereoFrame> expose(Light light) {
     if (auto armed = camera_->arm(within(seconds(2))); !armed) return pass_on(armed);
     if (auto fired = projector_->fire(light, within(seconds(2))); !fired) return pass_on(fired);
