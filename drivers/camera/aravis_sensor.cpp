@@ -55,7 +55,10 @@ const char* in_words(ArvBufferStatus status) {
   }
 }
 
-void on_control_lost(ArvDevice*, gpointer lost) { *static_cast<std::atomic<bool>*>(lost) = true; }
+using Lost = std::shared_ptr<std::atomic<bool>>;
+
+void on_control_lost(ArvDevice*, gpointer lost) { **static_cast<Lost*>(lost) = true; }
+void forget(gpointer lost, GClosure*) { delete static_cast<Lost*>(lost); }
 
 /// The name of the device with this serial number, or nothing.
 std::optional<std::string> find_by_serial(const std::string& serial) {
@@ -87,7 +90,7 @@ AravisSensor::AravisSensor(const std::string& side, const AravisSensorOptions& s
     : sensor_(sensor), options_(options), clock_(clock), attempt_(fmt::format("{} camera {}", side, sensor.serial)) {}
 
 AravisSensor::~AravisSensor() {
-  if (!lost_) stop_stream();
+  if (!*lost_) stop_stream();
   std::ignore = let_go({clock_.now()});
   // Nobody waits longer for a device that is gone: the thread owns all it needs.
   constexpr auto kLastWait = std::chrono::seconds(3);
@@ -97,14 +100,14 @@ AravisSensor::~AravisSensor() {
 std::uint64_t AravisSensor::id_ring() const { return camera_ && arv_camera_is_uv_device(camera_.get()) ? 0 : kGigeIds; }
 
 Result<bool> AravisSensor::ready(Deadline deadline) {
-  if (camera_ && !lost_) ask_whether_there();
-  if (camera_ && !lost_) return false;
+  if (camera_ && !*lost_) ask_whether_there();
+  if (camera_ && !*lost_) return false;
   if (auto free = let_go(deadline); !free) return pass_on(free);
   if (deadline.expired(clock_)) return fail(ErrorCode::timeout, "{}: no time left to connect", name());
   auto connected = connect();
   if (connected) connected = start_stream();
   if (connected) return true;
-  lost_ = true;
+  *lost_ = true;
   std::ignore = let_go({clock_.now()});  // if that has to wait, the next call does
   return pass_on(connected);
 }
@@ -120,7 +123,7 @@ void AravisSensor::ask_whether_there() {
   });
   in_doubt_ = false;
   if (asked) heard_ = clock_.now();
-  if (!asked) lost_ = true;
+  if (!asked) *lost_ = true;
 }
 
 Result<void> AravisSensor::connect() {
@@ -136,9 +139,11 @@ Result<void> AravisSensor::connect() {
   const auto opened =
       attempt_("connect to " + device, [&](GError** error) { camera_.reset(arv_camera_new(device.c_str(), error)); });
   if (!opened) return opened;
-  lost_ = false;
+  // A flag for each connection, which the signal owns too: it may come while nobody is left to hear it.
+  lost_ = std::make_shared<std::atomic<bool>>(false);
   arv_camera_set_range_check_policy(camera_.get(), ARV_RANGE_CHECK_POLICY_ENABLE);
-  g_signal_connect(arv_camera_get_device(camera_.get()), "control-lost", G_CALLBACK(on_control_lost), &lost_);
+  g_signal_connect_data(arv_camera_get_device(camera_.get()), "control-lost", G_CALLBACK(on_control_lost),
+                        new Lost(lost_), forget, GConnectFlags{});
   std::string serial;
   const auto asked = attempt_("read the serial number", [&](GError** error) {
     if (const char* text = arv_camera_get_device_serial_number(camera_.get(), error)) serial = text;
@@ -190,7 +195,6 @@ Result<void> AravisSensor::let_go(Deadline deadline) {
     return fail(ErrorCode::timeout, "{}: lost twice, the first connection is still being given up; try again in 10 s",
                 name());
   }
-  g_signal_handlers_disconnect_by_data(arv_camera_get_device(camera_.get()), &lost_);
   std::promise<void> gone;
   giving_up_ = gone.get_future();
   std::thread([camera = std::move(camera_), stream = std::move(stream_), gone = std::move(gone)]() mutable {
@@ -208,7 +212,7 @@ Result<std::optional<SensorFrame>> AravisSensor::next(Deadline deadline) {
                           ? arv_stream_timeout_pop_buffer(stream_.get(), static_cast<guint64>(wait.count()))
                           : arv_stream_try_pop_buffer(stream_.get());
   if (!buffer) {
-    if (lost_) return fail(ErrorCode::io, "{}: the connection is lost; check power and cable", name());
+    if (*lost_) return fail(ErrorCode::io, "{}: the connection is lost; check power and cable", name());
     in_doubt_ = in_doubt_ || wait.count() > 0;
     return std::nullopt;
   }
@@ -255,14 +259,14 @@ Result<void> AravisSensor::listen_to_line(bool line) {
   if (wanted == listens_to_line_) return {};
   auto set = set_trigger_source(camera_.get(), wanted ? options_.trigger_source : "Software", attempt_);
   if (set) listens_to_line_ = wanted;
-  if (!set) lost_ = true;  // what does not answer is connected again
+  if (!set) *lost_ = true;  // what does not answer is connected again
   return set;
 }
 
 Result<void> AravisSensor::trigger() {
   auto triggered =
       attempt_("trigger", [&](GError** error) { arv_camera_execute_command(camera_.get(), "TriggerSoftware", error); });
-  if (!triggered) lost_ = true;
+  if (!triggered) *lost_ = true;
   return triggered;
 }
 

@@ -74,9 +74,9 @@ class AravisSensor final : public Sensor {
   GRef<ArvStream> stream_;
   std::future<void> giving_up_;         // ready when the connection lost last is given up
   std::optional<std::string> finding_;  // about this machine, see host_finding()
-  std::atomic<bool> lost_ = false;      // set by a thread of the library
-  Clock::TimePoint heard_{};            // the last answer or frame
-  bool in_doubt_ = false;               // a frame was waited for and did not come
+  std::shared_ptr<std::atomic<bool>> lost_ = std::make_shared<std::atomic<bool>>(false);  // a library's thread sets it
+  Clock::TimePoint heard_{};                                                              // the last answer or frame
+  bool in_doubt_ = false;  // a frame was waited for and did not come
   bool listens_to_line_ = true;
 };
 
