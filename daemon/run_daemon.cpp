@@ -2,6 +2,7 @@
 
 #include <ctime>
 
+#include "daemon/jobs/heap.h"
 #include "daemon/jobs/housekeeping_thread.h"
 #include "daemon/journal/news.h"
 #include "daemon/overloaded.h"
@@ -100,6 +101,7 @@ bool quiet_now(const std::optional<QuietHours>& hours) {
 }  // namespace
 
 Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, Clock& clock, std::stop_token stop) {
+  keep_large_blocks_apart();
   auto store = JobStore::open(options.jobs);
   if (!store) return pass_on(store);
   auto known = store->recover();

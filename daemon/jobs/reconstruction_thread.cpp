@@ -1,6 +1,5 @@
 #include "daemon/jobs/reconstruction_thread.h"
 
-#include <malloc.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -9,6 +8,7 @@
 
 #include "daemon/actor_thread.h"
 #include "daemon/guarded.h"
+#include "daemon/jobs/heap.h"
 #include "daemon/jobs/job_files.h"
 
 namespace scanrig {
@@ -16,14 +16,6 @@ namespace {
 
 /// More views are not kept in memory while an earlier job is being worked on.
 constexpr int kMostViewsWaiting = 4;
-
-/// A job takes hundreds of megabytes from many threads, of which the C library keeps what fits nowhere: in months of
-/// jobs that grows. Given back between them, the process is as large after each.
-void give_memory_back() {
-#ifdef __GLIBC__
-  ::malloc_trim(0);
-#endif
-}
 
 }  // namespace
 

@@ -1,0 +1,21 @@
+#include "daemon/jobs/heap.h"
+
+#include <malloc.h>
+
+namespace scanrig {
+
+// Other C libraries than glibc do so by themselves, or cannot be told.
+
+void keep_large_blocks_apart() {
+#ifdef M_MMAP_THRESHOLD
+  ::mallopt(M_MMAP_THRESHOLD, 1 << 20);
+#endif
+}
+
+void give_memory_back() {
+#ifdef __GLIBC__
+  ::malloc_trim(0);
+#endif
+}
+
+}  // namespace scanrig
