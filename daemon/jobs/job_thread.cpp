@@ -156,7 +156,11 @@ Result<void> JobThread::cancel(const JobInfo& job) {
                 "job {} is {}: only what is queued, interrupted or being reconstructed can be cancelled", job.id,
                 to_string(job.state));
   }
-  if (auto noted = write_failure(job.folder, {ErrorCode::stopped, "cancelled on request"}); !noted) return noted;
+  if (auto noted = write_failure(job.folder, {ErrorCode::stopped, "cancelled on request"}); !noted) {
+    // Nobody works on it any more, and nobody else tells so.
+    if (job.state == JobState::reconstructing) tell_(event::ReconstructionFailed{job.id, noted.error()});
+    return noted;
+  }
   tell_known(job.id);
   return {};
 }

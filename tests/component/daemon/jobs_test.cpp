@@ -103,6 +103,20 @@ TEST_F(Jobs, AReconstructionCanBeCancelledAndTheModelBeMadeLater) {
   EXPECT_EQ(job(id)->state, JobState::done);
 }
 
+TEST_F(Jobs, AReconstructionWhoseCancellingCannotBeNotedDoesNotStandStill) {
+  Result<std::string> answer;
+  log.at_finish = [&] {
+    const fs::path folder = newest()->folder;
+    fs::create_directories(folder / "failure.json" / "in the way");
+    answer = ask_for(What::cancel, newest()->id);
+  };
+  boot();
+  get_ready();
+  scan_both_poses();
+  EXPECT_TRUE(wait_state(newest()->id, JobState::failed)) << to_string(newest()->state);
+  EXPECT_FALSE(answer);
+}
+
 TEST_F(Jobs, AReconstructionThatWaitsForAnotherCanBeCancelledToo) {
   boot();
   get_ready();
