@@ -5,18 +5,12 @@
 #include <algorithm>
 
 #include "daemon/ctl/answers.h"
+#include "daemon/ctl/stage_bars.h"
 
 namespace scanrig::ctl {
 namespace {
 
 using nlohmann::json;
-
-std::string share(double fraction) {
-  constexpr int kWidth = 30;
-  const int full = static_cast<int>(std::clamp(fraction, 0.0, 1.0) * kWidth);
-  return fmt::format("[{}{}] {:3.0f} %", std::string(static_cast<std::size_t>(full), '#'),
-                     std::string(static_cast<std::size_t>(kWidth - full), '-'), 100.0 * fraction);
-}
 
 /// `taken`: a view or a closure shot.
 void add_redone(const json& taken, const std::string& name, std::vector<std::string>& lines) {
@@ -36,14 +30,14 @@ std::vector<std::string> job_lines(const json& job) {
       fmt::format("job {}{}: {}", text(job, "id"), part.empty() ? "" : " of " + part, text(job, "state")),
       "  " + text(job, "sentence")};
   if (const auto action = text(job, "next_action"); !action.empty()) lines.push_back("  next: " + action);
-  lines.push_back(fmt::format("  {:<22} {}  {} of {}", "views stored",
-                              share(static_cast<double>(stored) / static_cast<double>(all)), stored, all));
+  lines.push_back(fmt::format(
+      "{}  {} of {}", bar("views stored", static_cast<double>(stored) / static_cast<double>(all)), stored, all));
   for (const auto& view : job.at("stored")) {
     add_redone(view, fmt::format("view {}", view.value("view", 0) + 1), lines);
   }
   for (const auto& closure : job.at("closures")) add_redone(closure, "view 1 again", lines);
   for (const auto& stage : job.at("stages")) {
-    lines.push_back(fmt::format("  {:<22} {}", text(stage, "name"), share(stage.at("fraction"))));
+    lines.push_back(bar(text(stage, "name"), stage.at("fraction")));
   }
   if (const auto model = text(job, "model"); !model.empty()) lines.push_back("  model " + model);
   return lines;

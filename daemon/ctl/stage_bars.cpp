@@ -7,13 +7,16 @@
 
 namespace scanrig::ctl {
 
-std::string bar(std::string_view name, double fraction, Clock::Duration spent) {
+std::string bar(std::string_view name, double fraction) {
   constexpr int kWidth = 30;
   const double share = std::clamp(fraction, 0.0, 1.0);
   const int full = static_cast<int>(std::floor(share * kWidth));
-  return fmt::format("  {:<22} [{}{}] {:3.0f} % {:7.1f} s", name, std::string(full, '#'),
-                     std::string(kWidth - full, '-'), std::floor(share * 100.0),
-                     std::chrono::duration<double>(spent).count());
+  return fmt::format("  {:<22} [{}{}] {:3.0f} %", name, std::string(full, '#'), std::string(kWidth - full, '-'),
+                     std::floor(share * 100.0));
+}
+
+std::string bar(std::string_view name, double fraction, Clock::Duration spent) {
+  return fmt::format("{} {:7.1f} s", bar(name, fraction), std::chrono::duration<double>(spent).count());
 }
 
 void StageBars::line(std::string_view text) {

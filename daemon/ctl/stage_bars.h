@@ -37,7 +37,9 @@ class StageBars {
   std::map<std::string, Stage, std::less<>> stages_;
 };
 
-/// "range               [##########----------]  50 %    1.2 s"
+/// "  range               [##########----------]  50 %"
+std::string bar(std::string_view name, double fraction);
+/// The same, and "    1.2 s".
 std::string bar(std::string_view name, double fraction, Clock::Duration spent);
 
 }  // namespace scanrig::ctl
