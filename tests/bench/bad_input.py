@@ -6,7 +6,9 @@ import pathlib
 import shutil
 import subprocess
 
-LIMIT_S = 120
+from slowness import SLOWNESS
+
+LIMIT_S = 120 * SLOWNESS
 USAGE, BAD_INPUT, OUT_OF_RANGE, NO_MODEL = 2, 3, 5, 7  # docs/exit-codes.md
 
 

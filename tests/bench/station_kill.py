@@ -12,8 +12,9 @@ import shutil
 import subprocess
 
 import station_disk
+from slowness import SLOWNESS
 
-LIMIT_S = 60
+LIMIT_S = 60 * SLOWNESS
 
 
 class Rig:

@@ -4,7 +4,9 @@ import pathlib
 import shutil
 import subprocess
 
-LIMIT_S = 900
+from slowness import SLOWNESS
+
+LIMIT_S = 900 * SLOWNESS
 FILES = ("model.glb", "model.ply", "model.obj", "model.stl")
 
 # What the first road asks of every report, as paths of keys; `[]` stands for every element of a list.

@@ -50,6 +50,11 @@ const Settings& settings() {
   return all;
 }
 
+/// Whether the program is up. The runtime of a sanitizer makes the folder of its reports before anything can be asked
+/// of it, and memory and guards are asked of it.
+bool is_up = false;
+[[gnu::constructor]] void come_up() { is_up = true; }
+
 std::atomic<long> count{0};
 std::mutex in_order;  // the log tells the order in which the calls happened
 
@@ -179,8 +184,8 @@ int renameat2(int from_folder, const char* from, int to_folder, const char* to, 
                 [&] { return static_cast<int>(::syscall(SYS_renameat2, from_folder, from, to_folder, to, flags)); });
 }
 int mkdir(const char* path, mode_t mode) noexcept {
-  return change("mkdir", absolute(AT_FDCWD, path), "",
-                [&] { return static_cast<int>(::syscall(SYS_mkdir, path, mode)); });
+  const auto call = [&] { return static_cast<int>(::syscall(SYS_mkdir, path, mode)); };
+  return is_up ? change("mkdir", absolute(AT_FDCWD, path), "", call) : call();
 }
 int unlinkat(int folder, const char* path, int flags) noexcept {
   return change("remove", absolute(folder, path), "",
