@@ -14,6 +14,7 @@
 #include "sim/wire/gpio_socket.h"
 #include "sim/wire/leadshine_drive.h"
 #include "sim/wire/modbus_server.h"
+#include "tests/slowness.h"
 
 namespace scanrig {
 
@@ -21,7 +22,7 @@ namespace scanrig {
 /// rig.toml that points at them. The test is the operator. Real time.
 class WireRig {
  public:
-  static constexpr auto kPatience = std::chrono::seconds(20);
+  static constexpr auto kPatience = kSlowness * std::chrono::seconds(20);
 
   /// Texts of rig.toml and what stands there instead.
   using Changes = std::vector<std::pair<std::string, std::string>>;

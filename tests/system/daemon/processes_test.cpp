@@ -7,6 +7,7 @@
 
 #include "core/clock.h"
 #include "daemon/ctl/client.h"
+#include "tests/slowness.h"
 #include "tests/system/daemon/process.h"
 #include "tests/unit/pipeline/scan/scan_samples.h"
 
@@ -39,11 +40,11 @@ class Programs : public scan_samples::FolderTest {
   }
   std::string socket() const { return folder_ / "api.sock"; }
 
-  /// Asks again and again until the answer is as wanted; null after two minutes.
+  /// Asks again and again until the answer is as wanted; null after two minutes, in a build without a sanitizer.
   template <class Wanted>
   json ask_until(const std::string& target, const Wanted& wanted) {
     RealClock clock;
-    for (const auto end = Deadline::after(clock, std::chrono::minutes(2)); !end.expired(clock);
+    for (const auto end = Deadline::after(clock, kSlowness * std::chrono::minutes(2)); !end.expired(clock);
          clock.sleep_for(std::chrono::milliseconds(20))) {
       const auto answer = ctl::ask(socket(), "GET", "/api/v1/" + target);
       if (answer && wanted(*answer)) return *answer;
@@ -158,7 +159,7 @@ TEST_F(Programs, WatchTellsWhatChangesUntilItIsInterrupted) {
   Process watch({SCANRIG_PROGRAM, "status", "--watch", "--socket", socket()}, folder_ / "watched");
   const auto watched = [&](const std::string& words) {
     RealClock clock;
-    for (const auto end = Deadline::after(clock, std::chrono::seconds(20)); !end.expired(clock);
+    for (const auto end = Deadline::after(clock, kSlowness * std::chrono::seconds(20)); !end.expired(clock);
          clock.sleep_for(std::chrono::milliseconds(20))) {
       if (const auto text = read_file(folder_ / "watched"); text && text->find(words) != std::string::npos) return true;
     }

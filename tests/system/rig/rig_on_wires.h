@@ -9,6 +9,7 @@
 #include "core/files.h"
 #include "daemon/ctl/client.h"
 #include "sim/wire/control_socket.h"
+#include "tests/slowness.h"
 #include "tests/system/daemon/process.h"
 
 namespace scanrig {
@@ -58,7 +59,7 @@ class RigOnWires : public testing::Test {
   }
   template <class Ready>
   bool soon(const Ready& ready, std::chrono::seconds limit = std::chrono::seconds(60)) {
-    for (const auto by = Deadline::after(clock_, limit); !by.expired(clock_);
+    for (const auto by = Deadline::after(clock_, kSlowness * limit); !by.expired(clock_);
          clock_.sleep_for(std::chrono::milliseconds(20))) {
       if (ready()) return true;
     }

@@ -6,6 +6,7 @@
 
 #include "daemon/ctl/client.h"
 #include "tests/component/safety/wire_rig.h"
+#include "tests/slowness.h"
 #include "tests/system/daemon/process.h"
 
 namespace scanrig {
@@ -45,7 +46,7 @@ TEST_F(MakeSafe, ADaemonKilledWhileTheTableTurnsLeavesItStoppedDarkAndRedWithinA
     EXPECT_EQ(make_safe(), 0) << *read_file(rig.folder / "make_safe.log");
     const double took = seconds_since(killed);
     fmt::print("killed to stopped and dark: {:.3f} s\n", took);
-    EXPECT_LT(took, 1.0);
+    EXPECT_LT(took, 1.0 * kSlowness);
     EXPECT_FALSE(rig.drive.truth().moving);
     EXPECT_FALSE(rig.lamp("DOTS") || rig.lamp("PLAIN"));
     EXPECT_TRUE(rig.lamp("RED"));
@@ -76,14 +77,14 @@ TEST_F(MakeSafe, TheExitCodeSaysWhatWasReachedAndItEndsInTimeAllTheSame) {
   rig.serial->vanish();
   auto begun = rig.clock.now();
   EXPECT_EQ(make_safe(), 5);
-  EXPECT_LT(seconds_since(begun), 1.2);
+  EXPECT_LT(seconds_since(begun), 1.2 * kSlowness);
   EXPECT_THAT(*read_file(rig.folder / "make_safe.log"), HasSubstr("turntable"));
   EXPECT_TRUE(rig.lamp("RED")) << "the rest was reached";
   ASSERT_TRUE(rig.serial->come_back());
   rig.lines.reset();
   begun = rig.clock.now();
   EXPECT_EQ(make_safe(), 11);
-  EXPECT_LT(seconds_since(begun), 1.2);
+  EXPECT_LT(seconds_since(begun), 1.2 * kSlowness);
   EXPECT_THAT(*read_file(rig.folder / "make_safe.log"), HasSubstr("panel"));
   std::filesystem::remove(rig.config());
   EXPECT_EQ(make_safe(), 3);
@@ -93,7 +94,7 @@ TEST_F(MakeSafe, ASilentDriveIsToldToStopAndIsNotCalledStopped) {
   rig.serial->inject({sim::wire::WireFault::Kind::deaf});
   const auto begun = rig.clock.now();
   EXPECT_EQ(make_safe(), 5);
-  EXPECT_LT(seconds_since(begun), 1.3);
+  EXPECT_LT(seconds_since(begun), 1.3 * kSlowness);
 }
 
 TEST_F(MakeSafe, AbsentCamerasLeaveTheRestRunningAndShown) {
