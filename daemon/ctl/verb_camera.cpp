@@ -1,9 +1,9 @@
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "core/files.h"
+#include "core/image_codec.h"
 #include "daemon/ctl/client.h"
 #include "daemon/ctl/free_rig.h"
 #include "daemon/ctl/verbs.h"
@@ -119,9 +119,9 @@ ExitCode tune(const CameraVerb& verb, Bench& bench) {
 }
 
 Result<void> write_png(const std::filesystem::path& file, const cv::Mat& image) {
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", image, bytes);
-  return write_file_atomically(file, std::as_bytes(std::span(bytes)));
+  const auto bytes = encode_png(image);
+  if (!bytes) return pass_on(bytes);
+  return write_file_atomically(file, *bytes);
 }
 
 ExitCode grab(const CameraVerb& verb, Bench& bench) {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/files.h"
+#include "core/image_codec.h"
 #include "core/units.h"
 #include "daemon/actor_thread.h"
 #include "pipeline/closure/compare_views.h"
