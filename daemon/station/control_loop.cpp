@@ -62,6 +62,8 @@ void ControlLoop::handle(Message message, const StationPorts& ports) {
   for (const auto& action : step.actions) carry_out(action, ports);
   show(ports);
   publish(ports);
+  const auto* pressed = std::get_if<event::Pressed>(&message.event);
+  if (step.refused && pressed && pressed->origin == Origin::panel) ports.refused_at_panel(*pressed, *step.refused);
   answer(message, step);
   if (std::holds_alternative<event::CheckDue>(message.event)) look_at_the_time(ports);
 }
@@ -158,6 +160,7 @@ void ControlLoop::publish(const StationPorts& ports) {
       .sentence = std::move(words.sentence),
       .next_action = std::move(words.next_action),
       .may_be_moving = state_.may_be_moving,
+      .fault_device = state_.machine == MachineState::error ? state_.fault_device : std::string(),
       .inputs = state_.inputs,
       .outputs = shown_,
       .devices = std::move(devices),

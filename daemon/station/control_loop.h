@@ -23,6 +23,7 @@ struct StationPorts {
   std::function<std::string()> fresh_job_id;  ///< another one each time
   std::function<bool()> quiet_hours = [] { return false; };
   std::function<void(const std::shared_ptr<const Snapshot>&)> published = [](const auto&) {};
+  std::function<void(const event::Pressed&, const Error& why)> refused_at_panel = [](const auto&, const auto&) {};
 };
 
 /// Why the control loop ended.

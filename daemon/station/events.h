@@ -96,7 +96,8 @@ struct Stopped {
 };                               ///< the table is seen standing
 struct RigFailed {
   Error error;
-};  ///< a move or an exposure; the motor has been told to stop
+  std::string device{};  ///< whose failure it is, as DeviceHealth names it
+};                       ///< a move or an exposure; the motor has been told to stop
 struct StopFailed {
   Error error;
 };  ///< nobody knows whether the table moves

@@ -56,6 +56,7 @@ struct StationState {
   bool latched = false;            ///< a fault that only Reset at the panel clears
   bool home_by_guard = true;       ///< nothing but a restart lies behind us
   std::optional<Error> unnamed{};  ///< a fault that may turn out to be the e-stop
+  std::string fault_device{};      ///< whose failure the last fault is; empty: nobody's, as of an e-stop
   std::optional<Maintenance> maintenance{};
   PanelInputs inputs{};
   std::optional<Error> panel_problem{};
