@@ -112,7 +112,7 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
                            .guard = options.guard,
                            .home_guarded = options.home_guarded,
                            .manual_light = options.manual_light};
-  ControlLoop loop(clock, {.rules = rules, .warning = options.warning}, *known);
+  ControlLoop loop(clock, {.rules = rules, .warning = options.warning, .warm_up = options.warm_up}, *known);
   const auto tell = [&loop](Event event) { loop.post(std::move(event)); };
 
   const OnLoop reachable(options, loop);

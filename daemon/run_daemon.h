@@ -36,6 +36,7 @@ struct DaemonOptions {
   JobStoreOptions jobs;
   std::map<std::string, Recipe> recipes{{"default", {}}};  ///< "default" is what Start scans when nothing is queued
   std::optional<QuietHours> quiet_hours{};                 ///< no job begins by itself then
+  std::chrono::seconds warm_up{0};                         ///< of the projector; nor before it is warm
   RetentionOptions retention{};
   std::optional<HttpAddress> webhook{};  ///< whom failures are told
   ApiOptions api;

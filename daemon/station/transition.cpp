@@ -109,6 +109,11 @@ class Transition : public Machine {
     begin_on_part(*this);
   }
 
+  void operator()(const event::WarmingUp& e) {
+    s().warm_up_left = e.left;
+    begin_on_part(*this);
+  }
+
   /// A projector that cannot be reached is an absent device; it does not make the table move.
   void operator()(const event::Stopped& e) {
     s().may_be_moving = false;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <map>
 #include <memory>
 #include <optional>
@@ -70,6 +71,7 @@ struct StationState {
   std::vector<std::shared_ptr<const JobInfo>> queue{};  ///< by place
   int failures = 0;                                     ///< jobs in a row without a model that passes
   bool quiet = false;                                   ///< quiet hours: no job begins by itself
+  std::chrono::seconds warm_up_left{0};                 ///< of the projector: until then likewise
   bool disk_trouble = false;                            ///< the jobs' disk refused something; until a job begins
   bool part_gone = false;                               ///< the part of the last job was taken away
 };
