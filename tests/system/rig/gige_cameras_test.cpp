@@ -164,7 +164,9 @@ TEST_F(CamerasOnWires, TheCommandTellsProgramsInJsonALineAPair) {
   for (const auto& pair : lines()) {
     for (const auto* side : {"left", "right"}) {
       EXPECT_THAT(pair[side]["brightness"].get<double>(), AllOf(testing::Ge(0.0), testing::Le(1.0))) << pair;
-      EXPECT_TRUE(pair[side]["saturated"].is_number() && pair[side]["blur_px"].is_number()) << pair;
+      EXPECT_TRUE(pair[side]["saturated"].is_number()) << pair;
+      EXPECT_TRUE(pair[side]["blur_px"].is_number() || pair[side]["blur_px"].is_null())
+          << "null: nothing to measure it on";
       EXPECT_TRUE(pair[side]["advice"].is_string()) << pair;
     }
   }

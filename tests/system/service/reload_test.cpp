@@ -128,7 +128,7 @@ TEST_F(Reload, AFileThatIsNotValidChangesNothing) {
 }
 
 TEST_F(Reload, WhileItScansItIsRefusedAndTheJobGoesOn) {
-  start({SCANRIGD_SIM_PROGRAM, "--scale", "0.1"});  // the figurine: something to be scanned
+  start();
   ASSERT_TRUE(press_until("reset", [&] { return machine() == "Operational.Ready"; })) << log();
   ASSERT_TRUE(press_until("start", [&] { return machine() == "Operational.SingleExecution"; })) << log();
   configure(kQuick);
