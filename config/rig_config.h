@@ -54,7 +54,7 @@ struct ProjectorConfig {
   std::chrono::microseconds pulse{15000};  ///< gpio: at least the exposure
   std::string serial;                      ///< lightcrafter4500: empty: the only one there is
   LightCrafterOptions lightcrafter;
-  std::chrono::seconds warm_up{600};
+  std::chrono::seconds warm_up{600};  ///< no job begins by itself before it has been there for so long
 };
 
 struct StereoCameraConfig {

@@ -46,6 +46,7 @@ DaemonOptions options_from(const config::RigConfig& config) {
   options.retention = {.keep_for = config.storage.keep_days, .keep_bytes = {}};
   if (config.storage.keep_gib) options.retention.keep_bytes = gib(*config.storage.keep_gib);
   if (config.quiet_hours) options.quiet_hours = QuietHours{config.quiet_hours->from, config.quiet_hours->to};
+  options.warm_up = config.projector.warm_up;
   options.api = {.socket = config.api.socket,
                  .groups = {config.api.viewer_group, config.api.operator_group, config.api.engineer_group},
                  .http_port = config.api.http_port,

@@ -112,13 +112,14 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
                            .guard = options.guard,
                            .home_guarded = options.home_guarded,
                            .manual_light = options.manual_light};
-  ControlLoop loop(clock, {.rules = rules, .warning = options.warning}, *known);
+  ControlLoop loop(clock, {.rules = rules, .warning = options.warning, .warm_up = options.warm_up}, *known);
   const auto tell = [&loop](Event event) { loop.post(std::move(event)); };
 
   const OnLoop reachable(options, loop);
   Preview preview(clock, [&loop] { return cameras_are_free(*loop.snapshot()); });
   auto api_options = options.api;
   api_options.storage = store->options().root;
+  api_options.journal = options.journal;
   api_options.preview_jpeg = [&preview](std::string_view side) {
     return preview.jpeg(side == "left" ? Side::left : Side::right);
   };
@@ -153,12 +154,16 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
     options.published(snapshot);
     (*api)->wake();
   };
+  const auto refused = [&](const event::Pressed& pressed, const Error& why) {
+    options.journal(refused_at_panel(pressed, why, *loop.snapshot()));
+  };
   return loop.run({.alive = [&] { options.alive(loop.snapshot()->sentence); },
                    .perform = perform_all,
                    .show = [&](const PanelOutputs& outputs) { panel.show(outputs); },
                    .fresh_job_id = [&] { return fresh_id(); },
                    .quiet_hours = [&] { return quiet_now(options.quiet_hours); },
-                   .published = published});
+                   .published = published,
+                   .refused_at_panel = refused});
 }
 
 }  // namespace scanrig

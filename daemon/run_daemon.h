@@ -36,6 +36,7 @@ struct DaemonOptions {
   JobStoreOptions jobs;
   std::map<std::string, Recipe> recipes{{"default", {}}};  ///< "default" is what Start scans when nothing is queued
   std::optional<QuietHours> quiet_hours{};                 ///< no job begins by itself then
+  std::chrono::seconds warm_up{0};                         ///< of the projector; nor before it is warm
   RetentionOptions retention{};
   std::optional<HttpAddress> webhook{};  ///< whom failures are told
   ApiOptions api;
@@ -52,7 +53,7 @@ struct DaemonOptions {
   std::function<void()> loop_ends = [] {};
   /// The control loop goes round, at least once a second; for the watchdog. From its thread; must not wait.
   std::function<void(const std::string& sentence)> alive = [](const auto&) {};
-  /// Lines of the log. From the control loop's thread; must not wait.
+  /// Lines of the log. From the control loop's thread and the API's; must not wait.
   std::function<void(JournalEntry)> journal = [](const auto&) {};
   /// Called with every snapshot from the control loop's thread; must not wait.
   std::function<void(const std::shared_ptr<const Snapshot>&)> published = [](const auto&) {};

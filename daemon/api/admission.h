@@ -42,6 +42,7 @@ class Admission : public std::enable_shared_from_this<Admission> {
     Seat& operator=(const Seat&) = delete;
     /// Whether the peer may ask once more now.
     [[nodiscard]] bool may_ask(Clock::time_point now) { return owner_->take(peer_, 1.0, now); }
+    [[nodiscard]] const std::string& peer() const { return peer_; }
     void showed_bad_token(Clock::time_point now) { owner_->take(peer_, owner_->limits_.price_of_a_bad_token, now); }
 
    private:

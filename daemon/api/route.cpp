@@ -42,7 +42,7 @@ unsigned http_status(ErrorCode code) {
 ApiResponse error_response(const Error& error) { return error_response(http_status(error.code), error); }
 
 ApiResponse error_response(unsigned status, const Error& error) {
-  return {status, to_text({{"error", to_json(error)}})};
+  return {.status = status, .body = to_text({{"error", to_json(error)}}), .why = error.message};
 }
 
 }  // namespace scanrig

@@ -41,6 +41,7 @@ struct ApiResponse {
   unsigned status = 200;
   std::variant<std::string, std::shared_ptr<OpenFile>, EventStream> body{};
   std::string_view type = "application/json";
+  std::string why{};  ///< of an error: its message
 };
 
 struct Facts;

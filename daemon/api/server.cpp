@@ -75,7 +75,7 @@ struct ApiServer::Impl {
         loop(control),
         core({control, [this] { return latest_facts(); }, with.storage, with.preview_jpeg, with.check_config,
               with.reload, [this](std::function<void()> work) { net::post(core.workers, std::move(work)); }},
-             roles, with.tokens, with.limits, this_life()),
+             roles, with, this_life()),
         local(io, Local(), listening) {}
 
   void run() {

@@ -10,6 +10,7 @@
 #include "core/result.h"
 #include "daemon/api/admission.h"
 #include "daemon/api/peer.h"
+#include "daemon/journal/entry.h"
 #include "daemon/station/control_loop.h"
 
 namespace scanrig {
@@ -28,6 +29,7 @@ struct ApiOptions {
   /// Reads that file again and begins anew with it, where nothing is being done; the reply as ControlLoop::ask().
   std::function<void(ControlLoop::Reply)> reload = no_reload;  ///< may take its time; from any thread
   ApiLimits limits{};
+  std::function<void(JournalEntry)> journal = [](const auto&) {};  ///< orders refused; from any thread, must not wait
 
   static Result<std::string> no_preview(std::string_view) { return fail(ErrorCode::not_found, "there are no cameras"); }
   static Result<void> no_config() {

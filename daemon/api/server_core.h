@@ -8,22 +8,25 @@
 #include "daemon/api/admission.h"
 #include "daemon/api/event_hub.h"
 #include "daemon/api/router.h"
+#include "daemon/api/server.h"
 
 namespace scanrig {
 
 /// What all connections share. Outlives them.
 struct ServerCore {
-  ServerCore(ApiStation what, PeerRoles peers, const std::filesystem::path& tokens, ApiLimits most, std::string life)
+  ServerCore(ApiStation what, PeerRoles peers, const ApiOptions& options, std::string life)
       : station(std::move(what)),
-        access(peers, tokens),
-        limits(most),
-        admission(std::make_shared<Admission>(most)),
+        access(peers, options.tokens),
+        limits(options.limits),
+        journal(options.journal),
+        admission(std::make_shared<Admission>(options.limits)),
         hub(std::move(life)) {}
 
   const Router router;
   const ApiStation station;
   Access access;
   const ApiLimits limits;
+  const std::function<void(JournalEntry)> journal;
   const std::shared_ptr<Admission> admission;
   EventHub hub;
   std::atomic<std::uint64_t> requests = 0, refused = 0;

@@ -14,6 +14,8 @@ namespace http = boost::beast::http;
 const scanrig::Error kTooMany{ErrorCode::busy, "there are too many connections: try again later"};
 const scanrig::Error kTooOften{ErrorCode::busy, "too many requests: wait a moment"};
 const scanrig::Error kNoAnswer{ErrorCode::timeout, "the station did not answer in time: see scanrig status"};
+constexpr unsigned kFirstError = 400, kForbidden = 403;
+constexpr std::size_t kLongestPath = 200;  ///< in the log
 constexpr auto kDrainTime = std::chrono::seconds(1);
 
 std::string_view plain(boost::beast::string_view text) { return {text.data(), text.size()}; }
@@ -75,10 +77,15 @@ void ApiSession::on_header(Error error) {
   auto found = core_.router.find(plain(parser_->get().method_string()), plain(parser_->get().target()), as);
   if (!may || !found) {
     ++core_.refused;
+    const bool by_role = may && as && found.error().status == kForbidden;
+    if (const auto order = by_role ? order_of(*as) : std::nullopt) tell_refused(*order, found.error().why);
     last_ = last_ || !parser_->is_done();  // a body that nobody has read is in the way
     return write_text(may ? std::move(found.error()) : error_response(429, kTooOften));
   }
   match_ = std::move(*found);
+  order_ = order_of(*as);
+  const auto job = order_ ? find_job(core_.station, match_->values) : nullptr;
+  if (job) order_->job = job->id;
   if (parser_->is_done()) return call();
   stream_.expires_after(core_.limits.body_time);
   http::async_read(stream_, buffer_, *parser_,
@@ -106,6 +113,19 @@ void ApiSession::call() {
   } else {
     work();
   }
+}
+
+std::optional<ApiSession::Order> ApiSession::order_of(Role as) const {
+  const auto method = plain(parser_->get().method_string());
+  if (method == to_string(Method::get)) return std::nullopt;
+  const auto target = plain(parser_->get().target());
+  return Order{fmt::format("{} {}, asked for by {} ({})", method,
+                           target.substr(0, target.find('?')).substr(0, kLongestPath), seat_->peer(), to_string(as))};
+}
+
+void ApiSession::tell_refused(const Order& order, const std::string& why) const {
+  core_.journal(
+      {.priority = Priority::notice, .message = fmt::format("{}, is refused: {}", order.asked, why), .job = order.job});
 }
 
 void ApiSession::await_answer(std::chrono::milliseconds patience) {
@@ -138,6 +158,7 @@ void ApiSession::answer(ApiResponse response) {
   if (!waiting_) return;  // it was given up
   waiting_ = false;
   timer_.cancel();
+  if (order_ && response.status >= kFirstError) tell_refused(*order_, response.why);
   if (const auto* file = std::get_if<std::shared_ptr<OpenFile>>(&response.body)) {
     begin_file(*file, response.type);
   } else if (std::holds_alternative<EventStream>(response.body)) {

@@ -75,6 +75,7 @@ void add_camera(CLI::App& app, Chosen& chosen) {
     action->add_option("--exposure-us", verb->exposure_us, "instead of the configuration's; without a daemon")
         ->check(CLI::Range(10, 1'000'000));
     action->add_option("--gain", verb->gain, "instead of the configuration's; without a daemon");
+    action->add_flag("--json", verb->json, action == grab ? "print JSON" : "print JSON, a line a pair");
   }
   for (auto* action : {grab, preview}) {
     action->add_option("--out", verb->out, "folder for left and right")->capture_default_str();

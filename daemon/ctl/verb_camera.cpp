@@ -1,9 +1,9 @@
 #include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "core/files.h"
+#include "core/image_codec.h"
 #include "daemon/ctl/client.h"
 #include "daemon/ctl/free_rig.h"
 #include "daemon/ctl/verbs.h"
@@ -92,17 +92,42 @@ ExitCode list(const CameraVerb& verb) {
   return ExitCode::ok;
 }
 
-/// What to do about a picture, or nothing.
-const char* advice(const ImageEvidence& evidence) {
+/// A line of its own for each, as it comes.
+void print_json(const nlohmann::ordered_json& all) {
+  fmt::print("{}\n", all.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+  std::fflush(stdout);
+}
+
+void tell_files(const CameraVerb& verb, const std::filesystem::path& left, const std::filesystem::path& right) {
+  if (verb.json) return print_json({{"left", left.string()}, {"right", right.string()}});
+  fmt::print("{}\n{}\n", left.string(), right.string());
+}
+
+/// What to do about a picture; empty: nothing.
+std::string_view advice(const ImageEvidence& evidence) {
   constexpr double kDim = 0.03, kFull = 0.01;
-  if (evidence.saturated > kFull) return "  too bright: lower exposure_us or gain";
-  if (evidence.brightness < kDim) return "  dim: raise exposure_us, gain or light";
+  if (evidence.saturated > kFull) return "too bright: lower exposure_us or gain";
+  if (evidence.brightness < kDim) return "dim: raise exposure_us, gain or light";
   return "";
 }
 
-void tell(const char* side, const ImageEvidence& evidence) {
-  fmt::print("{:<5}  brightness {:5.1f} %  at full scale {:5.2f} %  blur {:4.2f} px{}\n", side,
-             100 * evidence.brightness, 100 * evidence.saturated, evidence.blur_px, advice(evidence));
+nlohmann::ordered_json to_json(const ImageEvidence& evidence) {
+  return {{"brightness", evidence.brightness},
+          {"saturated", evidence.saturated},
+          {"blur_px", evidence.blur_px},
+          {"advice", advice(evidence)}};
+}
+
+void tell(const CameraVerb& verb, const StereoFrame& pair) {
+  if (verb.json) return print_json({{"left", to_json(pair.left_evidence)}, {"right", to_json(pair.right_evidence)}});
+  for (const auto& [side, evidence] :
+       {std::pair("left", pair.left_evidence), std::pair("right", pair.right_evidence)}) {
+    const auto what_to_do = advice(evidence);
+    fmt::print("{:<5}  brightness {:5.1f} %  at full scale {:5.2f} %  blur {:4.2f} px{}{}\n", side,
+               100 * evidence.brightness, 100 * evidence.saturated, evidence.blur_px, what_to_do.empty() ? "" : "  ",
+               what_to_do);
+  }
+  std::fflush(stdout);
 }
 
 ExitCode tune(const CameraVerb& verb, Bench& bench) {
@@ -111,17 +136,15 @@ ExitCode tune(const CameraVerb& verb, Bench& bench) {
     if (i > 0) bench.clock().sleep_for(kPeriod);
     const auto pair = bench.expose(verb.light);
     if (!pair) return complain(pair.error());
-    tell("left", pair->left_evidence);
-    tell("right", pair->right_evidence);
-    std::fflush(stdout);
+    tell(verb, *pair);
   }
   return ExitCode::ok;
 }
 
 Result<void> write_png(const std::filesystem::path& file, const cv::Mat& image) {
-  std::vector<std::uint8_t> bytes;
-  cv::imencode(".png", image, bytes);
-  return write_file_atomically(file, std::as_bytes(std::span(bytes)));
+  const auto bytes = encode_png(image);
+  if (!bytes) return pass_on(bytes);
+  return write_file_atomically(file, *bytes);
 }
 
 ExitCode grab(const CameraVerb& verb, Bench& bench) {
@@ -135,8 +158,8 @@ ExitCode grab(const CameraVerb& verb, Bench& bench) {
   if (auto made = create_directories_synced(verb.out); !made) return complain(made.error());
   for (const auto& [file, image] : {std::pair(left, pair->left), std::pair(right, pair->right)}) {
     if (auto written = write_png(file, image); !written) return complain(written.error());
-    fmt::print("{}\n", file.string());
   }
+  tell_files(verb, left, right);
   return ExitCode::ok;
 }
 
@@ -145,16 +168,18 @@ using TakePictures = std::function<tl::expected<std::array<std::string, 2>, Refu
 
 ExitCode preview(const CameraVerb& verb, const TakePictures& take, Clock& clock) {
   if (auto made = create_directories_synced(verb.out); !made) return complain(made.error());
-  fmt::print("{} and {} follow the cameras\n", (verb.out / "left.jpg").string(), (verb.out / "right.jpg").string());
+  const auto left = verb.out / "left.jpg", right = verb.out / "right.jpg";
+  if (!verb.json) fmt::print("{} and {} follow the cameras\n", left.string(), right.string());
   std::fflush(stdout);
   const SignalStop signal;
   for (int i = 0; (verb.count == 0 || i < verb.count) && !signal.token().stop_requested(); ++i) {
     if (i > 0) clock.sleep_for(kPeriod);
     const auto pictures = take();
     if (!pictures) return complain(pictures.error().exit, pictures.error().message);
-    for (const auto& [name, jpeg] : {std::pair("left.jpg", (*pictures)[0]), std::pair("right.jpg", (*pictures)[1])}) {
-      if (auto written = write_file_atomically(verb.out / name, jpeg); !written) return complain(written.error());
+    for (const auto& [file, jpeg] : {std::pair(left, (*pictures)[0]), std::pair(right, (*pictures)[1])}) {
+      if (auto written = write_file_atomically(file, jpeg); !written) return complain(written.error());
     }
+    if (verb.json) tell_files(verb, left, right);
   }
   return ExitCode::ok;
 }

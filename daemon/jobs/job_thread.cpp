@@ -1,13 +1,12 @@
 #include "daemon/jobs/job_thread.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "core/files.h"
-#include "core/units.h"
+#include "core/image_codec.h"
 #include "daemon/actor_thread.h"
-#include "pipeline/closure/compare_views.h"
+#include "pipeline/closure/turned_table.h"
 
 namespace scanrig {
 namespace {
@@ -24,16 +23,6 @@ Result<void> keep_images(const ScanFolder& scan, int pose, std::size_t number, c
   files.push_back({fmt::format("closure{:02}_left.png", number), *left});
   files.push_back({fmt::format("closure{:02}_right.png", number), *right});
   return write_files_synced(folder, files);
-}
-
-/// What view 0 may have moved where the table itself says that it stands `turned_deg` off its first angle: views are
-/// placed by what it says, so that is no slip.
-CompareViewsOptions allowing_for(double turned_deg, const Camera& camera) {
-  constexpr double kReachMm = 60.0;  // of the largest object, from the axis
-  const double mm_per_px = camera.projection.mm_per_pixel(camera.camera_from_turntable.translation().norm());
-  CompareViewsOptions options;
-  options.most_shift_px += to_radians(std::abs(std::remainder(turned_deg, 360.0))) * kReachMm / mm_per_px;
-  return options;
 }
 
 }  // namespace
@@ -210,9 +199,11 @@ Result<Closure> JobThread::judge(const TakenView& again) {
   if (!calibration) return pass_on(calibration);
   const auto& record = scan_->manifest().poses[pose];
   const double turned = again.record.measured_deg - record.views[0].measured_deg;
-  const auto left = compare_views(first->left_plain, now->left_plain, allowing_for(turned, calibration->left));
+  const auto left =
+      compare_views(first->left_plain, now->left_plain, allowing_for(turned, calibration->left, *calibration));
   if (!left) return pass_on(left);
-  const auto right = compare_views(first->right_plain, now->right_plain, allowing_for(turned, calibration->right));
+  const auto right =
+      compare_views(first->right_plain, now->right_plain, allowing_for(turned, calibration->right, *calibration));
   if (!right) return pass_on(right);
 
   const Closure closure{again.id.pose, std::max(left->shift_px, right->shift_px),

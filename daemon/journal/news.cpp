@@ -20,7 +20,11 @@ void tell_fault(const Snapshot& before, const Snapshot& now, Entries& entries) {
   if (other || before.may_be_moving != now.may_be_moving) {
     const auto cause = now.may_be_moving ? fmt::format("{} {}", now.cause, now.sentence) : now.cause;
     entries.push_back({Priority::error,
-                       with_next(fmt::format("{}: {}", to_string(now.machine), cause), now.next_action), before.job});
+                       with_next(fmt::format("{}: {}", to_string(now.machine), cause), now.next_action),
+                       before.job,
+                       {},
+                       {},
+                       now.fault_device});
   } else if (before.next_action != now.next_action && !now.next_action.empty()) {
     entries.push_back({Priority::notice, with_next(std::string(to_string(now.machine)) + ".", now.next_action)});
   }
@@ -47,23 +51,27 @@ void tell_devices(const Snapshot& before, const Snapshot& now, Entries& entries)
   }
 }
 
+void tell_spoilt(const std::vector<Error>& spoilt, const std::string& job, int pose, int view, Entries& entries) {
+  for (const auto& why : spoilt) {
+    entries.push_back({Priority::warning, fmt::format("Exposed again: {}.", why.message), job, pose, view});
+  }
+}
+
 void tell_views(const JobInfo& before, const JobInfo& now, Entries& entries) {
   for (auto i = before.stored.size(); i < now.stored.size(); ++i) {
     const auto& view = now.stored[i];
-    for (const auto& why : view.spoilt) {
-      entries.push_back(
-          {Priority::warning, fmt::format("Exposed again: {}.", why.message), now.id, view.pose, view.view});
-    }
+    tell_spoilt(view.spoilt, now.id, view.pose, view.view, entries);
     entries.push_back(
         {Priority::info, fmt::format("Stored, taken at {:.3f} deg.", view.measured_deg), now.id, view.pose, view.view});
   }
   for (auto i = before.closures.size(); i < now.closures.size(); ++i) {
     const auto& closure = now.closures[i];
+    tell_spoilt(closure.spoilt, now.id, closure.pose, 0, entries);
     entries.push_back({closure.unmoved ? Priority::info : Priority::warning,
                        fmt::format("View 0 again: {}, {:.2f} px and {:.1f} % of what is seen differ.",
                                    closure.unmoved ? "nothing has moved" : "something has moved", closure.shift_px,
                                    100.0 * closure.changed),
-                       now.id, closure.pose});
+                       now.id, closure.pose, 0});
   }
 }
 
@@ -125,6 +133,13 @@ void tell_jobs(const Snapshot& before, const Snapshot& now, Entries& entries) {
 }
 
 }  // namespace
+
+JournalEntry refused_at_panel(const event::Pressed& pressed, const Error& why, const Snapshot& now) {
+  return {.priority = Priority::notice,
+          .message = fmt::format("Pressed at the panel, {} is refused: {}", to_string(pressed.button), why.message),
+          .job = now.job,
+          .device = "panel"};
+}
 
 std::vector<JournalEntry> news(const Snapshot& before, const Snapshot& now) {
   Entries entries;

@@ -10,6 +10,8 @@ namespace {
 
 double milliseconds(Clock::Duration duration) { return std::chrono::duration<double, std::milli>(duration).count(); }
 
+constexpr auto kTurntable = "turntable", kProjector = "projector", kCamera = "camera";
+
 constexpr double kMostWound = 4 * 360.0;
 
 /// `angle` plus as many whole turns as bring it nearest to `to`.
@@ -24,14 +26,15 @@ bool may_pass(const Error& error) {
 }  // namespace
 
 Result<void> Acquisition::home() {
-  if (auto dark = devices_.projector.dark(Deadline::after(clock_, options_.exposure_limit)); !dark) {
+  if (auto dark = from(kProjector, devices_.projector.dark(Deadline::after(clock_, options_.exposure_limit))); !dark) {
     return pass_on(dark);
   }
-  if (auto reset = devices_.turntable.reset_alarm(Deadline::after(clock_, options_.stop_limit)); !reset) {
+  if (auto reset = from(kTurntable, devices_.turntable.reset_alarm(Deadline::after(clock_, options_.stop_limit)));
+      !reset) {
     return pass_on(reset);
   }
   position_deg_ = 0.0;
-  if (auto home = devices_.turntable.home(Deadline::after(clock_, options_.home_limit)); !home) {
+  if (auto home = from(kTurntable, devices_.turntable.home(Deadline::after(clock_, options_.home_limit))); !home) {
     return pass_on(home);
   }
   return {};
@@ -63,10 +66,10 @@ Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle) {
 }
 
 Result<Degrees> Acquisition::jog(const action::Jog& jog) {
-  if (auto limited = devices_.turntable.limit_speed(jog.speed); !limited) return pass_on(limited);
-  auto move = devices_.turntable.rotate_to({jog.angle.value + (jog.relative ? position_deg_ : 0.0)},
-                                           Deadline::after(clock_, options_.move_limit));
-  auto free = devices_.turntable.limit_speed(std::nullopt);
+  if (auto limited = from(kTurntable, devices_.turntable.limit_speed(jog.speed)); !limited) return pass_on(limited);
+  const Degrees target{jog.angle.value + (jog.relative ? position_deg_ : 0.0)};
+  auto move = from(kTurntable, devices_.turntable.rotate_to(target, Deadline::after(clock_, options_.move_limit)));
+  auto free = from(kTurntable, devices_.turntable.limit_speed(std::nullopt));
   if (!move) return pass_on(move);
   if (!free) return pass_on(free);
   position_deg_ = move->commanded.value;
@@ -74,7 +77,7 @@ Result<Degrees> Acquisition::jog(const action::Jog& jog) {
 }
 
 Result<void> Acquisition::pulse() {
-  return devices_.projector.fire(Light::pattern, Deadline::after(clock_, options_.exposure_limit));
+  return from(kProjector, devices_.projector.fire(Light::pattern, Deadline::after(clock_, options_.exposure_limit)));
 }
 
 Result<StereoFrame> Acquisition::look() {
@@ -86,9 +89,8 @@ std::vector<DeviceHealth> Acquisition::check() {
   const auto health = [](const char* name, const auto& answer) {
     return DeviceHealth{name, answer ? std::nullopt : std::optional(answer.error())};
   };
-  return {health("turntable", devices_.turntable.status(limit())),
-          health("projector", devices_.projector.dark(limit())),
-          health("camera", devices_.camera.ready(Deadline::after(clock_, options_.connect_limit)))};
+  return {health(kTurntable, devices_.turntable.status(limit())), health(kProjector, devices_.projector.dark(limit())),
+          health(kCamera, devices_.camera.ready(Deadline::after(clock_, options_.connect_limit)))};
 }
 
 Acquisition::Stop Acquisition::stop() {
@@ -100,7 +102,7 @@ Acquisition::Stop Acquisition::stop() {
 Result<Move> Acquisition::turn_to(Degrees angle) {
   double target = nearest_turn(angle.value, position_deg_);
   if (std::abs(target) > kMostWound) target = angle.value;
-  auto move = devices_.turntable.rotate_to({target}, Deadline::after(clock_, options_.move_limit));
+  auto move = from(kTurntable, devices_.turntable.rotate_to({target}, Deadline::after(clock_, options_.move_limit)));
   if (!move) return move;
   position_deg_ = target;
   // Some turntables count turns, some do not: recorded is the angle within the turn that was asked for.
@@ -111,7 +113,10 @@ Result<Move> Acquisition::turn_to(Degrees angle) {
 
 Result<StereoFrame> Acquisition::expose(Light light, unsigned before, std::vector<Error>& spoilt) {
   for (int i = 0;; ++i) {
-    if (interrupts_ != before) return fail(ErrorCode::stopped, "rig: stopped on request before the exposure");
+    if (interrupts_ != before) {
+      failed_.clear();
+      return fail(ErrorCode::stopped, "rig: stopped on request before the exposure");
+    }
     auto frame = expose_once(light);
     if (frame || !may_pass(frame.error()) || i == options_.redo_limit || interrupts_ != before) return frame;
     spoilt.push_back(frame.error());
@@ -119,15 +124,16 @@ Result<StereoFrame> Acquisition::expose(Light light, unsigned before, std::vecto
 }
 
 Result<StereoFrame> Acquisition::expose_once(Light light) {
-  if (auto armed = devices_.camera.arm(Deadline::after(clock_, options_.exposure_limit)); !armed) {
+  if (auto armed = from(kCamera, devices_.camera.arm(Deadline::after(clock_, options_.exposure_limit))); !armed) {
     return pass_on(armed);
   }
-  if (auto fired = devices_.projector.fire(light, Deadline::after(clock_, options_.exposure_limit)); !fired) {
+  if (auto fired = from(kProjector, devices_.projector.fire(light, Deadline::after(clock_, options_.exposure_limit)));
+      !fired) {
     return pass_on(fired);
   }
-  auto frame = devices_.camera.collect(Deadline::after(clock_, options_.exposure_limit));
+  auto frame = from(kCamera, devices_.camera.collect(Deadline::after(clock_, options_.exposure_limit)));
   if (!frame) return frame;
-  if (auto good = judge_.judge(light, *frame); !good) return pass_on(good);
+  if (auto good = from(kCamera, judge_.judge(light, *frame)); !good) return pass_on(good);
   seen_(*frame);
   return frame;
 }

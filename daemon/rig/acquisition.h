@@ -62,11 +62,20 @@ class Acquisition {
   /// Both are tried, whatever the other says.
   Stop stop();
 
+  /// The device that the last error came from, as DeviceHealth names it; of the owner's thread.
+  [[nodiscard]] const std::string& failed_device() const { return failed_; }
+
   /// Nothing is redone in what runs now. From any thread.
   void interrupt() noexcept { ++interrupts_; }
   [[nodiscard]] unsigned interrupts() const { return interrupts_; }
 
  private:
+  /// Passes on what a device answered; of an error, notes whose it is.
+  template <class Answer>
+  Answer from(const char* device, Answer answer) {
+    if (!answer) failed_ = device;
+    return answer;
+  }
   Result<Move> turn_to(Degrees angle);
   /// `before`: what interrupts() was when the view was begun.
   Result<StereoFrame> expose(Light light, unsigned before, std::vector<Error>& spoilt);
@@ -78,7 +87,8 @@ class Acquisition {
   const std::function<void(const StereoFrame&)> seen_;
   std::atomic<unsigned> interrupts_ = 0;
   PictureJudge judge_;
-  std::string job_;            ///< whose pictures it knows
+  std::string job_;  ///< whose pictures it knows
+  std::string failed_;
   double position_deg_ = 0.0;  ///< where the last move ended, turns counted from home
 };
 

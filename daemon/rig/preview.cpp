@@ -1,8 +1,9 @@
 #include "daemon/rig/preview.h"
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <utility>
+
+#include "core/image_codec.h"
 
 namespace scanrig {
 namespace {
@@ -14,9 +15,9 @@ Result<std::string> encode(const cv::Mat& image, PixelFormat format) {
   try {
     cv::Mat colour = image;
     if (format == PixelFormat::bayer_rggb8) cv::cvtColor(image, colour, cv::COLOR_BayerRGGB2BGR);
-    std::vector<std::uint8_t> bytes;
-    cv::imencode(".jpg", colour, bytes, {cv::IMWRITE_JPEG_QUALITY, kQuality});
-    return std::string(bytes.begin(), bytes.end());
+    const auto bytes = encode_jpeg(colour, kQuality);
+    if (!bytes) return pass_on(bytes, "preview");
+    return std::string(as_text(*bytes));
   } catch (const cv::Exception& error) {
     return fail(ErrorCode::internal, "preview: {}", error.what());
   }

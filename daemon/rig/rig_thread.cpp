@@ -62,24 +62,24 @@ Result<void> RigThread::home_now() {
 Event RigThread::perform(const Command& command) {
   if (std::holds_alternative<action::Home>(command)) {
     auto home = home_now();
-    if (!home) return event::RigFailed{home.error()};
+    if (!home) return event::RigFailed{home.error(), acquisition_.failed_device()};
     return event::Homed{};
   }
   if (const auto* view = std::get_if<action::TakeView>(&command)) {
     auto taken = acquisition_.take_view(view->id, view->angle);
-    if (!taken) return event::RigFailed{taken.error()};
+    if (!taken) return event::RigFailed{taken.error(), acquisition_.failed_device()};
     auto shared = std::make_shared<const TakenView>(std::move(*taken));
     if (view->closure) return event::ClosureTaken{std::move(shared)};
     return event::ViewTaken{std::move(shared)};
   }
   if (const auto* jog = std::get_if<action::Jog>(&command)) {
     const auto measured = acquisition_.jog(*jog);
-    if (!measured) return event::RigFailed{measured.error()};
+    if (!measured) return event::RigFailed{measured.error(), acquisition_.failed_device()};
     return event::Jogged{*measured};
   }
   if (std::holds_alternative<action::Pulse>(command)) {
     const auto fired = acquisition_.pulse();
-    if (!fired) return event::RigFailed{fired.error()};
+    if (!fired) return event::RigFailed{fired.error(), acquisition_.failed_device()};
     return event::Pulsed{};
   }
   if (std::holds_alternative<action::CheckDevices>(command)) return event::DevicesSeen{acquisition_.check()};

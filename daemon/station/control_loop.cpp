@@ -22,6 +22,7 @@ ControlLoop::ControlLoop(Clock& clock, ControlLoopOptions options, JobTable know
   for (const auto& [id, job] : jobs_) {
     state_ = next(state_, event::JobKnown{job}, options_.rules).state;
   }
+  state_.warm_up_left = options_.warm_up;
   publish({});
 }
 
@@ -62,6 +63,8 @@ void ControlLoop::handle(Message message, const StationPorts& ports) {
   for (const auto& action : step.actions) carry_out(action, ports);
   show(ports);
   publish(ports);
+  const auto* pressed = std::get_if<event::Pressed>(&message.event);
+  if (step.refused && pressed && pressed->origin == Origin::panel) ports.refused_at_panel(*pressed, *step.refused);
   answer(message, step);
   if (std::holds_alternative<event::CheckDue>(message.event)) look_at_the_time(ports);
 }
@@ -108,10 +111,22 @@ void ControlLoop::answer(Message& message, const Step& step) {
   }
 }
 
-/// Quiet hours come and go by the clock on the wall.
+/// Quiet hours come and go by the clock on the wall, and the projector gets warm.
 void ControlLoop::look_at_the_time(const StationPorts& ports) {
   const bool quiet = ports.quiet_hours();
   if (quiet != state_.quiet) handle({event::QuietHours{quiet}, {}}, ports);
+  const auto left = warm_up_left();
+  if (left != state_.warm_up_left) handle({event::WarmingUp{left}, {}}, ports);
+}
+
+/// A projector that was away may have been without power: it begins anew.
+std::chrono::seconds ControlLoop::warm_up_left() {
+  const auto now = clock_.now();
+  const auto projector = std::ranges::find(state_.devices, "projector", &DeviceHealth::name);
+  const bool there = projector != state_.devices.end() && !projector->problem;
+  projector_since_ = there ? projector_since_.value_or(now) : std::optional<Clock::TimePoint>();
+  const auto left = projector_since_.value_or(now) + options_.warm_up - now;
+  return std::max(std::chrono::seconds(0), std::chrono::ceil<std::chrono::seconds>(left));
 }
 
 void ControlLoop::carry_out(const Action& action, const StationPorts& ports) {
@@ -158,6 +173,7 @@ void ControlLoop::publish(const StationPorts& ports) {
       .sentence = std::move(words.sentence),
       .next_action = std::move(words.next_action),
       .may_be_moving = state_.may_be_moving,
+      .fault_device = state_.machine == MachineState::error ? state_.fault_device : std::string(),
       .inputs = state_.inputs,
       .outputs = shown_,
       .devices = std::move(devices),

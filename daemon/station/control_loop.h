@@ -3,6 +3,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "core/clock.h"
@@ -23,6 +24,7 @@ struct StationPorts {
   std::function<std::string()> fresh_job_id;  ///< another one each time
   std::function<bool()> quiet_hours = [] { return false; };
   std::function<void(const std::shared_ptr<const Snapshot>&)> published = [](const auto&) {};
+  std::function<void(const event::Pressed&, const Error& why)> refused_at_panel = [](const auto&, const auto&) {};
 };
 
 /// Why the control loop ended.
@@ -35,6 +37,7 @@ struct ControlLoopOptions {
   Clock::Duration stop_retry = std::chrono::seconds(1);           ///< while the table may be moving
   Clock::Duration check_period = std::chrono::seconds(2);         ///< of the devices, in quiet times
   Clock::Duration shutdown_limit = std::chrono::seconds(5);       ///< for the rig to be seen stopped
+  std::chrono::seconds warm_up{0};  ///< of the projector: no job begins by itself before it was there for so long
 };
 
 /// The thread of the state machine: takes events one by one, decides, hands out actions, publishes a snapshot.
@@ -77,6 +80,7 @@ class ControlLoop {
   void answer(Message& message, const Step& step);
   [[nodiscard]] std::string still_doing() const;
   void look_at_the_time(const StationPorts& ports);
+  [[nodiscard]] std::chrono::seconds warm_up_left();
   void carry_out(const Action& action, const StationPorts& ports);
   void wake_later(Event event, Clock::Duration after);
   void blink(const StationPorts& ports);
@@ -104,6 +108,7 @@ class ControlLoop {
   Clock::TimePoint next_blink_ = Clock::TimePoint::max();
   Clock::TimePoint lamps_tested_ = Clock::TimePoint::min();
   Clock::TimePoint give_up_ = Clock::TimePoint::max();
+  std::optional<Clock::TimePoint> projector_since_;  // has been there; nothing: it is not
 };
 
 }  // namespace scanrig

@@ -72,6 +72,9 @@ struct CheckDue {};
 struct QuietHours {
   bool quiet;
 };  ///< they have begun or ended
+struct WarmingUp {
+  std::chrono::seconds left;
+};  ///< the projector will be warm then; 0: it is
 struct DevicesSeen {
   std::vector<DeviceHealth> devices;
 };
@@ -96,7 +99,8 @@ struct Stopped {
 };                               ///< the table is seen standing
 struct RigFailed {
   Error error;
-};  ///< a move or an exposure; the motor has been told to stop
+  std::string device{};  ///< whose failure it is, as DeviceHealth names it
+};                       ///< a move or an exposure; the motor has been told to stop
 struct StopFailed {
   Error error;
 };  ///< nobody knows whether the table moves
@@ -203,12 +207,13 @@ struct Shutdown {};
 using Event =
     std::variant<event::PanelFound, event::InputsSeen, event::Pressed, event::EstopChanged, event::GuardChanged,
                  event::WarningOver, event::EstopWindowOver, event::StopRetryDue, event::CheckDue, event::QuietHours,
-                 event::DevicesSeen, event::MaintenanceAsked, event::Jogged, event::Pulsed, event::Homed,
-                 event::ViewTaken, event::Stopped, event::RigFailed, event::StopFailed, event::PanelFailed,
-                 event::Ordered, event::JobAsked, event::Answered, event::JobKnown, event::JobRemoved, event::JobBegun,
-                 event::JobNotBegun, event::ClosureTaken, event::ClosureJudged, event::FlipTimedOut, event::ViewStored,
-                 event::PoseStored, event::JobClosed, event::StoreFailed, event::StageProgress,
-                 event::ReconstructionFailed, event::ModelReady, event::ReloadAsked, event::Shutdown>;
+                 event::WarmingUp, event::DevicesSeen, event::MaintenanceAsked, event::Jogged, event::Pulsed,
+                 event::Homed, event::ViewTaken, event::Stopped, event::RigFailed, event::StopFailed,
+                 event::PanelFailed, event::Ordered, event::JobAsked, event::Answered, event::JobKnown,
+                 event::JobRemoved, event::JobBegun, event::JobNotBegun, event::ClosureTaken, event::ClosureJudged,
+                 event::FlipTimedOut, event::ViewStored, event::PoseStored, event::JobClosed, event::StoreFailed,
+                 event::StageProgress, event::ReconstructionFailed, event::ModelReady, event::ReloadAsked,
+                 event::Shutdown>;
 
 /// What is to be done about it. None of them waits.
 namespace action {

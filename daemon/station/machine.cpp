@@ -35,23 +35,25 @@ void Machine::close_job(JobState state, Error why) {
   s().job.reset();
 }
 
-void Machine::fault(std::string cause) {
+void Machine::fault(std::string cause, std::string device) {
   close_job(JobState::interrupted, {ErrorCode::stopped, cause});
   s().machine = MachineState::error;
   s().cause = std::move(cause);
   s().latched = true;
   s().home_by_guard = false;
   s().unnamed.reset();
+  s().fault_device = std::move(device);
   s().maintenance.reset();
   stop_rig();
 }
 
-void Machine::fault_unnamed(const Error& error) {
+void Machine::fault_unnamed(const event::RigFailed& failure) {
   s().machine = MachineState::error;
   s().cause = "A device failed; looking whether it was the e-stop.";
   s().latched = true;
   s().home_by_guard = false;
-  s().unnamed = error;
+  s().unnamed = failure.error;
+  s().fault_device = failure.device;
   s().maintenance.reset();
   stop_rig();
   act(action::WaitForEstop{});

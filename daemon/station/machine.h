@@ -35,10 +35,10 @@ class Machine {
   void close_job(JobState state, Error why);
 
   /// Stops what moves; only Reset at the panel leaves the state.
-  void fault(std::string cause);
+  void fault(std::string cause, std::string device = {});
   /// The same for a device that failed: safe at once, but it has its name only when an e-stop would have been seen,
   /// because an e-stop takes the power away from drives and adapters too.
-  void fault_unnamed(const Error& error);
+  void fault_unnamed(const event::RigFailed& failure);
   void name_fault();
 
   /// Why nothing may move now; null: it may.

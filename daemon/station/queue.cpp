@@ -137,7 +137,8 @@ void inputs_seen(Machine& m, const PanelInputs& inputs) {
 
 void begin_on_part(Machine& m) {
   auto& s = m.s();
-  if (s.activity != Activity::waiting_for_part || !s.part_gone || !s.inputs.part_present || s.quiet) return;
+  if (s.activity != Activity::waiting_for_part || !s.part_gone || !s.inputs.part_present) return;
+  if (s.quiet || s.warm_up_left > std::chrono::seconds(0)) return;
   if (!goes_on_by_itself(s) || s.shutting_down || m.unsafe() || m.absent_device()) return;
   begin_next_job(m, {}, "A new part is on the table.");
 }

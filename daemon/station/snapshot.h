@@ -21,6 +21,7 @@ struct Snapshot {
   std::string sentence{};
   std::string next_action{};
   bool may_be_moving = false;  ///< the last stop was not confirmed
+  std::string fault_device{};  ///< in Error: whose failure it is; empty: nobody's, as of an e-stop
   PanelInputs inputs{};
   PanelOutputs outputs{};
   std::vector<DeviceHealth> devices{};  ///< as of the last check

@@ -109,6 +109,11 @@ class Transition : public Machine {
     begin_on_part(*this);
   }
 
+  void operator()(const event::WarmingUp& e) {
+    s().warm_up_left = e.left;
+    begin_on_part(*this);
+  }
+
   /// A projector that cannot be reached is an absent device; it does not make the table move.
   void operator()(const event::Stopped& e) {
     s().may_be_moving = false;
@@ -120,12 +125,15 @@ class Transition : public Machine {
 
   void operator()(const event::RigFailed& e) {
     if (s().activity == Activity::stopping || s().machine == MachineState::error) return;  // cut short by the stop
-    fault_unnamed(e.error);
+    fault_unnamed(e);
   }
 
   /// The first cause stays: an e-stop is an e-stop, whatever a drive without power answers.
   void operator()(const event::StopFailed& e) {
-    if (s().machine != MachineState::error) s().cause = fmt::format("The table may be moving: {}.", e.error.message);
+    if (s().machine != MachineState::error) {
+      s().cause = fmt::format("The table may be moving: {}.", e.error.message);
+      s().fault_device = "turntable";
+    }
     s().machine = MachineState::error;
     s().latched = true;
     s().home_by_guard = false;
@@ -140,7 +148,7 @@ class Transition : public Machine {
   void operator()(const event::PanelFailed& e) {
     s().panel_known = false;
     s().panel_problem = e.error;
-    if (s().machine != MachineState::error) fault(e.error.message + ".");
+    if (s().machine != MachineState::error) fault(e.error.message + ".", "panel");
   }
 
   void operator()(const event::Ordered& e) { take_order(*this, e); }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <map>
 #include <memory>
 #include <optional>
@@ -56,6 +57,7 @@ struct StationState {
   bool latched = false;            ///< a fault that only Reset at the panel clears
   bool home_by_guard = true;       ///< nothing but a restart lies behind us
   std::optional<Error> unnamed{};  ///< a fault that may turn out to be the e-stop
+  std::string fault_device{};      ///< whose failure the last fault is; empty: nobody's, as of an e-stop
   std::optional<Maintenance> maintenance{};
   PanelInputs inputs{};
   std::optional<Error> panel_problem{};
@@ -69,6 +71,7 @@ struct StationState {
   std::vector<std::shared_ptr<const JobInfo>> queue{};  ///< by place
   int failures = 0;                                     ///< jobs in a row without a model that passes
   bool quiet = false;                                   ///< quiet hours: no job begins by itself
+  std::chrono::seconds warm_up_left{0};                 ///< of the projector: until then likewise
   bool disk_trouble = false;                            ///< the jobs' disk refused something; until a job begins
   bool part_gone = false;                               ///< the part of the last job was taken away
 };

@@ -56,10 +56,22 @@ std::string how_to_start(const StationState& state) {
   return fmt::format("Put the object for {} on the table, then press Start.", name);
 }
 
+bool warming_up(const StationState& state) { return state.warm_up_left > std::chrono::seconds(0); }
+
+/// What keeps the next job from beginning by itself although its part may be there.
+std::string what_holds_the_line(const StationState& state) {
+  if (state.quiet) return "Quiet hours: the queue goes on when they end.";
+  if (!warming_up(state)) return "";
+  return fmt::format("The projector is warming up: the queue goes on in {} s, or at once with Start.",
+                     state.warm_up_left.count());
+}
+
 Words when_ready(const StationState& state, const StationRules& rules) {
   const auto queued = state.queue.size();
-  return {queued == 0 ? "The rig is ready." : fmt::format("The rig is ready, {} in the queue.", queued),
-          with_light(rules, "Switch the projector on. ", how_to_start(state))};
+  auto sentence =
+      queued == 0 ? std::string("The rig is ready.") : fmt::format("The rig is ready, {} in the queue.", queued);
+  if (warming_up(state)) sentence += fmt::format(" The projector will be warm in {} s.", state.warm_up_left.count());
+  return {std::move(sentence), with_light(rules, "Switch the projector on. ", how_to_start(state))};
 }
 
 /// What has to be seen to besides: the next action alone would lead into the same trouble again.
@@ -74,8 +86,7 @@ Words when_executing(const StationState& state) {
             how_to_flip(state.job->recipe)};
   }
   if (state.activity == Activity::waiting_for_part) {
-    return {fmt::format("Waiting for the next part, {} in the queue.", state.queue.size()),
-            state.quiet ? "Quiet hours: the queue goes on when they end." : ""};
+    return {fmt::format("Waiting for the next part, {} in the queue.", state.queue.size()), what_holds_the_line(state)};
   }
   return {working(state), ""};
 }

@@ -2,8 +2,9 @@
 
 #include <optional>
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "core/image_codec.h"
 
 namespace scanrig {
 namespace {
@@ -31,13 +32,14 @@ std::optional<int> to_bgr(Layout layout) {
 }
 
 Result<Picture> decode(const RawImage& raw) {
-  const cv::Mat bytes(1, static_cast<int>(raw.bytes.size()), CV_8U, const_cast<std::uint8_t*>(raw.bytes.data()));
-  cv::Mat image = cv::imdecode(bytes, cv::IMREAD_COLOR);
-  if (image.empty() || image.size() != raw.size) {
-    return fail(ErrorCode::protocol, "camera: {} bytes that should be a JPEG of {}x{} are not", raw.bytes.size(),
+  const std::string_view bytes(reinterpret_cast<const char*>(raw.bytes.data()), raw.bytes.size());
+  const auto image = decode_jpeg(bytes);
+  if (!image) return fail(ErrorCode::protocol, "camera: {} bytes: {}", raw.bytes.size(), image.error().message);
+  if (image->size() != raw.size) {
+    return fail(ErrorCode::protocol, "camera: a JPEG image of {}x{} that should be of {}x{}", image->cols, image->rows,
                 raw.size.width, raw.size.height);
   }
-  return Picture{image, PixelFormat::bgr8};
+  return Picture{*image, PixelFormat::bgr8};
 }
 
 cv::Mat upper_8_bits(const cv::Mat& words, int bits) {

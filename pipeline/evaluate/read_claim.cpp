@@ -1,9 +1,9 @@
 #include <charconv>
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <string_view>
 
 #include "core/files.h"
+#include "core/image_codec.h"
 #include "pipeline/evaluate/evaluate.h"
 #include "pipeline/scan/model/mesh_reader.h"
 #include "pipeline/scan/strict_json.h"
@@ -76,7 +76,7 @@ Result<Claim> read_claim(const std::filesystem::path& folder) {
     if (const auto read = read_corner_uv(folder / "model.obj", claim.model); !read) return pass_on(read);
     const auto bytes = read_file(folder / "model.png");
     if (!bytes) return pass_on(bytes);
-    auto atlas = decode_image(*bytes);
+    auto atlas = decode_png(*bytes);
     if (!atlas) return pass_on(atlas, (folder / "model.png").string());
     if (atlas->type() != CV_8UC3) {
       return fail(ErrorCode::invalid_input, "{}: not an 8-bit colour image", (folder / "model.png").string());

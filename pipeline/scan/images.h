@@ -1,10 +1,7 @@
 #pragma once
 
-#include <cstddef>
 #include <opencv2/core/mat.hpp>
 #include <string>
-#include <string_view>
-#include <vector>
 
 #include "core/result.h"
 #include "pipeline/scan/manifest.h"
@@ -29,12 +26,5 @@ Result<ViewImages> to_view_images(const RawView& raw, const ViewRecord& record);
 
 /// Whether every image is 8 bit, has the format's channels and left and right each have one size. `invalid_input`.
 Result<void> check_images(const RawView& raw);
-
-/// PNG, lightly compressed. Fails with `invalid_input` (not an image a PNG can hold).
-Result<std::vector<std::byte>> encode_png(const cv::Mat& image);
-/// 32-bit float TIFF; NaN is kept.
-Result<std::vector<std::byte>> encode_tiff(const cv::Mat1f& depth);
-/// Either, as it is stored. Fails with `invalid_input` (unreadable or truncated).
-Result<cv::Mat> decode_image(std::string_view bytes);
 
 }  // namespace scanrig

@@ -5,6 +5,7 @@
 
 #include "core/files.h"
 #include "core/hash.h"
+#include "core/image_codec.h"
 #include "pipeline/scan/grid_surface.h"
 
 namespace scanrig {

@@ -1,10 +1,10 @@
 #include "sim/apps/shoot.h"
 
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
 #include "core/files.h"
 #include "core/hash.h"
+#include "core/image_codec.h"
 #include "core/units.h"
 #include "sim/scene/profile.h"
 #include "sim/scene/random.h"
@@ -18,14 +18,10 @@ using nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
 Result<std::string> save_png(const cv::Mat& image, const fs::path& file) {
-  std::vector<std::uint8_t> png;
-  // Noise does not compress: the fastest level costs 3 % of size and saves most of the time.
-  if (!cv::imencode(".png", image, png, {cv::IMWRITE_PNG_COMPRESSION, 1})) {
-    return fail(ErrorCode::io, "shoot: cannot encode {}", file.string());
-  }
-  const auto bytes = std::as_bytes(std::span(png));
-  if (const auto written = write_file_atomically(file, bytes); !written) return pass_on(written);
-  return sha256(bytes);
+  const auto bytes = encode_png(image);
+  if (!bytes) return pass_on(bytes, "shoot");
+  if (const auto written = write_file_atomically(file, *bytes); !written) return pass_on(written);
+  return sha256(*bytes);
 }
 
 Result<ordered_json> shoot_view(Scene& scene, int pose, int index, double commanded, double true_deg,

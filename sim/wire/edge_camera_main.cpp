@@ -22,11 +22,12 @@
 #include <filesystem>
 #include <functional>
 #include <iostream>
-#include <opencv2/imgcodecs.hpp>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "core/files.h"
+#include "core/image_codec.h"
 #include "sim/wire/gige_camera.h"
 #include "sim/wire/usbip_server.h"
 
@@ -45,7 +46,10 @@ class Sight {
     for (;;) {
       const auto view = folder / "pose1" / fmt::format("view{:02}", views_.size());
       if (!std::filesystem::is_directory(view)) return;
-      const auto image = [&](const char* name) { return cv::imread((view / name).string(), cv::IMREAD_UNCHANGED); };
+      const auto image = [&](const char* name) {
+        const auto bytes = read_file(view / name);
+        return bytes ? decode_png(*bytes).value_or(cv::Mat()) : cv::Mat();
+      };
       views_.push_back({{image("left_pattern.png"), image("right_pattern.png")},
                         {image("left_plain.png"), image("right_plain.png")}});
     }

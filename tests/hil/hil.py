@@ -113,17 +113,23 @@ def run(options, work, table):
     begin = time.monotonic()
     if options.cold:
         shutil.rmtree(cache, ignore_errors=True)
-    cached, was_there = image.prepare(cache, [options.bin / "scanrigd", options.bin / "scanrig"])
+    cached, was_there = image.prepare(cache, [options.bin / name for name in stations.PROGRAMS])
+    system, booted = image.prepare_system(cached)
+    was_there = was_there and booted
     images, rendered = render(options.bin, cached)
     tree = work / "tree"
     stations.make_tree(build, tree, images)
-    image.make_app(cached, tree, work / "app.sqfs")
+    image.make_app(tree, work / "app.sqfs")
     machine.make_disk(work / "disk.ext4")
     print(f"images {'cached' if was_there else 'made'}: {time.monotonic() - begin:.0f} s", flush=True)
 
     with stations.motion_rig.Rig(options.bin, work / "rig") as rig:
+        app = work / "app.sqfs"
+        installed = stations.install(work, system, app, rig.folder / "turntable")
+        print(f"the project installed: {time.monotonic() - begin:.0f} s", flush=True)
+
         def boot():
-            return Station(work, cached, work / "app.sqfs", rig)
+            return Station(work, system, app, rig, installed)
 
         if options.only:
             with boot() as station:

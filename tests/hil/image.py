@@ -2,10 +2,12 @@
 
 base.sqfs   Debian: systemd, udev and the packages that the installed programs' libraries are in
 kernel/     Debian's kernel, the modules that the scenario needs, gpio-sim built from the same kernel's source
-initrd      busybox: lays app.sqfs over base.sqfs and a tmpfs over both
-app.sqfs    what `cmake --install` installs, and tests/hil/guest; made anew every time
+initrd      busybox: lays system.sqfs over base.sqfs and a tmpfs over both
+system-*/   what makes Debian this machine: system.sqfs of tests/hil/guest and the modules, and the machine booted
+app.sqfs    what `cmake --install` installs; made anew every time
 """
 import hashlib
+import os
 import pathlib
 import platform
 import re
@@ -20,6 +22,7 @@ SYSTEM_PACKAGES = ["systemd-sysv", "udev", "kmod", "dbus", "iproute2", "procps",
 INITRD_MODULES = ["virtio_pci", "virtio_blk", "squashfs", "overlay", "ext4", "virtio_console"]
 MODULES = INITRD_MODULES + ["vivid", "vhci_hcd", "usbhid", "ftdi_sio", "xhci_pci", "virtio_net", "veth", "configfs",
                             "gpio_sim", "v4l2loopback"]
+APP_SIZE = 64 << 20
 SQUASH = ["-comp", "lz4", "-noappend", "-no-progress", "-quiet", "-all-root"]
 
 
@@ -143,10 +146,32 @@ def make_initrd(folder, modules):
     shutil.rmtree(tree)
 
 
-def make_app(cached, tree, target):
-    """`tree`: an installation of the project and whatever else goes over the base."""
-    shutil.copytree(cached / "kernel", tree / "usr", dirs_exist_ok=True)  # /lib is a link to usr/lib
+def make_app(tree, target):
+    """`tree`: an installation of the project and what else is installed in the booted machine."""
     run("mksquashfs", tree, target, *SQUASH)
+    os.truncate(target, APP_SIZE)  # the machine was booted with a disk of that size
+
+
+def prepare_system(cached):
+    """The folder with system.sqfs, made if it is not there; and whether the machine booted with it has been kept."""
+    parts = sorted(file for file in [*(HERE / "guest").rglob("*"), HERE / "machine.py"] if file.is_file())
+    recipe = [run("qemu-system-x86_64", "--version"), *(f"{file.relative_to(HERE)} {file.read_text()}" for file in parts)]
+    done = cached / f"system-{key_of(recipe)}"
+    if not done.is_dir():
+        for old in cached.glob("system-*"):
+            shutil.rmtree(old)
+        making = cached / "system.part"
+        shutil.rmtree(making, ignore_errors=True)
+        shutil.copytree(HERE / "guest", making / "tree", symlinks=True)
+        shutil.copytree(cached / "kernel", making / "tree" / "usr", dirs_exist_ok=True)  # /lib is a link to usr/lib
+        run("mksquashfs", making / "tree", making / "system.sqfs", *SQUASH)
+        shutil.rmtree(making / "tree")
+        making.rename(done)
+    return done, (done / "booted").is_file()
+
+
+def key_of(recipe):
+    return hashlib.sha256("\n".join(recipe).encode()).hexdigest()[:12]
 
 
 def prepare(cache, programs):
@@ -154,7 +179,7 @@ def prepare(cache, programs):
     version = kernel_version()
     packages = SYSTEM_PACKAGES + library_packages(programs)
     recipe = [version, *packages, pathlib.Path(__file__).read_text(), (HERE / "initrd_init.sh").read_text()]
-    key = hashlib.sha256("\n".join(recipe).encode()).hexdigest()[:12]
+    key = key_of(recipe)
     done = cache / key
     if done.is_dir():
         return done, True

@@ -67,18 +67,18 @@ def free_port():
 
 
 class Machine:
-    """`folder` keeps its disk, its sockets and what its console said. `cached`: vmlinuz, initrd, base.sqfs.
+    """`folder` keeps its disk, its sockets and what its console said. `system`: system.sqfs, and in the folder above
+    vmlinuz, initrd, base.sqfs. `kept`: what keep() wrote, to begin with; None to boot."""
 
-    `booted`: what keep() wrote; the machine begins there where the file exists."""
-
-    def __init__(self, folder, cached, app, turntable_port, booted, cores=2):
+    def __init__(self, folder, system, app, turntable_port, kept=None, cores=2):
         self.folder = pathlib.Path(folder)
         self.console = self.folder / "console.log"
         self.agent = Wire(self.folder / "agent.sock")
         self.eyes = Wire(self.folder / "eyes.sock")
         self.monitor = Wire(self.folder / "qmp.sock")
         self.http_port = free_port()
-        self.booted = booted if booted.is_file() else None
+        self.kept = kept
+        cached = system.parent
 
         def drive(file, options=""):
             return ["-drive", f"file={file},format=raw,if=virtio,{options}"]
@@ -91,9 +91,9 @@ class Machine:
             "-append", "console=ttyS0 quiet panic=-1 net.ifnames=0 mitigations=off "
             "systemd.show_status=0 systemd.log_target=journal "
             "systemd.unit=hil.target systemd.mask=e2scrub_reap.service systemd.mask=getty.target",
-            *drive(cached / "base.sqfs", "readonly=on"), *drive(app, "readonly=on"),
+            *drive(cached / "base.sqfs", "readonly=on"), *drive(system / "system.sqfs", "readonly=on"),
             # The host's page cache survives the machine: what it holds back is only what the guest never wrote out.
-            *drive(self.folder / "disk.ext4", "cache=writeback"),
+            *drive(self.folder / "disk.ext4", "cache=writeback"), *drive(app, "readonly=on"),
             "-chardev", f"file,id=console,path={self.console},append=on", "-serial", "chardev:console",
             "-chardev", "null,id=uart", "-serial", "chardev:uart",
             "-chardev", f"socket,id=qmp,path={self.folder / 'qmp.sock'}", "-mon", "chardev=qmp,mode=control",
@@ -105,7 +105,7 @@ class Machine:
             "-device", "qemu-xhci,id=usb",
             "-chardev", f"serial,id=turntable,path={turntable_port}",
             "-netdev", f"user,id=net,restrict=on,hostfwd=tcp:127.0.0.1:{self.http_port}-:80",
-            "-device", "virtio-net-pci,netdev=net", *(["-incoming", f"exec:cat {booted}"] if self.booted else [])]
+            "-device", "virtio-net-pci,netdev=net", *(["-incoming", f"exec:cat {kept}"] if kept else [])]
         self.process = subprocess.Popen([str(word) for word in command], stdin=subprocess.DEVNULL,
                                         stderr=open(self.folder / "qemu.log", "a"))
         try:
@@ -170,7 +170,7 @@ class Machine:
 
     def wait_for_boot(self):
         """Until its agent says that it is there."""
-        if self.booted:
+        if self.kept:
             self.wait_for("query-status", "paused", KEEP_S)  # as it was when it was kept
             self.qmp("cont")
             return

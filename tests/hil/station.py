@@ -17,8 +17,15 @@ sys.path.insert(0, str(image.ROOT / "tests" / "bench"))
 import motion_rig  # noqa: E402
 
 VIEWS = 8
+PROGRAMS = ["scanrigd", "scanrig", "scanrig-edge-camera"]  # what runs in the machine
 READY = "Operational.Ready"
 JOBS = "/var/lib/scanrig/jobs"
+CONFIGS = image.HERE / "configs"
+# As a package is installed in a running system.
+INSTALL = ("mkdir /run/app && mount -t squashfs -o ro /dev/vdd /run/app && cp -a /run/app/. / && umount /run/app && "
+           "systemd-sysusers scanrig.conf && systemd-tmpfiles --create scanrig.conf && "
+           "udevadm control --reload && udevadm trigger -s gpio && udevadm settle -t 10 && "
+           "systemctl daemon-reload && systemctl start hil-cameras")
 IMAGES = [f"{side}_{light}.png" for side in ("left", "right") for light in ("pattern", "plain")]
 
 
@@ -27,13 +34,16 @@ class Unmet(RuntimeError):
 
 
 def make_tree(build, tree, images):
-    """What lies over the base: the installed project, the scenario's own files, the images that the cameras show."""
+    """What is installed in the booted machine: the project, its configurations, the cameras and what they show."""
     image.run("cmake", "--install", build, "--prefix", "/usr", "--strip", env={**os.environ, "DESTDIR": str(tree)})
-    shutil.copytree(image.HERE / "guest", tree, symlinks=True, dirs_exist_ok=True)
-    image.run("strip", "-o", tree / "usr/lib/hil/scanrig-edge-camera", build / "bin" / "scanrig-edge-camera")
+    configs, programs = tree / "etc" / "scanrig", tree / "usr" / "lib" / "hil"
+    for folder in (configs, programs):
+        folder.mkdir(parents=True, exist_ok=True)
+    image.run("strip", "-o", programs / "scanrig-edge-camera", build / "bin" / "scanrig-edge-camera")
+    shutil.copy(CONFIGS / "rig.toml", configs)
     for name in ("usb-and-gige.toml", "vivid.toml"):
-        other = with_sections(tree / "etc/scanrig/rig.toml", tree / "usr/share/hil" / name)
-        (tree / "etc/scanrig" / name).write_text(other)
+        other = with_sections(CONFIGS / "rig.toml", CONFIGS / name)
+        (configs / name).write_text(other)
     shutil.copytree(images, tree / "usr" / "share" / "hil" / "images")
 
 
@@ -46,13 +56,25 @@ def with_sections(config, sections):
     return "".join({**split(config), **split(sections)}.values())
 
 
-class Station:
-    """One boot of the machine, until it is left."""
+def install(folder, system, app, port):
+    """Boots, if no run before has kept that; installs what is in `app`; returns what every life begins with."""
+    booted, installed = system / "booted", folder / "installed"
+    with machine.Machine(folder, system, app, port, booted if booted.is_file() else None) as fresh:
+        fresh.wait_for_boot()
+        if not booted.is_file():
+            fresh.do("systemctl start hil.target", 60)  # returns when it is reached
+            fresh.keep(booted)
+        fresh.do(INSTALL)
+        fresh.keep(installed)
+    return installed
 
-    def __init__(self, folder, cached, app, rig):
+
+class Station:
+    """One life of the machine, until it is left."""
+
+    def __init__(self, folder, system, app, rig, installed):
         self.rig = rig
-        self.booted = folder / "booted"
-        self.machine = machine.Machine(folder, cached, app, rig.folder / "turntable", self.booted)
+        self.machine = machine.Machine(folder, system, app, rig.folder / "turntable", installed)
         self.told = None  # the angle that the cameras know of
         self.job = None  # the last one that was started
         self.leaving = threading.Event()
@@ -61,9 +83,6 @@ class Station:
     def __enter__(self):
         try:
             self.machine.wait_for_boot()
-            if not self.booted.is_file():
-                self.machine.do("systemctl start hil.target", 60)  # returns when it is reached
-                self.machine.keep(self.booted)
             self.plug_serial(True)
             self.machine.do(f"date -s @{time.time():.3f} && systemctl start --no-block multi-user.target")
         except BaseException:

@@ -2,25 +2,15 @@
 
 #include <unistd.h>
 
-#include <opencv2/imgcodecs.hpp>
 #include <system_error>
 
 #include "core/files.h"
+#include "core/image_codec.h"
 
 namespace scanrig {
 namespace {
 
 namespace fs = std::filesystem;
-
-Result<std::string> encode_png(const cv::Mat3b& image) {
-  std::vector<uchar> png;
-  try {
-    if (cv::imencode(".png", image, png)) return std::string(png.begin(), png.end());
-  } catch (const cv::Exception& error) {
-    return fail(ErrorCode::internal, "PNG: the texture cannot be encoded: {}", error.what());
-  }
-  return fail(ErrorCode::internal, "PNG: the texture cannot be encoded");
-}
 
 Result<ModelFiles> write_into(const fs::path& folder, const TexturedMesh& model, std::string_view report_json) {
   ModelFiles files;
@@ -38,7 +28,7 @@ Result<ModelFiles> write_into(const fs::path& folder, const TexturedMesh& model,
   if (!model.atlas.empty()) {
     const auto png = encode_png(model.atlas);
     if (!png) return pass_on(png);
-    write("model.png", *png);
+    write("model.png", as_text(*png));
     write("model.mtl", encode_mtl("model.png"));
     write("model.obj", encode_obj(model, "model.mtl"));
   }

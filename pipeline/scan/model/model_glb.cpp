@@ -1,6 +1,6 @@
 #include <nlohmann/json.hpp>
-#include <opencv2/imgcodecs.hpp>
 
+#include "core/image_codec.h"
 #include "pipeline/mesh/solid.h"
 #include "pipeline/scan/model/bytes.h"
 #include "pipeline/scan/model/corner_vertices.h"
@@ -77,16 +77,10 @@ json add_geometry(const TexturedMesh& model, bool textured, Buffer& buffer) {
 }
 
 Result<void> add_texture(const cv::Mat3b& atlas, Buffer& buffer, json& gltf) {
-  std::vector<uchar> jpeg;
-  try {
-    if (!cv::imencode(".jpg", atlas, jpeg, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality})) {
-      return fail(ErrorCode::internal, "glTF: the texture cannot be encoded");
-    }
-  } catch (const cv::Exception& error) {
-    return fail(ErrorCode::internal, "glTF: the texture cannot be encoded: {}", error.what());
-  }
+  const auto jpeg = encode_jpeg(atlas, kJpegQuality);
+  if (!jpeg) return pass_on(jpeg, "glTF");
   const std::size_t begin = buffer.bytes.size();
-  buffer.bytes.append(jpeg.begin(), jpeg.end());
+  buffer.bytes.append(as_text(*jpeg));
   gltf["images"] = {{{"bufferView", buffer.add_view(begin, {})}, {"mimeType", "image/jpeg"}}};
   gltf["samplers"] = {
       {{"magFilter", kLinear}, {"minFilter", kLinearMipmapLinear}, {"wrapS", kClampToEdge}, {"wrapT", kClampToEdge}}};

@@ -106,7 +106,8 @@ struct TriggerLine {
   int lose = 0;       ///< the next exposures whose frames never arrive
   int looks = 0;      ///< since the beginning
   int dark = 0;       ///< the next exposures whose right picture is dark
-  int absent = 0;     ///< how often more the camera does not answer when it is armed; -1: it is not there at all
+  bool projector_absent = false;
+  int absent = 0;  ///< how often more the camera does not answer when it is armed; -1: it is not there at all
   std::function<void()> at_fire;  ///< happens during the next exposure, or
   int fires_before = 0;           ///< after so many more
   Clock::TimePoint ready_at{};    ///< when the cameras were asked to get ready last
@@ -137,6 +138,7 @@ class FakeProjector final : public Projector {
   }
   Result<void> dark(Deadline) override {
     const std::lock_guard guard(line_.mutex);
+    if (line_.projector_absent) return fail(ErrorCode::io, "projector: no answer");
     line_.lit = false;
     return {};
   }

@@ -249,6 +249,41 @@ TEST_F(Jobs, ALineRunsItsQueueByPartsAndByTheFlipSignal) {
   EXPECT_EQ(loop->snapshot()->machine, MachineState::ready);
 }
 
+TEST_F(Jobs, ALineWaitsForItsProjectorToBeWarmAndAPersonNeedNot) {
+  options.recipes["line"] = {.name = "line", .poses = 1, .views = 3, .start_on_part = true};
+  options.warm_up = std::chrono::seconds(600);
+  const auto begin = clock.now();
+  boot();
+  get_ready();
+  ASSERT_TRUE(ask(Order{.recipe = "line", .repeat = 2}));
+  const auto ids = loop->snapshot()->queue;
+  const auto begun = [&](const std::string& id) { return loop->snapshot()->job == id; };
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(clock_waits_for([&] { return begun(ids[0]); }));
+  ASSERT_TRUE(wait_state(ids[0], JobState::done));
+  EXPECT_LT(clock.now() - begin, options.warm_up) << "a cold projector is no matter to who presses Start";
+
+  // One that was away begins anew.
+  const auto set_absent = [&](bool absent) {
+    {
+      const std::lock_guard guard(rig.line.mutex);
+      rig.line.projector_absent = absent;
+    }
+    clock.sleep_for(std::chrono::seconds(10));
+  };
+  set_absent(true);
+  const auto back = clock.now();
+  set_absent(false);
+  rig.panel.set(&PanelInputs::part_present, false);
+  rig.panel.set(&PanelInputs::part_present, true);
+  EXPECT_THAT(loop->snapshot()->next_action, testing::HasSubstr("The projector is warming up: the queue goes on in 5"));
+  EXPECT_TRUE(wait_state(ids[1], JobState::done));
+  const std::lock_guard guard(rig.turntable.mutex);
+  const auto first_move = *std::ranges::find_if(rig.turntable.move_starts, [&](auto at) { return at > back; });
+  EXPECT_GE(first_move - back, options.warm_up);
+  EXPECT_LT(first_move - back, options.warm_up + std::chrono::seconds(15));
+}
+
 TEST_F(Jobs, AnEndedJobIsBundledExportedAndRemoved) {
   boot();
   get_ready();

@@ -66,7 +66,8 @@ TEST_F(LoggedDaemon, TellsAWholeJobOfTwoPoses) {
   shut_down();
   const auto id = job_folders().at(0).filename().string();
   EXPECT_THAT(states(id), ElementsAre("queued", "scanning", "waiting_for_flip", "scanning", "reconstructing", "done"));
-  EXPECT_THAT(of_view(0, 0), ElementsAre(HasSubstr("Exposed again: camera: no frame"), HasSubstr("Stored")));
+  EXPECT_THAT(of_view(0, 0), ElementsAre(HasSubstr("Exposed again: camera: no frame"), HasSubstr("Stored"),
+                                         HasSubstr("View 0 again")));
   for (const int pose : {0, 1}) {
     for (const int view : {0, 1, 2}) EXPECT_THAT(of_view(pose, view), Contains(HasSubstr("Stored, taken at"))) << view;
     EXPECT_THAT(lines,
@@ -100,6 +101,85 @@ TEST_F(LoggedDaemon, TellsAFaultWithItsCauseItsJobAndWhatToDo) {
   EXPECT_THAT(lines, Contains(says("Next: Release the e-stop, then press Reset.")));
   EXPECT_THAT(lines, Contains(says("Next: See to the cause, then press Reset at the panel.")));
   EXPECT_THAT(lines, Contains(AllOf(says("interrupted (stopped): The e-stop was pressed."), has(Priority::error),
+                                    Field(&JournalEntry::job, id))));
+}
+
+TEST_F(LoggedDaemon, NamesTheDeviceInItsFaultAndNobodyInAnEstop) {
+  const auto of_fault = [this](const std::string& words) {
+    const auto at = std::ranges::find_if(lines, [&](const auto& line) {
+      return line.priority == Priority::error && line.message.find("Error: " + words) == 0;
+    });
+    return at == lines.end() ? "no such line" : at->device;
+  };
+  boot();
+  get_ready();
+  {
+    const std::lock_guard guard(rig.turntable.mutex);
+    rig.turntable.stalled = true;
+  }
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_fault());
+  clock.sleep_for(seconds(1));
+  {
+    const std::lock_guard guard(rig.turntable.mutex);
+    rig.turntable.stalled = false;
+  }
+  rig.panel.press(&PanelInputs::reset);
+  ASSERT_TRUE(wait_ready());
+  {
+    const std::lock_guard guard(rig.line.mutex);
+    rig.line.lose = 100;
+  }
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_fault());
+  clock.sleep_for(seconds(1));
+  rig.panel.press(&PanelInputs::reset);
+  ASSERT_TRUE(wait_ready());
+  rig.panel.set(&PanelInputs::estop_ok, false);
+  ASSERT_TRUE(wait_fault());
+  rig.panel.set(&PanelInputs::estop_ok, true);
+  rig.panel.press(&PanelInputs::reset);
+  ASSERT_TRUE(wait_ready());
+  rig.panel.break_down(true);
+  clock.sleep_for(seconds(2));
+  rig.panel.break_down(false);
+  shut_down();
+  EXPECT_EQ(of_fault("turntable: no progress"), "turntable");
+  EXPECT_EQ(of_fault("camera: no frame"), "camera");
+  EXPECT_EQ(of_fault("The e-stop was pressed"), "") << "a person's doing";
+  EXPECT_EQ(of_fault("panel: unplugged"), "panel");
+}
+
+TEST_F(LoggedDaemon, TellsAnExposureOfTheClosureShotThatWasTakenAgain) {
+  rig.line.fires_before = 6;  // of three views
+  rig.line.at_fire = [this] {
+    const std::lock_guard guard(rig.line.mutex);
+    rig.line.lose = 1;
+  };
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_flip());
+  shut_down();
+  const auto id = job_folders().at(0).filename().string();
+  EXPECT_THAT(of_view(0, 0), ElementsAre(HasSubstr("Stored"), HasSubstr("Exposed again: camera: no frame"),
+                                         HasSubstr("View 0 again: nothing has moved")));
+  EXPECT_THAT(lines, Contains(AllOf(says("Exposed again"), has(Priority::warning), Field(&JournalEntry::job, id))));
+}
+
+TEST_F(LoggedDaemon, TellsAPressAtThePanelThatIsRefused) {
+  boot();
+  ASSERT_TRUE(wait_halted());
+  rig.panel.press(&PanelInputs::start);
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_busy());
+  rig.panel.press(&PanelInputs::reset);
+  shut_down();
+  const auto id = job_folders().at(0).filename().string();
+  EXPECT_THAT(lines, Contains(AllOf(says("Pressed at the panel, start is refused: The station is Halted"),
+                                    has(Priority::notice), Field(&JournalEntry::device, "panel"))));
+  EXPECT_THAT(lines, Contains(AllOf(says("Pressed at the panel, reset is refused: There is nothing to reset"),
                                     Field(&JournalEntry::job, id))));
 }
 

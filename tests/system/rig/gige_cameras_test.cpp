@@ -135,6 +135,7 @@ TEST_F(CamerasOnWires, TheCommandListsTunesGrabsAndPreviews) {
   EXPECT_THAT(output_, HasSubstr("right  brightness"));
   EXPECT_EQ(scanrig({"camera", "grab", "--light", "pattern", "--out", pictures}), 0) << output_;
   EXPECT_TRUE(std::filesystem::exists(pictures / "left.png"));
+  EXPECT_THAT(output_, HasSubstr((pictures / "left.png").string() + "\n" + (pictures / "right.png").string() + "\n"));
   EXPECT_EQ(scanrig({"camera", "grab", "--out", pictures}), static_cast<int>(ExitCode::bad_input)) << "already there";
   EXPECT_EQ(scanrig({"camera", "preview", "--count", "2", "--out", pictures}), 0) << output_;
   EXPECT_TRUE(std::filesystem::exists(pictures / "right.jpg"));
@@ -142,6 +143,37 @@ TEST_F(CamerasOnWires, TheCommandListsTunesGrabsAndPreviews) {
   start_daemon({SCANRIGD_PROGRAM});
   EXPECT_EQ(scanrig({"camera", "tune", "--count", "1"}), static_cast<int>(ExitCode::refused)) << "the daemon has them";
   EXPECT_EQ(scanrig({"camera", "preview", "--count", "3", "--out", pictures}), 0) << output_;
+  EXPECT_TRUE(std::filesystem::exists(pictures / "right.jpg"));
+}
+
+TEST_F(CamerasOnWires, TheCommandTellsProgramsInJsonALineAPair) {
+  start_rig({"--cameras", "gige", "--scale", "0.25"});
+  const auto lines = [this] {
+    std::vector<json> all;
+    std::istringstream text(output_);
+    for (std::string line; std::getline(text, line);) all.push_back(json::parse(line, nullptr, false));
+    return all;
+  };
+  const auto pictures = folder_ / "pictures";
+  const auto files = [&](const char* ending) {
+    return json{{"left", pictures / (std::string("left") + ending)},
+                {"right", pictures / (std::string("right") + ending)}};
+  };
+  EXPECT_EQ(scanrig({"camera", "tune", "--light", "pattern", "--count", "2", "--json"}), 0) << output_;
+  ASSERT_EQ(lines().size(), 2u) << output_;
+  for (const auto& pair : lines()) {
+    for (const auto* side : {"left", "right"}) {
+      EXPECT_THAT(pair[side]["brightness"].get<double>(), AllOf(testing::Ge(0.0), testing::Le(1.0))) << pair;
+      EXPECT_TRUE(pair[side]["saturated"].is_number()) << pair;
+      EXPECT_TRUE(pair[side]["blur_px"].is_number() || pair[side]["blur_px"].is_null())
+          << "null: nothing to measure it on";
+      EXPECT_TRUE(pair[side]["advice"].is_string()) << pair;
+    }
+  }
+  EXPECT_EQ(scanrig({"camera", "grab", "--out", pictures, "--json"}), 0) << output_;
+  EXPECT_EQ(lines(), std::vector<json>{files(".png")});
+  EXPECT_EQ(scanrig({"camera", "preview", "--count", "2", "--out", pictures, "--json"}), 0) << output_;
+  EXPECT_EQ(lines(), (std::vector<json>{files(".jpg"), files(".jpg")}));
   EXPECT_TRUE(std::filesystem::exists(pictures / "right.jpg"));
 }
 

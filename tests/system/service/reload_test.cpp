@@ -18,11 +18,19 @@ using testing::StartsWith;
 
 class Reload : public RigOnWires {
  protected:
-  void start(const std::vector<std::string>& program = {SCANRIGD_SIM_PROGRAM, "--scale", "0.1"}) {
+  void start() { start(quick_daemon()); }
+  void start(const std::vector<std::string>& program) {
     start_rig({"--scale", "0.1"});
     systemd_ = std::jthread([this](const std::stop_token& end) { listen(end); });
     ASSERT_TRUE(soon([&] { return listening_to_daemon_.load(); }));
     start_daemon(program);
+  }
+  /// Over a scene that is made at once, whenever the daemon begins: the built-in figurine takes seconds.
+  std::vector<std::string> quick_daemon() const {
+    const auto box = folder_ / "box.obj";
+    std::ofstream(box) << "v 0 0 0\nv 0 0 60\nv 0 30 0\nv 0 30 60\nv 40 0 0\nv 40 0 60\nv 40 30 0\nv 40 30 60\n"
+                          "f 1 2 4 3\nf 5 7 8 6\nf 1 5 6 2\nf 3 4 8 7\nf 1 3 7 5\nf 2 6 8 4\n";
+    return {SCANRIGD_SIM_PROGRAM, "--scale", "0.1", "--object", box};
   }
   void configure(const std::string& more) const { std::ofstream(config(), std::ios::app) << more; }
   std::string config() const { return folder_ / "rig.toml"; }
@@ -161,13 +169,11 @@ class PassedSocket : public Reload {
   }
   /// The descriptor 3 is for the process that LISTEN_PID names [sd_listen_fds(3)].
   std::vector<std::string> with_socket(const std::string& name) const {
-    return {"/bin/sh",
-            "-c",
-            fmt::format("exec 3<&{}; LISTEN_PID=$$ LISTEN_FDS=1 LISTEN_FDNAMES={} exec \"$@\"", inherited_, name),
-            "sh",
-            SCANRIGD_SIM_PROGRAM,
-            "--scale",
-            "0.1"};
+    std::vector<std::string> command{
+        "/bin/sh", "-c",
+        fmt::format("exec 3<&{}; LISTEN_PID=$$ LISTEN_FDS=1 LISTEN_FDNAMES={} exec \"$@\"", inherited_, name), "sh"};
+    for (auto& word : quick_daemon()) command.push_back(std::move(word));
+    return command;
   }
   std::uint64_t file() const {
     struct stat status {};

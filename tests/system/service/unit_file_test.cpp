@@ -73,6 +73,20 @@ TEST_F(UnitFile, TheSocketIsVerifiedBySystemdWithoutAWord) {
   EXPECT_EQ(verified.output, "");
 }
 
+/// A service at its start limit takes the socket that triggers it along [systemd.socket(5), systemd.unit(5)].
+TEST(UnitFiles, LimitNeitherStartsNorTriggersSoThatTheSocketStays) {
+  const auto text_of = [](const std::filesystem::path& file) {
+    std::stringstream text;
+    text << std::ifstream(file).rdbuf();
+    return text.str();
+  };
+  const auto service = text_of(kUnit), socket = text_of(kSocket);
+  const auto limit = service.find("\nStartLimitIntervalSec=0\n");
+  EXPECT_LT(limit, service.find("[Service]")) << "in [Unit], or it is not heard";
+  EXPECT_NE(socket.find("\nTriggerLimitIntervalSec=0\n"), socket.npos);
+  EXPECT_NE(socket.find("\nFlushPending=yes\n"), socket.npos) << "one who waits must not start it again and again";
+}
+
 TEST_F(UnitFile, AMistakeInItWouldBeNoticed) {
   const auto verified = run("systemd-analyze verify " + changed("Type=notify", "Type=whatever").string());
   EXPECT_NE(verified.output, "");

@@ -225,6 +225,34 @@ TEST_F(Queue, AnOpenGuardAnAbsentDeviceAndQuietHoursHoldTheLine) {
   EXPECT_NE(asked_for<action::BeginJob>(), nullptr) << "the part has been there all the time";
 }
 
+TEST_F(Queue, AProjectorThatWarmsUpHoldsTheLineAndSaysForHowLong) {
+  run_a_line_of(2);
+  scan("0");
+  tell(event::WarmingUp{std::chrono::seconds(600)});
+  see(false);
+  see(true);
+  EXPECT_TRUE(actions.empty());
+  EXPECT_EQ(state.activity, Activity::waiting_for_part);
+  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("goes on in 600 s, or at once with Start"));
+  tell(event::QuietHours{true});
+  tell(event::WarmingUp{std::chrono::seconds(0)});
+  EXPECT_EQ(state.activity, Activity::waiting_for_part) << "warm, but not now";
+  tell(event::WarmingUp{std::chrono::seconds(1)});
+  tell(event::QuietHours{false});
+  EXPECT_EQ(state.activity, Activity::waiting_for_part);
+  tell(event::WarmingUp{std::chrono::seconds(0)});
+  EXPECT_NE(asked_for<action::BeginJob>(), nullptr) << "the part has been there all the time";
+}
+
+TEST_F(Queue, AStartBeginsWithAColdProjectorAndWasToldSo) {
+  get_ready();
+  tell(event::WarmingUp{std::chrono::seconds(42)});
+  EXPECT_THAT(describe(state, rules).sentence, HasSubstr("The projector will be warm in 42 s."));
+  press(Button::start);
+  EXPECT_FALSE(refused);
+  EXPECT_NE(asked_for<action::BeginJob>(), nullptr);
+}
+
 TEST_F(Queue, ThreeFailuresInARowStopTheLineAndStartForgivesThem) {
   run_a_line_of(5);
   scan("0");

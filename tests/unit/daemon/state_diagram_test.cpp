@@ -255,6 +255,11 @@ std::string draw(const Edges& edges) {
   return text + "```\n";
 }
 
+constexpr const char* kByItself =
+    R"(## What begins by itself
+A job begins without a press only where its recipe has `start_on_part`, and only after a person's Start: when the next part is there, e-stop and guard are closed, all devices are there, outside quiet hours, and once the projector is warm, `warm_up_s` after the daemon found it (one that was away begins anew). Brightness and focus drift while a lamp warms up, and nobody would be there to see it: the line waits and says for how long. Start, at the panel or over the API, begins at once all the same: who presses it may know that the lamp has been on all day, which a daemon that began a minute ago cannot. A job that has begun goes on, after its flip too.
+)";
+
 std::string document(const Walk& walk) {
   return fmt::format(
       "# States of the station\n\nDrawn by `tests/unit/daemon/state_diagram_test.cpp`, which walks through the {} "
@@ -265,8 +270,8 @@ std::string document(const Walk& walk) {
       "again.\n\n{}\n## "
       "The machine\nFaults lead to Error from wherever something moves or is about to; only what is obeyed is drawn, "
       "not "
-      "what is refused.\n\n{}",
-      walk.states, draw(walk.job), draw(walk.machine));
+      "what is refused.\n\n{}\n{}",
+      walk.states, draw(walk.job), draw(walk.machine), kByItself);
 }
 
 class StateDiagram : public testing::Test {

@@ -57,20 +57,5 @@ TEST(ToViewImages, GreyAndColourPassThrough) {
   EXPECT_EQ(to_view_images(raw, {}).error().code, ErrorCode::invalid_input);
 }
 
-TEST(DecodeImage, NoiseIsNotAnImage) {
-  EXPECT_EQ(decode_image("certainly no image").error().code, ErrorCode::invalid_input);
-  EXPECT_EQ(decode_image("").error().code, ErrorCode::invalid_input);
-}
-
-TEST(DecodeImage, APngCutAnywhereIsRefused) {
-  const auto bytes = encode_png(raw_view(0).left_plain).value();
-  const std::string_view whole(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  ASSERT_TRUE(decode_image(whole));
-  for (std::size_t length = 0; length < whole.size(); length += 1 + length / 2) {
-    EXPECT_FALSE(decode_image(whole.substr(0, length))) << length;
-  }
-  EXPECT_FALSE(decode_image(whole.substr(0, whole.size() - 1)));
-}
-
 }  // namespace
 }  // namespace scanrig

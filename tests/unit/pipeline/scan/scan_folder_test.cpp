@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <limits>
+#include <opencv2/imgcodecs.hpp>
 
 #include "core/hash.h"
 #include "tests/unit/pipeline/scan/scan_samples.h"
@@ -68,8 +69,9 @@ class ScanFolderTest : public FolderTest {
 };
 
 std::string png(const cv::Mat& image) {
-  const auto bytes = encode_png(image).value();
-  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+  std::vector<uchar> bytes;
+  cv::imencode(".png", image, bytes);
+  return {bytes.begin(), bytes.end()};
 }
 
 TEST_F(ScanFolderTest, WhatIsWrittenIsReadBack) {

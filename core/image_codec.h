@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <opencv2/core/mat.hpp>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "core/result.h"
+
+/// Images to bytes of a file and back. The libraries of the formats are called directly: OpenCV's own reader of images
+/// loads a hundred libraries of formats that no rig has, which a program does each time that it is started.
+/// Every function may be called from any thread. An image has 8 bit, one channel (grey) or three (BGR), if not said
+/// otherwise, and at most kMostImagePixels. All fail with `invalid_input`.
+namespace scanrig {
+
+inline constexpr std::size_t kMostImagePixels = 1 << 27;
+
+/// Quickly rather than small: images of a sensor are noise to a compressor.
+Result<std::vector<std::byte>> encode_png(const cv::Mat& image);
+/// Grey, colour or a palette; not 16 bit, no alpha. A file that ends before its IEND chunk is refused.
+Result<cv::Mat> decode_png(std::string_view bytes);
+
+/// `quality`: per cent. Colour is kept at half the resolution (4:2:0).
+Result<std::vector<std::byte>> encode_jpeg(const cv::Mat& image, int quality);
+/// BGR, of grey files too. Also a frame of Motion JPEG, which leaves the Huffman tables out. Cut or damaged ones are
+/// refused.
+Result<cv::Mat> decode_jpeg(std::string_view bytes);
+
+/// 32-bit float, one channel; NaN is kept.
+Result<std::vector<std::byte>> encode_tiff(const cv::Mat1f& depth);
+Result<cv::Mat> decode_tiff(std::string_view bytes);
+
+/// A PNG or a TIFF, whichever it begins as.
+Result<cv::Mat> decode_image(std::string_view bytes);
+
+/// Whether an image of that size is one that is decoded at all.
+constexpr bool is_image_size(std::uint64_t width, std::uint64_t height) {
+  return width > 0 && height > 0 && width < kMostImagePixels && width * height <= kMostImagePixels;
+}
+
+inline std::string_view as_text(std::span<const std::byte> bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+}  // namespace scanrig
