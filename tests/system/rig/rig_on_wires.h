@@ -1,6 +1,7 @@
 #pragma once
 
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -78,14 +79,15 @@ class RigOnWires : public testing::Test {
     arguments.insert(arguments.begin(), SCANRIG_PROGRAM);
     arguments.insert(arguments.end(), {"--config", folder_ / "rig.toml"});
     const int code = Process(arguments, folder_ / "output").wait();
-    output_ = *read_file(folder_ / "output");
+    output_ = read_file(folder_ / "output").value_or("");
     return code;
   }
 
   RealClock clock_;
   const std::filesystem::path folder_ =
       std::filesystem::path(testing::TempDir()) /
-      (std::string("wires_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+      (std::string("wires_") + testing::UnitTest::GetInstance()->current_test_info()->name() + "_" +
+       std::to_string(::getpid()));
   std::optional<Process> rig_, daemon_;
   std::string output_;
 };

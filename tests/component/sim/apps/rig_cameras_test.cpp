@@ -1,6 +1,7 @@
 #include "sim/apps/rig_cameras.h"
 
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
@@ -83,7 +84,8 @@ class RigCamerasTest : public testing::Test {
   RealClock clock_;
   const std::filesystem::path folder_ =
       std::filesystem::path(testing::TempDir()) /
-      (std::string("eyes_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+      (std::string("eyes_") + testing::UnitTest::GetInstance()->current_test_info()->name() + "_" +
+       std::to_string(::getpid()));
   const SceneOptions scene_{.object = folder_ / "block.obj", .height_mm = 70, .seed = 3, .image_scale = 0.1};
   std::unique_ptr<WireRig> rig_;
   config::RigConfig config_;

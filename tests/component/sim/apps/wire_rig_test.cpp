@@ -1,6 +1,7 @@
 #include "sim/apps/wire_rig.h"
 
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include <nlohmann/json.hpp>
 
@@ -65,7 +66,8 @@ class WireRigTest : public testing::Test {
   RealClock clock_;
   const std::filesystem::path folder_ =
       std::filesystem::path(testing::TempDir()) /
-      (std::string("rig_") + testing::UnitTest::GetInstance()->current_test_info()->name());
+      (std::string("rig_") + testing::UnitTest::GetInstance()->current_test_info()->name() + "_" +
+       std::to_string(::getpid()));
   std::unique_ptr<WireRig> rig_;
   std::unique_ptr<RigControl> control_;
   std::unique_ptr<wire::ControlSocket> socket_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <string>
@@ -11,12 +12,13 @@
 
 namespace scanrig::scan_samples {
 
-/// A folder of its own for each test, removed afterwards.
+/// A folder of its own for each test, removed afterwards; also where the same test of another build runs beside it.
 class FolderTest : public testing::Test {
  protected:
   std::filesystem::path folder_ =
       std::filesystem::path(testing::TempDir()) /
-      ("scanrig_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()));
+      ("scanrig_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + "_" +
+       std::to_string(::getpid()));
   void SetUp() override {
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
