@@ -110,7 +110,7 @@ def cpu_s():
 def run(options, work, table):
     cache = image.ROOT / "build" / "hil"
     build = options.bin.parent
-    begin = time.monotonic()
+    begin, cpu_before_s = time.monotonic(), cpu_s()  # what built the programs was this process before
     if options.cold:
         shutil.rmtree(cache, ignore_errors=True)
     cached, was_there = image.prepare(cache, [options.bin / name for name in stations.PROGRAMS])
@@ -140,7 +140,7 @@ def run(options, work, table):
     if not options.only:
         limit = CACHED_S if was_there else COLD_S
         table.line(f"the whole of it, images {'cached' if was_there else 'made'}, {CORES} cores", f"<= {limit} s",
-                   f"{took:.0f} s, {cpu_s():.0f} s of processor", took <= limit)
+                   f"{took:.0f} s, {cpu_s() - cpu_before_s:.0f} s of processor", took <= limit)
 
 
 def main():
