@@ -3,8 +3,29 @@
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 #include <tbb/task_arena.h>
+#include <tbb/task_scheduler_observer.h>
+
+#include "core/priority.h"
 
 namespace scanrig {
+namespace {
+
+/// Those that help a thread which gives way do so too.
+class NoMoreUrgent : public tbb::task_scheduler_observer {
+ public:
+  explicit NoMoreUrgent(tbb::task_arena& arena) : task_scheduler_observer(arena), niceness_(niceness()) {
+    observe(true);
+  }
+  NoMoreUrgent(const NoMoreUrgent&) = delete;
+  NoMoreUrgent& operator=(const NoMoreUrgent&) = delete;
+  ~NoMoreUrgent() override { observe(false); }
+  void on_scheduler_entry(bool) override { give_way_by(niceness_); }
+
+ private:
+  const int niceness_;
+};
+
+}  // namespace
 
 void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) {
   tbb::parallel_for(
@@ -17,6 +38,7 @@ void parallel_for(std::size_t count, const std::function<void(std::size_t)>& bod
 
 void with_threads(int threads, const std::function<void()>& work) {
   tbb::task_arena arena(threads > 0 ? threads : tbb::task_arena::automatic);
+  const NoMoreUrgent helpers(arena);
   arena.execute([&] { work(); });
 }
 

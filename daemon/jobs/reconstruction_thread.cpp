@@ -1,11 +1,9 @@
 #include "daemon/jobs/reconstruction_thread.h"
 
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <cmath>
 #include <utility>
 
+#include "core/priority.h"
 #include "daemon/actor_thread.h"
 #include "daemon/guarded.h"
 #include "daemon/jobs/heap.h"
@@ -77,8 +75,7 @@ void ReconstructionThread::add_view(std::shared_ptr<const TakenView> view) {
 }
 
 void ReconstructionThread::run() {
-  // Linux: of this thread and of the workers it will start. Without the right to be nice it works all the same.
-  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), 10);
+  give_way();
   while (auto message = inbox_.take()) {
     if (ending_) continue;
     std::visit([this](const auto& m) { handle(m); }, *message);

@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "core/parallel.h"
+#include "core/priority.h"
 #include "core/units.h"
 
 namespace scanrig::sim {
@@ -39,6 +41,7 @@ bool ViewCache::wait_until_ready(const std::stop_token& stop) {
 }
 
 void ViewCache::run(const std::stop_token& stop) {
+  give_way();  // a rig does not compute what it shows
   std::unique_lock lock(mutex_);
   while (changed_.wait(lock, stop, [&] { return !wanted_.empty() || !expected_.empty(); })) {
     const bool surprise = !wanted_.empty();
@@ -46,7 +49,9 @@ void ViewCache::run(const std::stop_token& stop) {
     const Place place = queue.front();
     if (!views_.contains(place)) {
       lock.unlock();
-      auto view = std::make_shared<const View>(scene_.look(place.placement, to_radians(place.angle_deg)));
+      std::shared_ptr<const View> view;
+      const auto look = [&] { return scene_.look(place.placement, to_radians(place.angle_deg)); };
+      with_threads(0, [&] { view = std::make_shared<const View>(look()); });
       lock.lock();
       views_[place] = std::move(view);
       if (surprise) surprises_.push_back(place);
