@@ -76,6 +76,12 @@ class Bench {
   OpenDevices devices_;
 };
 
+/// At once; on a line, if not indented.
+void print_json(const nlohmann::ordered_json& all, int indent = -1) {
+  fmt::print("{}\n", all.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace));
+  std::fflush(stdout);
+}
+
 ExitCode list(const CameraVerb& verb) {
   auto found = find_aravis_cameras();
   for (auto& camera : find_v4l2_cameras(kernel_video())) found.push_back(std::move(camera));
@@ -84,18 +90,12 @@ ExitCode list(const CameraVerb& verb) {
     for (const auto& c : found) {
       all.push_back({{"kind", c.kind}, {"name", c.name}, {"serial", c.serial}, {"where", c.where}});
     }
-    fmt::print("{}\n", all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace));
+    print_json(all, 2);
     return ExitCode::ok;
   }
   if (found.empty()) fmt::print("no camera found; check power, cable and network\n");
   for (const auto& c : found) fmt::print("{:<11} {:<16} {:<16} {}\n", c.kind, c.serial, c.where, c.name);
   return ExitCode::ok;
-}
-
-/// A line of its own for each, as it comes.
-void print_json(const nlohmann::ordered_json& all) {
-  fmt::print("{}\n", all.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
-  std::fflush(stdout);
 }
 
 void tell_files(const CameraVerb& verb, const std::filesystem::path& left, const std::filesystem::path& right) {

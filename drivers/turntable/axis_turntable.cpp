@@ -13,7 +13,8 @@ using std::chrono::milliseconds;
 constexpr milliseconds kPollPeriod{5};  ///< between an answer and the next question
 constexpr milliseconds kStalledAfter{2000};
 constexpr milliseconds kEnableTime{1000};
-constexpr milliseconds kStandingTime{50};  ///< the position must not change for this long to be called standing
+/// For so long the position must not change to be called standing: longer than a table rings after a quick stop.
+constexpr milliseconds kStandingTime{100};
 constexpr int kAttempts = 3;
 constexpr int kStopReplyTimeouts = 12;  ///< three attempts, each with its quiet line, and some room
 

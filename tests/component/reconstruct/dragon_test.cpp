@@ -12,6 +12,7 @@
 #include "pipeline/scan/import_stanford.h"
 #include "pipeline/scan/strict_json.h"
 #include "tests/bench/real_data/dragon_measure.h"
+#include "tests/own_folder.h"
 
 namespace scanrig {
 namespace {
@@ -30,10 +31,8 @@ class Dragon : public ::testing::Test {
  protected:
   void SetUp() override {
     if (!std::filesystem::is_directory(data_)) GTEST_SKIP() << data_.string() << ": the scans are not here";
-    const auto* test = ::testing::UnitTest::GetInstance()->current_test_info();
-    folder_ = std::filesystem::path(::testing::TempDir()) / "scanrig-dragon" / test->name();
+    folder_ = own_folder();
     std::filesystem::remove_all(folder_);
-    std::filesystem::create_directories(folder_.parent_path());
   }
   void TearDown() override {
     std::error_code ignored;

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -10,6 +9,7 @@
 #include "core/files.h"
 #include "daemon/ctl/client.h"
 #include "sim/wire/control_socket.h"
+#include "tests/own_folder.h"
 #include "tests/slowness.h"
 #include "tests/system/daemon/process.h"
 
@@ -84,10 +84,7 @@ class RigOnWires : public testing::Test {
   }
 
   RealClock clock_;
-  const std::filesystem::path folder_ =
-      std::filesystem::path(testing::TempDir()) /
-      (std::string("wires_") + testing::UnitTest::GetInstance()->current_test_info()->name() + "_" +
-       std::to_string(::getpid()));
+  const std::filesystem::path folder_ = own_folder("wires_");
   std::optional<Process> rig_, daemon_;
   std::string output_;
 };

@@ -5,13 +5,14 @@
 #include <filesystem>
 
 #include "core/hash.h"
+#include "tests/own_folder.h"
 
 namespace scanrig {
 namespace {
 
 class FilesTest : public testing::Test {
  protected:
-  std::filesystem::path folder_ = std::filesystem::path(testing::TempDir()) / "scanrig_files_test";
+  std::filesystem::path folder_ = own_folder();
   void SetUp() override { std::filesystem::create_directories(folder_); }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 };

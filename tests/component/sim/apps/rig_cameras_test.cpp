@@ -1,7 +1,6 @@
 #include "sim/apps/rig_cameras.h"
 
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
@@ -16,6 +15,7 @@
 #include "sim/apps/rig_control.h"
 #include "sim/apps/wire_rig.h"
 #include "sim/scene/standing.h"
+#include "tests/own_folder.h"
 #include "tests/slowness.h"
 
 namespace scanrig::sim {
@@ -82,10 +82,7 @@ class RigCamerasTest : public testing::Test {
   static double difference(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF); }
 
   RealClock clock_;
-  const std::filesystem::path folder_ =
-      std::filesystem::path(testing::TempDir()) /
-      (std::string("eyes_") + testing::UnitTest::GetInstance()->current_test_info()->name() + "_" +
-       std::to_string(::getpid()));
+  const std::filesystem::path folder_ = own_folder("eyes_");
   const SceneOptions scene_{.object = folder_ / "block.obj", .height_mm = 70, .seed = 3, .image_scale = 0.1};
   std::unique_ptr<WireRig> rig_;
   config::RigConfig config_;

@@ -11,6 +11,7 @@
 #include "core/hash.h"
 #include "core/parallel.h"
 #include "sim/scene/profile.h"
+#include "tests/own_folder.h"
 #include "tests/slowness.h"
 
 namespace scanrig::sim {
@@ -22,7 +23,7 @@ using nlohmann::json;
 class Shoot : public testing::Test {
  protected:
   void SetUp() override {
-    folder_ = fs::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
+    folder_ = own_folder();
     fs::remove_all(folder_);
     options_.scene.image_scale = 0.1;
     options_.views = 2;

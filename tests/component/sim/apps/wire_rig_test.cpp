@@ -1,7 +1,6 @@
 #include "sim/apps/wire_rig.h"
 
 #include <gmock/gmock.h>
-#include <unistd.h>
 
 #include <nlohmann/json.hpp>
 
@@ -11,6 +10,7 @@
 #include "sim/apps/rig_control.h"
 #include "sim/apps/scanrig_sim_ctl.h"
 #include "sim/wire/control_socket.h"
+#include "tests/own_folder.h"
 
 namespace scanrig::sim {
 namespace {
@@ -64,10 +64,7 @@ class WireRigTest : public testing::Test {
   Deadline within(Clock::Duration time) { return Deadline::after(clock_, time); }
 
   RealClock clock_;
-  const std::filesystem::path folder_ =
-      std::filesystem::path(testing::TempDir()) /
-      (std::string("rig_") + testing::UnitTest::GetInstance()->current_test_info()->name() + "_" +
-       std::to_string(::getpid()));
+  const std::filesystem::path folder_ = own_folder("rig_");
   std::unique_ptr<WireRig> rig_;
   std::unique_ptr<RigControl> control_;
   std::unique_ptr<wire::ControlSocket> socket_;

@@ -10,6 +10,7 @@
 #include "pipeline/evaluate/texture_figures.h"
 #include "pipeline/scan/model/model_files.h"
 #include "pipeline/texture/render.h"
+#include "tests/own_folder.h"
 #include "tests/unit/pipeline/evaluate/ball_truth.h"
 
 namespace scanrig {
@@ -19,7 +20,7 @@ using namespace ball_truth;
 
 class EvaluateFilesTest : public testing::Test {
  protected:
-  std::filesystem::path folder_ = std::filesystem::path(testing::TempDir()) / "scanrig_evaluate_files_test";
+  std::filesystem::path folder_ = own_folder();
   void SetUp() override {
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);

@@ -1,24 +1,21 @@
 #pragma once
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <string>
 
 #include "core/files.h"
 #include "pipeline/scan/scan_folder.h"
+#include "tests/own_folder.h"
 #include "tests/unit/pipeline/scan/sample_files.h"
 
 namespace scanrig::scan_samples {
 
-/// A folder of its own for each test, removed afterwards; also where the same test of another build runs beside it.
+/// A folder of its own for each test, removed afterwards.
 class FolderTest : public testing::Test {
  protected:
-  std::filesystem::path folder_ =
-      std::filesystem::path(testing::TempDir()) /
-      ("scanrig_" + std::string(testing::UnitTest::GetInstance()->current_test_info()->name()) + "_" +
-       std::to_string(::getpid()));
+  std::filesystem::path folder_ = own_folder();
   void SetUp() override {
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);

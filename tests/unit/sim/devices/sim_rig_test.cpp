@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/files.h"
+#include "tests/own_folder.h"
 #include "tests/unit/sim/devices/manual_clock.h"
 
 namespace scanrig::sim {
@@ -245,7 +246,7 @@ TEST(SimRigTruth, HoldsTheTrueAnglesOfTheLatestPosesAndNoViewTwice) {
   SimRigOptions options;
   options.image_scale = 0.1;
   auto rig = SimRig::create(options, clock).value();
-  const auto folder = std::filesystem::path(testing::TempDir()) / "sim_rig_truth";
+  const auto folder = own_folder();
   std::filesystem::create_directories(folder);
   EXPECT_EQ(rig->write_truth(folder).error().code, ErrorCode::degenerate);
   std::vector<double> measured;
