@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <span>
 #include <vector>
 
 namespace scanrig {
@@ -63,9 +64,19 @@ double blur_px(const Plane& plane) {
 
 ImageEvidence measure(const cv::Mat& image, PixelFormat format) {
   if (image.empty()) return {};
-  const cv::Mat bytes = image.reshape(1);
-  const auto count = static_cast<double>(bytes.total());
-  return {cv::sum(bytes)[0] / (255.0 * count), cv::countNonZero(bytes == 255) / count,
+  const auto count = static_cast<double>(image.total() * image.elemSize());
+  std::int64_t sum = 0, full = 0;
+  for (int y = 0; y < image.rows; ++y) {
+    const std::span row(image.ptr<std::uint8_t>(y), static_cast<std::size_t>(image.cols) * image.elemSize());
+    std::uint32_t row_sum = 0, row_full = 0;
+    for (const std::uint8_t grey : row) {
+      row_sum += grey;
+      row_full += grey == 255;
+    }
+    sum += row_sum;
+    full += row_full;
+  }
+  return {static_cast<double>(sum) / (255.0 * count), static_cast<double>(full) / count,
           blur_px(plane_of(image, format))};
 }
 

@@ -1,10 +1,10 @@
 #include "drivers/camera/picture.h"
 
+#include <opencv2/imgproc.hpp>
 #include <optional>
 
-#include <opencv2/imgproc.hpp>
-
 #include "core/image_codec.h"
+#include "drivers/camera/image_memory.h"
 
 namespace scanrig {
 namespace {
@@ -43,7 +43,7 @@ Result<Picture> decode(const RawImage& raw) {
 }
 
 cv::Mat upper_8_bits(const cv::Mat& words, int bits) {
-  cv::Mat bytes(words.size(), CV_MAKETYPE(CV_8U, words.channels()));
+  cv::Mat bytes = new_image(words.size(), CV_MAKETYPE(CV_8U, words.channels()));
   const int values = words.cols * words.channels();
   for (int y = 0; y < words.rows; ++y) {
     const auto* from = words.ptr<std::uint16_t>(y);
@@ -68,11 +68,13 @@ Result<Picture> convert(const RawImage& raw) {
                 raw.size.height);
   }
   const cv::Mat seen(raw.size, type, const_cast<std::uint8_t*>(raw.bytes.data()), stride);
-  Picture picture{raw.bits > 8 ? upper_8_bits(seen, raw.bits) : seen.clone(), PixelFormat::mono8};
   if (const auto code = to_bgr(raw.layout)) {
-    cv::cvtColor(picture.image, picture.image, *code);
-    picture.format = PixelFormat::bgr8;
-  } else if (raw.layout == Layout::bgr) {
+    Picture picture{new_image(raw.size, CV_8UC3), PixelFormat::bgr8};
+    cv::cvtColor(raw.bits > 8 ? upper_8_bits(seen, raw.bits) : seen, picture.image, *code);
+    return picture;
+  }
+  Picture picture{raw.bits > 8 ? upper_8_bits(seen, raw.bits) : copy_of(seen), PixelFormat::mono8};
+  if (raw.layout == Layout::bgr) {
     picture.format = PixelFormat::bgr8;
   } else if (raw.layout == Layout::bayer_rg) {
     picture.format = PixelFormat::bayer_rggb8;

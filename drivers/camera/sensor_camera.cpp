@@ -1,6 +1,7 @@
 #include "drivers/camera/sensor_camera.h"
 
 #include "drivers/camera/image_evidence.h"
+#include "drivers/camera/image_memory.h"
 
 namespace scanrig {
 namespace {
@@ -314,8 +315,8 @@ StereoFrame SensorCamera::hand_out(std::vector<SensorFrame>& frames) {
     pair.right = frames.back().picture.image;
   } else {
     const int half = left.image.cols / 2;
-    pair.left = left.image.colRange(0, half).clone();
-    pair.right = left.image.colRange(half, 2 * half).clone();
+    pair.left = copy_of(left.image.colRange(0, half));
+    pair.right = copy_of(left.image.colRange(half, 2 * half));
   }
   pair.trigger = 1;
   pair.taken = channels_.front().ledger.host_time(frames.front().stamp, {trigger_after_, frames.front().arrival});

@@ -57,8 +57,11 @@ int socket_to(const std::string& address) {
   return descriptor;
 }
 
-/// Aravis' camera looks at its trigger register every millisecond, but now and then only after 100 ms or the next
-/// packet: a discovery request [GigE Vision 1.2, 14.1] is one.
+/// How often Aravis' camera looks at its trigger register; it waits for the last millisecond before with all of a
+/// processor's time.
+constexpr double kLooksPerSecond = 250.0;
+
+/// Now and then it looks only after 100 ms or the next packet: a discovery request [GigE Vision 1.2, 14.1] is one.
 void nudge(int descriptor) {
   constexpr std::array<std::uint8_t, 8> kDiscovery{0x42, 0x01, 0x00, 0x02, 0x00, 0x00, 0x00, 0x01};
   std::array<std::uint8_t, 512> answer;
@@ -126,7 +129,7 @@ Result<void> GigeSensor::plug(bool in) {
   arv_fake_camera_write_register(core, ARV_FAKE_CAMERA_REGISTER_SENSOR_HEIGHT, height);
   arv_fake_camera_write_register(core, ARV_FAKE_CAMERA_REGISTER_WIDTH, width);
   arv_fake_camera_write_register(core, ARV_FAKE_CAMERA_REGISTER_HEIGHT, height);
-  arv_fake_camera_set_trigger_frequency(core, 1000.0);
+  arv_fake_camera_set_trigger_frequency(core, kLooksPerSecond);
   arv_fake_camera_set_fill_pattern(core, &GigeSensor::fill, this);
   const std::scoped_lock lock(mutex_);
   camera_ = camera;
