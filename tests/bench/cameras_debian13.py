@@ -1,4 +1,6 @@
 """The whole build and every test on a bare Debian 13."""
+import re
+
 import bare_machine
 import debian13
 
@@ -11,5 +13,6 @@ def measure(bench):
         return
     done = bench.run(debian13.command(["test"]), 7200)
     summary = [line for line in done.stdout.splitlines() if "tests passed" in line]
+    failed = re.findall(r"^\s*\d+ - (\w+) \(\w+\)", done.stdout, re.MULTILINE)
     problem = (done.stderr.strip() or done.stdout.strip() or "no answer").splitlines()[-1]
-    bench.line(what, asked, summary[-1] if summary else problem, done.returncode == 0)
+    bench.line(what, asked, ", ".join(summary[-1:] + failed) or problem, done.returncode == 0)

@@ -105,7 +105,9 @@ struct TriggerLine {
   int exposures = 0;  ///< since the beginning
   int lose = 0;       ///< the next exposures whose frames never arrive
   int looks = 0;      ///< since the beginning
-  int dark = 0;       ///< the next exposures whose right picture is dark
+  int looks_before_exposures = 0;
+  int looks_in_between = 0;  ///< between the first exposure and the latest
+  int dark = 0;              ///< the next exposures whose right picture is dark
   bool projector_absent = false;
   int absent = 0;  ///< how often more the camera does not answer when it is armed; -1: it is not there at all
   std::function<void()> at_fire;  ///< happens during the next exposure, or
@@ -123,7 +125,8 @@ class FakeProjector final : public Projector {
     std::function<void()> happens;
     {
       const std::lock_guard guard(line_.mutex);
-      ++line_.exposures;
+      if (line_.exposures++ == 0) line_.looks_before_exposures = line_.looks;
+      line_.looks_in_between = line_.looks - line_.looks_before_exposures;
       line_.last = light;
       line_.lit = false;  // the pulse is over when this returns
       if (line_.fires_before > 0) {
