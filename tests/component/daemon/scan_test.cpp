@@ -170,7 +170,7 @@ TEST_F(Daemon, ThePreviewLooksInQuietTimesAndNeverDuringAScan) {
     return rig.panel.lamps().flip_request;
   }));
   const std::lock_guard guard(rig.line.mutex);
-  EXPECT_EQ(rig.line.exposures, 2 * 3);
+  EXPECT_EQ(rig.line.exposures, 2 * (3 + 1)) << "three views and a closure shot";
   EXPECT_EQ(rig.line.looks_in_between, 0);
 }
 
