@@ -74,10 +74,11 @@ class Daemon : public scan_samples::FolderTest {
     rig.panel.press(&PanelInputs::start);
   }
 
-  /// Looks again and again, for a virtual minute at most.
+  /// Looks again and again, for a virtual minute at most; a look takes none of it.
   bool clock_waits_for(const std::function<bool()>& as_wanted) {
     for (const auto by = Deadline::after(clock, std::chrono::seconds(60)); !by.expired(clock);
          clock.sleep_for(std::chrono::milliseconds(10))) {
+      const Clock::Busy looking(clock);
       if (as_wanted()) return true;
     }
     return false;
