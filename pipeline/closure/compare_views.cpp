@@ -3,26 +3,25 @@
 #include <algorithm>
 #include <opencv2/core.hpp>
 
-#include "pipeline/closure/patch_shift.h"
+#include "pipeline/closure/picture_shift.h"
 
 namespace scanrig {
 namespace {
 
 constexpr std::size_t kFewest = 3;  ///< fewer squares do not speak for the scene
-constexpr double kOtherPx = 0.5;    ///< a square that differs by more than such a shift would shows something else
 
 bool usable(const cv::Mat& image) { return !image.empty() && (image.type() == CV_8UC1 || image.type() == CV_8UC3); }
 
 ViewChange compare(const cv::Mat& before, const cv::Mat& after, const CompareViewsOptions& options) {
   ViewChange change;
-  auto squares = patch_shifts(before, after);
+  auto [squares, together_px] = picture_shift(before, after);
   change.squares = static_cast<int>(squares.size());
   if (squares.size() < kFewest) {
     const double values = static_cast<double>(before.total()) * before.channels();
     change.changed = cv::norm(before, after, cv::NORM_L1) / values > options.most_grey_step ? 1.0 : 0.0;
   } else {
     std::ranges::sort(squares, std::ranges::greater(), &PatchShift::shift_px);
-    change.shift_px = squares[std::max(kFewest - 1, squares.size() / 20)].shift_px;
+    change.shift_px = std::max(together_px, squares[std::max(kFewest - 1, squares.size() / 20)].shift_px);
     const auto others = std::ranges::count_if(squares, [](const auto& square) { return square.misfit_px > kOtherPx; });
     change.changed = static_cast<double>(others) / static_cast<double>(squares.size());
   }

@@ -16,7 +16,7 @@ struct CompareViewsOptions {
 /// What has become of one camera's picture.
 struct ViewChange {
   int squares = 0;        ///< of the images, that show enough to tell a shift
-  double shift_px = 0.0;  ///< a twentieth of them, at least three, moved so much; true up to about a pixel
+  double shift_px = 0.0;  ///< a twentieth of them, at least three, or all together; true up to about a pixel
   double changed = 0.0;   ///< share that no small shift explains; of images that show nothing 0 or 1
   bool unmoved = true;    ///< within the options
 };

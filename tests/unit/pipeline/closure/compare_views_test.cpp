@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <opencv2/imgproc.hpp>
 
 namespace scanrig {
@@ -53,6 +54,26 @@ TEST(CompareViews, ASlippedObjectIsMeasuredUpToAPixel) {
     EXPECT_FALSE(change.unmoved);
     EXPECT_NEAR(change.shift_px, std::hypot(shift.x, shift.y), 0.1);
   }
+}
+
+/// Stripes that rise to the right in the upper half and fall in the lower, moved by `shift` pixels to the right: no
+/// square shows more of it than what is across its own stripes.
+cv::Mat stripes(double shift, std::uint64_t noise) {
+  cv::Mat1f image(1920, 240);  // so high that few squares see both
+  cv::RNG(noise).fill(image, cv::RNG::NORMAL, 120, 1.5);
+  for (int y = 0; y < image.rows; ++y) {
+    const double slope = y < image.rows / 2 ? 1.0 : -1.0;
+    for (int x = 0; x < image.cols; ++x) image(y, x) += static_cast<float>(60 * std::sin((x - shift + slope * y) / 4));
+  }
+  cv::Mat result;
+  image.convertTo(result, CV_8U);
+  return result;
+}
+
+TEST(CompareViews, AShiftThatNoSquareShowsAloneIsSeenInAllTogether) {
+  const auto change = compare(stripes(0.0, 1), stripes(0.3, 2));
+  EXPECT_NEAR(change.shift_px, 0.3, 0.02);
+  EXPECT_FALSE(change.unmoved);
 }
 
 TEST(CompareViews, WhatMovedFartherHasMovedAtAnyRate) {

@@ -1,4 +1,4 @@
-#include "pipeline/closure/patch_shift.h"
+#include "pipeline/closure/picture_shift.h"
 
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
@@ -31,6 +31,11 @@ struct Square {
   [[nodiscard]] double unexplained() const {
     const Eigen::Vector2d d = shift();
     return std::max(0.0, products(2, 2) - d.dot(gradients() * d));
+  }
+  Square& operator+=(const Square& other) {
+    products += other.products;
+    values += other.values;
+    return *this;
   }
   /// How much it shows: gradient squared, a value.
   [[nodiscard]] double contrast() const { return gradients().trace() / values; }
@@ -90,36 +95,43 @@ double noise_of(std::vector<Square> all) {
   return std::max(left(all[all.size() / 2]), kQuantisation);
 }
 
-std::vector<PatchShift> shifts_of(const std::vector<Square>& all) {
-  std::vector<PatchShift> shifts;
-  if (all.empty()) return shifts;
+/// The shift in those directions that show more than `least`.
+double shift_px(const Square& square, double least) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(square.gradients());
+  const Eigen::Vector2d along = axes.eigenvectors().transpose() * square.shift();
+  return (axes.eigenvalues().array() < least).select(0.0, along.array()).matrix().norm();
+}
+
+PictureShift shift_of(const std::vector<Square>& all) {
+  PictureShift found;
+  if (all.empty()) return found;
   const double noise = noise_of(all);
   const double least = kCorrelated * noise / (kSharp * kSharp);
+  Square together;
   for (const auto& square : all) {
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(square.gradients());
-    if (axes.eigenvalues()(1) < least) continue;
-    Eigen::Vector2d across = axes.eigenvectors().transpose() * square.shift();
-    if (axes.eigenvalues()(0) < least) across(0) = 0.0;
+    if (square.gradients().selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff() < least) continue;
     const double misfit = std::max(0.0, square.unexplained() - noise * square.values);
-    shifts.push_back({across.norm(), std::sqrt(misfit / square.gradients().trace())});
+    found.squares.push_back({shift_px(square, least), std::sqrt(misfit / square.gradients().trace())});
+    if (found.squares.back().misfit_px <= kOtherPx) together += square;
   }
-  return shifts;
+  found.together_px = shift_px(together, least);
+  return found;
 }
 
 }  // namespace
 
-std::vector<PatchShift> patch_shifts(const cv::Mat& before, const cv::Mat& after) {
+PictureShift picture_shift(const cv::Mat& before, const cv::Mat& after) {
   std::vector<cv::Mat> a, b;
   cv::split(before, a);
   cv::split(after, b);
   std::vector<Channel> channels;
   for (std::size_t i = 0; i < a.size(); ++i) channels.push_back(channel(a[i], b[i]));
-  std::vector<PatchShift> shifts;
-  for (int side = kSmallest; side <= kLargest && shifts.size() < kEnough; side *= 2) {
-    auto larger = shifts_of(squares(channels, side));
-    if (larger.size() > shifts.size() || shifts.empty()) shifts = std::move(larger);
+  PictureShift found;
+  for (int side = kSmallest; side <= kLargest && found.squares.size() < kEnough; side *= 2) {
+    auto larger = shift_of(squares(channels, side));
+    if (larger.squares.size() > found.squares.size() || found.squares.empty()) found = std::move(larger);
   }
-  return shifts;
+  return found;
 }
 
 }  // namespace scanrig
