@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <nlohmann/json.hpp>
-#include <ranges>
 #include <set>
 
 namespace scanrig {
@@ -106,8 +106,9 @@ Result<void> read_body(std::string_view body, const std::vector<RequestField>& f
   for (const auto& [key, value] : object.items()) {
     const auto field = std::ranges::find(fields, key, &RequestField::name);
     if (field == fields.end()) {
-      return fail(ErrorCode::invalid_input, "the body has an unknown key; known here: {}",
-                  fmt::join(std::views::transform(fields, &RequestField::name), ", "));
+      std::vector<std::string_view> known;
+      std::ranges::transform(fields, std::back_inserter(known), &RequestField::name);
+      return fail(ErrorCode::invalid_input, "the body has an unknown key; known here: {}", fmt::join(known, ", "));
     }
     auto read = value_of(*field, value);
     if (!read) return pass_on(read);

@@ -8,8 +8,8 @@ import subprocess
 import time
 
 CPU_S, QUICK_CPU_S = 600, 5
-WALL_LIMIT_S = 1500
-BUILD_LIMIT_S = 900
+WALL_LIMIT_S = 3600
+BUILD_LIMIT_S = 3600
 LOOK_S = 0.5
 HANG_S = 60  # for one input, on a machine that has more to do than it can
 CRASH = re.compile(r"SUMMARY: .*")

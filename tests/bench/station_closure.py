@@ -3,7 +3,7 @@ movement that a model of the issue's accuracy would suffer from is found."""
 
 OBJECTS = ("figurine", "pebble")
 MESHES = ("spot/spot_triangulated.obj", "igea_tri.ply")
-LIMIT_S = 1500
+LIMIT_S = 3600
 
 # The smallest amount that has to be found in every exposure: at full size, at a quarter of it.
 FOUND = {"slipped along x, mm": (0.05, 0.2), "slipped along z, mm": (0.1, 0.5), "tipped, deg": (0.5, 1.0),

@@ -4,6 +4,22 @@ what was synced.
 A file's content is durable as of its last fsync; a folder's entries, its files' names, as of the folder's own last fsync.
 Nothing else is. That is less than what ext4 or xfs keep.
 """
+import atexit
+import pathlib
+import shutil
+import tempfile
+
+MEMORY = pathlib.Path("/dev/shm")
+
+
+def quick_folder(otherwise):
+    """A folder in memory, where syncing costs nothing, removed at the end; `otherwise` where there is none. What a kill
+    leaves there is what it leaves on a disk; what a power cut leaves is reckoned."""
+    if not MEMORY.is_dir() or shutil.disk_usage(MEMORY).free < 256 << 20:
+        return pathlib.Path(otherwise)
+    folder = pathlib.Path(tempfile.mkdtemp(dir=MEMORY, prefix="scanrig-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
 
 
 class File:

@@ -21,7 +21,7 @@ class Rig:
     def __init__(self, binaries, scratch):
         self.program = pathlib.Path(binaries).resolve() / "station_one_job"
         self.watcher = pathlib.Path(binaries).resolve() / "disk_calls.so"
-        self.home = pathlib.Path(scratch).resolve() / "kill"
+        self.home = station_disk.quick_folder(scratch).resolve() / "kill"
 
     def fresh(self, name):
         home = self.home / name
@@ -29,8 +29,8 @@ class Rig:
         (home / "jobs").mkdir(parents=True)
         return home
 
-    def run(self, verb, home, crash=False, **watch):
-        environment = dict(os.environ)
+    def run(self, verb, home, crash=False, deaths=1, **watch):
+        environment = dict(os.environ, ONE_JOB_DEATHS=str(deaths))
         if crash:
             environment["ONE_JOB_CRASH"] = "1"
         if watch:
@@ -43,9 +43,9 @@ class Rig:
         except subprocess.TimeoutExpired:
             return subprocess.CompletedProcess([], 124, f"still running after {LIMIT_S} s", "")
 
-    def recovers(self, home):
+    def recovers(self, home, deaths=1):
         """None, or what is wrong."""
-        done = self.run("recover", home)
+        done = self.run("recover", home, deaths=deaths)
         return None if done.returncode == 0 else (done.stdout + done.stderr).strip().replace("\n", "; ")
 
     def record(self):
@@ -103,7 +103,7 @@ def second_kills(rig, calls, count, seed=2):
         home = rig.fresh("killed_twice")
         rig.run("scan", home, kill=first, when="after")
         rig.run("recover", home, kill=second, when="after")
-        yield f"killed after call {first} and after call {second} of the recovery", rig.recovers(home)
+        yield f"killed after call {first} and after call {second} of the recovery", rig.recovers(home, deaths=2)
 
 
 def power_cuts(rig, home, log, share=1.0, seed=3):
@@ -126,17 +126,17 @@ def power_cuts(rig, home, log, share=1.0, seed=3):
         yield f"power cut after call {calls} ({kind} {pathlib.Path(path).name})", rig.recovers(cut)
 
 
-def bad_disks(rig, calls, share=1.0, seed=5):
-    """A disk that is full, or read-only, from some call on: the job must be named as interrupted or failed, nothing that
-    was acknowledged may be lost, and with a good disk everything must go on."""
+def bad_disks(rig, calls, share=1.0, seed=5, failures=0):
+    """A disk that is full, read-only or failing from some call on, or for so many calls: the job must be named as
+    interrupted, nothing that was acknowledged may be lost, and with a good disk the job must come to its model."""
     chance = random.Random(seed)
     for number in range(1, calls + 1):
         if chance.random() > share:
             continue
         error = chance.choice([errno.ENOSPC, errno.EROFS, errno.EIO])
         home = rig.fresh("bad_disk")
-        end = rig.run("scan", home, fail=number, error=error)
-        what = f"{errno.errorcode[error]} from call {number} on"
+        end = rig.run("scan", home, fail=number, error=error, failures=failures)
+        what = f"{errno.errorcode[error]} from call {number}, {failures or 'all'} of them"
         if end.returncode not in (0, 1):
             yield what, f"the daemon ended with {end.returncode}: {end.stdout}{end.stderr}"
         elif end.returncode == 1 and os.strerror(error) not in end.stdout:
@@ -192,6 +192,7 @@ def measure(bench, scratch):
     report(bench, "SIGKILL again during the recovery", second_kills(rig, calls, count))
     report(bench, "power cut after every write, fsync, rename of a job", power_cuts(rig, home, log, share))
     report(bench, "full, read-only and failing disk from every call on, then a good one", bad_disks(rig, calls, share))
+    report(bench, "a disk that fails once, at every call", bad_disks(rig, calls, share, seed=7, failures=1))
     report(bench, "a reconstruction that takes the daemon with it, twice", crashes(rig),
            "quarantine after the second, next job runs")
     report(bench, "index deleted, cut short, overwritten", damaged_index(rig, home, count // 3))

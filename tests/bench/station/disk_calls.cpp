@@ -1,6 +1,7 @@
 // LD_PRELOAD: watches every call by which a program changes files below $DISK_CALLS_ROOT.
 //   $DISK_CALLS_KILL=N, $DISK_CALLS_WHEN=before|after   SIGKILL at the N-th of them, counted from 1
-//   $DISK_CALLS_FAIL=N, $DISK_CALLS_ERROR=ERRNO           from the N-th on everything but removing fails like that
+//   $DISK_CALLS_FAIL=N, $DISK_CALLS_ERROR=ERRNO           from the N-th on everything but removing fails like that,
+//   $DISK_CALLS_FAILURES=COUNT                          so many of them; all where it is not set
 //   $DISK_CALLS_LOG=FILE                                what was done, one line a call; data as hexadecimal digits
 //   $DISK_CALLS_ACKS=FILE                               writes to this file are logged too, as acknowledgements
 // A log line: KIND, PATH, OTHER (second path, offset, size or flags), DATA; separated by tabs. Calls that fail are left
@@ -33,6 +34,7 @@ struct Settings {
   std::string acks = environment("DISK_CALLS_ACKS");
   long kill_at = std::atol(environment("DISK_CALLS_KILL").c_str());
   long fail_from = std::atol(environment("DISK_CALLS_FAIL").c_str());
+  long failures = std::atol(environment("DISK_CALLS_FAILURES").c_str());
   int error = std::atoi(environment("DISK_CALLS_ERROR").c_str());
   bool before = environment("DISK_CALLS_WHEN") == "before";
   int log = -1;
@@ -101,7 +103,8 @@ auto change(const char* kind, const std::string& path, const std::string& other,
   if (!watched(path)) return call();
   const auto& s = settings();
   const long mine = ++count;
-  if (s.fail_from > 0 && mine >= s.fail_from && std::strcmp(kind, "remove") != 0) {
+  const bool fails = s.fail_from > 0 && mine >= s.fail_from && (s.failures == 0 || mine < s.fail_from + s.failures);
+  if (fails && std::strcmp(kind, "remove") != 0) {
     errno = s.error;
     return static_cast<decltype(call())>(-1);
   }

@@ -13,7 +13,8 @@ home, log = rig.record()
 calls = sum(1 for entry in log if entry[0] != "ack")
 points = itertools.chain(itertools.islice(station_kill.kills(rig, calls, 12 / calls / 2), 12),
                          itertools.islice(station_kill.power_cuts(rig, home, log, 0.06), 8),
-                         itertools.islice(station_kill.bad_disks(rig, calls, 0.03), 6),
+                         itertools.islice(station_kill.bad_disks(rig, calls, 0.02), 4),
+                         itertools.islice(station_kill.bad_disks(rig, calls, 0.02, seed=7, failures=1), 4),
                          station_kill.crashes(rig),
                          station_kill.damaged_index(rig, home, 3))
 held = []
