@@ -87,10 +87,13 @@ Result<void> JobThread::begin(const JobInfo& job) {
   auto scan = ScanFolder::open(job.folder);
   if (!scan) return pass_on(scan);
   if (auto state = scan->set_state("scanning"); !state) return state;
+  // Of a scan whose end nobody noted the daemon died; its views may have been the reason, and are not looked at beside
+  // the moving table again.
+  later_ = !job.stored.empty() && !read_failure(job.folder) ? std::optional(job.recipe) : std::nullopt;
   remove_failure(job.folder);
   scan_ = std::move(*scan);
   broken_ = false;
-  reconstruction_.begin(job.id, scan_->path(), job.recipe);
+  if (!later_) reconstruction_.begin(job.id, scan_->path(), job.recipe);
   const auto& poses = scan_->manifest().poses;
   const auto pose = static_cast<std::size_t>(job.complete);
   tell_(event::JobBegun{job.id, job.complete, pose < poses.size() ? static_cast<int>(poses[pose].views.size()) : 0});
@@ -241,7 +244,7 @@ void JobThread::handle(const action::FinishPose& task) {
   tell_(event::PoseStored{task.job, task.pose});
   reconstruction_.finish_pose(task.job, task.pose);
   if (task.last) {
-    reconstruction_.finish(task.job);
+    later_ ? reconstruction_.rebuild(task.job, scan_->path(), *later_, {}) : reconstruction_.finish(task.job);
     scan_.reset();
   }
 }

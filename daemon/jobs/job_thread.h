@@ -62,6 +62,7 @@ class JobThread {
   Mailbox<Task> inbox_;
   // Of the thread only.
   std::optional<ScanFolder> scan_;  ///< of the job that has the rig
+  std::optional<Recipe> later_;     ///< its recipe, where the model is made after the last view only
   bool broken_ = false;             ///< it did not take something: nothing that comes after may stand in it
   std::thread thread_;
 };
