@@ -66,5 +66,32 @@ TEST_F(BadDisk, AViewItDidNotTakeOnceIsTakenAgainWithWhatCameAfterIt) {
   }
 }
 
+TEST_F(BadDisk, TakingNothingAtTheStartItLeavesAJobToBeResumed) {
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_flip());
+  const auto id = newest()->id;
+  shut_down();
+  const auto as_if_killed = ScanFolder::open(job_folders().at(0))->set_state("waiting_for_flip");
+  ASSERT_TRUE(as_if_killed) << as_if_killed.error().message;
+
+  fakes::disk().at_sync([](const std::string&) { return EROFS; });
+  boot();
+  get_ready();
+  EXPECT_EQ(job(id)->state, JobState::interrupted);
+  EXPECT_TRUE(job(id)->resumable);
+  const auto refused = resume(id);
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr(std::strerror(EROFS)));
+  EXPECT_EQ(job(id)->state, JobState::interrupted);
+
+  fakes::disk().at_sync({});
+  const auto resumed = resume(id);
+  ASSERT_TRUE(resumed) << resumed.error().message;
+  rig.panel.press(&PanelInputs::start);
+  EXPECT_TRUE(wait_state(id, JobState::done));
+}
+
 }  // namespace
 }  // namespace scanrig
