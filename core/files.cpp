@@ -99,6 +99,11 @@ Result<void> write_files_synced(const std::filesystem::path& folder, std::span<c
   return sync_folder(folder);
 }
 
+Result<void> remove_file_synced(const std::filesystem::path& path) {
+  if (::unlink(path.c_str()) == 0) return sync_folder(path.parent_path());
+  return errno == ENOENT ? Result<void>() : fail_errno("cannot remove", path);
+}
+
 Result<void> create_directories_synced(const std::filesystem::path& path) {
   std::error_code error;
   if (path.empty()) return {};

@@ -26,6 +26,9 @@ struct FileContent {
 /// atomic: for files that nobody reads until something else names them. Fails with `io`.
 Result<void> write_files_synced(const std::filesystem::path& folder, std::span<const FileContent> files);
 
+/// Removes a file so that it stays away after a power cut. One that is not there is no error. Fails with `io`.
+Result<void> remove_file_synced(const std::filesystem::path& path);
+
 /// Creates `path` and its parents and syncs each new entry's folder. Fails with `io`.
 Result<void> create_directories_synced(const std::filesystem::path& path);
 

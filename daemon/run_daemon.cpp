@@ -157,13 +157,15 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
   const auto refused = [&](const event::Pressed& pressed, const Error& why) {
     options.journal(refused_at_panel(pressed, why, *loop.snapshot()));
   };
-  return loop.run({.alive = [&] { options.alive(loop.snapshot()->sentence); },
-                   .perform = perform_all,
-                   .show = [&](const PanelOutputs& outputs) { panel.show(outputs); },
-                   .fresh_job_id = [&] { return fresh_id(); },
-                   .quiet_hours = [&] { return quiet_now(options.quiet_hours); },
-                   .published = published,
-                   .refused_at_panel = refused});
+  auto ended = loop.run({.alive = [&] { options.alive(loop.snapshot()->sentence); },
+                         .perform = perform_all,
+                         .show = [&](const PanelOutputs& outputs) { panel.show(outputs); },
+                         .fresh_job_id = [&] { return fresh_id(); },
+                         .quiet_hours = [&] { return quiet_now(options.quiet_hours); },
+                         .published = published,
+                         .refused_at_panel = refused});
+  reconstruction.stop();  // before views that are still being stored cost the time it has
+  return ended;
 }
 
 }  // namespace scanrig

@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 #include <random>
 #include <system_error>
+#include <tuple>
 
 #include "core/files.h"
 #include "pipeline/scan/strict_json.h"
@@ -145,7 +146,7 @@ Result<void> begin_attempt(const fs::path& job_folder) {
                                             {"process", this_process()}});
 }
 
-void forget_attempts(const fs::path& job_folder) { remove_file(job_folder / kAttempt); }
+void forget_attempts(const fs::path& job_folder) { std::ignore = remove_file_synced(job_folder / kAttempt); }
 
 Error quarantine_error() {
   return {ErrorCode::internal,

@@ -35,9 +35,10 @@ Result<void> write_failure(const std::filesystem::path& job_folder, const Error&
 std::optional<Error> read_failure(const std::filesystem::path& job_folder);
 void remove_failure(const std::filesystem::path& job_folder);
 
-/// So many reconstructions in a row that began and never ended make a quarantine: the daemon died with each.
+/// So many models in a row whose making began and never ended make a quarantine: the daemon died with each.
 constexpr int kAttemptsThatQuarantine = 2;
-/// attempt.json, written before a reconstruction begins and removed when it ends in any way but the daemon's death.
+/// attempt.json, written durably before a model is made of a whole scan, and removed when that ends in any way but the
+/// daemon's death. While views are being taken there is none.
 struct Attempts {
   int ended_by_death = 0;
   bool running = false;  ///< in this process, now
@@ -45,6 +46,7 @@ struct Attempts {
 Attempts read_attempts(const std::filesystem::path& job_folder);
 /// Another one begins. Fails with `io`.
 Result<void> begin_attempt(const std::filesystem::path& job_folder);
+/// Durable. Where the disk does not take it, the mark counts once too often.
 void forget_attempts(const std::filesystem::path& job_folder);
 /// What is said of a job in quarantine.
 Error quarantine_error();

@@ -8,6 +8,7 @@
 #include <cerrno>
 #include <cstring>
 #include <system_error>
+#include <tuple>
 #include <utility>
 
 #include "core/files.h"
@@ -96,7 +97,8 @@ JobInfo recover_job(const fs::path& folder) {
   auto scan = ScanFolder::open(folder);
   auto job = scan ? read_folder(folder, *scan) : pass_on(scan);
   if (job && job->state == JobState::interrupted && scan->manifest().state != "interrupted") {
-    if (auto marked = scan->set_state("interrupted"); !marked) job = pass_on(marked);
+    // On a disk that takes nothing it stays as it is, and whoever reads it again sees the same.
+    std::ignore = scan->set_state("interrupted");
   }
   if (job) return *job;
   return {.id = folder.filename(), .folder = folder, .state = JobState::failed, .error = job.error()};

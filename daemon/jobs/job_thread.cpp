@@ -87,9 +87,13 @@ Result<void> JobThread::begin(const JobInfo& job) {
   auto scan = ScanFolder::open(job.folder);
   if (!scan) return pass_on(scan);
   if (auto state = scan->set_state("scanning"); !state) return state;
+  // Of a scan whose end nobody noted the daemon died; its views may have been the reason, and are not looked at beside
+  // the moving table again.
+  later_ = !job.stored.empty() && !read_failure(job.folder) ? std::optional(job.recipe) : std::nullopt;
   remove_failure(job.folder);
   scan_ = std::move(*scan);
-  reconstruction_.begin(job.id, scan_->path(), job.recipe);
+  broken_ = false;
+  if (!later_) reconstruction_.begin(job.id, scan_->path(), job.recipe);
   const auto& poses = scan_->manifest().poses;
   const auto pose = static_cast<std::size_t>(job.complete);
   tell_(event::JobBegun{job.id, job.complete, pose < poses.size() ? static_cast<int>(poses[pose].views.size()) : 0});
@@ -171,20 +175,27 @@ Result<void> JobThread::reprocess(JobInfo job, const event::JobAsked& asked) {
   return {};
 }
 
+/// The views that were taken meanwhile are dropped, until the job is closed: a pose without one of its views could
+/// never be completed.
+void JobThread::give_up(const std::string& job, const Error& why) {
+  broken_ = true;
+  tell_(event::StoreFailed{job, why});
+}
+
 void JobThread::handle(const action::StoreView& task) {
   const TakenView& view = *task.view;
-  if (!scan_) return;  // the job could not be begun, and that was told
+  if (!storing()) return;  // the job could not be begun or gone on with, and that was told
   const auto stored = scan_->add_view(static_cast<std::size_t>(view.id.pose), view.record, view.images);
-  if (!stored) return tell_(event::StoreFailed{view.id.job, stored.error()});
+  if (!stored) return give_up(view.id.job, stored.error());
   reconstruction_.add_view(task.view);
   tell_(event::ViewStored{view.id, view.record.measured_deg, view.record.spoilt, view.record.commanded_deg,
                           view.record.settling_ms});
 }
 
 void JobThread::handle(const action::JudgeClosure& task) {
-  if (!scan_) return;
+  if (!storing()) return;
   const auto closure = judge(*task.view);
-  if (!closure) return tell_(event::StoreFailed{task.view->id.job, closure.error()});
+  if (!closure) return give_up(task.view->id.job, closure.error());
   tell_(event::ClosureJudged{task.view->id.job, *closure});
 }
 
@@ -227,21 +238,21 @@ Result<void> JobThread::finish_pose(const action::FinishPose& task) {
 }
 
 void JobThread::handle(const action::FinishPose& task) {
-  if (!scan_) return;
+  if (!storing()) return;
   const auto finished = finish_pose(task);
-  if (!finished) return tell_(event::StoreFailed{task.job, finished.error()});
+  if (!finished) return give_up(task.job, finished.error());
   tell_(event::PoseStored{task.job, task.pose});
   reconstruction_.finish_pose(task.job, task.pose);
   if (task.last) {
-    reconstruction_.finish(task.job);
+    later_ ? reconstruction_.rebuild(task.job, scan_->path(), *later_, {}) : reconstruction_.finish(task.job);
     scan_.reset();
   }
 }
 
 void JobThread::handle(const action::ResumeJob& task) {
-  if (!scan_) return;
+  if (!storing()) return;
   const auto state = scan_->set_state("scanning");
-  if (!state) tell_(event::StoreFailed{task.job, state.error()});
+  if (!state) give_up(task.job, state.error());
 }
 
 void JobThread::handle(const action::CloseJob& task) {

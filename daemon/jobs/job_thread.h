@@ -50,6 +50,8 @@ class JobThread {
   Result<void> finish_pose(const action::FinishPose& task);
   Result<Closure> judge(const TakenView& again);
   Result<void> reprocess(JobInfo job, const event::JobAsked& asked);
+  [[nodiscard]] bool storing() const { return scan_ && !broken_; }
+  void give_up(const std::string& job, const Error& why);
   void tell_known(const std::string& job);
   void answer(Ticket ticket, const Result<void>& done, const std::string& result);
 
@@ -58,7 +60,10 @@ class JobThread {
   ScannedHook on_scanned_;
   std::function<void(Event)> tell_;
   Mailbox<Task> inbox_;
-  std::optional<ScanFolder> scan_;  ///< of the job that has the rig; of the thread only
+  // Of the thread only.
+  std::optional<ScanFolder> scan_;  ///< of the job that has the rig
+  std::optional<Recipe> later_;     ///< its recipe, where the model is made after the last view only
+  bool broken_ = false;             ///< it did not take something: nothing that comes after may stand in it
   std::thread thread_;
 };
 

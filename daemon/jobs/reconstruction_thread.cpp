@@ -24,13 +24,33 @@ ReconstructionThread::ReconstructionThread(Clock& clock, ReconstructorFactory fa
       thread_(start_actor(clock, [this] { run(); })) {}
 
 ReconstructionThread::~ReconstructionThread() {
+  stop();
+  inbox_.close();
+  thread_.join();
+}
+
+void ReconstructionThread::stop() {
   ending_ = true;
   {
     const std::lock_guard guard(mutex_);
     for (auto& run : runs_) run.stop.request_stop();
   }
-  inbox_.close();
-  thread_.join();
+  unmark();
+}
+
+Result<void> ReconstructionThread::mark() {
+  const std::lock_guard guard(mutex_);
+  if (ending_) return fail(ErrorCode::stopped, "stopped by request");
+  if (marked_) return {};
+  if (auto begun = begin_attempt(current_->folder); !begun) return begun;
+  marked_ = current_->folder;
+  return {};
+}
+
+void ReconstructionThread::unmark() {
+  const std::lock_guard guard(mutex_);
+  if (marked_) forget_attempts(*marked_);
+  marked_.reset();
 }
 
 void ReconstructionThread::begin(std::string job, std::filesystem::path folder, Recipe recipe) {
@@ -108,7 +128,9 @@ Result<void> ReconstructionThread::start(const Begin& message, const ScanFolder&
   if (current_->quarantined) return {};
   const auto calibration = scan.load_calibration();
   if (!calibration) return pass_on(calibration);
-  if (auto marked = begin_attempt(message.folder); !marked) return marked;
+  if (scan.manifest().state == "scanned") {
+    if (auto marked = mark(); !marked) return marked;
+  }
   return guarded([&]() -> Result<void> {
     auto made = factory_({.calibration = *calibration,
                           .manifest = scan.manifest(),
@@ -198,15 +220,15 @@ void ReconstructionThread::handle(const Abandon& message) {
   if (current_ && current_->job == message.job) end();
 }
 
-/// The mark of a job in quarantine stays, until somebody asks for another try.
 void ReconstructionThread::end() {
-  if (!current_->quarantined) forget_attempts(current_->folder);
+  unmark();
   std::ignore = dismiss(current_->stop);
   current_.reset();
   give_memory_back();
 }
 
 Result<void> ReconstructionThread::make_model() {
+  if (auto marked = mark(); !marked) return marked;
   const auto progress = [this](std::string_view stage, double fraction) {
     tell_progress(std::string(stage), fraction);
   };

@@ -20,12 +20,13 @@
 namespace scanrig {
 
 /// Makes models, one job after the other, while the rig goes on; at nice +10, so that acquisition comes first.
-/// Work on a job ends with its first error; nothing that is thrown here leaves the thread. A job is marked on disk
-/// before work on it begins and until it ends: what is found marked at the next start took the daemon with it.
+/// Work on a job ends with its first error; nothing that is thrown here leaves the thread. A job that has all its views
+/// is marked on disk before its model is made and until that ends: what is found marked at the next start took the
+/// daemon with it.
 class ReconstructionThread {
  public:
   ReconstructionThread(Clock& clock, ReconstructorFactory factory, std::function<void(Event)> tell);
-  /// Asks the running stage to stop, drops the rest and joins.
+  /// As stop(), then joins.
   ~ReconstructionThread();
   ReconstructionThread(const ReconstructionThread&) = delete;
   ReconstructionThread& operator=(const ReconstructionThread&) = delete;
@@ -41,6 +42,9 @@ class ReconstructionThread {
   /// Ends the work on this job, begun or waiting, soon: nothing more is told of it and its folder is left alone, but
   /// for the model that may be there. False when nothing was to be done on it: then it has ended, and that was told.
   bool cancel(const std::string& job);
+  /// The daemon ends, on purpose: asks the running stage to stop, takes the mark away before anybody loses patience
+  /// with that stage, and drops the rest.
+  void stop();
 
  private:
   struct Begin {
@@ -91,6 +95,8 @@ class ReconstructionThread {
   Begin enlist(std::string job, std::filesystem::path folder, Recipe recipe, ReconstructionChanges changes);
   bool dismiss(const std::stop_source& stop);
   bool works_on(const std::string& job) const;
+  Result<void> mark();
+  void unmark();
   Result<void> start(const Begin& message, const ScanFolder& scan);
   Result<void> catch_up(const ScanFolder& scan);
   Result<void> add(int pose, const Result<ViewImages>& images);
@@ -111,7 +117,8 @@ class ReconstructionThread {
     std::stop_source stop;
   };
   std::mutex mutex_;
-  std::list<Run> runs_;  ///< asked for and not ended; under mutex_
+  std::list<Run> runs_;                          ///< asked for and not ended; under mutex_
+  std::optional<std::filesystem::path> marked_;  ///< the folder whose model is being made; under mutex_
   std::atomic<bool> ending_ = false;
   std::atomic<int> views_waiting_ = 0;  ///< in the inbox, with their images
   // Of the thread only.

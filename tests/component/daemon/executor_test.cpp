@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
+#include <atomic>
 #include <new>
 
 #include "daemon/jobs/process_reconstructor.h"
@@ -42,6 +43,31 @@ class Executor : public Daemon {
         folder / "attempt.json",
         fmt::format(R"({{"format": "scanrig-attempt", "version": 1, "count": {}, "process": "x"}})", count));
   }
+  /// Start; then in the exposure that follows `fires` others the power goes: the next daemon finds the disk as it was.
+  void cut_power_after(int fires) {
+    std::atomic<bool> cut = false;
+    rig.line.fires_before = fires;
+    rig.line.at_fire = [&] {
+      clock.sleep_for(std::chrono::seconds(2));  // the disk rests
+      fs::copy(folder_ / "jobs", folder_ / "cut", fs::copy_options::recursive);
+      cut = true;
+    };
+    rig.panel.press(&PanelInputs::start);
+    ASSERT_TRUE(clock_waits_for([&] { return cut.load(); }));
+    shut_down();
+    fs::remove_all(folder_ / "jobs");
+    fs::rename(folder_ / "cut", folder_ / "jobs");
+    for (const auto& folder : job_folders()) {
+      const auto attempts = read_attempts(folder);
+      if (attempts.running) write_attempts(folder, attempts.ended_by_death + 1);  // that process is no more
+    }
+    boot();
+    get_ready();
+  }
+  void resume(const std::string& id) {
+    const auto resumed = ask(event::JobAsked{.what = What::resume, .job = id});
+    ASSERT_TRUE(resumed) << resumed.error().message;
+  }
 };
 
 TEST_F(Executor, WhatIsThrownFailsTheJobOnly) {
@@ -64,6 +90,56 @@ TEST_F(Executor, AJobIsMarkedWhileItsModelIsMade) {
   EXPECT_TRUE(wait_state(id, JobState::done));
   EXPECT_TRUE(marked);
   EXPECT_FALSE(read_attempts(job(id)->folder).running);
+}
+
+TEST_F(Executor, PowerCutsDuringTheScanAreNoDeathsOverItsModel) {
+  boot();
+  get_ready();
+  cut_power_after(2 * 1);
+  const auto id = newest()->id;
+  EXPECT_FALSE(fs::exists(job_folders().at(0) / "attempt.json"));
+  resume(id);
+  cut_power_after(2 * (1 + 1));
+  EXPECT_EQ(job(id)->stored.size(), 2u);
+  resume(id);
+  scan_both_poses();
+  EXPECT_TRUE(wait_state(id, JobState::done)) << to_string(job(id)->state);
+}
+
+TEST_F(Executor, AScanTheDaemonDiedOverGoesOnAloneAndIsModelledAfterwards) {
+  boot();
+  get_ready();
+  cut_power_after(2 * 1);
+  const auto id = newest()->id;
+  log.calls.clear();
+  resume(id);
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_flip());
+  clock.sleep_for(std::chrono::minutes(1));
+  {
+    const std::lock_guard guard(log.mutex);
+    EXPECT_THAT(log.calls, IsEmpty()) << "what may have ended the daemon does not do so beside the moving table again";
+  }
+  rig.panel.press(&PanelInputs::start);
+  EXPECT_TRUE(wait_state(id, JobState::done));
+  EXPECT_THAT(log.calls, testing::ElementsAre("view 0/0", "view 0/1", "view 0/2", "pose 0", "view 1/0", "view 1/1",
+                                              "view 1/2", "pose 1", "finish"));
+}
+
+TEST_F(Executor, AnEndOnPurposeIsNoDeathHoweverLongTheStageTakes) {
+  std::atomic<bool> marked = false, unmarked = false;
+  log.at_finish = [&] {
+    const auto mark = job_folders().at(0) / "attempt.json";
+    marked = fs::exists(mark);
+    unmarked = clock_waits_for([&] { return !fs::exists(mark); });
+  };
+  boot();
+  get_ready();
+  scan_both_poses();
+  ASSERT_TRUE(clock_waits_for([&] { return marked.load(); }));
+  shut_down();
+  EXPECT_TRUE(unmarked);
+  EXPECT_EQ(read_attempts(job_folders().at(0)).ended_by_death, 0);
 }
 
 TEST_F(Executor, TheDaemonsDeathIsTriedOnceMoreThenTheJobIsInQuarantine) {

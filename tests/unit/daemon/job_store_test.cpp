@@ -1,6 +1,7 @@
 #include "daemon/jobs/job_store.h"
 
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include "tests/unit/pipeline/scan/scan_samples.h"
 
@@ -100,6 +101,20 @@ TEST_F(JobStoreTest, AJobThatWasBeingScannedIsMarkedInterruptedWithItsViews) {
     ASSERT_EQ(job.stored.size(), 1u);
     EXPECT_EQ(job.stored[0].measured_deg, 0.25);
     EXPECT_EQ(ScanFolder::open(folder)->manifest().state, "interrupted") << "the folder is the truth";
+  }
+}
+
+TEST_F(JobStoreTest, AnInterruptedJobIsOneToResumeThoughTheDiskDoesNotTakeItsMark) {
+  const auto store = open();
+  const auto folder = make_job(store, "job", "scanning");
+  const auto in_the_way = folder / fmt::format("scan.json.tmp{}", ::getpid());
+  fs::create_directory(in_the_way);
+  for (const bool disk_is_back : {false, true}) {
+    if (disk_is_back) fs::remove(in_the_way);
+    const auto job = recovered(store, "job");
+    EXPECT_EQ(job.state, JobState::interrupted);
+    EXPECT_TRUE(job.resumable);
+    EXPECT_EQ(job.stored.size(), 1u);
   }
 }
 
