@@ -96,6 +96,7 @@ void begin_next_job(Machine& m, const std::string& fresh_job_id, std::string cau
     s.job = ActiveJob{.id = s.queue.front()->id, .recipe = s.queue.front()->recipe};
     s.queue.erase(s.queue.begin());
   }
+  s.put_on_last = s.job->id;
   s.machine = s.job->recipe.start_on_part ? MachineState::continuous_execution : MachineState::single_execution;
   s.cause = std::move(cause);
   m.act(action::BeginJob{s.job->id});

@@ -68,6 +68,7 @@ struct StationState {
   bool may_be_moving = false;                     ///< the last stop was not confirmed
   std::string cause = "The daemon has started.";  ///< why the machine is in this state
   std::optional<ActiveJob> job;
+  std::string put_on_last{};  ///< the job that was given the rig last; empty: none since the daemon began
   std::vector<std::shared_ptr<const JobInfo>> queue{};  ///< by place
   int failures = 0;                                     ///< jobs in a row without a model that passes
   bool quiet = false;                                   ///< quiet hours: no job begins by itself

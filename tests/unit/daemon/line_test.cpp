@@ -1,0 +1,46 @@
+#include <gtest/gtest.h>
+
+#include "daemon/station/lamps.h"
+#include "tests/unit/daemon/queue_under_test.h"
+
+namespace scanrig {
+namespace {
+
+/// Part after part, with nobody there.
+class Line : public Queue {
+ protected:
+  PanelOutputs outputs() const { return lamps(state, jobs); }
+  void list(const std::string& id, JobState job_state) {
+    jobs[id] = std::make_shared<const JobInfo>(JobInfo{.id = id, .state = job_state});
+  }
+
+  JobTable jobs;
+};
+
+TEST_F(Line, PassAndFailSpeakOfThePartPutOnLast) {
+  get_ready();
+  know(queued("newer", 1, by_parts()));
+  know(queued("earlier", 2, by_parts()));
+  list("earlier", JobState::failed);
+  EXPECT_FALSE(outputs().fail) << "no part was put on";
+  press(Button::start);
+  scan("newer");
+  list("newer", JobState::done);
+  EXPECT_TRUE(outputs().pass);
+  see(false);
+  see(true);
+  list("earlier", JobState::scanning);
+  EXPECT_FALSE(outputs().pass) << "nobody knows yet how this one ends";
+  EXPECT_FALSE(outputs().fail);
+  scan("earlier");
+  list("earlier", JobState::failed);
+  EXPECT_FALSE(outputs().pass);
+  EXPECT_TRUE(outputs().fail);
+  list("newer", JobState::failed);
+  list("earlier", JobState::done);
+  EXPECT_TRUE(outputs().pass);
+  EXPECT_FALSE(outputs().fail);
+}
+
+}  // namespace
+}  // namespace scanrig
