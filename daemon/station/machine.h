@@ -92,6 +92,8 @@ void closure_taken(Machine& m, const event::ClosureTaken& e);
 void closure_judged(Machine& m, const event::ClosureJudged& e);
 void pose_stored(Machine& m, const event::PoseStored& e);
 void store_failed(Machine& m, const event::StoreFailed& e);
+/// There will be no model of the job that has the rig.
+void model_given_up(Machine& m, const Error& why);
 /// The object was turned over.
 void continue_after_flip(Machine& m, std::string cause);
 void flip_timed_out(Machine& m, const event::FlipTimedOut& e);

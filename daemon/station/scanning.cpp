@@ -28,6 +28,13 @@ void moved(Machine& m, const Closure& closure) {
   free_rig(m, cause);
 }
 
+/// No use turning the object over.
+void fail_before_flip(Machine& m) {
+  const auto job = *m.s().job;
+  m.close_job(JobState::failed, *job.reconstruction);
+  free_rig(m, fmt::format("Job {} failed.", job.id));
+}
+
 }  // namespace
 
 void job_begun(Machine& m, const event::JobBegun& e) {
@@ -92,15 +99,20 @@ void pose_stored(Machine& m, const event::PoseStored& e) {
   if (e.pose + 1 == s.job->recipe.poses) {
     s.job.reset();
     free_rig(m, fmt::format("Job {} has all its views.", e.job));
-  } else if (s.job->reconstruction) {  // no use turning the object over
-    m.close_job(JobState::failed, *s.job->reconstruction);
-    free_rig(m, fmt::format("Job {} failed.", e.job));
+  } else if (s.job->reconstruction) {
+    fail_before_flip(m);
   } else {
     s.job->state = JobState::waiting_for_flip;
     s.activity = Activity::waiting_for_flip;
     s.cause = fmt::format("Pose {} is complete.", e.pose + 1);
     m.act(action::WaitForFlip{e.job, s.job->recipe.flip_timeout});
   }
+}
+
+/// A pose that is being scanned is scanned to its end.
+void model_given_up(Machine& m, const Error& why) {
+  m.s().job->reconstruction = why;
+  if (m.s().activity == Activity::waiting_for_flip) fail_before_flip(m);
 }
 
 void continue_after_flip(Machine& m, std::string cause) {

@@ -167,8 +167,8 @@ class Transition : public Machine {
   void operator()(const event::StoreFailed& e) { store_failed(*this, e); }
 
   void operator()(const event::ReconstructionFailed& e) {
-    if (has(e.job)) s().job->reconstruction = e.error;
     count_result(*this, false);
+    if (has(e.job)) model_given_up(*this, e.error);
   }
 
   void operator()(const event::ModelReady& e) { count_result(*this, !e.beyond_limits); }

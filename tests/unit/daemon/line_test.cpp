@@ -6,6 +6,8 @@
 namespace scanrig {
 namespace {
 
+const Error kNothingSeen{ErrorCode::degenerate, "nothing seen"};
+
 /// Part after part, with nobody there.
 class Line : public Queue {
  protected:
@@ -40,6 +42,26 @@ TEST_F(Line, PassAndFailSpeakOfThePartPutOnLast) {
   list("earlier", JobState::done);
   EXPECT_TRUE(outputs().pass);
   EXPECT_FALSE(outputs().fail);
+}
+
+TEST_F(Line, AFailureAfterTheFirstPoseSparesTheFlip) {
+  reach_flip();
+  tell(event::ReconstructionFailed{"another", kNothingSeen});
+  EXPECT_EQ(state.activity, Activity::waiting_for_flip);
+  tell(event::ReconstructionFailed{"job", kNothingSeen});
+  ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::failed);
+  EXPECT_EQ(asked_for<action::CloseJob>()->why.code, ErrorCode::degenerate);
+  EXPECT_EQ(state.machine, MachineState::ready);
+  EXPECT_FALSE(outputs().flip_request);
+}
+
+TEST_F(Line, AFailureOfTheSecondPosesModelLeavesItsViewsToBeTaken) {
+  reach_flip();
+  press(Button::start);
+  tell(event::WarningOver{});
+  tell(event::ReconstructionFailed{"job", kNothingSeen});
+  EXPECT_EQ(state.activity, Activity::scanning) << "with all views it can be reprocessed";
 }
 
 }  // namespace
