@@ -80,8 +80,9 @@ void job_not_begun(Machine& m, const event::JobNotBegun& e);
 void free_rig(Machine& m, std::string cause);
 void count_result(Machine& m, bool good);
 void inputs_seen(Machine& m, const PanelInputs& inputs);
-/// The queue goes on by itself where a new part lies on the table and every rule allows it.
-void begin_on_part(Machine& m);
+/// What the line's signals ask for, where every rule allows it; until then they wait. An object that was turned over is
+/// scanned on, a new part on the table begins the next job of the queue.
+void serve_line(Machine& m);
 
 // scanning.cpp: the job that has the rig, view by view
 void job_begun(Machine& m, const event::JobBegun& e);

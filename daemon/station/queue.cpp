@@ -10,6 +10,7 @@ using What = event::JobAsked::What;
 
 constexpr int kMostRepeats = 100;
 constexpr std::size_t kLongestPart = 200;
+constexpr auto kTurnedOver = "The line says that the object was turned over.";
 
 Queue::iterator find(Queue& queue, const std::string& job) {
   return std::ranges::find_if(queue, [&](const auto& queued) { return queued->id == job; });
@@ -131,13 +132,18 @@ void inputs_seen(Machine& m, const PanelInputs& inputs) {
   s.inputs = inputs;
   if (!inputs.part_present) s.part_gone = true;
   if (s.activity == Activity::waiting_for_flip && s.job->recipe.flip_by_line && turned_over) {
-    if (m.safe_to_move() && m.all_there()) continue_after_flip(m, "The line says that the object was turned over.");
+    s.job->turned_over = true;
+    s.cause = kTurnedOver;
+    if (const char* const why_not = m.unsafe()) s.cause += fmt::format(" {}", why_not);
   }
-  begin_on_part(m);
+  serve_line(m);
 }
 
-void begin_on_part(Machine& m) {
+void serve_line(Machine& m) {
   auto& s = m.s();
+  if (s.activity == Activity::waiting_for_flip && s.job->turned_over && !m.unsafe() && !m.absent_device()) {
+    return continue_after_flip(m, kTurnedOver);
+  }
   if (s.activity != Activity::waiting_for_part || !s.part_gone || !s.inputs.part_present) return;
   if (s.quiet || s.warm_up_left > std::chrono::seconds(0)) return;
   if (!goes_on_by_itself(s) || s.shutting_down || m.unsafe() || m.absent_device()) return;

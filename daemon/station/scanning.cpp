@@ -120,6 +120,7 @@ void continue_after_flip(Machine& m, std::string cause) {
   job.state = JobState::scanning;
   ++job.pose;
   job.asked = job.taken = job.stored = 0;
+  job.turned_over = false;
   m.s().cause = std::move(cause);
   m.act(action::ResumeJob{job.id});
   m.warn();

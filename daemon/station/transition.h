@@ -36,6 +36,7 @@ struct ActiveJob {
   int stored = 0;                         ///< views that survive a power cut
   bool closure_due = false;               ///< view 0 has to be taken again before anything else
   bool closing = false;                   ///< it is being taken or judged
+  bool turned_over = false;               ///< the line has said so since the flip was asked for
   std::optional<Error> reconstruction{};  ///< why there will be no model
 };
 

@@ -1,10 +1,13 @@
-#include <gtest/gtest.h>
+#include <gmock/gmock.h>
 
 #include "daemon/station/lamps.h"
+#include "daemon/station/words.h"
 #include "tests/unit/daemon/queue_under_test.h"
 
 namespace scanrig {
 namespace {
+
+using testing::HasSubstr;
 
 const Error kNothingSeen{ErrorCode::degenerate, "nothing seen"};
 
@@ -62,6 +65,36 @@ TEST_F(Line, AFailureOfTheSecondPosesModelLeavesItsViewsToBeTaken) {
   tell(event::WarningOver{});
   tell(event::ReconstructionFailed{"job", kNothingSeen});
   EXPECT_EQ(state.activity, Activity::scanning) << "with all views it can be reprocessed";
+}
+
+TEST_F(Line, AHandshakeWithTheGuardOpenIsServedWhenItCloses) {
+  rules.recipes["default"].flip_by_line = true;
+  for (const bool held : {true, false}) {
+    state = {};
+    reach_flip();
+    tell(event::GuardChanged{false});
+    see(true, true);
+    EXPECT_EQ(state.activity, Activity::waiting_for_flip) << "nothing moves with an open guard";
+    EXPECT_TRUE(actions.empty());
+    EXPECT_THAT(state.cause, HasSubstr("The guard is open: close it first.")) << "and it is said why";
+    EXPECT_THAT(describe(state, rules).next_action, HasSubstr("Close the guard"));
+    if (!held) see(true, false);
+    tell(event::GuardChanged{true});
+    EXPECT_NE(asked_for<action::ResumeJob>(), nullptr);
+    EXPECT_NE(asked_for<action::Warn>(), nullptr);
+    EXPECT_EQ(state.job->pose, 1);
+  }
+}
+
+TEST_F(Line, AHandshakeBeforeTheFlipIsAskedForIsNone) {
+  rules.recipes["default"].flip_by_line = true;
+  begin_scan();
+  take_and_store_all(0);
+  see(true, true);
+  tell(event::PoseStored{"job", 0});
+  tell(event::GuardChanged{false});
+  tell(event::GuardChanged{true});
+  EXPECT_EQ(state.activity, Activity::waiting_for_flip);
 }
 
 }  // namespace

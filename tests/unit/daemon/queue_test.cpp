@@ -259,11 +259,6 @@ TEST_F(Queue, ALineTurnsTheObjectOverByItsSignal) {
   reach_flip();
   see(true, false);
   EXPECT_TRUE(actions.empty());
-  tell(event::GuardChanged{false});
-  see(true, true);
-  EXPECT_EQ(state.activity, Activity::waiting_for_flip) << "not with an open guard";
-  tell(event::GuardChanged{true});
-  see(true, false);
   see(true, true);
   EXPECT_NE(asked_for<action::ResumeJob>(), nullptr);
   EXPECT_NE(asked_for<action::Warn>(), nullptr);
