@@ -78,7 +78,8 @@ void begin_next_job(Machine& m, const std::string& fresh_job_id, std::string cau
 void job_not_begun(Machine& m, const event::JobNotBegun& e);
 /// The rig is free again: ready, or on to the next part.
 void free_rig(Machine& m, std::string cause);
-void count_result(Machine& m, bool good);
+/// The outcome of a scan: once, and not of what is made of its images later.
+void count_result(Machine& m, const std::string& job, bool good);
 void inputs_seen(Machine& m, const PanelInputs& inputs);
 /// What the line's signals ask for, where every rule allows it; until then they wait. An object that was turned over is
 /// scanned on, a new part on the table begins the next job of the queue.

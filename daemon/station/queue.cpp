@@ -76,6 +76,7 @@ void ask_job(Machine& m, const event::JobAsked& asked) {
 void job_known(Machine& m, const std::shared_ptr<const JobInfo>& info) {
   auto& s = m.s();
   if (m.has(info->id)) return;  // a fresh job that already has the rig
+  s.unjudged.erase(info->id);   // cancelled
   leave_queue(s, info->id);
   if (info->state != JobState::queued) return look_at_queue(m);
   const auto behind =
@@ -84,6 +85,7 @@ void job_known(Machine& m, const std::shared_ptr<const JobInfo>& info) {
 }
 
 void job_removed(Machine& m, const std::string& job) {
+  m.s().unjudged.erase(job);
   leave_queue(m.s(), job);
   look_at_queue(m);
 }
@@ -98,6 +100,7 @@ void begin_next_job(Machine& m, const std::string& fresh_job_id, std::string cau
     s.queue.erase(s.queue.begin());
   }
   s.put_on_last = s.job->id;
+  s.unjudged.insert(s.job->id);
   s.machine = s.job->recipe.start_on_part ? MachineState::continuous_execution : MachineState::single_execution;
   s.cause = std::move(cause);
   m.act(action::BeginJob{s.job->id});
@@ -121,7 +124,8 @@ void free_rig(Machine& m, std::string cause) {
   look_at_queue(m);
 }
 
-void count_result(Machine& m, bool good) {
+void count_result(Machine& m, const std::string& job, bool good) {
+  if (m.s().unjudged.erase(job) == 0) return;
   m.s().failures = good ? 0 : m.s().failures + 1;
   look_at_queue(m);
 }

@@ -23,7 +23,7 @@ void moved(Machine& m, const Closure& closure) {
           job.pose + 1, closure.shift_px > 1.0 ? "more than 1" : fmt::format("{:.2f}", closure.shift_px),
           100 * closure.changed)};
   const std::string cause = fmt::format("Job {}: {}.", job.id, why.message);
-  if (!resuming && !job.reconstruction) count_result(m, false);
+  if (!resuming) count_result(m, job.id, false);
   m.close_job(resuming ? JobState::interrupted : JobState::failed, why);
   free_rig(m, cause);
 }
@@ -146,6 +146,7 @@ void store_failed(Machine& m, const event::StoreFailed& e) {
 void flip_timed_out(Machine& m, const event::FlipTimedOut& e) {
   if (!m.has(e.job) || m.s().activity != Activity::waiting_for_flip) return;
   const auto limit = m.s().job->recipe.flip_timeout;
+  count_result(m, e.job, false);
   m.close_job(JobState::interrupted,
               {ErrorCode::timeout, fmt::format("parked: nobody turned the object over within {} min; resume the job to "
                                                "scan its other side",

@@ -167,11 +167,11 @@ class Transition : public Machine {
   void operator()(const event::StoreFailed& e) { store_failed(*this, e); }
 
   void operator()(const event::ReconstructionFailed& e) {
-    count_result(*this, false);
+    count_result(*this, e.job, false);
     if (has(e.job)) model_given_up(*this, e.error);
   }
 
-  void operator()(const event::ModelReady& e) { count_result(*this, !e.beyond_limits); }
+  void operator()(const event::ModelReady& e) { count_result(*this, e.job, !e.beyond_limits); }
 
   /// A latched fault is not to be got rid of by a reload.
   void operator()(const event::ReloadAsked& e) {

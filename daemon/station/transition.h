@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -71,7 +72,8 @@ struct StationState {
   std::optional<ActiveJob> job;
   std::string put_on_last{};  ///< the job that was given the rig last; empty: none since the daemon began
   std::vector<std::shared_ptr<const JobInfo>> queue{};  ///< by place
-  int failures = 0;                                     ///< jobs in a row without a model that passes
+  int failures = 0;                                     ///< scans in a row without a model that passes
+  std::set<std::string> unjudged{};                     ///< scans whose outcome is still to come
   bool quiet = false;                                   ///< quiet hours: no job begins by itself
   std::chrono::seconds warm_up_left{0};                 ///< of the projector: until then likewise
   bool disk_trouble = false;                            ///< the jobs' disk refused something; until a job begins

@@ -14,6 +14,13 @@ const Error kNothingSeen{ErrorCode::degenerate, "nothing seen"};
 /// Part after part, with nobody there.
 class Line : public Queue {
  protected:
+  void scan_next(const std::string& job) {
+    see(false);
+    see(true);
+    scan(job);
+  }
+  void fail_model(const std::string& job) { tell(event::ReconstructionFailed{job, kNothingSeen}); }
+  void make_model(const std::string& job) { tell(event::ModelReady{job, "m", "r"}); }
   PanelOutputs outputs() const { return lamps(state, jobs); }
   void list(const std::string& id, JobState job_state) {
     jobs[id] = std::make_shared<const JobInfo>(JobInfo{.id = id, .state = job_state});
@@ -95,6 +102,55 @@ TEST_F(Line, AHandshakeBeforeTheFlipIsAskedForIsNone) {
   tell(event::GuardChanged{false});
   tell(event::GuardChanged{true});
   EXPECT_EQ(state.activity, Activity::waiting_for_flip);
+}
+
+TEST_F(Line, ReprocessingNeitherStopsTheLineNorForgivesIt) {
+  run_a_line_of(4);
+  scan("0");
+  make_model("0");
+  for (int i = 0; i < 3; ++i) fail_model("0");
+  for (const auto* job : {"x", "y", "z"}) fail_model(job);
+  EXPECT_EQ(state.activity, Activity::waiting_for_part);
+  scan_next("1");
+  fail_model("1");
+  scan_next("2");
+  fail_model("2");
+  make_model("x");
+  EXPECT_EQ(state.failures, 2);
+  scan_next("3");
+  fail_model("3");
+  EXPECT_EQ(state.failures, 3);
+}
+
+TEST_F(Line, WhatWasCancelledCountsNeitherThenNorWhenReprocessed) {
+  run_a_line_of(2);
+  scan("0");
+  auto job = queued("0", 0, by_parts());
+  job.state = JobState::cancelled;
+  know(job);
+  job.state = JobState::reconstructing;
+  know(job);
+  fail_model("0");
+  EXPECT_EQ(state.failures, 0);
+}
+
+TEST_F(Line, ThreePartsThatNobodyTurnsOverStopIt) {
+  get_ready();
+  for (int i = 0; i < 4; ++i) {
+    auto recipe = by_parts();
+    recipe.poses = 2;
+    know(queued(fmt::format("{}", i), i, recipe));
+  }
+  press(Button::start);
+  scan("0");
+  tell(event::FlipTimedOut{"0"});
+  scan_next("1");
+  tell(event::FlipTimedOut{"1"});
+  EXPECT_EQ(state.activity, Activity::waiting_for_part);
+  scan_next("2");
+  tell(event::FlipTimedOut{"2"});
+  EXPECT_EQ(state.machine, MachineState::ready);
+  EXPECT_THAT(state.cause, HasSubstr("3 jobs in a row failed"));
 }
 
 }  // namespace

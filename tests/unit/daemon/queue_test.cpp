@@ -216,22 +216,26 @@ TEST_F(Queue, AStartBeginsWithAColdProjectorAndWasToldSo) {
 }
 
 TEST_F(Queue, ThreeFailuresInARowStopTheLineAndStartForgivesThem) {
-  run_a_line_of(5);
-  scan("0");
+  run_a_line_of(8);
   const auto failed = [&](const std::string& job) {
     tell(event::ReconstructionFailed{job, {ErrorCode::degenerate, "nothing seen"}});
+    EXPECT_EQ(state.activity, Activity::waiting_for_part) << job;
   };
+  for (const auto* job : {"0", "1", "2", "3", "4", "5"}) {
+    see(false);
+    see(true);
+    scan(job);
+  }
   failed("0");
-  failed("0");
-  tell(event::ModelReady{"0", "m", "r"});
-  failed("0");
-  failed("0");
-  EXPECT_EQ(state.activity, Activity::waiting_for_part) << "a good one lay between";
-  tell(event::ModelReady{"0", "m", "r", Error{ErrorCode::below_limits, "beyond"}});
+  failed("1");
+  tell(event::ModelReady{"2", "m", "r"});  // a good one lies between
+  failed("3");
+  failed("4");
+  tell(event::ModelReady{"5", "m", "r", Error{ErrorCode::below_limits, "beyond"}});
   EXPECT_EQ(state.machine, MachineState::ready);
   EXPECT_THAT(state.cause, HasSubstr("3 jobs in a row failed"));
   press(Button::start);
-  scan("1");
+  scan("6");
   EXPECT_EQ(state.activity, Activity::waiting_for_part);
 }
 
