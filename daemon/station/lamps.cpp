@@ -1,7 +1,5 @@
 #include "daemon/station/lamps.h"
 
-#include <algorithm>
-
 namespace scanrig {
 
 PanelOutputs lamps(const StationState& state, const JobTable& jobs, bool blink) {
@@ -17,9 +15,8 @@ PanelOutputs lamps(const StationState& state, const JobTable& jobs, bool blink) 
               (out.busy && !state.maintenance && !warning && !out.red && !out.amber);
   out.start_lamp = state.machine == MachineState::ready || flip || part;
   out.flip_request = flip;
-  const auto last =
-      std::find_if(jobs.rbegin(), jobs.rend(), [](const auto& job) { return is_final(job.second->state); });
-  if (last != jobs.rend()) {
+  const auto last = jobs.find(state.put_on_last);
+  if (last != jobs.end() && is_final(last->second->state)) {
     out.pass = last->second->state == JobState::done && last->second->passed.value_or(true);
     out.fail = !out.pass;
   }

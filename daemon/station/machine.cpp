@@ -31,6 +31,7 @@ void Machine::stop_rig() {
 
 void Machine::close_job(JobState state, Error why) {
   if (!s().job) return;
+  s().unjudged.erase(s().job->id);
   act(action::CloseJob{s().job->id, state, std::move(why)});
   s().job.reset();
 }

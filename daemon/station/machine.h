@@ -78,10 +78,12 @@ void begin_next_job(Machine& m, const std::string& fresh_job_id, std::string cau
 void job_not_begun(Machine& m, const event::JobNotBegun& e);
 /// The rig is free again: ready, or on to the next part.
 void free_rig(Machine& m, std::string cause);
-void count_result(Machine& m, bool good);
+/// The outcome of a scan: once, and not of what is made of its images later.
+void count_result(Machine& m, const std::string& job, bool good);
 void inputs_seen(Machine& m, const PanelInputs& inputs);
-/// The queue goes on by itself where a new part lies on the table and every rule allows it.
-void begin_on_part(Machine& m);
+/// What the line's signals ask for, where every rule allows it; until then they wait. An object that was turned over is
+/// scanned on, a new part on the table begins the next job of the queue.
+void serve_line(Machine& m);
 
 // scanning.cpp: the job that has the rig, view by view
 void job_begun(Machine& m, const event::JobBegun& e);
@@ -92,6 +94,8 @@ void closure_taken(Machine& m, const event::ClosureTaken& e);
 void closure_judged(Machine& m, const event::ClosureJudged& e);
 void pose_stored(Machine& m, const event::PoseStored& e);
 void store_failed(Machine& m, const event::StoreFailed& e);
+/// There will be no model of the job that has the rig.
+void model_given_up(Machine& m, const Error& why);
 /// The object was turned over.
 void continue_after_flip(Machine& m, std::string cause);
 void flip_timed_out(Machine& m, const event::FlipTimedOut& e);

@@ -10,6 +10,7 @@ using What = event::JobAsked::What;
 
 constexpr int kMostRepeats = 100;
 constexpr std::size_t kLongestPart = 200;
+constexpr auto kTurnedOver = "The line says that the object was turned over.";
 
 Queue::iterator find(Queue& queue, const std::string& job) {
   return std::ranges::find_if(queue, [&](const auto& queued) { return queued->id == job; });
@@ -75,6 +76,7 @@ void ask_job(Machine& m, const event::JobAsked& asked) {
 void job_known(Machine& m, const std::shared_ptr<const JobInfo>& info) {
   auto& s = m.s();
   if (m.has(info->id)) return;  // a fresh job that already has the rig
+  s.unjudged.erase(info->id);   // cancelled
   leave_queue(s, info->id);
   if (info->state != JobState::queued) return look_at_queue(m);
   const auto behind =
@@ -83,6 +85,7 @@ void job_known(Machine& m, const std::shared_ptr<const JobInfo>& info) {
 }
 
 void job_removed(Machine& m, const std::string& job) {
+  m.s().unjudged.erase(job);
   leave_queue(m.s(), job);
   look_at_queue(m);
 }
@@ -96,6 +99,8 @@ void begin_next_job(Machine& m, const std::string& fresh_job_id, std::string cau
     s.job = ActiveJob{.id = s.queue.front()->id, .recipe = s.queue.front()->recipe};
     s.queue.erase(s.queue.begin());
   }
+  s.put_on_last = s.job->id;
+  s.unjudged.insert(s.job->id);
   s.machine = s.job->recipe.start_on_part ? MachineState::continuous_execution : MachineState::single_execution;
   s.cause = std::move(cause);
   m.act(action::BeginJob{s.job->id});
@@ -119,7 +124,8 @@ void free_rig(Machine& m, std::string cause) {
   look_at_queue(m);
 }
 
-void count_result(Machine& m, bool good) {
+void count_result(Machine& m, const std::string& job, bool good) {
+  if (m.s().unjudged.erase(job) == 0) return;
   m.s().failures = good ? 0 : m.s().failures + 1;
   look_at_queue(m);
 }
@@ -130,13 +136,18 @@ void inputs_seen(Machine& m, const PanelInputs& inputs) {
   s.inputs = inputs;
   if (!inputs.part_present) s.part_gone = true;
   if (s.activity == Activity::waiting_for_flip && s.job->recipe.flip_by_line && turned_over) {
-    if (m.safe_to_move() && m.all_there()) continue_after_flip(m, "The line says that the object was turned over.");
+    s.job->turned_over = true;
+    s.cause = kTurnedOver;
+    if (const char* const why_not = m.unsafe()) s.cause += fmt::format(" {}", why_not);
   }
-  begin_on_part(m);
+  serve_line(m);
 }
 
-void begin_on_part(Machine& m) {
+void serve_line(Machine& m) {
   auto& s = m.s();
+  if (s.activity == Activity::waiting_for_flip && s.job->turned_over && !m.unsafe() && !m.absent_device()) {
+    return continue_after_flip(m, kTurnedOver);
+  }
   if (s.activity != Activity::waiting_for_part || !s.part_gone || !s.inputs.part_present) return;
   if (s.quiet || s.warm_up_left > std::chrono::seconds(0)) return;
   if (!goes_on_by_itself(s) || s.shutting_down || m.unsafe() || m.absent_device()) return;

@@ -23,9 +23,16 @@ void moved(Machine& m, const Closure& closure) {
           job.pose + 1, closure.shift_px > 1.0 ? "more than 1" : fmt::format("{:.2f}", closure.shift_px),
           100 * closure.changed)};
   const std::string cause = fmt::format("Job {}: {}.", job.id, why.message);
-  if (!resuming && !job.reconstruction) count_result(m, false);
+  if (!resuming) count_result(m, job.id, false);
   m.close_job(resuming ? JobState::interrupted : JobState::failed, why);
   free_rig(m, cause);
+}
+
+/// No use turning the object over.
+void fail_before_flip(Machine& m) {
+  const auto job = *m.s().job;
+  m.close_job(JobState::failed, *job.reconstruction);
+  free_rig(m, fmt::format("Job {} failed.", job.id));
 }
 
 }  // namespace
@@ -92,9 +99,8 @@ void pose_stored(Machine& m, const event::PoseStored& e) {
   if (e.pose + 1 == s.job->recipe.poses) {
     s.job.reset();
     free_rig(m, fmt::format("Job {} has all its views.", e.job));
-  } else if (s.job->reconstruction) {  // no use turning the object over
-    m.close_job(JobState::failed, *s.job->reconstruction);
-    free_rig(m, fmt::format("Job {} failed.", e.job));
+  } else if (s.job->reconstruction) {
+    fail_before_flip(m);
   } else {
     s.job->state = JobState::waiting_for_flip;
     s.activity = Activity::waiting_for_flip;
@@ -103,11 +109,18 @@ void pose_stored(Machine& m, const event::PoseStored& e) {
   }
 }
 
+/// A pose that is being scanned is scanned to its end.
+void model_given_up(Machine& m, const Error& why) {
+  m.s().job->reconstruction = why;
+  if (m.s().activity == Activity::waiting_for_flip) fail_before_flip(m);
+}
+
 void continue_after_flip(Machine& m, std::string cause) {
   auto& job = *m.s().job;
   job.state = JobState::scanning;
   ++job.pose;
   job.asked = job.taken = job.stored = 0;
+  job.turned_over = false;
   m.s().cause = std::move(cause);
   m.act(action::ResumeJob{job.id});
   m.warn();
@@ -133,6 +146,7 @@ void store_failed(Machine& m, const event::StoreFailed& e) {
 void flip_timed_out(Machine& m, const event::FlipTimedOut& e) {
   if (!m.has(e.job) || m.s().activity != Activity::waiting_for_flip) return;
   const auto limit = m.s().job->recipe.flip_timeout;
+  count_result(m, e.job, false);
   m.close_job(JobState::interrupted,
               {ErrorCode::timeout, fmt::format("parked: nobody turned the object over within {} min; resume the job to "
                                                "scan its other side",

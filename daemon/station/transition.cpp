@@ -48,7 +48,7 @@ class Transition : public Machine {
     s().guard_closed = e.closed;
     if (!e.closed && may_move()) return fault("The guard was opened while the table was moving.");
     home_if_guarded();
-    begin_on_part(*this);
+    serve_line(*this);
   }
 
   void operator()(const event::WarningOver&) {
@@ -101,17 +101,17 @@ class Transition : public Machine {
   void operator()(const event::DevicesSeen& e) {
     s().devices = e.devices;
     act(action::CheckLater{});
-    begin_on_part(*this);
+    serve_line(*this);
   }
 
   void operator()(const event::QuietHours& e) {
     s().quiet = e.quiet;
-    begin_on_part(*this);
+    serve_line(*this);
   }
 
   void operator()(const event::WarmingUp& e) {
     s().warm_up_left = e.left;
-    begin_on_part(*this);
+    serve_line(*this);
   }
 
   /// A projector that cannot be reached is an absent device; it does not make the table move.
@@ -167,11 +167,11 @@ class Transition : public Machine {
   void operator()(const event::StoreFailed& e) { store_failed(*this, e); }
 
   void operator()(const event::ReconstructionFailed& e) {
-    if (has(e.job)) s().job->reconstruction = e.error;
-    count_result(*this, false);
+    count_result(*this, e.job, false);
+    if (has(e.job)) model_given_up(*this, e.error);
   }
 
-  void operator()(const event::ModelReady& e) { count_result(*this, !e.beyond_limits); }
+  void operator()(const event::ModelReady& e) { count_result(*this, e.job, !e.beyond_limits); }
 
   /// A latched fault is not to be got rid of by a reload.
   void operator()(const event::ReloadAsked& e) {

@@ -4,6 +4,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,7 @@ struct ActiveJob {
   int stored = 0;                         ///< views that survive a power cut
   bool closure_due = false;               ///< view 0 has to be taken again before anything else
   bool closing = false;                   ///< it is being taken or judged
+  bool turned_over = false;               ///< the line has said so since the flip was asked for
   std::optional<Error> reconstruction{};  ///< why there will be no model
 };
 
@@ -68,8 +70,10 @@ struct StationState {
   bool may_be_moving = false;                     ///< the last stop was not confirmed
   std::string cause = "The daemon has started.";  ///< why the machine is in this state
   std::optional<ActiveJob> job;
+  std::string put_on_last{};  ///< the job that was given the rig last; empty: none since the daemon began
   std::vector<std::shared_ptr<const JobInfo>> queue{};  ///< by place
-  int failures = 0;                                     ///< jobs in a row without a model that passes
+  int failures = 0;                                     ///< scans in a row without a model that passes
+  std::set<std::string> unjudged{};                     ///< scans whose outcome is still to come
   bool quiet = false;                                   ///< quiet hours: no job begins by itself
   std::chrono::seconds warm_up_left{0};                 ///< of the projector: until then likewise
   bool disk_trouble = false;                            ///< the jobs' disk refused something; until a job begins

@@ -80,10 +80,16 @@ Words with_disk(const StationState& state, Words words) {
   return words;
 }
 
+/// The line has turned the object over.
+std::string how_to_go_on(const StationState& state) {
+  return state.guard_closed ? "The scan goes on when all devices are there."
+                            : "Close the guard: the scan goes on then.";
+}
+
 Words when_executing(const StationState& state) {
   if (state.activity == Activity::waiting_for_flip) {
     return {fmt::format("Pose {} of {} is complete.", state.job->pose + 1, state.job->recipe.poses),
-            how_to_flip(state.job->recipe)};
+            state.job->turned_over ? how_to_go_on(state) : how_to_flip(state.job->recipe)};
   }
   if (state.activity == Activity::waiting_for_part) {
     return {fmt::format("Waiting for the next part, {} in the queue.", state.queue.size()), what_holds_the_line(state)};

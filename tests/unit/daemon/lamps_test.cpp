@@ -5,10 +5,12 @@
 namespace scanrig {
 namespace {
 
-PanelOutputs of(MachineState machine, Activity activity, const JobTable& jobs = {}) {
+PanelOutputs of(MachineState machine, Activity activity, const JobTable& jobs = {},
+                const std::string& put_on_last = {}) {
   StationState state;
   state.machine = machine;
   state.activity = activity;
+  state.put_on_last = put_on_last;
   return lamps(state, jobs);
 }
 
@@ -33,15 +35,20 @@ TEST(Lamps, AFaultIsRedOnlyEvenWhileStopping) {
   EXPECT_EQ(of(MachineState::error, Activity::stopping), (PanelOutputs{.red = true, .busy = true}));
 }
 
-TEST(Lamps, PassAndFailTellHowTheNewestFinishedJobEnded) {
+TEST(Lamps, PassAndFailTellHowTheJobOfThePartPutOnLastEnded) {
   const auto job = [](JobState state) { return std::make_shared<const JobInfo>(JobInfo{.state = state}); };
   JobTable jobs{{"1", job(JobState::failed)}, {"2", job(JobState::done)}, {"3", job(JobState::scanning)}};
-  EXPECT_TRUE(of(MachineState::ready, Activity::none, jobs).pass);
-  jobs["4"] = job(JobState::failed);
-  EXPECT_TRUE(of(MachineState::ready, Activity::none, jobs).fail);
-  EXPECT_FALSE(of(MachineState::ready, Activity::none, jobs).pass);
+  const auto ready = [&](const char* last) { return of(MachineState::ready, Activity::none, jobs, last); };
+  EXPECT_TRUE(ready("2").pass);
+  EXPECT_FALSE(ready("2").fail);
+  EXPECT_TRUE(ready("1").fail);
+  EXPECT_FALSE(ready("1").pass);
+  for (const auto* unknown : {"3", "gone", ""}) {
+    EXPECT_FALSE(ready(unknown).pass) << unknown;
+    EXPECT_FALSE(ready(unknown).fail) << unknown;
+  }
   jobs["5"] = std::make_shared<const JobInfo>(JobInfo{.state = JobState::done, .passed = false});
-  EXPECT_TRUE(of(MachineState::ready, Activity::none, jobs).fail) << "a model beyond the limits";
+  EXPECT_TRUE(ready("5").fail) << "a model beyond the limits";
 }
 
 }  // namespace
