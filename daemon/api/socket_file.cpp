@@ -3,6 +3,7 @@
 #include <fcntl.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
+#include <sys/time.h>
 #include <sys/un.h>
 #include <unistd.h>
 
@@ -46,23 +47,30 @@ Result<void> check_free(const fs::path& path) {
     return fail(ErrorCode::exists, "{}: is there and no socket: name another path", path.string());
   }
   const auto other = connect_to_socket(path);
-  if (!other) return {};
-  ::close(*other);
-  return fail(ErrorCode::refused, "{}: another daemon answers there", path.string());
+  if (other) ::close(*other);
+  if (other || other.error().code == ErrorCode::timeout) {
+    return fail(ErrorCode::refused, "{}: another daemon listens there", path.string());
+  }
+  return other.error().code == ErrorCode::not_found ? Result<void>() : pass_on(other);
 }
 
 }  // namespace
 
-Result<int> connect_to_socket(const fs::path& path) {
+Result<int> connect_to_socket(const fs::path& path, std::chrono::microseconds limit) {
   const auto address = address_of(path);
   if (!address) return pass_on(address);
   const int fd = open_socket();
   if (fd < 0) return fail_errno("make", path, fd);
+  const auto whole = std::chrono::floor<std::chrono::seconds>(limit);
+  const timeval patience{.tv_sec = whole.count(), .tv_usec = (limit - whole).count()};
+  ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
   if (::connect(fd, plain(*address), sizeof *address) == 0) return fd;
-  const bool missing = errno == ENOENT;
+  const int why = errno;
+  if (why != ENOENT && why != ECONNREFUSED && why != EAGAIN) return fail_errno("connect to", path, fd);
   ::close(fd);
-  if (missing) return fail(ErrorCode::not_found, "{}: no such socket", path.string());
-  return fail(ErrorCode::io, "{}: nobody answers", path.string());
+  if (why == ENOENT) return fail(ErrorCode::not_found, "{}: no such socket", path.string());
+  if (why == ECONNREFUSED) return fail(ErrorCode::not_found, "{}: nobody listens", path.string());
+  return fail(ErrorCode::timeout, "{}: nobody takes the connection", path.string());
 }
 
 fs::path socket_path(int listening) {

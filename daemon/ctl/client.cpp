@@ -1,8 +1,6 @@
 #include "daemon/ctl/client.h"
 
 #include <fcntl.h>
-#include <sys/socket.h>
-#include <sys/time.h>
 #include <unistd.h>
 
 #include <boost/asio/io_context.hpp>
@@ -18,7 +16,6 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "core/clock.h"
 #include "daemon/api/socket_file.h"
 
 namespace scanrig::ctl {
@@ -26,12 +23,11 @@ namespace {
 
 namespace net = boost::asio;
 namespace http = boost::beast::http;
+using boost::system::error_code;
 using Answer = tl::expected<nlohmann::json, Refusal>;
 
-constexpr timeval kPatience{.tv_sec = 15, .tv_usec = 0};
 constexpr auto kTooOftenPause = std::chrono::milliseconds(50);
 constexpr auto kTooOftenLimit = std::chrono::seconds(10);
-constexpr timeval kPackingPatience{.tv_sec = 200, .tv_usec = 0};  ///< a file may have to be made first
 
 Answer unreachable(std::string message) { return tl::unexpected(Refusal{ExitCode::unreachable, std::move(message)}); }
 
@@ -51,70 +47,115 @@ struct Removed {
   ~Removed() { ::unlink(path.c_str()); }
 };
 
-/// A connection whose every step has a limit.
+/// A connection to the daemon on which every wait ends: a daemon that was stopped, or hangs, says nothing at all.
 class Link {
  public:
-  Link(int fd, const timeval& patience) : socket_(io_, net::local::stream_protocol(), fd) {
-    ::setsockopt(fd, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
-    ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
+  static tl::expected<std::unique_ptr<Link>, Refusal> open(const std::filesystem::path& path, Clock::Duration limit) {
+    const auto by = Clock::TimePoint::clock::now() + limit;
+    const auto connected = connect_to_socket(path, std::chrono::ceil<std::chrono::microseconds>(limit));
+    if (connected) return std::unique_ptr<Link>(new Link(path, *connected, by, limit));
+    const auto& why = connected.error();
+    if (why.code == ErrorCode::timeout) return tl::unexpected(too_late(path, limit));
+    return tl::unexpected(Refusal{ExitCode::unreachable,
+                                  why.message + (why.code == ErrorCode::not_found ? "; is the daemon running?" : "")});
   }
-  net::local::stream_protocol::socket& socket() { return socket_; }
+
+  /// What comes from now on has `limit`.
+  void give(Clock::Duration limit) {
+    limit_ = limit;
+    by_ = Clock::TimePoint::clock::now() + limit;
+  }
+  error_code write(http::request<http::string_body>& request) {
+    return wait([&](auto done) { http::async_write(socket_, request, std::move(done)); });
+  }
+  error_code read(http::response<http::string_body>& response) {
+    return wait([&](auto done) { http::async_read(socket_, buffer_, response, std::move(done)); });
+  }
+  error_code read_header(http::response_parser<http::buffer_body>& parser) {
+    return wait([&](auto done) { http::async_read_header(socket_, buffer_, parser, std::move(done)); });
+  }
+  error_code read(http::response_parser<http::buffer_body>& parser) {
+    return wait([&](auto done) { http::async_read(socket_, buffer_, parser, std::move(done)); });
+  }
+  [[nodiscard]] tl::unexpected<Refusal> failed(const error_code& error) const {
+    if (error == net::error::timed_out) return tl::unexpected(too_late(path_, limit_));
+    return tl::unexpected(Refusal{ExitCode::unreachable,
+                                  fmt::format("{}: the daemon does not answer: {}", path_.string(), error.message())});
+  }
 
  private:
+  Link(std::filesystem::path path, int fd, Clock::TimePoint by, Clock::Duration limit)
+      : path_(std::move(path)), by_(by), limit_(limit), socket_(io_, net::local::stream_protocol(), fd) {}
+
+  static Refusal too_late(const std::filesystem::path& path, Clock::Duration limit) {
+    return {ExitCode::unreachable,
+            fmt::format("{}: the daemon has not answered within {:g} s; see what `systemctl status scanrigd` says, and "
+                        "restart it where it hangs",
+                        path.string(), std::chrono::duration<double>(limit).count())};
+  }
+
+  /// Until what `begin` begins is done. Too late is the end of the connection.
+  template <class Begin>
+  error_code wait(const Begin& begin) {
+    error_code result;
+    begin([&result](const error_code& error, std::size_t) { result = error; });
+    io_.restart();
+    io_.run_until(by_);
+    if (io_.stopped()) return result;
+    socket_.close(result);
+    io_.run();
+    return net::error::timed_out;
+  }
+
+  const std::filesystem::path path_;
+  Clock::TimePoint by_;
+  Clock::Duration limit_;
   net::io_context io_;
   net::local::stream_protocol::socket socket_;
+  boost::beast::flat_buffer buffer_;
 };
 
-boost::system::error_code send(Link& link, const std::string& method, const std::string& target,
-                               const std::string& body) {
+http::request<http::string_body> request_for(const std::string& method, const std::string& target,
+                                             const std::string& body) {
   http::request<http::string_body> request(http::string_to_verb(method), target, 11, body);
   request.set(http::field::host, "localhost");
   request.keep_alive(false);
   if (!body.empty()) request.set(http::field::content_type, "application/json");
   request.prepare_payload();
-  boost::system::error_code error;
-  http::write(link.socket(), request, error);
-  return error;
-}
-
-tl::unexpected<Refusal> silent(const std::filesystem::path& path, const boost::system::error_code& error) {
-  return tl::unexpected(Refusal{ExitCode::unreachable,
-                                fmt::format("{}: the daemon does not answer: {}", path.string(), error.message())});
+  return request;
 }
 
 using Response = http::response<http::string_body>;
 
-tl::expected<Response, Refusal> exchange_once(const std::filesystem::path& path, const std::string& method,
-                                              const std::string& target, const std::string& body) {
-  const auto connected = connect_to_socket(path);
-  if (!connected) return tl::unexpected(unreachable(connected.error().message + "; is the daemon running?").error());
-  Link link(*connected, kPatience);
+tl::expected<Response, Refusal> exchange_once(const std::filesystem::path& path,
+                                              http::request<http::string_body>& request, Clock::Duration limit) {
+  const auto link = Link::open(path, limit);
+  if (!link) return tl::unexpected(link.error());
   Response response;
-  boost::beast::flat_buffer buffer;
-  auto error = send(link, method, target, body);
-  if (!error) http::read(link.socket(), buffer, response, error);
-  if (error) return silent(path, error);
+  auto error = (*link)->write(request);
+  if (!error) error = (*link)->read(response);
+  if (error) return (*link)->failed(error);
   return response;
 }
 
 /// Who asks too often is told so, and asks again a little later.
 tl::expected<Response, Refusal> exchange(const std::filesystem::path& path, const std::string& method,
-                                         const std::string& target, const std::string& body) {
+                                         const std::string& target, const std::string& body, Clock::Duration limit) {
   RealClock clock;
+  auto request = request_for(method, target, body);
   const auto by = Deadline::after(clock, kTooOftenLimit);
   for (;; clock.sleep_for(kTooOftenPause)) {
-    auto response = exchange_once(path, method, target, body);
+    auto response = exchange_once(path, request, limit);
     if (!response || response->result() != http::status::too_many_requests || by.expired(clock)) return response;
   }
 }
 
-tl::unexpected<Refusal> refusal_of(Link& link, boost::beast::flat_buffer& buffer,
-                                   http::response_parser<http::buffer_body>&& begun, const std::string& target) {
+tl::unexpected<Refusal> refusal_of(Link& link, http::response_parser<http::buffer_body>&& begun,
+                                   const std::string& target) {
   const auto status = begun.get().result();
   std::string text(16 * 1024, '\0');
   begun.get().body() = {text.data(), text.size(), true};
-  boost::system::error_code error;
-  http::read(link.socket(), buffer, begun, error);
+  if (const auto error = link.read(begun); error && error != http::error::need_buffer) return link.failed(error);
   text.resize(text.size() - begun.get().body().size);
   http::response<http::string_body> response(status, 11, std::move(text));
   const auto answer = understand(response, target);
@@ -130,31 +171,31 @@ tl::unexpected<Refusal> unwritten(const std::filesystem::path& path) {
 }  // namespace
 
 Answer ask(const std::filesystem::path& socket, const std::string& method, const std::string& target,
-           const std::string& body) {
-  const auto response = exchange(socket, method, target, body);
+           const std::string& body, Clock::Duration limit) {
+  const auto response = exchange(socket, method, target, body, limit);
   if (!response) return tl::unexpected(response.error());
   return understand(*response, target);
 }
 
 tl::expected<std::string, Refusal> fetch(const std::filesystem::path& socket, const std::string& target) {
-  const auto response = exchange(socket, "GET", target, "");
+  const auto response = exchange(socket, "GET", target, "", kPatience);
   if (!response) return tl::unexpected(response.error());
   if (response->result() == http::status::ok) return response->body();
   return tl::unexpected(understand(*response, target).error());
 }
 
 tl::expected<void, Refusal> download(const std::filesystem::path& path, const std::string& target,
-                                     const std::filesystem::path& out, const Arrived& arrived) {
-  const auto connected = connect_to_socket(path);
-  if (!connected) return tl::unexpected(unreachable(connected.error().message + "; is the daemon running?").error());
-  Link link(*connected, kPackingPatience);
-  boost::beast::flat_buffer buffer;
+                                     const std::filesystem::path& out, const Arrived& arrived, Clock::Duration limit) {
+  const auto opened = Link::open(path, limit);
+  if (!opened) return tl::unexpected(opened.error());
+  Link& link = **opened;
+  auto request = request_for("GET", target, "");
   http::response_parser<http::buffer_body> parser;
   parser.body_limit(std::numeric_limits<std::uint64_t>::max());
-  auto error = send(link, "GET", target, "");
-  if (!error) http::read_header(link.socket(), buffer, parser, error);
-  if (error) return silent(path, error);
-  if (parser.get().result() != http::status::ok) return refusal_of(link, buffer, std::move(parser), target);
+  auto error = link.write(request);
+  if (!error) error = link.read_header(parser);
+  if (error) return link.failed(error);
+  if (parser.get().result() != http::status::ok) return refusal_of(link, std::move(parser), target);
   // The name is taken at the end, and never from somebody who has it.
   const std::filesystem::path part = out.string() + fmt::format(".part-{}", ::getpid());
   const Removed remove_part{part};
@@ -164,9 +205,9 @@ tl::expected<void, Refusal> download(const std::filesystem::path& path, const st
   const auto whole = parser.content_length().value_or(0);
   for (std::uint64_t come = 0; !parser.is_done();) {
     parser.get().body() = {room.data(), room.size(), true};
-    http::read(link.socket(), buffer, parser, error);
-    if (error == http::error::need_buffer) error = {};
-    if (error) return silent(path, error);
+    link.give(kPatience);
+    error = link.read(parser);
+    if (error && error != http::error::need_buffer) return link.failed(error);
     const auto got = room.size() - parser.get().body().size;
     if (std::fwrite(room.data(), 1, got, file.get()) != got) return unwritten(part);
     come += got;

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/clock.h"
 #include "core/result.h"
 
 namespace scanrig::ctl {
@@ -17,10 +18,14 @@ struct Refusal {
   std::string message;
 };
 
-/// One request to the daemon behind `socket` and its JSON answer. Fails with `unreachable` (no daemon, or it does not
-/// answer within 15 s) or with the exit code of the API's error.
+/// For a whole request: connecting, sending it, the answer.
+constexpr std::chrono::seconds kPatience{15};
+
+/// One request to the daemon behind `socket` and its JSON answer. Fails with `unreachable` (no daemon, or it has not
+/// answered within `limit`) or with the exit code of the API's error.
 tl::expected<nlohmann::json, Refusal> ask(const std::filesystem::path& socket, const std::string& method,
-                                          const std::string& target, const std::string& body = "");
+                                          const std::string& target, const std::string& body = "",
+                                          Clock::Duration limit = kPatience);
 
 /// The same for an answer that is no JSON: its bytes, such as a picture.
 tl::expected<std::string, Refusal> fetch(const std::filesystem::path& socket, const std::string& target);
@@ -29,14 +34,13 @@ tl::expected<std::string, Refusal> fetch(const std::filesystem::path& socket, co
 using Arrived = std::function<void(std::uint64_t bytes, std::uint64_t of)>;
 
 /// Writes what the daemon sends for GET `target` to `out`, which must not be there; after a failure it is not there.
-/// Fails as ask(), with `bad_input` (the file is there) and `disk`.
+/// It has `limit` to begin with the file, then kPatience for each piece. Fails as ask(), with `bad_input` (the file is
+/// there) and `disk`.
 tl::expected<void, Refusal> download(const std::filesystem::path& socket, const std::string& target,
-                                     const std::filesystem::path& out, const Arrived& arrived);
+                                     const std::filesystem::path& out, const Arrived& arrived,
+                                     Clock::Duration limit = kPatience);
 
 /// `text` as one segment of a target: what is no letter, digit or one of ._- is escaped.
 std::string segment(std::string_view text);
-
-/// The same for an answer that is no JSON: its bytes, such as a picture.
-tl::expected<std::string, Refusal> fetch(const std::filesystem::path& socket, const std::string& target);
 
 }  // namespace scanrig::ctl

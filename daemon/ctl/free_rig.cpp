@@ -5,20 +5,24 @@
 
 #include <cstdio>
 #include <iostream>
-#include <nlohmann/json.hpp>
 
-#include "daemon/ctl/client.h"
+#include "daemon/api/socket_file.h"
 
 namespace scanrig::ctl {
 
 Result<config::RigConfig> free_rig(const std::filesystem::path& file) {
   auto rig = config::read_rig_config(file, {}, config::Cameras::or_simulated);
-  if (rig && ask(rig->api.socket, "GET", "/api/v1/status")) {
-    return fail(ErrorCode::refused,
-                "scanrigd holds the rig of {} (it answers at {}); use its maintenance mode, or stop it first",
-                file.string(), rig->api.socket.string());
+  if (!rig) return rig;
+  const auto connected = connect_to_socket(rig->api.socket);
+  if (!connected && connected.error().code == ErrorCode::not_found) return rig;
+  if (connected) ::close(*connected);
+  if (!connected && connected.error().code != ErrorCode::timeout) {
+    return pass_on(connected, "nobody knows whether a daemon holds the rig");
   }
-  return rig;
+  return fail(ErrorCode::refused,
+              "scanrigd holds the rig of {} (it listens at {}); use its maintenance mode, or stop it first: systemctl "
+              "stop scanrigd.socket scanrigd.service",
+              file.string(), rig->api.socket.string());
 }
 
 bool agreed(const std::string& question, bool yes) {

@@ -9,7 +9,7 @@
 namespace scanrig::ctl {
 
 /// The configuration of a rig that no daemon has its hands on; a simulated camera may stand in it. Fails with `refused`
-/// when a daemon answers at its socket, otherwise as read_rig_config().
+/// when a daemon listens at its socket, whether it answers or hangs, otherwise as read_rig_config().
 Result<config::RigConfig> free_rig(const std::filesystem::path& file);
 
 /// True when the person at the terminal says yes to `question`, or `yes` was given on the command line.

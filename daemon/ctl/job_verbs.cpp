@@ -14,6 +14,8 @@ namespace {
 using nlohmann::json;
 
 constexpr int kPage = 500;
+constexpr std::chrono::seconds kPackingPatience{200};  ///< a bundle has to be made first
+constexpr std::chrono::seconds kJobPatience{1};        ///< a queued job's folder is on the disk when it is answered
 
 void print_job(const json& job) {
   fmt::print("{:<22} {:<16} {:>2} views  {:<12} {}\n", text(job, "id"), text(job, "state"), job.at("stored").get<int>(),
@@ -36,13 +38,14 @@ tl::expected<json, Refusal> list(const Connection& connection, const JobsVerb& v
 }
 
 /// Copies what the daemon sends to a file here, with a bar.
-ExitCode save(const Connection& connection, const std::string& target, const std::string& name,
-              const std::string& out) {
+ExitCode save(const Connection& connection, const std::string& target, const std::string& name, const std::string& out,
+              Clock::Duration limit = kPatience) {
   std::FILE* told = connection.json ? stderr : stdout;
   StageBars bars(told, ::isatty(::fileno(told)) == 1);
-  const auto done = download(connection.socket, target, out, [&](std::uint64_t bytes, std::uint64_t of) {
+  const auto show = [&](std::uint64_t bytes, std::uint64_t of) {
     if (of > 0) bars.update(name, static_cast<double>(bytes) / static_cast<double>(of));
-  });
+  };
+  const auto done = download(connection.socket, target, out, show, limit);
   if (!done) return complain(done.error());
   if (connection.json) {
     print({{"file", out}});
@@ -95,13 +98,14 @@ ExitCode export_file(const Connection& connection, const ExportVerb& verb) {
 
 ExitCode bundle(const Connection& connection, const BundleVerb& verb) {
   const auto out = verb.out.empty() ? verb.id + ".tar.gz" : verb.out.string();
-  return save(connection, "/api/v1/jobs/" + segment(verb.id) + "/bundle", verb.id, out);
+  return save(connection, "/api/v1/jobs/" + segment(verb.id) + "/bundle", verb.id, out, kPackingPatience);
 }
 
 ExitCode queue(const Connection& connection, const QueueVerb& verb) {
   nlohmann::json body{{"recipe", verb.recipe}, {"repeat", verb.repeat}};
   if (!verb.part.empty()) body["part"] = verb.part;
-  const auto answer = ask(connection.socket, "POST", "/api/v1/jobs", body.dump());
+  const auto answer =
+      ask(connection.socket, "POST", "/api/v1/jobs", body.dump(), kPatience + verb.repeat * kJobPatience);
   if (!answer) return complain(answer.error());
   if (connection.json) {
     print(*answer);

@@ -13,6 +13,11 @@ namespace {
 using nlohmann::json;
 
 constexpr auto kGlance = std::chrono::milliseconds(250);
+constexpr auto kGlancePatience = std::chrono::seconds(3);  ///< who watches wants to see that a daemon hangs
+
+tl::expected<json, Refusal> glance(const Connection& connection, const std::string& target) {
+  return ask(connection.socket, "GET", "/api/v1/" + target, "", kGlancePatience);
+}
 
 void add_health(const json& health, std::vector<std::string>& lines) {
   lines.push_back("");
@@ -35,20 +40,20 @@ void add_health(const json& health, std::vector<std::string>& lines) {
 tl::expected<json, Refusal> job_to_show(const Connection& connection, const json& status) {
   auto id = text(status, "job");
   if (id.empty()) {
-    const auto page = ask(connection.socket, "GET", "/api/v1/jobs?limit=1");
+    const auto page = glance(connection, "jobs?limit=1");
     if (!page) return tl::unexpected(page.error());
     if (page->at("jobs").empty()) return json();
     id = text(page->at("jobs")[0], "id");
   }
-  auto job = ask(connection.socket, "GET", "/api/v1/jobs/" + segment(id));
+  auto job = glance(connection, "jobs/" + segment(id));
   if (!job && job.error().exit == ExitCode::bad_input) return json();  // gone in between
   return job;
 }
 
 tl::expected<std::vector<std::string>, Refusal> look(const Connection& connection) {
-  const auto status = ask(connection.socket, "GET", "/api/v1/status");
+  const auto status = glance(connection, "status");
   if (!status) return tl::unexpected(status.error());
-  const auto health = ask(connection.socket, "GET", "/api/v1/health");
+  const auto health = glance(connection, "health");
   if (!health) return tl::unexpected(health.error());
   const auto job = job_to_show(connection, *status);
   if (!job) return tl::unexpected(job.error());

@@ -1,11 +1,15 @@
 #include "daemon/ctl/client.h"
 
+#include <sys/socket.h>
+#include <unistd.h>
+
 #include "tests/component/api/api_bench.h"
 
 namespace scanrig {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::AllOf;
 using testing::HasSubstr;
 
 class Client : public api_bench::ApiBench {
@@ -69,6 +73,58 @@ TEST_F(Client, SendsABodyAndHearsWhy) {
   const auto answer = ctl::ask(options.socket, "POST", "/api/v1/maintenance/jog", R"({"by_deg": 5})");
   ASSERT_FALSE(answer);
   EXPECT_EQ(answer.error().exit, ExitCode::refused);
+}
+
+/// A daemon that was stopped, or hangs: it listens, and says nothing unless the test does.
+class HangingDaemon : public Client {
+ protected:
+  void SetUp() override {
+    Client::SetUp();
+    listening = listen_on_socket(options.socket).value_or(-1);
+    ASSERT_GE(listening, 0);
+  }
+  void TearDown() override {
+    for (const int fd : waiting) ::close(fd);
+    ::close(listening);
+    Client::TearDown();
+  }
+  /// Until the kernel keeps no more connections for the daemon.
+  void fill_the_backlog() {
+    ASSERT_EQ(::listen(listening, 0), 0);
+    for (auto one = connect_to_socket(options.socket, kSoon); one; one = connect_to_socket(options.socket, kSoon)) {
+      waiting.push_back(*one);
+      ASSERT_LT(waiting.size(), 100u);
+    }
+  }
+  void expect_given_up(const std::string& method, const std::string& body = "") const {
+    const auto answer = ctl::ask(options.socket, method, "/api/v1/status", body, kSoon);
+    ASSERT_FALSE(answer);
+    EXPECT_EQ(answer.error().exit, ExitCode::unreachable);
+    EXPECT_THAT(answer.error().message,
+                AllOf(HasSubstr(options.socket.string()), HasSubstr("not answered within 0.2 s"),
+                      HasSubstr("systemctl status scanrigd")));
+  }
+  static constexpr std::chrono::milliseconds kSoon{200};
+  int listening = -1;
+  std::vector<int> waiting;
+};
+
+TEST_F(HangingDaemon, ThatTakesTheRequestIsGivenUp) { expect_given_up("GET"); }
+
+TEST_F(HangingDaemon, ThatTakesNoBytesIsGivenUp) { expect_given_up("POST", std::string(std::size_t{8} << 20, 'x')); }
+
+TEST_F(HangingDaemon, ThatTakesNoConnectionIsGivenUp) {
+  fill_the_backlog();
+  expect_given_up("GET");
+  EXPECT_EQ(listen_on_socket(options.socket).error().code, ErrorCode::refused) << "it still has its socket";
+}
+
+TEST_F(HangingDaemon, ThatSendsNoFileIsGivenUpAndLeavesNothing) {
+  const auto done = ctl::download(options.socket, kModel, out(), nobody, kSoon);
+  ASSERT_FALSE(done);
+  EXPECT_EQ(done.error().exit, ExitCode::unreachable);
+  EXPECT_THAT(done.error().message, HasSubstr("not answered within 0.2 s"));
+  EXPECT_FALSE(left_something());
 }
 
 TEST(ClientSegment, EscapesWhatWouldBeMoreThanAName) {

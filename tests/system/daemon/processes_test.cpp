@@ -1,77 +1,11 @@
-#include <gmock/gmock.h>
-
-#include <algorithm>
-
-#include <nlohmann/json.hpp>
-#include <optional>
-
-#include "core/clock.h"
-#include "daemon/ctl/client.h"
-#include "tests/slowness.h"
-#include "tests/system/daemon/process.h"
-#include "tests/unit/pipeline/scan/scan_samples.h"
+#include "tests/system/daemon/programs.h"
 
 namespace scanrig {
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
 using testing::HasSubstr;
 using testing::Not;
-
-/// The programs as they are shipped, against each other; small images, and a rig that costs no waiting.
-class Programs : public scan_samples::FolderTest {
- protected:
-  void TearDown() override {
-    daemon.reset();
-    FolderTest::TearDown();
-  }
-  void boot(const std::string& operator_at_rig) {
-    daemon.emplace(std::vector<std::string>{SCANRIGD_SIM_PROGRAM, "--socket", socket(), "--jobs", folder_ / "jobs",
-                                            "--scale", "0.25", "--views", "4", "--clock", "virtual", "--operator",
-                                            operator_at_rig, "--voxel-mm", "1"},
-                   folder_ / "daemon.log");
-  }
-  int scanrig(std::vector<std::string> arguments) {
-    arguments.insert(arguments.begin(), SCANRIG_PROGRAM);
-    const int code = Process(arguments, folder_ / "output").wait();
-    output = read_file(folder_ / "output").value_or("");
-    return code;
-  }
-  std::string socket() const { return folder_ / "api.sock"; }
-
-  /// Asks again and again until the answer is as wanted; null after two minutes, in a build without a sanitizer.
-  template <class Wanted>
-  json ask_until(const std::string& target, const Wanted& wanted) {
-    RealClock clock;
-    for (const auto end = Deadline::after(clock, kSlowness * std::chrono::minutes(2)); !end.expired(clock);
-         clock.sleep_for(std::chrono::milliseconds(20))) {
-      const auto answer = ctl::ask(socket(), "GET", "/api/v1/" + target);
-      if (answer && wanted(*answer)) return *answer;
-    }
-    ADD_FAILURE() << target << " never became as wanted; the daemon said: " << *read_file(folder_ / "daemon.log");
-    return nullptr;
-  }
-  /// The only job once at least `views` of its views are acknowledged.
-  json job_with_views(int views) {
-    const auto jobs = ask_until("jobs", [&](const json& answer) {
-      return !answer["jobs"].empty() && answer["jobs"][0]["stored"].get<int>() >= views;
-    });
-    const auto answer = ctl::ask(socket(), "GET", "/api/v1/jobs/" + jobs["jobs"][0]["id"].get<std::string>());
-    return answer ? *answer : json();
-  }
-  static void expect_readable(const json& job) {
-    const auto scan = ScanFolder::open(job["folder"].get<std::string>());
-    ASSERT_TRUE(scan) << scan.error().message;
-    for (const auto& stored : job["stored"]) {
-      const auto images = scan->load_images(stored["pose"].get<std::size_t>(), stored["view"].get<std::size_t>());
-      EXPECT_TRUE(images) << images.error().message;
-    }
-  }
-
-  std::optional<Process> daemon;
-  std::string output;
-};
 
 TEST_F(Programs, AKilledDaemonLosesNoAcknowledgedViewAndTheJobIsInterrupted) {
   for (const int views : {1, 3, 5}) {
@@ -208,28 +142,6 @@ TEST_F(Programs, AReconstructionWhoseStageThrowsSaysSoInsteadOfCrashing) {
   EXPECT_FALSE(fs::exists(folder_ / "scan" / "model"));
 }
 #endif
-
-TEST_F(Programs, EndWithTheDocumentedCodeAndOneSentence) {
-  const auto sentences = [&] { return std::ranges::count(output, '\n'); };
-  EXPECT_EQ(scanrig({"no-such-verb"}), 2);
-  EXPECT_EQ(scanrig({"status", "--socket", socket()}), 9);
-  EXPECT_THAT(output, HasSubstr("api.sock"));
-  EXPECT_EQ(sentences(), 1);
-  EXPECT_EQ(scanrig({"reconstruct", folder_ / "nowhere"}), 3);
-  EXPECT_THAT(output, HasSubstr("nowhere"));
-  EXPECT_EQ(sentences(), 1);
-  EXPECT_EQ(scanrig({"evaluate", folder_ / "nowhere"}), 3);
-  EXPECT_THAT(output, HasSubstr("nowhere"));
-  EXPECT_EQ(scanrig({"check-config", folder_ / "nowhere.toml"}), 3);
-  EXPECT_THAT(output, HasSubstr("nowhere.toml"));
-  EXPECT_EQ(scanrig({"import", "stanford", "--pose", folder_ / "nowhere.conf", "--out", folder_ / "scan"}), 3);
-  EXPECT_THAT(output, HasSubstr("nowhere.conf"));
-  EXPECT_FALSE(fs::exists(folder_ / "scan"));
-  boot("none");
-  ask_until("status", [](const json& status) { return status["machine"] == "Halted" && status["activity"] == "none"; });
-  EXPECT_EQ(scanrig({"start", "--socket", socket()}), 6);
-  EXPECT_THAT(output, HasSubstr("Press Reset first"));
-}
 
 }  // namespace
 }  // namespace scanrig

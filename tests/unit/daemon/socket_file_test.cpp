@@ -49,7 +49,7 @@ TEST_F(SocketFile, APassedOneIsSharedAndGetsTheMode) {
 TEST_F(SocketFile, AStaleSocketIsReplaced) {
   ::close(*listen_on_socket(path()));
   ASSERT_TRUE(fs::exists(path()));
-  EXPECT_EQ(connect_to_socket(path()).error().code, ErrorCode::io);
+  EXPECT_EQ(connect_to_socket(path()).error().code, ErrorCode::not_found);
   const auto listening = listen_on_socket(path());
   ASSERT_TRUE(listening) << listening.error().message;
   ::close(*listening);

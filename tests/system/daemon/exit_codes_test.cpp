@@ -1,0 +1,74 @@
+#include <algorithm>
+#include <list>
+
+#include "tests/system/daemon/programs.h"
+
+namespace scanrig {
+namespace {
+
+using testing::HasSubstr;
+
+int code_of(ExitCode code) { return static_cast<int>(code); }
+
+TEST_F(Programs, EndWithTheDocumentedCodeAndOneSentence) {
+  const auto sentences = [&] { return std::ranges::count(output, '\n'); };
+  EXPECT_EQ(scanrig({"no-such-verb"}), 2);
+  EXPECT_EQ(scanrig({"status", "--socket", socket()}), 9);
+  EXPECT_THAT(output, HasSubstr("api.sock"));
+  EXPECT_EQ(sentences(), 1);
+  EXPECT_EQ(scanrig({"reconstruct", folder_ / "nowhere"}), 3);
+  EXPECT_THAT(output, HasSubstr("nowhere"));
+  EXPECT_EQ(sentences(), 1);
+  EXPECT_EQ(scanrig({"evaluate", folder_ / "nowhere"}), 3);
+  EXPECT_THAT(output, HasSubstr("nowhere"));
+  EXPECT_EQ(scanrig({"check-config", folder_ / "nowhere.toml"}), 3);
+  EXPECT_THAT(output, HasSubstr("nowhere.toml"));
+  EXPECT_EQ(scanrig({"import", "stanford", "--pose", folder_ / "nowhere.conf", "--out", folder_ / "scan"}), 3);
+  EXPECT_THAT(output, HasSubstr("nowhere.conf"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "scan"));
+  boot("none");
+  ask_until("status", [](const json& status) { return status["machine"] == "Halted" && status["activity"] == "none"; });
+  EXPECT_EQ(scanrig({"start", "--socket", socket()}), 6);
+  EXPECT_THAT(output, HasSubstr("Press Reset first"));
+}
+
+TEST_F(Programs, EveryVerbGivesUpOnADaemonThatWasStopped) {
+  boot("none");
+  ask_until("status", [](const json& status) { return status["machine"] == "Halted"; });
+  daemon->signal(SIGSTOP);
+  std::list<Process> clients;
+  std::vector<std::filesystem::path> outputs;
+  for (const std::vector<std::string>& verb : std::vector<std::vector<std::string>>{{"status"},
+                                                                                    {"status", "--follow"},
+                                                                                    {"start", "--follow"},
+                                                                                    {"stop"},
+                                                                                    {"jobs"},
+                                                                                    {"health"},
+                                                                                    {"export", "x"}}) {
+    std::vector<std::string> command{SCANRIG_PROGRAM};
+    command.insert(command.end(), verb.begin(), verb.end());
+    command.insert(command.end(), {"--socket", socket()});
+    outputs.push_back(folder_ / ("client" + std::to_string(outputs.size())));
+    clients.emplace_back(command, outputs.back());
+  }
+  for (auto& client : clients) EXPECT_EQ(client.wait(), code_of(ExitCode::unreachable));
+  for (const auto& file : outputs) {
+    EXPECT_THAT(*read_file(file), HasSubstr("api.sock: the daemon has not answered within 15 s; see what"));
+  }
+  daemon->signal(SIGCONT);
+  EXPECT_EQ(scanrig({"status", "--socket", socket()}), 0) << output;
+}
+
+TEST_F(Programs, WhatCannotBeWrittenIsTheDisk) {
+  boot("none");
+  ask_until("status", [](const json& status) { return status["machine"] == "Halted"; });
+  ASSERT_EQ(scanrig({"queue", "--socket", socket()}), 0) << output;
+  const auto id = output.substr(0, output.find('\n'));
+  EXPECT_EQ(scanrig({"export", id, "--file", "scan.json", "--out", folder_ / "nowhere/copy", "--socket", socket()}),
+            code_of(ExitCode::disk))
+      << output;
+  EXPECT_THAT(output, HasSubstr("nowhere/copy"));
+}
+
+}  // namespace
+}  // namespace scanrig
