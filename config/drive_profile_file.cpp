@@ -6,6 +6,7 @@
 #include <charconv>
 
 #include "config/section.h"
+#include "core/files.h"
 
 namespace scanrig::config {
 namespace {
@@ -158,10 +159,16 @@ void read_alarm(Section& s, DriveProfile::Alarm& alarm) {
 }  // namespace
 
 Result<DriveProfile> read_drive_profile(const std::filesystem::path& file) {
+  const auto text = read_file(file);
+  if (!text) return pass_on(text);
+  return parse_drive_profile(*text, file);
+}
+
+Result<DriveProfile> parse_drive_profile(std::string_view text, const std::filesystem::path& file) {
   DriveProfile profile;
   using Speed = DriveProfile::SpeedUnit;
   using Acceleration = DriveProfile::AccelerationUnit;
-  const auto read = read_toml(file, [&](Section& root) {
+  const auto read = read_toml(text, file, [&](Section& root) {
     int schema = 0;
     root.one_of("schema", schema, {1});
     root.text("name", profile.name);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <string_view>
 
 #include "core/result.h"
 #include "drivers/turntable/drive_profile.h"
@@ -10,5 +11,8 @@ namespace scanrig::config {
 /// A drive profile, see config/drives/leadshine-rs.toml. Fails with `not_found`, `io`, `invalid_input` (every problem
 /// with file and line).
 Result<DriveProfile> read_drive_profile(const std::filesystem::path& file);
+
+/// The same of its text; `file` is only named. Fails with `invalid_input`.
+Result<DriveProfile> parse_drive_profile(std::string_view text, const std::filesystem::path& file);
 
 }  // namespace scanrig::config

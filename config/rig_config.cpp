@@ -2,11 +2,14 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <tuple>
+#include <utility>
 
 #include "config/camera_section.h"
 #include "config/projector_section.h"
 #include "config/section.h"
 #include "config/turntable_section.h"
+#include "core/files.h"
 
 namespace scanrig::config {
 namespace {
@@ -182,6 +185,16 @@ void read_api(Section& s, const std::filesystem::path& base, ApiConfig& api) {
   if (s.has("engineer_group")) s.text("engineer_group", api.engineer_group.emplace());
 }
 
+void read_gpio(Section& root, const std::filesystem::path& base, RigConfig& rig) {
+  if (!root.has("gpio")) return;
+  root.section("gpio", [&](Section& s) { s.path("socket", base, rig.gpio_socket.emplace()); });
+}
+
+void read_panel_and_safety(Section& root, RigConfig& rig) {
+  root.section("panel", [&](Section& s) { read_panel(s, rig.panel); });
+  root.section("safety", [&](Section& s) { read_safety(s, rig.panel, rig.safety); });
+}
+
 void read_rig(Section& root, const std::filesystem::path& base, const std::vector<std::filesystem::path>& drives,
               Cameras cameras, RigConfig& rig) {
   int schema = 0;
@@ -189,8 +202,7 @@ void read_rig(Section& root, const std::filesystem::path& base, const std::vecto
   root.section("turntable", [&](Section& s) { read_turntable(s, drives, rig.turntable); });
   root.section("stereo_camera", [&](Section& s) { read_stereo_camera(s, base, cameras, rig.stereo_camera); });
   root.section("projector", [&](Section& s) { read_projector(s, rig.stereo_camera.exposure, rig.projector); });
-  root.section("panel", [&](Section& s) { read_panel(s, rig.panel); });
-  root.section("safety", [&](Section& s) { read_safety(s, rig.panel, rig.safety); });
+  read_panel_and_safety(root, rig);
   root.section("calibration", [&](Section& s) { s.path("file", base, rig.calibration_file); });
   root.section("recipe", [&](Section& s) { read_recipes(s, rig); });
   root.section("storage", [&](Section& s) { read_storage(s, base, rig.storage); });
@@ -204,21 +216,47 @@ void read_rig(Section& root, const std::filesystem::path& base, const std::vecto
   if (root.has("webhook")) {
     root.section("webhook", [&](Section& s) { read_webhook(s, rig.webhook.emplace()); });
   }
-  if (root.has("gpio")) {
-    root.section("gpio", [&](Section& s) { s.path("socket", base, rig.gpio_socket.emplace()); });
-  }
+  read_gpio(root, base, rig);
   root.section("api", [&](Section& s) { read_api(s, base, rig.api); });
+}
+
+std::vector<std::filesystem::path> usual_drives(const std::filesystem::path& file) {
+  const auto base = file.parent_path();
+  return {base / "drives", base / ".." / "drives", "/usr/share/scanrig/drives"};
 }
 
 }  // namespace
 
 Result<RigConfig> read_rig_config(const std::filesystem::path& file, const std::filesystem::path& drives,
                                   Cameras cameras) {
-  const auto base = file.parent_path();
-  std::vector<std::filesystem::path> folders{drives};
-  if (drives.empty()) folders = {base / "drives", base / ".." / "drives", "/usr/share/scanrig/drives"};
+  const std::vector<std::filesystem::path> folders = drives.empty() ? usual_drives(file) : std::vector{drives};
+  auto text = read_file(file);
+  if (!text) return pass_on(text);
   RigConfig rig;
-  const auto read = read_toml(file, [&](Section& root) { read_rig(root, base, folders, cameras, rig); });
+  rig.text = std::move(*text);
+  const auto read =
+      read_toml(rig.text, file, [&](Section& root) { read_rig(root, file.parent_path(), folders, cameras, rig); });
+  if (!read) return pass_on(read);
+  return rig;
+}
+
+Result<RigConfig> read_device_config(SafetyDevice device, const std::filesystem::path& file,
+                                     const std::filesystem::path& base) {
+  auto text = read_file(file);
+  if (!text) return pass_on(text);
+  RigConfig rig;
+  rig.text = std::move(*text);
+  const auto read = read_toml(rig.text, file, [&](Section& root) {
+    for (const auto& key : root.free_keys()) std::ignore = root.has(key);  // known, or of no concern
+    switch (device) {
+      case SafetyDevice::turntable:
+        return root.section("turntable", [&](Section& s) { read_turntable(s, usual_drives(file), rig.turntable); });
+      case SafetyDevice::projector:
+        root.section("projector", [&](Section& s) { read_projector(s, {}, rig.projector); });
+        return read_gpio(root, base, rig);
+      case SafetyDevice::panel: read_panel_and_safety(root, rig); return read_gpio(root, base, rig);
+    }
+  });
   if (!read) return pass_on(read);
   return rig;
 }

@@ -30,10 +30,17 @@ struct SafetyConfig {
   bool remote_start = false;  ///< only with a guard
 };
 
+/// A file as it was read.
+struct SourceFile {
+  std::string name;  ///< without its folder
+  std::string text;
+};
+
 struct TurntableConfig {
   enum class Driver { modbus, grbl };
   Driver driver = Driver::modbus;
-  ModbusTurntableOptions modbus;  ///< with the drive profile it names
+  ModbusTurntableOptions modbus;           ///< with the drive profile it names
+  std::optional<SourceFile> profile_file;  ///< of modbus
   GrblTurntableOptions grbl;
 
   [[nodiscard]] const AxisTurntableOptions& motion() const {
@@ -123,6 +130,7 @@ struct ApiConfig {
 
 /// rig.toml, checked; relative paths are made relative to the file's folder.
 struct RigConfig {
+  std::string text;  ///< of the file
   SafetyConfig safety;
   TurntableConfig turntable;
   ProjectorConfig projector;
@@ -146,5 +154,13 @@ enum class Cameras { real, or_simulated };
 /// Fails with `not_found`, `io`, or `invalid_input`: at most 20 problems, each on a line of its own, in order of line.
 Result<RigConfig> read_rig_config(const std::filesystem::path& file, const std::filesystem::path& drives = {},
                                   Cameras cameras = Cameras::real);
+
+/// What has to be made safe when nobody controls the rig.
+enum class SafetyDevice { turntable, projector, panel };
+
+/// Of the same file only what `device` needs, whatever is wrong with the rest; all else is left as it is by default.
+/// Relative paths start at `base`. Fails as read_rig_config().
+Result<RigConfig> read_device_config(SafetyDevice device, const std::filesystem::path& file,
+                                     const std::filesystem::path& base);
 
 }  // namespace scanrig::config

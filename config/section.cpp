@@ -4,8 +4,6 @@
 
 #include <algorithm>
 
-#include "core/files.h"
-
 namespace scanrig::config {
 namespace {
 
@@ -138,12 +136,11 @@ void Section::report_unknown_keys() {
   }
 }
 
-Result<void> read_toml(const std::filesystem::path& file, const std::function<void(Section&)>& read) {
-  const auto text = read_file(file);
-  if (!text) return pass_on(text);
+Result<void> read_toml(std::string_view text, const std::filesystem::path& file,
+                       const std::function<void(Section&)>& read) {
   Problems problems(file.string());
   try {
-    const toml::table table = toml::parse(*text, file.string());
+    const toml::table table = toml::parse(text, file.string());
     Section root(table, "", "", problems);
     read(root);
     root.report_unknown_keys();

@@ -132,8 +132,9 @@ class Section {
   std::set<std::string, std::less<>> known_;
 };
 
-/// Reads a file through `read`. Fails with `not_found`, `io`, or `invalid_input` with every problem on a line of its
-/// own: "FILE:LINE: [table] key: what is wrong".
-Result<void> read_toml(const std::filesystem::path& file, const std::function<void(Section&)>& read);
+/// Reads the text of `file` through `read`. Fails with `invalid_input` with every problem on a line of its own:
+/// "FILE:LINE: [table] key: what is wrong".
+Result<void> read_toml(std::string_view text, const std::filesystem::path& file,
+                       const std::function<void(Section&)>& read);
 
 }  // namespace scanrig::config

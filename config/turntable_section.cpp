@@ -3,6 +3,7 @@
 #include <fmt/ranges.h>
 
 #include "config/drive_profile_file.h"
+#include "core/files.h"
 
 namespace scanrig::config {
 namespace {
@@ -10,7 +11,7 @@ namespace {
 /// A tolerance finer than this many pulses cannot be told from the drive's own rounding.
 constexpr double kMinTolerancePulses = 2.0;
 
-void read_profile(Section& s, const std::vector<std::filesystem::path>& folders, DriveProfile& profile) {
+void read_profile(Section& s, const std::vector<std::filesystem::path>& folders, TurntableConfig& turntable) {
   std::string name;
   s.text("profile", name);
   if (name.empty()) return;
@@ -18,13 +19,16 @@ void read_profile(Section& s, const std::vector<std::filesystem::path>& folders,
   std::vector<std::string> tried;
   for (const auto& folder : folders) {
     const auto file = folder / (name + ".toml");
-    auto read = read_drive_profile(file);
-    if (read) {
-      profile = *read;
-      return;
+    auto text = read_file(file);
+    if (!text && text.error().code == ErrorCode::not_found) {
+      tried.push_back(file.string());
+      continue;
     }
-    if (read.error().code != ErrorCode::not_found) return s.report("profile", read.error().message);
-    tried.push_back(file.string());
+    const auto profile = text ? parse_drive_profile(*text, file) : pass_on(text);
+    if (!profile) return s.report("profile", profile.error().message);
+    turntable.modbus.profile = *profile;
+    turntable.profile_file = SourceFile{file.filename(), std::move(*text)};
+    return;
   }
   s.report("profile", fmt::format("there is none of {}", fmt::join(tried, ", ")));
 }
@@ -82,8 +86,9 @@ void read_motion(Section& s, const std::vector<std::string>& modes, AxisTurntabl
   read_soft_limits(s, options.soft_limits);
 }
 
-void read_modbus(Section& s, const std::vector<std::filesystem::path>& drive_folders, ModbusTurntableOptions& options) {
-  read_profile(s, drive_folders, options.profile);
+void read_modbus(Section& s, const std::vector<std::filesystem::path>& drive_folders, TurntableConfig& turntable) {
+  auto& options = turntable.modbus;
+  read_profile(s, drive_folders, turntable);
   read_modbus_line(s, options.line);
   s.number("pulses_per_motor_rev", options.scale.pulses_per_motor_rev, {200, 65535});
   std::vector<std::string> modes;
@@ -123,7 +128,7 @@ void read_modbus_line(Section& s, modbus::LineOptions& line) {
 void read_turntable(Section& s, const std::vector<std::filesystem::path>& drive_folders, TurntableConfig& turntable) {
   using Driver = TurntableConfig::Driver;
   s.choice<Driver>("driver", turntable.driver, {{"modbus", Driver::modbus}, {"grbl", Driver::grbl}});
-  turntable.driver == Driver::grbl ? read_grbl(s, turntable.grbl) : read_modbus(s, drive_folders, turntable.modbus);
+  turntable.driver == Driver::grbl ? read_grbl(s, turntable.grbl) : read_modbus(s, drive_folders, turntable);
 }
 
 }  // namespace scanrig::config

@@ -125,6 +125,7 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
   };
   auto api = ApiServer::start(api_options, loop);
   if (!api) return pass_on(api);
+  if (auto may = options.takes_devices(); !may) return pass_on(may);
 
   // Time stands until every thread is there. They end in reverse order: the panel shows the last lamps, the rig is
   // seen standing, what was taken goes to disk, then the reconstruction that all of them feed is stopped.

@@ -48,6 +48,9 @@ struct DaemonOptions {
   Clock::Duration warning = std::chrono::seconds(2);
   ReconstructorFactory reconstructor;
   JobThread::ScannedHook on_scanned;
+  /// Called once nobody else can refuse, another daemon for one, and before a device is used. What it fails with, the
+  /// daemon does.
+  std::function<Result<void>()> takes_devices = [] { return Result<void>(); };
   /// Called once, before anything can move, with what takes presses and orders; it lives until `loop_ends` is called.
   std::function<void(ControlLoop&)> on_loop = [](ControlLoop&) {};
   std::function<void()> loop_ends = [] {};

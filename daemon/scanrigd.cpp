@@ -10,7 +10,7 @@ namespace {
 using namespace scanrig;
 
 Result<void> run(const std::filesystem::path& file, SignalStop& stop) {
-  Service service("scanrigd", [file] { return config::read_rig_config(file); });
+  Service service("scanrigd", file, config::Cameras::real);
   return service.run(stop, [&](const config::RigConfig& config, const DaemonOptions& options) -> Result<Ended> {
     RealClock clock;
     const auto open = open_devices(config, clock);
@@ -35,7 +35,7 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "scanrigd: {}\n", error.what());
     return static_cast<int>(ExitCode::usage);
   }
-  if (make_safe) return static_cast<int>(make_safe_now(config::read_rig_config(config), "scanrigd"));
+  if (make_safe) return static_cast<int>(make_safe_now(config, "scanrigd"));
   SignalStop stop(SignalStop::Hangup::is_told);
   const auto done = run(config, stop);
   if (done) return static_cast<int>(ExitCode::ok);

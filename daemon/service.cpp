@@ -6,11 +6,12 @@
 #include "core/version.h"
 #include "daemon/api/socket_file.h"
 #include "daemon/options_from.h"
+#include "daemon/rig/kept_config.h"
 
 namespace scanrig {
 
 Result<void> Service::run(SignalStop& stop, const Run& run) {
-  auto config = read_();
+  auto config = read();
   if (!config) return pass_on(config);
   journal_.emplace(standard_sink());
   stop.on_hangup([this] { reload([](const auto&) {}); });
@@ -46,10 +47,11 @@ Result<void> Service::run_again_and_again(const Run& run, config::RigConfig conf
 DaemonOptions Service::options_for(const config::RigConfig& config, bool again) {
   auto options = options_from(config);
   if (again) options.home_guarded = false;  // a restart is somebody's doing at the rig, a reload need not be
+  options.takes_devices = [this, &config] { return keep_config(config, kept_config_folder(file_)); };
   options.api.passed_socket = sockets_.local;
   options.api.passed_tcp = sockets_.tcp;
   options.api.check_config = [this] {
-    const auto checked = read_();
+    const auto checked = read();
     return checked ? Result<void>() : pass_on(checked);
   };
   options.api.reload = [this](ControlLoop::Reply reply) { reload(std::move(reply)); };
@@ -89,7 +91,7 @@ void Service::reload(ControlLoop::Reply reply) {
     }
   }
   manager_.reloading();
-  auto config = read_();
+  auto config = read();
   if (!config) return give_up(config.error(), reply);
   const std::lock_guard guard(mutex_);
   next_ = std::move(*config);

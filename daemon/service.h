@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -19,20 +20,22 @@ namespace scanrig {
 /// nothing: the daemon goes on as it was, and says why in log, answer and `systemctl status`.
 class Service {
  public:
-  using Read = std::function<Result<config::RigConfig>()>;
   /// Opens the devices and runs the daemon until it ends. The configuration outlives the call.
   using Run = std::function<Result<Ended>(const config::RigConfig&, const DaemonOptions&)>;
 
-  /// `name`: of the program. Takes the sockets that systemd passes; to be made before threads that read the
-  /// environment.
-  Service(std::string name, Read read) : name_(std::move(name)), read_(std::move(read)) {}
+  /// `name`: of the program, `file` its rig.toml. Takes the sockets that systemd passes; to be made before threads that
+  /// read the environment.
+  Service(std::string name, std::filesystem::path file, config::Cameras cameras)
+      : name_(std::move(name)), file_(std::move(file)), cameras_(cameras) {}
 
-  /// Until `stop`. Fails as `read` and `run` do; a changed configuration under which `run` does not get as far as the
-  /// control loop is given up for the one before.
+  /// Until `stop`. What the daemon runs under is kept (rig/kept_config.h) before it uses a device. Fails as
+  /// read_rig_config(), `run` and keep_config() do; a changed configuration under which `run` does not get as far as
+  /// the control loop is given up for the one before.
   Result<void> run(SignalStop& stop, const Run& run);
 
  private:
   Result<void> run_again_and_again(const Run& run, config::RigConfig config);
+  [[nodiscard]] Result<config::RigConfig> read() const { return config::read_rig_config(file_, {}, cameras_); }
   DaemonOptions options_for(const config::RigConfig& config, bool again);
   void tell_begin(const config::RigConfig& config);
   void reload(ControlLoop::Reply reply);
@@ -40,7 +43,8 @@ class Service {
   void tell(Priority priority, std::string message) { journal_->write({priority, std::move(message)}); }
 
   const std::string name_;
-  const Read read_;
+  const std::filesystem::path file_;
+  const config::Cameras cameras_;
   const PassedSockets sockets_ = take_passed_sockets();
   ServiceManager manager_;
   std::optional<Journal> journal_;

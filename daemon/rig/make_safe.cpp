@@ -1,11 +1,15 @@
 #include "daemon/rig/make_safe.h"
 
+#include <set>
 #include <thread>
 
+#include "daemon/rig/kept_config.h"
 #include "daemon/rig/open_devices.h"
 
 namespace scanrig {
 namespace {
+
+using config::SafetyDevice;
 
 constexpr auto kLimit = std::chrono::milliseconds(900);
 constexpr auto kAgain = std::chrono::milliseconds(20);
@@ -19,32 +23,76 @@ Result<void> until(Clock& clock, Deadline deadline, const Try& attempt) {
   }
 }
 
+Result<void> stop_table(const Result<config::RigConfig>& config, Clock& clock, Deadline deadline) {
+  if (!config) return pass_on(config);
+  const auto turntable = open_turntable(config->turntable, clock);
+  if (!turntable) return pass_on(turntable);
+  return until(clock, deadline, [&] { return (*turntable)->stop(deadline); });
+}
+
+Result<void> darken(const Result<config::RigConfig>& config, Clock& clock, Deadline deadline) {
+  if (!config) return pass_on(config);
+  const auto lines = open_lines(*config, clock);
+  const auto projector = open_projector(config->projector, *lines, clock);
+  if (!projector) return pass_on(projector);
+  return until(clock, deadline, [&] { return (*projector)->dark(deadline); });
+}
+
+Result<void> show_red(const Result<config::RigConfig>& config, Clock& clock, Deadline deadline) {
+  if (!config) return pass_on(config);
+  const auto lines = open_lines(*config, clock);
+  const auto panel = open_panel(*config, *lines, clock);
+  return until(clock, deadline, [&] { return panel->show({.red = true}, deadline); });
+}
+
+void complain(const char* program, const std::set<std::string>& why) {
+  for (const auto& message : why) fmt::print(stderr, "{}: make-safe: {}\n", program, message);
+}
+
+/// Says once what the daemon's own configuration was not good for.
+DeviceConfigs config_to_use(const std::filesystem::path& file, const char* program) {
+  const auto kept = kept_config_folder(file) / "rig.toml";
+  const auto base = file.parent_path();
+  std::set<std::string> why;
+  const auto read = [&](SafetyDevice device) {
+    auto config = config::read_device_config(device, kept, base);
+    if (config) return config;
+    why.insert(config.error().code == ErrorCode::not_found
+                   ? fmt::format("No daemon has kept its configuration in {}: {} is used as it is now.",
+                                 kept.parent_path().string(), file.string())
+                   : fmt::format("{}; {} is used as it is now.", config.error().message, file.string()));
+    return config::read_device_config(device, file, base);
+  };
+  DeviceConfigs config{read(SafetyDevice::turntable), read(SafetyDevice::projector), read(SafetyDevice::panel)};
+  complain(program, why);
+  return config;
+}
+
+template <class... Value>
+std::set<std::string> errors_of(const Result<Value>&... results) {
+  std::set<std::string> messages;
+  ((results ? void() : void(messages.insert(results.error().message))), ...);
+  return messages;
+}
+
 }  // namespace
 
-MadeSafe make_safe(const config::RigConfig& config, Clock& clock, Deadline deadline) {
-  const auto open = open_devices(config, clock);
-  if (!open) return {pass_on(open), pass_on(open), pass_on(open)};
+MadeSafe make_safe(const DeviceConfigs& config, Clock& clock, Deadline deadline) {
   MadeSafe made;
-  std::thread projector(
-      [&] { made.projector = until(clock, deadline, [&] { return open->projector->dark(deadline); }); });
-  std::thread panel(
-      [&] { made.panel = until(clock, deadline, [&] { return open->panel->show({.red = true}, deadline); }); });
-  made.turntable = until(clock, deadline, [&] { return open->turntable->stop(deadline); });
+  std::thread projector([&] { made.projector = darken(config.projector, clock, deadline); });
+  std::thread panel([&] { made.panel = show_red(config.panel, clock, deadline); });
+  made.turntable = stop_table(config.turntable, clock, deadline);
   projector.join();
   panel.join();
   return made;
 }
 
-ExitCode make_safe_now(const Result<config::RigConfig>& config, const char* program) {
-  if (!config) {
-    fmt::print(stderr, "{}: {}\n", program, config.error().message);
-    return exit_code(config.error().code);
-  }
+ExitCode make_safe_now(const std::filesystem::path& file, const char* program) {
+  const auto config = config_to_use(file, program);
   RealClock clock;
-  const auto made = make_safe(*config, clock, Deadline::after(clock, kLimit));
-  for (const auto* one : {&made.turntable, &made.projector, &made.panel}) {
-    if (!*one) fmt::print(stderr, "{}: make-safe: {}\n", program, one->error().message);
-  }
+  const auto made = make_safe(config, clock, Deadline::after(clock, kLimit));
+  complain(program, errors_of(made.turntable, made.projector, made.panel));
+  if (!config.turntable && !config.projector && !config.panel) return exit_code(config.turntable.error().code);
   if (!made.turntable) return ExitCode::device;
   return made.projector && made.panel ? ExitCode::ok : ExitCode::partly_safe;
 }

@@ -1,9 +1,16 @@
 #pragma once
 
+#include <filesystem>
+
 #include "config/rig_config.h"
 #include "core/clock.h"
 
 namespace scanrig {
+
+/// What is known of the devices that have to be made safe, each by itself: see config::read_device_config().
+struct DeviceConfigs {
+  Result<config::RigConfig> turntable, projector, panel;
+};
 
 /// What could be reached when the rig was made safe.
 struct MadeSafe {
@@ -13,12 +20,14 @@ struct MadeSafe {
 };
 
 /// Stop, light off, red lamp, all at once and each again and again until it has succeeded or `deadline` has passed: the
-/// daemon that had the devices may have died a moment ago. May be done twice.
-MadeSafe make_safe(const config::RigConfig& config, Clock& clock, Deadline deadline);
+/// daemon that had the devices may have died a moment ago. A device whose configuration cannot be used leaves the
+/// others to be made safe. May be done twice.
+MadeSafe make_safe(const DeviceConfigs& config, Clock& clock, Deadline deadline);
 
-/// For systemd's ExecStopPost=: within a second, with a line on standard error for what was not reached.
+/// For systemd's ExecStopPost=: within a second, with a line on standard error for what was not reached. Uses what the
+/// last daemon of `file` has kept (kept_config.h), and for what that does not tell `file` as it is now.
 /// `ok`, `device` (the table may be moving), `partly_safe` (it stands, but light or lamp were not reached),
-/// `bad_input`.
-ExitCode make_safe_now(const Result<config::RigConfig>& config, const char* program);
+/// `bad_input` (nothing of the configuration can be used).
+ExitCode make_safe_now(const std::filesystem::path& file, const char* program);
 
 }  // namespace scanrig

@@ -13,10 +13,9 @@
 #include "drivers/turntable/modbus_turntable.h"
 
 namespace scanrig {
-namespace {
 
 /// The one place where a turntable's driver is chosen.
-Result<std::unique_ptr<Turntable>> make_turntable(const config::TurntableConfig& config, Clock& clock) {
+Result<std::unique_ptr<Turntable>> open_turntable(const config::TurntableConfig& config, Clock& clock) {
   const auto made = [](auto turntable) -> Result<std::unique_ptr<Turntable>> {
     if (!turntable) return pass_on(turntable);
     return std::move(*turntable);
@@ -25,8 +24,12 @@ Result<std::unique_ptr<Turntable>> make_turntable(const config::TurntableConfig&
   return made(ModbusTurntable::create(config.modbus, clock));
 }
 
+std::unique_ptr<gpio::Lines> open_lines(const config::RigConfig& config, Clock& clock) {
+  return config.gpio_socket ? gpio::socket_lines(*config.gpio_socket, clock) : gpio::chip_lines(clock);
+}
+
 /// A LightCrafter connects when it is used, GPIO lines are opened then.
-Result<std::unique_ptr<Projector>> make_projector(const config::ProjectorConfig& config, gpio::Lines& lines,
+Result<std::unique_ptr<Projector>> open_projector(const config::ProjectorConfig& config, gpio::Lines& lines,
                                                   Clock& clock) {
   using Driver = config::ProjectorConfig::Driver;
   if (config.driver == Driver::manual) return std::make_unique<ManualProjector>();
@@ -43,6 +46,8 @@ Result<std::unique_ptr<Projector>> make_projector(const config::ProjectorConfig&
   });
 }
 
+namespace {
+
 /// The cameras connect when they are used. Null for simulated ones.
 std::unique_ptr<StereoCamera> make_camera(const config::StereoCameraConfig& config, Clock& clock) {
   using Driver = config::StereoCameraConfig::Driver;
@@ -55,7 +60,7 @@ std::unique_ptr<StereoCamera> make_camera(const config::StereoCameraConfig& conf
   return nullptr;
 }
 
-Result<std::unique_ptr<Panel>> open_panel(const config::RigConfig& config, gpio::Lines& lines, Clock& clock) {
+Result<std::unique_ptr<Panel>> wired_panel(const config::RigConfig& config, gpio::Lines& lines, Clock& clock) {
   if (config.panel.driver == config::PanelConfig::Driver::modbus_io) {
     return std::make_unique<ModbusIoPanel>(config::modbus_io_panel_options(config), clock);
   }
@@ -66,17 +71,21 @@ Result<std::unique_ptr<Panel>> open_panel(const config::RigConfig& config, gpio:
 
 }  // namespace
 
+std::unique_ptr<Panel> open_panel(const config::RigConfig& config, gpio::Lines& lines, Clock& clock) {
+  return std::make_unique<RetriedPanel>([&config, &lines, &clock] { return wired_panel(config, lines, clock); });
+}
+
 Result<OpenDevices> open_devices(const config::RigConfig& config, Clock& clock) {
-  auto turntable = make_turntable(config.turntable, clock);
+  auto turntable = open_turntable(config.turntable, clock);
   if (!turntable) return pass_on(turntable);
   OpenDevices open;
-  open.lines = config.gpio_socket ? gpio::socket_lines(*config.gpio_socket, clock) : gpio::chip_lines(clock);
+  open.lines = open_lines(config, clock);
   open.turntable = std::move(*turntable);
   gpio::Lines& lines = *open.lines;
-  auto projector = make_projector(config.projector, lines, clock);
+  auto projector = open_projector(config.projector, lines, clock);
   if (!projector) return pass_on(projector);
   open.projector = std::move(*projector);
-  open.panel = std::make_unique<RetriedPanel>([&config, &lines, &clock] { return open_panel(config, lines, clock); });
+  open.panel = open_panel(config, lines, clock);
   open.camera = make_camera(config.stereo_camera, clock);
   return open;
 }

@@ -26,4 +26,11 @@ struct OpenDevices {
 /// asked for.
 Result<OpenDevices> open_devices(const config::RigConfig& config, Clock& clock);
 
+/// One by one, for who needs no more. `config` and `lines` outlive what is made. Fail with `out_of_range`.
+std::unique_ptr<gpio::Lines> open_lines(const config::RigConfig& config, Clock& clock);
+Result<std::unique_ptr<Turntable>> open_turntable(const config::TurntableConfig& config, Clock& clock);
+Result<std::unique_ptr<Projector>> open_projector(const config::ProjectorConfig& config, gpio::Lines& lines,
+                                                  Clock& clock);
+std::unique_ptr<Panel> open_panel(const config::RigConfig& config, gpio::Lines& lines, Clock& clock);
+
 }  // namespace scanrig

@@ -48,7 +48,11 @@ Webhook::Webhook(Clock& clock, HttpAddress address)
     : clock_(clock), address_(std::move(address)), inbox_(clock), thread_(start_actor(clock, [this] { run(); })) {}
 
 Webhook::~Webhook() {
-  stop_.request_stop();
+  {
+    const std::lock_guard guard(mutex_);
+    stop_.request_stop();
+  }
+  clock_.notify_all(stopped_);
   inbox_.close();
   thread_.join();
 }
@@ -64,10 +68,15 @@ void Webhook::look(std::shared_ptr<const Snapshot> now) {
 void Webhook::run() {
   while (const auto message = inbox_.take()) {
     for (int i = 0; i < kTries && !stop_.stop_requested(); ++i) {
-      if (http_post(address_, *message, kLimit)) break;
-      if (i + 1 < kTries) clock_.sleep_for(kPause);
+      if (http_post(address_, *message, kLimit, stop_.get_token())) break;
+      if (i + 1 < kTries) pause();
     }
   }
+}
+
+void Webhook::pause() {
+  std::unique_lock lock(mutex_);
+  clock_.wait_until(lock, stopped_, clock_.now() + kPause, [this] { return stop_.stop_requested(); });
 }
 
 }  // namespace scanrig

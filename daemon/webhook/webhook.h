@@ -1,6 +1,9 @@
 #pragma once
 
+#include <condition_variable>
 #include <memory>
+#include <mutex>
+#include <stop_token>
 #include <string>
 #include <thread>
 #include <vector>
@@ -21,7 +24,7 @@ std::vector<std::string> bad_news(const Snapshot& before, const Snapshot& now);
 class Webhook {
  public:
   Webhook(Clock& clock, HttpAddress address);
-  /// What has not been sent is dropped.
+  /// At once: what has not been sent is dropped.
   ~Webhook();
   Webhook(const Webhook&) = delete;
   Webhook& operator=(const Webhook&) = delete;
@@ -31,12 +34,15 @@ class Webhook {
 
  private:
   void run();
+  void pause();
 
   Clock& clock_;
   HttpAddress address_;
   std::shared_ptr<const Snapshot> before_;  ///< of look()'s thread
   Mailbox<std::string> inbox_;
   std::stop_source stop_;
+  std::mutex mutex_;
+  std::condition_variable stopped_;  ///< stop_ was, under the mutex
   std::thread thread_;
 };
 

@@ -134,8 +134,7 @@ Result<Ended> run_on_wires(const SimOptions& o, const config::RigConfig& config,
 
 Result<void> run_as_told(const SimOptions& o, SignalStop& stop) {
   if (o.config.empty()) return run(o, stop);
-  Service service("scanrigd-sim",
-                  [&o] { return config::read_rig_config(o.config, {}, config::Cameras::or_simulated); });
+  Service service("scanrigd-sim", o.config, config::Cameras::or_simulated);
   return service.run(stop, [&](const config::RigConfig& config, const DaemonOptions& options) {
     return run_on_wires(o, config, options, stop);
   });
@@ -155,10 +154,7 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "scanrigd-sim: {}\n", error.what());
     return static_cast<int>(ExitCode::usage);
   }
-  if (options.make_safe) {
-    const auto config = config::read_rig_config(options.config, {}, config::Cameras::or_simulated);
-    return static_cast<int>(make_safe_now(config, "scanrigd-sim"));
-  }
+  if (options.make_safe) return static_cast<int>(make_safe_now(options.config, "scanrigd-sim"));
   SignalStop stop(options.config.empty() ? SignalStop::Hangup::ends : SignalStop::Hangup::is_told);
   const auto done = run_as_told(options, stop);
   if (done) return static_cast<int>(ExitCode::ok);

@@ -199,18 +199,20 @@ def seen_safe(station, begin):
 
 
 def killed(station):
+    """The configuration is away when the daemon dies, and back before it begins again."""
     job = turning(station)
+    away = f"mv {CONFIGS}/rig.toml {CONFIGS}/away.toml; trap 'mv {CONFIGS}/away.toml {CONFIGS}/rig.toml' EXIT"
     begin = time.monotonic()
     # The lamp is red until the daemon is there again: looked at from within.
     red = "for i in {1..100}; do read -r red </run/hil/LAMP_RED/value; [ $red = 1 ] && exit; sleep 0.1; done; exit 1"
-    lit, _ = station.machine.call(f"systemctl kill -s SIGKILL --kill-whom=main scanrigd; {red}")
-    expect(lit == 0, "the red lamp has not been lit")
+    lit, _ = station.machine.call(f"{away}; systemctl kill -s SIGKILL --kill-whom=main scanrigd; {red}")
+    expect(lit == 0, f"the red lamp has not been lit; {station.journal()}")
     took = seen_safe(station, begin)
     station.wait_for_words("next_action", "Reset", RECOVERY_S)
     known = station.ask(f"jobs/{job}")
     expect(known["state"] == "interrupted", f"the job is {known['state']}")
     recovers(station)
-    return f"standing and dark {took:.1f} s later, red lamp; restarted: Halted, job interrupted"
+    return f"rig.toml away: standing and dark {took:.1f} s later, red lamp; restarted: Halted, job interrupted"
 
 
 def watchdog(station):

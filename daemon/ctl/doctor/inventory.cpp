@@ -202,6 +202,7 @@ void print_missing_snippets(const fs::path& device, const fs::path& config, Repo
         "ExecStopPost=/usr/bin/scanrigd --make-safe --config " + file, std::string("SupplementaryGroups=dialout gpio"),
         std::string("DevicePolicy=closed"), std::string("DeviceAllow=char-ttyUSB rw"),
         std::string("DeviceAllow=char-ttyACM rw"), std::string("DeviceAllow=char-gpiochip rw"),
+        std::string("RuntimeDirectory=scanrig"), std::string("RuntimeDirectoryPreserve=yes"),
         std::string("Restart=on-failure"), std::string("[Install]"), std::string("WantedBy=multi-user.target")}) {
     report.note(line);
   }

@@ -1,16 +1,35 @@
 #include "daemon/webhook/webhook.h"
 
+#include <dlfcn.h>
 #include <gmock/gmock.h>
+#include <netdb.h>
 #include <netinet/in.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <future>
+#include <optional>
+#include <thread>
+
+namespace {
+
+std::atomic<bool> name_server_is_dead = false;
+
+}  // namespace
+
+/// The C library's, but for a name server that may be dead: then an answer comes late, as from a real one.
+extern "C" int getaddrinfo(const char* node, const char* service, const addrinfo* hints, addrinfo** found) {
+  for (int i = 0; i < 600 && name_server_is_dead; ++i) ::usleep(10'000);
+  return reinterpret_cast<decltype(&::getaddrinfo)>(::dlsym(RTLD_NEXT, "getaddrinfo"))(node, service, hints, found);
+}
 
 namespace scanrig {
 namespace {
 
 using std::chrono::milliseconds;
+using std::chrono::seconds;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
@@ -32,6 +51,11 @@ class Listener {
   Listener(const Listener&) = delete;
   Listener& operator=(const Listener&) = delete;
 
+  /// Until somebody has connected; he is never answered.
+  void wait_for_peer() {
+    pollfd watched{socket_, POLLIN, 0};
+    ::poll(&watched, 1, -1);
+  }
   /// The request's text.
   std::future<std::string> answer(const std::string& with) {
     return std::async(std::launch::async, [this, with] {
@@ -122,6 +146,66 @@ TEST(Webhook, TellsWhatGoesWrongAfterItsStart) {
   webhook.look(
       std::make_shared<Snapshot>(with({{"old", job("old", JobState::failed)}, {"new", job("new", JobState::failed)}})));
   EXPECT_THAT(request.get(), HasSubstr(R"("job":"new")"));
+}
+
+/// The daemon ends to begin again: systemd's watchdog waits 5 s, and the rig is stopped meanwhile.
+class ClosingAWebhook : public testing::Test {
+ protected:
+  /// One that has something to tell.
+  void open(const std::string& port) {
+    webhook_.emplace(clock_, HttpAddress{"127.0.0.1", port, "/"});
+    webhook_->look(std::make_shared<Snapshot>(with({})));
+    webhook_->look(std::make_shared<Snapshot>(with({{"new", job("new", JobState::failed)}})));
+  }
+  Clock::Duration closing() {
+    const auto begun = clock_.now();
+    webhook_.reset();
+    return clock_.now() - begun;
+  }
+  static constexpr auto kAtOnce = milliseconds(1000);  // every wait there is takes at least 2 s
+  RealClock clock_;
+  Listener listener_;
+  std::optional<Webhook> webhook_;
+};
+
+TEST_F(ClosingAWebhook, WaitsForNoAnswer) {
+  open(listener_.port);
+  listener_.wait_for_peer();
+  EXPECT_LT(closing(), kAtOnce);
+}
+
+TEST_F(ClosingAWebhook, WaitsForNoSecondTry) {
+  auto refused = listener_.answer("HTTP/1.1 500 Oops\r\nContent-Length: 0\r\n\r\n");
+  open(listener_.port);
+  refused.wait();
+  EXPECT_LT(closing(), kAtOnce);
+}
+
+TEST_F(ClosingAWebhook, WaitsForNoNameServer) {
+  name_server_is_dead = true;
+  open(listener_.port);
+  EXPECT_LT(closing(), kAtOnce);
+  name_server_is_dead = false;
+}
+
+TEST(HttpPost, WaitsForANameServerNoLongerThanForTheRest) {
+  RealClock clock;
+  name_server_is_dead = true;
+  const auto begun = clock.now();
+  EXPECT_EQ(http_post({"127.0.0.1", "1", "/"}, "{}", milliseconds(50)).error().code, ErrorCode::timeout);
+  EXPECT_LT(clock.now() - begun, seconds(3));
+  name_server_is_dead = false;
+}
+
+TEST(HttpPost, EndsWhenItIsToldTo) {
+  Listener listener;
+  std::stop_source stop;
+  std::jthread stopper([&] {
+    listener.wait_for_peer();
+    stop.request_stop();
+  });
+  const auto sent = http_post({"127.0.0.1", listener.port, "/"}, "{}", seconds(60), stop.get_token());
+  EXPECT_EQ(sent.error().code, ErrorCode::stopped);
 }
 
 }  // namespace

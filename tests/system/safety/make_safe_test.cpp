@@ -1,6 +1,8 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <cstdlib>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <optional>
 
@@ -27,11 +29,32 @@ class MakeSafe : public testing::Test {
   int make_safe() {
     return Process({SCANRIGD_PROGRAM, "--make-safe", "--config", rig.config()}, rig.folder / "make_safe.log").wait();
   }
+  void kill_while_turning() {
+    rig.press("RESET");
+    ASSERT_TRUE(rig.wait_moving());
+    daemon->signal(SIGKILL);
+    daemon->wait();
+    ASSERT_TRUE(rig.drive.truth().moving);
+  }
+  void write(const std::string& text) const { std::ofstream(rig.config()) << text; }
+  void expect_safe() {
+    EXPECT_EQ(make_safe(), 0) << log();
+    EXPECT_FALSE(rig.drive.truth().moving);
+    EXPECT_FALSE(rig.lamp("DOTS") || rig.lamp("PLAIN"));
+    EXPECT_TRUE(rig.lamp("RED"));
+  }
+  std::string log() const { return *read_file(rig.folder / "make_safe.log"); }
   double seconds_since(Clock::TimePoint then) { return std::chrono::duration<double>(rig.clock.now() - then).count(); }
 
   WireRig rig{{}};
+  const std::filesystem::path kept = rig.folder / "rig.running";
   std::optional<Process> daemon;
 };
+
+std::string replaced(std::string text, const std::string& from, const std::string& to) {
+  EXPECT_NE(text.find(from), text.npos) << from;
+  return text.replace(text.find(from), from.size(), to);
+}
 
 TEST_F(MakeSafe, ADaemonKilledWhileTheTableTurnsLeavesItStoppedDarkAndRedWithinASecond) {
   boot();
@@ -87,6 +110,77 @@ TEST_F(MakeSafe, TheExitCodeSaysWhatWasReachedAndItEndsInTimeAllTheSame) {
   EXPECT_LT(seconds_since(begun), 1.2 * kSlowness);
   EXPECT_THAT(*read_file(rig.folder / "make_safe.log"), HasSubstr("panel"));
   std::filesystem::remove(rig.config());
+  EXPECT_EQ(make_safe(), 3);
+}
+
+TEST_F(MakeSafe, WhateverBecomesOfTheFileTheDaemonsOwnConfigurationCounts) {
+  const auto text = *read_file(rig.config());
+  for (const auto& edited : {text + "\n[turntable\n", replaced(text, rig.device(), "/dev/no-such-port"),
+                             replaced(text, "profile = ", "no_such_key = ")}) {
+    write(text);
+    boot();
+    kill_while_turning();
+    write(edited);
+    expect_safe();
+  }
+  write(text);
+  boot();
+  kill_while_turning();
+  std::filesystem::remove(rig.config());
+  std::filesystem::remove_all(rig.folder / "drives");
+  expect_safe();
+}
+
+TEST_F(MakeSafe, TheServicesConfigurationIsKeptInTheFolderThatSystemdMakesForIt) {
+  const auto runtime = rig.folder / "run";
+  std::filesystem::create_directory(runtime);
+  ::setenv("RUNTIME_DIRECTORY", runtime.c_str(), 1);
+  boot();
+  kill_while_turning();
+  EXPECT_FALSE(std::filesystem::exists(kept)) << "the file's own folder may not be written to";
+  std::filesystem::remove(rig.config());
+  expect_safe();
+  ::unsetenv("RUNTIME_DIRECTORY");
+}
+
+TEST_F(MakeSafe, ADaemonThatIsRefusedLeavesTheOtherOnesConfigurationAlone) {
+  boot();
+  write(replaced(*read_file(rig.config()), rig.device(), "/dev/no-such-port"));
+  EXPECT_EQ(Process({SCANRIGD_PROGRAM, "--config", rig.config()}, rig.folder / "second.log").wait(), 6);
+  kill_while_turning();
+  expect_safe();
+}
+
+TEST_F(MakeSafe, ADaemonThatCannotKeepItsConfigurationDoesNotBegin) {
+  ::setenv("RUNTIME_DIRECTORY", "/proc/none", 1);
+  daemon.emplace(std::vector<std::string>{SCANRIGD_PROGRAM, "--config", rig.config()}, rig.folder / "daemon.log");
+  ::unsetenv("RUNTIME_DIRECTORY");
+  ASSERT_TRUE(rig.wait_for([&] {
+    return read_file(rig.folder / "daemon.log")->find("scanrigd: cannot create the folder /proc/none") !=
+           std::string::npos;
+  })) << *read_file(rig.folder / "daemon.log");
+  EXPECT_EQ(daemon->wait(), 4);
+}
+
+TEST_F(MakeSafe, WithNothingKeptADeviceBadlyConfiguredLeavesTheOthersToBeMadeSafe) {
+  const auto text = *read_file(rig.config());
+  boot();
+  kill_while_turning();
+  std::filesystem::remove_all(kept);
+  write(replaced(text, "[panel]\n", "[panel]\nno_such_key = 1\n"));
+  EXPECT_EQ(make_safe(), 11);
+  EXPECT_FALSE(rig.drive.truth().moving);
+  EXPECT_FALSE(rig.lamp("RED"));
+  EXPECT_THAT(log(), HasSubstr("[panel] no_such_key: unknown key"));
+  EXPECT_THAT(log(), HasSubstr("No daemon has kept its configuration"));
+
+  write(replaced(text, "[turntable]\n", "[turntable]\nno_such_key = 1\n") + "\n[recipe.quick]\nviews = 0\n");
+  EXPECT_EQ(make_safe(), 5);
+  EXPECT_TRUE(rig.lamp("RED"));
+  EXPECT_THAT(log(), HasSubstr("[turntable] no_such_key: unknown key"));
+  EXPECT_THAT(log(), testing::Not(HasSubstr("recipe"))) << "what has nothing to do with it";
+
+  write("[turntable\n");
   EXPECT_EQ(make_safe(), 3);
 }
 

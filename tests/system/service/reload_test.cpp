@@ -66,6 +66,8 @@ class Reload : public RigOnWires {
     return code;
   }
   std::string socket() const { return folder_ / "api.sock"; }
+  /// What make-safe would be told.
+  std::string kept() const { return read_file(folder_ / "rig.running/rig.toml").value_or(""); }
 
   /// Always, or the daemon would have to wait until somebody does.
   void listen(const std::stop_token& end) {
@@ -93,8 +95,10 @@ TEST_F(Reload, WhileIdleTheNewConfigurationIsTakenAndTheStationWaitsForReset) {
   start();
   ASSERT_TRUE(press_until("reset", [&] { return machine() == "Operational.Ready"; })) << log();
   ASSERT_EQ(queue("quick"), 3) << "there is no such recipe yet";
+  EXPECT_THAT(kept(), Not(HasSubstr(kQuick)));
   configure(kQuick);
   ASSERT_TRUE(reload()) << log();
+  EXPECT_EQ(kept(), read_file(config()));
   EXPECT_THAT(since_.front(), testing::MatchesRegex("RELOADING=1\nMONOTONIC_USEC=[0-9]+\n.*"));
   EXPECT_THAT(ready(), StartsWith("WATCHDOG=1\nREADY=1"));
   for (const auto& message : since_) EXPECT_THAT(message, Not(HasSubstr("STOPPING=1")));
@@ -120,6 +124,7 @@ TEST_F(Reload, AFileThatIsNotValidChangesNothing) {
   EXPECT_THAT(ready(), HasSubstr("STATUS=No reload, the configuration stays as it was: "));
   EXPECT_THAT(ready(), HasSubstr("no_such_key"));
   EXPECT_EQ(std::ranges::count(ready(), '\n'), 1) << "one sentence: " << ready();
+  EXPECT_THAT(kept(), Not(HasSubstr("no_such_key")));
   EXPECT_EQ(ask_for_reload(), 3);
   EXPECT_THAT(output_, HasSubstr("no_such_key"));
   EXPECT_EQ(queue("quick"), 3);
@@ -153,6 +158,8 @@ TEST_F(Reload, AConfigurationThatTurnsOutToBeOfNoUseIsGivenUpForTheOneBefore) {
   EXPECT_THAT(log(), HasSubstr("The new configuration cannot be used, the one before is: "));
   EXPECT_THAT(log(), HasSubstr("no-such-group"));
   EXPECT_EQ(queue("quick"), 3) << "all of the old one";
+  EXPECT_THAT(kept(), StartsWith("#"));
+  EXPECT_THAT(kept(), Not(HasSubstr("no-such-group")));
 }
 
 /// The daemon as systemd starts it with scanrigd.socket.

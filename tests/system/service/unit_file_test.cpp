@@ -73,13 +73,22 @@ TEST_F(UnitFile, TheSocketIsVerifiedBySystemdWithoutAWord) {
   EXPECT_EQ(verified.output, "");
 }
 
+std::string text_of(const std::filesystem::path& file) {
+  std::stringstream text;
+  text << std::ifstream(file).rdbuf();
+  return text.str();
+}
+
+/// $RUNTIME_DIRECTORY of the daemon and of what makes the rig safe after it: the configuration is kept there.
+TEST(UnitFiles, LeaveWhoeverMakesTheRigSafeTheConfigurationOfTheDaemonThatDied) {
+  const auto service = text_of(kUnit);
+  EXPECT_NE(service.find("\nRuntimeDirectory=scanrig\n"), service.npos);
+  EXPECT_NE(service.find("\nRuntimeDirectoryPreserve=yes\n"), service.npos);
+  EXPECT_NE(service.find("\nExecStopPost=/usr/bin/scanrigd --make-safe "), service.npos);
+}
+
 /// A service at its start limit takes the socket that triggers it along [systemd.socket(5), systemd.unit(5)].
 TEST(UnitFiles, LimitNeitherStartsNorTriggersSoThatTheSocketStays) {
-  const auto text_of = [](const std::filesystem::path& file) {
-    std::stringstream text;
-    text << std::ifstream(file).rdbuf();
-    return text.str();
-  };
   const auto service = text_of(kUnit), socket = text_of(kSocket);
   const auto limit = service.find("\nStartLimitIntervalSec=0\n");
   EXPECT_LT(limit, service.find("[Service]")) << "in [Unit], or it is not heard";

@@ -1,0 +1,63 @@
+#include <gmock/gmock.h>
+
+#include <map>
+#include <vector>
+
+#include "tests/unit/config/rig_file.h"
+
+namespace scanrig::config {
+namespace {
+
+using testing::HasSubstr;
+
+/// When the daemon has died there is no time for what is wrong elsewhere.
+class DeviceConfigTest : public RigFile {
+ protected:
+  void SetUp() override {
+    RigFile::SetUp();
+    std::filesystem::copy(drives_, folder_ / "drives");
+  }
+  /// The example, with something wrong in these sections.
+  void break_in(const std::vector<std::string>& sections) const {
+    auto text = example_;
+    for (const auto& section : sections) text = replaced(text, "\n" + section, "\n" + section + "\nunknown = 1");
+    write(text);
+  }
+  Result<RigConfig> read(SafetyDevice device) const { return read_device_config(device, file_, "/elsewhere"); }
+};
+
+TEST_F(DeviceConfigTest, IsReadWhateverIsWrongWithTheRest) {
+  break_in({"[stereo_camera]", "[recipe.default]", "[storage]", "[api]"});
+  const auto turntable = read(SafetyDevice::turntable), projector = read(SafetyDevice::projector);
+  const auto panel = read(SafetyDevice::panel);
+  ASSERT_TRUE(turntable && projector && panel);
+  EXPECT_EQ(turntable->turntable.device(), "/dev/scanrig/turntable");
+  EXPECT_EQ(turntable->turntable.profile_file->name, "leadshine-rs.toml");
+  EXPECT_EQ(projector->projector.line, "PROJ_TRIG");
+  EXPECT_EQ(panel->safety.estop.line, "ESTOP_OK");
+  EXPECT_EQ(panel->panel.inputs.at("start").line, "START");
+}
+
+TEST_F(DeviceConfigTest, IsRefusedForItsOwnSectionOnly) {
+  const std::map<SafetyDevice, std::string> own{{SafetyDevice::turntable, "[turntable]"},
+                                                {SafetyDevice::projector, "[projector]"},
+                                                {SafetyDevice::panel, "[panel]"}};
+  for (const auto& [device, section] : own) {
+    break_in({section});
+    for (const auto& [other, its] : own) EXPECT_EQ(read(other).has_value(), other != device) << section << its;
+    EXPECT_THAT(read(device).error().message, HasSubstr(section + " unknown: unknown key"));
+  }
+  break_in({"[safety]"});
+  EXPECT_FALSE(read(SafetyDevice::panel)) << "e-stop and guard are the panel's";
+}
+
+TEST_F(DeviceConfigTest, HasItsRelativePathsStartWhereItIsTold) {
+  write(example_ + "\n[gpio]\nsocket = \"gpio.sock\"\n");
+  EXPECT_EQ(read(SafetyDevice::panel)->gpio_socket, "/elsewhere/gpio.sock");
+  EXPECT_EQ(read(SafetyDevice::projector)->gpio_socket, "/elsewhere/gpio.sock");
+  std::filesystem::remove(file_);
+  EXPECT_EQ(read(SafetyDevice::panel).error().code, ErrorCode::not_found);
+}
+
+}  // namespace
+}  // namespace scanrig::config
