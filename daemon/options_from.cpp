@@ -8,6 +8,19 @@ namespace {
 
 std::uintmax_t gib(double count) { return static_cast<std::uintmax_t>(count * (1u << 30)); }
 
+/// V4L2 devices that are named by their path are nobody in particular; two sensors in one device have one number.
+CameraSerials cameras_from(const config::StereoCameraConfig& config) {
+  using Driver = config::StereoCameraConfig::Driver;
+  switch (config.driver) {
+    case Driver::aravis: return {config.aravis.left.serial, config.aravis.right.serial};
+    case Driver::v4l2:
+    case Driver::v4l2_side_by_side:
+      return {config.v4l2.left.serial, config.v4l2.right.value_or(config.v4l2.left).serial};
+    case Driver::simulated: break;  // their owner knows
+  }
+  return {};
+}
+
 Recipe recipe_from(const std::string& name, const config::RecipeConfig& config) {
   return {.name = name,
           .poses = config.poses,
@@ -39,6 +52,7 @@ DaemonOptions options_from(const config::RigConfig& config) {
   DaemonOptions options;
   options.jobs = {.root = config.storage.root,
                   .calibration_file = config.calibration_file,
+                  .cameras = cameras_from(config.stereo_camera),
                   .profile = "",
                   .reserve_bytes = gib(config.storage.reserve_gib)};
   options.recipes.clear();

@@ -172,15 +172,52 @@ Result<JobInfo> JobStore::create(const std::string& id, const JobFile& job) cons
   manifest.created = iso_time(std::chrono::system_clock::now());
   manifest.state = "queued";
   manifest.profile = options_.profile;
+  if (auto made = make(std::move(manifest), job); !made) return pass_on(made);
+  return read(id);
+}
+
+Result<void> JobStore::make(Manifest manifest, const JobFile& job) const {
+  const auto id = manifest.id;
   const fs::path prepared = options_.root / (kNew + id);
   auto scan = ScanFolder::create(prepared, std::move(manifest), options_.calibration_file);
   auto made = scan ? write_job_file(prepared, job) : Result<void>(pass_on(scan));
   if (made) made = replace_folder(prepared, folder(id));
-  if (!made) {
-    fs::remove_all(prepared, ignored);
-    return pass_on(made);
+  std::error_code ignored;
+  if (!made) fs::remove_all(prepared, ignored);
+  return made;
+}
+
+Result<void> JobStore::check_cameras(const std::string& id) const {
+  const auto scan = id.empty() ? std::nullopt : std::optional(ScanFolder::open(folder(id)));
+  if (scan && !*scan) return pass_on(*scan);
+  const auto calibration = scan ? (*scan)->load_calibration() : read_calibration(options_.calibration_file);
+  if (!calibration) return pass_on(calibration);
+  const auto other = [](const std::string& own, const std::string& rigs) {
+    return !own.empty() && !rigs.empty() && own != rigs;
+  };
+  const auto &left = calibration->left.serial, &right = calibration->right.serial;
+  const auto& rig = options_.cameras;
+  if (!other(left, rig.left) && !other(right, rig.right)) return {};
+  const auto named = [](const std::string& serial) { return serial.empty() ? std::string("unnamed") : serial; };
+  const auto pairs = fmt::format("the cameras {} (left) and {} (right), but the rig has {} and {}", named(left),
+                                 named(right), named(rig.left), named(rig.right));
+  if (scan) {
+    return fail(ErrorCode::refused, "job {} was begun with {}; cancel it and scan the object again", id, pairs);
   }
-  return read(id);
+  return fail(ErrorCode::refused, "{} is of {}; calibrate this pair, or put its own file there",
+              options_.calibration_file.string(), pairs);
+}
+
+Result<void> JobStore::renew_calibration(const JobInfo& job) const {
+  const auto scan = ScanFolder::open(job.folder);
+  if (!scan) return pass_on(scan);
+  const auto now = read_calibration(options_.calibration_file);
+  if (!now) return pass_on(now);
+  const auto& had = scan->manifest().calibration;
+  if (had && had->sha256 == now->sha256) return {};
+  const auto order = read_job_file(job.folder);
+  if (!order) return pass_on(order);
+  return make(scan->manifest(), *order);
 }
 
 Result<void> JobStore::check_room(const JobInfo& job) const {

@@ -11,9 +11,15 @@
 
 namespace scanrig {
 
+/// Whom a pair of cameras is bound to, by the makers' serial numbers; empty: not known.
+struct CameraSerials {
+  std::string left{}, right{};
+};
+
 struct JobStoreOptions {
   std::filesystem::path root;              ///< one folder a job
   std::filesystem::path calibration_file;  ///< copied into every job
+  CameraSerials cameras{};                 ///< the rig's
   std::string profile{};                   ///< of a simulated rig; empty otherwise
   std::uintmax_t reserve_bytes = 0;        ///< of the disk: a job that would eat into it is not begun
   int bytes_per_pixel = 1;                 ///< of the sensors
@@ -42,6 +48,13 @@ class JobStore {
   /// Fails with `exists`, `io`, `not_found` and `invalid_input` (the calibration).
   [[nodiscard]] Result<JobInfo> create(const std::string& id, const JobFile& job) const;
 
+  /// Whether the calibration of this job's views (empty: the rig's) is of the rig's cameras; a serial number that it or
+  /// the rig does not have is not compared. Fails with `refused`, naming both, and as read_calibration().
+  [[nodiscard]] Result<void> check_cameras(const std::string& id) const;
+
+  /// Gives a job that has no views yet the rig's calibration as it is now. Fails as create().
+  [[nodiscard]] Result<void> renew_calibration(const JobInfo& job) const;
+
   /// Whether the views still to be taken and the model fit on the disk. Fails with `io`, saying how much is missing.
   [[nodiscard]] Result<void> check_room(const JobInfo& job) const;
 
@@ -52,6 +65,9 @@ class JobStore {
   [[nodiscard]] const JobStoreOptions& options() const { return options_; }
 
  private:
+  /// Puts a folder with this manifest, order and the rig's calibration in the place of the job's.
+  [[nodiscard]] Result<void> make(Manifest manifest, const JobFile& job) const;
+
   JobStore(JobStoreOptions options, int lock) : options_(std::move(options)), lock_(lock) {}
   JobStoreOptions options_;
   int lock_;  ///< descriptor of the locked root, -1 when moved from

@@ -57,6 +57,13 @@ void JobThread::tell_known(const std::string& job) {
   if (auto info = store_.read(job)) tell_(event::JobKnown{std::make_shared<const JobInfo>(std::move(*info))});
 }
 
+/// A calibration that cannot be read is named when a job is made.
+void JobThread::handle(const action::CheckCalibration& task) {
+  const auto same = store_.check_cameras(task.job);
+  const bool refused = !same && same.error().code == ErrorCode::refused;
+  tell_(event::CalibrationSeen{task.job, refused ? std::optional(same.error()) : std::nullopt});
+}
+
 void JobThread::handle(const action::CreateJobs& task) {
   Result<void> done;
   auto place = task.place;
@@ -75,6 +82,8 @@ void JobThread::handle(const action::CreateJobs& task) {
 void JobThread::handle(const action::BeginJob& task) {
   auto job = store_.read(task.job);
   auto room = job ? store_.check_room(*job) : Result<void>(pass_on(job));
+  if (room && !has_views(*job)) room = store_.renew_calibration(*job);
+  if (room) room = store_.check_cameras(task.job);
   if (room) room = begin(*job);
   if (room) return;
   tell_(event::JobNotBegun{task.job, room.error()});
@@ -108,6 +117,9 @@ Result<void> JobThread::move(const action::MoveJob& task) {
   if (task.resume && !job->resumable) {
     return fail(ErrorCode::refused, "job {} is {} and cannot be resumed: order a new one", task.job,
                 to_string(job->state));
+  }
+  if (task.resume && has_views(*job)) {
+    if (auto same = store_.check_cameras(task.job); !same) return same;
   }
   auto order = read_job_file(job->folder);
   if (!order) return pass_on(order);

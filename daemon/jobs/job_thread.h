@@ -17,8 +17,9 @@ namespace scanrig {
 /// when it survives a power cut.
 class JobThread {
  public:
-  using Task = std::variant<action::CreateJobs, action::BeginJob, action::MoveJob, action::KeepJob, action::StoreView,
-                            action::JudgeClosure, action::FinishPose, action::ResumeJob, action::CloseJob>;
+  using Task =
+      std::variant<action::CheckCalibration, action::CreateJobs, action::BeginJob, action::MoveJob, action::KeepJob,
+                   action::StoreView, action::JudgeClosure, action::FinishPose, action::ResumeJob, action::CloseJob>;
   using ScannedHook = std::function<Result<void>(const std::filesystem::path& job_folder)>;
 
   /// `on_scanned` (may be empty) is called when all views of a job are on disk, before anybody is told.
@@ -33,6 +34,7 @@ class JobThread {
 
  private:
   void run();
+  void handle(const action::CheckCalibration& task);
   void handle(const action::CreateJobs& task);
   void handle(const action::BeginJob& task);
   void handle(const action::MoveJob& task);

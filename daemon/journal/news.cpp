@@ -51,6 +51,15 @@ void tell_devices(const Snapshot& before, const Snapshot& now, Entries& entries)
   }
 }
 
+void tell_calibration(const Snapshot& before, const Snapshot& now, Entries& entries) {
+  const auto &old = before.calibration_problem, &problem = now.calibration_problem;
+  if (problem && (!old || old->message != problem->message)) {
+    entries.push_back({Priority::warning, fmt::format("No scan with this calibration: {}.", problem->message)});
+  } else if (old && !problem) {
+    entries.push_back({Priority::notice, "The calibration does not refuse the next scan any more."});
+  }
+}
+
 void tell_spoilt(const std::vector<Error>& spoilt, const std::string& job, int pose, int view, Entries& entries) {
   for (const auto& why : spoilt) {
     entries.push_back({Priority::warning, fmt::format("Exposed again: {}.", why.message), job, pose, view});
@@ -146,6 +155,7 @@ std::vector<JournalEntry> news(const Snapshot& before, const Snapshot& now) {
   tell_jobs(before, now, entries);
   tell_machine(before, now, entries);
   tell_devices(before, now, entries);
+  tell_calibration(before, now, entries);
   return entries;
 }
 

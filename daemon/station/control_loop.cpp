@@ -162,6 +162,7 @@ void ControlLoop::show(const StationPorts& ports) {
 void ControlLoop::publish(const StationPorts& ports) {
   auto words = describe(state_, options_.rules);
   auto devices = state_.devices;
+  const auto* const calibration = calibration_problem(state_);
   devices.push_back({"panel", state_.panel_problem});
   std::vector<std::string> queue;
   for (const auto& job : state_.queue) queue.push_back(job->id);
@@ -177,6 +178,7 @@ void ControlLoop::publish(const StationPorts& ports) {
       .inputs = state_.inputs,
       .outputs = shown_,
       .devices = std::move(devices),
+      .calibration_problem = calibration ? std::optional(*calibration) : std::nullopt,
       .job = state_.job ? state_.job->id : std::string(),
       .queue = std::move(queue),
       .jobs = jobs_,

@@ -75,6 +75,11 @@ struct QuietHours {
 struct WarmingUp {
   std::chrono::seconds left;
 };  ///< the projector will be warm then; 0: it is
+/// Whose calibration was looked at, as action::CheckCalibration says, and why it refuses a scan.
+struct CalibrationSeen {
+  std::string job{};
+  std::optional<Error> problem{};
+};
 struct DevicesSeen {
   std::vector<DeviceHealth> devices;
 };
@@ -207,8 +212,8 @@ struct Shutdown {};
 using Event =
     std::variant<event::PanelFound, event::InputsSeen, event::Pressed, event::EstopChanged, event::GuardChanged,
                  event::WarningOver, event::EstopWindowOver, event::StopRetryDue, event::CheckDue, event::QuietHours,
-                 event::WarmingUp, event::DevicesSeen, event::MaintenanceAsked, event::Jogged, event::Pulsed,
-                 event::Homed, event::ViewTaken, event::Stopped, event::RigFailed, event::StopFailed,
+                 event::WarmingUp, event::DevicesSeen, event::CalibrationSeen, event::MaintenanceAsked, event::Jogged,
+                 event::Pulsed, event::Homed, event::ViewTaken, event::Stopped, event::RigFailed, event::StopFailed,
                  event::PanelFailed, event::Ordered, event::JobAsked, event::Answered, event::JobKnown,
                  event::JobRemoved, event::JobBegun, event::JobNotBegun, event::ClosureTaken, event::ClosureJudged,
                  event::FlipTimedOut, event::ViewStored, event::PoseStored, event::JobClosed, event::StoreFailed,
@@ -222,8 +227,12 @@ struct WaitForEstop {};    ///< EstopWindowOver comes after the window
 struct RetryStopLater {};  ///< StopRetryDue comes after a while
 struct CheckLater {};      ///< CheckDue comes after a while
 struct CheckDevices {};    ///< answered by DevicesSeen
-struct Home {};            ///< clears a device alarm first
-struct StopRig {};         ///< answered by Stopped or StopFailed
+/// Is it of the rig's cameras? Answered by CalibrationSeen.
+struct CheckCalibration {
+  std::string job;  ///< whose views were taken with it; empty: the rig's, for a scan that has none yet
+};
+struct Home {};     ///< clears a device alarm first
+struct StopRig {};  ///< answered by Stopped or StopFailed
 struct Jog {
   Degrees angle;
   bool relative;
@@ -282,10 +291,10 @@ struct CloseJob {
 };
 }  // namespace action
 
-using Action =
-    std::variant<action::Warn, action::WaitForEstop, action::RetryStopLater, action::CheckLater, action::CheckDevices,
-                 action::Home, action::StopRig, action::Jog, action::Pulse, action::TestLamps, action::TakeView,
-                 action::WaitForFlip, action::CreateJobs, action::BeginJob, action::MoveJob, action::KeepJob,
-                 action::JudgeClosure, action::StoreView, action::FinishPose, action::ResumeJob, action::CloseJob>;
+using Action = std::variant<action::Warn, action::WaitForEstop, action::RetryStopLater, action::CheckLater,
+                            action::CheckDevices, action::CheckCalibration, action::Home, action::StopRig, action::Jog,
+                            action::Pulse, action::TestLamps, action::TakeView, action::WaitForFlip, action::CreateJobs,
+                            action::BeginJob, action::MoveJob, action::KeepJob, action::JudgeClosure, action::StoreView,
+                            action::FinishPose, action::ResumeJob, action::CloseJob>;
 
 }  // namespace scanrig

@@ -55,4 +55,7 @@ struct JobInfo {
   std::string report{};
 };
 
+/// Something of the scan is there, so it can only go on as it was begun.
+inline bool has_views(const JobInfo& job) { return job.complete > 0 || !job.stored.empty(); }
+
 }  // namespace scanrig

@@ -2,6 +2,17 @@
 
 namespace scanrig {
 
+std::string calibrated_job(const StationState& state) {
+  if (state.queue.empty()) return {};
+  const auto& head = *state.queue.front();
+  return has_views(head) ? head.id : std::string();
+}
+
+const Error* calibration_problem(const StationState& state) {
+  const auto& seen = state.calibration;
+  return seen.problem && seen.job == calibrated_job(state) ? &*seen.problem : nullptr;
+}
+
 bool Machine::may_move() {
   switch (s().activity) {
     case Activity::warning:
@@ -91,6 +102,17 @@ bool Machine::all_there() {
   const auto* const absent = absent_device();
   if (absent) refuse(absent->problem->code, "The {} is not there: {}.", absent->name, absent->problem->message);
   return !absent;
+}
+
+bool Machine::calibrated() {
+  const auto* const problem = calibration_problem(s());
+  if (problem) refuse(problem->code, "See to the calibration: {}.", problem->message);
+  return !problem;
+}
+
+void Machine::check() {
+  act(action::CheckDevices{});
+  act(action::CheckCalibration{calibrated_job(s())});
 }
 
 bool Machine::remote_may_move(std::string_view what) {

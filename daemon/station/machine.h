@@ -51,6 +51,10 @@ class Machine {
   const DeviceHealth* absent_device();
   /// Refuses, and says why, unless all devices are there. What is absent does not let a job begin.
   bool all_there();
+  /// Refuses, and says why, where the calibration is of other cameras than the rig's.
+  bool calibrated();
+  /// Asks what is there now: devices, and the calibration for the next scan.
+  void check();
   /// Homing, after the warning.
   void begin_homing(std::string cause);
   /// After a restart, where a closed guard stands for Reset.

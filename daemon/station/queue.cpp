@@ -82,6 +82,7 @@ void job_known(Machine& m, const std::shared_ptr<const JobInfo>& info) {
   const auto behind =
       std::ranges::upper_bound(s.queue, info->place, {}, [](const auto& queued) { return queued->place; });
   s.queue.insert(behind, info);
+  if (s.queue.front() == info) m.act(action::CheckCalibration{calibrated_job(s)});
 }
 
 void job_removed(Machine& m, const std::string& job) {
@@ -151,6 +152,7 @@ void serve_line(Machine& m) {
   if (s.activity != Activity::waiting_for_part || !s.part_gone || !s.inputs.part_present) return;
   if (s.quiet || s.warm_up_left > std::chrono::seconds(0)) return;
   if (!goes_on_by_itself(s) || s.shutting_down || m.unsafe() || m.absent_device()) return;
+  if (calibration_problem(s)) return;
   begin_next_job(m, {}, "A new part is on the table.");
 }
 

@@ -24,9 +24,10 @@ struct Snapshot {
   std::string fault_device{};  ///< in Error: whose failure it is; empty: nobody's, as of an e-stop
   PanelInputs inputs{};
   PanelOutputs outputs{};
-  std::vector<DeviceHealth> devices{};  ///< as of the last check
-  std::string job{};                    ///< the one that has the rig; empty: none
-  std::vector<std::string> queue{};     ///< ids of the jobs to come, the next one first
+  std::vector<DeviceHealth> devices{};         ///< as of the last check
+  std::optional<Error> calibration_problem{};  ///< why the calibration refuses the next scan
+  std::string job{};                           ///< the one that has the rig; empty: none
+  std::vector<std::string> queue{};            ///< ids of the jobs to come, the next one first
   JobTable jobs{};
   Counters counters{};
 };

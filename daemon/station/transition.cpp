@@ -92,7 +92,7 @@ class Transition : public Machine {
   void operator()(const event::CheckDue&) {
     const bool standing = s().activity == Activity::none || s().activity == Activity::waiting_for_part;
     if (standing && !s().may_be_moving && !s().shutting_down) {
-      act(action::CheckDevices{});
+      check();
     } else {
       act(action::CheckLater{});
     }
@@ -101,6 +101,11 @@ class Transition : public Machine {
   void operator()(const event::DevicesSeen& e) {
     s().devices = e.devices;
     act(action::CheckLater{});
+    serve_line(*this);
+  }
+
+  void operator()(const event::CalibrationSeen& e) {
+    s().calibration = e;
     serve_line(*this);
   }
 
@@ -119,7 +124,7 @@ class Transition : public Machine {
     s().may_be_moving = false;
     if (e.light) set_problem("projector", *e.light);
     stopped();
-    if (!s().shutting_down) act(action::CheckDevices{});  // what is absent is shown before somebody presses Start
+    if (!s().shutting_down) check();  // what is wrong is shown before somebody presses Start
     home_if_guarded();
   }
 
@@ -241,6 +246,7 @@ class Transition : public Machine {
       return refuse(ErrorCode::busy, "The station is busy ({}).", to_string(s().activity));
     }
     if (!safe_to_move() || !all_there()) return;
+    if (!flipped && !calibrated()) return;
     s().failures = 0;
     if (flipped) return continue_after_flip(*this, "The object was turned over.");
     begin_next_job(*this, fresh_job_id, "Start was pressed.");

@@ -63,7 +63,8 @@ struct StationState {
   std::optional<Maintenance> maintenance{};
   PanelInputs inputs{};
   std::optional<Error> panel_problem{};
-  std::vector<DeviceHealth> devices{};  ///< as of the last check
+  std::vector<DeviceHealth> devices{};   ///< as of the last check
+  event::CalibrationSeen calibration{};  ///< likewise
   bool shutting_down = false;
   bool reloading = false;                         ///< shutting down to begin again
   bool finished = false;                          ///< shut down, the rig asked to stop
@@ -85,6 +86,11 @@ struct Step {
   std::vector<Action> actions{};
   std::optional<Error> refused{};  ///< a press that was not obeyed; nothing has changed then
 };
+
+/// The job whose own calibration the next scan goes on with; empty: it begins with the rig's.
+std::string calibrated_job(const StationState& state);
+/// Why the calibration refuses the next scan, as of the last check; null: it does not.
+const Error* calibration_problem(const StationState& state);
 
 /// The whole behaviour of the station as a pure function: what happens next, and what is to be done.
 /// Events that come too late for the state they belong to change nothing.

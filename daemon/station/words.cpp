@@ -56,10 +56,15 @@ std::string how_to_start(const StationState& state) {
   return fmt::format("Put the object for {} on the table, then press Start.", name);
 }
 
+std::string see_to_calibration(const Error& problem) {
+  return fmt::format("See to the calibration: {}.", problem.message);
+}
+
 bool warming_up(const StationState& state) { return state.warm_up_left > std::chrono::seconds(0); }
 
 /// What keeps the next job from beginning by itself although its part may be there.
 std::string what_holds_the_line(const StationState& state) {
+  if (const auto* problem = calibration_problem(state)) return see_to_calibration(*problem);
   if (state.quiet) return "Quiet hours: the queue goes on when they end.";
   if (!warming_up(state)) return "";
   return fmt::format("The projector is warming up: the queue goes on in {} s, or at once with Start.",
@@ -71,6 +76,7 @@ Words when_ready(const StationState& state, const StationRules& rules) {
   auto sentence =
       queued == 0 ? std::string("The rig is ready.") : fmt::format("The rig is ready, {} in the queue.", queued);
   if (warming_up(state)) sentence += fmt::format(" The projector will be warm in {} s.", state.warm_up_left.count());
+  if (const auto* problem = calibration_problem(state)) return {std::move(sentence), see_to_calibration(*problem)};
   return {std::move(sentence), with_light(rules, "Switch the projector on. ", how_to_start(state))};
 }
 

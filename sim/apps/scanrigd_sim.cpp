@@ -87,7 +87,11 @@ Result<void> run(const SimOptions& o, const SignalStop& stop) {
   reconstruct.voxel_mm = o.voxel_mm;
   reconstruct.threads = o.threads;
   DaemonOptions options;
-  options.jobs = {.root = o.jobs, .calibration_file = calibration, .profile = r.profile_sha256()};
+  const auto cameras = r.camera_serials();
+  options.jobs = {.root = o.jobs,
+                  .calibration_file = calibration,
+                  .cameras = {cameras[0], cameras[1]},
+                  .profile = r.profile_sha256()};
   options.recipes["default"] = {.poses = o.rig.poses, .views = o.views};
   options.api.socket = o.socket;
   options.remote = options.guard = true;  // nobody can reach a simulated table
@@ -125,6 +129,7 @@ Result<Ended> run_on_wires(const SimOptions& o, const config::RigConfig& config,
   if (auto made = create_directories_synced(config.calibration_file.parent_path()); !made) return pass_on(made);
   if (auto written = sim::write_calibration(**scene, config.calibration_file); !written) return pass_on(written);
   options.jobs.profile = sim::profile_sha256();
+  options.jobs.cameras = {(*scene)->rig().left.serial, (*scene)->rig().right.serial};
   sim::WireCamera camera(std::move(*scene), config.stereo_camera.truth, clock);
   options.on_scanned = [&camera](const std::filesystem::path& folder) { return camera.write_truth(folder); };
   sim::WatchedProjector projector(*open->projector, camera);

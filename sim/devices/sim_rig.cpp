@@ -46,6 +46,9 @@ class Rig final : public SimRig {
   }
 
   std::string profile_sha256() const override { return sim::profile_sha256(); }
+  std::array<std::string, 2> camera_serials() const override {
+    return {bench_.scene->rig().left.serial, bench_.scene->rig().right.serial};
+  }
 
  private:
   template <class T>

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -57,6 +58,7 @@ class SimRig {
   /// view taken again replaces the one before. Fails with `degenerate` (nothing exposed yet), `io`.
   virtual Result<void> write_truth(const std::filesystem::path& folder) const = 0;
   virtual std::string profile_sha256() const = 0;
+  virtual std::array<std::string, 2> camera_serials() const = 0;  ///< left, right
 };
 
 }  // namespace scanrig::sim

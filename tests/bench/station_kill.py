@@ -29,8 +29,10 @@ class Rig:
         (home / "jobs").mkdir(parents=True)
         return home
 
-    def run(self, verb, home, crash=False, deaths=1, **watch):
-        environment = dict(os.environ, ONE_JOB_DEATHS=str(deaths))
+    def run(self, verb, home, crash=False, again=False, **watch):
+        environment = dict(os.environ)
+        if again:
+            environment["ONE_JOB_AGAIN"] = "1"
         if crash:
             environment["ONE_JOB_CRASH"] = "1"
         if watch:
@@ -43,9 +45,9 @@ class Rig:
         except subprocess.TimeoutExpired:
             return subprocess.CompletedProcess([], 124, f"still running after {LIMIT_S} s", "")
 
-    def recovers(self, home, deaths=1):
-        """None, or what is wrong."""
-        done = self.run("recover", home, deaths=deaths)
+    def recovers(self, home, again=False):
+        """None, or what is wrong. `again`: somebody asks for the model of a job that failed once more."""
+        done = self.run("recover", home, again=again)
         return None if done.returncode == 0 else (done.stdout + done.stderr).strip().replace("\n", "; ")
 
     def record(self):
@@ -96,14 +98,14 @@ def random_kills(rig, count, seed=6):
 
 
 def second_kills(rig, calls, count, seed=2):
-    """A second kill during the recovery from a first one."""
+    """A second kill during the recovery from a first one: both may have come while the model was made."""
     chance = random.Random(seed)
     for _ in range(count):
         first, second = chance.randint(1, calls), chance.randint(1, calls)
         home = rig.fresh("killed_twice")
         rig.run("scan", home, kill=first, when="after")
         rig.run("recover", home, kill=second, when="after")
-        yield f"killed after call {first} and after call {second} of the recovery", rig.recovers(home, deaths=2)
+        yield f"killed after call {first} and after call {second} of the recovery", rig.recovers(home, again=True)
 
 
 def power_cuts(rig, home, log, share=1.0, seed=3):
@@ -127,8 +129,9 @@ def power_cuts(rig, home, log, share=1.0, seed=3):
 
 
 def bad_disks(rig, calls, share=1.0, seed=5, failures=0):
-    """A disk that is full, read-only or failing from some call on, or for so many calls: the job must be named as
-    interrupted, nothing that was acknowledged may be lost, and with a good disk the job must come to its model."""
+    """A disk that is full, read-only or failing from some call on, or for so many calls: that must be named, nothing
+    that was acknowledged may be lost, and with a good disk the job must come to its model. One that failed alone while
+    that was written failed the job: somebody asks again."""
     chance = random.Random(seed)
     for number in range(1, calls + 1):
         if chance.random() > share:
@@ -142,7 +145,7 @@ def bad_disks(rig, calls, share=1.0, seed=5, failures=0):
         elif end.returncode == 1 and os.strerror(error) not in end.stdout:
             yield what, f"not told by its name: {end.stdout}"
         else:
-            yield what, rig.recovers(home)
+            yield what, rig.recovers(home, again=failures > 0)
 
 
 def crashes(rig):

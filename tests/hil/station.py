@@ -45,6 +45,8 @@ def make_tree(build, tree, images):
         other = with_sections(CONFIGS / "rig.toml", CONFIGS / name)
         (configs / name).write_text(other)
     shutil.copytree(images, tree / "usr" / "share" / "hil" / "images")
+    calibration = tree / "usr" / "share" / "hil" / "images" / "calibration.json"  # of the GigE pair, if of any
+    calibration.write_text(calibration.read_text().replace("SIM-L", "40012345").replace("SIM-R", "40012346"))
 
 
 def with_sections(config, sections):

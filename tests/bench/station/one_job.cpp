@@ -3,8 +3,8 @@
 //   station_one_job scan FOLDER      one two-pose job from Reset to the model; acknowledged views go to FOLDER/acks
 //   station_one_job recover FOLDER   starts again, brings every job it finds to its end, checks that no acknowledged
 //                                    view is lost; prints what it saw, exits 1 when something is not as it should be
-// With $ONE_JOB_CRASH set the making of the model ends in a segmentation fault. With $ONE_JOB_DEATHS=2 the job may be
-// in quarantine, and is made again by order.
+// With $ONE_JOB_CRASH set the making of the model ends in a segmentation fault. With $ONE_JOB_AGAIN set the model of a
+// job that failed is asked for again, once.
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -139,11 +139,9 @@ class Shift {
       if (!start()) return false;
     }
     if (!wait_reconstructed()) return false;
-    const char* deaths = std::getenv("ONE_JOB_DEATHS");
-    if (!deaths || deaths != std::string_view("2")) return true;
-    // Two kills while one model was made are two deaths; somebody who knows that it was not the job asks for another.
+    if (!std::getenv("ONE_JOB_AGAIN")) return true;
     for (const auto& [id, job] : loop_->snapshot()->jobs) {
-      if (job->quarantined) ask(What::reprocess, id);
+      if (job->state == JobState::failed) ask(What::reprocess, id);
     }
     return wait_reconstructed();
   }

@@ -107,7 +107,7 @@ class Daemon : public scan_samples::FolderTest {
     }
   }
 
-  /// What the daemon answers to an order or a wish; it has an hour of the clock.
+  /// What the daemon answers to an order, a wish or a press over the API; it has an hour of the clock.
   template <class Asked>
   Result<std::string> ask(const Asked& what) {
     struct Waiting {
@@ -123,7 +123,9 @@ class Daemon : public scan_samples::FolderTest {
       }
       clock.notify_all(waiting->changed);
     };
-    if constexpr (std::is_same_v<Asked, Order>) {
+    if constexpr (std::is_same_v<Asked, Button>) {
+      loop->press(what, Origin::remote, reply);
+    } else if constexpr (std::is_same_v<Asked, Order>) {
       loop->order(what, reply);
     } else {
       loop->ask(what, reply);

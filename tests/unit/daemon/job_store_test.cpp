@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <regex>
+
 #include "tests/unit/pipeline/scan/scan_samples.h"
 
 namespace scanrig {
@@ -241,6 +243,43 @@ TEST_F(JobStoreTest, AFolderThatCannotBeReadIsAFailedJobAndTheOthersAreListed) {
   const auto bad = recovered(store, "bad");
   EXPECT_EQ(bad.state, JobState::failed);
   EXPECT_THAT(bad.error->message, HasSubstr("scan.json"));
+}
+
+TEST_F(JobStoreTest, ComparesTheSerialNumbersThatAreKnown) {
+  struct Case {
+    const char *left, *right;
+    bool fits;
+  };
+  for (const auto& [left, right, fits] : {Case{"A1", "A1", true}, Case{"", "", true}, Case{"A1", "", true},
+                                          Case{"A1", "B2", false}, Case{"B2", "", false}}) {
+    options.cameras = {left, right};
+    const auto checked = open().check_cameras("");
+    EXPECT_EQ(checked.has_value(), fits) << left << " " << right;
+    if (!fits) {
+      EXPECT_EQ(checked.error().code, ErrorCode::refused);
+    }
+  }
+  scan_samples::write_text(options.calibration_file,
+                           std::regex_replace(scan_samples::calibration_json(), std::regex("A1"), ""));
+  options.cameras = {"B2", "B3"};
+  EXPECT_TRUE(open().check_cameras("")) << "a calibration that does not say whose it is";
+}
+
+TEST_F(JobStoreTest, AJobWithoutViewsIsGivenTheCalibrationAsItIsNow) {
+  const auto store = open();
+  const auto made = store.create("a", {.part = "4711", .place = 3});
+  ASSERT_TRUE(made);
+  const auto manifest = ScanFolder::open(made->folder)->manifest();
+  ASSERT_TRUE(store.renew_calibration(*made));
+  EXPECT_EQ(ScanFolder::open(made->folder)->manifest().calibration->sha256, manifest.calibration->sha256);
+  scan_samples::write_text(options.calibration_file, scan_samples::calibration_json() + "\n");
+  ASSERT_TRUE(store.renew_calibration(*made));
+  const auto renewed = ScanFolder::open(made->folder);
+  EXPECT_NE(renewed->manifest().calibration->sha256, manifest.calibration->sha256);
+  EXPECT_TRUE(renewed->load_calibration());
+  EXPECT_EQ(renewed->manifest().created, manifest.created);
+  EXPECT_EQ(store.read("a")->part, "4711");
+  EXPECT_EQ(store.read("a")->place, 3);
 }
 
 }  // namespace
