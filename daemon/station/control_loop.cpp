@@ -178,6 +178,7 @@ void ControlLoop::publish(const StationPorts& ports) {
       .outputs = shown_,
       .devices = std::move(devices),
       .job = state_.job ? state_.job->id : std::string(),
+      .not_begun = state_.not_begun,
       .queue = std::move(queue),
       .jobs = jobs_,
       .counters = tally_.counters(),

@@ -55,4 +55,10 @@ struct JobInfo {
   std::string report{};
 };
 
+/// A job that was to be begun, and why it was not.
+struct NotBegun {
+  std::string job;
+  Error why;
+};
+
 }  // namespace scanrig
