@@ -48,5 +48,13 @@ TEST_F(StartedOverTheApi, AModelBeyondTheLimitsOfItsRecipeIsNoSuccess) {
   EXPECT_THAT(output_, HasSubstr("the recipe asks for 100.0"));
 }
 
+TEST_F(StartedOverTheApi, AnAbsentDeviceIsADeviceAndNoFile) {
+  start_rig();
+  change_config("truth = \"control.sock\"", "truth = \"nowhere.sock\"");
+  get_ready();
+  EXPECT_EQ(start({}), ExitCode::device) << output_;
+  EXPECT_THAT(output_, HasSubstr("The camera is not there: "));
+}
+
 }  // namespace
 }  // namespace scanrig
