@@ -18,6 +18,10 @@ ordered_json devices_json(const std::vector<DeviceHealth>& devices) {
   return json;
 }
 
+ordered_json not_begun_json(const std::optional<NotBegun>& job) {
+  return job ? ordered_json{{"job", job->job}, {"why", to_json(job->why)}} : ordered_json(nullptr);
+}
+
 }  // namespace
 
 ordered_json to_json(const Error& error) { return {{"code", to_string(error.code)}, {"message", error.message}}; }
@@ -91,6 +95,7 @@ ordered_json to_json(const Snapshot& snapshot) {
           {"next_action", snapshot.next_action},
           {"devices", devices_json(snapshot.devices)},
           {"job", snapshot.job.empty() ? ordered_json(nullptr) : ordered_json(snapshot.job)},
+          {"not_begun", not_begun_json(snapshot.not_begun)},
           {"queue", snapshot.queue}};
 }
 

@@ -14,7 +14,7 @@ const char* const kSchemas = R"({
   "job": {"type": "string", "nullable": true, "description": "the job that has the rig now"}}},
 "Status": {"type": "object", "additionalProperties": false,
   "required": ["revision", "machine", "activity", "may_be_moving", "cause", "sentence", "next_action", "devices", "job",
-  "queue"],
+  "not_begun", "queue"],
   "properties": {
   "revision": {"type": "integer"},
   "machine": {"type": "string", "description": "in the words of OPC 40100-1, such as Operational.Ready"},
@@ -25,7 +25,11 @@ const char* const kSchemas = R"({
   "next_action": {"type": "string", "description": "what the operator should do; empty: nothing"},
   "devices": {"type": "array", "items": {"$ref": "#/components/schemas/Device"}},
   "job": {"type": "string", "nullable": true, "description": "the job that has the rig"},
+  "not_begun": {"allOf": [{"$ref": "#/components/schemas/NotBegun"}], "nullable": true},
   "queue": {"type": "array", "items": {"type": "string"}, "description": "jobs to come, the next one first"}}},
+"NotBegun": {"type": "object", "required": ["job", "why"], "additionalProperties": false,
+  "description": "the job that the last Start did not begin; null: it began one", "properties": {
+  "job": {"type": "string"}, "why": {"$ref": "#/components/schemas/Problem"}}},
 "Device": {"type": "object", "required": ["name", "ok", "problem"], "additionalProperties": false, "properties": {
   "name": {"type": "string"}, "ok": {"type": "boolean"}, "problem": {"$ref": "#/components/schemas/MaybeProblem"}}},
 "Io": {"type": "object", "required": ["inputs", "outputs"], "additionalProperties": false, "properties": {

@@ -17,23 +17,24 @@ constexpr auto kPoll = std::chrono::milliseconds(100);
 /// `id` empty: the job that has the rig, now or as soon as there is one.
 ExitCode follow(const Connection& connection, std::string id) {
   RealClock clock;
-  StageBars bars(stdout, !connection.json && ::isatty(STDOUT_FILENO) == 1);
+  std::FILE* told = connection.json ? stderr : stdout;
+  StageBars bars(told, ::isatty(::fileno(told)) == 1);
   JobStory story(bars);
   for (;; clock.sleep_for(kPoll)) {
     const auto status = ask(connection.socket, "GET", "/api/v1/status");
     if (!status) return complain(status.error());
     if (id.empty()) id = text(*status, "job");
-    if (id.empty()) continue;
+    if (id.empty()) {
+      story.wait(*status);
+      continue;
+    }
+    if (const auto why = why_not_begun(*status, id)) return complain(*why);
     const auto job = ask(connection.socket, "GET", "/api/v1/jobs/" + id);
     if (!job && job.error().exit == exit_code(ErrorCode::not_found) && text(*status, "job") == id) continue;  // not yet
     if (!job) return complain(job.error());
-    if (connection.json) {
-      const auto state = text(*job, "state");
-      if (state != "done" && state != "failed" && state != "interrupted" && state != "cancelled") continue;
-      print(*job);
-      return state == "done" ? ExitCode::ok : story.end(*job);
-    }
-    if (story.tell(*status, *job)) return story.end(*job);
+    if (!story.tell(*status, *job)) continue;
+    if (connection.json) print(*job);
+    return story.end(*job);
   }
 }
 

@@ -12,4 +12,9 @@ ExitCode complain(ExitCode code, const std::string& message) {
   return code;
 }
 
+Error of_device(Error error) {
+  if (error.code == ErrorCode::io || error.code == ErrorCode::not_found) error.code = ErrorCode::timeout;
+  return error;
+}
+
 }  // namespace scanrig::ctl

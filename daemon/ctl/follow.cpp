@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "daemon/ctl/answers.h"
 #include "daemon/ctl/verbs.h"
 #include "daemon/station/states.h"
 
@@ -32,6 +33,24 @@ std::string closure_line(const json& closure, const json& job) {
 
 }  // namespace
 
+std::optional<Error> why_not_begun(const json& status, const std::string& job) {
+  const auto not_begun = status.value("not_begun", json());
+  if (!not_begun.is_object() || text(not_begun, "job") != job) return std::nullopt;
+  const auto& why = not_begun.at("why");
+  const auto next = text(status, "next_action");
+  return Error{
+      parse_error_code(text(why, "code")).value_or(ErrorCode::internal),
+      fmt::format("job {} was not begun: {}{}{}", job, text(why, "message"), next.empty() ? "" : ". Next: ", next)};
+}
+
+void JobStory::wait(const json& status) {
+  const auto cause = text(status, "cause"), next = text(status, "next_action");
+  if (cause == waited_) return;
+  waited_ = cause;
+  bars_.line(fmt::format("Waiting for a job. {} {}{}{}", cause, text(status, "sentence"),
+                         next.empty() ? "" : " Next: ", next));
+}
+
 bool JobStory::tell(const json& status, const json& job) {
   const auto& stored = job.at("stored");
   if (!introduced_) bars_.line(fmt::format("Job {}", job.at("id").get<std::string>()));
@@ -51,17 +70,18 @@ ExitCode JobStory::end(const json& job) {
   const std::string state = job.at("state");
   const bool done = state == to_string(JobState::done);
   bars_.end(done);
+  const bool passed = job.value("passed", json()) != false;
   if (done) {
     const std::chrono::duration<double> spent = clock_.now() - begun_;
     bars_.line(fmt::format("Done after {:.1f} s.\n  scan    {}\n  model   {}\n  report  {}", spent.count(),
                            job.at("folder").get<std::string>(), job.at("model").get<std::string>(),
                            job.at("report").get<std::string>()));
-    return ExitCode::ok;
+    if (passed) return ExitCode::ok;
   }
   const auto& error = job.at("error");
   const auto code = error.is_object() ? parse_error_code(error.at("code").get<std::string>()) : std::nullopt;
   return complain({code.value_or(ErrorCode::internal),
-                   fmt::format("job {} {}: {}", job.at("id").get<std::string>(), state,
+                   fmt::format("job {} {}: {}", job.at("id").get<std::string>(), done ? "does not pass" : state,
                                error.is_object() ? error.at("message").get<std::string>() : "no reason given")});
 }
 

@@ -43,7 +43,7 @@ class Bench {
     if (!devices) return pass_on(devices);
     bench->devices_ = std::move(*devices);
     const auto ready = bench->devices_.camera->ready(Deadline::after(bench->clock_, kConnectLimit));
-    if (!ready) return pass_on(ready);
+    if (!ready) return tl::unexpected(of_device(ready.error()));
     return bench;
   }
 
@@ -54,7 +54,7 @@ class Bench {
       if (pair.error().code != ErrorCode::timeout && pair.error().code != ErrorCode::protocol) break;
       pair = expose_once(light);
     }
-    return pair;
+    return std::move(pair).map_error(of_device);
   }
   Clock& clock() { return clock_; }
 

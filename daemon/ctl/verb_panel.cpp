@@ -45,7 +45,7 @@ ExitCode watch_panel(const PanelVerb& verb) {
   PanelInputs known;
   for (bool first = true; !signal.token().stop_requested() && clock.now() < end; first = false) {
     const auto now = open->panel->wait_change(known, Deadline::after(clock, first ? Clock::Duration{} : kGlance));
-    if (!now) return complain(now.error());
+    if (!now) return complain(of_device(now.error()));
     if (first || *now != known) (verb.json ? tell_json : tell)(*now, clock.now() - begun);
     known = *now;
   }

@@ -50,13 +50,13 @@ ExitCode move(const TurntableVerb& verb, Turntable& table, Clock& clock) {
   const SignalStop signal;
   const auto token = signal.token();
   const std::stop_callback stop(token, [&] { table.request_stop(); });
-  if (auto homed = home(table, clock); !homed) return complain(homed.error());
+  if (auto homed = home(table, clock); !homed) return complain(of_device(homed.error()));
   if (verb.what == "home") {
     fmt::print("{}\n", verb.json ? R"({"homed": true})" : "home");
     return ExitCode::ok;
   }
   const auto moved = table.rotate_to({verb.angle_deg}, Deadline::after(clock, kMoveLimit));
-  if (!moved) return complain(moved.error());
+  if (!moved) return complain(of_device(moved.error()));
   const auto ms = [](Clock::Duration time) { return std::chrono::duration_cast<milliseconds>(time).count(); };
   if (verb.json) {
     fmt::print("{}\n", nlohmann::ordered_json{{"measured_deg", moved->measured.value},
@@ -75,9 +75,9 @@ ExitCode read_registers(const config::RigConfig& rig, Clock& clock, bool json) {
   const auto& options = rig.turntable.modbus;
   ModbusDrive drive(options.line, options.profile, clock);
   const auto state = drive.read_state(Deadline::after(clock, kAskLimit));
-  if (!state) return complain(state.error().in("turntable"));
+  if (!state) return complain(of_device(state.error().in("turntable")));
   const auto alarm = drive.read_alarm(Deadline::after(clock, kAskLimit));
-  if (!alarm) return complain(alarm.error().in("turntable"));
+  if (!alarm) return complain(of_device(alarm.error().in("turntable")));
   const double angle = options.scale.angle(state->position).value;
   if (json) {
     const nlohmann::ordered_json all{{"pulses", state->position}, {"angle_deg", angle},
@@ -111,7 +111,7 @@ ExitCode turntable(const TurntableVerb& verb) {
   auto& table = *open->turntable;
   if (verb.what != "status" && verb.what != "read") return move(verb, table, clock);
   const auto status = table.status(Deadline::after(clock, kAskLimit));
-  return status ? tell(*status, verb.json) : complain(status.error());
+  return status ? tell(*status, verb.json) : complain(of_device(status.error()));
 }
 
 }  // namespace scanrig::ctl

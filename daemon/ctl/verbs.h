@@ -15,6 +15,10 @@ namespace scanrig::ctl {
 ExitCode complain(const Error& error);
 ExitCode complain(ExitCode code, const std::string& message);
 
+/// An error of a device itself: a port, a line or a socket that cannot be used is a device that does not answer, no
+/// disk or file.
+Error of_device(Error error);
+
 // Clients of the daemon.
 
 struct Connection {

@@ -180,6 +180,7 @@ void ControlLoop::publish(const StationPorts& ports) {
       .devices = std::move(devices),
       .calibration_problem = calibration ? std::optional(*calibration) : std::nullopt,
       .job = state_.job ? state_.job->id : std::string(),
+      .not_begun = state_.not_begun,
       .queue = std::move(queue),
       .jobs = jobs_,
       .counters = tally_.counters(),

@@ -58,4 +58,10 @@ struct JobInfo {
 /// Something of the scan is there, so it can only go on as it was begun.
 inline bool has_views(const JobInfo& job) { return job.complete > 0 || !job.stored.empty(); }
 
+/// A job that was to be begun, and why it was not.
+struct NotBegun {
+  std::string job;
+  Error why;
+};
+
 }  // namespace scanrig

@@ -100,8 +100,12 @@ const DeviceHealth* Machine::absent_device() {
 
 bool Machine::all_there() {
   const auto* const absent = absent_device();
-  if (absent) refuse(absent->problem->code, "The {} is not there: {}.", absent->name, absent->problem->message);
-  return !absent;
+  if (!absent) return true;
+  const auto& why = *absent->problem;
+  // To whoever asked it is a device that does not answer, and neither the disk nor a file, whatever its port says.
+  const auto code = exit_code(why.code) == ExitCode::device ? why.code : ErrorCode::timeout;
+  refuse(code, "The {} is not there: {}.", absent->name, why.message);
+  return false;
 }
 
 bool Machine::calibrated() {

@@ -93,6 +93,7 @@ void job_removed(Machine& m, const std::string& job) {
 
 void begin_next_job(Machine& m, const std::string& fresh_job_id, std::string cause) {
   auto& s = m.s();
+  s.not_begun.reset();
   if (s.queue.empty()) {
     s.job = ActiveJob{.id = fresh_job_id, .recipe = m.rules().recipes.at("default")};
     m.act(action::CreateJobs{{fresh_job_id}, s.job->recipe, "", 0, 0});
@@ -109,6 +110,8 @@ void begin_next_job(Machine& m, const std::string& fresh_job_id, std::string cau
 }
 
 void job_not_begun(Machine& m, const event::JobNotBegun& e) {
+  auto& not_begun = m.s().not_begun;
+  if (!not_begun || not_begun->job != e.job) not_begun = {e.job, e.why};  // what came first is the reason
   if (!m.has(e.job)) return;
   m.s().job.reset();
   m.s().disk_trouble = e.why.code == ErrorCode::io;

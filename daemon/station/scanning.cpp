@@ -132,6 +132,7 @@ void store_failed(Machine& m, const event::StoreFailed& e) {
   if (!m.has(e.job)) return;
   const bool begun = m.s().job->state != JobState::queued;
   m.s().disk_trouble = true;
+  if (!begun) m.s().not_begun = {e.job, e.error};
   m.close_job(JobState::interrupted, e.error);
   if (m.s().machine == MachineState::error) return;  // a fault came first and has the word
   auto cause = fmt::format("Job {} {}: {}{}.", e.job, begun ? "is interrupted" : "was not begun", e.error.message,

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,6 +28,7 @@ struct Snapshot {
   std::vector<DeviceHealth> devices{};         ///< as of the last check
   std::optional<Error> calibration_problem{};  ///< why the calibration refuses the next scan
   std::string job{};                           ///< the one that has the rig; empty: none
+  std::optional<NotBegun> not_begun{};         ///< by the last Start; until the next one
   std::vector<std::string> queue{};            ///< ids of the jobs to come, the next one first
   JobTable jobs{};
   Counters counters{};

@@ -59,6 +59,32 @@ TEST_F(Programs, EveryVerbGivesUpOnADaemonThatWasStopped) {
   EXPECT_EQ(scanrig({"status", "--socket", socket()}), 0) << output;
 }
 
+TEST_F(Programs, AnObjectThatWasNotTurnedOverGivesNoModel) {
+  boot("auto", {"--same-rest"});
+  ask_until("status", [](const json& status) { return status["job"].is_string(); });
+  EXPECT_EQ(scanrig({"status", "--follow", "--socket", socket()}), code_of(ExitCode::no_model)) << output;
+  EXPECT_THAT(output, HasSubstr("scanrig: job "));
+}
+
+TEST_F(Programs, AScanThatIsStoppedEndsForWhoFollowsIt) {
+  boot("none");
+  ask_until("status", [](const json& status) { return status["machine"] == "Halted" && status["activity"] == "none"; });
+  ASSERT_EQ(scanrig({"reset", "--socket", socket()}), 0) << output;
+  ask_until("status", [](const json& status) { return status["machine"] == "Operational.Ready"; });
+  Process follower({SCANRIG_PROGRAM, "status", "--follow", "--json", "--socket", socket()}, folder_ / "followed");
+  RealClock clock;
+  const auto waits = [&] { return read_file(folder_ / "followed").value_or("").find("Waiting for a job."); };
+  for (const auto end = Deadline::after(clock, kSlowness * std::chrono::seconds(60));
+       waits() == std::string::npos && !end.expired(clock);) {
+    clock.sleep_for(std::chrono::milliseconds(20));
+  }
+  ASSERT_EQ(scanrig({"start", "--socket", socket()}), 0) << output;
+  ask_until("status", [](const json& status) { return status["activity"] == "waiting_for_flip"; });
+  ASSERT_EQ(scanrig({"stop", "--socket", socket()}), 0) << output;
+  EXPECT_EQ(follower.wait(), code_of(ExitCode::stopped)) << *read_file(folder_ / "followed");
+  EXPECT_THAT(*read_file(folder_ / "followed"), HasSubstr("cancelled: Stop was pressed"));
+}
+
 TEST_F(Programs, WhatCannotBeWrittenIsTheDisk) {
   boot("none");
   ask_until("status", [](const json& status) { return status["machine"] == "Halted"; });

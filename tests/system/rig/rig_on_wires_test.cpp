@@ -64,6 +64,15 @@ TEST_F(RigOnWires, TheDoctorPraisesASoundRigAndNamesAWrongParity) {
   EXPECT_THAT(output_, HasSubstr("no_answer"));
 }
 
+TEST_F(RigOnWires, ADeviceThatIsGoneIsADeviceAndNoFile) {
+  start_rig();
+  rig_.reset();
+  for (const auto& verb :
+       std::vector<std::vector<std::string>>{{"turntable", "status"}, {"turntable", "read"}, {"panel", "watch"}}) {
+    EXPECT_EQ(scanrig(verb), static_cast<int>(ExitCode::device)) << verb[0] << " " << verb[1] << ": " << output_;
+  }
+}
+
 TEST_F(RigOnWires, TheSimulatedRigEndsCleanly) {
   start_rig();
   rig_->signal(SIGTERM);

@@ -108,5 +108,30 @@ TEST_F(Follow, AFailedJobEndsWithTheCodeOfItsError) {
   EXPECT_EQ(story.end(j), ExitCode::no_model);
 }
 
+TEST_F(Follow, AModelBeyondTheLimitsIsToldAndEndsWithTheirCode) {
+  auto j = job("done");
+  j["passed"] = false;
+  j["error"] = {{"code", "below_limits"}, {"message", "80 % was measured"}};
+  EXPECT_TRUE(story.tell(status, j));
+  EXPECT_EQ(story.end(j), ExitCode::below_limits);
+  EXPECT_THAT(text(), HasSubstr("model   /j/model/model.glb"));
+}
+
+TEST_F(Follow, AJobThatWasNotBegunIsToldWithWhatToDo) {
+  EXPECT_FALSE(why_not_begun(status, "J"));
+  status["not_begun"] = {{"job", "J"}, {"why", {{"code", "io"}, {"message", "the disk is full"}}}};
+  const auto why = why_not_begun(status, "J");
+  ASSERT_TRUE(why);
+  EXPECT_EQ(why->code, ErrorCode::io);
+  EXPECT_EQ(why->message, "job J was not begun: the disk is full. Next: Turn the object over.");
+  EXPECT_FALSE(why_not_begun(status, "another"));
+}
+
+TEST_F(Follow, WhatIsWaitedForIsToldWhenItIsAnotherThing) {
+  status = {{"cause", "The table is homed."}, {"sentence", "The rig is ready."}, {"next_action", "Press Start."}};
+  for (int i = 0; i < 3; ++i) story.wait(status);
+  EXPECT_EQ(text(), "Waiting for a job. The table is homed. The rig is ready. Next: Press Start.\n");
+}
+
 }  // namespace
 }  // namespace scanrig::ctl

@@ -77,8 +77,13 @@ TEST_F(Queue, AJobThatDoesNotFitIsNotBegunAndWaits) {
   EXPECT_THAT(state.cause, HasSubstr("the disk is full"));
   EXPECT_THAT(describe(state, rules).next_action, StartsWith("See to the disk of the jobs. "));
   EXPECT_THAT(waiting(), ElementsAre("a"));
+  ASSERT_TRUE(state.not_begun);
+  EXPECT_EQ(state.not_begun->job, "a");
+  EXPECT_EQ(state.not_begun->why.code, ErrorCode::io);
   tell(event::WarningOver{});
   EXPECT_TRUE(actions.empty());
+  press(Button::start);
+  EXPECT_FALSE(state.not_begun) << "it is tried again";
 }
 
 TEST_F(Queue, AJobThatDoesNotFitClearsNoFault) {
