@@ -1,6 +1,8 @@
 #include "daemon/jobs/job_thread.h"
 
 #include <algorithm>
+#include <system_error>
+#include <tuple>
 #include <utility>
 
 #include "core/files.h"
@@ -73,13 +75,37 @@ void JobThread::handle(const action::CreateJobs& task) {
 }
 
 void JobThread::handle(const action::BeginJob& task) {
-  auto job = store_.read(task.job);
-  auto room = job ? store_.check_room(*job) : Result<void>(pass_on(job));
-  if (room) room = begin(*job);
-  if (room) return;
-  tell_(event::JobNotBegun{task.job, room.error()});
-  if (!job && job.error().code == ErrorCode::not_found) return tell_(event::JobRemoved{task.job});
+  const auto job = read_whole(task.job);
+  if (!job) return set_aside(task.job, job.error());
+  auto begun = store_.check_room(*job);
+  if (begun) begun = begin(*job);
+  if (begun) return;
+  tell_(event::JobNotBegun{task.job, begun.error()});
   tell_known(task.job);
+}
+
+/// With what the scan will be in need of: its calibration, and the view that is taken again before it goes on.
+Result<JobInfo> JobThread::read_whole(const std::string& id) const {
+  auto job = store_.read(id);
+  if (!job) return job;
+  const auto scan = ScanFolder::open(job->folder);
+  if (!scan) return pass_on(scan);
+  if (const auto calibration = scan->load_calibration(); !calibration) return pass_on(calibration);
+  const auto pose = static_cast<std::size_t>(job->complete);
+  const auto& poses = scan->manifest().poses;
+  if (pose >= poses.size() || poses[pose].views.empty()) return job;
+  if (const auto first = scan->load_images(pose, 0); !first) return pass_on(first);
+  return job;
+}
+
+/// Noted where the folder is still good for that: what cannot be read at all is found failed at the next start too, and
+/// a disk that does not answer now may do so then.
+void JobThread::set_aside(const std::string& id, const Error& why) {
+  auto scan = ScanFolder::open(store_.folder(id));
+  if (scan && why.code != ErrorCode::io && scan->set_state("failed")) std::ignore = write_failure(scan->path(), why);
+  tell_(event::JobUnreadable{id, why});
+  std::error_code ignored;
+  if (!std::filesystem::exists(store_.folder(id), ignored)) tell_(event::JobRemoved{id});
 }
 
 /// Goes on where the manifest ends.

@@ -43,6 +43,8 @@ class JobThread {
   void handle(const action::ResumeJob& task);
   void handle(const action::CloseJob& task);
 
+  [[nodiscard]] Result<JobInfo> read_whole(const std::string& id) const;
+  void set_aside(const std::string& id, const Error& why);
   Result<void> begin(const JobInfo& job);
   Result<void> move(const action::MoveJob& task);
   Result<void> cancel(const JobInfo& job);
