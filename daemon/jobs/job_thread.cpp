@@ -192,8 +192,9 @@ Result<void> JobThread::reprocess(JobInfo job, const event::JobAsked& asked) {
   job.quarantined = false;
   job.error.reset();
   job.passed.reset();
-  reconstruction_.rebuild(job.id, job.folder, job.recipe, {asked.voxel_mm, asked.fusion});
-  tell_(event::JobKnown{std::make_shared<const JobInfo>(std::move(job))});
+  const auto known = std::make_shared<const JobInfo>(std::move(job));
+  tell_(event::JobKnown{known});  // before anything that the reconstruction has to tell
+  reconstruction_.rebuild(known->id, known->folder, known->recipe, {asked.voxel_mm, asked.fusion});
   return {};
 }
 
