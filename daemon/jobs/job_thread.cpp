@@ -115,7 +115,7 @@ Result<void> JobThread::begin(const JobInfo& job) {
   if (auto state = scan->set_state("scanning"); !state) return state;
   remove_failure(job.folder);
   scan_ = std::move(*scan);
-  reconstruction_.begin(job.id, scan_->path(), job.recipe);
+  reconstruction_.begin(job.id, *scan_, job.recipe);
   const auto& poses = scan_->manifest().poses;
   const auto pose = static_cast<std::size_t>(job.complete);
   tell_(event::JobBegun{job.id, job.complete, pose < poses.size() ? static_cast<int>(poses[pose].views.size()) : 0});

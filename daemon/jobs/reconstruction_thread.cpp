@@ -33,8 +33,10 @@ ReconstructionThread::~ReconstructionThread() {
   thread_.join();
 }
 
-void ReconstructionThread::begin(std::string job, std::filesystem::path folder, Recipe recipe) {
-  inbox_.post(enlist(std::move(job), std::move(folder), std::move(recipe), {}));
+void ReconstructionThread::begin(std::string job, ScanFolder scan, Recipe recipe) {
+  auto begin = enlist(std::move(job), scan.path(), std::move(recipe), {});
+  begin.scan = std::move(scan);
+  inbox_.post(std::move(begin));
 }
 
 void ReconstructionThread::rebuild(std::string job, std::filesystem::path folder, Recipe recipe,
@@ -97,7 +99,7 @@ bool ReconstructionThread::works_on(const std::string& job) const {
 void ReconstructionThread::handle(const Begin& message) {
   current_ = Current{.job = message.job, .folder = message.folder, .recipe = message.recipe, .stop = message.stop};
   told_stage_.clear();
-  const auto scan = ScanFolder::open(message.folder);
+  const auto scan = message.scan ? Result<ScanFolder>(*message.scan) : ScanFolder::open(message.folder);
   if (!scan) return check(pass_on(scan));
   check(start(message, *scan));
   if (works_on(message.job)) check(catch_up(*scan));

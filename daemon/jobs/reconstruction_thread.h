@@ -16,6 +16,7 @@
 #include "daemon/jobs/reconstructor.h"
 #include "daemon/mailbox.h"
 #include "daemon/rig/taken_view.h"
+#include "pipeline/scan/scan_folder.h"
 
 namespace scanrig {
 
@@ -30,8 +31,8 @@ class ReconstructionThread {
   ReconstructionThread(const ReconstructionThread&) = delete;
   ReconstructionThread& operator=(const ReconstructionThread&) = delete;
 
-  /// A scan begins or goes on; what its folder holds is taken first.
-  void begin(std::string job, std::filesystem::path folder, Recipe recipe);
+  /// A scan begins or goes on; what its folder holds now is taken first, what comes later as views.
+  void begin(std::string job, ScanFolder scan, Recipe recipe);
   void add_view(std::shared_ptr<const TakenView> view);
   void finish_pose(std::string job, int pose) { inbox_.post(FinishPose{std::move(job), pose}); }
   void finish(std::string job) { inbox_.post(Finish{std::move(job)}); }
@@ -49,6 +50,7 @@ class ReconstructionThread {
     Recipe recipe;
     ReconstructionChanges changes;
     std::stop_source stop;
+    std::optional<ScanFolder> scan{};  ///< as it was when this was asked for; empty: as it is when its turn comes
   };
   struct Rebuild {
     Begin begin;

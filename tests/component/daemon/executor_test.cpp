@@ -10,6 +10,7 @@ namespace scanrig {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::ElementsAreArray;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using What = event::JobAsked::What;
@@ -104,6 +105,27 @@ TEST_F(Executor, AScanThatGoesOnInQuarantineTakesItsViewsAndSaysSo) {
   ASSERT_TRUE(ask(event::JobAsked{.what = What::reprocess, .job = id}));
   EXPECT_TRUE(wait_state(id, JobState::done));
   EXPECT_FALSE(job(id)->quarantined);
+}
+
+TEST_F(Executor, AScanThatBeginsWhileAModelIsMadeIsReconstructedOnce) {
+  options.recipes["default"].poses = 1;
+  log.at_finish = [this, first = true]() mutable {
+    if (!std::exchange(first, false)) return;
+    EXPECT_TRUE(clock_waits_for([this] { return loop->snapshot()->jobs.size() == 2 && newest()->stored.size() == 3; }));
+  };
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(clock_waits_for([this] { return newest() && newest()->state == JobState::reconstructing; }));
+  ASSERT_TRUE(wait_ready());
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(clock_waits_for([this] { return loop->snapshot()->jobs.size() == 2; }));
+  EXPECT_TRUE(wait_state(newest()->id, JobState::done));
+  shut_down();
+  const std::vector<std::string> job{"view 0/0", "view 0/1", "view 0/2", "pose 0", "finish"};
+  auto both = job;
+  both.insert(both.end(), job.begin(), job.end());
+  EXPECT_THAT(log.calls, ElementsAreArray(both));
 }
 
 TEST_F(Executor, AModelIsMadeAgainWithOtherOptions) {
