@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "daemon/actor_thread.h"
+#include "daemon/guarded.h"
 #include "daemon/jobs/bundle.h"
 
 namespace scanrig {
@@ -64,7 +65,7 @@ void HousekeepingThread::run() {
 }
 
 void HousekeepingThread::handle(const event::JobAsked& asked) {
-  tell_(event::Answered{asked.ticket, keep(asked)});
+  tell_(event::Answered{asked.ticket, guarded("housekeeping", [&] { return keep(asked); })});
 }
 
 /// None where the station does not know it.
@@ -101,6 +102,10 @@ Result<void> HousekeepingThread::remove(const std::string& job) {
 /// What fails is tried again at the next sweep.
 void HousekeepingThread::handle(const Sweep&) {
   if (!retention_.keep_for && !retention_.keep_bytes) return;
+  std::ignore = guarded("retention", [this] { return sweep_now(); });
+}
+
+Result<void> HousekeepingThread::sweep_now() {
   std::vector<KeptJob> kept;
   for (const auto& [id, job] : jobs_()) {
     // What cannot be read is left for a person to see.
@@ -112,6 +117,7 @@ void HousekeepingThread::handle(const Sweep&) {
     const auto state = state_of(job);  // measuring takes its time, in which a job may have been resumed
     if (state && is_final(*state)) std::ignore = remove(job);
   }
+  return {};
 }
 
 }  // namespace scanrig

@@ -36,6 +36,7 @@ class HousekeepingThread {
   void handle(const event::JobAsked& asked);
   void handle(const Sweep& sweep);
   Result<std::string> keep(const event::JobAsked& asked);
+  Result<void> sweep_now();
   Result<void> remove(const std::string& job);
   [[nodiscard]] std::optional<JobState> state_of(const std::string& job) const;
 

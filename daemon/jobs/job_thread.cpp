@@ -8,6 +8,8 @@
 #include "core/files.h"
 #include "core/image_codec.h"
 #include "daemon/actor_thread.h"
+#include "daemon/guarded.h"
+#include "daemon/overloaded.h"
 #include "pipeline/closure/turned_table.h"
 
 namespace scanrig {
@@ -45,8 +47,37 @@ JobThread::~JobThread() {
 
 void JobThread::run() {
   while (auto task = inbox_.take()) {
-    std::visit([this](const auto& t) { handle(t); }, *task);
+    const auto done = guarded("storing", [&]() -> Result<void> {
+      std::visit([this](const auto& t) { handle(t); }, *task);
+      return {};
+    });
+    if (!done) give_up(*task, done.error());
   }
+}
+
+/// What was thrown ends as what fails: whoever waits is answered, and the job that has the rig is interrupted.
+void JobThread::give_up(const Task& task, const Error& why) {
+  const Result<void> failed = tl::unexpected(why);
+  std::visit(Overloaded{[&](const action::CreateJobs& t) {
+                          answer(t.ticket, failed, {});
+                          tell_(event::StoreFailed{t.ids.front(), why});
+                        },
+                        [&](const action::MoveJob& t) { answer(t.ticket, failed, {}); },
+                        [&](const action::KeepJob& t) { answer(t.asked.ticket, failed, {}); },
+                        [&](const action::StoreView& t) {
+                          tell_(event::StoreFailed{t.view->id.job, why});
+                        },
+                        [&](const action::JudgeClosure& t) {
+                          tell_(event::StoreFailed{t.view->id.job, why});
+                        },
+                        [&](const action::CloseJob& t) {
+                          scan_.reset();
+                          tell_(event::JobClosed{t.job, t.state, t.why});
+                        },
+                        [&](const auto& t) {
+                          tell_(event::StoreFailed{t.job, why});
+                        }},
+             task);
 }
 
 void JobThread::answer(Ticket ticket, const Result<void>& done, const std::string& result) {

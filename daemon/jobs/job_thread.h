@@ -33,6 +33,7 @@ class JobThread {
 
  private:
   void run();
+  void give_up(const Task& task, const Error& why);
   void handle(const action::CreateJobs& task);
   void handle(const action::BeginJob& task);
   void handle(const action::MoveJob& task);

@@ -83,6 +83,8 @@ class ReconstructionThread {
   };
 
   void run();
+  template <class SomeMessage>
+  void perform(const SomeMessage& message);
   void handle(const Begin& message);
   void handle(const Rebuild& message);
   void handle(const AddView& message);
@@ -98,7 +100,7 @@ class ReconstructionThread {
   Result<void> add(int pose, const Result<ViewImages>& images);
   Result<void> close_pose(int pose);
   void check(const Result<void>& done);
-  Result<void> make_model();
+  Result<event::ModelReady> make_model();
   void end();
   Context context(std::function<void(std::string_view, double)> progress) const {
     return {current_->stop.get_token(), progress};

@@ -13,6 +13,7 @@ namespace fs = std::filesystem;
 using testing::ElementsAreArray;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using What = event::JobAsked::What;
 
 /// Reconstructions that go wrong: the rig goes on, and the job says what happened.
@@ -126,6 +127,34 @@ TEST_F(Executor, AScanThatBeginsWhileAModelIsMadeIsReconstructedOnce) {
   auto both = job;
   both.insert(both.end(), job.begin(), job.end());
   EXPECT_THAT(log.calls, ElementsAreArray(both));
+}
+
+TEST_F(Executor, AReportNobodyForesawPassesNothing) {
+  options.recipes["default"].limits = {.least_measured_share = 0.9, .most_residual_mm = 0.1};
+  execute(R"(mkdir $out; echo glTF > $out/model.glb; echo '{"mesh": [1], "poses": [1]}' > $out/report.json)");
+  boot();
+  get_ready();
+  const auto id = scan();
+  EXPECT_TRUE(wait_state(id, JobState::done));
+  EXPECT_EQ(job(id)->passed, false);
+  shut_down();
+  boot();
+  EXPECT_EQ(job(id)->passed, false);
+}
+
+TEST_F(Executor, AHookThatThrowsInterruptsItsJobOnly) {
+  options.on_scanned = [thrown = false](const auto&) mutable -> Result<void> {
+    if (std::exchange(thrown, true)) return {};
+    throw std::runtime_error("out of the blue");
+  };
+  boot();
+  get_ready();
+  const auto id = scan();
+  EXPECT_TRUE(wait_state(id, JobState::interrupted));
+  EXPECT_THAT(job(id)->error->message, HasSubstr("out of the blue"));
+  EXPECT_THAT(loop->snapshot()->next_action, Not(HasSubstr("disk"))) << "it is not at fault";
+  EXPECT_FALSE(rig.turntable.moving);
+  EXPECT_TRUE(wait_state(scan(), JobState::done));
 }
 
 TEST_F(Executor, AModelIsMadeAgainWithOtherOptions) {

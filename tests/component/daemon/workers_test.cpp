@@ -2,14 +2,19 @@
 
 #include <condition_variable>
 #include <mutex>
+#include <stdexcept>
 
 #include "daemon/jobs/housekeeping_thread.h"
+#include "daemon/jobs/reconstruction_thread.h"
+#include "tests/component/daemon/fake_reconstructor.h"
 #include "tests/unit/pipeline/scan/scan_samples.h"
 
 namespace scanrig {
 namespace {
 
+namespace fs = std::filesystem;
 using testing::ElementsAre;
+using testing::HasSubstr;
 using What = event::JobAsked::What;
 
 /// Single threads of the daemon over real folders; the test is the control loop.
@@ -91,6 +96,46 @@ TEST_F(Workers, WhatWaitsForAModelIsNotRemoved) {
   ASSERT_TRUE(answer);
   ASSERT_FALSE(answer->result);
   EXPECT_EQ(answer->result.error().code, ErrorCode::busy);
+}
+
+TEST_F(Workers, HousekeepingOutlivesWhatIsThrown) {
+  make_job("job", "cancelled", JobState::cancelled);
+  int throws = 2;
+  const auto jobs = [&] {
+    if (throws-- > 0) throw std::runtime_error("out of the blue");
+    return table;
+  };
+  HousekeepingThread housekeeping(clock, *store, {.keep_bytes = 1}, jobs, [&](Event event) { tell(std::move(event)); });
+  housekeeping.sweep();
+  housekeeping.post({.what = What::remove, .job = "job", .ticket = 1});
+  const auto answer = wait_for<event::Answered>();
+  ASSERT_TRUE(answer);
+  ASSERT_FALSE(answer->result);
+  EXPECT_THAT(answer->result.error().message, HasSubstr("out of the blue"));
+  housekeeping.post({.what = What::remove, .job = "job", .ticket = 2});
+  const auto removed = wait_for<event::JobRemoved>();
+  ASSERT_TRUE(removed);
+  EXPECT_FALSE(fs::exists(store->folder("job")));
+}
+
+TEST_F(Workers, ReconstructionOutlivesWhatIsThrownBesideIt) {
+  make_job("job", "scanned", JobState::reconstructing);
+  fakes::ReconstructionLog log;
+  int until_thrown = 1;  // the second word of progress comes when the first view is done
+  const auto tell_or_throw = [&](Event event) {
+    const bool progress = std::holds_alternative<event::StageProgress>(event);
+    if (progress && until_thrown-- == 0) throw std::runtime_error("out of the blue");
+    tell(std::move(event));
+  };
+  const Recipe recipe{.poses = 1, .views = 2};
+  ReconstructionThread reconstruction(
+      clock, [&](const ReconstructionTask&) { return std::make_unique<fakes::FakeReconstructor>(log); }, tell_or_throw);
+  reconstruction.rebuild("job", store->folder("job"), recipe, {});
+  const auto failed = wait_for<event::ReconstructionFailed>();
+  ASSERT_TRUE(failed);
+  EXPECT_THAT(failed->error.message, HasSubstr("out of the blue"));
+  reconstruction.rebuild("job", store->folder("job"), recipe, {});
+  EXPECT_TRUE(wait_for<event::ModelReady>());
 }
 
 }  // namespace
