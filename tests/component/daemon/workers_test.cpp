@@ -4,6 +4,7 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "daemon/jobs/bundle.h"
 #include "daemon/jobs/housekeeping_thread.h"
 #include "daemon/jobs/reconstruction_thread.h"
 #include "tests/component/daemon/fake_reconstructor.h"
@@ -116,6 +117,13 @@ TEST_F(Workers, HousekeepingOutlivesWhatIsThrown) {
   const auto removed = wait_for<event::JobRemoved>();
   ASSERT_TRUE(removed);
   EXPECT_FALSE(fs::exists(store->folder("job")));
+}
+
+TEST_F(Workers, APackingThatFailsLeavesNothingHalf) {
+  const auto target = folder_ / "bundle.tar.gz";
+  EXPECT_EQ(bundle(folder_ / "none", target, {}).error().code, ErrorCode::io);
+  EXPECT_FALSE(fs::exists(target));
+  EXPECT_FALSE(fs::exists(target.string() + ".part"));
 }
 
 TEST_F(Workers, ReconstructionOutlivesWhatIsThrownBesideIt) {
