@@ -10,6 +10,7 @@
 #include "config/section.h"
 #include "config/turntable_section.h"
 #include "core/files.h"
+#include "pipeline/reconstruct/voxel_size.h"
 
 namespace scanrig::config {
 namespace {
@@ -165,7 +166,7 @@ void read_reconstruction(Section& s, ReconstructionConfig& reconstruction) {
   s.choice<Executor>("executor", reconstruction.executor,
                      {{"in_process", Executor::in_process}, {"process", Executor::process}});
   s.number("memory_gib", reconstruction.memory_gib, {1, 1024});
-  s.number("voxel_mm", reconstruction.voxel_mm, {0.02, 5});
+  s.number("voxel_mm", reconstruction.voxel_mm, {kLeastVoxelMm, kMostVoxelMm});
   if (s.has("limit_min")) s.number("limit_min", reconstruction.limit, {1, 1440});
 }
 

@@ -132,7 +132,8 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
   std::optional<Clock::Busy> starting(clock);
   ReconstructionThread reconstruction(clock, options.reconstructor, tell);
   go_on_reconstructing(*known, reconstruction);
-  HousekeepingThread housekeeping(clock, *store, options.retention, tell);
+  HousekeepingThread housekeeping(
+      clock, *store, options.retention, [&loop] { return loop.snapshot()->jobs; }, tell);
   housekeeping.sweep();
   JobThread jobs(clock, *store, reconstruction, options.on_scanned, tell);
   RigThread rig(devices, clock, options.acquisition, preview, tell);

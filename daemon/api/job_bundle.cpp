@@ -36,8 +36,7 @@ void send_bundle(const ApiStation& station, const Values& values, Send send) {
 void remove_old_bundles(const std::filesystem::path& storage) {
   std::error_code error;
   for (std::filesystem::directory_iterator next(storage, error), end; !error && next != end; next.increment(error)) {
-    const auto name = next->path().filename().string();
-    if (name.starts_with(kPrefix) && name.ends_with(kEnding)) ::unlink(next->path().c_str());
+    if (next->path().filename().string().starts_with(kPrefix)) ::unlink(next->path().c_str());  // half packed ones too
   }
 }
 

@@ -3,6 +3,7 @@
 #include "daemon/api/job_bundle.h"
 #include "daemon/api/json_words.h"
 #include "daemon/api/routes.h"
+#include "pipeline/reconstruct/voxel_size.h"
 
 namespace scanrig {
 namespace {
@@ -91,11 +92,14 @@ std::vector<Route> order_routes() {
                 "The next Start begins this queued job."),
       job_route(Method::post, "/api/v1/jobs/{id}/exported", Role::operating, What::set_exported,
                 "Somebody has what he needs: retention may remove it."),
-      job_route(
-          Method::post, "/api/v1/jobs/{id}/reprocess", Role::engineer, What::reprocess,
-          "Makes the model again, from the images.",
-          {{.name = "voxel_mm", .type = Type::number, .about = "as configured without it", .min = 0.02, .max = 5.0},
-           {.name = "fusion", .about = "as configured without it", .words = {"evidence", "paper"}}}),
+      job_route(Method::post, "/api/v1/jobs/{id}/reprocess", Role::engineer, What::reprocess,
+                "Makes the model again, from the images.",
+                {{.name = "voxel_mm",
+                  .type = Type::number,
+                  .about = "as configured without it",
+                  .min = kLeastVoxelMm,
+                  .max = kMostVoxelMm},
+                 {.name = "fusion", .about = "as configured without it", .words = {"evidence", "paper"}}}),
       job_route(Method::del, "/api/v1/jobs/{id}", Role::engineer, What::remove,
                 "Removes a job that has ended, with all its files."),
       bundle_route(),

@@ -1,4 +1,5 @@
 #include "daemon/ctl/client_command.h"
+#include "pipeline/reconstruct/voxel_size.h"
 
 namespace scanrig::ctl {
 namespace {
@@ -21,7 +22,7 @@ void add_changes(CLI::App& app, Chosen& chosen) {
   add_change(app, chosen, "first", "let the next Start begin this queued job", verb());
   const auto again = verb();
   auto* sub = add_change(app, chosen, "reprocess", "make the model again, from the images", again);
-  sub->add_option("--voxel-mm", again->voxel_mm, "size of a voxel")->check(CLI::Range(0.02, 5.0));
+  sub->add_option("--voxel-mm", again->voxel_mm, "size of a voxel")->check(CLI::Range(kLeastVoxelMm, kMostVoxelMm));
   sub->add_option("--fusion", again->fusion, "how poses are integrated")->check(CLI::IsMember({"evidence", "paper"}));
   const auto removed = verb();
   add_change(app, chosen, "delete", "remove a job that has ended, with all its files", removed)

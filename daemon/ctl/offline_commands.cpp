@@ -3,6 +3,7 @@
 
 #include "daemon/ctl/commands.h"
 #include "daemon/ctl/verbs.h"
+#include "pipeline/reconstruct/voxel_size.h"
 
 namespace scanrig::ctl {
 namespace {
@@ -15,7 +16,7 @@ void add_reconstruct(CLI::App& app, Chosen& chosen) {
   sub->add_option("--threads", verb->options.threads, "threads; 0: all of the machine's")->check(CLI::Range(0, 1024));
   sub->add_option("--voxel-mm", verb->options.voxel_mm,
                   "size of a voxel (default: 0.25, or what suits imported range images)")
-      ->check(CLI::Range(0.05, 10.0));
+      ->check(CLI::Range(kLeastVoxelMm, kMostVoxelMm));
   sub->add_option("--fusion", verb->options.fusion, "how poses are integrated")
       ->check(CLI::IsMember({"evidence", "paper"}));
   sub->add_option("--rests", verb->options.rests, "how rests are found")->check(CLI::IsMember({"hull", "egi"}));

@@ -39,7 +39,9 @@ ExitCode reconstruct(const ReconstructVerb& verb) {
     fmt::print("{}\t{:.3f}\n", stage, fraction);
     std::fflush(stdout);
   };
-  const auto made = guarded([&] { return make_model(*scan, verb, {stop.token(), progress}, out); });
+  const auto made = guarded("the reconstruction", [&] {
+    return make_model(*scan, verb, {stop.token(), progress}, out);
+  });
   if (!verb.lines) bars.end(made.has_value());
   if (!made) {
     if (verb.lines) fmt::print("failed\t{}\t{}\n", to_string(made.error().code), made.error().message);

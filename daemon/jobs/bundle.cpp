@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <system_error>
+#include <utility>
 
 #include "core/files.h"
 #include "daemon/jobs/child_process.h"
@@ -24,6 +25,21 @@ Result<void> sync(const fs::path& file) {
   return fail(ErrorCode::io, "cannot write {}", file.string());
 }
 
+/// What is half packed when the packing ends in whatever way.
+class Remains {
+ public:
+  explicit Remains(fs::path file) : file_(std::move(file)) {}
+  ~Remains() {
+    std::error_code ignored;
+    fs::remove(file_, ignored);
+  }
+  Remains(const Remains&) = delete;
+  Remains& operator=(const Remains&) = delete;
+
+ private:
+  fs::path file_;
+};
+
 }  // namespace
 
 Result<void> bundle(const fs::path& job_folder, const fs::path& target, const Context& context) {
@@ -34,21 +50,17 @@ Result<void> bundle(const fs::path& job_folder, const fs::path& target, const Co
   if (fs::exists(target, ignored)) return fail(ErrorCode::exists, "bundle: {} is already there", target.string());
   fs::path prepared = target;
   prepared += ".part";
+  const Remains remains(prepared);
   const auto packed = run_child({.words = {kTar, "--create", "--gzip", "--file", prepared.string(), "--directory",
                                            job_folder.parent_path().string(), job_folder.filename().string()},
                                  .limit = kLimit},
                                 context.stop);
-  Result<void> done;
-  if (!packed) {
-    done = pass_on(packed, "bundle");
-  } else if (packed->code != 0) {
-    done = fail(ErrorCode::io, "bundle: cannot write {}: {}", target.string(), packed->last_words);
-  } else {
-    done = sync(prepared);
+  if (!packed) return pass_on(packed, "bundle");
+  if (packed->code != 0) {
+    return fail(ErrorCode::io, "bundle: cannot write {}: {}", target.string(), packed->last_words);
   }
-  if (done) done = replace_folder(prepared, target);
-  if (!done) fs::remove(prepared, ignored);
-  return done;
+  if (auto synced = sync(prepared); !synced) return synced;
+  return replace_folder(prepared, target);
 }
 
 }  // namespace scanrig

@@ -4,10 +4,13 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <system_error>
+#include <tuple>
 #include <utility>
 
 #include "daemon/actor_thread.h"
+#include "daemon/guarded.h"
 #include "daemon/jobs/bundle.h"
 
 namespace scanrig {
@@ -39,9 +42,10 @@ std::chrono::system_clock::time_point ended(const fs::path& folder) {
 }  // namespace
 
 HousekeepingThread::HousekeepingThread(Clock& clock, const JobStore& store, RetentionOptions retention,
-                                       std::function<void(Event)> tell)
+                                       std::function<JobTable()> jobs, std::function<void(Event)> tell)
     : store_(store),
       retention_(retention),
+      jobs_(std::move(jobs)),
       tell_(std::move(tell)),
       inbox_(clock),
       thread_(start_actor(clock, [this] { run(); })) {}
@@ -60,20 +64,30 @@ void HousekeepingThread::run() {
   }
 }
 
-void HousekeepingThread::handle(const event::JobAsked& asked) { tell_(event::Answered{asked.ticket, keep(asked)}); }
+void HousekeepingThread::handle(const event::JobAsked& asked) {
+  tell_(event::Answered{asked.ticket, guarded("housekeeping", [&] { return keep(asked); })});
+}
+
+/// None where the station does not know it.
+std::optional<JobState> HousekeepingThread::state_of(const std::string& job) const {
+  const auto jobs = jobs_();
+  const auto known = jobs.find(job);
+  return known == jobs.end() ? std::nullopt : std::optional(known->second->state);
+}
 
 Result<std::string> HousekeepingThread::keep(const event::JobAsked& asked) {
-  const auto job = store_.read(asked.job);
   if (asked.what == event::JobAsked::What::bundle) {
     // A folder that cannot be read is what somebody wants to see.
+    const auto job = store_.read(asked.job);
     if (!job && job.error().code == ErrorCode::not_found) return fail(ErrorCode::not_found, "no job {}", asked.job);
     if (auto packed = bundle(store_.folder(asked.job), asked.path, {stop_.get_token(), {}}); !packed) {
       return pass_on(packed);
     }
     return asked.path;
   }
-  if (job && !is_final(job->state)) {
-    return fail(ErrorCode::busy, "job {} is {}: only what has ended can be removed", asked.job, to_string(job->state));
+  const auto state = state_of(asked.job);
+  if (state && !is_final(*state)) {
+    return fail(ErrorCode::busy, "job {} is {}: only what has ended can be removed", asked.job, to_string(*state));
   }
   if (auto removed = remove(asked.job); !removed) return pass_on(removed);
   return asked.job;
@@ -85,19 +99,25 @@ Result<void> HousekeepingThread::remove(const std::string& job) {
   return removed;
 }
 
+/// What fails is tried again at the next sweep.
 void HousekeepingThread::handle(const Sweep&) {
   if (!retention_.keep_for && !retention_.keep_bytes) return;
+  std::ignore = guarded("retention", [this] { return sweep_now(); });
+}
+
+Result<void> HousekeepingThread::sweep_now() {
   std::vector<KeptJob> kept;
-  std::error_code error;
-  for (fs::directory_iterator next(store_.options().root, error), end; !error && next != end; next.increment(error)) {
-    const auto job = store_.read(next->path().filename());
-    if (!job || !is_final(job->state)) continue;
-    kept.push_back({job->id, ended(next->path()), bytes_in(next->path()), job->exported});
+  for (const auto& [id, job] : jobs_()) {
+    // What cannot be read is left for a person to see.
+    if (!is_final(job->state) || !store_.read(id)) continue;
+    const auto folder = store_.folder(id);
+    kept.push_back({id, ended(folder), bytes_in(folder), job->exported});
   }
   for (const auto& job : jobs_to_remove(std::move(kept), retention_, std::chrono::system_clock::now())) {
-    // One that cannot be removed is tried again at the next sweep.
-    std::ignore = remove(job);
+    const auto state = state_of(job);  // measuring takes its time, in which a job may have been resumed
+    if (state && is_final(*state)) std::ignore = remove(job);
   }
+  return {};
 }
 
 }  // namespace scanrig

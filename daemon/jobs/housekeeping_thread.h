@@ -1,6 +1,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <stop_token>
 #include <thread>
 #include <variant>
@@ -15,7 +16,9 @@ namespace scanrig {
 /// What takes its time and concerns ended jobs only: removing, bundling, retention; at nice +10.
 class HousekeepingThread {
  public:
-  HousekeepingThread(Clock& clock, const JobStore& store, RetentionOptions retention, std::function<void(Event)> tell);
+  /// `jobs`: what the station knows of them now; from this thread. A folder alone does not say who works in it.
+  HousekeepingThread(Clock& clock, const JobStore& store, RetentionOptions retention, std::function<JobTable()> jobs,
+                     std::function<void(Event)> tell);
   /// Stops a bundle that is being packed, drops the rest and joins.
   ~HousekeepingThread();
   HousekeepingThread(const HousekeepingThread&) = delete;
@@ -33,10 +36,13 @@ class HousekeepingThread {
   void handle(const event::JobAsked& asked);
   void handle(const Sweep& sweep);
   Result<std::string> keep(const event::JobAsked& asked);
+  Result<void> sweep_now();
   Result<void> remove(const std::string& job);
+  [[nodiscard]] std::optional<JobState> state_of(const std::string& job) const;
 
   const JobStore& store_;
   RetentionOptions retention_;
+  std::function<JobTable()> jobs_;
   std::function<void(Event)> tell_;
   Mailbox<std::variant<event::JobAsked, Sweep>> inbox_;
   std::stop_source stop_;

@@ -69,16 +69,21 @@ const std::string& this_process() {
   return name;
 }
 
-std::optional<double> number_at(const nlohmann::json& json, const char* pointer) {
-  const auto value = json.value(nlohmann::json::json_pointer(pointer), nlohmann::json());
+/// Null where `json` is no object or has no such member.
+nlohmann::json member(const nlohmann::json& json, const char* key) {
+  return json.is_object() ? json.value(key, nlohmann::json()) : nlohmann::json();
+}
+
+std::optional<double> number_at(const nlohmann::json& json, const char* key) {
+  const auto value = member(json, key);
   return value.is_number() ? std::optional(value.get<double>()) : std::nullopt;
 }
 
 /// The worst pose's median distance between its views.
 std::optional<double> residual_mm(const nlohmann::json& report) {
   std::optional<double> worst;
-  for (const auto& pose : report.value("poses", nlohmann::json::array())) {
-    const auto here = number_at(pose, "/residual_median_mm");
+  for (const auto& pose : member(report, "poses")) {
+    const auto here = number_at(pose, "residual_median_mm");
     if (!here) return std::nullopt;
     worst = std::max(worst.value_or(0.0), *here);
   }
@@ -160,7 +165,7 @@ std::optional<Error> beyond_limits(const fs::path& report, const Limits& limits)
   const auto text = read_file(report);
   const auto json = text ? nlohmann::json::parse(*text, nullptr, false) : nlohmann::json();
   if (!json.is_object()) return Error{ErrorCode::invalid_input, report.string() + ": cannot be read"};
-  const auto residual = residual_mm(json), share = number_at(json, "/mesh/measured_share");
+  const auto residual = residual_mm(json), share = number_at(member(json, "mesh"), "measured_share");
   if (limits.least_measured_share && share.value_or(0.0) < *limits.least_measured_share) {
     return Error{ErrorCode::below_limits,
                  fmt::format("{:.1f} % of the surface was measured, the recipe asks for {:.1f}",

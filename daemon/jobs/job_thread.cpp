@@ -1,11 +1,15 @@
 #include "daemon/jobs/job_thread.h"
 
 #include <algorithm>
+#include <system_error>
+#include <tuple>
 #include <utility>
 
 #include "core/files.h"
 #include "core/image_codec.h"
 #include "daemon/actor_thread.h"
+#include "daemon/guarded.h"
+#include "daemon/overloaded.h"
 #include "pipeline/closure/turned_table.h"
 
 namespace scanrig {
@@ -43,8 +47,32 @@ JobThread::~JobThread() {
 
 void JobThread::run() {
   while (auto task = inbox_.take()) {
-    std::visit([this](const auto& t) { handle(t); }, *task);
+    const auto done = guarded("storing", [&]() -> Result<void> {
+      std::visit([this](const auto& t) { handle(t); }, *task);
+      return {};
+    });
+    if (!done) end(*task, done.error());
   }
+}
+
+/// What was thrown ends as what fails: whoever waits is answered, and the job that has the rig is interrupted.
+void JobThread::end(const Task& task, const Error& why) {
+  const Result<void> failed = tl::unexpected(why);
+  std::visit(Overloaded{[&](const action::CreateJobs& t) {
+                          answer(t.ticket, failed, {});
+                          tell_(event::StoreFailed{t.ids.front(), why});
+                        },
+                        [&](const action::MoveJob& t) { answer(t.ticket, failed, {}); },
+                        [&](const action::KeepJob& t) { answer(t.asked.ticket, failed, {}); },
+                        [&](const action::CheckCalibration& t) { tell_(event::CalibrationSeen{t.job, std::nullopt}); },
+                        [&](const action::StoreView& t) { give_up(t.view->id.job, why); },
+                        [&](const action::JudgeClosure& t) { give_up(t.view->id.job, why); },
+                        [&](const action::CloseJob& t) {
+                          scan_.reset();
+                          tell_(event::JobClosed{t.job, t.state, t.why});
+                        },
+                        [&](const auto& t) { give_up(t.job, why); }},
+             task);
 }
 
 void JobThread::answer(Ticket ticket, const Result<void>& done, const std::string& result) {
@@ -80,15 +108,39 @@ void JobThread::handle(const action::CreateJobs& task) {
 }
 
 void JobThread::handle(const action::BeginJob& task) {
-  auto job = store_.read(task.job);
-  auto room = job ? store_.check_room(*job) : Result<void>(pass_on(job));
-  if (room && !has_views(*job)) room = store_.renew_calibration(*job);
-  if (room) room = store_.check_cameras(task.job);
-  if (room) room = begin(*job);
-  if (room) return;
-  tell_(event::JobNotBegun{task.job, room.error()});
-  if (!job && job.error().code == ErrorCode::not_found) return tell_(event::JobRemoved{task.job});
+  const auto job = read_whole(task.job);
+  if (!job) return set_aside(task.job, job.error());
+  auto begun = store_.check_room(*job);
+  if (begun && !has_views(*job)) begun = store_.renew_calibration(*job);
+  if (begun) begun = store_.check_cameras(task.job);
+  if (begun) begun = begin(*job);
+  if (begun) return;
+  tell_(event::JobNotBegun{task.job, begun.error()});
   tell_known(task.job);
+}
+
+/// With what the scan will be in need of: its calibration, and the view that is taken again before it goes on.
+Result<JobInfo> JobThread::read_whole(const std::string& id) const {
+  auto job = store_.read(id);
+  if (!job) return job;
+  const auto scan = ScanFolder::open(job->folder);
+  if (!scan) return pass_on(scan);
+  if (const auto calibration = scan->load_calibration(); !calibration) return pass_on(calibration);
+  const auto pose = static_cast<std::size_t>(job->complete);
+  const auto& poses = scan->manifest().poses;
+  if (pose >= poses.size() || poses[pose].views.empty()) return job;
+  if (const auto first = scan->load_images(pose, 0); !first) return pass_on(first);
+  return job;
+}
+
+/// Noted where the folder is still good for that: what cannot be read at all is found failed at the next start too, and
+/// a disk that does not answer now may do so then.
+void JobThread::set_aside(const std::string& id, const Error& why) {
+  auto scan = ScanFolder::open(store_.folder(id));
+  if (scan && why.code != ErrorCode::io && scan->set_state("failed")) std::ignore = write_failure(scan->path(), why);
+  tell_(event::JobUnreadable{id, why});
+  std::error_code ignored;
+  if (!std::filesystem::exists(store_.folder(id), ignored)) tell_(event::JobRemoved{id});
 }
 
 /// Goes on where the manifest ends.
@@ -102,7 +154,7 @@ Result<void> JobThread::begin(const JobInfo& job) {
   remove_failure(job.folder);
   scan_ = std::move(*scan);
   broken_ = false;
-  if (!later_) reconstruction_.begin(job.id, scan_->path(), job.recipe);
+  if (!later_) reconstruction_.begin(job.id, *scan_, job.recipe);
   const auto& poses = scan_->manifest().poses;
   const auto pose = static_cast<std::size_t>(job.complete);
   tell_(event::JobBegun{job.id, job.complete, pose < poses.size() ? static_cast<int>(poses[pose].views.size()) : 0});
@@ -182,8 +234,9 @@ Result<void> JobThread::reprocess(JobInfo job, const event::JobAsked& asked) {
   job.quarantined = false;
   job.error.reset();
   job.passed.reset();
-  reconstruction_.rebuild(job.id, job.folder, job.recipe, {asked.voxel_mm, asked.fusion});
-  tell_(event::JobKnown{std::make_shared<const JobInfo>(std::move(job))});
+  const auto known = std::make_shared<const JobInfo>(std::move(job));
+  tell_(event::JobKnown{known});  // before anything that the reconstruction has to tell
+  reconstruction_.rebuild(known->id, known->folder, known->recipe, {asked.voxel_mm, asked.fusion});
   return {};
 }
 

@@ -34,6 +34,7 @@ class JobThread {
 
  private:
   void run();
+  void end(const Task& task, const Error& why);
   void handle(const action::CheckCalibration& task);
   void handle(const action::CreateJobs& task);
   void handle(const action::BeginJob& task);
@@ -45,6 +46,8 @@ class JobThread {
   void handle(const action::ResumeJob& task);
   void handle(const action::CloseJob& task);
 
+  [[nodiscard]] Result<JobInfo> read_whole(const std::string& id) const;
+  void set_aside(const std::string& id, const Error& why);
   Result<void> begin(const JobInfo& job);
   Result<void> move(const action::MoveJob& task);
   Result<void> cancel(const JobInfo& job);

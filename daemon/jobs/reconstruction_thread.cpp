@@ -1,6 +1,7 @@
 #include "daemon/jobs/reconstruction_thread.h"
 
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 #include "core/priority.h"
@@ -14,6 +15,8 @@ namespace {
 
 /// More views are not kept in memory while an earlier job is being worked on.
 constexpr int kMostViewsWaiting = 4;
+
+constexpr const char* kWork = "the reconstruction";
 
 }  // namespace
 
@@ -53,8 +56,10 @@ void ReconstructionThread::unmark() {
   marked_.reset();
 }
 
-void ReconstructionThread::begin(std::string job, std::filesystem::path folder, Recipe recipe) {
-  inbox_.post(enlist(std::move(job), std::move(folder), std::move(recipe), {}));
+void ReconstructionThread::begin(std::string job, ScanFolder scan, Recipe recipe) {
+  auto begin = enlist(std::move(job), scan.path(), std::move(recipe), {});
+  begin.scan = std::move(scan);
+  inbox_.post(std::move(begin));
 }
 
 void ReconstructionThread::rebuild(std::string job, std::filesystem::path folder, Recipe recipe,
@@ -98,15 +103,27 @@ void ReconstructionThread::run() {
   give_way();
   while (auto message = inbox_.take()) {
     if (ending_) continue;
-    std::visit([this](const auto& m) { handle(m); }, *message);
+    std::visit([this](const auto& m) { perform(m); }, *message);
     while (!current_ && !rebuilds_.empty() && !ending_) {
       const auto next = std::move(rebuilds_.front());
       rebuilds_.pop_front();
-      handle(next);
-      handle(Finish{next.job});
+      perform(next);
+      perform(Finish{next.job});
     }
   }
   if (current_) end();  // told to stop: that is not the job's fault
+}
+
+/// What is thrown beside the pipeline is the job's bad luck too.
+template <class SomeMessage>
+void ReconstructionThread::perform(const SomeMessage& message) {
+  const auto done = guarded(kWork, [&]() -> Result<void> {
+    handle(message);
+    return {};
+  });
+  if (done || !current_) return;
+  check(done);
+  if constexpr (std::is_same_v<SomeMessage, Finish>) end();  // nothing else would
 }
 
 bool ReconstructionThread::works_on(const std::string& job) const {
@@ -117,7 +134,7 @@ bool ReconstructionThread::works_on(const std::string& job) const {
 void ReconstructionThread::handle(const Begin& message) {
   current_ = Current{.job = message.job, .folder = message.folder, .recipe = message.recipe, .stop = message.stop};
   told_stage_.clear();
-  const auto scan = ScanFolder::open(message.folder);
+  const auto scan = message.scan ? Result<ScanFolder>(*message.scan) : ScanFolder::open(message.folder);
   if (!scan) return check(pass_on(scan));
   check(start(message, *scan));
   if (works_on(message.job)) check(catch_up(*scan));
@@ -131,7 +148,7 @@ Result<void> ReconstructionThread::start(const Begin& message, const ScanFolder&
   if (scan.manifest().state == "scanned") {
     if (auto marked = mark(); !marked) return marked;
   }
-  return guarded([&]() -> Result<void> {
+  return guarded(kWork, [&]() -> Result<void> {
     auto made = factory_({.calibration = *calibration,
                           .manifest = scan.manifest(),
                           .folder = message.folder,
@@ -166,8 +183,9 @@ Result<void> ReconstructionThread::add(int pose, const Result<ViewImages>& image
   const auto progress = [&](std::string_view, double fraction) {
     tell_progress("range", (current_->views_done + fraction) / views);
   };
-  auto added = guarded(
-      [&] { return current_->reconstructor->add_view(static_cast<std::size_t>(pose), *images, context(progress)); });
+  auto added = guarded(kWork, [&] {
+    return current_->reconstructor->add_view(static_cast<std::size_t>(pose), *images, context(progress));
+  });
   ++current_->views_done;
   progress("range", 0.0);
   return added;
@@ -188,7 +206,7 @@ Result<void> ReconstructionThread::close_pose(int pose) {
     tell_progress(fmt::format("{} pose {}", stage, pose + 1), fraction);
   };
   return guarded(
-      [&] { return current_->reconstructor->finish_pose(static_cast<std::size_t>(pose), context(progress)); });
+      kWork, [&] { return current_->reconstructor->finish_pose(static_cast<std::size_t>(pose), context(progress)); });
 }
 
 void ReconstructionThread::handle(const FinishPose& message) {
@@ -198,22 +216,25 @@ void ReconstructionThread::handle(const FinishPose& message) {
 void ReconstructionThread::handle(const Finish& message) {
   if (!current_ || current_->job != message.job) return;
   if (current_->quarantined) check(tl::unexpected(quarantine_error()));
-  if (works_on(message.job)) check(make_model());
+  std::optional<event::ModelReady> ready;
+  if (works_on(message.job)) {
+    auto made = make_model();
+    if (made) {
+      ready = std::move(*made);
+    } else {
+      check(pass_on(made));
+    }
+  }
   if (ending_) return;
   if (!dismiss(current_->stop)) return end();
-  if (!current_->error) {
+  if (ready) {
     remove_failure(current_->folder);
-    const auto report = report_file(current_->folder);
-    const event::ModelReady ready{current_->job, model_file(current_->folder), report,
-                                  beyond_limits(report, current_->recipe.limits)};
-    end();
-    return tell_(ready);
-  }
-  if (!current_->quarantined) {
+  } else if (!current_->quarantined) {
     // A note that cannot be written costs the reason after a restart, nothing else.
     std::ignore = write_failure(current_->folder, *current_->error);
   }
   end();
+  if (ready) tell_(*std::move(ready));
 }
 
 void ReconstructionThread::handle(const Abandon& message) {
@@ -227,12 +248,18 @@ void ReconstructionThread::end() {
   give_memory_back();
 }
 
-Result<void> ReconstructionThread::make_model() {
-  if (auto marked = mark(); !marked) return marked;
+Result<event::ModelReady> ReconstructionThread::make_model() {
+  if (auto marked = mark(); !marked) return pass_on(marked);
   const auto progress = [this](std::string_view stage, double fraction) {
     tell_progress(std::string(stage), fraction);
   };
-  return guarded([&] { return current_->reconstructor->finish(model_folder(current_->folder), context(progress)); });
+  return guarded(kWork, [&]() -> Result<event::ModelReady> {
+    const auto made = current_->reconstructor->finish(model_folder(current_->folder), context(progress));
+    if (!made) return pass_on(made);
+    const auto report = report_file(current_->folder);
+    return event::ModelReady{current_->job, model_file(current_->folder), report,
+                             beyond_limits(report, current_->recipe.limits)};
+  });
 }
 
 void ReconstructionThread::check(const Result<void>& done) {

@@ -16,6 +16,7 @@
 #include "daemon/jobs/reconstructor.h"
 #include "daemon/mailbox.h"
 #include "daemon/rig/taken_view.h"
+#include "pipeline/scan/scan_folder.h"
 
 namespace scanrig {
 
@@ -31,8 +32,8 @@ class ReconstructionThread {
   ReconstructionThread(const ReconstructionThread&) = delete;
   ReconstructionThread& operator=(const ReconstructionThread&) = delete;
 
-  /// A scan begins or goes on; what its folder holds is taken first.
-  void begin(std::string job, std::filesystem::path folder, Recipe recipe);
+  /// A scan begins or goes on; what its folder holds now is taken first, what comes later as views.
+  void begin(std::string job, ScanFolder scan, Recipe recipe);
   void add_view(std::shared_ptr<const TakenView> view);
   void finish_pose(std::string job, int pose) { inbox_.post(FinishPose{std::move(job), pose}); }
   void finish(std::string job) { inbox_.post(Finish{std::move(job)}); }
@@ -53,6 +54,7 @@ class ReconstructionThread {
     Recipe recipe;
     ReconstructionChanges changes;
     std::stop_source stop;
+    std::optional<ScanFolder> scan{};  ///< as it was when this was asked for; empty: as it is when its turn comes
   };
   struct Rebuild {
     Begin begin;
@@ -85,6 +87,8 @@ class ReconstructionThread {
   };
 
   void run();
+  template <class SomeMessage>
+  void perform(const SomeMessage& message);
   void handle(const Begin& message);
   void handle(const Rebuild& message);
   void handle(const AddView& message);
@@ -102,7 +106,7 @@ class ReconstructionThread {
   Result<void> add(int pose, const Result<ViewImages>& images);
   Result<void> close_pose(int pose);
   void check(const Result<void>& done);
-  Result<void> make_model();
+  Result<event::ModelReady> make_model();
   void end();
   Context context(std::function<void(std::string_view, double)> progress) const {
     return {current_->stop.get_token(), progress};

@@ -153,8 +153,13 @@ struct JobBegun {
   std::string job;
   int pose, stored;
 };
-/// The job was not begun: the disk is too full, the folder is damaged. It stays queued.
+/// The job was not begun: the disk is too full. It stays queued.
 struct JobNotBegun {
+  std::string job;
+  Error why;
+};
+/// The job was not begun and never will be: its folder is damaged. It has failed.
+struct JobUnreadable {
   std::string job;
   Error why;
 };
@@ -215,10 +220,10 @@ using Event =
                  event::WarmingUp, event::DevicesSeen, event::CalibrationSeen, event::MaintenanceAsked, event::Jogged,
                  event::Pulsed, event::Homed, event::ViewTaken, event::Stopped, event::RigFailed, event::StopFailed,
                  event::PanelFailed, event::Ordered, event::JobAsked, event::Answered, event::JobKnown,
-                 event::JobRemoved, event::JobBegun, event::JobNotBegun, event::ClosureTaken, event::ClosureJudged,
-                 event::FlipTimedOut, event::ViewStored, event::PoseStored, event::JobClosed, event::StoreFailed,
-                 event::StageProgress, event::ReconstructionFailed, event::ModelReady, event::ReloadAsked,
-                 event::Shutdown>;
+                 event::JobRemoved, event::JobBegun, event::JobNotBegun, event::JobUnreadable, event::ClosureTaken,
+                 event::ClosureJudged, event::FlipTimedOut, event::ViewStored, event::PoseStored, event::JobClosed,
+                 event::StoreFailed, event::StageProgress, event::ReconstructionFailed, event::ModelReady,
+                 event::ReloadAsked, event::Shutdown>;
 
 /// What is to be done about it. None of them waits.
 namespace action {
@@ -259,7 +264,7 @@ struct CreateJobs {
 };
 struct BeginJob {
   std::string job;
-};  ///< answered by JobBegun or JobNotBegun
+};  ///< answered by JobBegun, JobNotBegun or JobUnreadable
 struct MoveJob {
   std::string job;
   std::int64_t place;

@@ -47,6 +47,13 @@ void update(JobTable& table, const Event& event) {
               job.error.reset();
             });
           },
+          [&](const event::JobUnreadable& e) {
+            change(table, e.job, [&](JobInfo& job) {
+              job.state = JobState::failed;
+              job.resumable = false;
+              job.error = e.why;
+            });
+          },
           [&](const event::ClosureJudged& e) {
             change(table, e.job, [&](JobInfo& job) { job.closures.push_back(e.closure); });
           },

@@ -80,6 +80,7 @@ void job_removed(Machine& m, const std::string& job);
 /// The head of the queue gets the rig; where nothing is queued, a new job of the default recipe. Warns first.
 void begin_next_job(Machine& m, const std::string& fresh_job_id, std::string cause);
 void job_not_begun(Machine& m, const event::JobNotBegun& e);
+void job_unreadable(Machine& m, const event::JobUnreadable& e);
 /// The rig is free again: ready, or on to the next part.
 void free_rig(Machine& m, std::string cause);
 /// The outcome of a scan: once, and not of what is made of its images later.

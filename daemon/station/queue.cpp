@@ -98,7 +98,8 @@ void begin_next_job(Machine& m, const std::string& fresh_job_id, std::string cau
     s.job = ActiveJob{.id = fresh_job_id, .recipe = m.rules().recipes.at("default")};
     m.act(action::CreateJobs{{fresh_job_id}, s.job->recipe, "", 0, 0});
   } else {
-    s.job = ActiveJob{.id = s.queue.front()->id, .recipe = s.queue.front()->recipe};
+    const auto& head = *s.queue.front();
+    s.job = ActiveJob{.id = head.id, .recipe = head.recipe, .part = head.part};
     s.queue.erase(s.queue.begin());
   }
   s.put_on_last = s.job->id;
@@ -117,6 +118,21 @@ void job_not_begun(Machine& m, const event::JobNotBegun& e) {
   m.s().disk_trouble = e.why.code == ErrorCode::io;
   if (m.s().activity != Activity::warning && m.s().activity != Activity::scanning) return;  // a fault came first
   m.enter(MachineState::ready, fmt::format("Job {} was not begun: {}.", e.job, e.why.message));
+}
+
+/// One damaged folder stops no line. The part on the table is meant for this job: the next one begins with it only
+/// where it was ordered in the same words, and waits for its own otherwise.
+void job_unreadable(Machine& m, const event::JobUnreadable& e) {
+  if (!m.has(e.job)) return;
+  auto& s = m.s();
+  const auto job = *std::exchange(s.job, std::nullopt);
+  count_result(m, false);
+  if (s.activity != Activity::warning && s.activity != Activity::scanning) return;  // a fault came first
+  auto cause = fmt::format("Job {} is set aside, its folder is damaged: {}.", e.job, e.why.message);
+  const bool same = !s.queue.empty() && s.queue.front()->stored.empty() && s.queue.front()->part == job.part &&
+                    s.queue.front()->recipe == job.recipe;
+  if (same && s.failures < kFailuresThatStop) return begin_next_job(m, {}, std::move(cause));
+  free_rig(m, std::move(cause));
 }
 
 void free_rig(Machine& m, std::string cause) {

@@ -131,12 +131,12 @@ void continue_after_flip(Machine& m, std::string cause) {
 void store_failed(Machine& m, const event::StoreFailed& e) {
   if (!m.has(e.job)) return;
   const bool begun = m.s().job->state != JobState::queued;
-  m.s().disk_trouble = true;
+  m.s().disk_trouble = e.error.code == ErrorCode::io;
   if (!begun) m.s().not_begun = {e.job, e.error};
   m.close_job(JobState::interrupted, e.error);
   if (m.s().machine == MachineState::error) return;  // a fault came first and has the word
   auto cause = fmt::format("Job {} {}: {}{}.", e.job, begun ? "is interrupted" : "was not begun", e.error.message,
-                           begun ? "; see to the disk, then resume it" : "");
+                           begun && m.s().disk_trouble ? "; see to the disk, then resume it" : "");
   if (m.s().activity != Activity::scanning) return m.enter(MachineState::ready, std::move(cause));  // nothing moves
   m.s().machine = MachineState::halted;
   m.s().home_by_guard = false;

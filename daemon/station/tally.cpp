@@ -32,6 +32,7 @@ void EventTally::see(const Event& event, Clock::TimePoint now) {
                         [&](const event::StoreFailed& e) { fault(e.error); },
                         [&](const event::EstopChanged& e) { counters_.faults += e.ok ? 0 : 1; },
                         [&](const event::JobClosed& e) { ended(e.job, e.state); },
+                        [&](const event::JobUnreadable& e) { ended(e.job, JobState::failed); },
                         [&](const event::ReconstructionFailed& e) { ended(e.job, JobState::failed); },
                         [&](const event::ModelReady& e) { ended(e.job, JobState::done); }, [](const auto&) {}},
              event);

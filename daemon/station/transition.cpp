@@ -162,6 +162,7 @@ class Transition : public Machine {
   void operator()(const event::JobRemoved& e) { job_removed(*this, e.job); }
   void operator()(const event::JobBegun& e) { job_begun(*this, e); }
   void operator()(const event::JobNotBegun& e) { job_not_begun(*this, e); }
+  void operator()(const event::JobUnreadable& e) { job_unreadable(*this, e); }
   void operator()(const event::ViewTaken& e) { view_taken(*this, e); }
   void operator()(const event::ViewStored& e) { view_stored(*this, e); }
   void operator()(const event::ClosureTaken& e) { closure_taken(*this, e); }

@@ -30,6 +30,7 @@ constexpr int kFailuresThatStop = 3;  ///< in a row: something is wrong with the
 struct ActiveJob {
   std::string id;
   Recipe recipe{};
+  std::string part{};  ///< of the order
   JobState state = JobState::queued;
   int pose = 0;
   int asked = 0;                          ///< views of this pose the rig was told to take

@@ -11,8 +11,10 @@ namespace scanrig {
 namespace {
 
 namespace fs = std::filesystem;
+using testing::ElementsAreArray;
 using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 using What = event::JobAsked::What;
 
 /// Reconstructions that go wrong: the rig goes on, and the job says what happened.
@@ -180,6 +182,55 @@ TEST_F(Executor, AScanThatGoesOnInQuarantineTakesItsViewsAndSaysSo) {
   ASSERT_TRUE(ask(event::JobAsked{.what = What::reprocess, .job = id}));
   EXPECT_TRUE(wait_state(id, JobState::done));
   EXPECT_FALSE(job(id)->quarantined);
+}
+
+TEST_F(Executor, AScanThatBeginsWhileAModelIsMadeIsReconstructedOnce) {
+  options.recipes["default"].poses = 1;
+  log.at_finish = [this, first = true]() mutable {
+    if (!std::exchange(first, false)) return;
+    EXPECT_TRUE(clock_waits_for([this] { return loop->snapshot()->jobs.size() == 2 && newest()->stored.size() == 3; }));
+  };
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(clock_waits_for([this] { return newest() && newest()->state == JobState::reconstructing; }));
+  ASSERT_TRUE(wait_ready());
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(clock_waits_for([this] { return loop->snapshot()->jobs.size() == 2; }));
+  EXPECT_TRUE(wait_state(newest()->id, JobState::done));
+  shut_down();
+  const std::vector<std::string> job{"view 0/0", "view 0/1", "view 0/2", "pose 0", "finish"};
+  auto both = job;
+  both.insert(both.end(), job.begin(), job.end());
+  EXPECT_THAT(log.calls, ElementsAreArray(both));
+}
+
+TEST_F(Executor, AReportNobodyForesawPassesNothing) {
+  options.recipes["default"].limits = {.least_measured_share = 0.9, .most_residual_mm = 0.1};
+  execute(R"(mkdir $out; echo glTF > $out/model.glb; echo '{"mesh": [1], "poses": [1]}' > $out/report.json)");
+  boot();
+  get_ready();
+  const auto id = scan();
+  EXPECT_TRUE(wait_state(id, JobState::done));
+  EXPECT_EQ(job(id)->passed, false);
+  shut_down();
+  boot();
+  EXPECT_EQ(job(id)->passed, false);
+}
+
+TEST_F(Executor, AHookThatThrowsInterruptsItsJobOnly) {
+  options.on_scanned = [thrown = false](const auto&) mutable -> Result<void> {
+    if (std::exchange(thrown, true)) return {};
+    throw std::runtime_error("out of the blue");
+  };
+  boot();
+  get_ready();
+  const auto id = scan();
+  EXPECT_TRUE(wait_state(id, JobState::interrupted));
+  EXPECT_THAT(job(id)->error->message, HasSubstr("out of the blue"));
+  EXPECT_THAT(loop->snapshot()->next_action, Not(HasSubstr("disk"))) << "it is not at fault";
+  EXPECT_FALSE(rig.turntable.moving);
+  EXPECT_TRUE(wait_state(scan(), JobState::done));
 }
 
 TEST_F(Executor, AModelIsMadeAgainWithOtherOptions) {

@@ -220,8 +220,10 @@ TEST_F(JobStoreTest, AModelIsJudgedByTheLimitsOfTheRecipe) {
   EXPECT_THAT(with("0.85", "0.05").error->message, HasSubstr("85.0 %"));
   EXPECT_EQ(with("0.95", "0.15").passed, false);
   EXPECT_EQ(with("0.95", "null").passed, false);
-  scan_samples::write_text(report_file(folder), "not json");
-  EXPECT_EQ(recovered(store, "job").passed, false);
+  for (const auto* const strange : {"not json", R"({"mesh": [1], "poses": [1]})", R"({"mesh": 1, "poses": 1})"}) {
+    scan_samples::write_text(report_file(folder), strange);
+    EXPECT_EQ(recovered(store, "job").passed, false) << strange;
+  }
 }
 
 TEST_F(JobStoreTest, AFailedReconstructionIsRemembered) {

@@ -8,6 +8,7 @@ namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
+using testing::IsEmpty;
 using testing::StartsWith;
 using What = event::JobAsked::What;
 
@@ -94,6 +95,48 @@ TEST_F(Queue, AJobThatDoesNotFitClearsNoFault) {
   tell(event::JobNotBegun{"a", {ErrorCode::io, "the disk is full"}});
   EXPECT_EQ(state.machine, MachineState::error);
   EXPECT_EQ(state.activity, Activity::stopping);
+}
+
+TEST_F(Queue, AJobWhoseFolderIsDamagedIsSetAsideAndTheNextBeginsWithItsPart) {
+  run_a_line_of(2);
+  tell(event::WarningOver{});
+  tell(event::JobUnreadable{"0", {ErrorCode::invalid_input, "scan.json: not JSON"}});
+  ASSERT_NE(asked_for<action::BeginJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::BeginJob>()->job, "1");
+  EXPECT_NE(asked_for<action::Warn>(), nullptr);
+  EXPECT_THAT(state.cause, HasSubstr("scan.json: not JSON"));
+  EXPECT_THAT(waiting(), IsEmpty());
+  scan("1");
+  EXPECT_EQ(state.machine, MachineState::ready);
+}
+
+TEST_F(Queue, ADamagedJobsPartIsNotScannedAsAnotherOne) {
+  auto other = queued("1", 1, by_parts());
+  other.part = "4712";
+  run_a_line_of(1);
+  know(other);
+  tell(event::JobUnreadable{"0", {ErrorCode::invalid_input, "scan.json: not JSON"}});
+  EXPECT_TRUE(actions.empty());
+  EXPECT_EQ(state.activity, Activity::waiting_for_part);
+  see(true);
+  EXPECT_TRUE(actions.empty()) << "that is the damaged job's part";
+  see(false);
+  see(true);
+  ASSERT_NE(asked_for<action::BeginJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::BeginJob>()->job, "1");
+}
+
+TEST_F(Queue, ThreeDamagedJobsInARowStopTheLineAndAFaultKeepsTheWord) {
+  const Error damaged{ErrorCode::invalid_input, "scan.json: not JSON"};
+  run_a_line_of(5);
+  for (const auto* const job : {"0", "1", "2"}) tell(event::JobUnreadable{job, damaged});
+  EXPECT_EQ(state.machine, MachineState::ready);
+  EXPECT_THAT(waiting(), ElementsAre("3", "4"));
+  press(Button::start);
+  tell(event::EstopChanged{false});
+  tell(event::JobUnreadable{"3", damaged});
+  EXPECT_EQ(state.machine, MachineState::error);
+  EXPECT_FALSE(asked_for<action::BeginJob>());
 }
 
 TEST_F(Queue, JobsAreMovedResumedAndKept) {

@@ -1,0 +1,8 @@
+#pragma once
+
+namespace scanrig {
+
+/// What the voxels of a model may measure, the same for all who ask for one: configuration, API and command line.
+constexpr double kLeastVoxelMm = 0.02, kMostVoxelMm = 5.0;
+
+}  // namespace scanrig

@@ -1,0 +1,150 @@
+#include <gmock/gmock.h>
+
+#include <condition_variable>
+#include <mutex>
+#include <stdexcept>
+
+#include "daemon/jobs/bundle.h"
+#include "daemon/jobs/housekeeping_thread.h"
+#include "daemon/jobs/reconstruction_thread.h"
+#include "tests/component/daemon/fake_reconstructor.h"
+#include "tests/unit/pipeline/scan/scan_samples.h"
+
+namespace scanrig {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using What = event::JobAsked::What;
+
+/// Single threads of the daemon over real folders; the test is the control loop.
+class Workers : public scan_samples::FolderTest {
+ protected:
+  void SetUp() override {
+    FolderTest::SetUp();
+    scan_samples::write_text(folder_ / "calibration.json", scan_samples::calibration_json());
+    auto opened = JobStore::open({.root = folder_ / "jobs", .calibration_file = folder_ / "calibration.json"});
+    ASSERT_TRUE(opened) << opened.error().message;
+    store.emplace(std::move(*opened));
+  }
+  /// A scanned folder of one pose with two views in this state, known to the station as `state`.
+  void make_job(const std::string& id, const std::string& written, JobState state, bool exported = false) {
+    auto info = store->create(id, {.recipe = {.poses = 1, .views = 2}, .exported = exported});
+    ASSERT_TRUE(info) << info.error().message;
+    auto scan = ScanFolder::open(store->folder(id));
+    for (int view = 0; view < 2; ++view) {
+      ASSERT_TRUE(scan->add_view(0, {.index = view}, scan_samples::raw_view(view)));
+    }
+    ASSERT_TRUE(scan->complete_pose(0, written));
+    info->state = state;
+    table[id] = std::make_shared<const JobInfo>(std::move(*info));
+  }
+  void tell(Event event) {
+    const std::lock_guard guard(mutex);
+    if (const auto* removed = std::get_if<event::JobRemoved>(&event)) gone.push_back(removed->job);
+    events.push_back(std::move(event));
+    changed.notify_all();
+  }
+  /// The first event of this kind, once it is there.
+  template <class Kind>
+  std::optional<Kind> wait_for() {
+    std::unique_lock lock(mutex);
+    std::optional<Kind> found;
+    changed.wait_for(lock, std::chrono::minutes(1), [&] {
+      for (const auto& event : events) {
+        if (const auto* kind = std::get_if<Kind>(&event); kind && !found) found = *kind;
+      }
+      return found.has_value();
+    });
+    events.clear();
+    return found;
+  }
+
+  RealClock clock;
+  std::optional<JobStore> store;
+  JobTable table;
+  std::mutex mutex;
+  std::condition_variable changed;
+  std::vector<Event> events;
+  std::vector<std::string> gone;
+};
+
+TEST_F(Workers, RetentionLooksAtWhatHasEndedOnly) {
+  make_job("a-kept", "cancelled", JobState::cancelled);
+  make_job("b-exported", "cancelled", JobState::cancelled, true);
+  make_job("c-scanned-again", "scanning", JobState::scanning, true);
+  make_job("d-scanned", "scanning", JobState::scanning);
+  make_job("e-turned", "waiting_for_flip", JobState::waiting_for_flip);
+  {
+    HousekeepingThread housekeeping(
+        clock, *store, {.keep_bytes = 1}, [&] { return table; }, [&](Event event) { tell(std::move(event)); });
+    housekeeping.sweep();
+    housekeeping.post({.what = What::remove, .job = "none", .ticket = 1});
+    ASSERT_TRUE(wait_for<event::Answered>()) << "the sweep came before";
+  }
+  EXPECT_THAT(gone, ElementsAre("b-exported")) << "a-kept is the newest that has ended and was not exported";
+}
+
+TEST_F(Workers, WhatWaitsForAModelIsNotRemoved) {
+  make_job("job", "scanned", JobState::reconstructing);
+  ASSERT_TRUE(create_directories_synced(model_folder(store->folder("job"))));
+  scan_samples::write_text(report_file(store->folder("job")), "{}");  // of an older model
+  HousekeepingThread housekeeping(
+      clock, *store, {}, [&] { return table; }, [&](Event event) { tell(std::move(event)); });
+  housekeeping.post({.what = What::remove, .job = "job", .ticket = 1});
+  const auto answer = wait_for<event::Answered>();
+  ASSERT_TRUE(answer);
+  ASSERT_FALSE(answer->result);
+  EXPECT_EQ(answer->result.error().code, ErrorCode::busy);
+}
+
+TEST_F(Workers, HousekeepingOutlivesWhatIsThrown) {
+  make_job("job", "cancelled", JobState::cancelled);
+  int throws = 2;
+  const auto jobs = [&] {
+    if (throws-- > 0) throw std::runtime_error("out of the blue");
+    return table;
+  };
+  HousekeepingThread housekeeping(clock, *store, {.keep_bytes = 1}, jobs, [&](Event event) { tell(std::move(event)); });
+  housekeeping.sweep();
+  housekeeping.post({.what = What::remove, .job = "job", .ticket = 1});
+  const auto answer = wait_for<event::Answered>();
+  ASSERT_TRUE(answer);
+  ASSERT_FALSE(answer->result);
+  EXPECT_THAT(answer->result.error().message, HasSubstr("out of the blue"));
+  housekeeping.post({.what = What::remove, .job = "job", .ticket = 2});
+  const auto removed = wait_for<event::JobRemoved>();
+  ASSERT_TRUE(removed);
+  EXPECT_FALSE(fs::exists(store->folder("job")));
+}
+
+TEST_F(Workers, APackingThatFailsLeavesNothingHalf) {
+  const auto target = folder_ / "bundle.tar.gz";
+  EXPECT_EQ(bundle(folder_ / "none", target, {}).error().code, ErrorCode::io);
+  EXPECT_FALSE(fs::exists(target));
+  EXPECT_FALSE(fs::exists(target.string() + ".part"));
+}
+
+TEST_F(Workers, ReconstructionOutlivesWhatIsThrownBesideIt) {
+  make_job("job", "scanned", JobState::reconstructing);
+  fakes::ReconstructionLog log;
+  int until_thrown = 1;  // the second word of progress comes when the first view is done
+  const auto tell_or_throw = [&](Event event) {
+    const bool progress = std::holds_alternative<event::StageProgress>(event);
+    if (progress && until_thrown-- == 0) throw std::runtime_error("out of the blue");
+    tell(std::move(event));
+  };
+  const Recipe recipe{.poses = 1, .views = 2};
+  ReconstructionThread reconstruction(
+      clock, [&](const ReconstructionTask&) { return std::make_unique<fakes::FakeReconstructor>(log); }, tell_or_throw);
+  reconstruction.rebuild("job", store->folder("job"), recipe, {});
+  const auto failed = wait_for<event::ReconstructionFailed>();
+  ASSERT_TRUE(failed);
+  EXPECT_THAT(failed->error.message, HasSubstr("out of the blue"));
+  reconstruction.rebuild("job", store->folder("job"), recipe, {});
+  EXPECT_TRUE(wait_for<event::ModelReady>());
+}
+
+}  // namespace
+}  // namespace scanrig

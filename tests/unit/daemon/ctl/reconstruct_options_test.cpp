@@ -1,0 +1,35 @@
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <CLI/CLI.hpp>
+
+#include "daemon/ctl/commands.h"
+#include "pipeline/reconstruct/voxel_size.h"
+
+namespace scanrig::ctl {
+namespace {
+
+/// Whether `scanrig reconstruct` takes these words.
+bool takes(const std::string& words) {
+  CLI::App app;
+  Chosen chosen;
+  add_offline_commands(app, chosen);
+  try {
+    app.parse("reconstruct scan " + words);
+    return true;
+  } catch (const CLI::ParseError&) {
+    return false;
+  }
+}
+
+TEST(ReconstructOptions, VoxelsAreThoseTheDaemonMayAskItsChildFor) {
+  for (const double voxel_mm : {kLeastVoxelMm, 0.049, kMostVoxelMm}) {
+    EXPECT_TRUE(takes(fmt::format("--voxel-mm {}", voxel_mm))) << voxel_mm;
+  }
+  for (const double voxel_mm : {kLeastVoxelMm - 0.001, kMostVoxelMm + 0.001}) {
+    EXPECT_FALSE(takes(fmt::format("--voxel-mm {}", voxel_mm))) << voxel_mm;
+  }
+}
+
+}  // namespace
+}  // namespace scanrig::ctl
