@@ -22,7 +22,7 @@ const char* const kSchemas = R"({
   "may_be_moving": {"type": "boolean"},
   "cause": {"type": "string", "description": "why the machine is in this state"},
   "sentence": {"type": "string", "description": "what is going on"},
-  "next_action": {"type": "string", "description": "what the operator should do; empty: nothing"},
+  "next_action": {"type": "string", "description": "what the operator should do, if only to wait"},
   "devices": {"type": "array", "items": {"$ref": "#/components/schemas/Device"}},
   "job": {"type": "string", "nullable": true, "description": "the job that has the rig"},
   "not_begun": {"allOf": [{"$ref": "#/components/schemas/NotBegun"}], "nullable": true},
@@ -40,7 +40,7 @@ const char* const kSchemas = R"({
   "exported", "passed", "model", "report", "error"], "properties": {
   "id": {"type": "string"}, "state": {"type": "string"},
   "sentence": {"type": "string", "description": "what becomes of it, and why"},
-  "next_action": {"type": "string", "description": "what the operator should do; empty: nothing"},
+  "next_action": {"type": "string", "description": "what the operator should do, if only to wait"},
   "recipe": {"type": "string"}, "part": {"type": "string", "description": "of the order: barcode or free text"},
   "resumable": {"type": "boolean", "description": "interrupted, and the missing views may still be taken"},
   "quarantined": {"type": "boolean", "description": "two daemons died over its reconstruction"},

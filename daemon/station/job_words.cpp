@@ -17,6 +17,9 @@ auto views_of_pose(const JobInfo& job) {
 Words when_queued(const JobInfo& job) {
   const std::string sentence =
       job.stored.empty() ? "It waits in the queue." : "It waits in the queue to go on where it stopped.";
+  if (job.recipe.start_on_part) {
+    return {sentence, "Put its part on the table when it is the first of the queue; Start begins the line."};
+  }
   return {sentence, "Press Start when it is the first of the queue."};
 }
 
@@ -51,18 +54,19 @@ Words describe(const JobInfo& job) {
     case JobState::scanning:
       return {fmt::format("Pose {} of {}: {} of {} views stored.", job.complete + 1, job.recipe.poses,
                           views_of_pose(job), job.recipe.views),
-              ""};
+              "Leave its object as it lies."};
     case JobState::waiting_for_flip:
       return {fmt::format("Pose {} of {} is complete.", job.complete, job.recipe.poses), how_to_flip(job.recipe)};
-    case JobState::reconstructing: return {making_model(job), ""};
+    case JobState::reconstructing: return {making_model(job), "Wait for its model."};
     case JobState::done:
-      if (job.passed.value_or(true)) return {"Its model is ready.", ""};
+      if (job.passed.value_or(true)) return {"Its model is ready.", "Look at its model."};
       return {fmt::format("Its model is ready, but does not pass: {}.", why(job)),
               fmt::format("Look at the model; scan the object again, or change the limits of the recipe {}.",
                           job.recipe.name)};
     case JobState::failed: return when_failed(job);
     case JobState::interrupted: return when_interrupted(job);
-    case JobState::cancelled: return {fmt::format("It was cancelled: {}.", why(job)), ""};
+    case JobState::cancelled:
+      return {fmt::format("It was cancelled: {}.", why(job)), "Scan its object again if it is still wanted."};
   }
   return {};
 }

@@ -126,7 +126,7 @@ void job_unreadable(Machine& m, const event::JobUnreadable& e) {
   if (!m.has(e.job)) return;
   auto& s = m.s();
   const auto job = *std::exchange(s.job, std::nullopt);
-  count_result(m, false);
+  count_result(m, job.id, false);
   if (s.activity != Activity::warning && s.activity != Activity::scanning) return;  // a fault came first
   auto cause = fmt::format("Job {} is set aside, its folder is damaged: {}.", e.job, e.why.message);
   const bool same = !s.queue.empty() && s.queue.front()->stored.empty() && s.queue.front()->part == job.part &&

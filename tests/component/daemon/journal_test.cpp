@@ -98,7 +98,7 @@ TEST_F(LoggedDaemon, TellsAFaultWithItsCauseItsJobAndWhatToDo) {
   const auto id = job_folders().at(0).filename().string();
   EXPECT_THAT(lines, Contains(AllOf(says("Error: The e-stop was pressed."), has(Priority::error),
                                     Field(&JournalEntry::job, id))));
-  EXPECT_THAT(lines, Contains(says("Next: Release the e-stop, then press Reset.")));
+  EXPECT_THAT(lines, Contains(says("Next: Release the e-stop, then press Reset at the panel.")));
   EXPECT_THAT(lines, Contains(says("Next: See to the cause, then press Reset at the panel.")));
   EXPECT_THAT(lines, Contains(AllOf(says("interrupted (stopped): The e-stop was pressed."), has(Priority::error),
                                     Field(&JournalEntry::job, id))));

@@ -12,9 +12,10 @@ JobInfo job(JobState state) {
   return job;
 }
 
-TEST(JobWords, EveryStateSaysWhatBecomesOfTheJob) {
+TEST(JobWords, EveryStateSaysWhatBecomesOfTheJobAndWhatToDo) {
   for (int state = 0; state <= static_cast<int>(JobState::cancelled); ++state) {
     EXPECT_FALSE(describe(job(static_cast<JobState>(state))).sentence.empty()) << state;
+    EXPECT_FALSE(describe(job(static_cast<JobState>(state))).next_action.empty()) << state;
   }
 }
 
@@ -24,7 +25,7 @@ TEST(JobWords, AScanTellsHowFarItsPoseIs) {
   for (int view = 0; view < 4; ++view) j.stored.push_back({.pose = 0, .view = view});
   j.stored.push_back({.pose = 1, .view = 0});
   EXPECT_EQ(describe(j).sentence, "Pose 2 of 2: 1 of 4 views stored.");
-  EXPECT_EQ(describe(j).next_action, "");
+  EXPECT_EQ(describe(j).next_action, "Leave its object as it lies.");
 }
 
 TEST(JobWords, TheFlipIsAskedForAsTheStationAsks) {

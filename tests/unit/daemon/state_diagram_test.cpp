@@ -10,6 +10,7 @@
 #include "daemon/overloaded.h"
 #include "daemon/rig/taken_view.h"
 #include "daemon/station/job_table.h"
+#include "daemon/station/job_words.h"
 #include "daemon/station/transition.h"
 #include "daemon/station/words.h"
 
@@ -28,8 +29,8 @@ struct Node {
 
 const Error kError{ErrorCode::io, "something failed"};
 
-std::shared_ptr<const JobInfo> job(JobState state) {
-  JobInfo info{.id = "job", .state = state};
+std::shared_ptr<const JobInfo> job(JobState state, const char* id = "job") {
+  JobInfo info{.id = id, .state = state};
   info.recipe = {.poses = 2, .views = 1, .start_on_part = true};
   return std::make_shared<const JobInfo>(info);
 }
@@ -71,6 +72,7 @@ std::vector<Named> of_jobs() {
   return {
       {"ordered", event::JobKnown{job(JobState::queued)}},
       {"cancelled", event::JobKnown{job(JobState::cancelled)}},
+      {"another ordered", event::JobKnown{job(JobState::queued, "next")}},
       {"begun", event::JobBegun{"job", 0, 0}},
       {"does not fit", event::JobNotBegun{"job", kError}},
       {"folder damaged", event::JobUnreadable{"job", kError}},
@@ -126,18 +128,20 @@ std::string key(const Node& node, bool with_jobs) {
   const auto& s = node.state;
   std::string key = machine_state(node) + (with_jobs ? job_state(node) : "");
   const bool line = s.machine == MachineState::continuous_execution;  // parts matter to nobody else
+  const bool all_there = std::ranges::none_of(s.devices, [](const auto& device) { return device.problem.has_value(); });
   for (const bool flag : {s.panel_known, s.estop_ok, s.guard_closed, s.latched, s.unnamed.has_value(), s.may_be_moving,
-                          line && s.part_gone, line && s.inputs.part_present, !s.queue.empty()}) {
+                          line && s.part_gone, line && s.inputs.part_present, all_there}) {
     key += flag ? '1' : '0';
   }
+  for (const auto& queued : s.queue) key += queued->id;
   if (s.maintenance) {
     key += fmt::format("m{}{}{}{}", static_cast<int>(s.maintenance->before), s.maintenance->moved, s.maintenance->homed,
                        s.maintenance->jog.has_value());
   }
   if (s.job) {
     const auto& j = *s.job;
-    key += fmt::format("j{}{}{}{}{}{}{}{}{}", to_string(j.state), j.pose, j.asked, j.taken, j.stored, j.closure_due,
-                       j.closing, j.reconstruction.has_value(), j.recipe.start_on_part);
+    key += fmt::format("j{}{}{}{}{}{}{}{}{}{}", j.id, to_string(j.state), j.pose, j.asked, j.taken, j.stored,
+                       j.closure_due, j.closing, j.reconstruction.has_value(), j.recipe.start_on_part);
   }
   return key + (s.activity == Activity::waiting_for_part ? std::to_string(s.failures) : "");
 }
@@ -146,8 +150,37 @@ using Edges = std::map<std::pair<std::string, std::string>, std::set<std::string
 
 struct Walk {
   Edges machine, job;
+  std::map<std::string, Words> words;  ///< of the machine, where it was met first
+  std::set<std::string> wordless;      ///< states that say nothing, or not what to do
+  std::set<std::string> untrue;        ///< what they say to do and is refused
   std::size_t states = 0;
 };
+
+/// Whoever does what he is told is not refused.
+void listen(const Node& node, const StationRules& rules, Walk& walk) {
+  const auto name = machine_state(node);
+  const auto words = describe(node.state, rules);
+  walk.words.try_emplace(name, words);
+  if (words.sentence.empty() || words.next_action.empty()) walk.wordless.insert(name);
+  for (const auto& [id, known] : node.jobs) {
+    const auto of_job = describe(*known);
+    if (of_job.sentence.empty() || of_job.next_action.empty()) walk.wordless.insert(job_state(node));
+  }
+  const auto told = [&](const char* what) { return words.next_action.find(what) != std::string::npos; };
+  auto state = node.state;
+  if (told("e-stop")) state = next(state, event::EstopChanged{true}, rules).state;
+  if (told("guard")) state = next(state, event::GuardChanged{true}, rules).state;
+  if (told("See to the turntable")) state = next(state, event::DevicesSeen{{{"turntable", {}}}}, rules).state;
+  const std::pair<const char*, Event> asked[] = {
+      {"ress Reset", event::Pressed{Button::reset, Origin::panel, {}}},
+      {"ress Start", event::Pressed{Button::start, Origin::panel, "job"}},
+      {"og the table", event::MaintenanceAsked{.what = event::MaintenanceAsked::What::jog, .speed = {5}}}};
+  for (const auto& [what, event] : asked) {
+    if (!told(what)) continue;
+    const auto step = next(state, event, rules);
+    if (step.refused) walk.untrue.insert(fmt::format("{}: {} But: {}", name, words.next_action, step.refused->message));
+  }
+}
 
 /// The rest of the station answers as it would: a job that is closed is closed on disk.
 void close_jobs(Node& node, const std::vector<Action>& actions) {
@@ -167,7 +200,7 @@ bool is_another_job(const std::vector<Action>& actions) {
 /// Nobody answers what was not asked.
 bool can_happen(const Node& node, const Event& event) {
   const auto& s = node.state;
-  const auto* const job = s.job ? &*s.job : nullptr;
+  const auto* const job = s.job && s.job->id == "job" ? &*s.job : nullptr;
   const bool listed = node.jobs.contains("job");
   const auto state = listed ? node.jobs.at("job")->state : JobState::done;
   return std::visit(
@@ -175,9 +208,10 @@ bool can_happen(const Node& node, const Event& event) {
           [&](const event::Stopped&) { return s.activity == Activity::stopping || s.may_be_moving; },
           [&](const event::StopFailed&) { return s.activity == Activity::stopping; },
           [&](const event::JobKnown& e) {
+            if (e.info->id != "job") return job && s.queue.empty();  // one is enough
             const bool waits = state == JobState::queued || state == JobState::interrupted;
-            if (e.info->state == JobState::queued) return !job && (!listed || state == JobState::interrupted);
-            return !job && listed && (waits || state == JobState::reconstructing);
+            if (e.info->state == JobState::queued) return !s.job && (!listed || state == JobState::interrupted);
+            return !s.job && listed && (waits || state == JobState::reconstructing);
           },
           [&](const event::JobBegun&) { return job && job->state == JobState::queued; },
           [&](const event::JobNotBegun&) { return job && job->state == JobState::queued; },
@@ -205,6 +239,7 @@ void walk(const std::vector<Named>& events, bool with_jobs, Walk& walk) {
   while (!open.empty()) {
     const Node before = std::move(open.front());
     open.pop_front();
+    listen(before, rules, walk);
     for (const auto& [name, event] : events) {
       if (!can_happen(before, event)) continue;
       auto step = next(before.state, event, rules);
@@ -257,6 +292,14 @@ std::string draw(const Edges& edges) {
   return text + "```\n";
 }
 
+std::string table(const std::map<std::string, Words>& words) {
+  std::string text = "| state | says | next action |\n|---|---|---|\n";
+  for (const auto& [state, said] : words) {
+    text += fmt::format("| {} | {} | {} |\n", state, said.sentence, said.next_action);
+  }
+  return text;
+}
+
 constexpr const char* kByItself =
     R"(## What begins by itself
 A job begins without a press only where its recipe has `start_on_part`, and only after a person's Start: when the next part is there, e-stop and guard are closed, all devices are there, outside quiet hours, and once the projector is warm, `warm_up_s` after the daemon found it (one that was away begins anew). Brightness and focus drift while a lamp warms up, and nobody would be there to see it: the line waits and says for how long. Start, at the panel or over the API, begins at once all the same: who presses it may know that the lamp has been on all day, which a daemon that began a minute ago cannot. A job that has begun goes on, after its flip too.
@@ -265,15 +308,16 @@ A job begins without a press only where its recipe has `start_on_part`, and only
 std::string document(const Walk& walk) {
   return fmt::format(
       "# States of the station\n\nDrawn by `tests/unit/daemon/state_diagram_test.cpp`, which walks through the {} "
-      "states "
-      "that `next()` in `daemon/station` can reach with one two-pose job; do not edit. What each state says to the "
-      "operator is in `daemon/station/words.cpp`.\n\n## A job\nHow it goes on after its last view is up to the "
-      "reconstruction; what is interrupted can be resumed, unless its object moved, and then is queued "
-      "again.\n\n{}\n## "
-      "The machine\nFaults lead to Error from wherever something moves or is about to; only what is obeyed is drawn, "
-      "not "
-      "what is refused.\n\n{}\n{}",
-      walk.states, draw(walk.job), draw(walk.machine), kByItself);
+      "states that `next()` in `daemon/station` can reach with one two-pose job and another queued behind it; do not "
+      "edit. What each state says to the operator is in `daemon/station/words.cpp`.\n\n"
+      "## A job\nHow it goes on after its last view is up to the reconstruction; what is interrupted can be resumed, "
+      "unless its object moved, and then is queued again.\n\n{}\n"
+      "## The machine\nFaults lead to Error from wherever something moves or is about to; only what is obeyed is "
+      "drawn, "
+      "not what is refused.\n\n{}\n"
+      "## What they say\nAs each state was met first; what is wrong, and what has been done already, changes it.\n\n"
+      "{}\n{}",
+      walk.states, draw(walk.job), draw(walk.machine), table(walk.words), kByItself);
 }
 
 class StateDiagram : public testing::Test {
@@ -303,12 +347,27 @@ TEST_F(StateDiagram, EveryStateIsLeftAgain) {
   for (const auto& state : entered) EXPECT_TRUE(left.contains(state)) << state << " is a dead end";
 }
 
+TEST_F(StateDiagram, EveryStateOfMachineAndJobSaysWhatToDo) {
+  std::set<std::string> drawn, known;
+  for (const auto& [ends, why] : whole().machine) drawn.insert(ends.second);
+  for (const auto& [state, words] : whole().words) known.insert(state);
+  EXPECT_TRUE(std::ranges::includes(known, drawn));
+  EXPECT_TRUE(drawn.contains("Operational.ContinuousExecution: waiting_for_part"));
+  EXPECT_THAT(whole().wordless, testing::IsEmpty());
+}
+
+TEST_F(StateDiagram, WhatAStateSaysToDoIsNotRefused) { EXPECT_THAT(whole().untrue, testing::IsEmpty()); }
+
+/// Whoever closes the guard before a line that a person has started is told what comes then.
 TEST_F(StateDiagram, NothingMovesWithoutResetStartOrANewPart) {
   const std::set<std::string> allowed{"Reset", "Start", "new part", "jog"};
   for (const auto& [ends, why] : whole().machine) {
     const bool about_to_move = ends.second.ends_with(": warning") && !ends.first.ends_with(": warning");
     if (!about_to_move) continue;
-    for (const auto& name : why) EXPECT_TRUE(allowed.contains(name)) << ends.first << " by " << name;
+    const bool line = ends.first.ends_with(": waiting_for_part");
+    for (const auto& name : why) {
+      EXPECT_TRUE(allowed.contains(name) || (line && name == "guard closed")) << ends.first << " by " << name;
+    }
   }
 }
 
