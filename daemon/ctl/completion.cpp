@@ -64,7 +64,7 @@ std::string word_cases(const CommandWords& root, const std::string& say, const s
 
 std::string bash(const CommandWords& root) {
   const std::string say = "COMPREPLY+=($(compgen -W '{}' -- \"$cur\"))";
-  const std::string files = "compopt -o filenames; COMPREPLY+=($(compgen -f -- \"$cur\"))";
+  const std::string files = "compopt -o filenames; local IFS=$'\\n'; COMPREPLY+=($(compgen -f -- \"$cur\"))";
   return fmt::format(R"(# bash completion for {0}; generated from its command line
 _{0}() {{
   local cur=${{COMP_WORDS[COMP_CWORD]}} prev=${{COMP_WORDS[COMP_CWORD-1]}} path={0} i

@@ -35,6 +35,13 @@ std::string upper(std::string text) {
   return text;
 }
 
+/// "What is said of a verb."
+std::string sentence(const std::string& about) {
+  auto text = roff(about);
+  text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+  return text + ".";
+}
+
 std::string begin(const CommandWords& command) {
   return fmt::format(".TH \"{}\" \"1\" \"\" \"scanrig {}\" \"User commands\"\n.SH NAME\n{} \\- {}\n",
                      upper(dashed(command.path)), kVersion, roff(dashed(command.path)), roff(command.about));
@@ -78,9 +85,9 @@ constexpr const char* kExit =
 std::string page_of(const CommandWords& verb, const std::string& program) {
   std::string text = begin(verb) + ".SH SYNOPSIS\n" + synopsis(verb);
   for (const auto& below : verb.verbs) text += ".br\n" + synopsis(below);
-  text += ".SH DESCRIPTION\n" + roff(verb.about) + ".\n.SH OPTIONS\n" + options(verb);
+  text += ".SH DESCRIPTION\n" + sentence(verb.about) + "\n.SH OPTIONS\n" + options(verb);
   for (const auto& below : verb.verbs) {
-    text += fmt::format(".SS {}\n{}.\n", roff(below.path), roff(below.about)) + options(below);
+    text += fmt::format(".SS {}\n{}\n", roff(below.path), sentence(below.about)) + options(below);
   }
   return text + kExit + fmt::format(".SH SEE ALSO\n.BR {} (1)\n", program);
 }

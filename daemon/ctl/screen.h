@@ -10,7 +10,8 @@ namespace scanrig::ctl {
 struct Window {
   int width = 80, height = 24;
 };
-/// Lines cut to the window; where they are too many the last one says how many are missing. Widths count code points.
+/// Lines wrapped to the window; where they are too many the last one says how many are missing. Widths count code
+/// points.
 std::vector<std::string> fitted(const std::vector<std::string>& lines, Window window);
 
 /// Text kept up to date. On a terminal one screen, written as a whole only when something is different, with nothing

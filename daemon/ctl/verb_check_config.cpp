@@ -15,7 +15,10 @@ ExitCode check_config(const CheckConfigVerb& verb) {
     fmt::print("{}\n",
                nlohmann::ordered_json{{"file", verb.file}, {"ok", config.has_value()}, {"problems", problems}}.dump(2));
   }
-  if (!config) return verb.json ? exit_code(config.error().code) : complain(config.error());
+  if (!config && verb.json) {
+    return complain(exit_code(config.error().code), verb.file.string() + " cannot be used: see its problems");
+  }
+  if (!config) return complain(config.error());
   if (!verb.json) fmt::print("{}: no problems\n", verb.file.string());
   return ExitCode::ok;
 }

@@ -22,7 +22,10 @@ ExitCode examine_rig(const DoctorVerb& verb) {
   if (drive_answers && estop_works && may_turn()) doctor::examine_motion(*rig, person, clock, report);
   doctor::print_missing_snippets(rig->turntable.device(), verb.config, report);
   fmt::print("{}", verb.json ? report.json() : report.text());
-  return report.findings().empty() ? ExitCode::ok : ExitCode::device;
+  const auto found = report.findings().size();
+  if (found == 0) return ExitCode::ok;
+  return complain(ExitCode::device,
+                  fmt::format("{}: {} finding(s); with each stands what to do", verb.config.string(), found));
 }
 
 }  // namespace scanrig::ctl

@@ -23,6 +23,9 @@ TEST_F(Programs, EndWithTheDocumentedCodeAndOneSentence) {
   EXPECT_THAT(output, HasSubstr("nowhere"));
   EXPECT_EQ(scanrig({"check-config", folder_ / "nowhere.toml"}), 3);
   EXPECT_THAT(output, HasSubstr("nowhere.toml"));
+  EXPECT_EQ(sentences(), 1);
+  EXPECT_EQ(scanrig({"check-config", folder_ / "nowhere.toml", "--json"}), 3);
+  EXPECT_THAT(output, HasSubstr("scanrig: "));
   EXPECT_EQ(scanrig({"import", "stanford", "--pose", folder_ / "nowhere.conf", "--out", folder_ / "scan"}), 3);
   EXPECT_THAT(output, HasSubstr("nowhere.conf"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "scan"));

@@ -31,8 +31,16 @@ class RigOnWires : public testing::Test {
   }
   /// What its cameras will see is rendered when this returns: a frame that is not there in time is a lost one.
   void start_rig(std::vector<std::string> more = {}) {
-    std::vector<std::string> command{SCANRIG_SIM_PROGRAM,     "rig",  "--dir",   folder_, "--speed-deg-s", "180",
-                                     "--acceleration-deg-s2", "1000", "--views", "4"};
+    std::vector<std::string> command{SCANRIG_SIM_PROGRAM,
+                                     "rig",
+                                     "--dir",
+                                     folder_,
+                                     "--speed-deg-s",
+                                     "180",
+                                     "--acceleration-deg-s2",
+                                     "1000",
+                                     "--views",
+                                     std::to_string(views_)};
     command.insert(command.end(), more.begin(), more.end());
     rig_.emplace(command, folder_ / "rig.log");
     const auto ready = [&] {
@@ -84,6 +92,7 @@ class RigOnWires : public testing::Test {
   }
 
   RealClock clock_;
+  int views_ = 4;  ///< a pose; GigE cameras have them all rendered before the rig is ready
   const std::filesystem::path folder_ = own_folder("wires_");
   std::optional<Process> rig_, daemon_;
   std::string output_;

@@ -57,6 +57,7 @@ TEST_F(RigOnWires, TheDoctorPraisesASoundRigAndNamesAWrongParity) {
   EXPECT_TRUE(json::parse(output_)["findings"].empty());
   say({{"set", {{"line", {{"parity", "even"}}}}}});
   EXPECT_EQ(scanrig({"doctor"}), 5);
+  EXPECT_THAT(output_, HasSubstr("scanrig: "));
   EXPECT_THAT(output_, HasSubstr("wrong_parity"));
   EXPECT_THAT(output_, HasSubstr("Set parity = \"even\""));
   say({{"set", {{"fault", "silent"}}}});

@@ -46,8 +46,10 @@ class Pages : public scan_samples::FolderTest {
     const auto script = file("test.bash", "source " + file("scanrig.bash", completion(app, "bash")) + "\nCOMP_WORDS=(" +
                                               line + ")\nCOMP_CWORD=$((${#COMP_WORDS[@]} - 1))\n" +
                                               "compopt() { :; }\n_scanrig\nprintf '%s\\n' \"${COMPREPLY[@]}\"\n");
-    std::istringstream words(output_of("bash " + script));
-    return {std::istream_iterator<std::string>(words), {}};
+    std::istringstream offers(output_of("bash " + script));
+    std::set<std::string> words;
+    for (std::string word; std::getline(offers, word);) words.insert(word);
+    return words;
   }
   CLI::App app{"a rig's command", "scanrig"};
   Chosen chosen;
@@ -60,6 +62,11 @@ TEST_F(Pages, BashOffersVerbsOptionsAndValues) {
   EXPECT_EQ(offered("scanrig token ''").count("revoke"), 1u);
   EXPECT_EQ(offered("scanrig token add x --role ''"), (std::set<std::string>{"viewer", "operator", "engineer"}));
   EXPECT_THAT(offered("scanrig maintenance ''"), IsSupersetOf({"on", "off", "jog"}));
+}
+
+TEST_F(Pages, BashOffersFilesWhoseNamesHaveSpaces) {
+  const auto path = file("my scan", "");
+  EXPECT_EQ(offered("scanrig export x --out '" + path.substr(0, path.size() - 2) + "'"), std::set<std::string>{path});
 }
 
 TEST_F(Pages, WhatIsHiddenIsNotOffered) {

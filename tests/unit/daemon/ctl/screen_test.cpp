@@ -19,10 +19,23 @@ using testing::HasSubstr;
 using testing::Not;
 using testing::StartsWith;
 
-TEST(Screen, LinesAreCutToTheWindow) {
-  EXPECT_THAT(fitted({"abcdef", "ab"}, {.width = 4, .height = 2}), ElementsAre("abcd", "ab"));
-  EXPECT_THAT(fitted({"\xc3\xa4\xc3\xb6\xc3\xbc"}, {.width = 2, .height = 1}), ElementsAre("\xc3\xa4\xc3\xb6"))
+TEST(Screen, LinesGoOnBelowWhereTheWindowIsNarrow) {
+  EXPECT_THAT(fitted({"next: close the guard", "ab", ""}, {.width = 12, .height = 9}),
+              ElementsAre("next: close", "  the guard", "ab", ""));
+  EXPECT_THAT(fitted({"  model /a/very/long"}, {.width = 10, .height = 9}),
+              ElementsAre("  model", "    /a/ver", "    y/long"));
+  EXPECT_THAT(fitted({"abcdef"}, {.width = 4, .height = 2}), ElementsAre("abcd", "  ef"));
+  EXPECT_THAT(fitted({"\xc3\xa4\xc3\xb6\xc3\xbc"}, {.width = 2, .height = 3}),
+              ElementsAre("\xc3\xa4\xc3\xb6", " \xc3\xbc"))
       << "letters are not torn";
+  for (int width = 1; width < 20; ++width) {
+    for (const auto& line : fitted({"      much further in than that", "x y z"}, {.width = width, .height = 99})) {
+      EXPECT_LE(line.size(), static_cast<std::size_t>(width)) << line;
+    }
+  }
+}
+
+TEST(Screen, SaysHowManyLinesAreMissing) {
   EXPECT_THAT(fitted({"1", "2", "3", "4"}, {.width = 80, .height = 3}), ElementsAre("1", "2", "(2 more lines)"));
 }
 
@@ -71,6 +84,14 @@ TEST_F(Terminal, IsDrawnOverWithoutBeingErasedFirst) {
   EXPECT_EQ(seen(), "") << "nothing is different";
   screen.show({"one", "three"});
   EXPECT_THAT(seen(), StartsWith("\x1b[Hone"));
+}
+
+TEST_F(Terminal, ALineThatFillsTheWindowKeepsItsLastLetter) {
+  ::setenv("TERM", "xterm", 1);
+  Screen screen(out.get());
+  seen();
+  screen.show({"0123456789", "ab"});
+  EXPECT_EQ(seen(), "\x1b[H0123456789\r\nab\x1b[K\x1b[J");
 }
 
 TEST_F(Terminal, IsLeftAsItWas) {
