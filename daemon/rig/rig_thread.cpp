@@ -15,7 +15,7 @@ RigThread::RigThread(const Devices& devices, Clock& clock, AcquisitionOptions op
       tell_(std::move(tell)),
       inbox_(clock),
       thread_(start_actor(clock, [this] { run(); })) {
-  preview_.on_wanted([this] { inbox_.post(Look{}); });
+  preview_.on_wanted([this] { post(Look{}); });
 }
 
 RigThread::~RigThread() {
@@ -27,7 +27,7 @@ RigThread::~RigThread() {
 
 void RigThread::stop() {
   interrupt();
-  inbox_.post(action::StopRig{});
+  post(action::StopRig{});
 }
 
 void RigThread::interrupt() noexcept {
@@ -37,11 +37,11 @@ void RigThread::interrupt() noexcept {
 }
 
 void RigThread::run() {
-  while (auto command = inbox_.take()) {
-    if (std::holds_alternative<Look>(*command)) {
+  while (const auto asked = inbox_.take()) {
+    if (std::holds_alternative<Look>(asked->what)) {
       look();
     } else {
-      tell_(perform(*command));
+      tell_(perform(*asked));
     }
   }
 }
@@ -51,17 +51,23 @@ void RigThread::look() {
   pair ? preview_.keep(*pair) : preview_.failed(pair.error());
 }
 
-Result<void> RigThread::home_now() {
-  const unsigned before = acquisition_.interrupts();
+/// `interrupts`: when it was asked for.
+Result<void> RigThread::home_now(unsigned interrupts) {
   auto home = acquisition_.home();
   // A stop that found nothing running is still kept by the turntable, and ends the next move: that was this one.
-  const bool stale = !home && home.error().code == ErrorCode::stopped && acquisition_.interrupts() == before;
+  const bool stale = !home && home.error().code == ErrorCode::stopped && acquisition_.interrupts() == interrupts;
   return stale ? acquisition_.home() : home;
 }
 
-Event RigThread::perform(const Command& command) {
+Event RigThread::perform(const Asked& asked) {
+  const auto& command = asked.what;
+  const bool harmless =
+      std::holds_alternative<action::CheckDevices>(command) || std::holds_alternative<action::StopRig>(command);
+  if (!harmless && acquisition_.interrupts() != asked.interrupts) {
+    return event::RigFailed{{ErrorCode::stopped, "rig: stopped on request before it began"}, {}};
+  }
   if (std::holds_alternative<action::Home>(command)) {
-    auto home = home_now();
+    auto home = home_now(asked.interrupts);
     if (!home) return event::RigFailed{home.error(), acquisition_.failed_device()};
     return event::Homed{};
   }

@@ -23,12 +23,13 @@ class RigThread {
   RigThread(const RigThread&) = delete;
   RigThread& operator=(const RigThread&) = delete;
 
-  void home() { inbox_.post(action::Home{}); }
-  void take_view(action::TakeView view) { inbox_.post(std::move(view)); }
-  void jog(action::Jog jog) { inbox_.post(jog); }
-  void pulse() { inbox_.post(action::Pulse{}); }
-  void check_devices() { inbox_.post(action::CheckDevices{}); }
-  /// Cuts short what runs, then waits for evidence that the table stands and the projector is dark.
+  void home() { post(action::Home{}); }
+  void take_view(action::TakeView view) { post(std::move(view)); }
+  void jog(action::Jog jog) { post(jog); }
+  void pulse() { post(action::Pulse{}); }
+  void check_devices() { post(action::CheckDevices{}); }
+  /// Cuts short what runs, and what is still to begin: a motion or a flash asked for before does not begin. Then waits
+  /// for evidence that the table stands and the projector is dark.
   void stop();
   /// The e-stop's short cut: the motor is told to stop and the light goes out at once. From any thread; the station
   /// follows with stop().
@@ -39,17 +40,23 @@ class RigThread {
   using Command = std::variant<action::Home, action::TakeView, action::Jog, action::Pulse, action::CheckDevices,
                                action::StopRig, Look>;
 
+  struct Asked {
+    Command what;
+    unsigned interrupts;  ///< so many had been when it was asked for
+  };
+
+  void post(Command what) { inbox_.post({std::move(what), acquisition_.interrupts()}); }
   void run();
-  Event perform(const Command& command);
+  Event perform(const Asked& asked);
   void look();
-  Result<void> home_now();
+  Result<void> home_now(unsigned interrupts);
 
   TurntableThread turntable_;
   Devices devices_;
   Acquisition acquisition_;
   Preview& preview_;
   std::function<void(Event)> tell_;
-  Mailbox<Command> inbox_;
+  Mailbox<Asked> inbox_;
   std::thread thread_;
 };
 

@@ -113,6 +113,7 @@ struct TriggerLine {
   std::function<void()> at_fire;  ///< happens during the next exposure, or
   int fires_before = 0;           ///< after so many more
   Clock::TimePoint ready_at{};    ///< when the cameras were asked to get ready last
+  Clock::Duration ready_takes{};  ///< what they need for that
   Light last = Light::plain;
   int scene = 0;  ///< what the cameras look at: another number, another picture
 };
@@ -156,8 +157,14 @@ class FakeCamera final : public StereoCamera {
  public:
   FakeCamera(TriggerLine& line, Clock& clock) : line_(line), clock_(clock) {}
   Result<void> ready(Deadline) override {
+    Clock::TimePoint answer;
+    {
+      const std::lock_guard guard(line_.mutex);
+      line_.ready_at = clock_.now();
+      answer = line_.ready_at + line_.ready_takes;
+    }
+    if (answer > clock_.now()) clock_.sleep_until(answer);
     const std::lock_guard guard(line_.mutex);
-    line_.ready_at = clock_.now();
     return there();
   }
   Result<void> arm(Deadline) override {

@@ -205,6 +205,32 @@ TEST_F(Daemon, TheEstopStopsAMovingTableAndNothingResumesByItself) {
   EXPECT_TRUE(wait_ready());
 }
 
+/// The thread of the rig may be asking cameras that are not there when homing is due, and does it next.
+TEST_F(Daemon, HomingThatWasStoppedBeforeItBeganDoesNotBegin) {
+  boot();
+  ASSERT_TRUE(wait_halted());
+  for (auto stop_it : {&PanelInputs::stop, &PanelInputs::guard_closed, &PanelInputs::estop_ok}) {
+    const auto since = clock.now();
+    {
+      const std::lock_guard guard(rig.line.mutex);
+      rig.line.ready_takes = std::chrono::seconds(3);
+    }
+    ASSERT_TRUE(clock_waits_for([&] {
+      const std::lock_guard guard(rig.line.mutex);
+      return rig.line.ready_at > since;
+    }));
+    rig.panel.press(&PanelInputs::reset);
+    clock.sleep_for(std::chrono::milliseconds(2500));  // the warning is over, the cameras have not answered
+    EXPECT_EQ(loop->snapshot()->activity, Activity::homing);
+    rig.panel.set(stop_it, stop_it == &PanelInputs::stop);
+    ASSERT_TRUE(clock_waits_for([&] { return loop->snapshot()->activity == Activity::none; }));
+    rig.panel.set(stop_it, stop_it != &PanelInputs::stop);
+    clock.sleep_for(std::chrono::seconds(10));
+    const std::lock_guard guard(rig.turntable.mutex);
+    EXPECT_THAT(rig.turntable.targets, testing::IsEmpty());
+  }
+}
+
 TEST_F(Daemon, StopCancelsTheJob) {
   boot();
   get_ready();
