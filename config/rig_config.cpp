@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <utility>
 
 #include "config/camera_section.h"
 #include "config/projector_section.h"
@@ -219,8 +220,9 @@ Result<RigConfig> read_rig_config(const std::filesystem::path& file, const std::
   std::vector<std::filesystem::path> folders{drives};
   if (drives.empty()) folders = {base / "drives", base / ".." / "drives", "/usr/share/scanrig/drives"};
   RigConfig rig;
-  const auto read = read_toml(file, [&](Section& root) { read_rig(root, base, folders, cameras, rig); });
+  auto read = read_toml(file, [&](Section& root) { read_rig(root, base, folders, cameras, rig); });
   if (!read) return pass_on(read);
+  rig.sha256 = std::move(*read);
   return rig;
 }
 

@@ -123,6 +123,7 @@ struct ApiConfig {
 
 /// rig.toml, checked; relative paths are made relative to the file's folder.
 struct RigConfig {
+  std::string sha256;  ///< of the file's text, as it was read
   SafetyConfig safety;
   TurntableConfig turntable;
   ProjectorConfig projector;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/files.h"
+#include "core/hash.h"
 
 namespace scanrig::config {
 namespace {
@@ -138,7 +139,7 @@ void Section::report_unknown_keys() {
   }
 }
 
-Result<void> read_toml(const std::filesystem::path& file, const std::function<void(Section&)>& read) {
+Result<std::string> read_toml(const std::filesystem::path& file, const std::function<void(Section&)>& read) {
   const auto text = read_file(file);
   if (!text) return pass_on(text);
   Problems problems(file.string());
@@ -151,7 +152,7 @@ Result<void> read_toml(const std::filesystem::path& file, const std::function<vo
     problems.add(static_cast<int>(error.source().begin.line), std::string(error.description()));
   }
   if (problems.count() > 0) return tl::unexpected(problems.error());
-  return {};
+  return sha256(*text);
 }
 
 }  // namespace scanrig::config

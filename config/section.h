@@ -133,7 +133,7 @@ class Section {
 };
 
 /// Reads a file through `read`. Fails with `not_found`, `io`, or `invalid_input` with every problem on a line of its
-/// own: "FILE:LINE: [table] key: what is wrong".
-Result<void> read_toml(const std::filesystem::path& file, const std::function<void(Section&)>& read);
+/// own: "FILE:LINE: [table] key: what is wrong". Returns the SHA-256 of the text that was read.
+Result<std::string> read_toml(const std::filesystem::path& file, const std::function<void(Section&)>& read);
 
 }  // namespace scanrig::config

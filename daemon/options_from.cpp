@@ -40,6 +40,7 @@ DaemonOptions options_from(const config::RigConfig& config) {
   options.jobs = {.root = config.storage.root,
                   .calibration_file = config.calibration_file,
                   .profile = "",
+                  .config_sha256 = config.sha256,
                   .reserve_bytes = gib(config.storage.reserve_gib)};
   options.recipes.clear();
   for (const auto& [name, recipe] : config.recipes) options.recipes[name] = recipe_from(name, recipe);

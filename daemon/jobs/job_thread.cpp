@@ -146,6 +146,7 @@ Result<void> JobThread::begin(const JobInfo& job) {
   if (auto state = scan->set_state("scanning"); !state) return state;
   remove_failure(job.folder);
   scan_ = std::move(*scan);
+  scan_->taken_under(store_.options().config_sha256);
   reconstruction_.begin(job.id, *scan_, job.recipe);
   const auto& poses = scan_->manifest().poses;
   const auto pose = static_cast<std::size_t>(job.complete);
@@ -236,7 +237,7 @@ void JobThread::handle(const action::StoreView& task) {
   if (!stored) return tell_(event::StoreFailed{view.id.job, stored.error()});
   reconstruction_.add_view(task.view);
   tell_(event::ViewStored{view.id, view.record.measured_deg, view.record.spoilt, view.record.commanded_deg,
-                          view.record.settling_ms});
+                          view.record.settling_ms, scan_->manifest().config_sha256});
 }
 
 void JobThread::handle(const action::JudgeClosure& task) {
