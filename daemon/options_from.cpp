@@ -1,5 +1,6 @@
 #include "daemon/options_from.h"
 
+#include "core/hash.h"
 #include "daemon/jobs/pipeline_reconstructor.h"
 #include "daemon/jobs/process_reconstructor.h"
 
@@ -54,6 +55,7 @@ DaemonOptions options_from(const config::RigConfig& config) {
                   .calibration_file = config.calibration_file,
                   .cameras = cameras_from(config.stereo_camera),
                   .profile = "",
+                  .config_sha256 = sha256(config.text),
                   .reserve_bytes = gib(config.storage.reserve_gib)};
   options.recipes.clear();
   for (const auto& [name, recipe] : config.recipes) options.recipes[name] = recipe_from(name, recipe);

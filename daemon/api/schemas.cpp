@@ -37,7 +37,7 @@ const char* const kSchemas = R"({
   "outputs": {"type": "object", "additionalProperties": {"type": "boolean"}}}},
 "Job": {"type": "object", "additionalProperties": false,
   "required": ["id", "state", "sentence", "next_action", "recipe", "part", "folder", "poses", "views", "stored", "resumable", "quarantined",
-  "exported", "passed", "model", "report", "error"], "properties": {
+  "exported", "passed", "model", "report", "config_sha256", "error"], "properties": {
   "id": {"type": "string"}, "state": {"type": "string"},
   "sentence": {"type": "string", "description": "what becomes of it, and why"},
   "next_action": {"type": "string", "description": "what the operator should do, if only to wait"},
@@ -50,7 +50,10 @@ const char* const kSchemas = R"({
   "poses": {"type": "integer"}, "views": {"type": "integer", "description": "a pose"},
   "stored": {"type": "integer", "description": "views that survive a power cut"},
   "model": {"type": "string", "description": "path of the model; empty until it is there"},
-  "report": {"type": "string"}, "error": {"$ref": "#/components/schemas/MaybeProblem"}}},
+  "report": {"type": "string"},
+  "config_sha256": {"type": "array", "items": {"type": "string"},
+    "description": "SHA-256 of each rig.toml that its views were taken under; of a rig without one none"},
+  "error": {"$ref": "#/components/schemas/MaybeProblem"}}},
 "JobPage": {"type": "object", "required": ["jobs", "next"], "additionalProperties": false, "properties": {
   "jobs": {"type": "array", "items": {"$ref": "#/components/schemas/Job"}},
   "next": {"type": "string", "nullable": true, "description": "`before` of the next page; null on the last"}}},

@@ -27,6 +27,7 @@ constexpr std::uintmax_t kModelBytes = 128u
                                        << 20;  ///< mesh in all formats, textures, report: the largest seen is 90 MiB
 
 void take_views(JobInfo& job, const Manifest& manifest) {
+  job.config_sha256 = manifest.config_sha256;
   for (std::size_t p = 0; p < manifest.poses.size(); ++p) {
     const auto& pose = manifest.poses[p];
     const int number = static_cast<int>(p);

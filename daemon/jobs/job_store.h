@@ -21,6 +21,7 @@ struct JobStoreOptions {
   std::filesystem::path calibration_file;  ///< copied into every job
   CameraSerials cameras{};                 ///< the rig's
   std::string profile{};                   ///< of a simulated rig; empty otherwise
+  std::string config_sha256{};             ///< of the configuration that views are taken under; empty: none
   std::uintmax_t reserve_bytes = 0;        ///< of the disk: a job that would eat into it is not begun
   int bytes_per_pixel = 1;                 ///< of the sensors
 };

@@ -153,6 +153,7 @@ Result<void> JobThread::begin(const JobInfo& job) {
   later_ = !job.stored.empty() && !read_failure(job.folder) ? std::optional(job.recipe) : std::nullopt;
   remove_failure(job.folder);
   scan_ = std::move(*scan);
+  scan_->taken_under(store_.options().config_sha256);
   broken_ = false;
   if (!later_) reconstruction_.begin(job.id, *scan_, job.recipe);
   const auto& poses = scan_->manifest().poses;
@@ -254,7 +255,7 @@ void JobThread::handle(const action::StoreView& task) {
   if (!stored) return give_up(view.id.job, stored.error());
   reconstruction_.add_view(task.view);
   tell_(event::ViewStored{view.id, view.record.measured_deg, view.record.spoilt, view.record.commanded_deg,
-                          view.record.settling_ms});
+                          view.record.settling_ms, scan_->manifest().config_sha256});
 }
 
 void JobThread::handle(const action::JudgeClosure& task) {

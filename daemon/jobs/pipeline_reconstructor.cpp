@@ -9,7 +9,8 @@ namespace {
 
 class PipelineReconstructor final : public Reconstructor {
  public:
-  explicit PipelineReconstructor(Reconstruction reconstruction) : reconstruction_(std::move(reconstruction)) {}
+  PipelineReconstructor(Reconstruction reconstruction, std::filesystem::path scan)
+      : reconstruction_(std::move(reconstruction)), scan_(std::move(scan)) {}
 
   Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context) override {
     return reconstruction_.add_view(pose, images, context);
@@ -18,13 +19,16 @@ class PipelineReconstructor final : public Reconstructor {
     return reconstruction_.finish_pose(pose, context);
   }
   Result<void> finish(const std::filesystem::path& folder, const Context& context) override {
-    const auto model = reconstruction_.finish(context);
+    const auto scan = ScanFolder::open(scan_);  // now that it is whole
+    if (!scan) return pass_on(scan);
+    const auto model = reconstruction_.finish(identity_of(scan->manifest()), context);
     if (!model) return pass_on(model);
     return write_model(*model, folder);
   }
 
  private:
   Reconstruction reconstruction_;
+  std::filesystem::path scan_;
 };
 
 double gib(std::uintmax_t bytes) { return static_cast<double>(bytes) / (1u << 30); }
@@ -46,8 +50,7 @@ ReconstructorFactory pipeline_reconstructor(ReconstructOptions options, std::uin
     changed.voxel_mm = task.changes.voxel_mm.value_or(options.voxel_mm);
     if (!task.changes.fusion.empty()) changed.fusion = task.changes.fusion;
     if (auto fits = check_memory(task, changed.voxel_mm, memory_bytes); !fits) return pass_on(fits);
-    const ScanIdentity identity{.id = task.manifest.id, .profile = task.manifest.profile};
-    return std::make_unique<PipelineReconstructor>(Reconstruction(task.calibration, changed, identity));
+    return std::make_unique<PipelineReconstructor>(Reconstruction(task.calibration, changed), task.folder);
   };
 }
 

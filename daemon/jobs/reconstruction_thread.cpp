@@ -150,7 +150,6 @@ Result<void> ReconstructionThread::start(const Begin& message, const ScanFolder&
   }
   return guarded(kWork, [&]() -> Result<void> {
     auto made = factory_({.calibration = *calibration,
-                          .manifest = scan.manifest(),
                           .folder = message.folder,
                           .views = message.recipe.poses * message.recipe.views,
                           .changes = message.changes});

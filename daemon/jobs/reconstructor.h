@@ -11,7 +11,6 @@
 #include "core/result.h"
 #include "pipeline/calibration/camera.h"
 #include "pipeline/scan/images.h"
-#include "pipeline/scan/manifest.h"
 
 namespace scanrig {
 
@@ -34,7 +33,6 @@ struct ReconstructionChanges {
 
 struct ReconstructionTask {
   const Calibration& calibration;
-  const Manifest& manifest;
   std::filesystem::path folder;  ///< of the job
   int views = 0;                 ///< of all poses, once they are there
   ReconstructionChanges changes{};

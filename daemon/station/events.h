@@ -179,7 +179,8 @@ struct ViewStored {
   std::vector<Error> spoilt{};  ///< exposures that were taken again, and why
   double commanded_deg = 0.0;
   double settling_ms = 0.0;
-};  ///< it survives a power cut
+  std::vector<std::string> config_sha256{};  ///< of all configurations that the job's views were taken under
+};                                           ///< it survives a power cut
 struct PoseStored {
   std::string job;
   int pose;

@@ -44,6 +44,7 @@ struct JobInfo {
   std::int64_t place = 0;  ///< in the queue: the smallest comes first
   int complete = 0;        ///< poses whose views are all there
   std::vector<StoredView> stored{};
+  std::vector<std::string> config_sha256{};  ///< of each configuration they were taken under
   std::vector<Closure> closures{};
   bool resumable = false;            ///< interrupted, and the missing views may still be taken
   bool quarantined = false;          ///< two daemons died over its reconstruction: only `reprocess` tries again

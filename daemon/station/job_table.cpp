@@ -61,6 +61,7 @@ void update(JobTable& table, const Event& event) {
             change(table, e.id.job, [&](JobInfo& job) {
               job.state = JobState::scanning;
               job.stored.push_back({e.id.pose, e.id.view, e.measured_deg, e.spoilt, e.commanded_deg, e.settling_ms});
+              job.config_sha256 = e.config_sha256;
             });
           },
           [&](const event::PoseStored& e) {

@@ -30,14 +30,17 @@ Result<void> add_all(const ScanFolder& scan, std::size_t pose, Reconstruction& r
 }
 
 Result<Reconstruction> begin(const ScanFolder& scan, const ReconstructOptions& options) {
-  const ScanIdentity identity{.id = scan.manifest().id, .profile = scan.manifest().profile};
-  if (scan.manifest().source != "stereo") return Reconstruction(options, identity);
+  if (scan.manifest().source != "stereo") return Reconstruction(options);
   auto calibration = scan.load_calibration();
   if (!calibration) return pass_on(calibration);
-  return Reconstruction(std::move(*calibration), options, identity);
+  return Reconstruction(std::move(*calibration), options);
 }
 
 }  // namespace
+
+ScanIdentity identity_of(const Manifest& manifest) {
+  return {.id = manifest.id, .profile = manifest.profile, .config_sha256 = manifest.config_sha256};
+}
 
 Result<Model> reconstruct(const ScanFolder& scan, const ReconstructOptions& options, const Context& context) {
   const auto& poses = scan.manifest().poses;
@@ -54,7 +57,7 @@ Result<Model> reconstruct(const ScanFolder& scan, const ReconstructOptions& opti
     if (auto added = add_all(scan, pose, *reconstruction, context); !added) return pass_on(added, scan.path().string());
     if (auto done = reconstruction->finish_pose(pose, context); !done) return pass_on(done, scan.path().string());
   }
-  auto model = reconstruction->finish(context);
+  auto model = reconstruction->finish(identity_of(scan.manifest()), context);
   if (!model) return pass_on(model, scan.path().string());
   return model;
 }

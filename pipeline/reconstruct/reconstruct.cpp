@@ -65,7 +65,6 @@ Result<PoseOptions> pose_options_of(const std::string& rests) {
 
 struct Reconstruction::State {
   ReconstructOptions options;
-  ScanIdentity identity;
   std::optional<Calibration> calibration;
   std::optional<Rectification> rectification;
   std::vector<PoseState> poses;
@@ -79,7 +78,7 @@ struct Reconstruction::State {
   [[nodiscard]] std::vector<Photo> photos(const Transform& pose1_from_pose2) const;
   Result<void> add_texture(TexturedMesh& model, const Transform& pose1_from_pose2, Report& report,
                            const Context& context);
-  Result<Model> finish(const Context& context);
+  Result<Model> finish(const ScanIdentity& identity, const Context& context);
 };
 
 Result<PoseState*> Reconstruction::State::open_pose(std::size_t pose) {
@@ -174,7 +173,7 @@ std::vector<Photo> Reconstruction::State::photos(const Transform& pose1_from_pos
   return photos;
 }
 
-Result<Model> Reconstruction::State::finish(const Context& context) {
+Result<Model> Reconstruction::State::finish(const ScanIdentity& identity, const Context& context) {
   if (poses.empty()) return fail(ErrorCode::invalid_input, "the scan has no views");
   for (std::size_t p = 0; p < poses.size(); ++p) {
     if (!poses[p].finished) return fail(ErrorCode::invalid_input, "pose {} is not finished", p + 1);
@@ -207,16 +206,13 @@ Result<void> Reconstruction::State::add_texture(TexturedMesh& model, const Trans
   return {};
 }
 
-Reconstruction::Reconstruction(Calibration calibration, ReconstructOptions options, ScanIdentity identity)
-    : state_(std::make_unique<State>()) {
-  state_->options = std::move(options);
-  state_->identity = std::move(identity);
+Reconstruction::Reconstruction(Calibration calibration, ReconstructOptions options)
+    : Reconstruction(std::move(options)) {
   state_->calibration = std::move(calibration);
 }
 
-Reconstruction::Reconstruction(ReconstructOptions options, ScanIdentity identity) : state_(std::make_unique<State>()) {
+Reconstruction::Reconstruction(ReconstructOptions options) : state_(std::make_unique<State>()) {
   state_->options = std::move(options);
-  state_->identity = std::move(identity);
 }
 
 Reconstruction::~Reconstruction() = default;
@@ -245,9 +241,9 @@ Result<void> Reconstruction::finish_pose(std::size_t pose, const Context& contex
   return done;
 }
 
-Result<Model> Reconstruction::finish(const Context& context) {
+Result<Model> Reconstruction::finish(const ScanIdentity& identity, const Context& context) {
   Result<Model> model;
-  with_threads(state_->options.threads, [&] { model = state_->finish(context); });
+  with_threads(state_->options.threads, [&] { model = state_->finish(identity, context); });
   return model;
 }
 

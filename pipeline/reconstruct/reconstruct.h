@@ -4,6 +4,7 @@
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "core/context.h"
 #include "core/result.h"
@@ -28,7 +29,10 @@ struct ReconstructOptions {
 struct ScanIdentity {
   std::string id;
   std::string profile;  ///< hash of the simulated sensor's profile; empty for a real rig
+  std::vector<std::string> config_sha256;
 };
+/// What the manifest of a whole scan says of it.
+ScanIdentity identity_of(const Manifest& manifest);
 
 /// What a scan becomes.
 struct Model {
@@ -42,9 +46,9 @@ struct Model {
 class Reconstruction {
  public:
   /// A stereo scan.
-  Reconstruction(Calibration calibration, ReconstructOptions options, ScanIdentity identity);
+  Reconstruction(Calibration calibration, ReconstructOptions options);
   /// A scan of imported range images: no calibration, no silhouettes, no colour.
-  Reconstruction(ReconstructOptions options, ScanIdentity identity);
+  explicit Reconstruction(ReconstructOptions options);
   ~Reconstruction();
   Reconstruction(Reconstruction&&) noexcept;
   Reconstruction& operator=(Reconstruction&&) noexcept;
@@ -60,7 +64,7 @@ class Reconstruction {
 
   /// Pose 2 into pose 1, integration, texture; with one pose, its own complete model. Every pose is finished before.
   /// Fails with `same_rest`, `ambiguous`, `no_overlap`, `degenerate`, `stopped`.
-  Result<Model> finish(const Context& context);
+  Result<Model> finish(const ScanIdentity& identity, const Context& context);
 
  private:
   struct State;

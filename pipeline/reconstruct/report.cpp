@@ -129,6 +129,7 @@ Report::Report(const ReconstructOptions& options, const ScanIdentity& identity,
   report["software"] = {{"name", "scanrig"}, {"version", kVersion}, {"compiler", kCompiler}};
   report["scan"] = identity.id;
   report["profile_sha256"] = identity.profile;
+  report["config_sha256"] = identity.config_sha256;
   report["calibration_sha256"] = calibration ? calibration->sha256 : "";
   report["options"] = {{"voxel_mm", options.voxel_mm},
                        {"fusion", options.fusion},

@@ -13,7 +13,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr int kVersion = 2;
+constexpr int kVersion = 3;
 constexpr std::array kStates = {"queued",    "scanning", "waiting_for_flip", "scanned", "interrupted",
                                 "cancelled", "failed"};
 constexpr std::array kSources = {"stereo", "range"};
@@ -169,9 +169,10 @@ PoseRecord read_pose(JsonObject object, bool stereo, int version) {
 }  // namespace
 
 std::string to_json(const Manifest& manifest) {
-  ordered_json json = {{"format", "scanrig-scan"},    {"version", kVersion},     {"id", manifest.id},
-                       {"created", manifest.created}, {"state", manifest.state}, {"source", manifest.source},
-                       {"profile", manifest.profile}};
+  ordered_json json = {{"format", "scanrig-scan"},    {"version", kVersion},
+                       {"id", manifest.id},           {"created", manifest.created},
+                       {"state", manifest.state},     {"source", manifest.source},
+                       {"profile", manifest.profile}, {"config_sha256", manifest.config_sha256}};
   if (manifest.calibration) json["calibration"] = to_json(*manifest.calibration, "file");
   json["poses"] = ordered_json::array();
   for (const PoseRecord& pose : manifest.poses) {
@@ -195,6 +196,7 @@ Result<Manifest> read_manifest(const std::filesystem::path& file) {
   manifest.state = root.text("state");
   manifest.source = root.text("source");
   manifest.profile = root.text("profile");
+  if (json->version() >= 3) manifest.config_sha256 = root.sha256s("config_sha256");
   if (const auto words = check_words(manifest); !words) root.reject("", words.error().message);
   if (root.has("calibration")) manifest.calibration = read_file_record(root.object("calibration"), "file");
   std::set<std::string> names;

@@ -56,6 +56,7 @@ struct Manifest {
   std::string state = "scanning";
   std::string source = "stereo";
   std::string profile;
+  std::vector<std::string> config_sha256;  ///< of each configuration its views were taken under, in order of use
   std::optional<FileRecord> calibration;
   std::vector<PoseRecord> poses;
 };
@@ -63,9 +64,9 @@ struct Manifest {
 /// The text of scan.json.
 std::string to_json(const Manifest& manifest);
 
-/// Reads version 1 too, which knew no closures; what is written is version 2.
-/// Fails with `not_found`, `io`, `invalid_input` (naming file and key), `unsupported` (version). Sizes of range grids
-/// are those of their files and stay 0 here.
+/// Reads version 1 too, which knew no closures, and version 2, which knew no configuration; what is written is
+/// version 3. Fails with `not_found`, `io`, `invalid_input` (naming file and key), `unsupported` (version). Sizes of
+/// range grids are those of their files and stay 0 here.
 Result<Manifest> read_manifest(const std::filesystem::path& file);
 
 /// Whether the words `state` and `source` are ones the format knows. Fails with `invalid_input`.

@@ -116,6 +116,9 @@ Result<void> ScanFolder::store_view(std::size_t pose, ViewRecord record, std::sp
   if (auto made = create_directories_synced(path_ / folder); !made) return made;
   if (auto written = write_files_synced(path_ / folder, contents); !written) return written;
 
+  auto& configs = changed.config_sha256;
+  const bool listed = std::find(configs.begin(), configs.end(), config_sha256_) != configs.end();
+  if (!config_sha256_.empty() && !listed) configs.push_back(config_sha256_);
   std::vector<std::filesystem::path> superseded;
   if (replaces) {
     for (const auto& [role, file] : place->files) superseded.push_back(path_ / file.path);

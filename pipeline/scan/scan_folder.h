@@ -31,6 +31,10 @@ class ScanFolder {
   [[nodiscard]] const Manifest& manifest() const { return manifest_; }
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
+  /// The views that are added to this object from now on are taken under this configuration, and the manifest says so
+  /// with the next of them. Empty: under none.
+  void taken_under(std::string config_sha256) { config_sha256_ = std::move(config_sha256); }
+
   /// Writes the images, syncs, then the manifest: when this returns the view survives a power cut, and until then the
   /// folder is what it was. `record.files` and `record.pixel_format` are filled in here. An index that is already there
   /// is replaced; `pose` may be one past the last: a new pose. Fails with `invalid_input`, `io`.
@@ -63,6 +67,7 @@ class ScanFolder {
 
   std::filesystem::path path_;
   Manifest manifest_;
+  std::string config_sha256_;
 };
 
 }  // namespace scanrig

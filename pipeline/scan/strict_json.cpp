@@ -22,6 +22,10 @@ std::pair<std::size_t, std::size_t> line_and_column(std::string_view text, std::
           1 + before.size() - (line_start == std::string_view::npos ? 0 : line_start + 1)};
 }
 
+bool is_sha256(std::string_view text) {
+  return text.size() == 64 && text.find_first_not_of("0123456789abcdef") == std::string_view::npos;
+}
+
 }  // namespace
 
 JsonObject::JsonObject(const json* value, std::string path, std::optional<Error>* fault)
@@ -110,10 +114,22 @@ std::string JsonObject::one_of(std::string_view key, std::initializer_list<std::
 
 std::string JsonObject::sha256(std::string_view key) {
   std::string value = text(key);
-  if (value.size() != 64 || value.find_first_not_of("0123456789abcdef") != std::string::npos) {
-    reject(key, "must be 64 lower-case hexadecimal digits");
-  }
+  if (!is_sha256(value)) reject(key, "must be 64 lower-case hexadecimal digits");
   return value;
+}
+
+std::vector<std::string> JsonObject::sha256s(std::string_view key) {
+  std::vector<std::string> values;
+  const json* list = take(key);
+  if (!list) return values;
+  for (const json& item : *list) {
+    if (!list->is_array() || !item.is_string() || !is_sha256(item.get<std::string>())) break;
+    values.push_back(item.get<std::string>());
+  }
+  if (!list->is_array() || values.size() != list->size()) {
+    reject(key, "must be a list of texts of 64 lower-case hexadecimal digits");
+  }
+  return values;
 }
 
 std::string JsonObject::inner_path(std::string_view key) {

@@ -300,8 +300,7 @@ TEST_F(Executor, AProcessIsStoppedOnRequestWithAllItStartedAndLeavesNothing) {
   execute("mkdir $out; echo $$ > $out/pid; sleep 600");
   const auto calibration = read_calibration(options.jobs.calibration_file);
   ASSERT_TRUE(calibration) << calibration.error().message;
-  const Manifest manifest;
-  const auto made = options.reconstructor({.calibration = *calibration, .manifest = manifest, .folder = folder_});
+  const auto made = options.reconstructor({.calibration = *calibration, .folder = folder_});
   ASSERT_TRUE(made) << made.error().message;
   std::stop_source asked;
   const auto begun = folder_ / "model.new" / "pid";

@@ -159,14 +159,22 @@ TEST_F(Jobs, AnInterruptedScanGoesOnWhereItStopped) {
 }
 
 TEST_F(Jobs, AScanGoesOnAfterTheDaemonDiedToo) {
+  options.jobs.config_sha256 = std::string(64, 'a');
   boot();
   get_ready();
   const auto id = interrupted_after(1);
-  restart();
+  shut_down();
+  options.jobs.config_sha256 = std::string(64, 'b');
+  boot();
+  get_ready();
+  EXPECT_THAT(job(id)->config_sha256, ElementsAre(std::string(64, 'a')));
   EXPECT_TRUE(job(id)->resumable);
   EXPECT_EQ(rig.turntable.moving, false);
   ASSERT_TRUE(ask_for(What::resume, id));
   finish(id);
+  EXPECT_THAT(job(id)->config_sha256, ElementsAre(std::string(64, 'a'), std::string(64, 'b')));
+  restart();
+  EXPECT_THAT(job(id)->config_sha256, ElementsAre(std::string(64, 'a'), std::string(64, 'b')));
   EXPECT_THAT(log.calls, testing::IsSupersetOf({"view 0/0", "view 0/1", "view 0/2", "pose 0", "pose 1", "finish"}));
 }
 

@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "core/hash.h"
 #include "tests/unit/config/rig_file.h"
 
 namespace scanrig::config {
@@ -53,6 +54,12 @@ TEST_F(RigConfigTest, TheShippedExampleIsReadAsItIsWritten) {
   EXPECT_EQ(rig.reconstruction.voxel_mm, 0.25);
   EXPECT_EQ(rig.api.socket, "/run/scanrig/api.sock");
   EXPECT_FALSE(rig.api.http_port);
+}
+
+TEST_F(RigConfigTest, IsNamedByTheTextItWasReadFrom) {
+  const auto rig = read_rig_config(std::filesystem::path(SCANRIG_SOURCE_DIR) / "config/rigs/example.toml");
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->sha256, sha256(shipped("rigs/example.toml")));
 }
 
 TEST_F(RigConfigTest, EachKindOfProblemIsToldWithItsLineAndWhatIsAllowed) {

@@ -22,6 +22,7 @@ class Index : public scan_samples::FolderTest {
     for (const char* id : {"a", "b", "queued"}) {
       ASSERT_TRUE(store->create(id, {.part = std::string("part ") + id}));
       auto scan = ScanFolder::open(store->folder(id));
+      scan->taken_under(std::string(64, 'c'));
       ASSERT_TRUE(scan->add_view(0, view, scan_samples::raw_view(1)));
       if (id != std::string("queued")) {
         ASSERT_TRUE(scan->add_closure(0, {.shift_px = 3, .spoilt = {{ErrorCode::protocol, "right camera: torn"}}}));
@@ -39,6 +40,7 @@ class Index : public scan_samples::FolderTest {
     EXPECT_EQ(jobs->at("a")->state, JobState::failed);
     EXPECT_EQ(jobs->at("a")->error->code, ErrorCode::moved);
     EXPECT_EQ(jobs->at("b")->part, "part b");
+    EXPECT_EQ(jobs->at("b")->config_sha256, std::vector{std::string(64, 'c')});
     EXPECT_EQ(jobs->at("b")->stored.at(0).measured_deg, 0.25);
     EXPECT_EQ(jobs->at("b")->stored.at(0).spoilt.at(0).code, ErrorCode::timeout);
     EXPECT_EQ(jobs->at("b")->stored.at(0).spoilt.at(0).message, "left camera: no frame");

@@ -144,23 +144,44 @@ TEST_F(ScanFolderTest, WhatWasWrongWithExposuresThatWereTakenAgainIsKept) {
 TEST_F(ScanFolderTest, AnOlderFolderIsReadAndBecomesANewOneWithItsNextChange) {
   ScanFolder scan = with_one_view();
   const std::string now = *read_file(scan_ / "scan.json");
-  auto old = replaced(now, "\"version\": 2", "\"version\": 1");
-  const auto closures = old.find(",\n      \"closures\": []");
-  ASSERT_NE(closures, std::string::npos);
-  old.erase(closures, std::string(",\n      \"closures\": []").size());
-  write_text(scan_ / "scan.json", old);
+  auto second = replaced(replaced(now, "\"version\": 3", "\"version\": 2"), "  \"config_sha256\": [],\n", "");
+  const auto first = replaced(replaced(second, "\"version\": 2", "\"version\": 1"), ",\n      \"closures\": []", "");
+  for (const auto& old : {first, second}) {
+    write_text(scan_ / "scan.json", old);
+    auto again = ScanFolder::open(scan_);
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_TRUE(again->manifest().config_sha256.empty());
+    ASSERT_TRUE(again->set_state(again->manifest().state));
+    EXPECT_EQ(*read_file(scan_ / "scan.json"), now);
+  }
+}
+
+TEST_F(ScanFolderTest, EachConfigurationItsViewsWereTakenUnderIsKeptOnce) {
+  const std::string a(64, 'a'), b(64, 'b');
+  {
+    ScanFolder scan = create();
+    scan.taken_under(a);
+    EXPECT_TRUE(ScanFolder::open(scan_)->manifest().config_sha256.empty()) << "it has no views yet";
+    for (int i : {0, 1}) ASSERT_TRUE(scan.add_view(0, record(i), raw_view(i)));
+  }
   auto again = ScanFolder::open(scan_);
   ASSERT_TRUE(again) << again.error().message;
-  ASSERT_TRUE(again->set_state(again->manifest().state));
-  EXPECT_EQ(*read_file(scan_ / "scan.json"), now);
+  EXPECT_EQ(again->manifest().config_sha256, std::vector{a});
+  for (const auto& config : {b, a, std::string()}) {
+    again->taken_under(config);
+    ASSERT_TRUE(again->add_view(0, record(2), raw_view(2)));
+  }
+  EXPECT_EQ(ScanFolder::open(scan_)->manifest().config_sha256, (std::vector{a, b}));
+  edit_manifest(b, "b");
+  expect_refused(ErrorCode::invalid_input, {"scan.json", "config_sha256"});
 }
 
 // The example of docs/scan-folder.md, shortened to one view.
 TEST_F(ScanFolderTest, TheDocumentedManifestIsRead) {
   const std::string zeros(64, '0');
   std::string text = R"({
-    "format": "scanrig-scan", "version": 2, "id": "20261121-093000-1", "created": "2026-11-21T09:30:00Z",
-    "state": "scanning", "source": "stereo", "profile": "",
+    "format": "scanrig-scan", "version": 3, "id": "20261121-093000-1", "created": "2026-11-21T09:30:00Z",
+    "state": "scanning", "source": "stereo", "profile": "", "config_sha256": ["HASH"],
     "calibration": { "file": "calibration.json", "sha256": "HASH" },
     "poses": [
       { "name": "pose1", "complete": true,
@@ -291,7 +312,7 @@ TEST_F(ScanFolderTest, AMissingKeyIsNamedWithItsPath) {
 
 TEST_F(ScanFolderTest, AFutureVersionIsUnsupported) {
   with_one_view();
-  edit_manifest("\"version\": 2", "\"version\": 3");
+  edit_manifest("\"version\": 3", "\"version\": 4");
   expect_refused(ErrorCode::unsupported, {"scan.json", "version"});
 }
 
