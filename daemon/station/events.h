@@ -184,6 +184,9 @@ struct StoreFailed {
   std::string job;
   Error error;
 };
+struct DiskSeen {
+  std::optional<Error> problem{};
+};  ///< the jobs' disk has stopped answering, or answers again
 struct StageProgress {
   std::string job, stage;
   double fraction;
@@ -212,8 +215,8 @@ using Event =
                  event::PanelFailed, event::Ordered, event::JobAsked, event::Answered, event::JobKnown,
                  event::JobRemoved, event::JobBegun, event::JobNotBegun, event::ClosureTaken, event::ClosureJudged,
                  event::FlipTimedOut, event::ViewStored, event::PoseStored, event::JobClosed, event::StoreFailed,
-                 event::StageProgress, event::ReconstructionFailed, event::ModelReady, event::ReloadAsked,
-                 event::Shutdown>;
+                 event::DiskSeen, event::StageProgress, event::ReconstructionFailed, event::ModelReady,
+                 event::ReloadAsked, event::Shutdown>;
 
 /// What is to be done about it. None of them waits.
 namespace action {

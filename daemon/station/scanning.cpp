@@ -28,6 +28,23 @@ void moved(Machine& m, const Closure& closure) {
   free_rig(m, cause);
 }
 
+/// A disk that takes nothing more is no fault of the rig: what moves is stopped, as by Stop, and nothing latches. What
+/// is stored stays, and with room again the job can be resumed.
+void interrupt_for_disk(Machine& m, const Error& why, const char* then) {
+  const auto id = m.s().job->id;
+  const bool begun = m.s().job->state != JobState::queued;
+  m.s().disk_trouble = true;
+  m.close_job(JobState::interrupted, why);
+  if (m.s().machine == MachineState::error) return;  // a fault came first and has the word
+  auto cause =
+      fmt::format("Job {} {}: {}{}.", id, begun ? "is interrupted" : "was not begun", why.message, begun ? then : "");
+  if (m.s().activity != Activity::scanning) return m.enter(MachineState::ready, std::move(cause));  // nothing moves
+  m.s().machine = MachineState::halted;
+  m.s().home_by_guard = false;
+  m.s().cause = std::move(cause);
+  m.stop_rig();
+}
+
 }  // namespace
 
 void job_begun(Machine& m, const event::JobBegun& e) {
@@ -113,21 +130,16 @@ void continue_after_flip(Machine& m, std::string cause) {
   m.warn();
 }
 
-/// A disk that takes nothing more is no fault of the rig: what moves is stopped, as by Stop, and nothing latches. What
-/// is stored stays, and with room again the job can be resumed.
 void store_failed(Machine& m, const event::StoreFailed& e) {
-  if (!m.has(e.job)) return;
-  const bool begun = m.s().job->state != JobState::queued;
+  if (m.has(e.job)) interrupt_for_disk(m, e.error, "; see to the disk, then resume it");
+}
+
+/// Whoever has the rig waits for the disk sooner or later; better it ends by its name than by a time-out of its own.
+void disk_seen(Machine& m, const event::DiskSeen& e) {
+  m.s().disk_problem = e.problem;
+  if (!e.problem) return begin_on_part(m);
   m.s().disk_trouble = true;
-  m.close_job(JobState::interrupted, e.error);
-  if (m.s().machine == MachineState::error) return;  // a fault came first and has the word
-  auto cause = fmt::format("Job {} {}: {}{}.", e.job, begun ? "is interrupted" : "was not begun", e.error.message,
-                           begun ? "; see to the disk, then resume it" : "");
-  if (m.s().activity != Activity::scanning) return m.enter(MachineState::ready, std::move(cause));  // nothing moves
-  m.s().machine = MachineState::halted;
-  m.s().home_by_guard = false;
-  m.s().cause = std::move(cause);
-  m.stop_rig();
+  if (m.s().job) interrupt_for_disk(m, *e.problem, ", then resume the job");
 }
 
 void flip_timed_out(Machine& m, const event::FlipTimedOut& e) {

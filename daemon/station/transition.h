@@ -73,6 +73,7 @@ struct StationState {
   bool quiet = false;                                   ///< quiet hours: no job begins by itself
   std::chrono::seconds warm_up_left{0};                 ///< of the projector: until then likewise
   bool disk_trouble = false;                            ///< the jobs' disk refused something; until a job begins
+  std::optional<Error> disk_problem{};                  ///< it does not answer: nothing is begun meanwhile
   bool part_gone = false;                               ///< the part of the last job was taken away
 };
 
