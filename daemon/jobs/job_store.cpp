@@ -178,6 +178,7 @@ Result<JobInfo> JobStore::create(const std::string& id, const JobFile& job) cons
   if (made) made = replace_folder(prepared, folder(id));
   if (!made) {
     fs::remove_all(prepared, ignored);
+    fs::remove_all(folder(id), ignored);  // renamed, but its name not synced: nobody is told of it
     return pass_on(made);
   }
   return read(id);

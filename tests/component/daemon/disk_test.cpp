@@ -136,6 +136,20 @@ TEST_F(BadDisk, TakingNothingAtTheStartItLeavesAJobToBeResumed) {
   EXPECT_TRUE(wait_state(id, JobState::done));
 }
 
+TEST_F(BadDisk, AnOrderItDidNotTakeLeavesNoJob) {
+  boot();
+  get_ready();
+  fakes::disk().at_sync([this](const std::string& path) {
+    const bool has_its_name = path == folder_ / "jobs" && !job_folders().empty() &&
+                              !job_folders().back().filename().string().starts_with('.');
+    return has_its_name ? EIO : 0;
+  });
+  const auto ordered = ask(Order{});
+  ASSERT_FALSE(ordered);
+  EXPECT_THAT(ordered.error().message, HasSubstr(std::strerror(EIO)));
+  EXPECT_THAT(job_folders(), testing::IsEmpty()) << "the next daemon would scan what was refused";
+}
+
 TEST_F(BadDisk, HangingItIsNamedInTimeAndTheJobGoesOnWhenItAnswers) {
   const auto id = scan_until_it_hangs();
   const auto hangs_since = clock.now();
