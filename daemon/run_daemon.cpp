@@ -2,6 +2,7 @@
 
 #include <ctime>
 
+#include "daemon/ending_watch.h"
 #include "daemon/jobs/heap.h"
 #include "daemon/jobs/housekeeping_thread.h"
 #include "daemon/journal/news.h"
@@ -14,25 +15,23 @@
 namespace scanrig {
 namespace {
 
-/// The serial number tells apart jobs of one second; a folder that is already there is never taken.
+/// The serial number tells apart jobs of one second; one that is known is never taken. The disk is not asked: it may
+/// hang, and a folder that somebody else has put there is not overwritten later either.
 class FreshIds {
  public:
-  explicit FreshIds(std::filesystem::path root) : root_(std::move(root)) {}
-  std::string operator()() {
+  std::string operator()(const JobTable& known) {
     using namespace std::chrono;
     const auto now = floor<seconds>(system_clock::now());
     if (now != second_) serial_ = 0;
     second_ = now;
-    std::error_code ignored;
     std::string id;
     do {
       id = job_id(now, ++serial_);
-    } while (std::filesystem::exists(root_ / id, ignored));
+    } while (known.contains(id));
     return id;
   }
 
  private:
-  std::filesystem::path root_;
   std::chrono::sys_seconds second_{};
   int serial_ = 0;
 };
@@ -89,6 +88,13 @@ void go_on_reconstructing(const JobTable& jobs, ReconstructionThread& reconstruc
   }
 }
 
+std::optional<Error> disk_problem(Clock::Duration waiting, const DaemonOptions& options) {
+  if (waiting < options.disk_limit) return std::nullopt;
+  return Error{ErrorCode::io,
+               fmt::format("the disk with {} has not answered for {} s: see to it", options.jobs.root.string(),
+                           std::chrono::duration_cast<std::chrono::seconds>(waiting).count())};
+}
+
 /// By the clock on the wall of this machine.
 bool quiet_now(const std::optional<QuietHours>& hours) {
   if (!hours) return false;
@@ -102,6 +108,7 @@ bool quiet_now(const std::optional<QuietHours>& hours) {
 
 Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, Clock& clock, std::stop_token stop) {
   keep_large_blocks_apart();
+  EndingWatch ending(options.ending_limit, options.ending_hangs);
   auto store = JobStore::open(options.jobs);
   if (!store) return pass_on(store);
   auto known = store->recover();
@@ -145,7 +152,7 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
   const Clock::Actor actor(clock);
   starting.reset();
   const Workers workers{rig, jobs, housekeeping};
-  FreshIds fresh_id(store->options().root);
+  FreshIds fresh_id;
   const auto perform_all = [&](const Action& action) {
     perform(action, workers);
     if (std::holds_alternative<action::BeginJob>(action)) housekeeping.sweep();
@@ -162,10 +169,12 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
   auto ended = loop.run({.alive = [&] { options.alive(loop.snapshot()->sentence); },
                          .perform = perform_all,
                          .show = [&](const PanelOutputs& outputs) { panel.show(outputs); },
-                         .fresh_job_id = [&] { return fresh_id(); },
+                         .fresh_job_id = [&] { return fresh_id(loop.snapshot()->jobs); },
                          .quiet_hours = [&] { return quiet_now(options.quiet_hours); },
+                         .disk_problem = [&] { return disk_problem(jobs.waiting(), options); },
                          .published = published,
                          .refused_at_panel = refused});
+  ending.begin();
   reconstruction.stop();  // before views that are still being stored cost the time it has
   return ended;
 }

@@ -34,9 +34,14 @@ struct QuietHours {
 
 struct DaemonOptions {
   JobStoreOptions jobs;
-  std::map<std::string, Recipe> recipes{{"default", {}}};  ///< "default" is what Start scans when nothing is queued
-  std::optional<QuietHours> quiet_hours{};                 ///< no job begins by itself then
-  std::chrono::seconds warm_up{0};                         ///< of the projector; nor before it is warm
+  std::map<std::string, Recipe> recipes{{"default", {}}};   ///< "default" is what Start scans when nothing is queued
+  std::optional<QuietHours> quiet_hours{};                  ///< no job begins by itself then
+  std::chrono::seconds warm_up{0};                          ///< of the projector; nor before it is warm
+  Clock::Duration disk_limit = std::chrono::seconds(30);    ///< a disk that does not answer for so long interrupts jobs
+  Clock::Duration ending_limit = std::chrono::seconds(30);  ///< for what is left when the control loop has ended; real
+  /// The ending has taken longer: from a thread of its own, while the others still wait. Who cannot wait ends the
+  /// process: what is acknowledged is on the disk.
+  std::function<void(const Error&)> ending_hangs = [](const auto&) {};
   RetentionOptions retention{};
   std::optional<HttpAddress> webhook{};  ///< whom failures are told
   ApiOptions api;

@@ -1,6 +1,8 @@
 #include "daemon/service.h"
 
 #include <algorithm>
+#include <cstdio>
+#include <cstdlib>
 #include <utility>
 
 #include "core/version.h"
@@ -63,6 +65,10 @@ DaemonOptions Service::options_for(const config::RigConfig& config, bool again) 
   options.loop_ends = [this] {
     const std::lock_guard guard(mutex_);
     loop_ = nullptr;
+  };
+  options.ending_hangs = [this](const Error& why) {
+    fmt::print(stderr, "{}: the rig was told to stop, but {}: the process ends as if killed.\n", name_, why.message);
+    std::_Exit(static_cast<int>(exit_code(why.code)));
   };
   options.alive = [this](const std::string& sentence) {
     begun_ = true;

@@ -173,7 +173,10 @@ Result<JobInfo> JobStore::create(const std::string& id, const JobFile& job) cons
   manifest.created = iso_time(std::chrono::system_clock::now());
   manifest.state = "queued";
   manifest.profile = options_.profile;
-  if (auto made = make(std::move(manifest), job); !made) return pass_on(made);
+  if (auto made = make(std::move(manifest), job); !made) {
+    fs::remove_all(folder(id), ignored);  // renamed, but its name not synced: nobody is told of it
+    return pass_on(made);
+  }
   return read(id);
 }
 

@@ -33,7 +33,8 @@ Result<void> keep_images(const ScanFolder& scan, int pose, std::size_t number, c
 
 JobThread::JobThread(Clock& clock, const JobStore& store, ReconstructionThread& reconstruction, ScannedHook on_scanned,
                      std::function<void(Event)> tell)
-    : store_(store),
+    : clock_(clock),
+      store_(store),
       reconstruction_(reconstruction),
       on_scanned_(std::move(on_scanned)),
       tell_(std::move(tell)),
@@ -47,11 +48,13 @@ JobThread::~JobThread() {
 
 void JobThread::run() {
   while (auto task = inbox_.take()) {
+    gets_on();
     const auto done = guarded("storing", [&]() -> Result<void> {
       std::visit([this](const auto& t) { handle(t); }, *task);
       return {};
     });
     if (!done) end(*task, done.error());
+    since_ = kIdle;
   }
 }
 
@@ -75,6 +78,11 @@ void JobThread::end(const Task& task, const Error& why) {
              task);
 }
 
+Clock::Duration JobThread::waiting() const {
+  const auto since = since_.load();
+  return since == kIdle ? Clock::Duration::zero() : clock_.now().time_since_epoch() - Clock::Duration(since);
+}
+
 void JobThread::answer(Ticket ticket, const Result<void>& done, const std::string& result) {
   if (ticket == 0) return;
   if (done) return tell_(event::Answered{ticket, result});
@@ -96,6 +104,7 @@ void JobThread::handle(const action::CreateJobs& task) {
   Result<void> done;
   auto place = task.place;
   for (const auto& id : task.ids) {
+    gets_on();
     auto job = store_.create(id, {.recipe = task.recipe, .part = task.part, .place = place++});
     if (!job) {
       done = pass_on(job);
@@ -283,6 +292,7 @@ Result<Closure> JobThread::judge(const TakenView& again) {
       compare_views(first->right_plain, now->right_plain, allowing_for(turned, calibration->right, *calibration));
   if (!right) return pass_on(right);
 
+  gets_on();  // comparing takes its time too
   const Closure closure{again.id.pose, std::max(left->shift_px, right->shift_px),
                         std::max(left->changed, right->changed), left->unmoved && right->unmoved, again.record.spoilt};
   if (!closure.unmoved) {

@@ -31,6 +31,7 @@ Result<Ended> ControlLoop::run(const StationPorts& ports) {
   show(ports);
   while (!state_.finished) {
     ports.alive();
+    look_at_the_disk(ports);
     auto next_later = std::ranges::min_element(later_, {}, [](const auto& one) { return one.second.at; });
     const auto later = next_later == later_.end() ? Clock::TimePoint::max() : next_later->second.at;
     auto message = inbox_.take(std::min({later, next_blink_, give_up_, clock_.now() + kSignOfLife}));
@@ -119,6 +120,12 @@ void ControlLoop::look_at_the_time(const StationPorts& ports) {
   if (left != state_.warm_up_left) handle({event::WarmingUp{left}, {}}, ports);
 }
 
+/// It is told when it stops answering, and when it answers again.
+void ControlLoop::look_at_the_disk(const StationPorts& ports) {
+  auto problem = ports.disk_problem();
+  if (problem.has_value() != state_.disk_problem.has_value()) handle({event::DiskSeen{std::move(problem)}, {}}, ports);
+}
+
 /// A projector that was away may have been without power: it begins anew.
 std::chrono::seconds ControlLoop::warm_up_left() {
   const auto now = clock_.now();
@@ -137,6 +144,10 @@ void ControlLoop::carry_out(const Action& action, const StationPorts& ports) {
                  [&](const action::WaitForFlip& flip) { wake_later(event::FlipTimedOut{flip.job}, flip.limit); },
                  [&](const action::CheckLater&) { wake_later(event::CheckDue{}, options_.check_period); },
                  [&](const action::TestLamps&) { lamps_tested_ = clock_.now() + kLampTest; },
+                 [&](const action::CloseJob& task) {
+                   close(jobs_, task);
+                   ports.perform(task);
+                 },
                  [&](const auto& other) { ports.perform(other); }},
       action);
 }
@@ -164,6 +175,7 @@ void ControlLoop::publish(const StationPorts& ports) {
   auto devices = state_.devices;
   const auto* const calibration = calibration_problem(state_);
   devices.push_back({"panel", state_.panel_problem});
+  if (state_.disk_problem) devices.push_back({"disk", state_.disk_problem});
   std::vector<std::string> queue;
   for (const auto& job : state_.queue) queue.push_back(job->id);
   auto snapshot = std::make_shared<const Snapshot>(Snapshot{

@@ -195,6 +195,9 @@ struct StoreFailed {
   std::string job;
   Error error;
 };
+struct DiskSeen {
+  std::optional<Error> problem{};
+};  ///< the jobs' disk has stopped answering, or answers again
 struct StageProgress {
   std::string job, stage;
   double fraction;
@@ -223,7 +226,7 @@ using Event =
                  event::PanelFailed, event::Ordered, event::JobAsked, event::Answered, event::JobKnown,
                  event::JobRemoved, event::JobBegun, event::JobNotBegun, event::JobUnreadable, event::ClosureTaken,
                  event::ClosureJudged, event::FlipTimedOut, event::ViewStored, event::PoseStored, event::JobClosed,
-                 event::StoreFailed, event::StageProgress, event::ReconstructionFailed, event::ModelReady,
+                 event::StoreFailed, event::DiskSeen, event::StageProgress, event::ReconstructionFailed, event::ModelReady,
                  event::ReloadAsked, event::Shutdown>;
 
 /// What is to be done about it. None of them waits.

@@ -42,6 +42,7 @@ void update(JobTable& table, const Event& event) {
           [&](const event::JobRemoved& e) { table.erase(e.job); },
           [&](const event::JobBegun& e) {
             change(table, e.job, [](JobInfo& job) {
+              if (is_final(job.state)) return;  // it was closed before the disk had let it begin
               job.state = JobState::scanning;
               job.resumable = false;
               job.error.reset();
@@ -59,7 +60,7 @@ void update(JobTable& table, const Event& event) {
           },
           [&](const event::ViewStored& e) {
             change(table, e.id.job, [&](JobInfo& job) {
-              job.state = JobState::scanning;
+              if (!is_final(job.state)) job.state = JobState::scanning;
               job.stored.push_back({e.id.pose, e.id.view, e.measured_deg, e.spoilt, e.commanded_deg, e.settling_ms});
               job.config_sha256 = e.config_sha256;
             });
@@ -90,6 +91,13 @@ void update(JobTable& table, const Event& event) {
           [](const auto&) {},  // concerns the machine only
       },
       event);
+}
+
+void close(JobTable& table, const action::CloseJob& task) {
+  change(table, task.job, [&](JobInfo& job) {
+    std::tie(job.state, job.error) = std::tuple(task.state, task.why);
+    job.resumable = task.state == JobState::interrupted && std::ranges::all_of(job.closures, &Closure::unmoved);
+  });
 }
 
 }  // namespace scanrig

@@ -14,4 +14,7 @@ using JobTable = std::map<std::string, std::shared_ptr<const JobInfo>>;
 /// The table after `event`. Jobs the table does not know are ignored, except in JobKnown.
 void update(JobTable& table, const Event& event);
 
+/// The table once `task` is handed out: to whoever looks the job has ended, however long its disk takes to note it.
+void close(JobTable& table, const action::CloseJob& task);
+
 }  // namespace scanrig

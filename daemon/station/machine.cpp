@@ -119,6 +119,12 @@ void Machine::check() {
   act(action::CheckCalibration{calibrated_job(s())});
 }
 
+bool Machine::disk_answers() {
+  const auto& problem = s().disk_problem;
+  if (problem) refuse(problem->code, "Not now: {}.", problem->message);
+  return !problem;
+}
+
 bool Machine::remote_may_move(std::string_view what) {
   if (!rules_.remote || !rules_.guard) {
     refuse(ErrorCode::refused, "Remote {} is switched off: do it at the panel.", what);

@@ -47,6 +47,8 @@ class Machine {
   bool safe_to_move();
   /// The same for whoever is not at the panel: he needs a guard between him and the table.
   bool remote_may_move(std::string_view what);
+  /// Refuses, and says why, while the jobs' disk does not answer.
+  bool disk_answers();
   /// The first device that is known to be absent; null: all are there.
   const DeviceHealth* absent_device();
   /// Refuses, and says why, unless all devices are there. What is absent does not let a job begin.
@@ -99,6 +101,7 @@ void closure_taken(Machine& m, const event::ClosureTaken& e);
 void closure_judged(Machine& m, const event::ClosureJudged& e);
 void pose_stored(Machine& m, const event::PoseStored& e);
 void store_failed(Machine& m, const event::StoreFailed& e);
+void disk_seen(Machine& m, const event::DiskSeen& e);
 /// There will be no model of the job that has the rig.
 void model_given_up(Machine& m, const Error& why);
 /// The object was turned over.

@@ -41,6 +41,7 @@ void look_at_queue(Machine& m) {
 
 void take_order(Machine& m, const event::Ordered& asked) {
   if (m.s().shutting_down) return m.refuse(ErrorCode::refused, "The daemon is shutting down.");
+  if (!m.disk_answers()) return;
   const auto recipe = m.rules().recipes.find(asked.order.recipe);
   if (recipe == m.rules().recipes.end()) {
     return m.refuse(ErrorCode::not_found, "There is no recipe \"{}\": name one of rig.toml.", asked.order.recipe);
@@ -57,6 +58,7 @@ void take_order(Machine& m, const event::Ordered& asked) {
 void ask_job(Machine& m, const event::JobAsked& asked) {
   auto& s = m.s();
   if (s.shutting_down) return m.refuse(ErrorCode::refused, "The daemon is shutting down.");
+  if (!m.disk_answers()) return;
   if (m.has(asked.job)) {
     return m.refuse(ErrorCode::busy, "Job {} has the rig: press Stop first, or wait.", asked.job);
   }
@@ -169,7 +171,7 @@ void serve_line(Machine& m) {
     return continue_after_flip(m, kTurnedOver);
   }
   if (s.activity != Activity::waiting_for_part || !s.part_gone || !s.inputs.part_present) return;
-  if (s.quiet || s.warm_up_left > std::chrono::seconds(0)) return;
+  if (s.quiet || s.warm_up_left > std::chrono::seconds(0) || s.disk_problem) return;
   if (!goes_on_by_itself(s) || s.shutting_down || m.unsafe() || m.absent_device()) return;
   if (calibration_problem(s)) return;
   begin_next_job(m, {}, "A new part is on the table.");

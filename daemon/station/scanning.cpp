@@ -35,6 +35,22 @@ void fail_before_flip(Machine& m) {
   free_rig(m, fmt::format("Job {} failed.", job.id));
 }
 
+/// A disk that takes nothing more is no fault of the rig: what moves is stopped, as by Stop, and nothing latches. What
+/// is stored stays, and with room again the job can be resumed.
+void interrupt(Machine& m, const Error& why, const char* then) {
+  const auto id = m.s().job->id;
+  const bool begun = m.s().job->state != JobState::queued;
+  m.close_job(JobState::interrupted, why);
+  if (m.s().machine == MachineState::error) return;  // a fault came first and has the word
+  auto cause =
+      fmt::format("Job {} {}: {}{}.", id, begun ? "is interrupted" : "was not begun", why.message, begun ? then : "");
+  if (m.s().activity != Activity::scanning) return m.enter(MachineState::ready, std::move(cause));  // nothing moves
+  m.s().machine = MachineState::halted;
+  m.s().home_by_guard = false;
+  m.s().cause = std::move(cause);
+  m.stop_rig();
+}
+
 }  // namespace
 
 void job_begun(Machine& m, const event::JobBegun& e) {
@@ -126,22 +142,20 @@ void continue_after_flip(Machine& m, std::string cause) {
   m.warn();
 }
 
-/// A disk that takes nothing more is no fault of the rig: what moves is stopped, as by Stop, and nothing latches. What
-/// is stored stays, and with room again the job can be resumed.
 void store_failed(Machine& m, const event::StoreFailed& e) {
   if (!m.has(e.job)) return;
-  const bool begun = m.s().job->state != JobState::queued;
-  m.s().disk_trouble = e.error.code == ErrorCode::io;
-  if (!begun) m.s().not_begun = {e.job, e.error};
-  m.close_job(JobState::interrupted, e.error);
-  if (m.s().machine == MachineState::error) return;  // a fault came first and has the word
-  auto cause = fmt::format("Job {} {}: {}{}.", e.job, begun ? "is interrupted" : "was not begun", e.error.message,
-                           begun && m.s().disk_trouble ? "; see to the disk, then resume it" : "");
-  if (m.s().activity != Activity::scanning) return m.enter(MachineState::ready, std::move(cause));  // nothing moves
-  m.s().machine = MachineState::halted;
-  m.s().home_by_guard = false;
-  m.s().cause = std::move(cause);
-  m.stop_rig();
+  const bool disk = e.error.code == ErrorCode::io;
+  m.s().disk_trouble = disk;
+  if (m.s().job->state == JobState::queued) m.s().not_begun = {e.job, e.error};
+  interrupt(m, e.error, disk ? "; see to the disk, then resume it" : "");
+}
+
+/// Whoever has the rig waits for the disk sooner or later; better it ends by its name than by a time-out of its own.
+void disk_seen(Machine& m, const event::DiskSeen& e) {
+  m.s().disk_problem = e.problem;
+  if (!e.problem) return serve_line(m);
+  m.s().disk_trouble = true;
+  if (m.s().job) interrupt(m, *e.problem, ", then resume the job");
 }
 
 void flip_timed_out(Machine& m, const event::FlipTimedOut& e) {

@@ -171,6 +171,7 @@ class Transition : public Machine {
   void operator()(const event::FlipTimedOut& e) { flip_timed_out(*this, e); }
 
   void operator()(const event::StoreFailed& e) { store_failed(*this, e); }
+  void operator()(const event::DiskSeen& e) { disk_seen(*this, e); }
 
   void operator()(const event::ReconstructionFailed& e) {
     count_result(*this, e.job, false);
@@ -191,6 +192,7 @@ class Transition : public Machine {
       return refuse(ErrorCode::busy, "{}: the station is {} ({}). Try again when it stands idle.", kStays,
                     to_string(s().machine), to_string(s().activity));
     }
+    if (!disk_answers()) return;
     if (!e.still_doing.empty()) return refuse(ErrorCode::busy, "{}: {}. Try again later.", kStays, e.still_doing);
     s().shutting_down = s().reloading = true;
     s().machine = MachineState::halted;
@@ -212,8 +214,10 @@ class Transition : public Machine {
     stop_rig();
   }
 
+  /// Whatever the folder said while it was on its way to the rig, the job does not wait for the rig any more.
+  void operator()(const event::JobClosed& e) { job_removed(*this, e.job); }
+
   // These concern the list of jobs or whoever asked.
-  void operator()(const event::JobClosed&) {}
   void operator()(const event::StageProgress&) {}
   void operator()(const event::Answered&) {}
 
@@ -246,7 +250,7 @@ class Transition : public Machine {
     if (!free && !flipped) {
       return refuse(ErrorCode::busy, "The station is busy ({}).", to_string(s().activity));
     }
-    if (!safe_to_move() || !all_there()) return;
+    if (!safe_to_move() || !all_there() || !disk_answers()) return;
     if (!flipped && !calibrated()) return;
     s().failures = 0;
     if (flipped) return continue_after_flip(*this, "The object was turned over.");

@@ -80,6 +80,7 @@ struct StationState {
   std::chrono::seconds warm_up_left{0};                 ///< of the projector: until then likewise
   bool disk_trouble = false;                            ///< the jobs' disk refused something; until a job begins
   std::optional<NotBegun> not_begun{};                  ///< by the last Start; until the next one
+  std::optional<Error> disk_problem{};                  ///< it does not answer: nothing is begun meanwhile
   bool part_gone = false;                               ///< the part of the last job was taken away
 };
 

@@ -132,6 +132,7 @@ Words when_ready(const StationState& state, const StationRules& rules) {
 
 /// What has to be seen to besides: the next action alone would lead into the same trouble again.
 Words with_disk(const StationState& state, Words words) {
+  if (state.disk_problem) words.sentence += " The disk of the jobs does not answer.";
   if (state.disk_trouble) words.next_action.insert(0, "See to the disk of the jobs. ");
   return words;
 }

@@ -86,6 +86,24 @@ TEST_F(Jobs, ARemovedJobIsGone) {
   EXPECT_TRUE(table.empty());
 }
 
+TEST_F(Jobs, AJobIsClosedForWhoeverLooksAndWhatTheDiskSaysLateDoesNotOpenIt) {
+  begin();
+  tell(event::ViewStored{{"a", 0, 0}, 0.0});
+  close(table, {"a", JobState::interrupted, {ErrorCode::io, "the disk does not answer"}});
+  EXPECT_EQ(job().state, JobState::interrupted);
+  EXPECT_EQ(job().error->message, "the disk does not answer");
+  EXPECT_TRUE(job().resumable);
+  tell(event::ViewStored{{"a", 0, 1}, 0.0});
+  tell(event::JobBegun{"a", 0, 0});
+  EXPECT_EQ(job().state, JobState::interrupted);
+  EXPECT_EQ(job().error->message, "the disk does not answer");
+  EXPECT_EQ(job().stored.size(), 2u) << "it is there all the same";
+
+  tell(event::ClosureJudged{"a", {.unmoved = false}});
+  close(table, {"a", JobState::interrupted, {ErrorCode::moved, "moved"}});
+  EXPECT_FALSE(job().resumable);
+}
+
 TEST_F(Jobs, AClosedJobSaysWhy) {
   begin();
   tell(event::JobClosed{"a", JobState::cancelled, {ErrorCode::stopped, "Stop was pressed"}});

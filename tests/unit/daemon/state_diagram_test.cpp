@@ -86,6 +86,7 @@ std::vector<Named> of_jobs() {
       {"last pose stored", event::PoseStored{"job", 1}},
       {"flip time-out", event::FlipTimedOut{"job"}},
       {"disk failed", event::StoreFailed{"job", kError}},
+      {"disk does not answer", event::DiskSeen{kError}},
       {"part taken away", inputs(false)},
       {"new part", inputs(true)},
       {"no model", event::ReconstructionFailed{"job", kError}},
@@ -224,6 +225,7 @@ bool can_happen(const Node& node, const Event& event) {
             return job && !job->closing && e.pose == job->pose && s.activity == Activity::storing;
           },
           [&](const event::StoreFailed&) { return job != nullptr; },
+          [&](const event::DiskSeen&) { return job != nullptr; },
           [&](const event::ReconstructionFailed&) { return job || state == JobState::reconstructing; },
           [&](const event::ModelReady&) { return listed && state == JobState::reconstructing; },
           [](const auto&) { return true; },

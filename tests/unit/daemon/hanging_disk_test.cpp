@@ -1,0 +1,108 @@
+#include <gmock/gmock.h>
+
+#include "daemon/station/words.h"
+#include "tests/unit/daemon/station_under_test.h"
+
+namespace scanrig {
+namespace {
+
+using testing::HasSubstr;
+
+/// The jobs' disk does not answer.
+class HangingDisk : public Station {
+ protected:
+  void hang() {
+    tell(event::DiskSeen{Error{ErrorCode::io, "the disk with /jobs has not answered for 30 s: see to it"}});
+  }
+  void expect_interrupted() {
+    ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
+    EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::interrupted);
+    EXPECT_THAT(asked_for<action::CloseJob>()->why.message, HasSubstr("/jobs has not answered"));
+    EXPECT_FALSE(state.job);
+    EXPECT_FALSE(state.latched) << "it is no fault of the rig";
+  }
+};
+
+TEST_F(HangingDisk, InterruptsTheScanAndStopsTheRig) {
+  begin_scan();
+  take(0, 0);
+  hang();
+  expect_interrupted();
+  EXPECT_NE(asked_for<action::StopRig>(), nullptr);
+  EXPECT_EQ(state.machine, MachineState::halted);
+  EXPECT_THAT(state.cause, HasSubstr("for 30 s: see to it, then resume the job."));
+}
+
+TEST_F(HangingDisk, InterruptsTheJobWhereNothingMovesToo) {
+  reach_flip();
+  hang();
+  expect_interrupted();
+  EXPECT_EQ(asked_for<action::StopRig>(), nullptr);
+  EXPECT_EQ(state.machine, MachineState::ready);
+}
+
+TEST_F(HangingDisk, BeginsNothingUntilItAnswers) {
+  get_ready();
+  know(queued("a", 1));
+  hang();
+  EXPECT_EQ(state.machine, MachineState::ready);
+  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("See to the disk"));
+  EXPECT_THAT(describe(state, rules).sentence, HasSubstr("does not answer"));
+  const auto expect_refused = [&] {
+    ASSERT_TRUE(refused);
+    EXPECT_EQ(refused->code, ErrorCode::io);
+    EXPECT_THAT(refused->message, HasSubstr("/jobs has not answered for 30 s: see to it"));
+    EXPECT_TRUE(actions.empty());
+  };
+  press(Button::start);
+  expect_refused();
+  tell(event::Ordered{.order = {}, .fresh_ids = {"b"}});
+  expect_refused();
+  tell(event::JobAsked{.what = event::JobAsked::What::cancel, .job = "a"});
+  expect_refused();
+  tell(event::ReloadAsked{});
+  expect_refused();
+
+  tell(event::DiskSeen{});
+  press(Button::start);
+  EXPECT_NE(asked_for<action::BeginJob>(), nullptr);
+}
+
+TEST_F(HangingDisk, HoldsTheLineAndLetsItGoOn) {
+  rules.recipes["line"] = {.name = "line", .poses = 1, .views = 1, .start_on_part = true};
+  get_ready();
+  know(queued("a", 1, rules.recipes["line"]));
+  know(queued("b", 2, rules.recipes["line"]));
+  press(Button::start);
+  tell(event::JobBegun{"a", 0, 0});
+  tell(event::WarningOver{});
+  tell(event::ViewTaken{std::make_shared<TakenView>(TakenView{.id = {"a", 0, 0}})});
+  tell(event::ViewStored{{"a", 0, 0}, 0.0});
+  tell(event::ClosureTaken{std::make_shared<TakenView>(TakenView{.id = {"a", 0, 0}})});
+  tell(event::ClosureJudged{"a", {.unmoved = true}});
+  tell(event::PoseStored{"a", 0});
+  ASSERT_EQ(state.activity, Activity::waiting_for_part);
+  hang();
+  event::InputsSeen part{};
+  part.inputs.part_present = false;
+  tell(part);
+  part.inputs.part_present = true;
+  tell(part);
+  EXPECT_EQ(asked_for<action::BeginJob>(), nullptr);
+  tell(event::DiskSeen{});
+  ASSERT_NE(asked_for<action::BeginJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::BeginJob>()->job, "b");
+}
+
+TEST_F(HangingDisk, AJobThatWasStoppedBeforeItsFolderWasThereIsNotQueued) {
+  get_ready();
+  press(Button::start);
+  press(Button::stop);
+  know(queued("job", 0));
+  tell(event::JobBegun{"job", 0, 0});
+  tell(event::JobClosed{"job", JobState::cancelled, {ErrorCode::stopped, "Stop was pressed"}});
+  EXPECT_TRUE(state.queue.empty());
+}
+
+}  // namespace
+}  // namespace scanrig
