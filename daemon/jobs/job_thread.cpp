@@ -29,6 +29,15 @@ Result<void> keep_images(const ScanFolder& scan, int pose, std::size_t number, c
   return write_files_synced(folder, files);
 }
 
+/// The job has the calibration that it is scanned with, and that is of the rig's cameras.
+Result<void> settle_calibration(const JobStore& store, const JobInfo& job) {
+  if (!has_views(job)) {
+    if (auto same = store.check_cameras(""); !same) return same;
+    if (auto renewed = store.renew_calibration(job); !renewed) return renewed;
+  }
+  return store.check_cameras(job.id);
+}
+
 }  // namespace
 
 JobThread::JobThread(Clock& clock, const JobStore& store, ReconstructionThread& reconstruction, ScannedHook on_scanned,
@@ -120,8 +129,7 @@ void JobThread::handle(const action::BeginJob& task) {
   const auto job = read_whole(task.job);
   if (!job) return set_aside(task.job, job.error());
   auto begun = store_.check_room(*job);
-  if (begun && !has_views(*job)) begun = store_.renew_calibration(*job);
-  if (begun) begun = store_.check_cameras(task.job);
+  if (begun) begun = settle_calibration(store_, *job);
   if (begun) begun = begin(*job);
   if (begun) return;
   tell_(event::JobNotBegun{task.job, begun.error()});

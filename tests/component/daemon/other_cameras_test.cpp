@@ -98,6 +98,7 @@ TEST_F(OtherCameras, RefuseAScanWhoseFileIsReplacedAMomentBeforeStart) {
   clock.sleep_for(minutes(1));
   EXPECT_EQ(moves(), before);
   EXPECT_EQ(loop->snapshot()->machine, MachineState::ready);
+  EXPECT_THAT(loop->snapshot()->cause, testing::Not(HasSubstr("was begun with"))) << "it has no views";
   EXPECT_THAT(loop->snapshot()->next_action, StartsWith("See to the calibration: "));
 }
 

@@ -1,5 +1,9 @@
 #include "tests/system/daemon/programs.h"
 
+#include <regex>
+
+#include "core/files.h"
+
 namespace scanrig {
 namespace {
 
@@ -85,6 +89,25 @@ TEST_F(Programs, AJobIsQueuedShownCancelledAndRemovedFromTheCommandLine) {
   for (const auto& entry : fs::directory_iterator(folder_ / "jobs")) {
     EXPECT_FALSE(entry.path().filename().string().starts_with(".bundle")) << entry.path();
   }
+}
+
+TEST_F(Programs, AStartWithACalibrationOfOtherCamerasIsRefusedByItsCode) {
+  boot("none");
+  const auto wait_for = [&](const char* what, const std::string& begin) {
+    return ask_until("status", [&](const json& now) { return now[what].get<std::string>().starts_with(begin); });
+  };
+  wait_for("next_action", "Press Reset");
+  ASSERT_EQ(scanrig({"reset", "--socket", socket()}), 0) << output;
+  wait_for("machine", "Operational.Ready");
+  const auto file = folder_ / "jobs" / "calibration.json";
+  const auto own = *read_file(file);
+  ASSERT_TRUE(write_file_atomically(file, std::regex_replace(own, std::regex("SIM-L"), "40012345")));
+  wait_for("next_action", "See to the calibration: ");
+  EXPECT_EQ(scanrig({"start", "--socket", socket()}), 6);
+  EXPECT_THAT(output, HasSubstr("of the cameras 40012345 (left) and SIM-R (right), but the rig has SIM-L and SIM-R"));
+  ASSERT_TRUE(write_file_atomically(file, own));
+  wait_for("next_action", "Put an object on the table");
+  EXPECT_EQ(scanrig({"start", "--socket", socket()}), 0) << output;
 }
 
 TEST_F(Programs, WatchTellsWhatChangesUntilItIsInterrupted) {
