@@ -47,11 +47,10 @@ Result<Ended> ControlLoop::run(const StationPorts& ports) {
     }
   }
   inbox_.close();
-  if (state_.reloading) return Ended::reload;
   if (!state_.finished || state_.may_be_moving) {
     return fail(ErrorCode::timeout, "the rig was not seen stopped before the daemon ended: the table may be moving");
   }
-  return Ended::shut_down;
+  return state_.reloading ? Ended::reload : Ended::shut_down;
 }
 
 void ControlLoop::handle(Message message, const StationPorts& ports) {

@@ -66,8 +66,8 @@ class ControlLoop {
   void ask(event::ReloadAsked what, Reply reply) { inbox_.post({std::move(what), std::move(reply)}); }
   [[nodiscard]] std::shared_ptr<const Snapshot> snapshot() const { return published_.get(); }
 
-  /// Runs until a Shutdown or a reload is done. Fails with `timeout` when the rig was not seen stopped by a Shutdown;
-  /// before a reload it stood, and whoever comes next stops it first.
+  /// Runs until a Shutdown or a reload is done. Fails with `timeout` when the rig was not seen stopped by it: under a
+  /// new configuration another drive might be asked.
   Result<Ended> run(const StationPorts& ports);
 
  private:

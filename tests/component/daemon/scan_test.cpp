@@ -274,6 +274,22 @@ TEST_F(Daemon, AShutdownWithAnUnreachableTableSaysSo) {
   EXPECT_THAT(result.error().message, HasSubstr("may be moving"));
 }
 
+/// Under a new configuration it may be another drive that is asked.
+TEST_F(Daemon, AReloadWithAnUnreachableTableEndsTheDaemonInsteadOfForgettingIt) {
+  boot();
+  get_ready();
+  {
+    const std::lock_guard guard(rig.turntable.mutex);
+    rig.turntable.unreachable = true;
+  }
+  loop->ask(event::ReloadAsked{}, [](const auto&) {});
+  thread.join();
+  rig.panel.detach();
+  ASSERT_FALSE(result);
+  EXPECT_EQ(result.error().code, ErrorCode::timeout);
+  EXPECT_THAT(result.error().message, HasSubstr("may be moving"));
+}
+
 TEST_F(Daemon, AFailedReconstructionFailsTheJobAndLeavesNoModel) {
   log.answer_to_finish = fail(ErrorCode::same_rest, "the object was not turned over");
   boot();
