@@ -233,6 +233,7 @@ Result<void> JobThread::cancel(const JobInfo& job) {
   }
   if (auto noted = write_failure(job.folder, {ErrorCode::stopped, "cancelled on request"}); !noted) {
     // Nobody works on it any more, and nobody else tells so.
+    if (job.state != JobState::reconstructing) tell_known(job.id);
     if (job.state == JobState::reconstructing) tell_(event::ReconstructionFailed{job.id, noted.error()});
     return noted;
   }

@@ -150,6 +150,17 @@ TEST_F(BadDisk, AnOrderItDidNotTakeLeavesNoJob) {
   EXPECT_THAT(job_folders(), testing::IsEmpty()) << "the next daemon would scan what was refused";
 }
 
+TEST_F(BadDisk, ACancelledJobWhoseReasonItDidNotTakeIsNotQueuedAnyMore) {
+  boot();
+  get_ready();
+  const auto id = ask(Order{});
+  ASSERT_TRUE(id) << id.error().message;
+  fakes::disk().at_sync([](const std::string& path) { return path.find("failure.json") != path.npos ? EIO : 0; });
+  EXPECT_FALSE(ask(event::JobAsked{.what = What::cancel, .job = *id}));
+  EXPECT_EQ(job(*id)->state, JobState::cancelled) << "as its folder says";
+  EXPECT_THAT(loop->snapshot()->queue, testing::IsEmpty());
+}
+
 TEST_F(BadDisk, HangingItIsNamedInTimeAndTheJobGoesOnWhenItAnswers) {
   const auto id = scan_until_it_hangs();
   const auto hangs_since = clock.now();
