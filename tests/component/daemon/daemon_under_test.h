@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <optional>
 #include <thread>
 
 #include "core/virtual_clock.h"
@@ -12,7 +13,7 @@
 
 namespace scanrig {
 
-/// A whole daemon over fake devices on a virtual clock; the test is the operator.
+/// A whole daemon over fake devices on a virtual clock; the test is the operator, for whom time waits too.
 class Daemon : public scan_samples::FolderTest {
  protected:
   void SetUp() override {
@@ -34,8 +35,10 @@ class Daemon : public scan_samples::FolderTest {
     const Clock::Busy until_it_runs(clock);
     thread = std::thread([this] { result = run_daemon(rig.devices(), options, clock, stop.get_token()); });
     rig.panel.wait_attached();
+    at_the_rig.emplace(clock);
   }
   void shut_down() {
+    at_the_rig.reset();
     stop.request_stop();
     thread.join();
     rig.panel.detach();
@@ -161,6 +164,7 @@ class Daemon : public scan_samples::FolderTest {
   std::stop_source stop;
   Result<Ended> result;
   std::thread thread;
+  std::optional<Clock::Actor> at_the_rig;  ///< while the daemon runs
 };
 
 }  // namespace scanrig

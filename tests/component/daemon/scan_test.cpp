@@ -283,6 +283,7 @@ TEST_F(Daemon, AReloadWithAnUnreachableTableEndsTheDaemonInsteadOfForgettingIt) 
     rig.turntable.unreachable = true;
   }
   loop->ask(event::ReloadAsked{}, [](const auto&) {});
+  at_the_rig.reset();
   thread.join();
   rig.panel.detach();
   ASSERT_FALSE(result);
