@@ -76,7 +76,9 @@ void JobThread::end(const Task& task, const Error& why) {
                         },
                         [&](const action::MoveJob& t) { answer(t.ticket, failed, {}); },
                         [&](const action::KeepJob& t) { answer(t.asked.ticket, failed, {}); },
-                        [&](const action::CheckCalibration& t) { tell_(event::CalibrationSeen{t.job, std::nullopt}); },
+                        [&](const action::CheckCalibration& t) {
+                          tell_(event::CalibrationSeen{t.job, std::nullopt});
+                        },
                         [&](const action::StoreView& t) { give_up(t.view->id.job, why); },
                         [&](const action::JudgeClosure& t) { give_up(t.view->id.job, why); },
                         [&](const action::CloseJob& t) {

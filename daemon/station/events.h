@@ -226,8 +226,8 @@ using Event =
                  event::PanelFailed, event::Ordered, event::JobAsked, event::Answered, event::JobKnown,
                  event::JobRemoved, event::JobBegun, event::JobNotBegun, event::JobUnreadable, event::ClosureTaken,
                  event::ClosureJudged, event::FlipTimedOut, event::ViewStored, event::PoseStored, event::JobClosed,
-                 event::StoreFailed, event::DiskSeen, event::StageProgress, event::ReconstructionFailed, event::ModelReady,
-                 event::ReloadAsked, event::Shutdown>;
+                 event::StoreFailed, event::DiskSeen, event::StageProgress, event::ReconstructionFailed,
+                 event::ModelReady, event::ReloadAsked, event::Shutdown>;
 
 /// What is to be done about it. None of them waits.
 namespace action {
