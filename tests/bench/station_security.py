@@ -28,13 +28,24 @@ class Door:
             status = self.once(method, target, token, body, more)
         return status
 
+    def connect(self):
+        """A daemon that was asked for a reload closes its door for a moment."""
+        end = time.monotonic() + PATIENCE_S
+        while True:
+            try:
+                return socket.create_connection(("127.0.0.1", self.port), PATIENCE_S)
+            except ConnectionRefusedError:
+                if time.monotonic() > end:
+                    raise
+                time.sleep(PAUSE_S)
+
     def once(self, method, target, token, body, more):
         text = f"{method} {target} HTTP/1.1\r\nHost: rig\r\nConnection: close\r\n{more}"
         if token:
             text += f"Authorization: Bearer {token}\r\n"
         if body:
             text += f"Content-Length: {len(body.encode('latin-1'))}\r\n"
-        with socket.create_connection(("127.0.0.1", self.port), PATIENCE_S) as peer:
+        with self.connect() as peer:
             peer.settimeout(PATIENCE_S)
             try:
                 peer.sendall((text + "\r\n" + body).encode("latin-1"))
