@@ -1,7 +1,9 @@
 #include "daemon/rig/make_safe.h"
 
+#include <memory>
 #include <set>
 #include <thread>
+#include <utility>
 
 #include "daemon/rig/kept_config.h"
 #include "daemon/rig/open_devices.h"
@@ -30,19 +32,27 @@ Result<void> stop_table(const Result<config::RigConfig>& config, Clock& clock, D
   return until(clock, deadline, [&] { return (*turntable)->stop(deadline); });
 }
 
-Result<void> darken(const Result<config::RigConfig>& config, Clock& clock, Deadline deadline) {
+/// Kept until all is done: a line that is let go falls back, and the lamp on it goes out.
+template <class Device>
+struct Held {
+  std::unique_ptr<gpio::Lines> lines;
+  std::unique_ptr<Device> device;
+};
+
+Result<void> darken(const Result<config::RigConfig>& config, Clock& clock, Deadline deadline, Held<Projector>& held) {
   if (!config) return pass_on(config);
-  const auto lines = open_lines(*config, clock);
-  const auto projector = open_projector(config->projector, *lines, clock);
+  held.lines = open_lines(*config, clock);
+  auto projector = open_projector(config->projector, *held.lines, clock);
   if (!projector) return pass_on(projector);
-  return until(clock, deadline, [&] { return (*projector)->dark(deadline); });
+  held.device = std::move(*projector);
+  return until(clock, deadline, [&] { return held.device->dark(deadline); });
 }
 
-Result<void> show_red(const Result<config::RigConfig>& config, Clock& clock, Deadline deadline) {
+Result<void> show_red(const Result<config::RigConfig>& config, Clock& clock, Deadline deadline, Held<Panel>& held) {
   if (!config) return pass_on(config);
-  const auto lines = open_lines(*config, clock);
-  const auto panel = open_panel(*config, *lines, clock);
-  return until(clock, deadline, [&] { return panel->show({.red = true}, deadline); });
+  held.lines = open_lines(*config, clock);
+  held.device = open_panel(*config, *held.lines, clock);
+  return until(clock, deadline, [&] { return held.device->show({.red = true}, deadline); });
 }
 
 void complain(const char* program, const std::set<std::string>& why) {
@@ -79,8 +89,10 @@ std::set<std::string> errors_of(const Result<Value>&... results) {
 
 MadeSafe make_safe(const DeviceConfigs& config, Clock& clock, Deadline deadline) {
   MadeSafe made;
-  std::thread projector([&] { made.projector = darken(config.projector, clock, deadline); });
-  std::thread panel([&] { made.panel = show_red(config.panel, clock, deadline); });
+  Held<Projector> light;
+  Held<Panel> lamps;
+  std::thread projector([&] { made.projector = darken(config.projector, clock, deadline, light); });
+  std::thread panel([&] { made.panel = show_red(config.panel, clock, deadline, lamps); });
   made.turntable = stop_table(config.turntable, clock, deadline);
   projector.join();
   panel.join();
