@@ -113,6 +113,18 @@ void remove_remains(const fs::path& root, const std::string& name) {
 
 double gib(std::uintmax_t bytes) { return static_cast<double>(bytes) / (1u << 30); }
 
+/// Both pairs in words where the calibration is not of the rig's; a serial number that either lacks is not compared.
+std::optional<std::string> other_cameras(const Calibration& calibration, const CameraSerials& rig) {
+  const auto other = [](const std::string& own, const std::string& rigs) {
+    return !own.empty() && !rigs.empty() && own != rigs;
+  };
+  const auto &left = calibration.left.serial, &right = calibration.right.serial;
+  if (!other(left, rig.left) && !other(right, rig.right)) return {};
+  const auto named = [](const std::string& serial) { return serial.empty() ? std::string("unnamed") : serial; };
+  return fmt::format("the cameras {} (left) and {} (right), but the rig has {} and {}", named(left), named(right),
+                     named(rig.left), named(rig.right));
+}
+
 }  // namespace
 
 Result<JobStore> JobStore::open(JobStoreOptions options) {
@@ -191,25 +203,23 @@ Result<void> JobStore::make(Manifest manifest, const JobFile& job) const {
   return made;
 }
 
-Result<void> JobStore::check_cameras(const std::string& id) const {
-  const auto scan = id.empty() ? std::nullopt : std::optional(ScanFolder::open(folder(id)));
-  if (scan && !*scan) return pass_on(*scan);
-  const auto calibration = scan ? (*scan)->load_calibration() : read_calibration(options_.calibration_file);
+Result<void> JobStore::check_rig_cameras() const {
+  const auto calibration = read_calibration(options_.calibration_file);
   if (!calibration) return pass_on(calibration);
-  const auto other = [](const std::string& own, const std::string& rigs) {
-    return !own.empty() && !rigs.empty() && own != rigs;
-  };
-  const auto &left = calibration->left.serial, &right = calibration->right.serial;
-  const auto& rig = options_.cameras;
-  if (!other(left, rig.left) && !other(right, rig.right)) return {};
-  const auto named = [](const std::string& serial) { return serial.empty() ? std::string("unnamed") : serial; };
-  const auto pairs = fmt::format("the cameras {} (left) and {} (right), but the rig has {} and {}", named(left),
-                                 named(right), named(rig.left), named(rig.right));
-  if (scan) {
-    return fail(ErrorCode::refused, "job {} was begun with {}; cancel it and scan the object again", id, pairs);
-  }
+  const auto others = other_cameras(*calibration, options_.cameras);
+  if (!others) return {};
   return fail(ErrorCode::refused, "{} is of {}; calibrate this pair, or put its own file there",
-              options_.calibration_file.string(), pairs);
+              options_.calibration_file.string(), *others);
+}
+
+Result<void> JobStore::check_job_cameras(const std::string& id) const {
+  const auto scan = ScanFolder::open(folder(id));
+  if (!scan) return pass_on(scan);
+  const auto calibration = scan->load_calibration();
+  if (!calibration) return pass_on(calibration);
+  const auto others = other_cameras(*calibration, options_.cameras);
+  if (!others) return {};
+  return fail(ErrorCode::refused, "job {} was begun with {}; cancel it and scan the object again", id, *others);
 }
 
 Result<void> JobStore::renew_calibration(const JobInfo& job) const {

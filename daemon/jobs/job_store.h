@@ -49,9 +49,12 @@ class JobStore {
   /// Fails with `exists`, `io`, `not_found` and `invalid_input` (the calibration).
   [[nodiscard]] Result<JobInfo> create(const std::string& id, const JobFile& job) const;
 
-  /// Whether the calibration of this job's views (empty: the rig's) is of the rig's cameras; a serial number that it or
-  /// the rig does not have is not compared. Fails with `refused`, naming both, and as read_calibration().
-  [[nodiscard]] Result<void> check_cameras(const std::string& id) const;
+  /// Whether the rig's calibration is of its cameras; a serial number that one of them lacks is not compared.
+  /// Fails with `refused`, naming both, and as read_calibration().
+  [[nodiscard]] Result<void> check_rig_cameras() const;
+
+  /// The same of the calibration that this job's views are taken with. Fails as read() too.
+  [[nodiscard]] Result<void> check_job_cameras(const std::string& id) const;
 
   /// Gives a job that has no views yet the rig's calibration as it is now. Fails as create().
   [[nodiscard]] Result<void> renew_calibration(const JobInfo& job) const;

@@ -32,10 +32,10 @@ Result<void> keep_images(const ScanFolder& scan, int pose, std::size_t number, c
 /// The job has the calibration that it is scanned with, and that is of the rig's cameras.
 Result<void> settle_calibration(const JobStore& store, const JobInfo& job) {
   if (!has_views(job)) {
-    if (auto same = store.check_cameras(""); !same) return same;
+    if (auto same = store.check_rig_cameras(); !same) return same;
     if (auto renewed = store.renew_calibration(job); !renewed) return renewed;
   }
-  return store.check_cameras(job.id);
+  return store.check_job_cameras(job.id);
 }
 
 }  // namespace
@@ -62,13 +62,13 @@ void JobThread::run() {
       std::visit([this](const auto& t) { handle(t); }, *task);
       return {};
     });
-    if (!done) end(*task, done.error());
+    if (!done) fail_task(*task, done.error());
     since_ = kIdle;
   }
 }
 
 /// What was thrown ends as what fails: whoever waits is answered, and the job that has the rig is interrupted.
-void JobThread::end(const Task& task, const Error& why) {
+void JobThread::fail_task(const Task& task, const Error& why) {
   const Result<void> failed = tl::unexpected(why);
   std::visit(Overloaded{[&](const action::CreateJobs& t) {
                           answer(t.ticket, failed, {});
@@ -106,7 +106,7 @@ void JobThread::tell_known(const std::string& job) {
 
 /// A calibration that cannot be read is named when a job is made.
 void JobThread::handle(const action::CheckCalibration& task) {
-  const auto same = store_.check_cameras(task.job);
+  const auto same = task.job.empty() ? store_.check_rig_cameras() : store_.check_job_cameras(task.job);
   const bool refused = !same && same.error().code == ErrorCode::refused;
   tell_(event::CalibrationSeen{task.job, refused ? std::optional(same.error()) : std::nullopt});
 }
@@ -191,7 +191,7 @@ Result<void> JobThread::move(const action::MoveJob& task) {
                 to_string(job->state));
   }
   if (task.resume && has_views(*job)) {
-    if (auto same = store_.check_cameras(task.job); !same) return same;
+    if (auto same = store_.check_job_cameras(task.job); !same) return same;
   }
   auto order = read_job_file(job->folder);
   if (!order) return pass_on(order);

@@ -40,7 +40,7 @@ class JobThread {
   static constexpr auto kIdle = std::numeric_limits<Clock::Duration::rep>::max();
 
   void run();
-  void end(const Task& task, const Error& why);
+  void fail_task(const Task& task, const Error& why);
   void handle(const action::CheckCalibration& task);
   void gets_on() { since_ = clock_.now().time_since_epoch().count(); }
   void handle(const action::CreateJobs& task);

@@ -95,9 +95,10 @@ double noise_of(std::vector<Square> all) {
   return std::max(left(all[all.size() / 2]), kQuantisation);
 }
 
+using Axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>;  ///< of the sums of gradients
+
 /// The shift in those directions that show more than `least`.
-double shift_px(const Square& square, double least) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> axes(square.gradients());
+double shift_px(const Square& square, const Axes& axes, double least) {
   const Eigen::Vector2d along = axes.eigenvectors().transpose() * square.shift();
   return (axes.eigenvalues().array() < least).select(0.0, along.array()).matrix().norm();
 }
@@ -109,12 +110,13 @@ PictureShift shift_of(const std::vector<Square>& all) {
   const double least = kCorrelated * noise / (kSharp * kSharp);
   Square together;
   for (const auto& square : all) {
-    if (square.gradients().selfadjointView<Eigen::Lower>().eigenvalues().maxCoeff() < least) continue;
+    const Axes axes(square.gradients());
+    if (axes.eigenvalues().maxCoeff() < least) continue;
     const double misfit = std::max(0.0, square.unexplained() - noise * square.values);
-    found.squares.push_back({shift_px(square, least), std::sqrt(misfit / square.gradients().trace())});
+    found.squares.push_back({shift_px(square, axes, least), std::sqrt(misfit / square.gradients().trace())});
     if (found.squares.back().misfit_px <= kOtherPx) together += square;
   }
-  found.together_px = shift_px(together, least);
+  found.together_px = shift_px(together, Axes(together.gradients()), least);
   return found;
 }
 

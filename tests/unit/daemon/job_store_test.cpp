@@ -255,7 +255,7 @@ TEST_F(JobStoreTest, ComparesTheSerialNumbersThatAreKnown) {
   for (const auto& [left, right, fits] : {Case{"A1", "A1", true}, Case{"", "", true}, Case{"A1", "", true},
                                           Case{"A1", "B2", false}, Case{"B2", "", false}}) {
     options.cameras = {left, right};
-    const auto checked = open().check_cameras("");
+    const auto checked = open().check_rig_cameras();
     EXPECT_EQ(checked.has_value(), fits) << left << " " << right;
     if (!fits) {
       EXPECT_EQ(checked.error().code, ErrorCode::refused);
@@ -264,7 +264,7 @@ TEST_F(JobStoreTest, ComparesTheSerialNumbersThatAreKnown) {
   scan_samples::write_text(options.calibration_file,
                            std::regex_replace(scan_samples::calibration_json(), std::regex("A1"), ""));
   options.cameras = {"B2", "B3"};
-  EXPECT_TRUE(open().check_cameras("")) << "a calibration that does not say whose it is";
+  EXPECT_TRUE(open().check_rig_cameras()) << "a calibration that does not say whose it is";
 }
 
 TEST_F(JobStoreTest, AJobWithoutViewsIsGivenTheCalibrationAsItIsNow) {

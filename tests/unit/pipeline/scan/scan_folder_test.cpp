@@ -1,78 +1,12 @@
 #include "pipeline/scan/scan_folder.h"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
 #include <limits>
-#include <opencv2/imgcodecs.hpp>
 
-#include "core/hash.h"
-#include "tests/unit/pipeline/scan/scan_samples.h"
+#include "tests/unit/pipeline/scan/scan_folder_fixture.h"
 
 namespace scanrig {
 namespace {
-
-using namespace scan_samples;
-
-class ScanFolderTest : public FolderTest {
- protected:
-  std::filesystem::path scan_ = folder_ / "scan";
-
-  ScanFolder create() {
-    write_text(folder_ / "calibration.json", calibration_json());
-    Manifest manifest;
-    manifest.id = "20261121-093000-1";
-    manifest.created = "2026-11-21T09:30:00Z";
-    auto scan = ScanFolder::create(scan_, manifest, folder_ / "calibration.json");
-    EXPECT_TRUE(scan) << scan.error().message;
-    return std::move(*scan);
-  }
-  ScanFolder with_one_view() {
-    ScanFolder scan = create();
-    EXPECT_TRUE(scan.add_view(0, record(0), raw_view(0)));
-    return scan;
-  }
-  static ViewRecord record(int index) {
-    ViewRecord view;
-    view.index = index;
-    view.commanded_deg = 45.0 * index;
-    view.measured_deg = 45.0 * index + 0.0031;
-    view.settling_ms = 210;
-    view.taken = "2026-11-21T09:30:04Z";
-    return view;
-  }
-  void edit_manifest(const std::string& what, const std::string& with) {
-    write_text(scan_ / "scan.json", replaced(read_file(scan_ / "scan.json").value(), what, with));
-  }
-  /// Opening fails with this code and names these.
-  void expect_refused(ErrorCode code, const std::vector<std::string>& names) {
-    const auto scan = ScanFolder::open(scan_);
-    ASSERT_FALSE(scan);
-    EXPECT_EQ(scan.error().code, code) << scan.error().message;
-    for (const auto& name : names)
-      EXPECT_NE(scan.error().message.find(name), std::string::npos) << scan.error().message;
-  }
-  void expect_unloadable(ErrorCode code, const std::string& name) {
-    const auto scan = ScanFolder::open(scan_);
-    ASSERT_TRUE(scan) << scan.error().message;
-    const auto raw = scan->load_raw(0, 0);
-    ASSERT_FALSE(raw);
-    EXPECT_EQ(raw.error().code, code) << raw.error().message;
-    EXPECT_NE(raw.error().message.find(name), std::string::npos) << raw.error().message;
-  }
-  /// Replaces a stored image and its hash in the manifest, so that only the content can be at fault.
-  void replace_image(const std::string& name, const std::string& bytes) {
-    const std::string old = sha256(read_file(scan_ / name).value());
-    write_text(scan_ / name, bytes);
-    edit_manifest(old, sha256(bytes));
-  }
-};
-
-std::string png(const cv::Mat& image) {
-  std::vector<uchar> bytes;
-  cv::imencode(".png", image, bytes);
-  return {bytes.begin(), bytes.end()};
-}
 
 TEST_F(ScanFolderTest, WhatIsWrittenIsReadBack) {
   {
@@ -280,89 +214,6 @@ TEST_F(ScanFolderTest, ImagesThatDoNotBelongTogetherAreNotStored) {
   EXPECT_EQ(scan.add_view(0, record(0), raw).error().code, ErrorCode::invalid_input);
   EXPECT_EQ(scan.add_view(1, record(0), raw_view(0)).error().code, ErrorCode::invalid_input) << "pose 2 before pose 1";
   EXPECT_TRUE(scan.manifest().poses.empty());
-}
-
-TEST_F(ScanFolderTest, AFolderWithoutAManifestIsNotFound) { expect_refused(ErrorCode::not_found, {"scan.json"}); }
-
-TEST_F(ScanFolderTest, AMissingImageIsNamed) {
-  with_one_view();
-  std::filesystem::remove(scan_ / "pose1/view00/right_plain.png");
-  expect_refused(ErrorCode::not_found, {"pose1/view00/right_plain.png"});
-}
-
-TEST_F(ScanFolderTest, ACompletePoseHasAllItsViews) {
-  with_one_view();
-  edit_manifest("\"complete\": false", "\"complete\": true");
-  EXPECT_TRUE(ScanFolder::open(scan_));
-  edit_manifest("\"index\": 0", "\"index\": 1");
-  expect_refused(ErrorCode::invalid_input, {"scan.json", "poses[0].views", "view 0 is missing"});
-}
-
-TEST_F(ScanFolderTest, AnUnknownKeyIsNamedWithItsPath) {
-  with_one_view();
-  edit_manifest("\"settling_ms\"", "\"speed\": 1, \"settling_ms\"");
-  expect_refused(ErrorCode::invalid_input, {"scan.json", "poses[0].views[0].speed"});
-}
-
-TEST_F(ScanFolderTest, AMissingKeyIsNamedWithItsPath) {
-  with_one_view();
-  edit_manifest("\"measured_deg\"", "\"measured\"");
-  expect_refused(ErrorCode::invalid_input, {"scan.json", "poses[0].views[0].measured_deg"});
-}
-
-TEST_F(ScanFolderTest, AFutureVersionIsUnsupported) {
-  with_one_view();
-  edit_manifest("\"version\": 3", "\"version\": 4");
-  expect_refused(ErrorCode::unsupported, {"scan.json", "version"});
-}
-
-TEST_F(ScanFolderTest, AnUnknownStateIsRefused) {
-  ScanFolder scan = with_one_view();
-  EXPECT_EQ(scan.set_state("asleep").error().code, ErrorCode::invalid_input);
-  edit_manifest("\"scanning\"", "\"asleep\"");
-  expect_refused(ErrorCode::invalid_input, {"scan.json", "state", "asleep"});
-}
-
-TEST_F(ScanFolderTest, HalfAManifestIsRefused) {
-  with_one_view();
-  const std::string text = read_file(scan_ / "scan.json").value();
-  write_text(scan_ / "scan.json", text.substr(0, text.size() / 2));
-  expect_refused(ErrorCode::invalid_input, {"scan.json", "JSON"});
-}
-
-TEST_F(ScanFolderTest, APathOutOfTheFolderIsRefused) {
-  with_one_view();
-  edit_manifest("pose1/view00/left_plain.png", "../left_plain.png");
-  expect_refused(ErrorCode::invalid_input, {"files.left_plain.path"});
-}
-
-TEST_F(ScanFolderTest, AChangedImageIsNoticedByItsHash) {
-  with_one_view();
-  write_text(scan_ / "pose1/view00/left_plain.png", png(raw_view(3).left_plain));
-  expect_unloadable(ErrorCode::invalid_input, "pose1/view00/left_plain.png");
-}
-
-TEST_F(ScanFolderTest, ATruncatedPngIsNamedEvenWhenItsHashIsRight) {
-  with_one_view();
-  const std::string whole = png(raw_view(0).left_plain);
-  replace_image("pose1/view00/left_plain.png", whole.substr(0, whole.size() * 2 / 3));
-  expect_unloadable(ErrorCode::invalid_input, "pose1/view00/left_plain.png");
-}
-
-TEST_F(ScanFolderTest, AnImageOfTheWrongSizeIsNamed) {
-  with_one_view();
-  replace_image("pose1/view00/right_pattern.png", png(cv::Mat::zeros(24, 32, CV_8UC1)));
-  expect_unloadable(ErrorCode::invalid_input, "pose1/view00/right_pattern.png");
-}
-
-TEST_F(ScanFolderTest, AnImageOfSixteenBitsIsRefused) {
-  with_one_view();
-  replace_image("pose1/view00/right_pattern.png", png(cv::Mat::zeros(48, 64, CV_16UC1)));
-  expect_unloadable(ErrorCode::invalid_input, "pose1/view00");
-}
-
-TEST_F(ScanFolderTest, AViewThatIsNotThereIsNotFound) {
-  EXPECT_EQ(with_one_view().load_raw(0, 1).error().code, ErrorCode::not_found);
 }
 
 TEST_F(ScanFolderTest, ARangeViewKeepsItsDepthsAndItsGaps) {
