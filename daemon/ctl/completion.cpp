@@ -69,6 +69,8 @@ std::string bash(const CommandWords& root) {
 _{0}() {{
   local cur=${{COMP_WORDS[COMP_CWORD]}} prev=${{COMP_WORDS[COMP_CWORD-1]}} path={0} i
   COMPREPLY=()
+  # `--option=value` comes as three words
+  if [ "$cur" = = ]; then cur=; elif [ "$prev" = = ]; then prev=${{COMP_WORDS[COMP_CWORD-2]}}; fi
   for ((i = 1; i < COMP_CWORD; i++)); do
     case "$path ${{COMP_WORDS[i]}}" in {1}) path="$path ${{COMP_WORDS[i]}}" ;; esac
   done

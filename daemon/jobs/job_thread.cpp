@@ -212,7 +212,9 @@ Result<void> JobThread::keep(const event::JobAsked& asked) {
   auto job = store_.read(asked.job);
   if (!job) return pass_on(job);
   if (asked.what == What::cancel) return cancel(*job);
-  if (job->state == JobState::reconstructing) return fail(ErrorCode::busy, "job {} is being reconstructed", asked.job);
+  if (job->state == JobState::reconstructing || reconstruction_.has(asked.job)) {
+    return fail(ErrorCode::busy, "job {} is being reconstructed: wait for its end, or cancel it", asked.job);
+  }
   if (asked.what == What::reprocess) return reprocess(std::move(*job), asked);
   auto order = read_job_file(job->folder);
   if (!order) return pass_on(order);

@@ -1,5 +1,6 @@
 #include "daemon/jobs/reconstruction_thread.h"
 
+#include <algorithm>
 #include <cmath>
 #include <type_traits>
 #include <utility>
@@ -74,6 +75,11 @@ bool ReconstructionThread::cancel(const std::string& job) {
     if (run.job == job) found = run.stop.request_stop() || found;
   }
   return found;
+}
+
+bool ReconstructionThread::has(const std::string& job) {
+  const std::lock_guard guard(mutex_);
+  return std::ranges::any_of(runs_, [&](const Run& run) { return run.job == job && !run.stop.stop_requested(); });
 }
 
 ReconstructionThread::Begin ReconstructionThread::enlist(std::string job, std::filesystem::path folder, Recipe recipe,

@@ -43,6 +43,8 @@ class ReconstructionThread {
   /// Ends the work on this job, begun or waiting, soon: nothing more is told of it and its folder is left alone, but
   /// for the model that may be there. False when nothing was to be done on it: then it has ended, and that was told.
   bool cancel(const std::string& job);
+  /// Whether work on this job is begun or waiting, and not cancelled.
+  bool has(const std::string& job);
   /// The daemon ends, on purpose: asks the running stage to stop, takes the mark away before anybody loses patience
   /// with that stage, and drops the rest.
   void stop();

@@ -142,6 +142,22 @@ TEST_F(Jobs, AReconstructionThatWaitsForAnotherCanBeCancelledToo) {
   EXPECT_EQ(std::ranges::count_if(log.calls, is_finish), 3) << "no work is done on what was cancelled";
 }
 
+TEST_F(Jobs, AModelThatIsBeingMadeAgainIsNotAskedForTwice) {
+  boot();
+  get_ready();
+  scan_both_poses();
+  const auto id = newest()->id;
+  ASSERT_TRUE(wait_state(id, JobState::done));
+  Result<std::string> again;
+  log.at_finish = [&] { again = ask_for(What::reprocess, id); };
+  ASSERT_TRUE(ask_for(What::reprocess, id));
+  EXPECT_TRUE(wait_state(id, JobState::done));
+  ASSERT_FALSE(again);
+  EXPECT_EQ(again.error().code, ErrorCode::busy);
+  shut_down();
+  EXPECT_EQ(std::ranges::count(log.calls, "finish"), 2);
+}
+
 TEST_F(Jobs, AnInterruptedScanGoesOnWhereItStopped) {
   boot();
   get_ready();

@@ -61,6 +61,8 @@ TEST_F(Pages, BashOffersVerbsOptionsAndValues) {
   EXPECT_THAT(offered("scanrig status --"), IsSupersetOf({"--json", "--watch", "--follow"}));
   EXPECT_EQ(offered("scanrig token ''").count("revoke"), 1u);
   EXPECT_EQ(offered("scanrig token add x --role ''"), (std::set<std::string>{"viewer", "operator", "engineer"}));
+  EXPECT_EQ(offered("scanrig token add x --role = op"), std::set<std::string>{"operator"});
+  EXPECT_EQ(offered("scanrig token add x --role =").size(), 3u);
   EXPECT_THAT(offered("scanrig maintenance ''"), IsSupersetOf({"on", "off", "jog"}));
 }
 
