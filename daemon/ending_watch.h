@@ -11,7 +11,7 @@
 
 namespace scanrig {
 
-/// Whether the daemon's ending comes to its end: threads that wait for a disk cannot be told to stop.
+/// Whether the daemon's ending comes to its end: threads that wait for a disk or a panel cannot be told to stop.
 /// On the real clock: a virtual one runs away when the threads that hold it have ended.
 /// To be made before those threads and destroyed after them.
 class EndingWatch {
@@ -35,7 +35,7 @@ class EndingWatch {
       std::unique_lock lock(mutex_);
       if (changed_.wait_for(lock, limit_, [this] { return over_; })) return;
       lock.unlock();
-      hangs_({ErrorCode::timeout, "the jobs' disk, or a stage of a reconstruction, does not let the daemon end"});
+      hangs_({ErrorCode::timeout, "the jobs' disk, the panel or a stage of a reconstruction does not let the daemon end"});
     });
   }
 

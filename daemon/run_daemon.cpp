@@ -172,6 +172,7 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
                          .fresh_job_id = [&] { return fresh_id(loop.snapshot()->jobs); },
                          .quiet_hours = [&] { return quiet_now(options.quiet_hours); },
                          .disk_problem = [&] { return disk_problem(jobs.waiting(), options); },
+                         .panel_hangs = [&] { return panel.hangs(); },
                          .published = published,
                          .refused_at_panel = refused});
   ending.begin();

@@ -42,12 +42,12 @@ Result<void> settle_calibration(const JobStore& store, const JobInfo& job) {
 
 JobThread::JobThread(Clock& clock, const JobStore& store, ReconstructionThread& reconstruction, ScannedHook on_scanned,
                      std::function<void(Event)> tell)
-    : clock_(clock),
-      store_(store),
+    : store_(store),
       reconstruction_(reconstruction),
       on_scanned_(std::move(on_scanned)),
       tell_(std::move(tell)),
       inbox_(clock),
+      at_work_(clock),
       thread_(start_actor(clock, [this] { run(); })) {}
 
 JobThread::~JobThread() {
@@ -57,13 +57,13 @@ JobThread::~JobThread() {
 
 void JobThread::run() {
   while (auto task = inbox_.take()) {
-    gets_on();
+    at_work_.begins();
     const auto done = guarded("storing", [&]() -> Result<void> {
       std::visit([this](const auto& t) { handle(t); }, *task);
       return {};
     });
     if (!done) fail_task(*task, done.error());
-    since_ = kIdle;
+    at_work_.ends();
   }
 }
 
@@ -89,11 +89,6 @@ void JobThread::fail_task(const Task& task, const Error& why) {
              task);
 }
 
-Clock::Duration JobThread::waiting() const {
-  const auto since = since_.load();
-  return since == kIdle ? Clock::Duration::zero() : clock_.now().time_since_epoch() - Clock::Duration(since);
-}
-
 void JobThread::answer(Ticket ticket, const Result<void>& done, const std::string& result) {
   if (ticket == 0) return;
   if (done) return tell_(event::Answered{ticket, result});
@@ -115,7 +110,7 @@ void JobThread::handle(const action::CreateJobs& task) {
   Result<void> done;
   auto place = task.place;
   for (const auto& id : task.ids) {
-    gets_on();
+    at_work_.begins();
     auto job = store_.create(id, {.recipe = task.recipe, .part = task.part, .place = place++});
     if (!job) {
       done = pass_on(job);
@@ -305,7 +300,7 @@ Result<Closure> JobThread::judge(const TakenView& again) {
       compare_views(first->right_plain, now->right_plain, allowing_for(turned, calibration->right, *calibration));
   if (!right) return pass_on(right);
 
-  gets_on();  // comparing takes its time too
+  at_work_.begins();  // comparing takes its time too
   const Closure closure{again.id.pose, std::max(left->shift_px, right->shift_px),
                         std::max(left->changed, right->changed), left->unmoved && right->unmoved, again.record.spoilt};
   if (!closure.unmoved) {

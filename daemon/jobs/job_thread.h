@@ -1,13 +1,12 @@
 #pragma once
 
-#include <atomic>
 #include <filesystem>
 #include <functional>
-#include <limits>
 #include <optional>
 #include <thread>
 #include <variant>
 
+#include "daemon/at_work.h"
 #include "daemon/jobs/job_store.h"
 #include "daemon/jobs/reconstruction_thread.h"
 #include "daemon/mailbox.h"
@@ -34,15 +33,12 @@ class JobThread {
 
   void post(Task task) { inbox_.post(std::move(task)); }
   /// For how long the disk has kept it from going on. From any thread.
-  [[nodiscard]] Clock::Duration waiting() const;
+  [[nodiscard]] Clock::Duration waiting() const { return at_work_.lasts(); }
 
  private:
-  static constexpr auto kIdle = std::numeric_limits<Clock::Duration::rep>::max();
-
   void run();
   void fail_task(const Task& task, const Error& why);
   void handle(const action::CheckCalibration& task);
-  void gets_on() { since_ = clock_.now().time_since_epoch().count(); }
   void handle(const action::CreateJobs& task);
   void handle(const action::BeginJob& task);
   void handle(const action::MoveJob& task);
@@ -67,13 +63,12 @@ class JobThread {
   void tell_known(const std::string& job);
   void answer(Ticket ticket, const Result<void>& done, const std::string& result);
 
-  Clock& clock_;
   const JobStore& store_;
   ReconstructionThread& reconstruction_;
   ScannedHook on_scanned_;
   std::function<void(Event)> tell_;
   Mailbox<Task> inbox_;
-  std::atomic<Clock::Duration::rep> since_ = kIdle;  ///< of the clock: it does what it does now
+  AtWork at_work_;
   // Of the thread only.
   std::optional<ScanFolder> scan_;  ///< of the job that has the rig
   std::optional<Recipe> later_;     ///< its recipe, where the model is made after the last view only

@@ -1,5 +1,7 @@
 #include "daemon/rig/panel_thread.h"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "daemon/actor_thread.h"
@@ -9,6 +11,7 @@ namespace {
 
 constexpr auto kPoll = std::chrono::milliseconds(50);  ///< longest wait of a lamp for a quiet panel
 constexpr auto kShowLimit = std::chrono::milliseconds(500);
+constexpr auto kHangs = std::chrono::seconds(3);  ///< far beyond kPoll and kShowLimit
 constexpr auto kRetry = std::chrono::seconds(1);  ///< after a panel that did not answer
 
 }  // namespace
@@ -32,6 +35,7 @@ PanelThread::PanelThread(Panel& panel, Clock& clock, std::function<void(Event)> 
       clock_(clock),
       tell_(std::move(tell)),
       on_estop_(std::move(on_estop)),
+      at_work_(clock),
       thread_(start_actor(clock, [this] { run(); })) {}
 
 PanelThread::~PanelThread() {
@@ -50,8 +54,7 @@ void PanelThread::show(const PanelOutputs& outputs) {
 
 void PanelThread::run() {
   while (true) {
-    auto done = show_wanted();
-    if (done) done = read_inputs();
+    const auto done = look();
     if (!done) {
       known_.reset();  // what a panel says that comes back is news
       tell_(event::PanelFailed{done.error()});
@@ -61,6 +64,25 @@ void PanelThread::run() {
     if (clock_.wait_until(lock, changed_, pause, [this] { return stop_; })) break;
   }
   std::ignore = show_wanted();  // the last word of the station; a panel that fails here was reported before
+}
+
+/// A panel that had hung is one that failed, whatever it says in the end.
+Result<void> PanelThread::look() {
+  at_work_.begins();
+  auto done = show_wanted();
+  if (done) done = read_inputs();
+  const auto hung = hangs();
+  at_work_.ends();
+  if (done && hung) return tl::unexpected(*hung);
+  return done;
+}
+
+std::optional<Error> PanelThread::hangs() const {
+  const auto waited = at_work_.lasts();
+  if (waited < kHangs) return std::nullopt;
+  return Error{ErrorCode::timeout,
+               fmt::format("panel: it has not answered for {:.0f} s, and the e-stop cannot be seen: see to its line",
+                           std::chrono::duration<double>(waited).count())};
 }
 
 Result<void> PanelThread::show_wanted() {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/clock.h"
+#include "daemon/at_work.h"
 #include "daemon/station/events.h"
 #include "drivers/panel/panel.h"
 
@@ -26,9 +27,13 @@ class PanelThread {
 
   /// Lamps for the panel; shown within the polling period. Does not wait.
   void show(const PanelOutputs& outputs);
+  /// What is wrong with a panel that lets its owner wait far beyond every deadline: whoever looks must say so, the
+  /// owner cannot. From any thread.
+  [[nodiscard]] std::optional<Error> hangs() const;
 
  private:
   void run();
+  Result<void> look();
   Result<void> show_wanted();
   Result<void> read_inputs();
 
@@ -36,6 +41,7 @@ class PanelThread {
   Clock& clock_;
   std::function<void(Event)> tell_;
   std::function<void()> on_estop_;
+  AtWork at_work_;  ///< on the panel
   std::mutex mutex_;
   std::condition_variable changed_;
   PanelOutputs wanted_;

@@ -32,6 +32,7 @@ Result<Ended> ControlLoop::run(const StationPorts& ports) {
   while (!state_.finished) {
     ports.alive();
     look_at_the_disk(ports);
+    look_at_the_panel(ports);
     auto next_later = std::ranges::min_element(later_, {}, [](const auto& one) { return one.second.at; });
     const auto later = next_later == later_.end() ? Clock::TimePoint::max() : next_later->second.at;
     auto message = inbox_.take(std::min({later, next_blink_, give_up_, clock_.now() + kSignOfLife}));
@@ -123,6 +124,12 @@ void ControlLoop::look_at_the_time(const StationPorts& ports) {
 void ControlLoop::look_at_the_disk(const StationPorts& ports) {
   auto problem = ports.disk_problem();
   if (problem.has_value() != state_.disk_problem.has_value()) handle({event::DiskSeen{std::move(problem)}, {}}, ports);
+}
+
+/// Its return is told by its owner.
+void ControlLoop::look_at_the_panel(const StationPorts& ports) {
+  auto problem = ports.panel_hangs();
+  if (problem && !state_.panel_problem) handle({event::PanelFailed{std::move(*problem)}, {}}, ports);
 }
 
 /// A projector that was away may have been without power: it begins anew.

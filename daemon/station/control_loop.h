@@ -24,6 +24,7 @@ struct StationPorts {
   std::function<std::string()> fresh_job_id;  ///< another one each time
   std::function<bool()> quiet_hours = [] { return false; };
   std::function<std::optional<Error>()> disk_problem = [] { return std::nullopt; };  ///< the jobs' does not answer
+  std::function<std::optional<Error>()> panel_hangs = [] { return std::nullopt; };   ///< and cannot say so itself
   std::function<void(const std::shared_ptr<const Snapshot>&)> published = [](const auto&) {};
   std::function<void(const event::Pressed&, const Error& why)> refused_at_panel = [](const auto&, const auto&) {};
 };
@@ -82,6 +83,7 @@ class ControlLoop {
   [[nodiscard]] std::string still_doing() const;
   void look_at_the_time(const StationPorts& ports);
   void look_at_the_disk(const StationPorts& ports);
+  void look_at_the_panel(const StationPorts& ports);
   [[nodiscard]] std::chrono::seconds warm_up_left();
   void carry_out(const Action& action, const StationPorts& ports);
   void wake_later(Event event, Clock::Duration after);

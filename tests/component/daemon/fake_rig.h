@@ -226,6 +226,7 @@ class FakePanel final : public Panel {
   Result<PanelInputs> wait_change(const PanelInputs& known, Deadline deadline) override {
     std::unique_lock lock(mutex_);
     clock_.wait_until(lock, changed_, deadline.at, [&] { return broken_ || inputs_ != known; });
+    clock_.wait_until(lock, changed_, Clock::TimePoint::max(), [&] { return !hangs_; });
     if (broken_) return fail(ErrorCode::io, "panel: unplugged");
     seen_ = inputs_;
     clock_.notify_all(changed_);
@@ -284,6 +285,14 @@ class FakePanel final : public Panel {
     }
     clock_.notify_all(changed_);
   }
+  /// Whoever looks at it waits, whatever his deadline.
+  void hang(bool hangs) {
+    {
+      const std::lock_guard guard(mutex_);
+      hangs_ = hangs;
+    }
+    clock_.notify_all(changed_);
+  }
 
  private:
   Clock& clock_;
@@ -293,6 +302,7 @@ class FakePanel final : public Panel {
   PanelInputs seen_;
   PanelOutputs outputs_;
   bool broken_ = false;
+  bool hangs_ = false;
   std::condition_variable attach_;
   bool attached_ = false;
 };

@@ -87,6 +87,33 @@ TEST_F(Daemon, WhatIsRedoneInAClosureShotIsTold) {
   EXPECT_TRUE(scan.manifest().poses[1].closures.at(0).spoilt.empty());
 }
 
+TEST_F(Daemon, APanelThatHangsStopsTheTableAndIsNamed) {
+  rig.line.fires_before = 2;
+  rig.line.at_fire = [this] { rig.panel.hang(true); };
+  boot();
+  get_ready();
+  rig.panel.press(&PanelInputs::start);
+  const auto snapshot = [this] { return loop->snapshot(); };
+  ASSERT_TRUE(
+      clock_waits_for([&] { return snapshot()->machine == MachineState::error && !snapshot()->may_be_moving; }));
+  EXPECT_THAT(snapshot()->cause, HasSubstr("panel: it has not answered for "));
+  EXPECT_EQ(snapshot()->fault_device, "panel");
+  EXPECT_TRUE(wait_state(newest()->id, JobState::interrupted));
+  const auto moves = [this] {
+    const std::lock_guard guard(rig.turntable.mutex);
+    EXPECT_FALSE(rig.turntable.moving);
+    return rig.turntable.targets.size();
+  };
+  const auto before = moves();
+  clock.sleep_for(seconds(20));
+  EXPECT_EQ(moves(), before);
+
+  rig.panel.hang(false);
+  ASSERT_TRUE(wait_fault()) << "the fault stays until somebody has seen to it";
+  rig.panel.press(&PanelInputs::reset);
+  ASSERT_TRUE(wait_ready());
+}
+
 TEST_F(Daemon, ACameraThatGoesSilentInterruptsTheJobAndLatches) {
   boot();
   get_ready();
