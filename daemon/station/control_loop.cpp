@@ -59,8 +59,8 @@ void ControlLoop::handle(Message message, const StationPorts& ports) {
   auto step = next(state_, message.event, options_.rules);
   if (step.state.shutting_down && !state_.shutting_down) give_up_ = clock_.now() + options_.shutdown_limit;
   state_ = std::move(step.state);
-  update(jobs_, message.event);
   tally_.see(message.event, clock_.now());
+  if (const auto ended = update(jobs_, message.event)) tally_.see(*ended);
   for (const auto& action : step.actions) carry_out(action, ports);
   show(ports);
   publish(ports);
@@ -151,7 +151,7 @@ void ControlLoop::carry_out(const Action& action, const StationPorts& ports) {
                  [&](const action::CheckLater&) { wake_later(event::CheckDue{}, options_.check_period); },
                  [&](const action::TestLamps&) { lamps_tested_ = clock_.now() + kLampTest; },
                  [&](const action::CloseJob& task) {
-                   close(jobs_, task);
+                   if (const auto ended = close(jobs_, task)) tally_.see(*ended);
                    ports.perform(task);
                  },
                  [&](const auto& other) { ports.perform(other); }},

@@ -8,13 +8,19 @@
 namespace scanrig {
 namespace {
 
+std::optional<JobEnd> replace(std::shared_ptr<const JobInfo>& job, std::shared_ptr<const JobInfo> with) {
+  const bool ends = job && !is_final(job->state) && is_final(with->state);
+  job = std::move(with);
+  return ends ? std::optional(JobEnd{job->id, job->state}) : std::nullopt;
+}
+
 template <class Change>
-void change(JobTable& table, const std::string& id, const Change& how) {
+std::optional<JobEnd> change(JobTable& table, const std::string& id, const Change& how) {
   const auto found = table.find(id);
-  if (found == table.end()) return;
+  if (found == table.end()) return std::nullopt;
   auto job = std::make_shared<JobInfo>(*found->second);
   how(*job);
-  found->second = std::move(job);
+  return replace(found->second, std::move(job));
 }
 
 void set_progress(JobInfo& job, const event::StageProgress& e) {
@@ -35,13 +41,15 @@ void set_pose_stored(JobInfo& job, int pose) {
 
 }  // namespace
 
-void update(JobTable& table, const Event& event) {
+std::optional<JobEnd> update(JobTable& table, const Event& event) {
+  std::optional<JobEnd> ended;
+  const auto change = [&](const std::string& id, const auto& how) { ended = scanrig::change(table, id, how); };
   std::visit(
       Overloaded{
-          [&](const event::JobKnown& e) { table[e.info->id] = e.info; },
+          [&](const event::JobKnown& e) { ended = replace(table[e.info->id], e.info); },
           [&](const event::JobRemoved& e) { table.erase(e.job); },
           [&](const event::JobBegun& e) {
-            change(table, e.job, [](JobInfo& job) {
+            change(e.job, [](JobInfo& job) {
               if (is_final(job.state)) return;  // it was closed before the disk had let it begin
               job.state = JobState::scanning;
               job.resumable = false;
@@ -49,40 +57,38 @@ void update(JobTable& table, const Event& event) {
             });
           },
           [&](const event::JobUnreadable& e) {
-            change(table, e.job, [&](JobInfo& job) {
+            change(e.job, [&](JobInfo& job) {
               job.state = JobState::failed;
               job.resumable = false;
               job.error = e.why;
             });
           },
           [&](const event::ClosureJudged& e) {
-            change(table, e.job, [&](JobInfo& job) { job.closures.push_back(e.closure); });
+            change(e.job, [&](JobInfo& job) { job.closures.push_back(e.closure); });
           },
           [&](const event::ViewStored& e) {
-            change(table, e.id.job, [&](JobInfo& job) {
+            change(e.id.job, [&](JobInfo& job) {
               if (!is_final(job.state)) job.state = JobState::scanning;
               job.stored.push_back({e.id.pose, e.id.view, e.measured_deg, e.spoilt, e.commanded_deg, e.settling_ms});
               job.config_sha256 = e.config_sha256;
             });
           },
-          [&](const event::PoseStored& e) {
-            change(table, e.job, [&](JobInfo& job) { set_pose_stored(job, e.pose); });
-          },
+          [&](const event::PoseStored& e) { change(e.job, [&](JobInfo& job) { set_pose_stored(job, e.pose); }); },
           [&](const event::JobClosed& e) {
-            change(table, e.job, [&](JobInfo& job) {
+            change(e.job, [&](JobInfo& job) {
               std::tie(job.state, job.error, job.resumable) = std::tuple(e.state, e.why, e.resumable);
             });
           },
-          [&](const event::StageProgress& e) { change(table, e.job, [&](JobInfo& job) { set_progress(job, e); }); },
+          [&](const event::StageProgress& e) { change(e.job, [&](JobInfo& job) { set_progress(job, e); }); },
           [&](const event::ReconstructionFailed& e) {
-            change(table, e.job, [&](JobInfo& job) {
+            change(e.job, [&](JobInfo& job) {
               job.error = e.error;
               job.quarantined = e.quarantined;
               if (job.state == JobState::reconstructing) job.state = JobState::failed;
             });
           },
           [&](const event::ModelReady& e) {
-            change(table, e.job, [&](JobInfo& job) {
+            change(e.job, [&](JobInfo& job) {
               std::tie(job.state, job.model, job.report) = std::tuple(JobState::done, e.model, e.report);
               job.passed = !e.beyond_limits;
               job.error = e.beyond_limits;
@@ -91,10 +97,11 @@ void update(JobTable& table, const Event& event) {
           [](const auto&) {},  // concerns the machine only
       },
       event);
+  return ended;
 }
 
-void close(JobTable& table, const action::CloseJob& task) {
-  change(table, task.job, [&](JobInfo& job) {
+std::optional<JobEnd> close(JobTable& table, const action::CloseJob& task) {
+  return change(table, task.job, [&](JobInfo& job) {
     std::tie(job.state, job.error) = std::tuple(task.state, task.why);
     job.resumable = task.state == JobState::interrupted && std::ranges::all_of(job.closures, &Closure::unmoved);
   });

@@ -10,10 +10,6 @@ void EventTally::fault(const Error& error) {
 }
 
 void EventTally::see(const Event& event, Clock::TimePoint now) {
-  const auto ended = [&](const std::string& job, JobState state) {
-    ++counters_.jobs_ended[std::string(to_string(state))];
-    std::erase_if(running_, [&](const auto& stage) { return stage.first.first == job; });
-  };
   std::visit(Overloaded{[&](const event::ViewStored& e) {
                           ++counters_.views_stored;
                           counters_.exposures_redone += e.spoilt.size();
@@ -30,12 +26,13 @@ void EventTally::see(const Event& event, Clock::TimePoint now) {
                         [&](const event::StopFailed& e) { fault(e.error); },
                         [&](const event::PanelFailed& e) { fault(e.error); },
                         [&](const event::StoreFailed& e) { fault(e.error); },
-                        [&](const event::EstopChanged& e) { counters_.faults += e.ok ? 0 : 1; },
-                        [&](const event::JobClosed& e) { ended(e.job, e.state); },
-                        [&](const event::JobUnreadable& e) { ended(e.job, JobState::failed); },
-                        [&](const event::ReconstructionFailed& e) { ended(e.job, JobState::failed); },
-                        [&](const event::ModelReady& e) { ended(e.job, JobState::done); }, [](const auto&) {}},
+                        [&](const event::EstopChanged& e) { counters_.faults += e.ok ? 0 : 1; }, [](const auto&) {}},
              event);
+}
+
+void EventTally::see(const JobEnd& end) {
+  ++counters_.jobs_ended[std::string(to_string(end.state))];
+  std::erase_if(running_, [&](const auto& stage) { return stage.first.first == end.job; });
 }
 
 }  // namespace scanrig

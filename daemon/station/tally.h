@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/clock.h"
-#include "daemon/station/events.h"
+#include "daemon/station/job_table.h"
 
 namespace scanrig {
 
@@ -24,6 +24,7 @@ struct Counters {
 class EventTally {
  public:
   void see(const Event& event, Clock::TimePoint now);
+  void see(const JobEnd& end);
   [[nodiscard]] const Counters& counters() const { return counters_; }
 
  private:

@@ -104,6 +104,24 @@ TEST_F(Jobs, AJobIsClosedForWhoeverLooksAndWhatTheDiskSaysLateDoesNotOpenIt) {
   EXPECT_FALSE(job().resumable);
 }
 
+TEST_F(Jobs, AnEndIsToldOnce) {
+  begin();
+  EXPECT_FALSE(update(table, event::ReconstructionFailed{"a", {ErrorCode::degenerate, "nothing seen"}}));
+  const auto ended = close(table, {"a", JobState::failed, {ErrorCode::degenerate, "nothing seen"}});
+  ASSERT_TRUE(ended);
+  EXPECT_EQ(ended->job, "a");
+  EXPECT_EQ(ended->state, JobState::failed);
+  EXPECT_FALSE(update(table, event::JobClosed{"a", JobState::failed, {ErrorCode::degenerate, "nothing seen"}}));
+
+  auto again = job();
+  again.state = JobState::reconstructing;
+  EXPECT_FALSE(update(table, event::JobKnown{std::make_shared<const JobInfo>(again)}));
+  const auto made = update(table, event::ModelReady{"a", "m", "r"});
+  ASSERT_TRUE(made) << "what is reprocessed ends again";
+  EXPECT_EQ(made->state, JobState::done);
+  EXPECT_FALSE(update(table, event::JobKnown{std::make_shared<const JobInfo>(job())}));
+}
+
 TEST_F(Jobs, AClosedJobSaysWhy) {
   begin();
   tell(event::JobClosed{"a", JobState::cancelled, {ErrorCode::stopped, "Stop was pressed"}});
