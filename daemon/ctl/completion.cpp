@@ -90,6 +90,7 @@ std::string zsh(const CommandWords& root) {
 # zsh completion; generated from the command line of {0}
 _{0}() {{
   local prev=${{words[CURRENT-1]}} path_={0} i
+  if [[ $words[CURRENT] = --*=* ]]; then prev=${{words[CURRENT]%%=*}}; compset -P '*='; fi
   for ((i = 2; i < CURRENT; i++)); do
     case "$path_ ${{words[i]}}" in ({1}) path_="$path_ ${{words[i]}}" ;; esac
   done
@@ -134,7 +135,7 @@ complete -c {0} -f
       }
       if (!option.values.empty()) words += fmt::format(" -a '{}'", fmt::join(option.values, " "));
       if (takes_path(option)) words += " -F";
-      if (!option.names.empty() && !option.label.empty()) words += " -r";
+      if (!option.names.empty() && !option.label.empty()) words += takes_path(option) ? " -r" : " -x";
       if (!words.empty()) text += fmt::format("{}{} -d {}\n", when, words, quoted(option.about));
     }
   }

@@ -87,6 +87,14 @@ TEST_F(Pages, EveryShellReadsItsCompletion) {
   }
   EXPECT_THAT(completion(app, "zsh"), testing::StartsWith("#compdef scanrig\n"));
   EXPECT_THAT(completion(app, "fish"), HasSubstr("__scanrig_path scanrig token add\" -l role"));
+  EXPECT_THAT(completion(app, "zsh"), HasSubstr("compset -P '*='"));
+  if (installed("fish")) {
+    const auto offers =
+        output_of("fish -c \"cd " + folder_.string() + "; source " + file("c.fish", completion(app, "fish")) +
+                  "; complete -C 'scanrig token add x --role '\"");
+    EXPECT_THAT(offers, HasSubstr("operator"));
+    EXPECT_THAT(offers, Not(HasSubstr("c.fish"))) << "no files";
+  }
 }
 
 TEST_F(Pages, EveryVerbHasAPageThatNamesItsOptions) {
