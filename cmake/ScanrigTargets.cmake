@@ -46,12 +46,13 @@ function(scanrig_program name)
   target_link_libraries(${name} PRIVATE ${ARG_LINK} scanrig_warnings)
 endfunction()
 
-# The seconds that a test may take; under a sanitizer everything is several times slower.
+# The seconds that a test may take, and what may take longest begins first; under a sanitizer everything is several
+# times slower.
 function(scanrig_time_limit test seconds)
   if(SCANRIG_SANITIZE)
     math(EXPR seconds "8 * ${seconds}")
   endif()
-  set_tests_properties(${test} PROPERTIES TIMEOUT ${seconds})
+  set_tests_properties(${test} PROPERTIES TIMEOUT ${seconds} COST ${seconds})
 endfunction()
 
 # scanrig_test(NAME LABEL unit|component|system SOURCES a_test.cpp ... LINK libs [TIMEOUT seconds] [REAL_TIME])
