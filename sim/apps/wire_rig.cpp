@@ -68,9 +68,10 @@ WireRig::~WireRig() {
 
 Result<void> WireRig::start_cameras(const WireRigOptions& o, Clock& clock) {
   if (!o.scene) return {};
+  auto expected = places_of_job(o);
+  expected.push_back({0, truth().angle_deg});  // for who tries the cameras before the table is homed
   auto cameras = RigCameras::start(
-      {.scene = *o.scene, .expected = places_of_job(o), .numbered = o.numbered_frames}, [this] { return truth(); },
-      clock);
+      {.scene = *o.scene, .expected = expected, .numbered = o.numbered_frames}, [this] { return truth(); }, clock);
   if (!cameras) return pass_on(cameras);
   cameras_ = std::move(*cameras);
   panel_->on_light([&cameras = *cameras_](bool pattern, bool on) { on ? cameras.edge(pattern) : cameras.light_out(); });

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string_view>
+
 #include "config/drive_profile_file.h"
 #include "drivers/turntable/modbus_turntable.h"
 #include "sim/wire/leadshine_drive.h"
@@ -11,11 +13,11 @@ namespace scanrig {
 
 /// A shipped profile, and the far end that it fits.
 struct ModbusKind {
-  const char* profile;
-  const char* home_mode;
+  std::string_view profile;
+  std::string_view home_mode;
 
   [[nodiscard]] DriveProfile read() const {
-    auto read = config::read_drive_profile(std::string(SCANRIG_SOURCE_DIR "/config/drives/") + profile + ".toml");
+    auto read = config::read_drive_profile(std::string(SCANRIG_SOURCE_DIR "/config/drives/").append(profile) + ".toml");
     EXPECT_TRUE(read) << read.error().message;
     return *read;
   }
