@@ -28,6 +28,7 @@ class Daemon : public scan_samples::FolderTest {
     };
   }
   void TearDown() override {
+    rig.panel.hang(false);
     if (thread.joinable()) shut_down();
     FolderTest::TearDown();
   }
