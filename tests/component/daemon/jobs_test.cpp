@@ -142,20 +142,34 @@ TEST_F(Jobs, AReconstructionThatWaitsForAnotherCanBeCancelledToo) {
   EXPECT_EQ(std::ranges::count_if(log.calls, is_finish), 3) << "no work is done on what was cancelled";
 }
 
-TEST_F(Jobs, AModelThatIsBeingMadeAgainIsNotAskedForTwice) {
+TEST_F(Jobs, AModelThatWillBeMadeAgainIsNotAskedForTwice) {
   boot();
   get_ready();
   scan_both_poses();
-  const auto id = newest()->id;
-  ASSERT_TRUE(wait_state(id, JobState::done));
-  Result<std::string> again;
-  log.at_finish = [&] { again = ask_for(What::reprocess, id); };
-  ASSERT_TRUE(ask_for(What::reprocess, id));
-  EXPECT_TRUE(wait_state(id, JobState::done));
-  ASSERT_FALSE(again);
-  EXPECT_EQ(again.error().code, ErrorCode::busy);
+  const auto first = newest()->id;
+  ASSERT_TRUE(wait_state(first, JobState::done));
+  ASSERT_TRUE(wait_ready());
+  scan_both_poses();
+  const auto second = newest()->id;
+  ASSERT_TRUE(wait_state(second, JobState::done));
+
+  std::vector<Result<std::string>> begun, waiting;
+  log.at_finish = [&] {
+    if (!begun.empty()) return;
+    begun.push_back(ask_for(What::reprocess, first));
+    for (int i = 0; i < 2; ++i) waiting.push_back(ask_for(What::reprocess, second));
+  };
+  ASSERT_TRUE(ask_for(What::reprocess, first));
+  EXPECT_TRUE(wait_state(first, JobState::done));
+  EXPECT_TRUE(wait_state(second, JobState::done));
+  ASSERT_EQ(waiting.size(), 2u);
+  EXPECT_TRUE(waiting[0]);
+  for (const auto& twice : {begun[0], waiting[1]}) {
+    ASSERT_FALSE(twice);
+    EXPECT_EQ(twice.error().code, ErrorCode::busy);
+  }
   shut_down();
-  EXPECT_EQ(std::ranges::count(log.calls, "finish"), 2);
+  EXPECT_EQ(std::ranges::count(log.calls, "finish"), 4);
 }
 
 TEST_F(Jobs, AnInterruptedScanGoesOnWhereItStopped) {
