@@ -35,7 +35,8 @@ class EndingWatch {
       std::unique_lock lock(mutex_);
       if (changed_.wait_for(lock, limit_, [this] { return over_; })) return;
       lock.unlock();
-      hangs_({ErrorCode::timeout, "the jobs' disk, the panel or a stage of a reconstruction does not let the daemon end"});
+      hangs_(
+          {ErrorCode::timeout, "the jobs' disk, the panel or a stage of a reconstruction does not let the daemon end"});
     });
   }
 
