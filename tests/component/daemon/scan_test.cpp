@@ -94,8 +94,8 @@ TEST_F(Daemon, APanelThatHangsStopsTheTableAndIsNamed) {
   get_ready();
   rig.panel.press(&PanelInputs::start);
   const auto snapshot = [this] { return loop->snapshot(); };
-  ASSERT_TRUE(
-      clock_waits_for([&] { return snapshot()->machine == MachineState::error && !snapshot()->may_be_moving; }));
+  ASSERT_TRUE(clock_waits_for(
+      [&] { return snapshot()->machine == MachineState::error && snapshot()->activity == Activity::none; }));
   EXPECT_THAT(snapshot()->cause, HasSubstr("panel: it has not answered for "));
   EXPECT_EQ(snapshot()->fault_device, "panel");
   EXPECT_TRUE(wait_state(newest()->id, JobState::interrupted));
