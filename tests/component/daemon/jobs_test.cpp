@@ -1,5 +1,7 @@
 #include <gmock/gmock.h>
 
+#include <array>
+
 #include "tests/component/daemon/daemon_under_test.h"
 
 namespace scanrig {
@@ -43,6 +45,19 @@ class Jobs : public Daemon {
     ASSERT_TRUE(wait_flip());
     rig.panel.press(&PanelInputs::start);
     EXPECT_TRUE(wait_state(id, JobState::done));
+  }
+  /// The ids of two jobs that have their models.
+  std::array<std::string, 2> two_models() {
+    boot();
+    get_ready();
+    std::array<std::string, 2> ids;
+    for (auto& id : ids) {
+      scan_both_poses();
+      id = newest()->id;
+      EXPECT_TRUE(wait_state(id, JobState::done));
+      EXPECT_TRUE(wait_ready());
+    }
+    return ids;
   }
   void look_at(int scene) {
     const std::lock_guard guard(rig.line.mutex);
@@ -118,22 +133,14 @@ TEST_F(Jobs, AReconstructionWhoseCancellingCannotBeNotedDoesNotStandStill) {
 }
 
 TEST_F(Jobs, AReconstructionThatWaitsForAnotherCanBeCancelledToo) {
-  boot();
-  get_ready();
-  scan_both_poses();
-  const auto first = newest()->id;
-  ASSERT_TRUE(wait_state(first, JobState::done));
-  ASSERT_TRUE(wait_ready());
-  scan_both_poses();
-  const auto second = newest()->id;
-  ASSERT_TRUE(wait_state(second, JobState::done));
+  const auto [first, second] = two_models();
   const auto is_finish = [](const std::string& call) { return call == "finish"; };
   ASSERT_EQ(std::ranges::count_if(log.calls, is_finish), 2);
 
-  log.at_finish = [&, asked = false]() mutable {
+  log.at_finish = [this, next = second, asked = false]() mutable {
     if (std::exchange(asked, true)) return;
-    EXPECT_TRUE(ask_for(What::reprocess, second));
-    EXPECT_TRUE(ask_for(What::cancel, second));
+    EXPECT_TRUE(ask_for(What::reprocess, next));
+    EXPECT_TRUE(ask_for(What::cancel, next));
   };
   ASSERT_TRUE(ask_for(What::reprocess, first));
   EXPECT_TRUE(wait_state(first, JobState::done));
@@ -143,21 +150,13 @@ TEST_F(Jobs, AReconstructionThatWaitsForAnotherCanBeCancelledToo) {
 }
 
 TEST_F(Jobs, AModelThatWillBeMadeAgainIsNotAskedForTwice) {
-  boot();
-  get_ready();
-  scan_both_poses();
-  const auto first = newest()->id;
-  ASSERT_TRUE(wait_state(first, JobState::done));
-  ASSERT_TRUE(wait_ready());
-  scan_both_poses();
-  const auto second = newest()->id;
-  ASSERT_TRUE(wait_state(second, JobState::done));
+  const auto [first, second] = two_models();
 
   std::vector<Result<std::string>> begun, waiting;
-  log.at_finish = [&] {
+  log.at_finish = [&, id = first, next = second] {
     if (!begun.empty()) return;
-    begun.push_back(ask_for(What::reprocess, first));
-    for (int i = 0; i < 2; ++i) waiting.push_back(ask_for(What::reprocess, second));
+    begun.push_back(ask_for(What::reprocess, id));
+    for (int i = 0; i < 2; ++i) waiting.push_back(ask_for(What::reprocess, next));
   };
   ASSERT_TRUE(ask_for(What::reprocess, first));
   EXPECT_TRUE(wait_state(first, JobState::done));
