@@ -136,14 +136,16 @@ Result<void> AravisSensor::connect() {
     }
     device = *found;
   }
+  // A flag for each connection, which the signal owns too: it may come while nobody is left to hear it. It is there
+  // before the threads that the library starts for the connection and that raise the signal.
+  lost_ = std::make_shared<std::atomic<bool>>(false);
+  auto flag = std::make_unique<Lost>(lost_);
   const auto opened =
       attempt_("connect to " + device, [&](GError** error) { camera_.reset(arv_camera_new(device.c_str(), error)); });
   if (!opened) return opened;
-  // A flag for each connection, which the signal owns too: it may come while nobody is left to hear it.
-  lost_ = std::make_shared<std::atomic<bool>>(false);
   arv_camera_set_range_check_policy(camera_.get(), ARV_RANGE_CHECK_POLICY_ENABLE);
   g_signal_connect_data(arv_camera_get_device(camera_.get()), "control-lost", G_CALLBACK(on_control_lost),
-                        new Lost(lost_), forget, GConnectFlags{});
+                        flag.release(), forget, GConnectFlags{});
   std::string serial;
   const auto asked = attempt_("read the serial number", [&](GError** error) {
     if (const char* text = arv_camera_get_device_serial_number(camera_.get(), error)) serial = text;
