@@ -57,8 +57,15 @@ const char* in_words(ArvBufferStatus status) {
 
 using Lost = std::shared_ptr<std::atomic<bool>>;
 
-void on_control_lost(ArvDevice*, gpointer lost) { **static_cast<Lost*>(lost) = true; }
-void forget(gpointer lost, GClosure*) { delete static_cast<Lost*>(lost); }
+/// By exchange, so that whoever reads the flag after several marks has seen what each of them did before.
+void mark(const Lost& lost) { lost->exchange(true); }
+
+void on_control_lost(ArvDevice*, gpointer lost) { mark(*static_cast<Lost*>(lost)); }
+
+void forget(gpointer lost, GClosure*) {
+  const std::unique_ptr<Lost> last(static_cast<Lost*>(lost));
+  std::ignore = (*last)->load();  // what the signal's thread did with it comes before its end
+}
 
 /// The name of the device with this serial number, or nothing.
 std::optional<std::string> find_by_serial(const std::string& serial) {
@@ -107,7 +114,7 @@ Result<bool> AravisSensor::ready(Deadline deadline) {
   auto connected = connect();
   if (connected) connected = start_stream();
   if (connected) return true;
-  *lost_ = true;
+  mark(lost_);
   std::ignore = let_go({clock_.now()});  // if that has to wait, the next call does
   return pass_on(connected);
 }
@@ -123,7 +130,7 @@ void AravisSensor::ask_whether_there() {
   });
   in_doubt_ = false;
   if (asked) heard_ = clock_.now();
-  if (!asked) *lost_ = true;
+  if (!asked) mark(lost_);
 }
 
 Result<void> AravisSensor::connect() {
@@ -261,14 +268,14 @@ Result<void> AravisSensor::listen_to_line(bool line) {
   if (wanted == listens_to_line_) return {};
   auto set = set_trigger_source(camera_.get(), wanted ? options_.trigger_source : "Software", attempt_);
   if (set) listens_to_line_ = wanted;
-  if (!set) *lost_ = true;  // what does not answer is connected again
+  if (!set) mark(lost_);  // what does not answer is connected again
   return set;
 }
 
 Result<void> AravisSensor::trigger() {
   auto triggered =
       attempt_("trigger", [&](GError** error) { arv_camera_execute_command(camera_.get(), "TriggerSoftware", error); });
-  if (!triggered) *lost_ = true;
+  if (!triggered) mark(lost_);
   return triggered;
 }
 
