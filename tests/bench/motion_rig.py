@@ -100,10 +100,11 @@ class Rig:
 
     # The daemon
 
-    def start_daemon(self, scale=0.25, wait=True, environment=None):
+    def start_daemon(self, scale=0.25, wait=True, environment=None, program="scanrigd-sim"):
+        """`scale`: of the cameras that the daemon itself simulates; None where it has none."""
         self.api.unlink(missing_ok=True)
         output = open(self.folder / "daemon.log", "a")
-        command = [self.bin / "scanrigd-sim", "--config", self.config, "--scale", scale]
+        command = [self.bin / program, "--config", self.config, *(["--scale", scale] if scale is not None else [])]
         self.daemon = subprocess.Popen([str(word) for word in command], stdout=output, stderr=output,
                                        env=dict(os.environ, **(environment or {})))
         if wait and not self.wait(self.asks_for_reset, DAEMON_READY_S):
