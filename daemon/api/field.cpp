@@ -73,11 +73,11 @@ json parse_strictly(std::string_view body) {
   std::vector<std::set<std::string>> keys;
   bool sound = true;
   const auto watch = [&](int depth, json::parse_event_t event, json& parsed) {
-    using enum json::parse_event_t;
+    using Seen = json::parse_event_t;
     sound = sound && depth <= kDeepest;
-    if (event == object_start) keys.emplace_back();
-    if (event == object_end && !keys.empty()) keys.pop_back();
-    if (event == key && !keys.empty()) sound = keys.back().insert(parsed.get<std::string>()).second && sound;
+    if (event == Seen::object_start) keys.emplace_back();
+    if (event == Seen::object_end && !keys.empty()) keys.pop_back();
+    if (event == Seen::key && !keys.empty()) sound = keys.back().insert(parsed.get<std::string>()).second && sound;
     return sound;
   };
   auto parsed_body = json::parse(body.begin(), body.end(), watch, false);
