@@ -100,11 +100,12 @@ class Rig:
 
     # The daemon
 
-    def start_daemon(self, scale=0.25, wait=True, environment=None, program="scanrigd-sim"):
-        """`scale`: of the cameras that the daemon itself simulates; None where it has none."""
+    def start_daemon(self, scale=0.25, wait=True, environment=None):
+        """`scale`: of the cameras that the daemon itself simulates; None: the shipped daemon, which simulates none."""
         self.api.unlink(missing_ok=True)
         output = open(self.folder / "daemon.log", "a")
-        command = [self.bin / program, "--config", self.config, *(["--scale", scale] if scale is not None else [])]
+        program = [self.bin / "scanrigd"] if scale is None else [self.bin / "scanrigd-sim", "--scale", scale]
+        command = [*program, "--config", self.config]
         self.daemon = subprocess.Popen([str(word) for word in command], stdout=output, stderr=output,
                                        env=dict(os.environ, **(environment or {})))
         if wait and not self.wait(self.asks_for_reset, DAEMON_READY_S):

@@ -100,7 +100,7 @@ def inside(binaries, scratch, size):
     with motion_rig.Rig(binaries, scratch / "load", *OPTIONS, "--scale", size["scale"], "--views", size["views"],
                         "--voxel-mm", size["voxel"]) as rig:
         port, token = open_api(rig)
-        rig.start_daemon(None, program="scanrigd")
+        rig.start_daemon(None)
         rig.get_ready()
         for _ in range(2):  # the table rests a little elsewhere in every other turn: both are rendered now
             one_job(rig, None)
@@ -122,8 +122,8 @@ def measure(bench, scratch):
         return
     seen, ages, quiet, loaded = json.loads(done.stdout.splitlines()[-1])
     what = "50 event streams, 200 requests/s, 20 slow clients, during scan and reconstruction"
-    done = f"{sum(t is not None for t in loaded)} of {size['jobs']} jobs done"
-    bench.line(f"{what}: jobs", "all done", done, None not in loaded)
+    jobs = f"{sum(t is not None for t in loaded)} of {size['jobs']} jobs done"
+    bench.line(f"{what}: jobs", "all done", jobs, None not in loaded)
     bench.note(f"{len(seen['status_ms'])} status, {len(seen['others_ms'])} other requests, {seen['events']} events, "
                f"{seen['loris_cut']} slow clients cut off")
     bench.at_most(f"{what}: status, p99", P99_LIMIT_MS, percentile(seen["status_ms"], 0.99), "ms", 1)

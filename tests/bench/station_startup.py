@@ -19,10 +19,8 @@ OPTIONS = ("--cameras", "gige", "--scale", "0.25", "--views", "4", "--poses", "1
 
 def boot(rig, devices, state):
     """Seconds to the API's first answer, to what the devices are known to be, to the state; None for what does not come."""
-    rig.api.unlink(missing_ok=True)
     begun = time.monotonic()
-    with open(rig.folder / "daemon.log", "a") as log:
-        rig.daemon = subprocess.Popen([str(rig.bin / "scanrigd"), "--config", str(rig.config)], stdout=log, stderr=log)
+    rig.start_daemon(None, wait=False)
 
     def until(seen):
         return time.monotonic() - begun if rig.wait(lambda: seen(rig.status() or {}), STATE_LIMIT_S, 0.01) else None
