@@ -9,6 +9,7 @@ namespace scanrig {
 void keep_large_blocks_apart() {
 #ifdef M_MMAP_THRESHOLD
   ::mallopt(M_MMAP_THRESHOLD, 1 << 20);
+  ::mallopt(M_TRIM_THRESHOLD, 1 << 17);
 #endif
 }
 

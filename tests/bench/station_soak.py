@@ -98,7 +98,8 @@ def report(bench, part, shift, seconds, stuck):
         bench.at_most(what, GROWTH_LIMIT_PERCENT, None, "%")
         return
     before, after = quarters(shift.memory)
-    bench.note(f"{part}: {before / 1024:.0f} MiB, then {after / 1024:.0f} MiB")
+    course = ", ".join(f"{kib / 1024:.0f}" for kib in shift.memory[::max(1, len(shift.memory) // 20)])
+    bench.note(f"{part}: {before / 1024:.0f} MiB, then {after / 1024:.0f} MiB; over the jobs: {course}")
     bench.at_most(what, GROWTH_LIMIT_PERCENT, 100 * (after / before - 1), "%", 1)
     before, after = quarters(shift.open)
     bench.line(f"soak, {part}: descriptors", "flat", f"{before:.0f}, then {after:.0f}", after <= before)

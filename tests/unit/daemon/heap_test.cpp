@@ -1,0 +1,53 @@
+#include "daemon/jobs/heap.h"
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdlib>
+#include <fstream>
+#include <thread>
+
+#include "tests/slowness.h"
+
+namespace scanrig {
+namespace {
+
+constexpr std::size_t kPicture = 24 << 20, kPiece = 256 << 10, kPieces = 100, kPage = 4096;
+
+long resident_bytes() {
+  std::ifstream statm("/proc/self/statm");
+  long all = 0, resident = 0;
+  statm >> all >> resident;
+  return resident * ::sysconf(_SC_PAGESIZE);
+}
+
+/// Every page written to; nothing here may be left out by the compiler.
+void* used(std::size_t size) {
+  auto* block = static_cast<volatile char*>(std::malloc(size));
+  for (std::size_t i = 0; i < size; i += kPage) block[i] = 1;
+  return const_cast<char*>(block);
+}
+
+/// What a thread used in pieces too small to be pages of their own, and freed.
+void work() {
+  std::array<void*, kPieces> pieces{};
+  for (void*& piece : pieces) piece = used(kPiece);
+  for (void* piece : pieces) std::free(piece);
+}
+
+TEST(Heap, WhatAThreadUsedGoesBackThoughALargeBlockWasFreedBefore) {
+#ifndef __GLIBC__
+  GTEST_SKIP() << "another C library";
+#endif
+  if (kSlowness > 1) GTEST_SKIP() << "the sanitizer's own heap";
+  std::free(used(kPicture));  // from now on the C library would keep twice as much
+  keep_large_blocks_apart();
+  const long before = resident_bytes();
+  std::thread(work).join();
+  give_memory_back();
+  EXPECT_LT(resident_bytes() - before, long{kPieces * kPiece} / 4);
+}
+
+}  // namespace
+}  // namespace scanrig
