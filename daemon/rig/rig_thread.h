@@ -45,7 +45,10 @@ class RigThread {
     unsigned interrupts;  ///< so many had been when it was asked for
   };
 
-  void post(Command what) { inbox_.post({std::move(what), acquisition_.interrupts()}); }
+  template <class What>
+  void post(What what) {
+    inbox_.post(Asked{.what = std::move(what), .interrupts = acquisition_.interrupts()});
+  }
   void run();
   Event perform(const Asked& asked);
   void look();

@@ -114,7 +114,7 @@ void list_usb(Report& report) {
 void list_groups(Report& report) {
   report.section("User");
   std::string names;
-  for (const gid_t group : own_groups()) names += " " + group_name(group);
+  for (const gid_t group : own_groups()) names += fmt::format(" {}", group_name(group));
   report.note(fmt::format("{}, groups:{}", user_name(), names));
 }
 
