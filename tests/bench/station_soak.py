@@ -20,8 +20,9 @@ QUICK = {"low-resolution": 16, "full-size": 1}
 
 
 def memory_kib(pid):
+    """Resident: the share of what two daemons have in common (PSS) would rise when the other one ends."""
     rollup = pathlib.Path(f"/proc/{pid}/smaps_rollup").read_text()
-    return next(int(line.split()[1]) for line in rollup.splitlines() if line.startswith("Pss:"))
+    return next(int(line.split()[1]) for line in rollup.splitlines() if line.startswith("Rss:"))
 
 
 def descriptors(pid):
