@@ -62,6 +62,8 @@ def rows(rendered):
     """Name, what, asked, act; a life of the machine a list. Each life but the last is ended by a kill."""
     return [
         [("unit", "installed daemon under its unit", "active, exposure <= 2.0", scenario.unit),
+         ("failing", f"daemon failing {scenario.FAILURES} times in a row", "socket stays; then answered",
+          scenario.failing),
          ("serial", "serial adapter unplugged and back", "named; back without a restart", scenario.serial_unplugged)],
         [("estop", "e-stop at the GPIO line", "named e-stop", scenario.estop)],
         [("camera", "cameras lost and back", "named; back without a restart", scenario.cameras_lost)],
@@ -146,7 +148,7 @@ def run(options, work, table):
 def main():
     parser = argparse.ArgumentParser(prog="./dev hil", description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="+", metavar="ROW",
-                        help="unit, serial, estop, camera, killed, watchdog, pose, gige, uart, vivid; "
+                        help="unit, failing, serial, estop, camera, killed, watchdog, pose, gige, uart, vivid; "
                         "without the kills of the machine")
     parser.add_argument("--cold", action="store_true", help="make the machine's images anew, and render what it sees")
     parser.add_argument("--bin", type=pathlib.Path, required=True, help=argparse.SUPPRESS)

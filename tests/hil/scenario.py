@@ -12,6 +12,8 @@ RECOVERY_S = 60
 CONFIGS = "/etc/scanrig"
 UART_DEG = 40.0
 MOST_EXPOSURE = 2.0
+FAILURES = 6  # one more than systemd lets a unit have in a row, if nothing is said
+FAILS = "[Service]\\nExecStart=\\nExecStart=/bin/false\\nExecStopPost=\\nRestartSec=200ms\\n"
 PAIRS, VIVID_SIZE = 8, (320, 180)
 
 
@@ -33,6 +35,26 @@ def unit(station):
     exposure = float(judged.split(":", 1)[1].split()[0])
     expect(exposure <= MOST_EXPOSURE, f"its exposure is {exposure}")
     return f"{exposure} exposure, user scanrig"
+
+
+def failing(station):
+    """A daemon that cannot begin is tried again and again and keeps its socket; who connects once it can is answered."""
+    drop_in = "/run/systemd/system/scanrigd.service.d"
+    station.machine.do(f"mkdir -p {drop_in} && printf '{FAILS}' >{drop_in}/fails.conf && systemctl daemon-reload && "
+                       "systemctl restart scanrigd; true", 60)
+
+    def tried():
+        return int(station.machine.do("systemctl show scanrigd -p NRestarts --value"))
+
+    failed = station.wait(f"tried {FAILURES} times", lambda: (n := tried()) >= FAILURES and n, 60)
+    code, words = station.machine.call("timeout 30 scanrig status 2>&1")
+    expect(code not in (0, 124), f"scanrig status of a daemon that cannot begin: exit code {code}, {words}")
+    station.machine.do(f"rm -r {drop_in} && systemctl daemon-reload && systemctl stop scanrigd", 60)
+    socket = station.machine.do("systemctl is-active scanrigd.socket || true")
+    expect(socket == "active", f"after {failed} failures the socket is {socket}")
+    station.machine.do("scanrig status", 60)
+    expect(station.machine.do("systemctl is-active scanrigd") == "active", "the daemon was not started by who connected")
+    return f"{failed} failures, socket active; told: {words.strip().splitlines()[-1]}"
 
 
 def wait_for_views(station, job, count, limit_s=SCAN_S):

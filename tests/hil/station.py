@@ -86,7 +86,7 @@ class Station:
         try:
             self.machine.wait_for_boot()
             self.plug_serial(True)
-            self.machine.do(f"date -s @{time.time():.3f} && systemctl start --no-block multi-user.target")
+            self.machine.do(f"date -s @{time.time():.3f} && systemctl start --no-block scanrigd.socket multi-user.target")
         except BaseException:
             self.machine.kill()
             raise
