@@ -115,7 +115,7 @@ def report(bench, what, tried, wrong):
 
 def measure(bench, scratch):
     with motion_rig.Rig(bench.bin, scratch / "security", "--poses", "1") as rig:
-        port, viewer = station_load.open_api(bench, rig)
+        port, viewer = station_load.open_api(rig)
         tokens = {"viewer": viewer}
         for role in ROLES[1:]:
             made = bench.run([bench.bin / "scanrig", "token", "add", role, "--role", role, "--config", rig.config], 10)
