@@ -107,7 +107,7 @@ bool quiet_now(const std::optional<QuietHours>& hours) {
 }  // namespace
 
 Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, Clock& clock, std::stop_token stop) {
-  keep_large_blocks_apart();
+  keep_heaps_small();
   EndingWatch ending(options.ending_limit, options.ending_hangs);
   auto store = JobStore::open(options.jobs);
   if (!store) return pass_on(store);

@@ -6,7 +6,7 @@ namespace scanrig {
 
 // Other C libraries than glibc do so by themselves, or cannot be told.
 
-void keep_large_blocks_apart() {
+void keep_heaps_small() {
 #ifdef M_MMAP_THRESHOLD
   ::mallopt(M_MMAP_THRESHOLD, 1 << 20);
   ::mallopt(M_TRIM_THRESHOLD, 1 << 17);

@@ -101,10 +101,16 @@ class Rig:
     # The daemon
 
     def start_daemon(self, scale=0.25, wait=True, environment=None):
-        """`scale`: of the cameras that the daemon itself simulates; None: the shipped daemon, which simulates none."""
+        """One that simulates its cameras itself, at this scale."""
+        self.run_daemon([self.bin / "scanrigd-sim", "--scale", scale], wait, environment)
+
+    def start_shipped_daemon(self, wait=True):
+        """For a rig whose cameras are simulated on the wire."""
+        self.run_daemon([self.bin / "scanrigd"], wait)
+
+    def run_daemon(self, program, wait, environment=None):
         self.api.unlink(missing_ok=True)
         output = open(self.folder / "daemon.log", "a")
-        program = [self.bin / "scanrigd"] if scale is None else [self.bin / "scanrigd-sim", "--scale", scale]
         command = [*program, "--config", self.config]
         self.daemon = subprocess.Popen([str(word) for word in command], stdout=output, stderr=output,
                                        env=dict(os.environ, **(environment or {})))

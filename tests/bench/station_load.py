@@ -100,7 +100,7 @@ def inside(binaries, scratch, size):
     with motion_rig.Rig(binaries, scratch / "load", *OPTIONS, "--scale", size["scale"], "--views", size["views"],
                         "--voxel-mm", size["voxel"]) as rig:
         port, token = open_api(rig)
-        rig.start_daemon(None)
+        rig.start_shipped_daemon()
         rig.get_ready()
         for _ in range(2):  # the table rests a little elsewhere in every other turn: both are rendered now
             one_job(rig, None)

@@ -20,7 +20,7 @@ OPTIONS = ("--cameras", "gige", "--scale", "0.25", "--views", "4", "--poses", "1
 def boot(rig, devices, state):
     """Seconds to the API's first answer, to what the devices are known to be, to the state; None for what does not come."""
     begun = time.monotonic()
-    rig.start_daemon(None, wait=False)
+    rig.start_shipped_daemon(wait=False)
 
     def until(seen):
         return time.monotonic() - begun if rig.wait(lambda: seen(rig.status() or {}), STATE_LIMIT_S, 0.01) else None

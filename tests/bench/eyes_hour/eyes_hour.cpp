@@ -1,16 +1,15 @@
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <condition_variable>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
 
 #include "daemon/rig/rig_thread.h"
 #include "sim/wire/loopback.h"
 #include "tests/component/camera/aravis_bench.h"
 #include "tests/component/daemon/fake_rig.h"
+#include "tests/resident_memory.h"
 
 /// eyes_hour SECONDS: the daemon's rig thread over two GigE cameras, in turns ten seconds of scanning and ten of live
 /// preview, both at 10 frames/s of each camera. Prints a line of JSON every two seconds: memory, descriptors, what was
@@ -43,13 +42,6 @@ class BenchProjector final : public Projector {
 
 std::ptrdiff_t descriptors() {
   return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator());
-}
-
-long resident_kib() {
-  std::ifstream statm("/proc/self/statm");
-  long all = 0, resident = 0;
-  statm >> all >> resident;
-  return resident * (::sysconf(_SC_PAGESIZE) / 1024);
 }
 
 /// Waits for the rig's answer to the last command.

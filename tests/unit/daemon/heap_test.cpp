@@ -1,26 +1,18 @@
 #include "daemon/jobs/heap.h"
 
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <array>
 #include <cstdlib>
-#include <fstream>
 #include <thread>
 
+#include "tests/resident_memory.h"
 #include "tests/slowness.h"
 
 namespace scanrig {
 namespace {
 
 constexpr std::size_t kPicture = 24 << 20, kPiece = 256 << 10, kPieces = 100, kPage = 4096;
-
-long resident_bytes() {
-  std::ifstream statm("/proc/self/statm");
-  long all = 0, resident = 0;
-  statm >> all >> resident;
-  return resident * ::sysconf(_SC_PAGESIZE);
-}
 
 /// Every page written to; nothing here may be left out by the compiler.
 void* used(std::size_t size) {
@@ -42,11 +34,11 @@ TEST(Heap, WhatAThreadUsedGoesBackThoughALargeBlockWasFreedBefore) {
 #endif
   if (kSlowness > 1) GTEST_SKIP() << "the sanitizer's own heap";
   std::free(used(kPicture));  // from now on the C library would keep twice as much
-  keep_large_blocks_apart();
-  const long before = resident_bytes();
+  keep_heaps_small();
+  const long before = resident_kib();
   std::thread(work).join();
   give_memory_back();
-  EXPECT_LT(resident_bytes() - before, long{kPieces * kPiece} / 4);
+  EXPECT_LT(resident_kib() - before, long{kPieces * kPiece >> 10} / 4);
 }
 
 }  // namespace
