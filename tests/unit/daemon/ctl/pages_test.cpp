@@ -124,7 +124,8 @@ TEST_F(Pages, TheManualIsReadWithoutComplaint) {
   for (const auto& [name, text] : manual_pages(app)) {
     const auto path = file(name, text);
     if (installed("mandoc")) {
-      EXPECT_EQ(output_of("mandoc -Tlint -W warning " + path), "") << name;
+      // Without a date, so that a version's pages are always the same.
+      EXPECT_EQ(output_of("mandoc -Tlint -W warning " + path + " | grep -v 'missing date'"), "") << name;
     }
     if (!installed("man")) continue;
     const auto shown = output_of("LC_ALL=C MANWIDTH=80 man --warnings -l " + path + " | cat");
