@@ -18,7 +18,7 @@ import station_view_cost
 MEASURED = {"startup": station_startup, "closure": station_closure, "kill": station_kill,
             "disturbed": station_disturbed, "stages": station_stages, "view_cost": station_view_cost,
             "load": station_load, "security": station_security, "soak": station_soak, "fuzz": station_fuzz,
-            "sanitize": station_sanitize}
+            "asan": station_sanitize.ASAN, "tsan": station_sanitize.TSAN}
 PARTS = tuple(MEASURED)
 
 
