@@ -9,6 +9,7 @@ from station import IMAGES, JOBS, VIEWS, Unmet
 
 SCAN_S = 120
 RECOVERY_S = 60
+UNITS = "scanrigd.socket scanrigd.service"  # both: whoever connects to the socket starts the daemon
 CONFIGS = "/etc/scanrig"
 UART_DEG = 40.0
 MOST_EXPOSURE = 2.0
@@ -71,7 +72,7 @@ def pose(station, rendered):
     """Start pressed at the panel; one pose of 8 views. `rendered`: sha256 by file of what the cameras show."""
     if station.job:
         end_job(station)
-        station.machine.do("systemctl start scanrigd", 60)
+        station.machine.do(f"systemctl start {UNITS}", 60)
     station.get_ready()
     begin = time.monotonic()
     job = station.start()
@@ -94,7 +95,7 @@ def usb_and_gige(station, rendered):
     attach = "ip netns exec cameras usbip attach -r 127.0.0.1 -b 1-1"
     station.wait("the LightCrafter attached", lambda: station.machine.call(attach)[0] == 0, 20)
     end_job(station)
-    station.machine.do(f"cp {CONFIGS}/usb-and-gige.toml {CONFIGS}/rig.toml && systemctl start scanrigd", 60)
+    station.machine.do(f"cp {CONFIGS}/usb-and-gige.toml {CONFIGS}/rig.toml && systemctl start {UNITS}", 60)
     for device in ("projector", "camera"):
         station.wait(f"the {device} there", lambda name=device: device_is_there(station, name), 30)
     return pose(station, rendered)
@@ -135,7 +136,7 @@ def vivid(station):
 def end_job(station):
     """The station stopped, its job's folder taken away: in an emulated machine a reconstruction would take minutes."""
     away = f" && rm -rf {JOBS}/{station.job}" if station.job else ""
-    station.machine.do(f"systemctl stop scanrigd{away}", 60)
+    station.machine.do(f"systemctl stop {UNITS}{away}", 60)
     station.job = None
 
 
