@@ -1,4 +1,4 @@
-"""The whole suite under a sanitizer; either is a part of its own, since each takes more than an hour."""
+"""The whole suite under a sanitizer; either is a part of its own, since each takes about an hour on two cores."""
 import pathlib
 import time
 
