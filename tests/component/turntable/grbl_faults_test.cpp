@@ -41,6 +41,7 @@ TEST_F(GrblFaults, SpoiledAnswersEndInTheirErrorWithinTheDeadlineWithTheTableAtR
       {"Silent", {WireFault::Kind::deaf}, ErrorCode::timeout, false},
       {"AnswersLost", {WireFault::Kind::answer_lost, forever, kReport}, ErrorCode::timeout, true},
       {"Late", {WireFault::Kind::late, forever, kReport, milliseconds(50)}, ErrorCode::timeout, true},
+      {"AsLateAsIsWaitedFor", {WireFault::Kind::late, forever, kReport, milliseconds(80)}, ErrorCode::timeout, true},
       {"Damaged", {WireFault::Kind::wrong_crc, forever, kReport}, ErrorCode::protocol, true},
       {"CutShort", {WireFault::Kind::cut_short, forever, kReport}, ErrorCode::timeout, true},
       {"EarlierAnswers", {WireFault::Kind::earlier_answer, forever, kReport}, ErrorCode::protocol, true}};
