@@ -16,8 +16,8 @@ constexpr milliseconds kEnableTime{1000};
 /// For so long the position must not change to be called standing: longer than a table rings after a quick stop.
 constexpr milliseconds kStandingTime{100};
 constexpr int kAttempts = 3;
-/// Three attempts of five each: an answer may come two late, the line is quiet for two after it, the next one takes one.
-/// The rest is room, for a reset too.
+/// Three attempts of five each: an answer may come two late, the line is quiet for two after it, the next one takes
+/// one. The rest is room, for a reset too.
 constexpr int kStopReplyTimeouts = 20;
 
 }  // namespace
