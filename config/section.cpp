@@ -8,6 +8,9 @@ namespace scanrig::config {
 namespace {
 
 constexpr std::size_t kMaxProblems = 20;
+/// Every dot of a key opens a table in a table, and toml++ takes those down by recursion: 100 000 deep are too many for
+/// a stack of 8 MiB.
+constexpr std::size_t kMostBytes = 64 * 1024;
 
 int line_of(const toml::node& node) { return std::max(1, static_cast<int>(node.source().begin.line)); }
 
@@ -139,6 +142,10 @@ void Section::report_unknown_keys() {
 Result<void> read_toml(std::string_view text, const std::filesystem::path& file,
                        const std::function<void(Section&)>& read) {
   Problems problems(file.string());
+  if (text.size() > kMostBytes) {
+    problems.add(1, fmt::format("{} bytes are too many; a file of this kind has at most {}", text.size(), kMostBytes));
+    return tl::unexpected(problems.error());
+  }
   try {
     const toml::table table = toml::parse(text, file.string());
     Section root(table, "", "", problems);

@@ -34,7 +34,7 @@ Result<void> read_corner_uv(const std::filesystem::path& file, TexturedMesh& mod
     if (line.starts_with("vt ")) {
       std::string_view words = line.substr(3);
       Eigen::Vector2f& at = uv.emplace_back();
-      if (!take_number(words, at.x()) || !take_number(words, at.y())) return bad(line);
+      if (!take_number(words, at.x()) || !take_number(words, at.y()) || !at.allFinite()) return bad(line);
       at.y() = 1.0F - at.y();
     } else if (line.starts_with("f ")) {
       std::string_view words = line.substr(2);

@@ -62,7 +62,7 @@ void JsonObject::ignore(std::string_view key) { taken_.emplace_back(key); }
 
 std::optional<double> JsonObject::finite(const json& value, const std::string& where) {
   if (value.is_number() && std::isfinite(value.get<double>())) return value.get<double>();
-  reject_at(where, fmt::format("must be a finite number, not {}", value.dump()));
+  reject_at(where, fmt::format("must be a finite number, not {}", value.type_name()));
   return std::nullopt;
 }
 
@@ -135,7 +135,9 @@ std::vector<std::string> JsonObject::sha256s(std::string_view key) {
 std::string JsonObject::inner_path(std::string_view key) {
   std::string value = text(key);
   const std::filesystem::path path(value);
-  if (value.empty() || path.is_absolute() || std::find(path.begin(), path.end(), "..") != path.end()) {
+  const bool inside = !value.empty() && value.find('\0') == std::string::npos && path.is_relative() &&
+                      std::find(path.begin(), path.end(), "..") == path.end();
+  if (!inside) {
     reject(key, fmt::format("\"{}\" is not a path inside the folder", value));
   }
   return value;

@@ -9,7 +9,8 @@
 
 namespace scanrig {
 
-/// Any bytes: a mesh whose faces name vertices that are there, or an error that names the file.
+/// Any bytes: a mesh whose faces name vertices that are there and whose attributes are none or one a vertex, or an
+/// error that names the file.
 template <class Parse>
 int mesh_fuzz(Parse parse, const std::uint8_t* data, std::size_t size) {
   constexpr std::string_view kName = "input.mesh";
@@ -23,7 +24,9 @@ int mesh_fuzz(Parse parse, const std::uint8_t* data, std::size_t size) {
       if (vertex >= mesh->vertices.size()) std::abort();
     }
   }
-  if (!mesh->colour.empty() && mesh->colour.size() != mesh->vertices.size()) std::abort();
+  for (const auto size : {mesh->normals.size(), mesh->views.size(), mesh->sigma.size(), mesh->colour.size()}) {
+    if (size != 0 && size != mesh->vertices.size()) std::abort();
+  }
   return 0;
 }
 

@@ -221,6 +221,8 @@ bool read_entry(const Element& element, Body& body, const Take& take, const Leng
 }
 
 Result<void> read_vertices(const Element& element, Body& body, std::string_view name, Mesh& mesh) {
+  // A second list with other properties would leave attributes of some vertices only.
+  if (!mesh.vertices.empty()) return fail(ErrorCode::invalid_input, "{}: it lists vertices twice", name);
   const VertexLayout layout(element);
   if (!layout.has(0, 3)) return fail(ErrorCode::invalid_input, "{}: the vertices have no x, y, z", name);
   const auto nothing = [](std::size_t, double) {};

@@ -12,6 +12,7 @@
 namespace scanrig::config {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 using testing::StartsWith;
 
@@ -246,6 +247,15 @@ TEST_F(RigConfigTest, TextThatIsNotTomlIsToldWithItsLine) {
   ASSERT_FALSE(rig);
   EXPECT_EQ(rig.error().code, ErrorCode::invalid_input);
   EXPECT_THAT(rig.error().message, StartsWith(file_.string() + ":2: "));
+}
+
+TEST_F(RigConfigTest, KeysOfAHundredThousandPartsAreRefused) {
+  std::string text = "a";
+  for (int i = 0; i < 100'000; ++i) text += ".a";
+  const auto rig = read(text + " = 1\n");
+  ASSERT_FALSE(rig);
+  EXPECT_EQ(rig.error().code, ErrorCode::invalid_input);
+  EXPECT_THAT(rig.error().message, AllOf(StartsWith(file_.string() + ":1: "), HasSubstr("too many")));
 }
 
 TEST_F(RigConfigTest, AMissingFileIsNotFound) {

@@ -83,6 +83,15 @@ TEST_F(EvaluateFilesTest, AModelsClaimsAreReadBack) {
   EXPECT_EQ(claim->model.atlas(5, 5), cv::Vec3b(10, 200, 30));
   EXPECT_EQ(claim->pose1_from_pose2->translation(), Eigen::Vector3d(1, 2, 3));
 
+  const std::string obj = read_file(folder_ / "model" / "model.obj").value();
+  const auto uv = obj.find("vt ");
+  ASSERT_NE(uv, std::string::npos);
+  ASSERT_TRUE(write_file_atomically(folder_ / "model" / "model.obj",
+                                    obj.substr(0, uv) + "vt nan 0" + obj.substr(obj.find('\n', uv))));
+  const auto nowhere = read_claim(folder_ / "model");
+  ASSERT_FALSE(nowhere);
+  EXPECT_NE(nowhere.error().message.find("vt nan 0"), std::string::npos) << nowhere.error().message;
+
   ASSERT_TRUE(write_file_atomically(folder_ / "model" / "model.obj", "vt 0 0\nf 1/1 2/1 4/1\n"));
   EXPECT_EQ(read_claim(folder_ / "model").error().code, ErrorCode::invalid_input);
   EXPECT_EQ(read_claim(folder_ / "absent").error().code, ErrorCode::not_found);

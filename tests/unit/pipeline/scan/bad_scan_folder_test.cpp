@@ -67,6 +67,19 @@ TEST_F(BadScanFolderTest, APathOutOfTheFolderIsRefused) {
   expect_refused(ErrorCode::invalid_input, {"files.left_plain.path"});
 }
 
+TEST_F(BadScanFolderTest, APathThatEndsBeforeItsTextIsRefused) {
+  with_one_view();
+  edit_manifest("pose1/view00/left_plain.png", "pose1/view00/left_plain.png\\u0000");
+  expect_refused(ErrorCode::invalid_input, {"files.left_plain.path"});
+}
+
+TEST_F(BadScanFolderTest, NestedListsForANumberAreRefusedHoweverDeep) {
+  with_one_view();
+  constexpr int kDeep = 200'000;
+  edit_manifest("\"moving_ms\":", "\"moving_ms\":" + std::string(kDeep, '[') + std::string(kDeep, ']') + ", \"x\":");
+  expect_refused(ErrorCode::invalid_input, {"scan.json", "poses[0].views[0].moving_ms", "not array"});
+}
+
 TEST_F(BadScanFolderTest, AChangedImageIsNoticedByItsHash) {
   with_one_view();
   write_text(scan_ / "pose1/view00/left_plain.png", png(raw_view(3).left_plain));

@@ -74,6 +74,7 @@ TEST(MeshReaderTest, anUnusablePlyIsRefusedByNameAndReason) {
   EXPECT_THAT(message_of(parse_ply(with(kSquare, "ascii", "utf8"), "a.ply")), HasSubstr("utf8"));
   EXPECT_THAT(message_of(parse_ply(with(kSquare, "double x", "quad x"), "a.ply")), HasSubstr("quad"));
   EXPECT_THAT(message_of(parse_ply(with(kSquare, "double z", "double w"), "a.ply")), HasSubstr("no x, y, z"));
+  EXPECT_THAT(message_of(parse_ply(with(kSquare, "element edge", "element vertex"), "a.ply")), HasSubstr("twice"));
   EXPECT_THAT(message_of(parse_ply(with(kSquare, "0 1 0 0.5", "0 nan 0 0.5"), "a.ply")), HasSubstr("vertex 3"));
   EXPECT_THAT(message_of(parse_ply(with(kSquare, "0 1 2 3\n", "0 1 2 4\n"), "a.ply")), HasSubstr("not there"));
   EXPECT_THAT(message_of(parse_ply(with(kSquare, "9 4 0 1 2 3", "9 2 0 1"), "a.ply")), HasSubstr("2 corners"));
