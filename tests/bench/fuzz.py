@@ -13,6 +13,7 @@ BUILD_LIMIT_S = 3600
 LOOK_S = 0.5
 HANG_S = 60  # for one input, on a machine that has more to do than it can
 CRASH = re.compile(r"SUMMARY: .*")
+INPUT = re.compile(r"Test unit written to \S*/(\S+)(?:\nBase64: (\S+))?")  # short ones in base64 too
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
@@ -41,6 +42,15 @@ def cpu_s(process):
     with open(f"/proc/{process.pid}/stat") as stat:
         fields = stat.read().rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / TICKS
+
+
+def crash_in(told):
+    """What libFuzzer says of a crash, and of which input; "" where there was none."""
+    found, kept = CRASH.search(told), INPUT.search(told)
+    if not found:
+        return ""
+    words = [word for word in kept.groups() if word] if kept else ["not kept"]
+    return f"{found.group(0)}; input: {' '.join(words)}"
 
 
 def run(bench, root, scratch, parser):
@@ -76,8 +86,7 @@ def run(bench, root, scratch, parser):
         out.close()
         counted = re.findall(r"(?:number_of_executed_units: |^#)(\d+)", told, re.MULTILINE)
         inputs += int(counted[-1]) if counted else 0
-        found = CRASH.search(told)
-        crash = crash or (found.group(0) if found else "ended by itself: " + told.strip()[-120:] if early else "")
+        crash = crash or crash_in(told) or ("ended by itself: " + told.strip()[-120:] if early else "")
     return inputs, spent, crash
 
 
