@@ -133,7 +133,7 @@ class Section {
 };
 
 /// Reads the text of `file` through `read`. Fails with `invalid_input` with every problem on a line of its own:
-/// "FILE:LINE: [table] key: what is wrong".
+/// "FILE:LINE: [table] key: what is wrong"; a text of more than 64 KiB is one problem.
 Result<void> read_toml(std::string_view text, const std::filesystem::path& file,
                        const std::function<void(Section&)>& read);
 

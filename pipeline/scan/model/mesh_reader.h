@@ -9,7 +9,8 @@
 namespace scanrig {
 
 /// Reads a mesh; units are the file's. All fail with `not_found`, `io`, `invalid_input` (not such a file, cut short, no
-/// faces, a face that names no vertex, a vertex that is not a number), naming the file. Any bytes are safe to read.
+/// faces, a face that names no vertex, a vertex that is not a number, two lists of vertices), naming the file. Any
+/// bytes are safe to read.
 
 /// PLY: ascii or binary of either byte order; polygons become fans of triangles. Takes normals, colour (red green blue,
 /// bytes or 0..1), `views` and `sigma` where the file has them, and skips what it does not know.
