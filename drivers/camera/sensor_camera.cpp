@@ -64,7 +64,8 @@ Result<void> SensorCamera::connect(Channel& channel, Deadline deadline) {
 void SensorCamera::forget(Channel& channel) {
   channel.ledger.forget();
   channel.warm = false;
-  for (Channel& each : channels_) each.last_pair.reset();
+  last_pair_.reset();
+  refused_pair_.reset();
 }
 
 /// What came unasked: an edge that was none, or the frame of an exposure given up.
@@ -284,25 +285,37 @@ Result<void> SensorCamera::expect_no_more(Channel& channel) {
   return fail(ErrorCode::protocol, "{}: more frames than triggers; {}", channel.sensor->name(), kRedo);
 }
 
+std::chrono::nanoseconds SensorCamera::Moments::apart_since(const Moments& before) const {
+  return (left - before.left) - (right - before.right);
+}
+
+bool SensorCamera::Moments::agrees_with(const Moments& before) const {
+  return std::chrono::abs(apart_since(before)) <= pair_tolerance(left - before.left);
+}
+
+/// A wrong stamp may be the pair's before, which was the first and compared with none: a pair that agrees with the one
+/// refused last is as good as one that agrees with the one taken last.
 Result<void> SensorCamera::expect_one_moment(const std::vector<SensorFrame>& frames) {
   // Without a common edge there is no common moment: the light stays on, and the table stands.
   if (frames.size() < 2 || options_.by != TriggeringOptions::By::line) return {};
-  Channel &left = channels_[0], &right = channels_[1];
-  const auto left_time = frames[0].stamp.time, right_time = frames[1].stamp.time;
-  std::chrono::nanoseconds apart{0}, since{0};
+  const Moments now{frames[0].stamp.time, frames[1].stamp.time};
+  std::chrono::nanoseconds apart{0};
+  bool together = true;
   if (options_.frame_clock == TriggeringOptions::FrameClock::ptp) {
-    apart = left_time - right_time;
-  } else if (left.last_pair && right.last_pair) {
-    since = left_time - *left.last_pair;
-    apart = since - (right_time - *right.last_pair);
+    apart = now.left - now.right;
+    together = std::chrono::abs(apart) <= pair_tolerance(std::chrono::nanoseconds(0));
+  } else if (last_pair_) {
+    apart = now.apart_since(*last_pair_);
+    together = now.agrees_with(*last_pair_) || (refused_pair_ && now.agrees_with(*refused_pair_));
   }
-  if (std::chrono::abs(apart) > pair_tolerance(since)) {
+  if (!together) {
     ++counts_.odd;
+    refused_pair_ = now;
     return fail(ErrorCode::protocol, "camera: left and right were exposed {:.2f} ms apart; {}", milliseconds(apart),
                 kRedo);
   }
-  left.last_pair = left_time;
-  right.last_pair = right_time;
+  last_pair_ = now;
+  refused_pair_.reset();
   return {};
 }
 

@@ -62,8 +62,12 @@ class SensorCamera final : public StereoCamera {
   struct Channel {
     std::unique_ptr<Sensor> sensor;
     TriggerLedger ledger;
-    std::optional<std::chrono::nanoseconds> last_pair{};  // on its own clock
-    bool warm = false;                                    // warmed up since it was connected
+    bool warm = false;  // warmed up since it was connected
+  };
+  struct Moments {
+    std::chrono::nanoseconds left, right;  // each on its sensor's own clock
+    [[nodiscard]] std::chrono::nanoseconds apart_since(const Moments& before) const;
+    [[nodiscard]] bool agrees_with(const Moments& before) const;
   };
 
   Result<void> connect(Deadline deadline);
@@ -85,6 +89,7 @@ class SensorCamera final : public StereoCamera {
   const TriggeringOptions options_;
   Clock& clock_;
   std::vector<Channel> channels_;
+  std::optional<Moments> last_pair_, refused_pair_;  // since both sensors' clocks are known
   bool armed_ = false;
   bool in_step_ = false;  // nothing has failed since the ledgers were last known to be right
   Clock::TimePoint trigger_after_{};

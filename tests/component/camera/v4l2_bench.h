@@ -38,9 +38,11 @@ class V4l2Bench : public StereoCameraBench {
   std::uint64_t fire() override {
     ++fired_;
     ++sequence_;
+    const auto edge = clock_.now();
     for (std::size_t i = 0; i < devices_.size(); ++i) {
       const bool spoilt = fault_ && i + 1 == devices_.size();
-      ScriptedVideo::Frame frame{image(fired_), sequence_, clock_.now(), clock_.now() + std::chrono::milliseconds(3)};
+      const auto stamp = edge + (i == 0 ? std::exchange(left_stamp_off_, {}) : Clock::Duration{});
+      ScriptedVideo::Frame frame{image(fired_), sequence_, stamp, edge + std::chrono::milliseconds(3)};
       if (spoilt && *fault_ == Fault::stale) {
         frame = last_[i];
         frame.sequence = sequence_;
@@ -54,6 +56,8 @@ class V4l2Bench : public StereoCameraBench {
     fault_.reset();
     return fired_;
   }
+  /// The next left frame's stamp is that much late.
+  void put_left_stamp_off(Clock::Duration by) { left_stamp_off_ = by; }
   std::optional<std::uint64_t> number_in(const cv::Mat& image) override { return sim::wire::hidden_number(image); }
   bool spoil(Fault fault) override {
     fault_ = fault;
@@ -84,6 +88,7 @@ class V4l2Bench : public StereoCameraBench {
   V4l2Options options_;
   Result<std::unique_ptr<SensorCamera>> opened_;
   std::optional<Fault> fault_;
+  Clock::Duration left_stamp_off_{};
   std::uint64_t fired_ = 0;
   std::uint32_t sequence_ = 0xFFFFFFF0;  // the sequence number begins again soon
 };

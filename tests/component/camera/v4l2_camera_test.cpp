@@ -123,6 +123,44 @@ TEST(V4l2Camera, AFreeRunningPairBeginsAfterItWasAskedFor) {
   EXPECT_GE(frame->taken, asked);
 }
 
+/// One exposure whose left stamp is that much late; "taken", or what was said.
+std::string expose(V4l2Bench& bench, std::chrono::microseconds left_stamp_off) {
+  const auto deadline = Deadline::after(bench.clock(), bench.ample());
+  if (const auto armed = bench.camera().arm(deadline); !armed) return armed.error().message;
+  bench.put_left_stamp_off(left_stamp_off);
+  bench.fire();
+  const auto frame = bench.camera().collect(deadline);
+  return frame ? "taken" : frame.error().message;
+}
+
+using std::chrono::microseconds;
+constexpr microseconds kRight{0}, kWrong{1400}, kMoreWrong{2800};
+
+TEST(V4l2Camera, AWrongStampCostsOneExposure) {
+  V4l2Bench bench;
+  EXPECT_EQ(expose(bench, kRight), "taken");
+  EXPECT_THAT(expose(bench, kWrong), HasSubstr("left and right were exposed 1.40 ms apart"));
+  EXPECT_EQ(expose(bench, kRight), "taken");
+}
+
+TEST(V4l2Camera, AWrongStampOfTheFirstPairCostsOneExposure) {
+  V4l2Bench bench;
+  EXPECT_EQ(expose(bench, kWrong), "taken") << "it can be compared with none";
+  EXPECT_THAT(expose(bench, kRight), HasSubstr("apart"));
+  EXPECT_EQ(expose(bench, kRight), "taken");
+  EXPECT_EQ(expose(bench, kRight), "taken");
+  EXPECT_THAT(expose(bench, kWrong), HasSubstr("apart"));
+}
+
+TEST(V4l2Camera, APairThatAgreesWithNoneBeforeIsRefused) {
+  V4l2Bench bench;
+  EXPECT_EQ(expose(bench, kRight), "taken");
+  EXPECT_THAT(expose(bench, kWrong), HasSubstr("apart"));
+  EXPECT_THAT(expose(bench, kMoreWrong), HasSubstr("apart"));
+  EXPECT_THAT(expose(bench, kWrong), HasSubstr("apart"));
+  EXPECT_EQ(expose(bench, kRight), "taken");
+}
+
 TEST(V4l2Camera, GivesItsDevicesBack) {
   auto bench = std::make_unique<V4l2Bench>();
   EXPECT_EQ(bench->video().open_descriptors(), 2);
