@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "drivers/camera/v4l2_stereo_camera.h"
 #include "sim/wire/gige_camera.h"
 #include "tests/component/camera/scripted_video.h"

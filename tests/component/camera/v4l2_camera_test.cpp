@@ -134,31 +134,31 @@ std::string expose(V4l2Bench& bench, std::chrono::microseconds left_stamp_off) {
 }
 
 using std::chrono::microseconds;
-constexpr microseconds kRight{0}, kWrong{1400}, kMoreWrong{2800};
+constexpr microseconds kOnTime{0}, kLate{1400}, kLater{2800};
 
 TEST(V4l2Camera, AWrongStampCostsOneExposure) {
   V4l2Bench bench;
-  EXPECT_EQ(expose(bench, kRight), "taken");
-  EXPECT_THAT(expose(bench, kWrong), HasSubstr("left and right were exposed 1.40 ms apart"));
-  EXPECT_EQ(expose(bench, kRight), "taken");
+  EXPECT_EQ(expose(bench, kOnTime), "taken");
+  EXPECT_THAT(expose(bench, kLate), HasSubstr("left and right were exposed 1.40 ms apart"));
+  EXPECT_EQ(expose(bench, kOnTime), "taken");
 }
 
 TEST(V4l2Camera, AWrongStampOfTheFirstPairCostsOneExposure) {
   V4l2Bench bench;
-  EXPECT_EQ(expose(bench, kWrong), "taken") << "it can be compared with none";
-  EXPECT_THAT(expose(bench, kRight), HasSubstr("apart"));
-  EXPECT_EQ(expose(bench, kRight), "taken");
-  EXPECT_EQ(expose(bench, kRight), "taken");
-  EXPECT_THAT(expose(bench, kWrong), HasSubstr("apart"));
+  EXPECT_EQ(expose(bench, kLate), "taken") << "it can be compared with none";
+  EXPECT_THAT(expose(bench, kOnTime), HasSubstr("apart"));
+  EXPECT_EQ(expose(bench, kOnTime), "taken");
+  EXPECT_EQ(expose(bench, kOnTime), "taken");
+  EXPECT_THAT(expose(bench, kLate), HasSubstr("apart"));
 }
 
 TEST(V4l2Camera, APairThatAgreesWithNoneBeforeIsRefused) {
   V4l2Bench bench;
-  EXPECT_EQ(expose(bench, kRight), "taken");
-  EXPECT_THAT(expose(bench, kWrong), HasSubstr("apart"));
-  EXPECT_THAT(expose(bench, kMoreWrong), HasSubstr("apart"));
-  EXPECT_THAT(expose(bench, kWrong), HasSubstr("apart"));
-  EXPECT_EQ(expose(bench, kRight), "taken");
+  EXPECT_EQ(expose(bench, kOnTime), "taken");
+  EXPECT_THAT(expose(bench, kLate), HasSubstr("apart"));
+  EXPECT_THAT(expose(bench, kLater), HasSubstr("apart"));
+  EXPECT_THAT(expose(bench, kLate), HasSubstr("apart"));
+  EXPECT_EQ(expose(bench, kOnTime), "taken");
 }
 
 TEST(V4l2Camera, GivesItsDevicesBack) {
