@@ -1,5 +1,6 @@
 """docs/measured.md: the last full table of every group, with the command that makes it again."""
 import pathlib
+import re
 
 HEAD = """# What was measured
 
@@ -39,6 +40,8 @@ def amended(text, group, record):
     rows = [later.pop(name[0].split(" (on ")[0], None) or name for name in rows] + list(later.values())
     named = {line["what"] for line in record["lines"]}
     rows = [[name + mark if name in named else name, *rest] for name, *rest in rows]
+    if all(" (on " in name for name, *_ in rows):
+        head = re.sub(r" on commit \w+,", ", each line on the commit it names,", head)
     return head.rsplit(": ", 1)[0] + ": " + counted(rows) + table(rows)
 
 
