@@ -13,6 +13,8 @@ endif()
 
 set(SCANRIG_SANITIZE "" CACHE STRING "Value for -fsanitize=, or empty")
 
+add_compile_options(-pthread)  # for all alike, or a precompiled header does not fit
+
 add_library(scanrig_warnings INTERFACE)
 target_compile_options(scanrig_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
                                                   -Wnon-virtual-dtor -Wold-style-cast)
@@ -23,6 +25,31 @@ if(SCANRIG_SANITIZE)
   add_link_options(-fsanitize=${SCANRIG_SANITIZE})
 endif()
 
+# One precompiled header for all (precompiled.h), one more for tests; clang's tools do without.
+option(SCANRIG_PRECOMPILE "Precompile the headers that most sources include" ON)
+if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+  set(SCANRIG_PRECOMPILE OFF)
+endif()
+if(SCANRIG_PRECOMPILE AND SCANRIG_CCACHE)
+  add_compile_options(-fpch-preprocess)  # what ccache needs to see through it
+  set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${SCANRIG_CCACHE})
+endif()
+
+# scanrig_precompiled(NAME HEADERS ... LINK libs): the target whose precompiled header others use.
+function(scanrig_precompiled name)
+  cmake_parse_arguments(ARG "" "" "HEADERS;LINK" ${ARGN})
+  file(GENERATE OUTPUT ${CMAKE_BINARY_DIR}/generated/${name}.cpp CONTENT "")
+  add_library(${name} OBJECT ${CMAKE_BINARY_DIR}/generated/${name}.cpp)
+  target_link_libraries(${name} PRIVATE ${ARG_LINK} scanrig_warnings)
+  target_precompile_headers(${name} PRIVATE ${ARG_HEADERS})
+endfunction()
+
+function(scanrig_use_precompiled target name)
+  if(SCANRIG_PRECOMPILE)
+    target_precompile_headers(${target} REUSE_FROM ${name})
+  endif()
+endfunction()
+
 # scanrig_library(NAME SOURCES a.cpp ... [LINK public libs] [PRIVATE private libs])
 # Makes the static library `scanrig_NAME` (or an INTERFACE library when it has no sources), alias `scanrig::NAME`.
 function(scanrig_library name)
@@ -31,6 +58,7 @@ function(scanrig_library name)
     add_library(scanrig_${name} STATIC ${ARG_SOURCES})
     target_include_directories(scanrig_${name} PUBLIC ${CMAKE_SOURCE_DIR})
     target_link_libraries(scanrig_${name} PUBLIC ${ARG_LINK} PRIVATE ${ARG_PRIVATE} scanrig_warnings)
+    scanrig_use_precompiled(scanrig_${name} scanrig_precompiled_headers)
   else()
     add_library(scanrig_${name} INTERFACE)
     target_include_directories(scanrig_${name} INTERFACE ${CMAKE_SOURCE_DIR})
@@ -44,6 +72,7 @@ function(scanrig_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;LINK" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LINK} scanrig_warnings)
+  scanrig_use_precompiled(${name} scanrig_precompiled_headers)
 endfunction()
 
 # The seconds that a test may take, and what may take longest begins first; under a sanitizer everything is several
@@ -64,6 +93,7 @@ function(scanrig_test name)
   endif()
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_LINK} GTest::gtest GTest::gmock GTest::gtest_main scanrig_warnings)
+  scanrig_use_precompiled(${name} scanrig_precompiled_test_headers)
   target_compile_definitions(${name} PRIVATE SCANRIG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
   add_test(NAME ${name} COMMAND ${name})
   set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL})
