@@ -25,7 +25,7 @@ ALLOWED = {
     "tests": set(FOLDERS),
 }
 # Leaves of the pipeline, lowest first: a leaf may include those before it.
-PIPELINE_ORDER = ["calibration", "silhouette", "closure", "range", "registration", "mesh", "volume", "pose", "texture",
+PIPELINE_ORDER = ["calibration", "silhouette", "movement", "range", "registration", "mesh", "volume", "pose", "texture",
                   "scan", "reconstruct", "evaluate"]
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"')
 

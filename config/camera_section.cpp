@@ -72,7 +72,8 @@ void read_aravis(Section& s, AravisOptions& options) {
   }
   s.choice<FrameClock>("clock", options.frame_clock, {{"interval", FrameClock::interval}, {"ptp", FrameClock::ptp}});
   s.number("frame_timeout_ms", options.frame_timeout, kFrameTimeoutMs);
-  if (s.has("dead_air_s")) s.number("dead_air_s", options.dead_air, {1, 3600});
+  s.accept_old_name("idle_refresh_s", "dead_air_s");
+  if (s.has("idle_refresh_s")) s.number("idle_refresh_s", options.idle_refresh, {1, 3600});
 }
 
 /// { serial = "40012345" } or { device = "/dev/scanrig/left" }.

@@ -17,7 +17,8 @@ void read_trigger(Section& section, std::string_view key, DriveProfile::Trigger&
   section.section(key, [&](Section& s) {
     s.number("register", trigger.address, kWord);
     s.number("value", trigger.value, kWord);
-    if (s.has("released")) s.flag("released", trigger.released);
+    s.accept_old_name("momentary", "released");
+    if (s.has("momentary")) s.flag("momentary", trigger.momentary);
   });
 }
 
@@ -161,10 +162,12 @@ void read_alarm(Section& s, DriveProfile::Alarm& alarm) {
 Result<DriveProfile> read_drive_profile(const std::filesystem::path& file) {
   const auto text = read_file(file);
   if (!text) return pass_on(text);
-  return parse_drive_profile(*text, file);
+  std::vector<std::string> warnings;
+  return parse_drive_profile(*text, file, warnings);
 }
 
-Result<DriveProfile> parse_drive_profile(std::string_view text, const std::filesystem::path& file) {
+Result<DriveProfile> parse_drive_profile(std::string_view text, const std::filesystem::path& file,
+                                         std::vector<std::string>& warnings) {
   DriveProfile profile;
   using Speed = DriveProfile::SpeedUnit;
   using Acceleration = DriveProfile::AccelerationUnit;
@@ -196,6 +199,7 @@ Result<DriveProfile> parse_drive_profile(std::string_view text, const std::files
     root.section("alarm", [&](Section& s) { read_alarm(s, profile.alarm); });
   });
   if (!read) return pass_on(read);
+  warnings.insert(warnings.end(), read->begin(), read->end());
   return profile;
 }
 

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/result.h"
 #include "drivers/turntable/drive_profile.h"
@@ -12,7 +14,8 @@ namespace scanrig::config {
 /// with file and line).
 Result<DriveProfile> read_drive_profile(const std::filesystem::path& file);
 
-/// The same of its text; `file` is only named. Fails with `invalid_input`.
-Result<DriveProfile> parse_drive_profile(std::string_view text, const std::filesystem::path& file);
+/// The same of its text; `file` is only named. Warnings are added to `warnings`. Fails with `invalid_input`.
+Result<DriveProfile> parse_drive_profile(std::string_view text, const std::filesystem::path& file,
+                                         std::vector<std::string>& warnings);
 
 }  // namespace scanrig::config

@@ -82,10 +82,12 @@ void read_panel(Section& s, PanelConfig& panel) {
 }
 
 void read_limits(Section& s, RecipeConfig& recipe) {
-  if (s.has("least_measured_share")) {
-    s.number("least_measured_share", recipe.least_measured_share.emplace(), {0, 1});
+  s.accept_old_name("min_measured_share", "least_measured_share");
+  s.accept_old_name("max_residual_mm", "most_residual_mm");
+  if (s.has("min_measured_share")) {
+    s.number("min_measured_share", recipe.min_measured_share.emplace(), {0, 1});
   }
-  if (s.has("most_residual_mm")) s.number("most_residual_mm", recipe.most_residual_mm.emplace(), {0.001, 10});
+  if (s.has("max_residual_mm")) s.number("max_residual_mm", recipe.max_residual_mm.emplace(), {0.001, 10});
 }
 
 /// What begins by a signal begins without a person: nobody may be able to reach the table then.
@@ -99,14 +101,15 @@ void read_recipe(Section& s, const RigConfig& rig, RecipeConfig& recipe) {
   s.number("views", recipe.views, {3, 72});
   s.number("poses", recipe.poses, {1, 2});
   s.number("flip_timeout_min", recipe.flip_timeout, {1, 1440});
-  if (s.has("flip")) s.choice<Flip>("flip", recipe.flip, {{"button", Flip::button}, {"line", Flip::line}});
+  s.accept_old_value("flip", "signal", "line");
+  if (s.has("flip")) s.choice<Flip>("flip", recipe.flip, {{"button", Flip::button}, {"signal", Flip::signal}});
   if (s.has("start")) {
     s.choice<Start>("start", recipe.start, {{"button", Start::button}, {"part_present", Start::part_present}});
   }
   if (s.has("limits")) s.section("limits", [&](Section& limits) { read_limits(limits, recipe); });
-  if (recipe.flip == Flip::line) {
-    if (!rig.panel.inputs.contains("flipped")) s.report("flip", "\"line\" needs the input flipped in [panel]");
-    expect_guard(s, rig, "flip", "line");
+  if (recipe.flip == Flip::signal) {
+    if (!rig.panel.inputs.contains("flipped")) s.report("flip", "\"signal\" needs the input flipped in [panel]");
+    expect_guard(s, rig, "flip", "signal");
   }
   if (recipe.start == Start::part_present) {
     if (!rig.panel.inputs.contains("part_present")) {
@@ -166,8 +169,9 @@ void read_reconstruction(Section& s, ReconstructionConfig& reconstruction) {
   s.choice<Executor>("executor", reconstruction.executor,
                      {{"in_process", Executor::in_process}, {"process", Executor::process}});
   s.number("memory_gib", reconstruction.memory_gib, {1, 1024});
-  s.number("voxel_mm", reconstruction.voxel_mm, {kLeastVoxelMm, kMostVoxelMm});
-  if (s.has("limit_min")) s.number("limit_min", reconstruction.limit, {1, 1440});
+  s.number("voxel_mm", reconstruction.voxel_mm, {kMinVoxelMm, kMaxVoxelMm});
+  s.accept_old_name("timeout_min", "limit_min");
+  if (s.has("timeout_min")) s.number("timeout_min", reconstruction.timeout, {1, 1440});
 }
 
 void read_api(Section& s, const std::filesystem::path& base, ApiConfig& api) {
@@ -238,6 +242,7 @@ Result<RigConfig> read_rig_config(const std::filesystem::path& file, const std::
   const auto read =
       read_toml(rig.text, file, [&](Section& root) { read_rig(root, file.parent_path(), folders, cameras, rig); });
   if (!read) return pass_on(read);
+  rig.warnings = *read;
   return rig;
 }
 

@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/result.h"
 #include "drivers/camera/aravis_stereo_camera.h"
@@ -76,22 +77,22 @@ struct StereoCameraConfig {
 struct PanelConfig {
   enum class Driver { gpio, modbus_io };
   Driver driver = Driver::gpio;
-  modbus::LineOptions io_module;       ///< modbus_io
+  modbus::ClientOptions io_module;     ///< modbus_io
   std::chrono::milliseconds poll{20};  ///< modbus_io
   std::map<std::string, Pin> inputs;   ///< by the names of PanelInputs; `start` is always there
   std::map<std::string, Pin> outputs;  ///< by their keys, such as lamp_green
 };
 
 struct RecipeConfig {
-  enum class Flip { button, line };
+  enum class Flip { button, signal };
   enum class Start { button, part_present };
   int views = 8;
   int poses = 2;
   std::chrono::minutes flip_timeout{30};
-  Flip flip = Flip::button;     ///< `line` needs the panel's `flipped` input
+  Flip flip = Flip::button;     ///< `signal` needs the panel's `flipped` input
   Start start = Start::button;  ///< `part_present` needs the panel's input of that name
-  std::optional<double> least_measured_share;
-  std::optional<double> most_residual_mm;
+  std::optional<double> min_measured_share;
+  std::optional<double> max_residual_mm;
 };
 
 /// Minutes of the day; over midnight where `from` is the later one.
@@ -116,7 +117,7 @@ struct ReconstructionConfig {
   Executor executor = Executor::in_process;
   double memory_gib = 6;
   double voxel_mm = 0.25;
-  std::chrono::minutes limit{60};  ///< of the executor `process`
+  std::chrono::minutes timeout{60};  ///< of the executor `process`
 };
 
 struct ApiConfig {
@@ -130,7 +131,8 @@ struct ApiConfig {
 
 /// rig.toml, checked; relative paths are made relative to the file's folder.
 struct RigConfig {
-  std::string text;  ///< of the file
+  std::string text;                   ///< of the file
+  std::vector<std::string> warnings;  ///< "FILE:LINE: [table] key: ...", about keys under their old names
   SafetyConfig safety;
   TurntableConfig turntable;
   ProjectorConfig projector;

@@ -10,7 +10,7 @@ namespace {
 constexpr std::size_t kMaxProblems = 20;
 /// Every dot of a key opens a table in a table, and toml++ takes those down by recursion: 100 000 deep are too many for
 /// a stack of 8 MiB.
-constexpr std::size_t kMostBytes = 64 * 1024;
+constexpr std::size_t kMaxBytes = 64 * 1024;
 
 int line_of(const toml::node& node) { return std::max(1, static_cast<int>(node.source().begin.line)); }
 
@@ -29,14 +29,38 @@ Error Problems::error() const {
 
 const toml::node* Section::find(std::string_view key) {
   known_.emplace(key);
-  const toml::node* node = table_.get(key);
+  const toml::node* node = get(key);
   if (!node) problems_.add(line_of(table_), fmt::format("{}{}{}: missing", name_, prefix_, key));
   return node;
 }
 
+const toml::node* Section::get(std::string_view key) const {
+  const auto old_name = old_names_.find(key);
+  return table_.get(old_name == old_names_.end() ? key : std::string_view(old_name->second));
+}
+
+void Section::accept_old_name(std::string_view key, std::string_view old_key) {
+  if (!table_.contains(old_key) || table_.contains(key)) return;  // with both, the old one is an unknown key
+  known_.emplace(old_key);
+  old_names_.emplace(key, old_key);
+  warn(old_key, fmt::format("this key is called {} now; the next version refuses the old name", key));
+}
+
+void Section::accept_old_value(std::string_view key, std::string_view value, std::string_view old_value) {
+  const toml::node* node = get(key);
+  if (!node || node->value<std::string_view>() != old_value) return;
+  new_values_.emplace(key, value);
+  warn(key, fmt::format("\"{}\" is called \"{}\" now; the next version refuses the old name", old_value, value));
+}
+
 void Section::report(std::string_view key, std::string_view problem) {
-  const toml::node* node = table_.get(key);
+  const toml::node* node = get(key);
   problems_.add(line_of(node ? *node : table_), fmt::format("{}{}{}: {}", name_, prefix_, key, problem));
+}
+
+void Section::warn(std::string_view key, std::string_view warning) {
+  const toml::node* node = get(key);
+  problems_.warn(line_of(node ? *node : table_), fmt::format("{}{}{}: {}", name_, prefix_, key, warning));
 }
 
 void Section::text(std::string_view key, std::string& value) {
@@ -45,7 +69,8 @@ void Section::text(std::string_view key, std::string& value) {
   const auto* found = node->as_string();
   if (!found) return report(key, "must be a text in quotes");
   if (found->get().empty()) return report(key, "must not be empty");
-  value = found->get();
+  const auto new_value = new_values_.find(key);
+  value = new_value == new_values_.end() ? found->get() : new_value->second;
 }
 
 void Section::flag(std::string_view key, bool& value) {
@@ -90,7 +115,7 @@ bool Section::within(std::string_view key, double value, Range allowed) {
 
 bool Section::has(std::string_view key) {
   known_.emplace(key);
-  return table_.contains(key);
+  return get(key) != nullptr;
 }
 
 void Section::section(std::string_view key, const std::function<void(Section&)>& read) {
@@ -139,11 +164,11 @@ void Section::report_unknown_keys() {
   }
 }
 
-Result<void> read_toml(std::string_view text, const std::filesystem::path& file,
-                       const std::function<void(Section&)>& read) {
+Result<std::vector<std::string>> read_toml(std::string_view text, const std::filesystem::path& file,
+                                           const std::function<void(Section&)>& read) {
   Problems problems(file.string());
-  if (text.size() > kMostBytes) {
-    problems.add(1, fmt::format("{} bytes are too many; a file of this kind has at most {}", text.size(), kMostBytes));
+  if (text.size() > kMaxBytes) {
+    problems.add(1, fmt::format("{} bytes are too many; a file of this kind has at most {}", text.size(), kMaxBytes));
     return tl::unexpected(problems.error());
   }
   try {
@@ -155,7 +180,7 @@ Result<void> read_toml(std::string_view text, const std::filesystem::path& file,
     problems.add(static_cast<int>(error.source().begin.line), std::string(error.description()));
   }
   if (problems.count() > 0) return tl::unexpected(problems.error());
-  return {};
+  return problems.warnings();
 }
 
 }  // namespace scanrig::config

@@ -7,6 +7,7 @@
 #include <functional>
 #include <initializer_list>
 #include <limits>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -18,17 +19,21 @@
 
 namespace scanrig::config {
 
-/// Everything that is wrong with one file, told at once and in the order of its lines.
+/// All problems of one file, reported at once and in the order of its lines.
 class Problems {
  public:
   explicit Problems(std::string file) : file_(std::move(file)) {}
   void add(int line, std::string text) { found_.emplace_back(line, std::move(text)); }
+  /// "FILE:LINE: text", for what is accepted but ought to be changed.
+  void warn(int line, std::string_view text) { warnings_.push_back(fmt::format("{}:{}: {}", file_, line, text)); }
   [[nodiscard]] std::size_t count() const { return found_.size(); }
+  [[nodiscard]] std::vector<std::string> warnings() const { return warnings_; }
   [[nodiscard]] Error error() const;
 
  private:
   std::string file_;
   std::vector<std::pair<int, std::string>> found_;
+  std::vector<std::string> warnings_;
 };
 
 struct Range {
@@ -105,6 +110,10 @@ class Section {
     report(key, fmt::format("\"{}\" is not one of {}", name, fmt::join(names, ", ")));
   }
 
+  /// From now on `key` may also be spelt `old_key`, its name in the version before: accepted with a warning.
+  void accept_old_name(std::string_view key, std::string_view old_key);
+  /// The same for one value of a text.
+  void accept_old_value(std::string_view key, std::string_view value, std::string_view old_value);
   /// Whether an optional key is there; from then on the key is known.
   [[nodiscard]] bool has(std::string_view key);
   void section(std::string_view key, const std::function<void(Section&)>& read);
@@ -116,10 +125,12 @@ class Section {
   /// Nothing was wrong in this table so far: rules between its keys can be checked.
   [[nodiscard]] bool sound() const { return problems_.count() == problems_before_; }
   void report(std::string_view key, std::string_view problem);
+  void warn(std::string_view key, std::string_view warning);
   void report_unknown_keys();
 
  private:
   const toml::node* find(std::string_view key);
+  [[nodiscard]] const toml::node* get(std::string_view key) const;
   std::optional<std::int64_t> integer(std::string_view key);
   std::optional<double> real(std::string_view key);
   bool within(std::string_view key, double value, Range allowed);
@@ -130,11 +141,13 @@ class Section {
   Problems& problems_;
   std::size_t problems_before_;
   std::set<std::string, std::less<>> known_;
+  std::map<std::string, std::string, std::less<>> old_names_;   // of keys that the file spells so
+  std::map<std::string, std::string, std::less<>> new_values_;  // of keys whose value the file spells as before
 };
 
-/// Reads the text of `file` through `read`. Fails with `invalid_input` with every problem on a line of its own:
-/// "FILE:LINE: [table] key: what is wrong"; a text of more than 64 KiB is one problem.
-Result<void> read_toml(std::string_view text, const std::filesystem::path& file,
-                       const std::function<void(Section&)>& read);
+/// Reads the text of `file` through `read` and returns the warnings. Fails with `invalid_input` with every problem on a
+/// line of its own: "FILE:LINE: [table] key: what is wrong"; a text of more than 64 KiB is one problem.
+Result<std::vector<std::string>> read_toml(std::string_view text, const std::filesystem::path& file,
+                                           const std::function<void(Section&)>& read);
 
 }  // namespace scanrig::config

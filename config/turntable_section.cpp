@@ -24,8 +24,10 @@ void read_profile(Section& s, const std::vector<std::filesystem::path>& folders,
       tried.push_back(file.string());
       continue;
     }
-    const auto profile = text ? parse_drive_profile(*text, file) : pass_on(text);
+    std::vector<std::string> warnings;
+    const auto profile = text ? parse_drive_profile(*text, file, warnings) : pass_on(text);
     if (!profile) return s.report("profile", profile.error().message);
+    for (const auto& warning : warnings) s.warn("profile", warning);
     turntable.modbus.profile = *profile;
     turntable.profile_file = SourceFile{file.filename(), std::move(*text)};
     return;
@@ -116,7 +118,7 @@ void read_grbl(Section& s, GrblTurntableOptions& options) {
 
 }  // namespace
 
-void read_modbus_line(Section& s, modbus::LineOptions& line) {
+void read_modbus_line(Section& s, modbus::ClientOptions& line) {
   using modbus::Parity;
   s.text("device", line.device);
   s.one_of("baud", line.baud, {9600, 19200, 38400, 57600, 115200});

@@ -12,10 +12,10 @@
 /// Images to bytes of a file and back. The libraries of the formats are called directly: OpenCV's own reader of images
 /// loads a hundred libraries of formats that no rig has, which a program does each time that it is started.
 /// Every function may be called from any thread. An image has 8 bit, one channel (grey) or three (BGR), if not said
-/// otherwise, and at most kMostImagePixels. All fail with `invalid_input`.
+/// otherwise, and at most kMaxImagePixels. All fail with `invalid_input`.
 namespace scanrig {
 
-inline constexpr std::size_t kMostImagePixels = 1 << 27;
+inline constexpr std::size_t kMaxImagePixels = 1 << 27;
 
 /// Quickly rather than small: images of a sensor are noise to a compressor.
 Result<std::vector<std::byte>> encode_png(const cv::Mat& image);
@@ -37,7 +37,7 @@ Result<cv::Mat> decode_image(std::string_view bytes);
 
 /// Whether an image of that size is one that is decoded at all.
 constexpr bool is_image_size(std::uint64_t width, std::uint64_t height) {
-  return width > 0 && height > 0 && width < kMostImagePixels && width * height <= kMostImagePixels;
+  return width > 0 && height > 0 && width < kMaxImagePixels && width * height <= kMaxImagePixels;
 }
 
 inline std::string_view as_text(std::span<const std::byte> bytes) {

@@ -16,6 +16,6 @@ void give_way_by(int value) {
   if (niceness() < value) ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), value);
 }
 
-void give_way() { give_way_by(kBackground); }
+void lower_priority() { give_way_by(kBackground); }
 
 }  // namespace scanrig

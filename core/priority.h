@@ -5,7 +5,7 @@ namespace scanrig {
 /// The calling thread, and those that it starts from now on, run when no other thread of the machine wants to: work of
 /// seconds beside work of milliseconds. For good: raising a priority again takes a privilege. Loops that such a thread
 /// runs in with_threads() give way with it. On Linux a thread has a nice value of its own (sched(7)).
-void give_way();
+void lower_priority();
 
 /// How far the calling thread gives way (its nice value); 0: not at all.
 int niceness();

@@ -5,8 +5,8 @@
 namespace scanrig {
 namespace {
 
-constexpr std::size_t kMostPeers = 1024;     ///< remembered
-constexpr std::size_t kMostTurnedAway = 32;  ///< at once: they cost descriptors, which the rest of the daemon needs
+constexpr std::size_t kMaxPeers = 1024;     ///< remembered
+constexpr std::size_t kMaxTurnedAway = 32;  ///< at once: they cost descriptors, which the rest of the daemon needs
 constexpr const char* kTurnedAway = "turned away";
 
 }  // namespace
@@ -14,7 +14,7 @@ constexpr const char* kTurnedAway = "turned away";
 std::unique_ptr<Admission::Seat> Admission::enter(const std::string& peer) {
   const std::lock_guard guard(mutex_);
   if (connections_ >= limits_.connections) return nullptr;
-  if (peers_.size() >= kMostPeers) forget_idle(Clock::now());
+  if (peers_.size() >= kMaxPeers) forget_idle(Clock::now());
   auto& known =
       peers_.try_emplace(peer, Peer{.requests = limits_.requests_at_once, .counted = Clock::now()}).first->second;
   if (known.connections >= limits_.connections_a_peer) return nullptr;
@@ -26,7 +26,7 @@ std::unique_ptr<Admission::Seat> Admission::enter(const std::string& peer) {
 std::unique_ptr<Admission::Seat> Admission::enter_to_be_turned_away() {
   const std::lock_guard guard(mutex_);
   auto& door = peers_[kTurnedAway];
-  if (door.connections >= kMostTurnedAway) return nullptr;
+  if (door.connections >= kMaxTurnedAway) return nullptr;
   ++door.connections;
   ++connections_;
   return std::make_unique<Seat>(shared_from_this(), kTurnedAway);

@@ -3,7 +3,7 @@
 #include <charconv>
 #include <nlohmann/json.hpp>
 
-#include "daemon/api/json_words.h"
+#include "daemon/api/json_replies.h"
 
 namespace scanrig {
 namespace {
@@ -58,7 +58,7 @@ EventHub::Batch EventHub::present(bool lost) const {
   const auto add_text = [&](std::string_view name, const std::string& data) {
     batch.texts.push_back(std::make_shared<const std::string>(text_of(last_, name, data)));
   };
-  if (lost) add_text("lost", R"({"sentence":"Some events are not kept any more: ask for the jobs again."})");
+  if (lost) add_text("lost", R"({"sentence":"Events lost: fetch the jobs again."})");
   if (seen_) add_text("status", to_line(to_json(*seen_)));
   return batch;
 }

@@ -18,7 +18,7 @@ struct RequestField {
   enum class Type { text, number, integer, flag };
   std::string_view name;
   Type type = Type::text;
-  std::string_view about;
+  std::string_view description;
   bool required = false;
   double min = 0.0, max = 0.0;            ///< of a number; of the length of a text, in bytes
   std::vector<std::string_view> words{};  ///< a text must be one of these; empty: any

@@ -56,7 +56,8 @@ void station(const Snapshot& snapshot, Text& text) {
 void counters(const Counters& counts, Text& text) {
   const auto number = [](std::uint64_t count) { return static_cast<double>(count); };
   text.one("views_stored_total", "counter", "Views that survive a power cut.", number(counts.views_stored));
-  text.one("retries_total", "counter", "Exposures that were lost and taken again.", number(counts.exposures_redone));
+  text.one("retakes_total", "counter", "Exposures that were lost and taken again.", number(counts.retakes));
+  text.one("retries_total", "counter", "Old name of retakes_total.", number(counts.retakes));  // old name
   text.one("faults_total", "counter", "Faults of rig, panel and disk, e-stops included.", number(counts.faults));
   text.one("deadlines_missed_total", "counter", "Faults that were a deadline passed.", number(counts.deadlines_missed));
   text.begin("jobs_ended_total", "counter", "Jobs that ended, by state.");
@@ -65,7 +66,7 @@ void counters(const Counters& counts, Text& text) {
   for (const auto& [stage, seconds] : counts.stage_seconds) text.value("stage", stage, seconds);
 }
 
-void machine(const Facts& facts, Text& text) {
+void machine(const ServiceStatus& facts, Text& text) {
   text.one("uptime_seconds", "gauge", "Since the daemon began.", facts.uptime_s);
   text.one("disk_bytes", "gauge", "Size of the disk that keeps the jobs.", static_cast<double>(facts.disk_bytes));
   text.one("disk_free_bytes", "gauge", "Free on it.", static_cast<double>(facts.disk_free_bytes));
@@ -80,7 +81,7 @@ void machine(const Facts& facts, Text& text) {
 
 }  // namespace
 
-std::string metrics_text(const Snapshot& snapshot, const Facts& facts) {
+std::string metrics_text(const Snapshot& snapshot, const ServiceStatus& facts) {
   Text text;
   station(snapshot, text);
   counters(snapshot.counters, text);

@@ -2,12 +2,12 @@
 
 #include <string>
 
-#include "daemon/api/facts.h"
+#include "daemon/api/service_status.h"
 #include "daemon/station/snapshot.h"
 
 namespace scanrig {
 
 /// In the text format 0.0.4 of Prometheus. Names begin with scanrig_, units are base units.
-std::string metrics_text(const Snapshot& snapshot, const Facts& facts);
+std::string metrics_text(const Snapshot& snapshot, const ServiceStatus& facts);
 
 }  // namespace scanrig

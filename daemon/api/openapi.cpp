@@ -5,7 +5,7 @@
 #include <set>
 
 #include "core/version.h"
-#include "daemon/api/json_words.h"
+#include "daemon/api/json_replies.h"
 #include "daemon/api/schemas.h"
 
 namespace scanrig {
@@ -30,7 +30,7 @@ ordered_json schema_of(const RequestField& field) {
     schema["minimum"] = field.min;
     schema["maximum"] = field.max;
   }
-  schema["description"] = field.about;
+  schema["description"] = field.description;
   return schema;
 }
 
@@ -70,7 +70,7 @@ std::string_view words_of(unsigned status) {
 ordered_json replies_of(const Route& route) {
   ordered_json replies;
   auto& good = replies[std::to_string(route.reply.status)];
-  good["description"] = route.reply.about;
+  good["description"] = route.reply.description;
   const auto schema = route.reply.schema.empty() ? ordered_json{{"type", "string"}, {"format", "binary"}}
                                                  : reference(route.reply.schema);
   good["content"][std::string(route.reply.type)]["schema"] = schema;
@@ -123,7 +123,7 @@ std::string openapi_document(const std::vector<Route>& routes) {
   auto& paths = document["paths"];
   for (const auto& route : routes) {
     ordered_json operation{
-        {"operationId", name_of(route)}, {"summary", route.about}, {"x-role", to_string(route.role)}};
+        {"operationId", name_of(route)}, {"summary", route.description}, {"x-role", to_string(route.role)}};
     ordered_json parameters = ordered_json::array();
     add_parameters(route.in_path, "path", parameters);
     add_parameters(route.in_query, "query", parameters);

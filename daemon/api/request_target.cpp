@@ -6,7 +6,7 @@
 namespace scanrig {
 namespace {
 
-constexpr std::size_t kLongest = 2048;
+constexpr std::size_t kMaxLength = 2048;
 
 int hexadecimal(char c) {
   if (c >= '0' && c <= '9') return c - '0';
@@ -53,7 +53,7 @@ tl::unexpected<Error> bad(std::string_view problem) {
 }  // namespace
 
 Result<RequestTarget> parse_target(std::string_view target) {
-  if (target.size() > kLongest) return bad("is too long");
+  if (target.size() > kMaxLength) return bad("is too long");
   if (!target.starts_with('/')) return bad("does not begin with a slash");
   RequestTarget parsed;
   const auto mark = target.find('?');

@@ -4,7 +4,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "daemon/api/json_words.h"
+#include "daemon/api/json_replies.h"
 
 namespace scanrig {
 

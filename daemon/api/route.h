@@ -44,13 +44,13 @@ struct ApiResponse {
   std::string why{};  ///< of an error: its message
 };
 
-struct Facts;
+struct ServiceStatus;
 
 /// What routes act on. All of it may be used from any thread.
 struct ApiStation {
   ControlLoop& loop;
-  std::function<Facts()> facts;     ///< of the machine and of the API itself; the latest, without waiting
-  std::filesystem::path storage{};  ///< absolute; where jobs are kept
+  std::function<ServiceStatus()> facts;  ///< of the machine and of the API itself; the latest, without waiting
+  std::filesystem::path storage{};       ///< absolute; where jobs are kept
   std::function<Result<std::string>(std::string_view side)> preview_jpeg{};  ///< of "left" or "right"
   std::function<Result<void>()> check_config{};            ///< of the file that the daemon was started with
   std::function<void(ControlLoop::Reply)> reload{};        ///< of it; reads the disk
@@ -61,7 +61,7 @@ using Send = std::function<void(ApiResponse)>;
 
 struct Reply {
   unsigned status = 200;
-  std::string_view about;
+  std::string_view description;
   std::string_view schema{};  ///< a name in schemas.h; empty: not JSON
   std::string_view type = "application/json";
 };
@@ -71,12 +71,12 @@ struct Route {
   Method method;
   std::string_view path;  ///< "/api/v1/jobs/{id}"
   Role role;              ///< that is enough
-  std::string_view about;
+  std::string_view description;
   std::vector<RequestField> in_path{}, in_query{}, in_body{};
   Reply reply;
-  std::vector<unsigned> errors{};   ///< beside those that every route has
-  bool slow = false;                ///< touches the disk: done by a worker, not by an I/O thread
-  std::chrono::seconds patience{};  ///< for the answer; 0: as the limits say
+  std::vector<unsigned> errors{};        ///< beside those that every route has
+  bool slow = false;                     ///< touches the disk: done by a worker, not by an I/O thread
+  std::chrono::seconds reply_timeout{};  ///< for the answer; 0: as the limits say
   /// Calls `send` once, from this thread or, soon, from the control loop's.
   std::function<void(const ApiStation&, const Values&, Send)> handle;
 };

@@ -82,7 +82,7 @@ tl::expected<Router::Match, ApiResponse> Router::find(std::string_view method, s
   const auto no = [](unsigned status, ErrorCode code, std::string why) {
     return tl::unexpected(error_response(status, Error{code, std::move(why)}));
   };
-  if (!role) return no(401, ErrorCode::refused, "the API does not know you: show a token, or ask for a group");
+  if (!role) return no(401, ErrorCode::refused, "not authenticated: send a token or join an API group");
   const auto parsed = parse_target(target);
   if (!parsed) return tl::unexpected(error_response(parsed.error()));
   std::optional<std::size_t> found;

@@ -1,7 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/api/folder_files.h"
-#include "daemon/api/json_words.h"
+#include "daemon/api/json_replies.h"
 #include "daemon/api/routes.h"
 
 namespace scanrig {
@@ -9,13 +9,13 @@ namespace {
 
 using nlohmann::ordered_json;
 
-const RequestField kId{.name = "id", .about = "the job", .required = true, .min = 1, .max = 128};
+const RequestField kId{.name = "id", .description = "the job", .required = true, .min = 1, .max = 128};
 const RequestField kFile{.name = "file",
-                         .about = "path within the job's folder, its slashes written %2F",
+                         .description = "path within the job's folder, its slashes written %2F",
                          .required = true,
                          .min = 1,
                          .max = 512};
-constexpr std::int64_t kPage = 50, kMostAPage = 500;
+constexpr std::int64_t kPage = 50, kMaxPerPage = 500;
 
 /// Newest first; `before` is the last one of the page before.
 void list(const ApiStation& station, const Values& values, const Send& send) {
@@ -63,18 +63,18 @@ Route list_route() {
   return {.method = Method::get,
           .path = "/api/v1/jobs",
           .role = Role::viewer,
-          .about = "All jobs, newest first, a page at a time.",
+          .description = "All jobs, newest first, a page at a time.",
           .in_query = {{.name = "limit",
                         .type = RequestField::Type::integer,
-                        .about = "jobs a page, 50 without it",
+                        .description = "jobs a page, 50 without it",
                         .min = 1,
-                        .max = kMostAPage},
-                       {.name = "before", .about = "`next` of the page before", .min = 1, .max = 128},
+                        .max = kMaxPerPage},
+                       {.name = "before", .description = "`next` of the page before", .min = 1, .max = 128},
                        {.name = "state",
-                        .about = "only these",
+                        .description = "only these",
                         .words = {"queued", "scanning", "waiting_for_flip", "reconstructing", "done", "failed",
                                   "interrupted", "cancelled"}}},
-          .reply = {.about = "a page", .schema = "JobPage"},
+          .reply = {.description = "a page", .schema = "JobPage"},
           .handle = list};
 }
 
@@ -86,25 +86,25 @@ std::vector<Route> job_routes() {
       {.method = Method::get,
        .path = "/api/v1/jobs/{id}",
        .role = Role::viewer,
-       .about = "One job with its views and stages.",
+       .description = "One job with its views and stages.",
        .in_path = {kId},
-       .reply = {.about = "the job", .schema = "JobDetail"},
+       .reply = {.description = "the job", .schema = "JobDetail"},
        .handle = show},
       {.method = Method::get,
        .path = "/api/v1/jobs/{id}/files",
        .role = Role::viewer,
-       .about = "The files in a job's folder: pictures, manifest, model, report.",
+       .description = "The files in a job's folder: pictures, manifest, model, report.",
        .in_path = {kId},
-       .reply = {.about = "as they are now", .schema = "FileList"},
+       .reply = {.description = "as they are now", .schema = "FileList"},
        .errors = {500},
        .slow = true,
        .handle = files},
       {.method = Method::get,
        .path = "/api/v1/jobs/{id}/files/{file}",
        .role = Role::viewer,
-       .about = "One file of a job, such as pose1%2Fview00%2Fleft_pattern.png.",
+       .description = "One file of a job, such as pose1%2Fview00%2Fleft_pattern.png.",
        .in_path = {kId, kFile},
-       .reply = {.about = "the file, with the media type of its ending", .type = "application/octet-stream"},
+       .reply = {.description = "the file, with the media type of its ending", .type = "application/octet-stream"},
        .errors = {500},
        .slow = true,
        .handle = [](const ApiStation& station, const Values& values,
@@ -112,9 +112,9 @@ std::vector<Route> job_routes() {
       {.method = Method::get,
        .path = "/api/v1/jobs/{id}/model",
        .role = Role::viewer,
-       .about = "The textured model of a job.",
+       .description = "The textured model of a job.",
        .in_path = {kId},
-       .reply = {.about = "glTF 2.0, binary", .type = "model/gltf-binary"},
+       .reply = {.description = "glTF 2.0, binary", .type = "model/gltf-binary"},
        .errors = {500},
        .slow = true,
        .handle = [](const ApiStation& station, const Values& values,
@@ -122,9 +122,9 @@ std::vector<Route> job_routes() {
       {.method = Method::get,
        .path = "/api/v1/jobs/{id}/report",
        .role = Role::viewer,
-       .about = "The report of a job's reconstruction.",
+       .description = "The report of a job's reconstruction.",
        .in_path = {kId},
-       .reply = {.about = "report.json as it was written", .schema = "Report"},
+       .reply = {.description = "report.json as it was written", .schema = "Report"},
        .errors = {500},
        .slow = true,
        .handle = [](const ApiStation& station, const Values& values,

@@ -1,18 +1,18 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/api/job_bundle.h"
-#include "daemon/api/json_words.h"
+#include "daemon/api/json_replies.h"
 #include "daemon/api/routes.h"
 #include "pipeline/reconstruct/voxel_size.h"
 
 namespace scanrig {
 namespace {
 
-using What = event::JobAsked::What;
+using What = event::JobRequested::What;
 using Type = RequestField::Type;
 
-const RequestField kId{.name = "id", .about = "the job", .required = true, .min = 1, .max = 128};
-constexpr Reply kDone{.about = "done, and durable", .schema = "JobDone"};
+const RequestField kId{.name = "id", .description = "the job", .required = true, .min = 1, .max = 128};
+constexpr Reply kDone{.description = "done, and durable", .schema = "JobDone"};
 
 ControlLoop::Reply reply_with(std::string job, Send send) {
   return [job = std::move(job), send = std::move(send)](const Result<std::string>& done) {
@@ -32,17 +32,17 @@ void ask(const ApiStation& station, const Values& values, What what, Send send) 
   const auto id = *values.text("id");
   if (!find_job(station, values)) return send(no_such_job());
   station.loop.ask(
-      event::JobAsked{
+      event::JobRequested{
           .what = what, .job = id, .voxel_mm = values.number("voxel_mm"), .fusion = values.text("fusion").value_or("")},
       reply_with(id, std::move(send)));
 }
 
-Route job_route(Method method, std::string_view path, Role role, What what, std::string_view about,
+Route job_route(Method method, std::string_view path, Role role, What what, std::string_view description,
                 std::vector<RequestField> body = {}) {
   return {.method = method,
           .path = path,
           .role = role,
-          .about = about,
+          .description = description,
           .in_path = {kId},
           .in_body = std::move(body),
           .reply = kDone,
@@ -56,27 +56,31 @@ Route order_route() {
   return {.method = Method::post,
           .path = "/api/v1/jobs",
           .role = Role::operating,
-          .about = "Queues scans; answered when their folders are durable, with the first one's id.",
+          .description = "Queues scans; answered when their folders are durable, with the first one's id.",
           .in_body =
-              {{.name = "recipe", .about = "one of the configuration's; default without it", .min = 1, .max = 64},
-               {.name = "part", .about = "of what is scanned: barcode or free text", .min = 0, .max = 200},
-               {.name = "repeat", .type = Type::integer, .about = "so many jobs; 1 without it", .min = 1, .max = 100}},
+              {{.name = "recipe", .description = "one of the configuration's; default without it", .min = 1, .max = 64},
+               {.name = "part", .description = "of what is scanned: barcode or free text", .min = 0, .max = 200},
+               {.name = "repeat",
+                .type = Type::integer,
+                .description = "so many jobs; 1 without it",
+                .min = 1,
+                .max = 100}},
           .reply = kDone,
           .errors = {404, 409, 500},
           .handle = order};
 }
 
 Route bundle_route() {
-  return {
-      .method = Method::get,
-      .path = "/api/v1/jobs/{id}/bundle",
-      .role = Role::operating,
-      .about = "The whole folder of a job that has ended, packed for whoever must help. The job counts as exported.",
-      .in_path = {kId},
-      .reply = {.about = "a compressed tar archive", .type = "application/gzip"},
-      .errors = {409, 500},
-      .patience = std::chrono::seconds(180),
-      .handle = send_bundle};
+  return {.method = Method::get,
+          .path = "/api/v1/jobs/{id}/bundle",
+          .role = Role::operating,
+          .description =
+              "The whole folder of a job that has ended, packed for whoever must help. The job counts as exported.",
+          .in_path = {kId},
+          .reply = {.description = "a compressed tar archive", .type = "application/gzip"},
+          .errors = {409, 500},
+          .reply_timeout = std::chrono::seconds(180),
+          .handle = send_bundle};
 }
 
 }  // namespace
@@ -91,15 +95,15 @@ std::vector<Route> order_routes() {
       job_route(Method::post, "/api/v1/jobs/{id}/first", Role::operating, What::to_front,
                 "The next Start begins this queued job."),
       job_route(Method::post, "/api/v1/jobs/{id}/exported", Role::operating, What::set_exported,
-                "Somebody has what he needs: retention may remove it."),
+                "Marks the job exported; retention may delete it."),
       job_route(Method::post, "/api/v1/jobs/{id}/reprocess", Role::engineer, What::reprocess,
                 "Makes the model again, from the images.",
                 {{.name = "voxel_mm",
                   .type = Type::number,
-                  .about = "as configured without it",
-                  .min = kLeastVoxelMm,
-                  .max = kMostVoxelMm},
-                 {.name = "fusion", .about = "as configured without it", .words = {"evidence", "paper"}}}),
+                  .description = "as configured without it",
+                  .min = kMinVoxelMm,
+                  .max = kMaxVoxelMm},
+                 {.name = "fusion", .description = "as configured without it", .words = {"evidence", "paper"}}}),
       job_route(Method::del, "/api/v1/jobs/{id}", Role::engineer, What::remove,
                 "Removes a job that has ended, with all its files."),
       bundle_route(),

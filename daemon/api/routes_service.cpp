@@ -2,12 +2,12 @@
 #include <sstream>
 
 #include "core/version.h"
-#include "daemon/api/facts.h"
-#include "daemon/api/json_words.h"
+#include "daemon/api/json_replies.h"
 #include "daemon/api/metrics.h"
 #include "daemon/api/openapi.h"
 #include "daemon/api/router.h"
 #include "daemon/api/routes.h"
+#include "daemon/api/service_status.h"
 
 namespace scanrig {
 namespace {
@@ -15,7 +15,7 @@ namespace {
 using nlohmann::ordered_json;
 
 /// What is wrong now, of whatever kind.
-ordered_json problems_of(const Snapshot& snapshot, const Facts& facts) {
+ordered_json problems_of(const Snapshot& snapshot, const ServiceStatus& facts) {
   ordered_json problems = ordered_json::array();
   for (const auto& device : snapshot.devices) {
     if (device.problem) problems.push_back(to_json(*device.problem));
@@ -27,7 +27,7 @@ ordered_json problems_of(const Snapshot& snapshot, const Facts& facts) {
 
 void health(const ApiStation& station, const Values&, const Send& send) {
   const auto snapshot = station.loop.snapshot();
-  const Facts facts = station.facts();
+  const ServiceStatus facts = station.facts();
   auto problems = problems_of(*snapshot, facts);
   ordered_json temperatures = ordered_json::array();
   for (const auto& one : facts.temperatures) {
@@ -42,7 +42,8 @@ void health(const ApiStation& station, const Values&, const Send& send) {
                          {"disk", {{"bytes", facts.disk_bytes}, {"free_bytes", facts.disk_free_bytes}}},
                          {"temperatures", std::move(temperatures)},
                          {"deadlines_missed", snapshot->counters.deadlines_missed},
-                         {"retries", snapshot->counters.exposures_redone},
+                         {"retakes", snapshot->counters.retakes},
+                         {"retries", snapshot->counters.retakes},  // old name
                          {"faults", snapshot->counters.faults},
                          {"connections", facts.connections},
                          {"event_streams", facts.event_streams}})});
@@ -81,49 +82,51 @@ void document(const ApiStation&, const Values&, const Send& send) {
 }  // namespace
 
 std::vector<Route> service_routes() {
-  return {{.method = Method::get,
-           .path = "/api/v1/health",
-           .role = Role::viewer,
-           .about = "Devices, disk, temperatures, deadlines missed, retries.",
-           .reply = {.about = "`ok` is false when something is wrong", .schema = "Health"},
-           .handle = health},
-          {.method = Method::get,
-           .path = "/api/v1/preview/{side}",
-           .role = Role::viewer,
-           .about = "What a camera sees: the latest picture; asks for a newer one while the rig is idle.",
-           .in_path = {{.name = "side", .about = "of the rig", .required = true, .words = {"left", "right"}}},
-           .reply = {.about = "a picture", .type = "image/jpeg"},
-           .slow = true,
-           .handle = preview},
-          {.method = Method::post,
-           .path = "/api/v1/config/check",
-           .role = Role::engineer,
-           .about = "Reads the daemon's configuration file again and tells what is wrong with it. Changes nothing.",
-           .reply = {.about = "every problem, with its line", .schema = "ConfigCheck"},
-           .errors = {409},
-           .slow = true,
-           .handle = check_config},
-          {.method = Method::post,
-           .path = "/api/v1/reload",
-           .role = Role::engineer,
-           .about = "The daemon begins again with its configuration file as it is now, if that is valid and nothing is "
-                    "being done; otherwise everything stays. Afterwards it waits for Reset. Connections are cut.",
-           .reply = {.about = "it begins again", .schema = "Nothing"},
-           .errors = {404, 409, 500},
-           .slow = true,
-           .handle = reload},
-          {.method = Method::get,
-           .path = "/api/v1/openapi.json",
-           .role = Role::viewer,
-           .about = "This document.",
-           .reply = {.about = "OpenAPI 3.0", .schema = "OpenApi"},
-           .handle = document},
-          {.method = Method::get,
-           .path = "/metrics",
-           .role = Role::viewer,
-           .about = "For Prometheus.",
-           .reply = {.about = "text format 0.0.4", .type = "text/plain; version=0.0.4"},
-           .handle = metrics}};
+  return {
+      {.method = Method::get,
+       .path = "/api/v1/health",
+       .role = Role::viewer,
+       .description = "Devices, disk, temperatures, deadlines missed, retakes.",
+       .reply = {.description = "`ok` is false when something is wrong", .schema = "Health"},
+       .handle = health},
+      {.method = Method::get,
+       .path = "/api/v1/preview/{side}",
+       .role = Role::viewer,
+       .description = "What a camera sees: the latest picture; asks for a newer one while the rig is idle.",
+       .in_path = {{.name = "side", .description = "of the rig", .required = true, .words = {"left", "right"}}},
+       .reply = {.description = "a picture", .type = "image/jpeg"},
+       .slow = true,
+       .handle = preview},
+      {.method = Method::post,
+       .path = "/api/v1/config/check",
+       .role = Role::engineer,
+       .description = "Reads the daemon's configuration file again and tells what is wrong with it. Changes nothing.",
+       .reply = {.description = "every problem, with its line", .schema = "ConfigCheck"},
+       .errors = {409},
+       .slow = true,
+       .handle = check_config},
+      {.method = Method::post,
+       .path = "/api/v1/reload",
+       .role = Role::engineer,
+       .description =
+           "The daemon begins again with its configuration file as it is now, if that is valid and nothing is "
+           "being done; otherwise everything stays. Afterwards it waits for Reset. Connections are cut.",
+       .reply = {.description = "it begins again", .schema = "Nothing"},
+       .errors = {404, 409, 500},
+       .slow = true,
+       .handle = reload},
+      {.method = Method::get,
+       .path = "/api/v1/openapi.json",
+       .role = Role::viewer,
+       .description = "This document.",
+       .reply = {.description = "OpenAPI 3.0", .schema = "OpenApi"},
+       .handle = document},
+      {.method = Method::get,
+       .path = "/metrics",
+       .role = Role::viewer,
+       .description = "For Prometheus.",
+       .reply = {.description = "text format 0.0.4", .type = "text/plain; version=0.0.4"},
+       .handle = metrics}};
 }
 
 }  // namespace scanrig

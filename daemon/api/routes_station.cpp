@@ -1,27 +1,27 @@
 #include <nlohmann/json.hpp>
 
-#include "daemon/api/json_words.h"
+#include "daemon/api/json_replies.h"
 #include "daemon/api/routes.h"
 
 namespace scanrig {
 namespace {
 
 using nlohmann::ordered_json;
-using What = event::MaintenanceAsked::What;
+using What = event::MaintenanceRequested::What;
 
-constexpr Reply kPressed{.about = "obeyed", .schema = "Pressed"};
-constexpr Reply kDone{.about = "obeyed; the state tells how it goes on", .schema = "Nothing"};
+constexpr Reply kPressed{.description = "obeyed", .schema = "Pressed"};
+constexpr Reply kDone{.description = "obeyed; the state tells how it goes on", .schema = "Nothing"};
 
 ApiResponse pressed(const Result<std::string>& job) {
   if (!job) return error_response(job.error());
   return {.body = to_text({{"job", job->empty() ? ordered_json(nullptr) : ordered_json(*job)}})};
 }
 
-Route press(std::string_view path, Button button, Role role, std::string_view about) {
+Route press(std::string_view path, Button button, Role role, std::string_view description) {
   return {.method = Method::post,
           .path = path,
           .role = role,
-          .about = about,
+          .description = description,
           .reply = kPressed,
           .errors = {409},
           .handle = [button](const ApiStation& station, const Values&, Send send) {
@@ -30,17 +30,17 @@ Route press(std::string_view path, Button button, Role role, std::string_view ab
           }};
 }
 
-void ask(const ApiStation& station, const event::MaintenanceAsked& asked, Send send) {
+void ask(const ApiStation& station, const event::MaintenanceRequested& asked, Send send) {
   station.loop.ask(asked, [send = std::move(send)](const Result<std::string>& done) {
     send(done ? ApiResponse{.body = to_text(ordered_json::object())} : error_response(done.error()));
   });
 }
 
-Route maintenance(std::string_view path, What what, std::string_view about) {
+Route maintenance(std::string_view path, What what, std::string_view description) {
   return {.method = Method::post,
           .path = path,
           .role = Role::engineer,
-          .about = about,
+          .description = description,
           .reply = kDone,
           .errors = {409},
           .handle = [what](const ApiStation& station, const Values&, Send send) {
@@ -63,33 +63,35 @@ void jog(const ApiStation& station, const Values& values, Send send) {
 
 Route jog_route() {
   constexpr double kTurns = 3600.0;
-  return {
-      .method = Method::post,
-      .path = "/api/v1/maintenance/jog",
-      .role = Role::engineer,
-      .about = "Turns the table while maintenance is on: to an angle, or by one.",
-      .in_body =
-          {{.name = "to_deg", .type = RequestField::Type::number, .about = "where to", .min = -kTurns, .max = kTurns},
-           {.name = "by_deg",
-            .type = RequestField::Type::number,
-            .about = "by how much",
-            .min = -kTurns,
-            .max = kTurns},
-           {.name = "speed_deg_s",
-            .type = RequestField::Type::number,
-            .about = "how fast; without it as fast as maintenance may",
-            .min = 0.0,
-            .max = 360.0}},
-      .reply = kDone,
-      .errors = {409},
-      .handle = jog};
+  return {.method = Method::post,
+          .path = "/api/v1/maintenance/jog",
+          .role = Role::engineer,
+          .description = "Turns the table while maintenance is on: to an angle, or by one.",
+          .in_body = {{.name = "to_deg",
+                       .type = RequestField::Type::number,
+                       .description = "where to",
+                       .min = -kTurns,
+                       .max = kTurns},
+                      {.name = "by_deg",
+                       .type = RequestField::Type::number,
+                       .description = "by how much",
+                       .min = -kTurns,
+                       .max = kTurns},
+                      {.name = "speed_deg_s",
+                       .type = RequestField::Type::number,
+                       .description = "how fast; without it as fast as maintenance may",
+                       .min = 0.0,
+                       .max = 360.0}},
+          .reply = kDone,
+          .errors = {409},
+          .handle = jog};
 }
 
-Route look(std::string_view path, std::string_view about, Reply reply, ordered_json (*what)(const Snapshot&)) {
+Route look(std::string_view path, std::string_view description, Reply reply, ordered_json (*what)(const Snapshot&)) {
   return {.method = Method::get,
           .path = path,
           .role = Role::viewer,
-          .about = about,
+          .description = description,
           .reply = reply,
           .handle = [what](const ApiStation& station, const Values&, const Send& send) {
             send({.body = to_text(what(*station.loop.snapshot()))});
@@ -101,16 +103,16 @@ Route look(std::string_view path, std::string_view about, Reply reply, ordered_j
 std::vector<Route> station_routes() {
   return {
       look("/api/v1/status", "What the station does, why, and what to do next.",
-           {.about = "the latest snapshot", .schema = "Status"}, [](const Snapshot& s) { return to_json(s); }),
-      look("/api/v1/io", "The panel's inputs and outputs.", {.about = "as last seen", .schema = "Io"}, io_table),
+           {.description = "the latest snapshot", .schema = "Status"}, [](const Snapshot& s) { return to_json(s); }),
+      look("/api/v1/io", "The panel's inputs and outputs.", {.description = "as last seen", .schema = "Io"}, io_table),
       {.method = Method::get,
        .path = "/api/v1/events",
        .role = Role::viewer,
-       .about =
+       .description =
            "Server-sent events: `status` and `job` as they change, each with the shapes of Status and JobDetail, and "
            "`job_deleted` with {\"id\"}. A client that comes back with Last-Event-ID gets what it missed, or `lost` "
            "and the present status when that is too long ago. A comment every 10 s is the heartbeat.",
-       .reply = {.about = "events without end", .type = "text/event-stream"},
+       .reply = {.description = "events without end", .type = "text/event-stream"},
        .handle = [](const ApiStation&, const Values&, const Send& send) { send({.body = EventStream{}}); }},
       press("/api/v1/start", Button::start, Role::operating, "Starts a scan; after the flip: goes on."),
       press("/api/v1/stop", Button::stop, Role::viewer, "Stops the table and cancels the scan. Anybody may."),

@@ -14,7 +14,7 @@ const char* const kSchemas = R"({
   "job": {"type": "string", "nullable": true, "description": "the job that has the rig now"}}},
 "Status": {"type": "object", "additionalProperties": false,
   "required": ["revision", "machine", "activity", "may_be_moving", "cause", "sentence", "next_action", "devices", "job",
-  "not_begun", "queue"],
+  "not_started", "queue", "not_begun"],
   "properties": {
   "revision": {"type": "integer"},
   "machine": {"type": "string", "description": "in the words of OPC 40100-1, such as Operational.Ready"},
@@ -25,9 +25,10 @@ const char* const kSchemas = R"({
   "next_action": {"type": "string", "description": "what the operator should do, if only to wait"},
   "devices": {"type": "array", "items": {"$ref": "#/components/schemas/Device"}},
   "job": {"type": "string", "nullable": true, "description": "the job that has the rig"},
-  "not_begun": {"allOf": [{"$ref": "#/components/schemas/NotBegun"}], "nullable": true},
+  "not_started": {"allOf": [{"$ref": "#/components/schemas/NotStarted"}], "nullable": true},
+  "not_begun": {"allOf": [{"$ref": "#/components/schemas/NotStarted"}], "nullable": true, "deprecated": true, "description": "old name of not_started"},
   "queue": {"type": "array", "items": {"type": "string"}, "description": "jobs to come, the next one first"}}},
-"NotBegun": {"type": "object", "required": ["job", "why"], "additionalProperties": false,
+"NotStarted": {"type": "object", "required": ["job", "why"], "additionalProperties": false,
   "description": "the job that the last Start did not begin; null: it began one", "properties": {
   "job": {"type": "string"}, "why": {"$ref": "#/components/schemas/Problem"}}},
 "Device": {"type": "object", "required": ["name", "ok", "problem"], "additionalProperties": false, "properties": {
@@ -58,18 +59,22 @@ const char* const kSchemas = R"({
   "jobs": {"type": "array", "items": {"$ref": "#/components/schemas/Job"}},
   "next": {"type": "string", "nullable": true, "description": "`before` of the next page; null on the last"}}},
 "StoredView": {"type": "object", "additionalProperties": false,
-  "required": ["pose", "view", "measured_deg", "error_deg", "settling_ms", "redone", "spoilt"], "properties": {
+  "required": ["pose", "view", "measured_deg", "error_deg", "settling_ms", "retakes", "retake_reasons", "redone", "spoilt"], "properties": {
   "pose": {"type": "integer"}, "view": {"type": "integer"}, "measured_deg": {"type": "number"},
   "error_deg": {"type": "number", "description": "measured less commanded"}, "settling_ms": {"type": "number"},
-  "redone": {"type": "integer", "description": "exposures that were lost or spoilt and taken again"},
-  "spoilt": {"type": "array", "items": {"$ref": "#/components/schemas/Problem"}, "description": "what was wrong with each"}}},
-"Closure": {"type": "object", "additionalProperties": false,
-  "required": ["pose", "shift_px", "changed", "unmoved", "redone", "spoilt"],
+  "retakes": {"type": "integer", "description": "exposures that were lost or unusable and taken again"},
+  "redone": {"type": "integer", "deprecated": true, "description": "old name of retakes"},
+  "retake_reasons": {"type": "array", "items": {"$ref": "#/components/schemas/Problem"}, "description": "what was wrong with each"},
+  "spoilt": {"type": "array", "items": {"$ref": "#/components/schemas/Problem"}, "deprecated": true, "description": "old name of retake_reasons"}}},
+"MovementCheck": {"type": "object", "additionalProperties": false,
+  "required": ["pose", "shift_px", "changed", "unmoved", "retakes", "retake_reasons", "redone", "spoilt"],
   "description": "view 0, taken again, against the first one", "properties": {
   "pose": {"type": "integer"}, "shift_px": {"type": "number"}, "changed": {"type": "number"},
   "unmoved": {"type": "boolean"},
-  "redone": {"type": "integer", "description": "exposures that were lost or spoilt and taken again"},
-  "spoilt": {"type": "array", "items": {"$ref": "#/components/schemas/Problem"}, "description": "what was wrong with each"}}},
+  "retakes": {"type": "integer", "description": "exposures that were lost or unusable and taken again"},
+  "redone": {"type": "integer", "deprecated": true, "description": "old name of retakes"},
+  "retake_reasons": {"type": "array", "items": {"$ref": "#/components/schemas/Problem"}, "description": "what was wrong with each"},
+  "spoilt": {"type": "array", "items": {"$ref": "#/components/schemas/Problem"}, "deprecated": true, "description": "old name of retake_reasons"}}},
 "Stage": {"type": "object", "required": ["name", "fraction"], "additionalProperties": false, "properties": {
   "name": {"type": "string"}, "fraction": {"type": "number", "minimum": 0, "maximum": 1}}},
 "JobDone": {"type": "object", "required": ["job"], "additionalProperties": false, "properties": {
@@ -80,8 +85,8 @@ const char* const kSchemas = R"({
     "path": {"type": "string"}, "bytes": {"type": "integer"}, "type": {"type": "string"}}}}}},
 "Report": {"type": "object", "description": "report.json of the model"},
 "Health": {"type": "object", "additionalProperties": false,
-  "required": ["ok", "problems", "version", "uptime_s", "devices", "disk", "temperatures", "deadlines_missed", "retries",
-  "faults", "connections", "event_streams"], "properties": {
+  "required": ["ok", "problems", "version", "uptime_s", "devices", "disk", "temperatures", "deadlines_missed", "retakes",
+  "retries", "faults", "connections", "event_streams"], "properties": {
   "ok": {"type": "boolean", "description": "nothing is wrong"},
   "problems": {"type": "array", "items": {"$ref": "#/components/schemas/Problem"}},
   "version": {"type": "string"}, "uptime_s": {"type": "number"},
@@ -90,7 +95,8 @@ const char* const kSchemas = R"({
     "bytes": {"type": "integer"}, "free_bytes": {"type": "integer"}}},
   "temperatures": {"type": "array", "items": {"type": "object", "required": ["sensor", "celsius"],
     "additionalProperties": false, "properties": {"sensor": {"type": "string"}, "celsius": {"type": "number"}}}},
-  "deadlines_missed": {"type": "integer"}, "retries": {"type": "integer"}, "faults": {"type": "integer"},
+  "deadlines_missed": {"type": "integer"}, "retakes": {"type": "integer"},
+  "retries": {"type": "integer", "deprecated": true, "description": "old name of retakes"}, "faults": {"type": "integer"},
   "connections": {"type": "integer"}, "event_streams": {"type": "integer"}}},
 "ConfigCheck": {"type": "object", "required": ["ok", "problems"], "additionalProperties": false, "properties": {
   "ok": {"type": "boolean"}, "problems": {"type": "array", "items": {"type": "string"}}}},
@@ -98,10 +104,11 @@ const char* const kSchemas = R"({
 })";
 
 const char* const kJobDetail = R"({
-"required": ["closures", "stages"],
+"required": ["movement_checks", "closures", "stages"],
 "properties": {
   "stored": {"type": "array", "description": null, "items": {"$ref": "#/components/schemas/StoredView"}},
-  "closures": {"type": "array", "items": {"$ref": "#/components/schemas/Closure"}},
+  "movement_checks": {"type": "array", "items": {"$ref": "#/components/schemas/MovementCheck"}},
+  "closures": {"type": "array", "items": {"$ref": "#/components/schemas/MovementCheck"}, "deprecated": true, "description": "old name of movement_checks"},
   "stages": {"type": "array", "items": {"$ref": "#/components/schemas/Stage"}}}})";
 
 }  // namespace scanrig

@@ -13,8 +13,8 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/api/facts.h"
 #include "daemon/api/job_bundle.h"
+#include "daemon/api/service_status.h"
 #include "daemon/api/session.h"
 #include "daemon/api/socket_file.h"
 
@@ -143,8 +143,8 @@ struct ApiServer::Impl {
     facts = std::move(machine);
   }
 
-  Facts latest_facts() {
-    Facts now;
+  ServiceStatus latest_facts() {
+    ServiceStatus now;
     {
       const std::lock_guard guard(facts_mutex);
       now = facts;
@@ -181,7 +181,7 @@ struct ApiServer::Impl {
   Steady::time_point fed{};
   const Steady::time_point begun = Steady::now();
   std::mutex facts_mutex;
-  Facts facts;
+  ServiceStatus facts;
   std::vector<std::thread> threads;
 };
 

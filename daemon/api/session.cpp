@@ -15,7 +15,7 @@ const scanrig::Error kTooMany{ErrorCode::busy, "there are too many connections: 
 const scanrig::Error kTooOften{ErrorCode::busy, "too many requests: wait a moment"};
 const scanrig::Error kNoAnswer{ErrorCode::timeout, "the station did not answer in time: see scanrig status"};
 constexpr unsigned kFirstError = 400, kForbidden = 403;
-constexpr std::size_t kLongestPath = 200;  ///< in the log
+constexpr std::size_t kMaxPathLength = 200;  ///< in the log
 constexpr auto kDrainTime = std::chrono::seconds(1);
 
 std::string_view plain(boost::beast::string_view text) { return {text.data(), text.size()}; }
@@ -102,7 +102,7 @@ void ApiSession::on_body(Error error) {
 
 /// The answer may come from a worker or from the control loop; until then only the timer keeps this session.
 void ApiSession::call() {
-  await_answer(match_->route->patience);
+  await_answer(match_->route->reply_timeout);
   const bool slow = match_->route->slow;
   auto work = [match = std::move(*match_), body = parser_->get().body(), &core = core_, send = sender()]() mutable {
     Router::call(std::move(match), body, core.station, std::move(send));
@@ -115,22 +115,23 @@ void ApiSession::call() {
   }
 }
 
-std::optional<ApiSession::Order> ApiSession::order_of(Role as) const {
+std::optional<ApiSession::JobOrder> ApiSession::order_of(Role as) const {
   const auto method = plain(parser_->get().method_string());
   if (method == to_string(Method::get)) return std::nullopt;
   const auto target = plain(parser_->get().target());
-  return Order{fmt::format("{} {}, asked for by {} ({})", method,
-                           target.substr(0, target.find('?')).substr(0, kLongestPath), seat_->peer(), to_string(as))};
+  return JobOrder{fmt::format("{} {}, asked for by {} ({})", method,
+                              target.substr(0, target.find('?')).substr(0, kMaxPathLength), seat_->peer(),
+                              to_string(as))};
 }
 
-void ApiSession::tell_refused(const Order& order, const std::string& why) const {
+void ApiSession::tell_refused(const JobOrder& order, const std::string& why) const {
   core_.journal(
       {.priority = Priority::notice, .message = fmt::format("{}, is refused: {}", order.asked, why), .job = order.job});
 }
 
-void ApiSession::await_answer(std::chrono::milliseconds patience) {
+void ApiSession::await_answer(std::chrono::milliseconds reply_timeout) {
   waiting_ = true;
-  timer_.expires_after(std::max(patience, core_.limits.answer_time));
+  timer_.expires_after(std::max(reply_timeout, core_.limits.answer_time));
   timer_.async_wait([self = shared_from_this()](Error error) {
     if (error || !self->waiting_) return;
     self->last_ = true;

@@ -31,7 +31,7 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
   using Error = boost::beast::error_code;
 
   /// An order, as the log tells it when it is refused. Holds no more of the request than its path.
-  struct Order {
+  struct JobOrder {
     std::string asked;
     std::string job{};
   };
@@ -40,9 +40,9 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
   void on_header(Error error);
   void on_body(Error error);
   void call();
-  [[nodiscard]] std::optional<Order> order_of(Role as) const;
-  void tell_refused(const Order& order, const std::string& why) const;
-  void await_answer(std::chrono::milliseconds patience);
+  [[nodiscard]] std::optional<JobOrder> order_of(Role as) const;
+  void tell_refused(const JobOrder& order, const std::string& why) const;
+  void await_answer(std::chrono::milliseconds reply_timeout);
   [[nodiscard]] Send sender();
   void answer(ApiResponse response);
   void set_head(unsigned status, std::string_view type);
@@ -73,7 +73,7 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::string_body>> parser_;
   std::optional<Router::Match> match_;
-  std::optional<Order> order_;       ///< that is being answered; of what only looks: nothing
+  std::optional<JobOrder> order_;    ///< that is being answered; of what only looks: nothing
   bool waiting_ = false;             ///< for an answer to the request
   bool last_ = false;                ///< no request can follow
   std::shared_ptr<int> on_its_way_;  ///< while an answer is being written

@@ -62,8 +62,8 @@ Result<int> connect_to_socket(const fs::path& path, std::chrono::microseconds li
   const int fd = open_socket();
   if (fd < 0) return fail_errno("make", path, fd);
   const auto whole = std::chrono::floor<std::chrono::seconds>(limit);
-  const timeval patience{.tv_sec = whole.count(), .tv_usec = (limit - whole).count()};
-  ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
+  const timeval reply_timeout{.tv_sec = whole.count(), .tv_usec = (limit - whole).count()};
+  ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &reply_timeout, sizeof reply_timeout);
   if (::connect(fd, plain(*address), sizeof *address) == 0) return fd;
   const int why = errno;
   if (why != ENOENT && why != ECONNREFUSED && why != EAGAIN) return fail_errno("connect to", path, fd);

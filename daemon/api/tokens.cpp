@@ -22,7 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-constexpr std::size_t kMostTokens = 256;
+constexpr std::size_t kMaxTokens = 256;
 constexpr std::string_view kHexadecimal = "0123456789abcdef";
 
 Result<std::string> random_hexadecimal(std::size_t bytes) {
@@ -101,7 +101,7 @@ Result<TokenFile> TokenFile::read(const fs::path& path) {
   const auto json = ordered_json::parse(*text, nullptr, false);
   if (!json.is_object() || json.value("format", ordered_json()) != "scanrig-tokens" ||
       json.value("version", ordered_json()) != 1 || !json.contains("tokens") || !json["tokens"].is_array() ||
-      json["tokens"].size() > kMostTokens) {
+      json["tokens"].size() > kMaxTokens) {
     return fail(ErrorCode::invalid_input, "{}: not a file of tokens (scanrig token add writes one)", path.string());
   }
   TokenFile file;
@@ -132,7 +132,7 @@ Result<std::string> TokenFile::add(const std::string& name, Role role, std::stri
   if (std::ranges::find(records_, name, &TokenRecord::name) != records_.end()) {
     return fail(ErrorCode::exists, "there is a token {} already: revoke it first", name);
   }
-  if (records_.size() == kMostTokens) return fail(ErrorCode::invalid_input, "there are {} tokens already", kMostTokens);
+  if (records_.size() == kMaxTokens) return fail(ErrorCode::invalid_input, "there are {} tokens already", kMaxTokens);
   const auto secret = random_hexadecimal(32);
   const auto salt = random_hexadecimal(16);
   if (!secret || !salt) return pass_on(secret ? salt : secret);

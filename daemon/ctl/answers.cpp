@@ -6,7 +6,7 @@ namespace scanrig::ctl {
 
 using nlohmann::json;
 
-ExitCode complain(const Refusal& refusal) { return complain(refusal.exit, refusal.message); }
+ExitCode report_error(const RequestError& error) { return report_error(error.exit, error.message); }
 
 void print(const json& answer) { fmt::print("{}\n", answer.dump(2, ' ', false, json::error_handler_t::replace)); }
 

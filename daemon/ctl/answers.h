@@ -8,7 +8,7 @@
 namespace scanrig::ctl {
 
 /// What the verbs that talk to the daemon do with its answers.
-ExitCode complain(const Refusal& refusal);
+ExitCode report_error(const RequestError& error);
 void print(const nlohmann::json& answer);
 /// The text behind `key`; empty where there is none.
 std::string text(const nlohmann::json& object, const char* key);

@@ -24,12 +24,14 @@ namespace {
 namespace net = boost::asio;
 namespace http = boost::beast::http;
 using boost::system::error_code;
-using Answer = tl::expected<nlohmann::json, Refusal>;
+using Answer = tl::expected<nlohmann::json, RequestError>;
 
 constexpr auto kTooOftenPause = std::chrono::milliseconds(50);
 constexpr auto kTooOftenLimit = std::chrono::seconds(10);
 
-Answer unreachable(std::string message) { return tl::unexpected(Refusal{ExitCode::unreachable, std::move(message)}); }
+Answer unreachable(std::string message) {
+  return tl::unexpected(RequestError{ExitCode::unreachable, std::move(message)});
+}
 
 Answer understand(const http::response<http::string_body>& response, const std::string& target) {
   auto json = nlohmann::json::parse(response.body(), nullptr, false);
@@ -38,7 +40,8 @@ Answer understand(const http::response<http::string_body>& response, const std::
     return unreachable(fmt::format("{}: an answer that is not the API's (HTTP {})", target, response.result_int()));
   }
   const auto code = parse_error_code(json["error"].value("code", ""));
-  return tl::unexpected(Refusal{exit_code(code.value_or(ErrorCode::internal)), json["error"].value("message", "")});
+  return tl::unexpected(
+      RequestError{exit_code(code.value_or(ErrorCode::internal)), json["error"].value("message", "")});
 }
 
 /// A file that is gone in the end, whatever happens.
@@ -50,14 +53,15 @@ struct Removed {
 /// A connection to the daemon on which every wait ends: a daemon that was stopped, or hangs, says nothing at all.
 class Link {
  public:
-  static tl::expected<std::unique_ptr<Link>, Refusal> open(const std::filesystem::path& path, Clock::Duration limit) {
+  static tl::expected<std::unique_ptr<Link>, RequestError> open(const std::filesystem::path& path,
+                                                                Clock::Duration limit) {
     const auto by = Clock::TimePoint::clock::now() + limit;
     const auto connected = connect_to_socket(path, std::chrono::ceil<std::chrono::microseconds>(limit));
     if (connected) return std::unique_ptr<Link>(new Link(path, *connected, by, limit));
     const auto& why = connected.error();
     if (why.code == ErrorCode::timeout) return tl::unexpected(too_late(path, limit));
-    return tl::unexpected(Refusal{ExitCode::unreachable,
-                                  why.message + (why.code == ErrorCode::not_found ? "; is the daemon running?" : "")});
+    return tl::unexpected(RequestError{
+        ExitCode::unreachable, why.message + (why.code == ErrorCode::not_found ? "; is the daemon running?" : "")});
   }
 
   /// What comes from now on has `limit`.
@@ -77,17 +81,17 @@ class Link {
   error_code read(http::response_parser<http::buffer_body>& parser) {
     return wait([&](auto done) { http::async_read(socket_, buffer_, parser, std::move(done)); });
   }
-  [[nodiscard]] tl::unexpected<Refusal> failed(const error_code& error) const {
+  [[nodiscard]] tl::unexpected<RequestError> failed(const error_code& error) const {
     if (error == net::error::timed_out) return tl::unexpected(too_late(path_, limit_));
-    return tl::unexpected(Refusal{ExitCode::unreachable,
-                                  fmt::format("{}: the daemon does not answer: {}", path_.string(), error.message())});
+    return tl::unexpected(RequestError{
+        ExitCode::unreachable, fmt::format("{}: the daemon does not answer: {}", path_.string(), error.message())});
   }
 
  private:
   Link(std::filesystem::path path, int fd, Clock::TimePoint by, Clock::Duration limit)
       : path_(std::move(path)), by_(by), limit_(limit), socket_(io_, net::local::stream_protocol(), fd) {}
 
-  static Refusal too_late(const std::filesystem::path& path, Clock::Duration limit) {
+  static RequestError too_late(const std::filesystem::path& path, Clock::Duration limit) {
     return {ExitCode::unreachable,
             fmt::format("{}: the daemon has not answered within {:g} s; see what `systemctl status scanrigd` says, and "
                         "restart it where it hangs",
@@ -127,8 +131,8 @@ http::request<http::string_body> request_for(const std::string& method, const st
 
 using Response = http::response<http::string_body>;
 
-tl::expected<Response, Refusal> exchange_once(const std::filesystem::path& path,
-                                              http::request<http::string_body>& request, Clock::Duration limit) {
+tl::expected<Response, RequestError> exchange_once(const std::filesystem::path& path,
+                                                   http::request<http::string_body>& request, Clock::Duration limit) {
   const auto link = Link::open(path, limit);
   if (!link) return tl::unexpected(link.error());
   Response response;
@@ -139,8 +143,9 @@ tl::expected<Response, Refusal> exchange_once(const std::filesystem::path& path,
 }
 
 /// Who asks too often is told so, and asks again a little later.
-tl::expected<Response, Refusal> exchange(const std::filesystem::path& path, const std::string& method,
-                                         const std::string& target, const std::string& body, Clock::Duration limit) {
+tl::expected<Response, RequestError> exchange(const std::filesystem::path& path, const std::string& method,
+                                              const std::string& target, const std::string& body,
+                                              Clock::Duration limit) {
   RealClock clock;
   auto request = request_for(method, target, body);
   const auto by = Deadline::after(clock, kTooOftenLimit);
@@ -150,8 +155,8 @@ tl::expected<Response, Refusal> exchange(const std::filesystem::path& path, cons
   }
 }
 
-tl::unexpected<Refusal> refusal_of(Link& link, http::response_parser<http::buffer_body>&& begun,
-                                   const std::string& target) {
+tl::unexpected<RequestError> request_error_of(Link& link, http::response_parser<http::buffer_body>&& begun,
+                                              const std::string& target) {
   const auto status = begun.get().result();
   std::string text(16 * 1024, '\0');
   begun.get().body() = {text.data(), text.size(), true};
@@ -159,33 +164,34 @@ tl::unexpected<Refusal> refusal_of(Link& link, http::response_parser<http::buffe
   text.resize(text.size() - begun.get().body().size);
   http::response<http::string_body> response(status, 11, std::move(text));
   const auto answer = understand(response, target);
-  if (!answer) return tl::unexpected(Refusal(answer.error()));
-  return tl::unexpected(Refusal{ExitCode::internal, target + ": no file came"});
+  if (!answer) return tl::unexpected(RequestError(answer.error()));
+  return tl::unexpected(RequestError{ExitCode::internal, target + ": no file came"});
 }
 
-tl::unexpected<Refusal> unwritten(const std::filesystem::path& path) {
+tl::unexpected<RequestError> unwritten(const std::filesystem::path& path) {
   return tl::unexpected(
-      Refusal{ExitCode::disk, fmt::format("cannot write {}: {}", path.string(), std::strerror(errno))});
+      RequestError{ExitCode::disk, fmt::format("cannot write {}: {}", path.string(), std::strerror(errno))});
 }
 
 }  // namespace
 
-Answer ask(const std::filesystem::path& socket, const std::string& method, const std::string& target,
-           const std::string& body, Clock::Duration limit) {
+Answer send_request(const std::filesystem::path& socket, const std::string& method, const std::string& target,
+                    const std::string& body, Clock::Duration limit) {
   const auto response = exchange(socket, method, target, body, limit);
   if (!response) return tl::unexpected(response.error());
   return understand(*response, target);
 }
 
-tl::expected<std::string, Refusal> fetch(const std::filesystem::path& socket, const std::string& target) {
-  const auto response = exchange(socket, "GET", target, "", kPatience);
+tl::expected<std::string, RequestError> fetch(const std::filesystem::path& socket, const std::string& target) {
+  const auto response = exchange(socket, "GET", target, "", kReplyTimeout);
   if (!response) return tl::unexpected(response.error());
   if (response->result() == http::status::ok) return response->body();
   return tl::unexpected(understand(*response, target).error());
 }
 
-tl::expected<void, Refusal> download(const std::filesystem::path& path, const std::string& target,
-                                     const std::filesystem::path& out, const Arrived& arrived, Clock::Duration limit) {
+tl::expected<void, RequestError> download(const std::filesystem::path& path, const std::string& target,
+                                          const std::filesystem::path& out, const Arrived& arrived,
+                                          Clock::Duration limit) {
   const auto opened = Link::open(path, limit);
   if (!opened) return tl::unexpected(opened.error());
   Link& link = **opened;
@@ -195,7 +201,7 @@ tl::expected<void, Refusal> download(const std::filesystem::path& path, const st
   auto error = link.write(request);
   if (!error) error = link.read_header(parser);
   if (error) return link.failed(error);
-  if (parser.get().result() != http::status::ok) return refusal_of(link, std::move(parser), target);
+  if (parser.get().result() != http::status::ok) return request_error_of(link, std::move(parser), target);
   // The name is taken at the end, and never from somebody who has it.
   const std::filesystem::path part = out.string() + fmt::format(".part-{}", ::getpid());
   const Removed remove_part{part};
@@ -205,7 +211,7 @@ tl::expected<void, Refusal> download(const std::filesystem::path& path, const st
   const auto whole = parser.content_length().value_or(0);
   for (std::uint64_t come = 0; !parser.is_done();) {
     parser.get().body() = {room.data(), room.size(), true};
-    link.give(kPatience);
+    link.give(kReplyTimeout);
     error = link.read(parser);
     if (error && error != http::error::need_buffer) return link.failed(error);
     const auto got = room.size() - parser.get().body().size;
@@ -216,7 +222,8 @@ tl::expected<void, Refusal> download(const std::filesystem::path& path, const st
   if (std::fflush(file.get()) != 0 || ::fsync(::fileno(file.get())) != 0) return unwritten(part);
   if (::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, out.c_str(), RENAME_NOREPLACE) == 0) return {};
   if (errno != EEXIST) return unwritten(out);
-  return tl::unexpected(Refusal{ExitCode::bad_input, out.string() + ": already there; name another file with --out"});
+  return tl::unexpected(
+      RequestError{ExitCode::bad_input, out.string() + ": already there; name another file with --out"});
 }
 
 std::string segment(std::string_view text) {

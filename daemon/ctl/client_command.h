@@ -10,9 +10,9 @@ namespace scanrig::ctl {
 
 /// A verb that talks to the daemon: `run` gets its connection. `Verb` are its own options.
 template <class Verb, class Run>
-CLI::App* add_client(CLI::App& app, Chosen& chosen, const char* name, const char* about, std::shared_ptr<Verb> verb,
-                     Run run) {
-  auto* sub = app.add_subcommand(name, about);
+CLI::App* add_client(CLI::App& app, Chosen& chosen, const char* name, const char* description,
+                     std::shared_ptr<Verb> verb, Run run) {
+  auto* sub = app.add_subcommand(name, description);
   auto connection = std::make_shared<Connection>();
   sub->add_option("--socket", connection->socket, "the daemon's socket")
       ->envname("SCANRIG_SOCKET")

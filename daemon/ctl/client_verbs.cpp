@@ -21,17 +21,17 @@ ExitCode follow(const Connection& connection, std::string id) {
   StageBars bars(told, ::isatty(::fileno(told)) == 1);
   JobStory story(bars);
   for (;; clock.sleep_for(kPoll)) {
-    const auto status = ask(connection.socket, "GET", "/api/v1/status");
-    if (!status) return complain(status.error());
+    const auto status = send_request(connection.socket, "GET", "/api/v1/status");
+    if (!status) return report_error(status.error());
     if (id.empty()) id = text(*status, "job");
     if (id.empty()) {
       story.wait(*status);
       continue;
     }
-    if (const auto why = why_not_begun(*status, id)) return complain(*why);
-    const auto job = ask(connection.socket, "GET", "/api/v1/jobs/" + id);
+    if (const auto why = why_not_started(*status, id)) return report_error(*why);
+    const auto job = send_request(connection.socket, "GET", "/api/v1/jobs/" + id);
     if (!job && job.error().exit == exit_code(ErrorCode::not_found) && text(*status, "job") == id) continue;  // not yet
-    if (!job) return complain(job.error());
+    if (!job) return report_error(job.error());
     if (!story.tell(*status, *job)) continue;
     if (connection.json) print(*job);
     return story.end(*job);
@@ -43,8 +43,8 @@ ExitCode follow(const Connection& connection, std::string id) {
 ExitCode status(const Connection& connection, const StatusVerb& verb) {
   if (verb.watch) return watch(connection);
   if (verb.follow) return follow(connection, "");
-  const auto answer = ask(connection.socket, "GET", "/api/v1/status");
-  if (!answer) return complain(answer.error());
+  const auto answer = send_request(connection.socket, "GET", "/api/v1/status");
+  if (!answer) return report_error(answer.error());
   if (connection.json) {
     print(*answer);
     return ExitCode::ok;
@@ -59,8 +59,8 @@ ExitCode status(const Connection& connection, const StatusVerb& verb) {
 }
 
 ExitCode health(const Connection& connection) {
-  const auto answer = ask(connection.socket, "GET", "/api/v1/health");
-  if (!answer) return complain(answer.error());
+  const auto answer = send_request(connection.socket, "GET", "/api/v1/health");
+  if (!answer) return report_error(answer.error());
   if (connection.json) {
     print(*answer);
     return ExitCode::ok;
@@ -72,15 +72,15 @@ ExitCode health(const Connection& connection) {
   for (const auto& one : answer->at("temperatures")) {
     fmt::print("{}: {:.1f} degrees Celsius\n", text(one, "sensor"), one.at("celsius").get<double>());
   }
-  fmt::print("since {:.0f} s: {} deadlines missed, {} exposures retried, {} faults\n",
-             answer->at("uptime_s").get<double>(), answer->at("deadlines_missed").get<int>(),
-             answer->at("retries").get<int>(), answer->at("faults").get<int>());
+  fmt::print("since {:.0f} s: {} deadlines missed, {} retakes, {} faults\n", answer->at("uptime_s").get<double>(),
+             answer->at("deadlines_missed").get<int>(), answer->at("retakes").get<int>(),
+             answer->at("faults").get<int>());
   return ExitCode::ok;
 }
 
 ExitCode start(const Connection& connection, const StartVerb& verb) {
-  const auto answer = ask(connection.socket, "POST", "/api/v1/start");
-  if (!answer) return complain(answer.error());
+  const auto answer = send_request(connection.socket, "POST", "/api/v1/start");
+  if (!answer) return report_error(answer.error());
   const auto id = text(*answer, "job");
   if (verb.follow) return follow(connection, id);
   if (connection.json) {
@@ -92,8 +92,8 @@ ExitCode start(const Connection& connection, const StartVerb& verb) {
 }
 
 ExitCode press(const Connection& connection, const std::string& button) {
-  const auto answer = ask(connection.socket, "POST", "/api/v1/" + button);
-  if (!answer) return complain(answer.error());
+  const auto answer = send_request(connection.socket, "POST", "/api/v1/" + button);
+  if (!answer) return report_error(answer.error());
   if (connection.json) print(*answer);
   return ExitCode::ok;
 }

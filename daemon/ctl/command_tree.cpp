@@ -17,7 +17,7 @@ std::vector<std::string> members_in(const std::string& type) {
 }
 
 OptionWords words_of(const CLI::Option& option) {
-  OptionWords words{.about = option.get_description(),
+  OptionWords words{.description = option.get_description(),
                     .fallback = option.get_default_str(),
                     .variable = option.get_envname(),
                     .required = option.get_required()};
@@ -39,7 +39,8 @@ OptionWords words_of(const CLI::Option& option) {
 }  // namespace
 
 CommandWords words_of(const CLI::App& app, const std::string& path_of_parent) {
-  CommandWords command{.path = path_of_parent + app.get_name(), .name = app.get_name(), .about = app.get_description()};
+  CommandWords command{
+      .path = path_of_parent + app.get_name(), .name = app.get_name(), .description = app.get_description()};
   for (const auto* option : app.get_options()) command.options.push_back(words_of(*option));
   for (const auto* verb : app.get_subcommands([](const CLI::App* one) { return !one->get_group().empty(); })) {
     command.verbs.push_back(words_of(*verb, command.path + " "));

@@ -9,7 +9,7 @@ namespace scanrig::ctl {
 /// What completion and manual pages need of a CLI11 tree, hidden verbs left out.
 struct OptionWords {
   std::vector<std::string> names{};  ///< "--json"; empty: positional
-  std::string about{};
+  std::string description{};
   std::string label{};                ///< of its value: "ID", "FILE", ...; empty: a flag
   std::vector<std::string> values{};  ///< that it may have; empty: any
   std::string fallback{};             ///< value without it
@@ -19,7 +19,7 @@ struct OptionWords {
 
 struct CommandWords {
   std::string path;  ///< "scanrig token add"
-  std::string name{}, about{};
+  std::string name{}, description{};
   std::vector<OptionWords> options{};  ///< positional ones too
   std::vector<CommandWords> verbs{};
 };

@@ -127,7 +127,7 @@ complete -c {0} -f
   for (const auto* command : flattened(root)) {
     const auto when = fmt::format("complete -c {0} -n \"__{0}_path {1}\"", root.name, command->path);
     for (const auto& verb : command->verbs)
-      text += fmt::format("{} -a {} -d {}\n", when, verb.name, quoted(verb.about));
+      text += fmt::format("{} -a {} -d {}\n", when, verb.name, quoted(verb.description));
     for (const auto& option : command->options) {
       std::string words;
       for (const auto& name : option.names) {
@@ -136,7 +136,7 @@ complete -c {0} -f
       if (!option.values.empty()) words += fmt::format(" -a '{}'", fmt::join(option.values, " "));
       if (takes_path(option)) words += " -F";
       if (!option.names.empty() && !option.label.empty()) words += takes_path(option) ? " -r" : " -x";
-      if (!words.empty()) text += fmt::format("{}{} -d {}\n", when, words, quoted(option.about));
+      if (!words.empty()) text += fmt::format("{}{} -d {}\n", when, words, quoted(option.description));
     }
   }
   return text;

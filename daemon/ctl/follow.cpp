@@ -11,36 +11,36 @@ namespace {
 
 using nlohmann::json;
 
-/// Of a view or a closure shot.
-std::string redone(const json& taken) {
-  const int count = taken.at("redone");
+/// Of a view or a movement check.
+std::string retakes(const json& taken) {
+  const int count = taken.at("retakes");
   std::string text = count == 0 ? "" : fmt::format(", {} exposure{} redone", count, count == 1 ? "" : "s");
-  for (const auto& why : taken.at("spoilt")) text += "\n      redone: " + why.at("message").get<std::string>();
+  for (const auto& why : taken.at("retake_reasons")) text += "\n      redone: " + why.at("message").get<std::string>();
   return text;
 }
 
 std::string view_line(const json& view, const json& job) {
   return fmt::format("  pose {}/{}  view {}/{}  {:8.3f} deg  stored{}", view.at("pose").get<int>() + 1,
                      job.at("poses").get<int>(), view.at("view").get<int>() + 1, job.at("views").get<int>(),
-                     view.at("measured_deg").get<double>(), redone(view));
+                     view.at("measured_deg").get<double>(), retakes(view));
 }
 
-std::string closure_line(const json& closure, const json& job) {
-  return fmt::format("  pose {}/{}  view 1 again  {}, off by {:.2f} px{}", closure.at("pose").get<int>() + 1,
-                     job.at("poses").get<int>(), closure.at("unmoved").get<bool>() ? "nothing moved" : "MOVED",
-                     closure.at("shift_px").get<double>(), redone(closure));
+std::string movement_line(const json& movement_check, const json& job) {
+  return fmt::format("  pose {}/{}  view 1 again  {}, off by {:.2f} px{}", movement_check.at("pose").get<int>() + 1,
+                     job.at("poses").get<int>(), movement_check.at("unmoved").get<bool>() ? "nothing moved" : "MOVED",
+                     movement_check.at("shift_px").get<double>(), retakes(movement_check));
 }
 
 }  // namespace
 
-std::optional<Error> why_not_begun(const json& status, const std::string& job) {
-  const auto not_begun = status.value("not_begun", json());
-  if (!not_begun.is_object() || text(not_begun, "job") != job) return std::nullopt;
-  const auto& why = not_begun.at("why");
+std::optional<Error> why_not_started(const json& status, const std::string& job) {
+  const auto not_started = status.value("not_started", json());
+  if (!not_started.is_object() || text(not_started, "job") != job) return std::nullopt;
+  const auto& why = not_started.at("why");
   const auto next = text(status, "next_action");
   return Error{
       parse_error_code(text(why, "code")).value_or(ErrorCode::internal),
-      fmt::format("job {} was not begun: {}{}{}", job, text(why, "message"), next.empty() ? "" : ". Next: ", next)};
+      fmt::format("job {} did not start: {}{}{}", job, text(why, "message"), next.empty() ? "" : ". Next: ", next)};
 }
 
 void JobStory::wait(const json& status) {
@@ -56,8 +56,9 @@ bool JobStory::tell(const json& status, const json& job) {
   if (!introduced_) bars_.line(fmt::format("Job {}", job.at("id").get<std::string>()));
   introduced_ = true;
   for (; views_told_ < stored.size(); ++views_told_) bars_.line(view_line(stored[views_told_], job));
-  const auto& closures = job.at("closures");
-  for (; closures_told_ < closures.size(); ++closures_told_) bars_.line(closure_line(closures[closures_told_], job));
+  const auto& movement_checks = job.at("movement_checks");
+  for (; movement_checks_reported_ < movement_checks.size(); ++movement_checks_reported_)
+    bars_.line(movement_line(movement_checks[movement_checks_reported_], job));
   const auto state = parse_job_state(job.at("state").get<std::string>());
   const std::string action = state == JobState::waiting_for_flip ? status.at("next_action").get<std::string>() : "-";
   if (action != asked_ && action != "-" && !action.empty()) bars_.line("  " + action);
@@ -80,9 +81,9 @@ ExitCode JobStory::end(const json& job) {
   }
   const auto& error = job.at("error");
   const auto code = error.is_object() ? parse_error_code(error.at("code").get<std::string>()) : std::nullopt;
-  return complain({code.value_or(ErrorCode::internal),
-                   fmt::format("job {} {}: {}", job.at("id").get<std::string>(), done ? "does not pass" : state,
-                               error.is_object() ? error.at("message").get<std::string>() : "no reason given")});
+  return report_error({code.value_or(ErrorCode::internal),
+                       fmt::format("job {} {}: {}", job.at("id").get<std::string>(), done ? "does not pass" : state,
+                                   error.is_object() ? error.at("message").get<std::string>() : "no reason given")});
 }
 
 }  // namespace scanrig::ctl

@@ -11,7 +11,7 @@
 namespace scanrig::ctl {
 
 /// Why the last Start did not begin `job`; nothing if it did, or still may. `status` as GET status gives it.
-std::optional<Error> why_not_begun(const nlohmann::json& status, const std::string& job);
+std::optional<Error> why_not_started(const nlohmann::json& status, const std::string& job);
 
 /// Tells a job's story line by line from what the API says of it, again and again.
 class JobStory {
@@ -31,7 +31,7 @@ class JobStory {
  private:
   StageBars& bars_;
   std::size_t views_told_ = 0;
-  std::size_t closures_told_ = 0;
+  std::size_t movement_checks_reported_ = 0;
   bool introduced_ = false;
   std::string waited_{};     ///< the cause of the last wait told
   std::string asked_ = "-";  ///< what the operator was last asked to do

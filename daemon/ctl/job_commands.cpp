@@ -7,10 +7,10 @@ namespace {
 CLI::Option* add_id(CLI::App* sub, std::string& id) { return sub->add_option("ID", id, "the job"); }
 
 template <class Verb>
-CLI::App* add_change(CLI::App& app, Chosen& chosen, const char* name, const char* about,
+CLI::App* add_change(CLI::App& app, Chosen& chosen, const char* name, const char* description,
                      const std::shared_ptr<Verb>& verb) {
   verb->what = name;
-  auto* sub = add_client(app, chosen, name, about, verb, change_job);
+  auto* sub = add_client(app, chosen, name, description, verb, change_job);
   add_id(sub, verb->id)->required();
   return sub;
 }
@@ -22,7 +22,7 @@ void add_changes(CLI::App& app, Chosen& chosen) {
   add_change(app, chosen, "first", "let the next Start begin this queued job", verb());
   const auto again = verb();
   auto* sub = add_change(app, chosen, "reprocess", "make the model again, from the images", again);
-  sub->add_option("--voxel-mm", again->voxel_mm, "size of a voxel")->check(CLI::Range(kLeastVoxelMm, kMostVoxelMm));
+  sub->add_option("--voxel-mm", again->voxel_mm, "size of a voxel")->check(CLI::Range(kMinVoxelMm, kMaxVoxelMm));
   sub->add_option("--fusion", again->fusion, "how poses are integrated")->check(CLI::IsMember({"evidence", "paper"}));
   const auto removed = verb();
   add_change(app, chosen, "delete", "remove a job that has ended, with all its files", removed)

@@ -12,9 +12,9 @@ namespace {
 
 using nlohmann::json;
 
-/// `taken`: a view or a closure shot.
-void add_redone(const json& taken, const std::string& name, std::vector<std::string>& lines) {
-  for (const auto& why : taken.value("spoilt", json::array())) {
+/// `taken`: a view or a movement check.
+void add_retakes(const json& taken, const std::string& name, std::vector<std::string>& lines) {
+  for (const auto& why : taken.value("retake_reasons", json::array())) {
     lines.push_back(fmt::format("  pose {} {}: an exposure was redone: {}", taken.at("pose").get<int>() + 1, name,
                                 text(why, "message")));
   }
@@ -33,9 +33,9 @@ std::vector<std::string> job_lines(const json& job) {
   lines.push_back(fmt::format(
       "{}  {} of {}", bar("views stored", static_cast<double>(stored) / static_cast<double>(all)), stored, all));
   for (const auto& view : job.at("stored")) {
-    add_redone(view, fmt::format("view {}", view.value("view", 0) + 1), lines);
+    add_retakes(view, fmt::format("view {}", view.value("view", 0) + 1), lines);
   }
-  for (const auto& closure : job.at("closures")) add_redone(closure, "view 1 again", lines);
+  for (const auto& movement_check : job.at("movement_checks")) add_retakes(movement_check, "view 1 again", lines);
   for (const auto& stage : job.at("stages")) {
     lines.push_back(bar(text(stage, "name"), stage.at("fraction")));
   }

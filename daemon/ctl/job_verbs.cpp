@@ -3,8 +3,8 @@
 #include <cstdio>
 
 #include "daemon/ctl/answers.h"
-#include "daemon/ctl/free_rig.h"
 #include "daemon/ctl/job_lines.h"
+#include "daemon/ctl/offline_rig_config.h"
 #include "daemon/ctl/stage_bars.h"
 #include "daemon/ctl/verbs.h"
 
@@ -14,8 +14,8 @@ namespace {
 using nlohmann::json;
 
 constexpr int kPage = 500;
-constexpr std::chrono::seconds kPackingPatience{200};  ///< a bundle has to be made first
-constexpr std::chrono::seconds kJobPatience{1};        ///< a queued job's folder is on the disk when it is answered
+constexpr std::chrono::seconds kPackingTimeout{200};  ///< a bundle has to be made first
+constexpr std::chrono::seconds kPerJobTimeout{1};     ///< a queued job's folder is on the disk when it is answered
 
 void print_job(const json& job) {
   fmt::print("{:<22} {:<16} {:>2} views  {:<12} {}\n", text(job, "id"), text(job, "state"), job.at("stored").get<int>(),
@@ -23,12 +23,13 @@ void print_job(const json& job) {
 }
 
 /// As many as are wanted, over as many pages as that takes.
-tl::expected<json, Refusal> list(const Connection& connection, const JobsVerb& verb) {
+tl::expected<json, RequestError> list(const Connection& connection, const JobsVerb& verb) {
   auto all = json::array();
   const std::string filter = verb.state.empty() ? "" : "&state=" + verb.state;
   for (std::string before;;) {
     const int wanted = std::min(kPage, verb.limit - static_cast<int>(all.size()));
-    const auto page = ask(connection.socket, "GET", fmt::format("/api/v1/jobs?limit={}{}{}", wanted, filter, before));
+    const auto page =
+        send_request(connection.socket, "GET", fmt::format("/api/v1/jobs?limit={}{}{}", wanted, filter, before));
     if (!page) return tl::unexpected(page.error());
     for (const auto& job : page->at("jobs")) all.push_back(job);
     const auto next = text(*page, "next");
@@ -39,14 +40,14 @@ tl::expected<json, Refusal> list(const Connection& connection, const JobsVerb& v
 
 /// Copies what the daemon sends to a file here, with a bar.
 ExitCode save(const Connection& connection, const std::string& target, const std::string& name, const std::string& out,
-              Clock::Duration limit = kPatience) {
+              Clock::Duration limit = kReplyTimeout) {
   std::FILE* told = connection.json ? stderr : stdout;
   StageBars bars(told, ::isatty(::fileno(told)) == 1);
   const auto show = [&](std::uint64_t bytes, std::uint64_t of) {
     if (of > 0) bars.update(name, static_cast<double>(bytes) / static_cast<double>(of));
   };
   const auto done = download(connection.socket, target, out, show, limit);
-  if (!done) return complain(done.error());
+  if (!done) return report_error(done.error());
   if (connection.json) {
     print({{"file", out}});
   } else {
@@ -58,9 +59,9 @@ ExitCode save(const Connection& connection, const std::string& target, const std
 }  // namespace
 
 ExitCode jobs(const Connection& connection, const JobsVerb& verb) {
-  const auto answer =
-      verb.id.empty() ? list(connection, verb) : ask(connection.socket, "GET", "/api/v1/jobs/" + segment(verb.id));
-  if (!answer) return complain(answer.error());
+  const auto answer = verb.id.empty() ? list(connection, verb)
+                                      : send_request(connection.socket, "GET", "/api/v1/jobs/" + segment(verb.id));
+  if (!answer) return report_error(answer.error());
   if (connection.json) {
     print(*answer);
   } else if (!verb.id.empty()) {
@@ -72,8 +73,8 @@ ExitCode jobs(const Connection& connection, const JobsVerb& verb) {
 }
 
 ExitCode job_files(const Connection& connection, const std::string& id) {
-  const auto answer = ask(connection.socket, "GET", "/api/v1/jobs/" + segment(id) + "/files");
-  if (!answer) return complain(answer.error());
+  const auto answer = send_request(connection.socket, "GET", "/api/v1/jobs/" + segment(id) + "/files");
+  if (!answer) return report_error(answer.error());
   if (connection.json) {
     print(*answer);
     return ExitCode::ok;
@@ -92,21 +93,21 @@ ExitCode export_file(const Connection& connection, const ExportVerb& verb) {
     return done;
   }
   // Who may only look may copy, but retention goes on as if nobody had.
-  const auto noted = ask(connection.socket, "POST", job + "/exported");
-  return noted || noted.error().exit == ExitCode::refused ? ExitCode::ok : complain(noted.error());
+  const auto noted = send_request(connection.socket, "POST", job + "/exported");
+  return noted || noted.error().exit == ExitCode::refused ? ExitCode::ok : report_error(noted.error());
 }
 
 ExitCode bundle(const Connection& connection, const BundleVerb& verb) {
   const auto out = verb.out.empty() ? verb.id + ".tar.gz" : verb.out.string();
-  return save(connection, "/api/v1/jobs/" + segment(verb.id) + "/bundle", verb.id, out, kPackingPatience);
+  return save(connection, "/api/v1/jobs/" + segment(verb.id) + "/bundle", verb.id, out, kPackingTimeout);
 }
 
 ExitCode queue(const Connection& connection, const QueueVerb& verb) {
   nlohmann::json body{{"recipe", verb.recipe}, {"repeat", verb.repeat}};
   if (!verb.part.empty()) body["part"] = verb.part;
-  const auto answer =
-      ask(connection.socket, "POST", "/api/v1/jobs", body.dump(), kPatience + verb.repeat * kJobPatience);
-  if (!answer) return complain(answer.error());
+  const auto answer = send_request(connection.socket, "POST", "/api/v1/jobs", body.dump(),
+                                   kReplyTimeout + verb.repeat * kPerJobTimeout);
+  if (!answer) return report_error(answer.error());
   if (connection.json) {
     print(*answer);
   } else {
@@ -118,15 +119,15 @@ ExitCode queue(const Connection& connection, const QueueVerb& verb) {
 ExitCode change_job(const Connection& connection, const JobVerb& verb) {
   const bool removes = verb.what == "delete";
   const auto job = "/api/v1/jobs/" + segment(verb.id);
-  if (removes && !agreed(fmt::format("Job {} and all its files are removed for good?", verb.id), verb.yes)) {
-    return complain(ExitCode::refused, "nothing was removed: answer y, or say --yes where there is no terminal");
+  if (removes && !agreed(fmt::format("Delete job {} and all its files for good?", verb.id), verb.yes)) {
+    return report_error(ExitCode::refused, "nothing was deleted: reply y, or give --yes where there is no terminal");
   }
   auto body = json::object();
   if (verb.voxel_mm) body["voxel_mm"] = *verb.voxel_mm;
   if (!verb.fusion.empty()) body["fusion"] = verb.fusion;
-  const auto answer = removes ? ask(connection.socket, "DELETE", job)
-                              : ask(connection.socket, "POST", job + "/" + verb.what, body.dump());
-  if (!answer) return complain(answer.error());
+  const auto answer = removes ? send_request(connection.socket, "DELETE", job)
+                              : send_request(connection.socket, "POST", job + "/" + verb.what, body.dump());
+  if (!answer) return report_error(answer.error());
   if (connection.json) print(*answer);
   return ExitCode::ok;
 }

@@ -36,15 +36,15 @@ std::string upper(std::string text) {
 }
 
 /// "What is said of a verb."
-std::string sentence(const std::string& about) {
-  auto text = roff(about);
+std::string sentence(const std::string& description) {
+  auto text = roff(description);
   text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
   return text + ".";
 }
 
 std::string begin(const CommandWords& command) {
   return fmt::format(".TH \"{}\" \"1\" \"\" \"scanrig {}\" \"User commands\"\n.SH NAME\n{} \\- {}\n",
-                     upper(dashed(command.path)), kVersion, roff(dashed(command.path)), roff(command.about));
+                     upper(dashed(command.path)), kVersion, roff(dashed(command.path)), roff(command.description));
 }
 
 std::string synopsis(const CommandWords& command) {
@@ -63,7 +63,7 @@ std::string entry(const OptionWords& option) {
                          ? fmt::format("\\fI{}\\fR", roff(option.label))
                          : fmt::format("\\fB{}\\fR", roff(fmt::format("{}", fmt::join(option.names, ", "))));
   if (!option.names.empty() && !option.label.empty()) head += fmt::format(" \\fI{}\\fR", option.label);
-  std::string text = fmt::format(".TP\n{}\n{}.\n", head, roff(option.about));
+  std::string text = fmt::format(".TP\n{}\n{}.\n", head, roff(option.description));
   if (!option.values.empty())
     text += fmt::format("One of: {}.\n", roff(fmt::format("{}", fmt::join(option.values, ", "))));
   if (!option.fallback.empty()) text += fmt::format("Default: {}.\n", roff(option.fallback));
@@ -85,9 +85,9 @@ constexpr const char* kExit =
 std::string page_of(const CommandWords& verb, const std::string& program) {
   std::string text = begin(verb) + ".SH SYNOPSIS\n" + synopsis(verb);
   for (const auto& below : verb.verbs) text += ".br\n" + synopsis(below);
-  text += ".SH DESCRIPTION\n" + sentence(verb.about) + "\n.SH OPTIONS\n" + options(verb);
+  text += ".SH DESCRIPTION\n" + sentence(verb.description) + "\n.SH OPTIONS\n" + options(verb);
   for (const auto& below : verb.verbs) {
-    text += fmt::format(".SS {}\n{}\n", roff(below.path), sentence(below.about)) + options(below);
+    text += fmt::format(".SS {}\n{}\n", roff(below.path), sentence(below.description)) + options(below);
   }
   return text + kExit + fmt::format(".SH SEE ALSO\n.BR {} (1)\n", program);
 }
@@ -99,9 +99,9 @@ std::map<std::string, std::string> manual_pages(const CLI::App& app) {
   std::map<std::string, std::string> pages;
   std::string text =
       begin(root) + ".SH SYNOPSIS\n" + synopsis(root) + ".SH DESCRIPTION\n" +
-      fmt::format("{} is {}.\nEach verb has a page of its own.\n.SH VERBS\n", root.name, roff(root.about));
+      fmt::format("{} is {}.\nEach verb has a page of its own.\n.SH VERBS\n", root.name, roff(root.description));
   for (const auto& verb : root.verbs) {
-    text += fmt::format(".TP\n\\fB{}\\fR\n{}.\n", roff(verb.name), roff(verb.about));
+    text += fmt::format(".TP\n\\fB{}\\fR\n{}.\n", roff(verb.name), roff(verb.description));
     pages[dashed(verb.path) + ".1"] = page_of(verb, root.name);
   }
   pages[root.name + ".1"] = text + ".SH OPTIONS\n" + options(root) + kExit;

@@ -16,7 +16,7 @@ void add_reconstruct(CLI::App& app, Chosen& chosen) {
   sub->add_option("--threads", verb->options.threads, "threads; 0: all of the machine's")->check(CLI::Range(0, 1024));
   sub->add_option("--voxel-mm", verb->options.voxel_mm,
                   "size of a voxel (default: 0.25, or what suits imported range images)")
-      ->check(CLI::Range(kLeastVoxelMm, kMostVoxelMm));
+      ->check(CLI::Range(kMinVoxelMm, kMaxVoxelMm));
   sub->add_option("--fusion", verb->options.fusion, "how poses are integrated")
       ->check(CLI::IsMember({"evidence", "paper"}));
   sub->add_option("--rests", verb->options.rests, "how rests are found")->check(CLI::IsMember({"hull", "egi"}));
@@ -62,8 +62,8 @@ void add_token(CLI::App& app, Chosen& chosen) {
   const auto verb = std::make_shared<TokenVerb>();
   auto* sub = app.add_subcommand("token", "who may use the API over TCP");
   sub->require_subcommand(1);
-  const auto add = [&](const char* name, const char* about) {
-    auto* action = sub->add_subcommand(name, about);
+  const auto add = [&](const char* name, const char* description) {
+    auto* action = sub->add_subcommand(name, description);
     action->add_option("--file", verb->file, "the file of tokens (default: the one that the configuration names)");
     action->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
     action->add_flag("--json", verb->json, "print JSON");

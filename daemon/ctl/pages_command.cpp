@@ -33,7 +33,7 @@ void add_pages_command(CLI::App& app, Chosen& chosen) {
   sub->callback([&app, &chosen, share] {
     chosen = [&app, share] {
       const auto written = write_pages(app, *share);
-      return written ? ExitCode::ok : complain(written.error());
+      return written ? ExitCode::ok : report_error(written.error());
     };
   });
 }

@@ -11,8 +11,8 @@ void add_turntable(CLI::App& app, Chosen& chosen) {
   const auto verb = std::make_shared<TurntableVerb>();
   auto* sub = app.add_subcommand("turntable", "move or ask the turntable itself, while no daemon runs");
   sub->require_subcommand(1);
-  const auto add = [&](const char* name, const char* about) {
-    auto* action = sub->add_subcommand(name, about);
+  const auto add = [&](const char* name, const char* description) {
+    auto* action = sub->add_subcommand(name, description);
     action->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
     action->callback([&chosen, verb, name] {
       verb->what = name;
@@ -54,8 +54,8 @@ void add_camera(CLI::App& app, Chosen& chosen) {
   const auto verb = std::make_shared<CameraVerb>();
   auto* sub = app.add_subcommand("camera", "the cameras themselves");
   sub->require_subcommand(1);
-  const auto add = [&](const char* name, const char* about) {
-    auto* action = sub->add_subcommand(name, about);
+  const auto add = [&](const char* name, const char* description) {
+    auto* action = sub->add_subcommand(name, description);
     action->callback([&chosen, verb, name] {
       verb->what = name;
       chosen = [verb] { return camera(*verb); };

@@ -20,7 +20,7 @@ int main(int argc, char** argv) {
   } catch (const CLI::CallForHelp& help) {
     return app.exit(help);
   } catch (const CLI::ParseError& error) {
-    return static_cast<int>(complain(ExitCode::usage, error.what()));
+    return static_cast<int>(report_error(ExitCode::usage, error.what()));
   }
   return static_cast<int>(chosen());
 }

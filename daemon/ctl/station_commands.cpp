@@ -3,8 +3,8 @@
 namespace scanrig::ctl {
 namespace {
 
-void add_button(CLI::App& app, Chosen& chosen, const char* name, const char* about) {
-  add_client(app, chosen, name, about, std::make_shared<std::string>(name),
+void add_button(CLI::App& app, Chosen& chosen, const char* name, const char* description) {
+  add_client(app, chosen, name, description, std::make_shared<std::string>(name),
              [](const Connection& connection, const std::string& button) { return press(connection, button); });
 }
 
@@ -34,7 +34,7 @@ void add_station_commands(CLI::App& app, Chosen& chosen) {
   add_button(app, chosen, "stop", "stop the table and cancel the scan");
   add_button(app, chosen, "reset", "clear a fault and home the table");
   add_button(app, chosen, "reload", "begin again with the configuration file as it is now, while the rig is idle");
-  add_client(app, chosen, "health", "devices, disk, temperatures, deadlines missed, retries", std::make_shared<int>(),
+  add_client(app, chosen, "health", "devices, disk, temperatures, deadlines missed, retakes", std::make_shared<int>(),
              [](const Connection& connection, int) { return health(connection); });
   add_maintenance(app, chosen);
 }

@@ -5,11 +5,11 @@
 #include "core/files.h"
 #include "core/image_codec.h"
 #include "daemon/ctl/client.h"
-#include "daemon/ctl/free_rig.h"
+#include "daemon/ctl/offline_rig_config.h"
 #include "daemon/ctl/verbs.h"
 #include "daemon/rig/open_devices.h"
 #include "daemon/rig/preview.h"
-#include "daemon/signal_stop.h"
+#include "daemon/runtime/signal_stop.h"
 #include "drivers/camera/camera_list.h"
 
 namespace scanrig::ctl {
@@ -27,7 +27,7 @@ constexpr int kTries = 4;
 class Bench {
  public:
   static Result<std::unique_ptr<Bench>> open(const CameraVerb& verb) {
-    auto rig = free_rig(verb.config);
+    auto rig = offline_rig_config(verb.config);
     if (!rig) return pass_on(rig);
     auto& camera = rig->stereo_camera;
     if (camera.driver == config::StereoCameraConfig::Driver::simulated) {
@@ -42,7 +42,7 @@ class Bench {
     auto devices = open_devices(bench->rig_, bench->clock_);
     if (!devices) return pass_on(devices);
     bench->devices_ = std::move(*devices);
-    const auto ready = bench->devices_.camera->ready(Deadline::after(bench->clock_, kConnectLimit));
+    const auto ready = bench->devices_.camera->prepare(Deadline::after(bench->clock_, kConnectLimit));
     if (!ready) return tl::unexpected(of_device(ready.error()));
     return bench;
   }
@@ -64,7 +64,7 @@ class Bench {
 
   Result<StereoFrame> expose_once(const std::string& light) {
     auto& camera = *devices_.camera;
-    if (light == "none") return camera.look(deadline());
+    if (light == "none") return camera.capture_preview(deadline());
     if (auto armed = camera.arm(deadline()); !armed) return pass_on(armed);
     const auto fired = devices_.projector->fire(light == "plain" ? Light::plain : Light::pattern, deadline());
     if (!fired) return pass_on(fired);
@@ -104,14 +104,14 @@ void tell_files(const CameraVerb& verb, const std::filesystem::path& left, const
 }
 
 /// What to do about a picture; empty: nothing.
-std::string_view advice(const ImageEvidence& evidence) {
+std::string_view advice(const ImageQuality& evidence) {
   constexpr double kDim = 0.03, kFull = 0.01;
   if (evidence.saturated > kFull) return "too bright: lower exposure_us or gain";
   if (evidence.brightness < kDim) return "dim: raise exposure_us, gain or light";
   return "";
 }
 
-nlohmann::ordered_json to_json(const ImageEvidence& evidence) {
+nlohmann::ordered_json to_json(const ImageQuality& evidence) {
   return {{"brightness", evidence.brightness},
           {"saturated", evidence.saturated},
           {"blur_px", evidence.blur_px},
@@ -135,7 +135,7 @@ ExitCode tune(const CameraVerb& verb, Bench& bench) {
   for (int i = 0; (verb.count == 0 || i < verb.count) && !signal.token().stop_requested(); ++i) {
     if (i > 0) bench.clock().sleep_for(kPeriod);
     const auto pair = bench.expose(verb.light);
-    if (!pair) return complain(pair.error());
+    if (!pair) return report_error(pair.error());
     tell(verb, *pair);
   }
   return ExitCode::ok;
@@ -151,23 +151,23 @@ ExitCode grab(const CameraVerb& verb, Bench& bench) {
   const auto left = verb.out / "left.png", right = verb.out / "right.png";
   for (const auto& file : {left, right}) {
     if (!std::filesystem::exists(file)) continue;
-    return complain({ErrorCode::exists, file.string() + " is already there: name another folder"});
+    return report_error({ErrorCode::exists, file.string() + " is already there: name another folder"});
   }
   const auto pair = bench.expose(verb.light);
-  if (!pair) return complain(pair.error());
-  if (auto made = create_directories_synced(verb.out); !made) return complain(made.error());
+  if (!pair) return report_error(pair.error());
+  if (auto made = create_directories_synced(verb.out); !made) return report_error(made.error());
   for (const auto& [file, image] : {std::pair(left, pair->left), std::pair(right, pair->right)}) {
-    if (auto written = write_png(file, image); !written) return complain(written.error());
+    if (auto written = write_png(file, image); !written) return report_error(written.error());
   }
   tell_files(verb, left, right);
   return ExitCode::ok;
 }
 
 /// One picture of each side, newer than the last; what went wrong where there is none.
-using TakePictures = std::function<tl::expected<std::array<std::string, 2>, Refusal>()>;
+using TakePictures = std::function<tl::expected<std::array<std::string, 2>, RequestError>()>;
 
 ExitCode preview(const CameraVerb& verb, const TakePictures& take, Clock& clock) {
-  if (auto made = create_directories_synced(verb.out); !made) return complain(made.error());
+  if (auto made = create_directories_synced(verb.out); !made) return report_error(made.error());
   const auto left = verb.out / "left.jpg", right = verb.out / "right.jpg";
   if (!verb.json) fmt::print("{} and {} follow the cameras\n", left.string(), right.string());
   std::fflush(stdout);
@@ -175,9 +175,9 @@ ExitCode preview(const CameraVerb& verb, const TakePictures& take, Clock& clock)
   for (int i = 0; (verb.count == 0 || i < verb.count) && !signal.token().stop_requested(); ++i) {
     if (i > 0) clock.sleep_for(kPeriod);
     const auto pictures = take();
-    if (!pictures) return complain(pictures.error().exit, pictures.error().message);
+    if (!pictures) return report_error(pictures.error().exit, pictures.error().message);
     for (const auto& [file, jpeg] : {std::pair(left, (*pictures)[0]), std::pair(right, (*pictures)[1])}) {
-      if (auto written = write_file_atomically(file, jpeg); !written) return complain(written.error());
+      if (auto written = write_file_atomically(file, jpeg); !written) return report_error(written.error());
     }
     if (verb.json) tell_files(verb, left, right);
   }
@@ -199,7 +199,7 @@ ExitCode preview_of_daemon(const CameraVerb& verb, const std::filesystem::path& 
   };
   return preview(
       verb,
-      [&]() -> tl::expected<std::array<std::string, 2>, Refusal> {
+      [&]() -> tl::expected<std::array<std::string, 2>, RequestError> {
         auto left = fetch_side("left");
         if (!left) return tl::unexpected(left.error());
         auto right = fetch_side("right");
@@ -211,10 +211,12 @@ ExitCode preview_of_daemon(const CameraVerb& verb, const std::filesystem::path& 
 
 ExitCode preview_of_cameras(const CameraVerb& verb, Bench& bench) {
   Preview pictures(bench.clock(), [] { return true; });
-  const auto told = [](const Error& error) { return tl::unexpected(Refusal{exit_code(error.code), error.message}); };
+  const auto told = [](const Error& error) {
+    return tl::unexpected(RequestError{exit_code(error.code), error.message});
+  };
   return preview(
       verb,
-      [&]() -> tl::expected<std::array<std::string, 2>, Refusal> {
+      [&]() -> tl::expected<std::array<std::string, 2>, RequestError> {
         const auto pair = bench.expose(verb.light);
         if (!pair) return told(pair.error());
         pictures.keep(*pair);
@@ -232,11 +234,11 @@ ExitCode camera(const CameraVerb& verb) {
   if (verb.what == "list") return list(verb);
   if (verb.what == "preview") {
     const auto rig = config::read_rig_config(verb.config, {}, config::Cameras::or_simulated);
-    if (!rig) return complain(rig.error());
-    if (ask(rig->api.socket, "GET", "/api/v1/status")) return preview_of_daemon(verb, rig->api.socket);
+    if (!rig) return report_error(rig.error());
+    if (send_request(rig->api.socket, "GET", "/api/v1/status")) return preview_of_daemon(verb, rig->api.socket);
   }
   const auto bench = Bench::open(verb);
-  if (!bench) return complain(bench.error());
+  if (!bench) return report_error(bench.error());
   if (verb.what == "preview") return preview_of_cameras(verb, **bench);
   return verb.what == "tune" ? tune(verb, **bench) : grab(verb, **bench);
 }

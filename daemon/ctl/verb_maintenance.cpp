@@ -26,11 +26,11 @@ std::string body_of(const MaintenanceVerb& verb) {
 ExitCode maintenance(const Connection& connection, const MaintenanceVerb& verb) {
   const bool io = verb.what == "io";
   if (verb.what == "jog" && verb.to_deg.has_value() == verb.by_deg.has_value()) {
-    return complain(ExitCode::usage, "maintenance jog needs --to or --by");
+    return report_error(ExitCode::usage, "maintenance jog needs --to or --by");
   }
-  const auto answer = io ? ask(connection.socket, "GET", "/api/v1/io")
-                         : ask(connection.socket, "POST", "/api/v1/maintenance/" + verb.what, body_of(verb));
-  if (!answer) return complain(answer.error().exit, answer.error().message);
+  const auto answer = io ? send_request(connection.socket, "GET", "/api/v1/io")
+                         : send_request(connection.socket, "POST", "/api/v1/maintenance/" + verb.what, body_of(verb));
+  if (!answer) return report_error(answer.error().exit, answer.error().message);
   if (connection.json) {
     fmt::print("{}\n", answer->dump(2));
   } else if (io) {

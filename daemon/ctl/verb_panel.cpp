@@ -1,10 +1,10 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "daemon/ctl/free_rig.h"
+#include "daemon/ctl/offline_rig_config.h"
 #include "daemon/ctl/verbs.h"
 #include "daemon/rig/open_devices.h"
-#include "daemon/signal_stop.h"
+#include "daemon/runtime/signal_stop.h"
 
 namespace scanrig::ctl {
 namespace {
@@ -34,18 +34,18 @@ void tell_json(const PanelInputs& now, Clock::Duration since) {
 }  // namespace
 
 ExitCode watch_panel(const PanelVerb& verb) {
-  const auto rig = free_rig(verb.config);
-  if (!rig) return complain(rig.error());
+  const auto rig = offline_rig_config(verb.config);
+  if (!rig) return report_error(rig.error());
   RealClock clock;
   const auto open = open_devices(*rig, clock);
-  if (!open) return complain(open.error());
+  if (!open) return report_error(open.error());
   const SignalStop signal;
   const auto begun = clock.now();
   const auto end = verb.seconds > 0 ? begun + std::chrono::seconds(verb.seconds) : Clock::TimePoint::max();
   PanelInputs known;
   for (bool first = true; !signal.token().stop_requested() && clock.now() < end; first = false) {
     const auto now = open->panel->wait_change(known, Deadline::after(clock, first ? Clock::Duration{} : kGlance));
-    if (!now) return complain(of_device(now.error()));
+    if (!now) return report_error(of_device(now.error()));
     if (first || *now != known) (verb.json ? tell_json : tell)(*now, clock.now() - begun);
     known = *now;
   }

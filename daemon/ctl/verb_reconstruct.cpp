@@ -6,8 +6,8 @@
 
 #include "daemon/ctl/stage_bars.h"
 #include "daemon/ctl/verbs.h"
-#include "daemon/guarded.h"
-#include "daemon/signal_stop.h"
+#include "daemon/runtime/catch_exceptions.h"
+#include "daemon/runtime/signal_stop.h"
 
 namespace scanrig::ctl {
 
@@ -26,10 +26,10 @@ ExitCode reconstruct(const ReconstructVerb& verb) {
   const auto out = verb.out.empty() ? verb.scan / "model" : verb.out;
   std::error_code ignored;
   if (std::filesystem::exists(out, ignored)) {
-    return complain({ErrorCode::exists, out.string() + ": already there; name another folder with --out"});
+    return report_error({ErrorCode::exists, out.string() + ": already there; name another folder with --out"});
   }
   const auto scan = ScanFolder::open(verb.scan);
-  if (!scan) return complain(scan.error());
+  if (!scan) return report_error(scan.error());
 
   const SignalStop stop;
   std::FILE* told = verb.json ? stderr : stdout;  // bars beside the JSON, not in it
@@ -39,13 +39,13 @@ ExitCode reconstruct(const ReconstructVerb& verb) {
     fmt::print("{}\t{:.3f}\n", stage, fraction);
     std::fflush(stdout);
   };
-  const auto made = guarded("the reconstruction", [&] {
+  const auto made = catch_exceptions("the reconstruction", [&] {
     return make_model(*scan, verb, {stop.token(), progress}, out);
   });
   if (!verb.lines) bars.end(made.has_value());
   if (!made) {
     if (verb.lines) fmt::print("failed\t{}\t{}\n", to_string(made.error().code), made.error().message);
-    return complain(made.error());
+    return report_error(made.error());
   }
   const auto glb = out / "model.glb", report = out / "report.json";
   if (verb.json) {

@@ -55,9 +55,9 @@ void list(const TokenVerb& verb, const TokenFile& tokens) {
 
 ExitCode token(const TokenVerb& verb) {
   const auto file = file_of(verb);
-  if (!file) return complain(file.error());
+  if (!file) return report_error(file.error());
   auto tokens = TokenFile::read(*file);
-  if (!tokens) return complain(tokens.error());
+  if (!tokens) return report_error(tokens.error());
   Result<void> done;
   if (verb.what == "add") {
     done = add(verb, std::move(*tokens), *file);
@@ -66,7 +66,7 @@ ExitCode token(const TokenVerb& verb) {
   } else {
     list(verb, *tokens);
   }
-  return done ? ExitCode::ok : complain(done.error());
+  return done ? ExitCode::ok : report_error(done.error());
 }
 
 }  // namespace scanrig::ctl

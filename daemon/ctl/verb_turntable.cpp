@@ -1,10 +1,10 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "daemon/ctl/free_rig.h"
+#include "daemon/ctl/offline_rig_config.h"
 #include "daemon/ctl/verbs.h"
 #include "daemon/rig/open_devices.h"
-#include "daemon/signal_stop.h"
+#include "daemon/runtime/signal_stop.h"
 
 namespace scanrig::ctl {
 namespace {
@@ -14,11 +14,11 @@ using std::chrono::seconds;
 
 constexpr seconds kMoveLimit{60};
 constexpr seconds kAskLimit{2};
-constexpr const char* kWarning = "The table is going to turn. Is everybody clear of it?";
+constexpr const char* kWarning = "The table is going to turn. Is everyone clear?";
 
 std::string_view word(TurntableStatus::Motion motion) {
   switch (motion) {
-    case TurntableStatus::Motion::standing: return "standing";
+    case TurntableStatus::Motion::stopped: return "standing";
     case TurntableStatus::Motion::moving: return "moving";
     case TurntableStatus::Motion::unknown: break;
   }
@@ -45,18 +45,18 @@ Result<void> home(Turntable& table, Clock& clock) {
 
 ExitCode move(const TurntableVerb& verb, Turntable& table, Clock& clock) {
   if (!agreed(kWarning, verb.yes)) {
-    return complain(ExitCode::refused, "nothing was moved: answer y, or say --yes where there is no terminal");
+    return report_error(ExitCode::refused, "nothing was moved: reply y, or give --yes where there is no terminal");
   }
   const SignalStop signal;
   const auto token = signal.token();
   const std::stop_callback stop(token, [&] { table.request_stop(); });
-  if (auto homed = home(table, clock); !homed) return complain(of_device(homed.error()));
+  if (auto homed = home(table, clock); !homed) return report_error(of_device(homed.error()));
   if (verb.what == "home") {
     fmt::print("{}\n", verb.json ? R"({"homed": true})" : "home");
     return ExitCode::ok;
   }
   const auto moved = table.rotate_to({verb.angle_deg}, Deadline::after(clock, kMoveLimit));
-  if (!moved) return complain(of_device(moved.error()));
+  if (!moved) return report_error(of_device(moved.error()));
   const auto ms = [](Clock::Duration time) { return std::chrono::duration_cast<milliseconds>(time).count(); };
   if (verb.json) {
     fmt::print("{}\n", nlohmann::ordered_json{{"measured_deg", moved->measured.value},
@@ -75,9 +75,9 @@ ExitCode read_registers(const config::RigConfig& rig, Clock& clock, bool json) {
   const auto& options = rig.turntable.modbus;
   ModbusDrive drive(options.line, options.profile, clock);
   const auto state = drive.read_state(Deadline::after(clock, kAskLimit));
-  if (!state) return complain(of_device(state.error().in("turntable")));
+  if (!state) return report_error(of_device(state.error().in("turntable")));
   const auto alarm = drive.read_alarm(Deadline::after(clock, kAskLimit));
-  if (!alarm) return complain(of_device(alarm.error().in("turntable")));
+  if (!alarm) return report_error(of_device(alarm.error().in("turntable")));
   const double angle = options.scale.angle(state->position).value;
   if (json) {
     const nlohmann::ordered_json all{{"pulses", state->position}, {"angle_deg", angle},
@@ -100,18 +100,18 @@ ExitCode read_registers(const config::RigConfig& rig, Clock& clock, bool json) {
 }  // namespace
 
 ExitCode turntable(const TurntableVerb& verb) {
-  const auto rig = free_rig(verb.config);
-  if (!rig) return complain(rig.error());
+  const auto rig = offline_rig_config(verb.config);
+  if (!rig) return report_error(rig.error());
   RealClock clock;
   // A GRBL controller has no registers: what it says is its status.
   const bool registers = rig->turntable.driver == config::TurntableConfig::Driver::modbus;
   if (verb.what == "read" && registers) return read_registers(*rig, clock, verb.json);
   const auto open = open_devices(*rig, clock);
-  if (!open) return complain(open.error());
+  if (!open) return report_error(open.error());
   auto& table = *open->turntable;
   if (verb.what != "status" && verb.what != "read") return move(verb, table, clock);
   const auto status = table.status(Deadline::after(clock, kAskLimit));
-  return status ? tell(*status, verb.json) : complain(of_device(status.error()));
+  return status ? tell(*status, verb.json) : report_error(of_device(status.error()));
 }
 
 }  // namespace scanrig::ctl

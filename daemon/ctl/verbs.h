@@ -12,8 +12,8 @@
 namespace scanrig::ctl {
 
 /// Tells an error and gives the exit code that belongs to it.
-ExitCode complain(const Error& error);
-ExitCode complain(ExitCode code, const std::string& message);
+ExitCode report_error(const Error& error);
+ExitCode report_error(ExitCode code, const std::string& message);
 
 /// An error of a device itself: a port, a line or a socket that cannot be used is a device that does not answer, no
 /// disk or file.

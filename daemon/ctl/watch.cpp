@@ -5,7 +5,7 @@
 #include "daemon/ctl/job_lines.h"
 #include "daemon/ctl/screen.h"
 #include "daemon/ctl/verbs.h"
-#include "daemon/signal_stop.h"
+#include "daemon/runtime/signal_stop.h"
 
 namespace scanrig::ctl {
 namespace {
@@ -15,8 +15,8 @@ using nlohmann::json;
 constexpr auto kGlance = std::chrono::milliseconds(250);
 constexpr auto kGlancePatience = std::chrono::seconds(3);  ///< who watches wants to see that a daemon hangs
 
-tl::expected<json, Refusal> glance(const Connection& connection, const std::string& target) {
-  return ask(connection.socket, "GET", "/api/v1/" + target, "", kGlancePatience);
+tl::expected<json, RequestError> glance(const Connection& connection, const std::string& target) {
+  return send_request(connection.socket, "GET", "/api/v1/" + target, "", kGlancePatience);
 }
 
 void add_health(const json& health, std::vector<std::string>& lines) {
@@ -32,12 +32,12 @@ void add_health(const json& health, std::vector<std::string>& lines) {
   }
   lines.push_back(machine);
   lines.push_back(fmt::format("{} deadlines missed, {} exposures retried, {} faults",
-                              health.at("deadlines_missed").get<int>(), health.at("retries").get<int>(),
+                              health.at("deadlines_missed").get<int>(), health.at("retakes").get<int>(),
                               health.at("faults").get<int>()));
 }
 
 /// Null where there is none.
-tl::expected<json, Refusal> job_to_show(const Connection& connection, const json& status) {
+tl::expected<json, RequestError> job_to_show(const Connection& connection, const json& status) {
   auto id = text(status, "job");
   if (id.empty()) {
     const auto page = glance(connection, "jobs?limit=1");
@@ -50,7 +50,7 @@ tl::expected<json, Refusal> job_to_show(const Connection& connection, const json
   return job;
 }
 
-tl::expected<std::vector<std::string>, Refusal> look(const Connection& connection) {
+tl::expected<std::vector<std::string>, RequestError> look(const Connection& connection) {
   const auto status = glance(connection, "status");
   if (!status) return tl::unexpected(status.error());
   const auto health = glance(connection, "health");
@@ -98,7 +98,7 @@ ExitCode watch(const Connection& connection) {
   bool ever = false;
   for (; !stop.token().stop_requested(); clock.sleep_for(kGlance)) {
     const auto lines = look(connection);
-    if (!lines && (!ever || connection.json)) return complain(lines.error());
+    if (!lines && (!ever || connection.json)) return report_error(lines.error());
     ever = true;
     if (connection.json) {
       tell(*lines, told);

@@ -9,9 +9,9 @@
 #include <tuple>
 #include <utility>
 
-#include "daemon/actor_thread.h"
-#include "daemon/guarded.h"
 #include "daemon/jobs/bundle.h"
+#include "daemon/runtime/actor_thread.h"
+#include "daemon/runtime/catch_exceptions.h"
 
 namespace scanrig {
 namespace {
@@ -42,11 +42,11 @@ std::chrono::system_clock::time_point ended(const fs::path& folder) {
 }  // namespace
 
 HousekeepingThread::HousekeepingThread(Clock& clock, const JobStore& store, RetentionOptions retention,
-                                       std::function<JobTable()> jobs, std::function<void(Event)> tell)
+                                       std::function<JobTable()> jobs, std::function<void(Event)> post_event)
     : store_(store),
       retention_(retention),
       jobs_(std::move(jobs)),
-      tell_(std::move(tell)),
+      post_event_(std::move(post_event)),
       inbox_(clock),
       thread_(start_actor(clock, [this] { run(); })) {}
 
@@ -64,8 +64,8 @@ void HousekeepingThread::run() {
   }
 }
 
-void HousekeepingThread::handle(const event::JobAsked& asked) {
-  tell_(event::Answered{asked.ticket, guarded("housekeeping", [&] { return keep(asked); })});
+void HousekeepingThread::handle(const event::JobRequested& asked) {
+  post_event_(event::RequestDone{asked.request_id, catch_exceptions("housekeeping", [&] { return keep(asked); })});
 }
 
 /// None where the station does not know it.
@@ -75,8 +75,8 @@ std::optional<JobState> HousekeepingThread::state_of(const std::string& job) con
   return known == jobs.end() ? std::nullopt : std::optional(known->second->state);
 }
 
-Result<std::string> HousekeepingThread::keep(const event::JobAsked& asked) {
-  if (asked.what == event::JobAsked::What::bundle) {
+Result<std::string> HousekeepingThread::keep(const event::JobRequested& asked) {
+  if (asked.what == event::JobRequested::What::bundle) {
     // A folder that cannot be read is what somebody wants to see.
     const auto job = store_.read(asked.job);
     if (!job && job.error().code == ErrorCode::not_found) return fail(ErrorCode::not_found, "no job {}", asked.job);
@@ -95,14 +95,14 @@ Result<std::string> HousekeepingThread::keep(const event::JobAsked& asked) {
 
 Result<void> HousekeepingThread::remove(const std::string& job) {
   auto removed = store_.remove(job);
-  if (removed) tell_(event::JobRemoved{job});
+  if (removed) post_event_(event::JobRemoved{job});
   return removed;
 }
 
 /// What fails is tried again at the next sweep.
 void HousekeepingThread::handle(const Sweep&) {
   if (!retention_.keep_for && !retention_.keep_bytes) return;
-  std::ignore = guarded("retention", [this] { return sweep_now(); });
+  std::ignore = catch_exceptions("retention", [this] { return sweep_now(); });
 }
 
 Result<void> HousekeepingThread::sweep_now() {

@@ -8,7 +8,7 @@
 
 #include "daemon/jobs/job_store.h"
 #include "daemon/jobs/retention.h"
-#include "daemon/mailbox.h"
+#include "daemon/runtime/mailbox.h"
 #include "daemon/station/events.h"
 
 namespace scanrig {
@@ -18,14 +18,14 @@ class HousekeepingThread {
  public:
   /// `jobs`: what the station knows of them now; from this thread. A folder alone does not say who works in it.
   HousekeepingThread(Clock& clock, const JobStore& store, RetentionOptions retention, std::function<JobTable()> jobs,
-                     std::function<void(Event)> tell);
+                     std::function<void(Event)> post_event);
   /// Stops a bundle that is being packed, drops the rest and joins.
   ~HousekeepingThread();
   HousekeepingThread(const HousekeepingThread&) = delete;
   HousekeepingThread& operator=(const HousekeepingThread&) = delete;
 
   /// `remove` or `bundle`.
-  void post(event::JobAsked asked) { inbox_.post(std::move(asked)); }
+  void post(event::JobRequested asked) { inbox_.post(std::move(asked)); }
   /// Time for retention.
   void sweep() { inbox_.post(Sweep{}); }
 
@@ -33,9 +33,9 @@ class HousekeepingThread {
   struct Sweep {};
 
   void run();
-  void handle(const event::JobAsked& asked);
+  void handle(const event::JobRequested& asked);
   void handle(const Sweep& sweep);
-  Result<std::string> keep(const event::JobAsked& asked);
+  Result<std::string> keep(const event::JobRequested& asked);
   Result<void> sweep_now();
   Result<void> remove(const std::string& job);
   [[nodiscard]] std::optional<JobState> state_of(const std::string& job) const;
@@ -43,8 +43,8 @@ class HousekeepingThread {
   const JobStore& store_;
   RetentionOptions retention_;
   std::function<JobTable()> jobs_;
-  std::function<void(Event)> tell_;
-  Mailbox<std::variant<event::JobAsked, Sweep>> inbox_;
+  std::function<void(Event)> post_event_;
+  Mailbox<std::variant<event::JobRequested, Sweep>> inbox_;
   std::stop_source stop_;
   std::thread thread_;
 };

@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "core/files.h"
-#include "pipeline/scan/strict_json.h"
+#include "core/strict_json.h"
 
 namespace scanrig {
 namespace {
@@ -18,6 +18,7 @@ using nlohmann::ordered_json;
 constexpr const char* kJob = "job.json";
 constexpr const char* kFailure = "failure.json";
 constexpr const char* kAttempt = "attempt.json";
+constexpr int kJobVersion = 2;  ///< 1 had other names for some keys of the recipe
 
 /// Part ids and messages come from outside and need not be UTF-8.
 Result<void> write_json(const fs::path& file, const ordered_json& json) {
@@ -31,30 +32,31 @@ void remove_file(const fs::path& file) {
 
 ordered_json to_json(const Recipe& recipe) {
   ordered_json limits = ordered_json::object();
-  if (recipe.limits.least_measured_share) limits["least_measured_share"] = *recipe.limits.least_measured_share;
-  if (recipe.limits.most_residual_mm) limits["most_residual_mm"] = *recipe.limits.most_residual_mm;
+  if (recipe.limits.min_measured_share) limits["min_measured_share"] = *recipe.limits.min_measured_share;
+  if (recipe.limits.max_residual_mm) limits["max_residual_mm"] = *recipe.limits.max_residual_mm;
   return {{"name", recipe.name},
           {"poses", recipe.poses},
           {"views", recipe.views},
           {"flip_timeout_min", recipe.flip_timeout.count()},
-          {"flip_by_line", recipe.flip_by_line},
+          {"flip_by_signal", recipe.flip_by_signal},
           {"start_on_part", recipe.start_on_part},
           {"limits", limits}};
 }
 
-Recipe read_recipe(JsonObject object) {
+Recipe read_recipe(JsonObject object, int version) {
+  const bool old_names = version < 2;
+  const char* const min_share = old_names ? "least_measured_share" : "min_measured_share";  // old name
+  const char* const max_residual = old_names ? "most_residual_mm" : "max_residual_mm";      // old name
   Recipe recipe;
   recipe.name = object.text("name");
   recipe.poses = object.integer("poses", 1, 2);
   recipe.views = object.integer("views", 1, 360);
   recipe.flip_timeout = std::chrono::minutes(object.integer("flip_timeout_min", 1, 1440));
-  recipe.flip_by_line = object.flag("flip_by_line");
+  recipe.flip_by_signal = object.flag(old_names ? "flip_by_line" : "flip_by_signal");  // old name
   recipe.start_on_part = object.flag("start_on_part");
   JsonObject limits = object.object("limits");
-  if (limits.has("least_measured_share")) {
-    recipe.limits.least_measured_share = limits.number("least_measured_share", 0, 1);
-  }
-  if (limits.has("most_residual_mm")) recipe.limits.most_residual_mm = limits.number("most_residual_mm", 0, 1000);
+  if (limits.has(min_share)) recipe.limits.min_measured_share = limits.number(min_share, 0, 1);
+  if (limits.has(max_residual)) recipe.limits.max_residual_mm = limits.number(max_residual, 0, 1000);
   limits.close();
   object.close();
   return recipe;
@@ -98,7 +100,7 @@ fs::path report_file(const fs::path& job_folder) { return model_folder(job_folde
 
 Result<void> write_job_file(const fs::path& job_folder, const JobFile& job) {
   return write_json(job_folder / kJob, {{"format", "scanrig-job"},
-                                        {"version", 1},
+                                        {"version", kJobVersion},
                                         {"part", job.part},
                                         {"place", job.place},
                                         {"exported", job.exported},
@@ -106,14 +108,14 @@ Result<void> write_job_file(const fs::path& job_folder, const JobFile& job) {
 }
 
 Result<JobFile> read_job_file(const fs::path& job_folder) {
-  auto json = JsonFile::read(job_folder / kJob, "scanrig-job", 1);
+  auto json = JsonFile::read(job_folder / kJob, "scanrig-job", kJobVersion, 1);
   if (!json && json.error().code == ErrorCode::not_found) return JobFile{};
   if (!json) return pass_on(json);
   JobFile job;
   job.part = json->root().text("part");
   job.place = json->root().integer("place", -1'000'000'000, 1'000'000'000);
   job.exported = json->root().flag("exported");
-  job.recipe = read_recipe(json->root().object("recipe"));
+  job.recipe = read_recipe(json->root().object("recipe"), json->version());
   if (const auto whole = json->finish(); !whole) return pass_on(whole);
   return job;
 }
@@ -135,7 +137,7 @@ std::optional<Error> read_failure(const fs::path& job_folder) {
 
 void remove_failure(const fs::path& job_folder) { remove_file(job_folder / kFailure); }
 
-Attempts read_attempts(const fs::path& job_folder) {
+AttemptRecord read_attempt_record(const fs::path& job_folder) {
   auto json = JsonFile::read(job_folder / kAttempt, "scanrig-attempt", 1);
   if (!json) return {};
   const int count = json->root().integer("count", 1, 1000);
@@ -147,7 +149,7 @@ Attempts read_attempts(const fs::path& job_folder) {
 Result<void> begin_attempt(const fs::path& job_folder) {
   return write_json(job_folder / kAttempt, {{"format", "scanrig-attempt"},
                                             {"version", 1},
-                                            {"count", read_attempts(job_folder).ended_by_death + 1},
+                                            {"count", read_attempt_record(job_folder).ended_by_death + 1},
                                             {"process", this_process()}});
 }
 
@@ -155,26 +157,25 @@ void forget_attempts(const fs::path& job_folder) { std::ignore = remove_file_syn
 
 Error quarantine_error() {
   return {ErrorCode::internal,
-          fmt::format("in quarantine: {} times the daemon ended while it made the model of this job; the images are "
-                      "whole: bundle the job for whoever must help, or reprocess it",
+          fmt::format("quarantined after {} crashes during reconstruction; send a bundle to support or reprocess",
                       kAttemptsThatQuarantine)};
 }
 
-std::optional<Error> beyond_limits(const fs::path& report, const Limits& limits) {
+std::optional<Error> limit_violation(const fs::path& report, const Limits& limits) {
   if (limits == Limits{}) return std::nullopt;
   const auto text = read_file(report);
   const auto json = text ? nlohmann::json::parse(*text, nullptr, false) : nlohmann::json();
   if (!json.is_object()) return Error{ErrorCode::invalid_input, report.string() + ": cannot be read"};
   const auto residual = residual_mm(json), share = number_at(member(json, "mesh"), "measured_share");
-  if (limits.least_measured_share && share.value_or(0.0) < *limits.least_measured_share) {
+  if (limits.min_measured_share && share.value_or(0.0) < *limits.min_measured_share) {
     return Error{ErrorCode::below_limits,
                  fmt::format("{:.1f} % of the surface was measured, the recipe asks for {:.1f}",
-                             100 * share.value_or(0.0), 100 * *limits.least_measured_share)};
+                             100 * share.value_or(0.0), 100 * *limits.min_measured_share)};
   }
-  if (limits.most_residual_mm && residual.value_or(1e9) > *limits.most_residual_mm) {
+  if (limits.max_residual_mm && residual.value_or(1e9) > *limits.max_residual_mm) {
     return Error{ErrorCode::below_limits,
                  fmt::format("the views of a pose are {:.3f} mm apart, the recipe allows {:.3f}",
-                             residual.value_or(1e9), *limits.most_residual_mm)};
+                             residual.value_or(1e9), *limits.max_residual_mm)};
   }
   return std::nullopt;
 }

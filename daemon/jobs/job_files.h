@@ -39,11 +39,11 @@ void remove_failure(const std::filesystem::path& job_folder);
 constexpr int kAttemptsThatQuarantine = 2;
 /// attempt.json, written durably before a model is made of a whole scan, and removed when that ends in any way but the
 /// daemon's death. While views are being taken there is none.
-struct Attempts {
+struct AttemptRecord {
   int ended_by_death = 0;
   bool running = false;  ///< in this process, now
 };
-Attempts read_attempts(const std::filesystem::path& job_folder);
+AttemptRecord read_attempt_record(const std::filesystem::path& job_folder);
 /// Another one begins. Fails with `io`.
 Result<void> begin_attempt(const std::filesystem::path& job_folder);
 /// Durable. Where the disk does not take it, the mark counts once too often.
@@ -53,6 +53,6 @@ Error quarantine_error();
 
 /// Why the model of report.json is beyond the limits; nothing when it is within, or when none are set. A report that
 /// cannot be read passes nothing.
-std::optional<Error> beyond_limits(const std::filesystem::path& report, const Limits& limits);
+std::optional<Error> limit_violation(const std::filesystem::path& report, const Limits& limits);
 
 }  // namespace scanrig

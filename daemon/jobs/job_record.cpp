@@ -9,7 +9,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kLayout = 4;  ///< to be raised with every change below
+constexpr int kLayout = 5;  ///< to be raised with every change below
 
 json to_json(const std::optional<Error>& error) {
   if (!error) return nullptr;
@@ -36,17 +36,17 @@ std::vector<Error> errors_from(const json& list) {
 json views_of(const JobInfo& job) {
   json views = json::array();
   for (const auto& v : job.stored) {
-    views.push_back({v.pose, v.view, v.measured_deg, to_json(v.spoilt), v.commanded_deg, v.settling_ms});
+    views.push_back({v.pose, v.view, v.measured_deg, to_json(v.retake_reasons), v.commanded_deg, v.settling_ms});
   }
   return views;
 }
 
-json closures_of(const JobInfo& job) {
-  json closures = json::array();
-  for (const auto& c : job.closures) {
-    closures.push_back({c.pose, c.shift_px, c.changed, c.unmoved, to_json(c.spoilt)});
+json movement_checks_of(const JobInfo& job) {
+  json movement_checks = json::array();
+  for (const auto& c : job.movement_checks) {
+    movement_checks.push_back({c.pose, c.shift_px, c.changed, c.unmoved, to_json(c.retake_reasons)});
   }
-  return closures;
+  return movement_checks;
 }
 
 void read(const json& j, JobInfo& job) {
@@ -64,8 +64,8 @@ void read(const json& j, JobInfo& job) {
   for (const auto& v : j.at("stored")) {
     job.stored.push_back({v.at(0), v.at(1), v.at(2), errors_from(v.at(3)), v.at(4), v.at(5)});
   }
-  for (const auto& c : j.at("closures")) {
-    job.closures.push_back({c.at(0), c.at(1), c.at(2), c.at(3), errors_from(c.at(4))});
+  for (const auto& c : j.at("movement_checks")) {
+    job.movement_checks.push_back({c.at(0), c.at(1), c.at(2), c.at(3), errors_from(c.at(4))});
   }
 }
 
@@ -85,7 +85,7 @@ std::string to_record(const JobInfo& job) {
                   {"report", job.report},
                   {"config_sha256", job.config_sha256},
                   {"stored", views_of(job)},
-                  {"closures", closures_of(job)}};
+                  {"movement_checks", movement_checks_of(job)}};
   return j.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 

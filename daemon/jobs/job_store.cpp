@@ -32,10 +32,12 @@ void take_views(JobInfo& job, const Manifest& manifest) {
     const auto& pose = manifest.poses[p];
     const int number = static_cast<int>(p);
     for (const auto& view : pose.views) {
-      job.stored.push_back({number, view.index, view.measured_deg, view.spoilt, view.commanded_deg, view.settling_ms});
+      job.stored.push_back(
+          {number, view.index, view.measured_deg, view.retake_reasons, view.commanded_deg, view.settling_ms});
     }
-    for (const auto& closure : pose.closures) {
-      job.closures.push_back({number, closure.shift_px, closure.changed, closure.unmoved, closure.spoilt});
+    for (const auto& movement_check : pose.movement_checks) {
+      job.movement_checks.push_back({number, movement_check.shift_px, movement_check.changed, movement_check.unmoved,
+                                     movement_check.retake_reasons});
     }
     if (pose.complete) job.complete = number + 1;
   }
@@ -48,7 +50,7 @@ void settle_scanned(JobInfo& job) {
     job.model = model_file(job.folder);
     job.report = report_file(job.folder);
   }
-  const auto attempts = read_attempts(job.folder);
+  const auto attempts = read_attempt_record(job.folder);
   job.quarantined = !attempts.running && attempts.ended_by_death >= kAttemptsThatQuarantine;
   job.error = job.quarantined ? quarantine_error() : read_failure(job.folder);
   if (job.error) {
@@ -57,7 +59,7 @@ void settle_scanned(JobInfo& job) {
     job.state = JobState::reconstructing;
   } else {
     job.state = JobState::done;
-    job.error = beyond_limits(job.report, job.recipe.limits);
+    job.error = limit_violation(job.report, job.recipe.limits);
     job.passed = !job.error;
   }
 }
@@ -72,7 +74,8 @@ void settle_unfinished(JobInfo& job, const std::string& manifest_state) {
   } else {
     job.error = read_failure(job.folder).value_or(Error{ErrorCode::stopped, "the scan was " + manifest_state});
   }
-  const bool moved = std::ranges::any_of(job.closures, [](const auto& closure) { return !closure.unmoved; });
+  const bool moved =
+      std::ranges::any_of(job.movement_checks, [](const auto& movement_check) { return !movement_check.unmoved; });
   job.resumable = job.state == JobState::interrupted && !moved;
 }
 
@@ -208,8 +211,8 @@ Result<void> JobStore::check_rig_cameras() const {
   if (!calibration) return pass_on(calibration);
   const auto others = other_cameras(*calibration, options_.cameras);
   if (!others) return {};
-  return fail(ErrorCode::refused, "{} is of {}; calibrate this pair, or put its own file there",
-              options_.calibration_file.string(), *others);
+  return fail(ErrorCode::refused, "{} is for {}; calibrate, or install its file", options_.calibration_file.string(),
+              *others);
 }
 
 Result<void> JobStore::check_job_cameras(const std::string& id) const {

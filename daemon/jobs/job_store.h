@@ -7,7 +7,7 @@
 #include "core/result.h"
 #include "daemon/jobs/job_files.h"
 #include "daemon/station/job_table.h"
-#include "pipeline/scan/scan_folder.h"
+#include "pipeline/storage/scan_folder.h"
 
 namespace scanrig {
 

@@ -7,15 +7,15 @@
 
 #include "core/files.h"
 #include "core/image_codec.h"
-#include "daemon/actor_thread.h"
-#include "daemon/guarded.h"
-#include "daemon/overloaded.h"
-#include "pipeline/closure/turned_table.h"
+#include "daemon/runtime/actor_thread.h"
+#include "daemon/runtime/catch_exceptions.h"
+#include "daemon/runtime/overloaded.h"
+#include "pipeline/movement/turned_table.h"
 
 namespace scanrig {
 namespace {
 
-using What = event::JobAsked::What;
+using What = event::JobRequested::What;
 
 /// Images without a match are what a person looks at first: kept beside the views.
 Result<void> keep_images(const ScanFolder& scan, int pose, std::size_t number, const RawView& again) {
@@ -24,8 +24,8 @@ Result<void> keep_images(const ScanFolder& scan, int pose, std::size_t number, c
   const auto left = encode_png(again.left_plain), right = encode_png(again.right_plain);
   if (!left) return pass_on(left);
   if (!right) return pass_on(right);
-  files.push_back({fmt::format("closure{:02}_left.png", number), *left});
-  files.push_back({fmt::format("closure{:02}_right.png", number), *right});
+  files.push_back({fmt::format("movement{:02}_left.png", number), *left});
+  files.push_back({fmt::format("movement{:02}_right.png", number), *right});
   return write_files_synced(folder, files);
 }
 
@@ -41,13 +41,13 @@ Result<void> settle_calibration(const JobStore& store, const JobInfo& job) {
 }  // namespace
 
 JobThread::JobThread(Clock& clock, const JobStore& store, ReconstructionThread& reconstruction, ScannedHook on_scanned,
-                     std::function<void(Event)> tell)
+                     std::function<void(Event)> post_event)
     : store_(store),
       reconstruction_(reconstruction),
       on_scanned_(std::move(on_scanned)),
-      tell_(std::move(tell)),
+      post_event_(std::move(post_event)),
       inbox_(clock),
-      at_work_(clock),
+      busy_timer_(clock),
       thread_(start_actor(clock, [this] { run(); })) {}
 
 JobThread::~JobThread() {
@@ -57,13 +57,13 @@ JobThread::~JobThread() {
 
 void JobThread::run() {
   while (auto task = inbox_.take()) {
-    at_work_.begins();
-    const auto done = guarded("storing", [&]() -> Result<void> {
+    busy_timer_.begins();
+    const auto done = catch_exceptions("storing", [&]() -> Result<void> {
       std::visit([this](const auto& t) { handle(t); }, *task);
       return {};
     });
     if (!done) fail_task(*task, done.error());
-    at_work_.ends();
+    busy_timer_.ends();
   }
 }
 
@@ -71,65 +71,65 @@ void JobThread::run() {
 void JobThread::fail_task(const Task& task, const Error& why) {
   const Result<void> failed = tl::unexpected(why);
   std::visit(Overloaded{[&](const action::CreateJobs& t) {
-                          answer(t.ticket, failed, {});
-                          tell_(event::StoreFailed{t.ids.front(), why});
+                          answer(t.request_id, failed, {});
+                          post_event_(event::StoreFailed{t.ids.front(), why});
                         },
-                        [&](const action::MoveJob& t) { answer(t.ticket, failed, {}); },
-                        [&](const action::KeepJob& t) { answer(t.asked.ticket, failed, {}); },
+                        [&](const action::MoveJob& t) { answer(t.request_id, failed, {}); },
+                        [&](const action::RunJobRequest& t) { answer(t.asked.request_id, failed, {}); },
                         [&](const action::CheckCalibration& t) {
-                          tell_(event::CalibrationSeen{t.job, std::nullopt});
+                          post_event_(event::CalibrationChecked{t.job, std::nullopt});
                         },
                         [&](const action::StoreView& t) { give_up(t.view->id.job, why); },
-                        [&](const action::JudgeClosure& t) { give_up(t.view->id.job, why); },
+                        [&](const action::CheckMovement& t) { give_up(t.view->id.job, why); },
                         [&](const action::CloseJob& t) {
                           scan_.reset();
-                          tell_(event::JobClosed{t.job, t.state, t.why});
+                          post_event_(event::JobClosed{t.job, t.state, t.why});
                         },
                         [&](const auto& t) { give_up(t.job, why); }},
              task);
 }
 
-void JobThread::answer(Ticket ticket, const Result<void>& done, const std::string& result) {
-  if (ticket == 0) return;
-  if (done) return tell_(event::Answered{ticket, result});
-  tell_(event::Answered{ticket, pass_on(done)});
+void JobThread::answer(RequestId request_id, const Result<void>& done, const std::string& result) {
+  if (request_id == 0) return;
+  if (done) return post_event_(event::RequestDone{request_id, result});
+  post_event_(event::RequestDone{request_id, pass_on(done)});
 }
 
 void JobThread::tell_known(const std::string& job) {
-  if (auto info = store_.read(job)) tell_(event::JobKnown{std::make_shared<const JobInfo>(std::move(*info))});
+  if (auto info = store_.read(job)) post_event_(event::JobUpdated{std::make_shared<const JobInfo>(std::move(*info))});
 }
 
 /// A calibration that cannot be read is named when a job is made.
 void JobThread::handle(const action::CheckCalibration& task) {
   const auto same = task.job.empty() ? store_.check_rig_cameras() : store_.check_job_cameras(task.job);
   const bool refused = !same && same.error().code == ErrorCode::refused;
-  tell_(event::CalibrationSeen{task.job, refused ? std::optional(same.error()) : std::nullopt});
+  post_event_(event::CalibrationChecked{task.job, refused ? std::optional(same.error()) : std::nullopt});
 }
 
 void JobThread::handle(const action::CreateJobs& task) {
   Result<void> done;
   auto place = task.place;
   for (const auto& id : task.ids) {
-    at_work_.begins();
+    busy_timer_.begins();
     auto job = store_.create(id, {.recipe = task.recipe, .part = task.part, .place = place++});
     if (!job) {
       done = pass_on(job);
-      tell_(event::StoreFailed{id, job.error().in("cannot begin the job")});
+      post_event_(event::StoreFailed{id, job.error().in("cannot begin the job")});
       break;
     }
-    tell_(event::JobKnown{std::make_shared<const JobInfo>(std::move(*job))});
+    post_event_(event::JobUpdated{std::make_shared<const JobInfo>(std::move(*job))});
   }
-  answer(task.ticket, done, task.ids.front());
+  answer(task.request_id, done, task.ids.front());
 }
 
-void JobThread::handle(const action::BeginJob& task) {
+void JobThread::handle(const action::StartJob& task) {
   const auto job = read_whole(task.job);
   if (!job) return set_aside(task.job, job.error());
   auto begun = store_.check_room(*job);
   if (begun) begun = settle_calibration(store_, *job);
   if (begun) begun = begin(*job);
   if (begun) return;
-  tell_(event::JobNotBegun{task.job, begun.error()});
+  post_event_(event::JobNotStarted{task.job, begun.error()});
   tell_known(task.job);
 }
 
@@ -152,9 +152,9 @@ Result<JobInfo> JobThread::read_whole(const std::string& id) const {
 void JobThread::set_aside(const std::string& id, const Error& why) {
   auto scan = ScanFolder::open(store_.folder(id));
   if (scan && why.code != ErrorCode::io && scan->set_state("failed")) std::ignore = write_failure(scan->path(), why);
-  tell_(event::JobUnreadable{id, why});
+  post_event_(event::JobUnreadable{id, why});
   std::error_code ignored;
-  if (!std::filesystem::exists(store_.folder(id), ignored)) tell_(event::JobRemoved{id});
+  if (!std::filesystem::exists(store_.folder(id), ignored)) post_event_(event::JobRemoved{id});
 }
 
 /// Goes on where the manifest ends.
@@ -172,11 +172,12 @@ Result<void> JobThread::begin(const JobInfo& job) {
   if (!later_) reconstruction_.begin(job.id, *scan_, job.recipe);
   const auto& poses = scan_->manifest().poses;
   const auto pose = static_cast<std::size_t>(job.complete);
-  tell_(event::JobBegun{job.id, job.complete, pose < poses.size() ? static_cast<int>(poses[pose].views.size()) : 0});
+  post_event_(
+      event::JobStarted{job.id, job.complete, pose < poses.size() ? static_cast<int>(poses[pose].views.size()) : 0});
   return {};
 }
 
-void JobThread::handle(const action::MoveJob& task) { answer(task.ticket, move(task), task.job); }
+void JobThread::handle(const action::MoveJob& task) { answer(task.request_id, move(task), task.job); }
 
 Result<void> JobThread::move(const action::MoveJob& task) {
   auto job = store_.read(task.job);
@@ -201,9 +202,11 @@ Result<void> JobThread::move(const action::MoveJob& task) {
   return {};
 }
 
-void JobThread::handle(const action::KeepJob& task) { answer(task.asked.ticket, keep(task.asked), task.asked.job); }
+void JobThread::handle(const action::RunJobRequest& task) {
+  answer(task.asked.request_id, keep(task.asked), task.asked.job);
+}
 
-Result<void> JobThread::keep(const event::JobAsked& asked) {
+Result<void> JobThread::keep(const event::JobRequested& asked) {
   auto job = store_.read(asked.job);
   if (!job) return pass_on(job);
   if (asked.what == What::cancel) return cancel(*job);
@@ -233,7 +236,7 @@ Result<void> JobThread::cancel(const JobInfo& job) {
   if (auto noted = write_failure(job.folder, {ErrorCode::stopped, "cancelled on request"}); !noted) {
     // Nobody works on it any more, and nobody else tells so.
     if (job.state != JobState::reconstructing) tell_known(job.id);
-    if (job.state == JobState::reconstructing) tell_(event::ReconstructionFailed{job.id, noted.error()});
+    if (job.state == JobState::reconstructing) post_event_(event::ReconstructionFailed{job.id, noted.error()});
     return noted;
   }
   tell_known(job.id);
@@ -241,7 +244,7 @@ Result<void> JobThread::cancel(const JobInfo& job) {
 }
 
 /// The images are all that is needed; an older model stays until the new one is there.
-Result<void> JobThread::reprocess(JobInfo job, const event::JobAsked& asked) {
+Result<void> JobThread::reprocess(JobInfo job, const event::JobRequested& asked) {
   if (job.complete < job.recipe.poses) {
     return fail(ErrorCode::refused, "job {} has only {} of {} poses: there is nothing to make a model of", asked.job,
                 job.complete, job.recipe.poses);
@@ -253,7 +256,7 @@ Result<void> JobThread::reprocess(JobInfo job, const event::JobAsked& asked) {
   job.error.reset();
   job.passed.reset();
   const auto known = std::make_shared<const JobInfo>(std::move(job));
-  tell_(event::JobKnown{known});  // before anything that the reconstruction has to tell
+  post_event_(event::JobUpdated{known});  // before anything that the reconstruction has to tell
   reconstruction_.rebuild(known->id, known->folder, known->recipe, {asked.voxel_mm, asked.fusion});
   return {};
 }
@@ -262,7 +265,7 @@ Result<void> JobThread::reprocess(JobInfo job, const event::JobAsked& asked) {
 /// never be completed.
 void JobThread::give_up(const std::string& job, const Error& why) {
   broken_ = true;
-  tell_(event::StoreFailed{job, why});
+  post_event_(event::StoreFailed{job, why});
 }
 
 void JobThread::handle(const action::StoreView& task) {
@@ -271,19 +274,19 @@ void JobThread::handle(const action::StoreView& task) {
   const auto stored = scan_->add_view(static_cast<std::size_t>(view.id.pose), view.record, view.images);
   if (!stored) return give_up(view.id.job, stored.error());
   reconstruction_.add_view(task.view);
-  tell_(event::ViewStored{view.id, view.record.measured_deg, view.record.spoilt, view.record.commanded_deg,
-                          view.record.settling_ms, scan_->manifest().config_sha256});
+  post_event_(event::ViewStored{view.id, view.record.measured_deg, view.record.retake_reasons,
+                                view.record.commanded_deg, view.record.settling_ms, scan_->manifest().config_sha256});
 }
 
-void JobThread::handle(const action::JudgeClosure& task) {
+void JobThread::handle(const action::CheckMovement& task) {
   if (!storing()) return;
-  const auto closure = judge(*task.view);
-  if (!closure) return give_up(task.view->id.job, closure.error());
-  tell_(event::ClosureJudged{task.view->id.job, *closure});
+  const auto movement_check = judge(*task.view);
+  if (!movement_check) return give_up(task.view->id.job, movement_check.error());
+  post_event_(event::MovementChecked{task.view->id.job, *movement_check});
 }
 
 /// Compares the plain images with those of the first time, and keeps the verdict as evidence.
-Result<Closure> JobThread::judge(const TakenView& again) {
+Result<MovementCheck> JobThread::judge(const TakenView& again) {
   const auto pose = static_cast<std::size_t>(again.id.pose);
   const auto first = scan_->load_images(pose, 0);
   if (!first) return pass_on(first);
@@ -300,19 +303,20 @@ Result<Closure> JobThread::judge(const TakenView& again) {
       compare_views(first->right_plain, now->right_plain, allowing_for(turned, calibration->right, *calibration));
   if (!right) return pass_on(right);
 
-  at_work_.begins();  // comparing takes its time too
-  const Closure closure{again.id.pose, std::max(left->shift_px, right->shift_px),
-                        std::max(left->changed, right->changed), left->unmoved && right->unmoved, again.record.spoilt};
-  if (!closure.unmoved) {
-    if (auto kept = keep_images(*scan_, again.id.pose, record.closures.size(), again.images); !kept) {
+  busy_timer_.begins();  // comparing takes its time too
+  const MovementCheck movement_check{again.id.pose, std::max(left->shift_px, right->shift_px),
+                                     std::max(left->changed, right->changed), left->unmoved && right->unmoved,
+                                     again.record.retake_reasons};
+  if (!movement_check.unmoved) {
+    if (auto kept = keep_images(*scan_, again.id.pose, record.movement_checks.size(), again.images); !kept) {
       return pass_on(kept);
     }
   }
-  const auto added =
-      scan_->add_closure(pose, {static_cast<int>(record.views.size()), again.record.measured_deg, again.record.taken,
-                                closure.shift_px, closure.changed, closure.unmoved, closure.spoilt});
+  const auto added = scan_->add_movement_check(
+      pose, {static_cast<int>(record.views.size()), again.record.measured_deg, again.record.taken,
+             movement_check.shift_px, movement_check.changed, movement_check.unmoved, movement_check.retake_reasons});
   if (!added) return pass_on(added);
-  return closure;
+  return movement_check;
 }
 
 Result<void> JobThread::finish_pose(const action::FinishPose& task) {
@@ -325,7 +329,7 @@ void JobThread::handle(const action::FinishPose& task) {
   if (!storing()) return;
   const auto finished = finish_pose(task);
   if (!finished) return give_up(task.job, finished.error());
-  tell_(event::PoseStored{task.job, task.pose});
+  post_event_(event::PoseStored{task.job, task.pose});
   reconstruction_.finish_pose(task.job, task.pose);
   if (task.last) {
     later_ ? reconstruction_.rebuild(task.job, scan_->path(), *later_, {}) : reconstruction_.finish(task.job);
@@ -347,7 +351,7 @@ void JobThread::handle(const action::CloseJob& task) {
   // On a disk that takes nothing more the job is found unfinished at the next start, and interrupted then.
   scan_.reset();
   const auto job = store_.read(task.job);
-  tell_(event::JobClosed{task.job, task.state, task.why, job && job->resumable});
+  post_event_(event::JobClosed{task.job, task.state, task.why, job && job->resumable});
 }
 
 }  // namespace scanrig

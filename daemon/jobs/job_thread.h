@@ -6,10 +6,10 @@
 #include <thread>
 #include <variant>
 
-#include "daemon/at_work.h"
 #include "daemon/jobs/job_store.h"
 #include "daemon/jobs/reconstruction_thread.h"
-#include "daemon/mailbox.h"
+#include "daemon/runtime/busy_timer.h"
+#include "daemon/runtime/mailbox.h"
 #include "daemon/station/events.h"
 
 namespace scanrig {
@@ -18,14 +18,14 @@ namespace scanrig {
 /// when it survives a power cut.
 class JobThread {
  public:
-  using Task =
-      std::variant<action::CheckCalibration, action::CreateJobs, action::BeginJob, action::MoveJob, action::KeepJob,
-                   action::StoreView, action::JudgeClosure, action::FinishPose, action::ResumeJob, action::CloseJob>;
+  using Task = std::variant<action::CheckCalibration, action::CreateJobs, action::StartJob, action::MoveJob,
+                            action::RunJobRequest, action::StoreView, action::CheckMovement, action::FinishPose,
+                            action::ResumeJob, action::CloseJob>;
   using ScannedHook = std::function<Result<void>(const std::filesystem::path& job_folder)>;
 
   /// `on_scanned` (may be empty) is called when all views of a job are on disk, before anybody is told.
   JobThread(Clock& clock, const JobStore& store, ReconstructionThread& reconstruction, ScannedHook on_scanned,
-            std::function<void(Event)> tell);
+            std::function<void(Event)> post_event);
   /// Does what was posted, then joins.
   ~JobThread();
   JobThread(const JobThread&) = delete;
@@ -33,18 +33,18 @@ class JobThread {
 
   void post(Task task) { inbox_.post(std::move(task)); }
   /// For how long the disk has kept it from going on. From any thread.
-  [[nodiscard]] Clock::Duration waiting() const { return at_work_.lasts(); }
+  [[nodiscard]] Clock::Duration waiting() const { return busy_timer_.lasts(); }
 
  private:
   void run();
   void fail_task(const Task& task, const Error& why);
   void handle(const action::CheckCalibration& task);
   void handle(const action::CreateJobs& task);
-  void handle(const action::BeginJob& task);
+  void handle(const action::StartJob& task);
   void handle(const action::MoveJob& task);
-  void handle(const action::KeepJob& task);
+  void handle(const action::RunJobRequest& task);
   void handle(const action::StoreView& task);
-  void handle(const action::JudgeClosure& task);
+  void handle(const action::CheckMovement& task);
   void handle(const action::FinishPose& task);
   void handle(const action::ResumeJob& task);
   void handle(const action::CloseJob& task);
@@ -54,21 +54,21 @@ class JobThread {
   Result<void> begin(const JobInfo& job);
   Result<void> move(const action::MoveJob& task);
   Result<void> cancel(const JobInfo& job);
-  Result<void> keep(const event::JobAsked& asked);
+  Result<void> keep(const event::JobRequested& asked);
   Result<void> finish_pose(const action::FinishPose& task);
-  Result<Closure> judge(const TakenView& again);
-  Result<void> reprocess(JobInfo job, const event::JobAsked& asked);
+  Result<MovementCheck> judge(const TakenView& again);
+  Result<void> reprocess(JobInfo job, const event::JobRequested& asked);
   [[nodiscard]] bool storing() const { return scan_ && !broken_; }
   void give_up(const std::string& job, const Error& why);
   void tell_known(const std::string& job);
-  void answer(Ticket ticket, const Result<void>& done, const std::string& result);
+  void answer(RequestId request_id, const Result<void>& done, const std::string& result);
 
   const JobStore& store_;
   ReconstructionThread& reconstruction_;
   ScannedHook on_scanned_;
-  std::function<void(Event)> tell_;
+  std::function<void(Event)> post_event_;
   Mailbox<Task> inbox_;
-  AtWork at_work_;
+  BusyTimer busy_timer_;
   // Of the thread only.
   std::optional<ScanFolder> scan_;  ///< of the job that has the rig
   std::optional<Recipe> later_;     ///< its recipe, where the model is made after the last view only

@@ -6,24 +6,25 @@
 #include <utility>
 
 #include "core/priority.h"
-#include "daemon/actor_thread.h"
-#include "daemon/guarded.h"
 #include "daemon/jobs/heap.h"
 #include "daemon/jobs/job_files.h"
+#include "daemon/runtime/actor_thread.h"
+#include "daemon/runtime/catch_exceptions.h"
 
 namespace scanrig {
 namespace {
 
 /// More views are not kept in memory while an earlier job is being worked on.
-constexpr int kMostViewsWaiting = 4;
+constexpr int kMaxViewsWaiting = 4;
 
 constexpr const char* kWork = "the reconstruction";
 
 }  // namespace
 
-ReconstructionThread::ReconstructionThread(Clock& clock, ReconstructorFactory factory, std::function<void(Event)> tell)
+ReconstructionThread::ReconstructionThread(Clock& clock, ReconstructorFactory factory,
+                                           std::function<void(Event)> post_event)
     : factory_(std::move(factory)),
-      tell_(std::move(tell)),
+      post_event_(std::move(post_event)),
       inbox_(clock),
       thread_(start_actor(clock, [this] { run(); })) {}
 
@@ -98,7 +99,7 @@ bool ReconstructionThread::dismiss(const std::stop_source& stop) {
 
 void ReconstructionThread::add_view(std::shared_ptr<const TakenView> view) {
   const auto id = view->id;
-  if (++views_waiting_ > kMostViewsWaiting) {
+  if (++views_waiting_ > kMaxViewsWaiting) {
     --views_waiting_;
     view.reset();
   }
@@ -106,7 +107,7 @@ void ReconstructionThread::add_view(std::shared_ptr<const TakenView> view) {
 }
 
 void ReconstructionThread::run() {
-  give_way();
+  lower_priority();
   while (auto message = inbox_.take()) {
     if (ending_) continue;
     std::visit([this](const auto& m) { perform(m); }, *message);
@@ -123,7 +124,7 @@ void ReconstructionThread::run() {
 /// What is thrown beside the pipeline is the job's bad luck too.
 template <class SomeMessage>
 void ReconstructionThread::perform(const SomeMessage& message) {
-  const auto done = guarded(kWork, [&]() -> Result<void> {
+  const auto done = catch_exceptions(kWork, [&]() -> Result<void> {
     handle(message);
     return {};
   });
@@ -147,14 +148,14 @@ void ReconstructionThread::handle(const Begin& message) {
 }
 
 Result<void> ReconstructionThread::start(const Begin& message, const ScanFolder& scan) {
-  current_->quarantined = read_attempts(message.folder).ended_by_death >= kAttemptsThatQuarantine;
+  current_->quarantined = read_attempt_record(message.folder).ended_by_death >= kAttemptsThatQuarantine;
   if (current_->quarantined) return {};
   const auto calibration = scan.load_calibration();
   if (!calibration) return pass_on(calibration);
   if (scan.manifest().state == "scanned") {
     if (auto marked = mark(); !marked) return marked;
   }
-  return guarded(kWork, [&]() -> Result<void> {
+  return catch_exceptions(kWork, [&]() -> Result<void> {
     auto made = factory_({.calibration = *calibration,
                           .folder = message.folder,
                           .views = message.recipe.poses * message.recipe.views,
@@ -188,7 +189,7 @@ Result<void> ReconstructionThread::add(int pose, const Result<ViewImages>& image
   const auto progress = [&](std::string_view, double fraction) {
     tell_progress("range", (current_->views_done + fraction) / views);
   };
-  auto added = guarded(kWork, [&] {
+  auto added = catch_exceptions(kWork, [&] {
     return current_->reconstructor->add_view(static_cast<std::size_t>(pose), *images, context(progress));
   });
   ++current_->views_done;
@@ -210,7 +211,7 @@ Result<void> ReconstructionThread::close_pose(int pose) {
   const auto progress = [&](std::string_view stage, double fraction) {
     tell_progress(fmt::format("{} pose {}", stage, pose + 1), fraction);
   };
-  return guarded(
+  return catch_exceptions(
       kWork, [&] { return current_->reconstructor->finish_pose(static_cast<std::size_t>(pose), context(progress)); });
 }
 
@@ -239,7 +240,7 @@ void ReconstructionThread::handle(const Finish& message) {
     std::ignore = write_failure(current_->folder, *current_->error);
   }
   end();
-  if (ready) tell_(*std::move(ready));
+  if (ready) post_event_(*std::move(ready));
 }
 
 void ReconstructionThread::handle(const Abandon& message) {
@@ -258,12 +259,12 @@ Result<event::ModelReady> ReconstructionThread::make_model() {
   const auto progress = [this](std::string_view stage, double fraction) {
     tell_progress(std::string(stage), fraction);
   };
-  return guarded(kWork, [&]() -> Result<event::ModelReady> {
+  return catch_exceptions(kWork, [&]() -> Result<event::ModelReady> {
     const auto made = current_->reconstructor->finish(model_folder(current_->folder), context(progress));
     if (!made) return pass_on(made);
     const auto report = report_file(current_->folder);
     return event::ModelReady{current_->job, model_file(current_->folder), report,
-                             beyond_limits(report, current_->recipe.limits)};
+                             limit_violation(report, current_->recipe.limits)};
   });
 }
 
@@ -271,7 +272,7 @@ void ReconstructionThread::check(const Result<void>& done) {
   if (done) return;
   current_->error = done.error();
   if (!current_->stop.stop_requested())
-    tell_(event::ReconstructionFailed{current_->job, done.error(), current_->quarantined});
+    post_event_(event::ReconstructionFailed{current_->job, done.error(), current_->quarantined});
 }
 
 void ReconstructionThread::tell_progress(std::string stage, double fraction) {
@@ -279,7 +280,7 @@ void ReconstructionThread::tell_progress(std::string stage, double fraction) {
   if (stage == told_stage_ && fraction < 1.0 && std::abs(fraction - told_fraction_) < 0.01) return;
   told_stage_ = stage;
   told_fraction_ = fraction;
-  tell_(event::StageProgress{current_->job, std::move(stage), fraction});
+  post_event_(event::StageProgress{current_->job, std::move(stage), fraction});
 }
 
 }  // namespace scanrig

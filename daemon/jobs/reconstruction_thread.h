@@ -14,9 +14,9 @@
 #include <variant>
 
 #include "daemon/jobs/reconstructor.h"
-#include "daemon/mailbox.h"
 #include "daemon/rig/taken_view.h"
-#include "pipeline/scan/scan_folder.h"
+#include "daemon/runtime/mailbox.h"
+#include "pipeline/storage/scan_folder.h"
 
 namespace scanrig {
 
@@ -26,7 +26,7 @@ namespace scanrig {
 /// daemon with it.
 class ReconstructionThread {
  public:
-  ReconstructionThread(Clock& clock, ReconstructorFactory factory, std::function<void(Event)> tell);
+  ReconstructionThread(Clock& clock, ReconstructorFactory factory, std::function<void(Event)> post_event);
   /// As stop(), then joins.
   ~ReconstructionThread();
   ReconstructionThread(const ReconstructionThread&) = delete;
@@ -45,8 +45,8 @@ class ReconstructionThread {
   bool cancel(const std::string& job);
   /// Whether work on this job is begun or waiting, and not cancelled.
   bool has(const std::string& job);
-  /// The daemon ends, on purpose: asks the running stage to stop, takes the mark away before anybody loses patience
-  /// with that stage, and drops the rest.
+  /// The daemon ends, on purpose: asks the running stage to stop, takes the mark away before a caller gives up on
+  /// that stage, and drops the rest.
   void stop();
 
  private:
@@ -116,7 +116,7 @@ class ReconstructionThread {
   void tell_progress(std::string stage, double fraction);
 
   ReconstructorFactory factory_;
-  std::function<void(Event)> tell_;
+  std::function<void(Event)> post_event_;
   Mailbox<Message> inbox_;
   struct Run {
     std::string job;

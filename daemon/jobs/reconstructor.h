@@ -10,7 +10,7 @@
 #include "core/context.h"
 #include "core/result.h"
 #include "pipeline/calibration/camera.h"
-#include "pipeline/scan/images.h"
+#include "pipeline/storage/images.h"
 
 namespace scanrig {
 

@@ -13,7 +13,7 @@ namespace scanrig {
 
 /// Outlives the Journal where a sink stalls. It waits on the real clock: the log takes no part in the rig's time.
 struct Journal::Shared {
-  Shared(Sink to, std::size_t most) : sink(std::move(to)), most_waiting(most) {}
+  Shared(Sink to, std::size_t most) : sink(std::move(to)), max_waiting(most) {}
 
   void run() {
     std::unique_lock lock(mutex);
@@ -32,7 +32,7 @@ struct Journal::Shared {
   }
 
   const Sink sink;
-  const std::size_t most_waiting;
+  const std::size_t max_waiting;
   std::mutex mutex;
   std::condition_variable changed;
   std::deque<JournalEntry> waiting;
@@ -40,8 +40,7 @@ struct Journal::Shared {
   bool ending = false, ended = false;
 };
 
-Journal::Journal(Sink sink, std::size_t most_waiting)
-    : shared_(std::make_shared<Shared>(std::move(sink), most_waiting)) {
+Journal::Journal(Sink sink, std::size_t max_waiting) : shared_(std::make_shared<Shared>(std::move(sink), max_waiting)) {
   std::thread([shared = shared_] { shared->run(); }).detach();
 }
 
@@ -60,7 +59,7 @@ void Journal::write(JournalEntry entry) {
   }
   {
     const std::lock_guard guard(shared_->mutex);
-    if (shared_->waiting.size() >= shared_->most_waiting) {
+    if (shared_->waiting.size() >= shared_->max_waiting) {
       ++shared_->dropped;
       return;
     }

@@ -18,7 +18,7 @@ class Journal {
   /// Called from the journal's thread only; may take its time.
   using Sink = std::function<void(const JournalEntry&)>;
 
-  explicit Journal(Sink sink, std::size_t most_waiting = 1024);
+  explicit Journal(Sink sink, std::size_t max_waiting = 1024);
   /// Writes what is waiting, for at most `kLastWords`; a sink that still stalls then is left behind.
   ~Journal();
   Journal(const Journal&) = delete;

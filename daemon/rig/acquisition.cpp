@@ -12,7 +12,7 @@ double milliseconds(Clock::Duration duration) { return std::chrono::duration<dou
 
 constexpr auto kTurntable = "turntable", kProjector = "projector", kCamera = "camera";
 
-constexpr double kMostWound = 4 * 360.0;
+constexpr double kMaxWound = 4 * 360.0;
 
 /// `angle` plus as many whole turns as bring it nearest to `to`.
 double nearest_turn(double angle, double to) { return angle + 360.0 * std::round((to - angle) / 360.0); }
@@ -26,7 +26,8 @@ bool may_pass(const Error& error) {
 }  // namespace
 
 Result<void> Acquisition::home() {
-  if (auto dark = from(kProjector, devices_.projector.dark(Deadline::after(clock_, options_.exposure_limit))); !dark) {
+  if (auto dark = from(kProjector, devices_.projector.turn_off(Deadline::after(clock_, options_.exposure_limit)));
+      !dark) {
     return pass_on(dark);
   }
   if (auto reset = from(kTurntable, devices_.turntable.reset_alarm(Deadline::after(clock_, options_.stop_limit)));
@@ -42,16 +43,16 @@ Result<void> Acquisition::home() {
 
 Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle) {
   const unsigned before = interrupts_;
-  if (id.job != std::exchange(job_, id.job)) judge_.begin();
+  if (id.job != std::exchange(job_, id.job)) image_checker_.begin();
   // What the cameras need before they can expose is done before the table stands; if they fail, the exposure says so.
-  std::ignore = devices_.camera.ready(Deadline::after(clock_, options_.exposure_limit));
+  std::ignore = devices_.camera.prepare(Deadline::after(clock_, options_.exposure_limit));
   const auto move = turn_to(angle);
   if (!move) return pass_on(move);
 
   TakenView view{.id = id};
-  const auto pattern = expose(Light::pattern, before, view.record.spoilt);
+  const auto pattern = expose(Light::pattern, before, view.record.retake_reasons);
   if (!pattern) return pass_on(pattern);
-  const auto plain = expose(Light::plain, before, view.record.spoilt);
+  const auto plain = expose(Light::plain, before, view.record.retake_reasons);
   if (!plain) return pass_on(plain);
 
   view.record.index = id.view;
@@ -80,8 +81,8 @@ Result<void> Acquisition::pulse() {
   return from(kProjector, devices_.projector.fire(Light::pattern, Deadline::after(clock_, options_.exposure_limit)));
 }
 
-Result<StereoFrame> Acquisition::look() {
-  return devices_.camera.look(Deadline::after(clock_, options_.exposure_limit));
+Result<StereoFrame> Acquisition::capture_preview() {
+  return devices_.camera.capture_preview(Deadline::after(clock_, options_.exposure_limit));
 }
 
 std::vector<DeviceHealth> Acquisition::check() {
@@ -89,19 +90,20 @@ std::vector<DeviceHealth> Acquisition::check() {
   const auto health = [](const char* name, const auto& answer) {
     return DeviceHealth{name, answer ? std::nullopt : std::optional(answer.error())};
   };
-  return {health(kTurntable, devices_.turntable.status(limit())), health(kProjector, devices_.projector.dark(limit())),
-          health(kCamera, devices_.camera.ready(Deadline::after(clock_, options_.connect_limit)))};
+  return {health(kTurntable, devices_.turntable.status(limit())),
+          health(kProjector, devices_.projector.turn_off(limit())),
+          health(kCamera, devices_.camera.prepare(Deadline::after(clock_, options_.connect_limit)))};
 }
 
 Acquisition::Stop Acquisition::stop() {
   const auto deadline = Deadline::after(clock_, options_.stop_limit);
-  const auto dark = devices_.projector.dark(deadline);
+  const auto dark = devices_.projector.turn_off(deadline);
   return {devices_.turntable.stop(deadline), dark};
 }
 
 Result<Move> Acquisition::turn_to(Degrees angle) {
   double target = nearest_turn(angle.value, position_deg_);
-  if (std::abs(target) > kMostWound) target = angle.value;
+  if (std::abs(target) > kMaxWound) target = angle.value;
   auto move = from(kTurntable, devices_.turntable.rotate_to({target}, Deadline::after(clock_, options_.move_limit)));
   if (!move) return move;
   position_deg_ = target;
@@ -111,15 +113,15 @@ Result<Move> Acquisition::turn_to(Degrees angle) {
   return move;
 }
 
-Result<StereoFrame> Acquisition::expose(Light light, unsigned before, std::vector<Error>& spoilt) {
+Result<StereoFrame> Acquisition::expose(Light light, unsigned before, std::vector<Error>& retake_reasons) {
   for (int i = 0;; ++i) {
     if (interrupts_ != before) {
       failed_.clear();
       return fail(ErrorCode::stopped, "rig: stopped on request before the exposure");
     }
     auto frame = expose_once(light);
-    if (frame || !may_pass(frame.error()) || i == options_.redo_limit || interrupts_ != before) return frame;
-    spoilt.push_back(frame.error());
+    if (frame || !may_pass(frame.error()) || i == options_.retake_limit || interrupts_ != before) return frame;
+    retake_reasons.push_back(frame.error());
   }
 }
 
@@ -133,7 +135,7 @@ Result<StereoFrame> Acquisition::expose_once(Light light) {
   }
   auto frame = from(kCamera, devices_.camera.collect(Deadline::after(clock_, options_.exposure_limit)));
   if (!frame) return frame;
-  if (auto good = from(kCamera, judge_.judge(light, *frame)); !good) return pass_on(good);
+  if (auto good = from(kCamera, image_checker_.judge(light, *frame)); !good) return pass_on(good);
   seen_(*frame);
   return frame;
 }

@@ -6,7 +6,7 @@
 
 #include "core/clock.h"
 #include "daemon/rig/devices.h"
-#include "daemon/rig/picture_judge.h"
+#include "daemon/rig/image_checker.h"
 #include "daemon/rig/taken_view.h"
 
 namespace scanrig {
@@ -18,7 +18,7 @@ struct AcquisitionOptions {
   Clock::Duration stop_limit = std::chrono::seconds(3);
   Clock::Duration check_limit = std::chrono::milliseconds(500);  ///< for each device
   Clock::Duration connect_limit = std::chrono::seconds(3);       ///< for cameras that have to be connected
-  int redo_limit = 3;                                            ///< spoilt exposures in a row before the view fails
+  int retake_limit = 3;                                          ///< spoilt exposures in a row before the view fails
 };
 
 /// The order in which the devices do one thing. Every wait has a deadline.
@@ -37,7 +37,7 @@ class Acquisition {
   Result<void> home();
 
   /// Turns to `angle`, the shorter way, and takes the four images. An exposure whose frames are lost, torn or not fit
-  /// for use (see PictureJudge), or during which camera or projector vanished, is redone, and what was wrong with it
+  /// for use (see ImageChecker), or during which camera or projector vanished, is redone, and what was wrong with it
   /// noted. A table wound up by several jobs is unwound on the way. Fails as the device that failed; the table has been
   /// told to stop then.
   Result<TakenView> take_view(const ViewId& id, Degrees angle);
@@ -50,7 +50,7 @@ class Acquisition {
   Result<void> pulse();
 
   /// A pair without an exposure of the projector. Fails as StereoCamera::look.
-  Result<StereoFrame> look();
+  Result<StereoFrame> capture_preview();
 
   /// Asks each device something that does no harm.
   std::vector<DeviceHealth> check();
@@ -78,7 +78,7 @@ class Acquisition {
   }
   Result<Move> turn_to(Degrees angle);
   /// `before`: what interrupts() was when the view was begun.
-  Result<StereoFrame> expose(Light light, unsigned before, std::vector<Error>& spoilt);
+  Result<StereoFrame> expose(Light light, unsigned before, std::vector<Error>& retake_reasons);
   Result<StereoFrame> expose_once(Light light);
 
   Devices devices_;
@@ -86,7 +86,7 @@ class Acquisition {
   AcquisitionOptions options_;
   const std::function<void(const StereoFrame&)> seen_;
   std::atomic<unsigned> interrupts_ = 0;
-  PictureJudge judge_;
+  ImageChecker image_checker_;
   std::string job_;  ///< whose pictures it knows
   std::string failed_;
   double position_deg_ = 0.0;  ///< where the last move ended, turns counted from home

@@ -5,8 +5,8 @@
 #include <thread>
 #include <utility>
 
-#include "daemon/rig/kept_config.h"
 #include "daemon/rig/open_devices.h"
+#include "daemon/rig/saved_config.h"
 
 namespace scanrig {
 namespace {
@@ -45,7 +45,7 @@ Result<void> darken(const Result<config::RigConfig>& config, Clock& clock, Deadl
   auto projector = open_projector(config->projector, *held.lines, clock);
   if (!projector) return pass_on(projector);
   held.device = std::move(*projector);
-  return until(clock, deadline, [&] { return held.device->dark(deadline); });
+  return until(clock, deadline, [&] { return held.device->turn_off(deadline); });
 }
 
 Result<void> show_red(const Result<config::RigConfig>& config, Clock& clock, Deadline deadline, Held<Panel>& held) {
@@ -55,26 +55,25 @@ Result<void> show_red(const Result<config::RigConfig>& config, Clock& clock, Dea
   return until(clock, deadline, [&] { return held.device->show({.red = true}, deadline); });
 }
 
-void complain(const char* program, const std::set<std::string>& why) {
+void report_error(const char* program, const std::set<std::string>& why) {
   for (const auto& message : why) fmt::print(stderr, "{}: make-safe: {}\n", program, message);
 }
 
 /// Says once what the daemon's own configuration was not good for.
 DeviceConfigs config_to_use(const std::filesystem::path& file, const char* program) {
-  const auto kept = kept_config_folder(file) / "rig.toml";
+  const auto kept = saved_config_folder(file) / "rig.toml";
   const auto base = file.parent_path();
   std::set<std::string> why;
   const auto read = [&](SafetyDevice device) {
     auto config = config::read_device_config(device, kept, base);
     if (config) return config;
     why.insert(config.error().code == ErrorCode::not_found
-                   ? fmt::format("No daemon has kept its configuration in {}: {} is used as it is now.",
-                                 kept.parent_path().string(), file.string())
-                   : fmt::format("{}; {} is used as it is now.", config.error().message, file.string()));
+                   ? fmt::format("No saved configuration in {}; using {}.", kept.parent_path().string(), file.string())
+                   : fmt::format("{}; using {}.", config.error().message, file.string()));
     return config::read_device_config(device, file, base);
   };
   DeviceConfigs config{read(SafetyDevice::turntable), read(SafetyDevice::projector), read(SafetyDevice::panel)};
-  complain(program, why);
+  report_error(program, why);
   return config;
 }
 
@@ -103,7 +102,7 @@ ExitCode make_safe_now(const std::filesystem::path& file, const char* program) {
   const auto config = config_to_use(file, program);
   RealClock clock;
   const auto made = make_safe(config, clock, Deadline::after(clock, kLimit));
-  complain(program, errors_of(made.turntable, made.projector, made.panel));
+  report_error(program, errors_of(made.turntable, made.projector, made.panel));
   if (!config.turntable && !config.projector && !config.panel) return exit_code(config.turntable.error().code);
   if (!made.turntable) return ExitCode::device;
   return made.projector && made.panel ? ExitCode::ok : ExitCode::partly_safe;

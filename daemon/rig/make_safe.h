@@ -25,7 +25,7 @@ struct MadeSafe {
 MadeSafe make_safe(const DeviceConfigs& config, Clock& clock, Deadline deadline);
 
 /// For systemd's ExecStopPost=: within a second, with a line on standard error for what was not reached. Uses what the
-/// last daemon of `file` has kept (kept_config.h), and for what that does not tell `file` as it is now.
+/// last daemon of `file` has kept (saved_config.h), and for what that does not tell `file` as it is now.
 /// `ok`, `device` (the table may be moving), `partly_safe` (it stands, but light or lamp were not reached),
 /// `bad_input` (nothing of the configuration can be used).
 ExitCode make_safe_now(const std::filesystem::path& file, const char* program);

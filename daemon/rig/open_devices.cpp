@@ -1,7 +1,7 @@
 #include "daemon/rig/open_devices.h"
 
 #include "config/gpio_options.h"
-#include "daemon/rig/retried_devices.h"
+#include "daemon/rig/auto_reopen_devices.h"
 #include "drivers/camera/aravis_stereo_camera.h"
 #include "drivers/camera/v4l2_stereo_camera.h"
 #include "drivers/panel/gpio_panel.h"
@@ -39,7 +39,7 @@ Result<std::unique_ptr<Projector>> open_projector(const config::ProjectorConfig&
     if (!projector) return pass_on(projector);
     return std::move(*projector);
   }
-  return std::make_unique<RetriedProjector>([&config, &lines, &clock]() -> Result<std::unique_ptr<Projector>> {
+  return std::make_unique<AutoReopenProjector>([&config, &lines, &clock]() -> Result<std::unique_ptr<Projector>> {
     auto projector = GpioProjector::open(config::gpio_projector_options(config), lines, clock);
     if (!projector) return pass_on(projector);
     return std::move(*projector);
@@ -72,7 +72,7 @@ Result<std::unique_ptr<Panel>> wired_panel(const config::RigConfig& config, gpio
 }  // namespace
 
 std::unique_ptr<Panel> open_panel(const config::RigConfig& config, gpio::Lines& lines, Clock& clock) {
-  return std::make_unique<RetriedPanel>([&config, &lines, &clock] { return wired_panel(config, lines, clock); });
+  return std::make_unique<AutoReopenPanel>([&config, &lines, &clock] { return wired_panel(config, lines, clock); });
 }
 
 Result<OpenDevices> open_devices(const config::RigConfig& config, Clock& clock) {

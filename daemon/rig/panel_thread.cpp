@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "daemon/actor_thread.h"
+#include "daemon/runtime/actor_thread.h"
 
 namespace scanrig {
 namespace {
@@ -23,19 +23,20 @@ std::vector<Event> changes(const PanelInputs& before, const PanelInputs& after) 
   };
   if (before.estop_ok != after.estop_ok) events.emplace_back(event::EstopChanged{after.estop_ok});
   if (before.guard_closed != after.guard_closed) events.emplace_back(event::GuardChanged{after.guard_closed});
-  if (before != after) events.emplace_back(event::InputsSeen{after});
+  if (before != after) events.emplace_back(event::InputsRead{after});
   pressed(before.stop, after.stop, Button::stop);
   pressed(before.reset, after.reset, Button::reset);
   pressed(before.start, after.start, Button::start);
   return events;
 }
 
-PanelThread::PanelThread(Panel& panel, Clock& clock, std::function<void(Event)> tell, std::function<void()> on_estop)
+PanelThread::PanelThread(Panel& panel, Clock& clock, std::function<void(Event)> post_event,
+                         std::function<void()> on_estop)
     : panel_(panel),
       clock_(clock),
-      tell_(std::move(tell)),
+      post_event_(std::move(post_event)),
       on_estop_(std::move(on_estop)),
-      at_work_(clock),
+      busy_timer_(clock),
       thread_(start_actor(clock, [this] { run(); })) {}
 
 PanelThread::~PanelThread() {
@@ -57,7 +58,7 @@ void PanelThread::run() {
     const auto done = look();
     if (!done) {
       known_.reset();  // what a panel says that comes back is news
-      tell_(event::PanelFailed{done.error()});
+      post_event_(event::PanelFailed{done.error()});
     }
     std::unique_lock lock(mutex_);
     const auto pause = done ? clock_.now() : clock_.now() + kRetry;
@@ -68,21 +69,20 @@ void PanelThread::run() {
 
 /// A panel that had hung is one that failed, whatever it says in the end.
 Result<void> PanelThread::look() {
-  at_work_.begins();
+  busy_timer_.begins();
   auto done = show_wanted();
   if (done) done = read_inputs();
   const auto hung = hangs();
-  at_work_.ends();
+  busy_timer_.ends();
   if (done && hung) return tl::unexpected(*hung);
   return done;
 }
 
 std::optional<Error> PanelThread::hangs() const {
-  const auto waited = at_work_.lasts();
+  const auto waited = busy_timer_.lasts();
   if (waited < kHangs) return std::nullopt;
-  return Error{ErrorCode::timeout,
-               fmt::format("panel: it has not answered for {:.0f} s, and the e-stop cannot be seen: see to its line",
-                           std::chrono::duration<double>(waited).count())};
+  return Error{ErrorCode::timeout, fmt::format("panel: no response for {:.0f} s, e-stop state unknown; check its cable",
+                                               std::chrono::duration<double>(waited).count())};
 }
 
 Result<void> PanelThread::show_wanted() {
@@ -105,10 +105,10 @@ Result<void> PanelThread::read_inputs() {
   if (!inputs) return pass_on(inputs);
   if (!inputs->estop_ok && (!known_ || known_->estop_ok)) on_estop_();
   if (!known_) {
-    tell_(event::InputsSeen{*inputs});
-    tell_(event::PanelFound{inputs->estop_ok, inputs->guard_closed});
+    post_event_(event::InputsRead{*inputs});
+    post_event_(event::PanelFound{inputs->estop_ok, inputs->guard_closed});
   } else {
-    for (auto& event : changes(*known_, *inputs)) tell_(std::move(event));
+    for (auto& event : changes(*known_, *inputs)) post_event_(std::move(event));
   }
   known_ = *inputs;
   return {};

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/clock.h"
-#include "daemon/at_work.h"
+#include "daemon/runtime/busy_timer.h"
 #include "daemon/station/events.h"
 #include "drivers/panel/panel.h"
 
@@ -20,7 +20,7 @@ std::vector<Event> changes(const PanelInputs& before, const PanelInputs& after);
 class PanelThread {
  public:
   /// `on_estop` is called first, before anybody is told, and must not wait.
-  PanelThread(Panel& panel, Clock& clock, std::function<void(Event)> tell, std::function<void()> on_estop);
+  PanelThread(Panel& panel, Clock& clock, std::function<void(Event)> post_event, std::function<void()> on_estop);
   ~PanelThread();
   PanelThread(const PanelThread&) = delete;
   PanelThread& operator=(const PanelThread&) = delete;
@@ -39,9 +39,9 @@ class PanelThread {
 
   Panel& panel_;
   Clock& clock_;
-  std::function<void(Event)> tell_;
+  std::function<void(Event)> post_event_;
   std::function<void()> on_estop_;
-  AtWork at_work_;  ///< on the panel
+  BusyTimer busy_timer_;  ///< on the panel
   std::mutex mutex_;
   std::condition_variable changed_;
   PanelOutputs wanted_;

@@ -2,17 +2,17 @@
 
 #include <utility>
 
-#include "daemon/actor_thread.h"
+#include "daemon/runtime/actor_thread.h"
 
 namespace scanrig {
 
 RigThread::RigThread(const Devices& devices, Clock& clock, AcquisitionOptions options, Preview& preview,
-                     std::function<void(Event)> tell)
+                     std::function<void(Event)> post_event)
     : turntable_(devices.turntable, clock),
       devices_{turntable_, devices.projector, devices.camera, devices.panel},
       acquisition_(devices_, clock, options, [&preview](const StereoFrame& pair) { preview.keep(pair); }),
       preview_(preview),
-      tell_(std::move(tell)),
+      post_event_(std::move(post_event)),
       inbox_(clock),
       thread_(start_actor(clock, [this] { run(); })) {
   preview_.on_wanted([this] { post(Look{}); });
@@ -33,21 +33,21 @@ void RigThread::stop() {
 void RigThread::interrupt() noexcept {
   acquisition_.interrupt();
   devices_.turntable.request_stop();
-  devices_.projector.request_dark();
+  devices_.projector.request_off();
 }
 
 void RigThread::run() {
   while (const auto asked = inbox_.take()) {
     if (std::holds_alternative<Look>(asked->what)) {
-      look();
+      capture_preview();
     } else {
-      tell_(perform(*asked));
+      post_event_(perform(*asked));
     }
   }
 }
 
-void RigThread::look() {
-  const auto pair = acquisition_.look();
+void RigThread::capture_preview() {
+  const auto pair = acquisition_.capture_preview();
   pair ? preview_.keep(*pair) : preview_.failed(pair.error());
 }
 
@@ -75,7 +75,7 @@ Event RigThread::perform(const Asked& asked) {
     auto taken = acquisition_.take_view(view->id, view->angle);
     if (!taken) return event::RigFailed{taken.error(), acquisition_.failed_device()};
     auto shared = std::make_shared<const TakenView>(std::move(*taken));
-    if (view->closure) return event::ClosureTaken{std::move(shared)};
+    if (view->movement_check) return event::CheckViewTaken{std::move(shared)};
     return event::ViewTaken{std::move(shared)};
   }
   if (const auto* jog = std::get_if<action::Jog>(&command)) {
@@ -88,7 +88,7 @@ Event RigThread::perform(const Asked& asked) {
     if (!fired) return event::RigFailed{fired.error(), acquisition_.failed_device()};
     return event::Pulsed{};
   }
-  if (std::holds_alternative<action::CheckDevices>(command)) return event::DevicesSeen{acquisition_.check()};
+  if (std::holds_alternative<action::CheckDevices>(command)) return event::DevicesChecked{acquisition_.check()};
   const auto stopped = acquisition_.stop();
   if (!stopped.table) return event::StopFailed{stopped.table.error()};
   return event::Stopped{stopped.light ? std::nullopt : std::optional(stopped.light.error())};

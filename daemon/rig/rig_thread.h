@@ -4,10 +4,10 @@
 #include <thread>
 #include <variant>
 
-#include "daemon/mailbox.h"
 #include "daemon/rig/acquisition.h"
 #include "daemon/rig/preview.h"
 #include "daemon/rig/turntable_thread.h"
+#include "daemon/runtime/mailbox.h"
 
 namespace scanrig {
 
@@ -17,7 +17,7 @@ class RigThread {
  public:
   /// `preview` outlives it, is given every pair and is served with looks.
   RigThread(const Devices& devices, Clock& clock, AcquisitionOptions options, Preview& preview,
-            std::function<void(Event)> tell);
+            std::function<void(Event)> post_event);
   /// Stops what moves and joins.
   ~RigThread();
   RigThread(const RigThread&) = delete;
@@ -51,14 +51,14 @@ class RigThread {
   }
   void run();
   Event perform(const Asked& asked);
-  void look();
+  void capture_preview();
   Result<void> home_now(unsigned interrupts);
 
   TurntableThread turntable_;
   Devices devices_;
   Acquisition acquisition_;
   Preview& preview_;
-  std::function<void(Event)> tell_;
+  std::function<void(Event)> post_event_;
   Mailbox<Asked> inbox_;
   std::thread thread_;
 };

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "daemon/station/events.h"
-#include "pipeline/scan/scan_folder.h"
+#include "pipeline/storage/scan_folder.h"
 
 namespace scanrig {
 

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <utility>
 
-#include "daemon/overloaded.h"
+#include "daemon/runtime/overloaded.h"
 #include "daemon/station/lamps.h"
-#include "daemon/station/words.h"
+#include "daemon/station/operator_message.h"
 
 namespace scanrig {
 namespace {
@@ -20,7 +20,7 @@ constexpr PanelOutputs kAllOn{true, true, true, true, true, true, true, true};
 ControlLoop::ControlLoop(Clock& clock, ControlLoopOptions options, JobTable known_jobs)
     : clock_(clock), options_(options), inbox_(clock), jobs_(std::move(known_jobs)) {
   for (const auto& [id, job] : jobs_) {
-    state_ = next(state_, event::JobKnown{job}, options_.rules).state;
+    state_ = next(state_, event::JobUpdated{job}, options_.rules).state;
   }
   state_.warm_up_left = options_.warm_up;
   publish({});
@@ -59,8 +59,8 @@ void ControlLoop::handle(Message message, const StationPorts& ports) {
   auto step = next(state_, message.event, options_.rules);
   if (step.state.shutting_down && !state_.shutting_down) give_up_ = clock_.now() + options_.shutdown_limit;
   state_ = std::move(step.state);
-  tally_.see(message.event, clock_.now());
-  if (const auto ended = update(jobs_, message.event)) tally_.see(*ended);
+  counter_.see(message.event, clock_.now());
+  if (const auto ended = update(jobs_, message.event)) counter_.see(*ended);
   for (const auto& action : step.actions) carry_out(action, ports);
   show(ports);
   publish(ports);
@@ -74,15 +74,15 @@ void ControlLoop::handle(Message message, const StationPorts& ports) {
 void ControlLoop::prepare(Message& message, const StationPorts& ports) {
   auto& event = message.event;
   if (auto* pressed = std::get_if<event::Pressed>(&event)) {
-    if (pressed->button == Button::start) pressed->fresh_job_id = ports.fresh_job_id();
-  } else if (auto* ordered = std::get_if<event::Ordered>(&event)) {
-    ordered->ticket = ++last_ticket_;
+    if (pressed->button == Button::start) pressed->new_job_id = ports.new_job_id();
+  } else if (auto* ordered = std::get_if<event::JobsOrdered>(&event)) {
+    ordered->request_id = ++last_request_id_;
     for (int i = 0; i < std::clamp(ordered->order.repeat, 0, 100); ++i) {
-      ordered->fresh_ids.push_back(ports.fresh_job_id());
+      ordered->new_ids.push_back(ports.new_job_id());
     }
-  } else if (auto* asked = std::get_if<event::JobAsked>(&event)) {
-    asked->ticket = ++last_ticket_;
-  } else if (auto* reload = std::get_if<event::ReloadAsked>(&event)) {
+  } else if (auto* asked = std::get_if<event::JobRequested>(&event)) {
+    asked->request_id = ++last_request_id_;
+  } else if (auto* reload = std::get_if<event::ReloadRequested>(&event)) {
     reload->still_doing = still_doing();
   }
 }
@@ -97,16 +97,16 @@ std::string ControlLoop::still_doing() const {
 
 /// Whoever asked for something that takes a while is answered when it is done.
 void ControlLoop::answer(Message& message, const Step& step) {
-  if (const auto* answered = std::get_if<event::Answered>(&message.event)) {
-    if (auto waiting = waiting_.extract(answered->ticket)) waiting.mapped()(answered->result);
+  if (const auto* answered = std::get_if<event::RequestDone>(&message.event)) {
+    if (auto waiting = waiting_.extract(answered->request_id)) waiting.mapped()(answered->result);
   }
   if (!message.reply) return;
-  const bool takes_a_while =
-      std::holds_alternative<event::Ordered>(message.event) || std::holds_alternative<event::JobAsked>(message.event);
+  const bool takes_a_while = std::holds_alternative<event::JobsOrdered>(message.event) ||
+                             std::holds_alternative<event::JobRequested>(message.event);
   if (step.refused) {
     message.reply(tl::unexpected(*step.refused));
   } else if (takes_a_while) {
-    waiting_[last_ticket_] = std::move(message.reply);
+    waiting_[last_request_id_] = std::move(message.reply);
   } else {
     message.reply(state_.job ? state_.job->id : std::string());
   }
@@ -123,7 +123,8 @@ void ControlLoop::look_at_the_time(const StationPorts& ports) {
 /// It is told when it stops answering, and when it answers again.
 void ControlLoop::look_at_the_disk(const StationPorts& ports) {
   auto problem = ports.disk_problem();
-  if (problem.has_value() != state_.disk_problem.has_value()) handle({event::DiskSeen{std::move(problem)}, {}}, ports);
+  if (problem.has_value() != state_.disk_problem.has_value())
+    handle({event::DiskChecked{std::move(problem)}, {}}, ports);
 }
 
 /// Its return is told by its owner.
@@ -151,7 +152,7 @@ void ControlLoop::carry_out(const Action& action, const StationPorts& ports) {
                  [&](const action::CheckLater&) { wake_later(event::CheckDue{}, options_.check_period); },
                  [&](const action::TestLamps&) { lamps_tested_ = clock_.now() + kLampTest; },
                  [&](const action::CloseJob& task) {
-                   if (const auto ended = close(jobs_, task)) tally_.see(*ended);
+                   if (const auto ended = close(jobs_, task)) counter_.see(*ended);
                    ports.perform(task);
                  },
                  [&](const auto& other) { ports.perform(other); }},
@@ -198,10 +199,10 @@ void ControlLoop::publish(const StationPorts& ports) {
       .devices = std::move(devices),
       .calibration_problem = calibration ? std::optional(*calibration) : std::nullopt,
       .job = state_.job ? state_.job->id : std::string(),
-      .not_begun = state_.not_begun,
+      .not_started = state_.not_started,
       .queue = std::move(queue),
       .jobs = jobs_,
-      .counters = tally_.counters(),
+      .counters = counter_.counters(),
   });
   published_.set(snapshot);
   ports.published(snapshot);

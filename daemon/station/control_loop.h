@@ -7,10 +7,10 @@
 #include <string>
 
 #include "core/clock.h"
-#include "daemon/mailbox.h"
+#include "daemon/runtime/mailbox.h"
+#include "daemon/station/event_counter.h"
 #include "daemon/station/events.h"
 #include "daemon/station/snapshot.h"
-#include "daemon/station/tally.h"
 #include "daemon/station/transition.h"
 #include "drivers/panel/panel.h"
 
@@ -21,7 +21,7 @@ struct StationPorts {
   std::function<void()> alive = [] {};         ///< the loop goes round; at least once a second
   std::function<void(const Action&)> perform;  ///< everything but Warn
   std::function<void(const PanelOutputs&)> show;
-  std::function<std::string()> fresh_job_id;  ///< another one each time
+  std::function<std::string()> new_job_id;  ///< another one each time
   std::function<bool()> quiet_hours = [] { return false; };
   std::function<std::optional<Error>()> disk_problem = [] { return std::nullopt; };  ///< the jobs' does not answer
   std::function<std::optional<Error>()> panel_hangs = [] { return std::nullopt; };   ///< and cannot say so itself
@@ -56,15 +56,15 @@ class ControlLoop {
     inbox_.post({event::Pressed{button, origin, {}}, std::move(reply)});
   }
   /// The same for what an engineer asks for.
-  void ask(event::MaintenanceAsked what, Reply reply) { inbox_.post({what, std::move(reply)}); }
+  void ask(event::MaintenanceRequested what, Reply reply) { inbox_.post({what, std::move(reply)}); }
   /// Queues jobs. `reply` comes when their folders are durable, with the id of the first one. Fails with `not_found`
   /// (the recipe), `invalid_input`, `refused`, `io`.
-  void order(Order order, Reply reply) { inbox_.post({event::Ordered{std::move(order)}, std::move(reply)}); }
-  /// What event::JobAsked lists. `reply` comes when it is done (a bundle: after a while), with the job's id or the
+  void order(JobOrder order, Reply reply) { inbox_.post({event::JobsOrdered{std::move(order)}, std::move(reply)}); }
+  /// What event::JobRequested lists. `reply` comes when it is done (a bundle: after a while), with the job's id or the
   /// bundle's path. Fails with `not_found`, `busy`, `refused`, `exists`, `io`.
-  void ask(event::JobAsked what, Reply reply) { inbox_.post({std::move(what), std::move(reply)}); }
+  void ask(event::JobRequested what, Reply reply) { inbox_.post({std::move(what), std::move(reply)}); }
   /// Ends the loop if nothing is being done. Fails with `busy`, `refused`.
-  void ask(event::ReloadAsked what, Reply reply) { inbox_.post({std::move(what), std::move(reply)}); }
+  void ask(event::ReloadRequested what, Reply reply) { inbox_.post({std::move(what), std::move(reply)}); }
   [[nodiscard]] std::shared_ptr<const Snapshot> snapshot() const { return published_.get(); }
 
   /// Runs until a Shutdown or a reload is done. Fails with `timeout` when the rig was not seen stopped by it: under a
@@ -98,10 +98,10 @@ class ControlLoop {
   // Of run()'s thread only.
   StationState state_;
   JobTable jobs_;
-  EventTally tally_;
+  EventCounter counter_;
   std::uint64_t revision_ = 0;
-  Ticket last_ticket_ = 0;
-  std::map<Ticket, Reply> waiting_;  // for what takes a while
+  RequestId last_request_id_ = 0;
+  std::map<RequestId, Reply> waiting_;  // for what takes a while
   struct Later {
     Clock::TimePoint at;
     Event event;

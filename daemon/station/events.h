@@ -27,14 +27,14 @@ struct ViewId {
 struct TakenView;  // daemon/rig/taken_view.h
 
 /// Scans to be done: one job each.
-struct Order {
+struct JobOrder {
   std::string recipe = "default";
   std::string part{};  ///< free text, at most 200 bytes
   int repeat = 1;      ///< 1 to 100
 };
 
 /// Names whoever waits for an answer; 0: nobody.
-using Ticket = std::uint64_t;
+using RequestId = std::uint64_t;
 
 /// Whether a device answers. One that does not leaves the rest running.
 struct DeviceHealth {
@@ -51,13 +51,13 @@ namespace event {
 struct PanelFound {
   bool estop_ok, guard_closed;
 };  ///< the panel's first answer, or its first after it could not be read
-struct InputsSeen {
+struct InputsRead {
   PanelInputs inputs;
 };  ///< for the I/O table
 struct Pressed {
   Button button;
   Origin origin;
-  std::string fresh_job_id;
+  std::string new_job_id;
 };
 struct EstopChanged {
   bool ok;
@@ -76,15 +76,15 @@ struct WarmingUp {
   std::chrono::seconds left;
 };  ///< the projector will be warm then; 0: it is
 /// Whose calibration was looked at, as action::CheckCalibration says, and why it refuses a scan.
-struct CalibrationSeen {
+struct CalibrationChecked {
   std::string job{};
   std::optional<Error> problem{};
 };
-struct DevicesSeen {
+struct DevicesChecked {
   std::vector<DeviceHealth> devices;
 };
 /// What an engineer asks for.
-struct MaintenanceAsked {
+struct MaintenanceRequested {
   enum class What { on, off, home, jog, pulse, lamp_test };
   What what;
   Degrees angle{};  ///< jog: where to, or by how much
@@ -112,14 +112,14 @@ struct StopFailed {
 struct PanelFailed {
   Error error;
 };
-/// Somebody wants scans. Answered when every job's folder is durable, with the first one's id.
-struct Ordered {
-  Order order;
-  std::vector<std::string> fresh_ids{};  ///< one a job
-  Ticket ticket = 0;
+/// Somebody wants scans. RequestDone when every job's folder is durable, with the first one's id.
+struct JobsOrdered {
+  JobOrder order;
+  std::vector<std::string> new_ids{};  ///< one a job
+  RequestId request_id = 0;
 };
-/// Somebody wants something done with one job. Answered when it is done.
-struct JobAsked {
+/// Somebody wants something done with one job. RequestDone when it is done.
+struct JobRequested {
   enum class What {
     cancel,        ///< queued, interrupted or reconstructing: ends cancelled, with its evidence
     resume,        ///< interrupted: the next Start goes on with it
@@ -134,27 +134,27 @@ struct JobAsked {
   std::string path{};                ///< bundle: absolute, .tar.gz, must not be there
   std::optional<double> voxel_mm{};  ///< reprocess
   std::string fusion{};              ///< reprocess: `evidence`, `paper`; empty: as configured
-  Ticket ticket = 0;
+  RequestId request_id = 0;
 };
-/// What was asked for under `ticket` has been done, or why not.
-struct Answered {
-  Ticket ticket;
+/// What was asked for under `request_id` has been done, or why not.
+struct RequestDone {
+  RequestId request_id;
   Result<std::string> result;
 };
 /// What a job's folder says now; a new job, or one that changed in other ways than by being scanned.
-struct JobKnown {
+struct JobUpdated {
   std::shared_ptr<const JobInfo> info;
 };
 struct JobRemoved {
   std::string job;
 };
 /// The job has the rig: it goes on after `stored` views of `pose`.
-struct JobBegun {
+struct JobStarted {
   std::string job;
   int pose, stored;
 };
 /// The job was not begun: the disk is too full. It stays queued.
-struct JobNotBegun {
+struct JobNotStarted {
   std::string job;
   Error why;
 };
@@ -163,12 +163,12 @@ struct JobUnreadable {
   std::string job;
   Error why;
 };
-struct ClosureTaken {
+struct CheckViewTaken {
   std::shared_ptr<const TakenView> view;
 };
-struct ClosureJudged {
+struct MovementChecked {
   std::string job;
-  Closure closure;
+  MovementCheck movement_check;
 };
 struct FlipTimedOut {
   std::string job;
@@ -176,7 +176,7 @@ struct FlipTimedOut {
 struct ViewStored {
   ViewId id;
   double measured_deg;
-  std::vector<Error> spoilt{};  ///< exposures that were taken again, and why
+  std::vector<Error> retake_reasons{};  ///< exposures that were taken again, and why
   double commanded_deg = 0.0;
   double settling_ms = 0.0;
   std::vector<std::string> config_sha256{};  ///< of all configurations that the job's views were taken under
@@ -195,7 +195,7 @@ struct StoreFailed {
   std::string job;
   Error error;
 };
-struct DiskSeen {
+struct DiskChecked {
   std::optional<Error> problem{};
 };  ///< the jobs' disk has stopped answering, or answers again
 struct StageProgress {
@@ -208,26 +208,26 @@ struct ReconstructionFailed {
   bool quarantined = false;  ///< it was not tried
 };
 struct ModelReady {
-  std::string job, model, report;        ///< paths of the files
-  std::optional<Error> beyond_limits{};  ///< why it does not pass
+  std::string job, model, report;          ///< paths of the files
+  std::optional<Error> limit_violation{};  ///< why it does not pass
 };
 /// The daemon is to begin again under a new configuration; taken only while nothing is being done.
-struct ReloadAsked {
+struct ReloadRequested {
   std::string still_doing{};  ///< what goes on beside the rig; empty: nothing
 };
 struct Shutdown {};
 }  // namespace event
 
 using Event =
-    std::variant<event::PanelFound, event::InputsSeen, event::Pressed, event::EstopChanged, event::GuardChanged,
+    std::variant<event::PanelFound, event::InputsRead, event::Pressed, event::EstopChanged, event::GuardChanged,
                  event::WarningOver, event::EstopWindowOver, event::StopRetryDue, event::CheckDue, event::QuietHours,
-                 event::WarmingUp, event::DevicesSeen, event::CalibrationSeen, event::MaintenanceAsked, event::Jogged,
-                 event::Pulsed, event::Homed, event::ViewTaken, event::Stopped, event::RigFailed, event::StopFailed,
-                 event::PanelFailed, event::Ordered, event::JobAsked, event::Answered, event::JobKnown,
-                 event::JobRemoved, event::JobBegun, event::JobNotBegun, event::JobUnreadable, event::ClosureTaken,
-                 event::ClosureJudged, event::FlipTimedOut, event::ViewStored, event::PoseStored, event::JobClosed,
-                 event::StoreFailed, event::DiskSeen, event::StageProgress, event::ReconstructionFailed,
-                 event::ModelReady, event::ReloadAsked, event::Shutdown>;
+                 event::WarmingUp, event::DevicesChecked, event::CalibrationChecked, event::MaintenanceRequested,
+                 event::Jogged, event::Pulsed, event::Homed, event::ViewTaken, event::Stopped, event::RigFailed,
+                 event::StopFailed, event::PanelFailed, event::JobsOrdered, event::JobRequested, event::RequestDone,
+                 event::JobUpdated, event::JobRemoved, event::JobStarted, event::JobNotStarted, event::JobUnreadable,
+                 event::CheckViewTaken, event::MovementChecked, event::FlipTimedOut, event::ViewStored,
+                 event::PoseStored, event::JobClosed, event::StoreFailed, event::DiskChecked, event::StageProgress,
+                 event::ReconstructionFailed, event::ModelReady, event::ReloadRequested, event::Shutdown>;
 
 /// What is to be done about it. None of them waits.
 namespace action {
@@ -235,8 +235,8 @@ struct Warn {};            ///< WarningOver comes after the warning time
 struct WaitForEstop {};    ///< EstopWindowOver comes after the window
 struct RetryStopLater {};  ///< StopRetryDue comes after a while
 struct CheckLater {};      ///< CheckDue comes after a while
-struct CheckDevices {};    ///< answered by DevicesSeen
-/// Is it of the rig's cameras? Answered by CalibrationSeen.
+struct CheckDevices {};    ///< answered by DevicesChecked
+/// Is it of the rig's cameras? RequestDone by CalibrationChecked.
 struct CheckCalibration {
   std::string job;  ///< whose views were taken with it; empty: the rig's, for a scan that has none yet
 };
@@ -252,34 +252,34 @@ struct TestLamps {};
 struct TakeView {
   ViewId id;
   Degrees angle;
-  bool closure = false;  ///< view 0 again, for comparison: answered by ClosureTaken instead of ViewTaken
+  bool movement_check = false;  ///< view 0 again, for comparison: answered by CheckViewTaken instead of ViewTaken
 };
 struct WaitForFlip {
   std::string job;
   std::chrono::minutes limit;
 };  ///< FlipTimedOut comes after it
-/// Job folders in the state queued, one after the other. Each is told as JobKnown.
+/// Job folders in the state queued, one after the other. Each is told as JobUpdated.
 struct CreateJobs {
   std::vector<std::string> ids;
   Recipe recipe;
   std::string part;
   std::int64_t place;  ///< of the first
-  Ticket ticket;
+  RequestId request_id;
 };
-struct BeginJob {
+struct StartJob {
   std::string job;
-};  ///< answered by JobBegun, JobNotBegun or JobUnreadable
+};  ///< answered by JobStarted, JobNotStarted or JobUnreadable
 struct MoveJob {
   std::string job;
   std::int64_t place;
   bool resume;  ///< an interrupted job is queued again
-  Ticket ticket;
+  RequestId request_id;
 };
 /// Everything else somebody wants done with a job that does not have the rig.
-struct KeepJob {
-  event::JobAsked asked;
+struct RunJobRequest {
+  event::JobRequested asked;
 };
-struct JudgeClosure {
+struct CheckMovement {
   std::shared_ptr<const TakenView> view;
 };
 struct StoreView {
@@ -303,7 +303,7 @@ struct CloseJob {
 using Action = std::variant<action::Warn, action::WaitForEstop, action::RetryStopLater, action::CheckLater,
                             action::CheckDevices, action::CheckCalibration, action::Home, action::StopRig, action::Jog,
                             action::Pulse, action::TestLamps, action::TakeView, action::WaitForFlip, action::CreateJobs,
-                            action::BeginJob, action::MoveJob, action::KeepJob, action::JudgeClosure, action::StoreView,
-                            action::FinishPose, action::ResumeJob, action::CloseJob>;
+                            action::StartJob, action::MoveJob, action::RunJobRequest, action::CheckMovement,
+                            action::StoreView, action::FinishPose, action::ResumeJob, action::CloseJob>;
 
 }  // namespace scanrig

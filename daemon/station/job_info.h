@@ -15,7 +15,7 @@ struct StoredView {
   int pose = 0;
   int view = 0;
   double measured_deg = 0.0;
-  std::vector<Error> spoilt{};  ///< exposures that were taken again, and why
+  std::vector<Error> retake_reasons{};  ///< exposures that were taken again, and why
   double commanded_deg = 0.0;
   double settling_ms = 0.0;  ///< from in-position to still
 };
@@ -25,13 +25,13 @@ struct StageShare {
   double fraction = 0.0;
 };
 
-/// What view 0, taken again, says about the views since: a closure shot, or the check before a job is resumed.
-struct Closure {
+/// What view 0, taken again, says about the views since: a movement check, or the check before a job is resumed.
+struct MovementCheck {
   int pose = 0;
-  double shift_px = 0.0;        ///< of what is seen, the larger of both cameras
-  double changed = 0.0;         ///< share of what is seen that looks different, 0 to 1
-  bool unmoved = true;          ///< object, table and cameras are where they were
-  std::vector<Error> spoilt{};  ///< exposures that were taken again, and why
+  double shift_px = 0.0;                ///< of what is seen, the larger of both cameras
+  double changed = 0.0;                 ///< share of what is seen that looks different, 0 to 1
+  bool unmoved = true;                  ///< object, table and cameras are where they were
+  std::vector<Error> retake_reasons{};  ///< exposures that were taken again, and why
 };
 
 /// What is known of one job.
@@ -45,7 +45,7 @@ struct JobInfo {
   int complete = 0;        ///< poses whose views are all there
   std::vector<StoredView> stored{};
   std::vector<std::string> config_sha256{};  ///< of each configuration they were taken under
-  std::vector<Closure> closures{};
+  std::vector<MovementCheck> movement_checks{};
   bool resumable = false;            ///< interrupted, and the missing views may still be taken
   bool quarantined = false;          ///< two daemons died over its reconstruction: only `reprocess` tries again
   bool exported = false;             ///< somebody has what he needs of it
@@ -60,7 +60,7 @@ struct JobInfo {
 inline bool has_views(const JobInfo& job) { return job.complete > 0 || !job.stored.empty(); }
 
 /// A job that was to be begun, and why it was not.
-struct NotBegun {
+struct NotStarted {
   std::string job;
   Error why;
 };

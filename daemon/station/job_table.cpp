@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
-#include "daemon/overloaded.h"
+#include "daemon/runtime/overloaded.h"
 
 namespace scanrig {
 namespace {
@@ -46,9 +46,9 @@ std::optional<JobEnd> update(JobTable& table, const Event& event) {
   const auto change = [&](const std::string& id, const auto& how) { ended = scanrig::change(table, id, how); };
   std::visit(
       Overloaded{
-          [&](const event::JobKnown& e) { ended = replace(table[e.info->id], e.info); },
+          [&](const event::JobUpdated& e) { ended = replace(table[e.info->id], e.info); },
           [&](const event::JobRemoved& e) { table.erase(e.job); },
-          [&](const event::JobBegun& e) {
+          [&](const event::JobStarted& e) {
             change(e.job, [](JobInfo& job) {
               if (is_final(job.state)) return;  // it was closed before the disk had let it begin
               job.state = JobState::scanning;
@@ -63,13 +63,14 @@ std::optional<JobEnd> update(JobTable& table, const Event& event) {
               job.error = e.why;
             });
           },
-          [&](const event::ClosureJudged& e) {
-            change(e.job, [&](JobInfo& job) { job.closures.push_back(e.closure); });
+          [&](const event::MovementChecked& e) {
+            change(e.job, [&](JobInfo& job) { job.movement_checks.push_back(e.movement_check); });
           },
           [&](const event::ViewStored& e) {
             change(e.id.job, [&](JobInfo& job) {
               if (!is_final(job.state)) job.state = JobState::scanning;
-              job.stored.push_back({e.id.pose, e.id.view, e.measured_deg, e.spoilt, e.commanded_deg, e.settling_ms});
+              job.stored.push_back(
+                  {e.id.pose, e.id.view, e.measured_deg, e.retake_reasons, e.commanded_deg, e.settling_ms});
               job.config_sha256 = e.config_sha256;
             });
           },
@@ -90,8 +91,8 @@ std::optional<JobEnd> update(JobTable& table, const Event& event) {
           [&](const event::ModelReady& e) {
             change(e.job, [&](JobInfo& job) {
               std::tie(job.state, job.model, job.report) = std::tuple(JobState::done, e.model, e.report);
-              job.passed = !e.beyond_limits;
-              job.error = e.beyond_limits;
+              job.passed = !e.limit_violation;
+              job.error = e.limit_violation;
             });
           },
           [](const auto&) {},  // concerns the machine only
@@ -103,7 +104,8 @@ std::optional<JobEnd> update(JobTable& table, const Event& event) {
 std::optional<JobEnd> close(JobTable& table, const action::CloseJob& task) {
   return change(table, task.job, [&](JobInfo& job) {
     std::tie(job.state, job.error) = std::tuple(task.state, task.why);
-    job.resumable = task.state == JobState::interrupted && std::ranges::all_of(job.closures, &Closure::unmoved);
+    job.resumable =
+        task.state == JobState::interrupted && std::ranges::all_of(job.movement_checks, &MovementCheck::unmoved);
   });
 }
 

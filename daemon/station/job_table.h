@@ -19,7 +19,7 @@ struct JobEnd {
 };
 
 /// The table after `event`, and the job that ended with it. Jobs the table does not know are ignored, except in
-/// JobKnown.
+/// JobUpdated.
 std::optional<JobEnd> update(JobTable& table, const Event& event);
 
 /// The table once `task` is handed out: to whoever looks the job has ended, however long its disk takes to note it.

@@ -1,28 +1,28 @@
 #include <cmath>
 
-#include "daemon/station/machine.h"
+#include "daemon/station/step_builder.h"
 
 namespace scanrig {
 namespace {
 
-using What = event::MaintenanceAsked::What;
+using What = event::MaintenanceRequested::What;
 
-void begin(Machine& m) {
+void begin(StepBuilder& m) {
   auto& s = m.s();
-  if (s.machine == MachineState::maintenance) return m.refuse(ErrorCode::refused, "Maintenance mode is on already.");
+  if (s.machine == MachineState::maintenance) return m.refuse(ErrorCode::refused, "Maintenance mode is already on.");
   const bool idle =
       s.machine == MachineState::halted || s.machine == MachineState::error || s.machine == MachineState::ready;
-  if (!idle || s.activity != Activity::none || s.may_be_moving || s.unnamed) {
-    return m.refuse(ErrorCode::busy, "Maintenance begins when the rig is idle: it is {} ({}).", to_string(s.machine),
+  if (!idle || s.activity != Activity::none || s.may_be_moving || s.unclassified) {
+    return m.refuse(ErrorCode::busy, "The rig is busy ({}, {}). Try again when idle.", to_string(s.machine),
                     to_string(s.activity));
   }
   s.maintenance = Maintenance{.before = s.machine, .homed = s.machine == MachineState::ready};
-  s.home_by_guard = false;
-  m.enter(MachineState::maintenance, "Maintenance was asked for.");
+  s.auto_home_allowed = false;
+  m.enter(MachineState::maintenance, "Maintenance was requested.");
 }
 
 /// Only who found the table homed and has moved nothing may go on scanning.
-void end(Machine& m) {
+void end(StepBuilder& m) {
   auto& s = m.s();
   const auto& was = *s.maintenance;
   const bool still_ready = was.before == MachineState::ready && !was.moved;
@@ -32,13 +32,13 @@ void end(Machine& m) {
 }
 
 /// Whoever lets the table move in maintenance stands at the panel, or there is a guard between him and the table.
-void jog(Machine& m, const event::MaintenanceAsked& asked) {
+void jog(StepBuilder& m, const event::MaintenanceRequested& asked) {
   auto& maintenance = *m.s().maintenance;
-  if (!m.safe_to_move()) return;
+  if (!m.require_safe()) return;
   if (!m.rules().guard && !maintenance.consent) {
-    return m.refuse(ErrorCode::refused, "Without a guard somebody must stand at the panel: press Reset there first.");
+    return m.refuse(ErrorCode::refused, "No guard: press Reset at the panel first.");
   }
-  if (!maintenance.homed) return m.refuse(ErrorCode::not_homed, "The table is not homed: press Reset first.");
+  if (!maintenance.homed) return m.refuse(ErrorCode::not_homed, "The table is not homed. Press Reset first.");
   if (!std::isfinite(asked.angle.value) || !(asked.speed.value > 0) || asked.speed > kMaxJogSpeed) {
     return m.refuse(ErrorCode::out_of_range, "A jog is an angle and a speed of more than 0 and at most {} deg/s.",
                     kMaxJogSpeed.value);
@@ -49,12 +49,12 @@ void jog(Machine& m, const event::MaintenanceAsked& asked) {
 
 }  // namespace
 
-void ask_maintenance(Machine& m, const event::MaintenanceAsked& asked) {
-  if (m.s().shutting_down) return m.refuse(ErrorCode::refused, "The daemon is shutting down.");
+void ask_maintenance(StepBuilder& m, const event::MaintenanceRequested& asked) {
+  if (m.s().shutting_down) return m.refuse(ErrorCode::refused, "The service is shutting down.");
   if (asked.what == What::on) return begin(m);
-  if (!m.s().maintenance) return m.refuse(ErrorCode::refused, "Maintenance mode is off: switch it on first.");
+  if (!m.s().maintenance) return m.refuse(ErrorCode::refused, "Maintenance mode is off. Switch it on first.");
   if (m.s().activity != Activity::none) {
-    return m.refuse(ErrorCode::busy, "The rig is {}: wait, or press Stop.", to_string(m.s().activity));
+    return m.refuse(ErrorCode::busy, "The rig is busy ({}): wait or press Stop.", to_string(m.s().activity));
   }
   switch (asked.what) {
     case What::on: break;  // above
@@ -66,10 +66,10 @@ void ask_maintenance(Machine& m, const event::MaintenanceAsked& asked) {
   }
 }
 
-void reset_in_maintenance(Machine& m, Origin origin) {
+void reset_in_maintenance(StepBuilder& m, Origin origin) {
   if (m.s().activity != Activity::none) return m.refuse(ErrorCode::busy, "The rig is {}.", to_string(m.s().activity));
   if (origin == Origin::remote && !m.remote_may_move("homing")) return;
-  if (!m.safe_to_move()) return;
+  if (!m.require_safe()) return;
   auto& maintenance = *m.s().maintenance;
   if (origin == Origin::panel) {
     m.s().latched = false;
@@ -77,18 +77,18 @@ void reset_in_maintenance(Machine& m, Origin origin) {
   }
   maintenance.jog.reset();
   maintenance.homed = false;
-  m.s().cause = "Homing was asked for.";
+  m.s().cause = "Homing was requested.";
   m.warn();
 }
 
-void stop_in_maintenance(Machine& m) {
+void stop_in_maintenance(StepBuilder& m) {
   if (!m.may_move()) return m.refuse(ErrorCode::refused, "Nothing is moving.");
   m.s().maintenance->homed = false;
   m.s().cause = "Stop was pressed.";
   m.stop_rig();
 }
 
-void move_in_maintenance(Machine& m) {
+void move_in_maintenance(StepBuilder& m) {
   auto& maintenance = *m.s().maintenance;
   maintenance.moved = true;
   if (maintenance.jog) {

@@ -1,16 +1,16 @@
 #include <algorithm>
 
-#include "daemon/station/machine.h"
+#include "daemon/station/step_builder.h"
 
 namespace scanrig {
 namespace {
 
 using Queue = std::vector<std::shared_ptr<const JobInfo>>;
-using What = event::JobAsked::What;
+using What = event::JobRequested::What;
 
-constexpr int kMostRepeats = 100;
-constexpr std::size_t kLongestPart = 200;
-constexpr auto kTurnedOver = "The line says that the object was turned over.";
+constexpr int kMaxRepeats = 100;
+constexpr std::size_t kMaxPartLength = 200;
+constexpr auto kTurnedOver = "The automation reports that the part was turned over.";
 
 Queue::iterator find(Queue& queue, const std::string& job) {
   return std::ranges::find_if(queue, [&](const auto& queued) { return queued->id == job; });
@@ -27,11 +27,11 @@ std::int64_t first_place(const StationState& s) { return s.queue.empty() ? 0 : s
 bool goes_on_by_itself(const StationState& s) { return !s.queue.empty() && s.queue.front()->recipe.start_on_part; }
 
 /// Waiting for a part is of use only while a job is there for it.
-void look_at_queue(Machine& m) {
+void look_at_queue(StepBuilder& m) {
   auto& s = m.s();
   if (s.activity != Activity::waiting_for_part) return;
   if (s.failures >= kFailuresThatStop) {
-    m.enter(MachineState::ready, fmt::format("{} jobs in a row failed, so the queue stopped.", s.failures));
+    m.enter(MachineState::ready, fmt::format("{} jobs in a row failed: the queue has stopped.", s.failures));
   } else if (!goes_on_by_itself(s)) {
     m.enter(MachineState::ready, s.cause);
   }
@@ -39,46 +39,45 @@ void look_at_queue(Machine& m) {
 
 }  // namespace
 
-void take_order(Machine& m, const event::Ordered& asked) {
-  if (m.s().shutting_down) return m.refuse(ErrorCode::refused, "The daemon is shutting down.");
-  if (!m.disk_answers()) return;
+void take_order(StepBuilder& m, const event::JobsOrdered& asked) {
+  if (m.s().shutting_down) return m.refuse(ErrorCode::refused, "The service is shutting down.");
+  if (!m.require_disk()) return;
   const auto recipe = m.rules().recipes.find(asked.order.recipe);
   if (recipe == m.rules().recipes.end()) {
-    return m.refuse(ErrorCode::not_found, "There is no recipe \"{}\": name one of rig.toml.", asked.order.recipe);
+    return m.refuse(ErrorCode::not_found, "There is no recipe \"{}\". Use one of rig.toml.", asked.order.recipe);
   }
-  if (asked.order.repeat < 1 || asked.order.repeat > kMostRepeats) {
-    return m.refuse(ErrorCode::invalid_input, "repeat is {}, but must be 1 to {}.", asked.order.repeat, kMostRepeats);
+  if (asked.order.repeat < 1 || asked.order.repeat > kMaxRepeats) {
+    return m.refuse(ErrorCode::invalid_input, "repeat is {}, but must be 1 to {}.", asked.order.repeat, kMaxRepeats);
   }
-  if (asked.order.part.size() > kLongestPart) {
-    return m.refuse(ErrorCode::invalid_input, "The part id is longer than {} bytes.", kLongestPart);
+  if (asked.order.part.size() > kMaxPartLength) {
+    return m.refuse(ErrorCode::invalid_input, "The part id is longer than {} bytes.", kMaxPartLength);
   }
-  m.act(action::CreateJobs{asked.fresh_ids, recipe->second, asked.order.part, last_place(m.s()) + 1, asked.ticket});
+  m.act(action::CreateJobs{asked.new_ids, recipe->second, asked.order.part, last_place(m.s()) + 1, asked.request_id});
 }
 
-void ask_job(Machine& m, const event::JobAsked& asked) {
+void ask_job(StepBuilder& m, const event::JobRequested& asked) {
   auto& s = m.s();
-  if (s.shutting_down) return m.refuse(ErrorCode::refused, "The daemon is shutting down.");
-  if (!m.disk_answers()) return;
-  if (m.has(asked.job)) {
-    return m.refuse(ErrorCode::busy, "Job {} has the rig: press Stop first, or wait.", asked.job);
+  if (s.shutting_down) return m.refuse(ErrorCode::refused, "The service is shutting down.");
+  if (!m.require_disk()) return;
+  if (m.is_active(asked.job)) {
+    return m.refuse(ErrorCode::busy, "Job {} is active: wait or press Stop.", asked.job);
   }
   const bool queued = find(s.queue, asked.job) != s.queue.end();
   const bool for_waiting = asked.what == What::to_front || asked.what == What::cancel;
   if (asked.what == What::to_front && !queued) {
-    return m.refuse(ErrorCode::refused, "Job {} is not in the queue.", asked.job);
+    return m.refuse(ErrorCode::refused, "Job {} is not queued.", asked.job);
   }
-  if (queued && !for_waiting)
-    return m.refuse(ErrorCode::refused, "Job {} is in the queue: cancel it first.", asked.job);
+  if (queued && !for_waiting) return m.refuse(ErrorCode::refused, "Job {} is queued: cancel it first.", asked.job);
   if (asked.what == What::to_front || asked.what == What::resume) {
-    return m.act(action::MoveJob{asked.job, first_place(s) - 1, asked.what == What::resume, asked.ticket});
+    return m.act(action::MoveJob{asked.job, first_place(s) - 1, asked.what == What::resume, asked.request_id});
   }
-  m.act(action::KeepJob{asked});
+  m.act(action::RunJobRequest{asked});
 }
 
-void job_known(Machine& m, const std::shared_ptr<const JobInfo>& info) {
+void job_updated(StepBuilder& m, const std::shared_ptr<const JobInfo>& info) {
   auto& s = m.s();
-  if (m.has(info->id)) return;  // a fresh job that already has the rig
-  s.unjudged.erase(info->id);   // cancelled
+  if (m.is_active(info->id)) return;  // a fresh job that already has the rig
+  s.unjudged.erase(info->id);         // cancelled
   leave_queue(s, info->id);
   if (info->state != JobState::queued) return look_at_queue(m);
   const auto behind =
@@ -87,57 +86,57 @@ void job_known(Machine& m, const std::shared_ptr<const JobInfo>& info) {
   if (s.queue.front() == info) m.act(action::CheckCalibration{calibrated_job(s)});
 }
 
-void job_removed(Machine& m, const std::string& job) {
+void job_removed(StepBuilder& m, const std::string& job) {
   m.s().unjudged.erase(job);
   leave_queue(m.s(), job);
   look_at_queue(m);
 }
 
-void begin_next_job(Machine& m, const std::string& fresh_job_id, std::string cause) {
+void start_next_job(StepBuilder& m, const std::string& new_job_id, std::string cause) {
   auto& s = m.s();
-  s.not_begun.reset();
+  s.not_started.reset();
   if (s.queue.empty()) {
-    s.job = ActiveJob{.id = fresh_job_id, .recipe = m.rules().recipes.at("default")};
-    m.act(action::CreateJobs{{fresh_job_id}, s.job->recipe, "", 0, 0});
+    s.job = ActiveJob{.id = new_job_id, .recipe = m.rules().recipes.at("default")};
+    m.act(action::CreateJobs{{new_job_id}, s.job->recipe, "", 0, 0});
   } else {
     const auto& head = *s.queue.front();
     s.job = ActiveJob{.id = head.id, .recipe = head.recipe, .part = head.part};
     s.queue.erase(s.queue.begin());
   }
-  s.put_on_last = s.job->id;
+  s.last_started_job = s.job->id;
   s.unjudged.insert(s.job->id);
   s.machine = s.job->recipe.start_on_part ? MachineState::continuous_execution : MachineState::single_execution;
   s.cause = std::move(cause);
-  m.act(action::BeginJob{s.job->id});
+  m.act(action::StartJob{s.job->id});
   m.warn();
 }
 
-void job_not_begun(Machine& m, const event::JobNotBegun& e) {
-  auto& not_begun = m.s().not_begun;
-  if (!not_begun || not_begun->job != e.job) not_begun = {e.job, e.why};  // what came first is the reason
-  if (!m.has(e.job)) return;
+void job_not_started(StepBuilder& m, const event::JobNotStarted& e) {
+  auto& not_started = m.s().not_started;
+  if (!not_started || not_started->job != e.job) not_started = {e.job, e.why};  // what came first is the reason
+  if (!m.is_active(e.job)) return;
   m.s().job.reset();
   m.s().disk_trouble = e.why.code == ErrorCode::io;
   if (m.s().activity != Activity::warning && m.s().activity != Activity::scanning) return;  // a fault came first
-  m.enter(MachineState::ready, fmt::format("Job {} was not begun: {}.", e.job, e.why.message));
+  m.enter(MachineState::ready, fmt::format("Job {} did not start: {}.", e.job, e.why.message));
 }
 
 /// One damaged folder stops no line. The part on the table is meant for this job: the next one begins with it only
 /// where it was ordered in the same words, and waits for its own otherwise.
-void job_unreadable(Machine& m, const event::JobUnreadable& e) {
-  if (!m.has(e.job)) return;
+void job_unreadable(StepBuilder& m, const event::JobUnreadable& e) {
+  if (!m.is_active(e.job)) return;
   auto& s = m.s();
   const auto job = *std::exchange(s.job, std::nullopt);
   count_result(m, job.id, false);
   if (s.activity != Activity::warning && s.activity != Activity::scanning) return;  // a fault came first
-  auto cause = fmt::format("Job {} is set aside, its folder is damaged: {}.", e.job, e.why.message);
+  auto cause = fmt::format("Job {} failed, its folder is damaged: {}.", e.job, e.why.message);
   const bool same = !s.queue.empty() && s.queue.front()->stored.empty() && s.queue.front()->part == job.part &&
                     s.queue.front()->recipe == job.recipe;
-  if (same && s.failures < kFailuresThatStop) return begin_next_job(m, {}, std::move(cause));
-  free_rig(m, std::move(cause));
+  if (same && s.failures < kFailuresThatStop) return start_next_job(m, {}, std::move(cause));
+  release_rig(m, std::move(cause));
 }
 
-void free_rig(Machine& m, std::string cause) {
+void release_rig(StepBuilder& m, std::string cause) {
   auto& s = m.s();
   if (s.machine != MachineState::continuous_execution) return m.enter(MachineState::ready, std::move(cause));
   s.activity = Activity::waiting_for_part;
@@ -146,26 +145,26 @@ void free_rig(Machine& m, std::string cause) {
   look_at_queue(m);
 }
 
-void count_result(Machine& m, const std::string& job, bool good) {
+void count_result(StepBuilder& m, const std::string& job, bool good) {
   if (m.s().unjudged.erase(job) == 0) return;
   m.s().failures = good ? 0 : m.s().failures + 1;
   look_at_queue(m);
 }
 
-void inputs_seen(Machine& m, const PanelInputs& inputs) {
+void inputs_read(StepBuilder& m, const PanelInputs& inputs) {
   auto& s = m.s();
   const bool turned_over = inputs.flipped && !s.inputs.flipped;
   s.inputs = inputs;
   if (!inputs.part_present) s.part_gone = true;
-  if (s.activity == Activity::waiting_for_flip && s.job->recipe.flip_by_line && turned_over) {
+  if (s.activity == Activity::waiting_for_flip && s.job->recipe.flip_by_signal && turned_over) {
     s.job->turned_over = true;
     s.cause = kTurnedOver;
     if (const char* const why_not = m.unsafe()) s.cause += fmt::format(" {}", why_not);
   }
-  serve_line(m);
+  handle_part_signals(m);
 }
 
-void serve_line(Machine& m) {
+void handle_part_signals(StepBuilder& m) {
   auto& s = m.s();
   if (s.activity == Activity::waiting_for_flip && s.job->turned_over && !m.unsafe() && !m.absent_device()) {
     return continue_after_flip(m, kTurnedOver);
@@ -174,7 +173,7 @@ void serve_line(Machine& m) {
   if (s.quiet || s.warm_up_left > std::chrono::seconds(0) || s.disk_problem) return;
   if (!goes_on_by_itself(s) || s.shutting_down || m.unsafe() || m.absent_device()) return;
   if (calibration_problem(s)) return;
-  begin_next_job(m, {}, "A new part is on the table.");
+  start_next_job(m, {}, "A new part is on the table.");
 }
 
 }  // namespace scanrig

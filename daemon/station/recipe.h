@@ -8,8 +8,8 @@ namespace scanrig {
 
 /// What a model must reach to be passed.
 struct Limits {
-  std::optional<double> least_measured_share{};  ///< of the model's area that cameras saw, 0 to 1
-  std::optional<double> most_residual_mm{};      ///< median distance between a pose's views, the worst pose
+  std::optional<double> min_measured_share{};  ///< of the model's area that cameras saw, 0 to 1
+  std::optional<double> max_residual_mm{};     ///< median distance between a pose's views, the worst pose
   bool operator==(const Limits&) const = default;
 };
 
@@ -19,7 +19,7 @@ struct Recipe {
   int poses = 2;
   int views = 8;                          ///< a pose, at equal angles
   std::chrono::minutes flip_timeout{30};  ///< then the job is parked and the rig is free
-  bool flip_by_line = false;              ///< the panel's `flipped` input says that the object was turned over
+  bool flip_by_signal = false;            ///< the panel's `flipped` input says that the object was turned over
   bool start_on_part = false;             ///< the queue goes on when `part_present` falls and rises again
   Limits limits{};
   bool operator==(const Recipe&) const = default;

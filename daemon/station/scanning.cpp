@@ -1,18 +1,18 @@
-#include "daemon/station/machine.h"
+#include "daemon/station/step_builder.h"
 
 namespace scanrig {
 namespace {
 
-constexpr int kMostUnstored = 2;  ///< views in memory only; a power cut costs no more
+constexpr int kMaxUnstored = 2;  ///< views in memory only; a power cut costs no more
 
-void finish_pose(Machine& m) {
+void finish_pose(StepBuilder& m) {
   const auto& job = *m.s().job;
   m.s().activity = Activity::storing;
   m.act(action::FinishPose{job.id, job.pose, job.pose + 1 == job.recipe.poses});
 }
 
 /// What the views of this pose show does not belong together: no model can come of them.
-void moved(Machine& m, const Closure& closure) {
+void moved(StepBuilder& m, const MovementCheck& movement_check) {
   const auto& job = *m.s().job;
   const bool resuming = job.taken < job.recipe.views;
   const Error why{
@@ -20,24 +20,24 @@ void moved(Machine& m, const Closure& closure) {
       fmt::format(
           "the object, the table or a camera has moved during pose {}: view 0, taken again, is off by {} px and "
           "differs on {:.0f} % of what it shows; scan the object again",
-          job.pose + 1, closure.shift_px > 1.0 ? "more than 1" : fmt::format("{:.2f}", closure.shift_px),
-          100 * closure.changed)};
+          job.pose + 1, movement_check.shift_px > 1.0 ? "more than 1" : fmt::format("{:.2f}", movement_check.shift_px),
+          100 * movement_check.changed)};
   const std::string cause = fmt::format("Job {}: {}.", job.id, why.message);
   if (!resuming) count_result(m, job.id, false);
   m.close_job(resuming ? JobState::interrupted : JobState::failed, why);
-  free_rig(m, cause);
+  release_rig(m, cause);
 }
 
 /// No use turning the object over.
-void fail_before_flip(Machine& m) {
+void fail_before_flip(StepBuilder& m) {
   const auto job = *m.s().job;
   m.close_job(JobState::failed, *job.reconstruction);
-  free_rig(m, fmt::format("Job {} failed.", job.id));
+  release_rig(m, fmt::format("Job {} failed.", job.id));
 }
 
 /// A disk that takes nothing more is no fault of the rig: what moves is stopped, as by Stop, and nothing latches. What
 /// is stored stays, and with room again the job can be resumed.
-void interrupt(Machine& m, const Error& why, const char* then) {
+void interrupt(StepBuilder& m, const Error& why, const char* then) {
   const auto id = m.s().job->id;
   const bool begun = m.s().job->state != JobState::queued;
   m.close_job(JobState::interrupted, why);
@@ -46,30 +46,30 @@ void interrupt(Machine& m, const Error& why, const char* then) {
       fmt::format("Job {} {}: {}{}.", id, begun ? "is interrupted" : "was not begun", why.message, begun ? then : "");
   if (m.s().activity != Activity::scanning) return m.enter(MachineState::ready, std::move(cause));  // nothing moves
   m.s().machine = MachineState::halted;
-  m.s().home_by_guard = false;
+  m.s().auto_home_allowed = false;
   m.s().cause = std::move(cause);
   m.stop_rig();
 }
 
 }  // namespace
 
-void job_begun(Machine& m, const event::JobBegun& e) {
-  if (!m.has(e.job)) return;
+void job_started(StepBuilder& m, const event::JobStarted& e) {
+  if (!m.is_active(e.job)) return;
   auto& job = *m.s().job;
   m.s().disk_trouble = false;
   job.state = JobState::scanning;
   job.pose = e.pose;
   job.asked = job.taken = job.stored = e.stored;
-  job.closure_due = e.stored > 0;  // is the object still where the stored views saw it?
+  job.movement_check_due = e.stored > 0;  // is the object still where the stored views saw it?
   take_next_view(m);
 }
 
-void take_next_view(Machine& m) {
+void take_next_view(StepBuilder& m) {
   if (m.s().activity != Activity::scanning || m.s().job->state != JobState::scanning) return;
   auto& job = *m.s().job;
-  if (job.closing || job.asked > job.taken || job.taken - job.stored >= kMostUnstored) return;
-  if (job.closure_due) {
-    job.closure_due = false;
+  if (job.closing || job.asked > job.taken || job.taken - job.stored >= kMaxUnstored) return;
+  if (job.movement_check_due) {
+    job.movement_check_due = false;
     job.closing = true;
     return m.act(action::TakeView{{job.id, job.pose, 0}, {0.0}, true});
   }
@@ -78,43 +78,43 @@ void take_next_view(Machine& m) {
   ++job.asked;
 }
 
-void view_taken(Machine& m, const event::ViewTaken& e) {
+void view_taken(StepBuilder& m, const event::ViewTaken& e) {
   if (m.s().activity != Activity::scanning) return;  // a view that came after Stop is not kept
   auto& job = *m.s().job;
   if (job.taken == job.asked) return;
   ++job.taken;
   m.act(action::StoreView{e.view});
-  job.closure_due = job.taken == job.recipe.views;
+  job.movement_check_due = job.taken == job.recipe.views;
   take_next_view(m);
 }
 
-void view_stored(Machine& m, const event::ViewStored& e) {
-  if (!m.has(e.id.job) || e.id.pose != m.s().job->pose || m.s().job->stored == m.s().job->taken) return;
+void view_stored(StepBuilder& m, const event::ViewStored& e) {
+  if (!m.is_active(e.id.job) || e.id.pose != m.s().job->pose || m.s().job->stored == m.s().job->taken) return;
   ++m.s().job->stored;
   take_next_view(m);
 }
 
-void closure_taken(Machine& m, const event::ClosureTaken& e) {
+void check_view_taken(StepBuilder& m, const event::CheckViewTaken& e) {
   if (m.s().activity != Activity::scanning) return;
   if (m.s().job->taken == m.s().job->recipe.views) m.s().activity = Activity::storing;
-  m.act(action::JudgeClosure{e.view});
+  m.act(action::CheckMovement{e.view});
 }
 
-void closure_judged(Machine& m, const event::ClosureJudged& e) {
+void movement_checked(StepBuilder& m, const event::MovementChecked& e) {
   const bool executing = m.s().activity == Activity::scanning || m.s().activity == Activity::storing;
-  if (!m.has(e.job) || !m.s().job->closing || !executing) return;
+  if (!m.is_active(e.job) || !m.s().job->closing || !executing) return;
   m.s().job->closing = false;
-  if (!e.closure.unmoved) return moved(m, e.closure);
+  if (!e.movement_check.unmoved) return moved(m, e.movement_check);
   if (m.s().job->stored == m.s().job->recipe.views) return finish_pose(m);
   take_next_view(m);
 }
 
-void pose_stored(Machine& m, const event::PoseStored& e) {
+void pose_stored(StepBuilder& m, const event::PoseStored& e) {
   auto& s = m.s();
-  if (!m.has(e.job) || s.activity != Activity::storing || e.pose != s.job->pose) return;
+  if (!m.is_active(e.job) || s.activity != Activity::storing || e.pose != s.job->pose) return;
   if (e.pose + 1 == s.job->recipe.poses) {
     s.job.reset();
-    free_rig(m, fmt::format("Job {} has all its views.", e.job));
+    release_rig(m, fmt::format("Job {} has all its views.", e.job));
   } else if (s.job->reconstruction) {
     fail_before_flip(m);
   } else {
@@ -126,12 +126,12 @@ void pose_stored(Machine& m, const event::PoseStored& e) {
 }
 
 /// A pose that is being scanned is scanned to its end.
-void model_given_up(Machine& m, const Error& why) {
+void model_given_up(StepBuilder& m, const Error& why) {
   m.s().job->reconstruction = why;
   if (m.s().activity == Activity::waiting_for_flip) fail_before_flip(m);
 }
 
-void continue_after_flip(Machine& m, std::string cause) {
+void continue_after_flip(StepBuilder& m, std::string cause) {
   auto& job = *m.s().job;
   job.state = JobState::scanning;
   ++job.pose;
@@ -142,31 +142,30 @@ void continue_after_flip(Machine& m, std::string cause) {
   m.warn();
 }
 
-void store_failed(Machine& m, const event::StoreFailed& e) {
-  if (!m.has(e.job)) return;
+void store_failed(StepBuilder& m, const event::StoreFailed& e) {
+  if (!m.is_active(e.job)) return;
   const bool disk = e.error.code == ErrorCode::io;
   m.s().disk_trouble = disk;
-  if (m.s().job->state == JobState::queued) m.s().not_begun = {e.job, e.error};
-  interrupt(m, e.error, disk ? "; see to the disk, then resume it" : "");
+  if (m.s().job->state == JobState::queued) m.s().not_started = {e.job, e.error};
+  interrupt(m, e.error, disk ? "; check the disk, then resume the job" : "");
 }
 
 /// Whoever has the rig waits for the disk sooner or later; better it ends by its name than by a time-out of its own.
-void disk_seen(Machine& m, const event::DiskSeen& e) {
+void disk_checked(StepBuilder& m, const event::DiskChecked& e) {
   m.s().disk_problem = e.problem;
-  if (!e.problem) return serve_line(m);
+  if (!e.problem) return handle_part_signals(m);
   m.s().disk_trouble = true;
   if (m.s().job) interrupt(m, *e.problem, ", then resume the job");
 }
 
-void flip_timed_out(Machine& m, const event::FlipTimedOut& e) {
-  if (!m.has(e.job) || m.s().activity != Activity::waiting_for_flip) return;
+void flip_timed_out(StepBuilder& m, const event::FlipTimedOut& e) {
+  if (!m.is_active(e.job) || m.s().activity != Activity::waiting_for_flip) return;
   const auto limit = m.s().job->recipe.flip_timeout;
   count_result(m, e.job, false);
-  m.close_job(JobState::interrupted,
-              {ErrorCode::timeout, fmt::format("parked: nobody turned the object over within {} min; resume the job to "
-                                               "scan its other side",
-                                               limit.count())});
-  free_rig(m, fmt::format("Job {} is parked: nobody turned the object over.", e.job));
+  m.close_job(
+      JobState::interrupted,
+      {ErrorCode::timeout, fmt::format("parked: part not turned over in {} min; resume the job", limit.count())});
+  release_rig(m, fmt::format("Job {} is parked: the part was not turned over.", e.job));
 }
 
 }  // namespace scanrig

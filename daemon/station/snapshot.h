@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "daemon/station/event_counter.h"
 #include "daemon/station/job_table.h"
 #include "daemon/station/states.h"
-#include "daemon/station/tally.h"
 
 namespace scanrig {
 
@@ -28,7 +28,7 @@ struct Snapshot {
   std::vector<DeviceHealth> devices{};         ///< as of the last check
   std::optional<Error> calibration_problem{};  ///< why the calibration refuses the next scan
   std::string job{};                           ///< the one that has the rig; empty: none
-  std::optional<NotBegun> not_begun{};         ///< by the last Start; until the next one
+  std::optional<NotStarted> not_started{};     ///< by the last Start; until the next one
   std::vector<std::string> queue{};            ///< ids of the jobs to come, the next one first
   JobTable jobs{};
   Counters counters{};

@@ -1,13 +1,13 @@
 #include "daemon/station/transition.h"
 
-#include "daemon/station/machine.h"
+#include "daemon/station/step_builder.h"
 
 namespace scanrig {
 namespace {
 
-class Transition : public Machine {
+class Transition : public StepBuilder {
  public:
-  using Machine::Machine;
+  using StepBuilder::StepBuilder;
 
   void operator()(const event::PanelFound& e) {
     s().panel_known = true;
@@ -21,15 +21,15 @@ class Transition : public Machine {
     if (!e.estop_ok && !s().latched) fault("The e-stop is pressed.");
   }
 
-  void operator()(const event::InputsSeen& e) { inputs_seen(*this, e.inputs); }
+  void operator()(const event::InputsRead& e) { inputs_read(*this, e.inputs); }
 
   void operator()(const event::Pressed& e) {
-    if (s().shutting_down) return refuse(ErrorCode::refused, "The daemon is shutting down.");
+    if (s().shutting_down) return refuse(ErrorCode::refused, "The service is shutting down.");
     const bool remote = e.origin == Origin::remote;
     switch (e.button) {
       case Button::start:
         if (remote && !remote_may_move("start")) return;
-        return start(e.fresh_job_id);
+        return start(e.new_job_id);
       case Button::stop: return s().maintenance ? stop_in_maintenance(*this) : stop();
       case Button::reset:
         if (s().maintenance) return reset_in_maintenance(*this, e.origin);
@@ -41,14 +41,14 @@ class Transition : public Machine {
   void operator()(const event::EstopChanged& e) {
     s().estop_ok = e.ok;
     if (!e.ok) return fault("The e-stop was pressed.");
-    home_if_guarded();
+    auto_home_if_allowed();
   }
 
   void operator()(const event::GuardChanged& e) {
     s().guard_closed = e.closed;
     if (!e.closed && may_move()) return fault("The guard was opened while the table was moving.");
-    home_if_guarded();
-    serve_line(*this);
+    auto_home_if_allowed();
+    handle_part_signals(*this);
   }
 
   void operator()(const event::WarningOver&) {
@@ -72,16 +72,16 @@ class Transition : public Machine {
   void operator()(const event::Jogged& e) {
     if (s().activity != Activity::jogging) return;
     s().maintenance->jog.reset();
-    enter(MachineState::maintenance, fmt::format("The table stands at {:.3f} deg.", e.measured.value));
+    enter(MachineState::maintenance, fmt::format("The table is at {:.3f} deg.", e.measured.value));
   }
 
   void operator()(const event::Pulsed&) {
     if (s().activity == Activity::pulsing) enter(MachineState::maintenance, "The projector has flashed.");
   }
 
-  void operator()(const event::MaintenanceAsked& e) { ask_maintenance(*this, e); }
+  void operator()(const event::MaintenanceRequested& e) { ask_maintenance(*this, e); }
 
-  void operator()(const event::EstopWindowOver&) { name_fault(); }
+  void operator()(const event::EstopWindowOver&) { classify_fault(); }
 
   /// Where nobody knows whether the table moves, stop is asked for again and again: the first frame that gets through.
   void operator()(const event::StopRetryDue&) {
@@ -98,25 +98,25 @@ class Transition : public Machine {
     }
   }
 
-  void operator()(const event::DevicesSeen& e) {
+  void operator()(const event::DevicesChecked& e) {
     s().devices = e.devices;
     act(action::CheckLater{});
-    serve_line(*this);
+    handle_part_signals(*this);
   }
 
-  void operator()(const event::CalibrationSeen& e) {
+  void operator()(const event::CalibrationChecked& e) {
     s().calibration = e;
-    serve_line(*this);
+    handle_part_signals(*this);
   }
 
   void operator()(const event::QuietHours& e) {
     s().quiet = e.quiet;
-    serve_line(*this);
+    handle_part_signals(*this);
   }
 
   void operator()(const event::WarmingUp& e) {
     s().warm_up_left = e.left;
-    serve_line(*this);
+    handle_part_signals(*this);
   }
 
   /// A projector that cannot be reached is an absent device; it does not make the table move.
@@ -125,12 +125,12 @@ class Transition : public Machine {
     if (e.light) set_problem("projector", *e.light);
     stopped();
     if (!s().shutting_down) check();  // what is wrong is shown before somebody presses Start
-    home_if_guarded();
+    auto_home_if_allowed();
   }
 
   void operator()(const event::RigFailed& e) {
     if (s().activity == Activity::stopping || s().machine == MachineState::error) return;  // cut short by the stop
-    fault_unnamed(e);
+    fault_unclassified(e);
   }
 
   /// The first cause stays: an e-stop is an e-stop, whatever a drive without power answers.
@@ -141,7 +141,7 @@ class Transition : public Machine {
     }
     s().machine = MachineState::error;
     s().latched = true;
-    s().home_by_guard = false;
+    s().auto_home_allowed = false;
     s().maintenance.reset();
     s().may_be_moving = true;
     set_problem("turntable", e.error);  // nobody else will ask it now
@@ -156,47 +156,47 @@ class Transition : public Machine {
     if (s().machine != MachineState::error) fault(e.error.message + ".", "panel");
   }
 
-  void operator()(const event::Ordered& e) { take_order(*this, e); }
-  void operator()(const event::JobAsked& e) { ask_job(*this, e); }
-  void operator()(const event::JobKnown& e) { job_known(*this, e.info); }
+  void operator()(const event::JobsOrdered& e) { take_order(*this, e); }
+  void operator()(const event::JobRequested& e) { ask_job(*this, e); }
+  void operator()(const event::JobUpdated& e) { job_updated(*this, e.info); }
   void operator()(const event::JobRemoved& e) { job_removed(*this, e.job); }
-  void operator()(const event::JobBegun& e) { job_begun(*this, e); }
-  void operator()(const event::JobNotBegun& e) { job_not_begun(*this, e); }
+  void operator()(const event::JobStarted& e) { job_started(*this, e); }
+  void operator()(const event::JobNotStarted& e) { job_not_started(*this, e); }
   void operator()(const event::JobUnreadable& e) { job_unreadable(*this, e); }
   void operator()(const event::ViewTaken& e) { view_taken(*this, e); }
   void operator()(const event::ViewStored& e) { view_stored(*this, e); }
-  void operator()(const event::ClosureTaken& e) { closure_taken(*this, e); }
-  void operator()(const event::ClosureJudged& e) { closure_judged(*this, e); }
+  void operator()(const event::CheckViewTaken& e) { check_view_taken(*this, e); }
+  void operator()(const event::MovementChecked& e) { movement_checked(*this, e); }
   void operator()(const event::PoseStored& e) { pose_stored(*this, e); }
   void operator()(const event::FlipTimedOut& e) { flip_timed_out(*this, e); }
 
   void operator()(const event::StoreFailed& e) { store_failed(*this, e); }
-  void operator()(const event::DiskSeen& e) { disk_seen(*this, e); }
+  void operator()(const event::DiskChecked& e) { disk_checked(*this, e); }
 
   void operator()(const event::ReconstructionFailed& e) {
     count_result(*this, e.job, false);
-    if (has(e.job)) model_given_up(*this, e.error);
+    if (is_active(e.job)) model_given_up(*this, e.error);
   }
 
-  void operator()(const event::ModelReady& e) { count_result(*this, e.job, !e.beyond_limits); }
+  void operator()(const event::ModelReady& e) { count_result(*this, e.job, !e.limit_violation); }
 
   /// A latched fault is not to be got rid of by a reload.
-  void operator()(const event::ReloadAsked& e) {
-    constexpr const char* kStays = "The configuration is not read now";
-    if (s().shutting_down) return refuse(ErrorCode::busy, "{}: the daemon is ending or reloading.", kStays);
+  void operator()(const event::ReloadRequested& e) {
+    constexpr const char* kStays = "The configuration is not reloaded";
+    if (s().shutting_down) return refuse(ErrorCode::busy, "{}: the service is ending or reloading.", kStays);
     if (s().machine == MachineState::error) {
-      return refuse(ErrorCode::refused, "{}: see to the fault and press Reset, or restart the daemon.", kStays);
+      return refuse(ErrorCode::refused, "{}: fix the fault, then press Reset at the panel.", kStays);
     }
     const bool idle = s().machine == MachineState::halted || s().machine == MachineState::ready;
     if (!idle || s().activity != Activity::none) {
-      return refuse(ErrorCode::busy, "{}: the station is {} ({}). Try again when it stands idle.", kStays,
+      return refuse(ErrorCode::busy, "{}: the rig is busy ({}, {}). Try again when idle.", kStays,
                     to_string(s().machine), to_string(s().activity));
     }
-    if (!disk_answers()) return;
+    if (!require_disk()) return;
     if (!e.still_doing.empty()) return refuse(ErrorCode::busy, "{}: {}. Try again later.", kStays, e.still_doing);
     s().shutting_down = s().reloading = true;
     s().machine = MachineState::halted;
-    s().cause = "The configuration is read again.";
+    s().cause = "The configuration is reloaded.";
     stop_rig();
   }
 
@@ -204,12 +204,12 @@ class Transition : public Machine {
     s().reloading = false;
     if (s().shutting_down) return;
     s().shutting_down = true;
-    name_fault();
+    classify_fault();
     s().maintenance.reset();
-    close_job(JobState::interrupted, {ErrorCode::stopped, "the daemon was shut down during the scan"});
+    close_job(JobState::interrupted, {ErrorCode::stopped, "the service was shut down during the scan"});
     if (s().machine != MachineState::error) {
       s().machine = MachineState::halted;
-      s().cause = "The daemon is shutting down.";
+      s().cause = "The service is shutting down.";
     }
     stop_rig();
   }
@@ -219,7 +219,7 @@ class Transition : public Machine {
 
   // These concern the list of jobs or whoever asked.
   void operator()(const event::StageProgress&) {}
-  void operator()(const event::Answered&) {}
+  void operator()(const event::RequestDone&) {}
 
  private:
   void stopped() {
@@ -238,23 +238,22 @@ class Transition : public Machine {
     s().devices.push_back({name, error});
   }
 
-  void start(const std::string& fresh_job_id) {
+  void start(const std::string& new_job_id) {
     const bool flipped = s().activity == Activity::waiting_for_flip;
-    if (s().maintenance)
-      return refuse(ErrorCode::refused, "Maintenance mode is on: there are no jobs until it is off.");
+    if (s().maintenance) return refuse(ErrorCode::refused, "Maintenance mode is on. Switch it off to run jobs.");
     if (s().machine == MachineState::halted || s().machine == MachineState::error ||
         s().machine == MachineState::preoperational) {
-      return refuse(ErrorCode::refused, "The station is {}: {} Press Reset first.", to_string(s().machine), s().cause);
+      return refuse(ErrorCode::refused, "The rig is {}: {} Press Reset first.", to_string(s().machine), s().cause);
     }
     const bool free = s().machine == MachineState::ready || s().activity == Activity::waiting_for_part;
     if (!free && !flipped) {
-      return refuse(ErrorCode::busy, "The station is busy ({}).", to_string(s().activity));
+      return refuse(ErrorCode::busy, "The rig is busy ({}). Try again when idle.", to_string(s().activity));
     }
-    if (!safe_to_move() || !all_there() || !disk_answers()) return;
-    if (!flipped && !calibrated()) return;
+    if (!require_safe() || !require_devices() || !require_disk()) return;
+    if (!flipped && !require_calibration()) return;
     s().failures = 0;
-    if (flipped) return continue_after_flip(*this, "The object was turned over.");
-    begin_next_job(*this, fresh_job_id, "Start was pressed.");
+    if (flipped) return continue_after_flip(*this, "The part was turned over.");
+    start_next_job(*this, new_job_id, "Start was pressed.");
   }
 
   void stop() {
@@ -266,7 +265,7 @@ class Transition : public Machine {
     if (!may_move()) return refuse(ErrorCode::refused, "Nothing is moving.");
     close_job(JobState::cancelled, why);
     s().machine = MachineState::halted;
-    s().home_by_guard = false;
+    s().auto_home_allowed = false;
     s().cause = "Stop was pressed.";
     stop_rig();
   }
@@ -274,15 +273,15 @@ class Transition : public Machine {
   void reset(Origin origin) {
     if (s().machine != MachineState::halted && s().machine != MachineState::error) {
       return refuse(s().machine == MachineState::ready ? ErrorCode::refused : ErrorCode::busy,
-                    "There is nothing to reset: the station is {}.", to_string(s().machine));
+                    "Nothing to reset: the rig is {}.", to_string(s().machine));
     }
     if (s().may_be_moving) {
-      return refuse(ErrorCode::busy, "The table may be moving, its drive does not answer: see to power and cable.");
+      return refuse(ErrorCode::busy, "The table may be moving: check the drive's power and cable.");
     }
-    if (s().activity == Activity::stopping || s().unnamed) {
-      return refuse(ErrorCode::busy, "The table has not been seen standing yet: wait a moment.");
+    if (s().activity == Activity::stopping || s().unclassified) {
+      return refuse(ErrorCode::busy, "The table is still stopping: wait.");
     }
-    if (!safe_to_move()) return;
+    if (!require_safe()) return;
     if (origin == Origin::panel) s().latched = false;
     begin_homing("Reset was pressed.");
   }

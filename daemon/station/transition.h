@@ -18,7 +18,7 @@ struct StationRules {
   std::map<std::string, Recipe> recipes{{"default", {}}};  ///< "default" is what Start scans when nothing is queued
   bool remote = false;        ///< the API may start and home while the guard is closed; needs a guard
   bool guard = false;         ///< there is a guard whose contact is wired
-  bool home_guarded = false;  ///< after a restart a closed guard homes the table, without Reset
+  bool auto_home = false;     ///< after a restart a closed guard homes the table, without Reset
   bool manual_light = false;  ///< a hand switches the projector
 };
 
@@ -36,7 +36,7 @@ struct ActiveJob {
   int asked = 0;                          ///< views of this pose the rig was told to take
   int taken = 0;                          ///< views whose four images are in memory
   int stored = 0;                         ///< views that survive a power cut
-  bool closure_due = false;               ///< view 0 has to be taken again before anything else
+  bool movement_check_due = false;        ///< view 0 has to be taken again before anything else
   bool closing = false;                   ///< it is being taken or judged
   bool turned_over = false;               ///< the line has said so since the flip was asked for
   std::optional<Error> reconstruction{};  ///< why there will be no model
@@ -57,29 +57,29 @@ struct StationState {
   bool panel_known = false;  ///< what e-stop and guard say is known
   bool estop_ok = true;
   bool guard_closed = true;
-  bool latched = false;            ///< a fault that only Reset at the panel clears
-  bool home_by_guard = true;       ///< nothing but a restart lies behind us
-  std::optional<Error> unnamed{};  ///< a fault that may turn out to be the e-stop
-  std::string fault_device{};      ///< whose failure the last fault is; empty: nobody's, as of an e-stop
+  bool latched = false;                 ///< a fault that only Reset at the panel clears
+  bool auto_home_allowed = true;        ///< nothing but a restart lies behind us
+  std::optional<Error> unclassified{};  ///< a fault that may turn out to be the e-stop
+  std::string fault_device{};           ///< whose failure the last fault is; empty: nobody's, as of an e-stop
   std::optional<Maintenance> maintenance{};
   PanelInputs inputs{};
   std::optional<Error> panel_problem{};
-  std::vector<DeviceHealth> devices{};   ///< as of the last check
-  event::CalibrationSeen calibration{};  ///< likewise
+  std::vector<DeviceHealth> devices{};      ///< as of the last check
+  event::CalibrationChecked calibration{};  ///< likewise
   bool shutting_down = false;
-  bool reloading = false;                         ///< shutting down to begin again
-  bool finished = false;                          ///< shut down, the rig asked to stop
-  bool may_be_moving = false;                     ///< the last stop was not confirmed
-  std::string cause = "The daemon has started.";  ///< why the machine is in this state
+  bool reloading = false;                          ///< shutting down to begin again
+  bool finished = false;                           ///< shut down, the rig asked to stop
+  bool may_be_moving = false;                      ///< the last stop was not confirmed
+  std::string cause = "The service has started.";  ///< why the machine is in this state
   std::optional<ActiveJob> job;
-  std::string put_on_last{};  ///< the job that was given the rig last; empty: none since the daemon began
+  std::string last_started_job{};  ///< the job that was given the rig last; empty: none since the daemon began
   std::vector<std::shared_ptr<const JobInfo>> queue{};  ///< by place
   int failures = 0;                                     ///< scans in a row without a model that passes
   std::set<std::string> unjudged{};                     ///< scans whose outcome is still to come
   bool quiet = false;                                   ///< quiet hours: no job begins by itself
   std::chrono::seconds warm_up_left{0};                 ///< of the projector: until then likewise
   bool disk_trouble = false;                            ///< the jobs' disk refused something; until a job begins
-  std::optional<NotBegun> not_begun{};                  ///< by the last Start; until the next one
+  std::optional<NotStarted> not_started{};              ///< by the last Start; until the next one
   std::optional<Error> disk_problem{};                  ///< it does not answer: nothing is begun meanwhile
   bool part_gone = false;                               ///< the part of the last job was taken away
 };

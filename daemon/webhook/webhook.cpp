@@ -3,7 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "daemon/actor_thread.h"
+#include "daemon/runtime/actor_thread.h"
 
 namespace scanrig {
 namespace {
@@ -29,19 +29,19 @@ std::string news_of(const JobInfo& job) {
 
 }  // namespace
 
-std::vector<std::string> bad_news(const Snapshot& before, const Snapshot& now) {
-  std::vector<std::string> news;
+std::vector<std::string> alerts(const Snapshot& before, const Snapshot& now) {
+  std::vector<std::string> log_entries;
   for (const auto& [id, job] : now.jobs) {
     const auto was = before.jobs.find(id);
     const bool known = was != before.jobs.end() && (was->second == job || is_bad(*was->second));
-    if (is_bad(*job) && !known) news.push_back(news_of(*job));
+    if (is_bad(*job) && !known) log_entries.push_back(news_of(*job));
   }
   if (now.machine == MachineState::error && before.machine != MachineState::error) {
     const nlohmann::ordered_json json = {
         {"event", "machine"}, {"state", to_string(now.machine)}, {"message", now.cause}};
-    news.push_back(json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+    log_entries.push_back(json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
   }
-  return news;
+  return log_entries;
 }
 
 Webhook::Webhook(Clock& clock, HttpAddress address)
@@ -60,7 +60,7 @@ Webhook::~Webhook() {
 /// What is bad already when the daemon starts is no news.
 void Webhook::look(std::shared_ptr<const Snapshot> now) {
   if (before_) {
-    for (auto& message : bad_news(*before_, *now)) inbox_.post(std::move(message));
+    for (auto& message : alerts(*before_, *now)) inbox_.post(std::move(message));
   }
   before_ = std::move(now);
 }

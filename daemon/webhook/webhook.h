@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/clock.h"
-#include "daemon/mailbox.h"
+#include "daemon/runtime/mailbox.h"
 #include "daemon/station/snapshot.h"
 #include "daemon/webhook/http_post.h"
 
@@ -17,7 +17,7 @@ namespace scanrig {
 
 /// What between two snapshots is worth a message, as JSON: a job that failed, was interrupted or does not pass, and a
 /// fault of the machine.
-std::vector<std::string> bad_news(const Snapshot& before, const Snapshot& now);
+std::vector<std::string> alerts(const Snapshot& before, const Snapshot& now);
 
 /// Tells one address over HTTP what goes wrong; tries three times, then drops the message: whoever must not miss
 /// anything asks the API.

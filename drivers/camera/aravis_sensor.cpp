@@ -79,7 +79,7 @@ std::optional<std::string> find_by_serial(const std::string& serial) {
 
 }  // namespace
 
-Result<void> Attempts::refused(const std::string& what, GError* error) const {
+Result<void> GenicamCall::refused(const std::string& what, GError* error) const {
   auto code = ErrorCode::io;
   if (g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_TIMEOUT)) code = ErrorCode::timeout;
   if (g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_NOT_FOUND)) code = ErrorCode::not_found;
@@ -106,7 +106,7 @@ AravisSensor::~AravisSensor() {
 
 std::uint64_t AravisSensor::id_ring() const { return camera_ && arv_camera_is_uv_device(camera_.get()) ? 0 : kGigeIds; }
 
-Result<bool> AravisSensor::ready(Deadline deadline) {
+Result<bool> AravisSensor::prepare(Deadline deadline) {
   if (camera_ && !*lost_) ask_whether_there();
   if (camera_ && !*lost_) return false;
   if (auto free = let_go(deadline); !free) return pass_on(free);
@@ -254,7 +254,7 @@ Result<SensorFrame> AravisSensor::read(ArvBuffer* buffer) const {
   raw.bits = format->bits;
   raw.size = {arv_buffer_get_image_width(buffer), arv_buffer_get_image_height(buffer)};
   raw.bytes = {static_cast<const std::uint8_t*>(bytes), size};
-  auto picture = to_picture(raw);
+  auto picture = decode_image(raw);
   if (picture) {
     frame.picture = std::move(*picture);
   } else {

@@ -19,9 +19,9 @@ template <class T>
 using GRef = std::unique_ptr<T, Unref>;
 
 /// A GError as Result; `act` is called with a place for one: attempt("set Gain", [&](GError** e) { ... });
-class Attempts {
+class GenicamCall {
  public:
-  explicit Attempts(std::string who) : who_(std::move(who)) {}
+  explicit GenicamCall(std::string who) : who_(std::move(who)) {}
   template <class Act>
   Result<void> operator()(const std::string& what, Act act) const {
     GError* error = nullptr;
@@ -38,10 +38,10 @@ class Attempts {
 
 /// Trigger, exposure, pixels and transport of one camera [GenICam SFNC 2.7, 5 and 6]. See open_aravis() for errors.
 Result<void> set_up(ArvCamera* camera, const AravisOptions& options, const std::string& address,
-                    const Attempts& attempt);
+                    const GenicamCall& attempt);
 
 /// Whether `line` (or else the software trigger) starts an exposure.
-Result<void> set_trigger_source(ArvCamera* camera, const std::string& source, const Attempts& attempt);
+Result<void> set_trigger_source(ArvCamera* camera, const std::string& source, const GenicamCall& attempt);
 
 /// One GigE Vision or USB3 Vision camera.
 class AravisSensor final : public Sensor {
@@ -50,7 +50,7 @@ class AravisSensor final : public Sensor {
   ~AravisSensor() override;
 
   [[nodiscard]] const std::string& name() const override { return attempt_.who(); }
-  Result<bool> ready(Deadline deadline) override;
+  Result<bool> prepare(Deadline deadline) override;
   Result<std::optional<SensorFrame>> next(Deadline deadline) override;
   [[nodiscard]] bool can_trigger() const override { return true; }
   [[nodiscard]] std::uint64_t id_ring() const override;
@@ -69,7 +69,7 @@ class AravisSensor final : public Sensor {
   const AravisSensorOptions sensor_;
   const AravisOptions options_;
   Clock& clock_;
-  const Attempts attempt_;
+  const GenicamCall attempt_;
   GRef<ArvCamera> camera_;
   GRef<ArvStream> stream_;
   std::future<void> giving_up_;         // ready when the connection lost last is given up

@@ -26,13 +26,13 @@ bool has_entry(ArvCamera* camera, const char* feature, const char* entry) {
   return there;
 }
 
-Result<void> set_text(ArvCamera* camera, const char* feature, const std::string& value, const Attempts& attempt) {
+Result<void> set_text(ArvCamera* camera, const char* feature, const std::string& value, const GenicamCall& attempt) {
   return attempt(fmt::format("set {} to {}", feature, value),
                  [&](GError** error) { arv_camera_set_string(camera, feature, value.c_str(), error); });
 }
 
 /// Frames come on triggers only, and one kind of trigger only.
-Result<void> set_up_trigger(ArvCamera* camera, const AravisOptions& options, const Attempts& attempt) {
+Result<void> set_up_trigger(ArvCamera* camera, const AravisOptions& options, const GenicamCall& attempt) {
   if (has(camera, "AcquisitionFrameRateEnable")) {
     auto off = attempt("set AcquisitionFrameRateEnable", [&](GError** error) {
       arv_camera_set_boolean(camera, "AcquisitionFrameRateEnable", FALSE, error);
@@ -58,7 +58,7 @@ Result<void> set_up_trigger(ArvCamera* camera, const AravisOptions& options, con
   return set_text(camera, "TriggerMode", "On", attempt);
 }
 
-Result<void> set_up_image(ArvCamera* camera, const AravisOptions& options, const Attempts& attempt) {
+Result<void> set_up_image(ArvCamera* camera, const AravisOptions& options, const GenicamCall& attempt) {
   if (!has_entry(camera, "PixelFormat", options.pixel_format.c_str())) {
     return fail(ErrorCode::unsupported, "{}: the camera has no pixel format {}", attempt.who(), options.pixel_format);
   }
@@ -111,7 +111,7 @@ int path_mtu(const std::string& address) {
 }
 
 Result<void> set_up_packets(ArvCamera* camera, const AravisOptions& options, const std::string& address,
-                            const Attempts& attempt) {
+                            const GenicamCall& attempt) {
   if (!arv_camera_is_gv_device(camera)) return {};
   // A raw packet socket would need a capability the service does not have.
   arv_camera_gv_set_stream_options(camera, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
@@ -141,7 +141,7 @@ Result<void> set_up_packets(ArvCamera* camera, const AravisOptions& options, con
   });
 }
 
-Result<void> set_up_clock(ArvCamera* camera, const AravisOptions& options, const Attempts& attempt) {
+Result<void> set_up_clock(ArvCamera* camera, const AravisOptions& options, const GenicamCall& attempt) {
   if (options.frame_clock != TriggeringOptions::FrameClock::ptp) return {};
   for (const char* feature : {"PtpEnable", "GevIEEE1588"}) {
     if (!has(camera, feature)) continue;
@@ -160,12 +160,12 @@ std::optional<std::uint64_t> read_number(const std::string& file) {
 
 }  // namespace
 
-Result<void> set_trigger_source(ArvCamera* camera, const std::string& source, const Attempts& attempt) {
+Result<void> set_trigger_source(ArvCamera* camera, const std::string& source, const GenicamCall& attempt) {
   return set_text(camera, "TriggerSource", source, attempt);
 }
 
 Result<void> set_up(ArvCamera* camera, const AravisOptions& options, const std::string& address,
-                    const Attempts& attempt) {
+                    const GenicamCall& attempt) {
   auto continuous = attempt("set AcquisitionMode", [&](GError** error) {
     arv_camera_set_acquisition_mode(camera, ARV_ACQUISITION_MODE_CONTINUOUS, error);
   });
@@ -184,13 +184,13 @@ std::unique_ptr<SensorCamera> aravis_camera(const AravisOptions& options, Clock&
   triggering.by = options.trigger_source == "Software" ? TriggeringOptions::By::software : TriggeringOptions::By::line;
   triggering.frame_clock = options.frame_clock;
   triggering.frame_timeout = options.frame_timeout;
-  triggering.dead_air = options.dead_air;
+  triggering.idle_refresh = options.idle_refresh;
   return std::make_unique<SensorCamera>(std::move(sensors), triggering, clock);
 }
 
 Result<std::unique_ptr<SensorCamera>> open_aravis(const AravisOptions& options, Clock& clock, Deadline deadline) {
   auto camera = aravis_camera(options, clock);
-  if (auto ready = camera->ready(deadline); !ready) return pass_on(ready);
+  if (auto ready = camera->prepare(deadline); !ready) return pass_on(ready);
   return camera;
 }
 

@@ -32,10 +32,10 @@ struct AravisOptions {
   std::chrono::microseconds packet_delay{0};
   TriggeringOptions::FrameClock frame_clock = TriggeringOptions::FrameClock::interval;
   std::chrono::milliseconds frame_timeout{500};
-  std::chrono::seconds dead_air{10};
+  std::chrono::seconds idle_refresh{10};
 };
 
-/// Two cameras that ready() or arm() connects. See open_aravis() for its errors.
+/// Two cameras that prepare() or arm() connects. See open_aravis() for its errors.
 std::unique_ptr<SensorCamera> aravis_camera(const AravisOptions& options, Clock& clock);
 
 /// The same, connected and set up. Fails with `not_found` (no such camera), `io`, `timeout`, `invalid_input`

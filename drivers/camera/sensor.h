@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "drivers/camera/picture.h"
+#include "drivers/camera/decoded_image.h"
 
 namespace scanrig {
 
@@ -16,7 +16,7 @@ struct FrameStamp {
 
 struct SensorFrame {
   FrameStamp stamp;
-  Picture picture;
+  DecodedImage picture;
   std::string damage;          ///< why the frame is not whole; empty if it is
   Clock::TimePoint arrival{};  ///< when this process had it
 };
@@ -31,7 +31,7 @@ class Sensor {
 
   /// Connected and waiting for triggers; connects again if the device was lost. True if it was connected anew: ids and
   /// clock may have begun again. Fails with `not_found`, `io`, `timeout`, `unsupported`, `invalid_input`.
-  virtual Result<bool> ready(Deadline deadline) = 0;
+  virtual Result<bool> prepare(Deadline deadline) = 0;
 
   /// The oldest frame not yet taken; nothing if there is none by the deadline. Fails with `io`, `unsupported`.
   virtual Result<std::optional<SensorFrame>> next(Deadline deadline) = 0;

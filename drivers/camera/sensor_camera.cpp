@@ -1,12 +1,12 @@
 #include "drivers/camera/sensor_camera.h"
 
-#include "drivers/camera/image_evidence.h"
 #include "drivers/camera/image_memory.h"
+#include "drivers/camera/image_quality.h"
 
 namespace scanrig {
 namespace {
 
-using Finding = TriggerLedger::Finding;
+using Finding = TriggerTracker::Finding;
 
 constexpr int kWarmUpTries = 4;
 constexpr const char* kRedo = "repeat the exposure, and if this goes on check the cable and the load on the line";
@@ -18,12 +18,12 @@ double milliseconds(std::chrono::nanoseconds time) { return std::chrono::duratio
 SensorCamera::SensorCamera(std::vector<std::unique_ptr<Sensor>> sensors, const TriggeringOptions& options, Clock& clock)
     : options_(options), clock_(clock) {
   for (auto& sensor : sensors) {
-    const TriggerLedger ledger(sensor->id_ring(), sensor->shares_host_clock());
+    const TriggerTracker ledger(sensor->id_ring(), sensor->shares_host_clock());
     channels_.push_back({std::move(sensor), ledger});
   }
 }
 
-Result<void> SensorCamera::ready(Deadline deadline) {
+Result<void> SensorCamera::prepare(Deadline deadline) {
   if (auto connected = connect(deadline); !connected || armed_) return connected;
   return get_in_step(deadline);
 }
@@ -51,7 +51,7 @@ Result<void> SensorCamera::connect(Deadline deadline) {
 }
 
 Result<void> SensorCamera::connect(Channel& channel, Deadline deadline) {
-  const auto connected_anew = channel.sensor->ready(deadline);
+  const auto connected_anew = channel.sensor->prepare(deadline);
   if (!connected_anew) return pass_on(connected_anew);
   if (*connected_anew) {
     if (channel.ledger.knows_clock()) ++counts_.returns;
@@ -82,7 +82,7 @@ Result<void> SensorCamera::throw_away(Channel& channel, Clock::TimePoint until) 
 
 /// Nothing to do while one good exposure follows the other.
 Result<void> SensorCamera::get_in_step(Deadline deadline) {
-  const bool all = !in_step_ || clock_.now() - last_in_step_ > options_.dead_air;
+  const bool all = !in_step_ || clock_.now() - last_in_step_ > options_.idle_refresh;
   for (Channel& channel : channels_) {
     if (!all && channel.warm) continue;
     in_step_ = false;
@@ -179,7 +179,7 @@ Result<StereoFrame> SensorCamera::collect(Deadline deadline) {
   return hand_out(*frames);
 }
 
-Result<StereoFrame> SensorCamera::look(Deadline deadline) {
+Result<StereoFrame> SensorCamera::capture_preview(Deadline deadline) {
   const bool running = options_.by == TriggeringOptions::By::free_run;
   if (std::exchange(armed_, false)) in_step_ = running;  // its frames may be on their way
   if (auto connected = connect(deadline); !connected) return pass_on(connected);
@@ -321,7 +321,7 @@ Result<void> SensorCamera::expect_one_moment(const std::vector<SensorFrame>& fra
 
 StereoFrame SensorCamera::hand_out(std::vector<SensorFrame>& frames) {
   StereoFrame pair;
-  const Picture& left = frames.front().picture;
+  const DecodedImage& left = frames.front().picture;
   pair.format = left.format;
   if (frames.size() == 2) {
     pair.left = left.image;
@@ -335,7 +335,7 @@ StereoFrame SensorCamera::hand_out(std::vector<SensorFrame>& frames) {
   pair.taken = channels_.front().ledger.host_time(frames.front().stamp, {trigger_after_, frames.front().arrival});
   pair.left_evidence = measure(pair.left, pair.format);
   pair.right_evidence = measure(pair.right, pair.format);
-  pair.likeness = likeness(pair.left, pair.right, pair.format);
+  pair.left_right_correlation = left_right_correlation(pair.left, pair.right, pair.format);
   return pair;
 }
 

@@ -6,7 +6,7 @@
 
 #include "drivers/camera/sensor.h"
 #include "drivers/camera/stereo_camera.h"
-#include "drivers/camera/trigger_ledger.h"
+#include "drivers/camera/trigger_tracker.h"
 
 namespace scanrig {
 
@@ -21,7 +21,7 @@ struct TriggeringOptions {
   By by = By::line;
   FrameClock frame_clock = FrameClock::interval;
   std::chrono::milliseconds frame_timeout{500};  ///< from collect() to the whole pair
-  std::chrono::seconds dead_air{10};             ///< after this long without an exposure one is made and thrown away
+  std::chrono::seconds idle_refresh{10};         ///< after this long without an exposure one is made and thrown away
 };
 
 /// What has happened to triggers so far.
@@ -38,30 +38,30 @@ struct TriggerCounts {
 
 /// A stereo camera of two sensors, or of one that delivers both images side by side. Every exposure is counted: one
 /// trigger, one whole frame from each sensor, ids without a gap, each sensor's interval since its last trigger in step
-/// with the host's and with the other sensor's. After a failure, a return or dead air ready(), or else arm(), waits for
-/// what may be on its way and makes an exposure of its own (with sensors that have a software trigger) from which the
-/// count begins again.
+/// with the host's and with the other sensor's. After a failure, a return or dead air prepare(), or else arm(), waits
+/// for what may be on its way and makes an exposure of its own (with sensors that have a software trigger) from which
+/// the count begins again.
 class SensorCamera final : public StereoCamera {
  public:
   /// `sensors`: left and right, or one for both.
   SensorCamera(std::vector<std::unique_ptr<Sensor>> sensors, const TriggeringOptions& options, Clock& clock);
 
   /// Fails with `protocol` too, for a sensor that exposes and gives no frame in order.
-  Result<void> ready(Deadline deadline) override;
+  Result<void> prepare(Deadline deadline) override;
   /// Fails with `timeout`, `protocol`, `io`, and with `not_found`, `unsupported`, `invalid_input` for a sensor that has
   /// to be connected again and is not what it was.
   Result<void> arm(Deadline deadline) override;
   /// Fails with `timeout` (a frame is missing), `protocol` (torn, old, skipped, too many, not one moment), `io`.
   Result<StereoFrame> collect(Deadline deadline) override;
   /// By software, one sensor after the other; of freely running ones the next pair.
-  Result<StereoFrame> look(Deadline deadline) override;
+  Result<StereoFrame> capture_preview(Deadline deadline) override;
 
   [[nodiscard]] const TriggerCounts& counts() const { return counts_; }
 
  private:
   struct Channel {
     std::unique_ptr<Sensor> sensor;
-    TriggerLedger ledger;
+    TriggerTracker ledger;
     bool warm = false;  // warmed up since it was connected
   };
   struct Moments {

@@ -17,7 +17,7 @@ enum class PixelFormat { mono8, bayer_rggb8, bgr8 };
 std::string to_string(PixelFormat format);
 
 /// How good an image is, whatever it shows; NaN where the driver does not measure it.
-struct ImageEvidence {
+struct ImageQuality {
   double brightness = std::numeric_limits<double>::quiet_NaN();  ///< mean grey value, 0 to 1
   double saturated = std::numeric_limits<double>::quiet_NaN();   ///< share of the pixels at full scale, 0 to 1
   double blur_px =
@@ -31,11 +31,11 @@ struct StereoFrame {
   PixelFormat format = PixelFormat::mono8;
   std::uint64_t trigger = 0;  ///< how many triggers since arm(), this one included
   Clock::TimePoint taken;
-  ImageEvidence left_evidence = {};
-  ImageEvidence right_evidence = {};
+  ImageQuality left_evidence = {};
+  ImageQuality right_evidence = {};
   /// Correlation of the fine texture at the same places of both images, upper quartile of the rows: near 1 when both
   /// show one picture, near 0 for two viewpoints; NaN where it is not measured.
-  double likeness = std::numeric_limits<double>::quiet_NaN();
+  double left_right_correlation = std::numeric_limits<double>::quiet_NaN();
 };
 
 /// Two synchronised sensors, bound by serial number, triggered by the projector's edge.
@@ -50,7 +50,7 @@ class StereoCamera {
   /// exposes nothing.
   /// Fails with `not_found`, `timeout`, `io`, `protocol`, and with `unsupported`, `invalid_input` for what is not as it
   /// was told.
-  virtual Result<void> ready(Deadline deadline) = 0;
+  virtual Result<void> prepare(Deadline deadline) = 0;
 
   /// Makes both sensors wait for the next edge; frames still in flight are thrown away.
   /// Fails with `timeout`, `protocol`, `io`.
@@ -62,7 +62,7 @@ class StereoCamera {
 
   /// A pair without an edge, in whatever light there is, for looking only: left and right may be two moments. Ends what
   /// arm() began. Fails as arm() and collect(), and with `unsupported` where only an edge exposes.
-  virtual Result<StereoFrame> look(Deadline deadline) = 0;
+  virtual Result<StereoFrame> capture_preview(Deadline deadline) = 0;
 };
 
 }  // namespace scanrig

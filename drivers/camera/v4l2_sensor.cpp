@@ -63,7 +63,7 @@ Result<void> V4l2Sensor::call(unsigned long request, void* argument, const char*
   return {};
 }
 
-Result<bool> V4l2Sensor::ready(Deadline deadline) {
+Result<bool> V4l2Sensor::prepare(Deadline deadline) {
   if (descriptor_ >= 0 && !lost_) {
     v4l2_capability capability{};
     std::ignore = call(VIDIOC_QUERYCAP, &capability, "ask whether it is there");  // notes the loss
@@ -236,7 +236,7 @@ Result<SensorFrame> V4l2Sensor::read(const v4l2_buffer& buffer) const {
   raw.size = options_.size;
   raw.stride = format_.bytesperline;
   raw.bytes = {static_cast<const std::uint8_t*>(buffers_[buffer.index].address), buffer.bytesused};
-  auto picture = to_picture(raw);
+  auto picture = decode_image(raw);
   if (picture) {
     frame.picture = std::move(*picture);
   } else {
@@ -267,7 +267,7 @@ std::unique_ptr<SensorCamera> v4l2_camera(const V4l2Options& options, VideoCalls
 Result<std::unique_ptr<SensorCamera>> open_v4l2(const V4l2Options& options, VideoCalls& calls, Clock& clock,
                                                 Deadline deadline) {
   auto camera = v4l2_camera(options, calls, clock);
-  if (auto ready = camera->ready(deadline); !ready) return pass_on(ready);
+  if (auto ready = camera->prepare(deadline); !ready) return pass_on(ready);
   return camera;
 }
 

@@ -17,7 +17,7 @@ class V4l2Sensor final : public Sensor {
   ~V4l2Sensor() override { disconnect(); }
 
   [[nodiscard]] const std::string& name() const override { return name_; }
-  Result<bool> ready(Deadline deadline) override;
+  Result<bool> prepare(Deadline deadline) override;
   Result<std::optional<SensorFrame>> next(Deadline deadline) override;
   [[nodiscard]] bool can_trigger() const override { return false; }
   [[nodiscard]] std::uint64_t id_ring() const override { return std::uint64_t{1} << 32; }

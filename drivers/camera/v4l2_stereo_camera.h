@@ -30,7 +30,7 @@ struct V4l2Options {
   std::filesystem::path by_id = "/dev/v4l/by-id";
 };
 
-/// Devices that ready() or arm() opens. See open_v4l2() for its errors.
+/// Devices that prepare() or arm() opens. See open_v4l2() for its errors.
 std::unique_ptr<SensorCamera> v4l2_camera(const V4l2Options& options, VideoCalls& calls, Clock& clock);
 
 /// The same, opened and started. Fails with `not_found`, `io` (in use, access refused), `unsupported` (no capture

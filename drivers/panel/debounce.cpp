@@ -72,8 +72,7 @@ Result<void> PanelDebounce::none_stuck() const {
     if (input.stuck) stuck.emplace_back(name_of(input.field));
   }
   if (stuck.empty()) return {};
-  return fail(ErrorCode::device_alarm, "panel: {} pressed since the panel was opened: release it, or see what is stuck",
-              fmt::join(stuck, " and "));
+  return fail(ErrorCode::device_alarm, "panel: {} held since start-up; release or free it", fmt::join(stuck, " and "));
 }
 
 }  // namespace scanrig

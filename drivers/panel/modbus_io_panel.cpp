@@ -47,7 +47,7 @@ Result<PanelInputs> ModbusIoPanel::wait_change(const PanelInputs& known, Deadlin
 /// Whoever cannot read forgets what it knew: a button that is pressed by then is not a press.
 Result<void> ModbusIoPanel::poll() {
   auto read = read_once();
-  for (int attempt = 1; attempt < kAttempts && !read && line_.answer_missed(); ++attempt) {
+  for (int attempt = 1; attempt < kAttempts && !read && line_.reply_missed(); ++attempt) {
     line_.count_retry();
     read = read_once();
   }
@@ -75,7 +75,7 @@ Result<void> ModbusIoPanel::read_once() {
 /// Without outputs the question is asked too, and the module may refuse it.
 Result<void> ModbusIoPanel::coils_as_shown(Deadline deadline) {
   const auto bits = line_.read_coils(coils_.first, coils_.count, deadline);
-  if (options_.outputs.empty() && !bits && bits.error().code == ErrorCode::protocol && !line_.answer_missed()) {
+  if (options_.outputs.empty() && !bits && bits.error().code == ErrorCode::protocol && !line_.reply_missed()) {
     return {};
   }
   if (!bits) return pass_on(bits);
@@ -91,7 +91,7 @@ Result<void> ModbusIoPanel::coils_as_shown(Deadline deadline) {
 
 Result<void> ModbusIoPanel::show(const PanelOutputs& outputs, Deadline deadline) {
   auto written = write(outputs, deadline);
-  if (!written && line_.answer_missed()) {  // writing twice does no harm
+  if (!written && line_.reply_missed()) {  // writing twice does no harm
     line_.count_retry();
     written = write(outputs, deadline);
   }

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/modbus/line.h"
+#include "drivers/modbus/client.h"
 #include "drivers/panel/debounce.h"
 
 namespace scanrig {
@@ -16,7 +16,7 @@ struct ModbusIoPanelOptions {
     std::uint16_t address = 0;
     bool active_low = false;
   };
-  modbus::LineOptions line;
+  modbus::ClientOptions line;
   std::vector<std::pair<bool PanelInputs::*, Signal>> inputs{};    ///< at least one
   std::vector<std::pair<bool PanelOutputs::*, Signal>> outputs{};  ///< coils
   std::chrono::milliseconds poll{20};
@@ -33,7 +33,7 @@ class ModbusIoPanel final : public Panel {
   Result<PanelInputs> wait_change(const PanelInputs& known, Deadline deadline) override;
   Result<void> show(const PanelOutputs& outputs, Deadline deadline) override;
 
-  [[nodiscard]] const modbus::LineStatistics& statistics() const { return line_.statistics(); }
+  [[nodiscard]] const modbus::ClientStatistics& statistics() const { return line_.statistics(); }
 
  private:
   struct Span {
@@ -50,7 +50,7 @@ class ModbusIoPanel final : public Panel {
 
   ModbusIoPanelOptions options_;
   Clock& clock_;
-  modbus::Line line_;
+  modbus::Client line_;
   const Span inputs_;
   const Span coils_;
   std::optional<PanelDebounce> debounce_;  // nothing: the inputs are unknown

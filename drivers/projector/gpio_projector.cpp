@@ -33,7 +33,7 @@ Result<void> GpioProjector::fire(Light light, Deadline deadline) {
   return {};
 }
 
-Result<void> GpioProjector::dark(Deadline) {
+Result<void> GpioProjector::turn_off(Deadline) {
   const auto pattern_off = pattern_->set(false);
   const auto plain_off = plain_ ? plain_->set(false) : Result<void>{};
   if (!pattern_off) return pass_on(pattern_off, "projector: the light may be on");
@@ -41,7 +41,7 @@ Result<void> GpioProjector::dark(Deadline) {
   return {};
 }
 
-void GpioProjector::request_dark() noexcept {
+void GpioProjector::request_off() noexcept {
   {
     const std::scoped_lock lock(mutex_);
     dark_requested_ = true;

@@ -17,7 +17,7 @@ struct GpioProjectorOptions {
 };
 
 /// A dot projector fired by a pulse on a GPIO line whose edge is also the cameras' trigger.
-/// request_dark() ends a running pulse, and fire() then fails with `io`. A plain exposure fails with `unsupported` when
+/// request_off() ends a running pulse, and fire() then fails with `io`. A plain exposure fails with `unsupported` when
 /// there is no line for it.
 class GpioProjector final : public Projector {
  public:
@@ -26,8 +26,8 @@ class GpioProjector final : public Projector {
                                                      Clock& clock);
 
   Result<void> fire(Light light, Deadline deadline) override;
-  Result<void> dark(Deadline deadline) override;
-  void request_dark() noexcept override;
+  Result<void> turn_off(Deadline deadline) override;
+  void request_off() noexcept override;
 
  private:
   GpioProjector(std::chrono::microseconds pulse, std::unique_ptr<gpio::Output> pattern,

@@ -10,10 +10,10 @@ using dlpc350::LutEntry;
 using std::chrono::milliseconds;
 
 constexpr int kAllWhite = 24;
-constexpr double kDelayStep = 107.2;                       // ns
-constexpr int kZeroDelay = 0xBB;                           // of the trigger output, in steps
-constexpr std::chrono::microseconds kShortest{235};        // exposure of a pattern of one bit [DLPU010, table 2-65]
-constexpr std::chrono::microseconds kLongest{10'000'000};  // long enough for any rig
+constexpr double kDelayStep = 107.2;                         // ns
+constexpr int kZeroDelay = 0xBB;                             // of the trigger output, in steps
+constexpr std::chrono::microseconds kMinLength{235};         // exposure of a pattern of one bit [DLPU010, table 2-65]
+constexpr std::chrono::microseconds kMaxLength{10'000'000};  // long enough for any rig
 constexpr milliseconds kPoll{2};
 constexpr std::uint8_t kImages = 1, kPatterns = 2;  // mailboxes
 
@@ -37,7 +37,7 @@ Result<std::unique_ptr<LightCrafterProjector>> LightCrafterProjector::create(con
   if (options.image < 0 || options.image > 63) return outside("the image's index (0 to 63)");
   if (options.pattern < 0 || options.pattern >= kAllWhite) return outside("the pattern (0 to 23)");
   if (options.depth < 1 || options.depth > 8) return outside("the depth (1 to 8 bits)");
-  if (options.exposure < kShortest || options.exposure > kLongest) return outside("the exposure (235 us to 10 s)");
+  if (options.exposure < kMinLength || options.exposure > kMaxLength) return outside("the exposure (235 us to 10 s)");
   const int out_delay = kZeroDelay + steps(options.trigger_out_delay);
   if (out_delay < 0 || out_delay > 0xD5) return outside("the trigger output's delay (-20 to 2.7 us)");
   if (options.trigger_in_delay.count() < 0) return outside("the trigger input's delay (not negative)");
@@ -64,17 +64,17 @@ Result<void> LightCrafterProjector::fire(Light light, Deadline deadline) {
   if (over) over = wait_until_over(deadline);
   if (over) return expect_healthy(deadline);
   // It may have started although its reply was lost.
-  const auto darkened = dark(Deadline::after(clock_, options_.reply_timeout));
+  const auto darkened = turn_off(Deadline::after(clock_, options_.reply_timeout));
   return darkened ? over : pass_on(over, "the light may be on");
 }
 
-Result<void> LightCrafterProjector::dark(Deadline deadline) {
+Result<void> LightCrafterProjector::turn_off(Deadline deadline) {
   if (auto connected = connect(deadline); !connected) return pass_on(connected, "the light may be on");
   if (auto stopped = stop(deadline); !stopped) return pass_on(stopped, "the light may be on");
   return {};
 }
 
-void LightCrafterProjector::request_dark() noexcept {
+void LightCrafterProjector::request_off() noexcept {
   {
     const std::scoped_lock lock(mutex_);
     dark_requested_ = true;

@@ -23,7 +23,7 @@ struct LightCrafterOptions {
 };
 
 /// A TI DLP LightCrafter 4500 that shows dots from its flash, or all white, once for each fire(); TRIG_OUT_1 is the
-/// cameras' trigger. Connected when first used, and again after a loss. request_dark() ends a running exposure, and
+/// cameras' trigger. Connected when first used, and again after a loss. request_off() ends a running exposure, and
 /// fire() then fails with `io`. Faults the device reports are `device_alarm` in words; what it does not accept of the
 /// options is `invalid_input`.
 class LightCrafterProjector final : public Projector {
@@ -33,8 +33,8 @@ class LightCrafterProjector final : public Projector {
                                                                dlpc350::OpenTransport open, Clock& clock);
 
   Result<void> fire(Light light, Deadline deadline) override;
-  Result<void> dark(Deadline deadline) override;
-  void request_dark() noexcept override;
+  Result<void> turn_off(Deadline deadline) override;
+  void request_off() noexcept override;
 
  private:
   using Bytes = std::vector<std::uint8_t>;

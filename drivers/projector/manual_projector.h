@@ -9,8 +9,8 @@ namespace scanrig {
 class ManualProjector final : public Projector {
  public:
   Result<void> fire(Light, Deadline) override { return {}; }
-  Result<void> dark(Deadline) override { return {}; }
-  void request_dark() noexcept override {}
+  Result<void> turn_off(Deadline) override { return {}; }
+  void request_off() noexcept override {}
 };
 
 }  // namespace scanrig

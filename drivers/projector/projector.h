@@ -12,7 +12,7 @@ enum class Light {
 };
 
 /// The random-dot projector. Its trigger edge is also the cameras' trigger: one fire() is one exposure.
-/// Threads: one owner; only request_dark() may be called from another.
+/// Threads: one owner; only request_off() may be called from another.
 class Projector {
  public:
   virtual ~Projector() = default;
@@ -22,9 +22,9 @@ class Projector {
   virtual Result<void> fire(Light light, Deadline deadline) = 0;
 
   /// Dots off, seen off where the device can tell. Fails with `timeout`, `protocol`, `io`.
-  virtual Result<void> dark(Deadline deadline) = 0;
+  virtual Result<void> turn_off(Deadline deadline) = 0;
 
-  virtual void request_dark() noexcept = 0;
+  virtual void request_off() noexcept = 0;
 };
 
 }  // namespace scanrig

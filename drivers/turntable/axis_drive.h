@@ -23,7 +23,7 @@ struct DriveState {
 /// What AxisTurntable needs of a motor drive: one request each, nothing about what a move is.
 /// Every function fails with `timeout`, `protocol`, `io`. Requests that may be repeated without harm are repeated, and
 /// counted; those that start a motion are sent once.
-/// Threads: one owner; hurry() may be called from any thread.
+/// Threads: one owner; set_fail_fast() may be called from any thread.
 class AxisDrive {
  public:
   virtual ~AxisDrive() = default;
@@ -53,12 +53,12 @@ class AxisDrive {
   virtual Result<void> stop(Deadline deadline) = 0;
   /// The same at once where the answer to the last request was missed, when stop() would first wait for a quiet line.
   /// Whoever calls it calls stop() next.
-  virtual void stop_unheard() = 0;
+  virtual void stop_without_reply() = 0;
   /// While on, no request waits for a quiet line: it fails with `stopped` instead.
-  virtual void hurry(bool on) noexcept = 0;
+  virtual void set_fail_fast(bool on) noexcept = 0;
 
   /// Whether the last request may have been carried out although it failed.
-  [[nodiscard]] virtual bool answer_missed() const = 0;
+  [[nodiscard]] virtual bool reply_missed() const = 0;
   virtual void count_retry() = 0;
 };
 

@@ -60,7 +60,7 @@ MovePlanner::Counter MovePlanner::counter_range() const {
   return range;
 }
 
-std::optional<MovePlan> MovePlanner::plan(std::int32_t from, Degrees target, bool flank_loaded) const {
+std::optional<MovePlan> MovePlanner::plan(std::int32_t from, Degrees target, bool backlash_taken_up) const {
   if (!std::isfinite(target.value)) return std::nullopt;
   const Counter range = counter_range();
   const Degrees here = scale.angle(std::clamp<double>(from, range.min, range.max));
@@ -77,7 +77,7 @@ std::optional<MovePlan> MovePlanner::plan(std::int32_t from, Degrees target, boo
   for (const Degrees end : equivalents) {
     if (!fits(end)) continue;
     const Degrees way = end - from_angle;
-    const bool direct = flank_loaded ? way >= Degrees{-tolerance.value} : way >= backlash;
+    const bool direct = backlash_taken_up ? way >= Degrees{-tolerance.value} : way >= backlash;
     MovePlan plan;
     plan.target = static_cast<std::int32_t>(std::lround(scale.pulses(end)));
     if (!direct && backlash > Degrees{0.0}) {

@@ -55,9 +55,9 @@ struct MovePlanner {
   Counter device{std::numeric_limits<std::int32_t>::min(), std::numeric_limits<std::int32_t>::max()};
 
   /// The shortest way to `target`, an angle modulo 360 degrees, that stays inside the soft limits and the device's
-  /// counter: near its end the axis goes the other way round, so the counter never overflows. `flank_loaded`: the last
-  /// move ended counter-clockwise, so the backlash is taken up. Nothing when no equivalent of `target` fits.
-  [[nodiscard]] std::optional<MovePlan> plan(std::int32_t from, Degrees target, bool flank_loaded) const;
+  /// counter: near its end the axis goes the other way round, so the counter never overflows. `backlash_taken_up`: the
+  /// last move ended counter-clockwise, so the backlash is taken up. Nothing when no equivalent of `target` fits.
+  [[nodiscard]] std::optional<MovePlan> plan(std::int32_t from, Degrees target, bool backlash_taken_up) const;
 
   /// The counter values that may be used.
   [[nodiscard]] Counter counter_range() const;

@@ -103,7 +103,7 @@ Result<void> AxisTurntable::check_and_enable(Deadline deadline) {
 
 Result<Move> AxisTurntable::rotate_to(Degrees target, Deadline deadline) {
   if (auto free = not_stopped(); !free) return give_up(free.error());
-  if (!homed_) return fail(ErrorCode::not_homed, "turntable: no known zero: home it first");
+  if (!homed_) return fail(ErrorCode::not_homed, "turntable: not homed; home first");
   const auto before = ask(deadline);
   if (!before) return give_up(before.error());
   if (auto fit = healthy(*before, deadline); !fit) return give_up(fit.error());
@@ -149,15 +149,15 @@ Result<AxisTurntable::Arrival> AxisTurntable::run_to(std::int32_t target, const 
 
   Arrival arrival;
   std::optional<Clock::TimePoint> in_position;
-  std::int64_t least_left = std::abs(std::int64_t{target} - before.position);
+  std::int64_t min_left = std::abs(std::int64_t{target} - before.position);
   const auto arrived = watch(
       fmt::format("turning to {:.2f} deg", options_.scale.angle(target).value),
       [&](const DriveState& state, Clock::TimePoint& again) {
-        if (!state.homed) return Seen::homeless;
+        if (!state.homed) return Seen::home_lost;
         const auto now = clock_.now();
         const std::int64_t left = std::abs(std::int64_t{target} - state.position);
-        const bool nearer = left + tolerance_pulses() <= least_left;
-        if (nearer) least_left = left;
+        const bool nearer = left + tolerance_pulses() <= min_left;
+        if (nearer) min_left = left;
         if (state.running || !state.in_position || !near(state.position, target)) {
           in_position.reset();
           return nearer ? Seen::progress : Seen::waiting;
@@ -181,7 +181,7 @@ Result<void> AxisTurntable::command(const std::function<Result<void>()>& send,
                                     const std::function<bool(const DriveState&)>& obeyed, Deadline deadline) {
   for (int attempt = 1;; ++attempt) {
     auto sent = send();
-    if (sent || !drive_->answer_missed() || sent.error().code == ErrorCode::io) return sent;
+    if (sent || !drive_->reply_missed() || sent.error().code == ErrorCode::io) return sent;
     const auto state = ask(deadline);
     if (!state) return pass_on(state);
     if (obeyed(*state)) return {};
@@ -200,7 +200,7 @@ Result<void> AxisTurntable::watch(std::string_view doing, const Look& look, Dead
     auto again = clock_.now() + kPollPeriod;
     const Seen seen = look(*state, again);
     if (seen == Seen::done) return {};
-    if (seen == Seen::homeless) {
+    if (seen == Seen::home_lost) {
       return fail(ErrorCode::not_homed, "{}: the drive has lost its home (switched off, reset?)", doing);
     }
     if (seen == Seen::progress) last_progress = clock_.now();
@@ -243,16 +243,16 @@ Result<DriveState> AxisTurntable::ask(Deadline deadline) {
 }
 
 Result<DriveState> AxisTurntable::read_after_owed_stop(Deadline deadline) {
-  if (stop_owed_) {
+  if (stop_pending_) {
     if (auto told = drive_->stop(deadline); !told) return pass_on(told);
-    stop_owed_ = false;
+    stop_pending_ = false;
   }
   return drive_->read_state(deadline);
 }
 
 Result<void> AxisTurntable::stop_drive(Deadline deadline) {
-  drive_->stop_unheard();
-  drive_->hurry(false);
+  drive_->stop_without_reply();
+  drive_->set_fail_fast(false);
   return drive_->stop(deadline);
 }
 
@@ -265,9 +265,9 @@ tl::unexpected<Error> AxisTurntable::give_up(const Error& error) {
     const std::scoped_lock lock(mutex_);
     if (std::exchange(stop_requested_, false)) code = ErrorCode::stopped;
   }
-  stop_owed_ = !stop_drive(Deadline::after(clock_, kStopReplyTimeouts * reply_timeout_));
+  stop_pending_ = !stop_drive(Deadline::after(clock_, kStopReplyTimeouts * reply_timeout_));
   return fail(code, "turntable: {}; {}", error.message,
-              stop_owed_ ? "the stop was not confirmed: the table may be moving" : "the motor was told to stop");
+              stop_pending_ ? "the stop was not confirmed: the table may be moving" : "the motor was told to stop");
 }
 
 /// Waits until the next poll is due or someone asks to stop.
@@ -278,11 +278,11 @@ void AxisTurntable::pause(Clock::TimePoint until) {
 
 Result<void> AxisTurntable::stop(Deadline deadline) {
   const auto failed = [&](const Error& error) {
-    stop_owed_ = true;
+    stop_pending_ = true;
     return tl::unexpected(Error{error.code, error.message + "; the table may be moving"}.in("turntable"));
   };
   if (auto told = stop_drive(deadline); !told) return failed(told.error());
-  stop_owed_ = false;
+  stop_pending_ = false;
   flank_loaded_ = false;
   auto since = clock_.now();
   for (std::optional<std::int32_t> last; !deadline.expired(clock_); pause(clock_.now() + kPollPeriod)) {
@@ -295,7 +295,7 @@ Result<void> AxisTurntable::stop(Deadline deadline) {
       return {};
     }
   }
-  return failed({ErrorCode::timeout, "stop: not seen standing by the deadline"});
+  return failed({ErrorCode::timeout, "stop: standstill not confirmed in time"});
 }
 
 Result<void> AxisTurntable::reset_alarm(Deadline deadline) {
@@ -314,7 +314,7 @@ Result<TurntableStatus> AxisTurntable::status(Deadline deadline) {
   const auto state = read_after_owed_stop(deadline);
   if (!state) return pass_on(state, "turntable");
   TurntableStatus status;
-  status.motion = state->running ? TurntableStatus::Motion::moving : TurntableStatus::Motion::standing;
+  status.motion = state->running ? TurntableStatus::Motion::moving : TurntableStatus::Motion::stopped;
   status.homed = homed_ && state->homed;
   if (status.homed) status.angle = options_.scale.angle(state->position);
   if (state->fault) {
@@ -336,7 +336,7 @@ void AxisTurntable::request_stop() noexcept {
     const std::scoped_lock lock(mutex_);
     stop_requested_ = true;
   }
-  drive_->hurry(true);
+  drive_->set_fail_fast(true);
   clock_.notify_all(wake_);
 }
 

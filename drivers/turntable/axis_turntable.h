@@ -45,7 +45,7 @@ class AxisTurntable : public Turntable {
                 MovePlanner::Counter counter, Clock& clock);
 
  private:
-  enum class Seen { waiting, progress, done, homeless };
+  enum class Seen { waiting, progress, done, home_lost };
   struct Arrival {
     Clock::TimePoint in_position;
     Clock::TimePoint still;
@@ -80,7 +80,7 @@ class AxisTurntable : public Turntable {
   std::unique_ptr<AxisDrive> drive_;
   bool homed_ = false;
   bool flank_loaded_ = false;  // the last move ended counter-clockwise
-  bool stop_owed_ = false;     // a stop could not be delivered
+  bool stop_pending_ = false;  // a stop could not be delivered
 
   std::mutex mutex_;
   std::condition_variable wake_;

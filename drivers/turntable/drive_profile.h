@@ -15,7 +15,7 @@ struct DriveProfile {
   struct Trigger {
     std::uint16_t address = 0;
     std::uint16_t value = 0;
-    bool released = false;  ///< an input that must be let go: 0 is written after the value
+    bool momentary = false;  ///< an input that must be let go: 0 is written after the value
   };
 
   /// Words written in one request.

@@ -54,7 +54,7 @@ Result<grbl::Report> GrblDrive::exchange(Deadline deadline) {
     if (report_first && report) probe();
     if (report && probed) return report;
     const Error& error = probed ? report.error() : probed.error();
-    if (attempt == kAttempts || !link_.answer_missed() || error.code == ErrorCode::io) return tl::unexpected(error);
+    if (attempt == kAttempts || !link_.reply_missed() || error.code == ErrorCode::io) return tl::unexpected(error);
     report_first = !probed;
     link_.count_retry();
   }
@@ -218,8 +218,8 @@ Result<void> GrblDrive::stop(Deadline deadline) {
   return {};
 }
 
-void GrblDrive::stop_unheard() {
-  if (link_.answer_missed() && !homing_) std::ignore = link_.at_once('!');
+void GrblDrive::stop_without_reply() {
+  if (link_.reply_missed() && !homing_) std::ignore = link_.at_once('!');
 }
 
 }  // namespace scanrig

@@ -45,9 +45,9 @@ class GrblDrive final : public AxisDrive {
   }
   Result<void> start_move(std::int32_t target, Deadline deadline) override;
   Result<void> stop(Deadline deadline) override;
-  void stop_unheard() override;
-  void hurry(bool on) noexcept override { link_.hurry(on); }
-  [[nodiscard]] bool answer_missed() const override { return link_.answer_missed(); }
+  void stop_without_reply() override;
+  void set_fail_fast(bool on) noexcept override { link_.set_fail_fast(on); }
+  [[nodiscard]] bool reply_missed() const override { return link_.reply_missed(); }
   void count_retry() override { link_.count_retry(); }
 
   [[nodiscard]] const grbl::LinkStatistics& statistics() const { return link_.statistics(); }

@@ -8,7 +8,7 @@ namespace {
 using std::chrono::milliseconds;
 using Kind = Line::Kind;
 
-constexpr std::size_t kLongestLine = 200;
+constexpr std::size_t kMaxLineLength = 200;
 constexpr milliseconds kRestart{1500};              ///< from a reset to the greeting
 constexpr Clock::Duration kLook = milliseconds(5);  ///< how soon somebody who waits sees that he is to hurry
 constexpr char kReset = 0x18;
@@ -19,7 +19,7 @@ tl::unexpected<Error> Link::lost(const Error& error) {
   if (error.code == ErrorCode::io) {
     port_.reset();
     heard_.clear();
-    answer_missed_ = true;
+    reply_missed_ = true;
     ++statistics_.io_errors;
   }
   return tl::unexpected(error);
@@ -31,7 +31,7 @@ Result<void> Link::open() {
   port_.emplace(std::move(*port));
   heard_.clear();
   ++statistics_.openings;
-  answer_missed_ = true;  // whatever the controller was saying before is not for us
+  reply_missed_ = true;  // whatever the controller was saying before is not for us
   return {};
 }
 
@@ -39,7 +39,7 @@ Result<void> Link::open() {
 Result<std::optional<Line>> Link::next_line(Clock::Duration wait) {
   for (const auto until = clock_.now() + wait;;) {
     const auto end = heard_.find_first_of("\r\n");
-    if (end != std::string::npos || heard_.size() > kLongestLine) {
+    if (end != std::string::npos || heard_.size() > kMaxLineLength) {
       const std::string text = heard_.substr(0, end);
       heard_.erase(0, end == std::string::npos ? end : end + 1);
       if (text.empty()) continue;
@@ -60,15 +60,15 @@ Result<void> Link::wait_until_quiet(Deadline deadline) {
   const auto silence = 2 * options_.reply_timeout;
   for (auto quiet_at = clock_.now() + silence; clock_.now() < quiet_at;) {
     if (deadline.expired(clock_)) {
-      return fail(ErrorCode::timeout, "{}: the deadline passed before the line fell silent", options_.device);
+      return fail(ErrorCode::timeout, "{}: bus not quiet in time", options_.device);
     }
-    if (hurry_) return fail(ErrorCode::stopped, "{}: called off before the line fell silent", options_.device);
+    if (fail_fast_) return fail(ErrorCode::stopped, "{}: cancelled while waiting for a quiet bus", options_.device);
     const auto line = next_line(std::min<Clock::Duration>(quiet_at - clock_.now(), kLook));
     if (!line) return pass_on(line);
     if (*line) quiet_at = clock_.now() + silence;
   }
   heard_.clear();
-  answer_missed_ = false;
+  reply_missed_ = false;
   return {};
 }
 
@@ -82,17 +82,17 @@ Result<void> Link::send(std::string_view bytes, Deadline deadline) {
     if (!*unasked) break;
     const Kind kind = (*unasked)->kind;
     if (kind == Kind::alarm || kind == Kind::banner || kind == Kind::message) continue;
-    answer_missed_ = true;
+    reply_missed_ = true;
     ++statistics_.corrupt;
   }
-  if (answer_missed_) {
+  if (reply_missed_) {
     if (auto quiet = wait_until_quiet(deadline); !quiet) return quiet;
   }
   if (deadline.expired(clock_)) {
     return fail(ErrorCode::timeout, "{}: the deadline passed before it could be asked", options_.device);
   }
   ++statistics_.requests;
-  answer_missed_ = true;  // until the answer is there
+  reply_missed_ = true;  // until the answer is there
   if (auto sent = port_->write(bytes, options_.reply_timeout); !sent) return lost(sent.error());
   return {};
 }
@@ -104,11 +104,11 @@ Result<Line> Link::answer(std::string_view to, const std::function<bool(const Li
     if (!line) return pass_on(line);
     if (!*line) {
       ++statistics_.timeouts;
-      return fail(ErrorCode::timeout, "{}: no whole answer to \"{}\" within {} ms; check power, wiring and baud",
+      return fail(ErrorCode::timeout, "{}: no complete reply to \"{}\" within {} ms; check power, wiring and baud",
                   options_.device, to, options_.reply_timeout.count());
     }
     if (wanted(**line)) {
-      answer_missed_ = false;
+      reply_missed_ = false;
       return **line;
     }
     const Kind kind = (*line)->kind;
@@ -142,7 +142,7 @@ Result<void> Link::command(std::string_view line, Deadline deadline) {
 
 Result<void> Link::begin(std::string_view line, Deadline deadline) {
   if (auto sent = send(std::string(line) + "\n", deadline); !sent) return sent;
-  answer_missed_ = false;  // it is not late before it has been carried out
+  reply_missed_ = false;  // it is not late before it has been carried out
   return {};
 }
 
@@ -176,7 +176,7 @@ Result<std::map<int, double>> Link::settings(Deadline deadline) {
     if (!line) return pass_on(line);
     if (line->kind == Kind::ok) return all;
     all[line->number] = line->value;
-    answer_missed_ = true;  // the list goes on
+    reply_missed_ = true;  // the list goes on
   }
 }
 
@@ -191,12 +191,12 @@ Result<void> Link::at_once(char byte) {
 
 Result<void> Link::reset(Deadline deadline) {
   if (auto sent = at_once(kReset); !sent) return sent;
-  for (const auto by = deadline.at_most(clock_, kRestart); !by.expired(clock_) && !hurry_;) {
+  for (const auto by = deadline.at_most(clock_, kRestart); !by.expired(clock_) && !fail_fast_;) {
     const auto line = next_line(std::min(by.left(clock_), kLook));
     if (!line) return pass_on(line);
     if (!*line || (*line)->kind != Kind::banner) continue;
     restarted_ = false;
-    answer_missed_ = true;  // what it adds to its greeting is not for the next request
+    reply_missed_ = true;  // what it adds to its greeting is not for the next request
     return {};
   }
   ++statistics_.timeouts;

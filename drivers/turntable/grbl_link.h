@@ -37,7 +37,7 @@ struct LinkStatistics {
 /// the deadline; never retries. The port is opened by the first request and again after it was lost. After a missed
 /// answer the next request is held back until the line has been silent for twice `reply_timeout`. Every request fails
 /// with `timeout`, `protocol` (not understood, or refused: error:N in words), `io`; alarms and restarts are told by the
-/// controller when they happen, and kept here until asked for. Threads: one owner; hurry() from any thread.
+/// controller when they happen, and kept here until asked for. Threads: one owner; set_fail_fast() from any thread.
 class Link {
  public:
   Link(LinkOptions options, Clock& clock) : options_(std::move(options)), clock_(clock) {}
@@ -68,8 +68,8 @@ class Link {
   bool restarted() { return std::exchange(restarted_, false); }
 
   /// While on, no request waits for a quiet line: it fails with `timeout` instead.
-  void hurry(bool on) noexcept { hurry_ = on; }
-  [[nodiscard]] bool answer_missed() const { return answer_missed_; }
+  void set_fail_fast(bool on) noexcept { fail_fast_ = on; }
+  [[nodiscard]] bool reply_missed() const { return reply_missed_; }
   void count_retry() { ++statistics_.retries; }
   [[nodiscard]] const LinkStatistics& statistics() const { return statistics_; }
 
@@ -88,8 +88,8 @@ class Link {
   std::string heard_;  // of the line that has not ended
   int alarm_ = 0;
   bool restarted_ = false;
-  bool answer_missed_ = false;
-  std::atomic<bool> hurry_ = false;
+  bool reply_missed_ = false;
+  std::atomic<bool> fail_fast_ = false;
   LinkStatistics statistics_;
 };
 

@@ -20,7 +20,7 @@ constexpr std::array<std::pair<std::string_view, State>, 9> kStates{{{"Idle", St
                                                                      {"Check", State::check},
                                                                      {"Home", State::home},
                                                                      {"Sleep", State::sleep}}};
-constexpr std::size_t kMostAxes = 6;
+constexpr std::size_t kMaxAxes = 6;
 
 template <class Number>
 std::optional<Number> number(std::string_view text) {
@@ -48,7 +48,7 @@ std::optional<std::vector<double>> coordinates(std::string_view text) {
   std::vector<double> values;
   while (!text.empty()) {
     const auto value = real(take(text, ','));
-    if (!value || values.size() == kMostAxes) return std::nullopt;
+    if (!value || values.size() == kMaxAxes) return std::nullopt;
     values.push_back(*value);
   }
   return values;

@@ -40,7 +40,7 @@ template <class Request>
 auto ModbusDrive::repeat(const Request& request) -> decltype(request()) {
   auto answer = request();
   for (int attempt = 1; attempt < kAttempts && !answer; ++attempt) {
-    if (!line_.answer_missed() || answer.error().code == ErrorCode::io) break;
+    if (!line_.reply_missed() || answer.error().code == ErrorCode::io) break;
     line_.count_retry();
     answer = request();
   }
@@ -110,16 +110,16 @@ Result<std::string> ModbusDrive::read_alarm(Deadline deadline) {
 }
 
 Result<void> ModbusDrive::write(const DriveProfile::Trigger& trigger, Deadline deadline) {
-  if (trigger.released) to_release_ = trigger.address;
+  if (trigger.momentary) to_release_ = trigger.address;
   return line_.write(trigger.address, trigger.value, deadline);
 }
 
 /// Lets go of what is still pulled: the drive acts on the edge, and would not see the next one.
 Result<void> ModbusDrive::release(Deadline deadline) {
   if (!to_release_) return {};
-  const auto released = repeat([&] { return line_.write(*to_release_, 0, deadline); });
-  if (released) to_release_.reset();
-  return released;
+  const auto momentary = repeat([&] { return line_.write(*to_release_, 0, deadline); });
+  if (momentary) to_release_.reset();
+  return momentary;
 }
 
 Result<void> ModbusDrive::pull(const DriveProfile::Trigger& trigger, Deadline deadline) {
@@ -146,10 +146,10 @@ Result<void> ModbusDrive::stop(Deadline deadline) {
   return release(deadline);
 }
 
-void ModbusDrive::stop_unheard() {
-  if (!line_.answer_missed()) return;
-  if (profile_.stop.released) to_release_ = profile_.stop.address;
-  std::ignore = line_.write_unheard(profile_.stop.address, profile_.stop.value);
+void ModbusDrive::stop_without_reply() {
+  if (!line_.reply_missed()) return;
+  if (profile_.stop.momentary) to_release_ = profile_.stop.address;
+  std::ignore = line_.write_without_reply(profile_.stop.address, profile_.stop.value);
 }
 
 Result<void> ModbusDrive::set_homing(const std::string& mode, const DriveMotion& motion, Deadline deadline) {

@@ -6,7 +6,7 @@
 
 #include "core/clock.h"
 #include "core/result.h"
-#include "drivers/modbus/line.h"
+#include "drivers/modbus/client.h"
 #include "drivers/turntable/axis_drive.h"
 #include "drivers/turntable/drive_profile.h"
 
@@ -22,14 +22,14 @@ struct DriveMotion {
 
 /// A motor drive as its profile describes it. Requests that may be repeated without harm are sent up to three times,
 /// each repetition counted in the line's statistics; those that start a motion are sent once.
-/// Every function fails with `timeout`, `protocol`, `io` as modbus::Line does.
+/// Every function fails with `timeout`, `protocol`, `io` as modbus::Client does.
 /// Threads: one owner.
 class ModbusDrive {
  public:
-  ModbusDrive(modbus::LineOptions line, DriveProfile profile, Clock& clock)
+  ModbusDrive(modbus::ClientOptions line, DriveProfile profile, Clock& clock)
       : line_(std::move(line), clock), profile_(std::move(profile)) {
     // Whoever was here before may have been killed with an input pulled.
-    if (profile_.stop.released) to_release_ = profile_.stop.address;
+    if (profile_.stop.momentary) to_release_ = profile_.stop.address;
   }
 
   /// Status and position, read in turn. What follows a missed answer is never the same request again but the other
@@ -43,9 +43,9 @@ class ModbusDrive {
   Result<void> stop(Deadline deadline);
   /// The same at once where the answer to the last request was missed, when stop() would first wait for a quiet line.
   /// Whoever calls it calls stop() next.
-  void stop_unheard();
-  /// From any thread, see modbus::Line.
-  void hurry(bool on) noexcept { line_.hurry(on); }
+  void stop_without_reply();
+  /// From any thread, see modbus::Client.
+  void set_fail_fast(bool on) noexcept { line_.set_fail_fast(on); }
   /// Mode and speeds, as far as the drive wants to be told.
   Result<void> set_homing(const std::string& mode, const DriveMotion& motion, Deadline deadline);
   /// Nothing where the drive has none: the caller keeps them.
@@ -59,9 +59,9 @@ class ModbusDrive {
   [[nodiscard]] bool knows_zero() const { return profile_.homing.absolute; }
 
   /// Whether the last request may have been carried out although it failed.
-  [[nodiscard]] bool answer_missed() const { return line_.answer_missed(); }
+  [[nodiscard]] bool reply_missed() const { return line_.reply_missed(); }
   void count_retry() { line_.count_retry(); }
-  [[nodiscard]] const modbus::LineStatistics& statistics() const { return line_.statistics(); }
+  [[nodiscard]] const modbus::ClientStatistics& statistics() const { return line_.statistics(); }
 
  private:
   Result<void> write(const DriveProfile::Trigger& trigger, Deadline deadline);
@@ -72,7 +72,7 @@ class ModbusDrive {
   template <class Request>
   auto repeat(const Request& request) -> decltype(request());
 
-  modbus::Line line_;
+  modbus::Client line_;
   DriveProfile profile_;
   std::optional<std::uint16_t> to_release_;  // the register of a trigger that is still pulled
   bool homed_ = false;                       // where the encoder knows the zero: since the last homing

@@ -63,11 +63,11 @@ class ModbusTurntable::Drive final : public AxisDrive {
   }
 
   Result<void> stop(Deadline deadline) override { return drive_.stop(deadline); }
-  void stop_unheard() override { drive_.stop_unheard(); }
-  void hurry(bool on) noexcept override { drive_.hurry(on); }
-  [[nodiscard]] bool answer_missed() const override { return drive_.answer_missed(); }
+  void stop_without_reply() override { drive_.stop_without_reply(); }
+  void set_fail_fast(bool on) noexcept override { drive_.set_fail_fast(on); }
+  [[nodiscard]] bool reply_missed() const override { return drive_.reply_missed(); }
   void count_retry() override { drive_.count_retry(); }
-  [[nodiscard]] const modbus::LineStatistics& statistics() const { return drive_.statistics(); }
+  [[nodiscard]] const modbus::ClientStatistics& statistics() const { return drive_.statistics(); }
 
  private:
   ModbusDrive drive_;
@@ -92,7 +92,7 @@ Result<std::unique_ptr<ModbusTurntable>> ModbusTurntable::create(ModbusTurntable
 }
 
 ModbusTurntable::ModbusTurntable(const ModbusTurntableOptions& options, std::unique_ptr<Drive> drive,
-                                 const modbus::LineStatistics& line, Clock& clock)
+                                 const modbus::ClientStatistics& line, Clock& clock)
     : AxisTurntable(options, std::move(drive), options.line.reply_timeout,
                     {std::numeric_limits<std::int32_t>::min(), std::numeric_limits<std::int32_t>::max()}, clock),
       line_(line) {}

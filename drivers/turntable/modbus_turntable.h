@@ -8,7 +8,7 @@
 namespace scanrig {
 
 struct ModbusTurntableOptions : AxisTurntableOptions {
-  modbus::LineOptions line;
+  modbus::ClientOptions line;
   DriveProfile profile;
 };
 
@@ -18,14 +18,14 @@ class ModbusTurntable final : public AxisTurntable {
   /// Checks the options; the port is opened by the first use. Fails with `out_of_range`.
   static Result<std::unique_ptr<ModbusTurntable>> create(ModbusTurntableOptions options, Clock& clock);
 
-  [[nodiscard]] const modbus::LineStatistics& statistics() const { return line_; }
+  [[nodiscard]] const modbus::ClientStatistics& statistics() const { return line_; }
 
  private:
   class Drive;
   ModbusTurntable(const ModbusTurntableOptions& options, std::unique_ptr<Drive> drive,
-                  const modbus::LineStatistics& line, Clock& clock);
+                  const modbus::ClientStatistics& line, Clock& clock);
 
-  const modbus::LineStatistics& line_;
+  const modbus::ClientStatistics& line_;
 };
 
 }  // namespace scanrig

@@ -11,7 +11,7 @@ namespace scanrig {
 
 /// What is known about the axis, from the device itself.
 struct TurntableStatus {
-  enum class Motion { standing, moving, unknown };
+  enum class Motion { stopped, moving, unknown };
   Motion motion = Motion::unknown;  ///< `unknown`: the drive cannot be reached, the table may be moving
   bool homed = false;
   std::optional<Degrees> angle;  ///< as the device says: measured, or its steps counted where it has no feedback

@@ -10,7 +10,7 @@ namespace scanrig {
 namespace {
 
 constexpr int kIterations = 15;
-constexpr std::size_t kMostSamples = 20000;
+constexpr std::size_t kMaxSamples = 20000;
 constexpr double kKept = 0.9;
 
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
@@ -25,7 +25,7 @@ struct Pair {
 
 Transform align(const std::vector<SurfaceSample>& samples, const Mesh& truth, const SurfaceIndex& surface) {
   Transform motion = Transform::Identity();
-  const std::size_t stride = std::max<std::size_t>(1, samples.size() / kMostSamples);
+  const std::size_t stride = std::max<std::size_t>(1, samples.size() / kMaxSamples);
   std::vector<Pair> pairs(samples.size() / stride);
   if (pairs.size() < 6) return motion;
   for (int iteration = 0; iteration < kIterations; ++iteration) {

@@ -4,9 +4,9 @@
 
 #include "core/files.h"
 #include "core/image_codec.h"
+#include "core/strict_json.h"
 #include "pipeline/evaluate/evaluate.h"
-#include "pipeline/scan/model/mesh_reader.h"
-#include "pipeline/scan/strict_json.h"
+#include "pipeline/model_io/mesh_reader.h"
 
 namespace scanrig {
 namespace {

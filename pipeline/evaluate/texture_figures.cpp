@@ -15,9 +15,9 @@ namespace {
 
 constexpr int kPatch = 32;
 constexpr int kErosion = 6;
-constexpr int kReach = 6;               ///< how far a patch is looked for, px
-constexpr double kLeastGradient = 1.0;  ///< deviation of the gradient over a patch, grey levels a pixel
-constexpr double kLeastCorrelation = 0.6;
+constexpr int kReach = 6;             ///< how far a patch is looked for, px
+constexpr double kMinGradient = 1.0;  ///< deviation of the gradient over a patch, grey levels a pixel
+constexpr double kMinCorrelation = 0.6;
 
 cv::Mat1f gradient_magnitude(const cv::Mat& image) {
   cv::Mat grey;
@@ -45,7 +45,7 @@ double vertex(double before, double peak, double after) {
 double offset_of(const cv::Mat1f& drawn, const cv::Mat1f& photo, const cv::Rect& patch) {
   cv::Scalar mean, deviation;
   cv::meanStdDev(drawn(patch), mean, deviation);
-  if (deviation[0] < kLeastGradient) return std::nan("");
+  if (deviation[0] < kMinGradient) return std::nan("");
   const cv::Rect window(patch.x - kReach, patch.y - kReach, patch.width + 2 * kReach, patch.height + 2 * kReach);
   if ((window & cv::Rect({0, 0}, photo.size())) != window) return std::nan("");
   cv::Mat1f score;
@@ -54,7 +54,7 @@ double offset_of(const cv::Mat1f& drawn, const cv::Mat1f& photo, const cv::Rect&
   cv::Point at;
   cv::minMaxLoc(score, nullptr, &best, nullptr, &at);
   const bool inside = at.x > 0 && at.y > 0 && at.x + 1 < score.cols && at.y + 1 < score.rows;
-  if (best < kLeastCorrelation || !inside) return std::nan("");
+  if (best < kMinCorrelation || !inside) return std::nan("");
   const double dx = at.x - kReach + vertex(score(at.y, at.x - 1), best, score(at.y, at.x + 1));
   const double dy = at.y - kReach + vertex(score(at.y - 1, at.x), best, score(at.y + 1, at.x));
   return std::hypot(dx, dy);

@@ -6,9 +6,9 @@
 #include "core/context.h"
 #include "core/result.h"
 #include "pipeline/evaluate/scores.h"
-#include "pipeline/evaluate/truth.h"
+#include "pipeline/evaluate/truth_file.h"
 #include "pipeline/mesh/mesh.h"
-#include "pipeline/scan/scan_folder.h"
+#include "pipeline/storage/scan_folder.h"
 
 namespace scanrig {
 

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "pipeline/evaluate/surface_samples.h"
-#include "pipeline/evaluate/truth.h"
+#include "pipeline/evaluate/truth_file.h"
 #include "pipeline/mesh/surface_index.h"
 
 namespace scanrig {
@@ -15,7 +15,7 @@ struct ObservableRule {
   int margin_px = 8;           ///< inside both images
   double depth_jump_mm = 1.5;  ///< between neighbouring pixels
   int jump_distance_px = 6;
-  double least_height_mm = 0.5;  ///< above the table
+  double min_height_mm = 0.5;  ///< above the table
 };
 
 /// What one camera sees of the true object and the table.

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "pipeline/mesh/solid.h"
+#include "pipeline/mesh/solid_properties.h"
 #include "pipeline/mesh/topology.h"
 
 namespace scanrig {

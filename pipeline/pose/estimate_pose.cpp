@@ -18,7 +18,7 @@ constexpr int kPointPairMotions = 40;
 /// A candidate on its way, with what the measurements say of it.
 struct Hypothesis {
   Candidate candidate;
-  std::vector<Testimony> testimonies;
+  std::vector<SampleCheck> sample_checks;
   double score = 0.0;
   double condition = 0.0;
 };
@@ -28,7 +28,7 @@ struct Scene {
   RestingSolid solid1, solid2;
   std::vector<RestPair> pairs;
   MeasuredPose measured1, measured2;
-  Witness witness1, witness2;
+  PoseObservations observations1, observations2;
   double size_mm = 0.0;
   Eigen::Vector3d middle2 = Eigen::Vector3d::Zero();  ///< of pose 2's object
 };
@@ -39,13 +39,13 @@ bool alike(const Transform& a, const Transform& b, const Scene& scene, double de
 }
 
 /// Confirmations fade with the distance: a ranking for motions that are still degrees off.
-double soft_score(const std::vector<Testimony>& testimonies, double reach_mm) {
+double soft_score(const std::vector<SampleCheck>& sample_checks, double reach_mm) {
   double sum = 0.0;
-  for (const Testimony& t : testimonies) {
-    if (t.kind == Testimony::Kind::free_space) sum -= 1.0;
-    if (t.kind == Testimony::Kind::surface) sum += 1.0 - std::abs(t.distance_mm) / reach_mm;
+  for (const SampleCheck& t : sample_checks) {
+    if (t.kind == SampleCheck::Kind::free_space) sum -= 1.0;
+    if (t.kind == SampleCheck::Kind::surface) sum += 1.0 - std::abs(t.distance_mm) / reach_mm;
   }
-  return sum / static_cast<double>(std::max<std::size_t>(testimonies.size(), 1));
+  return sum / static_cast<double>(std::max<std::size_t>(sample_checks.size(), 1));
 }
 
 /// One narrowing of the field: align what is left, hear the witnesses, keep the best that are distinct.
@@ -64,7 +64,7 @@ void narrow(std::vector<Hypothesis>& field, const Scene& scene, const Round& rou
     if (round.iterations > 0) {
       RefineOptions refine;
       refine.iterations = round.iterations;
-      h.candidate.contacts = contacts_for(h.candidate.pose1_from_pose2, scene.pairs, scene.solid2.facts);
+      h.candidate.contacts = contacts_for(h.candidate.pose1_from_pose2, scene.pairs, scene.solid2.properties);
       refine.contacts = h.candidate.contacts;
       const RefinedPose aligned = align(scene.measured1, scene.measured2, h.candidate.pose1_from_pose2, round.level,
                                         round.capture * scene.size_mm, refine);
@@ -72,8 +72,9 @@ void narrow(std::vector<Hypothesis>& field, const Scene& scene, const Round& rou
       h.condition = aligned.condition;
     }
     const double reach = round.reach * scene.size_mm;
-    h.testimonies = hear(scene.witness1, scene.witness2, h.candidate.pose1_from_pose2, round.level, reach);
-    h.score = soft_score(h.testimonies, reach);
+    h.sample_checks =
+        check_samples(scene.observations1, scene.observations2, h.candidate.pose1_from_pose2, round.level, reach);
+    h.score = soft_score(h.sample_checks, reach);
   });
   std::stable_sort(field.begin(), field.end(),
                    [](const Hypothesis& a, const Hypothesis& b) { return a.score > b.score; });
@@ -92,9 +93,9 @@ double height_above_table(const Mesh& solid) { return reach_along(solid.vertices
 
 Result<Scene> set_scene(const PoseInput& pose1, const PoseInput& pose2) {
   Scene scene;
-  const auto facts1 = solid_facts(pose1.solid);
+  const auto facts1 = solid_properties(pose1.solid);
   if (!facts1) return pass_on(facts1, "pose 1");
-  const auto facts2 = solid_facts(pose2.solid);
+  const auto facts2 = solid_properties(pose2.solid);
   if (!facts2) return pass_on(facts2, "pose 2");
   scene.solid1 = {*facts1, height_above_table(pose1.solid), {}};
   scene.solid2 = {*facts2, height_above_table(pose2.solid), {}};
@@ -114,7 +115,7 @@ Result<Scene> set_scene(const PoseInput& pose1, const PoseInput& pose2) {
 void add_pair(const RestPair& pair, const char* generator, const Scene& scene, std::vector<Hypothesis>& field) {
   for (const double swivel : swivels_of(pair)) {
     Hypothesis h;
-    h.candidate.pose1_from_pose2 = transform_of(pair, scene.solid1.facts, scene.solid2.facts, swivel);
+    h.candidate.pose1_from_pose2 = transform_of(pair, scene.solid1.properties, scene.solid2.properties, swivel);
     h.candidate.generator = generator;
     h.candidate.normal1 = pair.of_pose1.normal;
     h.candidate.normal2 = pair.of_pose2.normal;
@@ -127,9 +128,9 @@ Result<void> add_rest_hypotheses(const PoseInput& pose1, const PoseInput& pose2,
                                  Scene& scene, PoseEstimate& estimate, std::vector<Hypothesis>& field) {
   const bool egi = options.rests == PoseOptions::Rests::egi;
   const auto find = egi ? &rests_on_sphere : &rests_on_hull;
-  auto rests1 = find(pose1.solid, scene.solid1.facts, scene.solid2.height_mm, options.stable);
+  auto rests1 = find(pose1.solid, scene.solid1.properties, scene.solid2.height_mm, options.stable);
   if (!rests1) return pass_on(rests1, "pose 1");
-  auto rests2 = find(pose2.solid, scene.solid2.facts, scene.solid1.height_mm, options.stable);
+  auto rests2 = find(pose2.solid, scene.solid2.properties, scene.solid1.height_mm, options.stable);
   if (!rests2) return pass_on(rests2, "pose 2");
   estimate.counts1 = rests1->counts;
   estimate.counts2 = rests2->counts;
@@ -161,22 +162,22 @@ std::string describe(const Candidate& c) {
   const Eigen::AngleAxisd turn(c.pose1_from_pose2.linear());
   return fmt::format("{:.1f} deg about ({:.2f}, {:.2f}, {:.2f}), {:.0f} % confirmed, {:.1f} % contradicted",
                      to_degrees(turn.angle()), turn.axis().x(), turn.axis().y(), turn.axis().z(),
-                     100.0 * c.tally.confirmed, 100.0 * c.tally.contradicted);
+                     100.0 * c.agreement.confirmed, 100.0 * c.agreement.contradicted);
 }
 
 /// One yardstick for all: the spread of the best fitting hypothesis that covers enough.
 void judge(std::vector<Hypothesis>& field, const PoseOptions& options) {
   double spread = std::numeric_limits<double>::infinity();
   for (const Hypothesis& h : field) {
-    const Tally loose = tally(h.testimonies, std::numeric_limits<double>::infinity());
-    if (loose.confirmed > options.least_overlap) spread = std::min(spread, 1.4826 * loose.median_mm);
+    const Agreement loose = count_agreement(h.sample_checks, std::numeric_limits<double>::infinity());
+    if (loose.confirmed > options.min_overlap) spread = std::min(spread, 1.4826 * loose.median_mm);
   }
-  for (Hypothesis& h : field) h.candidate.tally = tally(h.testimonies, spread);
+  for (Hypothesis& h : field) h.candidate.agreement = count_agreement(h.sample_checks, spread);
   std::stable_sort(field.begin(), field.end(), [](const Hypothesis& a, const Hypothesis& b) {
-    return a.candidate.tally.score() > b.candidate.tally.score();
+    return a.candidate.agreement.score() > b.candidate.agreement.score();
   });
   for (Hypothesis& h : field) {
-    const Comparison with_best = compare(field[0].testimonies, h.testimonies, spread);
+    const AgreementGap with_best = compare(field[0].sample_checks, h.sample_checks, spread);
     Candidate& c = h.candidate;
     c.contradicted_more = with_best.contradicted_more;
     c.separable = with_best.separable;
@@ -187,7 +188,8 @@ void judge(std::vector<Hypothesis>& field, const PoseOptions& options) {
 
 /// Another answer that the measurements do not tell from `best`.
 bool is_rival(const Candidate& c, const Candidate& best, const PoseOptions& options) {
-  return c.angle_to_best_deg > options.same_deg && !c.separable && c.tally.confirmed > 0.7 * best.tally.confirmed;
+  return c.angle_to_best_deg > options.same_deg && !c.separable &&
+         c.agreement.confirmed > 0.7 * best.agreement.confirmed;
 }
 
 /// Takes what cannot be told apart yet to full resolution; what was told apart stays behind the finalists.
@@ -210,9 +212,8 @@ Result<void> decide(const std::vector<Hypothesis>& field, const Scene& scene, co
   if (field.empty())
     return fail(ErrorCode::no_overlap, "pose estimation: no motion between the poses could be proposed");
   const Candidate& best = field[0].candidate;
-  const Tally& t = best.tally;
-  if (t.confirmed < options.least_overlap ||
-      t.contradicted > options.most_contradicted * (t.confirmed + t.contradicted) ||
+  const Agreement& t = best.agreement;
+  if (t.confirmed < options.min_overlap || t.contradicted > options.max_contradicted * (t.confirmed + t.contradicted) ||
       t.median_mm > options.worst_median * scene.size_mm) {
     return fail(ErrorCode::no_overlap,
                 "pose estimation: the two poses do not fit together; the best of {} tried: {}. "
@@ -248,8 +249,8 @@ Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose
                                    const Context& context) {
   auto scene = set_scene(pose1, pose2);
   if (!scene) return pass_on(scene);
-  scene->witness1 = {&scene->measured1, pose1.views};
-  scene->witness2 = {&scene->measured2, pose2.views};
+  scene->observations1 = {&scene->measured1, pose1.views};
+  scene->observations2 = {&scene->measured2, pose2.views};
   if (context.stopped()) return fail(ErrorCode::stopped, "pose estimation: stopped");
   PoseEstimate estimate;
   std::vector<Hypothesis> field;
@@ -274,7 +275,7 @@ Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose
   if (auto ok = decide(field, *scene, options); !ok) return pass_on(ok);
   estimate.best = field[0].candidate;
   estimate.pose1_from_pose2 = estimate.best.pose1_from_pose2;
-  estimate.overlap = estimate.best.tally.confirmed;
+  estimate.overlap = estimate.best.agreement.confirmed;
   estimate.condition = field[0].condition;
   for (std::size_t i = 1; i < field.size(); ++i) estimate.alternatives.push_back(field[i].candidate);
   return estimate;

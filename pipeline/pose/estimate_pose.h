@@ -7,7 +7,7 @@
 #include "core/context.h"
 #include "core/result.h"
 #include "pipeline/mesh/mesh.h"
-#include "pipeline/pose/evidence.h"
+#include "pipeline/pose/agreement.h"
 #include "pipeline/pose/rest_pairs.h"
 #include "pipeline/pose/stable_rests.h"
 #include "pipeline/range/range_image.h"
@@ -29,8 +29,8 @@ struct PoseOptions {
   bool point_pairs = true;            ///< global search without rests, for an object on putty or pins
   double same_deg = 10.0;             ///< hypotheses closer than this are one
   double same_rest_tilt_deg = 5.0;    ///< a motion that tilts the object less than this has not turned it over
-  double least_overlap = 0.06;        ///< confirmed share of both surfaces
-  double most_contradicted = 0.25;    ///< contradicted share of what was judged
+  double min_overlap = 0.06;          ///< confirmed share of both surfaces
+  double max_contradicted = 0.25;     ///< contradicted share of what was judged
   double worst_median = 0.006;        ///< median distance as a share of the object's size
 };
 
@@ -41,7 +41,7 @@ struct Candidate {
   Eigen::Vector3d normal1 = Eigen::Vector3d::Zero();  ///< n_T1 and n_T2 of the pair it came from; 0 for point pairs
   Eigen::Vector3d normal2 = Eigen::Vector3d::Zero();
   std::vector<Contact> contacts;  ///< with the tables, for the refinement
-  Tally tally;
+  Agreement agreement;
   double angle_to_best_deg = 0.0;
   int contradicted_more = 0;  ///< samples that speak against it and not against the best, less the other way round
   bool separable = false;     ///< that is more than chance

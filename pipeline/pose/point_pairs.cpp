@@ -15,11 +15,11 @@ constexpr int kDistanceSteps = 16;  // over the range of distances used
 constexpr int kAngleSteps = 15;     // over 180 deg
 constexpr int kTurnSteps = 30;      // over 360 deg
 constexpr int kKeys = kDistanceSteps * kAngleSteps * kAngleSteps * kAngleSteps;
-constexpr double kShortest = 0.12;  // pairs, as a share of the object's size
-constexpr double kLongest = 0.6;
-constexpr std::size_t kReferences = 200;   // points of surface 2 that vote
-constexpr std::uint32_t kMostAlike = 400;  // pairs looked at under one key
-constexpr std::size_t kPeaks = 3;          // motions taken from each
+constexpr double kMinLength = 0.12;  // pairs, as a share of the object's size
+constexpr double kMaxLength = 0.6;
+constexpr std::size_t kReferences = 200;  // points of surface 2 that vote
+constexpr std::uint32_t kMaxAlike = 400;  // pairs looked at under one key
+constexpr std::size_t kPeaks = 3;         // motions taken from each
 
 int angle_step(double cosine) {
   const double share = std::acos(std::clamp(cosine, -1.0, 1.0)) / std::numbers::pi;
@@ -30,7 +30,7 @@ int angle_step(double cosine) {
 int key_of(const SurfacePoint& a, const SurfacePoint& b, double size_mm) {
   const Eigen::Vector3d d = b.point - a.point;
   const double length = d.norm();
-  const double share = (length / size_mm - kShortest) / (kLongest - kShortest);
+  const double share = (length / size_mm - kMinLength) / (kMaxLength - kMinLength);
   if (share < 0.0 || share >= 1.0) return -1;
   const Eigen::Vector3d u = d / length;
   int key = static_cast<int>(share * kDistanceSteps);
@@ -104,7 +104,7 @@ std::vector<Vote> votes_of(const PairTable& table, std::span<const SurfacePoint>
     // A common key (flat faces have them) says little: its votes count less, and a part of its pairs is enough.
     const std::uint32_t alike = table.begin[key + 1] - table.begin[key];
     const float weight = 1.0F / std::sqrt(static_cast<float>(alike) + 1.0F);
-    for (std::uint32_t e = table.begin[key]; e < table.begin[key + 1]; e += 1 + alike / kMostAlike) {
+    for (std::uint32_t e = table.begin[key]; e < table.begin[key + 1]; e += 1 + alike / kMaxAlike) {
       const double turn = (table.entries[e].turn - turn2) / kTwoPi;
       const int step = static_cast<int>((turn - std::floor(turn)) * kTurnSteps) % kTurnSteps;
       votes[table.entries[e].reference * kTurnSteps + step] += weight;

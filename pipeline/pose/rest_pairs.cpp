@@ -37,7 +37,7 @@ Eigen::Matrix3d bisector_frame(const Eigen::Vector3d& a, const Eigen::Vector3d& 
 }  // namespace
 
 std::vector<RestPair> pair_rests(const RestingSolid& pose1, const RestingSolid& pose2, const RestPairOptions& options) {
-  const double size = 0.5 * (pose1.facts.size_mm + pose2.facts.size_mm);
+  const double size = 0.5 * (pose1.properties.size_mm + pose2.properties.size_mm);
   const double height_sigma = std::max(options.height_sigma_mm, options.height_sigma * size);
   std::vector<RestPair> pairs;
   for (const StableRest& one : pose1.rests) {
@@ -54,7 +54,8 @@ std::vector<RestPair> pair_rests(const RestingSolid& pose1, const RestingSolid& 
   return pairs;
 }
 
-Transform transform_of(const RestPair& pair, const SolidFacts& pose1, const SolidFacts& pose2, double swivel) {
+Transform transform_of(const RestPair& pair, const SolidProperties& pose1, const SolidProperties& pose2,
+                       double swivel) {
   const Eigen::Vector3d base = base_normal();
   const Eigen::Vector3d& contact1 = pair.of_pose1.normal;  // of pose 2's table, seen in pose 1
   const Eigen::Vector3d& contact2 = pair.of_pose2.normal;  // of pose 1's table, seen in pose 2
@@ -75,7 +76,7 @@ Transform transform_of(const RestPair& pair, const SolidFacts& pose1, const Soli
 }
 
 std::vector<Contact> contacts_for(const Transform& pose1_from_pose2, std::span<const RestPair> pairs,
-                                  const SolidFacts& pose2) {
+                                  const SolidProperties& pose2) {
   const Eigen::Matrix3d& turn = pose1_from_pose2.linear();
   const RestPair* best = nullptr;
   double nearest = to_radians(3.0);

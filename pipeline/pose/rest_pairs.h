@@ -14,7 +14,7 @@ inline Eigen::Vector3d base_normal() { return -Eigen::Vector3d::UnitY(); }
 
 /// A solid in its pose's turntable frame and the planes it can rest on.
 struct RestingSolid {
-  SolidFacts facts;
+  SolidProperties properties;
   double height_mm = 0.0;  ///< above the table in its own pose
   std::vector<StableRest> rests;
 };
@@ -41,12 +41,12 @@ std::vector<RestPair> pair_rests(const RestingSolid& pose1, const RestingSolid& 
 /// pose1_from_pose2 of a pair: R n_T2 = n_B and R n_B = n_T1, both met equally well (TRIAD on the bisectors), then
 /// turned by `swivel` radians about n_T1. Contact fixes the translation along n_B and n_T1, the centres of mass the
 /// rest.
-Transform transform_of(const RestPair& pair, const SolidFacts& pose1, const SolidFacts& pose2, double swivel);
+Transform transform_of(const RestPair& pair, const SolidProperties& pose1, const SolidProperties& pose2, double swivel);
 
 /// What the tables say of a motion: the contacts of the pair that agrees with it best, pose 2's rest on pose 1's table
 /// and pose 1's rest on pose 2's; none where no pair agrees within 3 deg.
 std::vector<Contact> contacts_for(const Transform& pose1_from_pose2, std::span<const RestPair> pairs,
-                                  const SolidFacts& pose2);
+                                  const SolidProperties& pose2);
 
 /// The swivels to try. Within 30 deg of upside down the two contacts are one and any angle about the vertical fits:
 /// the full circle; beyond, the closed form and its neighbours, since normals of smooth contacts jitter.

@@ -34,11 +34,11 @@ std::vector<StableRest> facet_directions(const std::vector<Mesh::Face>& faces,
 
 }  // namespace
 
-Result<StableRests> rests_on_hull(const Mesh& solid, const SolidFacts& facts, double other_height_mm,
+Result<StableRests> rests_on_hull(const Mesh& solid, const SolidProperties& properties, double other_height_mm,
                                   const StableRestOptions& options) {
   const auto hull = convex_hull(solid.vertices);
   if (!hull) return pass_on(hull, "stable rests");
-  const double dilation = std::max(options.dilation_mm, options.dilation * facts.size_mm);
+  const double dilation = std::max(options.dilation_mm, options.dilation * properties.size_mm);
   std::vector<Eigen::Vector3d> corners;
   for (const Eigen::Vector3f& v : hull->vertices) corners.push_back(v.cast<double>());
 
@@ -49,9 +49,9 @@ Result<StableRests> rests_on_hull(const Mesh& solid, const SolidFacts& facts, do
     rest.height_mm = rest.offset_mm + reach_along(hull->vertices, -rest.normal);
     std::vector<Eigen::Vector3d> supports;
     for (const Eigen::Vector3d& c : corners) {
-      if (rest.normal.dot(c) > rest.offset_mm - options.flatness * facts.size_mm) supports.push_back(c);
+      if (rest.normal.dot(c) > rest.offset_mm - options.flatness * properties.size_mm) supports.push_back(c);
     }
-    rest.margin_mm = support_margin(supports, rest.normal, facts.centre_of_mass);
+    rest.margin_mm = support_margin(supports, rest.normal, properties.centre_of_mass);
   });
 
   StableRests found;

@@ -98,14 +98,14 @@ StableRest tangent_plane(const Mesh& solid, const Cell& cell) {
 
 }  // namespace
 
-Result<StableRests> rests_on_sphere(const Mesh& solid, const SolidFacts& facts, double other_height_mm,
+Result<StableRests> rests_on_sphere(const Mesh& solid, const SolidProperties& properties, double other_height_mm,
                                     const StableRestOptions& options) {
   const auto hull = convex_hull(solid.vertices);
   if (!hull) return pass_on(hull, "stable rests");
-  const double dilation = std::max(options.dilation_mm, options.dilation * facts.size_mm);
+  const double dilation = std::max(options.dilation_mm, options.dilation * properties.size_mm);
   StableRests found;
   for (const Cell& cell : gaussian_image(solid)) {
-    if (cell.area.norm() < 1e-6 * facts.size_mm * facts.size_mm) continue;
+    if (cell.area.norm() < 1e-6 * properties.size_mm * properties.size_mm) continue;
     StableRest plane = tangent_plane(solid, cell);
     ++found.counts.tangent_planes;
     const double reach = reach_along(hull->vertices, plane.normal);
@@ -117,7 +117,7 @@ Result<StableRests> rests_on_sphere(const Mesh& solid, const SolidFacts& facts, 
       if (plane.normal.dot(corner) > reach - options.support_tolerance_mm) supports.push_back(corner);
     }
     plane.offset_mm = reach;
-    plane.margin_mm = support_margin(supports, plane.normal, facts.centre_of_mass);
+    plane.margin_mm = support_margin(supports, plane.normal, properties.centre_of_mass);
     if (plane.margin_mm < -dilation) continue;
     ++found.counts.after_stability;
     plane.height_mm = reach + reach_along(hull->vertices, -plane.normal);

@@ -5,7 +5,8 @@
 
 #include "core/result.h"
 #include "pipeline/mesh/mesh.h"
-#include "pipeline/pose/solid.h"
+#include "pipeline/mesh/solid_properties.h"
+#include "pipeline/pose/convex_hull.h"
 
 namespace scanrig {
 
@@ -42,12 +43,12 @@ struct StableRests {
 /// Rests by the facets of the convex hull, merged where coplanar: a facet is a rest if the centre of mass projects into
 /// it [exact form of Park and Subbarao 2002, 3.2]. `other_height_mm` is the height of the object in the other pose; it
 /// is only counted here (`after_height`), since a hard gate loses true rests of partial models.
-Result<StableRests> rests_on_hull(const Mesh& solid, const SolidFacts& facts, double other_height_mm,
+Result<StableRests> rests_on_hull(const Mesh& solid, const SolidProperties& properties, double other_height_mm,
                                   const StableRestOptions& options);
 
 /// Rests by the Extended Gaussian Image, one tangent plane for each of the 320 faces of a tessellated sphere, through
 /// the three tests as published [Park and Subbarao 2002, 3.2].
-Result<StableRests> rests_on_sphere(const Mesh& solid, const SolidFacts& facts, double other_height_mm,
+Result<StableRests> rests_on_sphere(const Mesh& solid, const SolidProperties& properties, double other_height_mm,
                                     const StableRestOptions& options);
 
 /// Distance from the foot of `point` on the plane with `normal` to the nearest edge of the convex hull of the feet of

@@ -103,7 +103,7 @@ struct Side {
   const StereoOptions& options;
 
   [[nodiscard]] bool good(const DisparityPatch& patch) const {
-    return patch.valid && static_cast<double>(patch.zncc) >= options.least_zncc &&
+    return patch.valid && static_cast<double>(patch.zncc) >= options.min_zncc &&
            static_cast<double>(patch.sigma) <= options.largest_sigma_px;
   }
 
@@ -286,7 +286,7 @@ Neighbours ask_neighbours(const DenseDisparity& disparity, int u, int v, const S
 }  // namespace
 
 void remove_outliers(DenseDisparity& disparity, const StereoOptions& options) {
-  constexpr int kLeastAgreeing = 3;  // of 8: one side of a corner
+  constexpr int kMinAgreeing = 3;  // of 8: one side of a corner
   const cv::Size size = disparity.value.size();
   cv::Mat1s kept(size, short{0});
   parallel_for(static_cast<std::size_t>(size.height), [&](std::size_t row) {
@@ -294,7 +294,7 @@ void remove_outliers(DenseDisparity& disparity, const StereoOptions& options) {
     for (int u = 0; u < size.width; ++u) {
       if (std::isnan(disparity.value(v, u))) continue;
       const Neighbours n = ask_neighbours(disparity, u, v, options);
-      if (n.at_step || n.agreeing < kLeastAgreeing || 4 * n.agreeing < 3 * n.seen) continue;
+      if (n.at_step || n.agreeing < kMinAgreeing || 4 * n.agreeing < 3 * n.seen) continue;
       // Disparity in 1/16 px, offset so that 0 stays "nothing".
       kept(v, u) = cv::saturate_cast<short>(16000.0f + 16.0f * disparity.value(v, u));
     }

@@ -100,9 +100,7 @@ Result<RangeImage> match_rectified(const RectifiedPair& pair, const StereoOption
   remove_outliers(*disparity, options);
   RangeImage range = to_range(pair, *disparity);
   if (cv::countNonZero(range.depth == range.depth) == 0) {
-    return fail(
-        ErrorCode::degenerate,
-        "range: nothing matched between left and right image; is the projector on, the calibration the right one?");
+    return fail(ErrorCode::degenerate, "range: no stereo matches; check the projector and the calibration");
   }
   context.report("range", 1.0);
   return range;

@@ -10,7 +10,7 @@
 namespace scanrig {
 
 struct StereoOptions {
-  double least_zncc = 0.8;         ///< correlation below which a match is not believed
+  double min_zncc = 0.8;           ///< correlation below which a match is not believed
   double left_right_px = 0.3;      ///< the match from the right image must come back this near, or within 3 sigma
   double largest_sigma_px = 0.25;  ///< beyond it a pixel counts as not measured
   double enough_sigma_px = 0.08;   ///< a larger window is tried only above this

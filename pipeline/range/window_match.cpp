@@ -44,7 +44,7 @@ class Window {
          const WindowOptions& options);
 
   [[nodiscard]] bool usable(const WindowOptions& options) const {
-    return count_ >= options.least_support * kSide * kSide && variance_ > 1e-3;
+    return count_ >= options.min_support * kSide * kSide && variance_ > 1e-3;
   }
   [[nodiscard]] DisparityPatch match(const MatchImage& there, DisparityPatch patch, const WindowOptions& options);
 

@@ -46,7 +46,7 @@ struct MatchMask {
 struct WindowOptions {
   int iterations = 8;
   float step_px = 1.0f;          ///< a coarse disparity further than this from the patch belongs to another surface
-  float least_support = 0.45f;   ///< share of the window that must belong to the patch
+  float min_support = 0.45f;     ///< share of the window that must belong to the patch
   float curvature_prior = 0.5f;  ///< px over a window of radius 7: the second order is worth its noise only above this
 };
 

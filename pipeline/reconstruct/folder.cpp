@@ -1,8 +1,8 @@
 #include <nlohmann/json.hpp>
 
 #include "core/units.h"
+#include "pipeline/model_io/model_files.h"
 #include "pipeline/reconstruct/reconstruct.h"
-#include "pipeline/scan/model/model_files.h"
 
 namespace scanrig {
 namespace {

@@ -11,8 +11,8 @@
 #include "pipeline/calibration/camera.h"
 #include "pipeline/mesh/mesh.h"
 #include "pipeline/range/range_image.h"
-#include "pipeline/scan/images.h"
-#include "pipeline/scan/scan_folder.h"
+#include "pipeline/storage/images.h"
+#include "pipeline/storage/scan_folder.h"
 
 namespace scanrig {
 

@@ -7,7 +7,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/version.h"
-#include "pipeline/mesh/solid.h"
+#include "pipeline/mesh/solid_properties.h"
 #include "pipeline/mesh/topology.h"
 
 namespace scanrig {
@@ -64,7 +64,7 @@ json volume_json(const VolumeReport& volume) {
           {"voxels_filled", volume.voxels_filled},
           {"classes", classes},
           {"class_pairs", pairs},
-          {"alarms", volume.alarms}};
+          {"conflicts", volume.conflicts}};
 }
 
 double face_area(const Mesh& mesh, const Mesh::Face& face) {
@@ -79,10 +79,10 @@ json candidate_json(const Candidate& candidate) {
           {"generator", candidate.generator},
           {"rest_normal_in_pose1", vector_json(candidate.normal1)},
           {"rest_normal_in_pose2", vector_json(candidate.normal2)},
-          {"confirmed", candidate.tally.confirmed},
-          {"contradicted", candidate.tally.contradicted},
-          {"in_free_space", candidate.tally.free_space},
-          {"median_mm", number(candidate.tally.median_mm)},
+          {"confirmed", candidate.agreement.confirmed},
+          {"contradicted", candidate.agreement.contradicted},
+          {"in_free_space", candidate.agreement.free_space},
+          {"median_mm", number(candidate.agreement.median_mm)},
           {"angle_to_best_deg", candidate.angle_to_best_deg},
           {"contradicted_more_than_best", candidate.contradicted_more},
           {"separable", candidate.separable}};
@@ -125,7 +125,7 @@ Report::Report(const ReconstructOptions& options, const ScanIdentity& identity,
     : json_(std::make_unique<json>()) {
   json& report = *json_;
   report["format"] = "scanrig-report";
-  report["version"] = 1;
+  report["version"] = 2;
   report["software"] = {{"name", "scanrig"}, {"version", kVersion}, {"compiler", kCompiler}};
   report["scan"] = identity.id;
   report["profile_sha256"] = identity.profile;

@@ -60,11 +60,11 @@ Matches match(const RangeImage& target, const std::vector<SurfacePoint>& source,
   const Transform pose_from_target = target_from_pose.inverse();
   Matches matches;
   for (const SurfacePoint& s : source) {
-    if (s.facing < options.least_facing) continue;
+    if (s.facing < options.min_facing) continue;
     const Eigen::Vector3d point = target_from_source * s.point;
     const Eigen::Vector3d normal = target_from_source.linear() * s.normal;
     const auto plane = tangent_plane_near(target, point);
-    if (!plane || plane->facing < options.least_facing || plane->normal.dot(normal) < kMinAgreement) continue;
+    if (!plane || plane->facing < options.min_facing || plane->normal.dot(normal) < kMinAgreement) continue;
     if (std::abs(plane->normal.dot(point - plane->point)) > capture_mm) continue;
     matches.push_back({pose_from_source * s.point, pose_from_target * plane->point,
                        pose_from_source.linear() * s.normal, pose_from_target.linear() * plane->normal,
@@ -328,7 +328,7 @@ RegistrationOptions RegistrationOptions::imported() {
   options.axis_tilt_sigma_deg = options.axis_shift_sigma_mm = 0.0;
   options.pair_bias_mm = 0.02;
   options.capture_mm = 4.0;
-  options.least_facing = 0.25;
+  options.min_facing = 0.25;
   return options;
 }
 

@@ -18,7 +18,7 @@ struct RegistrationOptions {
   double axis_shift_sigma_mm = 0.005;  ///< the same, its position
   double pair_bias_mm = 0.01;          ///< error of two views' mean distance that more points do not average away
   double capture_mm = 1.0;             ///< farthest distance between corresponding surfaces at the start
-  double least_facing = 0.5;           ///< cosine of incidence below which a point is not used: stereo is biased there
+  double min_facing = 0.5;             ///< cosine of incidence below which a point is not used: stereo is biased there
   int neighbours = 2;                  ///< views up to this many places away around the ring are compared
   int samples = 20000;                 ///< points a view at the finest level, a quarter of it at each coarser one
   int levels = 3;

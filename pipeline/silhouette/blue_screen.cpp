@@ -131,7 +131,7 @@ Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const BlueScreenOpti
   image.convertTo(colour, CV_32F);
   cv::boxFilter(colour, smooth, CV_32F, {3, 3}, {-1, -1}, true, cv::BORDER_REPLICATE);
   const double share = border_blue_share(smooth);
-  if (share < options.least_blue_share) {
+  if (share < options.min_blue_share) {
     return fail(
         ErrorCode::degenerate,
         "silhouette: the border of the image is not blue ({:.0f} % of its light); is the screen in place and lit?",

@@ -7,7 +7,7 @@
 namespace scanrig {
 
 struct BlueScreenOptions {
-  double least_blue_share = 0.45;      ///< B / (B + G + R) of a screen that can serve as a key
+  double min_blue_share = 0.45;        ///< B / (B + G + R) of a screen that can serve as a key
   double object_key = 0.6;             ///< 0: grey, 1: the screen's chroma; an object's pixel lies below this
   double smallest_part_share = 0.005;  ///< of the largest part; smaller islands are specks
   int smallest_hole_px = 40;           ///< smaller openings are highlights or noise, larger ones show the screen

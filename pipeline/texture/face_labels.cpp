@@ -12,8 +12,8 @@ namespace {
 
 using Label = std::uint16_t;
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-constexpr double kGoodShare = 0.7;    ///< of the best photo's cosine: good enough to lay a face flat
-constexpr double kLeastGain = 0.002;  ///< of the seen area: what a further view must add to be picked
+constexpr double kGoodShare = 0.7;  ///< of the best photo's cosine: good enough to lay a face flat
+constexpr double kMinGain = 0.002;  ///< of the seen area: what a further view must add to be picked
 constexpr int kSmoothingRounds = 10;
 constexpr double kBorderCost = 0.5;       ///< of one edge between two labels, against a cosine lost of 1
 constexpr std::size_t kSmallChart = 200;  ///< faces: smaller charts join a neighbour where its view shows them ...
@@ -114,7 +114,7 @@ std::vector<Label> cover(const Quality& quality) {
       }
     });
     const auto next = static_cast<std::size_t>(std::max_element(gain.begin(), gain.end()) - gain.begin());
-    if (gain[next] <= kLeastGain * seen_area) break;
+    if (gain[next] <= kMinGain * seen_area) break;
     for (std::size_t f = 0; f < labels.size(); ++f) {
       if (labels[f] == open && quality(f, next) >= enough[f]) labels[f] = static_cast<Label>(next);
     }

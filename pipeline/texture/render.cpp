@@ -1,5 +1,5 @@
 #include "pipeline/texture/render.h"
-#include "pipeline/mesh/solid.h"
+#include "pipeline/mesh/solid_properties.h"
 
 #include <algorithm>
 #include <cmath>

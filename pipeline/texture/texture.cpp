@@ -1,5 +1,5 @@
 #include "pipeline/texture/texture.h"
-#include "pipeline/mesh/solid.h"
+#include "pipeline/mesh/solid_properties.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -24,7 +24,7 @@ constexpr float kFillSay = 1e-4F;
 constexpr double kWhiteShare = 0.99;
 constexpr double kWhite = 0.8;
 /// ... unless that takes more gain than this: a dark object stays dark.
-constexpr double kMostGain = 3.0;
+constexpr double kMaxGain = 3.0;
 
 Result<void> check(const Mesh& mesh, std::span<const Photo> photos, const TextureOptions& options) {
   if (mesh.faces.empty()) return fail(ErrorCode::degenerate, "texture: the mesh has no faces");
@@ -75,7 +75,7 @@ double gain_for(const std::vector<PointColour>& colours) {
   const auto white =
       brightest.begin() + static_cast<std::ptrdiff_t>(kWhiteShare * static_cast<double>(brightest.size() - 1));
   std::nth_element(brightest.begin(), white, brightest.end());
-  return std::min(kMostGain, kWhite / std::max(1e-3, static_cast<double>(*white)));
+  return std::min(kMaxGain, kWhite / std::max(1e-3, static_cast<double>(*white)));
 }
 
 /// What texels that no face owns show: harmless where a viewer's coarser levels reach beyond the padding.

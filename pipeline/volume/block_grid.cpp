@@ -8,8 +8,8 @@
 namespace scanrig {
 namespace {
 
-constexpr std::size_t kMostBlocks = 400'000;  // about 1 GB of nodes
-constexpr double kMostBlocksInBox = 3e7;
+constexpr std::size_t kMaxBlocks = 400'000;  // about 1 GB of nodes
+constexpr double kMaxBlocksInBox = 3e7;
 const std::array<Eigen::Vector3i, 6> kFaces = {
     Eigen::Vector3i{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}};
 
@@ -109,7 +109,7 @@ std::vector<Eigen::Vector3i> BlockGrid::open_neighbours(const Block& block) cons
 }
 
 Result<void> BlockGrid::fill(const Field& field, const std::vector<Eigen::Vector3f>& seeds, const Context& context) {
-  if (size_.cast<double>().prod() > kMostBlocksInBox) {
+  if (size_.cast<double>().prod() > kMaxBlocksInBox) {
     return fail(ErrorCode::out_of_range, "volume: {} x {} x {} blocks of 8 voxels are too many; use larger voxels",
                 size_.x(), size_.y(), size_.z());
   }
@@ -118,9 +118,9 @@ Result<void> BlockGrid::fill(const Field& field, const std::vector<Eigen::Vector
   std::vector<Eigen::Vector3i> wanted = seed_blocks(seeds);
   while (!wanted.empty()) {
     const std::size_t first = blocks_.size();
-    if (first + wanted.size() > kMostBlocks) {
+    if (first + wanted.size() > kMaxBlocks) {
       return fail(ErrorCode::out_of_range,
-                  "volume: the surface needs more than {} blocks of 8 voxels; use larger voxels", kMostBlocks);
+                  "volume: the surface needs more than {} blocks of 8 voxels; use larger voxels", kMaxBlocks);
     }
     blocks_.resize(first + wanted.size());
     parallel_for(wanted.size(), [&](std::size_t i) {

@@ -20,7 +20,7 @@ struct SurfaceStatistics {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
 };
 
-SurfaceStatistics surface_statistics(const std::vector<std::vector<RangeEvidence>>& views_of_pose) {
+SurfaceStatistics surface_statistics(const std::vector<std::vector<RangeSampler>>& views_of_pose) {
   std::vector<float> weights;
   SurfaceStatistics result;
   for (const auto& views : views_of_pose) {
@@ -41,7 +41,7 @@ SurfaceStatistics surface_statistics(const std::vector<std::vector<RangeEvidence
 
 }  // namespace
 
-Field::Field(std::vector<std::vector<RangeEvidence>> views_of_pose, std::vector<Transform> model_from_pose, Hull hull,
+Field::Field(std::vector<std::vector<RangeSampler>> views_of_pose, std::vector<Transform> model_from_pose, Hull hull,
              const VolumeOptions& options, double band_mm)
     : views_of_pose_(std::move(views_of_pose)),
       hull_(std::move(hull)),

@@ -7,7 +7,7 @@
 #include "pipeline/volume/class_table.h"
 #include "pipeline/volume/hull.h"
 #include "pipeline/volume/integrate.h"
-#include "pipeline/volume/range_evidence.h"
+#include "pipeline/volume/range_sampler.h"
 
 namespace scanrig {
 
@@ -36,12 +36,12 @@ struct PointEvidence {
 class Field {
  public:
   /// `views_of_pose`: prepared views, pose after pose.
-  Field(std::vector<std::vector<RangeEvidence>> views_of_pose, std::vector<Transform> model_from_pose, Hull hull,
+  Field(std::vector<std::vector<RangeSampler>> views_of_pose, std::vector<Transform> model_from_pose, Hull hull,
         const VolumeOptions& options, double band_mm);
 
   /// The views and bounds that matter near one place.
   struct Neighbourhood {
-    std::vector<const RangeEvidence*> views;
+    std::vector<const RangeSampler*> views;
     Hull hull;
   };
   [[nodiscard]] Neighbourhood near(const Eigen::Vector3f& centre, float radius) const;
@@ -60,7 +60,7 @@ class Field {
   [[nodiscard]] float bounds(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood,
                              std::size_t views_behind) const;
 
-  std::vector<std::vector<RangeEvidence>> views_of_pose_;
+  std::vector<std::vector<RangeSampler>> views_of_pose_;
   std::vector<Transform> pose_from_model_;
   Hull hull_;
   VolumeOptions::Fusion fusion_;

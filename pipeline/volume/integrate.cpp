@@ -83,7 +83,7 @@ bool has_silhouettes(const PosedViews& pose) {
 }
 
 struct Prepared {
-  std::vector<std::vector<RangeEvidence>> views_of_pose;
+  std::vector<std::vector<RangeSampler>> views_of_pose;
   std::vector<Transform> model_from_pose;
   std::vector<Eigen::Vector3f> seeds;  ///< one measured point in about eight
   Eigen::AlignedBox3f box;             ///< of everything measured
@@ -93,7 +93,7 @@ Prepared prepare(std::span<const PosedViews> poses, const VolumeOptions& options
   constexpr std::size_t kSeedStride = 8;
   Prepared result;
   for (const auto& pose : poses) {
-    std::vector<std::optional<RangeEvidence>> made(pose.views.size());
+    std::vector<std::optional<RangeSampler>> made(pose.views.size());
     parallel_for(made.size(), [&](std::size_t i) {
       made[i].emplace(pose.views[i].range, pose.model_from_pose, band_mm, options.voxel_mm);
     });
@@ -127,7 +127,7 @@ void count_classes(const Field& field, const BlockGrid& grid, VolumeReport& repo
   struct Count {
     std::array<std::array<std::size_t, kVoxelClasses>, 2> classes{};
     ClassPairCounts pairs{};
-    std::size_t alarms = 0;
+    std::size_t conflicts = 0;
   };
   std::vector<Count> counts(grid.blocks().size());
   parallel_for(counts.size(), [&](std::size_t i) {
@@ -141,7 +141,7 @@ void count_classes(const Field& field, const BlockGrid& grid, VolumeReport& repo
       }
       if (field.poses() < 2) continue;
       ++counts[i].pairs[static_cast<std::size_t>(pose[0].voxel_class)][static_cast<std::size_t>(pose[1].voxel_class)];
-      counts[i].alarms += combine(pose[0], pose[1], field.class_threshold()).alarm ? 1 : 0;
+      counts[i].conflicts += combine(pose[0], pose[1], field.class_threshold()).alarm ? 1 : 0;
     }
   });
   report.class_counts.assign(field.poses(), {});
@@ -150,7 +150,7 @@ void count_classes(const Field& field, const BlockGrid& grid, VolumeReport& repo
       for (std::size_t p = 0; p < field.poses(); ++p) report.class_counts[p][a] += count.classes[p][a];
       for (std::size_t b = 0; b < kVoxelClasses; ++b) report.class_pairs[a][b] += count.pairs[a][b];
     }
-    report.alarms += count.alarms;
+    report.conflicts += count.conflicts;
   }
 }
 

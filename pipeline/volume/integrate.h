@@ -45,7 +45,7 @@ struct VolumeReport {
   /// On every fourth voxel of the active blocks: classes a pose, pairs of classes (two poses), contradictions.
   std::vector<std::array<std::size_t, kVoxelClasses>> class_counts;
   ClassPairCounts class_pairs{};
-  std::size_t alarms = 0;
+  std::size_t conflicts = 0;
 };
 
 struct Surface {

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "core/parallel.h"
-#include "pipeline/mesh/solid.h"
+#include "pipeline/mesh/solid_properties.h"
 
 namespace scanrig {
 namespace {

@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 
-from hand import Hand
+from control_client import ControlClient
 
 START_LIMIT_S = 60
 RENDER_LIMIT_S = 900
@@ -37,7 +37,7 @@ def arguments():
     return parser.parse_args()
 
 
-def complain(sentence, code):
+def report_error(sentence, code):
     print(f"demo: {sentence}", file=sys.stderr)
     return code
 
@@ -99,7 +99,7 @@ class WireStation:
             return rig
         daemon = run([options.bin / "scanrigd", "--config", self.rig / "rig.toml"], log)
         self.processes.insert(0, daemon)
-        self.hand = Hand(self.rig / "control.sock")
+        self.hand = ControlClient(self.rig / "control.sock")
         threading.Thread(target=self.hand.operate, daemon=True).start()
         return daemon
 
@@ -178,10 +178,10 @@ def main():
     began = time.monotonic()
     folder = options.out
     if options.object and not options.object.is_file():
-        return complain(f"no such file: {options.object}", 3)
+        return report_error(f"no such file: {options.object}", 3)
     in_the_way = make_room(folder)
     if in_the_way:
-        return complain(in_the_way, 3)
+        return report_error(in_the_way, 3)
     log = open(folder / "demo.log", "w")
     station = (WireStation if options.wire else SimulatedStation)(folder)
     try:
@@ -194,7 +194,7 @@ def main():
             followed = subprocess.run([options.bin / "scanrig", "status", "--follow", "--socket", station.socket],
                                       timeout=JOB_LIMIT_S).returncode
         except subprocess.TimeoutExpired:
-            return complain(f"the job is not done after {JOB_LIMIT_S} s; see {folder}/demo.log", 1)
+            return report_error(f"the job is not done after {JOB_LIMIT_S} s; see {folder}/demo.log", 1)
         if followed != 0:
             return followed
         job = job_folder(station.jobs)

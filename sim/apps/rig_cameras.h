@@ -11,7 +11,7 @@
 #include "core/clock.h"
 #include "core/result.h"
 #include "sim/apps/view_cache.h"
-#include "sim/scene/truth.h"
+#include "sim/scene/truth_writer.h"
 #include "sim/wire/gige_camera.h"
 
 namespace scanrig::sim {

@@ -12,7 +12,7 @@ namespace {
 using nlohmann::json;
 using Kind = wire::WireFault::Kind;
 
-constexpr std::size_t kMostAtOnce = 20000;  ///< frames or changes in one answer
+constexpr std::size_t kMaxAtOnce = 20000;  ///< frames or changes in one answer
 
 std::int64_t nanoseconds(Clock::TimePoint at) { return at.time_since_epoch().count(); }
 
@@ -97,7 +97,7 @@ template <class Entry>
 json since(const char* name, const std::vector<Entry>& all, std::size_t since) {
   json list = json::array();
   std::size_t next = std::min(since, all.size());
-  for (; next < all.size() && list.size() < kMostAtOnce; ++next) list.push_back(to_json(all[next], next));
+  for (; next < all.size() && list.size() < kMaxAtOnce; ++next) list.push_back(to_json(all[next], next));
   return {{name, list}, {"next", next}};
 }
 

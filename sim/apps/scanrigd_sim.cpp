@@ -8,7 +8,7 @@
 #include "daemon/jobs/pipeline_reconstructor.h"
 #include "daemon/rig/make_safe.h"
 #include "daemon/rig/open_devices.h"
-#include "daemon/service.h"
+#include "daemon/service/service.h"
 #include "sim/apps/operator.h"
 #include "sim/apps/troubled_camera.h"
 #include "sim/apps/wire_camera.h"

@@ -9,7 +9,7 @@
 #include "sim/scene/profile.h"
 #include "sim/scene/random.h"
 #include "sim/scene/standing.h"
-#include "sim/scene/truth.h"
+#include "sim/scene/truth_writer.h"
 
 namespace scanrig::sim {
 namespace {

@@ -12,10 +12,10 @@ namespace scanrig::sim {
 class TroubledCamera final : public StereoCamera {
  public:
   TroubledCamera(SimRig& rig, double share, std::uint64_t seed) : rig_(rig), share_(share), seed_(seed) {}
-  Result<void> ready(Deadline deadline) override { return rig_.camera().ready(deadline); }
+  Result<void> prepare(Deadline deadline) override { return rig_.camera().prepare(deadline); }
   Result<void> arm(Deadline deadline) override;
   Result<StereoFrame> collect(Deadline deadline) override { return rig_.camera().collect(deadline); }
-  Result<StereoFrame> look(Deadline deadline) override { return rig_.camera().look(deadline); }
+  Result<StereoFrame> capture_preview(Deadline deadline) override { return rig_.camera().capture_preview(deadline); }
 
  private:
   SimRig& rig_;

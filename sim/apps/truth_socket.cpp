@@ -13,8 +13,8 @@
 namespace scanrig::sim {
 namespace {
 
-constexpr timeval kPatience{.tv_sec = 1, .tv_usec = 0};
-constexpr std::size_t kLongestAnswer = 4096;
+constexpr timeval kReplyTimeout{.tv_sec = 1, .tv_usec = 0};
+constexpr std::size_t kMaxReplyLength = 4096;
 
 }  // namespace
 
@@ -36,7 +36,7 @@ Result<void> TruthSocket::connect() {
   if (path_.native().size() >= sizeof(address.sun_path)) return lost(ErrorCode::io, "the path is too long");
   std::memcpy(address.sun_path, path_.c_str(), path_.native().size());
   descriptor_ = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-  ::setsockopt(descriptor_, SOL_SOCKET, SO_RCVTIMEO, &kPatience, sizeof kPatience);
+  ::setsockopt(descriptor_, SOL_SOCKET, SO_RCVTIMEO, &kReplyTimeout, sizeof kReplyTimeout);
   if (::connect(descriptor_, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) return {};
   return lost(ErrorCode::io, std::strerror(errno));
 }
@@ -57,7 +57,7 @@ Result<std::string> TruthSocket::ask() {
     if (count < 0 && (errno == EAGAIN || errno == EINTR)) return lost(ErrorCode::timeout, "no answer within 1 s");
     if (count <= 0) return lost(ErrorCode::io, "the simulator has gone");
     pending_.append(bytes.data(), static_cast<std::size_t>(count));
-    if (pending_.size() > kLongestAnswer) return lost(ErrorCode::protocol, "an answer without end");
+    if (pending_.size() > kMaxReplyLength) return lost(ErrorCode::protocol, "an answer without end");
   }
 }
 

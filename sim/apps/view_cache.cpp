@@ -41,7 +41,7 @@ bool ViewCache::wait_until_ready(const std::stop_token& stop) {
 }
 
 void ViewCache::run(const std::stop_token& stop) {
-  give_way();  // a rig does not compute what it shows
+  lower_priority();  // a rig does not compute what it shows
   std::unique_lock lock(mutex_);
   while (changed_.wait(lock, stop, [&] { return !wanted_.empty() || !expected_.empty(); })) {
     const bool surprise = !wanted_.empty();

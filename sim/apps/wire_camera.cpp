@@ -6,13 +6,13 @@
 
 namespace scanrig::sim {
 
-Result<void> WireCamera::ready(Deadline) {
+Result<void> WireCamera::prepare(Deadline) {
   if (const auto there = truth_.get(); !there) return pass_on(there);
   return {};
 }
 
 Result<void> WireCamera::arm(Deadline deadline) {
-  if (auto there = ready(deadline); !there) return there;
+  if (auto there = prepare(deadline); !there) return there;
   exposed_.reset();
   armed_ = true;
   return {};
@@ -57,7 +57,7 @@ Result<StereoFrame> WireCamera::collect(Deadline deadline) {
   return StereoFrame{images.left, images.right, PixelFormat::bayer_rggb8, 1, e->taken};
 }
 
-Result<StereoFrame> WireCamera::look(Deadline) {
+Result<StereoFrame> WireCamera::capture_preview(Deadline) {
   return fail(ErrorCode::unsupported, "camera: this simulated camera exposes at the projector's edge only");
 }
 

@@ -12,7 +12,7 @@
 #include "drivers/projector/projector.h"
 #include "sim/apps/truth_socket.h"
 #include "sim/scene/scene.h"
-#include "sim/scene/truth.h"
+#include "sim/scene/truth_writer.h"
 
 namespace scanrig::sim {
 
@@ -24,11 +24,11 @@ class WireCamera final : public StereoCamera {
   WireCamera(std::unique_ptr<Scene> scene, std::filesystem::path truth, Clock& clock)
       : scene_(std::move(scene)), truth_(std::move(truth)), clock_(clock) {}
 
-  Result<void> ready(Deadline deadline) override;
+  Result<void> prepare(Deadline deadline) override;
   Result<void> arm(Deadline deadline) override;
   Result<StereoFrame> collect(Deadline deadline) override;
   /// Fails with `unsupported`: to render takes too long.
-  Result<StereoFrame> look(Deadline deadline) override;
+  Result<StereoFrame> capture_preview(Deadline deadline) override;
 
   /// The trigger line: an exposure begins, and lasts as long as `fire` does.
   Result<void> expose(Light light, const std::function<Result<void>()>& fire);
@@ -63,8 +63,8 @@ class WatchedProjector final : public Projector {
   Result<void> fire(Light light, Deadline deadline) override {
     return camera_.expose(light, [&] { return projector_.fire(light, deadline); });
   }
-  Result<void> dark(Deadline deadline) override { return projector_.dark(deadline); }
-  void request_dark() noexcept override { projector_.request_dark(); }
+  Result<void> turn_off(Deadline deadline) override { return projector_.turn_off(deadline); }
+  void request_off() noexcept override { projector_.request_off(); }
 
  private:
   Projector& projector_;

@@ -9,9 +9,9 @@
 #include "core/clock.h"
 #include "drivers/panel/panel.h"
 #include "drivers/projector/projector.h"
-#include "sim/devices/axis.h"
+#include "sim/devices/table_motion.h"
 #include "sim/scene/scene.h"
-#include "sim/scene/truth.h"
+#include "sim/scene/truth_writer.h"
 
 namespace scanrig::sim {
 

@@ -19,12 +19,12 @@ Result<void> SimProjector::fire(Light light, Deadline deadline) {
   return {};
 }
 
-Result<void> SimProjector::dark(Deadline) {
-  request_dark();
+Result<void> SimProjector::turn_off(Deadline) {
+  request_off();
   return {};
 }
 
-void SimProjector::request_dark() noexcept {
+void SimProjector::request_off() noexcept {
   const std::scoped_lock lock(bench_.mutex);
   bench_.dark_requested = true;
   bench_.clock.notify_all(bench_.changed);
@@ -61,7 +61,7 @@ Result<StereoFrame> SimStereoCamera::collect(Deadline deadline) {
   return StereoFrame{images.left, images.right, PixelFormat::bayer_rggb8, e.trigger, e.taken};
 }
 
-Result<StereoFrame> SimStereoCamera::look(Deadline) {
+Result<StereoFrame> SimStereoCamera::capture_preview(Deadline) {
   return fail(ErrorCode::unsupported, "camera: this simulated camera exposes at the projector's edge only");
 }
 

@@ -30,27 +30,27 @@ class SimTurntable final : public Turntable {
   double speed_;  // deg/s
 };
 
-/// Fails with `timeout`, and with `io` if request_dark() cut the pulse short.
+/// Fails with `timeout`, and with `io` if request_off() cut the pulse short.
 class SimProjector final : public Projector {
  public:
   explicit SimProjector(Bench& bench) : bench_(bench) {}
   Result<void> fire(Light light, Deadline deadline) override;
-  Result<void> dark(Deadline deadline) override;
-  void request_dark() noexcept override;
+  Result<void> turn_off(Deadline deadline) override;
+  void request_off() noexcept override;
 
  private:
   Bench& bench_;
 };
 
-/// collect() fails with `timeout`, and with `protocol` if it was not armed; look() with `unsupported`: to render takes
-/// too long.
+/// collect() fails with `timeout`, and with `protocol` if it was not armed; capture_preview() with `unsupported`: to
+/// render takes too long.
 class SimStereoCamera final : public StereoCamera {
  public:
   explicit SimStereoCamera(Bench& bench) : bench_(bench) {}
-  Result<void> ready(Deadline) override { return {}; }
+  Result<void> prepare(Deadline) override { return {}; }
   Result<void> arm(Deadline deadline) override;
   Result<StereoFrame> collect(Deadline deadline) override;
-  Result<StereoFrame> look(Deadline deadline) override;
+  Result<StereoFrame> capture_preview(Deadline deadline) override;
 
  private:
   Bench& bench_;

@@ -93,7 +93,8 @@ Result<void> SimTurntable::stop(Deadline deadline) {
   b.axis.brake(b.clock.now());
   const auto standing = b.axis.still();
   b.clock.wait_until(lock, b.changed, std::min(standing, deadline.at), [] { return false; });
-  if (deadline.at < standing) return fail(ErrorCode::timeout, "turntable: not seen standing in time; it may be moving");
+  if (deadline.at < standing)
+    return fail(ErrorCode::timeout, "turntable: standstill not confirmed in time; the table may be moving");
   return {};
 }
 
@@ -107,7 +108,7 @@ Result<TurntableStatus> SimTurntable::status(Deadline) {
   const std::scoped_lock lock(bench_.mutex);
   const auto now = bench_.clock.now();
   TurntableStatus status;
-  status.motion = now < bench_.axis.still() ? TurntableStatus::Motion::moving : TurntableStatus::Motion::standing;
+  status.motion = now < bench_.axis.still() ? TurntableStatus::Motion::moving : TurntableStatus::Motion::stopped;
   status.homed = homed_;
   status.angle = Degrees{encoder_reading(bench_.axis.angle(now))};
   if (!bench_.estop_ok) status.alarm = "no motor power: E-stop";

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "sim/scene/mesh.h"
+#include "sim/scene/triangle_mesh.h"
 
 namespace scanrig::sim {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/result.h"
-#include "sim/scene/mesh.h"
+#include "sim/scene/triangle_mesh.h"
 
 namespace scanrig::sim {
 

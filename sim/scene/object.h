@@ -5,8 +5,8 @@
 #include <string>
 
 #include "core/result.h"
-#include "sim/scene/mesh.h"
 #include "sim/scene/surface_colour.h"
+#include "sim/scene/triangle_mesh.h"
 
 namespace scanrig::sim {
 

@@ -2,7 +2,7 @@
 
 #include <functional>
 
-#include "sim/scene/mesh.h"
+#include "sim/scene/triangle_mesh.h"
 
 namespace scanrig::sim {
 

@@ -85,8 +85,8 @@ bool drop_one_contact(const Points& points, const Vector3d& down, std::vector<in
 
 Vector3d roll(const Points& points, Vector3d down) {
   std::vector<int> contacts = {lowest(points, down)};
-  constexpr int kMostSteps = 3000;
-  for (int step = 0; step < kMostSteps; ++step) {
+  constexpr int kMaxSteps = 3000;
+  for (int step = 0; step < kMaxSteps; ++step) {
     if (contacts.size() == 3 && !drop_one_contact(points, down, contacts)) return down;
     const auto side = rolling_side(points, down, contacts);
     if (!side) return down;
@@ -106,12 +106,12 @@ Vector3d roll(const Points& points, Vector3d down) {
 /// A tilt of two degrees any way lifts the centre of mass, and by more than the facets of a round body would.
 bool is_firm(const Points& points, const Vector3d& down) {
   const double tilt = to_radians(2.0), at_rest = height(points, down);
-  constexpr double kLeastLift = 1e-3;  // of the height of the centre of mass
+  constexpr double kMinLift = 1e-3;  // of the height of the centre of mass
   const Vector3d side = down.unitOrthogonal(), other = down.cross(side);
   for (int i = 0; i < 24; ++i) {
     const double phi = 2.0 * std::numbers::pi * i / 24;
     const Vector3d tilted = std::cos(tilt) * down + std::sin(tilt) * (std::cos(phi) * side + std::sin(phi) * other);
-    if (height(points, tilted) < (1.0 + kLeastLift) * at_rest) return false;
+    if (height(points, tilted) < (1.0 + kMinLift) * at_rest) return false;
   }
   return true;
 }

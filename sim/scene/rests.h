@@ -4,7 +4,7 @@
 
 #include "core/result.h"
 #include "core/transform.h"
-#include "sim/scene/mesh.h"
+#include "sim/scene/triangle_mesh.h"
 
 namespace scanrig::sim {
 

@@ -15,7 +15,7 @@
 namespace scanrig::sim::wire {
 namespace {
 
-constexpr std::size_t kLongestLine = 1 << 20;
+constexpr std::size_t kMaxLineLength = 1 << 20;
 constexpr int kBacklog = 16;
 
 std::optional<sockaddr_un> address_of(const std::filesystem::path& path) {
@@ -41,7 +41,7 @@ bool receive(int descriptor, std::string& pending) {
   const ssize_t count = ::recv(descriptor, bytes.data(), bytes.size(), 0);
   if (count <= 0) return false;
   pending.append(bytes.data(), static_cast<std::size_t>(count));
-  return pending.size() <= kLongestLine;
+  return pending.size() <= kMaxLineLength;
 }
 
 std::optional<std::string> take_line(std::string& pending) {

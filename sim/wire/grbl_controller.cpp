@@ -15,7 +15,7 @@ constexpr const char* kLocked = "[MSG:'$H'|'$X' to unlock]\r\n";
 constexpr const char* kOk = "ok\r\n";
 constexpr float kPullOff = 1.0F;       ///< $27, units: home is this far from the machine's zero
 constexpr double kHomingTravel = 1.5;  ///< of the axis' travel, one table turn; then homing is given up
-constexpr std::size_t kLongestLine = 80;
+constexpr std::size_t kMaxLineLength = 80;
 constexpr double kJogDegS = 90;
 
 std::string error(int number) { return fmt::format("error:{}\r\n", number); }
@@ -56,7 +56,7 @@ float GrblController::position() const { return static_cast<float>(axis_.command
 AxisMotion GrblController::motion(double deg_s) const {
   const double steps_per_deg = pulses_per_motor_rev_ * gear_ratio_ / 360.0;
   const double rate = settings_.acceleration_deg_s2 * steps_per_deg;
-  return {std::min(deg_s, settings_.most_deg_s) * steps_per_deg, rate, rate};
+  return {std::min(deg_s, settings_.max_deg_s) * steps_per_deg, rate, rate};
 }
 
 std::string GrblController::report() const {
@@ -147,7 +147,7 @@ void GrblController::advance() const {
 void GrblController::carry_out(const std::string& text) const {
   if (text.empty()) {
     said_ += kOk;
-  } else if (text.size() > kLongestLine) {
+  } else if (text.size() > kMaxLineLength) {
     said_ += error(11);
   } else if (text == "$H") {
     settings_.homing ? start_homing() : static_cast<void>(said_ += error(5));
@@ -169,7 +169,7 @@ std::string GrblController::list_settings() const {
   const double units_per_deg = gear_ratio_;
   return fmt::format(
       "$0=10\r\n$10=1\r\n$13=0\r\n$20=0\r\n$22={}\r\n$27={:.3f}\r\n$100={:.3f}\r\n$110={:.3f}\r\n$120={:.3f}\r\nok\r\n",
-      settings_.homing ? 1 : 0, kPullOff, steps_per_unit_, settings_.most_deg_s * units_per_deg * 60.0,
+      settings_.homing ? 1 : 0, kPullOff, steps_per_unit_, settings_.max_deg_s * units_per_deg * 60.0,
       settings_.acceleration_deg_s2 * units_per_deg);
 }
 

@@ -12,7 +12,7 @@ namespace scanrig::sim::wire {
 struct GrblSettings {
   double homing_deg_s = 60;
   double acceleration_deg_s2 = 90;
-  double most_deg_s = 3600;
+  double max_deg_s = 3600;
   bool homing = true;  ///< $22: locked until homed
 };
 

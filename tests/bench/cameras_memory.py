@@ -15,7 +15,7 @@ def slope_kib(samples):
 def measure(bench):
     time = QUICK_S if bench.quick else HOUR_S
     what = f"{time // 60} min of preview and scanning at 10 frames/s: "
-    done = bench.run([bench.bin / "eyes_hour", time], time + 120)
+    done = bench.run([bench.bin / "camera_hour", time], time + 120)
     lines = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
     samples, ends = [line for line in lines if "at_s" in line], [line for line in lines if "before" in line]
     if done.returncode != 0 or len(samples) < 8 or not ends:

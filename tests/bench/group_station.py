@@ -3,7 +3,7 @@ import pathlib
 import shutil
 import tempfile
 
-import station_closure
+import station_movement
 import station_disturbed
 import station_fuzz
 import station_kill
@@ -15,7 +15,7 @@ import station_stages
 import station_startup
 import station_view_cost
 
-MEASURED = {"startup": station_startup, "closure": station_closure, "kill": station_kill,
+MEASURED = {"startup": station_startup, "movement": station_movement, "kill": station_kill,
             "disturbed": station_disturbed, "stages": station_stages, "view_cost": station_view_cost,
             "load": station_load, "security": station_security, "soak": station_soak, "fuzz": station_fuzz,
             "asan": station_sanitize.ASAN, "tsan": station_sanitize.TSAN}

@@ -182,24 +182,24 @@ def restarted(rig, n):
     rig.kill_daemon(signal.SIGKILL if chance.random() < 0.5 else signal.SIGTERM)
     rig.make_safe()
     frames, _ = rig.frames(since)
-    unasked = homeless = moves = 0
+    unasked = home_lost = moves = 0
     homed = False
     for frame in frames:
         what = rig.kind(frame)
         moves += what in ("move", "home")
         unasked += what in ("move", "home") and (reset_at is None or frame["at_ns"] < reset_at)
-        homeless += what == "move" and not homed
+        home_lost += what == "move" and not homed
         homed = homed or what == "home"
-    return unasked, homeless, moves, not rig.truth()["standing"]
+    return unasked, home_lost, moves, not rig.truth()["standing"]
 
 
 def restarts(bench, scratch):
     wanted = 8 if bench.quick else 200
     lives = in_parallel(bench, scratch, "life", wanted, restarted)
-    unasked, homeless, moves, still = (sum(column) for column in zip(*lives))
+    unasked, home_lost, moves, still = (sum(column) for column in zip(*lives))
     bench.line("no motion after a restart without Reset", "0 frames that move",
                f"{unasked} in {len(lives)} random restarts ({moves} motions heard in all)",
                len(lives) == wanted and unasked == 0 and moves > 0)
-    bench.line("no move without home", "0 frames", f"{homeless} in {len(lives)} random restarts", homeless == 0)
+    bench.line("no move without home", "0 frames", f"{home_lost} in {len(lives)} random restarts", home_lost == 0)
     bench.line("standing after every end and make-safe", "all", f"{len(lives) - still} of {len(lives)}", still == 0)
 

@@ -32,7 +32,7 @@ def problems(status):
     return {device["name"]: device["problem"] for device in status.get("devices", []) if not device["ok"]}
 
 
-def all_there(status):
+def require_devices(status):
     return len(status.get("devices", [])) == 4 and not problems(status)  # turntable, projector, camera, panel
 
 
@@ -54,7 +54,7 @@ def old_jobs(rig):
     def ask(*words):
         subprocess.run([rig.bin / "scanrig", *words, "--socket", rig.api], check=True, capture_output=True, timeout=20)
 
-    boot(rig, all_there, machine_is("Halted"))
+    boot(rig, require_devices, machine_is("Halted"))
     ask("queue")
     job = rig.ask("jobs")["jobs"][0]["id"]
     ask("cancel", job)
@@ -87,9 +87,9 @@ def unplugged(section, key):
 
 
 HALTED = machine_is("Halted")
-CASES = {"all devices there": (as_it_is, all_there, HALTED, "Halted"),
-         "guard closed, homing without Reset allowed": (guarded, all_there, machine_is("Operational.Ready"), "Ready"),
-         f"{OLD_JOBS} jobs and no index": (old_jobs, all_there, HALTED, "Halted"),
+CASES = {"all devices there": (as_it_is, require_devices, HALTED, "Halted"),
+         "guard closed, homing without Reset allowed": (guarded, require_devices, machine_is("Operational.Ready"), "Ready"),
+         f"{OLD_JOBS} jobs and no index": (old_jobs, require_devices, HALTED, "Halted"),
          "camera unplugged": (other_camera, missing("camera"), HALTED, "Halted"),
          "turntable unplugged": (unplugged("turntable", "device"), missing("turntable"), machine_is("Error"), "Error"),
          "panel unplugged": (unplugged("gpio", "socket"), missing("panel"), machine_is("Error"), "Error")}

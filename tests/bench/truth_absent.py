@@ -15,7 +15,7 @@ REPORT = (
     "profile_sha256", "stages[].stage", "stages[].seconds", "stages[].process_peak_memory_mib", "poses[].views[]",
     "pose_estimate.tangent_planes[].tangent_planes", "pose_estimate.tangent_planes[].after_base_plane",
     "pose_estimate.tangent_planes[].after_stability", "pose_estimate.tangent_planes[].after_height",
-    "pose_estimate.chosen", "pose_estimate.alternatives", "pose_estimate.condition", "integration.alarms",
+    "pose_estimate.chosen", "pose_estimate.alternatives", "pose_estimate.condition", "integration.conflicts",
     "integration.class_pairs", "mesh.components", "mesh.genus", "mesh.watertight", "mesh.faces", "mesh.measured_share",
     "mesh.closed_share")
 

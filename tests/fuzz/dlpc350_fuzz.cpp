@@ -63,7 +63,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const auto begun = clock.now();
   for (const Light light : {Light::pattern, Light::plain}) {
     std::ignore = (*projector)->fire(light, clock.within(std::chrono::seconds(1)));
-    std::ignore = (*projector)->dark(clock.within(std::chrono::seconds(1)));
+    std::ignore = (*projector)->turn_off(clock.within(std::chrono::seconds(1)));
   }
   if (clock.now() - begun > std::chrono::seconds(10)) std::abort();  // a wait without end
   return 0;

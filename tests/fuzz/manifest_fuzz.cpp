@@ -1,6 +1,6 @@
 #include <cstdlib>
 
-#include "pipeline/scan/manifest.h"
+#include "pipeline/storage/manifest.h"
 #include "tests/fuzz/input_file.h"
 
 // A scan.json is any text: a manifest whose words are sound, or an error that names the file.

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "pipeline/scan/model/mesh_reader.h"
+#include "pipeline/model_io/mesh_reader.h"
 
 namespace scanrig {
 

@@ -260,10 +260,10 @@ class Acknowledged:
         self.job, self.views = None, set()
         self.kills, self.checked, self.lost = 0, 0, 0
 
-    def kill(self, station, most_s):
-        """During a scan, `most_s` after the view that is stored by now at the latest."""
+    def kill(self, station, max_s):
+        """During a scan, `max_s` after the view that is stored by now at the latest."""
         self.job, self.views = scanning(station), set()
-        end = time.monotonic() + random.uniform(0, most_s)
+        end = time.monotonic() + random.uniform(0, max_s)
         while True:
             known = station.ask(f"jobs/{self.job}") or {}
             self.views |= {view["view"] for view in known.get("stored", [])}

@@ -2,8 +2,8 @@
 
 #include "config/rig_config.h"
 #include "core/clock.h"
+#include "daemon/ctl/doctor/findings.h"
 #include "daemon/ctl/doctor/operator.h"
-#include "daemon/ctl/doctor/report.h"
 
 namespace scanrig::ctl::doctor {
 

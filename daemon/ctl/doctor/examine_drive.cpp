@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "daemon/ctl/doctor/examine.h"
+#include "daemon/ctl/doctor/find_devices.h"
 #include "daemon/ctl/doctor/inventory.h"
-#include "daemon/ctl/doctor/who_answers.h"
 
 namespace scanrig::ctl::doctor {
 namespace {

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "daemon/ctl/doctor/report.h"
+#include "daemon/ctl/doctor/findings.h"
 
 namespace scanrig::ctl::doctor {
 

@@ -64,9 +64,9 @@ class CameraTrial {
     if (collects) bench_->fire();
     auto outcome = timed(clock(), collects ? Clock::Duration(kFrameLimit) : kConnectLimit,
                          {ErrorCode::io, ErrorCode::timeout, ErrorCode::not_found}, [&](Deadline by) -> Result<void> {
-                           if (method == "ready") return camera().ready(by);
+                           if (method == "ready") return camera().prepare(by);
                            if (method == "arm") return camera().arm(by);
-                           return ended(collects ? camera().collect(by) : camera().look(by));
+                           return ended(collects ? camera().collect(by) : camera().capture_preview(by));
                          });
     if (fault == Fault::back_after_2s) clock().sleep_until(begun + kAbsence);
     outcome.expect(bench_->plug(true), "the bench cannot plug it in");

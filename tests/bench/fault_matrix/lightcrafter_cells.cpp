@@ -20,17 +20,17 @@ class LightCrafterTrial {
     if (auto fired = fire(); !fired) return {.told = fired.error().message, .wrongs = {"could not begin"}};
     const auto begun = clock().now();
     std::jthread meanwhile;
-    if (method == "request_dark") {
+    if (method == "request_off") {
       meanwhile = std::jthread([&] {
         soon(clock(), kLimit, [&] { return bench_.device().lit(); });  // the fault comes while the light burns
         begin(fault);
-        bench_.projector().request_dark();
+        bench_.projector().request_off();
       });
     } else {
       begin(fault);
     }
     auto outcome = timed(clock(), kLimit, named(method, fault), [&](Deadline by) {
-      return method == "dark" ? bench_.projector().dark(by) : bench_.projector().fire(Light::pattern, by);
+      return method == "dark" ? bench_.projector().turn_off(by) : bench_.projector().fire(Light::pattern, by);
     });
     if (meanwhile.joinable()) meanwhile.join();
     if (fault == Fault::back_after_2s) clock().sleep_until(begun + kAbsence);
@@ -45,7 +45,7 @@ class LightCrafterTrial {
  private:
   /// None: it succeeds all the same.
   static std::vector<ErrorCode> named(const std::string& method, Fault fault) {
-    if (method == "request_dark") return {ErrorCode::io};
+    if (method == "request_off") return {ErrorCode::io};
     switch (fault) {
       case Fault::silent: return {ErrorCode::timeout};
       case Fault::damaged: return {ErrorCode::protocol};
@@ -88,7 +88,7 @@ std::optional<std::string> why_not(Fault fault) {
 
 std::vector<Cell> lightcrafter_cells() {
   std::vector<Cell> cells;
-  for (const std::string method : {"fire", "dark", "request_dark"}) {
+  for (const std::string method : {"fire", "dark", "request_off"}) {
     for (const auto& [fault, name] : kFaults) {
       cells.push_back({"LightCrafterProjector", "", method, fault, [method, fault] {
                          if (auto reason = why_not(fault)) return not_applicable(*reason);

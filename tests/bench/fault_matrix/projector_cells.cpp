@@ -31,11 +31,11 @@ class Trial {
         soon(clock_, kLimit, [&] { return far_end_->level(kLine); });  // the fault comes while the light burns
         begun = clock_.now();
         far_end_.reset();
-        if (method == "request_dark") projector_->request_dark();
+        if (method == "request_off") projector_->request_off();
       });
     }
     auto outcome = timed(clock_, kLimit, {ErrorCode::io}, [&](Deadline by) {
-      return method == "dark" ? projector_->dark(by) : projector_->fire(Light::pattern, by);
+      return method == "dark" ? projector_->turn_off(by) : projector_->fire(Light::pattern, by);
     });
     if (meanwhile.joinable()) meanwhile.join();
     if (fault == Fault::back_after_2s) clock_.sleep_until(begun + kAbsence);
@@ -80,7 +80,7 @@ std::optional<std::string> why_not(Fault fault) {
 
 std::vector<Cell> projector_cells(const std::filesystem::path& scratch) {
   std::vector<Cell> cells;
-  for (const std::string method : {"fire", "dark", "request_dark"}) {
+  for (const std::string method : {"fire", "dark", "request_off"}) {
     for (const auto& [fault, name] : kFaults) {
       cells.push_back({"GpioProjector", "", method, fault, [scratch, method, fault] {
                          if (auto reason = why_not(fault)) return not_applicable(*reason);

@@ -6,10 +6,10 @@
 
 #include "core/units.h"
 #include "pipeline/evaluate/surface_samples.h"
+#include "pipeline/importers/grid_resampling.h"
+#include "pipeline/importers/stanford_files.h"
 #include "pipeline/mesh/surface_index.h"
-#include "pipeline/scan/grid_resampling.h"
-#include "pipeline/scan/model/mesh_reader.h"
-#include "pipeline/scan/stanford_files.h"
+#include "pipeline/model_io/mesh_reader.h"
 
 namespace scanrig::bench {
 namespace {

@@ -6,7 +6,7 @@
 #include "core/result.h"
 #include "core/transform.h"
 #include "pipeline/mesh/mesh.h"
-#include "pipeline/scan/scan_folder.h"
+#include "pipeline/storage/scan_folder.h"
 
 namespace scanrig::bench {
 

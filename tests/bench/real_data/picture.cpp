@@ -12,7 +12,7 @@
 #include "core/parallel.h"
 #include "core/units.h"
 #include "pipeline/mesh/surface_index.h"
-#include "pipeline/scan/model/mesh_reader.h"
+#include "pipeline/model_io/mesh_reader.h"
 
 namespace {
 

@@ -18,10 +18,10 @@
 #include <thread>
 
 #include "core/virtual_clock.h"
-#include "daemon/run_daemon.h"
-#include "pipeline/scan/model/model_files.h"
+#include "daemon/service/run_daemon.h"
+#include "pipeline/model_io/model_files.h"
 #include "tests/component/daemon/fake_rig.h"
-#include "tests/unit/pipeline/scan/sample_files.h"
+#include "tests/unit/pipeline/storage/sample_files.h"
 
 namespace {
 
@@ -146,12 +146,12 @@ class Shift {
     return wait_reconstructed();
   }
 
-  using What = event::JobAsked::What;
+  using What = event::JobRequested::What;
   void ask(What what, const std::string& job) {
     std::mutex mutex;
     std::condition_variable changed;
     bool answered = false;
-    loop_->ask(event::JobAsked{.what = what, .job = job}, [&](const Result<std::string>& result) {
+    loop_->ask(event::JobRequested{.what = what, .job = job}, [&](const Result<std::string>& result) {
       const std::lock_guard guard(mutex);
       if (!result) fmt::print("refused: {}\n", result.error().message);
       answered = true;

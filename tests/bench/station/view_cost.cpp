@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "daemon/jobs/pipeline_reconstructor.h"
-#include "daemon/run_daemon.h"
+#include "daemon/service/run_daemon.h"
 #include "sim/devices/sim_rig.h"
 
 namespace {
@@ -28,9 +28,9 @@ constexpr auto kLimit = std::chrono::minutes(5);
 class ReplayedCamera final : public StereoCamera {
  public:
   ReplayedCamera(StereoCamera& camera, Clock& clock) : camera_(camera), clock_(clock) {}
-  Result<void> ready(Deadline deadline) override { return camera_.ready(deadline); }
+  Result<void> prepare(Deadline deadline) override { return camera_.prepare(deadline); }
   Result<void> arm(Deadline deadline) override { return camera_.arm(deadline); }
-  Result<StereoFrame> look(Deadline deadline) override { return camera_.look(deadline); }
+  Result<StereoFrame> capture_preview(Deadline deadline) override { return camera_.capture_preview(deadline); }
   Result<StereoFrame> collect(Deadline deadline) override {
     const auto number = exposures_++ % kExposures;
     if (frames_.size() == kExposures) {

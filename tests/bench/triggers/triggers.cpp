@@ -13,7 +13,7 @@
 namespace scanrig::bench {
 namespace {
 
-constexpr int kPatience = 20;  ///< exposures in a row that may fail
+constexpr int kReplyTimeout = 20;  ///< exposures in a row that may fail
 
 struct Seen {
   int good = 0, wrong = 0, named = 0;
@@ -34,7 +34,7 @@ Result<Seen> take(AravisBench& bench, int count) {
     const auto frame = bench.camera().collect(deadline);
     if (!frame) {
       ++seen.named;
-      if (++failed > kPatience) return pass_on(frame);
+      if (++failed > kReplyTimeout) return pass_on(frame);
       continue;
     }
     failed = 0;

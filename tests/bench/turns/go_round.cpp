@@ -19,7 +19,7 @@ namespace {
 constexpr int kFaster = 100;
 constexpr double kStepDeg = 120;
 constexpr std::chrono::minutes kMoveLimit{10};  ///< six of the wall's seconds: a busy machine is not the subject
-constexpr double kLongestWayDeg = 361;          ///< a way longer than a turn was not asked for by anybody
+constexpr double kMaxWayDeg = 361;              ///< a way longer than a turn was not asked for by anybody
 
 /// The wall's clock, faster. The wire's own time-outs stay in the wall's time.
 class FastClock final : public Clock {
@@ -127,7 +127,7 @@ Seen go_round(const std::string& name, const std::filesystem::path& profiles, co
     }
   }
   --seen.turns;
-  if (seen.longest_way_deg > kLongestWayDeg) seen.error = fmt::format("a way of {:.0f} deg", seen.longest_way_deg);
+  if (seen.longest_way_deg > kMaxWayDeg) seen.error = fmt::format("a way of {:.0f} deg", seen.longest_way_deg);
   return seen;
 }
 

@@ -13,7 +13,7 @@
 #include "daemon/api/socket_file.h"
 #include "daemon/api/tokens.h"
 #include "tests/unit/daemon/api/station_without_rig.h"
-#include "tests/unit/pipeline/scan/scan_samples.h"
+#include "tests/unit/pipeline/storage/scan_samples.h"
 
 namespace scanrig::api_bench {
 
@@ -27,8 +27,8 @@ struct Answer {
 class Wire {
  public:
   explicit Wire(int fd) : fd_(fd) {
-    const timeval patience{.tv_sec = 5, .tv_usec = 0};
-    ::setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    const timeval reply_timeout{.tv_sec = 5, .tv_usec = 0};
+    ::setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &reply_timeout, sizeof reply_timeout);
   }
   ~Wire() {
     if (fd_ >= 0) ::close(fd_);

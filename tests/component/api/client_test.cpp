@@ -65,12 +65,12 @@ TEST_F(Client, SaysThatNobodyAnswers) {
   const auto done = ctl::download(options.socket, kModel, out(), nobody);
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().exit, ExitCode::unreachable);
-  EXPECT_EQ(ctl::ask(options.socket, "GET", "/api/v1/status").error().exit, ExitCode::unreachable);
+  EXPECT_EQ(ctl::send_request(options.socket, "GET", "/api/v1/status").error().exit, ExitCode::unreachable);
 }
 
 TEST_F(Client, SendsABodyAndHearsWhy) {
   serve();
-  const auto answer = ctl::ask(options.socket, "POST", "/api/v1/maintenance/jog", R"({"by_deg": 5})");
+  const auto answer = ctl::send_request(options.socket, "POST", "/api/v1/maintenance/jog", R"({"by_deg": 5})");
   ASSERT_FALSE(answer);
   EXPECT_EQ(answer.error().exit, ExitCode::refused);
 }
@@ -97,7 +97,7 @@ class HangingDaemon : public Client {
     }
   }
   void expect_given_up(const std::string& method, const std::string& body = "") const {
-    const auto answer = ctl::ask(options.socket, method, "/api/v1/status", body, kSoon);
+    const auto answer = ctl::send_request(options.socket, method, "/api/v1/status", body, kSoon);
     ASSERT_FALSE(answer);
     EXPECT_EQ(answer.error().exit, ExitCode::unreachable);
     EXPECT_THAT(answer.error().message,

@@ -146,7 +146,7 @@ TEST(AravisTriggers, BySoftwareCollectExposes) {
 }
 
 TEST(AravisTriggers, AfterDeadAirAnExposureIsMadeAndThrownAway) {
-  AravisBench bench([](auto& options) { options.dead_air = std::chrono::seconds(0); });
+  AravisBench bench([](auto& options) { options.idle_refresh = std::chrono::seconds(0); });
   ASSERT_TRUE(expose(bench));
   const auto before = bench.camera().counts().warm_up;
   ASSERT_TRUE(expose(bench));
@@ -163,14 +163,14 @@ TEST(AravisTriggers, CamerasThatAreReadyNeedNoExposureBeforeTheFirst) {
 }
 
 TEST(AravisTriggers, AfterDeadAirReadyMakesTheExposureThatArmNeedsNot) {
-  AravisBench bench([](auto& options) { options.dead_air = std::chrono::seconds(1); });
+  AravisBench bench([](auto& options) { options.idle_refresh = std::chrono::seconds(1); });
   ASSERT_TRUE(expose(bench));
   const auto before = bench.camera().counts().warm_up;
   const auto deadline = Deadline::after(bench.clock(), std::chrono::seconds(5));
-  ASSERT_TRUE(bench.camera().ready(deadline));
+  ASSERT_TRUE(bench.camera().prepare(deadline));
   EXPECT_EQ(bench.camera().counts().warm_up, before) << "no dead air yet";
   bench.clock().sleep_for(milliseconds(1100));  // the dead air itself
-  ASSERT_TRUE(bench.camera().ready(deadline));
+  ASSERT_TRUE(bench.camera().prepare(deadline));
   EXPECT_EQ(bench.camera().counts().warm_up, before + 2);
   ASSERT_TRUE(expose(bench));
   EXPECT_EQ(bench.camera().counts().warm_up, before + 2);
@@ -179,7 +179,7 @@ TEST(AravisTriggers, AfterDeadAirReadyMakesTheExposureThatArmNeedsNot) {
 TEST(AravisTriggers, ALookCostsTheNextExposureNothing) {
   AravisBench bench;
   ASSERT_TRUE(expose(bench));
-  ASSERT_TRUE(bench.camera().look(Deadline::after(bench.clock(), std::chrono::seconds(5))));
+  ASSERT_TRUE(bench.camera().capture_preview(Deadline::after(bench.clock(), std::chrono::seconds(5))));
   const auto before = bench.camera().counts().warm_up;
   ASSERT_TRUE(expose(bench));
   EXPECT_EQ(bench.camera().counts().warm_up, before);
@@ -204,12 +204,12 @@ TEST(AravisLoss, NobodyWaitsUntilTheLibraryHasGivenALostCameraUp) {
   ASSERT_TRUE(bench.plug(false));
   EXPECT_FALSE(expose(bench));  // a frame that does not come makes the next call ask
   const auto begun = bench.clock().now();
-  const auto lost = bench.camera().ready(Deadline::after(bench.clock(), std::chrono::seconds(10)));
+  const auto lost = bench.camera().prepare(Deadline::after(bench.clock(), std::chrono::seconds(10)));
   ASSERT_FALSE(lost);
   EXPECT_THAT(lost.error().message, HasSubstr("right camera 40012346"));
   EXPECT_LT(bench.clock().now() - begun, std::chrono::seconds(9)) << "giving it up alone takes ten";
   ASSERT_TRUE(bench.plug(true));
-  const auto again = bench.camera().ready(Deadline::after(bench.clock(), std::chrono::seconds(10)));
+  const auto again = bench.camera().prepare(Deadline::after(bench.clock(), std::chrono::seconds(10)));
   EXPECT_TRUE(again) << again.error().message;
   EXPECT_TRUE(expose(bench));
   const auto given_up = Deadline::after(bench.clock(), std::chrono::seconds(20));

@@ -48,9 +48,9 @@ class StereoCameraCompliance : public testing::TestWithParam<MakeStereoCameraBen
   void expect_named_and_redone(CameraFault fault, ErrorCode code) {
     expect_good_exposure();
     if (!bench_->spoil(fault)) GTEST_SKIP() << "this bench cannot spoil frames so";
-    const auto spoilt = expose();
-    ASSERT_FALSE(spoilt);
-    EXPECT_EQ(spoilt.error().code, code) << spoilt.error().message;
+    const auto retake_reasons = expose();
+    ASSERT_FALSE(retake_reasons);
+    EXPECT_EQ(retake_reasons.error().code, code) << retake_reasons.error().message;
     for (int i = 0; i < 3; ++i) expect_good_exposure();
   }
 
@@ -120,19 +120,19 @@ TEST_P(StereoCameraCompliance, AnEdgeFromBeforeArmingIsNeverTheAnswer) {
 
 TEST_P(StereoCameraCompliance, BeingReadyDisturbsNothing) {
   for (int i = 0; i < 2; ++i) {
-    const auto ready = bench_->camera().ready(ample());
+    const auto ready = bench_->camera().prepare(ample());
     ASSERT_TRUE(ready) << ready.error().message;
     expect_good_exposure();
   }
   ASSERT_TRUE(arm());
-  ASSERT_TRUE(bench_->camera().ready(ample()));
+  ASSERT_TRUE(bench_->camera().prepare(ample()));
   bench_->fire();
-  EXPECT_TRUE(collect()) << "ready() spoils no exposure that is awaited";
+  EXPECT_TRUE(collect()) << "prepare() spoils no exposure that is awaited";
 }
 
 TEST_P(StereoCameraCompliance, ALookNeedsNoEdgeAndSpoilsNoExposure) {
   for (int i = 0; i < 3; ++i) {
-    const auto seen = bench_->camera().look(ample());
+    const auto seen = bench_->camera().capture_preview(ample());
     if (!seen && seen.error().code == ErrorCode::unsupported) GTEST_SKIP() << seen.error().message;
     ASSERT_TRUE(seen) << seen.error().message;
     EXPECT_EQ(seen->left.size(), bench_->size());
@@ -141,7 +141,7 @@ TEST_P(StereoCameraCompliance, ALookNeedsNoEdgeAndSpoilsNoExposure) {
   ASSERT_FALSE(collect()) << "a look is no arm";
   for (int i = 0; i < 3; ++i) expect_good_exposure();
   ASSERT_TRUE(arm());
-  ASSERT_TRUE(bench_->camera().look(ample()));
+  ASSERT_TRUE(bench_->camera().capture_preview(ample()));
   const auto after = collect();
   ASSERT_FALSE(after);
   EXPECT_EQ(after.error().code, ErrorCode::protocol) << "a look ends what arm() began";
@@ -163,7 +163,7 @@ TEST_P(StereoCameraCompliance, AnUnpluggedCameraIsAnErrorAndComesBack) {
   expect_good_exposure();
   if (!bench_->plug(false)) GTEST_SKIP() << "this bench cannot be unplugged";
   EXPECT_FALSE(expose());
-  const auto noticed = [&] { return !bench_->camera().ready(ample()); };
+  const auto noticed = [&] { return !bench_->camera().prepare(ample()); };
   for (const auto by = ample(); !noticed() && !by.expired(bench_->clock());) {
     bench_->clock().sleep_for(std::chrono::milliseconds(20));
   }

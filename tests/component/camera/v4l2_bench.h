@@ -42,17 +42,17 @@ class V4l2Bench : public StereoCameraBench {
     ++sequence_;
     const auto edge = clock_.now();
     for (std::size_t i = 0; i < devices_.size(); ++i) {
-      const bool spoilt = fault_ && i + 1 == devices_.size();
+      const bool retake_reasons = fault_ && i + 1 == devices_.size();
       const auto stamp = edge + (i == 0 ? std::exchange(left_stamp_off_, {}) : Clock::Duration{});
       ScriptedVideo::Frame frame{image(fired_), sequence_, stamp, edge + std::chrono::milliseconds(3)};
-      if (spoilt && *fault_ == Fault::stale) {
+      if (retake_reasons && *fault_ == Fault::stale) {
         frame = last_[i];
         frame.sequence = sequence_;
       }
       last_[i] = frame;
-      if (spoilt && *fault_ == Fault::lost) continue;
-      if (spoilt && *fault_ == Fault::late) frame.due += std::chrono::milliseconds(180);
-      if (spoilt && *fault_ == Fault::torn) frame.flags = V4L2_BUF_FLAG_ERROR;
+      if (retake_reasons && *fault_ == Fault::lost) continue;
+      if (retake_reasons && *fault_ == Fault::late) frame.due += std::chrono::milliseconds(180);
+      if (retake_reasons && *fault_ == Fault::torn) frame.flags = V4L2_BUF_FLAG_ERROR;
       video_.deliver(devices_[i], frame);
     }
     fault_.reset();

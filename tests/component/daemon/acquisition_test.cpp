@@ -28,7 +28,7 @@ TEST_F(AcquisitionTest, AViewIsFourImagesAtTheAngleMeasured) {
   EXPECT_EQ(view->record.pixel_format, "Mono8");
   EXPECT_EQ(view->images.left_pattern.at<unsigned char>(0, 0), 200);
   EXPECT_EQ(view->images.right_plain.at<unsigned char>(0, 0), 100);
-  EXPECT_TRUE(view->record.spoilt.empty());
+  EXPECT_TRUE(view->record.retake_reasons.empty());
 }
 
 TEST_F(AcquisitionTest, TheCamerasGetReadyBeforeTheTableTurnsAndNotWhenItStands) {
@@ -61,9 +61,9 @@ TEST_F(AcquisitionTest, ALostExposureIsRedoneAndNamed) {
   rig.line.lose = 2;
   const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
   ASSERT_TRUE(view);
-  ASSERT_EQ(view->record.spoilt.size(), 2u);
-  EXPECT_EQ(view->record.spoilt[0].code, ErrorCode::timeout);
-  EXPECT_FALSE(view->record.spoilt[0].message.empty());
+  ASSERT_EQ(view->record.retake_reasons.size(), 2u);
+  EXPECT_EQ(view->record.retake_reasons[0].code, ErrorCode::timeout);
+  EXPECT_FALSE(view->record.retake_reasons[0].message.empty());
   EXPECT_EQ(rig.line.exposures, 4);
   EXPECT_EQ(view->images.left_pattern.at<unsigned char>(0, 0), 200) << "the redone exposure is the pattern again";
 }
@@ -82,8 +82,8 @@ TEST_F(AcquisitionTest, ADarkPictureIsRedoneAndFailsTheViewByNameWhenItStaysDark
   rig.line.dark = 3;
   const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
   ASSERT_TRUE(view) << view.error().message;
-  ASSERT_EQ(view->record.spoilt.size(), 3u);
-  EXPECT_TRUE(view->record.spoilt.back().message.starts_with("right camera: the picture in the dots is dark"));
+  ASSERT_EQ(view->record.retake_reasons.size(), 3u);
+  EXPECT_TRUE(view->record.retake_reasons.back().message.starts_with("right camera: the picture in the dots is dark"));
   rig.line.dark = 100;
   const auto next = acquisition.take_view({"job", 0, 1}, {45.0});
   ASSERT_FALSE(next);
@@ -97,8 +97,8 @@ TEST_F(AcquisitionTest, AnExposureDuringWhichTheCameraVanishedIsRedone) {
   rig.line.absent = 2;
   const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
   ASSERT_TRUE(view) << view.error().message;
-  ASSERT_EQ(view->record.spoilt.size(), 2u);
-  EXPECT_EQ(view->record.spoilt[0].message, "left camera 4711: no answer");
+  ASSERT_EQ(view->record.retake_reasons.size(), 2u);
+  EXPECT_EQ(view->record.retake_reasons[0].message, "left camera 4711: no answer");
 }
 
 TEST_F(AcquisitionTest, ACameraThatStaysAwayFailsTheViewByItsName) {
@@ -117,7 +117,7 @@ TEST_F(AcquisitionTest, AnInterruptedExposureIsNotRedone) {
   ASSERT_TRUE(acquisition.home());
   rig.line.at_fire = [&] {
     acquisition.interrupt();
-    rig.projector.request_dark();
+    rig.projector.request_off();
   };
   const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
   ASSERT_FALSE(view);

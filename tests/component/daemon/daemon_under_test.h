@@ -6,10 +6,10 @@
 #include <thread>
 
 #include "core/virtual_clock.h"
-#include "daemon/run_daemon.h"
+#include "daemon/service/run_daemon.h"
 #include "tests/component/daemon/fake_reconstructor.h"
 #include "tests/component/daemon/fake_rig.h"
-#include "tests/unit/pipeline/scan/scan_samples.h"
+#include "tests/unit/pipeline/storage/scan_samples.h"
 
 namespace scanrig {
 
@@ -129,7 +129,7 @@ class Daemon : public scan_samples::FolderTest {
     };
     if constexpr (std::is_same_v<Asked, Button>) {
       loop->press(what, Origin::remote, reply);
-    } else if constexpr (std::is_same_v<Asked, Order>) {
+    } else if constexpr (std::is_same_v<Asked, JobOrder>) {
       loop->order(what, reply);
     } else {
       loop->ask(what, reply);

@@ -7,7 +7,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using testing::HasSubstr;
-using What = event::JobAsked::What;
+using What = event::JobRequested::What;
 
 /// Jobs whose folders are not what they were when their turn comes.
 class Damaged : public Daemon {
@@ -18,7 +18,7 @@ class Damaged : public Daemon {
   }
   /// The ids of two jobs in the queue.
   std::pair<std::string, std::string> order_two() {
-    const auto first = ask(Order{.repeat = 2});
+    const auto first = ask(JobOrder{.repeat = 2});
     EXPECT_TRUE(first) << first.error().message;
     const auto queue = loop->snapshot()->queue;
     EXPECT_EQ(queue.size(), 2u);
@@ -76,7 +76,7 @@ TEST_F(Damaged, AResumedJobWithoutTheViewItIsComparedWithIsSetAside) {
   shut_down();
   boot();
   get_ready();
-  ASSERT_TRUE(ask(event::JobAsked{.what = What::resume, .job = id}));
+  ASSERT_TRUE(ask(event::JobRequested{.what = What::resume, .job = id}));
   damage(id, "pose1/view00/left_plain.png");
   rig.panel.press(&PanelInputs::start);
   expect_set_aside(id, "left_plain.png");

@@ -13,7 +13,7 @@ namespace {
 using std::chrono::seconds;
 using testing::ElementsAre;
 using testing::HasSubstr;
-using What = event::JobAsked::What;
+using What = event::JobRequested::What;
 
 /// A whole daemon on a disk that fails or hangs.
 class BadDisk : public Daemon {
@@ -27,7 +27,9 @@ class BadDisk : public Daemon {
     const std::lock_guard guard(rig.line.mutex);
     return rig.line.exposures;
   }
-  Result<std::string> resume(const std::string& id) { return ask(event::JobAsked{.what = What::resume, .job = id}); }
+  Result<std::string> resume(const std::string& id) {
+    return ask(event::JobRequested{.what = What::resume, .job = id});
+  }
   /// From now on whoever syncs a file of the first pose's second view waits for release().
   void hang() {
     released_ = false;
@@ -144,7 +146,7 @@ TEST_F(BadDisk, AnOrderItDidNotTakeLeavesNoJob) {
                               !job_folders().back().filename().string().starts_with('.');
     return has_its_name ? EIO : 0;
   });
-  const auto ordered = ask(Order{});
+  const auto ordered = ask(JobOrder{});
   ASSERT_FALSE(ordered);
   EXPECT_THAT(ordered.error().message, HasSubstr(std::strerror(EIO)));
   EXPECT_THAT(job_folders(), testing::IsEmpty()) << "the next daemon would scan what was refused";
@@ -153,10 +155,10 @@ TEST_F(BadDisk, AnOrderItDidNotTakeLeavesNoJob) {
 TEST_F(BadDisk, ACancelledJobWhoseReasonItDidNotTakeIsNotQueuedAnyMore) {
   boot();
   get_ready();
-  const auto id = ask(Order{});
+  const auto id = ask(JobOrder{});
   ASSERT_TRUE(id) << id.error().message;
   fakes::disk().at_sync([](const std::string& path) { return path.find("failure.json") != path.npos ? EIO : 0; });
-  EXPECT_FALSE(ask(event::JobAsked{.what = What::cancel, .job = *id}));
+  EXPECT_FALSE(ask(event::JobRequested{.what = What::cancel, .job = *id}));
   EXPECT_EQ(job(*id)->state, JobState::cancelled) << "as its folder says";
   EXPECT_THAT(loop->snapshot()->queue, testing::IsEmpty());
 }
@@ -176,7 +178,7 @@ TEST_F(BadDisk, HangingItIsNamedInTimeAndTheJobGoesOnWhenItAnswers) {
 
   rig.panel.press(&PanelInputs::reset);
   ASSERT_TRUE(wait_ready()) << "the rig itself is well";
-  EXPECT_EQ(ask(Order{}).error().code, ErrorCode::io) << "nobody is kept waiting for it";
+  EXPECT_EQ(ask(JobOrder{}).error().code, ErrorCode::io) << "nobody is kept waiting for it";
   EXPECT_EQ(resume(id).error().code, ErrorCode::io);
   const auto before = exposures();
   rig.panel.press(&PanelInputs::start);
@@ -212,8 +214,8 @@ TEST_F(BadDisk, HangingItKeepsNobodyWaitingWhoPressesStop) {
 
 TEST_F(BadDisk, HangingItDoesNotKeepTheDaemonFromEnding) {
   const auto told = std::make_shared<std::string>();
-  options.ending_limit = std::chrono::milliseconds(200);
-  options.ending_hangs = [this, told](const Error& why) {
+  options.exit_timeout = std::chrono::milliseconds(200);
+  options.on_exit_hang = [this, told](const Error& why) {
     *told = why.message;
     release();  // in the place of the end of the process
   };
@@ -222,7 +224,7 @@ TEST_F(BadDisk, HangingItDoesNotKeepTheDaemonFromEnding) {
   EXPECT_TRUE(result) << result.error().message;
   EXPECT_THAT(*told, HasSubstr("disk"));
   EXPECT_FALSE(table_moves());
-  options.ending_limit = seconds(60);
+  options.exit_timeout = seconds(60);
   boot();
   get_ready();
   EXPECT_EQ(job(id)->state, JobState::interrupted);

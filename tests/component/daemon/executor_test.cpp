@@ -15,7 +15,7 @@ using testing::ElementsAreArray;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::Not;
-using What = event::JobAsked::What;
+using What = event::JobRequested::What;
 
 /// Reconstructions that go wrong: the rig goes on, and the job says what happened.
 class Executor : public Daemon {
@@ -60,14 +60,14 @@ class Executor : public Daemon {
     fs::remove_all(folder_ / "jobs");
     fs::rename(folder_ / "cut", folder_ / "jobs");
     for (const auto& folder : job_folders()) {
-      const auto attempts = read_attempts(folder);
+      const auto attempts = read_attempt_record(folder);
       if (attempts.running) write_attempts(folder, attempts.ended_by_death + 1);  // that process is no more
     }
     boot();
     get_ready();
   }
   void resume(const std::string& id) {
-    const auto resumed = ask(event::JobAsked{.what = What::resume, .job = id});
+    const auto resumed = ask(event::JobRequested{.what = What::resume, .job = id});
     ASSERT_TRUE(resumed) << resumed.error().message;
   }
 };
@@ -85,13 +85,13 @@ TEST_F(Executor, WhatIsThrownFailsTheJobOnly) {
 
 TEST_F(Executor, AJobIsMarkedWhileItsModelIsMade) {
   bool marked = false;
-  log.at_finish = [&] { marked = read_attempts(job_folders().at(0)).running; };
+  log.at_finish = [&] { marked = read_attempt_record(job_folders().at(0)).running; };
   boot();
   get_ready();
   const auto id = scan();
   EXPECT_TRUE(wait_state(id, JobState::done));
   EXPECT_TRUE(marked);
-  EXPECT_FALSE(read_attempts(job(id)->folder).running);
+  EXPECT_FALSE(read_attempt_record(job(id)->folder).running);
 }
 
 TEST_F(Executor, PowerCutsDuringTheScanAreNoDeathsOverItsModel) {
@@ -141,7 +141,7 @@ TEST_F(Executor, AnEndOnPurposeIsNoDeathHoweverLongTheStageTakes) {
   ASSERT_TRUE(clock_waits_for([&] { return marked.load(); }));
   shut_down();
   EXPECT_TRUE(unmarked);
-  EXPECT_EQ(read_attempts(job_folders().at(0)).ended_by_death, 0);
+  EXPECT_EQ(read_attempt_record(job_folders().at(0)).ended_by_death, 0);
 }
 
 TEST_F(Executor, TheDaemonsDeathIsTriedOnceMoreThenTheJobIsInQuarantine) {
@@ -160,7 +160,7 @@ TEST_F(Executor, TheDaemonsDeathIsTriedOnceMoreThenTheJobIsInQuarantine) {
   get_ready();
   EXPECT_TRUE(job(id)->quarantined);
   EXPECT_THAT(job(id)->error->message, HasSubstr("quarantine"));
-  EXPECT_TRUE(ask(event::JobAsked{.what = What::reprocess, .job = id}));
+  EXPECT_TRUE(ask(event::JobRequested{.what = What::reprocess, .job = id}));
   EXPECT_TRUE(wait_state(id, JobState::done)) << "somebody asked for another try";
 }
 
@@ -174,12 +174,12 @@ TEST_F(Executor, AScanThatGoesOnInQuarantineTakesItsViewsAndSaysSo) {
   write_attempts(job_folders().at(0), 2);
   boot();
   get_ready();
-  ASSERT_TRUE(ask(event::JobAsked{.what = What::resume, .job = id}));
+  ASSERT_TRUE(ask(event::JobRequested{.what = What::resume, .job = id}));
   scan_both_poses();
   EXPECT_TRUE(wait_state(id, JobState::failed));
   EXPECT_TRUE(job(id)->quarantined);
   EXPECT_THAT(job(id)->error->message, HasSubstr("quarantine"));
-  ASSERT_TRUE(ask(event::JobAsked{.what = What::reprocess, .job = id}));
+  ASSERT_TRUE(ask(event::JobRequested{.what = What::reprocess, .job = id}));
   EXPECT_TRUE(wait_state(id, JobState::done));
   EXPECT_FALSE(job(id)->quarantined);
 }
@@ -206,7 +206,7 @@ TEST_F(Executor, AScanThatBeginsWhileAModelIsMadeIsReconstructedOnce) {
 }
 
 TEST_F(Executor, AReportNobodyForesawPassesNothing) {
-  options.recipes["default"].limits = {.least_measured_share = 0.9, .most_residual_mm = 0.1};
+  options.recipes["default"].limits = {.min_measured_share = 0.9, .max_residual_mm = 0.1};
   execute(R"(mkdir $out; echo glTF > $out/model.glb; echo '{"mesh": [1], "poses": [1]}' > $out/report.json)");
   boot();
   get_ready();
@@ -244,12 +244,12 @@ TEST_F(Executor, AModelIsMadeAgainWithOtherOptions) {
   get_ready();
   const auto id = scan();
   ASSERT_TRUE(wait_state(id, JobState::done));
-  ASSERT_TRUE(ask(event::JobAsked{.what = What::reprocess, .job = id, .voxel_mm = 0.5, .fusion = "paper"}));
+  ASSERT_TRUE(ask(event::JobRequested{.what = What::reprocess, .job = id, .voxel_mm = 0.5, .fusion = "paper"}));
   EXPECT_TRUE(wait_state(id, JobState::done));
   ASSERT_EQ(asked.size(), 2u);
   EXPECT_EQ(asked[1].first, 0.5);
   EXPECT_EQ(asked[1].second, "paper");
-  EXPECT_EQ(ask(event::JobAsked{.what = What::reprocess, .job = "none"}).error().code, ErrorCode::not_found);
+  EXPECT_EQ(ask(event::JobRequested{.what = What::reprocess, .job = "none"}).error().code, ErrorCode::not_found);
 }
 
 TEST_F(Executor, AJobThatWouldNeedTooMuchMemoryIsRefusedBeforeItStarts) {

@@ -140,13 +140,13 @@ class FakeProjector final : public Projector {
     if (dark_requested_) return fail(ErrorCode::io, "projector: went dark on request");
     return {};
   }
-  Result<void> dark(Deadline) override {
+  Result<void> turn_off(Deadline) override {
     const std::lock_guard guard(line_.mutex);
     if (line_.projector_absent) return fail(ErrorCode::io, "projector: no answer");
     line_.lit = false;
     return {};
   }
-  void request_dark() noexcept override { dark_requested_ = true; }
+  void request_off() noexcept override { dark_requested_ = true; }
 
  private:
   TriggerLine& line_;
@@ -156,7 +156,7 @@ class FakeProjector final : public Projector {
 class FakeCamera final : public StereoCamera {
  public:
   FakeCamera(TriggerLine& line, Clock& clock) : line_(line), clock_(clock) {}
-  Result<void> ready(Deadline) override {
+  Result<void> prepare(Deadline) override {
     Clock::TimePoint answer;
     {
       const std::lock_guard guard(line_.mutex);
@@ -175,7 +175,7 @@ class FakeCamera final : public StereoCamera {
     line_.armed = true;
     return {};
   }
-  Result<StereoFrame> look(Deadline) override {
+  Result<StereoFrame> capture_preview(Deadline) override {
     const std::lock_guard guard(line_.mutex);
     if (auto answers = there(); !answers) return pass_on(answers);
     ++line_.looks;

@@ -11,7 +11,7 @@ namespace fs = std::filesystem;
 using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
-using What = event::JobAsked::What;
+using What = event::JobRequested::What;
 
 /// Jobs that are ordered, interrupted, resumed, kept: over fake devices, with real folders.
 class Jobs : public Daemon {
@@ -22,7 +22,7 @@ class Jobs : public Daemon {
     get_ready();
   }
   Result<std::string> ask_for(What what, const std::string& id) {
-    return ask(event::JobAsked{.what = what, .job = id});
+    return ask(event::JobRequested{.what = what, .job = id});
   }
   /// Interrupts a scan of three views a pose by the e-stop, in the exposure that follows `views` of its first pose.
   std::string interrupted_after(int views) {
@@ -69,13 +69,13 @@ TEST_F(Jobs, AnOrderIsAFolderBeforeItIsAnswered) {
   options.recipes["small"] = {.name = "small", .poses = 1, .views = 3};
   boot();
   get_ready();
-  const auto first = ask(Order{.recipe = "small", .part = "4711", .repeat = 2});
+  const auto first = ask(JobOrder{.recipe = "small", .part = "4711", .repeat = 2});
   ASSERT_TRUE(first) << first.error().message;
   EXPECT_EQ(ScanFolder::open(folder_ / "jobs" / *first)->manifest().state, "queued");
   EXPECT_EQ(job_folders().size(), 2u);
   EXPECT_EQ(job(*first)->part, "4711");
   EXPECT_EQ(loop->snapshot()->queue.size(), 2u);
-  EXPECT_EQ(ask(Order{.recipe = "none"}).error().code, ErrorCode::not_found);
+  EXPECT_EQ(ask(JobOrder{.recipe = "none"}).error().code, ErrorCode::not_found);
 
   rig.panel.press(&PanelInputs::start);
   EXPECT_TRUE(wait_state(*first, JobState::done));
@@ -86,7 +86,7 @@ TEST_F(Jobs, AnOrderIsAFolderBeforeItIsAnswered) {
 TEST_F(Jobs, TheQueueOutlivesTheDaemonInItsOrder) {
   boot();
   get_ready();
-  const auto a = ask(Order{.part = "a"}), b = ask(Order{.part = "b"});
+  const auto a = ask(JobOrder{.part = "a"}), b = ask(JobOrder{.part = "b"});
   ASSERT_TRUE(a && b);
   ASSERT_TRUE(ask_for(What::to_front, *b));
   EXPECT_THAT(loop->snapshot()->queue, ElementsAre(*b, *a));
@@ -180,8 +180,8 @@ TEST_F(Jobs, AnInterruptedScanGoesOnWhereItStopped) {
   ASSERT_TRUE(ask_for(What::resume, id));
   finish(id);
   const auto scan = only_job();
-  EXPECT_EQ(scan.manifest().poses[0].closures.size(), 2u) << "before it went on, and after the last view";
-  EXPECT_EQ(scan.manifest().poses[0].closures[0].after_views, 2);
+  EXPECT_EQ(scan.manifest().poses[0].movement_checks.size(), 2u) << "before it went on, and after the last view";
+  EXPECT_EQ(scan.manifest().poses[0].movement_checks[0].after_views, 2);
   EXPECT_LE(rig.line.exposures - before, 2 * (1 + 1 + 1 + 3 + 1)) << "no view that was there is taken again";
   expect_all_stored_views_readable(scan);
   EXPECT_FALSE(read_failure(scan.path())) << "why it was interrupted is history";
@@ -217,7 +217,7 @@ TEST_F(Jobs, AnObjectThatWasTouchedIsNotGoneOnWith) {
   EXPECT_TRUE(wait_state(id, JobState::interrupted));
   EXPECT_EQ(job(id)->error->code, ErrorCode::moved);
   EXPECT_FALSE(job(id)->resumable);
-  EXPECT_TRUE(fs::exists(job_folders()[0] / "pose1" / "closure00_left.png")) << "evidence";
+  EXPECT_TRUE(fs::exists(job_folders()[0] / "pose1" / "movement00_left.png")) << "evidence";
   ASSERT_TRUE(wait_ready());
   EXPECT_EQ(ask_for(What::resume, id).error().code, ErrorCode::refused);
   ASSERT_TRUE(ask_for(What::cancel, id)) << "it can be ended";
@@ -266,10 +266,10 @@ TEST_F(Jobs, AJobThatDoesNotFitOnTheDiskIsNotBegun) {
 }
 
 TEST_F(Jobs, ALineRunsItsQueueByPartsAndByTheFlipSignal) {
-  options.recipes["line"] = {.name = "line", .views = 3, .flip_by_line = true, .start_on_part = true};
+  options.recipes["line"] = {.name = "line", .views = 3, .flip_by_signal = true, .start_on_part = true};
   boot();
   get_ready();
-  ASSERT_TRUE(ask(Order{.recipe = "line", .repeat = 2}));
+  ASSERT_TRUE(ask(JobOrder{.recipe = "line", .repeat = 2}));
   const auto ids = loop->snapshot()->queue;
   const auto turn_over = [&] {
     ASSERT_TRUE(wait_flip());
@@ -292,7 +292,7 @@ TEST_F(Jobs, ALineWaitsForItsProjectorToBeWarmAndAPersonNeedNot) {
   const auto begin = clock.now();
   boot();
   get_ready();
-  ASSERT_TRUE(ask(Order{.recipe = "line", .repeat = 2}));
+  ASSERT_TRUE(ask(JobOrder{.recipe = "line", .repeat = 2}));
   const auto ids = loop->snapshot()->queue;
   const auto begun = [&](const std::string& id) { return loop->snapshot()->job == id; };
   rig.panel.press(&PanelInputs::start);
@@ -313,7 +313,7 @@ TEST_F(Jobs, ALineWaitsForItsProjectorToBeWarmAndAPersonNeedNot) {
   set_absent(false);
   rig.panel.set(&PanelInputs::part_present, false);
   rig.panel.set(&PanelInputs::part_present, true);
-  EXPECT_THAT(loop->snapshot()->next_action, testing::HasSubstr("The projector is warming up: the queue goes on in 5"));
+  EXPECT_THAT(loop->snapshot()->next_action, testing::HasSubstr("Projector warming up: 5"));
   EXPECT_TRUE(wait_state(ids[1], JobState::done));
   const std::lock_guard guard(rig.turntable.mutex);
   const auto first_move = *std::ranges::find_if(rig.turntable.move_starts, [&](auto at) { return at > back; });
@@ -328,14 +328,15 @@ TEST_F(Jobs, AnEndedJobIsBundledExportedAndRemoved) {
   ASSERT_TRUE(wait_pass());
   const auto id = newest()->id;
   const auto file = folder_ / "bundle.tar.gz";
-  EXPECT_EQ(ask(event::JobAsked{.what = What::bundle, .job = id, .path = file}).value_or("no"), file.string());
+  EXPECT_EQ(ask(event::JobRequested{.what = What::bundle, .job = id, .path = file}).value_or("no"), file.string());
   EXPECT_GT(fs::file_size(file), 1000u);
-  EXPECT_EQ(ask(event::JobAsked{.what = What::bundle, .job = id, .path = file}).error().code, ErrorCode::exists);
-  EXPECT_EQ(ask(event::JobAsked{.what = What::bundle, .job = id, .path = "here.tar.gz"}).error().code,
+  EXPECT_EQ(ask(event::JobRequested{.what = What::bundle, .job = id, .path = file}).error().code, ErrorCode::exists);
+  EXPECT_EQ(ask(event::JobRequested{.what = What::bundle, .job = id, .path = "here.tar.gz"}).error().code,
             ErrorCode::invalid_input);
-  EXPECT_EQ(ask(event::JobAsked{.what = What::bundle, .job = id, .path = folder_ / "no" / "b.tar.gz"}).error().code,
+  EXPECT_EQ(ask(event::JobRequested{.what = What::bundle, .job = id, .path = folder_ / "no" / "b.tar.gz"}).error().code,
             ErrorCode::io);
-  EXPECT_EQ(ask(event::JobAsked{.what = What::bundle, .job = "none", .path = file}).error().code, ErrorCode::not_found);
+  EXPECT_EQ(ask(event::JobRequested{.what = What::bundle, .job = "none", .path = file}).error().code,
+            ErrorCode::not_found);
   ASSERT_TRUE(ask_for(What::set_exported, id));
   EXPECT_TRUE(job(id)->exported);
   ASSERT_TRUE(ask_for(What::remove, id));

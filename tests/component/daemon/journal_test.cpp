@@ -5,7 +5,7 @@
 
 #include <future>
 
-#include "daemon/journal/news.h"
+#include "daemon/journal/log_entries.h"
 #include "tests/component/daemon/daemon_under_test.h"
 
 namespace scanrig {
@@ -67,11 +67,11 @@ TEST_F(LoggedDaemon, TellsAWholeJobOfTwoPoses) {
   const auto id = job_folders().at(0).filename().string();
   EXPECT_THAT(states(id), ElementsAre("queued", "scanning", "waiting_for_flip", "scanning", "reconstructing", "done"));
   EXPECT_THAT(of_view(0, 0), ElementsAre(HasSubstr("Exposed again: camera: no frame"), HasSubstr("Stored"),
-                                         HasSubstr("View 0 again")));
+                                         HasSubstr("Movement check")));
   for (const int pose : {0, 1}) {
     for (const int view : {0, 1, 2}) EXPECT_THAT(of_view(pose, view), Contains(HasSubstr("Stored, taken at"))) << view;
     EXPECT_THAT(lines,
-                Contains(AllOf(says("View 0 again: nothing has moved"), Field(&JournalEntry::pose, Optional(pose)))));
+                Contains(AllOf(says("Movement check: nothing has moved"), Field(&JournalEntry::pose, Optional(pose)))));
   }
   for (const auto* stage : {"Stage range begins", "Stage registration pose 1 begins",
                             "Stage registration pose 2 ends after", "Stage texture ends after"}) {
@@ -81,7 +81,7 @@ TEST_F(LoggedDaemon, TellsAWholeJobOfTwoPoses) {
                               "Operational.Ready: ", "Operational.SingleExecution: Start was pressed."}) {
     EXPECT_THAT(lines, Contains(AllOf(says(machine), has(Priority::notice)))) << machine;
   }
-  EXPECT_THAT(lines, Contains(says("Halted: The daemon is shutting down.")));
+  EXPECT_THAT(lines, Contains(says("Halted: The service is shutting down.")));
   EXPECT_THAT(lines, Each(testing::Not(has(Priority::error))));
 }
 
@@ -99,7 +99,7 @@ TEST_F(LoggedDaemon, TellsAFaultWithItsCauseItsJobAndWhatToDo) {
   EXPECT_THAT(lines, Contains(AllOf(says("Error: The e-stop was pressed."), has(Priority::error),
                                     Field(&JournalEntry::job, id))));
   EXPECT_THAT(lines, Contains(says("Next: Release the e-stop, then press Reset at the panel.")));
-  EXPECT_THAT(lines, Contains(says("Next: See to the cause, then press Reset at the panel.")));
+  EXPECT_THAT(lines, Contains(says("Next: Fix the cause, then press Reset at the panel.")));
   EXPECT_THAT(lines, Contains(AllOf(says("interrupted (stopped): The e-stop was pressed."), has(Priority::error),
                                     Field(&JournalEntry::job, id))));
 }
@@ -150,7 +150,7 @@ TEST_F(LoggedDaemon, NamesTheDeviceInItsFaultAndNobodyInAnEstop) {
   EXPECT_EQ(of_fault("panel: unplugged"), "panel");
 }
 
-TEST_F(LoggedDaemon, TellsAnExposureOfTheClosureShotThatWasTakenAgain) {
+TEST_F(LoggedDaemon, TellsAnExposureOfTheMovementCheckThatWasTakenAgain) {
   rig.line.fires_before = 6;  // of three views
   rig.line.at_fire = [this] {
     const std::lock_guard guard(rig.line.mutex);
@@ -163,7 +163,7 @@ TEST_F(LoggedDaemon, TellsAnExposureOfTheClosureShotThatWasTakenAgain) {
   shut_down();
   const auto id = job_folders().at(0).filename().string();
   EXPECT_THAT(of_view(0, 0), ElementsAre(HasSubstr("Stored"), HasSubstr("Exposed again: camera: no frame"),
-                                         HasSubstr("View 0 again: nothing has moved")));
+                                         HasSubstr("Movement check: nothing has moved")));
   EXPECT_THAT(lines, Contains(AllOf(says("Exposed again"), has(Priority::warning), Field(&JournalEntry::job, id))));
 }
 
@@ -198,7 +198,7 @@ TEST_F(LoggedDaemon, TellsADeviceThatIsLostAndBackByItsName) {
   shut_down();
   const auto of_camera = Field(&JournalEntry::device, "camera");
   EXPECT_THAT(lines,
-              Contains(AllOf(of_camera, says("Not there: left camera 4711: no answer."), has(Priority::warning))));
+              Contains(AllOf(of_camera, says("Not responding: left camera 4711: no answer."), has(Priority::warning))));
   EXPECT_THAT(lines, Contains(AllOf(of_camera, says("It is back."))));
 }
 
@@ -207,10 +207,10 @@ TEST_F(LoggedDaemon, TellsThatThreeFailuresStoppedTheQueueAndWhatAJobWasNotBegun
   before.machine = MachineState::continuous_execution;
   now.machine = MachineState::ready;
   now.cause = "3 jobs in a row failed, so the queue stopped.";
-  EXPECT_THAT(news(before, now), ElementsAre(says("Operational.Ready: 3 jobs in a row failed")));
+  EXPECT_THAT(log_entries(before, now), ElementsAre(says("Operational.Ready: 3 jobs in a row failed")));
   before = now;
   now.cause = "Job 7 was not begun: the disk has no room.";
-  EXPECT_THAT(news(before, now), ElementsAre(says("Job 7 was not begun: the disk has no room.")));
+  EXPECT_THAT(log_entries(before, now), ElementsAre(says("Job 7 was not begun: the disk has no room.")));
 }
 
 TEST_F(LoggedDaemon, IsNotHeldUpByALogThatStalls) {

@@ -39,12 +39,12 @@ class OpenDevicesTest : public config::RigFile {
 
 TEST_F(OpenDevicesTest, ACameraThatIsNotThereFailsByNameAtEveryUse) {
   open();
-  const auto ready = devices_.camera->ready(soon());
+  const auto ready = devices_.camera->prepare(soon());
   ASSERT_FALSE(ready);
   EXPECT_EQ(ready.error().code, ErrorCode::not_found);
   EXPECT_THAT(ready.error().message, HasSubstr("left camera /dev/no-left"));
   EXPECT_FALSE(devices_.camera->arm(soon()));
-  EXPECT_FALSE(devices_.camera->look(soon()));
+  EXPECT_FALSE(devices_.camera->capture_preview(soon()));
 }
 
 TEST_F(OpenDevicesTest, AProjectorOnUsbThatIsNotThereFailsByNameAtEveryUse) {
@@ -56,7 +56,7 @@ TEST_F(OpenDevicesTest, AProjectorOnUsbThatIsNotThereFailsByNameAtEveryUse) {
     ASSERT_FALSE(fired);
     EXPECT_THAT(fired.error().message, HasSubstr("LightCrafter"));
   }
-  EXPECT_FALSE(devices_.projector->dark(soon()));
+  EXPECT_FALSE(devices_.projector->turn_off(soon()));
 }
 
 TEST_F(OpenDevicesTest, SimulatedCamerasAreTheirOwners) {

@@ -11,7 +11,7 @@ namespace {
 using std::chrono::minutes;
 using testing::HasSubstr;
 using testing::StartsWith;
-using What = event::JobAsked::What;
+using What = event::JobRequested::What;
 
 class OtherCameras : public Daemon {
  protected:
@@ -68,7 +68,7 @@ TEST_F(OtherCameras, RefuseAScanUntilTheFileIsReplaced) {
   calibrate("L0", "R0");
   boot();
   get_ready();
-  ASSERT_TRUE(wait_next_action("See to the calibration: "));
+  ASSERT_TRUE(wait_next_action("Check the calibration: "));
   const auto before = moves();
   const auto started = ask(Button::start);
   ASSERT_FALSE(started);
@@ -79,7 +79,7 @@ TEST_F(OtherCameras, RefuseAScanUntilTheFileIsReplaced) {
   EXPECT_EQ(moves(), before);
   EXPECT_TRUE(job_folders().empty());
   EXPECT_TRUE(wait_line("No scan with this calibration: "));
-  EXPECT_TRUE(wait_line("start is refused: See to the calibration: "));
+  EXPECT_TRUE(wait_line("start is refused: Check the calibration: "));
 
   calibrate("L1", "R1");
   ASSERT_TRUE(wait_next_action("Put an object on the table"));
@@ -99,16 +99,16 @@ TEST_F(OtherCameras, RefuseAScanWhoseFileIsReplacedAMomentBeforeStart) {
   EXPECT_EQ(moves(), before);
   EXPECT_EQ(loop->snapshot()->machine, MachineState::ready);
   EXPECT_THAT(loop->snapshot()->cause, testing::Not(HasSubstr("was begun with"))) << "it has no views";
-  EXPECT_THAT(loop->snapshot()->next_action, StartsWith("See to the calibration: "));
+  EXPECT_THAT(loop->snapshot()->next_action, StartsWith("Check the calibration: "));
 }
 
 TEST_F(OtherCameras, AQueuedJobTakesTheCalibrationThatIsThereWhenItBegins) {
   calibrate("L0", "R0");
   boot();
   get_ready();
-  const auto id = ask(Order{.part = "4711"});
+  const auto id = ask(JobOrder{.part = "4711"});
   ASSERT_TRUE(id);
-  ASSERT_TRUE(wait_next_action("See to the calibration: "));
+  ASSERT_TRUE(wait_next_action("Check the calibration: "));
   EXPECT_FALSE(ask(Button::start));
   calibrate("L1", "R1");
   ASSERT_TRUE(wait_next_action("Put the object for 4711"));
@@ -125,12 +125,12 @@ TEST_F(OtherCameras, HoldTheLine) {
   calibrate("L1", "R1");
   boot();
   get_ready();
-  ASSERT_TRUE(ask(Order{.recipe = "line", .repeat = 2}));
+  ASSERT_TRUE(ask(JobOrder{.recipe = "line", .repeat = 2}));
   const auto ids = loop->snapshot()->queue;
   rig.panel.press(&PanelInputs::start);
   ASSERT_TRUE(wait_state(ids[0], JobState::done));
   calibrate("L0", "R0");
-  ASSERT_TRUE(wait_next_action("See to the calibration: "));
+  ASSERT_TRUE(wait_next_action("Check the calibration: "));
   rig.panel.set(&PanelInputs::part_present, false);
   rig.panel.set(&PanelInputs::part_present, true);
   clock.sleep_for(minutes(1));
@@ -149,7 +149,7 @@ TEST_F(OtherCameras, AJobOfOthersIsNotGoneOnWith) {
   calibrate("L2", "R2");
   boot();
   get_ready();
-  const auto resumed = ask(event::JobAsked{.what = What::resume, .job = id});
+  const auto resumed = ask(event::JobRequested{.what = What::resume, .job = id});
   ASSERT_FALSE(resumed);
   EXPECT_EQ(resumed.error().code, ErrorCode::refused);
   EXPECT_THAT(resumed.error().message, HasSubstr("was begun with the cameras L1 (left) and R1 (right)"));
@@ -161,18 +161,18 @@ TEST_F(OtherCameras, AJobOfOthersThatIsQueuedRefusesStart) {
   boot();
   get_ready();
   const auto id = interrupted();
-  ASSERT_TRUE(ask(event::JobAsked{.what = What::resume, .job = id}));
+  ASSERT_TRUE(ask(event::JobRequested{.what = What::resume, .job = id}));
   shut_down();
   options.jobs.cameras = {"L2", "R2"};
   calibrate("L2", "R2");
   boot();
   get_ready();
-  ASSERT_TRUE(wait_next_action("See to the calibration: job " + id));
+  ASSERT_TRUE(wait_next_action("Check the calibration: job " + id));
   const auto before = moves();
   EXPECT_FALSE(ask(Button::start));
   clock.sleep_for(minutes(1));
   EXPECT_EQ(moves(), before);
-  ASSERT_TRUE(ask(event::JobAsked{.what = What::cancel, .job = id}));
+  ASSERT_TRUE(ask(event::JobRequested{.what = What::cancel, .job = id}));
   ASSERT_TRUE(wait_next_action("Put an object on the table"));
   EXPECT_TRUE(ask(Button::start));
 }

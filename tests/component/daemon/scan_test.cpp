@@ -67,7 +67,7 @@ TEST_F(Daemon, LostFramesAreRedoneWithoutAFault) {
   get_ready();
   scan_both_poses();
   ASSERT_TRUE(wait_pass());
-  EXPECT_EQ(rig.line.exposures, 12 + 4 + 3) << "six views, two closures, three lost";
+  EXPECT_EQ(rig.line.exposures, 12 + 4 + 3) << "six views, two movement_checks, three lost";
 }
 
 TEST_F(Daemon, WhatIsRedoneInAClosureShotIsTold) {
@@ -81,10 +81,10 @@ TEST_F(Daemon, WhatIsRedoneInAClosureShotIsTold) {
   scan_both_poses();
   ASSERT_TRUE(wait_pass());
   const auto scan = only_job();
-  const auto& closure = scan.manifest().poses[0].closures.at(0);
-  EXPECT_EQ(closure.spoilt.size(), 2u);
-  EXPECT_EQ(loop->snapshot()->jobs.begin()->second->closures.at(0).spoilt.size(), 2u);
-  EXPECT_TRUE(scan.manifest().poses[1].closures.at(0).spoilt.empty());
+  const auto& movement_check = scan.manifest().poses[0].movement_checks.at(0);
+  EXPECT_EQ(movement_check.retake_reasons.size(), 2u);
+  EXPECT_EQ(loop->snapshot()->jobs.begin()->second->movement_checks.at(0).retake_reasons.size(), 2u);
+  EXPECT_TRUE(scan.manifest().poses[1].movement_checks.at(0).retake_reasons.empty());
 }
 
 TEST_F(Daemon, APanelThatHangsStopsTheTableAndIsNamed) {
@@ -200,7 +200,7 @@ TEST_F(Daemon, ThePreviewLooksInQuietTimesAndNeverDuringAScan) {
     return rig.panel.lamps().flip_request;
   }));
   const std::lock_guard guard(rig.line.mutex);
-  EXPECT_EQ(rig.line.exposures, 2 * (3 + 1)) << "three views and a closure shot";
+  EXPECT_EQ(rig.line.exposures, 2 * (3 + 1)) << "three views and a movement check";
   EXPECT_EQ(rig.line.looks_in_between, 0);
 }
 
@@ -312,7 +312,7 @@ TEST_F(Daemon, AReloadWithAnUnreachableTableEndsTheDaemonInsteadOfForgettingIt) 
     const std::lock_guard guard(rig.turntable.mutex);
     rig.turntable.unreachable = true;
   }
-  loop->ask(event::ReloadAsked{}, [](const auto&) {});
+  loop->ask(event::ReloadRequested{}, [](const auto&) {});
   at_the_rig.reset();
   thread.join();
   rig.panel.detach();

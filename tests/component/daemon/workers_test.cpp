@@ -8,7 +8,7 @@
 #include "daemon/jobs/housekeeping_thread.h"
 #include "daemon/jobs/reconstruction_thread.h"
 #include "tests/component/daemon/fake_reconstructor.h"
-#include "tests/unit/pipeline/scan/scan_samples.h"
+#include "tests/unit/pipeline/storage/scan_samples.h"
 
 namespace scanrig {
 namespace {
@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::ElementsAre;
 using testing::HasSubstr;
-using What = event::JobAsked::What;
+using What = event::JobRequested::What;
 
 /// Single threads of the daemon over real folders; the test is the control loop.
 class Workers : public scan_samples::FolderTest {
@@ -80,8 +80,8 @@ TEST_F(Workers, RetentionLooksAtWhatHasEndedOnly) {
     HousekeepingThread housekeeping(
         clock, *store, {.keep_bytes = 1}, [&] { return table; }, [&](Event event) { tell(std::move(event)); });
     housekeeping.sweep();
-    housekeeping.post({.what = What::remove, .job = "none", .ticket = 1});
-    ASSERT_TRUE(wait_for<event::Answered>()) << "the sweep came before";
+    housekeeping.post({.what = What::remove, .job = "none", .request_id = 1});
+    ASSERT_TRUE(wait_for<event::RequestDone>()) << "the sweep came before";
   }
   EXPECT_THAT(gone, ElementsAre("b-exported")) << "a-kept is the newest that has ended and was not exported";
 }
@@ -92,8 +92,8 @@ TEST_F(Workers, WhatWaitsForAModelIsNotRemoved) {
   scan_samples::write_text(report_file(store->folder("job")), "{}");  // of an older model
   HousekeepingThread housekeeping(
       clock, *store, {}, [&] { return table; }, [&](Event event) { tell(std::move(event)); });
-  housekeeping.post({.what = What::remove, .job = "job", .ticket = 1});
-  const auto answer = wait_for<event::Answered>();
+  housekeeping.post({.what = What::remove, .job = "job", .request_id = 1});
+  const auto answer = wait_for<event::RequestDone>();
   ASSERT_TRUE(answer);
   ASSERT_FALSE(answer->result);
   EXPECT_EQ(answer->result.error().code, ErrorCode::busy);
@@ -108,12 +108,12 @@ TEST_F(Workers, HousekeepingOutlivesWhatIsThrown) {
   };
   HousekeepingThread housekeeping(clock, *store, {.keep_bytes = 1}, jobs, [&](Event event) { tell(std::move(event)); });
   housekeeping.sweep();
-  housekeeping.post({.what = What::remove, .job = "job", .ticket = 1});
-  const auto answer = wait_for<event::Answered>();
+  housekeeping.post({.what = What::remove, .job = "job", .request_id = 1});
+  const auto answer = wait_for<event::RequestDone>();
   ASSERT_TRUE(answer);
   ASSERT_FALSE(answer->result);
   EXPECT_THAT(answer->result.error().message, HasSubstr("out of the blue"));
-  housekeeping.post({.what = What::remove, .job = "job", .ticket = 2});
+  housekeeping.post({.what = What::remove, .job = "job", .request_id = 2});
   const auto removed = wait_for<event::JobRemoved>();
   ASSERT_TRUE(removed);
   EXPECT_FALSE(fs::exists(store->folder("job")));

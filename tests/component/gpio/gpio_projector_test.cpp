@@ -62,7 +62,7 @@ TEST_F(GpioProjectorTest, DarkOnRequestEndsThePulse) {
   open();
   std::thread onlooker;
   far_end_->on_edge([&](const auto& edge) {
-    if (edge.high) onlooker = std::thread([&] { projector_->request_dark(); });
+    if (edge.high) onlooker = std::thread([&] { projector_->request_off(); });
   });
   const auto fired = projector_->fire(Light::pattern, within(500));
   far_end_->on_edge({});
@@ -83,7 +83,7 @@ TEST_F(GpioProjectorTest, APulseThatDoesNotFitIsNotBegun) {
 TEST_F(GpioProjectorTest, LostLinesAreIoErrorsThatSayTheLightMayBeOn) {
   open();
   far_end_.reset();
-  const auto dark = projector_->dark(within(500));
+  const auto dark = projector_->turn_off(within(500));
   ASSERT_FALSE(dark);
   EXPECT_EQ(dark.error().code, ErrorCode::io);
   EXPECT_THAT(dark.error().message, HasSubstr("may be on"));

@@ -68,7 +68,7 @@ TEST_P(ProjectorCompliance, AnExposureThatDoesNotFitIsATimeoutAndNotBegun) {
 
 TEST_P(ProjectorCompliance, AnotherThreadEndsTheLight) {
   ASSERT_TRUE(fire(Light::pattern));
-  bench_->when_lit([&] { bench_->projector().request_dark(); });
+  bench_->when_lit([&] { bench_->projector().request_off(); });
   const auto fired = fire(Light::pattern);
   ASSERT_FALSE(fired);
   EXPECT_EQ(fired.error().code, ErrorCode::io) << fired.error().message;
@@ -78,7 +78,7 @@ TEST_P(ProjectorCompliance, AnotherThreadEndsTheLight) {
 }
 
 TEST_P(ProjectorCompliance, DarkIsDark) {
-  const auto dark = bench_->projector().dark(ample());
+  const auto dark = bench_->projector().turn_off(ample());
   ASSERT_TRUE(dark) << dark.error().message;
   EXPECT_FALSE(bench_->seen_lit());
 }
@@ -87,7 +87,7 @@ TEST_P(ProjectorCompliance, ALostProjectorIsAnErrorThatSaysTheLightMayBeOn) {
   ASSERT_TRUE(fire(Light::pattern));
   bench_->plug(false);
   EXPECT_FALSE(fire(Light::pattern));
-  const auto dark = bench_->projector().dark(ample());
+  const auto dark = bench_->projector().turn_off(ample());
   ASSERT_FALSE(dark);
   EXPECT_NE(dark.error().message.find("light may be on"), std::string::npos) << dark.error().message;
 }

@@ -8,9 +8,9 @@
 #include <optional>
 #include <string>
 
+#include "core/strict_json.h"
+#include "pipeline/importers/import_stanford.h"
 #include "pipeline/reconstruct/reconstruct.h"
-#include "pipeline/scan/import_stanford.h"
-#include "pipeline/scan/strict_json.h"
 #include "tests/bench/real_data/dragon_measure.h"
 #include "tests/own_folder.h"
 

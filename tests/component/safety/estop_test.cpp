@@ -7,11 +7,11 @@
 
 #include "daemon/rig/make_safe.h"
 #include "daemon/rig/open_devices.h"
-#include "daemon/run_daemon.h"
+#include "daemon/service/run_daemon.h"
 #include "tests/component/daemon/fake_reconstructor.h"
 #include "tests/component/daemon/fake_rig.h"
 #include "tests/component/safety/wire_rig.h"
-#include "tests/unit/pipeline/scan/scan_samples.h"
+#include "tests/unit/pipeline/storage/scan_samples.h"
 
 namespace scanrig {
 namespace {

@@ -22,7 +22,7 @@ namespace scanrig {
 /// rig.toml that points at them. The test is the operator. Real time.
 class WireRig {
  public:
-  static constexpr auto kPatience = kSlowness * std::chrono::seconds(20);
+  static constexpr auto kReplyTimeout = kSlowness * std::chrono::seconds(20);
 
   /// Texts of rig.toml and what stands there instead.
   using Changes = std::vector<std::pair<std::string, std::string>>;
@@ -53,7 +53,7 @@ class WireRig {
 
   /// Looks again and again, without disturbing anybody.
   bool wait_for(const std::function<bool()>& as_wanted) {
-    for (const auto end = Deadline::after(clock, kPatience); !end.expired(clock);
+    for (const auto end = Deadline::after(clock, kReplyTimeout); !end.expired(clock);
          clock.sleep_for(std::chrono::milliseconds(1))) {
       if (as_wanted()) return true;
     }

@@ -53,9 +53,9 @@ TEST_P(ModbusFaults, APulledAdapterIsAnIoErrorAndTheDriveHearsStopFirstWhenItIsB
 
 TEST_P(ModbusFaults, TwoMastersCannotShareALine) {
   start_at_zero();
-  modbus::LineOptions options;
+  modbus::ClientOptions options;
   options.device = bench_->device();
-  modbus::Line second(options, bench_->clock());
+  modbus::Client second(options, bench_->clock());
   const auto read = second.read(0x1003, 1, within(milliseconds(500)));
   ASSERT_FALSE(read);
   EXPECT_EQ(read.error().code, ErrorCode::io);

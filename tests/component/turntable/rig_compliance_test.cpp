@@ -21,7 +21,7 @@ class RigBench final : public TurntableBench {
   Turntable& turntable() override { return *table_; }
   Clock& clock() override { return clock_; }
   double seen_deg() override { return look().angle.value_or(Degrees{0}).value; }
-  bool seen_moving() override { return look().motion != TurntableStatus::Motion::standing; }
+  bool seen_moving() override { return look().motion != TurntableStatus::Motion::stopped; }
   bool can_block() override { return false; }
   void block(bool) override {}
   void when_moving(std::function<void()> act) override {

@@ -92,7 +92,7 @@ TEST_P(TurntableCompliance, StatusIsWhatTheDeviceSays) {
   ASSERT_TRUE(rotate_to(30));
   const auto status = bench_->turntable().status(ample());
   ASSERT_TRUE(status) << status.error().message;
-  EXPECT_EQ(status->motion, TurntableStatus::Motion::standing);
+  EXPECT_EQ(status->motion, TurntableStatus::Motion::stopped);
   EXPECT_TRUE(status->homed);
   EXPECT_TRUE(status->alarm.empty());
   EXPECT_NEAR(std::remainder(status->angle.value_or(Degrees{30}).value - 30, 360.0), 0.0, bench_->tolerance().value);

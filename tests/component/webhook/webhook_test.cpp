@@ -94,24 +94,24 @@ Snapshot with(JobTable jobs, MachineState machine = MachineState::ready) {
 TEST(BadNews, IsAJobThatFailsIsInterruptedOrDoesNotPass) {
   const auto before = with({{"a", job("a", JobState::scanning)}});
   for (const auto state : {JobState::failed, JobState::interrupted}) {
-    const auto news = bad_news(before, with({{"a", job("a", state)}}));
-    ASSERT_EQ(news.size(), 1u);
-    EXPECT_THAT(news[0], HasSubstr(R"("job":"a","part":"4711")"));
-    EXPECT_THAT(news[0], HasSubstr(R"("code":"moved","message":"it \"moved\"")"));
+    const auto log_entries = alerts(before, with({{"a", job("a", state)}}));
+    ASSERT_EQ(log_entries.size(), 1u);
+    EXPECT_THAT(log_entries[0], HasSubstr(R"("job":"a","part":"4711")"));
+    EXPECT_THAT(log_entries[0], HasSubstr(R"("code":"moved","message":"it \"moved\"")"));
   }
-  EXPECT_EQ(bad_news(before, with({{"a", job("a", JobState::done, false)}})).size(), 1u);
-  EXPECT_THAT(bad_news(before, with({{"a", job("a", JobState::done, true)}})), IsEmpty());
-  EXPECT_THAT(bad_news(before, with({{"a", job("a", JobState::cancelled)}})), IsEmpty());
+  EXPECT_EQ(alerts(before, with({{"a", job("a", JobState::done, false)}})).size(), 1u);
+  EXPECT_THAT(alerts(before, with({{"a", job("a", JobState::done, true)}})), IsEmpty());
+  EXPECT_THAT(alerts(before, with({{"a", job("a", JobState::cancelled)}})), IsEmpty());
 }
 
 TEST(BadNews, IsToldOnce) {
   const auto failed = with({{"a", job("a", JobState::failed)}});
-  EXPECT_THAT(bad_news(failed, with({{"a", job("a", JobState::failed)}})), IsEmpty());
+  EXPECT_THAT(alerts(failed, with({{"a", job("a", JobState::failed)}})), IsEmpty());
 }
 
 TEST(BadNews, IsAFaultOfTheMachine) {
-  const auto news = bad_news(with({}), with({}, MachineState::error));
-  EXPECT_THAT(news, ElementsAre(HasSubstr("The guard was opened.")));
+  const auto log_entries = alerts(with({}), with({}, MachineState::error));
+  EXPECT_THAT(log_entries, ElementsAre(HasSubstr("The guard was opened.")));
 }
 
 TEST(HttpPost, SendsJson) {

@@ -13,7 +13,7 @@
 #include "daemon/ctl/client.h"
 #include "tests/slowness.h"
 #include "tests/system/daemon/process.h"
-#include "tests/unit/pipeline/scan/scan_samples.h"
+#include "tests/unit/pipeline/storage/scan_samples.h"
 
 namespace scanrig {
 

@@ -40,7 +40,7 @@ TEST_F(StartedOverTheApi, AJobThatDoesNotFitOnTheDiskIsNotWaitedFor) {
 
 TEST_F(StartedOverTheApi, AModelBeyondTheLimitsOfItsRecipeIsNoSuccess) {
   start_rig();
-  change_config("poses = 2", "poses = 1\nlimits = { least_measured_share = 1.0 }");
+  change_config("poses = 2", "poses = 1\nlimits = { min_measured_share = 1.0 }");
   get_ready();
   EXPECT_EQ(start({"--follow"}), ExitCode::below_limits) << output_ << log();
   EXPECT_THAT(output_, HasSubstr("model.glb")) << "there is a model";

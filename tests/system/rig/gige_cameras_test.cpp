@@ -62,14 +62,14 @@ TEST_F(CamerasOnWires, AScanRedoesALostExposureUsesTheFramesOfOneEdgeOnlyAndEnds
 
   const auto job = ask("jobs/" + jobs()[0]["id"].get<std::string>());
   const std::filesystem::path folder(job["folder"].get<std::string>());
-  ASSERT_GE(job["stored"][0]["redone"], 1);
-  EXPECT_THAT(job["stored"][0]["spoilt"].dump(), HasSubstr("right camera SIM-R: no frame"));
+  ASSERT_GE(job["stored"][0]["retakes"], 1);
+  EXPECT_THAT(job["stored"][0]["retake_reasons"].dump(), HasSubstr("right camera SIM-R: no frame"));
   EXPECT_THAT(*read_file(folder / "scan.json"), HasSubstr("right camera SIM-R: no frame"));
   std::uint32_t last = 0;
   for (std::size_t i = 0; i < 8; ++i) {
     const auto& stored = job["stored"][i];
-    const auto redone = stored["redone"].get<std::uint32_t>();  // on a busy machine more than the one that was lost
-    EXPECT_EQ(stored["spoilt"].size(), redone);
+    const auto retakes = stored["retakes"].get<std::uint32_t>();  // on a busy machine more than the one that was lost
+    EXPECT_EQ(stored["retake_reasons"].size(), retakes);
     const auto view =
         folder / fmt::format("pose{}/view{:02}", stored["pose"].get<int>() + 1, stored["view"].get<int>());
     const auto edge_of = [&](const char* name) { return faint_number(cv::imread(view / name, cv::IMREAD_UNCHANGED)); };
@@ -79,7 +79,7 @@ TEST_F(CamerasOnWires, AScanRedoesALostExposureUsesTheFramesOfOneEdgeOnlyAndEnds
     EXPECT_GT(pattern, last);
     EXPECT_GT(plain, pattern);
     if (i != 4) {  // after a pose view 0 was looked at again
-      EXPECT_LE(plain, last + 2 + redone);
+      EXPECT_LE(plain, last + 2 + retakes);
     }
     last = plain;
   }
@@ -91,16 +91,16 @@ TEST_F(CamerasOnWires, PicturesThatAreDarkBlurredOrOfTheOtherSideAreRedone) {
   spoil("dark", 2);
   begin_scan();
   ASSERT_TRUE(wait_stored(1)) << log();
-  EXPECT_GE(job()["stored"][0]["redone"], 2);
-  EXPECT_THAT(job()["stored"][0]["spoilt"].dump(), HasSubstr("right camera: the picture in the dots is dark"));
+  EXPECT_GE(job()["stored"][0]["retakes"], 2);
+  EXPECT_THAT(job()["stored"][0]["retake_reasons"].dump(), HasSubstr("right camera: the picture in the dots is dark"));
   spoil("swapped", 2);
   ASSERT_TRUE(wait_stored(3)) << log();
   spoil("blurred", 2);
   ASSERT_TRUE(soon([&] { return job()["state"] == "reconstructing"; })) << log();
-  int redone = 0;
+  int retakes = 0;
   const auto stored = job()["stored"];
-  for (const auto& view : stored) redone += view["redone"].get<int>();
-  EXPECT_GE(redone, 4) << "of two spoilt exposures at least one was with dots";
+  for (const auto& view : stored) retakes += view["retakes"].get<int>();
+  EXPECT_GE(retakes, 4) << "of two spoilt exposures at least one was with dots";
 }
 
 TEST_F(CamerasOnWires, ACameraThatStaysDarkEndsTheJobInItsName) {

@@ -172,7 +172,7 @@ TEST_F(MakeSafe, WithNothingKeptADeviceBadlyConfiguredLeavesTheOthersToBeMadeSaf
   EXPECT_FALSE(rig.drive.truth().moving);
   EXPECT_FALSE(rig.lamp("RED"));
   EXPECT_THAT(log(), HasSubstr("[panel] no_such_key: unknown key"));
-  EXPECT_THAT(log(), HasSubstr("No daemon has kept its configuration"));
+  EXPECT_THAT(log(), HasSubstr("No saved configuration"));
 
   write(replaced(text, "[turntable]\n", "[turntable]\nno_such_key = 1\n") + "\n[recipe.quick]\nviews = 0\n");
   EXPECT_EQ(make_safe(), 5);

@@ -5,7 +5,7 @@
 #include <opencv2/core.hpp>
 #include <optional>
 
-#include "pipeline/scan/scan_folder.h"
+#include "pipeline/storage/scan_folder.h"
 #include "tests/component/safety/wire_rig.h"
 #include "tests/system/daemon/process.h"
 #include "tests/system/safety/truth_server.h"

@@ -121,7 +121,7 @@ TEST_F(Reload, AFileThatIsNotValidChangesNothing) {
   start();
   configure("\n[recipe.quick]\nviews = 0\nno_such_key = 1\n");
   ASSERT_TRUE(reload()) << log();
-  EXPECT_THAT(ready(), HasSubstr("STATUS=No reload, the configuration stays as it was: "));
+  EXPECT_THAT(ready(), HasSubstr("STATUS=Reload refused, configuration unchanged: "));
   EXPECT_THAT(ready(), HasSubstr("no_such_key"));
   EXPECT_EQ(std::ranges::count(ready(), '\n'), 1) << "one sentence: " << ready();
   EXPECT_THAT(kept(), Not(HasSubstr("no_such_key")));
@@ -138,7 +138,7 @@ TEST_F(Reload, WhileItScansItIsRefusedAndTheJobGoesOn) {
   ASSERT_TRUE(press_until("start", [&] { return machine() == "Operational.SingleExecution"; })) << log();
   configure(kQuick);
   ASSERT_TRUE(reload()) << log();
-  EXPECT_THAT(ready(), HasSubstr("STATUS=No reload, the configuration stays as it was: "));
+  EXPECT_THAT(ready(), HasSubstr("STATUS=Reload refused, configuration unchanged: "));
   EXPECT_EQ(ask_for_reload(), 6);
   EXPECT_THAT(output_, HasSubstr("Operational.SingleExecution"));
   EXPECT_TRUE(soon([&] { return jobs().at(0)["stored"] == 4; })) << log();
@@ -153,7 +153,7 @@ TEST_F(Reload, AConfigurationThatTurnsOutToBeOfNoUseIsGivenUpForTheOneBefore) {
                           << kQuick;
   ASSERT_TRUE(reload()) << log();
   EXPECT_TRUE(soon([&] { return machine() == "Halted" && next_action() == "Press Reset."; })) << log();
-  EXPECT_THAT(log(), HasSubstr("The new configuration cannot be used, the one before is: "));
+  EXPECT_THAT(log(), HasSubstr("New configuration failed, old one restored: "));
   EXPECT_THAT(log(), HasSubstr("no-such-group"));
   EXPECT_EQ(queue("quick"), 3) << "all of the old one";
   EXPECT_THAT(kept(), StartsWith("#"));

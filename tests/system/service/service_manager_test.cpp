@@ -1,5 +1,5 @@
 // What the daemon tells systemd, heard on the socket that systemd would listen to.
-#include "daemon/service_manager.h"
+#include "daemon/service/service_manager.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -84,7 +84,7 @@ TEST(ServiceManager, AnIdleControlLoopSaysEverySecondThatItLives) {
                                },
                            .perform = [](const Action&) {},
                            .show = [](const PanelOutputs&) {},
-                           .fresh_job_id = [] { return std::string(); }};
+                           .new_job_id = [] { return std::string(); }};
   std::ignore = loop.run(ports);
   EXPECT_LE(clock.now() - begin, std::chrono::seconds(60 + 5));  // 5 s to be seen stopped
 }

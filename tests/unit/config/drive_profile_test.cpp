@@ -75,7 +75,7 @@ TEST_F(DriveProfileTest, ValuesOf32BitsLieInTwoWordsAndInputsAreLetGo) {
   for (const Word word : {Word::position, Word::speed, Word::acceleration, Word::deceleration}) {
     EXPECT_TRUE(profile->move.has(word, true) && profile->move.has(word, false));
   }
-  EXPECT_TRUE(profile->stop.released);
+  EXPECT_TRUE(profile->stop.momentary);
   EXPECT_FALSE(profile->enable);
   EXPECT_FALSE(profile->soft_limits);
   EXPECT_EQ(profile->status.enabled, 0);

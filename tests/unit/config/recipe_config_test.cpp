@@ -32,9 +32,9 @@ class RecipeConfigTest : public FileUnderTest {
 views = 6
 poses = 2
 flip_timeout_min = 2
-flip = "line"
+flip = "signal"
 start = "part_present"
-limits = { least_measured_share = 0.9, most_residual_mm = 0.05 }
+limits = { min_measured_share = 0.9, max_residual_mm = 0.05 }
 )";
 };
 
@@ -44,7 +44,7 @@ TEST_F(RecipeConfigTest, ARecipeMayLeaveEverythingButTheScanToTheButton) {
   const auto& recipe = rig->recipes.at("default");
   EXPECT_EQ(recipe.flip, RecipeConfig::Flip::button);
   EXPECT_EQ(recipe.start, RecipeConfig::Start::button);
-  EXPECT_FALSE(recipe.least_measured_share);
+  EXPECT_FALSE(recipe.min_measured_share);
   EXPECT_FALSE(rig->quiet_hours);
   EXPECT_FALSE(rig->webhook);
   EXPECT_FALSE(rig->storage.keep_days);
@@ -55,26 +55,47 @@ TEST_F(RecipeConfigTest, ALineHasSignalsAndLimits) {
   ASSERT_TRUE(rig) << rig.error().message;
   const auto& recipe = rig->recipes.at("line");
   EXPECT_EQ(recipe.views, 6);
-  EXPECT_EQ(recipe.flip, RecipeConfig::Flip::line);
+  EXPECT_EQ(recipe.flip, RecipeConfig::Flip::signal);
   EXPECT_EQ(recipe.start, RecipeConfig::Start::part_present);
-  EXPECT_EQ(recipe.least_measured_share, 0.9);
-  EXPECT_EQ(recipe.most_residual_mm, 0.05);
+  EXPECT_EQ(recipe.min_measured_share, 0.9);
+  EXPECT_EQ(recipe.max_residual_mm, 0.05);
+}
+
+TEST_F(RecipeConfigTest, OldNamesAreReadWithAWarning) {
+  auto old_names = with_inputs() + line_;
+  for (const auto& [now, before] :
+       {std::pair("flip = \"signal\"", "flip = \"line\""),  // old name
+        std::pair("min_measured_share", "least_measured_share"), std::pair("max_residual_mm", "most_residual_mm"),
+        std::pair("voxel_mm = 0.25", "voxel_mm = 0.25\nlimit_min = 7")}) {
+    old_names = replaced(old_names, now, before);
+  }
+  const auto rig = read(old_names);
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->recipes.at("line").flip, RecipeConfig::Flip::signal);
+  EXPECT_EQ(rig->recipes.at("line").min_measured_share, 0.9);
+  EXPECT_EQ(rig->reconstruction.timeout, std::chrono::minutes(7));
+  ASSERT_EQ(rig->warnings.size(), 4u);
+  EXPECT_THAT(rig->warnings, testing::Contains(testing::HasSubstr(
+                                 "[recipe.line] limits.most_residual_mm: this key is called max_residual_mm now")));
+  const auto both = read(replaced(old_names, "limit_min = 7", "limit_min = 7\ntimeout_min = 8"));
+  ASSERT_FALSE(both);
+  EXPECT_THAT(both.error().message, testing::HasSubstr("limit_min: unknown key"));
 }
 
 TEST_F(RecipeConfigTest, SignalsNeedTheirInputs) {
-  expect_problem(example_ + line_, "[recipe.line] flip: \"line\" needs the input flipped in [panel]");
+  expect_problem(example_ + line_, "[recipe.line] flip: \"signal\" needs the input flipped in [panel]");
   expect_problem(example_ + line_, "[recipe.line] start: \"part_present\" needs the input part_present in [panel]");
 }
 
 TEST_F(RecipeConfigTest, WhatBeginsByASignalNeedsAGuard) {
   const auto open = replaced(with_inputs() + line_, "guard = { line = \"GUARD_OK\", active = \"low\" }", "#");
-  expect_problem(open, "[recipe.line] flip: \"line\" needs a guard in [safety]");
+  expect_problem(open, "[recipe.line] flip: \"signal\" needs a guard in [safety]");
   expect_problem(open, "[recipe.line] start: \"part_present\" needs a guard in [safety]");
 }
 
 TEST_F(RecipeConfigTest, LimitsAreChecked) {
-  const auto text = replaced(with_inputs() + line_, "least_measured_share = 0.9", "least_measured_share = 90");
-  expect_problem(text, "limits.least_measured_share: 90 is not between 0 and 1");
+  const auto text = replaced(with_inputs() + line_, "min_measured_share = 0.9", "min_measured_share = 90");
+  expect_problem(text, "limits.min_measured_share: 90 is not between 0 and 1");
 }
 
 TEST_F(RecipeConfigTest, QuietHoursAreTimesOfTheDay) {

@@ -40,7 +40,7 @@ TEST(Parallel, ThreadsThatHelpOneThatGivesWayGiveWayToo) {
   EXPECT_EQ(most_urgent_helper(), ordinary);
   int background = 0;
   std::thread([&] {
-    give_way();
+    lower_priority();
     background = most_urgent_helper();
   }).join();
   EXPECT_GE(background, std::min(ordinary + 1, 15));

@@ -1,6 +1,6 @@
 #include <gmock/gmock.h>
 
-#include "daemon/station/words.h"
+#include "daemon/station/operator_message.h"
 #include "tests/unit/daemon/queue_under_test.h"
 
 namespace scanrig {
@@ -15,7 +15,7 @@ const Error kOthers{ErrorCode::refused, "calibration.json is of the cameras A an
 class CalibrationRules : public Queue {
  protected:
   void see_calibration(const std::string& job, const std::optional<Error>& problem) {
-    tell(event::CalibrationSeen{job, problem});
+    tell(event::CalibrationChecked{job, problem});
   }
   static JobInfo half_done(const std::string& id) {
     auto job = queued(id, 1);
@@ -27,7 +27,7 @@ class CalibrationRules : public Queue {
 TEST_F(CalibrationRules, OfOtherCamerasRefusesStartUntilItIsReplaced) {
   get_ready();
   see_calibration("", kOthers);
-  EXPECT_THAT(describe(state, rules).next_action, StartsWith("See to the calibration: calibration.json is of"));
+  EXPECT_THAT(describe(state, rules).next_action, StartsWith("Check the calibration: calibration.json is of"));
   press(Button::start);
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->code, ErrorCode::refused);
@@ -36,7 +36,7 @@ TEST_F(CalibrationRules, OfOtherCamerasRefusesStartUntilItIsReplaced) {
   see_calibration("", std::nullopt);
   press(Button::start);
   EXPECT_FALSE(refused);
-  EXPECT_NE(asked_for<action::BeginJob>(), nullptr);
+  EXPECT_NE(asked_for<action::StartJob>(), nullptr);
 }
 
 TEST_F(CalibrationRules, IsAskedForWithTheDevicesAndForTheHeadOfTheQueue) {
@@ -77,13 +77,13 @@ TEST_F(CalibrationRules, HoldsTheLineUntilItIsReplaced) {
   run_a_line_of(2);
   scan("0");
   see_calibration("", kOthers);
-  EXPECT_THAT(describe(state, rules).next_action, StartsWith("See to the calibration: "));
+  EXPECT_THAT(describe(state, rules).next_action, StartsWith("Check the calibration: "));
   see(false);
   see(true);
   EXPECT_EQ(state.activity, Activity::waiting_for_part);
   EXPECT_TRUE(actions.empty());
   see_calibration("", std::nullopt);
-  EXPECT_NE(asked_for<action::BeginJob>(), nullptr) << "the part has been there all the time";
+  EXPECT_NE(asked_for<action::StartJob>(), nullptr) << "the part has been there all the time";
 }
 
 TEST_F(CalibrationRules, AScanThatHasBegunGoesOnAfterItsFlip) {

@@ -22,13 +22,13 @@ class Follow : public testing::Test {
     all.resize(std::fread(all.data(), 1, all.size(), out));
     return all;
   }
-  static json view(int pose, int index, int redone) {
+  static json view(int pose, int index, int retakes) {
     const json why = {{"code", "timeout"}, {"message", "left camera: no frame in time"}};
     return {{"pose", pose},
             {"view", index},
             {"measured_deg", 45.01},
-            {"redone", redone},
-            {"spoilt", std::vector<json>(static_cast<std::size_t>(redone), why)}};
+            {"retakes", retakes},
+            {"retake_reasons", std::vector<json>(static_cast<std::size_t>(retakes), why)}};
   }
   static json job(const std::string& state) {
     return {{"id", "J"},
@@ -36,7 +36,7 @@ class Follow : public testing::Test {
             {"poses", 2},
             {"views", 8},
             {"stored", json::array()},
-            {"closures", json::array()},
+            {"movement_checks", json::array()},
             {"stages", json::array()},
             {"error", nullptr},
             {"folder", "/j"},
@@ -64,11 +64,12 @@ TEST_F(Follow, EachViewIsToldOnce) {
             "      redone: left camera: no frame in time\n");
 }
 
-TEST_F(Follow, AClosureShotIsToldWithWhatWasRedone) {
+TEST_F(Follow, AMovementCheckIsToldWithWhatWasRedone) {
   auto j = job("scanning");
   const json why = {{"code", "timeout"}, {"message", "left camera: no frame in time"}};
-  j["closures"] = {{{"pose", 0}, {"shift_px", 0.04}, {"unmoved", true}, {"redone", 1}, {"spoilt", {why}}},
-                   {{"pose", 1}, {"shift_px", 3.5}, {"unmoved", false}, {"redone", 0}, {"spoilt", json::array()}}};
+  j["movement_checks"] = {
+      {{"pose", 0}, {"shift_px", 0.04}, {"unmoved", true}, {"retakes", 1}, {"retake_reasons", {why}}},
+      {{"pose", 1}, {"shift_px", 3.5}, {"unmoved", false}, {"retakes", 0}, {"retake_reasons", json::array()}}};
   for (int i = 0; i < 2; ++i) story.tell(status, j);
   EXPECT_EQ(text(),
             "Job J\n"
@@ -118,13 +119,13 @@ TEST_F(Follow, AModelBeyondTheLimitsIsToldAndEndsWithTheirCode) {
 }
 
 TEST_F(Follow, AJobThatWasNotBegunIsToldWithWhatToDo) {
-  EXPECT_FALSE(why_not_begun(status, "J"));
-  status["not_begun"] = {{"job", "J"}, {"why", {{"code", "io"}, {"message", "the disk is full"}}}};
-  const auto why = why_not_begun(status, "J");
+  EXPECT_FALSE(why_not_started(status, "J"));
+  status["not_started"] = {{"job", "J"}, {"why", {{"code", "io"}, {"message", "the disk is full"}}}};
+  const auto why = why_not_started(status, "J");
   ASSERT_TRUE(why);
   EXPECT_EQ(why->code, ErrorCode::io);
   EXPECT_EQ(why->message, "job J was not begun: the disk is full. Next: Turn the object over.");
-  EXPECT_FALSE(why_not_begun(status, "another"));
+  EXPECT_FALSE(why_not_started(status, "another"));
 }
 
 TEST_F(Follow, WhatIsWaitedForIsToldWhenItIsAnotherThing) {

@@ -1,6 +1,6 @@
 #include <gmock/gmock.h>
 
-#include "daemon/station/words.h"
+#include "daemon/station/operator_message.h"
 #include "tests/unit/daemon/station_under_test.h"
 
 namespace scanrig {
@@ -12,7 +12,7 @@ using testing::HasSubstr;
 class HangingDisk : public Station {
  protected:
   void hang() {
-    tell(event::DiskSeen{Error{ErrorCode::io, "the disk with /jobs has not answered for 30 s: see to it"}});
+    tell(event::DiskChecked{Error{ErrorCode::io, "the disk with /jobs has not answered for 30 s: see to it"}});
   }
   void expect_interrupted() {
     ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
@@ -56,16 +56,16 @@ TEST_F(HangingDisk, BeginsNothingUntilItAnswers) {
   };
   press(Button::start);
   expect_refused();
-  tell(event::Ordered{.order = {}, .fresh_ids = {"b"}});
+  tell(event::JobsOrdered{.order = {}, .new_ids = {"b"}});
   expect_refused();
-  tell(event::JobAsked{.what = event::JobAsked::What::cancel, .job = "a"});
+  tell(event::JobRequested{.what = event::JobRequested::What::cancel, .job = "a"});
   expect_refused();
-  tell(event::ReloadAsked{});
+  tell(event::ReloadRequested{});
   expect_refused();
 
-  tell(event::DiskSeen{});
+  tell(event::DiskChecked{});
   press(Button::start);
-  EXPECT_NE(asked_for<action::BeginJob>(), nullptr);
+  EXPECT_NE(asked_for<action::StartJob>(), nullptr);
 }
 
 TEST_F(HangingDisk, HoldsTheLineAndLetsItGoOn) {
@@ -74,24 +74,24 @@ TEST_F(HangingDisk, HoldsTheLineAndLetsItGoOn) {
   know(queued("a", 1, rules.recipes["line"]));
   know(queued("b", 2, rules.recipes["line"]));
   press(Button::start);
-  tell(event::JobBegun{"a", 0, 0});
+  tell(event::JobStarted{"a", 0, 0});
   tell(event::WarningOver{});
   tell(event::ViewTaken{std::make_shared<TakenView>(TakenView{.id = {"a", 0, 0}})});
   tell(event::ViewStored{{"a", 0, 0}, 0.0});
-  tell(event::ClosureTaken{std::make_shared<TakenView>(TakenView{.id = {"a", 0, 0}})});
-  tell(event::ClosureJudged{"a", {.unmoved = true}});
+  tell(event::CheckViewTaken{std::make_shared<TakenView>(TakenView{.id = {"a", 0, 0}})});
+  tell(event::MovementChecked{"a", {.unmoved = true}});
   tell(event::PoseStored{"a", 0});
   ASSERT_EQ(state.activity, Activity::waiting_for_part);
   hang();
-  event::InputsSeen part{};
+  event::InputsRead part{};
   part.inputs.part_present = false;
   tell(part);
   part.inputs.part_present = true;
   tell(part);
-  EXPECT_EQ(asked_for<action::BeginJob>(), nullptr);
-  tell(event::DiskSeen{});
-  ASSERT_NE(asked_for<action::BeginJob>(), nullptr);
-  EXPECT_EQ(asked_for<action::BeginJob>()->job, "b");
+  EXPECT_EQ(asked_for<action::StartJob>(), nullptr);
+  tell(event::DiskChecked{});
+  ASSERT_NE(asked_for<action::StartJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::StartJob>()->job, "b");
 }
 
 TEST_F(HangingDisk, AJobThatWasStoppedBeforeItsFolderWasThereIsNotQueued) {
@@ -99,7 +99,7 @@ TEST_F(HangingDisk, AJobThatWasStoppedBeforeItsFolderWasThereIsNotQueued) {
   press(Button::start);
   press(Button::stop);
   know(queued("job", 0));
-  tell(event::JobBegun{"job", 0, 0});
+  tell(event::JobStarted{"job", 0, 0});
   tell(event::JobClosed{"job", JobState::cancelled, {ErrorCode::stopped, "Stop was pressed"}});
   EXPECT_TRUE(state.queue.empty());
 }

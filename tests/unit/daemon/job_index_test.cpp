@@ -4,7 +4,7 @@
 #include <sqlite3.h>
 
 #include "daemon/jobs/job_store.h"
-#include "tests/unit/pipeline/scan/scan_samples.h"
+#include "tests/unit/pipeline/storage/scan_samples.h"
 
 namespace scanrig {
 namespace {
@@ -18,14 +18,16 @@ class Index : public scan_samples::FolderTest {
     FolderTest::SetUp();
     scan_samples::write_text(folder_ / "calibration.json", scan_samples::calibration_json());
     store.emplace(*JobStore::open({.root = folder_ / "jobs", .calibration_file = folder_ / "calibration.json"}));
-    const ViewRecord view{.index = 0, .measured_deg = 0.25, .spoilt = {{ErrorCode::timeout, "left camera: no frame"}}};
+    const ViewRecord view{
+        .index = 0, .measured_deg = 0.25, .retake_reasons = {{ErrorCode::timeout, "left camera: no frame"}}};
     for (const char* id : {"a", "b", "queued"}) {
       ASSERT_TRUE(store->create(id, {.part = std::string("part ") + id}));
       auto scan = ScanFolder::open(store->folder(id));
       scan->taken_under(std::string(64, 'c'));
       ASSERT_TRUE(scan->add_view(0, view, scan_samples::raw_view(1)));
       if (id != std::string("queued")) {
-        ASSERT_TRUE(scan->add_closure(0, {.shift_px = 3, .spoilt = {{ErrorCode::protocol, "right camera: torn"}}}));
+        ASSERT_TRUE(scan->add_movement_check(
+            0, {.shift_px = 3, .retake_reasons = {{ErrorCode::protocol, "right camera: torn"}}}));
         ASSERT_TRUE(scan->set_state("failed"));
         ASSERT_TRUE(write_failure(scan->path(), {ErrorCode::moved, "it moved"}));
       }
@@ -42,9 +44,9 @@ class Index : public scan_samples::FolderTest {
     EXPECT_EQ(jobs->at("b")->part, "part b");
     EXPECT_EQ(jobs->at("b")->config_sha256, std::vector{std::string(64, 'c')});
     EXPECT_EQ(jobs->at("b")->stored.at(0).measured_deg, 0.25);
-    EXPECT_EQ(jobs->at("b")->stored.at(0).spoilt.at(0).code, ErrorCode::timeout);
-    EXPECT_EQ(jobs->at("b")->stored.at(0).spoilt.at(0).message, "left camera: no frame");
-    EXPECT_EQ(jobs->at("b")->closures.at(0).spoilt.at(0).message, "right camera: torn");
+    EXPECT_EQ(jobs->at("b")->stored.at(0).retake_reasons.at(0).code, ErrorCode::timeout);
+    EXPECT_EQ(jobs->at("b")->stored.at(0).retake_reasons.at(0).message, "left camera: no frame");
+    EXPECT_EQ(jobs->at("b")->movement_checks.at(0).retake_reasons.at(0).message, "right camera: torn");
     EXPECT_EQ(jobs->at("queued")->state, JobState::queued);
   }
   bool knows(const std::string& id) { return JobIndex(file()).find(store->folder(id)).has_value(); }

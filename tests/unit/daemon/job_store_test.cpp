@@ -5,7 +5,7 @@
 
 #include <regex>
 
-#include "tests/unit/pipeline/scan/scan_samples.h"
+#include "tests/unit/pipeline/storage/scan_samples.h"
 
 namespace scanrig {
 namespace {
@@ -151,9 +151,21 @@ TEST_F(JobStoreTest, AJobThatTookTwoDaemonsWithItIsInQuarantineWithItsImages) {
   EXPECT_EQ(recovered(store, "job").state, JobState::reconstructing) << "somebody has asked for another try";
 }
 
+TEST_F(JobStoreTest, AnOrderOfVersion1IsRead) {
+  const auto store = open();
+  ASSERT_TRUE(store.create("job", JobFile{.part = "4711", .place = 7}));
+  ASSERT_TRUE(write_file_atomically(root_ / "job" / "job.json", R"({
+    "format": "scanrig-job", "version": 1, "part": "4711", "place": 7, "exported": false,
+    "recipe": { "name": "small", "poses": 1, "views": 5, "flip_timeout_min": 30, "flip_by_line": true,
+                "start_on_part": false, "limits": { "least_measured_share": 0.9, "most_residual_mm": 0.05 } } })"));
+  const auto recipe = recovered(store, "job").recipe;  // the keys above have their old names
+  EXPECT_TRUE(recipe.flip_by_signal);
+  EXPECT_EQ(recipe.limits, (Limits{.min_measured_share = 0.9, .max_residual_mm = 0.05}));
+}
+
 TEST_F(JobStoreTest, AQueuedJobKeepsItsOrderAndItsPlace) {
   const auto store = open();
-  const JobFile order{.recipe = {.name = "small", .poses = 1, .views = 5, .limits = {.least_measured_share = 0.9}},
+  const JobFile order{.recipe = {.name = "small", .poses = 1, .views = 5, .limits = {.min_measured_share = 0.9}},
                       .part = "4711",
                       .place = 7};
   ASSERT_TRUE(store.create("job", order));
@@ -168,7 +180,7 @@ TEST_F(JobStoreTest, AnInterruptedJobIsResumableUnlessItsObjectMoved) {
   const auto store = open();
   const auto folder = make_job(store, "job", "interrupted");
   EXPECT_TRUE(recovered(store, "job").resumable);
-  ASSERT_TRUE(ScanFolder::open(folder)->add_closure(0, {.after_views = 1, .shift_px = 9, .unmoved = false}));
+  ASSERT_TRUE(ScanFolder::open(folder)->add_movement_check(0, {.after_views = 1, .shift_px = 9, .unmoved = false}));
   EXPECT_FALSE(recovered(store, "job").resumable);
   make_job(store, "ended", "cancelled");
   EXPECT_FALSE(recovered(store, "ended").resumable);
@@ -205,7 +217,7 @@ TEST_F(JobStoreTest, AJobThatDoesNotFitIsRefusedWithFigures) {
 
 TEST_F(JobStoreTest, AModelIsJudgedByTheLimitsOfTheRecipe) {
   const auto store = open();
-  ASSERT_TRUE(store.create("job", {.recipe = {.limits = {.least_measured_share = 0.9, .most_residual_mm = 0.1}}}));
+  ASSERT_TRUE(store.create("job", {.recipe = {.limits = {.min_measured_share = 0.9, .max_residual_mm = 0.1}}}));
   const auto folder = store.folder("job");
   ASSERT_TRUE(ScanFolder::open(folder)->set_state("scanned"));
   fs::create_directories(model_folder(folder));

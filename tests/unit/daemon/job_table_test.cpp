@@ -9,8 +9,8 @@ class Jobs : public testing::Test {
  protected:
   void tell(const Event& event) { update(table, event); }
   void begin() {
-    tell(event::JobKnown{std::make_shared<const JobInfo>(JobInfo{.id = "a", .folder = "/jobs/a"})});
-    tell(event::JobBegun{"a", 0, 0});
+    tell(event::JobUpdated{std::make_shared<const JobInfo>(JobInfo{.id = "a", .folder = "/jobs/a"})});
+    tell(event::JobStarted{"a", 0, 0});
   }
   const JobInfo& job() const { return *table.at("a"); }
   JobTable table;
@@ -19,10 +19,10 @@ class Jobs : public testing::Test {
 TEST_F(Jobs, AJobAppearsWhenItsFolderIsThere) {
   tell(event::ViewStored{{"a", 0, 0}, 0.0});
   EXPECT_TRUE(table.empty());
-  tell(event::JobKnown{std::make_shared<const JobInfo>(JobInfo{.id = "a", .folder = "/jobs/a"})});
+  tell(event::JobUpdated{std::make_shared<const JobInfo>(JobInfo{.id = "a", .folder = "/jobs/a"})});
   EXPECT_EQ(job().state, JobState::queued);
   EXPECT_EQ(job().folder, "/jobs/a");
-  tell(event::JobBegun{"a", 0, 0});
+  tell(event::JobStarted{"a", 0, 0});
   EXPECT_EQ(job().state, JobState::scanning);
 }
 
@@ -33,8 +33,8 @@ TEST_F(Jobs, EntriesAlreadyHandedOutDoNotChange) {
   EXPECT_TRUE(held->stored.empty());
   ASSERT_EQ(job().stored.size(), 1u);
   EXPECT_EQ(job().stored[0].measured_deg, 0.5);
-  ASSERT_EQ(job().stored[0].spoilt.size(), 1u);
-  EXPECT_EQ(job().stored[0].spoilt[0].message, "left camera: no frame");
+  ASSERT_EQ(job().stored[0].retake_reasons.size(), 1u);
+  EXPECT_EQ(job().stored[0].retake_reasons[0].message, "left camera: no frame");
 }
 
 TEST_F(Jobs, AJobGoesThroughFlipAndReconstructionToDone) {
@@ -73,11 +73,11 @@ TEST_F(Jobs, AModelBeyondTheLimitsIsDoneAndDoesNotPass) {
   EXPECT_EQ(job().error->message, "80 % was measured");
 }
 
-TEST_F(Jobs, ClosureShotsAreKept) {
+TEST_F(Jobs, MovementCheckAreKept) {
   begin();
-  tell(event::ClosureJudged{"a", {.pose = 0, .shift_px = 3.0, .unmoved = false}});
-  ASSERT_EQ(job().closures.size(), 1u);
-  EXPECT_EQ(job().closures[0].shift_px, 3.0);
+  tell(event::MovementChecked{"a", {.pose = 0, .shift_px = 3.0, .unmoved = false}});
+  ASSERT_EQ(job().movement_checks.size(), 1u);
+  EXPECT_EQ(job().movement_checks[0].shift_px, 3.0);
 }
 
 TEST_F(Jobs, ARemovedJobIsGone) {
@@ -94,12 +94,12 @@ TEST_F(Jobs, AJobIsClosedForWhoeverLooksAndWhatTheDiskSaysLateDoesNotOpenIt) {
   EXPECT_EQ(job().error->message, "the disk does not answer");
   EXPECT_TRUE(job().resumable);
   tell(event::ViewStored{{"a", 0, 1}, 0.0});
-  tell(event::JobBegun{"a", 0, 0});
+  tell(event::JobStarted{"a", 0, 0});
   EXPECT_EQ(job().state, JobState::interrupted);
   EXPECT_EQ(job().error->message, "the disk does not answer");
   EXPECT_EQ(job().stored.size(), 2u) << "it is there all the same";
 
-  tell(event::ClosureJudged{"a", {.unmoved = false}});
+  tell(event::MovementChecked{"a", {.unmoved = false}});
   close(table, {"a", JobState::interrupted, {ErrorCode::moved, "moved"}});
   EXPECT_FALSE(job().resumable);
 }
@@ -115,11 +115,11 @@ TEST_F(Jobs, AnEndIsToldOnce) {
 
   auto again = job();
   again.state = JobState::reconstructing;
-  EXPECT_FALSE(update(table, event::JobKnown{std::make_shared<const JobInfo>(again)}));
+  EXPECT_FALSE(update(table, event::JobUpdated{std::make_shared<const JobInfo>(again)}));
   const auto made = update(table, event::ModelReady{"a", "m", "r"});
   ASSERT_TRUE(made) << "what is reprocessed ends again";
   EXPECT_EQ(made->state, JobState::done);
-  EXPECT_FALSE(update(table, event::JobKnown{std::make_shared<const JobInfo>(job())}));
+  EXPECT_FALSE(update(table, event::JobUpdated{std::make_shared<const JobInfo>(job())}));
 }
 
 TEST_F(Jobs, AClosedJobSaysWhy) {

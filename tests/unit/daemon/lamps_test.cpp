@@ -6,11 +6,11 @@ namespace scanrig {
 namespace {
 
 PanelOutputs of(MachineState machine, Activity activity, const JobTable& jobs = {},
-                const std::string& put_on_last = {}) {
+                const std::string& last_started_job = {}) {
   StationState state;
   state.machine = machine;
   state.activity = activity;
-  state.put_on_last = put_on_last;
+  state.last_started_job = last_started_job;
   return lamps(state, jobs);
 }
 

@@ -9,12 +9,12 @@ namespace scanrig {
 namespace {
 
 using testing::HasSubstr;
-using What = event::MaintenanceAsked::What;
+using What = event::MaintenanceRequested::What;
 
 class MaintenanceMode : public Safety {
  protected:
   void ask(What what, double angle = 0.0, double speed = 5.0) {
-    tell(event::MaintenanceAsked{what, {angle}, true, {speed}});
+    tell(event::MaintenanceRequested{what, {angle}, true, {speed}});
   }
 };
 

@@ -1,6 +1,6 @@
 #include <gmock/gmock.h>
 
-#include "daemon/station/words.h"
+#include "daemon/station/operator_message.h"
 #include "tests/unit/daemon/queue_under_test.h"
 
 namespace scanrig {
@@ -10,7 +10,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using testing::StartsWith;
-using What = event::JobAsked::What;
+using What = event::JobRequested::What;
 
 TEST_F(Queue, AnOrderMakesOneFolderAJobBehindTheOthers) {
   rules.recipes["small"] = {.name = "small", .views = 5};
@@ -22,7 +22,7 @@ TEST_F(Queue, AnOrderMakesOneFolderAJobBehindTheOthers) {
   EXPECT_EQ(create->recipe.views, 5);
   EXPECT_EQ(create->part, "4711");
   EXPECT_EQ(create->place, 5);
-  EXPECT_EQ(create->ticket, 7u);
+  EXPECT_EQ(create->request_id, 7u);
 }
 
 TEST_F(Queue, AnOrderThatCannotBeUnderstoodIsRefused) {
@@ -60,8 +60,8 @@ TEST_F(Queue, StartTakesTheFirstJobAndItsRecipe) {
   EXPECT_THAT(describe(state, rules).next_action, HasSubstr("job a"));
   press(Button::start);
   EXPECT_EQ(asked_for<action::CreateJobs>(), nullptr);
-  ASSERT_NE(asked_for<action::BeginJob>(), nullptr);
-  EXPECT_EQ(asked_for<action::BeginJob>()->job, "a");
+  ASSERT_NE(asked_for<action::StartJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::StartJob>()->job, "a");
   EXPECT_EQ(state.job->recipe.views, 3);
   EXPECT_EQ(state.machine, MachineState::single_execution);
   EXPECT_THAT(waiting(), ElementsAre("b"));
@@ -71,20 +71,20 @@ TEST_F(Queue, AJobThatDoesNotFitIsNotBegunAndWaits) {
   get_ready();
   know(queued("a", 1));
   press(Button::start);
-  tell(event::JobNotBegun{"a", {ErrorCode::io, "the disk is full"}});
+  tell(event::JobNotStarted{"a", {ErrorCode::io, "the disk is full"}});
   know(queued("a", 1));
   EXPECT_EQ(state.machine, MachineState::ready);
   EXPECT_EQ(state.activity, Activity::none) << "nothing is about to move";
   EXPECT_THAT(state.cause, HasSubstr("the disk is full"));
-  EXPECT_THAT(describe(state, rules).next_action, StartsWith("See to the disk of the jobs. "));
+  EXPECT_THAT(describe(state, rules).next_action, StartsWith("Check the job disk. "));
   EXPECT_THAT(waiting(), ElementsAre("a"));
-  ASSERT_TRUE(state.not_begun);
-  EXPECT_EQ(state.not_begun->job, "a");
-  EXPECT_EQ(state.not_begun->why.code, ErrorCode::io);
+  ASSERT_TRUE(state.not_started);
+  EXPECT_EQ(state.not_started->job, "a");
+  EXPECT_EQ(state.not_started->why.code, ErrorCode::io);
   tell(event::WarningOver{});
   EXPECT_TRUE(actions.empty());
   press(Button::start);
-  EXPECT_FALSE(state.not_begun) << "it is tried again";
+  EXPECT_FALSE(state.not_started) << "it is tried again";
 }
 
 TEST_F(Queue, AJobThatDoesNotFitClearsNoFault) {
@@ -92,7 +92,7 @@ TEST_F(Queue, AJobThatDoesNotFitClearsNoFault) {
   know(queued("a", 1));
   press(Button::start);
   tell(event::RigFailed{{ErrorCode::timeout, "turntable: no reply"}});
-  tell(event::JobNotBegun{"a", {ErrorCode::io, "the disk is full"}});
+  tell(event::JobNotStarted{"a", {ErrorCode::io, "the disk is full"}});
   EXPECT_EQ(state.machine, MachineState::error);
   EXPECT_EQ(state.activity, Activity::stopping);
 }
@@ -101,8 +101,8 @@ TEST_F(Queue, AJobWhoseFolderIsDamagedIsSetAsideAndTheNextBeginsWithItsPart) {
   run_a_line_of(2);
   tell(event::WarningOver{});
   tell(event::JobUnreadable{"0", {ErrorCode::invalid_input, "scan.json: not JSON"}});
-  ASSERT_NE(asked_for<action::BeginJob>(), nullptr);
-  EXPECT_EQ(asked_for<action::BeginJob>()->job, "1");
+  ASSERT_NE(asked_for<action::StartJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::StartJob>()->job, "1");
   EXPECT_NE(asked_for<action::Warn>(), nullptr);
   EXPECT_THAT(state.cause, HasSubstr("scan.json: not JSON"));
   EXPECT_THAT(waiting(), IsEmpty());
@@ -122,8 +122,8 @@ TEST_F(Queue, ADamagedJobsPartIsNotScannedAsAnotherOne) {
   EXPECT_TRUE(actions.empty()) << "that is the damaged job's part";
   see(false);
   see(true);
-  ASSERT_NE(asked_for<action::BeginJob>(), nullptr);
-  EXPECT_EQ(asked_for<action::BeginJob>()->job, "1");
+  ASSERT_NE(asked_for<action::StartJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::StartJob>()->job, "1");
 }
 
 TEST_F(Queue, ThreeDamagedJobsInARowStopTheLineAndAFaultKeepsTheWord) {
@@ -136,7 +136,7 @@ TEST_F(Queue, ThreeDamagedJobsInARowStopTheLineAndAFaultKeepsTheWord) {
   tell(event::EstopChanged{false});
   tell(event::JobUnreadable{"3", damaged});
   EXPECT_EQ(state.machine, MachineState::error);
-  EXPECT_FALSE(asked_for<action::BeginJob>());
+  EXPECT_FALSE(asked_for<action::StartJob>());
 }
 
 TEST_F(Queue, JobsAreMovedResumedAndKept) {
@@ -151,10 +151,10 @@ TEST_F(Queue, JobsAreMovedResumedAndKept) {
   EXPECT_TRUE(asked_for<action::MoveJob>()->resume);
   for (const auto what : {What::cancel, What::remove, What::reprocess, What::set_exported, What::bundle}) {
     ask(what, "old");
-    EXPECT_NE(asked_for<action::KeepJob>(), nullptr);
+    EXPECT_NE(asked_for<action::RunJobRequest>(), nullptr);
   }
   ask(What::cancel, "a");
-  EXPECT_NE(asked_for<action::KeepJob>(), nullptr);
+  EXPECT_NE(asked_for<action::RunJobRequest>(), nullptr);
 }
 
 TEST_F(Queue, WhatTheStateForbidsIsRefused) {
@@ -183,8 +183,8 @@ TEST_F(Queue, ANewPartBeginsTheNextJobAfterTheWarning) {
   see(false);
   EXPECT_TRUE(actions.empty());
   see(true);
-  ASSERT_NE(asked_for<action::BeginJob>(), nullptr);
-  EXPECT_EQ(asked_for<action::BeginJob>()->job, "1");
+  ASSERT_NE(asked_for<action::StartJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::StartJob>()->job, "1");
   EXPECT_NE(asked_for<action::Warn>(), nullptr);
   scan("1");
   EXPECT_EQ(state.machine, MachineState::ready) << "the queue is empty";
@@ -210,7 +210,7 @@ TEST_F(Queue, StopEndsTheLineAndStartIsAPartToo) {
   run_a_line_of(3);
   scan("0");
   press(Button::start);
-  EXPECT_NE(asked_for<action::BeginJob>(), nullptr) << "somebody says that the part is there";
+  EXPECT_NE(asked_for<action::StartJob>(), nullptr) << "somebody says that the part is there";
   scan("1");
   press(Button::stop);
   EXPECT_EQ(state.machine, MachineState::ready);
@@ -224,15 +224,15 @@ TEST_F(Queue, AnOpenGuardAnAbsentDeviceAndQuietHoursHoldTheLine) {
   scan("0");
   tell(event::QuietHours{true});
   tell(event::GuardChanged{false});
-  tell(event::DevicesSeen{{{"camera", Error{ErrorCode::io, "unplugged"}}}});
+  tell(event::DevicesChecked{{{"camera", Error{ErrorCode::io, "unplugged"}}}});
   see(false);
   see(true);
   tell(event::QuietHours{false});
   EXPECT_EQ(state.activity, Activity::waiting_for_part);
   tell(event::GuardChanged{true});
   EXPECT_EQ(state.activity, Activity::waiting_for_part);
-  tell(event::DevicesSeen{{{"camera", std::nullopt}}});
-  EXPECT_NE(asked_for<action::BeginJob>(), nullptr) << "the part has been there all the time";
+  tell(event::DevicesChecked{{{"camera", std::nullopt}}});
+  EXPECT_NE(asked_for<action::StartJob>(), nullptr) << "the part has been there all the time";
 }
 
 TEST_F(Queue, AProjectorThatWarmsUpHoldsTheLineAndSaysForHowLong) {
@@ -251,7 +251,7 @@ TEST_F(Queue, AProjectorThatWarmsUpHoldsTheLineAndSaysForHowLong) {
   tell(event::QuietHours{false});
   EXPECT_EQ(state.activity, Activity::waiting_for_part);
   tell(event::WarmingUp{std::chrono::seconds(0)});
-  EXPECT_NE(asked_for<action::BeginJob>(), nullptr) << "the part has been there all the time";
+  EXPECT_NE(asked_for<action::StartJob>(), nullptr) << "the part has been there all the time";
 }
 
 TEST_F(Queue, AStartBeginsWithAColdProjectorAndWasToldSo) {
@@ -260,7 +260,7 @@ TEST_F(Queue, AStartBeginsWithAColdProjectorAndWasToldSo) {
   EXPECT_THAT(describe(state, rules).sentence, HasSubstr("The projector will be warm in 42 s."));
   press(Button::start);
   EXPECT_FALSE(refused);
-  EXPECT_NE(asked_for<action::BeginJob>(), nullptr);
+  EXPECT_NE(asked_for<action::StartJob>(), nullptr);
 }
 
 TEST_F(Queue, ThreeFailuresInARowStopTheLineAndStartForgivesThem) {
@@ -307,7 +307,7 @@ TEST_F(Queue, TheFlipTimeComesFromTheRecipe) {
 }
 
 TEST_F(Queue, ALineTurnsTheObjectOverByItsSignal) {
-  rules.recipes["default"].flip_by_line = true;
+  rules.recipes["default"].flip_by_signal = true;
   reach_flip();
   see(true, false);
   EXPECT_TRUE(actions.empty());

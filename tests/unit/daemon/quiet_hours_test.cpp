@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "daemon/run_daemon.h"
+#include "daemon/service/run_daemon.h"
 
 namespace scanrig {
 namespace {

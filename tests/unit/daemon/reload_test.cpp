@@ -1,6 +1,6 @@
 #include <gmock/gmock.h>
 
-#include "daemon/station/words.h"
+#include "daemon/station/operator_message.h"
 #include "tests/unit/daemon/station_under_test.h"
 
 namespace scanrig {
@@ -12,7 +12,7 @@ class AskedToReload : public Station {
  protected:
   void expect_refused(const std::string& why) {
     const auto before = state.machine;
-    tell(event::ReloadAsked{});
+    tell(event::ReloadRequested{});
     ASSERT_TRUE(refused);
     EXPECT_THAT(refused->message, HasSubstr(why));
     EXPECT_TRUE(actions.empty());
@@ -23,7 +23,7 @@ class AskedToReload : public Station {
 
 TEST_F(AskedToReload, AnIdleStationStopsTheRigAndEndsWhenItIsSeenStanding) {
   get_ready();
-  tell(event::ReloadAsked{});
+  tell(event::ReloadRequested{});
   EXPECT_FALSE(refused);
   EXPECT_TRUE(asked_for<action::StopRig>());
   EXPECT_FALSE(state.finished);
@@ -37,7 +37,7 @@ TEST_F(AskedToReload, AnIdleStationStopsTheRigAndEndsWhenItIsSeenStanding) {
 
 TEST_F(AskedToReload, AStationThatIsHaltedDoesSoToo) {
   start_up();
-  tell(event::ReloadAsked{});
+  tell(event::ReloadRequested{});
   EXPECT_TRUE(state.reloading);
 }
 
@@ -51,7 +51,7 @@ TEST_F(AskedToReload, NothingThatIsBeingDoneIsDisturbed) {
   tell(event::Homed{});
   press(Button::start);
   expect_refused("Operational.SingleExecution");
-  tell(event::JobBegun{"job", 0, 0});
+  tell(event::JobStarted{"job", 0, 0});
   tell(event::WarningOver{});
   take_and_store_all(0);
   tell(event::PoseStored{"job", 0});
@@ -60,14 +60,14 @@ TEST_F(AskedToReload, NothingThatIsBeingDoneIsDisturbed) {
 
 TEST_F(AskedToReload, AReconstructionIsNotDisturbedEither) {
   get_ready();
-  tell(event::ReloadAsked{"job 7 is being reconstructed"});
+  tell(event::ReloadRequested{"job 7 is being reconstructed"});
   ASSERT_TRUE(refused);
   EXPECT_THAT(refused->message, HasSubstr("job 7 is being reconstructed"));
 }
 
 TEST_F(AskedToReload, AnEngineerKeepsTheRig) {
   get_ready();
-  tell(event::MaintenanceAsked{event::MaintenanceAsked::What::on});
+  tell(event::MaintenanceRequested{event::MaintenanceRequested::What::on});
   expect_refused("Maintenance");
 }
 
@@ -82,7 +82,7 @@ TEST_F(AskedToReload, ALatchedFaultIsNotGotRidOf) {
 
 TEST_F(AskedToReload, AShutdownThatComesMeanwhileWins) {
   get_ready();
-  tell(event::ReloadAsked{});
+  tell(event::ReloadRequested{});
   tell(event::Shutdown{});
   EXPECT_FALSE(state.reloading);
   tell(event::Stopped{});

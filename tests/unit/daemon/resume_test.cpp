@@ -1,6 +1,6 @@
 #include <gmock/gmock.h>
 
-#include "daemon/station/words.h"
+#include "daemon/station/operator_message.h"
 #include "tests/unit/daemon/station_under_test.h"
 
 namespace scanrig {
@@ -8,7 +8,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Closure shots, and jobs that go on after an interruption.
+/// Movement checks, and jobs that go on after an interruption.
 class Resume : public Station {
  protected:
   /// The job "job" gets the rig again, with `stored` views of `pose`.
@@ -21,7 +21,7 @@ class Resume : public Station {
     said = describe(state, rules).next_action;
     press(Button::start);
     tell(event::WarningOver{});
-    tell(event::JobBegun{"job", pose, stored});
+    tell(event::JobStarted{"job", pose, stored});
   }
   std::string said;
 };
@@ -30,11 +30,11 @@ TEST_F(Resume, TakesView0AgainBeforeAnythingElse) {
   resume(0, 2);
   EXPECT_THAT(said, HasSubstr("leave its object as it lies"));
   ASSERT_NE(asked_for<action::TakeView>(), nullptr);
-  EXPECT_TRUE(asked_for<action::TakeView>()->closure);
-  tell(event::ClosureTaken{});
-  EXPECT_NE(asked_for<action::JudgeClosure>(), nullptr);
+  EXPECT_TRUE(asked_for<action::TakeView>()->movement_check);
+  tell(event::CheckViewTaken{});
+  EXPECT_NE(asked_for<action::CheckMovement>(), nullptr);
   EXPECT_EQ(asked_for<action::TakeView>(), nullptr) << "not before it is judged";
-  tell(event::ClosureJudged{"job", {.unmoved = true}});
+  tell(event::MovementChecked{"job", {.unmoved = true}});
   ASSERT_NE(asked_for<action::TakeView>(), nullptr);
   EXPECT_EQ(asked_for<action::TakeView>()->id, (ViewId{"job", 0, 2}));
   EXPECT_EQ(asked_for<action::TakeView>()->angle.value, 180.0);
@@ -50,7 +50,7 @@ TEST_F(Resume, AnObjectThatMovedSinceEndsTheAttemptAndTheRigIsFree) {
   EXPECT_EQ(state.failures, 0) << "nobody's part was bad";
 }
 
-TEST_F(Resume, WithAllViewsThereTheCheckIsTheClosure) {
+TEST_F(Resume, WithAllViewsThereTheCheckIsTheMovementCheck) {
   resume(0, 4);
   close_pose(0);
   ASSERT_NE(asked_for<action::FinishPose>(), nullptr);
@@ -63,7 +63,7 @@ TEST_F(Resume, BetweenThePosesTheObjectIsTurnedOverAndNothingIsCompared) {
   resume(1, 0);
   EXPECT_THAT(said, HasSubstr("turned over"));
   ASSERT_NE(asked_for<action::TakeView>(), nullptr);
-  EXPECT_FALSE(asked_for<action::TakeView>()->closure);
+  EXPECT_FALSE(asked_for<action::TakeView>()->movement_check);
   EXPECT_EQ(asked_for<action::TakeView>()->id, (ViewId{"job", 1, 0}));
 }
 
@@ -94,16 +94,16 @@ TEST_F(Resume, AVerdictThatComesAfterAFaultClearsNothing) {
   for (const bool unmoved : {true, false}) {
     state = {};
     resume(0, 2);
-    tell(event::ClosureTaken{});
+    tell(event::CheckViewTaken{});
     tell(event::RigFailed{{ErrorCode::timeout, "turntable: no reply"}});
-    tell(event::ClosureJudged{"job", {.unmoved = unmoved}});
+    tell(event::MovementChecked{"job", {.unmoved = unmoved}});
     EXPECT_EQ(state.machine, MachineState::error);
     EXPECT_EQ(state.activity, Activity::stopping);
     EXPECT_TRUE(actions.empty());
   }
 }
 
-TEST_F(Resume, AClosureThatComesAfterStopChangesNothing) {
+TEST_F(Resume, AMovementCheckThatComesAfterStopChangesNothing) {
   resume(0, 2);
   press(Button::stop);
   close_pose(0, false);

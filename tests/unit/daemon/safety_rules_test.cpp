@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 
 #include "daemon/station/lamps.h"
-#include "daemon/station/words.h"
+#include "daemon/station/operator_message.h"
 #include "tests/unit/daemon/safety_under_test.h"
 
 namespace scanrig {
@@ -89,7 +89,7 @@ TEST_F(Safety, AfterARestartNothingMovesByItself) {
 }
 
 TEST_F(Safety, WhereConfiguredAClosedGuardHomesAfterARestartWithTheWarning) {
-  rules.guard = rules.home_guarded = true;
+  rules.guard = rules.auto_home = true;
   tell(event::PanelFound{true, false});
   tell(event::Stopped{});
   EXPECT_EQ(state.machine, MachineState::halted);
@@ -102,7 +102,7 @@ TEST_F(Safety, WhereConfiguredAClosedGuardHomesAfterARestartWithTheWarning) {
 }
 
 TEST_F(Safety, AClosedGuardHomesAfterARestartOnlyNotAfterAStopOrAFault) {
-  rules.guard = rules.home_guarded = true;
+  rules.guard = rules.auto_home = true;
   start_up();
   ASSERT_EQ(state.machine, MachineState::initialized);
   press(Button::stop);
@@ -114,7 +114,7 @@ TEST_F(Safety, AClosedGuardHomesAfterARestartOnlyNotAfterAStopOrAFault) {
 }
 
 TEST_F(Safety, AClosedGuardDoesNotHomeWhileTheEstopIsPressed) {
-  rules.guard = rules.home_guarded = true;
+  rules.guard = rules.auto_home = true;
   tell(event::PanelFound{false, true});
   tell(event::Stopped{});
   tell(event::EstopChanged{true});
@@ -138,7 +138,7 @@ TEST_F(Safety, TheGuardOpenedInTheWarningOrWhileHomingStops) {
 
 TEST_F(Safety, APanelThatCannotBeReadStopsTheTableAndAllowsNoMotion) {
   begin_scan();
-  tell(event::PanelFailed{{ErrorCode::timeout, "panel: no whole answer"}});
+  tell(event::PanelFailed{{ErrorCode::timeout, "panel: no complete reply"}});
   EXPECT_EQ(state.machine, MachineState::error);
   EXPECT_NE(asked_for<action::StopRig>(), nullptr);
   tell(event::Stopped{});
@@ -269,7 +269,7 @@ TEST_F(Safety, ADaemonThatEndsLeavesTheRedLamp) {
 
 TEST_F(Safety, AnAbsentDeviceLeavesTheRestRunningAndLetsNoJobBegin) {
   start_up();
-  tell(event::DevicesSeen{{{"turntable"}, {"camera", Error{ErrorCode::unsupported, "no driver aravis"}}}});
+  tell(event::DevicesChecked{{{"turntable"}, {"camera", Error{ErrorCode::unsupported, "no driver aravis"}}}});
   EXPECT_EQ(state.machine, MachineState::halted);
   press(Button::reset);
   EXPECT_FALSE(refused);
@@ -277,7 +277,7 @@ TEST_F(Safety, AnAbsentDeviceLeavesTheRestRunningAndLetsNoJobBegin) {
   tell(event::Homed{});
   press(Button::start);
   expect_refused("no driver aravis");
-  tell(event::DevicesSeen{{{"turntable"}, {"camera"}}});
+  tell(event::DevicesChecked{{{"turntable"}, {"camera"}}});
   EXPECT_NE(asked_for<action::CheckLater>(), nullptr);
   press(Button::start);
   EXPECT_FALSE(refused);

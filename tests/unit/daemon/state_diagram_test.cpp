@@ -7,12 +7,11 @@
 #include <set>
 
 #include "core/files.h"
-#include "daemon/overloaded.h"
 #include "daemon/rig/taken_view.h"
+#include "daemon/runtime/overloaded.h"
 #include "daemon/station/job_table.h"
-#include "daemon/station/job_words.h"
+#include "daemon/station/operator_message.h"
 #include "daemon/station/transition.h"
-#include "daemon/station/words.h"
 
 namespace scanrig {
 namespace {
@@ -35,8 +34,8 @@ std::shared_ptr<const JobInfo> job(JobState state, const char* id = "job") {
   return std::make_shared<const JobInfo>(info);
 }
 
-event::InputsSeen inputs(bool part) {
-  event::InputsSeen seen{};
+event::InputsRead inputs(bool part) {
+  event::InputsRead seen{};
   seen.inputs.part_present = part;
   return seen;
 }
@@ -70,23 +69,23 @@ std::vector<Named> of_safety() {
 std::vector<Named> of_jobs() {
   const auto view = std::make_shared<TakenView>(TakenView{.id = {"job", 0, 0}});
   return {
-      {"ordered", event::JobKnown{job(JobState::queued)}},
-      {"cancelled", event::JobKnown{job(JobState::cancelled)}},
-      {"another ordered", event::JobKnown{job(JobState::queued, "next")}},
-      {"begun", event::JobBegun{"job", 0, 0}},
-      {"does not fit", event::JobNotBegun{"job", kError}},
+      {"ordered", event::JobUpdated{job(JobState::queued)}},
+      {"cancelled", event::JobUpdated{job(JobState::cancelled)}},
+      {"another ordered", event::JobUpdated{job(JobState::queued, "next")}},
+      {"begun", event::JobStarted{"job", 0, 0}},
+      {"does not fit", event::JobNotStarted{"job", kError}},
       {"folder damaged", event::JobUnreadable{"job", kError}},
       {"view taken", event::ViewTaken{view}},
       {"view stored", event::ViewStored{{"job", 0, 0}, 0.0}},
       {"view stored", event::ViewStored{{"job", 1, 0}, 0.0}},
-      {"view 0 taken again", event::ClosureTaken{view}},
-      {"unmoved", event::ClosureJudged{"job", {.unmoved = true}}},
-      {"moved", event::ClosureJudged{"job", {.unmoved = false}}},
+      {"view 0 taken again", event::CheckViewTaken{view}},
+      {"unmoved", event::MovementChecked{"job", {.unmoved = true}}},
+      {"moved", event::MovementChecked{"job", {.unmoved = false}}},
       {"pose stored", event::PoseStored{"job", 0}},
       {"last pose stored", event::PoseStored{"job", 1}},
       {"flip time-out", event::FlipTimedOut{"job"}},
       {"disk failed", event::StoreFailed{"job", kError}},
-      {"disk does not answer", event::DiskSeen{kError}},
+      {"disk does not answer", event::DiskChecked{kError}},
       {"part taken away", inputs(false)},
       {"new part", inputs(true)},
       {"no model", event::ReconstructionFailed{"job", kError}},
@@ -96,13 +95,13 @@ std::vector<Named> of_jobs() {
 
 /// What an engineer does.
 std::vector<Named> of_maintenance() {
-  using What = event::MaintenanceAsked::What;
+  using What = event::MaintenanceRequested::What;
   return {
-      {"maintenance on", event::MaintenanceAsked{.what = What::on}},
-      {"maintenance off", event::MaintenanceAsked{.what = What::off}},
-      {"jog", event::MaintenanceAsked{.what = What::jog, .speed = {5}}},
+      {"maintenance on", event::MaintenanceRequested{.what = What::on}},
+      {"maintenance off", event::MaintenanceRequested{.what = What::off}},
+      {"jog", event::MaintenanceRequested{.what = What::jog, .speed = {5}}},
       {"jogged", event::Jogged{}},
-      {"pulse", event::MaintenanceAsked{.what = What::pulse}},
+      {"pulse", event::MaintenanceRequested{.what = What::pulse}},
       {"pulsed", event::Pulsed{}},
   };
 }
@@ -129,9 +128,10 @@ std::string key(const Node& node, bool with_jobs) {
   const auto& s = node.state;
   std::string key = machine_state(node) + (with_jobs ? job_state(node) : "");
   const bool line = s.machine == MachineState::continuous_execution;  // parts matter to nobody else
-  const bool all_there = std::ranges::none_of(s.devices, [](const auto& device) { return device.problem.has_value(); });
-  for (const bool flag : {s.panel_known, s.estop_ok, s.guard_closed, s.latched, s.unnamed.has_value(), s.may_be_moving,
-                          line && s.part_gone, line && s.inputs.part_present, all_there}) {
+  const bool require_devices =
+      std::ranges::none_of(s.devices, [](const auto& device) { return device.problem.has_value(); });
+  for (const bool flag : {s.panel_known, s.estop_ok, s.guard_closed, s.latched, s.unclassified.has_value(),
+                          s.may_be_moving, line && s.part_gone, line && s.inputs.part_present, require_devices}) {
     key += flag ? '1' : '0';
   }
   for (const auto& queued : s.queue) key += queued->id;
@@ -142,7 +142,7 @@ std::string key(const Node& node, bool with_jobs) {
   if (s.job) {
     const auto& j = *s.job;
     key += fmt::format("j{}{}{}{}{}{}{}{}{}{}", j.id, to_string(j.state), j.pose, j.asked, j.taken, j.stored,
-                       j.closure_due, j.closing, j.reconstruction.has_value(), j.recipe.start_on_part);
+                       j.movement_check_due, j.closing, j.reconstruction.has_value(), j.recipe.start_on_part);
   }
   return key + (s.activity == Activity::waiting_for_part ? std::to_string(s.failures) : "");
 }
@@ -151,9 +151,9 @@ using Edges = std::map<std::pair<std::string, std::string>, std::set<std::string
 
 struct Walk {
   Edges machine, job;
-  std::map<std::string, Words> words;  ///< of the machine, where it was met first
-  std::set<std::string> wordless;      ///< states that say nothing, or not what to do
-  std::set<std::string> untrue;        ///< what they say to do and is refused
+  std::map<std::string, OperatorMessage> words;  ///< of the machine, where it was met first
+  std::set<std::string> wordless;                ///< states that say nothing, or not what to do
+  std::set<std::string> untrue;                  ///< what they say to do and is refused
   std::size_t states = 0;
 };
 
@@ -171,11 +171,11 @@ void listen(const Node& node, const StationRules& rules, Walk& walk) {
   auto state = node.state;
   if (told("e-stop")) state = next(state, event::EstopChanged{true}, rules).state;
   if (told("guard")) state = next(state, event::GuardChanged{true}, rules).state;
-  if (told("See to the turntable")) state = next(state, event::DevicesSeen{{{"turntable", {}}}}, rules).state;
+  if (told("Check the turntable")) state = next(state, event::DevicesChecked{{{"turntable", {}}}}, rules).state;
   const std::pair<const char*, Event> asked[] = {
       {"ress Reset", event::Pressed{Button::reset, Origin::panel, {}}},
       {"ress Start", event::Pressed{Button::start, Origin::panel, "job"}},
-      {"og the table", event::MaintenanceAsked{.what = event::MaintenanceAsked::What::jog, .speed = {5}}}};
+      {"og the table", event::MaintenanceRequested{.what = event::MaintenanceRequested::What::jog, .speed = {5}}}};
   for (const auto& [what, event] : asked) {
     if (!told(what)) continue;
     const auto step = next(state, event, rules);
@@ -208,24 +208,24 @@ bool can_happen(const Node& node, const Event& event) {
       Overloaded{
           [&](const event::Stopped&) { return s.activity == Activity::stopping || s.may_be_moving; },
           [&](const event::StopFailed&) { return s.activity == Activity::stopping; },
-          [&](const event::JobKnown& e) {
+          [&](const event::JobUpdated& e) {
             if (e.info->id != "job") return job && s.queue.empty();  // one is enough
             const bool waits = state == JobState::queued || state == JobState::interrupted;
             if (e.info->state == JobState::queued) return !s.job && (!listed || state == JobState::interrupted);
             return !s.job && listed && (waits || state == JobState::reconstructing);
           },
-          [&](const event::JobBegun&) { return job && job->state == JobState::queued; },
-          [&](const event::JobNotBegun&) { return job && job->state == JobState::queued; },
+          [&](const event::JobStarted&) { return job && job->state == JobState::queued; },
+          [&](const event::JobNotStarted&) { return job && job->state == JobState::queued; },
           [&](const event::JobUnreadable&) { return job && job->state == JobState::queued; },
           [&](const event::ViewTaken&) { return job && job->taken < job->asked; },
           [&](const event::ViewStored& e) { return job && e.id.pose == job->pose && job->stored < job->taken; },
-          [&](const event::ClosureTaken&) { return job && job->closing && s.activity == Activity::scanning; },
-          [&](const event::ClosureJudged&) { return job && job->closing && job->stored == job->taken; },
+          [&](const event::CheckViewTaken&) { return job && job->closing && s.activity == Activity::scanning; },
+          [&](const event::MovementChecked&) { return job && job->closing && job->stored == job->taken; },
           [&](const event::PoseStored& e) {
             return job && !job->closing && e.pose == job->pose && s.activity == Activity::storing;
           },
           [&](const event::StoreFailed&) { return job != nullptr; },
-          [&](const event::DiskSeen&) { return job != nullptr; },
+          [&](const event::DiskChecked&) { return job != nullptr; },
           [&](const event::ReconstructionFailed&) { return job || state == JobState::reconstructing; },
           [&](const event::ModelReady&) { return listed && state == JobState::reconstructing; },
           [](const auto&) { return true; },
@@ -294,7 +294,7 @@ std::string draw(const Edges& edges) {
   return text + "```\n";
 }
 
-std::string table(const std::map<std::string, Words>& words) {
+std::string table(const std::map<std::string, OperatorMessage>& words) {
   std::string text = "| state | says | next action |\n|---|---|---|\n";
   for (const auto& [state, said] : words) {
     text += fmt::format("| {} | {} | {} |\n", state, said.sentence, said.next_action);
@@ -311,7 +311,7 @@ std::string document(const Walk& walk) {
   return fmt::format(
       "# States of the station\n\nDrawn by `tests/unit/daemon/state_diagram_test.cpp`, which walks through the {} "
       "states that `next()` in `daemon/station` can reach with one two-pose job and another queued behind it; do not "
-      "edit. What each state says to the operator is in `daemon/station/words.cpp`.\n\n"
+      "edit. What each state says to the operator is in `daemon/station/operator_message.cpp`.\n\n"
       "## A job\nHow it goes on after its last view is up to the reconstruction; what is interrupted can be resumed, "
       "unless its object moved, and then is queued again.\n\n{}\n"
       "## The machine\nFaults lead to Error from wherever something moves or is about to; only what is obeyed is "

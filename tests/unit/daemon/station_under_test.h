@@ -42,7 +42,7 @@ class Station : public testing::Test {
   void begin_scan() {
     get_ready();
     press(Button::start);
-    tell(event::JobBegun{"job", 0, 0});
+    tell(event::JobStarted{"job", 0, 0});
     tell(event::WarningOver{});
   }
   void take(int pose, int view) {
@@ -59,13 +59,13 @@ class Station : public testing::Test {
   }
   /// View 0 again, and nothing has moved.
   void close_pose(int pose, bool unmoved = true) {
-    tell(event::ClosureTaken{std::make_shared<TakenView>(TakenView{.id = {"job", pose, 0}})});
-    tell(event::ClosureJudged{"job", {.pose = pose, .unmoved = unmoved}});
+    tell(event::CheckViewTaken{std::make_shared<TakenView>(TakenView{.id = {"job", pose, 0}})});
+    tell(event::MovementChecked{"job", {.pose = pose, .unmoved = unmoved}});
   }
   static JobInfo queued(const std::string& id, std::int64_t place, Recipe recipe = {}) {
     return {.id = id, .folder = "/jobs/" + id, .recipe = std::move(recipe), .place = place};
   }
-  void know(JobInfo job) { tell(event::JobKnown{std::make_shared<const JobInfo>(std::move(job))}); }
+  void know(JobInfo job) { tell(event::JobUpdated{std::make_shared<const JobInfo>(std::move(job))}); }
   void reach_flip() {
     begin_scan();
     take_and_store_all(0);

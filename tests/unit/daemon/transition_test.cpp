@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "daemon/station/words.h"
+#include "daemon/station/operator_message.h"
 #include "tests/unit/daemon/station_under_test.h"
 
 namespace scanrig {
@@ -43,7 +43,7 @@ TEST_F(Station, MovesForAJobOnlyWhenWarnedAndTheFolderIsThere) {
   EXPECT_NE(asked_for<action::Warn>(), nullptr);
   tell(event::WarningOver{});
   EXPECT_EQ(asked_for<action::TakeView>(), nullptr) << "the job's folder is not there yet";
-  tell(event::JobBegun{"job", 0, 0});
+  tell(event::JobStarted{"job", 0, 0});
   ASSERT_NE(asked_for<action::TakeView>(), nullptr);
   EXPECT_EQ(asked_for<action::TakeView>()->id, (ViewId{"job", 0, 0}));
 }
@@ -58,7 +58,7 @@ TEST_F(Station, TakesViewsAtEqualAngles) {
     take(0, view);
   }
   ASSERT_NE(asked_for<action::TakeView>(), nullptr);
-  EXPECT_TRUE(asked_for<action::TakeView>()->closure) << "a fifth view of four";
+  EXPECT_TRUE(asked_for<action::TakeView>()->movement_check) << "a fifth view of four";
   EXPECT_EQ(asked_for<action::TakeView>()->angle.value, 0.0);
 }
 
@@ -79,11 +79,11 @@ TEST_F(Station, AsksForTheFlipWhenThePoseIsOnDisk) {
     take(0, view);
     if (view < 3) store(0, view);
   }
-  tell(event::ClosureTaken{});
+  tell(event::CheckViewTaken{});
   EXPECT_EQ(state.activity, Activity::storing);
   store(0, 3);
   EXPECT_EQ(asked_for<action::FinishPose>(), nullptr) << "nobody knows yet whether something moved";
-  tell(event::ClosureJudged{"job", {.unmoved = true}});
+  tell(event::MovementChecked{"job", {.unmoved = true}});
   ASSERT_NE(asked_for<action::FinishPose>(), nullptr);
   EXPECT_FALSE(asked_for<action::FinishPose>()->last);
   EXPECT_EQ(state.activity, Activity::storing) << "not before the manifest says so";
@@ -243,7 +243,7 @@ TEST_F(Station, AFullDiskInterruptsTheJobAndStopsTheTableButLatchesNothing) {
   EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::interrupted) << "with room again it can be resumed";
   tell(event::Stopped{});
   EXPECT_EQ(state.activity, Activity::none) << "and homes by itself no more than after Stop";
-  EXPECT_EQ(describe(state, rules).next_action, "See to the disk of the jobs. Press Reset.");
+  EXPECT_EQ(describe(state, rules).next_action, "Check the job disk. Press Reset.");
 }
 
 TEST_F(Station, AFullDiskWhileNothingMovesKeepsTheTableHomed) {
@@ -257,7 +257,7 @@ TEST_F(Station, AFullDiskWhileNothingMovesKeepsTheTableHomed) {
   EXPECT_EQ(asked_for<action::TakeView>(), nullptr);
 
   press(Button::start);
-  tell(event::JobBegun{"job", 0, 0});
+  tell(event::JobStarted{"job", 0, 0});
   EXPECT_FALSE(state.disk_trouble) << "its folder could be written";
   tell(event::WarningOver{});
   take_and_store_all(0);

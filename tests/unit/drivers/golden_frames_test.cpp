@@ -24,7 +24,7 @@ class GoldenFrames : public testing::Test {
     return *profile;
   }
   ModbusDrive drive_on(const ScriptedPeer& peer, const DriveProfile& profile, int unit_id = 1) {
-    modbus::LineOptions options;
+    modbus::ClientOptions options;
     options.device = peer.device();
     options.unit_id = unit_id;
     return {options, profile, clock_};

@@ -33,9 +33,9 @@ class PromptDrive final : public AxisDrive {
     return {};
   }
   Result<void> stop(Deadline) override { return {}; }
-  void stop_unheard() override {}
-  void hurry(bool) noexcept override {}
-  [[nodiscard]] bool answer_missed() const override { return false; }
+  void stop_without_reply() override {}
+  void set_fail_fast(bool) noexcept override {}
+  [[nodiscard]] bool reply_missed() const override { return false; }
   void count_retry() override {}
 
  private:

@@ -8,11 +8,12 @@ namespace {
 using testing::HasSubstr;
 using Type = RequestField::Type;
 
-const std::vector<RequestField> kFields{{.name = "name", .about = "", .required = true, .min = 1, .max = 4},
-                                        {.name = "kind", .about = "", .words = {"good", "bad"}},
-                                        {.name = "share", .type = Type::number, .about = "", .min = 0, .max = 1},
-                                        {.name = "count", .type = Type::integer, .about = "", .min = 0, .max = 10},
-                                        {.name = "fast", .type = Type::flag, .about = ""}};
+const std::vector<RequestField> kFields{
+    {.name = "name", .description = "", .required = true, .min = 1, .max = 4},
+    {.name = "kind", .description = "", .words = {"good", "bad"}},
+    {.name = "share", .type = Type::number, .description = "", .min = 0, .max = 1},
+    {.name = "count", .type = Type::integer, .description = "", .min = 0, .max = 10},
+    {.name = "fast", .type = Type::flag, .description = ""}};
 
 TEST(RequestBody, IsReadIntoTypedValues) {
   Values values;

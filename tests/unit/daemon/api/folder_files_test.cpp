@@ -4,7 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "tests/unit/pipeline/scan/scan_samples.h"
+#include "tests/unit/pipeline/storage/scan_samples.h"
 
 namespace scanrig {
 namespace {

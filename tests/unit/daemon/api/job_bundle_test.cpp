@@ -1,6 +1,6 @@
 #include "daemon/api/job_bundle.h"
 
-#include "tests/unit/pipeline/scan/scan_samples.h"
+#include "tests/unit/pipeline/storage/scan_samples.h"
 
 namespace scanrig {
 namespace {

@@ -16,7 +16,7 @@ using testing::HasSubstr;
 std::string sample() {
   Snapshot snapshot{.machine = MachineState::ready, .jobs = one_job("old", "/jobs")};
   snapshot.devices = {{"turntable", {}}, {"camera \"left\"\n\\", Error{ErrorCode::timeout, "silent"}}};
-  snapshot.counters = {.views_stored = 16, .exposures_redone = 2, .stage_seconds = {{"volume", 1.5}}};
+  snapshot.counters = {.views_stored = 16, .retakes = 2, .stage_seconds = {{"volume", 1.5}}};
   return metrics_text(snapshot, {.disk_bytes = 1000, .disk_free_bytes = 250, .temperatures = {{"cpu", 41.5}}});
 }
 
@@ -25,9 +25,10 @@ TEST(Metrics, TellStateCountersAndMachine) {
   for (const auto* line :
        {"scanrig_machine_state{state=\"Operational.Ready\"} 1\n", "scanrig_machine_state{state=\"Error\"} 0\n",
         "scanrig_device_up{device=\"turntable\"} 1\n", "scanrig_device_up{device=\"camera \\\"left\\\" \\\\\"} 0\n",
-        "scanrig_jobs{state=\"failed\"} 1\n", "scanrig_views_stored_total 16\n", "scanrig_retries_total 2\n",
-        "scanrig_deadlines_missed_total 0\n", "scanrig_stage_seconds_total{stage=\"volume\"} 1.5\n",
-        "scanrig_disk_free_bytes 250\n", "scanrig_temperature_celsius{sensor=\"cpu\"} 41.5\n"}) {
+        "scanrig_jobs{state=\"failed\"} 1\n", "scanrig_views_stored_total 16\n", "scanrig_retakes_total 2\n",
+        "scanrig_retries_total 2\n", "scanrig_deadlines_missed_total 0\n",
+        "scanrig_stage_seconds_total{stage=\"volume\"} 1.5\n", "scanrig_disk_free_bytes 250\n",
+        "scanrig_temperature_celsius{sensor=\"cpu\"} 41.5\n"}) {
     EXPECT_THAT(text, HasSubstr(line));
   }
 }

@@ -23,7 +23,7 @@ class Api : public testing::Test {
     auto match = router.find(method, target, role);
     if (!match) return read(match.error());
     std::promise<ApiResponse> response;
-    Router::call(std::move(*match), body, {station.loop, [] { return Facts{.uptime_s = 5.0}; }},
+    Router::call(std::move(*match), body, {station.loop, [] { return ServiceStatus{.uptime_s = 5.0}; }},
                  [&](ApiResponse r) { response.set_value(std::move(r)); });
     return read(response.get_future().get());
   }
@@ -68,13 +68,13 @@ TEST_F(Api, OneJobIsToldInDetail) {
   EXPECT_EQ(status, 200u);
   EXPECT_EQ(job["state"], "failed");
   EXPECT_EQ(job["stored"][0]["measured_deg"], 135.01);
-  EXPECT_EQ(job["stored"][0]["redone"], 1);
-  EXPECT_EQ(job["stored"][0]["spoilt"][0]["code"], "timeout");
-  EXPECT_EQ(job["stored"][0]["spoilt"][0]["message"], "left camera: no frame in time");
+  EXPECT_EQ(job["stored"][0]["retakes"], 1);
+  EXPECT_EQ(job["stored"][0]["retake_reasons"][0]["code"], "timeout");
+  EXPECT_EQ(job["stored"][0]["retake_reasons"][0]["message"], "left camera: no frame in time");
   EXPECT_NEAR(job["stored"][0]["error_deg"].get<double>(), 0.01, 1e-9);
   EXPECT_EQ(job["stored"][0]["settling_ms"], 212.0);
-  EXPECT_EQ(job["closures"][0]["redone"], 1);
-  EXPECT_EQ(job["closures"][0]["spoilt"][0]["message"], "right camera: torn");
+  EXPECT_EQ(job["movement_checks"][0]["retakes"], 1);
+  EXPECT_EQ(job["movement_checks"][0]["retake_reasons"][0]["message"], "right camera: torn");
   EXPECT_EQ(job["stages"][0]["name"], "volume");
   EXPECT_EQ(job["error"]["code"], "same_rest");
 }
@@ -106,7 +106,7 @@ TEST_F(Api, AJogTakesOneAngle) {
 TEST_F(Api, TheInputsAndOutputsOfThePanelAreATable) {
   PanelInputs inputs;
   inputs.flipped = true;
-  station.loop.post(event::InputsSeen{inputs});
+  station.loop.post(event::InputsRead{inputs});
   nlohmann::json io;
   while (!(io = ask("GET", "/api/v1/io").second)["inputs"]["flipped"].get<bool>()) {
   }
@@ -161,7 +161,7 @@ TEST_F(Api, TooLowARoleIsToldWhichIsNeeded) {
 }
 
 TEST_F(Api, HealthNamesEveryProblem) {
-  station.loop.post(event::DevicesSeen{{{"camera", Error{ErrorCode::timeout, "no answer"}}}});
+  station.loop.post(event::DevicesChecked{{{"camera", Error{ErrorCode::timeout, "no answer"}}}});
   nlohmann::json health;
   while ((health = ask("GET", "/api/v1/health").second)["devices"].size() < 2) {
   }

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "daemon/api/facts.h"
 #include "daemon/api/router.h"
+#include "daemon/api/service_status.h"
 
 namespace scanrig {
 
@@ -21,13 +21,13 @@ class StationWithoutRig {
     thread_ = std::thread([this, published = std::move(published)] {
       const auto perform = [this](const Action& action) {
         if (std::holds_alternative<action::StopRig>(action)) loop.post(event::Stopped{});
-        if (const auto* task = std::get_if<action::CreateJobs>(&action)) answer(task->ticket);
-        if (const auto* task = std::get_if<action::MoveJob>(&action)) answer(task->ticket);
-        if (const auto* task = std::get_if<action::KeepJob>(&action)) answer(task->asked.ticket);
+        if (const auto* task = std::get_if<action::CreateJobs>(&action)) answer(task->request_id);
+        if (const auto* task = std::get_if<action::MoveJob>(&action)) answer(task->request_id);
+        if (const auto* task = std::get_if<action::RunJobRequest>(&action)) answer(task->asked.request_id);
       };
       EXPECT_TRUE(loop.run({.perform = perform,
                             .show = [](const PanelOutputs&) {},
-                            .fresh_job_id = [] { return std::string("fresh"); },
+                            .new_job_id = [] { return std::string("fresh"); },
                             .published = [&published](const auto&) { published(); }}));
     });
   }
@@ -45,7 +45,9 @@ class StationWithoutRig {
 
  private:
   /// Nobody keeps jobs here.
-  void answer(Ticket ticket) { loop.post(event::Answered{ticket, fail(ErrorCode::refused, "there is no rig")}); }
+  void answer(RequestId request_id) {
+    loop.post(event::RequestDone{request_id, fail(ErrorCode::refused, "there is no rig")});
+  }
 
   std::thread thread_;
 };
@@ -57,7 +59,7 @@ inline JobTable one_job(const std::string& id, const std::string& folder) {
   job->state = JobState::failed;
   job->folder = folder;
   job->stored = {{0, 3, 135.01, {{ErrorCode::timeout, "left camera: no frame in time"}}, 135.0, 212.0}};
-  job->closures = {{0, 0.04, 0.0, true, {{ErrorCode::protocol, "right camera: torn"}}}};
+  job->movement_checks = {{0, 0.04, 0.0, true, {{ErrorCode::protocol, "right camera: torn"}}}};
   job->stages = {{"volume", 0.5}};
   job->error = Error{ErrorCode::same_rest, "not turned over"};
   return {{id, std::move(job)}};

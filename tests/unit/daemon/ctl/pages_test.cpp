@@ -9,7 +9,7 @@
 
 #include "daemon/ctl/command_tree.h"
 #include "daemon/ctl/commands.h"
-#include "tests/unit/pipeline/scan/scan_samples.h"
+#include "tests/unit/pipeline/storage/scan_samples.h"
 
 namespace scanrig::ctl {
 namespace {

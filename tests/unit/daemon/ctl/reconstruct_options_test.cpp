@@ -23,10 +23,10 @@ bool takes(const std::string& words) {
 }
 
 TEST(ReconstructOptions, VoxelsAreThoseTheDaemonMayAskItsChildFor) {
-  for (const double voxel_mm : {kLeastVoxelMm, 0.049, kMostVoxelMm}) {
+  for (const double voxel_mm : {kMinVoxelMm, 0.049, kMaxVoxelMm}) {
     EXPECT_TRUE(takes(fmt::format("--voxel-mm {}", voxel_mm))) << voxel_mm;
   }
-  for (const double voxel_mm : {kLeastVoxelMm - 0.001, kMostVoxelMm + 0.001}) {
+  for (const double voxel_mm : {kMinVoxelMm - 0.001, kMaxVoxelMm + 0.001}) {
     EXPECT_FALSE(takes(fmt::format("--voxel-mm {}", voxel_mm))) << voxel_mm;
   }
 }

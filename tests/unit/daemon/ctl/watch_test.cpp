@@ -22,8 +22,8 @@ const json kHealth = json::parse(R"({"devices": [{"name": "turntable", "ok": tru
   "deadlines_missed": 1, "retries": 2, "faults": 3})");
 const json kJob = json::parse(R"({"id": "j1", "state": "scanning", "part": "4711",
   "sentence": "Pose 1 of 2: 4 of 8 views stored.", "next_action": "", "poses": 2, "views": 8, "stored": [{}, {}, {},
-  {"pose": 0, "view": 3, "spoilt": [{"code": "timeout", "message": "left camera: no frame in time"}]}],
-  "closures": [{"pose": 1, "spoilt": [{"code": "protocol", "message": "right camera: torn"}]}],
+  {"pose": 0, "view": 3, "retake_reasons": [{"code": "timeout", "message": "left camera: no frame in time"}]}],
+  "movement_checks": [{"pose": 1, "retake_reasons": [{"code": "protocol", "message": "right camera: torn"}]}],
   "stages": [{"name": "range", "fraction": 0.5}], "error": null, "model": ""})");
 
 TEST(Watch, ShowsStateJobStagesAndHealthOnOneScreen) {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/units.h"
-#include "pipeline/evaluate/truth.h"
+#include "pipeline/evaluate/truth_file.h"
 #include "tests/unit/pipeline/mesh/ball_mesh.h"
 
 namespace scanrig::ball_truth {

@@ -8,7 +8,7 @@
 #include "core/statistics.h"
 #include "pipeline/evaluate/evaluate.h"
 #include "pipeline/evaluate/texture_figures.h"
-#include "pipeline/scan/model/model_files.h"
+#include "pipeline/model_io/model_files.h"
 #include "pipeline/texture/render.h"
 #include "tests/own_folder.h"
 #include "tests/unit/pipeline/evaluate/ball_truth.h"

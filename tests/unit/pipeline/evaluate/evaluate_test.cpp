@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "core/parallel.h"
-#include "pipeline/scan/model/model_files.h"
+#include "pipeline/model_io/model_files.h"
 #include "tests/unit/pipeline/evaluate/ball_truth.h"
 
 namespace scanrig {

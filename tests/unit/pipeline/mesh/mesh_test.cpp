@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "pipeline/mesh/decimate.h"
-#include "pipeline/mesh/solid.h"
+#include "pipeline/mesh/solid_properties.h"
 #include "pipeline/mesh/topology.h"
 
 namespace scanrig {

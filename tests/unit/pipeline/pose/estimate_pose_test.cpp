@@ -32,7 +32,7 @@ Scan scan(const Solid& solid, const Eigen::Matrix3d& turned, double lift_mm = 0.
   s.views1 = testing::turn_around(solid, 8, kRig, 1);
   s.solid1 = closed(solid);
   const double lowest = -reach_along(s.solid1.vertices, -turned.transpose() * Eigen::Vector3d::UnitY());
-  const Eigen::Vector3d centre = turned * solid_facts(s.solid1)->centre_of_mass;
+  const Eigen::Vector3d centre = turned * solid_properties(s.solid1)->centre_of_mass;
   Transform pose2_from_pose1 = Transform::Identity();
   pose2_from_pose1.linear() = turned;
   pose2_from_pose1.translation() = Eigen::Vector3d(4 - centre.x(), lift_mm - lowest, -3 - centre.z());
@@ -75,8 +75,8 @@ TEST(EstimatePose, FindsAnObjectLaidOnItsSideByTheFacetsOfItsHull) {
   const auto estimate = workpiece_on_its_side().estimate(options);
   expect_found(estimate, workpiece_on_its_side());
   EXPECT_EQ(estimate->best.generator, "hull");
-  EXPECT_GT(estimate->best.tally.confirmed, 0.3);
-  EXPECT_LT(estimate->best.tally.contradicted, 0.1);
+  EXPECT_GT(estimate->best.agreement.confirmed, 0.3);
+  EXPECT_LT(estimate->best.agreement.contradicted, 0.1);
   EXPECT_FALSE(estimate->alternatives.empty());
 }
 
@@ -163,7 +163,7 @@ TEST(EstimatePose, GivesTheSameBitsOnAnyNumberOfThreads) {
   with_threads(3, [&] { many = workpiece_on_its_side().estimate(); });
   ASSERT_TRUE(one && many);
   EXPECT_EQ(0, std::memcmp(one->pose1_from_pose2.data(), many->pose1_from_pose2.data(), 16 * sizeof(double)));
-  EXPECT_EQ(one->best.tally.confirmed, many->best.tally.confirmed);
+  EXPECT_EQ(one->best.agreement.confirmed, many->best.agreement.confirmed);
 }
 
 }  // namespace

@@ -12,7 +12,7 @@ namespace {
 /// What two perfect models of one object say of their contacts, the truth being `pose1_from_pose2`.
 struct Contacts {
   RestPair pair;
-  SolidFacts solid1, solid2;
+  SolidProperties solid1, solid2;
 };
 
 Contacts contacts_of(const Transform& pose1_from_pose2, const Eigen::Vector3d& centre1) {

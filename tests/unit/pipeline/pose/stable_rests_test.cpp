@@ -9,14 +9,14 @@
 namespace scanrig {
 namespace {
 
-using FindRests = Result<StableRests> (*)(const Mesh&, const SolidFacts&, double, const StableRestOptions&);
+using FindRests = Result<StableRests> (*)(const Mesh&, const SolidProperties&, double, const StableRestOptions&);
 
 class RestsEitherWay : public ::testing::TestWithParam<FindRests> {
  protected:
   static StableRests find(const Mesh& solid, double other_height, FindRests how) {
-    const auto facts = solid_facts(solid);
-    EXPECT_TRUE(facts);
-    const auto found = how(solid, *facts, other_height, {});
+    const auto properties = solid_properties(solid);
+    EXPECT_TRUE(properties);
+    const auto found = how(solid, *properties, other_height, {});
     EXPECT_TRUE(found) << (found ? "" : found.error().message);
     return found.value_or(StableRests{});
   }
@@ -48,8 +48,8 @@ TEST_P(RestsEitherWay, ALeaningPrismFallsOverWhereItsCentreOfMassIsBesideTheFace
 
 TEST_P(RestsEitherWay, TheOffsetTouchesTheSolidAndNothingLiesBeyond) {
   const Mesh solid = testing::mesh_of(testing::workpiece(), {-34, -3, -24}, {35, 66, 36}, 2.0);
-  const auto facts = solid_facts(solid);
-  ASSERT_TRUE(facts) << facts.error().message;
+  const auto properties = solid_properties(solid);
+  ASSERT_TRUE(properties) << properties.error().message;
   const auto found = find(solid, 60, GetParam());
   for (const auto& rest : found.rests) EXPECT_NEAR(rest.offset_mm, reach_along(solid.vertices, rest.normal), 1e-3);
 }
@@ -59,9 +59,9 @@ INSTANTIATE_TEST_SUITE_P(HullAndSphere, RestsEitherWay, ::testing::Values(&rests
 
 TEST(RestsOnHull, KeepsTheRestsOfAWorkPieceThatItsFacesShow) {
   const Mesh solid = testing::mesh_of(testing::workpiece(), {-34, -3, -24}, {35, 66, 36}, 2.0);
-  const auto facts = solid_facts(solid);
-  ASSERT_TRUE(facts) << facts.error().message;
-  const auto found = rests_on_hull(solid, *facts, 60, {});
+  const auto properties = solid_properties(solid);
+  ASSERT_TRUE(properties) << properties.error().message;
+  const auto found = rests_on_hull(solid, *properties, 60, {});
   ASSERT_TRUE(found) << found.error().message;
   for (const int axis : {0, 1, 2}) {
     const Eigen::Vector3d side = -Eigen::Vector3d::Unit(axis);
@@ -73,9 +73,9 @@ TEST(RestsOnHull, KeepsTheRestsOfAWorkPieceThatItsFacesShow) {
 
 TEST(RestsOnSphere, CountsWhatEachTestOfThePaperLeaves) {
   const Mesh solid = testing::mesh_of(testing::workpiece(), {-34, -3, -24}, {35, 66, 36}, 2.0);
-  const auto facts = solid_facts(solid);
-  ASSERT_TRUE(facts) << facts.error().message;
-  const auto found = rests_on_sphere(solid, *facts, 62, {});
+  const auto properties = solid_properties(solid);
+  ASSERT_TRUE(properties) << properties.error().message;
+  const auto found = rests_on_sphere(solid, *properties, 62, {});
   ASSERT_TRUE(found) << found.error().message;
   EXPECT_GT(found->counts.tangent_planes, found->counts.after_base_plane);  // the steps of the work piece face nothing
   EXPECT_GT(found->counts.after_base_plane, found->counts.after_stability);

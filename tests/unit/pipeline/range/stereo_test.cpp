@@ -10,13 +10,13 @@
 #include "core/parallel.h"
 #include "core/units.h"
 #include "tests/bench/real_data/d415_measure.h"
-#include "tests/unit/pipeline/range/comparison.h"
+#include "tests/unit/pipeline/range/range_error.h"
 #include "tests/unit/pipeline/range/two_cameras.h"
 
 namespace scanrig {
 namespace {
 
-using test::Comparison;
+using test::RangeError;
 using test::Surface;
 
 cv::Mat1b where_known(const cv::Mat1f& depth) {
@@ -64,7 +64,7 @@ TEST(Stereo, MeasuresABallToHundredthsOfAMillimetre) {
   const Scene scene(test::ball(kMiddle, 20));
   const auto range = scene.match();
   ASSERT_TRUE(range) << range.error().message;
-  const Comparison c = test::compare(*range, scene.truth, scene.inner(12));
+  const RangeError c = test::compare(*range, scene.truth, scene.inner(12));
   EXPECT_LT(c.median, 0.01);
   EXPECT_LT(c.p95, 0.05);
   EXPECT_LT(std::abs(c.bias), 0.003);
@@ -76,7 +76,7 @@ TEST(Stereo, MeasuresSmallRadiiWithoutFlatteningThem) {
   const Scene scene(test::ball(kMiddle, 5), {240, 240});
   const auto range = scene.match();
   ASSERT_TRUE(range) << range.error().message;
-  const Comparison c = test::compare(*range, scene.truth, scene.inner(8));
+  const RangeError c = test::compare(*range, scene.truth, scene.inner(8));
   EXPECT_LT(c.median, 0.015);
   EXPECT_LT(std::abs(c.bias), 0.006);
 }
@@ -86,7 +86,7 @@ TEST(Stereo, MeasuresASurfaceThatTurnsAwayBySixtyDegrees) {
   const Scene scene(test::disc(kMiddle, {std::sin(angle), 0.0, std::cos(angle)}, 25));
   const auto range = scene.match();
   ASSERT_TRUE(range) << range.error().message;
-  const Comparison c = test::compare(*range, scene.truth, scene.inner(10));
+  const RangeError c = test::compare(*range, scene.truth, scene.inner(10));
   EXPECT_LT(c.median, 0.02);
   EXPECT_LT(c.p95, 0.08);
   EXPECT_GT(c.coverage, 0.95);
@@ -96,7 +96,7 @@ TEST(Stereo, SigmaTellsTheSizeOfTheErrors) {
   const Scene scene(test::disc(kMiddle, Eigen::Vector3d(0.3, 0.2, 1.0).normalized(), 22));
   const auto range = scene.match();
   ASSERT_TRUE(range) << range.error().message;
-  const Comparison c = test::compare(*range, scene.truth, scene.object);
+  const RangeError c = test::compare(*range, scene.truth, scene.object);
   // These images have no colour mosaic, whose correlated noise sigma allows for.
   EXPECT_GT(c.sigma_ratio, 0.4);
   EXPECT_LT(c.sigma_ratio, 1.2);
@@ -130,7 +130,7 @@ TEST(Stereo, PutsNothingBetweenTheTwoSidesOfADepthStep) {
   const Scene scene(test::nearest_of(test::disc(kMiddle, {0, 0.37, 0.93}, 24), near_disc));
   const auto range = scene.match();
   ASSERT_TRUE(range) << range.error().message;
-  const Comparison c = test::compare(*range, scene.truth, scene.object);
+  const RangeError c = test::compare(*range, scene.truth, scene.object);
   EXPECT_LT(c.gross, 0.003);
   EXPECT_GT(c.coverage, 0.75);
 }

@@ -8,7 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "pipeline/mesh/surface_index.h"
-#include "pipeline/texture/compare.h"
+#include "pipeline/texture/image_difference.h"
 #include "tests/unit/pipeline/texture/painted_scene.h"
 
 namespace scanrig {

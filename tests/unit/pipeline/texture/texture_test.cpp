@@ -11,7 +11,7 @@
 #include <set>
 
 #include "core/parallel.h"
-#include "pipeline/texture/compare.h"
+#include "pipeline/texture/image_difference.h"
 #include "pipeline/texture/render.h"
 #include "tests/unit/pipeline/texture/painted_scene.h"
 
@@ -56,11 +56,11 @@ TextureOptions small_atlas() { return {.atlas_px = 1024}; }
 
 /// Green of the vertices whose direction from `centre` has a cosine in this range with `axis`.
 std::vector<double> greens(const TexturedModel& model, const Eigen::Vector3f& centre, const Eigen::Vector3f& axis,
-                           float least_cosine, float most_cosine) {
+                           float min_cosine, float max_cosine) {
   std::vector<double> found;
   for (std::size_t v = 0; v < model.mesh.mesh.vertices.size(); ++v) {
     const float cosine = (model.mesh.mesh.vertices[v] - centre).normalized().dot(axis);
-    if (cosine >= least_cosine && cosine <= most_cosine) found.push_back(model.mesh.mesh.colour[v][1]);
+    if (cosine >= min_cosine && cosine <= max_cosine) found.push_back(model.mesh.mesh.colour[v][1]);
   }
   return found;
 }

@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "core/parallel.h"
-#include "pipeline/mesh/solid.h"
+#include "pipeline/mesh/solid_properties.h"
 #include "pipeline/mesh/topology.h"
 #include "tests/unit/pipeline/volume/analytic_rig.h"
 

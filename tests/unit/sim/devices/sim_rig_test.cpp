@@ -85,7 +85,7 @@ TEST_F(SimTurntable, StopsOnRequestFromElsewhere) {
   EXPECT_TRUE(fails_with(rig_->turntable().rotate_to({180.0}, soon()), ErrorCode::stopped));
   ASSERT_TRUE(rig_->turntable().stop(soon()));
   const auto status = rig_->turntable().status(soon());
-  EXPECT_EQ(status->motion, TurntableStatus::Motion::standing);
+  EXPECT_EQ(status->motion, TurntableStatus::Motion::stopped);
   // One second: 11.25 degrees up to speed, 22.5 at speed, 11.25 braking.
   EXPECT_NEAR(status->angle->value, 45.0, 0.1);
   EXPECT_TRUE(fails_with(rig_->turntable().rotate_to({0.0}, soon()), ErrorCode::not_homed));
@@ -188,7 +188,7 @@ TEST_F(SimProjector, TakesTheTimeOfThePulse) {
   const auto begin = clock_->now();
   ASSERT_TRUE(rig_->projector().fire(Light::pattern, soon()));
   EXPECT_EQ(clock_->now() - begin, 12ms);
-  EXPECT_TRUE(rig_->projector().dark(soon()));
+  EXPECT_TRUE(rig_->projector().turn_off(soon()));
 }
 
 TEST_F(SimProjector, TimesOutIfThePulseIsLongerThanItMayTake) {
@@ -197,7 +197,7 @@ TEST_F(SimProjector, TimesOutIfThePulseIsLongerThanItMayTake) {
 
 TEST_F(SimProjector, GoesDarkOnRequestAndTheExposureIsVoid) {
   ASSERT_TRUE(rig_->camera().arm(soon()));
-  clock_->at(3ms, [] { rig_->projector().request_dark(); });
+  clock_->at(3ms, [] { rig_->projector().request_off(); });
   EXPECT_TRUE(fails_with(rig_->projector().fire(Light::pattern, soon()), ErrorCode::io));
   EXPECT_TRUE(fails_with(rig_->camera().collect(clock_->within(1s)), ErrorCode::timeout));
 }

@@ -1,0 +1,32 @@
+#include "daemon/ctl/doctor/findings.h"
+
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+namespace scanrig::ctl::doctor {
+
+std::string Report::text() const {
+  std::string text;
+  for (const Section& section : sections_) {
+    text += section.heading + "\n";
+    for (const std::string& line : section.lines) text += "  " + line + "\n";
+  }
+  text += findings_.empty() ? "Nothing wrong was found.\n" : fmt::format("{} finding(s)\n", findings_.size());
+  for (const Finding& finding : findings_) {
+    text += fmt::format("  {}: {}\n    {}\n", finding.id, finding.problem, finding.remedy);
+  }
+  return text;
+}
+
+std::string Report::json() const {
+  auto sections = nlohmann::ordered_json::array(), findings = nlohmann::ordered_json::array();
+  for (const Section& section : sections_) sections.push_back({{"heading", section.heading}, {"lines", section.lines}});
+  for (const Finding& finding : findings_) {
+    findings.push_back({{"id", finding.id}, {"problem", finding.problem}, {"remedy", finding.remedy}});
+  }
+  const nlohmann::ordered_json all{{"sections", sections}, {"findings", findings}};
+  return all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace scanrig::ctl::doctor

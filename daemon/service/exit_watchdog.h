@@ -1,0 +1,51 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "core/result.h"
+
+namespace scanrig {
+
+/// Whether the daemon's ending comes to its end: threads that wait for a disk or a panel cannot be told to stop.
+/// On the real clock: a virtual one runs away when the threads that hold it have ended.
+/// To be made before those threads and destroyed after them.
+class ExitWatchdog {
+ public:
+  ExitWatchdog(std::chrono::nanoseconds limit, std::function<void(const Error&)> hangs)
+      : limit_(limit), hangs_(std::move(hangs)) {}
+  ExitWatchdog(const ExitWatchdog&) = delete;
+  ExitWatchdog& operator=(const ExitWatchdog&) = delete;
+  ~ExitWatchdog() {
+    {
+      const std::lock_guard guard(mutex_);
+      over_ = true;
+    }
+    changed_.notify_all();
+    if (thread_.joinable()) thread_.join();
+  }
+
+  /// From now on it counts.
+  void begin() {
+    thread_ = std::thread([this] {
+      std::unique_lock lock(mutex_);
+      if (changed_.wait_for(lock, limit_, [this] { return over_; })) return;
+      lock.unlock();
+      hangs_({ErrorCode::timeout, "shutdown blocked by the job disk, the panel or a reconstruction"});
+    });
+  }
+
+ private:
+  const std::chrono::nanoseconds limit_;
+  const std::function<void(const Error&)> hangs_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool over_ = false;
+  std::thread thread_;
+};
+
+}  // namespace scanrig

@@ -1,0 +1,183 @@
+#include "daemon/service/run_daemon.h"
+
+#include <ctime>
+
+#include "daemon/jobs/heap.h"
+#include "daemon/jobs/housekeeping_thread.h"
+#include "daemon/journal/log_entries.h"
+#include "daemon/rig/panel_thread.h"
+#include "daemon/rig/rig_thread.h"
+#include "daemon/runtime/overloaded.h"
+#include "daemon/service/exit_watchdog.h"
+#include "daemon/station/timestamp.h"
+#include "daemon/webhook/webhook.h"
+
+namespace scanrig {
+namespace {
+
+/// The serial number tells apart jobs of one second; one that is known is never taken. The disk is not asked: it may
+/// hang, and a folder that somebody else has put there is not overwritten later either.
+class NewIds {
+ public:
+  std::string operator()(const JobTable& known) {
+    using namespace std::chrono;
+    const auto now = floor<seconds>(system_clock::now());
+    if (now != second_) serial_ = 0;
+    second_ = now;
+    std::string id;
+    do {
+      id = job_id(now, ++serial_);
+    } while (known.contains(id));
+    return id;
+  }
+
+ private:
+  std::chrono::sys_seconds second_{};
+  int serial_ = 0;
+};
+
+/// For as long as it lives the loop may be asked by others.
+class OnLoop {
+ public:
+  OnLoop(const DaemonOptions& options, ControlLoop& loop) : options_(options) { options.on_loop(loop); }
+  ~OnLoop() { options_.loop_ends(); }
+  OnLoop(const OnLoop&) = delete;
+  OnLoop& operator=(const OnLoop&) = delete;
+
+ private:
+  const DaemonOptions& options_;
+};
+
+struct Workers {
+  RigThread& rig;
+  JobThread& jobs;
+  HousekeepingThread& housekeeping;
+};
+
+/// What takes its time is kept away from the thread that stores views.
+void keep(const action::RunJobRequest& task, const Workers& workers) {
+  using What = event::JobRequested::What;
+  const auto what = task.asked.what;
+  if (what == What::remove || what == What::bundle) return workers.housekeeping.post(task.asked);
+  workers.jobs.post(task);
+}
+
+bool cameras_are_free(const Snapshot& snapshot) {
+  return snapshot.activity == Activity::none || snapshot.activity == Activity::waiting_for_flip ||
+         snapshot.activity == Activity::waiting_for_part;
+}
+
+void perform(const Action& action, const Workers& workers) {
+  auto& rig = workers.rig;
+  std::visit(
+      Overloaded{[](const action::Warn&) {},  // these are the control loop's own
+                 [](const action::WaitForEstop&) {}, [](const action::RetryStopLater&) {},
+                 [](const action::CheckLater&) {}, [](const action::TestLamps&) {}, [](const action::WaitForFlip&) {},
+                 [&](const action::Home&) { rig.home(); }, [&](const action::StopRig&) { rig.stop(); },
+                 [&](const action::TakeView& a) { rig.take_view(a); }, [&](const action::Jog& a) { rig.jog(a); },
+                 [&](const action::Pulse&) { rig.pulse(); }, [&](const action::CheckDevices&) { rig.check_devices(); },
+                 [&](const action::RunJobRequest& a) { keep(a, workers); },
+                 [&](const auto& task) { workers.jobs.post(task); }},
+      action);
+}
+
+/// What the last daemon left to be reconstructed.
+void go_on_reconstructing(const JobTable& jobs, ReconstructionThread& reconstruction) {
+  for (const auto& [id, job] : jobs) {
+    if (job->state == JobState::reconstructing) reconstruction.rebuild(id, job->folder, job->recipe, {});
+  }
+}
+
+std::optional<Error> disk_problem(Clock::Duration waiting, const DaemonOptions& options) {
+  if (waiting < options.disk_limit) return std::nullopt;
+  return Error{ErrorCode::io,
+               fmt::format("the disk with {} has not responded for {} s; check it", options.jobs.root.string(),
+                           std::chrono::duration_cast<std::chrono::seconds>(waiting).count())};
+}
+
+/// By the clock on the wall of this machine.
+bool quiet_now(const std::optional<QuietHours>& hours) {
+  if (!hours) return false;
+  const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm local{};
+  ::localtime_r(&now, &local);
+  return hours->contain(std::chrono::hours(local.tm_hour) + std::chrono::minutes(local.tm_min));
+}
+
+}  // namespace
+
+Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, Clock& clock, std::stop_token stop) {
+  keep_heaps_small();
+  ExitWatchdog ending(options.exit_timeout, options.on_exit_hang);
+  auto store = JobStore::open(options.jobs);
+  if (!store) return pass_on(store);
+  auto known = store->recover();
+  if (!known) return pass_on(known);
+
+  const StationRules rules{.recipes = options.recipes,
+                           .remote = options.remote,
+                           .guard = options.guard,
+                           .auto_home = options.auto_home,
+                           .manual_light = options.manual_light};
+  ControlLoop loop(clock, {.rules = rules, .warning = options.warning, .warm_up = options.warm_up}, *known);
+  const auto post_event = [&loop](Event event) { loop.post(std::move(event)); };
+
+  const OnLoop reachable(options, loop);
+  Preview preview(clock, [&loop] { return cameras_are_free(*loop.snapshot()); });
+  auto api_options = options.api;
+  api_options.storage = store->options().root;
+  api_options.journal = options.journal;
+  api_options.preview_jpeg = [&preview](std::string_view side) {
+    return preview.jpeg(side == "left" ? Side::left : Side::right);
+  };
+  auto api = ApiServer::start(api_options, loop);
+  if (!api) return pass_on(api);
+  if (auto may = options.takes_devices(); !may) return pass_on(may);
+
+  // Time stands until every thread is there. They end in reverse order: the panel shows the last lamps, the rig is
+  // seen standing, what was taken goes to disk, then the reconstruction that all of them feed is stopped.
+  std::optional<Clock::Busy> starting(clock);
+  ReconstructionThread reconstruction(clock, options.reconstructor, post_event);
+  go_on_reconstructing(*known, reconstruction);
+  HousekeepingThread housekeeping(
+      clock, *store, options.retention, [&loop] { return loop.snapshot()->jobs; }, post_event);
+  housekeeping.sweep();
+  JobThread jobs(clock, *store, reconstruction, options.on_scanned, post_event);
+  RigThread rig(devices, clock, options.acquisition, preview, post_event);
+  std::optional<Webhook> webhook;
+  if (options.webhook) webhook.emplace(clock, *options.webhook);
+  PanelThread panel(devices.panel, clock, post_event, [&rig] { rig.interrupt(); });
+
+  const std::stop_callback shut_down(stop, [&loop] { loop.post(event::Shutdown{}); });
+  const Clock::Actor actor(clock);
+  starting.reset();
+  const Workers workers{rig, jobs, housekeeping};
+  NewIds new_id;
+  const auto perform_all = [&](const Action& action) {
+    perform(action, workers);
+    if (std::holds_alternative<action::StartJob>(action)) housekeeping.sweep();
+  };
+  const auto published = [&, told = loop.snapshot()](const std::shared_ptr<const Snapshot>& snapshot) mutable {
+    for (auto& line : log_entries(*std::exchange(told, snapshot), *snapshot)) options.journal(std::move(line));
+    if (webhook) webhook->look(snapshot);
+    options.published(snapshot);
+    (*api)->wake();
+  };
+  const auto refused = [&](const event::Pressed& pressed, const Error& why) {
+    options.journal(refused_at_panel(pressed, why, *loop.snapshot()));
+  };
+  auto ended = loop.run({.alive = [&] { options.alive(loop.snapshot()->sentence); },
+                         .perform = perform_all,
+                         .show = [&](const PanelOutputs& outputs) { panel.show(outputs); },
+                         .new_job_id = [&] { return new_id(loop.snapshot()->jobs); },
+                         .quiet_hours = [&] { return quiet_now(options.quiet_hours); },
+                         .disk_problem = [&] { return disk_problem(jobs.waiting(), options); },
+                         .panel_hangs = [&] { return panel.hangs(); },
+                         .published = published,
+                         .refused_at_panel = refused});
+  ending.begin();
+  reconstruction.stop();  // before views that are still being stored cost the time it has
+  return ended;
+}
+
+}  // namespace scanrig

@@ -1,0 +1,125 @@
+#include "daemon/service/service.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <utility>
+
+#include "core/version.h"
+#include "daemon/api/socket_file.h"
+#include "daemon/rig/saved_config.h"
+#include "daemon/service/daemon_options.h"
+
+namespace scanrig {
+
+Result<void> Service::run(SignalStop& stop, const Run& run) {
+  auto config = read();
+  if (!config) return pass_on(config);
+  journal_.emplace(standard_sink());
+  stop.on_hangup([this] { reload([](const auto&) {}); });
+  auto ended = run_again_and_again(run, std::move(*config));
+  stop.on_hangup({});
+  tell(Priority::notice, name_ + " ends.");
+  journal_.reset();
+  return ended;
+}
+
+Result<void> Service::run_again_and_again(const Run& run, config::RigConfig config) {
+  std::optional<config::RigConfig> before;
+  for (bool again = false;; again = true) {
+    if (again) manager_.begins_again();
+    tell_begin(config);
+    begun_ = false;
+    const auto ended = run(config, options_for(config, again));
+    if (ended && *ended == Ended::reload) {
+      const std::lock_guard guard(mutex_);
+      before = std::exchange(config, std::move(*next_));
+      next_.reset();
+    } else if (!ended && !begun_ && before) {
+      tell(Priority::error, fmt::format("New configuration failed, old one restored: {}", ended.error().message));
+      config = std::move(*before);
+      before.reset();
+    } else {
+      return ended ? Result<void>() : pass_on(ended);
+    }
+  }
+}
+
+DaemonOptions Service::options_for(const config::RigConfig& config, bool again) {
+  auto options = options_from(config);
+  if (again) options.auto_home = false;  // a restart is somebody's doing at the rig, a reload need not be
+  options.takes_devices = [this, &config] { return save_config(config, saved_config_folder(file_)); };
+  options.api.passed_socket = sockets_.local;
+  options.api.passed_tcp = sockets_.tcp;
+  options.api.check_config = [this] {
+    const auto checked = read();
+    return checked ? Result<void>() : pass_on(checked);
+  };
+  options.api.reload = [this](ControlLoop::Reply reply) { reload(std::move(reply)); };
+  options.on_loop = [this](ControlLoop& loop) {
+    const std::lock_guard guard(mutex_);
+    loop_ = &loop;
+    reloading_ = false;
+  };
+  options.loop_ends = [this] {
+    const std::lock_guard guard(mutex_);
+    loop_ = nullptr;
+  };
+  options.on_exit_hang = [this](const Error& why) {
+    fmt::print(stderr, "{}: the rig was stopped, but {}: forced exit.\n", name_, why.message);
+    std::_Exit(static_cast<int>(exit_code(why.code)));
+  };
+  options.alive = [this](const std::string& sentence) {
+    begun_ = true;
+    manager_.alive(sentence);
+  };
+  options.journal = [this](JournalEntry entry) { journal_->write(std::move(entry)); };
+  return options;
+}
+
+void Service::tell_begin(const config::RigConfig& config) {
+  tell(Priority::notice, fmt::format("{} {} begins.", name_, kVersion));
+  for (const auto& warning : config.warnings) tell(Priority::warning, warning);
+  if (!sockets_.local) return;
+  const auto there = socket_path(*sockets_.local);
+  if (there == config.api.socket) return;
+  tell(Priority::warning, fmt::format("The API's socket is {}, as systemd was told, not {}, as the configuration says.",
+                                      there.string(), config.api.socket.string()));
+}
+
+void Service::reload(ControlLoop::Reply reply) {
+  {
+    const std::lock_guard guard(mutex_);
+    if (!loop_ || std::exchange(reloading_, true)) {
+      const Error why{ErrorCode::busy, "The service is already starting, ending or reloading."};
+      tell(Priority::warning, "No reload: " + why.message);
+      return reply(tl::unexpected(why));
+    }
+  }
+  manager_.reloading();
+  auto config = read();
+  if (!config) return give_up(config.error(), reply);
+  const std::lock_guard guard(mutex_);
+  next_ = std::move(*config);
+  if (!loop_) return;  // the daemon has ended: nobody is left to be answered
+  loop_->ask(event::ReloadRequested{}, [this, reply = std::move(reply)](const Result<std::string>& taken) {
+    if (!taken) return give_up(taken.error(), reply);
+    tell(Priority::notice, "The new configuration is valid: the service restarts with it.");
+    reply(taken);
+  });
+}
+
+void Service::give_up(const Error& why, const ControlLoop::Reply& reply) {
+  auto sentence = "Reload refused, configuration unchanged: " + why.message;
+  std::ranges::replace(sentence, '\n', ' ');  // one a problem; a status is one line
+  {
+    const std::lock_guard guard(mutex_);
+    next_.reset();
+    reloading_ = false;
+  }
+  manager_.stays(sentence);
+  tell(Priority::warning, sentence);
+  reply(tl::unexpected(why));
+}
+
+}  // namespace scanrig

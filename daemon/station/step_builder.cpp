@@ -1,0 +1,153 @@
+#include "daemon/station/step_builder.h"
+
+namespace scanrig {
+
+std::string calibrated_job(const StationState& state) {
+  if (state.queue.empty()) return {};
+  const auto& head = *state.queue.front();
+  return has_views(head) ? head.id : std::string();
+}
+
+const Error* calibration_problem(const StationState& state) {
+  const auto& seen = state.calibration;
+  return seen.problem && seen.job == calibrated_job(state) ? &*seen.problem : nullptr;
+}
+
+bool StepBuilder::may_move() {
+  switch (s().activity) {
+    case Activity::warning:
+    case Activity::homing:
+    case Activity::jogging:
+    case Activity::scanning:
+    case Activity::storing: return true;
+    default: return false;
+  }
+}
+
+void StepBuilder::enter(MachineState machine, std::string cause) {
+  s().machine = machine;
+  s().activity = Activity::none;
+  s().cause = std::move(cause);
+}
+
+void StepBuilder::warn() {
+  s().activity = Activity::warning;
+  act(action::Warn{});
+}
+
+void StepBuilder::stop_rig() {
+  s().activity = Activity::stopping;
+  act(action::StopRig{});
+}
+
+void StepBuilder::close_job(JobState state, Error why) {
+  if (!s().job) return;
+  s().unjudged.erase(s().job->id);
+  act(action::CloseJob{s().job->id, state, std::move(why)});
+  s().job.reset();
+}
+
+void StepBuilder::fault(std::string cause, std::string device) {
+  close_job(JobState::interrupted, {ErrorCode::stopped, cause});
+  s().machine = MachineState::error;
+  s().cause = std::move(cause);
+  s().latched = true;
+  s().auto_home_allowed = false;
+  s().unclassified.reset();
+  s().fault_device = std::move(device);
+  s().maintenance.reset();
+  stop_rig();
+}
+
+void StepBuilder::fault_unclassified(const event::RigFailed& failure) {
+  s().machine = MachineState::error;
+  s().cause = "A device failed; checking for an e-stop.";
+  s().latched = true;
+  s().auto_home_allowed = false;
+  s().unclassified = failure.error;
+  s().fault_device = failure.device;
+  s().maintenance.reset();
+  stop_rig();
+  act(action::WaitForEstop{});
+}
+
+void StepBuilder::classify_fault() {
+  if (!s().unclassified) return;
+  s().cause = s().unclassified->message + ".";
+  s().unclassified.reset();
+  close_job(JobState::interrupted, {ErrorCode::stopped, s().cause});
+}
+
+const char* StepBuilder::unsafe() {
+  if (!s().panel_known) return "E-stop state unknown: check the panel.";
+  if (!s().estop_ok) return "The e-stop is pressed: release it first.";
+  if (!s().guard_closed) return "The guard is open: close it first.";
+  return nullptr;
+}
+
+bool StepBuilder::require_safe() {
+  const char* const why_not = unsafe();
+  if (why_not) refuse(ErrorCode::refused, "{}", why_not);
+  return !why_not;
+}
+
+const DeviceHealth* StepBuilder::absent_device() {
+  for (const auto& device : s().devices) {
+    if (device.problem) return &device;
+  }
+  return nullptr;
+}
+
+bool StepBuilder::require_devices() {
+  const auto* const absent = absent_device();
+  if (!absent) return true;
+  const auto& why = *absent->problem;
+  // To whoever asked it is a device that does not answer, and neither the disk nor a file, whatever its port says.
+  const auto code = exit_code(why.code) == ExitCode::device ? why.code : ErrorCode::timeout;
+  refuse(code, "The {} is not responding: {}.", absent->name, why.message);
+  return false;
+}
+
+bool StepBuilder::require_calibration() {
+  const auto* const problem = calibration_problem(s());
+  if (problem) refuse(problem->code, "Check the calibration: {}.", problem->message);
+  return !problem;
+}
+
+void StepBuilder::check() {
+  act(action::CheckDevices{});
+  act(action::CheckCalibration{calibrated_job(s())});
+}
+
+bool StepBuilder::require_disk() {
+  const auto& problem = s().disk_problem;
+  if (problem) refuse(problem->code, "Not now: {}.", problem->message);
+  return !problem;
+}
+
+bool StepBuilder::remote_may_move(std::string_view what) {
+  if (!rules_.remote || !rules_.guard) {
+    refuse(ErrorCode::refused, "Remote {} is disabled: use the panel.", what);
+  } else if (s().latched) {
+    refuse(ErrorCode::refused, "Fix the cause, then press Reset at the panel.");
+  } else {
+    return true;
+  }
+  return false;
+}
+
+void StepBuilder::begin_homing(std::string cause) {
+  s().machine = MachineState::initialized;
+  s().cause = std::move(cause);
+  s().auto_home_allowed = false;
+  warn();
+}
+
+void StepBuilder::auto_home_if_allowed() {
+  if (!rules_.auto_home || !rules_.guard || !s().auto_home_allowed) return;
+  if (s().machine != MachineState::halted || s().activity != Activity::none || s().shutting_down) return;
+  if (unsafe()) return;
+  begin_homing("The guard is closed.");
+}
+
+}  // namespace scanrig

@@ -1,0 +1,139 @@
+#include "pipeline/movement/image_shift.h"
+
+#include <Eigen/Core>
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace scanrig {
+namespace {
+
+constexpr int kSmallest = 24, kLargest = 96;  ///< px: sides of the squares
+constexpr std::size_t kEnough = 8;            ///< squares that speak for the whole picture
+constexpr double kSmoothing = 1.0;            ///< px: against noise and the traces of demosaicing
+constexpr double kSharp = 0.05;  ///< px: a direction in which noise alone would shift a square by more is not looked at
+constexpr double kCorrelated = 15.0;    ///< pixels that share their noise after smoothing and demosaicing
+constexpr double kQuantisation = 0.01;  ///< grey levels squared: no picture has less noise
+
+/// Sums over a square of products of gradient (2) and change, free of what another gain and offset of the light
+/// explain.
+struct Square {
+  Eigen::Matrix3d products = Eigen::Matrix3d::Zero();
+  int values = 0;
+
+  [[nodiscard]] Eigen::Matrix2d gradients() const { return products.topLeftCorner<2, 2>(); }
+  /// Least squares: change = -gradient . shift
+  [[nodiscard]] Eigen::Vector2d shift() const {
+    return -(gradients() + 1e-9 * Eigen::Matrix2d::Identity()).inverse() * products.block<2, 1>(0, 2);
+  }
+  [[nodiscard]] double unexplained() const {
+    const Eigen::Vector2d d = shift();
+    return std::max(0.0, products(2, 2) - d.dot(gradients() * d));
+  }
+  Square& operator+=(const Square& other) {
+    products += other.products;
+    values += other.values;
+    return *this;
+  }
+  /// How much it shows: gradient squared, a value.
+  [[nodiscard]] double contrast() const { return gradients().trace() / values; }
+};
+
+struct Channel {
+  cv::Mat1f mean, dx, dy, change;
+};
+
+Channel channel(const cv::Mat& before, const cv::Mat& after) {
+  Channel c;
+  cv::Mat1f a, b;
+  before.convertTo(a, CV_32F);
+  after.convertTo(b, CV_32F);
+  cv::GaussianBlur(a, a, {}, kSmoothing);
+  cv::GaussianBlur(b, b, {}, kSmoothing);
+  c.mean = 0.5 * (a + b);
+  c.change = b - a;
+  cv::Sobel(c.mean, c.dx, CV_32F, 1, 0, 1, 0.5);
+  cv::Sobel(c.mean, c.dy, CV_32F, 0, 1, 1, 0.5);
+  return c;
+}
+
+void add(const Channel& c, const cv::Rect& where, Square& square) {
+  Eigen::Matrix<double, 5, 5> sums = Eigen::Matrix<double, 5, 5>::Zero();
+  for (int y = where.y; y < where.y + where.height; ++y) {
+    for (int x = where.x; x < where.x + where.width; ++x) {
+      const Eigen::Matrix<double, 5, 1> v{1.0, c.mean(y, x), c.dx(y, x), c.dy(y, x), c.change(y, x)};
+      sums.noalias() += v * v.transpose();
+    }
+  }
+  Eigen::Matrix2d light = sums.topLeftCorner<2, 2>();
+  light(1, 1) += where.area();  // where all is one grey, gain and offset are the same
+  const Eigen::Matrix<double, 2, 3> by_light = sums.topRightCorner<2, 3>();
+  square.products += sums.bottomRightCorner<3, 3>() - by_light.transpose() * light.inverse() * by_light;
+  square.values += where.area();
+}
+
+std::vector<Square> squares(const std::vector<Channel>& channels, int side) {
+  std::vector<Square> all;
+  const cv::Size size = channels.front().mean.size();
+  for (int y = 0; y + side <= size.height; y += side) {
+    for (int x = 0; x + side <= size.width; x += side) {
+      all.emplace_back();
+      for (const auto& c : channels) add(c, {x, y, side, side}, all.back());
+    }
+  }
+  return all;
+}
+
+/// Variance of a value's change where nothing happened: what is left in those squares that show least.
+double noise_of(std::vector<Square> all) {
+  std::ranges::sort(all, {}, &Square::contrast);
+  all.resize((all.size() + 3) / 4);
+  const auto left = [](const Square& square) { return square.unexplained() / square.values; };
+  std::ranges::nth_element(all, all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), {}, left);
+  return std::max(left(all[all.size() / 2]), kQuantisation);
+}
+
+using Axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>;  ///< of the sums of gradients
+
+/// The shift in those directions that show more than `least`.
+double shift_px(const Square& square, const Axes& axes, double least) {
+  const Eigen::Vector2d along = axes.eigenvectors().transpose() * square.shift();
+  return (axes.eigenvalues().array() < least).select(0.0, along.array()).matrix().norm();
+}
+
+PictureShift shift_of(const std::vector<Square>& all) {
+  PictureShift found;
+  if (all.empty()) return found;
+  const double noise = noise_of(all);
+  const double least = kCorrelated * noise / (kSharp * kSharp);
+  Square together;
+  for (const auto& square : all) {
+    const Axes axes(square.gradients());
+    if (axes.eigenvalues().maxCoeff() < least) continue;
+    const double misfit = std::max(0.0, square.unexplained() - noise * square.values);
+    found.squares.push_back({shift_px(square, axes, least), std::sqrt(misfit / square.gradients().trace())});
+    if (found.squares.back().misfit_px <= kOtherPx) together += square;
+  }
+  found.together_px = shift_px(together, Axes(together.gradients()), least);
+  return found;
+}
+
+}  // namespace
+
+PictureShift image_shift(const cv::Mat& before, const cv::Mat& after) {
+  std::vector<cv::Mat> a, b;
+  cv::split(before, a);
+  cv::split(after, b);
+  std::vector<Channel> channels;
+  for (std::size_t i = 0; i < a.size(); ++i) channels.push_back(channel(a[i], b[i]));
+  PictureShift found;
+  for (int side = kSmallest; side <= kLargest && found.squares.size() < kEnough; side *= 2) {
+    auto larger = shift_of(squares(channels, side));
+    if (larger.squares.size() > found.squares.size() || found.squares.empty()) found = std::move(larger);
+  }
+  return found;
+}
+
+}  // namespace scanrig

@@ -1,0 +1,52 @@
+#include "pipeline/storage/calibration_file.h"
+
+#include <algorithm>
+
+namespace scanrig {
+
+Projection read_pinhole(JsonObject& object) {
+  Projection projection;
+  projection.width = object.integer("width", 16, 32768);
+  projection.height = object.integer("height", 16, 32768);
+  projection.fx = object.number("fx", 1.0, 1e6);
+  projection.fy = object.number("fy", 1.0, 1e6);
+  // A shifted principal point may lie outside the image, but not by more than its size.
+  projection.cx = object.number("cx", -projection.width, 2.0 * projection.width);
+  projection.cy = object.number("cy", -projection.height, 2.0 * projection.height);
+  return projection;
+}
+
+Camera read_camera(JsonObject object) {
+  Camera camera;
+  camera.serial = object.text("serial");
+  camera.projection = read_pinhole(object);
+  const std::vector<double> distortion = object.numbers("distortion");
+  if (distortion.size() == camera.distortion.size()) {
+    std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
+  } else {
+    object.reject("distortion", "must be five numbers: k1 k2 p1 p2 k3");
+  }
+  camera.camera_from_turntable = object.transform("camera_from_turntable");
+  if (camera.camera_from_turntable.translation().z() <= 0.0) {
+    object.reject("camera_from_turntable", "puts the table behind the camera");
+  }
+  object.close();
+  return camera;
+}
+
+Result<Calibration> read_calibration(const std::filesystem::path& file) {
+  auto json = JsonFile::read(file, "scanrig-calibration", 1);
+  if (!json) return pass_on(json);
+  JsonObject& root = json->root();
+  Calibration calibration;
+  calibration.date = root.text("date");
+  calibration.table_radius_mm = root.number("table_radius_mm", 1.0, 1e4);
+  calibration.left = read_camera(root.object("left"));
+  calibration.right = read_camera(root.object("right"));
+  root.ignore("report");
+  calibration.sha256 = json->sha256();
+  if (const auto whole = json->finish(); !whole) return pass_on(whole);
+  return calibration;
+}
+
+}  // namespace scanrig

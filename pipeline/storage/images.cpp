@@ -1,0 +1,62 @@
+#include "pipeline/storage/images.h"
+
+#include <array>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+#include "core/units.h"
+
+namespace scanrig {
+namespace {
+
+std::array<std::pair<const char*, const cv::Mat*>, 4> named(const RawView& raw) {
+  return {{{"left_pattern", &raw.left_pattern},
+           {"right_pattern", &raw.right_pattern},
+           {"left_plain", &raw.left_plain},
+           {"right_plain", &raw.right_plain}}};
+}
+
+cv::Mat demosaiced(const cv::Mat& image, const std::string& pixel_format) {
+  if (pixel_format != "BayerRG8") return image;
+  cv::Mat bgr;
+  // OpenCV names a pattern by the pixels at (1,1) and (1,2), GenICam by those at (0,0) and (0,1).
+  cv::cvtColor(image, bgr, cv::COLOR_BayerBG2BGR_EA);
+  return bgr;
+}
+
+}  // namespace
+
+Result<void> check_images(const RawView& raw) {
+  const bool known = raw.pixel_format == "Mono8" || raw.pixel_format == "BayerRG8" || raw.pixel_format == "BGR8";
+  if (!known) return fail(ErrorCode::invalid_input, "unknown pixel format \"{}\"", raw.pixel_format);
+  const int type = raw.pixel_format == "BGR8" ? CV_8UC3 : CV_8UC1;
+  for (const auto& [name, image] : named(raw)) {
+    if (image->empty()) return fail(ErrorCode::invalid_input, "{}: there is no image", name);
+    if (image->type() != type) {
+      return fail(ErrorCode::invalid_input, "{}: {} channels of {} bytes do not make {}", name, image->channels(),
+                  image->elemSize1(), raw.pixel_format);
+    }
+  }
+  if (raw.left_pattern.size() != raw.left_plain.size() || raw.right_pattern.size() != raw.right_plain.size()) {
+    return fail(ErrorCode::invalid_input, "the pattern and the plain image of a camera differ in size");
+  }
+  return {};
+}
+
+Result<ViewImages> to_view_images(const RawView& raw, const ViewRecord& record) {
+  if (const auto checked = check_images(raw); !checked) return pass_on(checked);
+  try {
+    ViewImages images;
+    images.index = record.index;
+    images.angle_rad = to_radians(record.measured_deg);
+    images.left_pattern = demosaiced(raw.left_pattern, raw.pixel_format);
+    images.right_pattern = demosaiced(raw.right_pattern, raw.pixel_format);
+    images.left_plain = demosaiced(raw.left_plain, raw.pixel_format);
+    images.right_plain = demosaiced(raw.right_plain, raw.pixel_format);
+    return images;
+  } catch (const cv::Exception& e) {
+    return fail(ErrorCode::invalid_input, "the images cannot be demosaiced: {}", e.what());
+  }
+}
+
+}  // namespace scanrig

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <string>
+
+#include "core/result.h"
+#include "pipeline/storage/manifest.h"
+
+namespace scanrig {
+
+/// The four images of a view, as the sensors delivered them.
+struct RawView {
+  std::string pixel_format;
+  cv::Mat left_pattern, right_pattern, left_plain, right_plain;
+};
+
+/// The four images of a view, ready for use: BGR (colour sensors, demosaiced) or grey (mono sensors), 8 bit.
+struct ViewImages {
+  int index = 0;
+  double angle_rad = 0.0;  ///< table angle as measured
+  cv::Mat left_pattern, right_pattern, left_plain, right_plain;
+};
+
+/// Demosaics where needed. Fails with `invalid_input` for a format or sizes that do not belong together.
+Result<ViewImages> to_view_images(const RawView& raw, const ViewRecord& record);
+
+/// Whether every image is 8 bit, has the format's channels and left and right each have one size. `invalid_input`.
+Result<void> check_images(const RawView& raw);
+
+}  // namespace scanrig

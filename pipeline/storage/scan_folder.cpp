@@ -1,0 +1,263 @@
+#include "pipeline/storage/scan_folder.h"
+
+#include <algorithm>
+#include <system_error>
+
+#include "core/files.h"
+#include "core/hash.h"
+#include "core/image_codec.h"
+#include "pipeline/storage/grid_surface.h"
+
+namespace scanrig {
+namespace {
+
+constexpr const char* kManifest = "scan.json";
+constexpr const char* kCalibration = "calibration.json";
+
+std::span<const std::byte> as_span(std::string_view text) { return std::as_bytes(std::span(text.data(), text.size())); }
+
+/// The bytes of a file of the folder, the ones the manifest means.
+Result<std::string> read_recorded(const std::filesystem::path& folder, const FileRecord& file) {
+  auto bytes = read_file(folder / file.path);
+  if (bytes && sha256(*bytes) != file.sha256) {
+    return fail(ErrorCode::invalid_input,
+                "{}: the file is damaged, truncated or was changed: its SHA-256 is not that of {}",
+                (folder / file.path).string(), kManifest);
+  }
+  return bytes;
+}
+
+Result<void> check_present(const std::filesystem::path& folder, const FileRecord& file) {
+  std::error_code error;
+  if (std::filesystem::is_regular_file(folder / file.path, error)) return {};
+  return fail(ErrorCode::not_found, "{}: the file is missing, though {} names it", (folder / file.path).string(),
+              kManifest);
+}
+
+/// The view's folder, relative to the scan's. A view that is taken again goes to another folder than the one the
+/// manifest names, so that the old view stays whole until the new manifest is there.
+std::string view_folder(const PoseRecord& pose, const ViewRecord* replaced, int index) {
+  const std::string name = fmt::format("{}/view{:02}", pose.name, index);
+  const bool taken = replaced && replaced->files.begin()->second.path.starts_with(name + "/");
+  return taken ? name + "_again" : name;
+}
+
+}  // namespace
+
+Result<ScanFolder> ScanFolder::create(const std::filesystem::path& folder, Manifest manifest,
+                                      const std::filesystem::path& calibration_file) {
+  std::error_code error;
+  if (std::filesystem::exists(folder, error) && !std::filesystem::is_empty(folder, error)) {
+    return fail(ErrorCode::exists, "{}: already there; name another folder or remove this one", folder.string());
+  }
+  if (const auto words = check_words(manifest); !words) return pass_on(words, folder.string());
+  std::string calibration;
+  if (!calibration_file.empty()) {
+    if (const auto checked = read_calibration(calibration_file); !checked) return pass_on(checked);
+    auto text = read_file(calibration_file);
+    if (!text) return pass_on(text);
+    calibration = std::move(*text);
+    manifest.calibration = FileRecord{kCalibration, sha256(calibration)};
+  }
+  if (const auto made = create_directories_synced(folder); !made) return pass_on(made);
+  if (manifest.calibration) {
+    const FileContent content{kCalibration, as_span(calibration)};
+    if (const auto written = write_files_synced(folder, {&content, 1}); !written) return pass_on(written);
+  }
+  ScanFolder scan(folder, std::move(manifest));
+  if (const auto written = scan.write_manifest(scan.manifest_); !written) return pass_on(written);
+  return scan;
+}
+
+Result<ScanFolder> ScanFolder::open(const std::filesystem::path& folder) {
+  auto manifest = read_manifest(folder / kManifest);
+  if (!manifest) return pass_on(manifest);
+  if (manifest->calibration) {
+    if (const auto there = check_present(folder, *manifest->calibration); !there) return pass_on(there);
+  }
+  for (const PoseRecord& pose : manifest->poses) {
+    for (const ViewRecord& view : pose.views) {
+      for (const auto& [role, file] : view.files) {
+        if (const auto there = check_present(folder, file); !there) return pass_on(there);
+      }
+    }
+  }
+  return ScanFolder(folder, std::move(*manifest));
+}
+
+Result<void> ScanFolder::write_manifest(const Manifest& manifest) const {
+  return write_file_atomically(path_ / kManifest, to_json(manifest));
+}
+
+Result<void> ScanFolder::change_manifest(Manifest changed) {
+  if (auto written = write_manifest(changed); !written) return written;
+  manifest_ = std::move(changed);
+  return {};
+}
+
+Result<void> ScanFolder::store_view(std::size_t pose, ViewRecord record, std::span<const NamedImage> images,
+                                    std::string_view extension) {
+  Manifest changed = manifest_;
+  if (pose == changed.poses.size()) changed.poses.push_back({fmt::format("pose{}", pose + 1), false, {}, {}});
+  if (pose > changed.poses.size()) return fail(ErrorCode::invalid_input, "{}: no pose {}", path_.string(), pose + 1);
+  std::vector<ViewRecord>& views = changed.poses[pose].views;
+  auto place = std::lower_bound(views.begin(), views.end(), record.index,
+                                [](const ViewRecord& view, int index) { return view.index < index; });
+  const bool replaces = place != views.end() && place->index == record.index;
+  const std::string folder = view_folder(changed.poses[pose], replaces ? &*place : nullptr, record.index);
+
+  std::vector<FileContent> contents;
+  record.files.clear();
+  for (const auto& [role, bytes] : images) {
+    const std::string name = fmt::format("{}{}", role, extension);
+    contents.push_back({name, bytes});
+    record.files[role] = {fmt::format("{}/{}", folder, name), sha256(bytes)};
+  }
+  if (auto made = create_directories_synced(path_ / folder); !made) return made;
+  if (auto written = write_files_synced(path_ / folder, contents); !written) return written;
+
+  auto& configs = changed.config_sha256;
+  const bool listed = std::find(configs.begin(), configs.end(), config_sha256_) != configs.end();
+  if (!config_sha256_.empty() && !listed) configs.push_back(config_sha256_);
+  std::vector<std::filesystem::path> superseded;
+  if (replaces) {
+    for (const auto& [role, file] : place->files) superseded.push_back(path_ / file.path);
+    *place = std::move(record);
+  } else {
+    views.insert(place, std::move(record));
+  }
+  if (auto written = change_manifest(std::move(changed)); !written) return written;
+  // Nobody names the old files any more; should they stay, it is not worth an error.
+  std::error_code ignored;
+  for (const auto& file : superseded) std::filesystem::remove(file, ignored);
+  if (!superseded.empty()) std::filesystem::remove(superseded.front().parent_path(), ignored);
+  return {};
+}
+
+Result<void> ScanFolder::add_view(std::size_t pose, ViewRecord record, const RawView& images) {
+  const std::string who = fmt::format("{}: view {}", path_.string(), record.index);
+  if (manifest_.source != "stereo") return fail(ErrorCode::invalid_input, "{}: not a stereo scan", who);
+  if (auto checked = check_images(images); !checked) return pass_on(checked, who);
+  std::vector<NamedImage> encoded;
+  const std::pair<const char*, const cv::Mat*> all[] = {{"left_pattern", &images.left_pattern},
+                                                        {"right_pattern", &images.right_pattern},
+                                                        {"left_plain", &images.left_plain},
+                                                        {"right_plain", &images.right_plain}};
+  for (const auto& [role, image] : all) {
+    auto bytes = encode_png(*image);
+    if (!bytes) return pass_on(bytes, who);
+    encoded.emplace_back(role, std::move(*bytes));
+  }
+  record.pixel_format = images.pixel_format;
+  return store_view(pose, std::move(record), encoded, ".png");
+}
+
+Result<void> ScanFolder::add_range_view(std::size_t pose, ViewRecord record, const cv::Mat1f& depth) {
+  const std::string who = fmt::format("{}: view {}", path_.string(), record.index);
+  if (manifest_.source != "range" || !record.grid) return fail(ErrorCode::invalid_input, "{}: not a range scan", who);
+  auto bytes = encode_tiff(depth);
+  if (!bytes) return pass_on(bytes, who);
+  record.pixel_format.clear();
+  const NamedImage image{"range", std::move(*bytes)};
+  return store_view(pose, std::move(record), {&image, 1}, ".tiff");
+}
+
+Result<void> ScanFolder::complete_pose(std::size_t pose, std::string state) {
+  if (pose >= manifest_.poses.size()) return fail(ErrorCode::invalid_input, "{}: no pose {}", path_.string(), pose + 1);
+  Manifest changed = manifest_;
+  changed.poses[pose].complete = true;
+  changed.state = std::move(state);
+  if (auto words = check_words(changed); !words) return words;
+  return change_manifest(std::move(changed));
+}
+
+Result<void> ScanFolder::add_movement_check(std::size_t pose, MovementCheckRecord record) {
+  if (pose >= manifest_.poses.size()) return fail(ErrorCode::invalid_input, "{}: no pose {}", path_.string(), pose + 1);
+  Manifest changed = manifest_;
+  changed.poses[pose].movement_checks.push_back(std::move(record));
+  return change_manifest(std::move(changed));
+}
+
+Result<void> ScanFolder::set_state(std::string state) {
+  Manifest changed = manifest_;
+  changed.state = std::move(state);
+  if (auto words = check_words(changed); !words) return words;
+  return change_manifest(std::move(changed));
+}
+
+Result<const ViewRecord*> ScanFolder::find_view(std::size_t pose, std::size_t view) const {
+  if (pose >= manifest_.poses.size() || view >= manifest_.poses[pose].views.size()) {
+    return fail(ErrorCode::not_found, "{}: there is no view {} of pose {}", path_.string(), view, pose + 1);
+  }
+  return &manifest_.poses[pose].views[view];
+}
+
+Result<cv::Mat> ScanFolder::load_image(const FileRecord& file) const {
+  const auto bytes = read_recorded(path_, file);
+  if (!bytes) return pass_on(bytes);
+  auto image = decode_image(*bytes);
+  if (!image) return pass_on(image, (path_ / file.path).string());
+  return image;
+}
+
+Result<RawView> ScanFolder::load_raw(std::size_t pose, std::size_t view) const {
+  const auto record = find_view(pose, view);
+  if (!record) return pass_on(record);
+  if (manifest_.source != "stereo") return fail(ErrorCode::invalid_input, "{}: not a stereo scan", path_.string());
+  cv::Size left, right;
+  if (manifest_.calibration) {
+    const auto calibration = load_calibration();
+    if (!calibration) return pass_on(calibration);
+    left = {calibration->left.projection.width, calibration->left.projection.height};
+    right = {calibration->right.projection.width, calibration->right.projection.height};
+  }
+  RawView raw{(*record)->pixel_format, {}, {}, {}, {}};
+  const std::tuple<const char*, cv::Mat*, cv::Size> all[] = {{"left_pattern", &raw.left_pattern, left},
+                                                             {"right_pattern", &raw.right_pattern, right},
+                                                             {"left_plain", &raw.left_plain, left},
+                                                             {"right_plain", &raw.right_plain, right}};
+  for (const auto& [role, image, size] : all) {
+    const FileRecord& file = (*record)->files.at(role);
+    auto loaded = load_image(file);
+    if (!loaded) return pass_on(loaded);
+    if (!size.empty() && loaded->size() != size) {
+      return fail(ErrorCode::invalid_input, "{}: {}x{} pixels, but the calibration is for {}x{}",
+                  (path_ / file.path).string(), loaded->cols, loaded->rows, size.width, size.height);
+    }
+    *image = std::move(*loaded);
+  }
+  if (const auto checked = check_images(raw); !checked) {
+    return pass_on(checked, (path_ / (*record)->files.at("left_pattern").path).parent_path().string());
+  }
+  return raw;
+}
+
+Result<ViewImages> ScanFolder::load_images(std::size_t pose, std::size_t view) const {
+  const auto raw = load_raw(pose, view);
+  if (!raw) return pass_on(raw);
+  return to_view_images(*raw, manifest_.poses[pose].views[view]);
+}
+
+Result<RangeImage> ScanFolder::load_range(std::size_t pose, std::size_t view) const {
+  const auto record = find_view(pose, view);
+  if (!record) return pass_on(record);
+  if (manifest_.source != "range") return fail(ErrorCode::invalid_input, "{}: not a range scan", path_.string());
+  const FileRecord& file = (*record)->files.at("range");
+  const auto depth = load_image(file);
+  if (!depth) return pass_on(depth);
+  if (depth->type() != CV_32FC1) {
+    return fail(ErrorCode::invalid_input, "{}: not 32-bit float of one channel", (path_ / file.path).string());
+  }
+  Projection grid = *(*record)->grid;
+  grid.width = depth->cols;
+  grid.height = depth->rows;
+  return range_image_of_grid(grid, (*record)->camera_from_pose, *depth);
+}
+
+Result<Calibration> ScanFolder::load_calibration() const {
+  if (!manifest_.calibration) return fail(ErrorCode::not_found, "{}: has no calibration", (path_ / kManifest).string());
+  if (const auto bytes = read_recorded(path_, *manifest_.calibration); !bytes) return pass_on(bytes);
+  return read_calibration(path_ / manifest_.calibration->path);
+}
+
+}  // namespace scanrig

@@ -1,0 +1,73 @@
+#pragma once
+
+#include <filesystem>
+#include <opencv2/core/mat.hpp>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "core/result.h"
+#include "pipeline/calibration/camera.h"
+#include "pipeline/range/range_image.h"
+#include "pipeline/storage/calibration_file.h"
+#include "pipeline/storage/images.h"
+#include "pipeline/storage/manifest.h"
+
+namespace scanrig {
+
+/// A scan on disk, docs/scan-folder.md. A pose and a view are named by their positions in the manifest, from 0.
+/// Threads: one user at a time; the const functions may be called from several.
+class ScanFolder {
+ public:
+  /// Makes the folder (it must not be there, or be empty) with its manifest and a copy of the calibration file (empty
+  /// path: none), which is checked. Fails with `exists`, `io`, and as read_calibration().
+  static Result<ScanFolder> create(const std::filesystem::path& folder, Manifest manifest,
+                                   const std::filesystem::path& calibration_file);
+
+  /// Opens and checks: every named file is there. What the manifest does not name is ignored: a crash may leave it.
+  /// Fails with `not_found`, `invalid_input` (naming file and key), `unsupported` (a version not known here).
+  static Result<ScanFolder> open(const std::filesystem::path& folder);
+
+  [[nodiscard]] const Manifest& manifest() const { return manifest_; }
+  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
+
+  /// The views that are added to this object from now on are taken under this configuration, and the manifest says so
+  /// with the next of them. Empty: under none.
+  void taken_under(std::string config_sha256) { config_sha256_ = std::move(config_sha256); }
+
+  /// Writes the images, syncs, then the manifest: when this returns the view survives a power cut, and until then the
+  /// folder is what it was. `record.files` and `record.pixel_format` are filled in here. An index that is already there
+  /// is replaced; `pose` may be one past the last: a new pose. Fails with `invalid_input`, `io`.
+  Result<void> add_view(std::size_t pose, ViewRecord record, const RawView& images);
+  /// The same for an imported range scan; `depth` in mm, NaN where unknown.
+  Result<void> add_range_view(std::size_t pose, ViewRecord record, const cv::Mat1f& depth);
+
+  /// The last view of the pose is there; `state` is the scan's from then on.
+  Result<void> complete_pose(std::size_t pose, std::string state);
+  Result<void> add_movement_check(std::size_t pose, MovementCheckRecord record);
+  Result<void> set_state(std::string state);
+
+  /// Fails with `not_found`, `invalid_input` (unreadable, truncated, wrong size, hash differs), naming the file.
+  [[nodiscard]] Result<RawView> load_raw(std::size_t pose, std::size_t view) const;
+  [[nodiscard]] Result<ViewImages> load_images(std::size_t pose, std::size_t view) const;
+  /// A `range` view as a range image: sigma and normals filled from the depth grid.
+  [[nodiscard]] Result<RangeImage> load_range(std::size_t pose, std::size_t view) const;
+  [[nodiscard]] Result<Calibration> load_calibration() const;
+
+ private:
+  using NamedImage = std::pair<std::string, std::vector<std::byte>>;  ///< role and encoded bytes
+
+  ScanFolder(std::filesystem::path path, Manifest manifest) : path_(std::move(path)), manifest_(std::move(manifest)) {}
+  [[nodiscard]] Result<void> write_manifest(const Manifest& manifest) const;
+  Result<void> change_manifest(Manifest changed);
+  Result<void> store_view(std::size_t pose, ViewRecord record, std::span<const NamedImage> images,
+                          std::string_view extension);
+  [[nodiscard]] Result<const ViewRecord*> find_view(std::size_t pose, std::size_t view) const;
+  [[nodiscard]] Result<cv::Mat> load_image(const FileRecord& file) const;
+
+  std::filesystem::path path_;
+  Manifest manifest_;
+  std::string config_sha256_;
+};
+
+}  // namespace scanrig

@@ -1,0 +1,96 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+#include "core/transform.h"
+#include "pipeline/range/range_image.h"
+
+namespace scanrig {
+
+/// What one range image says about one point.
+struct RangeSample {
+  enum class Kind : std::uint8_t {
+    none,     ///< nothing: not measured there, or across a depth step
+    free,     ///< seen through: the ray goes on behind the point
+    surface,  ///< within the band of the measured surface
+    behind    ///< deeper than the band: the view cannot know
+  };
+  Kind kind = Kind::none;
+  bool clearly_free = false;  ///< free, and so is everything a voxel around the ray
+  float distance = 0.0F;      ///< to the tangent plane of the pixel, mm, positive outside; +infinity over background
+  float weight = 0.0F;        ///< cos(incidence) / sigma^2, fading towards the edges of what was measured; 1/mm^2
+  float sigma = 0.0F;         ///< of `distance`, mm
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< of the surface, model frame
+};
+
+/// A range image made ready for gathering: tangent planes in the model frame, pinholes of a pixel or two closed,
+/// specks and flying pixels gone, free space eroded by a voxel. Immutable, so any number of threads may sample it.
+class RangeSampler {
+ public:
+  /// `band_mm`: half width of the zone around the surface in which it is evidence.
+  RangeSampler(const RangeImage& range, const Transform& model_from_pose, double band_mm, double voxel_mm);
+
+  [[nodiscard]] RangeSample sample(const Eigen::Vector3f& point_in_model) const;
+
+  /// True where nothing within `radius` (mm) of the point can be free or surface: the view adds nothing there.
+  [[nodiscard]] bool says_nothing_near(const Eigen::Vector3f& point_in_model, float radius) const;
+
+  /// How far, in mm, the point lies beside everything this image measured; very negative if the image cannot tell.
+  /// A stand-in for a silhouette where a range image has neither silhouettes nor background.
+  [[nodiscard]] float beside_footprint_mm(const Eigen::Vector3f& point_in_model) const;
+
+  [[nodiscard]] bool knows_background() const { return knows_background_; }
+  struct SurfacePixel {
+    Eigen::Vector3f point;  ///< model frame
+    float weight;
+    float sigma;
+  };
+  [[nodiscard]] std::vector<SurfacePixel> surface() const;  ///< row by row
+  /// Unit vector, model frame, from the point towards the camera.
+  [[nodiscard]] Eigen::Vector3d towards_camera(const Eigen::Vector3d& point_in_model) const;
+
+ private:
+  enum class State : std::uint8_t { unknown, surface, background };
+  struct Pixel {
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< model frame
+    float offset = 0.0F;                               ///< plane: normal . x = offset
+    float weight = 0.0F;
+    float sigma = 0.0F;       ///< along the normal
+    float free_depth = 0.0F;  ///< everything nearer than this is free in the whole window; +infinity: background
+    State state = State::unknown;
+  };
+  struct PixelPosition {
+    float u, v, depth;  ///< u, v in the crop
+  };
+
+  void crop(const RangeImage& range);
+  void make_planes(const RangeImage& range);
+  void close_pinholes();
+  void drop_specks_and_fade_edges(int radius);
+  void erode_free_depth(int radius);
+  void make_footprint();
+  void make_tiles();
+  [[nodiscard]] bool one_surface(int x0, int y0, int x1, int y1) const;
+  [[nodiscard]] PixelPosition project(const Eigen::Vector3f& point_in_model) const;
+  [[nodiscard]] Eigen::Vector3f point_on(const Pixel& pixel, int x, int y) const;
+  [[nodiscard]] float depth_on_plane(const Pixel& plane, int x, int y) const;
+  [[nodiscard]] double mm_per_pixel() const;
+  [[nodiscard]] const Pixel& pixel(int x, int y) const { return pixels_[static_cast<std::size_t>(y) * width_ + x]; }
+  [[nodiscard]] Pixel& pixel(int x, int y) { return pixels_[static_cast<std::size_t>(y) * width_ + x]; }
+
+  Transform camera_from_model_;
+  Eigen::Matrix3f rotation_;
+  Eigen::Vector3f translation_;
+  Projection projection_;  ///< of the crop
+  cv::Rect crop_;
+  bool knows_background_ = false;  ///< then all of the image outside the crop is background
+  float band_mm_ = 0.0F;
+  int width_ = 0, height_ = 0;
+  std::vector<Pixel> pixels_;
+  cv::Mat1f footprint_px_;  ///< distance to the footprint, positive beside it; empty if the background is known
+  cv::Mat1f tile_reach_;    ///< beyond this depth nothing in the tile is free or surface
+};
+
+}  // namespace scanrig

@@ -1,0 +1,180 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <tiny_gltf.h>
+
+#include <cstring>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <set>
+
+#include "core/files.h"
+#include "pipeline/model_io/mesh_reader.h"
+#include "pipeline/model_io/model_files.h"
+
+namespace scanrig {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::HasSubstr;
+
+/// A tetrahedron of 60 mm whose four faces lie in four quarters of a four-coloured atlas.
+TexturedMesh tetrahedron() {
+  TexturedMesh model;
+  model.mesh.vertices = {{0, 0, 0}, {60, 0, 0}, {0, 60, 0}, {0, 0, 60}};
+  model.mesh.faces = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  model.mesh.colour = {{255, 0, 0}, {0, 255, 0}, {0, 0, 255}, {10, 20, 30}};
+  model.mesh.views = {3, 0, 8, 1};
+  model.mesh.sigma = {0.01F, std::numeric_limits<float>::quiet_NaN(), 0.02F, 0.03F};
+  model.atlas = cv::Mat3b(64, 64);
+  const std::array<cv::Vec3b, 4> colours = {cv::Vec3b(0, 0, 220), {0, 220, 0}, {220, 0, 0}, {200, 200, 200}};
+  for (int f = 0; f < 4; ++f) {
+    const cv::Rect quarter(f % 2 * 32, f / 2 * 32, 32, 32);
+    model.atlas(quarter).setTo(colours[static_cast<std::size_t>(f)]);
+    const Eigen::Vector2f corner(static_cast<float>(quarter.x) / 64.0F, static_cast<float>(quarter.y) / 64.0F);
+    model.corner_uv.push_back({corner + Eigen::Vector2f(0.1F, 0.1F), corner + Eigen::Vector2f(0.4F, 0.1F),
+                               corner + Eigen::Vector2f(0.1F, 0.4F)});
+  }
+  return model;
+}
+
+class ModelFilesTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    room_ = fs::temp_directory_path() / fmt::format("scanrig_model_test_{}", ::getpid());
+    fs::remove_all(room_);
+    fs::create_directories(room_);
+  }
+  void TearDown() override { fs::remove_all(room_); }
+
+  [[nodiscard]] std::set<std::string> names_in(const fs::path& folder) const {
+    std::set<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder)) names.insert(entry.path().filename().string());
+    return names;
+  }
+  fs::path room_;
+};
+
+TEST_F(ModelFilesTest, aModelIsWrittenInEveryFormatAndNothingElseIsLeft) {
+  const auto files = write_model_files(tetrahedron(), "{}", room_ / "model");
+  ASSERT_TRUE(files) << files.error().message;
+  const std::set<std::string> wanted = {"model.glb", "model.ply", "model.stl",  "model.obj",
+                                        "model.mtl", "model.png", "report.json"};
+  EXPECT_EQ(names_in(room_ / "model"), wanted);
+  EXPECT_EQ(std::set<std::string>(files->names.begin(), files->names.end()), wanted);
+  EXPECT_EQ(names_in(room_), std::set<std::string>{"model"});
+}
+
+TEST_F(ModelFilesTest, anOlderModelIsReplacedAsAWhole) {
+  fs::create_directories(room_ / "model");
+  std::ofstream(room_ / "model" / "stale.txt") << "old";
+  ASSERT_TRUE(write_model_files(tetrahedron(), "", room_ / "model"));
+  EXPECT_FALSE(fs::exists(room_ / "model" / "stale.txt"));
+  EXPECT_TRUE(fs::exists(room_ / "model" / "model.glb"));
+  EXPECT_EQ(names_in(room_), std::set<std::string>{"model"});
+}
+
+TEST_F(ModelFilesTest, aModelWithoutATextureHasNoObj) {
+  TexturedMesh model = tetrahedron();
+  model.atlas.release();
+  model.corner_uv.clear();
+  ASSERT_TRUE(write_model_files(model, "", room_ / "model"));
+  EXPECT_EQ(names_in(room_ / "model"), (std::set<std::string>{"model.glb", "model.ply", "model.stl"}));
+}
+
+TEST_F(ModelFilesTest, whereNothingCanBeWrittenTheOldModelStays) {
+  std::ofstream(room_ / "file") << "not a folder";
+  const auto files = write_model_files(tetrahedron(), "", room_ / "file" / "model");
+  ASSERT_FALSE(files);
+  EXPECT_EQ(files.error().code, ErrorCode::io);
+  EXPECT_EQ(names_in(room_), std::set<std::string>{"file"});
+}
+
+TEST_F(ModelFilesTest, aModelWithoutFacesIsNotWritten) {
+  const auto files = write_model_files({}, "", room_ / "model");
+  ASSERT_FALSE(files);
+  EXPECT_EQ(files.error().code, ErrorCode::degenerate);
+  EXPECT_TRUE(names_in(room_).empty());
+}
+
+TEST_F(ModelFilesTest, theGlbOpensElsewhereInMetresWithItsTexture) {
+  const auto bytes = encode_glb(tetrahedron());
+  ASSERT_TRUE(bytes);
+  tinygltf::Model gltf;
+  tinygltf::TinyGLTF loader;
+  std::string error, warning;
+  ASSERT_TRUE(loader.LoadBinaryFromMemory(&gltf, &error, &warning,
+                                          reinterpret_cast<const unsigned char*>(bytes->data()),
+                                          static_cast<unsigned>(bytes->size())))
+      << error;
+  EXPECT_EQ(warning, "");
+  EXPECT_EQ(gltf.asset.generator, "scanrig");
+  const auto& primitive = gltf.meshes.at(0).primitives.at(0);
+  const auto& positions = gltf.accessors.at(primitive.attributes.at("POSITION"));
+  EXPECT_EQ(positions.count, 12u) << "each face has its own place in the atlas, so no vertex can be shared";
+  EXPECT_THAT(positions.maxValues, ::testing::Each(::testing::DoubleNear(0.06, 1e-8)));
+  EXPECT_THAT(positions.minValues, ::testing::Each(0.0));
+  EXPECT_EQ(gltf.accessors.at(primitive.indices).count, 12u);
+  const auto& material = gltf.materials.at(0).pbrMetallicRoughness;
+  EXPECT_EQ(material.metallicFactor, 0.0);
+  EXPECT_EQ(material.roughnessFactor, 1.0);
+  ASSERT_EQ(material.baseColorTexture.index, 0);
+
+  // The colour under the middle of face 0's coordinates is that of its quarter.
+  const auto& uv = gltf.accessors.at(primitive.attributes.at("TEXCOORD_0"));
+  const auto& view = gltf.bufferViews.at(uv.bufferView);
+  std::array<float, 2> first{};
+  std::memcpy(first.data(), gltf.buffers.at(0).data.data() + view.byteOffset, sizeof first);
+  EXPECT_NEAR(first[0], 0.1, 1e-6);
+  EXPECT_NEAR(first[1], 0.1, 1e-6);
+  const auto& image = gltf.images.at(0);
+  ASSERT_EQ(image.width, 64);
+  const std::size_t at = (static_cast<std::size_t>(first[1] * 64) * 64 + static_cast<std::size_t>(first[0] * 64)) *
+                         static_cast<std::size_t>(image.component);
+  EXPECT_NEAR(image.image[at], 220, 4) << "red, first in RGB";
+  EXPECT_NEAR(image.image[at + 2], 0, 4);
+}
+
+TEST_F(ModelFilesTest, thePlyKeepsEveryVertexWithWhatWasMeasuredThere) {
+  const TexturedMesh model = tetrahedron();
+  const std::string bytes = encode_ply(model.mesh);
+  EXPECT_THAT(bytes, HasSubstr("comment units mm"));
+  EXPECT_THAT(bytes, HasSubstr("comment up axis +Y"));
+  const auto mesh = parse_ply(bytes, "model.ply");
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  EXPECT_EQ(mesh->vertices, model.mesh.vertices);
+  EXPECT_EQ(mesh->faces, model.mesh.faces);
+  EXPECT_EQ(mesh->colour, model.mesh.colour);
+  EXPECT_EQ(mesh->views, model.mesh.views);
+  EXPECT_FLOAT_EQ(mesh->sigma[3], 0.03F);
+  EXPECT_TRUE(std::isnan(mesh->sigma[1]));
+  EXPECT_NEAR(mesh->normals[0].norm(), 1.0F, 1e-6F);
+  EXPECT_LT(mesh->normals[0].x(), 0.0F) << "outwards";
+}
+
+TEST_F(ModelFilesTest, theObjReadsBackAndItsTextureBeginsAtTheBottom) {
+  const TexturedMesh model = tetrahedron();
+  const std::string text = encode_obj(model, "model.mtl");
+  EXPECT_THAT(text, HasSubstr("mtllib model.mtl"));
+  EXPECT_THAT(text, HasSubstr("units mm"));
+  EXPECT_THAT(text, HasSubstr("vt 0.1000000 0.9000000"));
+  const auto mesh = parse_obj(text, "model.obj");
+  ASSERT_TRUE(mesh);
+  EXPECT_EQ(mesh->vertices, model.mesh.vertices);
+  EXPECT_EQ(mesh->faces, model.mesh.faces);
+  EXPECT_THAT(encode_mtl("model.png"), HasSubstr("map_Kd model.png"));
+}
+
+TEST_F(ModelFilesTest, theStlHasFiftyBytesAFaceAndSaysItsUnit) {
+  const std::string bytes = encode_stl(tetrahedron().mesh);
+  ASSERT_EQ(bytes.size(), 84u + 4u * 50u);
+  EXPECT_FALSE(bytes.starts_with("solid"));
+  EXPECT_THAT(bytes.substr(0, 80), HasSubstr("units mm"));
+  std::array<float, 6> facet{};  // normal and first corner of the last face
+  std::memcpy(facet.data(), bytes.data() + 84 + 3 * 50, sizeof facet);
+  EXPECT_NEAR(facet[0], 1.0 / std::sqrt(3.0), 1e-6);
+  EXPECT_EQ(facet[3], 60.0F);
+}
+
+}  // namespace
+}  // namespace scanrig
