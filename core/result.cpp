@@ -1,5 +1,7 @@
 #include "core/result.h"
 
+#include <cctype>
+
 namespace scanrig {
 
 std::string_view to_string(ErrorCode code) {
@@ -35,6 +37,14 @@ std::optional<ErrorCode> parse_error_code(std::string_view name) {
     if (to_string(static_cast<ErrorCode>(i)) == name) return static_cast<ErrorCode>(i);
   }
   return std::nullopt;
+}
+
+std::string as_sentence(std::string_view message) {
+  std::string sentence(message);
+  if (sentence.empty()) return sentence;
+  sentence.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(sentence.front())));
+  if (std::string_view(".!?").find(sentence.back()) == std::string_view::npos) sentence += '.';
+  return sentence;
 }
 
 Error Error::in(std::string_view who) const { return Error{code, fmt::format("{}: {}", who, message)}; }

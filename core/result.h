@@ -50,6 +50,9 @@ struct Error {
 template <class T>
 using Result = tl::expected<T, Error>;
 
+/// For display: "turntable: no reply" becomes "Turntable: no reply."
+std::string as_sentence(std::string_view message);
+
 /// `return fail(ErrorCode::io, "cannot open {}: {}", path, reason);`
 template <class... Args>
 [[nodiscard]] tl::unexpected<Error> fail(ErrorCode code, fmt::format_string<Args...> text, Args&&... args) {
@@ -82,6 +85,7 @@ enum class ExitCode : int {
   unreachable = 9,
   stopped = 10,
   partly_safe = 11,
+  standstill_unknown = 12,
 };
 
 ExitCode exit_code(ErrorCode code);

@@ -94,6 +94,7 @@ ordered_json to_json(const Snapshot& snapshot) {
           {"machine", to_string(snapshot.machine)},
           {"activity", to_string(snapshot.activity)},
           {"may_be_moving", snapshot.may_be_moving},
+          {"standstill", to_string(standstill(snapshot))},
           {"cause", snapshot.cause},
           {"sentence", snapshot.sentence},
           {"next_action", snapshot.next_action},

@@ -10,6 +10,7 @@ using nlohmann::ordered_json;
 using What = event::MaintenanceRequested::What;
 
 constexpr Reply kPressed{.description = "obeyed", .schema = "Pressed"};
+constexpr Reply kStopped{.description = "stop was sent", .schema = "Stopped"};
 constexpr Reply kDone{.description = "obeyed; the state tells how it goes on", .schema = "Nothing"};
 
 ApiResponse pressed(const Result<std::string>& job) {
@@ -27,6 +28,30 @@ Route press(std::string_view path, Button button, Role role, std::string_view de
           .handle = [button](const ApiStation& station, const Values&, Send send) {
             station.loop.press(button, Origin::remote,
                                [send = std::move(send)](const Result<std::string>& job) { send(pressed(job)); });
+          }};
+}
+
+/// The snapshot is that of the stop, or a later one.
+ApiResponse stopped(const Result<std::string>& job, const Snapshot& snapshot) {
+  if (!job) return error_response(job.error());
+  return {.body = to_text({{"job", job->empty() ? ordered_json(nullptr) : ordered_json(*job)},
+                           {"sent", "Stop was sent to the drive; the light is switched off."},
+                           {"standstill", to_string(standstill(snapshot))}})};
+}
+
+Route stop_route() {
+  return {.method = Method::post,
+          .path = "/api/v1/stop",
+          .role = Role::viewer,
+          .description =
+              "Sends stop to the drive and switches the light off, in every state; an active job is "
+              "interrupted and stays resumable. Any role may. `standstill` of the status follows.",
+          .reply = kStopped,
+          .handle = [](const ApiStation& station, const Values&, Send send) {
+            station.loop.press(Button::stop, Origin::remote,
+                               [&loop = station.loop, send = std::move(send)](const Result<std::string>& job) {
+                                 send(stopped(job, *loop.snapshot()));
+                               });
           }};
 }
 
@@ -115,7 +140,7 @@ std::vector<Route> station_routes() {
        .reply = {.description = "events without end", .type = "text/event-stream"},
        .handle = [](const ApiStation&, const Values&, const Send& send) { send({.body = EventStream{}}); }},
       press("/api/v1/start", Button::start, Role::operating, "Starts a scan; after the flip: goes on."),
-      press("/api/v1/stop", Button::stop, Role::viewer, "Stops the table and cancels the scan. Anybody may."),
+      stop_route(),
       press("/api/v1/reset", Button::reset, Role::operating, "Clears a fault and homes the table."),
       maintenance("/api/v1/maintenance/on", What::on, "Maintenance mode begins: no jobs."),
       maintenance("/api/v1/maintenance/off", What::off, "Maintenance mode ends."),

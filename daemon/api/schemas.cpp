@@ -12,14 +12,21 @@ const char* const kSchemas = R"({
 "Nothing": {"type": "object", "additionalProperties": false, "properties": {}},
 "Pressed": {"type": "object", "required": ["job"], "additionalProperties": false, "properties": {
   "job": {"type": "string", "nullable": true, "description": "the job that has the rig now"}}},
+"Stopped": {"type": "object", "required": ["job", "sent", "standstill"], "additionalProperties": false, "properties": {
+  "job": {"type": "string", "nullable": true, "description": "the job that was interrupted"},
+  "sent": {"type": "string", "description": "what was done"},
+  "standstill": {"$ref": "#/components/schemas/Standstill"}}},
+"Standstill": {"type": "string", "enum": ["confirmed", "pending", "moving", "unknown"],
+  "description": "pending: stop was sent and is not confirmed yet; unknown: the table may be moving"},
 "Status": {"type": "object", "additionalProperties": false,
-  "required": ["revision", "machine", "activity", "may_be_moving", "cause", "sentence", "next_action", "devices", "job",
+  "required": ["revision", "machine", "activity", "may_be_moving", "standstill", "cause", "sentence", "next_action", "devices", "job",
   "not_started", "queue", "not_begun"],
   "properties": {
   "revision": {"type": "integer"},
   "machine": {"type": "string", "description": "in the words of OPC 40100-1, such as Operational.Ready"},
   "activity": {"type": "string", "description": "what the rig is busy with inside that state"},
   "may_be_moving": {"type": "boolean"},
+  "standstill": {"$ref": "#/components/schemas/Standstill"},
   "cause": {"type": "string", "description": "why the machine is in this state"},
   "sentence": {"type": "string", "description": "what is going on"},
   "next_action": {"type": "string", "description": "what the operator should do, if only to wait"},

@@ -13,6 +13,7 @@ namespace {
 using nlohmann::json;
 
 constexpr auto kPoll = std::chrono::milliseconds(100);
+constexpr auto kStandstillTimeout = std::chrono::seconds(10);  ///< the service gives the drive less
 
 /// `id` empty: the job that has the rig, now or as soon as there is one.
 ExitCode follow(const Connection& connection, std::string id) {
@@ -89,6 +90,37 @@ ExitCode start(const Connection& connection, const StartVerb& verb) {
     fmt::print("{}\n", id);
   }
   return ExitCode::ok;
+}
+
+ExitCode stop(const Connection& connection, const StopVerb& verb) {
+  const auto stopped = send_request(connection.socket, "POST", "/api/v1/stop");
+  if (!stopped) return report_error(stopped.error());
+  if (!connection.json) {
+    fmt::print("{}\n", text(*stopped, "sent"));
+    if (const auto job = text(*stopped, "job"); !job.empty()) fmt::print("Job {} is interrupted.\n", job);
+  }
+  RealClock clock;
+  const auto deadline = Deadline::after(clock, kStandstillTimeout);
+  auto standstill = text(*stopped, "standstill");
+  while (verb.wait && standstill == "pending" && !deadline.expired(clock)) {
+    clock.sleep_for(kPoll);
+    const auto status = send_request(connection.socket, "GET", "/api/v1/status");
+    if (!status) return report_error(ExitCode::standstill_unknown, "stop was sent, but " + status.error().message);
+    standstill = text(*status, "standstill");
+  }
+  const bool confirmed = standstill == "confirmed" || standstill == "moving";  // it moves again: it had stopped
+  if (connection.json) {
+    auto reply = *stopped;
+    reply["standstill"] = standstill;
+    print(reply);
+  } else if (confirmed) {
+    fmt::print("The table has stopped.\n");
+  }
+  if (confirmed) return ExitCode::ok;
+  return report_error(ExitCode::standstill_unknown,
+                      standstill == "pending"
+                          ? "standstill is not confirmed yet; run scanrig status"
+                          : "the table may be moving: keep clear, check the drive's power and cable");
 }
 
 ExitCode press(const Connection& connection, const std::string& button) {

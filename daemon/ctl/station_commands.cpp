@@ -31,7 +31,9 @@ void add_station_commands(CLI::App& app, Chosen& chosen) {
   const auto begin = std::make_shared<StartVerb>();
   add_client(app, chosen, "start", "start a scan; after the flip: continue", begin, start)
       ->add_flag("--follow", begin->follow, "follow the job to its end");
-  add_button(app, chosen, "stop", "stop the table and cancel the scan");
+  const auto halt = std::make_shared<StopVerb>();
+  add_client(app, chosen, "stop", "stop the table, in every state, and wait until it has stopped", halt, stop)
+      ->add_flag("!--no-wait", halt->wait, "do not wait for standstill");
   add_button(app, chosen, "reset", "clear a fault and home the table");
   add_button(app, chosen, "reload", "begin again with the configuration file as it is now, while the rig is idle");
   add_client(app, chosen, "health", "devices, disk, temperatures, deadlines missed, retakes", std::make_shared<int>(),

@@ -36,6 +36,12 @@ ExitCode status(const Connection& connection, const StatusVerb& verb);
 ExitCode watch(const Connection& connection);
 ExitCode health(const Connection& connection);
 
+struct StopVerb {
+  bool wait = true;
+};
+/// Stop, and then what is known of the table: `ok` (standstill confirmed) or `standstill_unknown`.
+ExitCode stop(const Connection& connection, const StopVerb& verb);
+
 struct StartVerb {
   bool follow = false;
 };

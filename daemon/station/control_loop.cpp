@@ -13,6 +13,14 @@ namespace {
 constexpr auto kSignOfLife = std::chrono::seconds(1);
 constexpr auto kBlink = std::chrono::milliseconds(500);
 constexpr auto kLampTest = std::chrono::seconds(3);
+/// The active job, or the one that the request has just ended.
+std::string concerned_job(const StationState& state, const Step& step) {
+  for (const auto& action : step.actions) {
+    if (const auto* closed = std::get_if<action::CloseJob>(&action)) return closed->job;
+  }
+  return state.job ? state.job->id : std::string();
+}
+
 constexpr PanelOutputs kAllOn{true, true, true, true, true, true, true, true};
 
 }  // namespace
@@ -23,6 +31,11 @@ ControlLoop::ControlLoop(Clock& clock, ControlLoopOptions options, JobTable know
     state_ = next(state_, event::JobUpdated{job}, options_.rules).state;
   }
   state_.warm_up_left = options_.warm_up;
+  if (options_.latch) {
+    state_.latch = options_.latch;
+    state_.cause = options_.latch->cause;
+    state_.fault_device = options_.latch->device;
+  }
   publish({});
 }
 
@@ -58,11 +71,13 @@ void ControlLoop::handle(Message message, const StationPorts& ports) {
   prepare(message, ports);
   auto step = next(state_, message.event, options_.rules);
   if (step.state.shutting_down && !state_.shutting_down) give_up_ = clock_.now() + options_.shutdown_limit;
+  const bool latch_changed = step.state.latch != state_.latch;
   state_ = std::move(step.state);
   counter_.see(message.event, clock_.now());
   if (const auto ended = update(jobs_, message.event)) counter_.see(*ended);
   for (const auto& action : step.actions) carry_out(action, ports);
   show(ports);
+  if (latch_changed) ports.store_latch(state_.latch);  // the rig is being stopped; nothing is reported before this
   publish(ports);
   const auto* pressed = std::get_if<event::Pressed>(&message.event);
   if (step.refused && pressed && pressed->origin == Origin::panel) ports.refused_at_panel(*pressed, *step.refused);
@@ -108,7 +123,7 @@ void ControlLoop::answer(Message& message, const Step& step) {
   } else if (takes_a_while) {
     waiting_[last_request_id_] = std::move(message.reply);
   } else {
-    message.reply(state_.job ? state_.job->id : std::string());
+    message.reply(concerned_job(state_, step));
   }
 }
 

@@ -21,6 +21,9 @@ struct StationPorts {
   std::function<void()> alive = [] {};         ///< the loop goes round; at least once a second
   std::function<void(const Action&)> perform;  ///< everything but Warn
   std::function<void(const PanelOutputs&)> show;
+  /// A latch was set, changed or cleared: returns once it is durable, within a third of a second. What it fails with is
+  /// for the log; the latch holds all the same.
+  std::function<void(const std::optional<Latch>&)> store_latch = [](const auto&) {};
   std::function<std::string()> new_job_id;  ///< another one each time
   std::function<bool()> quiet_hours = [] { return false; };
   std::function<std::optional<Error>()> disk_problem = [] { return std::nullopt; };  ///< the jobs' does not answer
@@ -40,6 +43,7 @@ struct ControlLoopOptions {
   Clock::Duration check_period = std::chrono::seconds(2);         ///< of the devices, in quiet times
   Clock::Duration shutdown_limit = std::chrono::seconds(5);       ///< for the rig to be seen stopped
   std::chrono::seconds warm_up{0};  ///< of the projector: no job begins by itself before it was there for so long
+  std::optional<Latch> latch{};     ///< that an earlier process left
 };
 
 /// The thread of the state machine: takes events one by one, decides, hands out actions, publishes a snapshot.

@@ -26,9 +26,9 @@ void end(StepBuilder& m) {
   auto& s = m.s();
   const auto& was = *s.maintenance;
   const bool still_ready = was.before == MachineState::ready && !was.moved;
-  const auto next = s.latched ? MachineState::error : still_ready ? MachineState::ready : MachineState::halted;
+  const auto next = s.latch ? MachineState::error : still_ready ? MachineState::ready : MachineState::halted;
   s.maintenance.reset();
-  m.enter(next, "Maintenance has ended.");
+  m.enter(next, s.latch ? s.latch->cause : "Maintenance has ended.");
 }
 
 /// Whoever lets the table move in maintenance stands at the panel, or there is a guard between him and the table.
@@ -72,20 +72,13 @@ void reset_in_maintenance(StepBuilder& m, Origin origin) {
   if (!m.require_safe()) return;
   auto& maintenance = *m.s().maintenance;
   if (origin == Origin::panel) {
-    m.s().latched = false;
+    m.s().latch.reset();
     maintenance.consent = true;
   }
   maintenance.jog.reset();
   maintenance.homed = false;
   m.s().cause = "Homing was requested.";
   m.warn();
-}
-
-void stop_in_maintenance(StepBuilder& m) {
-  if (!m.may_move()) return m.refuse(ErrorCode::refused, "Nothing is moving.");
-  m.s().maintenance->homed = false;
-  m.s().cause = "Stop was pressed.";
-  m.stop_rig();
 }
 
 void move_in_maintenance(StepBuilder& m) {

@@ -33,9 +33,9 @@ std::string how_to_reset(const StationState& state, const StationRules& rules) {
   if (state.activity == Activity::stopping) return kWaitForStanding;
   if (state.unclassified) return "Wait: checking for an e-stop.";
   if (!state.panel_known) return kSeeToPanel;
-  const bool by_guard = rules.auto_home && rules.guard && state.auto_home_allowed && !state.latched;
+  const bool by_guard = rules.auto_home && rules.guard && state.auto_home_allowed && !state.latch;
   if (by_guard && !state.guard_closed) return "Keep clear, then close the guard: the table homes.";
-  if (!state.latched) return after_steps(state, "press Reset");
+  if (!state.latch) return after_steps(state, "press Reset");
   const char* const reset = "press Reset at the panel";
   return steps_before_motion(state).empty() ? fmt::format("Fix the cause, then {}.", reset) : after_steps(state, reset);
 }

@@ -5,6 +5,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "daemon/station/event_counter.h"
@@ -13,7 +14,15 @@
 
 namespace scanrig {
 
-/// Everything the station says about itself at one moment. Immutable once published.
+/// Whether the table is known to stand still.
+enum class Standstill {
+  confirmed,
+  pending,  ///< stop was sent, the drive has not confirmed yet
+  moving,   ///< by intention
+  unknown,  ///< the drive does not respond, or has not been reached yet
+};
+
+/// The state of the whole rig at one moment. Immutable once published.
 struct Snapshot {
   std::uint64_t revision = 0;
   MachineState machine = MachineState::preoperational;
@@ -33,6 +42,9 @@ struct Snapshot {
   JobTable jobs{};
   Counters counters{};
 };
+
+Standstill standstill(const Snapshot& snapshot);
+std::string_view to_string(Standstill standstill);  ///< "confirmed"
 
 /// The latest snapshot, from one writer to any number of readers.
 class Published {

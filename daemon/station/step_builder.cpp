@@ -50,8 +50,8 @@ void StepBuilder::close_job(JobState state, Error why) {
 void StepBuilder::fault(std::string cause, std::string device) {
   close_job(JobState::interrupted, {ErrorCode::stopped, cause});
   s().machine = MachineState::error;
+  s().latch = Latch{cause, device};
   s().cause = std::move(cause);
-  s().latched = true;
   s().auto_home_allowed = false;
   s().unclassified.reset();
   s().fault_device = std::move(device);
@@ -59,10 +59,31 @@ void StepBuilder::fault(std::string cause, std::string device) {
   stop_rig();
 }
 
+/// While a device failure waits for its cause, the e-stop is that cause: it takes the power of drives and adapters.
+void StepBuilder::estop(std::string_view what) {
+  const bool first = s().machine != MachineState::error || s().unclassified || !s().latch;
+  if (first) return fault(std::string(what));
+  if (s().cause.find(what) == std::string::npos) s().cause += fmt::format(" {}", what);
+  s().latch->cause = s().cause;
+  stop_rig();
+}
+
+std::string_view StepBuilder::meanwhile() {
+  switch (s().activity) {
+    case Activity::warning: return "before the table moved";
+    case Activity::homing: return "while the table was homing";
+    case Activity::jogging: return "while the table was jogging";
+    case Activity::pulsing: return "while the projector flashed";
+    case Activity::scanning: return "during a scan";
+    case Activity::storing: return "while the last views were stored";
+    default: return "while the rig was idle";
+  }
+}
+
 void StepBuilder::fault_unclassified(const event::RigFailed& failure) {
   s().machine = MachineState::error;
   s().cause = "A device failed; checking for an e-stop.";
-  s().latched = true;
+  s().latch = Latch{failure.error.message + ".", failure.device};
   s().auto_home_allowed = false;
   s().unclassified = failure.error;
   s().fault_device = failure.device;
@@ -75,6 +96,7 @@ void StepBuilder::classify_fault() {
   if (!s().unclassified) return;
   s().cause = s().unclassified->message + ".";
   s().unclassified.reset();
+  if (s().latch) s().latch->cause = s().cause;
   close_job(JobState::interrupted, {ErrorCode::stopped, s().cause});
 }
 
@@ -128,7 +150,7 @@ bool StepBuilder::require_disk() {
 bool StepBuilder::remote_may_move(std::string_view what) {
   if (!rules_.remote || !rules_.guard) {
     refuse(ErrorCode::refused, "Remote {} is disabled: use the panel.", what);
-  } else if (s().latched) {
+  } else if (s().latch) {
     refuse(ErrorCode::refused, "Fix the cause, then press Reset at the panel.");
   } else {
     return true;
@@ -146,7 +168,7 @@ void StepBuilder::begin_homing(std::string cause) {
 void StepBuilder::auto_home_if_allowed() {
   if (!rules_.auto_home || !rules_.guard || !s().auto_home_allowed) return;
   if (s().machine != MachineState::halted || s().activity != Activity::none || s().shutting_down) return;
-  if (unsafe()) return;
+  if (s().latch || unsafe()) return;
   begin_homing("The guard is closed.");
 }
 

@@ -36,6 +36,10 @@ class StepBuilder {
 
   /// Stops what moves; only Reset at the panel leaves the state.
   void fault(std::string cause, std::string device = {});
+  /// The e-stop was pressed. A fault that came first stays the cause, and this is added to it.
+  void estop(std::string_view what);
+  /// What the rig was doing, for a sentence: "while the table was homing".
+  std::string_view meanwhile();
   /// The same for a device that failed: safe at once, but it has its name only when an e-stop would have been seen,
   /// because an e-stop takes the power away from drives and adapters too.
   void fault_unclassified(const event::RigFailed& failure);
@@ -70,7 +74,6 @@ class StepBuilder {
 // maintenance.cpp
 void ask_maintenance(StepBuilder& m, const event::MaintenanceRequested& asked);
 void reset_in_maintenance(StepBuilder& m, Origin origin);
-void stop_in_maintenance(StepBuilder& m);
 /// The warning is over: what was asked for begins.
 void move_in_maintenance(StepBuilder& m);
 

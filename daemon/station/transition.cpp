@@ -15,22 +15,23 @@ class Transition : public StepBuilder {
     s().estop_ok = e.estop_ok;
     s().guard_closed = e.guard_closed;
     if (s().machine == MachineState::preoperational) {
-      s().machine = MachineState::halted;
+      s().machine = s().latch ? MachineState::error : MachineState::halted;
       stop_rig();
     }
-    if (!e.estop_ok && !s().latched) fault("The e-stop is pressed.");
+    if (!e.estop_ok && !s().latch) fault("The e-stop is pressed.");
   }
 
   void operator()(const event::InputsRead& e) { inputs_read(*this, e.inputs); }
 
   void operator()(const event::Pressed& e) {
+    if (e.button == Button::stop) return stop();
     if (s().shutting_down) return refuse(ErrorCode::refused, "The service is shutting down.");
     const bool remote = e.origin == Origin::remote;
     switch (e.button) {
       case Button::start:
         if (remote && !remote_may_move("start")) return;
         return start(e.new_job_id);
-      case Button::stop: return s().maintenance ? stop_in_maintenance(*this) : stop();
+      case Button::stop: return;  // above
       case Button::reset:
         if (s().maintenance) return reset_in_maintenance(*this, e.origin);
         if (remote && !remote_may_move("reset")) return;
@@ -40,13 +41,13 @@ class Transition : public StepBuilder {
 
   void operator()(const event::EstopChanged& e) {
     s().estop_ok = e.ok;
-    if (!e.ok) return fault("The e-stop was pressed.");
+    if (!e.ok) return estop("The e-stop was pressed.");
     auto_home_if_allowed();
   }
 
   void operator()(const event::GuardChanged& e) {
     s().guard_closed = e.closed;
-    if (!e.closed && may_move()) return fault("The guard was opened while the table was moving.");
+    if (!e.closed && may_move()) return fault(fmt::format("The guard was opened {}.", meanwhile()));
     auto_home_if_allowed();
     handle_part_signals(*this);
   }
@@ -140,7 +141,7 @@ class Transition : public StepBuilder {
       s().fault_device = "turntable";
     }
     s().machine = MachineState::error;
-    s().latched = true;
+    if (!s().latch) s().latch = Latch{s().cause, "turntable"};
     s().auto_home_allowed = false;
     s().maintenance.reset();
     s().may_be_moving = true;
@@ -256,18 +257,26 @@ class Transition : public StepBuilder {
     start_next_job(*this, new_job_id, "Start was pressed.");
   }
 
+  /// Never refused: in every state the drive is told to stop and the light goes out. The job stays resumable. Home is
+  /// lost only where something was moving, or about to.
   void stop() {
-    const Error why{ErrorCode::stopped, "Stop was pressed"};
-    if (s().activity == Activity::waiting_for_flip || s().activity == Activity::waiting_for_part) {
-      close_job(JobState::cancelled, why);
-      return enter(MachineState::ready, "Stop was pressed.");
-    }
-    if (!may_move()) return refuse(ErrorCode::refused, "Nothing is moving.");
-    close_job(JobState::cancelled, why);
-    s().machine = MachineState::halted;
+    const bool was_active = may_move();
+    if (!s().unclassified) close_job(JobState::interrupted, {ErrorCode::stopped, "Stop was pressed"});
     s().auto_home_allowed = false;
-    s().cause = "Stop was pressed.";
+    if (s().maintenance) {
+      s().maintenance->jog.reset();
+      if (was_active) s().maintenance->homed = false;
+    } else if (s().machine == MachineState::ready || executing()) {
+      s().machine = was_active ? MachineState::halted : MachineState::ready;
+    } else if (s().machine == MachineState::initialized) {
+      s().machine = MachineState::halted;
+    }
+    if (s().machine != MachineState::error && !s().shutting_down) s().cause = "Stop was pressed.";
     stop_rig();
+  }
+
+  bool executing() {
+    return s().machine == MachineState::single_execution || s().machine == MachineState::continuous_execution;
   }
 
   void reset(Origin origin) {
@@ -282,7 +291,7 @@ class Transition : public StepBuilder {
       return refuse(ErrorCode::busy, "The table is still stopping: wait.");
     }
     if (!require_safe()) return;
-    if (origin == Origin::panel) s().latched = false;
+    if (origin == Origin::panel) s().latch.reset();
     begin_homing("Reset was pressed.");
   }
 };

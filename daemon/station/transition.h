@@ -26,6 +26,13 @@ constexpr DegreesPerSecond kMaxJogSpeed{10};
 
 constexpr int kFailuresThatStop = 3;  ///< in a row: something is wrong with the line, not with a part
 
+/// A fault that only Reset at the panel clears, whatever restarts in between.
+struct Latch {
+  std::string cause;     ///< a sentence
+  std::string device{};  ///< whose failure it is, as DeviceHealth names it; empty: none, as of an e-stop
+  bool operator==(const Latch&) const = default;
+};
+
 /// The job that has the rig.
 struct ActiveJob {
   std::string id;
@@ -57,7 +64,7 @@ struct StationState {
   bool panel_known = false;  ///< what e-stop and guard say is known
   bool estop_ok = true;
   bool guard_closed = true;
-  bool latched = false;                 ///< a fault that only Reset at the panel clears
+  std::optional<Latch> latch{};
   bool auto_home_allowed = true;        ///< nothing but a restart lies behind us
   std::optional<Error> unclassified{};  ///< a fault that may turn out to be the e-stop
   std::string fault_device{};           ///< whose failure the last fault is; empty: nobody's, as of an e-stop

@@ -19,7 +19,7 @@ class HangingDisk : public Station {
     EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::interrupted);
     EXPECT_THAT(asked_for<action::CloseJob>()->why.message, HasSubstr("/jobs has not answered"));
     EXPECT_FALSE(state.job);
-    EXPECT_FALSE(state.latched) << "it is no fault of the rig";
+    EXPECT_FALSE(state.latch) << "it is no fault of the rig";
   }
 };
 

@@ -213,6 +213,7 @@ TEST_F(Queue, StopEndsTheLineAndStartIsAPartToo) {
   EXPECT_NE(asked_for<action::StartJob>(), nullptr) << "somebody says that the part is there";
   scan("1");
   press(Button::stop);
+  tell(event::Stopped{});
   EXPECT_EQ(state.machine, MachineState::ready);
   see(false);
   see(true);

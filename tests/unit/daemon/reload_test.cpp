@@ -77,7 +77,7 @@ TEST_F(AskedToReload, ALatchedFaultIsNotGotRidOf) {
   tell(event::Stopped{});
   tell(event::EstopChanged{true});
   expect_refused("press Reset");
-  EXPECT_TRUE(state.latched);
+  EXPECT_TRUE(state.latch);
 }
 
 TEST_F(AskedToReload, AShutdownThatComesMeanwhileWins) {

@@ -193,6 +193,26 @@ TEST_F(Safety, AnEstopWithinTheWindowGivesItsNameToFaultAndJob) {
   EXPECT_THAT(state.cause, HasSubstr("e-stop"));
 }
 
+TEST_F(Safety, AnEstopAfterAFaultIsAddedToItsCause) {
+  begin_scan();
+  tell(event::RigFailed{kNoReply});
+  tell(event::EstopWindowOver{});
+  tell(event::EstopChanged{false});
+  EXPECT_EQ(state.cause, "turntable: no reply. The e-stop was pressed.");
+  EXPECT_EQ(state.latch->cause, state.cause);
+  EXPECT_NE(asked_for<action::StopRig>(), nullptr);
+  tell(event::EstopChanged{true});
+  tell(event::EstopChanged{false});
+  EXPECT_EQ(state.cause, "turntable: no reply. The e-stop was pressed.") << "once";
+}
+
+TEST_F(Safety, AnOpenedGuardIsReportedWithWhatTheRigWasDoing) {
+  start_up();
+  press(Button::reset);
+  tell(event::GuardChanged{false});
+  EXPECT_EQ(state.cause, "The guard was opened before the table moved.");
+}
+
 TEST_F(Safety, WhatFailsAfterAnEstopDoesNotTakeItsName) {
   begin_scan();
   tell(event::EstopChanged{false});

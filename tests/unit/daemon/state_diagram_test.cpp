@@ -130,7 +130,7 @@ std::string key(const Node& node, bool with_jobs) {
   const bool line = s.machine == MachineState::continuous_execution;  // parts matter to nobody else
   const bool require_devices =
       std::ranges::none_of(s.devices, [](const auto& device) { return device.problem.has_value(); });
-  for (const bool flag : {s.panel_known, s.estop_ok, s.guard_closed, s.latched, s.unclassified.has_value(),
+  for (const bool flag : {s.panel_known, s.estop_ok, s.guard_closed, s.latch.has_value(), s.unclassified.has_value(),
                           s.may_be_moving, line && s.part_gone, line && s.inputs.part_present, require_devices}) {
     key += flag ? '1' : '0';
   }
@@ -154,6 +154,7 @@ struct Walk {
   std::map<std::string, OperatorMessage> words;  ///< of the machine, where it was met first
   std::set<std::string> wordless;                ///< states that say nothing, or not what to do
   std::set<std::string> untrue;                  ///< what they say to do and is refused
+  std::set<std::string> unstoppable;             ///< states in which Stop is refused, not sent, or cancels a job
   std::size_t states = 0;
 };
 
@@ -180,6 +181,20 @@ void listen(const Node& node, const StationRules& rules, Walk& walk) {
     if (!told(what)) continue;
     const auto step = next(state, event, rules);
     if (step.refused) walk.untrue.insert(fmt::format("{}: {} But: {}", name, words.next_action, step.refused->message));
+  }
+}
+
+void press_stop(const Node& node, const StationRules& rules, Walk& walk) {
+  for (const auto origin : {Origin::panel, Origin::remote}) {
+    const auto step = next(node.state, event::Pressed{Button::stop, origin, {}}, rules);
+    const auto has = [&](const auto& is_it) { return std::ranges::any_of(step.actions, is_it); };
+    const bool sent = has([](const Action& a) { return std::holds_alternative<action::StopRig>(a); });
+    const bool cancels = has([](const Action& a) {
+      const auto* close = std::get_if<action::CloseJob>(&a);
+      return close && close->state != JobState::interrupted;
+    });
+    const bool stopping = step.state.activity == Activity::stopping;
+    if (step.refused || !sent || cancels || !stopping) walk.unstoppable.insert(machine_state(node));
   }
 }
 
@@ -242,6 +257,7 @@ void walk(const std::vector<Named>& events, bool with_jobs, Walk& walk) {
     const Node before = std::move(open.front());
     open.pop_front();
     listen(before, rules, walk);
+    press_stop(before, rules, walk);
     for (const auto& [name, event] : events) {
       if (!can_happen(before, event)) continue;
       auto step = next(before.state, event, rules);
@@ -357,6 +373,8 @@ TEST_F(StateDiagram, EveryStateOfMachineAndJobSaysWhatToDo) {
   EXPECT_TRUE(drawn.contains("Operational.ContinuousExecution: waiting_for_part"));
   EXPECT_THAT(whole().wordless, testing::IsEmpty());
 }
+
+TEST_F(StateDiagram, StopIsObeyedInEveryState) { EXPECT_THAT(whole().unstoppable, testing::IsEmpty()); }
 
 TEST_F(StateDiagram, WhatAStateSaysToDoIsNotRefused) { EXPECT_THAT(whole().untrue, testing::IsEmpty()); }
 

@@ -125,12 +125,12 @@ TEST_F(Station, IgnoresStartWhileBusy) {
   EXPECT_EQ(state.job->asked, before);
 }
 
-TEST_F(Station, StopCancelsTheJobAndEndsHaltedWhenSeenStanding) {
+TEST_F(Station, StopInterruptsTheJobAndEndsHaltedAfterStandstill) {
   begin_scan();
   press(Button::stop);
   EXPECT_NE(asked_for<action::StopRig>(), nullptr);
   ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
-  EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::cancelled);
+  EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::interrupted) << "only Cancel cancels";
   tell(event::RigFailed{{ErrorCode::stopped, "turntable: stopped"}});
   EXPECT_EQ(state.machine, MachineState::halted) << "a move cut short by Stop is no fault";
   EXPECT_EQ(state.activity, Activity::stopping);
@@ -149,14 +149,44 @@ TEST_F(Station, StopWhileWaitingForTheFlipNeedsNoHoming) {
   reach_flip();
   press(Button::stop);
   ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
+  EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::interrupted);
+  EXPECT_NE(asked_for<action::StopRig>(), nullptr);
+  tell(event::Stopped{});
+  EXPECT_EQ(state.machine, MachineState::ready);
+  EXPECT_EQ(state.activity, Activity::none);
+}
+
+TEST_F(Station, StopWhenNothingMovesIsSentAllTheSameAndKeepsHome) {
+  get_ready();
+  for (int press_count = 0; press_count < 2; ++press_count) {
+    press(Button::stop);
+    EXPECT_FALSE(refused);
+    EXPECT_NE(asked_for<action::StopRig>(), nullptr);
+  }
+  tell(event::Stopped{});
   EXPECT_EQ(state.machine, MachineState::ready);
 }
 
-TEST_F(Station, StopIsRefusedWhenNothingMoves) {
-  get_ready();
+TEST_F(Station, StopWhileShuttingDownIsSentToo) {
+  begin_scan();
+  tell(event::Shutdown{});
   press(Button::stop);
-  ASSERT_TRUE(refused);
-  EXPECT_EQ(refused->code, ErrorCode::refused);
+  EXPECT_FALSE(refused);
+  EXPECT_NE(asked_for<action::StopRig>(), nullptr);
+}
+
+TEST_F(Station, ALatchOfAnEarlierProcessNeedsResetAtThePanel) {
+  rules.guard = rules.auto_home = rules.remote = true;
+  state.latch = Latch{"The e-stop was pressed."};
+  state.cause = state.latch->cause;
+  start_up();
+  EXPECT_EQ(state.machine, MachineState::error) << "a closed guard does not home over a latch";
+  EXPECT_EQ(state.cause, "The e-stop was pressed.");
+  press(Button::reset, Origin::remote);
+  EXPECT_TRUE(refused);
+  press(Button::reset);
+  EXPECT_FALSE(state.latch);
+  EXPECT_EQ(state.machine, MachineState::initialized);
 }
 
 TEST_F(Station, AFaultLatchesUntilReset) {
@@ -236,7 +266,7 @@ TEST_F(Station, AFullDiskInterruptsTheJobAndStopsTheTableButLatchesNothing) {
   take(0, 0);
   tell(event::StoreFailed{"job", {ErrorCode::io, "cannot write: No space left on device"}});
   EXPECT_EQ(state.machine, MachineState::halted);
-  EXPECT_FALSE(state.latched);
+  EXPECT_FALSE(state.latch);
   EXPECT_NE(asked_for<action::StopRig>(), nullptr);
   EXPECT_THAT(state.cause, HasSubstr("No space left on device; see to the disk"));
   ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
@@ -272,7 +302,7 @@ TEST_F(Station, AFaultIsNotForgottenOverAFullDisk) {
   tell(event::StoreFailed{"job", {ErrorCode::io, "cannot write: No space left on device"}});
   tell(event::EstopWindowOver{});
   EXPECT_EQ(state.machine, MachineState::error);
-  EXPECT_TRUE(state.latched);
+  EXPECT_TRUE(state.latch);
   EXPECT_EQ(state.cause, "turntable: no reply.");
 }
 

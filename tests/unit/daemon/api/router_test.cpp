@@ -141,7 +141,7 @@ TEST_F(Api, AnotherMethodIsNotTaken) {
 
 TEST_F(Api, ABodyIsForRoutesThatTakeOne) {
   EXPECT_EQ(ask("POST", "/api/v1/stop", R"({"now":true})").first, 400u);
-  EXPECT_EQ(ask("POST", "/api/v1/stop", "{}").first, 409u) << "nothing is moving";
+  EXPECT_EQ(ask("POST", "/api/v1/stop", "{}").first, 200u) << "stop is never refused";
 }
 
 TEST_F(Api, NobodyLearnsNothingNotEvenWhatIsThere) {
@@ -157,7 +157,7 @@ TEST_F(Api, TooLowARoleIsToldWhichIsNeeded) {
   EXPECT_EQ(status, 403u);
   EXPECT_THAT(json["error"]["message"].get<std::string>(), HasSubstr("operator"));
   EXPECT_EQ(ask("POST", "/api/v1/maintenance/on", "", Role::operating).first, 403u);
-  EXPECT_EQ(ask("POST", "/api/v1/stop", "", Role::viewer).first, 409u) << "anybody may stop; nothing is moving";
+  EXPECT_EQ(ask("POST", "/api/v1/stop", "", Role::viewer).first, 200u) << "any role may stop";
 }
 
 TEST_F(Api, HealthNamesEveryProblem) {
