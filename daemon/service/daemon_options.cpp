@@ -1,5 +1,7 @@
 #include "daemon/service/daemon_options.h"
 
+#include <cstdlib>
+
 #include "core/hash.h"
 #include "daemon/jobs/pipeline_reconstructor.h"
 #include "daemon/jobs/process_reconstructor.h"
@@ -47,6 +49,12 @@ ReconstructorFactory reconstructor_from(const config::ReconstructionConfig& conf
   return pipeline_reconstructor(options, gib(config.memory_gib));
 }
 
+/// systemd's, else beside the jobs; no job's id begins with a dot.
+std::filesystem::path state_folder(const std::filesystem::path& root) {
+  const char* const given = std::getenv("STATE_DIRECTORY");
+  return given && *given ? std::filesystem::path(given) : root / ".state";
+}
+
 }  // namespace
 
 DaemonOptions options_from(const config::RigConfig& config) {
@@ -57,6 +65,7 @@ DaemonOptions options_from(const config::RigConfig& config) {
                   .profile = "",
                   .config_sha256 = sha256(config.text),
                   .reserve_bytes = gib(config.storage.reserve_gib)};
+  options.state_folder = state_folder(config.storage.root);
   options.recipes.clear();
   for (const auto& [name, recipe] : config.recipes) options.recipes[name] = recipe_from(name, recipe);
   options.retention = {.keep_for = config.storage.keep_days, .keep_bytes = {}};

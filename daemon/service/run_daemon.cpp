@@ -9,6 +9,7 @@
 #include "daemon/rig/rig_thread.h"
 #include "daemon/runtime/overloaded.h"
 #include "daemon/service/exit_watchdog.h"
+#include "daemon/service/safety_record.h"
 #include "daemon/station/timestamp.h"
 #include "daemon/webhook/webhook.h"
 
@@ -95,6 +96,38 @@ std::optional<Error> disk_problem(Clock::Duration waiting, const DaemonOptions& 
                            std::chrono::duration_cast<std::chrono::seconds>(waiting).count())};
 }
 
+/// The record of one run, if there is one. An end counts as unexpected unless nothing was using the devices.
+class RecordedRun {
+ public:
+  explicit RecordedRun(const std::filesystem::path& state_folder) {
+    if (state_folder.empty()) return;
+    record_.emplace(state_folder);
+    auto latch = record_->begin();
+    // Where nothing can be read, the last process may have left a fault: a person has to look first.
+    latch_ = latch ? std::move(*latch) : Latch{as_sentence(latch.error().message)};
+  }
+  ~RecordedRun() {
+    writer_.reset();
+    if (record_ && !uses_devices_) std::ignore = record_->end();
+  }
+  RecordedRun(const RecordedRun&) = delete;
+  RecordedRun& operator=(const RecordedRun&) = delete;
+
+  [[nodiscard]] const std::optional<Latch>& latch() const { return latch_; }
+  void begin_devices() {
+    uses_devices_ = true;
+    if (record_) writer_.emplace(*record_);
+  }
+  void end_devices() { uses_devices_ = false; }
+  Result<void> store(const std::optional<Latch>& latch) { return writer_ ? writer_->store(latch) : Result<void>(); }
+
+ private:
+  std::optional<SafetyRecord> record_;
+  std::optional<LatchWriter> writer_;
+  std::optional<Latch> latch_;
+  bool uses_devices_ = false;
+};
+
 /// By the clock on the wall of this machine.
 bool quiet_now(const std::optional<QuietHours>& hours) {
   if (!hours) return false;
@@ -114,12 +147,14 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
   auto known = store->recover();
   if (!known) return pass_on(known);
 
+  RecordedRun record(options.state_folder);
   const StationRules rules{.recipes = options.recipes,
                            .remote = options.remote,
                            .guard = options.guard,
                            .auto_home = options.auto_home,
                            .manual_light = options.manual_light};
-  ControlLoop loop(clock, {.rules = rules, .warning = options.warning, .warm_up = options.warm_up}, *known);
+  ControlLoop loop(
+      clock, {.rules = rules, .warning = options.warning, .warm_up = options.warm_up, .latch = record.latch()}, *known);
   const auto post_event = [&loop](Event event) { loop.post(std::move(event)); };
 
   const OnLoop reachable(options, loop);
@@ -133,6 +168,7 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
   auto api = ApiServer::start(api_options, loop);
   if (!api) return pass_on(api);
   if (auto may = options.takes_devices(); !may) return pass_on(may);
+  record.begin_devices();
 
   // Time stands until every thread is there. They end in reverse order: the panel shows the last lamps, the rig is
   // seen standing, what was taken goes to disk, then the reconstruction that all of them feed is stopped.
@@ -144,6 +180,11 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
   housekeeping.sweep();
   JobThread jobs(clock, *store, reconstruction, options.on_scanned, post_event);
   RigThread rig(devices, clock, options.acquisition, preview, post_event);
+  const auto store_latch = [&](const std::optional<Latch>& latch) {
+    if (auto stored = record.store(latch); !stored) {
+      options.journal({Priority::error, as_sentence(stored.error().message)});
+    }
+  };
   std::optional<Webhook> webhook;
   if (options.webhook) webhook.emplace(clock, *options.webhook);
   PanelThread panel(devices.panel, clock, post_event, [&rig] { rig.interrupt(); });
@@ -169,6 +210,7 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
   auto ended = loop.run({.alive = [&] { options.alive(loop.snapshot()->sentence); },
                          .perform = perform_all,
                          .show = [&](const PanelOutputs& outputs) { panel.show(outputs); },
+                         .store_latch = store_latch,
                          .new_job_id = [&] { return new_id(loop.snapshot()->jobs); },
                          .quiet_hours = [&] { return quiet_now(options.quiet_hours); },
                          .disk_problem = [&] { return disk_problem(jobs.waiting(), options); },
@@ -177,6 +219,7 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
                          .refused_at_panel = refused});
   ending.begin();
   reconstruction.stop();  // before views that are still being stored cost the time it has
+  if (ended) record.end_devices();
   return ended;
 }
 

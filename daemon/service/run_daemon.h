@@ -34,6 +34,7 @@ struct QuietHours {
 
 struct DaemonOptions {
   JobStoreOptions jobs;
+  std::filesystem::path state_folder{};                     ///< of the latch; empty: it does not outlive the process
   std::map<std::string, Recipe> recipes{{"default", {}}};   ///< "default" is what Start scans when nothing is queued
   std::optional<QuietHours> quiet_hours{};                  ///< no job begins by itself then
   std::chrono::seconds warm_up{0};                          ///< of the projector; nor before it is warm
