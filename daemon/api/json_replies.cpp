@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "daemon/station/job_lifecycle.h"
 #include "daemon/station/operator_message.h"
 
 namespace scanrig {
@@ -40,7 +41,7 @@ ordered_json to_json(const JobInfo& job) {
           {"poses", job.recipe.poses},
           {"views", job.recipe.views},
           {"stored", job.stored.size()},
-          {"resumable", job.resumable},
+          {"resumable", is_resumable(job)},
           {"quarantined", job.quarantined},
           {"exported", job.exported},
           {"passed", job.passed ? ordered_json(*job.passed) : ordered_json(nullptr)},

@@ -155,12 +155,6 @@ Result<void> begin_attempt(const fs::path& job_folder) {
 
 void forget_attempts(const fs::path& job_folder) { std::ignore = remove_file_synced(job_folder / kAttempt); }
 
-Error quarantine_error() {
-  return {ErrorCode::internal,
-          fmt::format("quarantined after {} crashes during reconstruction; send a bundle to support or reprocess",
-                      kAttemptsThatQuarantine)};
-}
-
 std::optional<Error> limit_violation(const fs::path& report, const Limits& limits) {
   if (limits == Limits{}) return std::nullopt;
   const auto text = read_file(report);

@@ -35,8 +35,6 @@ Result<void> write_failure(const std::filesystem::path& job_folder, const Error&
 std::optional<Error> read_failure(const std::filesystem::path& job_folder);
 void remove_failure(const std::filesystem::path& job_folder);
 
-/// So many models in a row whose making began and never ended make a quarantine: the daemon died with each.
-constexpr int kAttemptsThatQuarantine = 2;
 /// attempt.json, written durably before a model is made of a whole scan, and removed when that ends in any way but the
 /// daemon's death. While views are being taken there is none.
 struct AttemptRecord {
@@ -48,8 +46,6 @@ AttemptRecord read_attempt_record(const std::filesystem::path& job_folder);
 Result<void> begin_attempt(const std::filesystem::path& job_folder);
 /// Durable. Where the disk does not take it, the mark counts once too often.
 void forget_attempts(const std::filesystem::path& job_folder);
-/// What is said of a job in quarantine.
-Error quarantine_error();
 
 /// Why the model of report.json is beyond the limits; nothing when it is within, or when none are set. A report that
 /// cannot be read passes nothing.

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "daemon/station/job_table.h"
+#include "daemon/station/job_lifecycle.h"
 
 struct sqlite3;
 

@@ -9,7 +9,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kLayout = 5;  ///< to be raised with every change below
+constexpr int kLayout = 6;  ///< to be raised with every change below
 
 json to_json(const std::optional<Error>& error) {
   if (!error) return nullptr;
@@ -54,7 +54,6 @@ void read(const json& j, JobInfo& job) {
   job.folder = j.at("folder");
   job.state = parse_job_state(j.at("state").get<std::string>()).value();
   job.complete = j.at("complete");
-  job.resumable = j.at("resumable");
   job.quarantined = j.at("quarantined");
   if (!j.at("passed").is_null()) job.passed = j.at("passed").get<bool>();
   job.error = error_from(j.at("error"));
@@ -77,7 +76,6 @@ std::string to_record(const JobInfo& job) {
                   {"folder", job.folder},
                   {"state", to_string(job.state)},
                   {"complete", job.complete},
-                  {"resumable", job.resumable},
                   {"quarantined", job.quarantined},
                   {"passed", job.passed ? json(*job.passed) : json()},
                   {"error", to_json(job.error)},

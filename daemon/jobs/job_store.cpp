@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/files.h"
+#include "daemon/jobs/job_files.h"
 #include "daemon/jobs/job_index.h"
 #include "daemon/station/timestamp.h"
 
@@ -43,40 +44,16 @@ void take_views(JobInfo& job, const Manifest& manifest) {
   }
 }
 
-/// The state of a scan that has all its views.
-void settle_scanned(JobInfo& job) {
+FolderFacts facts_of(const JobInfo& job, const std::string& manifest_state) {
   std::error_code ignored;
-  if (fs::exists(report_file(job.folder), ignored)) {
-    job.model = model_file(job.folder);
-    job.report = report_file(job.folder);
-  }
   const auto attempts = read_attempt_record(job.folder);
-  job.quarantined = !attempts.running && attempts.ended_by_death >= kAttemptsThatQuarantine;
-  job.error = job.quarantined ? quarantine_error() : read_failure(job.folder);
-  if (job.error) {
-    job.state = job.error->code == ErrorCode::stopped ? JobState::cancelled : JobState::failed;
-  } else if (job.report.empty() || attempts.running) {
-    job.state = JobState::reconstructing;
-  } else {
-    job.state = JobState::done;
-    job.error = limit_violation(job.report, job.recipe.limits);
-    job.passed = !job.error;
-  }
-}
-
-/// The state of one that has not. What was being scanned when the daemon ended is interrupted.
-void settle_unfinished(JobInfo& job, const std::string& manifest_state) {
-  job.state = parse_job_state(manifest_state).value_or(JobState::interrupted);
-  if (job.state == JobState::queued) return;
-  if (job.state == JobState::scanning || job.state == JobState::waiting_for_flip) {
-    job.state = JobState::interrupted;
-    job.error = Error{ErrorCode::stopped, "the daemon ended during the scan"};
-  } else {
-    job.error = read_failure(job.folder).value_or(Error{ErrorCode::stopped, "the scan was " + manifest_state});
-  }
-  const bool moved =
-      std::ranges::any_of(job.movement_checks, [](const auto& movement_check) { return !movement_check.unmoved; });
-  job.resumable = job.state == JobState::interrupted && !moved;
+  FolderFacts facts{.manifest_state = manifest_state,
+                    .has_report = fs::exists(report_file(job.folder), ignored),
+                    .failure = read_failure(job.folder),
+                    .deaths = attempts.ended_by_death,
+                    .is_running = attempts.running};
+  if (facts.has_report) facts.limit_violation = limit_violation(report_file(job.folder), job.recipe.limits);
+  return facts;
 }
 
 Result<JobInfo> read_folder(const fs::path& folder, const ScanFolder& scan) {
@@ -87,14 +64,12 @@ Result<JobInfo> read_folder(const fs::path& folder, const ScanFolder& scan) {
               .recipe = std::move(order->recipe),
               .part = std::move(order->part),
               .place = order->place,
-              .exported = order->exported};
+              .exported = order->exported,
+              .model = model_file(folder),
+              .report = report_file(folder)};
   take_views(job, scan.manifest());
-  if (scan.manifest().state == "scanned") {
-    settle_scanned(job);
-  } else {
-    settle_unfinished(job, scan.manifest().state);
-  }
-  return job;
+  const auto facts = facts_of(job, scan.manifest().state);
+  return with_state_of_folder(std::move(job), facts);
 }
 
 JobInfo recover_job(const fs::path& folder) {

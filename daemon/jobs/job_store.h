@@ -6,7 +6,7 @@
 
 #include "core/result.h"
 #include "daemon/jobs/job_files.h"
-#include "daemon/station/job_table.h"
+#include "daemon/station/job_lifecycle.h"
 #include "pipeline/storage/scan_folder.h"
 
 namespace scanrig {

@@ -10,6 +10,7 @@
 #include "daemon/runtime/actor_thread.h"
 #include "daemon/runtime/catch_exceptions.h"
 #include "daemon/runtime/overloaded.h"
+#include "daemon/station/job_lifecycle.h"
 #include "pipeline/movement/turned_table.h"
 
 namespace scanrig {
@@ -182,7 +183,7 @@ void JobThread::handle(const action::MoveJob& task) { answer(task.request_id, mo
 Result<void> JobThread::move(const action::MoveJob& task) {
   auto job = store_.read(task.job);
   if (!job) return pass_on(job);
-  if (task.resume && !job->resumable) {
+  if (task.resume && !is_resumable(*job)) {
     return fail(ErrorCode::refused, "job {} is {} and cannot be resumed: order a new one", task.job,
                 to_string(job->state));
   }
@@ -350,8 +351,7 @@ void JobThread::handle(const action::CloseJob& task) {
   if (closed) closed = write_failure(scan_->path(), task.why);
   // On a disk that takes nothing more the job is found unfinished at the next start, and interrupted then.
   scan_.reset();
-  const auto job = store_.read(task.job);
-  post_event_(event::JobClosed{task.job, task.state, task.why, job && job->resumable});
+  post_event_(event::JobClosed{task.job, task.state, task.why});
 }
 
 }  // namespace scanrig

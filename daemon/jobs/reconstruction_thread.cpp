@@ -10,6 +10,7 @@
 #include "daemon/jobs/job_files.h"
 #include "daemon/runtime/actor_thread.h"
 #include "daemon/runtime/catch_exceptions.h"
+#include "daemon/station/job_lifecycle.h"
 
 namespace scanrig {
 namespace {

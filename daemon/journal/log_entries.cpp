@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "daemon/station/job_lifecycle.h"
+
 namespace scanrig {
 namespace {
 
@@ -115,7 +117,7 @@ void tell_state(const JobInfo& job, Entries& entries) {
   const bool bad = job.state == JobState::failed || job.state == JobState::interrupted || job.passed == false;
   std::string text(to_string(job.state));
   if (job.error) text += fmt::format(" ({}): {}", to_string(job.error->code), job.error->message);
-  if (job.state == JobState::interrupted && job.resumable) text += "; it can be resumed";
+  if (is_resumable(job)) text += "; it can be resumed";
   if (job.quarantined) text += "; quarantined";
   entries.push_back({bad ? Priority::error : Priority::notice, text + ".", job.id});
 }

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "core/clock.h"
-#include "daemon/station/job_table.h"
+#include "daemon/station/job_lifecycle.h"
 
 namespace scanrig {
 

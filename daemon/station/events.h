@@ -189,7 +189,6 @@ struct JobClosed {
   std::string job;
   JobState state;
   Error why;
-  bool resumable = false;
 };
 struct StoreFailed {
   std::string job;

@@ -46,7 +46,6 @@ struct JobInfo {
   std::vector<StoredView> stored{};
   std::vector<std::string> config_sha256{};  ///< of each configuration they were taken under
   std::vector<MovementCheck> movement_checks{};
-  bool resumable = false;            ///< interrupted, and the missing views may still be taken
   bool quarantined = false;          ///< two daemons died over its reconstruction: only `reprocess` tries again
   bool exported = false;             ///< somebody has what he needs of it
   std::optional<bool> passed{};      ///< done: whether the model is within the recipe's limits

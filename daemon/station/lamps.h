@@ -1,6 +1,6 @@
 #pragma once
 
-#include "daemon/station/job_table.h"
+#include "daemon/station/job_lifecycle.h"
 #include "daemon/station/transition.h"
 #include "drivers/panel/panel.h"
 

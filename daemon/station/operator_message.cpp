@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cctype>
 
+#include "daemon/station/job_lifecycle.h"
+
 namespace scanrig {
 namespace {
 
@@ -218,7 +220,7 @@ OperatorMessage when_failed(const JobInfo& job) {
 
 OperatorMessage when_interrupted(const JobInfo& job) {
   const auto sentence = fmt::format("Interrupted: {}.", why(job));
-  if (!job.resumable) return {sentence, "Cancel the job, then scan the part again."};
+  if (!is_resumable(job)) return {sentence, "Cancel the job, then scan the part again."};
   if (views_of_pose(job) > 0) return {sentence, "Do not move the part. Resume the job, then press Start."};
   if (job.complete > 0) return {sentence, "Put its part on the table, turned over. Resume the job, then press Start."};
   return {sentence, "Put its part on the table. Resume the job, then press Start."};

@@ -39,7 +39,7 @@ void fail_before_flip(StepBuilder& m) {
 /// is stored stays, and with room again the job can be resumed.
 void interrupt(StepBuilder& m, const Error& why, const char* then) {
   const auto id = m.s().job->id;
-  const bool begun = m.s().job->state != JobState::queued;
+  const bool begun = m.s().job->is_started;
   m.close_job(JobState::interrupted, why);
   if (m.s().machine == MachineState::error) return;  // a fault came first and has the word
   auto cause =
@@ -57,7 +57,7 @@ void job_started(StepBuilder& m, const event::JobStarted& e) {
   if (!m.is_active(e.job)) return;
   auto& job = *m.s().job;
   m.s().disk_trouble = false;
-  job.state = JobState::scanning;
+  job.is_started = true;
   job.pose = e.pose;
   job.asked = job.taken = job.stored = e.stored;
   job.movement_check_due = e.stored > 0;  // is the object still where the stored views saw it?
@@ -65,7 +65,7 @@ void job_started(StepBuilder& m, const event::JobStarted& e) {
 }
 
 void take_next_view(StepBuilder& m) {
-  if (m.s().activity != Activity::scanning || m.s().job->state != JobState::scanning) return;
+  if (m.s().activity != Activity::scanning || !m.s().job->is_started) return;
   auto& job = *m.s().job;
   if (job.closing || job.asked > job.taken || job.taken - job.stored >= kMaxUnstored) return;
   if (job.movement_check_due) {
@@ -118,7 +118,6 @@ void pose_stored(StepBuilder& m, const event::PoseStored& e) {
   } else if (s.job->reconstruction) {
     fail_before_flip(m);
   } else {
-    s.job->state = JobState::waiting_for_flip;
     s.activity = Activity::waiting_for_flip;
     s.cause = fmt::format("Pose {} is complete.", e.pose + 1);
     m.act(action::WaitForFlip{e.job, s.job->recipe.flip_timeout});
@@ -133,7 +132,6 @@ void model_given_up(StepBuilder& m, const Error& why) {
 
 void continue_after_flip(StepBuilder& m, std::string cause) {
   auto& job = *m.s().job;
-  job.state = JobState::scanning;
   ++job.pose;
   job.asked = job.taken = job.stored = 0;
   job.turned_over = false;
@@ -146,7 +144,7 @@ void store_failed(StepBuilder& m, const event::StoreFailed& e) {
   if (!m.is_active(e.job)) return;
   const bool disk = e.error.code == ErrorCode::io;
   m.s().disk_trouble = disk;
-  if (m.s().job->state == JobState::queued) m.s().not_started = {e.job, e.error};
+  if (!m.s().job->is_started) m.s().not_started = {e.job, e.error};
   interrupt(m, e.error, disk ? "; check the disk, then resume the job" : "");
 }
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "daemon/station/event_counter.h"
-#include "daemon/station/job_table.h"
+#include "daemon/station/job_lifecycle.h"
 #include "daemon/station/states.h"
 
 namespace scanrig {

@@ -37,8 +37,8 @@ struct Latch {
 struct ActiveJob {
   std::string id;
   Recipe recipe{};
-  std::string part{};  ///< of the order
-  JobState state = JobState::queued;
+  std::string part{};       ///< of the order
+  bool is_started = false;  ///< its folder is ready for views
   int pose = 0;
   int asked = 0;                          ///< views of this pose the rig was told to take
   int taken = 0;                          ///< views whose four images are in memory

@@ -133,7 +133,7 @@ class Shift {
     if (!get_ready()) return false;
     const auto found = loop_->snapshot();
     for (const auto& [id, job] : found->jobs) {
-      if (job->state == JobState::interrupted) ask(job->resumable ? What::resume : What::cancel, id);
+      if (job->state == JobState::interrupted) ask(is_resumable(*job) ? What::resume : What::cancel, id);
     }
     while (!loop_->snapshot()->queue.empty()) {
       if (!start()) return false;

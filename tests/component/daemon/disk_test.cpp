@@ -125,7 +125,7 @@ TEST_F(BadDisk, TakingNothingAtTheStartItLeavesAJobToBeResumed) {
   boot();
   get_ready();
   EXPECT_EQ(job(id)->state, JobState::interrupted);
-  EXPECT_TRUE(job(id)->resumable);
+  EXPECT_TRUE(is_resumable(*job(id)));
   const auto refused = resume(id);
   ASSERT_FALSE(refused);
   EXPECT_THAT(refused.error().message, HasSubstr(std::strerror(EROFS)));

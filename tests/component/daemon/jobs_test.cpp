@@ -175,7 +175,7 @@ TEST_F(Jobs, AnInterruptedScanGoesOnWhereItStopped) {
   boot();
   get_ready();
   const auto id = interrupted_after(2);
-  EXPECT_TRUE(job(id)->resumable);
+  EXPECT_TRUE(is_resumable(*job(id)));
   const auto before = rig.line.exposures;
   ASSERT_TRUE(ask_for(What::resume, id));
   finish(id);
@@ -197,7 +197,7 @@ TEST_F(Jobs, AScanGoesOnAfterTheDaemonDiedToo) {
   boot();
   get_ready();
   EXPECT_THAT(job(id)->config_sha256, ElementsAre(std::string(64, 'a')));
-  EXPECT_TRUE(job(id)->resumable);
+  EXPECT_TRUE(is_resumable(*job(id)));
   EXPECT_EQ(rig.turntable.moving, false);
   ASSERT_TRUE(ask_for(What::resume, id));
   finish(id);
@@ -216,7 +216,7 @@ TEST_F(Jobs, AnObjectThatWasTouchedIsNotGoneOnWith) {
   rig.panel.press(&PanelInputs::start);
   EXPECT_TRUE(wait_state(id, JobState::interrupted));
   EXPECT_EQ(job(id)->error->code, ErrorCode::moved);
-  EXPECT_FALSE(job(id)->resumable);
+  EXPECT_FALSE(is_resumable(*job(id)));
   EXPECT_TRUE(fs::exists(job_folders()[0] / "pose1" / "movement00_left.png")) << "evidence";
   ASSERT_TRUE(wait_ready());
   EXPECT_EQ(ask_for(What::resume, id).error().code, ErrorCode::refused);

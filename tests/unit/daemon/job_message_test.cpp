@@ -70,8 +70,9 @@ TEST(JobWords, AnInterruptedJobSaysWhereItsObjectBelongs) {
   auto j = job(JobState::interrupted);
   j.error = Error{ErrorCode::stopped, "the e-stop was pressed"};
   EXPECT_EQ(describe(j).sentence, "Interrupted: the e-stop was pressed.");
+  j.movement_checks = {{.unmoved = false}};
   EXPECT_EQ(describe(j).next_action, "Cancel the job, then scan the part again.") << "it moved";
-  j.resumable = true;
+  j.movement_checks.clear();
   EXPECT_EQ(describe(j).next_action, "Put its part on the table. Resume the job, then press Start.");
   j.stored = {{.pose = 0, .view = 0}};
   EXPECT_EQ(describe(j).next_action, "Do not move the part. Resume the job, then press Start.");

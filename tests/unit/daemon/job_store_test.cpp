@@ -115,7 +115,7 @@ TEST_F(JobStoreTest, AnInterruptedJobIsOneToResumeThoughTheDiskDoesNotTakeItsMar
     if (disk_is_back) fs::remove(in_the_way);
     const auto job = recovered(store, "job");
     EXPECT_EQ(job.state, JobState::interrupted);
-    EXPECT_TRUE(job.resumable);
+    EXPECT_TRUE(is_resumable(job));
     EXPECT_EQ(job.stored.size(), 1u);
   }
 }
@@ -179,11 +179,11 @@ TEST_F(JobStoreTest, AQueuedJobKeepsItsOrderAndItsPlace) {
 TEST_F(JobStoreTest, AnInterruptedJobIsResumableUnlessItsObjectMoved) {
   const auto store = open();
   const auto folder = make_job(store, "job", "interrupted");
-  EXPECT_TRUE(recovered(store, "job").resumable);
+  EXPECT_TRUE(is_resumable(recovered(store, "job")));
   ASSERT_TRUE(ScanFolder::open(folder)->add_movement_check(0, {.after_views = 1, .shift_px = 9, .unmoved = false}));
-  EXPECT_FALSE(recovered(store, "job").resumable);
+  EXPECT_FALSE(is_resumable(recovered(store, "job")));
   make_job(store, "ended", "cancelled");
-  EXPECT_FALSE(recovered(store, "ended").resumable);
+  EXPECT_FALSE(is_resumable(recovered(store, "ended")));
 }
 
 TEST_F(JobStoreTest, WhatWasLeftOfFoldersHalfMadeOrHalfRemovedGoes) {

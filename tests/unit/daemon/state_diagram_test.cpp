@@ -9,7 +9,7 @@
 #include "core/files.h"
 #include "daemon/rig/taken_view.h"
 #include "daemon/runtime/overloaded.h"
-#include "daemon/station/job_table.h"
+#include "daemon/station/job_lifecycle.h"
 #include "daemon/station/operator_message.h"
 #include "daemon/station/transition.h"
 
@@ -141,7 +141,7 @@ std::string key(const Node& node, bool with_jobs) {
   }
   if (s.job) {
     const auto& j = *s.job;
-    key += fmt::format("j{}{}{}{}{}{}{}{}{}{}", j.id, to_string(j.state), j.pose, j.asked, j.taken, j.stored,
+    key += fmt::format("j{}{}{}{}{}{}{}{}{}{}", j.id, j.is_started, j.pose, j.asked, j.taken, j.stored,
                        j.movement_check_due, j.closing, j.reconstruction.has_value(), j.recipe.start_on_part);
   }
   return key + (s.activity == Activity::waiting_for_part ? std::to_string(s.failures) : "");
@@ -229,9 +229,9 @@ bool can_happen(const Node& node, const Event& event) {
             if (e.info->state == JobState::queued) return !s.job && (!listed || state == JobState::interrupted);
             return !s.job && listed && (waits || state == JobState::reconstructing);
           },
-          [&](const event::JobStarted&) { return job && job->state == JobState::queued; },
-          [&](const event::JobNotStarted&) { return job && job->state == JobState::queued; },
-          [&](const event::JobUnreadable&) { return job && job->state == JobState::queued; },
+          [&](const event::JobStarted&) { return job && !job->is_started; },
+          [&](const event::JobNotStarted&) { return job && !job->is_started; },
+          [&](const event::JobUnreadable&) { return job && !job->is_started; },
           [&](const event::ViewTaken&) { return job && job->taken < job->asked; },
           [&](const event::ViewStored& e) { return job && e.id.pose == job->pose && job->stored < job->taken; },
           [&](const event::CheckViewTaken&) { return job && job->closing && s.activity == Activity::scanning; },

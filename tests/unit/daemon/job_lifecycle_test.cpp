@@ -1,4 +1,4 @@
-#include "daemon/station/job_table.h"
+#include "daemon/station/job_lifecycle.h"
 
 #include <gtest/gtest.h>
 
@@ -92,7 +92,7 @@ TEST_F(Jobs, AJobIsClosedForWhoeverLooksAndWhatTheDiskSaysLateDoesNotOpenIt) {
   close(table, {"a", JobState::interrupted, {ErrorCode::io, "the disk does not answer"}});
   EXPECT_EQ(job().state, JobState::interrupted);
   EXPECT_EQ(job().error->message, "the disk does not answer");
-  EXPECT_TRUE(job().resumable);
+  EXPECT_TRUE(is_resumable(job()));
   tell(event::ViewStored{{"a", 0, 1}, 0.0});
   tell(event::JobStarted{"a", 0, 0});
   EXPECT_EQ(job().state, JobState::interrupted);
@@ -101,7 +101,7 @@ TEST_F(Jobs, AJobIsClosedForWhoeverLooksAndWhatTheDiskSaysLateDoesNotOpenIt) {
 
   tell(event::MovementChecked{"a", {.unmoved = false}});
   close(table, {"a", JobState::interrupted, {ErrorCode::moved, "moved"}});
-  EXPECT_FALSE(job().resumable);
+  EXPECT_FALSE(is_resumable(job()));
 }
 
 TEST_F(Jobs, AnEndIsToldOnce) {

@@ -1,4 +1,6 @@
-#include "daemon/station/job_table.h"
+#include "daemon/station/job_lifecycle.h"
+
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <tuple>
@@ -52,14 +54,12 @@ std::optional<JobEnd> update(JobTable& table, const Event& event) {
             change(e.job, [](JobInfo& job) {
               if (is_final(job.state)) return;  // it was closed before the disk had let it begin
               job.state = JobState::scanning;
-              job.resumable = false;
               job.error.reset();
             });
           },
           [&](const event::JobUnreadable& e) {
             change(e.job, [&](JobInfo& job) {
               job.state = JobState::failed;
-              job.resumable = false;
               job.error = e.why;
             });
           },
@@ -76,9 +76,7 @@ std::optional<JobEnd> update(JobTable& table, const Event& event) {
           },
           [&](const event::PoseStored& e) { change(e.job, [&](JobInfo& job) { set_pose_stored(job, e.pose); }); },
           [&](const event::JobClosed& e) {
-            change(e.job, [&](JobInfo& job) {
-              std::tie(job.state, job.error, job.resumable) = std::tuple(e.state, e.why, e.resumable);
-            });
+            change(e.job, [&](JobInfo& job) { std::tie(job.state, job.error) = std::tuple(e.state, e.why); });
           },
           [&](const event::StageProgress& e) { change(e.job, [&](JobInfo& job) { set_progress(job, e); }); },
           [&](const event::ReconstructionFailed& e) {
@@ -102,11 +100,56 @@ std::optional<JobEnd> update(JobTable& table, const Event& event) {
 }
 
 std::optional<JobEnd> close(JobTable& table, const action::CloseJob& task) {
-  return change(table, task.job, [&](JobInfo& job) {
-    std::tie(job.state, job.error) = std::tuple(task.state, task.why);
-    job.resumable =
-        task.state == JobState::interrupted && std::ranges::all_of(job.movement_checks, &MovementCheck::unmoved);
-  });
+  return change(table, task.job,
+                [&](JobInfo& job) { std::tie(job.state, job.error) = std::tuple(task.state, task.why); });
+}
+
+bool is_resumable(const JobInfo& job) {
+  return job.state == JobState::interrupted && std::ranges::all_of(job.movement_checks, &MovementCheck::unmoved);
+}
+
+Error quarantine_error() {
+  return {ErrorCode::internal,
+          fmt::format("quarantined after {} crashes during reconstruction; send a bundle to support "
+                      "or reprocess",
+                      kAttemptsThatQuarantine)};
+}
+
+namespace {
+
+/// A scan that has all its views.
+void set_scanned_state(JobInfo& job, const FolderFacts& facts) {
+  if (!facts.has_report) job.model = job.report = "";
+  job.quarantined = !facts.is_running && facts.deaths >= kAttemptsThatQuarantine;
+  job.error = job.quarantined ? quarantine_error() : facts.failure;
+  if (job.error) {
+    job.state = job.error->code == ErrorCode::stopped ? JobState::cancelled : JobState::failed;
+  } else if (!facts.has_report || facts.is_running) {
+    job.state = JobState::reconstructing;
+  } else {
+    job.state = JobState::done;
+    job.error = facts.limit_violation;
+    job.passed = !job.error;
+  }
+}
+
+}  // namespace
+
+JobInfo with_state_of_folder(JobInfo job, const FolderFacts& facts) {
+  if (facts.manifest_state == "scanned") {
+    set_scanned_state(job, facts);
+    return job;
+  }
+  job.model = job.report = "";
+  job.state = parse_job_state(facts.manifest_state).value_or(JobState::interrupted);
+  if (job.state == JobState::queued) return job;
+  if (job.state == JobState::scanning || job.state == JobState::waiting_for_flip) {
+    job.state = JobState::interrupted;
+    job.error = Error{ErrorCode::stopped, "the service ended during the scan"};
+  } else {
+    job.error = facts.failure.value_or(Error{ErrorCode::stopped, "the scan was " + facts.manifest_state});
+  }
+  return job;
 }
 
 }  // namespace scanrig
