@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
-"""The one place where figures are made: ./dev bench GROUP... [--quick] [--only PART...] [--record]
+"""The one place where figures are made: ./dev bench GROUP... [--long] [--quick] [--only PART...] [--record]
 
-Every group is a module beside this file with `measure(bench)`; it calls bench.line() for each figure that an issue or a
-design page asks for. A group with PARTS can be measured in parts: it asks bench.wants() before each. Prints what | asked | measured | ok, writes out/bench.json, exits 1 when a line falls short.
-A line that this machine cannot measure says so and does not count as held.
+Every group is a module beside this file with PARTS, the functions that measure its parts; each calls bench.line() for
+each figure that an issue or a design page requires. Without --long a part takes samples and ends within its budget
+(budget.py), so that a group ends within 45 minutes on two cores. Prints what | asked | measured | ok, writes
+out/bench.json, exits 1 when a line falls short. A line that this machine cannot measure does not count as held.
 """
 import argparse
 import importlib
@@ -12,17 +13,25 @@ import os
 import pathlib
 import subprocess
 import sys
+import time
 
+import budget
+import parts
 import record as record_file
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+OLD_NAMES = {"road": "end-to-end"}  # old name, accepted for a release
 
 
 class Bench:
-    def __init__(self, binaries, quick):
+    """`quick`: for a first look; `is_long`: everything; neither: samples, within the budgets."""
+
+    def __init__(self, binaries, quick=False, is_long=False):
         self.bin = pathlib.Path(binaries).resolve()
         self.quick = quick
+        self.long = is_long
+        self.deadline = None
         self.only = set()
         self.out = ROOT / "out" / "bench"
         self.out.mkdir(parents=True, exist_ok=True)
@@ -39,6 +48,26 @@ class Bench:
 
     def wants(self, part):
         return not self.only or part in self.only
+
+    def pick(self, full, sampled, quick):
+        """How many of something this run takes."""
+        return quick if self.quick else full if self.long else sampled
+
+    def begin_group(self, group):
+        self.group = group
+        self.deadline = None if self.long else time.monotonic() + 60 * budget.LIMIT_MIN
+
+    def seconds_left(self):
+        """Of the minutes of the group; without end with --long."""
+        return float("inf") if self.deadline is None else self.deadline - time.monotonic()
+
+    def in_time(self, points):
+        """The points, until the minutes of the group are over."""
+        for point in points:
+            yield point
+            if self.seconds_left() <= 0:
+                self.note(f"stopped early: the {budget.LIMIT_MIN} minutes of the group are over")
+                return
 
     def line(self, what, asked, measured, ok):
         """`ok` is True, False or None (not measured; `measured` says why)."""
@@ -63,10 +92,11 @@ class Bench:
     def run(self, command, timeout, **options):
         """A finished process with its text output; a hang ends as exit code 124."""
         command = [str(word) for word in command]
+        timeout = max(1.0, min(timeout, self.seconds_left()))
         try:
             return subprocess.run(command, capture_output=True, text=True, timeout=timeout, **options)
         except subprocess.TimeoutExpired as late:
-            return subprocess.CompletedProcess(command, 124, str(late.stdout or ""), f"still running after {timeout} s")
+            return subprocess.CompletedProcess(command, 124, str(late.stdout or ""), f"still running after {timeout:.0f} s")
 
 
 def commit():
@@ -78,39 +108,67 @@ def commit():
     return git("describe", "--always") + ("-dirty" if dirty else "")
 
 
-def main():
-    groups = sorted(p.stem[len("group_"):] for p in HERE.glob("group_*.py"))
+def group_names():
+    return sorted(p.stem[len("group_"):].replace("_", "-") for p in HERE.glob("group_*.py"))
+
+
+def load(group):
+    """The module of a group, its parts checked against the budgets."""
+    module = importlib.import_module("group_" + group.replace("-", "_"))
+    if problems := budget.problems(group, module.PARTS):
+        sys.exit("budget.py: " + "; ".join(problems))
+    return module
+
+
+def arguments():
+    groups = group_names()
     parser = argparse.ArgumentParser(prog="./dev bench", description=__doc__.splitlines()[0])
-    parser.add_argument("groups", nargs="+", choices=groups, metavar="GROUP", help=f"one of: {', '.join(groups)}")
+    parser.add_argument("groups", nargs="+", choices=groups, metavar="GROUP", help=f"one of: {', '.join(groups)}",
+                        type=lambda name: OLD_NAMES.get(name, name))
+    parser.add_argument("--long", action="store_true", help="everything: every call of the kill test, whole soak and "
+                        "turns, fuzzing, suites under sanitizers; hours")
     parser.add_argument("--quick", action="store_true", help="fewer repetitions; for a first look, not for the record")
     parser.add_argument("--only", nargs="+", metavar="PART", default=[], help="parts of the group; --record then puts "
-                        "their lines into the table that is there, and says so")
-    parser.add_argument("--record", action="store_true", help="put the full table into docs/measured.md")
+                        "their lines into the existing table, each with its commit")
+    parser.add_argument("--record", action="store_true", help="put the table into docs/measured.md; lines of --long "
+                        "have tables of their own")
     parser.add_argument("--bin", required=True, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.record and options.quick:
-        parser.error("--record wants the full measurement, not --quick")
+        parser.error("--record needs the full measurement, not --quick")
+    options.groups = list(dict.fromkeys(options.groups))
+    options.modules = {group: load(group) for group in options.groups}
+    check_only(parser, options)
+    return options
 
-    sys.path.insert(0, str(HERE))
-    modules = {group: importlib.import_module(f"group_{group}") for group in options.groups}
-    known = [part for module in modules.values() for part in getattr(module, "PARTS", ())]
+
+def check_only(parser, options):
+    known = [part for module in options.modules.values() for part in module.PARTS]
     if unknown := set(options.only) - set(known):
-        parser.error(f"no such part: {', '.join(sorted(unknown))}; there are: {', '.join(known) or 'none'}")
+        parser.error(f"no such part: {', '.join(sorted(unknown))}; possible: {', '.join(known)}")
+    runnable = {part for group, module in options.modules.items() for part in module.PARTS
+                if budget.runs(group, part, options.long)}
+    if left := [part for part in options.only if part not in runnable]:
+        parser.error(f"with --long only: {', '.join(left)}")
 
-    bench = Bench(options.bin, options.quick)
+
+def main():
+    sys.path.insert(0, str(HERE))
+    options = arguments()
+    bench = Bench(options.bin, options.quick, options.long)
     bench.only = set(options.only)
     measured_commit = commit()
-    print(f"commit {measured_commit}, {bench.cores} cores{', quick' if options.quick else ''}")
+    how = "".join(f", {word}" for word in ("long", "quick") if getattr(options, word))
+    print(f"commit {measured_commit}, {bench.cores} cores{how}")
     print("what | asked | measured | ok")
-    for group, module in modules.items():
-        bench.group = group
-        module.measure(bench)
+    for group, module in options.modules.items():
+        parts.run_group(bench, group, module)
 
     held = [line["ok"] for line in bench.lines]
     print(f"profile {bench.profile or '-'}")
     print(f"{held.count(True)} held, {held.count(False)} fell short, {held.count(None)} not measured")
-    record = {"commit": measured_commit, "cores": bench.cores, "quick": options.quick, "profile": bench.profile,
-              "lines": bench.lines}
+    record = {"commit": measured_commit, "cores": bench.cores, "quick": options.quick, "long": options.long,
+              "profile": bench.profile, "lines": bench.lines}
     (ROOT / "out" / "bench.json").write_text(json.dumps(record, indent=1) + "\n")
     if options.record:
         record_file.write(ROOT / "docs" / "measured.md", options.groups, record, again=bool(options.only))

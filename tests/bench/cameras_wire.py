@@ -1,10 +1,10 @@
 """The whole job over the wire: what the daemon's software takes beside the devices, the same bits as in one process,
-and the road's accuracy."""
+and the accuracy of the group end-to-end."""
 import hashlib
 import json
 import shutil
 
-import group_road
+import group_end_to_end
 
 SETTLING_S = 0.2  # of the simulated table
 MODEL = ("model.glb", "model.ply", "model.obj", "model.stl")
@@ -61,7 +61,7 @@ def demo(bench, name, options):
     """Folder of a demo that ended well, or None; says why not."""
     folder = bench.out / name
     shutil.rmtree(folder, ignore_errors=True)
-    done, _ = group_road.demo(bench, folder, options)
+    done, _ = group_end_to_end.demo(bench, folder, options)
     if done.returncode == 0 and (folder / "scores.json").is_file():
         return folder
     bench.line(name, "a model", f"none: {(done.stderr or done.stdout).strip()[-200:]}", False)
@@ -82,7 +82,7 @@ def same_bits(bench, options):
 
 
 def measure(bench):
-    seeds = group_road.SEEDS[:1] if bench.quick else group_road.SEEDS
+    seeds = group_end_to_end.SEEDS[:bench.pick(full=3, sampled=1, quick=1)]
     same_bits(bench, ["--no-noise", "--scale", 0.25] if bench.quick else ["--no-noise"])
     overheads = []
     for seed in seeds:
@@ -95,6 +95,6 @@ def measure(bench):
         lost = sum(len(view) - 2 for view in views(stamps))
         bench.line(f"wire, figurine seed {seed}: exposures redone", "reported", f"{lost} of {len(stamps['exposures'])}",
                    True)
-        group_road.accuracy(bench, "wire, figurine", seed, folder)
+        group_end_to_end.accuracy(bench, "wire, figurine", seed, folder)
     bench.at_most(f"software beside motion, settling, exposure, readout: p95 of {len(overheads)} views", 50,
                   p95(overheads) if overheads else None, "ms", 1)

@@ -1,10 +1,7 @@
 """Cameras and the USB projector: triggers against frames on the wire, overhead, fault matrix, memory, fuzzed
 replies, Debian 13."""
-import concurrent.futures
 import json
 import pathlib
-import shutil
-import tempfile
 
 import cameras_debian13
 import cameras_memory
@@ -13,13 +10,11 @@ import fuzz
 import motion_matrix
 import virtual_machine
 
-PARTS = ("triggers", "matrix", "wire", "hil", "debian13", "memory", "fuzz")
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
-TRIGGERS, QUICK_TRIGGERS = 10000, 1000
 
 
-def triggers(bench):
-    count = QUICK_TRIGGERS if bench.quick else TRIGGERS
+def triggers(bench, _scratch):
+    count = bench.pick(full=10000, sampled=2000, quick=1000)
     what = f"{count} triggers with 1 % lost, 1 % late, 1 % torn, 0.5 % stale: "
     done = bench.run([bench.bin / "triggers", count], count // 10 + 120)
     if done.returncode != 0:
@@ -38,26 +33,15 @@ def triggers(bench):
     bench.at_most("arming and collecting one exposure over the wire, p95", 50, seen["overhead_p95_ms"], "ms")
 
 
-def measure(bench):
-    scratch = pathlib.Path(tempfile.mkdtemp(prefix="scanrig-cameras-"))
-    try:
-        # What takes an hour runs beside the rest: that has to hold on a busy machine too.
-        with concurrent.futures.ThreadPoolExecutor() as pool:
-            hour = pool.submit(cameras_memory.measure, bench) if bench.wants("memory") else None
-            if bench.wants("triggers"):
-                triggers(bench)
-            if bench.wants("matrix"):
-                motion_matrix.measure(bench, ROOT, scratch, cameras=True)
-            if bench.wants("wire"):
-                cameras_wire.measure(bench)
-            if bench.wants("hil"):
-                virtual_machine.measure(bench)
-            if bench.wants("debian13"):
-                cameras_debian13.measure(bench)
-            if bench.wants("fuzz"):
-                fuzz.measure(bench, ROOT, scratch,
-                             [fuzz.Parser("dlpc350", "LightCrafter 4500 replies", processes=bench.cores)])
-            if hour:
-                hour.result()
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+def fuzzed(bench, scratch):
+    fuzz.measure(bench, ROOT, scratch, [fuzz.Parser("dlpc350", "LightCrafter 4500 replies", processes=bench.cores)])
+
+
+PARTS = {"triggers": triggers,
+         "matrix": lambda bench, scratch: motion_matrix.measure(bench, ROOT, scratch, cameras=True),
+         "wire": lambda bench, _: cameras_wire.measure(bench),
+         "hil": lambda bench, _: virtual_machine.measure(bench),
+         "debian13": lambda bench, _: cameras_debian13.measure(bench),
+         "memory": lambda bench, _: cameras_memory.measure(bench),
+         "fuzz": fuzzed}
+BESIDE = ("memory",)  # an hour: that has to hold on a busy machine too

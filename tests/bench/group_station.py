@@ -1,8 +1,4 @@
 """The station: jobs that survive, and what operators and programs see of it."""
-import pathlib
-import shutil
-import tempfile
-
 import station_movement
 import station_disturbed
 import station_fuzz
@@ -15,18 +11,8 @@ import station_stages
 import station_startup
 import station_view_cost
 
-MEASURED = {"startup": station_startup, "movement": station_movement, "kill": station_kill,
-            "disturbed": station_disturbed, "stages": station_stages, "view_cost": station_view_cost,
-            "load": station_load, "security": station_security, "soak": station_soak, "fuzz": station_fuzz,
-            "asan": station_sanitize.ASAN, "tsan": station_sanitize.TSAN}
-PARTS = tuple(MEASURED)
-
-
-def measure(bench):
-    scratch = pathlib.Path(tempfile.mkdtemp(prefix="scanrig-station-"))
-    try:
-        for name, part in MEASURED.items():
-            if bench.wants(name):
-                part.measure(bench, scratch)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
+PARTS = {"startup": station_startup.measure, "movement": station_movement.measure, "kill": station_kill.measure,
+         "disturbed": station_disturbed.measure, "stages": station_stages.measure,
+         "view_cost": station_view_cost.measure, "load": station_load.measure, "security": station_security.measure,
+         "soak": station_soak.measure, "fuzz": station_fuzz.measure, "asan": station_sanitize.ASAN.measure,
+         "tsan": station_sanitize.TSAN.measure}

@@ -21,7 +21,7 @@ def turns(bench, root, scratch):
     drives["grbl"] = ("grbl", WOUND_UP_GRBL)
     plan = []
     for name, (drive, wound_up) in drives.items():
-        lengths = (100, 30, 30) if bench.quick else (10000, 500, 500)
+        lengths = bench.pick(full=(10000, 500, 500), sampled=(1000, 100, 100), quick=(100, 30, 30))
         plan += [(name, drive, *run) for run in zip(lengths, (0, wound_up, -wound_up), ("up", "up", "down"))]
 
     def go(number):

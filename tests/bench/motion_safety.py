@@ -19,7 +19,7 @@ def in_parallel(bench, scratch, name, jobs, work, *options):
         results = []
         drive = motion_rig.DRIVES[member % len(motion_rig.DRIVES)]
         with motion_rig.Rig(bench.bin, scratch / f"{name}{member}", "--drive", drive, *FAST, *options) as rig:
-            for n in range(member, jobs, RIGS):
+            for n in bench.in_time(range(member, jobs, RIGS)):
                 results.append(work(rig, n))
         return results
 
@@ -82,7 +82,7 @@ def report_edges(bench, what, wanted, took):
 
 
 def estop_scan(bench, scratch):
-    wanted = 8 if bench.quick else 100
+    wanted = bench.pick(full=100, sampled=36, quick=8)
     took = in_parallel(bench, scratch, "scan", wanted, estop_in_scan)
     report_edges(bench, "e-stop edge to stop frame, during a scan", wanted, took)
 
@@ -112,7 +112,7 @@ def scan_once(rig):
 def estop_reconstruction(bench, scratch):
     """Edges for as long as reconstructions run; every one needs Reset and home before the next."""
     crews = len(motion_rig.DRIVES)
-    wanted = crews if bench.quick else 100
+    wanted = bench.pick(full=100, sampled=30, quick=crews)
     crew_share = -(-wanted // crews)
 
     def crew(member):
@@ -122,7 +122,7 @@ def estop_reconstruction(bench, scratch):
                             "2", "--voxel-mm", "0.2") as rig:
             rig.set(estop_cuts_power=False)
             rig.start_daemon(scale=0.25 if bench.quick else 0.5)
-            end = time.monotonic() + (150 if bench.quick else 1800)
+            end = time.monotonic() + min(bench.pick(full=1800, sampled=600, quick=150), bench.seconds_left())
             while len(took) < crew_share and time.monotonic() < end:
                 if not reconstructing(rig) and not scan_once(rig):
                     break
@@ -158,7 +158,7 @@ def killed_while_turning(rig, n):
 
 
 def killed(bench, scratch):
-    wanted = 4 if bench.quick else 40
+    wanted = bench.pick(full=40, sampled=12, quick=4)
     took = in_parallel(bench, scratch, "killed", wanted, killed_while_turning)
     good = [seconds for seconds in took if seconds is not None]
     bench.line("daemon killed while the table turns, make-safe after it", f"standing and dark within {SAFE_LIMIT_S} s",
@@ -194,7 +194,7 @@ def restarted(rig, n):
 
 
 def restarts(bench, scratch):
-    wanted = 8 if bench.quick else 200
+    wanted = bench.pick(full=200, sampled=48, quick=8)
     lives = in_parallel(bench, scratch, "life", wanted, restarted)
     unasked, home_lost, moves, still = (sum(column) for column in zip(*lives))
     bench.line("no motion after a restart without Reset", "0 frames that move",

@@ -1,11 +1,11 @@
-"""docs/measured.md: the last full table of every group, with the command that makes it again."""
+"""docs/measured.md: the last table of every group, with the command that makes it again; that of --long by itself."""
 import pathlib
 import re
 
 HEAD = """# What was measured
 
-Each table is what `./dev bench GROUP --record` printed the last time it ran in full; a line measured again by itself
-(`--only PART`) names its commit. Nothing here is written by hand.
+Each table is what `./dev bench GROUP --record` printed the last time, with samples; those of `--long` hold everything
+and are kept apart. A line measured again by itself (`--only PART`) names its commit. Nothing here is written by hand.
 """
 
 
@@ -25,9 +25,14 @@ def table(rows):
     return "\n\n| what | asked | measured | ok |\n|---|---|---|---|\n" + "".join(f"| {' | '.join(r)} |\n" for r in rows)
 
 
+def title(group, record):
+    return group + (", long" if record["long"] else "")
+
+
 def section(group, record):
+    command = f"./dev bench {group}" + (" --long" if record["long"] else "")
     rows = [row(line) for line in record["lines"] if line["group"] == group]
-    return (f"\n## {group}\n\n`./dev bench {group}` on commit {record['commit']}, {record['cores']} cores, simulation profile "
+    return (f"\n## {title(group, record)}\n\n`{command}` on commit {record['commit']}, {record['cores']} cores, simulation profile "
             f"{(record['profile'] or 'none')[:12]}: {counted(rows)}{table(rows)}")
 
 
@@ -50,6 +55,7 @@ def write(path: pathlib.Path, groups, record, again=False):
     parts = path.read_text().split("\n## ") if path.is_file() else [""]
     kept = {part.split("\n", 1)[0]: "\n## " + part for part in parts[1:]}
     for group in groups:
-        whole = not again or group not in kept
-        kept[group] = section(group, record) if whole else amended(kept[group], group, record)
-    path.write_text(HEAD + "".join(kept[group].rstrip("\n") + "\n" for group in sorted(kept)))
+        name = title(group, record)
+        whole = not again or name not in kept
+        kept[name] = section(group, record) if whole else amended(kept[name], group, record)
+    path.write_text(HEAD + "".join(kept[name].rstrip("\n") + "\n" for name in sorted(kept)))

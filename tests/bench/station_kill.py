@@ -11,10 +11,12 @@ import random
 import shutil
 import subprocess
 
+import sample
 import station_disk
 from slowness import SLOWNESS
 
 LIMIT_S = 60 * SLOWNESS
+SIDES = ("before", "after")
 
 
 class Rig:
@@ -69,11 +71,24 @@ def one_kill(rig, number, when):
     return rig.recovers(home), end.returncode == -9
 
 
-def kills(rig, calls, share=1.0, seed=1):
-    """Yields (what, fault or None) for the calls, both sides of each; `share` of them by chance."""
-    points = [(n, when) for n in range(1, calls + 1) for when in ("before", "after")]
-    if share < 1:
-        points = random.Random(seed).sample(points, max(1, round(share * len(points))))
+def calls_of(log):
+    """The calls by which the recorded job changed its files, in order; call 1 is the first."""
+    return [entry for entry in log if entry[0] != "ack"]
+
+
+def call_numbers(calls, count=None, seed=1):
+    """Numbers of calls: all of them, or `count` by chance with every kind of call among them, ascending."""
+    return sorted(sample.choose(range(1, len(calls) + 1), count, lambda number: calls[number - 1][0], seed))
+
+
+def kill_points(calls, count=None, seed=1):
+    """(number, side) of calls: both sides of all, or `count` by chance with both sides of every kind among them."""
+    return sample.choose([(number, side) for number in range(1, len(calls) + 1) for side in SIDES], count,
+                         lambda point: (calls[point[0] - 1][0], point[1]), seed)
+
+
+def kills(rig, points):
+    """Yields (what, fault or None) for each (number, side) of `points`."""
     for number, when in points:
         fault, killed = one_kill(rig, number, when)
         if killed:
@@ -108,17 +123,17 @@ def second_kills(rig, calls, count, seed=2):
         yield f"killed after call {first} and after call {second} of the recovery", rig.recovers(home, again=True)
 
 
-def power_cuts(rig, home, log, share=1.0, seed=3):
-    """Yields (what, fault or None) for a power cut after each of the logged calls."""
+def power_cuts(rig, home, log, numbers):
+    """Yields (what, fault or None) for a power cut after each of the logged calls with these numbers."""
     disk, acks, calls = station_disk.Disk(str(home / "jobs")), b"", 0
-    chance = random.Random(seed)
+    chosen = set(numbers)
     for kind, path, other, data in log:
         if kind == "ack":
             acks += data
             continue
         disk.apply(kind, path, other, data)
         calls += 1
-        if chance.random() > share:
+        if calls not in chosen:
             continue
         cut = rig.fresh("cut")
         shutil.rmtree(cut / "jobs")
@@ -128,14 +143,12 @@ def power_cuts(rig, home, log, share=1.0, seed=3):
         yield f"power cut after call {calls} ({kind} {pathlib.Path(path).name})", rig.recovers(cut)
 
 
-def bad_disks(rig, calls, share=1.0, seed=5, failures=0):
-    """A disk that is full, read-only or failing from some call on, or for so many calls: that must be named, nothing
-    that was acknowledged may be lost, and with a good disk the job must come to its model. One that failed alone while
-    that was written failed the job: somebody asks again."""
+def bad_disks(rig, numbers, seed=5, failures=0):
+    """A disk that is full, read-only or failing from each of these calls on, or for so many calls. The cause must be
+    named, no acknowledged view may be lost, and with a good disk the job must come to its model. A single failure while
+    the model was written leaves a failed job: its model is requested again."""
     chance = random.Random(seed)
-    for number in range(1, calls + 1):
-        if chance.random() > share:
-            continue
+    for number in numbers:
         error = chance.choice([errno.ENOSPC, errno.EROFS, errno.EIO])
         home = rig.fresh("bad_disk")
         end = rig.run("scan", home, fail=number, error=error, failures=failures)
@@ -186,30 +199,41 @@ def damaged_index(rig, home, count, seed=4):
 def measure(bench, scratch):
     rig = Rig(bench.bin, scratch)
     home, log = rig.record()
-    calls = sum(1 for entry in log if entry[0] != "ack")
-    share = 0.1 if bench.quick else 1.0
-    bench.note(f"one job changes its files by {calls} calls")
-    count = 30 if bench.quick else 300
-    report(bench, "SIGKILL before and after every write, fsync, rename of a job", kills(rig, calls, share))
-    report(bench, "SIGKILL at random moments", random_kills(rig, 10 if bench.quick else 120))
-    report(bench, "SIGKILL again during the recovery", second_kills(rig, calls, count))
-    report(bench, "power cut after every write, fsync, rename of a job", power_cuts(rig, home, log, share))
-    report(bench, "full, read-only and failing disk from every call on, then a good one", bad_disks(rig, calls, share))
-    report(bench, "a disk that fails once, at every call", bad_disks(rig, calls, share, seed=7, failures=1))
-    report(bench, "a reconstruction that takes the daemon with it, twice", crashes(rig),
-           "quarantine after the second, next job runs")
-    report(bench, "index deleted, cut short, overwritten", damaged_index(rig, home, count // 3))
+    calls = calls_of(log)
+    bench.note(f"one job changes its files by {len(calls)} calls of {len({call[0] for call in calls})} kinds")
+    each = "every" if bench.long and not bench.quick else "a sampled"
+    some = bench.pick(full=None, sampled=40, quick=24)
+    kill = kill_points(calls, bench.pick(full=None, sampled=60, quick=48), seed=1)
+    report(bench, f"SIGKILL before and after {each} write, fsync, rename of a job", kills(rig, kill), len(kill),
+           of=2 * len(calls))
+    count = bench.pick(full=120, sampled=20, quick=10)
+    report(bench, "SIGKILL at random moments", random_kills(rig, count), count, of=120)
+    count = bench.pick(full=300, sampled=30, quick=30)
+    report(bench, "SIGKILL again during the recovery", second_kills(rig, len(calls), count), count, of=300)
+    for what, seed, points in (
+            (f"power cut after {each} write, fsync, rename of a job", 3, lambda at: power_cuts(rig, home, log, at)),
+            (f"full, read-only and failing disk from {each} call on, then a good one", 5, lambda at: bad_disks(rig, at)),
+            (f"a disk that fails once, at {each} call", 7, lambda at: bad_disks(rig, at, seed=7, failures=1))):
+        numbers = call_numbers(calls, some, seed)
+        report(bench, what, points(numbers), len(numbers), of=len(calls))
+    report(bench, "a reconstruction that takes the daemon with it, twice", crashes(rig), 2, of=2,
+           asked="quarantine after the second, next job runs")
+    count = bench.pick(full=100, sampled=15, quick=10)
+    report(bench, "index deleted, cut short, overwritten", damaged_index(rig, home, count), count, of=100)
 
 
 NOTHING_LOST = "0 acknowledged views lost, 0 unreadable folders, 0 jobs without an end"
+ENOUGH = 0.9  # of the planned points: a kill may come when the job is over
 
 
-def report(bench, what, points, asked=NOTHING_LOST):
+def report(bench, what, points, planned, of, asked=NOTHING_LOST):
+    """A line about what happened at the points; `of` is how many there are with --long."""
     faults, done = [], 0
-    for where, fault in points:
+    for where, fault in bench.in_time(points):
         done += 1
         if fault:
             faults.append(f"{where}: {fault}")
     for fault in faults[:10]:
         bench.note(fault)
-    bench.line(what, asked, f"{len(faults)} faults at {done} points", done > 0 and not faults)
+    counted = f"{done} points" if planned >= of else f"{done} of {of} points"
+    bench.line(what, asked, f"{len(faults)} faults at {counted}", done >= ENOUGH * planned and not faults)

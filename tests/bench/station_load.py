@@ -16,6 +16,7 @@ import motion_rig
 HERE = pathlib.Path(__file__).resolve().parent
 OPTIONS = ("--cameras", "gige", "--poses", "1", "--speed-deg-s", "90", "--acceleration-deg-s2", "400")
 FULL = {"jobs": 5, "views": "8", "scale": 0.5, "voxel": "0.5"}
+SAMPLED = dict(FULL, jobs=3)
 QUICK = {"jobs": 1, "views": "4", "scale": 0.25, "voxel": "1"}
 JOB_LIMIT_S = 300
 LIMIT_S = 2400
@@ -113,7 +114,7 @@ def inside(binaries, scratch, size):
 
 
 def measure(bench, scratch):
-    size = QUICK if bench.quick else FULL
+    size = bench.pick(full=FULL, sampled=SAMPLED, quick=QUICK)
     done = bench.run([bench.bin / "scanrig-sim", "own-network", "--", sys.executable, __file__, bench.bin, scratch,
                       json.dumps(size)], LIMIT_S)
     if done.returncode != 0:

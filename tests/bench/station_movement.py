@@ -49,5 +49,5 @@ def measure(bench, _scratch):
     if not meshes:
         bench.note("movement check: no meshes beside the project, built-in objects only")
     measure_size(bench, 0.25, "a quarter of the size", [*OBJECTS, *meshes])
-    if not bench.quick:
+    if bench.long and not bench.quick:
         measure_size(bench, 1, "full size", [*OBJECTS, *meshes])

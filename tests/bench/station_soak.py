@@ -16,6 +16,7 @@ JOB_LIMIT_S = 300
 GROWTH_LIMIT_PERCENT = 2
 PARTS = {"low-resolution": (500, ("--scale", "0.15", "--views", "4", "--voxel-mm", "3", "--threads", "2")),
          "full-size": (20, ("--views", "8", "--threads", "2"))}
+SAMPLED = {"low-resolution": 80, "full-size": 2}
 QUICK = {"low-resolution": 16, "full-size": 1}
 
 
@@ -53,7 +54,7 @@ class Shift:
                                 f"job {job} does not end", JOB_LIMIT_S)
 
     def work(self, jobs):
-        for _ in range(jobs):
+        for _ in jobs:
             job = self.one_job()
             self.ended[job["state"]] = self.ended.get(job["state"], 0) + 1
             self.memory.append(memory_kib(self.daemon.process.pid))
@@ -66,15 +67,19 @@ class Shift:
             self.daemon.order("DELETE", "jobs/" + job["id"])
 
 
+def job_count(bench, part):
+    return bench.pick(full=PARTS[part][0], sampled=SAMPLED[part], quick=QUICK[part])
+
+
 def soak(bench, scratch, part):
     """What the shift saw, seconds, and what ended it early or ''."""
-    jobs, options = PARTS[part]
+    _, options = PARTS[part]
     home = scratch / f"soak_{part}"
     begun, stuck = time.monotonic(), ""
     daemon = station_daemon.Daemon(bench.bin, home, "--clock", "virtual", "--trouble", TROUBLE, *options)
     shift = Shift(daemon)
     try:
-        shift.work(QUICK[part] if bench.quick else jobs)
+        shift.work(bench.in_time(range(job_count(bench, part))))
     except (TimeoutError, KeyError, TypeError, OSError) as error:
         stuck = f"{type(error).__name__}: {error}"
     return shift, time.monotonic() - begun, daemon.end() or stuck
@@ -88,7 +93,7 @@ def quarters(values):
 
 def report(bench, part, shift, seconds, stuck):
     jobs = sum(shift.ended.values())
-    wanted = QUICK[part] if bench.quick else PARTS[part][0]
+    wanted = job_count(bench, part)
     told = ", ".join(f"{count} {state}" for state, count in sorted(shift.ended.items()))
     bench.note(f"{part}: {seconds / max(1, jobs):.1f} s a job, {shift.resumed} interruptions resumed, "
                f"{shift.daemon.unanswered} requests without an answer")
@@ -96,7 +101,7 @@ def report(bench, part, shift, seconds, stuck):
                "; ".join(filter(None, [told, stuck])), not stuck and jobs == wanted)
     what = f"soak, {part}: memory, last quarter against second"
     if len(shift.memory) < 8:
-        bench.at_most(what, GROWTH_LIMIT_PERCENT, None, "%")
+        bench.line(what, f"<= {GROWTH_LIMIT_PERCENT} %", f"not measured: {len(shift.memory)} jobs are too few", None)
         return
     before, after = quarters(shift.memory)
     course = ", ".join(f"{kib / 1024:.0f}" for kib in shift.memory[::max(1, len(shift.memory) // 20)])

@@ -11,7 +11,7 @@ def measure(bench, scratch):
     what = "a view's disk cost that the move does not hide, p95"
     home = scratch / "view_cost"
     home.mkdir(parents=True, exist_ok=True)
-    done = bench.run([bench.bin / "station_view_cost", home, 2 if bench.quick else 8], LIMIT_S)
+    done = bench.run([bench.bin / "station_view_cost", home, bench.pick(full=8, sampled=3, quick=2)], LIMIT_S)
     stood = sorted(float(line) for line in done.stdout.split())
     if done.returncode != 0 or not stood:
         bench.note(done.stderr.strip())

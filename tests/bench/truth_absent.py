@@ -9,7 +9,7 @@ from slowness import SLOWNESS
 LIMIT_S = 900 * SLOWNESS
 FILES = ("model.glb", "model.ply", "model.obj", "model.stl")
 
-# What the first road asks of every report, as paths of keys; `[]` stands for every element of a list.
+# What the group end-to-end requires of every report, as paths of keys; `[]` stands for every element of a list.
 REPORT = (
     "software.name", "software.version", "options.voxel_mm", "options.fusion", "options.rests", "calibration_sha256",
     "profile_sha256", "stages[].stage", "stages[].seconds", "stages[].process_peak_memory_mib", "poses[].views[]",

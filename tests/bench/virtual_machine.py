@@ -1,20 +1,19 @@
 """The virtual machine's lines: ./dev hil, run as a person would, its images made anew and with them cached."""
 import json
 import pathlib
-import subprocess
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 LIMIT_S = 1500
 
 
 def measure(bench):
-    if not bench.quick:
+    if bench.long and not bench.quick:
         rows(bench, "images made", "--cold")
     rows(bench, "images cached")
 
 
 def rows(bench, which, *options):
-    packages = subprocess.run(["./dev", "deps", "hil"], cwd=ROOT, capture_output=True, text=True)
+    packages = bench.run(["./dev", "deps", "hil"], LIMIT_S, cwd=ROOT)
     if packages.returncode != 0:
         bench.line(f"virtual machine, {which}", "its rows", f"not measured: {packages.stderr.strip()[-200:]}", None)
         return

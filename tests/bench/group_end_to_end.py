@@ -1,4 +1,4 @@
-"""The first road: Start to model in the simulated rig, real scans through the same pipeline, bad input, power cuts."""
+"""From end to end: Start to model in the simulated rig, real scans through the same pipeline, bad input, power cuts."""
 import json
 import pathlib
 import shutil
@@ -82,9 +82,9 @@ def accuracy(bench, name, seed, folder):
     bench.at_most(f"{what}: texture, median patch offset", 1, scores["texture"]["median_px"], "px")
 
 
-def nine_runs(bench):
+def models(bench, _scratch):
     for name, options in objects(bench):
-        for seed in SEEDS[:1] if bench.quick else SEEDS:
+        for seed in SEEDS[:bench.pick(full=3, sampled=1, quick=1)]:
             if options is None:
                 bench.line(f"{name} seed {seed}", "a model within the limits", "not measured: no data", None)
                 continue
@@ -98,7 +98,7 @@ def nine_runs(bench):
             accuracy(bench, name, seed, folder)
 
 
-def render_time(bench):
+def render_time(bench, _scratch):
     if bench.cores < 2:
         bench.line("a rendered view (four images) on 2 cores", "<= 4 s", "not measured: 1 core", None)
         return
@@ -114,7 +114,7 @@ def render_time(bench):
     bench.at_most("a rendered view (four images) on 2 cores", 4, (seconds[5] - seconds[1]) / 8, "s")
 
 
-def from_nothing(bench):
+def from_nothing(bench, _scratch):
     what = "a bare Debian 12 on 2 cores"
     reason = "not measured: --quick" if bench.quick else bare_machine.why_not()
     if reason:
@@ -136,15 +136,17 @@ def each_case(bench, what, cases):
         bench.line(f"{what}: {name}", "as documented", measured, ok)
 
 
-def measure(bench):
-    nine_runs(bench)
-    render_time(bench)
-    scratch = bench.out / "scratch"
-    shutil.rmtree(scratch, ignore_errors=True)
-    scratch.mkdir()
-    each_case(bench, "same model", truth_absent.cases(bench.bin, scratch))
-    dragon.measure(bench)
-    rim.measure(bench)
-    each_case(bench, "bad input", bad_input.cases(bench.bin, scratch, ROOT / "config" / "rigs" / "example.toml"))
-    each_case(bench, "SIGKILL in a scan", sigkill.cases(bench.bin, scratch, 3 if bench.quick else 20))
-    from_nothing(bench)
+def killed_scans(bench, scratch):
+    kills = bench.pick(full=20, sampled=8, quick=3)
+    each_case(bench, "SIGKILL in a scan", bench.in_time(sigkill.cases(bench.bin, scratch, kills)))
+
+
+PARTS = {"models": models,
+         "render": render_time,
+         "same_model": lambda bench, scratch: each_case(bench, "same model", truth_absent.cases(bench.bin, scratch)),
+         "dragon": lambda bench, _: dragon.measure(bench),
+         "rim": lambda bench, _: rim.measure(bench),
+         "bad_input": lambda bench, scratch: each_case(bench, "bad input", bad_input.cases(
+             bench.bin, scratch, ROOT / "config" / "rigs" / "example.toml")),
+         "sigkill": killed_scans,
+         "bare_machine": from_nothing}

@@ -1,0 +1,36 @@
+"""The minutes that each part of a group may take on two cores, without --long: the one place that states them.
+
+The build comes before and is not part of it. What is in LONG runs with --long only.
+"""
+LIMIT_MIN = 45
+CORES = 2
+
+MINUTES = {
+    "station": {"startup": 2, "movement check": 6, "kill": 5, "disturbed": 4, "stages": 4, "view_cost": 4, "load": 7,
+                "security": 4, "soak": 9},
+    "motion": {"matrix": 6, "estop": 12, "killed": 3, "restarts": 5, "turns": 5, "words": 8, "doctor": 4},
+    "cameras": {"triggers": 4, "matrix": 3, "wire": 12, "hil": 8, "memory": 12},
+    "end-to-end": {"models": 14, "render": 1, "same_model": 4, "dragon": 8, "rim": 1, "bad_input": 4, "sigkill": 4},
+}
+LONG = {
+    "station": {"fuzz", "asan", "tsan"},
+    "motion": {"fuzz"},
+    "cameras": {"debian13", "fuzz"},
+    "end-to-end": {"bare_machine"},
+}
+
+
+def runs(group, part, is_long):
+    return is_long or part not in LONG[group]
+
+
+def problems(group, parts):
+    """What is wrong with the budgets of a group that has these parts, one sentence each."""
+    minutes, long_only, found = MINUTES.get(group, {}), LONG.get(group, set()), []
+    for part in parts:
+        if (part in minutes) == (part in long_only):
+            found.append(f"{group}: part {part} needs either a budget or a place in LONG")
+    found += [f"{group}: there is no part {part}" for part in sorted({*minutes, *long_only} - set(parts))]
+    if (total := sum(minutes.values())) > LIMIT_MIN:
+        found.append(f"{group}: the parts have {total} minutes together, more than {LIMIT_MIN}")
+    return found

@@ -1,0 +1,18 @@
+"""A choice by chance from a list of points, repeatable, with every kind of point in it."""
+import random
+
+
+def choose(points, count, kind_of, seed):
+    """All points, in order, where `count` allows; else one of each kind and the rest by chance, in random order, so that
+    a run that ends early has tried all kinds too."""
+    points = list(points)
+    if count is None or count >= len(points):
+        return points
+    chance = random.Random(seed)
+    chance.shuffle(points)
+    first = {}
+    for point in points:
+        first.setdefault(kind_of(point), point)
+    chosen = list(first.values())
+    rest = [point for point in points if first[kind_of(point)] is not point]
+    return (chosen + rest)[:count]

@@ -1,0 +1,155 @@
+"""The rules of ./dev bench: budgets, samples, tables of short and long runs, names of groups."""
+import io
+import pathlib
+import sys
+import tempfile
+import types
+import unittest
+from contextlib import redirect_stderr, redirect_stdout
+from unittest import mock
+
+BENCH = pathlib.Path(__file__).resolve().parent.parent.parent / "bench"
+sys.path.insert(0, str(BENCH))
+
+import bench
+import budget
+import parts
+import record
+import sample
+
+
+def quietly(function, *words):
+    with redirect_stdout(io.StringIO()), redirect_stderr(io.StringIO()):
+        return function(*words)
+
+
+def made(**how):
+    one = bench.Bench(".", **how)
+    one.cores = 2
+    return one
+
+
+def group(**parts_of_it):
+    return types.SimpleNamespace(PARTS=parts_of_it)
+
+
+class Budgets(unittest.TestCase):
+    def test_every_part_of_every_group_has_its_minutes_and_their_sum_is_within_the_limit(self):
+        for name in bench.group_names():
+            with self.subTest(name):
+                self.assertEqual(budget.problems(name, bench.load(name).PARTS), [])
+
+    def test_no_budget_two_places_an_unknown_part_and_too_large_a_sum_are_named(self):
+        with mock.patch.dict(budget.MINUTES, {"g": {"both": 1, "gone": 1, "large": 44}}), \
+                mock.patch.dict(budget.LONG, {"g": {"both"}}):
+            found = "\n".join(budget.problems("g", ["both", "large", "new"]))
+        for word in ("part both", "part new", "no part gone", "46 minutes"):
+            self.assertIn(word, found)
+
+    def run_parts(self, is_long=False, took_min=1.0, timeout_min=2, **parts_of_it):
+        one, clock = made(is_long=is_long), [0.0]
+
+        def part(bench_, _):
+            clock[0] += 60 * took_min
+            bench_.line("figure", "1", "1", True)
+
+        measured = {"part": part, **parts_of_it}
+        with mock.patch.dict(budget.MINUTES, {"g": dict.fromkeys(measured, timeout_min)}), \
+                mock.patch.dict(budget.LONG, {"g": set()}), mock.patch("time.monotonic", lambda: clock[0]):
+            quietly(parts.run_group, one, "g", group(**measured))
+        return {line["what"]: line["ok"] for line in one.lines}
+
+    def test_a_part_that_overruns_its_budget_falls_short_by_a_line_of_its_own(self):
+        self.assertEqual(self.run_parts(took_min=1.0)["part part: time"], True)
+        self.assertEqual(self.run_parts(took_min=3.0)["part part: time"], False)
+        self.assertEqual(self.run_parts(took_min=3.0, is_long=True)["part part: time"], True)
+
+    def test_no_part_begins_when_the_minutes_of_the_group_are_over(self):
+        lines = self.run_parts(took_min=46.0, late=lambda bench_, _: bench_.line("late", "1", "1", True))
+        self.assertEqual((lines["part late"], lines["all parts: time"], "late" in lines), (False, False, False))
+
+    def test_a_part_that_raises_costs_the_others_nothing(self):
+        def broken(*_):
+            raise KeyError("broken")
+
+        lines = self.run_parts(broken=broken, other=lambda bench_, _: bench_.line("other", "1", "1", True))
+        self.assertEqual((lines["part broken"], lines["other"]), (False, True))
+
+    def test_a_run_that_is_not_long_leaves_out_long_parts_and_ends_its_points_with_its_minutes(self):
+        one, called = made(), []
+        with mock.patch.dict(budget.MINUTES, {"g": {"short": 1}}), mock.patch.dict(budget.LONG, {"g": {"hours"}}):
+            quietly(parts.run_group, one, "g", group(short=lambda *_: called.append("short"),
+                                                     hours=lambda *_: called.append("hours")))
+        self.assertEqual(called, ["short"])
+        one.deadline = 0.0
+        self.assertEqual(quietly(list, one.in_time([1, 2, 3])), [1])
+
+
+class Samples(unittest.TestCase):
+    POINTS = [(number, "rare" if number % 100 == 7 else "common" if number % 2 else "usual") for number in range(300)]
+
+    def chosen(self, count, seed=1):
+        return sample.choose(self.POINTS, count, lambda point: point[1], seed)
+
+    def test_every_kind_is_among_few_and_no_point_twice(self):
+        for seed in range(20):
+            few = self.chosen(12, seed)
+            self.assertEqual(len(set(few)), 12)
+            self.assertEqual({kind for _, kind in few}, {"rare", "common", "usual"})
+
+    def test_the_same_seed_chooses_the_same_and_another_others(self):
+        self.assertEqual(self.chosen(12), self.chosen(12))
+        self.assertNotEqual(self.chosen(12), self.chosen(12, seed=2))
+
+    def test_without_a_limit_it_is_every_point_in_order(self):
+        self.assertEqual(self.chosen(None), self.POINTS)
+
+
+class Tables(unittest.TestCase):
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.path = pathlib.Path(folder.name) / "measured.md"
+
+    def write(self, is_long, measured, commit, again=False, what="kills"):
+        line = {"group": "station", "what": what, "asked": "0", "measured": measured, "ok": True}
+        record.write(self.path, ["station"], {"commit": commit, "cores": 2, "long": is_long, "profile": "",
+                                              "lines": [line]}, again)
+        return self.path.read_text()
+
+    def test_a_short_run_leaves_the_lines_of_a_long_one(self):
+        self.write(True, "484 points", "aaaaaaa")
+        text = self.write(False, "60 of 484 points", "bbbbbbb")
+        self.assertIn("## station, long\n\n`./dev bench station --long` on commit aaaaaaa", text)
+        self.assertIn("## station\n\n`./dev bench station` on commit bbbbbbb", text)
+        self.assertIn("| kills | 0 | 484 points | yes |", text)
+        self.assertIn("| kills | 0 | 60 of 484 points | yes |", text)
+
+    def test_a_part_measured_again_names_its_commit_in_its_own_table(self):
+        self.write(True, "484 points", "aaaaaaa")
+        self.write(False, "60 of 484 points", "bbbbbbb")
+        text = self.write(True, "485 points", "ccccccc", again=True)
+        self.assertIn("| kills (on ccccccc) | 0 | 485 points | yes |", text)
+        self.assertIn("| kills | 0 | 60 of 484 points | yes |", text)
+
+
+class Arguments(unittest.TestCase):
+    def parse(self, *words):
+        with mock.patch("sys.argv", ["bench", "--bin", ".", *words]):
+            return quietly(bench.arguments)
+
+    def test_the_old_name_road_is_end_to_end(self):
+        self.assertEqual(self.parse("road").groups, ["end-to-end"])
+        self.assertEqual(self.parse("road", "end-to-end").groups, ["end-to-end"])
+
+    def test_a_part_of_long_runs_alone_is_refused_without_long(self):
+        self.assertRaises(SystemExit, self.parse, "station", "--only", "fuzz")
+        self.assertEqual(self.parse("station", "--only", "fuzz", "--long").only, ["fuzz"])
+
+    def test_an_unknown_part_and_a_quick_record_are_refused(self):
+        self.assertRaises(SystemExit, self.parse, "station", "--only", "no-such-part")
+        self.assertRaises(SystemExit, self.parse, "station", "--quick", "--record")
+
+
+if __name__ == "__main__":
+    unittest.main()
