@@ -1,8 +1,11 @@
 """The rules of ./dev bench: budgets, samples, tables of short and long runs, names of groups."""
 import io
+import itertools
 import pathlib
+import subprocess
 import sys
 import tempfile
+import threading
 import types
 import unittest
 from contextlib import redirect_stderr, redirect_stdout
@@ -16,6 +19,7 @@ import budget
 import parts
 import record
 import sample
+import station_kill
 
 
 def quietly(function, *words):
@@ -85,6 +89,23 @@ class Budgets(unittest.TestCase):
         self.assertEqual(quietly(list, one.in_time([1, 2, 3])), [1])
 
 
+class Beside(unittest.TestCase):
+    LIMIT_S = 60
+
+    def test_a_long_part_runs_beside_the_others_but_not_beside_one_that_must_be_alone(self):
+        other_ran, ended = threading.Event(), []
+
+        def hour(*_):
+            ended.append(other_ran.wait(self.LIMIT_S))
+
+        module = group(hour=hour, other=lambda *_: other_ran.set(), fuzz=lambda *_: ended.append("fuzz"))
+        module.BESIDE, module.ALONE = ("hour",), ("fuzz",)
+        one = made(is_long=True)
+        quietly(parts.run_group, one, "g", module)
+        self.assertEqual(ended, [True, "fuzz"])
+        self.assertTrue(all(line["ok"] for line in one.lines), one.lines)
+
+
 class Samples(unittest.TestCase):
     POINTS = [(number, "rare" if number % 100 == 7 else "common" if number % 2 else "usual") for number in range(300)]
 
@@ -103,6 +124,90 @@ class Samples(unittest.TestCase):
 
     def test_without_a_limit_it_is_every_point_in_order(self):
         self.assertEqual(self.chosen(None), self.POINTS)
+
+
+class FakeRig:
+    """A job of 40 calls that survives everything; of each call it remembers what was done to it."""
+
+    KINDS = ("create", "write", "sync", "rename")
+    program = "true"
+
+    def __init__(self, _, scratch):
+        self.home, self.crashes = scratch, itertools.count()
+        self.killed, self.failed, self.fault = [], [], None
+
+    def fresh(self, name):
+        home = self.home / name
+        (home / "jobs").mkdir(parents=True, exist_ok=True)
+        (home / "jobs" / "index.sqlite").write_bytes(b"index")
+        (home / "calibration.json").touch()
+        return home
+
+    def record(self):
+        home, log = self.fresh("record"), []
+        for number in range(10):
+            path = f"{home}/jobs/{number}"
+            log += [("create", path, "0", b""), ("write", path, "0", b"x"), ("sync", path, "", b""), ("ack", "", "", b"a"),
+                    ("rename", path, path + "x", b"")]
+        return home, log
+
+    def run(self, _, __, crash=False, kill=0, when="", fail=0, **___):
+        if crash:
+            return subprocess.CompletedProcess([], -11 if next(self.crashes) < 2 else 0, "in quarantine", "")
+        self.killed += [(kill, when)] if kill else []
+        self.failed += [fail] if fail else []
+        return subprocess.CompletedProcess([], -9 if kill else 0, "", "")
+
+    def recovers(self, home, again=False):
+        (home / "jobs").mkdir(exist_ok=True)
+        (home / "jobs" / "index.sqlite").write_bytes(b"index")
+        return self.fault
+
+
+class KillTest(unittest.TestCase):
+    def measure(self, fault=None, **how):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.rig = FakeRig("", pathlib.Path(folder.name))
+        self.rig.fault = fault
+        one = made(**how)
+        with mock.patch.object(station_kill, "Rig", lambda *_: self.rig):
+            quietly(station_kill.measure, one, folder.name)
+        return {line["what"]: line for line in one.lines}
+
+    def test_a_long_run_takes_both_sides_of_every_call(self):
+        line = self.measure(is_long=True)["SIGKILL before and after every write, fsync, rename of a job"]
+        self.assertEqual((line["measured"], line["ok"]), ("0 faults at 80 points", True))
+        both = {(number, when) for number in range(1, 41) for when in ("before", "after")}
+        self.assertLessEqual(both, set(self.rig.killed))
+        self.assertEqual(sorted(self.rig.failed), sorted(2 * list(range(1, 41))))
+
+    def test_a_short_run_states_how_many_of_how_many_and_takes_both_sides_of_every_kind(self):
+        lines = self.measure()
+        line = lines["SIGKILL before and after a sampled write, fsync, rename of a job"]
+        self.assertEqual((line["measured"], line["ok"]), ("0 faults at 60 of 80 points", True))
+        kinds = {(FakeRig.KINDS[(number - 1) % 4], when) for number, when in self.rig.killed[:60]}
+        self.assertEqual(len(kinds), 8)
+        self.assertTrue(all(line["ok"] for line in lines.values()), lines)
+
+    def test_a_kind_that_is_rare_is_killed_on_both_sides(self):
+        calls = [("write",)] * 400 + [("rename",)]
+        for seed in range(20):
+            points = station_kill.kill_points(calls, 12, seed)
+            self.assertEqual(len(points), 12)
+            self.assertLessEqual({(401, "before"), (401, "after")}, set(points))
+            self.assertIn(401, station_kill.call_numbers(calls, 12, seed))
+
+    def test_one_fault_makes_its_line_fall_short(self):
+        lines = self.measure(fault="view lost")
+        self.assertIn("60 faults at 60 of 80 points", lines["SIGKILL before and after a sampled write, fsync, rename of a job"]
+                      ["measured"])
+        self.assertFalse(any(line["ok"] for what, line in lines.items() if "reconstruction" not in what))
+
+    def test_too_few_points_fall_short(self):
+        one = made()
+        quietly(lambda: station_kill.report(one, "kills", [("call 1", None)] * 8, 10, of=80))
+        self.assertEqual((one.lines[0]["measured"], one.lines[0]["ok"]), ("0 faults at 8 of 80 points", False))
 
 
 class Tables(unittest.TestCase):
