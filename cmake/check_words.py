@@ -15,7 +15,7 @@ HASH = {".toml", ".cmake", ".txt", ".in", ".service", ".socket", ".rules", ".yml
 SUFFIXES = CPP | MARKDOWN | HASH | {".py"}
 LEFT_OUT = {"build", "out"}  # of ROOT; and what begins with a dot
 TEST_FOLDERS = ("tests/unit/", "tests/component/", "tests/system/", "tests/bench/", "tests/fuzz/")
-MARK = re.compile(r"(//|#|<!--).*\b(old names?|alias(es)?)\b")
+MARK = re.compile(r"\b(old names?|alias(es)?)\b")
 KINDS = {"text": {COMMENT, STRING}, "strings": {STRING}, "sentences": {STRING}, "names": {CODE}, "files": set()}
 WITHOUT_TESTS = {"strings", "sentences"}
 CPP_PART = re.compile(
@@ -30,12 +30,14 @@ class Rule:
         self.kind, self.folders, self.use = kind, folders, use
         self.public = term.startswith("!")
         self.term = term.lstrip("!")
+        self.piece = max(re.findall(r"\w+", self.term), key=len).lower()  # without it in a file there is no hit
         escaped = re.escape(self.term).replace(r"\*", r"\w*").replace(r"\ ", r"\s+")
         word_at_start, word_at_end = (re.match(r"[\w*]", self.term[at]) for at in (0, -1))
         if kind == "sentences":
             self.pattern = re.compile(re.escape(self.term))
         elif kind == "names":
-            self.pattern = re.compile((r"(?<!\w)" if word_at_start else "") + escaped + (r"_?(?!\w)" if word_at_end else ""))
+            self.pattern = re.compile((r"(?<!\w)" if word_at_start else "") + escaped +
+                                      (r"_?(?!\w)" if word_at_end else ""))
         else:
             self.pattern = re.compile((r"(?<![\w-])" if word_at_start else "") + escaped +
                                       (r"(?![\w-])" if word_at_end else ""), re.IGNORECASE)
@@ -132,6 +134,8 @@ def parts(path, text):
 
 def hits(rules, name, path, text):
     """(line number, rule) of every forbidden term in a file."""
+    lower = text.lower()
+    rules = [rule for rule in rules if rule.kind == "files" or rule.piece in lower]
     found = [(1, rule) for rule in rules if rule.kind == "files" and rule.pattern.fullmatch(path.name)]
     for kind, at, part in parts(path, text):
         for rule in rules:

@@ -3,8 +3,8 @@ import random
 
 
 def choose(points, count, kind_of, seed):
-    """All points, in order, where `count` allows; else one of each kind and the rest by chance, in random order, so that
-    a run that ends early has tried all kinds too."""
+    """All points, in order, where `count` allows; else one of each kind first, then the rest by chance, so that a run
+    that ends early has tried all kinds too."""
     points = list(points)
     if count is None or count >= len(points):
         return points

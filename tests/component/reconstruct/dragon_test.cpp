@@ -1,4 +1,4 @@
-// Real range scans, imported and reconstructed like any scan; coarse voxels, for `./dev bench road` does it in full.
+// Real range scans, imported and reconstructed like any scan; coarse voxels: `./dev bench end-to-end` does it in full.
 
 #include <gtest/gtest.h>
 

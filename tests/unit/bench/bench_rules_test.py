@@ -244,8 +244,8 @@ class Arguments(unittest.TestCase):
             return quietly(bench.arguments)
 
     def test_the_old_name_road_is_end_to_end(self):
-        self.assertEqual(self.parse("road").groups, ["end-to-end"])
-        self.assertEqual(self.parse("road", "end-to-end").groups, ["end-to-end"])
+        self.assertEqual(self.parse("road").groups, ["end-to-end"])  # old name
+        self.assertEqual(self.parse("road", "end-to-end").groups, ["end-to-end"])  # old name
 
     def test_a_part_of_long_runs_alone_is_refused_without_long(self):
         self.assertRaises(SystemExit, self.parse, "station", "--only", "fuzz")
