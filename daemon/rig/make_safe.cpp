@@ -16,6 +16,9 @@ using config::SafetyDevice;
 constexpr auto kLimit = std::chrono::milliseconds(900);
 constexpr auto kAgain = std::chrono::milliseconds(20);
 
+/// Of one attempt: a stop that gets no confirmation is sent again.
+Deadline attempt_deadline(Clock& clock, Deadline all) { return all.at_most(clock, kLimit); }
+
 template <class Try>
 Result<void> until(Clock& clock, Deadline deadline, const Try& attempt) {
   for (;;) {
@@ -29,7 +32,7 @@ Result<void> stop_table(const Result<config::RigConfig>& config, Clock& clock, D
   if (!config) return pass_on(config);
   const auto turntable = open_turntable(config->turntable, clock);
   if (!turntable) return pass_on(turntable);
-  return until(clock, deadline, [&] { return (*turntable)->stop(deadline); });
+  return until(clock, deadline, [&] { return (*turntable)->stop(attempt_deadline(clock, deadline)); });
 }
 
 /// Kept until all is done: a line that is let go falls back, and the lamp on it goes out.
@@ -45,14 +48,14 @@ Result<void> darken(const Result<config::RigConfig>& config, Clock& clock, Deadl
   auto projector = open_projector(config->projector, *held.lines, clock);
   if (!projector) return pass_on(projector);
   held.device = std::move(*projector);
-  return until(clock, deadline, [&] { return held.device->turn_off(deadline); });
+  return until(clock, deadline, [&] { return held.device->turn_off(attempt_deadline(clock, deadline)); });
 }
 
 Result<void> show_red(const Result<config::RigConfig>& config, Clock& clock, Deadline deadline, Held<Panel>& held) {
   if (!config) return pass_on(config);
   held.lines = open_lines(*config, clock);
   held.device = open_panel(*config, *held.lines, clock);
-  return until(clock, deadline, [&] { return held.device->show({.red = true}, deadline); });
+  return until(clock, deadline, [&] { return held.device->show({.red = true}, attempt_deadline(clock, deadline)); });
 }
 
 void report_error(const char* program, const std::set<std::string>& why) {
