@@ -2,6 +2,7 @@
 #include <memory>
 
 #include "daemon/ctl/commands.h"
+#include "daemon/ctl/motion_guardian.h"
 #include "daemon/ctl/verbs.h"
 
 namespace scanrig::ctl {
@@ -85,6 +86,14 @@ void add_camera(CLI::App& app, Chosen& chosen) {
   }
 }
 
+/// Started by the tools that move, on their socket.
+void add_guardian(CLI::App& app, Chosen& chosen) {
+  const auto config = std::make_shared<std::filesystem::path>();
+  auto* sub = app.add_subcommand("guard-motion", "stop the table when the program that moves it ends")->group("");
+  sub->add_option("CONFIG", *config, "the rig's configuration")->required();
+  sub->callback([&chosen, config] { chosen = [config] { return guard_motion(*config); }; });
+}
+
 }  // namespace
 
 void add_rig_commands(CLI::App& app, Chosen& chosen) {
@@ -92,6 +101,7 @@ void add_rig_commands(CLI::App& app, Chosen& chosen) {
   add_panel(app, chosen);
   add_doctor(app, chosen);
   add_camera(app, chosen);
+  add_guardian(app, chosen);
 }
 
 }  // namespace scanrig::ctl

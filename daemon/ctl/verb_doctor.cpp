@@ -17,9 +17,13 @@ ExitCode examine_rig(const DoctorVerb& verb) {
   const bool drive_answers = doctor::examine_drive(*rig, clock, report);
   const bool estop_works = doctor::examine_panel(*rig, drive_answers, person, clock, report);
   const auto may_turn = [&] { return verb.yes_move || person.ask("Is everyone clear? Turn the table? [y/N]") == "y"; };
-  if (drive_answers && estop_works && may_turn()) doctor::examine_motion(*rig, person, clock, report);
+  Result<void> moved;
+  if (drive_answers && estop_works && may_turn()) {
+    moved = doctor::examine_motion({*rig, verb.config}, person, clock, report);
+  }
   doctor::print_missing_snippets(rig->turntable.device(), verb.config, report);
   fmt::print("{}", verb.json ? report.json() : report.text());
+  if (!moved) return report_error(moved.error());
   const auto found = report.findings().size();
   if (found == 0) return ExitCode::ok;
   return report_error(ExitCode::device,

@@ -1,10 +1,10 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "daemon/ctl/motion_session.h"
 #include "daemon/ctl/offline_rig_config.h"
 #include "daemon/ctl/verbs.h"
 #include "daemon/rig/open_devices.h"
-#include "daemon/runtime/signal_stop.h"
 
 namespace scanrig::ctl {
 namespace {
@@ -43,30 +43,36 @@ Result<void> home(Turntable& table, Clock& clock) {
   return table.home(Deadline::after(clock, kMoveLimit));
 }
 
-ExitCode move(const TurntableVerb& verb, Turntable& table, Clock& clock) {
-  if (!agreed(kWarning, verb.yes)) {
-    return report_error(ExitCode::refused, "nothing was moved: reply y, or give --yes where there is no terminal");
-  }
-  const SignalStop signal;
-  const auto token = signal.token();
-  const std::stop_callback stop(token, [&] { table.request_stop(); });
-  if (auto homed = home(table, clock); !homed) return report_error(of_device(homed.error()));
-  if (verb.what == "home") {
-    fmt::print("{}\n", verb.json ? R"({"homed": true})" : "home");
-    return ExitCode::ok;
-  }
-  const auto moved = table.rotate_to({verb.angle_deg}, Deadline::after(clock, kMoveLimit));
-  if (!moved) return report_error(of_device(moved.error()));
+ExitCode print_move(const TurntableVerb& verb, const Move& moved) {
   const auto ms = [](Clock::Duration time) { return std::chrono::duration_cast<milliseconds>(time).count(); };
   if (verb.json) {
-    fmt::print("{}\n", nlohmann::ordered_json{{"measured_deg", moved->measured.value},
-                                              {"moving_ms", ms(moved->moving)},
-                                              {"settling_ms", ms(moved->settling)}}
+    fmt::print("{}\n", nlohmann::ordered_json{{"measured_deg", moved.measured.value},
+                                              {"moving_ms", ms(moved.moving)},
+                                              {"settling_ms", ms(moved.settling)}}
                            .dump());
     return ExitCode::ok;
   }
-  fmt::print("{:.3f} deg, {} ms moving, {} ms settling\n", moved->measured.value, ms(moved->moving),
-             ms(moved->settling));
+  fmt::print("{:.3f} deg, {} ms moving, {} ms settling\n", moved.measured.value, ms(moved.moving), ms(moved.settling));
+  return ExitCode::ok;
+}
+
+ExitCode move(const TurntableVerb& verb, const config::RigConfig& rig, Clock& clock) {
+  if (!agreed(kWarning, verb.yes)) {
+    return report_error(ExitCode::refused, "nothing was moved: reply y, or give --yes where there is no terminal");
+  }
+  Move move;
+  const auto moved = with_motion(rig, verb.config, clock, [&](Motion& motion) {
+    return motion.turn([&](Turntable& table) -> Result<void> {
+      if (auto homed = home(table, clock); !homed || verb.what == "home") return homed;
+      const auto turned = table.rotate_to({verb.angle_deg}, Deadline::after(clock, kMoveLimit));
+      if (!turned) return pass_on(turned);
+      move = *turned;
+      return {};
+    });
+  });
+  if (!moved) return report_error(of_device(moved.error()));
+  if (verb.what == "move") return print_move(verb, move);
+  fmt::print("{}\n", verb.json ? R"({"homed": true})" : "home");
   return ExitCode::ok;
 }
 
@@ -106,11 +112,10 @@ ExitCode turntable(const TurntableVerb& verb) {
   // A GRBL controller has no registers: what it says is its status.
   const bool registers = rig->turntable.driver == config::TurntableConfig::Driver::modbus;
   if (verb.what == "read" && registers) return read_registers(*rig, clock, verb.json);
-  const auto open = open_devices(*rig, clock);
-  if (!open) return report_error(open.error());
-  auto& table = *open->turntable;
-  if (verb.what != "status" && verb.what != "read") return move(verb, table, clock);
-  const auto status = table.status(Deadline::after(clock, kAskLimit));
+  if (verb.what != "status" && verb.what != "read") return move(verb, *rig, clock);
+  const auto table = open_turntable(rig->turntable, clock);
+  if (!table) return report_error(table.error());
+  const auto status = (*table)->status(Deadline::after(clock, kAskLimit));
   return status ? tell(*status, verb.json) : report_error(of_device(status.error()));
 }
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <filesystem>
+
 #include "config/rig_config.h"
 #include "core/clock.h"
 #include "daemon/ctl/doctor/findings.h"
@@ -12,9 +14,16 @@ namespace scanrig::ctl::doctor {
 /// Returns whether the drive can be worked with.
 bool examine_drive(const config::RigConfig& rig, Clock& clock, Report& report);
 
-/// Turns the table: home, a quarter turn for the sign (the operator says which way it went), one revolution from home
-/// switch to home switch for the gear ratio. Findings: `cannot_turn`, `reversed_sign`, `gear_ratio`.
-void examine_motion(const config::RigConfig& rig, const Operator& person, Clock& clock, Report& report);
+/// The rig to be examined, and the file that a motion's guardian reads again.
+struct Rig {
+  const config::RigConfig& config;
+  const std::filesystem::path& file;
+};
+
+/// Turns the table under the rules of with_motion(): home, a quarter turn for the sign (the operator says which way it
+/// went), one revolution from home switch to home switch for the gear ratio. Findings: `cannot_turn`, `reversed_sign`,
+/// `gear_ratio`. Fails with `stopped` (somebody stopped it) and `refused` (e-stop, guard): the examination ends.
+Result<void> examine_motion(const Rig& rig, const Operator& person, Clock& clock, Report& report);
 
 /// Lamps can be lit, inputs read; with somebody there, whether the e-stop's input follows the button and whether the
 /// drive loses its power. Findings: `panel`, `estop_not_wired`, `estop_keeps_power`.

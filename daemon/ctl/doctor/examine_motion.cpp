@@ -1,12 +1,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <initializer_list>
 
 #include "daemon/ctl/doctor/examine.h"
-#include "daemon/rig/open_devices.h"
+#include "daemon/ctl/motion_session.h"
 
 namespace scanrig::ctl::doctor {
 namespace {
@@ -23,8 +25,10 @@ constexpr milliseconds kPoll{2};
 /// Drives the motor past the home switch twice; the drive's own counter says how far that is.
 class Revolution {
  public:
-  Revolution(const ModbusTurntableOptions& options, Clock& clock)
-      : options_(options), clock_(clock), drive_(options.line, options.profile, clock) {}
+  /// `is_stop_requested` ends it with `stopped`; the caller stops the drive after any failure.
+  Revolution(const ModbusTurntableOptions& options, Clock& clock, ModbusDrive& drive,
+             const std::atomic<bool>& is_stop_requested)
+      : options_(options), clock_(clock), drive_(drive), is_stop_requested_(is_stop_requested) {}
 
   /// Pulses from the home switch to the home switch, once around. The table stands at home before.
   Result<double> pulses() {
@@ -51,14 +55,14 @@ class Revolution {
 
   Result<double> step_aside(int side) {
     const auto by = Deadline::after(clock_, kMoveLimit);
-    const auto before = drive_.read_state(by);
+    const auto before = read_state(by);
     const auto words = motion(1.0);
     if (!before) return pass_on(before);
     if (!words) return pass_on(words);
     const auto way = static_cast<std::int32_t>(side * kAsideDeg * options_.scale.pulses_per_degree());
     if (auto sent = drive_.start_move(before->position + way, *words, by); !sent) return pass_on(sent);
     for (bool arrived = false; !arrived; clock_.sleep_for(kPoll)) {
-      const auto state = drive_.read_state(by);
+      const auto state = read_state(by);
       if (!state) return pass_on(state);
       arrived = !state->running && std::abs(state->position - before->position - way) < std::abs(way) / 50;
       if (by.expired(clock_)) return fail(ErrorCode::timeout, "the table did not step aside");
@@ -69,7 +73,7 @@ class Revolution {
   /// How far it was to the switch, pulses.
   Result<double> seek_switch() {
     const auto by = Deadline::after(clock_, kRevolutionLimit);
-    const auto before = drive_.read_state(by);
+    const auto before = read_state(by);
     const auto fast = motion(kHomingShare);
     if (!before) return pass_on(before);
     if (!fast) return pass_on(fast);
@@ -78,7 +82,7 @@ class Revolution {
     // The furthest way seen, not the last: state and position are read in turn, and home sets the position to zero.
     double furthest = 0.0;
     for (bool begun = false;; clock_.sleep_for(kPoll)) {
-      const auto state = drive_.read_state(by);
+      const auto state = read_state(by);
       if (!state) return pass_on(state);
       begun = begun || state->running || !state->homed;
       if (begun && state->homed && !state->running) return furthest;
@@ -89,27 +93,24 @@ class Revolution {
     }
   }
 
-  ModbusTurntableOptions options_;
+  /// The drive's state, unless a stop was requested.
+  Result<DriveState> read_state(Deadline by) {
+    if (is_stop_requested_) return fail(ErrorCode::stopped, "stopped on request");
+    return drive_.read_state(by);
+  }
+
+  const ModbusTurntableOptions& options_;
   Clock& clock_;
-  ModbusDrive drive_;
+  ModbusDrive& drive_;
+  const std::atomic<bool>& is_stop_requested_;
 };
 
-/// Home, then a quarter turn that ought to be counter-clockwise.
-Result<void> show_quarter_turn(const config::RigConfig& rig, Clock& clock) {
-  const auto open = open_devices(rig, clock);
-  if (!open) return pass_on(open);
-  auto& table = *open->turntable;
+Result<void> home_and_turn(Turntable& table, std::initializer_list<double> degrees, Clock& clock) {
   if (auto homed = table.home(Deadline::after(clock, kMoveLimit)); !homed) return homed;
-  const auto moved = table.rotate_to({90}, Deadline::after(clock, kMoveLimit));
-  if (!moved) return pass_on(moved);
+  for (const double deg : degrees) {
+    if (const auto moved = table.rotate_to({deg}, Deadline::after(clock, kMoveLimit)); !moved) return pass_on(moved);
+  }
   return {};
-}
-
-Result<void> go_home(const config::RigConfig& rig, Clock& clock) {
-  const auto open = open_devices(rig, clock);
-  if (!open) return pass_on(open);
-  auto& table = *open->turntable;
-  return table.home(Deadline::after(clock, kMoveLimit));
 }
 
 void check_sign(const config::RigConfig& rig, const Operator& person, Report& report) {
@@ -137,34 +138,42 @@ void compare_gear(double configured, double ratio, Report& report) {
 }
 
 /// By the drive's own counter, from the home switch to the home switch.
-Result<void> check_gear_by_switch(const config::RigConfig& rig, Clock& clock, Report& report) {
-  const auto& options = rig.turntable.modbus;
-  if (auto homed = go_home(rig, clock); !homed) return homed;
-  const auto pulses = Revolution(options, clock).pulses();
-  if (!pulses) return pass_on(pulses);
-  const double ratio = *pulses / options.scale.pulses_per_motor_rev;
-  report.note(fmt::format("gear: one turn of the table, switch to switch, is {:.0f} pulses, {:.3f} motor turns",
-                          *pulses, ratio));
+Result<void> check_gear_by_switch(const Rig& rig, Clock& clock, Report& report) {
+  const auto& options = rig.config.turntable.modbus;
+  double pulses = 0.0;
+  const auto moved = with_motion(rig.config, rig.file, clock, [&](Motion& motion) -> Result<void> {
+    auto homed = motion.turn([&](Turntable& table) { return home_and_turn(table, {}, clock); });
+    if (!homed) return homed;
+    return motion.turn_drive([&](ModbusDrive& drive, const std::atomic<bool>& is_stop_requested) -> Result<void> {
+      const auto counted = Revolution(options, clock, drive, is_stop_requested).pulses();
+      if (!counted) return pass_on(counted);
+      pulses = *counted;
+      return {};
+    });
+  });
+  if (!moved) return moved;
+  const double ratio = pulses / options.scale.pulses_per_motor_rev;
+  report.note(fmt::format("gear: one turn of the table, switch to switch, is {:.0f} pulses, {:.3f} motor turns", pulses,
+                          ratio));
   compare_gear(options.scale.gear_ratio, ratio, report);
   return {};
 }
 
-/// By a mark that somebody puts on the table: for drives that cannot count from a switch.
-Result<void> check_gear_by_mark(const config::RigConfig& rig, const Operator& person, Clock& clock, Report& report) {
+/// By a mark that somebody puts on the table: for drives that cannot count from a switch. Nothing may move while the
+/// mark is put there, so there are two motions; home is the same place in both.
+Result<void> check_gear_by_mark(const Rig& rig, const Operator& person, Clock& clock, Report& report) {
   if (!person.there()) {
     report.note("gear: not checked, nobody is here to watch a mark on the table");
     return {};
   }
-  const auto open = open_devices(rig, clock);
-  if (!open) return pass_on(open);
-  auto& table = *open->turntable;
-  if (auto homed = table.home(Deadline::after(clock, kMoveLimit)); !homed) return homed;
-  const auto turn_to = [&](double deg) { return table.rotate_to({deg}, Deadline::after(clock, kMoveLimit)); };
-  if (const auto moved = turn_to(0); !moved) return pass_on(moved);
-  std::ignore = person.ask("Put a mark on the table and one on the base beside it, then press Enter.");
-  for (const double deg : {120.0, 240.0, 0.0}) {
-    if (const auto moved = turn_to(deg); !moved) return pass_on(moved);
-  }
+  const auto turn_to = [&](std::initializer_list<double> degrees) {
+    return with_motion(rig.config, rig.file, clock, [&](Motion& motion) {
+      return motion.turn([&](Turntable& table) { return home_and_turn(table, degrees, clock); });
+    });
+  };
+  if (auto moved = turn_to({0}); !moved) return moved;
+  std::ignore = person.ask("Put a mark on the table and one on the base beside it, keep clear, then press Enter.");
+  if (auto moved = turn_to({120, 240, 0}); !moved) return moved;
   const auto said = person.ask(
       "The table was told to make one whole turn. By how many degrees is its mark away from the other one? [0; -10: "
       "it stopped 10 degrees short; 10: it went 10 degrees too far]");
@@ -173,7 +182,7 @@ Result<void> check_gear_by_mark(const config::RigConfig& rig, const Operator& pe
     report.note("gear: not checked, nobody has said where the mark stopped");
     return {};
   }
-  const double configured = rig.turntable.motion().scale.gear_ratio;
+  const double configured = rig.config.turntable.motion().scale.gear_ratio;
   report.note(fmt::format("gear: told to turn 360 degrees, the table was seen to turn {:.1f}", 360.0 + off_deg));
   compare_gear(configured, configured * 360.0 / (360.0 + off_deg), report);
   return {};
@@ -181,19 +190,24 @@ Result<void> check_gear_by_mark(const config::RigConfig& rig, const Operator& pe
 
 }  // namespace
 
-void examine_motion(const config::RigConfig& rig, const Operator& person, Clock& clock, Report& report) {
-  const auto failed = [&](const Error& error) {
+Result<void> examine_motion(const Rig& rig, const Operator& person, Clock& clock, Report& report) {
+  const auto failed = [&](Error error) -> Result<void> {
+    if (error.code == ErrorCode::stopped || error.code == ErrorCode::refused) return tl::unexpected(std::move(error));
     report.find("cannot_turn", error.message + ".", "Remove the cause and run the doctor again.");
+    return {};
   };
   report.section("Turntable: motion");
-  if (auto shown = show_quarter_turn(rig, clock); !shown) return failed(shown.error());
-  check_sign(rig, person, report);
-  const auto& options = rig.turntable.modbus;
-  const bool counts_from_switch = rig.turntable.driver == config::TurntableConfig::Driver::modbus &&
-                                  options.home_mode != "here" && !options.profile.homing.absolute;
+  const auto shown = with_motion(rig.config, rig.file, clock, [&](Motion& motion) {
+    return motion.turn([&](Turntable& table) { return home_and_turn(table, {90}, clock); });
+  });
+  if (!shown) return failed(shown.error());
+  check_sign(rig.config, person, report);
+  const auto& turntable = rig.config.turntable;
+  const bool counts_from_switch = turntable.driver == config::TurntableConfig::Driver::modbus &&
+                                  turntable.modbus.home_mode != "here" && !turntable.modbus.profile.homing.absolute;
   const auto checked =
       counts_from_switch ? check_gear_by_switch(rig, clock, report) : check_gear_by_mark(rig, person, clock, report);
-  if (!checked) return failed(checked.error());
+  return checked ? checked : failed(checked.error());
 }
 
 }  // namespace scanrig::ctl::doctor

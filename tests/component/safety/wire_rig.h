@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -81,14 +82,17 @@ class WireRig {
   [[nodiscard]] std::filesystem::path api() const { return folder / "api.sock"; }
 
   RealClock clock;
-  const std::filesystem::path folder =
-      std::filesystem::path(testing::TempDir()) /
-      ("rig" + std::to_string(::getpid()) + "-" + std::to_string(reinterpret_cast<std::uintptr_t>(this) >> 4 & 0xFFFF));
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) /
+                                       ("rig" + std::to_string(::getpid()) + "-" + std::to_string(next_number()));
   sim::wire::LeadshineDrive drive;
   std::unique_ptr<sim::wire::ModbusServer> serial;
   std::unique_ptr<sim::wire::GpioSocket> lines;
 
  private:
+  static int next_number() {
+    static std::atomic<int> last = 0;
+    return ++last;
+  }
   static bool is_stop(const sim::wire::Bytes& b) {  // 06 6002 0040: quick stop
     return b.size() == 8 && b[1] == 0x06 && b[2] == 0x60 && b[3] == 0x02 && b[5] == 0x40;
   }
