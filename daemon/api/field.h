@@ -35,6 +35,9 @@ class Values {
   [[nodiscard]] std::optional<double> number(std::string_view name) const { return get<double>(name); }
   [[nodiscard]] std::optional<std::int64_t> integer(std::string_view name) const { return get<std::int64_t>(name); }
   [[nodiscard]] bool flag(std::string_view name) const { return get<bool>(name).value_or(false); }
+  /// The user of this machine or the address that sent the request, as the log names it.
+  [[nodiscard]] const std::string& requester() const { return requester_; }
+  void set_requester(std::string requester) { requester_ = std::move(requester); }
 
  private:
   template <class T>
@@ -44,6 +47,7 @@ class Values {
     return std::get<T>(found->second);
   }
   std::map<std::string, Value, std::less<>> values_;
+  std::string requester_;
 };
 
 /// Reads the text of a parameter as what `field` describes. Fails with `invalid_input`, naming the field.

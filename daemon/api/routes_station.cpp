@@ -68,8 +68,8 @@ Route maintenance(std::string_view path, What what, std::string_view description
           .description = description,
           .reply = kDone,
           .errors = {409},
-          .handle = [what](const ApiStation& station, const Values&, Send send) {
-            ask(station, {.what = what, .speed = kMaxJogSpeed}, std::move(send));
+          .handle = [what](const ApiStation& station, const Values& values, Send send) {
+            ask(station, {.what = what, .speed = kMaxJogSpeed, .requester = values.requester()}, std::move(send));
           }};
 }
 
@@ -82,7 +82,8 @@ void jog(const ApiStation& station, const Values& values, Send send) {
       {.what = What::jog,
        .angle = {to ? *to : *by},
        .relative = by.has_value(),
-       .speed = {values.number("speed_deg_s").value_or(kMaxJogSpeed.value)}},
+       .speed = {values.number("speed_deg_s").value_or(kMaxJogSpeed.value)},
+       .requester = values.requester()},
       std::move(send));
 }
 

@@ -83,6 +83,7 @@ void ApiSession::on_header(Error error) {
     return write_text(may ? std::move(found.error()) : error_response(429, kTooOften));
   }
   match_ = std::move(*found);
+  match_->values.set_requester(seat_->peer());
   order_ = order_of(*as);
   const auto job = order_ ? find_job(core_.station, match_->values) : nullptr;
   if (job) order_->job = job->id;

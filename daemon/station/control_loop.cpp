@@ -163,6 +163,7 @@ void ControlLoop::carry_out(const Action& action, const StationPorts& ports) {
       Overloaded{[&](const action::Warn&) { wake_later(event::WarningOver{}, options_.warning); },
                  [&](const action::WaitForEstop&) { wake_later(event::EstopWindowOver{}, options_.estop_window); },
                  [&](const action::RetryStopLater&) { wake_later(event::StopRetryDue{}, options_.stop_retry); },
+                 [&](const action::EndConsentLater& wait) { wake_later(event::ConsentTimeout{}, wait.after); },
                  [&](const action::WaitForFlip& flip) { wake_later(event::FlipTimedOut{flip.job}, flip.limit); },
                  [&](const action::CheckLater&) { wake_later(event::CheckDue{}, options_.check_period); },
                  [&](const action::TestLamps&) { lamps_tested_ = clock_.now() + kLampTest; },

@@ -90,7 +90,9 @@ struct MaintenanceRequested {
   Degrees angle{};  ///< jog: where to, or by how much
   bool relative = false;
   DegreesPerSecond speed{};  ///< jog
+  std::string requester{};   ///< the user of this machine or the address that sent the request; empty: unknown
 };
+struct ConsentTimeout {};  ///< nothing has moved in maintenance for a while
 struct Jogged {
   Degrees measured;
 };
@@ -221,20 +223,24 @@ using Event =
     std::variant<event::PanelFound, event::InputsRead, event::Pressed, event::EstopChanged, event::GuardChanged,
                  event::WarningOver, event::EstopWindowOver, event::StopRetryDue, event::CheckDue, event::QuietHours,
                  event::WarmingUp, event::DevicesChecked, event::CalibrationChecked, event::MaintenanceRequested,
-                 event::Jogged, event::Pulsed, event::Homed, event::ViewTaken, event::Stopped, event::RigFailed,
-                 event::StopFailed, event::PanelFailed, event::JobsOrdered, event::JobRequested, event::RequestDone,
-                 event::JobUpdated, event::JobRemoved, event::JobStarted, event::JobNotStarted, event::JobUnreadable,
-                 event::CheckViewTaken, event::MovementChecked, event::FlipTimedOut, event::ViewStored,
-                 event::PoseStored, event::JobClosed, event::StoreFailed, event::DiskChecked, event::StageProgress,
-                 event::ReconstructionFailed, event::ModelReady, event::ReloadRequested, event::Shutdown>;
+                 event::ConsentTimeout, event::Jogged, event::Pulsed, event::Homed, event::ViewTaken, event::Stopped,
+                 event::RigFailed, event::StopFailed, event::PanelFailed, event::JobsOrdered, event::JobRequested,
+                 event::RequestDone, event::JobUpdated, event::JobRemoved, event::JobStarted, event::JobNotStarted,
+                 event::JobUnreadable, event::CheckViewTaken, event::MovementChecked, event::FlipTimedOut,
+                 event::ViewStored, event::PoseStored, event::JobClosed, event::StoreFailed, event::DiskChecked,
+                 event::StageProgress, event::ReconstructionFailed, event::ModelReady, event::ReloadRequested,
+                 event::Shutdown>;
 
 /// What is to be done about it. None of them waits.
 namespace action {
 struct Warn {};            ///< WarningOver comes after the warning time
 struct WaitForEstop {};    ///< EstopWindowOver comes after the window
 struct RetryStopLater {};  ///< StopRetryDue comes after a while
-struct CheckLater {};      ///< CheckDue comes after a while
-struct CheckDevices {};    ///< answered by DevicesChecked
+struct EndConsentLater {
+  std::chrono::minutes after;
+};                       ///< ConsentTimeout comes after it, counted anew each time
+struct CheckLater {};    ///< CheckDue comes after a while
+struct CheckDevices {};  ///< answered by DevicesChecked
 /// Is it of the rig's cameras? RequestDone by CalibrationChecked.
 struct CheckCalibration {
   std::string job;  ///< whose views were taken with it; empty: the rig's, for a scan that has none yet
@@ -299,10 +305,11 @@ struct CloseJob {
 };
 }  // namespace action
 
-using Action = std::variant<action::Warn, action::WaitForEstop, action::RetryStopLater, action::CheckLater,
-                            action::CheckDevices, action::CheckCalibration, action::Home, action::StopRig, action::Jog,
-                            action::Pulse, action::TestLamps, action::TakeView, action::WaitForFlip, action::CreateJobs,
-                            action::StartJob, action::MoveJob, action::RunJobRequest, action::CheckMovement,
-                            action::StoreView, action::FinishPose, action::ResumeJob, action::CloseJob>;
+using Action =
+    std::variant<action::Warn, action::WaitForEstop, action::RetryStopLater, action::EndConsentLater,
+                 action::CheckLater, action::CheckDevices, action::CheckCalibration, action::Home, action::StopRig,
+                 action::Jog, action::Pulse, action::TestLamps, action::TakeView, action::WaitForFlip,
+                 action::CreateJobs, action::StartJob, action::MoveJob, action::RunJobRequest, action::CheckMovement,
+                 action::StoreView, action::FinishPose, action::ResumeJob, action::CloseJob>;
 
 }  // namespace scanrig

@@ -1,3 +1,4 @@
+#include <chrono>
 #include <cmath>
 
 #include "daemon/station/step_builder.h"
@@ -7,7 +8,9 @@ namespace {
 
 using What = event::MaintenanceRequested::What;
 
-void begin(StepBuilder& m) {
+constexpr std::chrono::minutes kConsentTimeout{10};  ///< without a motion
+
+void begin(StepBuilder& m, const std::string& requester) {
   auto& s = m.s();
   if (s.machine == MachineState::maintenance) return m.refuse(ErrorCode::refused, "Maintenance mode is already on.");
   const bool idle =
@@ -16,7 +19,7 @@ void begin(StepBuilder& m) {
     return m.refuse(ErrorCode::busy, "The rig is busy ({}, {}). Try again when idle.", to_string(s.machine),
                     to_string(s.activity));
   }
-  s.maintenance = Maintenance{.before = s.machine, .homed = s.machine == MachineState::ready};
+  s.maintenance = Maintenance{.before = s.machine, .homed = s.machine == MachineState::ready, .requester = requester};
   s.auto_home_allowed = false;
   m.enter(MachineState::maintenance, "Maintenance was requested.");
 }
@@ -35,8 +38,15 @@ void end(StepBuilder& m) {
 void jog(StepBuilder& m, const event::MaintenanceRequested& asked) {
   auto& maintenance = *m.s().maintenance;
   if (!m.require_safe()) return;
-  if (!m.rules().guard && !maintenance.consent) {
-    return m.refuse(ErrorCode::refused, "No guard: press Reset at the panel first.");
+  if (!maintenance.may_jog(m.rules().guard)) {
+    return m.refuse(
+        ErrorCode::refused,
+        "A jog needs somebody at the panel, or a guard that stayed closed: press Reset at the panel first.");
+  }
+  const bool is_by_guard = m.rules().guard && !maintenance.guard_was_opened;
+  if (!is_by_guard && asked.requester != maintenance.requester) {
+    return m.refuse(ErrorCode::refused,
+                    "Consent to jog is for who switched maintenance on: switch it off and on, then press Reset.");
   }
   if (!maintenance.homed) return m.refuse(ErrorCode::not_homed, "The table is not homed. Press Reset first.");
   if (!std::isfinite(asked.angle.value) || !(asked.speed.value > 0) || asked.speed > kMaxJogSpeed) {
@@ -47,11 +57,18 @@ void jog(StepBuilder& m, const event::MaintenanceRequested& asked) {
   m.warn();
 }
 
+/// Light hurts as a motion does: the same rules but for home and consent.
+void pulse(StepBuilder& m) {
+  if (!m.require_safe()) return;
+  m.s().activity = Activity::pulsing;
+  m.act(action::Pulse{});
+}
+
 }  // namespace
 
 void ask_maintenance(StepBuilder& m, const event::MaintenanceRequested& asked) {
   if (m.s().shutting_down) return m.refuse(ErrorCode::refused, "The service is shutting down.");
-  if (asked.what == What::on) return begin(m);
+  if (asked.what == What::on) return begin(m, asked.requester);
   if (!m.s().maintenance) return m.refuse(ErrorCode::refused, "Maintenance mode is off. Switch it on first.");
   if (m.s().activity != Activity::none) {
     return m.refuse(ErrorCode::busy, "The rig is busy ({}): wait or press Stop.", to_string(m.s().activity));
@@ -61,7 +78,7 @@ void ask_maintenance(StepBuilder& m, const event::MaintenanceRequested& asked) {
     case What::off: return end(m);
     case What::home: return reset_in_maintenance(m, Origin::remote);
     case What::jog: return jog(m, asked);
-    case What::pulse: m.s().activity = Activity::pulsing; return m.act(action::Pulse{});
+    case What::pulse: return pulse(m);
     case What::lamp_test: return m.act(action::TestLamps{});
   }
 }
@@ -74,6 +91,8 @@ void reset_in_maintenance(StepBuilder& m, Origin origin) {
   if (origin == Origin::panel) {
     m.s().latch.reset();
     maintenance.consent = true;
+    maintenance.guard_was_opened = false;
+    m.act(action::EndConsentLater{kConsentTimeout});
   }
   maintenance.jog.reset();
   maintenance.homed = false;
@@ -91,6 +110,24 @@ void move_in_maintenance(StepBuilder& m) {
     m.s().activity = Activity::homing;
     m.act(action::Home{});
   }
+}
+
+void moved_in_maintenance(StepBuilder& m) {
+  if (m.s().maintenance->consent) m.act(action::EndConsentLater{kConsentTimeout});
+}
+
+void consent_timed_out(StepBuilder& m) {
+  auto& maintenance = m.s().maintenance;
+  if (!maintenance || !maintenance->consent) return;
+  if (m.s().activity != Activity::none) return m.act(action::EndConsentLater{kConsentTimeout});
+  maintenance->consent = false;
+}
+
+void guard_opened_in_maintenance(StepBuilder& m) {
+  auto& maintenance = m.s().maintenance;
+  if (!maintenance) return;
+  maintenance->consent = false;
+  maintenance->guard_was_opened = true;
 }
 
 }  // namespace scanrig

@@ -55,7 +55,7 @@ std::string with_light(const StationRules& rules, const char* before, const std:
 
 std::string how_to_go_on_in_maintenance(const StationState& state, const StationRules& rules) {
   if (!state.panel_known) return kSeeToPanel;
-  const bool may_jog = state.maintenance->homed && (rules.guard || state.maintenance->consent);
+  const bool may_jog = state.maintenance->homed && state.maintenance->may_jog(rules.guard);
   const char* const motion = may_jog ? "jog the table" : "press Reset at the panel to home the table";
   return after_steps(state, fmt::format("{}, or switch maintenance off", motion));
 }

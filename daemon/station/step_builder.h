@@ -76,6 +76,11 @@ void ask_maintenance(StepBuilder& m, const event::MaintenanceRequested& asked);
 void reset_in_maintenance(StepBuilder& m, Origin origin);
 /// The warning is over: what was asked for begins.
 void move_in_maintenance(StepBuilder& m);
+/// A motion in maintenance has ended: consent lasts for a while from now.
+void moved_in_maintenance(StepBuilder& m);
+void consent_timed_out(StepBuilder& m);
+/// Somebody may be at the table: whoever jogs next needs Reset at the panel.
+void guard_opened_in_maintenance(StepBuilder& m);
 
 // queue.cpp: which job has the rig next
 void take_order(StepBuilder& m, const event::JobsOrdered& asked);

@@ -47,7 +47,9 @@ class Transition : public StepBuilder {
 
   void operator()(const event::GuardChanged& e) {
     s().guard_closed = e.closed;
-    if (!e.closed && may_move()) return fault(fmt::format("The guard was opened {}.", meanwhile()));
+    if (!e.closed) guard_opened_in_maintenance(*this);
+    const bool is_hazard = may_move() || s().activity == Activity::pulsing;
+    if (!e.closed && is_hazard) return fault(fmt::format("The guard was opened {}.", meanwhile()));
     auto_home_if_allowed();
     handle_part_signals(*this);
   }
@@ -66,13 +68,17 @@ class Transition : public StepBuilder {
 
   void operator()(const event::Homed&) {
     if (s().activity != Activity::homing) return;
-    if (s().maintenance) s().maintenance->homed = true;
+    if (s().maintenance) {
+      s().maintenance->homed = true;
+      moved_in_maintenance(*this);
+    }
     enter(s().maintenance ? MachineState::maintenance : MachineState::ready, "The table is homed.");
   }
 
   void operator()(const event::Jogged& e) {
     if (s().activity != Activity::jogging) return;
     s().maintenance->jog.reset();
+    moved_in_maintenance(*this);
     enter(MachineState::maintenance, fmt::format("The table is at {:.3f} deg.", e.measured.value));
   }
 
@@ -81,6 +87,7 @@ class Transition : public StepBuilder {
   }
 
   void operator()(const event::MaintenanceRequested& e) { ask_maintenance(*this, e); }
+  void operator()(const event::ConsentTimeout&) { consent_timed_out(*this); }
 
   void operator()(const event::EstopWindowOver&) { classify_fault(); }
 

@@ -54,8 +54,13 @@ struct Maintenance {
   MachineState before = MachineState::halted;
   bool moved = false;  ///< something has moved outside a job
   bool homed = false;
-  bool consent = false;              ///< Reset was pressed at the panel since it began
+  std::string requester{};           ///< who switched it on, as event::MaintenanceRequested names him
+  bool consent = false;              ///< to jog, by Reset at the panel; ends as docs/safety.md lists
+  bool guard_was_opened = false;     ///< since it began, and no Reset at the panel after it
   std::optional<action::Jog> jog{};  ///< to be done when the warning is over
+
+  /// A guard that stayed closed, or consent.
+  [[nodiscard]] bool may_jog(bool has_guard) const { return consent || (has_guard && !guard_was_opened); }
 };
 
 struct StationState {

@@ -101,9 +101,10 @@ class ApiBench : public scan_samples::FolderTest {
     options.storage = folder_;
   }
   void serve() {
-    station.emplace(one_job("old", folder_ / "jobs/old"), [this] {
+    const auto wake = [this] {
       if (auto* server = running.load()) server->wake();
-    });
+    };
+    station.emplace(one_job("old", folder_ / "jobs/old"), wake, has_guard);
     auto started = ApiServer::start(options, station->loop);
     ASSERT_TRUE(started) << started.error().message;
     api = std::move(*started);
@@ -137,6 +138,7 @@ class ApiBench : public scan_samples::FolderTest {
     return wire.answer();
   }
 
+  bool has_guard = true;
   std::map<Role, std::string> tokens;
   ApiOptions options;
   std::optional<StationWithoutRig> station;

@@ -81,5 +81,30 @@ TEST_F(RefusedOrders, AreNotWhatIsObeyedOrOnlyLooks) {
   EXPECT_THAT(told(), testing::SizeIs(1)) << "the last one";
 }
 
+/// Where only somebody at the panel lets an engineer jog.
+class WithoutAGuard : public ApiBench {
+ protected:
+  void SetUp() override {
+    ApiBench::SetUp();
+    has_guard = false;
+    serve();
+  }
+};
+
+TEST_F(WithoutAGuard, AJogIsRefusedToAnotherRequesterThanTheOneThatSwitchedMaintenanceOn) {
+  auto& loop = station->loop;
+  loop.post(event::PanelFound{true, true});
+  loop.post(event::Stopped{});
+  EXPECT_EQ(ask(local(), request("POST", "/api/v1/maintenance/on")).status, 200);
+  loop.post(event::Pressed{Button::reset, Origin::panel, {}});
+  loop.post(event::WarningOver{});
+  loop.post(event::Homed{});
+  const std::string jog = R"({"by_deg": 5})";
+  const auto refused = ask(tcp(), request("POST", "/api/v1/maintenance/jog", tokens[Role::engineer], jog));
+  EXPECT_EQ(refused.status, 409);
+  EXPECT_THAT(refused.body, HasSubstr("who switched maintenance on"));
+  EXPECT_EQ(ask(local(), request("POST", "/api/v1/maintenance/jog", "", jog)).status, 200);
+}
+
 }  // namespace
 }  // namespace scanrig

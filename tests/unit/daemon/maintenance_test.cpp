@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "daemon/station/lamps.h"
+#include "daemon/station/words.h"
 #include "tests/unit/daemon/safety_under_test.h"
 
 namespace scanrig {
@@ -14,8 +15,22 @@ using What = event::MaintenanceRequested::What;
 class MaintenanceMode : public Safety {
  protected:
   void ask(What what, double angle = 0.0, double speed = 5.0) {
-    tell(event::MaintenanceRequested{what, {angle}, true, {speed}});
+    tell(event::MaintenanceRequested{what, {angle}, true, {speed}, requester});
   }
+  /// Homed by Reset at the panel: consent to jog.
+  void consent() {
+    press(Button::reset);
+    tell(event::WarningOver{});
+    tell(event::Homed{});
+  }
+  void jog_and_arrive() {
+    ask(What::jog, 5);
+    EXPECT_FALSE(refused);
+    tell(event::WarningOver{});
+    tell(event::Jogged{{5}});
+  }
+
+  std::string requester = "user 1000";
 };
 
 TEST_F(MaintenanceMode, MaintenanceRefusesJobsAndBlinksAmber) {
@@ -150,6 +165,130 @@ TEST_F(MaintenanceMode, StopEstopAndGuardEndAJog) {
   tell(event::GuardChanged{false});
   EXPECT_EQ(state.machine, MachineState::error);
   EXPECT_NE(asked_for<action::StopRig>(), nullptr);
+}
+
+// --- A flash obeys what a motion obeys -----------------------------------------------------------------------------
+
+TEST_F(MaintenanceMode, APulseNeedsTheEstopTheGuardAndAPanelThatCanBeRead) {
+  get_ready();
+  ask(What::on);
+  tell(event::GuardChanged{false});
+  ask(What::pulse);
+  expect_refused("guard is open");
+  tell(event::GuardChanged{true});
+  state.estop_ok = false;
+  ask(What::pulse);
+  expect_refused("e-stop is pressed");
+  state.estop_ok = true;
+  state.panel_known = false;
+  ask(What::pulse);
+  expect_refused("panel cannot be read");
+}
+
+TEST_F(MaintenanceMode, StopEstopGuardAndPanelEndAPulse) {
+  const auto pulsing = [&] {
+    state = {};
+    get_ready();
+    ask(What::on);
+    ask(What::pulse);
+    ASSERT_EQ(state.activity, Activity::pulsing);
+  };
+  const Event faults[] = {event::EstopChanged{false}, event::GuardChanged{false}, event::PanelFailed{kNoReply}};
+  for (const auto& fault : faults) {
+    pulsing();
+    tell(fault);
+    EXPECT_EQ(state.machine, MachineState::error) << fault.index();
+    EXPECT_NE(asked_for<action::StopRig>(), nullptr) << fault.index();
+  }
+  pulsing();
+  press(Button::stop);
+  EXPECT_FALSE(refused);
+  EXPECT_NE(asked_for<action::StopRig>(), nullptr);
+}
+
+// --- Consent to jog ------------------------------------------------------------------------------------------------
+
+TEST_F(MaintenanceMode, ConsentEndsTenMinutesAfterTheLastMotion) {
+  start_up();
+  ask(What::on);
+  press(Button::reset);
+  ASSERT_NE(asked_for<action::EndConsentLater>(), nullptr);
+  EXPECT_EQ(asked_for<action::EndConsentLater>()->after, std::chrono::minutes(10));
+  tell(event::WarningOver{});
+  tell(event::Homed{});
+  EXPECT_NE(asked_for<action::EndConsentLater>(), nullptr) << "counted from the end of the motion";
+  jog_and_arrive();
+  EXPECT_NE(asked_for<action::EndConsentLater>(), nullptr);
+
+  ask(What::jog, 5);
+  tell(event::ConsentTimeout{});
+  EXPECT_NE(asked_for<action::EndConsentLater>(), nullptr) << "not in the middle of a motion";
+  tell(event::WarningOver{});
+  tell(event::Jogged{{5}});
+  tell(event::ConsentTimeout{});
+  ask(What::jog, 5);
+  expect_refused("at the panel");
+  consent();
+  jog_and_arrive();
+}
+
+TEST_F(MaintenanceMode, ATimeoutOfConsentThatHasEndedOtherwiseChangesNothing) {
+  start_up();
+  tell(event::ConsentTimeout{});
+  EXPECT_EQ(state.machine, MachineState::halted);
+  ask(What::on);
+  tell(event::ConsentTimeout{});
+  EXPECT_EQ(state.machine, MachineState::maintenance);
+  EXPECT_TRUE(actions.empty());
+}
+
+TEST_F(MaintenanceMode, AnOpenedGuardEndsTheLeaveToJogUntilResetAtThePanel) {
+  rules.guard = true;
+  get_ready();
+  ask(What::on);
+  jog_and_arrive();
+  tell(event::GuardChanged{false});
+  tell(event::GuardChanged{true});
+  ask(What::jog, 5);
+  expect_refused("at the panel");
+  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("Reset at the panel"));
+  consent();
+  jog_and_arrive();
+  tell(event::GuardChanged{false});
+  tell(event::GuardChanged{true});
+  ask(What::jog, 5);
+  expect_refused("at the panel");
+}
+
+TEST_F(MaintenanceMode, ConsentIsForTheRequesterThatSwitchedMaintenanceOn) {
+  start_up();
+  ask(What::on);
+  consent();
+  jog_and_arrive();
+  requester = "192.0.2.7";
+  ask(What::jog, 5);
+  expect_refused("who switched maintenance on");
+  requester = "user 1000";
+  jog_and_arrive();
+}
+
+TEST_F(MaintenanceMode, ConsentEndsWithMaintenance) {
+  start_up();
+  ask(What::on);
+  consent();
+  ask(What::off);
+  requester = "192.0.2.7";
+  ask(What::on);
+  ask(What::jog, 5);
+  expect_refused("at the panel");
+}
+
+TEST_F(MaintenanceMode, BehindAGuardThatStayedClosedAnyEngineerMayJog) {
+  rules.guard = true;
+  get_ready();
+  ask(What::on);
+  requester = "192.0.2.7";
+  jog_and_arrive();
 }
 
 }  // namespace

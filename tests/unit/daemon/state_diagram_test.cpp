@@ -103,6 +103,7 @@ std::vector<Named> of_maintenance() {
       {"jogged", event::Jogged{}},
       {"pulse", event::MaintenanceRequested{.what = What::pulse}},
       {"pulsed", event::Pulsed{}},
+      {"consent ended", event::ConsentTimeout{}},
   };
 }
 

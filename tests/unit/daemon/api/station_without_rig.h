@@ -16,8 +16,8 @@ namespace scanrig {
 class StationWithoutRig {
  public:
   explicit StationWithoutRig(
-      JobTable jobs, std::function<void()> published = [] {})
-      : loop(clock_, ControlLoopOptions{.rules = {.remote = true, .guard = true}}, std::move(jobs)) {
+      JobTable jobs, std::function<void()> published = [] {}, bool has_guard = true)
+      : loop(clock_, ControlLoopOptions{.rules = {.remote = true, .guard = has_guard}}, std::move(jobs)) {
     thread_ = std::thread([this, published = std::move(published)] {
       const auto perform = [this](const Action& action) {
         if (std::holds_alternative<action::StopRig>(action)) loop.post(event::Stopped{});
