@@ -26,7 +26,19 @@ ALLOWED = {
 }
 # Leaves of the pipeline, lowest first: a leaf may include those before it.
 PIPELINE_ORDER = ["calibration", "silhouette", "movement", "range", "registration", "mesh", "volume", "pose", "texture",
-                  "scan", "reconstruct", "evaluate"]
+                  "model_io", "storage", "importers", "reconstruct", "evaluate"]
+# Rooms of the daemon, and which others each may include.
+DAEMON_ROOMS = {
+    "runtime": set(),
+    "station": {"runtime"},
+    "rig": {"station", "runtime"},
+    "journal": {"station", "runtime"},
+    "jobs": {"rig", "journal", "station", "runtime"},
+    "webhook": {"journal", "station", "runtime"},
+    "api": {"rig", "journal", "station", "runtime"},
+    "ctl": {"api", "rig", "station", "runtime", "jobs"},
+    "service": {"api", "jobs", "webhook", "rig", "journal", "station", "runtime"},
+}
 INCLUDE = re.compile(r'^\s*#\s*include\s+"([^"]+)"')
 
 
@@ -50,6 +62,10 @@ def forbidden(source, target):
         mine, theirs = source.split("/")[1], target.split("/")[1]
         if PIPELINE_ORDER.index(theirs) > PIPELINE_ORDER.index(mine):
             return f"pipeline/{mine} comes before pipeline/{theirs}"
+    if here == there == "daemon":
+        mine, theirs = source.split("/")[1], target.split("/")[1]
+        if mine != theirs and theirs not in DAEMON_ROOMS[mine]:
+            return f"daemon/{mine} must not know daemon/{theirs}"
     return None
 
 

@@ -1,15 +1,13 @@
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <functional>
+#include <memory>
 
 #include "core/result.h"
-
-namespace CLI {
-class App;
-}
+#include "daemon/ctl/verbs.h"
 
 namespace scanrig::ctl {
-
 /// The verb that was asked for; set while the command line is read.
 using Chosen = std::function<ExitCode()>;
 
@@ -19,5 +17,20 @@ void add_job_commands(CLI::App& app, Chosen& chosen);      ///< jobs, export, ..
 void add_offline_commands(CLI::App& app, Chosen& chosen);  ///< reconstruct, evaluate, check-config, token, ...
 void add_rig_commands(CLI::App& app, Chosen& chosen);      ///< at the rig, while no daemon runs
 void add_pages_command(CLI::App& app, Chosen& chosen);     ///< hidden: writes completion and manual pages
+
+/// A verb that talks to the daemon: `run` gets its connection. `Verb` are its own options.
+template <class Verb, class Run>
+CLI::App* add_client(CLI::App& app, Chosen& chosen, const char* name, const char* description,
+                     std::shared_ptr<Verb> verb, Run run) {
+  auto* sub = app.add_subcommand(name, description);
+  auto connection = std::make_shared<Connection>();
+  sub->add_option("--socket", connection->socket, "the daemon's socket")
+      ->envname("SCANRIG_SOCKET")
+      ->capture_default_str();
+  sub->add_flag("--json", connection->json, "print JSON");
+  sub->callback(
+      [&chosen, connection, verb, run] { chosen = [connection, verb, run] { return run(*connection, *verb); }; });
+  return sub;
+}
 
 }  // namespace scanrig::ctl

@@ -1,10 +1,35 @@
 #pragma once
 
+#include <cstdio>
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
 namespace scanrig::ctl {
+/// What a terminal of `width` x `height` shows of some lines.
+struct Window {
+  int width = 80, height = 24;
+};
+/// Lines wrapped to the window; where they are too many the last one says how many are missing. Widths count code
+/// points.
+std::vector<std::string> fitted(const std::vector<std::string>& lines, Window window);
+
+/// Text kept up to date. On a terminal one screen, written as a whole only when something is different, with nothing
+/// erased first: no flicker. Elsewhere (a pipe, TERM=dumb) the lines that changed. Leaves the terminal as it was.
+class Screen {
+ public:
+  explicit Screen(std::FILE* out);
+  ~Screen();
+  Screen(const Screen&) = delete;
+  Screen& operator=(const Screen&) = delete;
+
+  void show(const std::vector<std::string>& lines);
+
+ private:
+  std::FILE* out_;
+  bool terminal_;
+  std::vector<std::string> shown_;
+};
 
 /// The lines of `scanrig status --watch`. `status`, `health`: as the API gives them; `job`: the one that has the rig
 /// or was the last to have it, null: none.

@@ -73,7 +73,8 @@ void perform(const Action& action, const Workers& workers) {
   std::visit(
       Overloaded{[](const action::Warn&) {},  // these are the control loop's own
                  [](const action::WaitForEstop&) {}, [](const action::RetryStopLater&) {},
-                 [](const action::CheckLater&) {}, [](const action::TestLamps&) {}, [](const action::WaitForFlip&) {},
+                 [](const action::EndConsentLater&) {}, [](const action::CheckLater&) {},
+                 [](const action::TestLamps&) {}, [](const action::WaitForFlip&) {},
                  [&](const action::Home&) { rig.home(); }, [&](const action::StopRig&) { rig.stop(); },
                  [&](const action::TakeView& a) { rig.take_view(a); }, [&](const action::Jog& a) { rig.jog(a); },
                  [&](const action::Pulse&) { rig.pulse(); }, [&](const action::CheckDevices&) { rig.check_devices(); },

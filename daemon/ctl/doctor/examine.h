@@ -1,14 +1,13 @@
 #pragma once
 
 #include <filesystem>
+#include <string>
 
 #include "config/rig_config.h"
 #include "core/clock.h"
 #include "daemon/ctl/doctor/findings.h"
-#include "daemon/ctl/doctor/operator.h"
 
 namespace scanrig::ctl::doctor {
-
 /// Whether the drive answers at its port as configured, how fast, and what its registers say. Where it does not: who
 /// answers there instead (`wrong_parity`, `wrong_baud`, `wrong_unit_id`, `swapped_adapter`, `no_answer`, ...).
 /// Returns whether the drive can be worked with.
@@ -30,5 +29,16 @@ Result<void> examine_motion(const Rig& rig, const Operator& person, Clock& clock
 /// Returns whether the table may be turned: nothing speaks against the emergency stop.
 bool examine_panel(const config::RigConfig& rig, bool drive_answers, const Operator& person, Clock& clock,
                    Report& report);
+
+/// Lists serial adapters, GPIO chips with their named lines, USB devices and the groups of the user.
+void list_what_is_connected(Report& report);
+
+/// Whether this user may open `device` for reading and writing. Where not, a finding says why: no such device, or the
+/// group that is missing (`device_missing`, `missing_group`).
+bool may_open(const std::filesystem::path& device, const std::string& section, Report& report);
+
+/// The udev rule that gives the adapter behind `device` the name the configuration uses, and the systemd unit, where
+/// this machine has none yet.
+void print_missing_snippets(const std::filesystem::path& device, const std::filesystem::path& config, Report& report);
 
 }  // namespace scanrig::ctl::doctor

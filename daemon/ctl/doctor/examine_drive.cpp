@@ -6,7 +6,6 @@
 
 #include "daemon/ctl/doctor/examine.h"
 #include "daemon/ctl/doctor/find_devices.h"
-#include "daemon/ctl/doctor/inventory.h"
 
 namespace scanrig::ctl::doctor {
 namespace {

@@ -1,11 +1,12 @@
 #include "daemon/ctl/doctor/findings.h"
 
 #include <fmt/format.h>
-
+#include <unistd.h>
+#include <cstdio>
+#include <iostream>
 #include <nlohmann/json.hpp>
 
 namespace scanrig::ctl::doctor {
-
 std::string Report::text() const {
   std::string text;
   for (const Section& section : sections_) {
@@ -27,6 +28,23 @@ std::string Report::json() const {
   }
   const nlohmann::ordered_json all{{"sections", sections}, {"findings", findings}};
   return all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+Operator::Operator(bool answers, bool quiet_output)
+    : there_(answers || ::isatty(STDIN_FILENO) == 1), quiet_output_(quiet_output) {}
+
+void Operator::tell(const std::string& text) const {
+  std::FILE* out = quiet_output_ ? stderr : stdout;
+  fmt::print(out, "{}\n", text);
+  std::fflush(out);
+}
+
+std::optional<std::string> Operator::ask(const std::string& question) const {
+  if (!there_) return std::nullopt;
+  tell(question);
+  std::string line;
+  if (!std::getline(std::cin, line)) return std::nullopt;
+  return line;
 }
 
 }  // namespace scanrig::ctl::doctor

@@ -1,11 +1,11 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 namespace scanrig::ctl::doctor {
-
 /// Something that is wrong, in one sentence, and what to do about it in another.
 struct Finding {
   std::string id;  ///< one word for programs: "gear_ratio"
@@ -33,6 +33,23 @@ class Report {
   };
   std::vector<Section> sections_;
   std::vector<Finding> findings_;
+};
+
+/// The person at the rig, at a terminal or at the other end of standard input.
+class Operator {
+ public:
+  /// `answers`: somebody answers on standard input although it is no terminal. Prompts go to standard error with
+  /// `quiet_output`, so that standard output stays JSON.
+  Operator(bool answers, bool quiet_output);
+
+  [[nodiscard]] bool there() const { return there_; }
+  void tell(const std::string& text) const;
+  /// The line that was answered; nothing when nobody is there.
+  [[nodiscard]] std::optional<std::string> ask(const std::string& question) const;
+
+ private:
+  bool there_;
+  bool quiet_output_;
 };
 
 }  // namespace scanrig::ctl::doctor

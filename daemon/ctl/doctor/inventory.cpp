@@ -1,4 +1,4 @@
-#include "daemon/ctl/doctor/inventory.h"
+#include "daemon/ctl/doctor/examine.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>

@@ -1,4 +1,4 @@
-#include "daemon/ctl/follow.h"
+#include "daemon/ctl/job_view.h"
 
 #include <gmock/gmock.h>
 

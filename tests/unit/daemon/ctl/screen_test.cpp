@@ -1,4 +1,4 @@
-#include "daemon/ctl/screen.h"
+#include "daemon/ctl/watch.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>

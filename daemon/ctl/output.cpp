@@ -1,11 +1,43 @@
-#include "daemon/ctl/stage_bars.h"
+#include "daemon/ctl/output.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+
+#include "daemon/ctl/verbs.h"
 
 namespace scanrig::ctl {
+using nlohmann::json;
+
+ExitCode report_error(const RequestError& error) { return report_error(error.exit, error.message); }
+
+void print(const json& answer) { fmt::print("{}\n", answer.dump(2, ' ', false, json::error_handler_t::replace)); }
+
+std::string text(const json& object, const char* key) {
+  return object.is_object() && object.contains(key) && object[key].is_string() ? object[key].get<std::string>()
+                                                                               : std::string();
+}
+
+std::string bytes_text(double bytes) {
+  constexpr const char* kUnits[] = {"B", "KiB", "MiB", "GiB", "TiB"};
+  std::size_t unit = 0;
+  for (; bytes >= 1024.0 && unit + 1 < std::size(kUnits); ++unit) bytes /= 1024.0;
+  return fmt::format("{:.{}f} {}", bytes, unit == 0 ? 0 : 1, kUnits[unit]);
+}
+
+ExitCode report_error(const Error& error) { return report_error(exit_code(error.code), error.message); }
+
+ExitCode report_error(ExitCode code, const std::string& message) {
+  std::fflush(stdout);
+  fmt::print(stderr, "scanrig: {}\n", message);
+  return code;
+}
+
+Error of_device(Error error) {
+  if (error.code == ErrorCode::io || error.code == ErrorCode::not_found) error.code = ErrorCode::timeout;
+  return error;
+}
 
 std::string bar(std::string_view name, double fraction) {
   constexpr int kWidth = 30;

@@ -4,12 +4,12 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/result.h"
-#include "daemon/ctl/stage_bars.h"
+#include "daemon/ctl/output.h"
 
 namespace scanrig::ctl {
-
 /// Why the last Start did not begin `job`; nothing if it did, or still may. `status` as GET status gives it.
 std::optional<Error> why_not_started(const nlohmann::json& status, const std::string& job);
 
@@ -38,5 +38,8 @@ class JobStory {
   RealClock clock_;
   Clock::TimePoint begun_ = clock_.now();
 };
+
+/// What a person wants to know of one job: `job` as GET jobs/ID gives it.
+std::vector<std::string> job_lines(const nlohmann::json& job);
 
 }  // namespace scanrig::ctl

@@ -1,10 +1,12 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "daemon/ctl/doctor/examine.h"
 #include "daemon/ctl/motion_session.h"
 #include "daemon/ctl/offline_rig_config.h"
 #include "daemon/ctl/verbs.h"
 #include "daemon/rig/open_devices.h"
+#include "daemon/runtime/signal_stop.h"
 
 namespace scanrig::ctl {
 namespace {
@@ -117,6 +119,74 @@ ExitCode turntable(const TurntableVerb& verb) {
   if (!table) return report_error(table.error());
   const auto status = (*table)->status(Deadline::after(clock, kAskLimit));
   return status ? tell(*status, verb.json) : report_error(of_device(status.error()));
+}
+
+namespace {
+
+constexpr std::chrono::milliseconds kGlance{200};
+
+void print_inputs(const PanelInputs& now, Clock::Duration since) {
+  fmt::print("{:9.3f} s  e-stop {}  guard {}  part {}  {}{}{}\n", std::chrono::duration<double>(since).count(),
+             now.estop_ok ? "ok" : "PRESSED", now.guard_closed ? "closed" : "OPEN", now.part_present ? "there" : "-",
+             now.start ? "[start]" : "", now.stop ? "[stop]" : "", now.reset ? "[reset]" : "");
+  std::fflush(stdout);
+}
+
+void print_inputs_json(const PanelInputs& now, Clock::Duration since) {
+  fmt::print("{}\n", nlohmann::ordered_json{{"after_s", std::chrono::duration<double>(since).count()},
+                                            {"estop_ok", now.estop_ok},
+                                            {"guard_closed", now.guard_closed},
+                                            {"part_present", now.part_present},
+                                            {"flipped", now.flipped},
+                                            {"start", now.start},
+                                            {"stop", now.stop},
+                                            {"reset", now.reset}}
+                         .dump());
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+ExitCode watch_panel(const PanelVerb& verb) {
+  const auto rig = offline_rig_config(verb.config);
+  if (!rig) return report_error(rig.error());
+  RealClock clock;
+  const auto open = open_devices(*rig, clock);
+  if (!open) return report_error(open.error());
+  const SignalStop signal;
+  const auto begun = clock.now();
+  const auto end = verb.seconds > 0 ? begun + std::chrono::seconds(verb.seconds) : Clock::TimePoint::max();
+  PanelInputs known;
+  for (bool first = true; !signal.token().stop_requested() && clock.now() < end; first = false) {
+    const auto now = open->panel->wait_change(known, Deadline::after(clock, first ? Clock::Duration{} : kGlance));
+    if (!now) return report_error(of_device(now.error()));
+    if (first || *now != known) (verb.json ? print_inputs_json : print_inputs)(*now, clock.now() - begun);
+    known = *now;
+  }
+  return ExitCode::ok;
+}
+
+ExitCode examine_rig(const DoctorVerb& verb) {
+  const auto rig = offline_rig_config(verb.config);
+  if (!rig) return report_error(rig.error());
+  RealClock clock;
+  const doctor::Operator person(verb.answers, verb.json);
+  doctor::Report report;
+  doctor::list_what_is_connected(report);
+  const bool drive_answers = doctor::examine_drive(*rig, clock, report);
+  const bool estop_works = doctor::examine_panel(*rig, drive_answers, person, clock, report);
+  const auto may_turn = [&] { return verb.yes_move || person.ask("Is everyone clear? Turn the table? [y/N]") == "y"; };
+  Result<void> moved;
+  if (drive_answers && estop_works && may_turn()) {
+    moved = doctor::examine_motion({*rig, verb.config}, person, clock, report);
+  }
+  doctor::print_missing_snippets(rig->turntable.device(), verb.config, report);
+  fmt::print("{}", verb.json ? report.json() : report.text());
+  if (!moved) return report_error(moved.error());
+  const auto found = report.findings().size();
+  if (found == 0) return ExitCode::ok;
+  return report_error(ExitCode::device,
+                      fmt::format("{}: {} finding(s); with each stands what to do", verb.config.string(), found));
 }
 
 }  // namespace scanrig::ctl

@@ -2,12 +2,21 @@
 
 #include <cstdio>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <string_view>
 
 #include "core/clock.h"
+#include "daemon/ctl/client.h"
 
 namespace scanrig::ctl {
+/// What the verbs that talk to the daemon do with its answers.
+ExitCode report_error(const RequestError& error);
+void print(const nlohmann::json& answer);
+/// The text behind `key`; empty where there is none.
+std::string text(const nlohmann::json& object, const char* key);
+/// "1.2 GiB"
+std::string bytes_text(double bytes);
 
 /// Lines and a bar a stage. On a terminal the running stage's bar is drawn over itself; in a log each stage is one
 /// line, written when it is complete. Threads: one user at a time.

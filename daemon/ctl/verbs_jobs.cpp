@@ -2,10 +2,9 @@
 
 #include <cstdio>
 
-#include "daemon/ctl/answers.h"
-#include "daemon/ctl/job_lines.h"
+#include "daemon/ctl/job_view.h"
 #include "daemon/ctl/offline_rig_config.h"
-#include "daemon/ctl/stage_bars.h"
+#include "daemon/ctl/output.h"
 #include "daemon/ctl/verbs.h"
 
 namespace scanrig::ctl {

@@ -1,0 +1,294 @@
+#include "daemon/ctl/commands.h"
+
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "daemon/ctl/motion_guardian.h"
+#include "daemon/ctl/verbs.h"
+#include "pipeline/reconstruct/voxel_size.h"
+
+namespace scanrig::ctl {
+namespace {
+
+void add_button(CLI::App& app, Chosen& chosen, const char* name, const char* description) {
+  add_client(app, chosen, name, description, std::make_shared<std::string>(name),
+             [](const Connection& connection, const std::string& button) { return press(connection, button); });
+}
+
+void add_maintenance(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<MaintenanceVerb>();
+  auto* sub =
+      add_client(app, chosen, "maintenance", "home, jog and try the rig while no job can run", verb, maintenance);
+  sub->add_option("WHAT", verb->what, "on, off, or what to do while it is on")
+      ->required()
+      ->check(CLI::IsMember({"on", "off", "home", "jog", "pulse", "lamp_test", "io"}));
+  sub->add_option("--to", verb->to_deg, "jog: to this angle");
+  sub->add_option("--by", verb->by_deg, "jog: by this much");
+  sub->add_option("--speed", verb->speed_deg_s, "jog: deg/s")->capture_default_str();
+}
+
+}  // namespace
+
+void add_station_commands(CLI::App& app, Chosen& chosen) {
+  const auto look = std::make_shared<StatusVerb>();
+  auto* sub = add_client(app, chosen, "status", "what the station does, why, and what to do next", look, status);
+  auto* follow =
+      sub->add_flag("--follow", look->follow, "follow the job that has the rig, or the next one, to its end");
+  sub->add_flag("--watch", look->watch, "one screen, kept up to date until interrupted")->excludes(follow);
+  const auto begin = std::make_shared<StartVerb>();
+  add_client(app, chosen, "start", "start a scan; after the flip: continue", begin, start)
+      ->add_flag("--follow", begin->follow, "follow the job to its end");
+  const auto halt = std::make_shared<StopVerb>();
+  add_client(app, chosen, "stop", "stop the table, in every state, and wait until it has stopped", halt, stop)
+      ->add_flag("!--no-wait", halt->wait, "do not wait for standstill");
+  add_button(app, chosen, "reset", "clear a fault and home the table");
+  add_button(app, chosen, "reload", "begin again with the configuration file as it is now, while the rig is idle");
+  add_client(app, chosen, "health", "devices, disk, temperatures, deadlines missed, retakes", std::make_shared<int>(),
+             [](const Connection& connection, int) { return health(connection); });
+  add_maintenance(app, chosen);
+}
+
+namespace {
+
+CLI::Option* add_id(CLI::App* sub, std::string& id) { return sub->add_option("ID", id, "the job"); }
+
+template <class Verb>
+CLI::App* add_change(CLI::App& app, Chosen& chosen, const char* name, const char* description,
+                     const std::shared_ptr<Verb>& verb) {
+  verb->what = name;
+  auto* sub = add_client(app, chosen, name, description, verb, change_job);
+  add_id(sub, verb->id)->required();
+  return sub;
+}
+
+void add_changes(CLI::App& app, Chosen& chosen) {
+  const auto verb = [] { return std::make_shared<JobVerb>(); };
+  add_change(app, chosen, "cancel", "end a job that is queued, interrupted or being reconstructed", verb());
+  add_change(app, chosen, "resume", "let the next Start go on with an interrupted job", verb());
+  add_change(app, chosen, "first", "let the next Start begin this queued job", verb());
+  const auto again = verb();
+  auto* sub = add_change(app, chosen, "reprocess", "make the model again, from the images", again);
+  sub->add_option("--voxel-mm", again->voxel_mm, "size of a voxel")->check(CLI::Range(kMinVoxelMm, kMaxVoxelMm));
+  sub->add_option("--fusion", again->fusion, "how poses are integrated")->check(CLI::IsMember({"evidence", "paper"}));
+  const auto removed = verb();
+  add_change(app, chosen, "delete", "remove a job that has ended, with all its files", removed)
+      ->add_flag("--yes", removed->yes, "do not ask");
+}
+
+}  // namespace
+
+void add_job_commands(CLI::App& app, Chosen& chosen) {
+  const auto list = std::make_shared<JobsVerb>();
+  auto* sub = add_client(app, chosen, "jobs", "all jobs, newest first, or one in detail", list, jobs);
+  add_id(sub, list->id);
+  sub->add_option("--limit", list->limit, "this many at most")->capture_default_str()->check(CLI::Range(1, 100000));
+  sub->add_option("--state", list->state, "only jobs in this state")
+      ->check(CLI::IsMember(
+          {"queued", "scanning", "waiting_for_flip", "reconstructing", "done", "failed", "interrupted", "cancelled"}));
+  const auto order = std::make_shared<QueueVerb>();
+  sub = add_client(app, chosen, "queue", "queue scans and print the first one's id", order, queue);
+  sub->add_option("--recipe", order->recipe, "one of the configuration's")->capture_default_str();
+  sub->add_option("--part", order->part, "of what is scanned: barcode or free text");
+  sub->add_option("--repeat", order->repeat, "so many jobs")->capture_default_str()->check(CLI::Range(1, 100));
+  add_changes(app, chosen);
+  const auto files = std::make_shared<std::string>();
+  add_id(add_client(app, chosen, "files", "the files of a job", files, job_files), *files)->required();
+  const auto out = std::make_shared<ExportVerb>();
+  sub = add_client(app, chosen, "export", "copy a file of a job, by default its model, from the daemon", out,
+                   export_file);
+  add_id(sub, out->id)->required();
+  sub->add_option("--file", out->file, "which, as `scanrig files` names it")->capture_default_str();
+  sub->add_option("--out", out->out, "where to, not there yet (default: ID and the file's name, here)");
+  const auto pack = std::make_shared<BundleVerb>();
+  sub = add_client(app, chosen, "bundle", "pack a job for whoever must help", pack, bundle);
+  add_id(sub, pack->id)->required();
+  sub->add_option("--out", pack->out, "the archive, not there yet (default: ID.tar.gz, here)");
+}
+
+namespace {
+
+void add_turntable(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<TurntableVerb>();
+  auto* sub = app.add_subcommand("turntable", "move or ask the turntable itself, while no daemon runs");
+  sub->require_subcommand(1);
+  const auto add = [&](const char* name, const char* description) {
+    auto* action = sub->add_subcommand(name, description);
+    action->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
+    action->callback([&chosen, verb, name] {
+      verb->what = name;
+      chosen = [verb] { return turntable(*verb); };
+    });
+    return action;
+  };
+  auto* home = add("home", "find home");
+  auto* move = add("move", "find home, then turn to ANGLE, the shorter way");
+  move->add_option("ANGLE", verb->angle_deg, "degrees, counter-clockwise")->required();
+  for (auto* action : {home, move}) action->add_flag("--yes", verb->yes, "nobody is near: do not ask");
+  auto* status = add("status", "moving, home, alarm");
+  auto* read = add("read", "what the drive's registers say");
+  for (auto* action : {home, move, status, read}) action->add_flag("--json", verb->json, "print JSON");
+}
+
+void add_panel(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<PanelVerb>();
+  auto* sub = app.add_subcommand("panel", "the panel itself, while no daemon runs");
+  sub->require_subcommand(1);
+  auto* watch = sub->add_subcommand("watch", "print buttons and contacts as they change");
+  watch->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
+  watch->add_option("--seconds", verb->seconds, "how long; 0: until interrupted")->check(CLI::Range(0, 86400));
+  watch->add_flag("--json", verb->json, "print JSON, a line a change");
+  watch->callback([&chosen, verb] { chosen = [verb] { return watch_panel(*verb); }; });
+}
+
+void add_doctor(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<DoctorVerb>();
+  auto* sub = app.add_subcommand("doctor", "try everything the configuration names and tell what is wrong");
+  sub->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
+  sub->add_flag("--yes-move", verb->yes_move, "the table may turn: nobody is near it");
+  sub->add_flag("--answers", verb->answers, "somebody answers on standard input although it is no terminal");
+  sub->add_flag("--json", verb->json, "print JSON");
+  sub->callback([&chosen, verb] { chosen = [verb] { return examine_rig(*verb); }; });
+}
+
+void add_camera(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<CameraVerb>();
+  auto* sub = app.add_subcommand("camera", "the cameras themselves");
+  sub->require_subcommand(1);
+  const auto add = [&](const char* name, const char* description) {
+    auto* action = sub->add_subcommand(name, description);
+    action->callback([&chosen, verb, name] {
+      verb->what = name;
+      chosen = [verb] { return camera(*verb); };
+    });
+    return action;
+  };
+  add("list", "every camera on network, USB and V4L2, with its serial number")
+      ->add_flag("--json", verb->json, "print JSON");
+  auto* tune = add("tune", "brightness, saturation and blur of what the cameras see");
+  auto* grab = add("grab", "one pair as PNG files");
+  auto* preview = add("preview", "two JPEG files that follow the cameras, through the daemon where one runs");
+  for (auto* action : {tune, grab, preview}) {
+    action->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
+    action->add_option("--light", verb->light, "what the projector does; without a daemon")
+        ->check(CLI::IsMember({"none", "pattern", "plain"}))
+        ->capture_default_str();
+    action->add_option("--exposure-us", verb->exposure_us, "instead of the configuration's; without a daemon")
+        ->check(CLI::Range(10, 1'000'000));
+    action->add_option("--gain", verb->gain, "instead of the configuration's; without a daemon");
+    action->add_flag("--json", verb->json, action == grab ? "print JSON" : "print JSON, a line a pair");
+  }
+  for (auto* action : {grab, preview}) {
+    action->add_option("--out", verb->out, "folder for left and right")->capture_default_str();
+  }
+  for (auto* action : {tune, preview}) {
+    action->add_option("--count", verb->count, "how many pairs; 0: until interrupted")->check(CLI::Range(0, 1'000'000));
+  }
+}
+
+/// Started by the tools that move, on their socket.
+void add_guardian(CLI::App& app, Chosen& chosen) {
+  const auto config = std::make_shared<std::filesystem::path>();
+  auto* sub = app.add_subcommand("guard-motion", "stop the table when the program that moves it ends")->group("");
+  sub->add_option("CONFIG", *config, "the rig's configuration")->required();
+  sub->callback([&chosen, config] { chosen = [config] { return guard_motion(*config); }; });
+}
+
+}  // namespace
+
+void add_rig_commands(CLI::App& app, Chosen& chosen) {
+  add_turntable(app, chosen);
+  add_panel(app, chosen);
+  add_doctor(app, chosen);
+  add_camera(app, chosen);
+  add_guardian(app, chosen);
+}
+
+namespace {
+
+void add_reconstruct(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<ReconstructVerb>();
+  auto* sub = app.add_subcommand("reconstruct", "make the model of a scan folder");
+  sub->add_option("DIR", verb->scan, "the scan folder")->required();
+  sub->add_option("--out", verb->out, "folder for the model, not there yet (default: DIR/model)");
+  sub->add_option("--threads", verb->options.threads, "threads; 0: all of the machine's")->check(CLI::Range(0, 1024));
+  sub->add_option("--voxel-mm", verb->options.voxel_mm,
+                  "size of a voxel (default: 0.25, or what suits imported range images)")
+      ->check(CLI::Range(kMinVoxelMm, kMaxVoxelMm));
+  sub->add_option("--fusion", verb->options.fusion, "how poses are integrated")
+      ->check(CLI::IsMember({"evidence", "paper"}));
+  sub->add_option("--rests", verb->options.rests, "how rests are found")->check(CLI::IsMember({"hull", "egi"}));
+  sub->add_flag("!--no-texture", verb->options.texture, "shape only");
+  auto* json = sub->add_flag("--json", verb->json, "print JSON");
+  sub->add_flag("--lines", verb->lines, "tell the progress in lines for a program")->excludes(json);
+  sub->callback([&chosen, verb] { chosen = [verb] { return reconstruct(*verb); }; });
+}
+
+void add_evaluate(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<EvaluateVerb>();
+  auto* sub = app.add_subcommand("evaluate", "compare a model with the truth of a simulated scan");
+  sub->add_option("DIR", verb->scan, "the scan folder, with truth.json")->required();
+  sub->add_option("--model", verb->model, "the model's folder (default: DIR/model)");
+  sub->add_flag("--json", verb->json, "print JSON");
+  sub->callback([&chosen, verb] { chosen = [verb] { return evaluate(*verb); }; });
+}
+
+void add_import(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<ImportVerb>();
+  auto* sub = app.add_subcommand("import", "make a scan folder from other people's data");
+  sub->require_subcommand(1);
+  auto* stanford = sub->add_subcommand("stanford", "range scans of the Stanford repository");
+  stanford->add_option("--pose", verb->conf, "the .conf file of a pose; once or twice")
+      ->required()
+      ->expected(1)
+      ->take_all();
+  stanford->add_option("--out", verb->out, "the scan folder to make")->required();
+  stanford->add_flag("--json", verb->json, "print JSON");
+  stanford->callback([&chosen, verb] { chosen = [verb] { return import_stanford(*verb); }; });
+}
+
+void add_check_config(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<CheckConfigVerb>();
+  auto* sub = app.add_subcommand("check-config", "read a rig.toml and tell everything that is wrong with it");
+  sub->add_option("FILE", verb->file, "the configuration")->capture_default_str();
+  sub->add_flag("--json", verb->json, "print JSON");
+  sub->add_option("--drives", verb->drives, "folder of the drive profiles");
+  sub->callback([&chosen, verb] { chosen = [verb] { return check_config(*verb); }; });
+}
+
+void add_token(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<TokenVerb>();
+  auto* sub = app.add_subcommand("token", "who may use the API over TCP");
+  sub->require_subcommand(1);
+  const auto add = [&](const char* name, const char* description) {
+    auto* action = sub->add_subcommand(name, description);
+    action->add_option("--file", verb->file, "the file of tokens (default: the one that the configuration names)");
+    action->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
+    action->add_flag("--json", verb->json, "print JSON");
+    action->callback([&chosen, verb, name] {
+      verb->what = name;
+      chosen = [verb] { return token(*verb); };
+    });
+    return action;
+  };
+  auto* make = add("add", "make a token and print it, once");
+  make->add_option("NAME", verb->name, "of who or what gets it")->required();
+  make->add_option("--role", verb->role, "what it may do")
+      ->check(CLI::IsMember({"viewer", "operator", "engineer"}))
+      ->capture_default_str();
+  add("list", "names, roles and dates; never the tokens");
+  add("revoke", "make a token void; the daemon knows within a second")
+      ->add_option("NAME", verb->name, "of the token")
+      ->required();
+}
+
+}  // namespace
+
+void add_offline_commands(CLI::App& app, Chosen& chosen) {
+  add_reconstruct(app, chosen);
+  add_evaluate(app, chosen);
+  add_import(app, chosen);
+  add_check_config(app, chosen);
+  add_token(app, chosen);
+}
+
+}  // namespace scanrig::ctl

@@ -1,0 +1,185 @@
+#include <unistd.h>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <system_error>
+
+#include "config/rig_config.h"
+#include "daemon/api/tokens.h"
+#include "daemon/ctl/output.h"
+#include "daemon/ctl/verbs.h"
+#include "daemon/runtime/catch_exceptions.h"
+#include "daemon/runtime/signal_stop.h"
+#include "daemon/station/timestamp.h"
+#include "pipeline/evaluate/evaluate.h"
+#include "pipeline/importers/import_stanford.h"
+
+namespace scanrig::ctl {
+namespace {
+
+Result<void> make_model(const ScanFolder& scan, const ReconstructVerb& verb, const Context& context,
+                        const std::filesystem::path& out) {
+  const auto model = scanrig::reconstruct(scan, verb.options, context);
+  if (!model) return pass_on(model);
+  return write_model(*model, out);
+}
+
+}  // namespace
+
+ExitCode reconstruct(const ReconstructVerb& verb) {
+  const auto out = verb.out.empty() ? verb.scan / "model" : verb.out;
+  std::error_code ignored;
+  if (std::filesystem::exists(out, ignored)) {
+    return report_error({ErrorCode::exists, out.string() + ": already there; name another folder with --out"});
+  }
+  const auto scan = ScanFolder::open(verb.scan);
+  if (!scan) return report_error(scan.error());
+
+  const SignalStop stop;
+  std::FILE* told = verb.json ? stderr : stdout;  // bars beside the JSON, not in it
+  StageBars bars(told, ::isatty(::fileno(told)) == 1);
+  const auto progress = [&](std::string_view stage, double fraction) {
+    if (!verb.lines) return bars.update(std::string(stage), fraction);
+    fmt::print("{}\t{:.3f}\n", stage, fraction);
+    std::fflush(stdout);
+  };
+  const auto made = catch_exceptions("the reconstruction", [&] {
+    return make_model(*scan, verb, {stop.token(), progress}, out);
+  });
+  if (!verb.lines) bars.end(made.has_value());
+  if (!made) {
+    if (verb.lines) fmt::print("failed\t{}\t{}\n", to_string(made.error().code), made.error().message);
+    return report_error(made.error());
+  }
+  const auto glb = out / "model.glb", report = out / "report.json";
+  if (verb.json) {
+    fmt::print("{}\n", nlohmann::ordered_json{{"model", glb}, {"report", report}}.dump());
+  } else {
+    fmt::print("{}\n{}\n", glb.string(), report.string());
+  }
+  return ExitCode::ok;
+}
+
+ExitCode evaluate(const EvaluateVerb& verb) {
+  const auto truth = read_truth(verb.scan);
+  if (!truth) return report_error(truth.error());
+  const auto claim = read_claim(verb.model.empty() ? verb.scan / "model" : verb.model);
+  if (!claim) return report_error(claim.error());
+  const auto photos = ScanFolder::open(verb.scan);
+  if (!photos) return report_error(photos.error());
+
+  const SignalStop stop;
+  const auto scores = scanrig::evaluate(*claim, *truth, &*photos, {}, {stop.token(), {}});
+  if (!scores) return report_error(scores.error());
+  const auto limits = gates(*scores);
+  if (verb.json) {
+    fmt::print("{}\n", to_json(*scores).dump(2));
+  } else {
+    fmt::print("{}", to_table(*scores));
+  }
+  const auto missed = std::ranges::count_if(limits, [](const Gate& gate) { return !gate.ok(); });
+  if (missed == 0) return ExitCode::ok;
+  return report_error(ExitCode::below_limits,
+                      fmt::format("{}: {} of {} limits are not reached", verb.scan.string(), missed, limits.size()));
+}
+
+ExitCode import_stanford(const ImportVerb& verb) {
+  const auto pose2 = verb.conf.size() > 1 ? std::optional(verb.conf[1]) : std::nullopt;
+  const auto imported = scanrig::import_stanford(verb.conf[0], pose2, verb.out);
+  if (!imported) return report_error(imported.error());
+  if (verb.json) {
+    fmt::print("{}\n", nlohmann::json{{"scan", verb.out}}.dump());
+  } else {
+    fmt::print("{}\n", verb.out.string());
+  }
+  return ExitCode::ok;
+}
+
+ExitCode check_config(const CheckConfigVerb& verb) {
+  const auto config = config::read_rig_config(verb.file, verb.drives);
+  if (verb.json) {
+    auto problems = nlohmann::ordered_json::array();
+    std::istringstream lines(config ? std::string() : config.error().message);
+    for (std::string line; std::getline(lines, line);) problems.push_back(line);
+    const auto warnings = config ? config->warnings : std::vector<std::string>();
+    fmt::print("{}\n",
+               nlohmann::ordered_json{
+                   {"file", verb.file}, {"ok", config.has_value()}, {"problems", problems}, {"warnings", warnings}}
+                   .dump(2));
+  }
+  if (!config && verb.json) {
+    return report_error(exit_code(config.error().code), verb.file.string() + " cannot be used: see its problems");
+  }
+  if (!config) return report_error(config.error());
+  if (!verb.json) {
+    for (const auto& warning : config->warnings) fmt::print(stderr, "{}\n", warning);
+    fmt::print("{}: no problems\n", verb.file.string());
+  }
+  return ExitCode::ok;
+}
+
+namespace {
+
+using nlohmann::ordered_json;
+
+Result<std::filesystem::path> file_of(const TokenVerb& verb) {
+  if (!verb.file.empty()) return verb.file;
+  const auto config = config::read_rig_config(verb.config, {}, config::Cameras::or_simulated);
+  if (!config) return pass_on(config);
+  if (config->api.tokens.empty()) {
+    return fail(ErrorCode::invalid_input, "{}: [api] names no file of tokens: add `tokens`, or say --file",
+                verb.config.string());
+  }
+  return config->api.tokens;
+}
+
+Result<void> add(const TokenVerb& verb, TokenFile tokens, const std::filesystem::path& file) {
+  const auto token =
+      tokens.add(verb.name, parse_role(verb.role).value_or(Role::viewer), iso_time(std::chrono::system_clock::now()));
+  if (!token) return pass_on(token);
+  if (auto written = tokens.write(file); !written) return written;
+  if (verb.json) {
+    fmt::print("{}\n", ordered_json{{"name", verb.name}, {"role", verb.role}, {"token", *token}}.dump());
+  } else {
+    fmt::print("{}\n", *token);
+  }
+  return {};
+}
+
+Result<void> revoke(const TokenVerb& verb, TokenFile tokens, const std::filesystem::path& file) {
+  if (auto revoked = tokens.revoke(verb.name); !revoked) return revoked;
+  if (auto written = tokens.write(file); !written) return written;
+  if (verb.json) fmt::print("{}\n", ordered_json{{"revoked", verb.name}}.dump());
+  return {};
+}
+
+void list(const TokenVerb& verb, const TokenFile& tokens) {
+  auto all = ordered_json::array();
+  for (const auto& token : tokens.records()) {
+    if (!verb.json) fmt::print("{:<32}  {:<8}  {}\n", token.name, to_string(token.role), token.created);
+    all.push_back({{"name", token.name}, {"role", to_string(token.role)}, {"created", token.created}});
+  }
+  if (verb.json) fmt::print("{}\n", ordered_json{{"tokens", all}}.dump(2));
+}
+
+}  // namespace
+
+ExitCode token(const TokenVerb& verb) {
+  const auto file = file_of(verb);
+  if (!file) return report_error(file.error());
+  auto tokens = TokenFile::read(*file);
+  if (!tokens) return report_error(tokens.error());
+  Result<void> done;
+  if (verb.what == "add") {
+    done = add(verb, std::move(*tokens), *file);
+  } else if (verb.what == "revoke") {
+    done = revoke(verb, std::move(*tokens), *file);
+  } else {
+    list(verb, *tokens);
+  }
+  return done ? ExitCode::ok : report_error(done.error());
+}
+
+}  // namespace scanrig::ctl
