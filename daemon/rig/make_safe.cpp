@@ -1,9 +1,19 @@
 #include "daemon/rig/make_safe.h"
 
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstring>
 #include <memory>
+#include <optional>
 #include <set>
+#include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "daemon/rig/open_devices.h"
 #include "daemon/rig/saved_config.h"
@@ -80,6 +90,20 @@ DeviceConfigs config_to_use(const std::filesystem::path& file, const char* progr
   return config;
 }
 
+/// A process that is given up is killed, and waited for: no other may be left with its number.
+std::optional<int> wait_for_end(pid_t child, Clock& clock, Deadline deadline) {
+  int status = 0;
+  while (::waitpid(child, &status, WNOHANG) == 0) {
+    if (deadline.expired(clock)) {
+      ::kill(child, SIGKILL);
+      ::waitpid(child, &status, 0);
+      return std::nullopt;
+    }
+    clock.sleep_for(kAgain);
+  }
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
 template <class... Value>
 std::set<std::string> errors_of(const Result<Value>&... results) {
   std::set<std::string> messages;
@@ -101,14 +125,45 @@ MadeSafe make_safe(const DeviceConfigs& config, Clock& clock, Deadline deadline)
   return made;
 }
 
-ExitCode make_safe_now(const std::filesystem::path& file, const char* program) {
-  const auto config = config_to_use(file, program);
+ExitCode make_safe_now(const std::filesystem::path& file, const char* program, Beside beside) {
+  auto config = config_to_use(file, program);
+  if (config.turntable && beside == Beside::hung_daemon) {
+    config.turntable->turntable.modbus.line.is_shared = true;
+    config.turntable->turntable.grbl.drive.link.lock = serial::Port::Lock::shared;
+  }
   RealClock clock;
   const auto made = make_safe(config, clock, Deadline::after(clock, kLimit));
   report_error(program, errors_of(made.turntable, made.projector, made.panel));
   if (!config.turntable && !config.projector && !config.panel) return exit_code(config.turntable.error().code);
   if (!made.turntable) return ExitCode::device;
   return made.projector && made.panel ? ExitCode::ok : ExitCode::partly_safe;
+}
+
+Result<void> make_safe_in_process(const std::filesystem::path& program, const std::filesystem::path& file,
+                                  std::chrono::milliseconds limit) {
+  std::vector<std::string> words{"scanrigd", "--make-safe", "--beside-daemon", "--config", file.string()};
+  std::vector<char*> arguments;
+  for (auto& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+
+  posix_spawnattr_t attributes;
+  ::posix_spawnattr_init(&attributes);
+  sigset_t none;
+  ::sigemptyset(&none);
+  ::posix_spawnattr_setsigmask(&attributes, &none);  // the daemon blocks the signals it waits for
+  ::posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK);
+  pid_t child = -1;
+  const int refused = ::posix_spawn(&child, program.c_str(), nullptr, &attributes, arguments.data(), environ);
+  ::posix_spawnattr_destroy(&attributes);
+  if (refused != 0)
+    return fail(ErrorCode::io, "turntable: cannot start {}: {}", program.string(), std::strerror(refused));
+
+  RealClock clock;
+  const auto code = wait_for_end(child, clock, Deadline::after(clock, limit));
+  if (!code)
+    return fail(ErrorCode::timeout, "turntable: the process that stops it did not end within {} ms", limit.count());
+  if (*code == static_cast<int>(ExitCode::ok) || *code == static_cast<int>(ExitCode::partly_safe)) return {};
+  return fail(ErrorCode::device_alarm, "turntable: another process could not stop it (exit code {})", *code);
 }
 
 }  // namespace scanrig

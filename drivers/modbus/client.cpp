@@ -175,7 +175,7 @@ Result<void> Client::open() {
   };
   if (modbus_connect(context_.get()) != 0) return give_up(std::strerror(errno));
   // libmodbus does not lock: two masters on one line would take each other's answers.
-  if (::flock(modbus_get_socket(context_.get()), LOCK_EX | LOCK_NB) != 0) {
+  if (!options_.is_shared && ::flock(modbus_get_socket(context_.get()), LOCK_EX | LOCK_NB) != 0) {
     return give_up(errno == EWOULDBLOCK ? "another program is using it" : std::strerror(errno));
   }
   ++statistics_.openings;

@@ -24,6 +24,7 @@ struct ClientOptions {
   Parity parity = Parity::none;  ///< one stop bit with even and odd, and with none
   int unit_id = 1;
   std::chrono::milliseconds reply_timeout{60};  ///< request sent to whole answer received
+  bool is_shared = false;                       ///< the port is used although another program has it, one that hangs
 };
 
 /// What happened on the line since it was made; every miss and every retry is visible here.

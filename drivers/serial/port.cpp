@@ -21,12 +21,12 @@ tl::unexpected<Error> gone(const std::string& device, std::string_view reason) {
 }
 
 /// Fails with what is wrong.
-Result<void> set_up(int descriptor, int baud) {
+Result<void> set_up(int descriptor, int baud, Port::Lock lock) {
   static const std::map<int, speed_t> speeds{{9600, B9600},   {19200, B19200},   {38400, B38400},
                                              {57600, B57600}, {115200, B115200}, {230400, B230400}};
   const auto speed = speeds.find(baud);
   if (speed == speeds.end()) return fail(ErrorCode::io, "no speed of {} baud", baud);
-  if (::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
+  if (lock == Port::Lock::exclusive && ::flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
     return fail(ErrorCode::io, "{}", errno == EWOULDBLOCK ? "another program is using it" : std::strerror(errno));
   }
   termios settings{};
@@ -42,11 +42,11 @@ Result<void> set_up(int descriptor, int baud) {
 
 }  // namespace
 
-Result<Port> Port::open(const std::string& device, int baud) {
+Result<Port> Port::open(const std::string& device, int baud, Lock lock) {
   const int descriptor = ::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
   if (descriptor < 0) return fail(ErrorCode::io, "open {}: {}", device, std::strerror(errno));
   Port port(descriptor, device);
-  if (auto ready = set_up(descriptor, baud); !ready) return pass_on(ready, "open " + device);
+  if (auto ready = set_up(descriptor, baud, lock); !ready) return pass_on(ready, "open " + device);
   return port;
 }
 

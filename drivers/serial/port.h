@@ -12,8 +12,10 @@ namespace scanrig::serial {
 /// Waits in real time. Threads: one owner.
 class Port {
  public:
+  /// `shared`: used although another program has it, one that hangs.
+  enum class Lock { exclusive, shared };
   /// Fails with `io`: absent, not a terminal, no such speed, or used by another program.
-  static Result<Port> open(const std::string& device, int baud);
+  static Result<Port> open(const std::string& device, int baud, Lock lock = Lock::exclusive);
   Port(Port&& other) noexcept;
   Port& operator=(Port&& other) noexcept;
   ~Port();

@@ -26,7 +26,7 @@ tl::unexpected<Error> Link::lost(const Error& error) {
 }
 
 Result<void> Link::open() {
-  auto port = serial::Port::open(options_.device, options_.baud);
+  auto port = serial::Port::open(options_.device, options_.baud, options_.lock);
   if (!port) return lost(port.error());
   port_.emplace(std::move(*port));
   heard_.clear();

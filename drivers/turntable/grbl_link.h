@@ -20,6 +20,7 @@ struct LinkOptions {
   std::string device;
   int baud = 115200;
   std::chrono::milliseconds reply_timeout{100};  ///< request sent to its answer received
+  serial::Port::Lock lock = serial::Port::Lock::exclusive;
 };
 
 /// What happened on the line since it was made.
