@@ -17,6 +17,11 @@ constexpr double kMaxWound = 4 * 360.0;
 /// `angle` plus as many whole turns as bring it nearest to `to`.
 double nearest_turn(double angle, double to) { return angle + 360.0 * std::round((to - angle) / 360.0); }
 
+Result<TurntableStatus> known_motion(Result<TurntableStatus> status) {
+  if (!status || status->motion != TurntableStatus::Motion::unknown) return status;
+  return fail(ErrorCode::timeout, "turntable: its drive cannot be reached; check its power and cable");
+}
+
 /// What the same exposure, taken again, may not have: frames are lost, plugs are pulled and put in.
 bool may_pass(const Error& error) {
   return error.code == ErrorCode::timeout || error.code == ErrorCode::protocol || error.code == ErrorCode::io ||
@@ -85,14 +90,17 @@ Result<StereoFrame> Acquisition::capture_preview() {
   return devices_.camera.capture_preview(Deadline::after(clock_, options_.exposure_limit));
 }
 
-std::vector<DeviceHealth> Acquisition::check() {
+event::DevicesChecked Acquisition::check() {
   const auto limit = [this] { return Deadline::after(clock_, options_.check_limit); };
   const auto health = [](const char* name, const auto& answer) {
     return DeviceHealth{name, answer ? std::nullopt : std::optional(answer.error())};
   };
-  return {health(kTurntable, devices_.turntable.status(limit())),
-          health(kProjector, devices_.projector.turn_off(limit())),
-          health(kCamera, devices_.camera.prepare(Deadline::after(clock_, options_.connect_limit)))};
+  const auto status = known_motion(devices_.turntable.status(limit()));
+  event::DevicesChecked seen{
+      {health(kTurntable, status), health(kProjector, devices_.projector.turn_off(limit())),
+       health(kCamera, devices_.camera.prepare(Deadline::after(clock_, options_.connect_limit)))}};
+  if (status) seen.drive = event::DriveReport{status->motion == TurntableStatus::Motion::moving, status->alarm};
+  return seen;
 }
 
 Acquisition::Stop Acquisition::stop() {

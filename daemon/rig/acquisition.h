@@ -52,8 +52,9 @@ class Acquisition {
   /// A pair without an exposure of the projector. Fails as StereoCamera::look.
   Result<StereoFrame> capture_preview();
 
-  /// Asks each device something that does no harm.
-  std::vector<DeviceHealth> check();
+  /// Requests something harmless of each device, and reports what the drive says of motion and alarms. A drive that
+  /// does not know whether the table moves is absent.
+  event::DevicesChecked check();
 
   struct Stop {
     Result<void> table;  ///< seen standing

@@ -1,17 +1,16 @@
 #include "daemon/rig/panel_thread.h"
 
-#include <fmt/format.h>
-
 #include <utility>
 
 #include "daemon/runtime/actor_thread.h"
+#include "drivers/panel/debounce.h"
 
 namespace scanrig {
 namespace {
 
-constexpr auto kPoll = std::chrono::milliseconds(50);  ///< longest wait of a lamp for a quiet panel
+/// Longest wait of a lamp for a quiet panel; part of panel_latency().
+constexpr auto kPoll = std::chrono::milliseconds(20);
 constexpr auto kShowLimit = std::chrono::milliseconds(500);
-constexpr auto kHangs = std::chrono::seconds(3);  ///< far beyond kPoll and kShowLimit
 constexpr auto kRetry = std::chrono::seconds(1);  ///< after a panel that did not answer
 
 }  // namespace
@@ -30,13 +29,14 @@ std::vector<Event> changes(const PanelInputs& before, const PanelInputs& after) 
   return events;
 }
 
-PanelThread::PanelThread(Panel& panel, Clock& clock, std::function<void(Event)> post_event,
+Clock::Duration panel_latency(Clock::Duration read_time) { return PanelDebounce::kDebounce + kPoll + read_time; }
+
+PanelThread::PanelThread(Panel& panel, Clock& clock, PanelThreadOptions options, std::function<void(Event)> post_event,
                          std::function<void()> on_estop)
-    : panel_(panel),
+    : panel_(panel, clock, options.hang_margin, options.read_time),
       clock_(clock),
       post_event_(std::move(post_event)),
       on_estop_(std::move(on_estop)),
-      busy_timer_(clock),
       thread_(start_actor(clock, [this] { run(); })) {}
 
 PanelThread::~PanelThread() {
@@ -55,7 +55,8 @@ void PanelThread::show(const PanelOutputs& outputs) {
 
 void PanelThread::run() {
   while (true) {
-    const auto done = look();
+    auto done = show_wanted();
+    if (done) done = read_inputs();
     if (!done) {
       known_.reset();  // what a panel says that comes back is news
       post_event_(event::PanelFailed{done.error()});
@@ -65,24 +66,6 @@ void PanelThread::run() {
     if (clock_.wait_until(lock, changed_, pause, [this] { return stop_; })) break;
   }
   std::ignore = show_wanted();  // the last word of the station; a panel that fails here was reported before
-}
-
-/// A panel that had hung is one that failed, whatever it says in the end.
-Result<void> PanelThread::look() {
-  busy_timer_.begins();
-  auto done = show_wanted();
-  if (done) done = read_inputs();
-  const auto hung = hangs();
-  busy_timer_.ends();
-  if (done && hung) return tl::unexpected(*hung);
-  return done;
-}
-
-std::optional<Error> PanelThread::hangs() const {
-  const auto waited = busy_timer_.lasts();
-  if (waited < kHangs) return std::nullopt;
-  return Error{ErrorCode::timeout, fmt::format("panel: no response for {:.0f} s, e-stop state unknown; check its cable",
-                                               std::chrono::duration<double>(waited).count())};
 }
 
 Result<void> PanelThread::show_wanted() {

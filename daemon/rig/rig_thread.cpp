@@ -1,5 +1,7 @@
 #include "daemon/rig/rig_thread.h"
 
+#include <fmt/format.h>
+
 #include <utility>
 
 #include "daemon/runtime/actor_thread.h"
@@ -7,12 +9,16 @@
 namespace scanrig {
 
 RigThread::RigThread(const Devices& devices, Clock& clock, AcquisitionOptions options, Preview& preview,
-                     std::function<void(Event)> post_event)
-    : turntable_(devices.turntable, clock),
-      devices_{turntable_, devices.projector, devices.camera, devices.panel},
+                     std::function<void(Event)> post_event, Clock::Duration hang_margin)
+    : post_event_(std::move(post_event)),
+      stop_limit_(options.stop_limit),
+      watched_turntable_(devices.turntable, clock, hang_margin),
+      projector_(devices.projector, clock, hang_margin),
+      camera_(devices.camera, clock, hang_margin),
+      turntable_(watched_turntable_, clock),
+      devices_{turntable_, projector_, camera_, devices.panel},
       acquisition_(devices_, clock, options, [&preview](const StereoFrame& pair) { preview.keep(pair); }),
       preview_(preview),
-      post_event_(std::move(post_event)),
       inbox_(clock),
       thread_(start_actor(clock, [this] { run(); })) {
   preview_.on_wanted([this] { post(Look{}); });
@@ -34,6 +40,23 @@ void RigThread::interrupt() noexcept {
   acquisition_.interrupt();
   devices_.turntable.request_stop();
   devices_.projector.request_off();
+}
+
+void RigThread::stop_directly() {
+  acquisition_.interrupt();
+  devices_.projector.request_off();
+  turntable_.stop_directly(stop_limit_, [this](const Result<void>& stopped) {
+    if (!stopped) return post_event_(event::StopFailed{stopped.error()});
+    const auto call = hung();
+    const auto why = call ? fmt::format(", {} hangs in {}", call->device, call->call) : "";
+    post_event_(event::Stopped{Error{ErrorCode::timeout, fmt::format("projector: not confirmed dark{}", why)}});
+  });
+}
+
+std::optional<HungCall> RigThread::hung() const {
+  if (auto call = watched_turntable_.hung()) return call;
+  if (auto call = projector_.hung()) return call;
+  return camera_.hung();
 }
 
 void RigThread::run() {
@@ -88,7 +111,7 @@ Event RigThread::perform(const Asked& asked) {
     if (!fired) return event::RigFailed{fired.error(), acquisition_.failed_device()};
     return event::Pulsed{};
   }
-  if (std::holds_alternative<action::CheckDevices>(command)) return event::DevicesChecked{acquisition_.check()};
+  if (std::holds_alternative<action::CheckDevices>(command)) return acquisition_.check();
   const auto stopped = acquisition_.stop();
   if (!stopped.table) return event::StopFailed{stopped.table.error()};
   return event::Stopped{stopped.light ? std::nullopt : std::optional(stopped.light.error())};

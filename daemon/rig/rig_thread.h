@@ -1,12 +1,14 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <thread>
 #include <variant>
 
 #include "daemon/rig/acquisition.h"
 #include "daemon/rig/preview.h"
 #include "daemon/rig/turntable_thread.h"
+#include "daemon/rig/watched_devices.h"
 #include "daemon/runtime/mailbox.h"
 
 namespace scanrig {
@@ -16,8 +18,9 @@ namespace scanrig {
 class RigThread {
  public:
   /// `preview` outlives it, is given every pair and is served with looks.
+  /// `hang_margin`: a call that is so late hangs.
   RigThread(const Devices& devices, Clock& clock, AcquisitionOptions options, Preview& preview,
-            std::function<void(Event)> post_event);
+            std::function<void(Event)> post_event, Clock::Duration hang_margin = DeviceWatch::kMargin);
   /// Stops what moves and joins.
   ~RigThread();
   RigThread(const RigThread&) = delete;
@@ -34,6 +37,10 @@ class RigThread {
   /// The e-stop's short cut: the motor is told to stop and the light goes out at once. From any thread; the station
   /// follows with stop().
   void interrupt() noexcept;
+  /// While a call of projector or camera hangs: stop() through the turntable's own thread, past this one.
+  void stop_directly();
+  /// The call this thread or the turntable's hangs in, the turntable's first. From any thread.
+  [[nodiscard]] std::optional<HungCall> hung() const;
 
  private:
   struct Look {};
@@ -54,11 +61,16 @@ class RigThread {
   void capture_preview();
   Result<void> home_now(unsigned interrupts);
 
+  // Before the turntable's thread, which uses them.
+  const std::function<void(Event)> post_event_;
+  const Clock::Duration stop_limit_;
+  WatchedTurntable watched_turntable_;
+  WatchedProjector projector_;
+  WatchedCamera camera_;
   TurntableThread turntable_;
   Devices devices_;
   Acquisition acquisition_;
   Preview& preview_;
-  std::function<void(Event)> post_event_;
   Mailbox<Asked> inbox_;
   std::thread thread_;
 };

@@ -39,9 +39,11 @@ void TurntableThread::run() {
   for (;;) {
     clock_.wait_until(lock, changed_, Clock::TimePoint::max(), [this] { return task_ || stop_wanted_ || end_; });
     if (std::exchange(stop_wanted_, false)) {
+      const auto direct = std::exchange(direct_stop_, std::nullopt);
       lock.unlock();
       // Without an answer: the station asks for evidence through stop(), and the driver owes the stop from now on.
-      std::ignore = turntable_.stop(Deadline::after(clock_, kStopLimit));
+      const auto stopped = turntable_.stop(Deadline::after(clock_, direct ? direct->limit : kStopLimit));
+      if (direct) direct->done(stopped);
       lock.lock();
     } else if (task_) {
       lock.unlock();
@@ -72,6 +74,16 @@ Result<TurntableStatus> TurntableThread::status(Deadline deadline) {
 }
 Result<void> TurntableThread::limit_speed(std::optional<DegreesPerSecond> limit) {
   return ask<Result<void>>([&] { return turntable_.limit_speed(limit); });
+}
+
+void TurntableThread::stop_directly(Clock::Duration limit, std::function<void(const Result<void>&)> done) {
+  turntable_.request_stop();
+  {
+    const std::lock_guard guard(mutex_);
+    stop_wanted_ = true;
+    direct_stop_ = DirectStop{limit, std::move(done)};
+  }
+  clock_.notify_all(changed_);
 }
 
 void TurntableThread::request_stop() noexcept {

@@ -3,6 +3,7 @@
 #include <condition_variable>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "core/clock.h"
@@ -28,6 +29,9 @@ class TurntableThread final : public Turntable {
   Result<void> limit_speed(std::optional<DegreesPerSecond> limit) override;
   /// Ends what runs, and tells the drive to stop even when nothing does.
   void request_stop() noexcept override;
+  /// The same from any thread, with evidence: `done` is called from the turntable's own thread with what stop()
+  /// returned by `limit`, and not at all where the turntable itself hangs.
+  void stop_directly(Clock::Duration limit, std::function<void(const Result<void>&)> done);
 
  private:
   template <class Answer>
@@ -40,6 +44,11 @@ class TurntableThread final : public Turntable {
   std::condition_variable changed_;
   std::function<void()> task_;  // guarded by mutex_, as all below; empty: none, or done
   bool stop_wanted_ = false;
+  struct DirectStop {
+    Clock::Duration limit;
+    std::function<void(const Result<void>&)> done;
+  };
+  std::optional<DirectStop> direct_stop_;  // of the stop that is wanted
   bool end_ = false;
   std::thread thread_;
 };

@@ -34,6 +34,14 @@ Recipe recipe_from(const std::string& name, const config::RecipeConfig& config) 
           .limits = {config.min_measured_share, config.max_residual_mm}};
 }
 
+/// On a module's bus: until the next polling, then coils and inputs; one reply is missed, the bus is left quiet for two
+/// reply timeouts, and both are read again (drivers/panel/modbus_io_panel.h).
+Clock::Duration panel_read_time(const config::PanelConfig& config) {
+  if (config.driver != config::PanelConfig::Driver::modbus_io) return Clock::Duration::zero();
+  constexpr int kReplyTimeouts = 1 + 2 + 2;
+  return config.poll + kReplyTimeouts * config.io_module.reply_timeout;
+}
+
 ReconstructorFactory reconstructor_from(const config::ReconstructionConfig& config) {
   if (config.executor == config::ReconstructionConfig::Executor::process) {
     const auto outside = process_reconstructor(
@@ -82,6 +90,7 @@ DaemonOptions options_from(const config::RigConfig& config) {
   options.guard = config.safety.guard.has_value();
   options.auto_home = config.safety.home_after_restart == config::SafetyConfig::HomeAfterRestart::guarded;
   options.manual_light = config.projector.driver == config::ProjectorConfig::Driver::manual;
+  options.panel_read_time = panel_read_time(config.panel);
   options.reconstructor = reconstructor_from(config.reconstruction);
   return options;
 }

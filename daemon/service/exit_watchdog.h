@@ -4,6 +4,7 @@
 #include <condition_variable>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
 
@@ -29,8 +30,9 @@ class ExitWatchdog {
     if (thread_.joinable()) thread_.join();
   }
 
-  /// From now on it counts.
-  void begin() {
+  /// From now on it counts. `lost`: why it cannot come to its end; then nothing is waited for.
+  void begin(const std::optional<Error>& lost) {
+    if (lost) return hangs_(*lost);
     thread_ = std::thread([this] {
       std::unique_lock lock(mutex_);
       if (changed_.wait_for(lock, limit_, [this] { return over_; })) return;

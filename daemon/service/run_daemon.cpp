@@ -1,10 +1,12 @@
 #include "daemon/service/run_daemon.h"
 
+#include <algorithm>
 #include <ctime>
 
 #include "daemon/jobs/heap.h"
 #include "daemon/jobs/housekeeping_thread.h"
 #include "daemon/journal/log_entries.h"
+#include "daemon/rig/outside_stop.h"
 #include "daemon/rig/panel_thread.h"
 #include "daemon/rig/rig_thread.h"
 #include "daemon/runtime/overloaded.h"
@@ -51,6 +53,7 @@ class OnLoop {
 
 struct Workers {
   RigThread& rig;
+  OutsideStop& outside;
   JobThread& jobs;
   HousekeepingThread& housekeeping;
 };
@@ -76,6 +79,8 @@ void perform(const Action& action, const Workers& workers) {
                  [](const action::EndConsentLater&) {}, [](const action::CheckLater&) {},
                  [](const action::TestLamps&) {}, [](const action::WaitForFlip&) {},
                  [&](const action::Home&) { rig.home(); }, [&](const action::StopRig&) { rig.stop(); },
+                 [&](const action::StopTableDirectly&) { rig.stop_directly(); },
+                 [&](const action::StopTableOutside&) { workers.outside.begin(); },
                  [&](const action::TakeView& a) { rig.take_view(a); }, [&](const action::Jog& a) { rig.jog(a); },
                  [&](const action::Pulse&) { rig.pulse(); }, [&](const action::CheckDevices&) { rig.check_devices(); },
                  [&](const action::RunJobRequest& a) { keep(a, workers); },
@@ -154,8 +159,13 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
                            .guard = options.guard,
                            .auto_home = options.auto_home,
                            .manual_light = options.manual_light};
-  ControlLoop loop(
-      clock, {.rules = rules, .warning = options.warning, .warm_up = options.warm_up, .latch = record.latch()}, *known);
+  ControlLoopOptions loop_options{.rules = rules,
+                                  .warning = options.warning,
+                                  .hang_limit = options.hang_limit,
+                                  .warm_up = options.warm_up,
+                                  .latch = record.latch()};
+  loop_options.estop_window = std::max(loop_options.estop_window, panel_latency(options.panel_read_time));
+  ControlLoop loop(clock, loop_options, *known);
   const auto post_event = [&loop](Event event) { loop.post(std::move(event)); };
 
   const OnLoop reachable(options, loop);
@@ -180,7 +190,8 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
       clock, *store, options.retention, [&loop] { return loop.snapshot()->jobs; }, post_event);
   housekeeping.sweep();
   JobThread jobs(clock, *store, reconstruction, options.on_scanned, post_event);
-  RigThread rig(devices, clock, options.acquisition, preview, post_event);
+  RigThread rig(devices, clock, options.acquisition, preview, post_event, options.hang_margin);
+  OutsideStop outside(clock, options.stop_table_outside, post_event);
   const auto store_latch = [&](const std::optional<Latch>& latch) {
     if (auto stored = record.store(latch); !stored) {
       options.journal({Priority::error, as_sentence(stored.error().message)});
@@ -188,12 +199,13 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
   };
   std::optional<Webhook> webhook;
   if (options.webhook) webhook.emplace(clock, *options.webhook);
-  PanelThread panel(devices.panel, clock, post_event, [&rig] { rig.interrupt(); });
+  PanelThread panel(devices.panel, clock, {options.panel_read_time, options.hang_margin}, post_event,
+                    [&rig] { rig.interrupt(); });
 
   const std::stop_callback shut_down(stop, [&loop] { loop.post(event::Shutdown{}); });
   const Clock::Actor actor(clock);
   starting.reset();
-  const Workers workers{rig, jobs, housekeeping};
+  const Workers workers{rig, outside, jobs, housekeeping};
   NewIds new_id;
   const auto perform_all = [&](const Action& action) {
     perform(action, workers);
@@ -215,10 +227,12 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
                          .new_job_id = [&] { return new_id(loop.snapshot()->jobs); },
                          .quiet_hours = [&] { return quiet_now(options.quiet_hours); },
                          .disk_problem = [&] { return disk_problem(jobs.waiting(), options); },
-                         .panel_hangs = [&] { return panel.hangs(); },
+                         .rig_hangs = [&] { return rig.hung(); },
+                         .panel_hangs = [&] { return panel.hung(); },
                          .published = published,
                          .refused_at_panel = refused});
-  ending.begin();
+  const auto hung = ended ? std::nullopt : rig.hung() ? rig.hung() : panel.hung();
+  ending.begin(hung ? std::optional(hung_error(*hung)) : std::nullopt);
   reconstruction.stop();  // before views that are still being stored cost the time it has
   if (ended) record.end_devices();
   return ended;

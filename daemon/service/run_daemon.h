@@ -43,6 +43,14 @@ struct DaemonOptions {
   /// The ending has taken longer: from a thread of its own, while the others still wait. Who cannot wait ends the
   /// process: what is acknowledged is on the disk.
   std::function<void(const Error&)> on_exit_hang = [](const auto&) {};
+  Clock::Duration hang_margin = DeviceWatch::kMargin;     ///< a device's call that is so late hangs
+  Clock::Duration hang_limit = std::chrono::seconds(10);  ///< one that is so late ends the daemon
+  Clock::Duration panel_read_time{0};  ///< how long a reading of the panel may take beyond its deadline
+  /// Stops the table by another path than the devices given: their turntable hangs. On a thread of its own; returns
+  /// once the table is seen standing. Fails with why it may be moving; then the daemon ends.
+  std::function<Result<void>()> stop_table_outside = [] {
+    return Result<void>(fail(ErrorCode::unsupported, "turntable: no other path to its drive"));
+  };
   RetentionOptions retention{};
   std::optional<HttpAddress> webhook{};  ///< whom failures are told
   ApiOptions api;
@@ -71,7 +79,8 @@ struct DaemonOptions {
 /// The daemon from start-up to a clean stop: owns all threads but the caller's, which becomes the control loop.
 /// Returns after `stop` with the motor stopped, the projector dark and an unfinished job marked interrupted, or when a
 /// reload was asked for. Fails with `io`, `refused` (another daemon), `invalid_input` before it begins, `timeout` when
-/// the rig was not seen stopped at the end. The devices outlive the call.
+/// the rig was not seen stopped at the end, or a device's call hangs for good: then `on_exit_hang` is called at once,
+/// and the daemon returns only when the device does. The devices outlive the call.
 Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, Clock& clock, std::stop_token stop);
 
 }  // namespace scanrig

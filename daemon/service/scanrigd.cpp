@@ -15,7 +15,9 @@ Result<void> run(const std::filesystem::path& file, SignalStop& stop) {
     RealClock clock;
     const auto open = open_devices(config, clock);
     if (!open) return pass_on(open, file.string());
-    return run_daemon(open->devices(), options, clock, stop.token());
+    auto with_way_out = options;
+    with_way_out.stop_table_outside = [&file] { return make_safe_in_process("/proc/self/exe", file); };
+    return run_daemon(open->devices(), with_way_out, clock, stop.token());
   });
 }
 
@@ -24,9 +26,11 @@ Result<void> run(const std::filesystem::path& file, SignalStop& stop) {
 int main(int argc, char** argv) {
   CLI::App app("scanrigd: the daemon of a scanning rig. Exit codes: docs/exit-codes.md");
   std::filesystem::path config = "/etc/scanrig/rig.toml";
-  bool make_safe = false;
+  bool make_safe = false, beside_daemon = false;
   app.add_option("--config", config, "the rig's configuration")->capture_default_str();
   app.add_flag("--make-safe", make_safe, "stop the table, light off, red lamp; for when the daemon has ended");
+  app.add_flag("--beside-daemon", beside_daemon,
+               "with --make-safe: use the turntable's port although a daemon that hangs still has it");
   try {
     app.parse(argc, argv);
   } catch (const CLI::CallForHelp& help) {
@@ -35,7 +39,8 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "scanrigd: {}\n", error.what());
     return static_cast<int>(ExitCode::usage);
   }
-  if (make_safe) return static_cast<int>(make_safe_now(config, "scanrigd"));
+  if (make_safe)
+    return static_cast<int>(make_safe_now(config, "scanrigd", beside_daemon ? Beside::hung_daemon : Beside::nobody));
   SignalStop stop(SignalStop::Hangup::is_told);
   const auto done = run(config, stop);
   if (done) return static_cast<int>(ExitCode::ok);

@@ -10,7 +10,8 @@
 namespace scanrig {
 namespace {
 
-constexpr auto kSignOfLife = std::chrono::seconds(1);
+/// Between two looks at the calls under way: with DeviceWatch::kMargin one that hangs is named within a second.
+constexpr auto kLook = std::chrono::milliseconds(250);
 constexpr auto kBlink = std::chrono::milliseconds(500);
 constexpr auto kLampTest = std::chrono::seconds(3);
 /// The active job, or the one that the request has just ended.
@@ -46,9 +47,11 @@ Result<Ended> ControlLoop::run(const StationPorts& ports) {
     ports.alive();
     look_at_the_disk(ports);
     look_at_the_panel(ports);
+    look_at_the_rig(ports);
+    if (lost_) break;
     auto next_later = std::ranges::min_element(later_, {}, [](const auto& one) { return one.second.at; });
     const auto later = next_later == later_.end() ? Clock::TimePoint::max() : next_later->second.at;
-    auto message = inbox_.take(std::min({later, next_blink_, give_up_, clock_.now() + kSignOfLife}));
+    auto message = inbox_.take(std::min({later, next_blink_, give_up_, clock_.now() + kLook}));
     if (message) {
       handle(std::move(*message), ports);
     } else if (clock_.now() >= give_up_) {
@@ -61,6 +64,7 @@ Result<Ended> ControlLoop::run(const StationPorts& ports) {
     }
   }
   inbox_.close();
+  if (lost_) return tl::unexpected(*lost_);
   if (!state_.finished || state_.may_be_moving) {
     return fail(ErrorCode::timeout, "the rig was not seen stopped before the daemon ended: the table may be moving");
   }
@@ -144,8 +148,24 @@ void ControlLoop::look_at_the_disk(const StationPorts& ports) {
 
 /// Its return is told by its owner.
 void ControlLoop::look_at_the_panel(const StationPorts& ports) {
-  auto problem = ports.panel_hangs();
-  if (problem && !state_.panel_problem) handle({event::PanelFailed{std::move(*problem)}, {}}, ports);
+  const auto call = ports.panel_hangs();
+  if (!call) return;
+  if (!state_.panel_problem) handle({event::PanelFailed{hung_error(*call)}, {}}, ports);
+  if (is_lost(*call)) lost_ = hung_error(*call);
+}
+
+/// One that hangs may keep the stop by its own path, or another one by the path past it, from returning too.
+void ControlLoop::look_at_the_rig(const StationPorts& ports) {
+  auto call = ports.rig_hangs();
+  const auto device_of = [](const std::optional<HungCall>& one) { return one ? one->device : std::string(); };
+  if (device_of(call) != device_of(state_.hung)) handle({event::HungCallChanged{call}, {}}, ports);
+  if (call && is_lost(*call)) lost_ = hung_error(*call);
+}
+
+/// Where no other process can stop the drive either while this one has it, this one ends at once.
+bool ControlLoop::is_lost(const HungCall& call) const {
+  const bool unreached = call.device == "turntable" && state_.may_be_moving && state_.activity == Activity::none;
+  return unreached || call.late >= options_.hang_limit;
 }
 
 /// A projector that was away may have been without power: it begins anew.

@@ -18,7 +18,7 @@ namespace scanrig {
 
 /// Where the decisions of the control loop go. Called from its thread; none may wait.
 struct StationPorts {
-  std::function<void()> alive = [] {};         ///< the loop goes round; at least once a second
+  std::function<void()> alive = [] {};         ///< the loop goes round; at least four times a second
   std::function<void(const Action&)> perform;  ///< everything but Warn
   std::function<void(const PanelOutputs&)> show;
   /// A latch was set, changed or cleared: returns once it is durable, within a third of a second. What it fails with is
@@ -27,7 +27,9 @@ struct StationPorts {
   std::function<std::string()> new_job_id;  ///< another one each time
   std::function<bool()> quiet_hours = [] { return false; };
   std::function<std::optional<Error>()> disk_problem = [] { return std::nullopt; };  ///< the jobs' does not answer
-  std::function<std::optional<Error>()> panel_hangs = [] { return std::nullopt; };   ///< and cannot say so itself
+  /// Calls that hang: what waits for them cannot report it. `rig_hangs`: of turntable, projector and camera.
+  std::function<std::optional<HungCall>()> rig_hangs = [] { return std::nullopt; };
+  std::function<std::optional<HungCall>()> panel_hangs = [] { return std::nullopt; };
   std::function<void(const std::shared_ptr<const Snapshot>&)> published = [](const auto&) {};
   std::function<void(const event::Pressed&, const Error& why)> refused_at_panel = [](const auto&, const auto&) {};
 };
@@ -37,11 +39,13 @@ enum class Ended { shut_down, reload };
 
 struct ControlLoopOptions {
   StationRules rules;
-  Clock::Duration warning = std::chrono::seconds(2);              ///< lamp before the first move
-  Clock::Duration estop_window = std::chrono::milliseconds(200);  ///< a device that fails may only lack power
-  Clock::Duration stop_retry = std::chrono::seconds(1);           ///< while the table may be moving
-  Clock::Duration check_period = std::chrono::seconds(2);         ///< of the devices, in quiet times
-  Clock::Duration shutdown_limit = std::chrono::seconds(5);       ///< for the rig to be seen stopped
+  Clock::Duration warning = std::chrono::seconds(2);  ///< lamp before the first move
+  /// A device that fails may only lack power: an e-stop that took it is reported by then (panel_latency()).
+  Clock::Duration estop_window = std::chrono::milliseconds(200);
+  Clock::Duration stop_retry = std::chrono::seconds(1);      ///< while the table may be moving
+  Clock::Duration check_period = std::chrono::seconds(2);    ///< of the devices, in quiet times
+  Clock::Duration shutdown_limit = std::chrono::seconds(5);  ///< for the rig to be seen stopped
+  Clock::Duration hang_limit = std::chrono::seconds(10);     ///< a call that is so late ends the loop
   std::chrono::seconds warm_up{0};  ///< of the projector: no job begins by itself before it was there for so long
   std::optional<Latch> latch{};     ///< that an earlier process left
 };
@@ -72,7 +76,8 @@ class ControlLoop {
   [[nodiscard]] std::shared_ptr<const Snapshot> snapshot() const { return published_.get(); }
 
   /// Runs until a Shutdown or a reload is done. Fails with `timeout` when the rig was not seen stopped by it: under a
-  /// new configuration another drive might be asked.
+  /// new configuration another drive might be asked. Likewise once a device's call hangs for good: only another process
+  /// can use that device again.
   Result<Ended> run(const StationPorts& ports);
 
  private:
@@ -88,6 +93,8 @@ class ControlLoop {
   void look_at_the_time(const StationPorts& ports);
   void look_at_the_disk(const StationPorts& ports);
   void look_at_the_panel(const StationPorts& ports);
+  void look_at_the_rig(const StationPorts& ports);
+  [[nodiscard]] bool is_lost(const HungCall& call) const;
   [[nodiscard]] std::chrono::seconds warm_up_left();
   void carry_out(const Action& action, const StationPorts& ports);
   void wake_later(Event event, Clock::Duration after);
@@ -115,6 +122,7 @@ class ControlLoop {
   bool blink_ = false;
   Clock::TimePoint next_blink_ = Clock::TimePoint::max();
   Clock::TimePoint lamps_tested_ = Clock::TimePoint::min();
+  std::optional<Error> lost_;  // why the loop ends although nobody has asked for it
   Clock::TimePoint give_up_ = Clock::TimePoint::max();
   std::optional<Clock::TimePoint> projector_since_;  // has been there; nothing: it is not
 };

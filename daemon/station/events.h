@@ -10,6 +10,7 @@
 
 #include "core/result.h"
 #include "core/units.h"
+#include "daemon/runtime/device_watch.h"
 #include "daemon/station/job_info.h"
 #include "daemon/station/states.h"
 #include "drivers/panel/panel.h"
@@ -80,8 +81,18 @@ struct CalibrationChecked {
   std::string job{};
   std::optional<Error> problem{};
 };
+/// What the turntable's drive reports while no motion is requested.
+struct DriveReport {
+  bool is_moving = false;
+  std::string alarm{};  ///< in words; empty: none
+};
 struct DevicesChecked {
   std::vector<DeviceHealth> devices;
+  std::optional<DriveReport> drive{};  ///< nothing: the turntable is absent
+};
+/// A call of turntable, projector or camera hangs; nothing: it has returned.
+struct HungCallChanged {
+  std::optional<HungCall> call{};
 };
 /// What an engineer asks for.
 struct MaintenanceRequested {
@@ -222,14 +233,14 @@ struct Shutdown {};
 using Event =
     std::variant<event::PanelFound, event::InputsRead, event::Pressed, event::EstopChanged, event::GuardChanged,
                  event::WarningOver, event::EstopWindowOver, event::StopRetryDue, event::CheckDue, event::QuietHours,
-                 event::WarmingUp, event::DevicesChecked, event::CalibrationChecked, event::MaintenanceRequested,
-                 event::ConsentTimeout, event::Jogged, event::Pulsed, event::Homed, event::ViewTaken, event::Stopped,
-                 event::RigFailed, event::StopFailed, event::PanelFailed, event::JobsOrdered, event::JobRequested,
-                 event::RequestDone, event::JobUpdated, event::JobRemoved, event::JobStarted, event::JobNotStarted,
-                 event::JobUnreadable, event::CheckViewTaken, event::MovementChecked, event::FlipTimedOut,
-                 event::ViewStored, event::PoseStored, event::JobClosed, event::StoreFailed, event::DiskChecked,
-                 event::StageProgress, event::ReconstructionFailed, event::ModelReady, event::ReloadRequested,
-                 event::Shutdown>;
+                 event::WarmingUp, event::DevicesChecked, event::HungCallChanged, event::CalibrationChecked,
+                 event::MaintenanceRequested, event::ConsentTimeout, event::Jogged, event::Pulsed, event::Homed,
+                 event::ViewTaken, event::Stopped, event::RigFailed, event::StopFailed, event::PanelFailed,
+                 event::JobsOrdered, event::JobRequested, event::RequestDone, event::JobUpdated, event::JobRemoved,
+                 event::JobStarted, event::JobNotStarted, event::JobUnreadable, event::CheckViewTaken,
+                 event::MovementChecked, event::FlipTimedOut, event::ViewStored, event::PoseStored, event::JobClosed,
+                 event::StoreFailed, event::DiskChecked, event::StageProgress, event::ReconstructionFailed,
+                 event::ModelReady, event::ReloadRequested, event::Shutdown>;
 
 /// What is to be done about it. None of them waits.
 namespace action {
@@ -247,6 +258,10 @@ struct CheckCalibration {
 };
 struct Home {};     ///< clears a device alarm first
 struct StopRig {};  ///< answered by Stopped or StopFailed
+/// The same past a projector or camera that hangs, on the turntable's own thread.
+struct StopTableDirectly {};
+/// The same past a turntable that hangs, by another process.
+struct StopTableOutside {};
 struct Jog {
   Degrees angle;
   bool relative;
@@ -305,11 +320,11 @@ struct CloseJob {
 };
 }  // namespace action
 
-using Action =
-    std::variant<action::Warn, action::WaitForEstop, action::RetryStopLater, action::EndConsentLater,
-                 action::CheckLater, action::CheckDevices, action::CheckCalibration, action::Home, action::StopRig,
-                 action::Jog, action::Pulse, action::TestLamps, action::TakeView, action::WaitForFlip,
-                 action::CreateJobs, action::StartJob, action::MoveJob, action::RunJobRequest, action::CheckMovement,
-                 action::StoreView, action::FinishPose, action::ResumeJob, action::CloseJob>;
+using Action = std::variant<action::Warn, action::WaitForEstop, action::RetryStopLater, action::EndConsentLater,
+                            action::CheckLater, action::CheckDevices, action::CheckCalibration, action::Home,
+                            action::StopRig, action::StopTableDirectly, action::StopTableOutside, action::Jog,
+                            action::Pulse, action::TestLamps, action::TakeView, action::WaitForFlip, action::CreateJobs,
+                            action::StartJob, action::MoveJob, action::RunJobRequest, action::CheckMovement,
+                            action::StoreView, action::FinishPose, action::ResumeJob, action::CloseJob>;
 
 }  // namespace scanrig

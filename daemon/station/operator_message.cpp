@@ -32,6 +32,7 @@ std::string after_steps(const StationState& state, const std::string& action) {
 
 std::string how_to_reset(const StationState& state, const StationRules& rules) {
   if (state.may_be_moving) return "Keep clear. Check the drive's power and cable.";
+  if (state.hung) return "Wait: the service restarts itself. Then check the cable of the " + state.hung->device + ".";
   if (state.activity == Activity::stopping) return kWaitForStanding;
   if (state.unclassified) return "Wait: checking for an e-stop.";
   if (!state.panel_known) return kSeeToPanel;

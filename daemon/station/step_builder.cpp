@@ -37,7 +37,13 @@ void StepBuilder::warn() {
 
 void StepBuilder::stop_rig() {
   s().activity = Activity::stopping;
-  act(action::StopRig{});
+  send_stop();
+}
+
+void StepBuilder::send_stop() {
+  if (!s().hung) return act(action::StopRig{});
+  if (s().hung->device == "turntable") return act(action::StopTableOutside{});
+  act(action::StopTableDirectly{});
 }
 
 void StepBuilder::close_job(JobState state, Error why) {

@@ -32,6 +32,8 @@ class StepBuilder {
   void enter(MachineState machine, std::string cause);
   void warn();
   void stop_rig();
+  /// Stop to the drive, by a path that does not hang.
+  void send_stop();
   void close_job(JobState state, Error why);
 
   /// Stops what moves; only Reset at the panel leaves the state.

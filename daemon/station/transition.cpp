@@ -68,6 +68,7 @@ class Transition : public StepBuilder {
 
   void operator()(const event::Homed&) {
     if (s().activity != Activity::homing) return;
+    s().has_no_alarm = true;
     if (s().maintenance) {
       s().maintenance->homed = true;
       moved_in_maintenance(*this);
@@ -93,12 +94,13 @@ class Transition : public StepBuilder {
 
   /// Where nobody knows whether the table moves, stop is asked for again and again: the first frame that gets through.
   void operator()(const event::StopRetryDue&) {
-    if (s().may_be_moving && s().activity == Activity::none && !s().shutting_down) act(action::StopRig{});
+    if (s().may_be_moving && s().activity == Activity::none && !s().shutting_down) send_stop();
   }
 
   /// Asking devices is for quiet times only.
   void operator()(const event::CheckDue&) {
-    const bool standing = s().activity == Activity::none || s().activity == Activity::waiting_for_part;
+    const bool standing = s().activity == Activity::none || s().activity == Activity::waiting_for_flip ||
+                          s().activity == Activity::waiting_for_part;
     if (standing && !s().may_be_moving && !s().shutting_down) {
       check();
     } else {
@@ -109,7 +111,22 @@ class Transition : public StepBuilder {
   void operator()(const event::DevicesChecked& e) {
     s().devices = e.devices;
     act(action::CheckLater{});
+    if (e.drive) check_drive(*e.drive);
     handle_part_signals(*this);
+  }
+
+  /// The call that returns in the end may have been a stop that has no evidence yet.
+  void operator()(const event::HungCallChanged& e) {
+    const auto before = std::exchange(s().hung, e.call);
+    if (s().shutting_down && !e.call) return;
+    if (!e.call) return before ? stop_rig() : void();
+    const auto error = hung_error(*e.call);
+    if (s().machine != MachineState::error) {
+      fault(error.message + ".", e.call->device);
+    } else {
+      stop_rig();  // the one before may be waiting behind this call
+    }
+    set_problem(e.call->device, error);
   }
 
   void operator()(const event::CalibrationChecked& e) {
@@ -230,6 +247,21 @@ class Transition : public StepBuilder {
   void operator()(const event::RequestDone&) {}
 
  private:
+  /// Requested motion is over before the devices are checked. An alarm that was there when the daemon started, or that
+  /// came with a latched fault, is left to Reset; an e-stop takes the drive's power away and must keep its name.
+  void check_drive(const event::DriveReport& drive) {
+    if (s().shutting_down) return;
+    if (drive.is_moving) {
+      if (s().machine != MachineState::error) return fault("The table moved without a request.", "turntable");
+      if (s().activity == Activity::none) stop_rig();
+      return;
+    }
+    const bool is_new = std::exchange(s().has_no_alarm, drive.alarm.empty()) && !drive.alarm.empty();
+    if (!is_new || s().latch) return;
+    fault_unclassified(
+        {{ErrorCode::device_alarm, fmt::format("The drive reports an alarm: {}", drive.alarm)}, "turntable"});
+  }
+
   void stopped() {
     if (s().activity != Activity::stopping) return;
     s().activity = Activity::none;
@@ -293,6 +325,9 @@ class Transition : public StepBuilder {
     }
     if (s().may_be_moving) {
       return refuse(ErrorCode::busy, "The table may be moving: check the drive's power and cable.");
+    }
+    if (s().hung) {
+      return refuse(ErrorCode::busy, "The {} does not respond: wait, the service restarts itself.", s().hung->device);
     }
     if (s().activity == Activity::stopping || s().unclassified) {
       return refuse(ErrorCode::busy, "The table is still stopping: wait.");

@@ -82,6 +82,8 @@ struct StationState {
   bool reloading = false;                          ///< shutting down to begin again
   bool finished = false;                           ///< shut down, the rig asked to stop
   bool may_be_moving = false;                      ///< the last stop was not confirmed
+  bool has_no_alarm = false;                       ///< the drive's last report, or its homing, showed none
+  std::optional<HungCall> hung{};                  ///< of turntable, projector or camera
   std::string cause = "The service has started.";  ///< why the machine is in this state
   std::optional<ActiveJob> job;
   std::string last_started_job{};  ///< the job that was given the rig last; empty: none since the daemon began

@@ -30,7 +30,7 @@ struct SimOptions {
   std::string operator_at_rig = "auto";
   double trouble = 0.0;
   std::filesystem::path config;  ///< a rig of real drivers on simulated wires
-  bool make_safe = false;
+  bool make_safe = false, beside_daemon = false;
 };
 
 void add_options(CLI::App& app, SimOptions& o) {
@@ -38,6 +38,7 @@ void add_options(CLI::App& app, SimOptions& o) {
                                 "open turntable, projector and panel as this rig.toml says; its [stereo_camera] driver "
                                 "may be \"simulated\"");
   app.add_flag("--make-safe", o.make_safe, "as scanrigd --make-safe")->needs(config);
+  app.add_flag("--beside-daemon", o.beside_daemon, "likewise")->needs(config);
   app.add_option("--socket", o.socket, "socket of the API")->capture_default_str();
   app.add_option("--jobs", o.jobs, "folder of the jobs; calibration.json beside them")->capture_default_str();
   app.add_option("--object", o.rig.object, "mesh to scan (OBJ, PLY, GLB); default: the built-in figurine");
@@ -67,6 +68,9 @@ void add_options(CLI::App& app, SimOptions& o) {
       ->check(CLI::Range(0.0, 1.0));
 }
 
+/// A simulated image takes as long as its rendering: that is no camera that hangs.
+constexpr auto kRenderingMargin = std::chrono::minutes(2);
+
 /// The object must be one that the rig can take before anything is written.
 Result<void> run(const SimOptions& o, const SignalStop& stop) {
   std::unique_ptr<Clock> clock;
@@ -94,6 +98,7 @@ Result<void> run(const SimOptions& o, const SignalStop& stop) {
                   .profile = r.profile_sha256()};
   options.recipes["default"] = {.poses = o.rig.poses, .views = o.views};
   options.api.socket = o.socket;
+  options.hang_margin = kRenderingMargin;
   options.remote = options.guard = true;  // nobody can reach a simulated table
   options.reconstructor = pipeline_reconstructor(reconstruct);
   options.on_scanned = [&r](const std::filesystem::path& folder) { return r.write_truth(folder); };
@@ -113,11 +118,13 @@ Result<void> run(const SimOptions& o, const SignalStop& stop) {
 Result<Ended> run_on_wires(const SimOptions& o, const config::RigConfig& config, DaemonOptions options,
                            const SignalStop& stop) {
   RealClock clock;
+  options.stop_table_outside = [&o] { return make_safe_in_process("/proc/self/exe", o.config); };
   auto open = open_devices(config, clock);
   if (!open) return pass_on(open, o.config.string());
   if (config.stereo_camera.driver != config::StereoCameraConfig::Driver::simulated) {
     return run_daemon(open->devices(), options, clock, stop.token());
   }
+  options.hang_margin = kRenderingMargin;
   auto scene = sim::Scene::create({.object = o.rig.object,
                                    .height_mm = o.rig.height_mm,
                                    .seed = o.rig.seed,
@@ -159,7 +166,9 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "scanrigd-sim: {}\n", error.what());
     return static_cast<int>(ExitCode::usage);
   }
-  if (options.make_safe) return static_cast<int>(make_safe_now(options.config, "scanrigd-sim"));
+  if (options.make_safe)
+    return static_cast<int>(
+        make_safe_now(options.config, "scanrigd-sim", options.beside_daemon ? Beside::hung_daemon : Beside::nobody));
   SignalStop stop(options.config.empty() ? SignalStop::Hangup::ends : SignalStop::Hangup::is_told);
   const auto done = run_as_told(options, stop);
   if (done) return static_cast<int>(ExitCode::ok);

@@ -34,10 +34,11 @@ class Daemon : public scan_samples::FolderTest {
   }
   void boot() {
     const Clock::Busy until_it_runs(clock);
-    thread = std::thread([this] { result = run_daemon(rig.devices(), options, clock, stop.get_token()); });
+    thread = std::thread([this] { result = run_daemon(devices(), options, clock, stop.get_token()); });
     rig.panel.wait_attached();
     at_the_rig.emplace(clock);
   }
+  virtual Devices devices() { return rig.devices(); }
   void shut_down() {
     at_the_rig.reset();
     stop.request_stop();

@@ -43,7 +43,10 @@ class FakeTurntable final : public Turntable {
     return {};
   }
   Result<void> reset_alarm(Deadline) override { return {}; }
-  Result<TurntableStatus> status(Deadline) override { return TurntableStatus{}; }
+  Result<TurntableStatus> status(Deadline) override {
+    const std::lock_guard guard(mutex);
+    return TurntableStatus{reported, homed_, std::nullopt, alarm};
+  }
   Result<void> limit_speed(std::optional<DegreesPerSecond> limit) override {
     const std::lock_guard guard(mutex);
     speed_ = std::min(45.0, limit.value_or(DegreesPerSecond{45.0}).value);
@@ -61,8 +64,10 @@ class FakeTurntable final : public Turntable {
   bool moving = false;
   bool stalled = false;
   bool unreachable = false;
-  std::vector<double> targets;                ///< of every move, homing included
-  std::vector<Clock::TimePoint> move_starts;  ///< of the same
+  TurntableStatus::Motion reported = TurntableStatus::Motion::stopped;  ///< by status()
+  std::string alarm;                                                    ///< likewise
+  std::vector<double> targets;                                          ///< of every move, homing included
+  std::vector<Clock::TimePoint> move_starts;                            ///< of the same
 
  private:
   /// 45 degrees a second; a stop ends it, and one from before it too.

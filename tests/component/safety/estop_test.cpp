@@ -40,6 +40,7 @@ class DaemonOnWires : public testing::Test {
     options.api.socket = config->api.socket;
     options.warning = milliseconds(100);
     options.guard = true;
+    options.hang_margin = kSlowness * DeviceWatch::kMargin;
     options.reconstructor = [this](const ReconstructionTask&) {
       return std::make_unique<fakes::FakeReconstructor>(log);
     };

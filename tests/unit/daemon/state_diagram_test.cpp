@@ -59,9 +59,12 @@ std::vector<Named> of_the_rig() {
 /// What keeps things from moving.
 std::vector<Named> of_safety() {
   return {
-      {"e-stop released", event::EstopChanged{true}}, {"guard opened", event::GuardChanged{false}},
-      {"guard closed", event::GuardChanged{true}},    {"not seen standing", event::StopFailed{kError}},
+      {"e-stop released", event::EstopChanged{true}},
+      {"guard opened", event::GuardChanged{false}},
+      {"guard closed", event::GuardChanged{true}},
+      {"not seen standing", event::StopFailed{kError}},
       {"panel failed", event::PanelFailed{kError}},
+      {"moved without a request", event::DevicesChecked{{}, event::DriveReport{true, {}}}},
   };
 }
 
@@ -189,7 +192,10 @@ void press_stop(const Node& node, const StationRules& rules, Walk& walk) {
   for (const auto origin : {Origin::panel, Origin::remote}) {
     const auto step = next(node.state, event::Pressed{Button::stop, origin, {}}, rules);
     const auto has = [&](const auto& is_it) { return std::ranges::any_of(step.actions, is_it); };
-    const bool sent = has([](const Action& a) { return std::holds_alternative<action::StopRig>(a); });
+    const bool sent = has([](const Action& a) {
+      return std::holds_alternative<action::StopRig>(a) || std::holds_alternative<action::StopTableDirectly>(a) ||
+             std::holds_alternative<action::StopTableOutside>(a);
+    });
     const bool cancels = has([](const Action& a) {
       const auto* close = std::get_if<action::CloseJob>(&a);
       return close && close->state != JobState::interrupted;
@@ -223,6 +229,10 @@ bool can_happen(const Node& node, const Event& event) {
   return std::visit(
       Overloaded{
           [&](const event::Stopped&) { return s.activity == Activity::stopping || s.may_be_moving; },
+          [&](const event::DevicesChecked&) {
+            return s.activity == Activity::none || s.activity == Activity::warning ||
+                   s.activity == Activity::waiting_for_flip || s.activity == Activity::waiting_for_part;
+          },
           [&](const event::StopFailed&) { return s.activity == Activity::stopping; },
           [&](const event::JobUpdated& e) {
             if (e.info->id != "job") return job && s.queue.empty();  // one is enough

@@ -1,0 +1,134 @@
+#pragma once
+
+#include <chrono>
+#include <optional>
+
+#include "daemon/runtime/device_watch.h"
+#include "daemon/rig/devices.h"
+
+namespace scanrig {
+
+/// Devices whose every call is recorded in a DeviceWatch for as long as it takes. The device outlives its wrapper.
+/// To add a call to a device's interface: forward it here with a Call of its name.
+
+class WatchedTurntable final : public Turntable {
+ public:
+  WatchedTurntable(Turntable& turntable, const Clock& clock, Clock::Duration margin)
+      : turntable_(turntable), clock_(clock), watch_(clock, "turntable", margin) {}
+
+  Result<void> home(Deadline deadline) override {
+    const DeviceWatch::Call call(watch_, "home", deadline);
+    return turntable_.home(deadline);
+  }
+  Result<Move> rotate_to(Degrees target, Deadline deadline) override {
+    const DeviceWatch::Call call(watch_, "rotate_to", deadline);
+    return turntable_.rotate_to(target, deadline);
+  }
+  Result<void> stop(Deadline deadline) override {
+    const DeviceWatch::Call call(watch_, "stop", deadline);
+    return turntable_.stop(deadline);
+  }
+  Result<void> reset_alarm(Deadline deadline) override {
+    const DeviceWatch::Call call(watch_, "reset_alarm", deadline);
+    return turntable_.reset_alarm(deadline);
+  }
+  Result<TurntableStatus> status(Deadline deadline) override {
+    const DeviceWatch::Call call(watch_, "status", deadline);
+    return turntable_.status(deadline);
+  }
+  Result<void> limit_speed(std::optional<DegreesPerSecond> limit) override {
+    const DeviceWatch::Call call(watch_, "limit_speed", Deadline::after(clock_, kSpeedLimit));
+    return turntable_.limit_speed(limit);
+  }
+  void request_stop() noexcept override { turntable_.request_stop(); }
+
+  [[nodiscard]] std::optional<HungCall> hung() const { return watch_.hung(); }
+
+ private:
+  static constexpr auto kSpeedLimit = std::chrono::seconds(1);  ///< limit_speed() has no deadline of its own
+
+  Turntable& turntable_;
+  const Clock& clock_;
+  DeviceWatch watch_;
+};
+
+class WatchedProjector final : public Projector {
+ public:
+  WatchedProjector(Projector& projector, const Clock& clock, Clock::Duration margin)
+      : projector_(projector), watch_(clock, "projector", margin) {}
+
+  Result<void> fire(Light light, Deadline deadline) override {
+    const DeviceWatch::Call call(watch_, "fire", deadline);
+    return projector_.fire(light, deadline);
+  }
+  Result<void> turn_off(Deadline deadline) override {
+    const DeviceWatch::Call call(watch_, "dark", deadline);
+    return projector_.turn_off(deadline);
+  }
+  void request_off() noexcept override { projector_.request_off(); }
+
+  [[nodiscard]] std::optional<HungCall> hung() const { return watch_.hung(); }
+
+ private:
+  Projector& projector_;
+  DeviceWatch watch_;
+};
+
+class WatchedCamera final : public StereoCamera {
+ public:
+  WatchedCamera(StereoCamera& camera, const Clock& clock, Clock::Duration margin)
+      : camera_(camera), watch_(clock, "camera", margin) {}
+
+  Result<void> ready(Deadline deadline) override {
+    const DeviceWatch::Call call(watch_, "ready", deadline);
+    return camera_.ready(deadline);
+  }
+  Result<void> arm(Deadline deadline) override {
+    const DeviceWatch::Call call(watch_, "arm", deadline);
+    return camera_.arm(deadline);
+  }
+  Result<StereoFrame> collect(Deadline deadline) override {
+    const DeviceWatch::Call call(watch_, "collect", deadline);
+    return camera_.collect(deadline);
+  }
+  Result<StereoFrame> look(Deadline deadline) override {
+    const DeviceWatch::Call call(watch_, "look", deadline);
+    return camera_.look(deadline);
+  }
+
+  [[nodiscard]] std::optional<HungCall> hung() const { return watch_.hung(); }
+
+ private:
+  StereoCamera& camera_;
+  DeviceWatch watch_;
+};
+
+/// A panel that hung is one that failed, whatever it returns in the end: the station has been told so.
+class WatchedPanel final : public Panel {
+ public:
+  /// `read_time`: how long a reading may take beyond its deadline.
+  WatchedPanel(Panel& panel, const Clock& clock, Clock::Duration margin, Clock::Duration read_time)
+      : panel_(panel), read_time_(read_time), watch_(clock, "panel", margin) {}
+
+  Result<PanelInputs> wait_change(const PanelInputs& known, Deadline deadline) override {
+    DeviceWatch::Call call(watch_, "wait_change", {deadline.at + read_time_});
+    auto inputs = panel_.wait_change(known, deadline);
+    if (const auto hung = call.end(); hung && inputs) return tl::unexpected(hung_error(*hung));
+    return inputs;
+  }
+  Result<void> show(const PanelOutputs& outputs, Deadline deadline) override {
+    DeviceWatch::Call call(watch_, "show", deadline);
+    auto shown = panel_.show(outputs, deadline);
+    if (const auto hung = call.end(); hung && shown) return tl::unexpected(hung_error(*hung));
+    return shown;
+  }
+
+  [[nodiscard]] std::optional<HungCall> hung() const { return watch_.hung(); }
+
+ private:
+  Panel& panel_;
+  const Clock::Duration read_time_;
+  DeviceWatch watch_;
+};
+
+}  // namespace scanrig

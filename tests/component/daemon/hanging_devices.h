@@ -1,0 +1,171 @@
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "core/clock.h"
+#include "daemon/rig/devices.h"
+#include "daemon/runtime/actor_thread.h"
+
+namespace scanrig::fakes {
+
+/// Keeps one call of one device from returning until it is released, whatever its deadline.
+class Gate {
+ public:
+  explicit Gate(Clock& clock) : clock_(clock) {}
+
+  /// The next call of this name, "camera.collect", hangs.
+  void close(const std::string& call) {
+    const std::lock_guard guard(mutex_);
+    closed_ = call;
+  }
+  void release() {
+    {
+      const std::lock_guard guard(mutex_);
+      closed_.clear();
+      deadline_.reset();
+      ++released_;
+    }
+    clock_.notify_all(changed_);
+  }
+  /// The deadline of the call that hangs; nothing: none does.
+  std::optional<Deadline> deadline() const {
+    const std::lock_guard guard(mutex_);
+    return deadline_;
+  }
+  [[nodiscard]] bool hangs(const std::string& call) const {
+    const std::lock_guard guard(mutex_);
+    return deadline_ && closed_ == call;
+  }
+  [[nodiscard]] bool is_closed(const std::string& call) const {
+    const std::lock_guard guard(mutex_);
+    return closed_ == call && !deadline_;
+  }
+  void pass(const std::string& call, Deadline deadline) {
+    std::unique_lock lock(mutex_);
+    if (closed_ != call || deadline_) return;
+    deadline_ = deadline;
+    const auto before = released_;
+    clock_.wait_until(lock, changed_, Clock::TimePoint::max(), [&] { return released_ != before; });
+  }
+
+ private:
+  Clock& clock_;
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::string closed_;
+  std::optional<Deadline> deadline_;
+  int released_ = 0;
+};
+
+/// A driver's thread that hangs obeys no stop either, and what its motor was commanded to do goes on.
+class HangingTurntable final : public Turntable {
+ public:
+  HangingTurntable(Turntable& turntable, Gate& gate, Clock& clock)
+      : turntable_(turntable), gate_(gate), clock_(clock) {}
+
+  Result<void> home(Deadline deadline) override {
+    gate_.pass("turntable.home", deadline);
+    return turntable_.home(deadline);
+  }
+  Result<Move> rotate_to(Degrees target, Deadline deadline) override {
+    std::thread motion;
+    if (gate_.is_closed("turntable.rotate_to")) {
+      motion = start_actor(
+          clock_, [&] { std::ignore = turntable_.rotate_to(target, Deadline::after(clock_, std::chrono::hours(1))); });
+      gate_.pass("turntable.rotate_to", deadline);
+      motion.join();
+      return fail(ErrorCode::timeout, "turntable: hung");
+    }
+    return turntable_.rotate_to(target, deadline);
+  }
+  Result<void> stop(Deadline deadline) override {
+    gate_.pass("turntable.stop", deadline);
+    return turntable_.stop(deadline);
+  }
+  Result<void> reset_alarm(Deadline deadline) override {
+    gate_.pass("turntable.reset_alarm", deadline);
+    return turntable_.reset_alarm(deadline);
+  }
+  Result<TurntableStatus> status(Deadline deadline) override {
+    gate_.pass("turntable.status", deadline);
+    return turntable_.status(deadline);
+  }
+  Result<void> limit_speed(std::optional<DegreesPerSecond> limit) override {
+    gate_.pass("turntable.limit_speed", Deadline::after(clock_, std::chrono::seconds(1)));
+    return turntable_.limit_speed(limit);
+  }
+  void request_stop() noexcept override {
+    if (!gate_.hangs("turntable.rotate_to")) turntable_.request_stop();
+  }
+
+ private:
+  Turntable& turntable_;
+  Gate& gate_;
+  Clock& clock_;
+};
+
+class HangingProjector final : public Projector {
+ public:
+  HangingProjector(Projector& projector, Gate& gate) : projector_(projector), gate_(gate) {}
+  Result<void> fire(Light light, Deadline deadline) override {
+    gate_.pass("projector.fire", deadline);
+    return projector_.fire(light, deadline);
+  }
+  Result<void> turn_off(Deadline deadline) override {
+    gate_.pass("projector.dark", deadline);
+    return projector_.turn_off(deadline);
+  }
+  void request_off() noexcept override { projector_.request_off(); }
+
+ private:
+  Projector& projector_;
+  Gate& gate_;
+};
+
+class HangingCamera final : public StereoCamera {
+ public:
+  HangingCamera(StereoCamera& camera, Gate& gate) : camera_(camera), gate_(gate) {}
+  Result<void> prepare(Deadline deadline) override {
+    gate_.pass("camera.ready", deadline);
+    return camera_.prepare(deadline);
+  }
+  Result<void> arm(Deadline deadline) override {
+    gate_.pass("camera.arm", deadline);
+    return camera_.arm(deadline);
+  }
+  Result<StereoFrame> collect(Deadline deadline) override {
+    gate_.pass("camera.collect", deadline);
+    return camera_.collect(deadline);
+  }
+  Result<StereoFrame> capture_preview(Deadline deadline) override {
+    gate_.pass("camera.look", deadline);
+    return camera_.capture_preview(deadline);
+  }
+
+ private:
+  StereoCamera& camera_;
+  Gate& gate_;
+};
+
+class HangingPanel final : public Panel {
+ public:
+  HangingPanel(Panel& panel, Gate& gate) : panel_(panel), gate_(gate) {}
+  Result<PanelInputs> wait_change(const PanelInputs& known, Deadline deadline) override {
+    gate_.pass("panel.wait_change", deadline);
+    return panel_.wait_change(known, deadline);
+  }
+  Result<void> show(const PanelOutputs& outputs, Deadline deadline) override {
+    gate_.pass("panel.show", deadline);
+    return panel_.show(outputs, deadline);
+  }
+
+ private:
+  Panel& panel_;
+  Gate& gate_;
+};
+
+}  // namespace scanrig::fakes
