@@ -18,35 +18,29 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::uintmax_t bytes_in(const fs::path& folder) {
-  std::uintmax_t total = 0;
-  std::error_code error;
-  for (fs::recursive_directory_iterator next(folder, error), end; !error && next != end; next.increment(error)) {
-    std::error_code ignored;
-    const auto size = next->file_size(ignored);
-    if (!ignored) total += size;
-  }
-  return total;
-}
+fs::path ledger_file(const JobStore& store) { return store.options().root / "retention.json"; }
 
-/// When the manifest was last written, or the report.
-std::chrono::system_clock::time_point ended(const fs::path& folder) {
-  std::time_t newest = 0;
+/// Another one after the job has ended anew.
+std::string end_mark(const fs::path& folder) {
+  std::string mark;
   for (const auto& file : {folder / "scan.json", report_file(folder)}) {
     struct stat info {};
-    if (::stat(file.c_str(), &info) == 0) newest = std::max(newest, info.st_mtim.tv_sec);
+    if (::stat(file.c_str(), &info) != 0) info = {};
+    mark += fmt::format("{}.{}.{}.{};", info.st_ino, info.st_size, info.st_mtim.tv_sec, info.st_mtim.tv_nsec);
   }
-  return std::chrono::system_clock::from_time_t(newest);
+  return mark;
 }
 
 }  // namespace
 
 HousekeepingThread::HousekeepingThread(Clock& clock, const JobStore& store, RetentionOptions retention,
-                                       std::function<JobTable()> jobs, std::function<void(Event)> post_event)
+                                       std::function<JobTable()> jobs, std::function<void(Event)> post_event,
+                                       BundleOptions bundle)
     : store_(store),
-      retention_(retention),
+      retention_(std::move(retention)),
       jobs_(std::move(jobs)),
       post_event_(std::move(post_event)),
+      bundle_(std::move(bundle)),
       inbox_(clock),
       thread_(start_actor(clock, [this] { run(); })) {}
 
@@ -80,7 +74,7 @@ Result<std::string> HousekeepingThread::keep(const event::JobRequested& asked) {
     // A folder that cannot be read is what somebody wants to see.
     const auto job = store_.read(asked.job);
     if (!job && job.error().code == ErrorCode::not_found) return fail(ErrorCode::not_found, "no job {}", asked.job);
-    if (auto packed = bundle(store_.folder(asked.job), asked.path, {stop_.get_token(), {}}); !packed) {
+    if (auto packed = bundle(store_.folder(asked.job), asked.path, bundle_, {stop_.get_token(), {}}); !packed) {
       return pass_on(packed);
     }
     return asked.path;
@@ -106,18 +100,38 @@ void HousekeepingThread::handle(const Sweep&) {
 }
 
 Result<void> HousekeepingThread::sweep_now() {
-  std::vector<KeptJob> kept;
-  for (const auto& [id, job] : jobs_()) {
-    // What cannot be read is left for a person to see.
-    if (!is_final(job->state) || !store_.read(id)) continue;
-    const auto folder = store_.folder(id);
-    kept.push_back({id, ended(folder), bytes_in(folder), job->exported});
-  }
-  for (const auto& job : jobs_to_remove(std::move(kept), retention_, std::chrono::system_clock::now())) {
-    const auto state = state_of(job);  // measuring takes its time, in which a job may have been resumed
+  if (!ledger_) ledger_ = RetentionLedger::read(ledger_file(store_));
+  ledger_->advance(retention_.time->read(stop_.get_token()));
+  auto kept = ended_jobs();
+  // Where the disk does not take it, what was counted now counts again after the next start: jobs stay longer.
+  std::ignore = ledger_->write(ledger_file(store_));
+  for (const auto& job : jobs_to_remove(std::move(kept), retention_)) {
+    const auto state = state_of(job);  // measuring takes its time, in which a job may have been reprocessed
     if (state && is_final(*state)) std::ignore = remove(job);
   }
   return {};
+}
+
+/// What cannot be read is left for a person to see. Both the station and the folder must have it ended and exported.
+std::vector<KeptJob> HousekeepingThread::ended_jobs() {
+  std::vector<KeptJob> kept;
+  std::set<std::string> ids;
+  for (const auto& [id, job] : jobs_()) {
+    if (!is_final(job->state)) continue;
+    const auto folder = store_.folder(id);
+    const auto& entry = ledger_->note(id, end_mark(folder));
+    ids.insert(id);
+    const auto stored = store_.read(id);
+    if (!stored) continue;
+    kept.push_back({.id = id,
+                    .age = ledger_->age(entry),
+                    .number = entry.number,
+                    .bytes = retention_.keep_bytes ? measure_folder(folder).bytes : 0,
+                    .is_removable = is_final(stored->state) && stored->exported && job->exported &&
+                                    !stored->resumable && !job->resumable});
+  }
+  ledger_->keep_only(ids);
+  return kept;
 }
 
 }  // namespace scanrig

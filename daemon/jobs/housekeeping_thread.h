@@ -6,8 +6,10 @@
 #include <thread>
 #include <variant>
 
+#include "daemon/jobs/bundle.h"
 #include "daemon/jobs/job_store.h"
 #include "daemon/jobs/retention.h"
+#include "daemon/jobs/retention_ledger.h"
 #include "daemon/runtime/mailbox.h"
 #include "daemon/station/events.h"
 
@@ -18,7 +20,7 @@ class HousekeepingThread {
  public:
   /// `jobs`: what the station knows of them now; from this thread. A folder alone does not say who works in it.
   HousekeepingThread(Clock& clock, const JobStore& store, RetentionOptions retention, std::function<JobTable()> jobs,
-                     std::function<void(Event)> post_event);
+                     std::function<void(Event)> post_event, BundleOptions bundle = {});
   /// Stops a bundle that is being packed, drops the rest and joins.
   ~HousekeepingThread();
   HousekeepingThread(const HousekeepingThread&) = delete;
@@ -37,6 +39,7 @@ class HousekeepingThread {
   void handle(const Sweep& sweep);
   Result<std::string> keep(const event::JobRequested& asked);
   Result<void> sweep_now();
+  [[nodiscard]] std::vector<KeptJob> ended_jobs();
   Result<void> remove(const std::string& job);
   [[nodiscard]] std::optional<JobState> state_of(const std::string& job) const;
 
@@ -44,6 +47,8 @@ class HousekeepingThread {
   RetentionOptions retention_;
   std::function<JobTable()> jobs_;
   std::function<void(Event)> post_event_;
+  BundleOptions bundle_;
+  std::optional<RetentionLedger> ledger_;  ///< once it was read
   Mailbox<std::variant<event::JobRequested, Sweep>> inbox_;
   std::stop_source stop_;
   std::thread thread_;

@@ -98,6 +98,18 @@ fs::path model_folder(const fs::path& job_folder) { return job_folder / "model";
 fs::path model_file(const fs::path& job_folder) { return model_folder(job_folder) / "model.glb"; }
 fs::path report_file(const fs::path& job_folder) { return model_folder(job_folder) / "report.json"; }
 
+FolderSize measure_folder(const fs::path& folder) {
+  FolderSize size;
+  std::error_code error;
+  for (fs::recursive_directory_iterator next(folder, error), end; !error && next != end; next.increment(error)) {
+    std::error_code ignored;
+    const auto bytes = next->file_size(ignored);
+    ++size.files;
+    if (!ignored) size.bytes += bytes;
+  }
+  return size;
+}
+
 Result<void> write_job_file(const fs::path& job_folder, const JobFile& job) {
   return write_json(job_folder / kJob, {{"format", "scanrig-job"},
                                         {"version", kJobVersion},

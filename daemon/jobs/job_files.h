@@ -17,6 +17,13 @@ std::filesystem::path model_folder(const std::filesystem::path& job_folder);
 std::filesystem::path model_file(const std::filesystem::path& job_folder);
 std::filesystem::path report_file(const std::filesystem::path& job_folder);
 
+struct FolderSize {
+  std::uintmax_t bytes = 0;
+  std::size_t files = 0;
+};
+/// All that is below `folder`. What cannot be read counts as nothing.
+FolderSize measure_folder(const std::filesystem::path& folder);
+
 /// job.json: how the job was ordered.
 struct JobFile {
   Recipe recipe{};

@@ -14,6 +14,7 @@
 #include "core/files.h"
 #include "daemon/jobs/job_files.h"
 #include "daemon/jobs/job_index.h"
+#include "daemon/jobs/job_log.h"
 #include "daemon/station/timestamp.h"
 
 namespace scanrig {
@@ -175,8 +176,9 @@ Result<void> JobStore::make(Manifest manifest, const JobFile& job) const {
   const fs::path prepared = options_.root / (kNew + id);
   auto scan = ScanFolder::create(prepared, std::move(manifest), options_.calibration_file);
   auto made = scan ? write_job_file(prepared, job) : Result<void>(pass_on(scan));
-  if (made) made = replace_folder(prepared, folder(id));
   std::error_code ignored;
+  fs::copy_file(job_log_file(folder(id)), job_log_file(prepared), ignored);  // of the folder that is replaced
+  if (made) made = replace_folder(prepared, folder(id));
   if (!made) fs::remove_all(prepared, ignored);
   return made;
 }

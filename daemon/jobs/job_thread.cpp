@@ -75,7 +75,7 @@ void JobThread::fail_task(const Task& task, const Error& why) {
                           answer(t.request_id, failed, {});
                           post_event_(event::StoreFailed{t.ids.front(), why});
                         },
-                        [&](const action::MoveJob& t) { answer(t.request_id, failed, {}); },
+                        [](const LogLine&) {}, [&](const action::MoveJob& t) { answer(t.request_id, failed, {}); },
                         [&](const action::RunJobRequest& t) { answer(t.asked.request_id, failed, {}); },
                         [&](const action::CheckCalibration& t) {
                           post_event_(event::CalibrationChecked{t.job, std::nullopt});
@@ -98,6 +98,11 @@ void JobThread::answer(RequestId request_id, const Result<void>& done, const std
 
 void JobThread::tell_known(const std::string& job) {
   if (auto info = store_.read(job)) post_event_(event::JobUpdated{std::make_shared<const JobInfo>(std::move(*info))});
+}
+
+/// A disk that does not take it does not take what the job needs either, and that is reported.
+void JobThread::handle(const LogLine& line) {
+  std::ignore = append_job_log(store_.folder(line.entry.job), line.entry, line.when);
 }
 
 /// A calibration that cannot be read is named when a job is made.

@@ -6,6 +6,7 @@
 #include <thread>
 #include <variant>
 
+#include "daemon/jobs/job_log.h"
 #include "daemon/jobs/job_store.h"
 #include "daemon/jobs/reconstruction_thread.h"
 #include "daemon/runtime/busy_timer.h"
@@ -18,7 +19,12 @@ namespace scanrig {
 /// when it survives a power cut.
 class JobThread {
  public:
-  using Task = std::variant<action::CheckCalibration, action::CreateJobs, action::StartJob, action::MoveJob,
+  /// A line for the job's own log.
+  struct LogLine {
+    JournalEntry entry;
+    std::chrono::system_clock::time_point when;
+  };
+  using Task = std::variant<LogLine, action::CheckCalibration, action::CreateJobs, action::StartJob, action::MoveJob,
                             action::RunJobRequest, action::StoreView, action::CheckMovement, action::FinishPose,
                             action::ResumeJob, action::CloseJob>;
   using ScannedHook = std::function<Result<void>(const std::filesystem::path& job_folder)>;
@@ -32,12 +38,15 @@ class JobThread {
   JobThread& operator=(const JobThread&) = delete;
 
   void post(Task task) { inbox_.post(std::move(task)); }
+  /// The same for an entry of the log: it goes to the log of the job that it names.
+  void log(JournalEntry entry) { post(LogLine{std::move(entry), std::chrono::system_clock::now()}); }
   /// For how long the disk has kept it from going on. From any thread.
   [[nodiscard]] Clock::Duration waiting() const { return busy_timer_.lasts(); }
 
  private:
   void run();
   void fail_task(const Task& task, const Error& why);
+  void handle(const LogLine& line);
   void handle(const action::CheckCalibration& task);
   void handle(const action::CreateJobs& task);
   void handle(const action::StartJob& task);

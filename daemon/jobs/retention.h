@@ -2,28 +2,32 @@
 
 #include <chrono>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "daemon/jobs/system_time.h"
 
 namespace scanrig {
 
 struct RetentionOptions {
   std::optional<std::chrono::days> keep_for{};  ///< empty: for ever
   std::optional<std::uintmax_t> keep_bytes{};   ///< of all jobs together; empty: as many as there are
+  std::shared_ptr<const SystemTime> time = system_time();
 };
 
 /// One job that has ended.
 struct KeptJob {
   std::string id;
-  std::chrono::system_clock::time_point ended;
+  std::chrono::seconds age{0};  ///< of RetentionLedger
+  std::uint64_t number = 0;     ///< in the order of ending
   std::uintmax_t bytes = 0;
-  bool exported = false;
+  bool is_removable = false;  ///< exported, and cannot be resumed
 };
 
-/// Which jobs go, in this order: what is too old, then, until the rest fits, exported ones before the others and older
-/// ones before newer ones. The newest one that was not exported always stays: somebody may be on his way to fetch it.
-std::vector<std::string> jobs_to_remove(std::vector<KeptJob> jobs, const RetentionOptions& options,
-                                        std::chrono::system_clock::time_point now);
+/// Which jobs are removed, in this order: what is too old, then, until the rest fits, what ended first. Others than
+/// removable ones always stay.
+std::vector<std::string> jobs_to_remove(std::vector<KeptJob> jobs, const RetentionOptions& options);
 
 }  // namespace scanrig

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <ctime>
+#include <mutex>
 
 #include "daemon/jobs/heap.h"
 #include "daemon/jobs/housekeeping_thread.h"
@@ -49,6 +50,39 @@ class OnLoop {
 
  private:
   const DaemonOptions& options_;
+};
+
+/// Entries of the log go to the log of their job too, while its thread is there.
+class JobLogs {
+ public:
+  explicit JobLogs(const std::function<void(JournalEntry)>& journal) : journal_(journal) {}
+  void write(JournalEntry entry) {
+    {
+      const std::lock_guard guard(mutex_);
+      if (jobs_ && !entry.job.empty()) jobs_->log(entry);
+    }
+    journal_(std::move(entry));
+  }
+  void attach(JobThread* jobs) {
+    const std::lock_guard guard(mutex_);
+    jobs_ = jobs;
+  }
+
+ private:
+  const std::function<void(JournalEntry)>& journal_;
+  std::mutex mutex_;
+  JobThread* jobs_ = nullptr;
+};
+
+class Attached {
+ public:
+  Attached(JobLogs& logs, JobThread& jobs) : logs_(logs) { logs_.attach(&jobs); }
+  ~Attached() { logs_.attach(nullptr); }
+  Attached(const Attached&) = delete;
+  Attached& operator=(const Attached&) = delete;
+
+ private:
+  JobLogs& logs_;
 };
 
 struct Workers {
@@ -168,11 +202,12 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
   ControlLoop loop(clock, loop_options, *known);
   const auto post_event = [&loop](Event event) { loop.post(std::move(event)); };
 
+  JobLogs logs(options.journal);
   const OnLoop reachable(options, loop);
   Preview preview(clock, [&loop] { return cameras_are_free(*loop.snapshot()); });
   auto api_options = options.api;
   api_options.storage = store->options().root;
-  api_options.journal = options.journal;
+  api_options.journal = [&logs](JournalEntry entry) { logs.write(std::move(entry)); };
   api_options.preview_jpeg = [&preview](std::string_view side) {
     return preview.jpeg(side == "left" ? Side::left : Side::right);
   };
@@ -186,15 +221,19 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
   std::optional<Clock::Busy> starting(clock);
   ReconstructionThread reconstruction(clock, options.reconstructor, post_event);
   go_on_reconstructing(*known, reconstruction);
+  auto in_bundle = options.bundle;
+  in_bundle.calibration_file = options.jobs.calibration_file;
+  in_bundle.reserve_bytes = options.jobs.reserve_bytes;
   HousekeepingThread housekeeping(
-      clock, *store, options.retention, [&loop] { return loop.snapshot()->jobs; }, post_event);
+      clock, *store, options.retention, [&loop] { return loop.snapshot()->jobs; }, post_event, in_bundle);
   housekeeping.sweep();
   JobThread jobs(clock, *store, reconstruction, options.on_scanned, post_event);
+  const Attached attached(logs, jobs);
   RigThread rig(devices, clock, options.acquisition, preview, post_event, options.hang_margin);
   OutsideStop outside(clock, options.stop_table_outside, post_event);
   const auto store_latch = [&](const std::optional<Latch>& latch) {
     if (auto stored = record.store(latch); !stored) {
-      options.journal({Priority::error, as_sentence(stored.error().message)});
+      logs.write({Priority::error, as_sentence(stored.error().message)});
     }
   };
   std::optional<Webhook> webhook;
@@ -212,13 +251,13 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
     if (std::holds_alternative<action::StartJob>(action)) housekeeping.sweep();
   };
   const auto published = [&, told = loop.snapshot()](const std::shared_ptr<const Snapshot>& snapshot) mutable {
-    for (auto& line : log_entries(*std::exchange(told, snapshot), *snapshot)) options.journal(std::move(line));
+    for (auto& line : log_entries(*std::exchange(told, snapshot), *snapshot)) logs.write(std::move(line));
     if (webhook) webhook->look(snapshot);
     options.published(snapshot);
     (*api)->wake();
   };
   const auto refused = [&](const event::Pressed& pressed, const Error& why) {
-    options.journal(refused_at_panel(pressed, why, *loop.snapshot()));
+    logs.write(refused_at_panel(pressed, why, *loop.snapshot()));
   };
   auto ended = loop.run({.alive = [&] { options.alive(loop.snapshot()->sentence); },
                          .perform = perform_all,

@@ -10,6 +10,7 @@
 #include "core/clock.h"
 #include "core/result.h"
 #include "daemon/api/server.h"
+#include "daemon/jobs/bundle.h"
 #include "daemon/jobs/job_store.h"
 #include "daemon/jobs/job_thread.h"
 #include "daemon/jobs/reconstructor.h"
@@ -52,6 +53,7 @@ struct DaemonOptions {
     return Result<void>(fail(ErrorCode::unsupported, "turntable: no other path to its drive"));
   };
   RetentionOptions retention{};
+  BundleOptions bundle{};                ///< without calibration and reserve, which are those of `jobs`
   std::optional<HttpAddress> webhook{};  ///< whom failures are told
   ApiOptions api;
   bool remote = false;        ///< the API may start and home while the guard is closed

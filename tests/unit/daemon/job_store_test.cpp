@@ -286,6 +286,7 @@ TEST_F(JobStoreTest, AJobWithoutViewsIsGivenTheCalibrationAsItIsNow) {
   const auto manifest = ScanFolder::open(made->folder)->manifest();
   ASSERT_TRUE(store.renew_calibration(*made));
   EXPECT_EQ(ScanFolder::open(made->folder)->manifest().calibration->sha256, manifest.calibration->sha256);
+  scan_samples::write_text(fs::path(made->folder) / "log.jsonl", "{}\n");
   scan_samples::write_text(options.calibration_file, scan_samples::calibration_json() + "\n");
   ASSERT_TRUE(store.renew_calibration(*made));
   const auto renewed = ScanFolder::open(made->folder);
@@ -294,6 +295,7 @@ TEST_F(JobStoreTest, AJobWithoutViewsIsGivenTheCalibrationAsItIsNow) {
   EXPECT_EQ(renewed->manifest().created, manifest.created);
   EXPECT_EQ(store.read("a")->part, "4711");
   EXPECT_EQ(store.read("a")->place, 3);
+  EXPECT_TRUE(fs::exists(fs::path(made->folder) / "log.jsonl")) << "its log goes with it";
 }
 
 }  // namespace

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "daemon/station/lamps.h"
-#include "daemon/station/words.h"
+#include "daemon/station/operator_message.h"
 #include "tests/unit/daemon/safety_under_test.h"
 
 namespace scanrig {

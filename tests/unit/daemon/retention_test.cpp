@@ -9,35 +9,37 @@ using std::chrono::days;
 using testing::ElementsAre;
 using testing::IsEmpty;
 
-constexpr std::chrono::sys_days kToday(days(20'000));
-
-KeptJob job(const std::string& id, int age_days, bool exported = false) {
-  return {id, kToday - days(age_days), 10, exported};
+KeptJob job(const std::string& id, int age_days, std::uint64_t number, bool is_removable = true) {
+  return {.id = id, .age = days(age_days), .number = number, .bytes = 10, .is_removable = is_removable};
 }
 
-TEST(Retention, KeepsEverythingUnlessToldOtherwise) {
-  EXPECT_THAT(jobs_to_remove({job("a", 9000), job("b", 1)}, {}, kToday), IsEmpty());
+TEST(Retention, KeepsEverythingUnlessLimited) {
+  EXPECT_THAT(jobs_to_remove({job("a", 9000, 1), job("b", 1, 2)}, {}), IsEmpty());
 }
 
-TEST(Retention, RemovesWhatIsTooOld) {
-  EXPECT_THAT(jobs_to_remove({job("new", 1), job("old", 40), job("older", 50)}, {.keep_for = days(30)}, kToday),
+TEST(Retention, RemovesWhatIsTooOldInOrderOfEnding) {
+  EXPECT_THAT(jobs_to_remove({job("new", 1, 3), job("old", 40, 2), job("older", 50, 1)}, {.keep_for = days(30)}),
               ElementsAre("older", "old"));
+  EXPECT_THAT(jobs_to_remove({job("just", 30, 1)}, {.keep_for = days(30)}), IsEmpty());
 }
 
-TEST(Retention, MakesRoomByExportedJobsFirst) {
-  const std::vector<KeptJob> jobs{job("a", 9), job("b", 8, true), job("c", 7), job("d", 6, true), job("e", 5)};
-  EXPECT_THAT(jobs_to_remove(jobs, {.keep_bytes = 40}, kToday), ElementsAre("b"));
-  EXPECT_THAT(jobs_to_remove(jobs, {.keep_bytes = 25}, kToday), ElementsAre("b", "d", "a"));
-  EXPECT_THAT(jobs_to_remove(jobs, {.keep_bytes = 50}, kToday), IsEmpty());
+TEST(Retention, MakesRoomInOrderOfEnding) {
+  const std::vector<KeptJob> jobs{job("a", 0, 9), job("b", 0, 8), job("c", 0, 7, false), job("d", 0, 6),
+                                  job("e", 0, 5)};
+  EXPECT_THAT(jobs_to_remove(jobs, {.keep_bytes = 50}), IsEmpty());
+  EXPECT_THAT(jobs_to_remove(jobs, {.keep_bytes = 40}), ElementsAre("e"));
+  EXPECT_THAT(jobs_to_remove(jobs, {.keep_bytes = 15}), ElementsAre("e", "d", "b", "a"));
 }
 
-TEST(Retention, NeverRemovesTheNewestThatWasNotExported) {
-  const std::vector<KeptJob> jobs{job("a", 90), job("b", 80), job("c", 70, true)};
-  EXPECT_THAT(jobs_to_remove(jobs, {.keep_for = days(1), .keep_bytes = 0}, kToday), ElementsAre("c", "a"));
+TEST(Retention, WhatIsTooOldMakesRoomForTheRest) {
+  EXPECT_THAT(jobs_to_remove({job("first", 1, 1), job("old", 40, 2)}, {.keep_for = days(30), .keep_bytes = 10}),
+              ElementsAre("old"));
 }
 
-TEST(Retention, WithNothingThereNothingGoes) {
-  EXPECT_THAT(jobs_to_remove({}, {.keep_for = days(1), .keep_bytes = 0}, kToday), IsEmpty());
+TEST(Retention, NeverRemovesWhatHasToStay) {
+  const std::vector<KeptJob> jobs{job("a", 90, 1, false), job("b", 80, 2, false)};
+  EXPECT_THAT(jobs_to_remove(jobs, {.keep_for = days(1), .keep_bytes = 0}), IsEmpty());
+  EXPECT_THAT(jobs_to_remove({}, {.keep_for = days(1), .keep_bytes = 0}), IsEmpty());
 }
 
 }  // namespace
