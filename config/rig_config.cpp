@@ -185,6 +185,10 @@ void read_api(Section& s, const std::filesystem::path& base, ApiConfig& api) {
     s.text("http_address", api.http_address);
     if (!api.http_port) s.report("http_address", "needs http_port");
   }
+  if (s.has("proxy")) {
+    s.text("proxy", api.proxy);
+    if (!api.http_port && !api.proxy.starts_with("unix:")) s.report("proxy", "needs http_port, or \"unix:USER\"");
+  }
   if (s.has("viewer_group")) s.text("viewer_group", api.viewer_group.emplace());
   if (s.has("operator_group")) s.text("operator_group", api.operator_group.emplace());
   if (s.has("engineer_group")) s.text("engineer_group", api.engineer_group.emplace());

@@ -125,6 +125,7 @@ struct ApiConfig {
   std::optional<int> http_port;  ///< TCP; every request over it needs a token
   std::string http_address = "127.0.0.1";
   std::filesystem::path tokens;  ///< the file of tokens; empty: there are none
+  std::string proxy;             ///< the reverse proxy in front: its address, or "unix:USER"; empty: none
   /// Groups of local users by what they may do over the socket. Without any, the daemon's own group operates.
   std::optional<std::string> viewer_group, operator_group, engineer_group;
 };

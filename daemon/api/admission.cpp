@@ -1,47 +1,81 @@
 #include "daemon/api/admission.h"
 
 #include <algorithm>
+#include <utility>
 
 namespace scanrig {
 namespace {
 
-constexpr std::size_t kMaxPeers = 1024;     ///< remembered
-constexpr std::size_t kMaxTurnedAway = 32;  ///< at once: they cost descriptors, which the rest of the daemon needs
-constexpr const char* kTurnedAway = "turned away";
+constexpr std::size_t kMaxAccounts = 1024;  ///< then those that have their full allowance again are forgotten
 
 }  // namespace
 
-std::unique_ptr<Admission::Seat> Admission::enter(const std::string& peer) {
-  const std::lock_guard guard(mutex_);
-  if (connections_ >= limits_.connections) return nullptr;
-  if (peers_.size() >= kMaxPeers) forget_idle(Clock::now());
-  auto& known =
-      peers_.try_emplace(peer, Peer{.requests = limits_.requests_at_once, .counted = Clock::now()}).first->second;
-  if (known.connections >= limits_.connections_a_peer) return nullptr;
-  ++known.connections;
-  ++connections_;
-  return std::make_unique<Seat>(shared_from_this(), peer);
+Admission::Admission(const ApiLimits& limits) : limits_(limits) {
+  waiting_.max_seats = limits.waiting;
+  local_waiting_.max_seats = limits.local_waiting;
+  seats_.max_seats = limits.connections;
+  local_seats_.max_seats = limits.local_connections;
+  reserved_.max_seats = limits.reserved;
 }
 
-std::unique_ptr<Admission::Seat> Admission::enter_to_be_turned_away() {
-  const std::lock_guard guard(mutex_);
-  auto& door = peers_[kTurnedAway];
-  if (door.connections >= kMaxTurnedAway) return nullptr;
-  ++door.connections;
-  ++connections_;
-  return std::make_unique<Seat>(shared_from_this(), kTurnedAway);
+Admission::SeatPtr Admission::wait(Door door, const std::string& peer, OnEvicted on_evicted) {
+  return enter(door == Door::local ? local_waiting_ : waiting_, peer, std::move(on_evicted), true);
 }
 
-/// The peer stays known, or hanging up would buy new requests.
-void Admission::leave(const std::string& peer) {
-  const std::lock_guard guard(mutex_);
-  --connections_;
-  --peers_.at(peer).connections;
+Admission::SeatPtr Admission::enter(Door door, const std::string& peer, OnEvicted on_evicted) {
+  return enter(door == Door::local ? local_seats_ : seats_, peer, std::move(on_evicted), false);
 }
 
-bool Admission::take(const std::string& peer, double price, Clock::time_point now) {
+Admission::SeatPtr Admission::enter_reserved(const std::string& peer, OnEvicted on_evicted) {
+  return enter(reserved_, peer, std::move(on_evicted), true);
+}
+
+Admission::SeatPtr Admission::enter(Pool& pool, const std::string& peer, OnEvicted on_evicted, bool always) {
+  OnEvicted evicted;
+  SeatPtr seat;
+  {
+    const std::lock_guard guard(mutex_);
+    const auto counted = pool.by_peer.find(peer);
+    const std::size_t held = counted == pool.by_peer.end() ? 0 : counted->second;
+    if (!always && (held >= limits_.connections_a_peer || pool.max_seats == 0)) return nullptr;
+    if (pool.taken.size() >= pool.max_seats && !pool.taken.empty()) {
+      const auto place = oldest_of_largest(pool);
+      if (!always && pool.by_peer.at(place->peer) < held + 2) return nullptr;
+      evicted = std::move(place->on_evicted);
+      remove(pool, place);
+    }
+    ++pool.by_peer[peer];
+    pool.taken.push_back({++last_number_, peer, std::move(on_evicted)});
+    seat = std::make_unique<Seat>(shared_from_this(), pool, peer, last_number_);
+  }
+  if (evicted) evicted();
+  return seat;
+}
+
+/// One that was evicted has left already.
+void Admission::leave(Pool& pool, std::uint64_t number) {
   const std::lock_guard guard(mutex_);
-  auto& known = peers_.at(peer);
+  const auto place = std::ranges::find(pool.taken, number, &Taken::number);
+  if (place != pool.taken.end()) remove(pool, place);
+}
+
+/// Where several peers have most, the oldest of all of theirs: a newcomer is never the first to go.
+Admission::Places::iterator Admission::oldest_of_largest(Pool& pool) {
+  std::size_t most = 0;
+  for (const auto& [peer, count] : pool.by_peer) most = std::max(most, count);
+  return std::ranges::find_if(pool.taken, [&](const Taken& taken) { return pool.by_peer.at(taken.peer) == most; });
+}
+
+void Admission::remove(Pool& pool, Places::iterator place) {
+  const auto counted = pool.by_peer.find(place->peer);
+  if (--counted->second == 0) pool.by_peer.erase(counted);
+  pool.taken.erase(place);
+}
+
+bool Admission::take(const std::string& account, double price, Clock::time_point now) {
+  const std::lock_guard guard(mutex_);
+  if (accounts_.size() >= kMaxAccounts) forget_idle(now);
+  auto& known = accounts_.try_emplace(account, Account{limits_.requests_at_once, now}).first->second;
   const auto later = std::max(now, known.counted);
   const std::chrono::duration<double> passed = later - known.counted;
   known.counted = later;
@@ -52,14 +86,16 @@ bool Admission::take(const std::string& peer, double price, Clock::time_point no
 }
 
 void Admission::forget_idle(Clock::time_point now) {
-  const auto refilled = std::chrono::duration<double>(limits_.requests_at_once / limits_.requests_a_second);
-  std::erase_if(peers_,
-                [&](const auto& peer) { return peer.second.connections == 0 && now - peer.second.counted > refilled; });
+  const auto refilled = std::chrono::duration<double>((limits_.requests_at_once + limits_.price_of_a_bad_token) /
+                                                      limits_.requests_a_second);
+  std::erase_if(accounts_, [&](const auto& account) { return now - account.second.counted > refilled; });
 }
 
 std::size_t Admission::connections() const {
   const std::lock_guard guard(mutex_);
-  return connections_;
+  std::size_t all = 0;
+  for (const auto* pool : {&waiting_, &local_waiting_, &seats_, &local_seats_, &reserved_}) all += pool->taken.size();
+  return all;
 }
 
 }  // namespace scanrig

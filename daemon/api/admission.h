@@ -3,6 +3,8 @@
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <list>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -10,13 +12,17 @@
 
 namespace scanrig {
 
-/// What one client, and all of them together, may use up.
+/// What one client, and all of them together, may use up. A peer is a user of this machine, or an address.
 struct ApiLimits {
-  std::size_t connections = 256;
-  std::size_t connections_a_peer = 128;  ///< a peer is a user of this machine, or an address
-  double requests_a_second = 1000.0;     ///< a peer, on average
-  double requests_at_once = 1000.0;      ///< a peer, after a pause
-  double price_of_a_bad_token = 100.0;   ///< in requests: 10 guesses a second
+  // A connection waits until its first request has shown who sends it, then has a seat. Local connections have waiting
+  // places and seats of their own. All of them together stay well below the 1024 descriptors of a process.
+  std::size_t waiting = 128, local_waiting = 64;
+  std::size_t connections = 256, local_connections = 64;
+  std::size_t connections_a_peer = 128;
+  std::size_t reserved = 16;            ///< for Stop and status where no seat is free, each for one request
+  double requests_a_second = 1000.0;    ///< a peer, on average
+  double requests_at_once = 1000.0;     ///< a peer, after a pause
+  double price_of_a_bad_token = 100.0;  ///< in requests: 10 guesses a second
   std::uint32_t header_bytes = 8 * 1024;
   std::uint64_t body_bytes = 64 * 1024;
   // Absolute: a client that sends or reads a byte now and then gains nothing.
@@ -27,49 +33,82 @@ struct ApiLimits {
   std::chrono::milliseconds heartbeat{10000};    ///< of an event stream
 };
 
-/// Counts connections and requests by peer. Threads: any.
+/// Seats for connections and a rate for requests, by peer. Threads: any.
 class Admission : public std::enable_shared_from_this<Admission> {
  public:
   using Clock = std::chrono::steady_clock;
-  explicit Admission(ApiLimits limits) : limits_(limits) {}
+  enum class Door { local, tcp };
+  /// The seat was given to another connection: close this one. From any thread; must not wait.
+  using OnEvicted = std::function<void()>;
 
-  /// A place among the connections, given back when it is destroyed.
+  explicit Admission(const ApiLimits& limits);
+
+ private:
+  struct Taken {
+    std::uint64_t number;
+    std::string peer;
+    OnEvicted on_evicted;
+  };
+  using Places = std::list<Taken>;
+  /// Seats of one kind, in order of entry.
+  struct Pool {
+    std::size_t max_seats = 1;
+    Places taken{};
+    std::map<std::string, std::size_t, std::less<>> by_peer{};
+  };
+
+ public:
+  /// Freed when it is destroyed.
   class Seat {
    public:
-    Seat(std::shared_ptr<Admission> owner, std::string peer) : owner_(std::move(owner)), peer_(std::move(peer)) {}
-    ~Seat() { owner_->leave(peer_); }
+    Seat(std::shared_ptr<Admission> owner, Pool& pool, std::string peer, std::uint64_t number)
+        : owner_(std::move(owner)), pool_(pool), peer_(std::move(peer)), number_(number) {}
+    ~Seat() { owner_->leave(pool_, number_); }
     Seat(const Seat&) = delete;
     Seat& operator=(const Seat&) = delete;
-    /// Whether the peer may ask once more now.
-    [[nodiscard]] bool may_ask(Clock::time_point now) { return owner_->take(peer_, 1.0, now); }
     [[nodiscard]] const std::string& peer() const { return peer_; }
-    void showed_bad_token(Clock::time_point now) { owner_->take(peer_, owner_->limits_.price_of_a_bad_token, now); }
 
    private:
     std::shared_ptr<Admission> owner_;
+    Pool& pool_;
     std::string peer_;
+    std::uint64_t number_;
   };
-  /// Nothing when too many are there.
-  std::unique_ptr<Seat> enter(const std::string& peer);
-  /// For one that is only told so; nothing when too many of those are there already.
-  std::unique_ptr<Seat> enter_to_be_turned_away();
+  using SeatPtr = std::unique_ptr<Seat>;
+
+  /// A waiting place. There is always one: where all are taken, the peer with the most of them loses its oldest.
+  SeatPtr wait(Door door, const std::string& peer, OnEvicted on_evicted);
+  /// A seat for an authenticated peer. Where all are taken, a peer that has at least two more than this one loses its
+  /// oldest. Null where there is none, or where this peer has its share.
+  SeatPtr enter(Door door, const std::string& peer, OnEvicted on_evicted);
+  /// A seat for one request that must not be refused, as wait().
+  SeatPtr enter_reserved(const std::string& peer, OnEvicted on_evicted);
+
+  /// Counts a request. False: too many since the last pause. Hanging up buys no new ones.
+  bool may_request(const std::string& account, Clock::time_point now) { return take(account, 1.0, now); }
+  void charge_bad_token(const std::string& account, Clock::time_point now) {
+    take(account, limits_.price_of_a_bad_token, now);
+  }
 
   [[nodiscard]] std::size_t connections() const;
 
  private:
-  struct Peer {
-    std::size_t connections = 0;
-    double requests = 0.0;  ///< that it may ask at once
+  struct Account {
+    double requests = 0.0;  ///< that it may make at once
     Clock::time_point counted{};
   };
-  void leave(const std::string& peer);
-  bool take(const std::string& peer, double price, Clock::time_point now);
+  SeatPtr enter(Pool& pool, const std::string& peer, OnEvicted on_evicted, bool always);
+  void leave(Pool& pool, std::uint64_t number);
+  static Places::iterator oldest_of_largest(Pool& pool);
+  static void remove(Pool& pool, Places::iterator place);
+  bool take(const std::string& account, double price, Clock::time_point now);
   void forget_idle(Clock::time_point now);
 
   const ApiLimits limits_;
   mutable std::mutex mutex_;
-  std::map<std::string, Peer> peers_;
-  std::size_t connections_ = 0;
+  Pool waiting_, local_waiting_, seats_, local_seats_, reserved_;
+  std::uint64_t last_number_ = 0;
+  std::map<std::string, Account> accounts_;
 };
 
 }  // namespace scanrig

@@ -36,7 +36,9 @@ void send_bundle(const ApiStation& station, const Values& values, Send send) {
 void remove_old_bundles(const std::filesystem::path& storage) {
   std::error_code error;
   for (std::filesystem::directory_iterator next(storage, error), end; !error && next != end; next.increment(error)) {
-    if (next->path().filename().string().starts_with(kPrefix)) ::unlink(next->path().c_str());  // half packed ones too
+    std::error_code ignored;
+    if (!next->path().filename().string().starts_with(kPrefix)) continue;
+    std::filesystem::remove_all(next->path(), ignored);  // half packed ones too
   }
 }
 

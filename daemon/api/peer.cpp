@@ -1,6 +1,9 @@
 #include "daemon/api/peer.h"
 
+#include <arpa/inet.h>
 #include <grp.h>
+#include <netinet/in.h>
+#include <pwd.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
@@ -67,6 +70,45 @@ Result<PeerRoles> find_groups(const PeerGroups& groups) {
     *id = *found;
   }
   return roles;
+}
+
+Result<Proxy> find_proxy(const std::string& name) {
+  constexpr std::string_view kUnix = "unix:";
+  if (name.empty()) return Proxy{};
+  if (!name.starts_with(kUnix)) {
+    const auto address = plain_address(name);
+    if (address) return Proxy{.address = address};
+    return fail(ErrorCode::invalid_input, "[api] proxy \"{}\": name an IP address or \"unix:USER\"", name);
+  }
+  passwd entry{};
+  passwd* found = nullptr;
+  std::vector<char> room(64 * 1024);
+  const auto user = name.substr(kUnix.size());
+  const int error = ::getpwnam_r(user.c_str(), &entry, room.data(), room.size(), &found);
+  if (error == 0 && found != nullptr) return Proxy{.user = entry.pw_uid};
+  return fail(ErrorCode::not_found, "[api] proxy: no user \"{}\" on this machine; add it, or name another", user);
+}
+
+std::optional<std::string> plain_address(std::string_view text) {
+  const std::string address(text);
+  char plain[INET6_ADDRSTRLEN];
+  in_addr v4{};
+  if (::inet_pton(AF_INET, address.c_str(), &v4) == 1) return ::inet_ntop(AF_INET, &v4, plain, sizeof plain);
+  in6_addr v6{};
+  if (::inet_pton(AF_INET6, address.c_str(), &v6) != 1) return std::nullopt;
+  if (!IN6_IS_ADDR_V4MAPPED(&v6)) return ::inet_ntop(AF_INET6, &v6, plain, sizeof plain);
+  std::memcpy(&v4, &v6.s6_addr[12], sizeof v4);
+  return ::inet_ntop(AF_INET, &v4, plain, sizeof plain);
+}
+
+std::optional<std::string> forwarded_address(std::string_view header) {
+  const auto comma = header.rfind(',');
+  auto last = header.substr(comma == std::string_view::npos ? 0 : comma + 1);
+  constexpr std::string_view kBlank = " \t";
+  const auto begin = last.find_first_not_of(kBlank);
+  if (begin == std::string_view::npos) return std::nullopt;
+  last = last.substr(begin, last.find_last_not_of(kBlank) + 1 - begin);
+  return plain_address(last);
 }
 
 }  // namespace scanrig

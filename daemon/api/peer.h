@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/result.h"
@@ -33,6 +34,22 @@ struct PeerGroups {
   std::optional<std::string> viewer{}, operating{}, engineer{};
   [[nodiscard]] bool any() const { return viewer || operating || engineer; }
 };
+
+/// The reverse proxy in front of the API. What it forwards counts for the address that it names.
+struct Proxy {
+  std::optional<std::string> address{};  ///< over TCP, as plain_address() writes it
+  std::optional<uid_t> user{};           ///< over the Unix socket
+};
+
+/// "127.0.0.1", or "unix:USER" for a proxy that connects to the socket as this user. Empty: none.
+/// Fails with `invalid_input`, `not_found` (the user).
+Result<Proxy> find_proxy(const std::string& name);
+
+/// The address in one spelling, IPv4 as such where it is mapped to IPv6. Nothing where `text` is no address.
+std::optional<std::string> plain_address(std::string_view text);
+
+/// The client that the nearest proxy names in X-Forwarded-For: the last address. Those before it come from the client.
+std::optional<std::string> forwarded_address(std::string_view header);
 
 /// Without any group named, the caller's own one operates. Fails with `not_found`.
 Result<PeerRoles> find_groups(const PeerGroups& groups);

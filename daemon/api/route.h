@@ -76,6 +76,7 @@ struct Route {
   Reply reply;
   std::vector<unsigned> errors{};        ///< beside those that every route has
   bool slow = false;                     ///< touches the disk: done by a worker, not by an I/O thread
+  bool reserved = false;                 ///< served where no seat is free
   std::chrono::seconds reply_timeout{};  ///< for the answer; 0: as the limits say
   /// Calls `send` once, from this thread or, soon, from the control loop's.
   std::function<void(const ApiStation&, const Values&, Send)> handle;

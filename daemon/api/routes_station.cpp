@@ -25,6 +25,7 @@ Route press(std::string_view path, Button button, Role role, std::string_view de
           .description = description,
           .reply = kPressed,
           .errors = {409},
+          .reserved = button == Button::stop,
           .handle = [button](const ApiStation& station, const Values&, Send send) {
             station.loop.press(button, Origin::remote,
                                [send = std::move(send)](const Result<std::string>& job) { send(pressed(job)); });
@@ -113,12 +114,14 @@ Route jog_route() {
           .handle = jog};
 }
 
-Route look(std::string_view path, std::string_view description, Reply reply, ordered_json (*what)(const Snapshot&)) {
+Route look(std::string_view path, std::string_view description, Reply reply, ordered_json (*what)(const Snapshot&),
+           bool reserved = false) {
   return {.method = Method::get,
           .path = path,
           .role = Role::viewer,
           .description = description,
           .reply = reply,
+          .reserved = reserved,
           .handle = [what](const ApiStation& station, const Values&, const Send& send) {
             send({.body = to_text(what(*station.loop.snapshot()))});
           }};
@@ -128,8 +131,10 @@ Route look(std::string_view path, std::string_view description, Reply reply, ord
 
 std::vector<Route> station_routes() {
   return {
-      look("/api/v1/status", "What the station does, why, and what to do next.",
-           {.description = "the latest snapshot", .schema = "Status"}, [](const Snapshot& s) { return to_json(s); }),
+      look(
+          "/api/v1/status", "What the station does, why, and what to do next.",
+          {.description = "the latest snapshot", .schema = "Status"}, [](const Snapshot& s) { return to_json(s); },
+          true),
       look("/api/v1/io", "The panel's inputs and outputs.", {.description = "as last seen", .schema = "Io"}, io_table),
       {.method = Method::get,
        .path = "/api/v1/events",

@@ -70,12 +70,12 @@ void remove_own_socket(const ApiOptions& options) {
 }  // namespace
 
 struct ApiServer::Impl {
-  Impl(const ApiOptions& with, const PeerRoles& roles, int listening, ControlLoop& control)
+  Impl(const ApiOptions& with, const PeerRoles& roles, const Proxy& proxy, int listening, ControlLoop& control)
       : options(with),
         loop(control),
         core({control, [this] { return latest_facts(); }, with.storage, with.preview_jpeg, with.check_config,
               with.reload, [this](std::function<void()> work) { net::post(core.workers, std::move(work)); }},
-             roles, with, this_life()),
+             roles, proxy, with, this_life()),
         local(io, Local(), listening) {}
 
   void run() {
@@ -91,9 +91,7 @@ struct ApiServer::Impl {
       if (!local.is_open()) return;
       if (error) return pause(local_pause, [this] { accept_local(); });
       const auto peer = peer_credentials(socket.native_handle());
-      if (peer) {
-        begin(std::move(socket), fmt::format("user {}", peer->uid), core.access.peers().role_of(*peer));
-      }
+      if (peer) begin(std::move(socket), local_peer(*peer));
       accept_local();
     });
   }
@@ -105,7 +103,7 @@ struct ApiServer::Impl {
       ErrorCondition gone;
       const auto peer = socket.remote_endpoint(gone);
       if (!gone) socket.set_option(Tcp::no_delay(true), gone);
-      if (!gone) begin(std::move(socket), peer.address().to_string(), std::nullopt);
+      if (!gone) begin(std::move(socket), tcp_peer(peer.address().to_string()));
       accept_tcp();
     });
   }
@@ -116,13 +114,23 @@ struct ApiServer::Impl {
     timer.async_wait([again](ErrorCondition) { again(); });
   }
 
-  void begin(ApiSession::Protocol::socket socket, const std::string& peer, std::optional<Role> role) {
-    auto seat = core.admission->enter(peer);
-    const bool welcome = seat != nullptr;
-    if (!welcome) seat = core.admission->enter_to_be_turned_away();
-    if (!seat) return;
-    const auto session = std::make_shared<ApiSession>(std::move(socket), core, std::move(seat), role);
-    welcome ? session->start() : session->turn_away();
+  /// Requests through a proxy need a token, whatever its user may do.
+  [[nodiscard]] ApiPeer local_peer(const PeerCredentials& peer) const {
+    const bool is_proxy = core.proxy.user == peer.uid;
+    return {.door = Admission::Door::local,
+            .name = fmt::format("user {}", peer.uid),
+            .role = is_proxy ? std::nullopt : core.access.peers().role_of(peer),
+            .is_proxy = is_proxy};
+  }
+
+  [[nodiscard]] ApiPeer tcp_peer(const std::string& address) const {
+    auto name = plain_address(address).value_or(address);
+    const bool is_proxy = core.proxy.address == name;
+    return {.door = Admission::Door::tcp, .name = std::move(name), .is_proxy = is_proxy};
+  }
+
+  void begin(ApiSession::Protocol::socket socket, ApiPeer peer) {
+    std::make_shared<ApiSession>(std::move(socket), core, std::move(peer))->start();
   }
 
   /// On a worker, again and again.
@@ -188,12 +196,14 @@ struct ApiServer::Impl {
 Result<std::unique_ptr<ApiServer>> ApiServer::start(const ApiOptions& options, ControlLoop& loop) {
   const auto roles = find_groups(options.groups);
   if (!roles) return pass_on(roles, "API");
+  const auto proxy = find_proxy(options.proxy);
+  if (!proxy) return pass_on(proxy, "API");
   // Where groups are named the peer's credentials decide, not the file's one group.
   const mode_t mode = options.groups.any() ? 0666 : 0660;
   const auto listening =
       options.passed_socket ? take_over_socket(*options.passed_socket, mode) : listen_on_socket(options.socket, mode);
   if (!listening) return pass_on(listening, "API");
-  auto impl = std::make_unique<Impl>(options, *roles, *listening, loop);
+  auto impl = std::make_unique<Impl>(options, *roles, *proxy, *listening, loop);
   if (options.http_port || options.passed_tcp) {
     auto tcp = options.passed_tcp ? take_over_tcp(impl->io, *options.passed_tcp)
                                   : listen_on_tcp(impl->io, options.http_address, *options.http_port);

@@ -21,6 +21,7 @@ struct ApiOptions {
   std::optional<int> http_port{};  ///< TCP, where every request needs a token; 0: any free port
   std::string http_address = "127.0.0.1";
   std::filesystem::path tokens{};  ///< the file of tokens
+  std::string proxy{};             ///< the reverse proxy in front, as find_proxy() reads it; empty: none
   /// Listening sockets of the caller, used instead of an own one and left open and in place at the end.
   std::optional<int> passed_socket{}, passed_tcp{};
   std::filesystem::path storage{};                                                      ///< whose disk is watched
@@ -42,8 +43,8 @@ struct ApiOptions {
 /// request with an absolute limit. It reads snapshots and posts to the control loop, and neither waits for the other.
 class ApiServer {
  public:
-  /// Fails as listen_on_socket(), with `io` or `invalid_input` for the address, with `not_found` for a group. `loop`
-  /// must outlive the server.
+  /// Fails as listen_on_socket(), with `io` or `invalid_input` for the address, with `not_found` for a group or the
+  /// proxy's user. `loop` must outlive the server.
   static Result<std::unique_ptr<ApiServer>> start(const ApiOptions& options, ControlLoop& loop);
   /// Cuts all connections, removes the socket file and joins. The control loop must not run any more.
   ~ApiServer();

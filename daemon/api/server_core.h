@@ -14,9 +14,10 @@ namespace scanrig {
 
 /// What all connections share. Outlives them.
 struct ServerCore {
-  ServerCore(ApiStation what, PeerRoles peers, const ApiOptions& options, std::string life)
+  ServerCore(ApiStation what, PeerRoles peers, Proxy in_front, const ApiOptions& options, std::string life)
       : station(std::move(what)),
         access(peers, options.tokens),
+        proxy(std::move(in_front)),
         limits(options.limits),
         journal(options.journal),
         admission(std::make_shared<Admission>(options.limits)),
@@ -25,6 +26,7 @@ struct ServerCore {
   const Router router;
   const ApiStation station;
   Access access;
+  const Proxy proxy;
   const ApiLimits limits;
   const std::function<void(JournalEntry)> journal;
   const std::shared_ptr<Admission> admission;

@@ -41,15 +41,46 @@ ApiSession::~ApiSession() {
 }
 
 void ApiSession::start() {
-  net::post(stream_.get_executor(), [self = shared_from_this()] { self->read_header(); });
+  net::post(stream_.get_executor(), [self = shared_from_this()] {
+    self->take(Place::waiting, self->core_.admission->wait(self->peer_.door, self->peer_.name, self->when_evicted()));
+    self->read_header();
+  });
 }
 
-void ApiSession::turn_away() {
-  net::post(stream_.get_executor(), [self = shared_from_this()] {
-    ++self->core_.refused;
-    self->last_ = true;
-    self->write_text(error_response(503, kTooMany));
-  });
+void ApiSession::take(Place place, Admission::SeatPtr seat) {
+  place_ = place;
+  seat_ = std::move(seat);
+}
+
+/// For the request that has just been read. A connection of a proxy may carry requests of many.
+bool ApiSession::take_seat(bool may_use_reserved) {
+  if (place_ == Place::seat && seat_->peer() == requester_) return true;
+  const auto door = peer_.is_proxy ? Admission::Door::tcp : peer_.door;
+  const auto had = seat_number_;
+  if (auto seat = core_.admission->enter(door, requester_, when_evicted())) {
+    take(Place::seat, std::move(seat));
+    return true;
+  }
+  seat_number_ = had;  // the place that it has may still be taken away
+  if (!may_use_reserved) return false;
+  last_ = true;
+  take(Place::reserved, core_.admission->enter_reserved(requester_, when_evicted()));
+  return true;
+}
+
+/// A seat that was left for another is no reason to hang up when it is taken away late.
+Admission::OnEvicted ApiSession::when_evicted() {
+  return [weak = weak_from_this(), strand = stream_.get_executor(), number = ++seat_number_] {
+    net::post(strand, [weak, number] {
+      if (const auto self = weak.lock()) self->evicted(number);
+    });
+  };
+}
+
+void ApiSession::evicted(std::uint64_t number) {
+  if (number != seat_number_) return;
+  timer_.cancel();
+  hang_up();
 }
 
 void ApiSession::read_header() {
@@ -70,17 +101,17 @@ void ApiSession::on_header(Error error) {
   }
   ++core_.requests;
   last_ = !parser_->get().keep_alive();
-  const auto now = Admission::Clock::now();
   const auto as = role();
-  if (!as && !header(http::field::authorization).empty()) seat_->showed_bad_token(now);
-  const bool may = seat_->may_ask(now);
+  requester_ = requester();
   auto found = core_.router.find(plain(parser_->get().method_string()), plain(parser_->get().target()), as);
-  if (!may || !found) {
-    ++core_.refused;
-    const bool by_role = may && as && found.error().status == kForbidden;
-    if (const auto order = by_role ? order_of(*as) : std::nullopt) tell_refused(*order, found.error().why);
-    last_ = last_ || !parser_->is_done();  // a body that nobody has read is in the way
-    return write_text(may ? std::move(found.error()) : error_response(429, kTooOften));
+  const bool may = may_request(found ? found->route : nullptr, as.has_value());
+  if (!may) return refuse(error_response(429, kTooOften), false);
+  if (!as) return refuse(std::move(found.error()), true);
+  if (!take_seat(found && found->route->reserved)) return refuse(error_response(503, kTooMany), true);
+  if (!found) {
+    const auto order = found.error().status == kForbidden ? order_of(*as) : std::nullopt;
+    if (order) tell_refused(*order, found.error().why);
+    return refuse(std::move(found.error()), false);
   }
   match_ = std::move(*found);
   match_->values.set_requester(seat_->peer());
@@ -91,6 +122,21 @@ void ApiSession::on_header(Error error) {
   stream_.expires_after(core_.limits.body_time);
   http::async_read(stream_, buffer_, *parser_,
                    [self = shared_from_this()](Error failed, std::size_t) { self->on_body(failed); });
+}
+
+/// What Stop and status may cost is counted apart from all else: neither bad tokens nor other requests use it up.
+bool ApiSession::may_request(const Route* route, bool authenticated) {
+  const auto now = Admission::Clock::now();
+  if (route && route->reserved) return core_.admission->may_request(fmt::format("{} {}", route->path, requester_), now);
+  if (!authenticated && !header(http::field::authorization).empty()) core_.admission->charge_bad_token(requester_, now);
+  return core_.admission->may_request(requester_, now);
+}
+
+/// A body that nobody has read is in the way of a next request.
+void ApiSession::refuse(ApiResponse response, bool must_close) {
+  ++core_.refused;
+  last_ = last_ || must_close || !parser_->is_done();
+  write_text(std::move(response));
 }
 
 void ApiSession::on_body(Error error) {
@@ -121,8 +167,7 @@ std::optional<ApiSession::JobOrder> ApiSession::order_of(Role as) const {
   if (method == to_string(Method::get)) return std::nullopt;
   const auto target = plain(parser_->get().target());
   return JobOrder{fmt::format("{} {}, asked for by {} ({})", method,
-                              target.substr(0, target.find('?')).substr(0, kMaxPathLength), seat_->peer(),
-                              to_string(as))};
+                              target.substr(0, target.find('?')).substr(0, kMaxPathLength), requester_, to_string(as))};
 }
 
 void ApiSession::tell_refused(const JobOrder& order, const std::string& why) const {
@@ -217,6 +262,16 @@ void ApiSession::drain_more() {
 
 std::string_view ApiSession::header(http::field name) const { return plain(parser_->get()[name]); }
 
-std::optional<Role> ApiSession::role() const { return core_.access.role_of(peer_, header(http::field::authorization)); }
+std::optional<Role> ApiSession::role() const {
+  return core_.access.role_of(peer_.role, header(http::field::authorization));
+}
+
+/// Several lines of one header are one list.
+std::string ApiSession::requester() const {
+  if (!peer_.is_proxy) return peer_.name;
+  const auto lines = parser_->get().equal_range("X-Forwarded-For");
+  if (lines.first == lines.second) return peer_.name;
+  return forwarded_address(plain(std::prev(lines.second)->value())).value_or(peer_.name);
+}
 
 }  // namespace scanrig

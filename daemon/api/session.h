@@ -12,20 +12,25 @@
 
 namespace scanrig {
 
+/// Where a connection comes from.
+struct ApiPeer {
+  Admission::Door door = Admission::Door::tcp;
+  std::string name{};          ///< a user of this machine, or an address
+  std::optional<Role> role{};  ///< by the kernel's record of the peer; nothing over TCP and for a proxy
+  bool is_proxy = false;       ///< names in each request whom it is from
+};
+
 /// One connection, over TCP or a Unix socket: reads a request, answers, reads the next. Lives as long as something
 /// is under way on it, each with an absolute limit. All of it runs on the socket's strand.
 class ApiSession : public std::enable_shared_from_this<ApiSession> {
  public:
   using Protocol = boost::asio::generic::stream_protocol;
 
-  /// `peer`: the role that the kernel's word for the peer gives it; nothing over TCP.
-  ApiSession(Protocol::socket socket, ServerCore& core, std::unique_ptr<Admission::Seat> seat, std::optional<Role> peer)
-      : stream_(std::move(socket)), timer_(stream_.get_executor()), core_(core), seat_(std::move(seat)), peer_(peer) {}
+  ApiSession(Protocol::socket socket, ServerCore& core, ApiPeer peer)
+      : stream_(std::move(socket)), timer_(stream_.get_executor()), core_(core), peer_(std::move(peer)) {}
   ~ApiSession();
 
   void start();
-  /// Tells a client for whom there is no place, and hangs up.
-  void turn_away();
 
  private:
   using Error = boost::beast::error_code;
@@ -36,8 +41,16 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
     std::string job{};
   };
 
+  enum class Place { waiting, seat, reserved };
+
+  void take(Place place, Admission::SeatPtr seat);
+  bool take_seat(bool may_use_reserved);
+  Admission::OnEvicted when_evicted();
+  void evicted(std::uint64_t number);
   void read_header();
   void on_header(Error error);
+  bool may_request(const Route* route, bool authenticated);
+  void refuse(ApiResponse response, bool must_close);
   void on_body(Error error);
   void call();
   [[nodiscard]] std::optional<JobOrder> order_of(Role as) const;
@@ -54,6 +67,7 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
   void drain_more();
   [[nodiscard]] std::string_view header(boost::beast::http::field name) const;
   [[nodiscard]] std::optional<Role> role() const;
+  [[nodiscard]] std::string requester() const;
 
   void begin_file(std::shared_ptr<OpenFile> file, std::string_view type);
   void read_chunk();
@@ -68,8 +82,11 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
   boost::beast::basic_stream<Protocol> stream_;
   boost::asio::steady_timer timer_;
   ServerCore& core_;
-  std::unique_ptr<Admission::Seat> seat_;
-  std::optional<Role> peer_;
+  const ApiPeer peer_;
+  Admission::SeatPtr seat_;
+  Place place_ = Place::waiting;
+  std::uint64_t seat_number_ = 0;  ///< counts the seats that this connection has had
+  std::string requester_;          ///< whose request this is
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::string_body>> parser_;
   std::optional<Router::Match> match_;

@@ -24,6 +24,13 @@ CameraSerials cameras_from(const config::StereoCameraConfig& config) {
   return {};
 }
 
+/// Beside the jobs where no service manager names a state folder.
+std::filesystem::path crash_folder(const config::RigConfig& config) {
+  const char* const state = std::getenv("STATE_DIRECTORY");  // systemd.exec(5); several are separated by colons
+  const std::string first = state ? std::string(state).substr(0, std::string_view(state).find(':')) : "";
+  return (first.empty() ? config.storage.root.parent_path() : std::filesystem::path(first)) / "crash";
+}
+
 Recipe recipe_from(const std::string& name, const config::RecipeConfig& config) {
   return {.name = name,
           .poses = config.poses,
@@ -76,15 +83,19 @@ DaemonOptions options_from(const config::RigConfig& config) {
   options.state_folder = state_folder(config.storage.root);
   options.recipes.clear();
   for (const auto& [name, recipe] : config.recipes) options.recipes[name] = recipe_from(name, recipe);
-  options.retention = {.keep_for = config.storage.keep_days, .keep_bytes = {}};
+  options.retention.keep_for = config.storage.keep_days;
   if (config.storage.keep_gib) options.retention.keep_bytes = gib(*config.storage.keep_gib);
+  options.bundle.rig_texts["rig.toml"] = config.text;
+  if (const auto& profile = config.turntable.profile_file) options.bundle.rig_texts[profile->name] = profile->text;
+  options.bundle.crash_folder = crash_folder(config);
   if (config.quiet_hours) options.quiet_hours = QuietHours{config.quiet_hours->from, config.quiet_hours->to};
   options.warm_up = config.projector.warm_up;
   options.api = {.socket = config.api.socket,
                  .groups = {config.api.viewer_group, config.api.operator_group, config.api.engineer_group},
                  .http_port = config.api.http_port,
                  .http_address = config.api.http_address,
-                 .tokens = config.api.tokens};
+                 .tokens = config.api.tokens,
+                 .proxy = config.api.proxy};
   if (config.webhook) options.webhook = HttpAddress{config.webhook->host, config.webhook->port, config.webhook->path};
   options.remote = config.safety.remote_start;
   options.guard = config.safety.guard.has_value();

@@ -118,8 +118,13 @@ class ApiBench : public scan_samples::FolderTest {
   }
 
   Wire local() const { return Wire(connect_to_socket(options.socket).value_or(-1)); }
-  Wire tcp() const {
+  /// From 127.0.0.`host`.
+  Wire tcp(std::uint32_t host = 1) const {
     const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+    sockaddr_in here{};
+    here.sin_family = AF_INET;
+    here.sin_addr.s_addr = htonl(INADDR_LOOPBACK - 1 + host);
+    EXPECT_EQ(::bind(fd, reinterpret_cast<const sockaddr*>(&here), sizeof here), 0);
     sockaddr_in there{};
     there.sin_family = AF_INET;
     there.sin_port = htons(static_cast<std::uint16_t>(api->http_port()));

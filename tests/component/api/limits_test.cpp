@@ -75,29 +75,16 @@ TEST_F(Limits, WhoDoesNotReadItsAnswerIsCutOff) {
   FAIL() << "it still has its place";
 }
 
-TEST_F(Limits, TooManyConnectionsOfAPeerAreTurnedAwayWithAWord) {
-  options.limits.connections_a_peer = 2;
-  serve();
-  auto one = local();
-  auto two = local();
-  EXPECT_EQ(ask(std::move(two), kStatus).status, 200);
-  ASSERT_TRUE(one.say(kStatus));
-  EXPECT_EQ(one.answer().status, 200);
-  const auto idle = local();
-  auto third = local();
-  const auto turned_away = third.answer();
-  EXPECT_EQ(turned_away.status, 503);
-  EXPECT_EQ(turned_away.json()["error"]["code"], "busy");
-}
-
 TEST_F(Limits, TooManyRequestsAreToldSo) {
   options.limits.requests_a_second = 0.1;
   options.limits.requests_at_once = 3;
   serve();
-  auto wire = local();
-  for (const int expected : {200, 200, 200, 429}) {
-    ASSERT_TRUE(wire.say(kStatus));
-    EXPECT_EQ(wire.answer().status, expected);
+  for (const char* const path : {"/api/v1/health", "/api/v1/status"}) {
+    auto wire = local();
+    for (const int expected : {200, 200, 200, 429}) {
+      ASSERT_TRUE(wire.say(request("GET", path)));
+      EXPECT_EQ(wire.answer().status, expected) << path;
+    }
   }
 }
 

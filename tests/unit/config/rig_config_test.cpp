@@ -148,6 +148,12 @@ TEST_F(RigConfigTest, TcpNeedsTokensAndIsOnThisMachineUnlessToldOtherwise) {
   rig = read(replaced(example_, socket, socket + "http_address = \"0.0.0.0\"\n"));
   ASSERT_FALSE(rig);
   EXPECT_THAT(rig.error().message, HasSubstr("[api] http_address: needs http_port"));
+  rig = read(replaced(example_, socket, socket + "proxy = \"127.0.0.1\"\n"));
+  ASSERT_FALSE(rig);
+  EXPECT_THAT(rig.error().message, HasSubstr("[api] proxy: needs http_port, or \"unix:USER\""));
+  rig = read(replaced(example_, socket, socket + "proxy = \"unix:www-data\"\n"));
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->api.proxy, "unix:www-data");
   rig = read(replaced(example_, socket,
                       socket + "tokens = \"tokens.json\"\nhttp_port = 8080\noperator_group = \"scanners\"\n"));
   ASSERT_TRUE(rig) << rig.error().message;

@@ -27,6 +27,25 @@ TEST(PeerRoles, AGroupDecidesForOthersAndTheHighestCounts) {
   EXPECT_FALSE(PeerRoles{}.role_of({kSomebody, {0}})) << "no group is told";
 }
 
+TEST(Proxy, IsNamedByAddressOrByUser) {
+  EXPECT_EQ(find_proxy("127.0.0.1")->address, "127.0.0.1");
+  EXPECT_EQ(find_proxy("::ffff:10.1.2.3")->address, "10.1.2.3");
+  EXPECT_EQ(find_proxy("unix:root")->user, uid_t{0});
+  const auto none = find_proxy("");
+  EXPECT_FALSE(none->address || none->user);
+  EXPECT_EQ(find_proxy("proxy.example").error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(find_proxy("unix:nobody-of-that-name").error().code, ErrorCode::not_found);
+}
+
+TEST(ForwardedAddress, IsTheLastOneWhichTheProxyItselfAppended) {
+  EXPECT_EQ(forwarded_address("10.0.0.7"), "10.0.0.7");
+  EXPECT_EQ(forwarded_address("1.2.3.4, 5.6.7.8 ,\t2001:DB8::0:1 "), "2001:db8::1");
+  EXPECT_EQ(forwarded_address("::ffff:10.0.0.7"), "10.0.0.7");
+  for (const auto* const bad : {"", " ", "10.0.0.7,", "unknown", "10.0.0", "10.0.0.7:80", "10.0.0.7, _hidden"}) {
+    EXPECT_FALSE(forwarded_address(bad)) << bad;
+  }
+}
+
 TEST(PeerCredentials, AreThoseOfTheOtherEnd) {
   int ends[2];
   ASSERT_EQ(::socketpair(AF_UNIX, SOCK_STREAM, 0, ends), 0);

@@ -14,7 +14,9 @@ TEST_F(JobBundles, WhatADaemonThatDiedLeftGoesHalfPackedOrWhole) {
   for (const auto* const file : {".bundle-1.tar.gz", ".bundle-2.tar.gz.part", "index.sqlite"}) {
     scan_samples::write_text(folder_ / file, "x");
   }
+  fs::create_directories(folder_ / ".bundle-2.tar.gz.beside/job/rig");
   remove_old_bundles(folder_);
+  EXPECT_FALSE(fs::exists(folder_ / ".bundle-2.tar.gz.beside"));
   EXPECT_FALSE(fs::exists(folder_ / ".bundle-1.tar.gz"));
   EXPECT_FALSE(fs::exists(folder_ / ".bundle-2.tar.gz.part"));
   EXPECT_TRUE(fs::exists(folder_ / "index.sqlite"));
