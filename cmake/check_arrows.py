@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks which folder may include which: the arrows of docs/architecture.md.
+"""Checks which folder may include which: the arrows of docs/reference/architecture.md.
 
 Usage: check_arrows.py ROOT. Prints one line a forbidden include and exits 1 if there is any.
 """

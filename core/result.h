@@ -71,7 +71,7 @@ template <class T>
   return tl::unexpected<Error>(result.error().in(who));
 }
 
-/// Exit codes of every scanrig program, documented in docs/exit-codes.md.
+/// Exit codes of every scanrig program, documented in docs/reference/exit-codes.md.
 enum class ExitCode : int {
   ok = 0,
   internal = 1,

@@ -57,7 +57,8 @@ class JsonObject {
   std::vector<std::string> taken_;
 };
 
-/// A JSON file of one of the formats of docs/scan-folder.md, read strictly. Errors name the file and the key's path.
+/// A JSON file of one of the formats of docs/reference/scan-folder.md, read strictly. Errors name the file and the
+/// key's path.
 class JsonFile {
  public:
   /// Fails with `not_found`, `io`, `invalid_input` (not JSON, another format), `unsupported` (a version not known

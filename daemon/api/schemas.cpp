@@ -6,7 +6,7 @@ const char* const kSchemas = R"({
 "Error": {"type": "object", "required": ["error"], "additionalProperties": false, "properties": {
   "error": {"$ref": "#/components/schemas/Problem"}}},
 "Problem": {"type": "object", "required": ["code", "message"], "additionalProperties": false, "properties": {
-  "code": {"type": "string", "description": "one of the error codes of docs/exit-codes.md"},
+  "code": {"type": "string", "description": "one of the error codes of docs/reference/exit-codes.md"},
   "message": {"type": "string", "description": "who, doing what, what happened, what to do"}}},
 "MaybeProblem": {"allOf": [{"$ref": "#/components/schemas/Problem"}], "nullable": true},
 "Nothing": {"type": "object", "additionalProperties": false, "properties": {}},

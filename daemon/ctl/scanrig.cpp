@@ -8,7 +8,7 @@ int main(int argc, char** argv) {
   using namespace scanrig::ctl;
   CLI::App app("the operator's and engineer's command of a 3D-scanning rig", "scanrig");
   app.require_subcommand(1);
-  app.footer("Exit codes: docs/exit-codes.md");
+  app.footer("Exit codes: docs/reference/exit-codes.md");
   Chosen chosen;
   add_station_commands(app, chosen);
   add_job_commands(app, chosen);

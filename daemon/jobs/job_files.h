@@ -10,7 +10,7 @@
 
 namespace scanrig {
 
-/// The files of a job beside scan.json, docs/scan-folder.md.
+/// The files of a job beside scan.json, docs/reference/scan-folder.md.
 
 /// Where a job's model and report are.
 std::filesystem::path model_folder(const std::filesystem::path& job_folder);

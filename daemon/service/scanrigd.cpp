@@ -24,7 +24,7 @@ Result<void> run(const std::filesystem::path& file, SignalStop& stop) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("scanrigd: the daemon of a scanning rig. Exit codes: docs/exit-codes.md");
+  CLI::App app("scanrigd: the daemon of a scanning rig. Exit codes: docs/reference/exit-codes.md");
   std::filesystem::path config = "/etc/scanrig/rig.toml";
   bool make_safe = false, beside_daemon = false;
   app.add_option("--config", config, "the rig's configuration")->capture_default_str();

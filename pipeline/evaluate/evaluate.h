@@ -25,8 +25,8 @@ struct Claim {
   std::optional<Transform> pose1_from_pose2;  ///< as the reconstruction found it
 };
 
-/// Judges a model against the truth by the rules of pipeline.md, section 9. `photos`: the scan's plain images for the
-/// texture's figures, or null. Stages reported: "evaluate".
+/// Judges a model against the truth by the rules of pipeline/evaluate/README.md. `photos`: the scan's plain images for
+/// the texture's figures, or null. Stages reported: "evaluate".
 /// Fails with `degenerate` (a mesh without faces), `stopped`, and as the photos' loading does.
 Result<Scores> evaluate(const Claim& claim, const Truth& truth, const ScanFolder* photos,
                         const EvaluateOptions& options, const Context& context);

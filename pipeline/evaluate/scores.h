@@ -20,7 +20,7 @@ struct DistanceFigures {
   double share_over_050 = kNoFigure;
 };
 
-/// Shares are of area, 0..1. pipeline.md, section 9.
+/// Shares are of area, 0..1. pipeline/evaluate/README.md.
 struct Scores {
   // In the absolute frame: no alignment.
   DistanceFigures measured;        ///< A, C: measured area to truth

@@ -9,7 +9,7 @@
 
 namespace scanrig {
 
-/// What can be seen at all: pipeline.md, section 9.
+/// What can be seen at all: pipeline/evaluate/README.md.
 struct ObservableRule {
   double steepest_deg = 70.0;  ///< incidence to left, right and projector
   int margin_px = 8;           ///< inside both images

@@ -15,7 +15,7 @@
 
 namespace scanrig {
 
-/// Collects report.json, docs/report.md. Lengths mm, angles degrees.
+/// Collects report.json, docs/reference/report.md. Lengths mm, angles degrees.
 class Report {
  public:
   Report(const ReconstructOptions& options, const ScanIdentity& identity,

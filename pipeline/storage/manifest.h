@@ -12,7 +12,7 @@
 
 namespace scanrig {
 
-/// The manifest of docs/scan-folder.md.
+/// The manifest of docs/reference/scan-folder.md.
 struct FileRecord {
   std::string path;  ///< relative to the scan folder
   std::string sha256;

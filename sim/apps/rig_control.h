@@ -8,7 +8,7 @@
 
 namespace scanrig::sim {
 
-/// What the lines on the control socket mean; the list is in sim/wire/README.md.
+/// What the lines on the control socket mean; the list is in docs/reference/simulated-rig.md.
 /// Threads: one at a time.
 class RigControl {
  public:

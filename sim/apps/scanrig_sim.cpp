@@ -66,7 +66,8 @@ Result<void> serve_rig(const sim::WireRigOptions& options) {
 }
 
 void add_rig(CLI::App& app, sim::WireRigOptions& o, sim::SceneOptions& scene, Chosen& chosen) {
-  auto* rig = app.add_subcommand("rig", "The simulated rig on the wire, until SIGTERM; see sim/wire/README.md");
+  auto* rig =
+      app.add_subcommand("rig", "The simulated rig on the wire, until SIGTERM; see docs/reference/simulated-rig.md");
   rig->add_option("--dir", o.toml.folder, "folder for rig.toml, ports and sockets")->required();
   rig->add_option("--drive", o.toml.drive, "leadshine-rs, oriental-az, grbl")->capture_default_str();
   rig->add_option("--panel", o.toml.panel, "gpio, modbus-io")->capture_default_str();

@@ -155,7 +155,8 @@ Result<void> run_as_told(const SimOptions& o, SignalStop& stop) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("scanrigd-sim: the daemon over a simulated rig in the same process. Exit codes: docs/exit-codes.md");
+  CLI::App app(
+      "scanrigd-sim: the daemon over a simulated rig in the same process. Exit codes: docs/reference/exit-codes.md");
   SimOptions options;
   add_options(app, options);
   try {

@@ -52,7 +52,7 @@ class SimRig {
   virtual void stall_turntable(bool stalled) = 0;
   virtual void lose_frames(int count) = 0;  ///< the next `count` frame pairs never arrive
 
-  /// The calibration of docs/scan-folder.md, exact.
+  /// The calibration of docs/reference/scan-folder.md, exact.
   virtual Result<void> write_calibration(const std::filesystem::path& file) const = 0;
   /// truth.json and truth.ply, into a scan folder, for the latest `poses` times the object was put down and exposed; a
   /// view taken again replaces the one before. Fails with `degenerate` (nothing exposed yet), `io`.

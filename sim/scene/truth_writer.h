@@ -8,7 +8,7 @@
 
 namespace scanrig::sim {
 
-/// The exact calibration of a scene's cameras, as docs/scan-folder.md has it. Fails with `io`.
+/// The exact calibration of a scene's cameras, as docs/reference/scan-folder.md has it. Fails with `io`.
 Result<void> write_calibration(const Scene& scene, const std::filesystem::path& file);
 
 /// Where the table really stood while one pose was taken.

@@ -9,7 +9,7 @@ import subprocess
 from slowness import SLOWNESS
 
 LIMIT_S = 120 * SLOWNESS
-USAGE, BAD_INPUT, OUT_OF_RANGE, NO_MODEL = 2, 3, 5, 7  # docs/exit-codes.md
+USAGE, BAD_INPUT, OUT_OF_RANGE, NO_MODEL = 2, 3, 5, 7  # docs/reference/exit-codes.md
 
 
 def tree(folder):

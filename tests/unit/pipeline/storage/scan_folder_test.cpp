@@ -135,7 +135,7 @@ TEST_F(ScanFolderTest, EachConfigurationItsViewsWereTakenUnderIsKeptOnce) {
   expect_refused(ErrorCode::invalid_input, {"scan.json", "config_sha256"});
 }
 
-// The example of docs/scan-folder.md, shortened to one view.
+// The example of docs/reference/scan-folder.md, shortened to one view.
 TEST_F(ScanFolderTest, TheDocumentedManifestIsRead) {
   const std::string zeros(64, '0');
   std::string text = R"({
