@@ -57,7 +57,8 @@ class MotionSession final : public Motion {
     lines_ = open_lines(config_, clock_);
     panel_ = open_panel(config_, *lines_, clock_);
     panel_thread_.emplace(
-        *panel_, clock_, [this](const Event& event) { panel_event(event); }, [this] { estop(); });
+        *panel_, clock_, PanelThreadOptions{.read_time = panel_read_time(config_.panel)},
+        [this](const Event& event) { panel_event(event); }, [this] { estop(); });
     supervisor_ = std::thread([this] { supervise(); });
   }
   ~MotionSession() override { close(); }
@@ -136,7 +137,7 @@ void MotionSession::supervise() {
     const bool has_guardian = guardian_.report(is_moving_);
     lock.unlock();
     if (!has_guardian) stop({ErrorCode::timeout, "motion guardian: ended unexpectedly. Try again"});
-    if (auto hangs = panel_thread_->hangs()) stop(std::move(*hangs));
+    if (const auto call = panel_thread_->hung()) stop(hung_error(*call));
     lock.lock();
   }
 }

@@ -128,7 +128,7 @@ std::vector<KeptJob> HousekeepingThread::ended_jobs() {
                     .number = entry.number,
                     .bytes = retention_.keep_bytes ? measure_folder(folder).bytes : 0,
                     .is_removable = is_final(stored->state) && stored->exported && job->exported &&
-                                    !stored->resumable && !job->resumable});
+                                    !is_resumable(*stored) && !is_resumable(*job)});
   }
   ledger_->keep_only(ids);
   return kept;

@@ -90,4 +90,12 @@ Result<OpenDevices> open_devices(const config::RigConfig& config, Clock& clock) 
   return open;
 }
 
+/// On a module's bus: until the next polling, then coils and inputs; one reply is missed, the bus is left quiet for two
+/// reply timeouts, and both are read again (drivers/panel/modbus_io_panel.h).
+Clock::Duration panel_read_time(const config::PanelConfig& config) {
+  if (config.driver != config::PanelConfig::Driver::modbus_io) return Clock::Duration::zero();
+  constexpr int kReplyTimeouts = 1 + 2 + 2;
+  return config.poll + kReplyTimeouts * config.io_module.reply_timeout;
+}
+
 }  // namespace scanrig

@@ -33,4 +33,8 @@ Result<std::unique_ptr<Projector>> open_projector(const config::ProjectorConfig&
                                                   Clock& clock);
 std::unique_ptr<Panel> open_panel(const config::RigConfig& config, gpio::Lines& lines, Clock& clock);
 
+/// How long a reading of the panel may take beyond its deadline, for PanelThreadOptions: 0 unless it is a module on a
+/// bus.
+Clock::Duration panel_read_time(const config::PanelConfig& config);
+
 }  // namespace scanrig

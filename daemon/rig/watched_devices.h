@@ -62,7 +62,7 @@ class WatchedProjector final : public Projector {
     return projector_.fire(light, deadline);
   }
   Result<void> turn_off(Deadline deadline) override {
-    const DeviceWatch::Call call(watch_, "dark", deadline);
+    const DeviceWatch::Call call(watch_, "turn_off", deadline);
     return projector_.turn_off(deadline);
   }
   void request_off() noexcept override { projector_.request_off(); }
@@ -79,9 +79,9 @@ class WatchedCamera final : public StereoCamera {
   WatchedCamera(StereoCamera& camera, const Clock& clock, Clock::Duration margin)
       : camera_(camera), watch_(clock, "camera", margin) {}
 
-  Result<void> ready(Deadline deadline) override {
-    const DeviceWatch::Call call(watch_, "ready", deadline);
-    return camera_.ready(deadline);
+  Result<void> prepare(Deadline deadline) override {
+    const DeviceWatch::Call call(watch_, "prepare", deadline);
+    return camera_.prepare(deadline);
   }
   Result<void> arm(Deadline deadline) override {
     const DeviceWatch::Call call(watch_, "arm", deadline);
@@ -91,9 +91,9 @@ class WatchedCamera final : public StereoCamera {
     const DeviceWatch::Call call(watch_, "collect", deadline);
     return camera_.collect(deadline);
   }
-  Result<StereoFrame> look(Deadline deadline) override {
-    const DeviceWatch::Call call(watch_, "look", deadline);
-    return camera_.look(deadline);
+  Result<StereoFrame> capture_preview(Deadline deadline) override {
+    const DeviceWatch::Call call(watch_, "capture_preview", deadline);
+    return camera_.capture_preview(deadline);
   }
 
   [[nodiscard]] std::optional<HungCall> hung() const { return watch_.hung(); }

@@ -5,6 +5,7 @@
 #include "core/hash.h"
 #include "daemon/jobs/pipeline_reconstructor.h"
 #include "daemon/jobs/process_reconstructor.h"
+#include "daemon/rig/open_devices.h"
 
 namespace scanrig {
 namespace {
@@ -39,14 +40,6 @@ Recipe recipe_from(const std::string& name, const config::RecipeConfig& config) 
           .flip_by_signal = config.flip == config::RecipeConfig::Flip::signal,
           .start_on_part = config.start == config::RecipeConfig::Start::part_present,
           .limits = {config.min_measured_share, config.max_residual_mm}};
-}
-
-/// On a module's bus: until the next polling, then coils and inputs; one reply is missed, the bus is left quiet for two
-/// reply timeouts, and both are read again (drivers/panel/modbus_io_panel.h).
-Clock::Duration panel_read_time(const config::PanelConfig& config) {
-  if (config.driver != config::PanelConfig::Driver::modbus_io) return Clock::Duration::zero();
-  constexpr int kReplyTimeouts = 1 + 2 + 2;
-  return config.poll + kReplyTimeouts * config.io_module.reply_timeout;
 }
 
 ReconstructorFactory reconstructor_from(const config::ReconstructionConfig& config) {

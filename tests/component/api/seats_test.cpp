@@ -42,7 +42,7 @@ class SeatsOfTheApi : public ApiBench {
   }
   /// What the client of the command line does for `scanrig stop`.
   void stop_locally() const {
-    const auto stopped = ctl::ask(options.socket, "POST", "/api/v1/stop");
+    const auto stopped = ctl::send_request(options.socket, "POST", "/api/v1/stop");
     EXPECT_TRUE(stopped) << (stopped ? "" : stopped.error().message);
   }
 };

@@ -38,6 +38,8 @@ class FakeTurntable final : public Turntable {
   }
   Result<void> stop(Deadline) override {
     const std::lock_guard guard(mutex);
+    ++stops;
+    last_stop = clock_.now();
     if (unreachable) return fail(ErrorCode::timeout, "turntable: no reply");
     moving = false;
     return {};
@@ -64,6 +66,8 @@ class FakeTurntable final : public Turntable {
   bool moving = false;
   bool stalled = false;
   bool unreachable = false;
+  int stops = 0;  ///< calls of stop()
+  Clock::TimePoint last_stop{};
   TurntableStatus::Motion reported = TurntableStatus::Motion::stopped;  ///< by status()
   std::string alarm;                                                    ///< likewise
   std::vector<double> targets;                                          ///< of every move, homing included

@@ -116,7 +116,7 @@ class HangingProjector final : public Projector {
     return projector_.fire(light, deadline);
   }
   Result<void> turn_off(Deadline deadline) override {
-    gate_.pass("projector.dark", deadline);
+    gate_.pass("projector.turn_off", deadline);
     return projector_.turn_off(deadline);
   }
   void request_off() noexcept override { projector_.request_off(); }
@@ -130,7 +130,7 @@ class HangingCamera final : public StereoCamera {
  public:
   HangingCamera(StereoCamera& camera, Gate& gate) : camera_(camera), gate_(gate) {}
   Result<void> prepare(Deadline deadline) override {
-    gate_.pass("camera.ready", deadline);
+    gate_.pass("camera.prepare", deadline);
     return camera_.prepare(deadline);
   }
   Result<void> arm(Deadline deadline) override {
@@ -142,7 +142,7 @@ class HangingCamera final : public StereoCamera {
     return camera_.collect(deadline);
   }
   Result<StereoFrame> capture_preview(Deadline deadline) override {
-    gate_.pass("camera.look", deadline);
+    gate_.pass("camera.capture_preview", deadline);
     return camera_.capture_preview(deadline);
   }
 

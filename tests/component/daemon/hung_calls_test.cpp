@@ -134,9 +134,9 @@ class EachHungCall : public HungCalls, public testing::WithParamInterface<std::p
         {"turntable.home", &EachHungCall::while_homing},       {"turntable.reset_alarm", &EachHungCall::while_homing},
         {"turntable.rotate_to", &EachHungCall::while_turning}, {"turntable.stop", &EachHungCall::by_stop},
         {"turntable.status", &EachHungCall::while_idle},       {"turntable.limit_speed", &EachHungCall::by_jog},
-        {"projector.fire", &EachHungCall::while_exposing},     {"projector.dark", &EachHungCall::by_stop},
-        {"camera.ready", &EachHungCall::while_idle},           {"camera.arm", &EachHungCall::while_exposing},
-        {"camera.collect", &EachHungCall::while_exposing},     {"camera.look", &EachHungCall::by_preview},
+        {"projector.fire", &EachHungCall::while_exposing},     {"projector.turn_off", &EachHungCall::by_stop},
+        {"camera.prepare", &EachHungCall::while_idle},           {"camera.arm", &EachHungCall::while_exposing},
+        {"camera.collect", &EachHungCall::while_exposing},     {"camera.capture_preview", &EachHungCall::by_preview},
         {"panel.wait_change", &EachHungCall::while_moving},    {"panel.show", &EachHungCall::by_stop}};
     (this->*ways.at(call))(call);
   }
@@ -177,9 +177,9 @@ INSTANTIATE_TEST_SUITE_P(AllCalls, EachHungCall,
                          testing::Values(std::pair("turntable", "home"), std::pair("turntable", "rotate_to"),
                                          std::pair("turntable", "stop"), std::pair("turntable", "reset_alarm"),
                                          std::pair("turntable", "status"), std::pair("turntable", "limit_speed"),
-                                         std::pair("projector", "fire"), std::pair("projector", "dark"),
-                                         std::pair("camera", "ready"), std::pair("camera", "arm"),
-                                         std::pair("camera", "collect"), std::pair("camera", "look"),
+                                         std::pair("projector", "fire"), std::pair("projector", "turn_off"),
+                                         std::pair("camera", "prepare"), std::pair("camera", "arm"),
+                                         std::pair("camera", "collect"), std::pair("camera", "capture_preview"),
                                          std::pair("panel", "wait_change"), std::pair("panel", "show")),
                          [](const auto& info) { return std::string(info.param.first) + "_" + info.param.second; });
 
