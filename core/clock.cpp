@@ -4,9 +4,9 @@ namespace scanrig {
 
 void Clock::sleep_until(TimePoint until) {
   std::mutex mutex;
-  std::condition_variable nobody;
+  std::condition_variable unused;
   std::unique_lock lock(mutex);
-  wait_until(lock, nobody, until, [] { return false; });
+  wait_until(lock, unused, until, [] { return false; });
 }
 
 Clock::TimePoint RealClock::now() const { return std::chrono::steady_clock::now(); }

@@ -7,7 +7,7 @@
 
 namespace scanrig {
 
-/// Time as the rig sees it. Everything that waits does so through a Clock, so that tests can run on a virtual one.
+/// Time for everything in the rig. All waiting goes through a Clock, so that tests can run on a virtual one.
 /// Threads: every function may be called from any thread.
 class Clock {
  public:
@@ -18,14 +18,14 @@ class Clock {
   [[nodiscard]] virtual TimePoint now() const = 0;
 
   /// Waits, with `lock` held, until `ready()` or `until`; returns `ready()`.
-  /// Whoever makes `ready()` true must call `notify_all(changed)` of the same clock.
+  /// The code that makes `ready()` true must call `notify_all(changed)` of the same clock.
   virtual bool wait_until(std::unique_lock<std::mutex>& lock, std::condition_variable& changed, TimePoint until,
                           const std::function<bool()>& ready) = 0;
 
   virtual void notify_all(std::condition_variable& changed) = 0;
 
   /// Held by a thread for as long as it runs: a virtual clock moves only while every actor waits in it.
-  /// Whoever starts the thread holds a Busy until the thread has its Actor. Nothing on a real clock.
+  /// The starter of the thread holds a Busy until the thread has its Actor. No effect on a real clock.
   class Actor {
    public:
     explicit Actor(Clock& clock) : clock_(clock) { clock_.enter(); }
@@ -49,7 +49,7 @@ class Clock {
     Clock& clock_;
   };
 
-  /// Sleeps; for devices' physics, never to wait for somebody else's result.
+  /// Sleeps; for devices' physics, never to wait for a result of another thread.
   void sleep_until(TimePoint until);
   void sleep_for(Duration duration) { sleep_until(now() + duration); }
 

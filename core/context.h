@@ -6,7 +6,7 @@
 
 namespace scanrig {
 
-/// What a long computation is given last: a way to be stopped and a way to say how far it is.
+/// Last argument of a long computation: a stop request and a progress report.
 /// `progress` may be called from the computing thread only; stage names are short words ("range", "volume").
 struct Context {
   std::stop_token stop;

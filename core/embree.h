@@ -1,5 +1,5 @@
 #pragma once
-// Embree 3 (Debian 12) and 4 (Debian 13): the places where they differ for us. Link scanrig::embree.
+// Embree 3 (Debian 12) and 4 (Debian 13): the differences that matter here. Link scanrig::embree.
 
 #if __has_include(<embree4/rtcore.h>)
 #include <embree4/rtcore.h>
@@ -9,8 +9,8 @@
 
 namespace scanrig {
 
-/// Null where it cannot be had. Under the thread sanitizer, which cannot see how Embree's threads hand work to each
-/// other, scenes are built by the thread that asks for it.
+/// A device, or null where Embree cannot create one. The thread sanitizer cannot follow how Embree's threads hand work
+/// to each other. Under it the calling thread builds the scenes.
 inline RTCDevice new_embree_device() {
 #ifdef __SANITIZE_THREAD__
   return rtcNewDevice("threads=1");
@@ -19,7 +19,7 @@ inline RTCDevice new_embree_device() {
 #endif
 }
 
-/// The first triangle `ray` meets is written into it; ray.hit.geomID is to be RTC_INVALID_GEOMETRY_ID beforehand.
+/// Writes the first triangle hit by `ray` into it. ray.hit.geomID must be RTC_INVALID_GEOMETRY_ID beforehand.
 inline void intersect(RTCScene scene, RTCRayHit& ray) {
 #if RTC_VERSION_MAJOR >= 4
   rtcIntersect1(scene, &ray);

@@ -108,8 +108,8 @@ Result<void> create_directories_synced(const std::filesystem::path& path) {
   std::error_code error;
   if (path.empty()) return {};
   if (std::filesystem::exists(path, error)) {
-    // A crash between making a folder and syncing its name leaves it like this; where that may not be read, it is
-    // somebody else's folder.
+    // A crash between creating a folder and syncing its name leaves this state. A parent that may not be read belongs
+    // to another user.
     std::ignore = sync_folder(path.parent_path());
     return {};
   }

@@ -23,17 +23,17 @@ struct FileContent {
   std::span<const std::byte> bytes;
 };
 /// Writes several files of one folder, then syncs each of them and the folder once. Cheaper than one by one but not
-/// atomic: for files that nobody reads until something else names them. Fails with `io`.
+/// atomic: for files that are not read until another file names them. Fails with `io`.
 Result<void> write_files_synced(const std::filesystem::path& folder, std::span<const FileContent> files);
 
-/// Removes a file so that it stays away after a power cut. One that is not there is no error. Fails with `io`.
+/// Deletes a file so that it stays deleted after a power cut. A missing file is no error. Fails with `io`.
 Result<void> remove_file_synced(const std::filesystem::path& path);
 
 /// Creates `path` and its parents and syncs each new entry's folder. Fails with `io`.
 Result<void> create_directories_synced(const std::filesystem::path& path);
 
 /// Puts the folder `prepared`, its files already synced, in the place of `target` on the same file system, and syncs.
-/// An older `target` is exchanged in one step where the file system can do that, and removed. Fails with `io`.
+/// An older `target` is exchanged in one step where the file system supports it, and deleted. Fails with `io`.
 Result<void> replace_folder(const std::filesystem::path& prepared, const std::filesystem::path& target);
 
 }  // namespace scanrig

@@ -9,15 +9,15 @@
 
 #include "core/result.h"
 
-/// Images to bytes of a file and back. The libraries of the formats are called directly: OpenCV's own reader of images
-/// loads a hundred libraries of formats that no rig has, which a program does each time that it is started.
-/// Every function may be called from any thread. An image has 8 bit, one channel (grey) or three (BGR), if not said
+/// Images to bytes of a file and back. The format libraries are called directly: OpenCV's own image reader loads a
+/// hundred libraries of formats that no rig has, at every program start.
+/// Every function may be called from any thread. An image has 8 bit, one channel (grey) or three (BGR), unless stated
 /// otherwise, and at most kMaxImagePixels. All fail with `invalid_input`.
 namespace scanrig {
 
 inline constexpr std::size_t kMaxImagePixels = 1 << 27;
 
-/// Quickly rather than small: images of a sensor are noise to a compressor.
+/// Favours speed over size: sensor images are noise to a compressor.
 Result<std::vector<std::byte>> encode_png(const cv::Mat& image);
 /// Grey, colour or a palette; not 16 bit, no alpha. A file that ends before its IEND chunk is refused.
 Result<cv::Mat> decode_png(std::string_view bytes);
@@ -32,10 +32,10 @@ Result<cv::Mat> decode_jpeg(std::string_view bytes);
 Result<std::vector<std::byte>> encode_tiff(const cv::Mat1f& depth);
 Result<cv::Mat> decode_tiff(std::string_view bytes);
 
-/// A PNG or a TIFF, whichever it begins as.
+/// A PNG or a TIFF, by its first bytes.
 Result<cv::Mat> decode_image(std::string_view bytes);
 
-/// Whether an image of that size is one that is decoded at all.
+/// Whether an image of that size may be decoded at all.
 constexpr bool is_image_size(std::uint64_t width, std::uint64_t height) {
   return width > 0 && height > 0 && width < kMaxImagePixels && width * height <= kMaxImagePixels;
 }

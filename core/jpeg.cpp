@@ -16,7 +16,7 @@ struct Release {
   void operator()(unsigned char* bytes) const { tjFree(bytes); }
 };
 
-/// Cameras pad between markers, which harms nothing; what else libjpeg warns about leaves a part of the image grey.
+/// Cameras pad between markers, which does no harm; other warnings of libjpeg leave a region of the image grey.
 bool is_harmless(std::string_view warning) { return warning.find("extraneous bytes") != std::string_view::npos; }
 
 }  // namespace

@@ -10,7 +10,7 @@
 namespace scanrig {
 namespace {
 
-/// Those that help a thread which gives way do so too.
+/// Worker threads that help a thread of lower priority take its priority.
 class NoMoreUrgent : public tbb::task_scheduler_observer {
  public:
   explicit NoMoreUrgent(tbb::task_arena& arena) : task_scheduler_observer(arena), niceness_(niceness()) {
@@ -19,7 +19,7 @@ class NoMoreUrgent : public tbb::task_scheduler_observer {
   NoMoreUrgent(const NoMoreUrgent&) = delete;
   NoMoreUrgent& operator=(const NoMoreUrgent&) = delete;
   ~NoMoreUrgent() override { observe(false); }
-  void on_scheduler_entry(bool) override { give_way_by(niceness_); }
+  void on_scheduler_entry(bool) override { lower_priority_to(niceness_); }
 
  private:
   const int niceness_;

@@ -5,8 +5,8 @@
 
 namespace scanrig {
 
-/// Runs `body(i)` for i in [0, count) on the pool of the current thread's arena. Bodies must not depend on order;
-/// a result must not depend on which thread ran them. Hand out rows or blocks, not single pixels: the call is indirect.
+/// Runs `body(i)` for i in [0, count) on the pool of the current thread's arena. Bodies must not depend on order,
+/// results not on the thread. Use rows or blocks, not single pixels: the call is indirect.
 void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body);
 
 /// Runs `work` with parallel_for limited to `threads` threads (0: all of the machine's).

@@ -1,5 +1,5 @@
-// The loops of a build for the thread sanitizer, which cannot see how TBB hands work from thread to thread: threads
-// that are started and joined here, and nothing else between the bodies that could hide a race.
+// Loops for a build with the thread sanitizer, which cannot follow how TBB hands work from thread to thread. Threads
+// are started and joined here; no other synchronisation between the bodies could hide a race.
 
 #include <algorithm>
 #include <atomic>
@@ -17,7 +17,7 @@ thread_local std::size_t threads_here = 0;  // 0: all of the machine's
 }  // namespace
 
 void parallel_for(std::size_t count, const std::function<void(std::size_t)>& body) {
-  const std::size_t most = threads_here > 0 ? threads_here : std::thread::hardware_concurrency();
+  const std::size_t max_threads = threads_here > 0 ? threads_here : std::thread::hardware_concurrency();
   std::atomic<std::size_t> next = 0;
   const auto work = [&] {
     with_threads(1, [&] {  // a loop inside a body finds all processors taken
@@ -26,7 +26,7 @@ void parallel_for(std::size_t count, const std::function<void(std::size_t)>& bod
     });
   };
   std::vector<std::jthread> others;
-  for (std::size_t k = 1; k < std::min(most, count); ++k) others.emplace_back(work);
+  for (std::size_t k = 1; k < std::min(max_threads, count); ++k) others.emplace_back(work);
   work();
 }
 

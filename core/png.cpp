@@ -66,8 +66,7 @@ Result<cv::Mat> decode_png(std::string_view bytes) {
   if (code == 0) code = spng_get_ihdr(context.get(), &header);
   if (code != 0) return complaint("decoded", code);
   if (header.bit_depth > 8 || has_alpha(header) || !is_image_size(header.width, header.height)) {
-    return fail(ErrorCode::invalid_input,
-                "the PNG image is not one of 8 bit grey or colour without alpha, or too large");
+    return fail(ErrorCode::invalid_input, "the PNG image is not 8 bit grey or colour without alpha, or is too large");
   }
   const bool grey = header.color_type == SPNG_COLOR_TYPE_GRAYSCALE;
   cv::Mat image(static_cast<int>(header.height), static_cast<int>(header.width), grey ? CV_8UC1 : CV_8UC3);
@@ -76,7 +75,7 @@ Result<cv::Mat> decode_png(std::string_view bytes) {
   if (code == 0) code = spng_decode_chunks(context.get());
   if (code != 0) return complaint("decoded", code);
   if (bytes.find(kEnd) == std::string_view::npos)
-    return fail(ErrorCode::invalid_input, "a PNG image of which the end is missing");
+    return fail(ErrorCode::invalid_input, "the PNG image is cut short: its end is missing");
   if (!grey) cv::cvtColor(image, image, cv::COLOR_RGB2BGR);
   return image;
 }

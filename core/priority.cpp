@@ -6,16 +6,16 @@
 namespace scanrig {
 namespace {
 
-constexpr int kBackground = 15;  // about a thirtieth of the time of a thread that does not give way
+constexpr int kBackground = 15;  // about a thirtieth of the time of a thread with normal priority
 
 }  // namespace
 
 int niceness() { return ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid())); }
 
-void give_way_by(int value) {
-  if (niceness() < value) ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), value);
+void lower_priority_to(int nice) {
+  if (niceness() < nice) ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), nice);
 }
 
-void lower_priority() { give_way_by(kBackground); }
+void lower_priority() { lower_priority_to(kBackground); }
 
 }  // namespace scanrig

@@ -2,14 +2,15 @@
 
 namespace scanrig {
 
-/// The calling thread, and those that it starts from now on, run when no other thread of the machine wants to: work of
-/// seconds beside work of milliseconds. For good: raising a priority again takes a privilege. Loops that such a thread
-/// runs in with_threads() give way with it. On Linux a thread has a nice value of its own (sched(7)).
+/// Lowers the priority of the calling thread and of those that it starts from now on, for work of seconds beside work
+/// of milliseconds. They run when no other thread of the machine needs the processor. Permanent: raising a priority
+/// again takes a privilege. Loops in with_threads() of such a thread take its priority. On Linux a thread has its own
+/// nice value (sched(7)).
 void lower_priority();
 
-/// How far the calling thread gives way (its nice value); 0: not at all.
+/// Nice value of the calling thread; 0: normal priority.
 int niceness();
-/// The calling thread gives way at least so far, from now on.
-void give_way_by(int niceness);
+/// Lowers the calling thread at least to `nice`, from now on.
+void lower_priority_to(int nice);
 
 }  // namespace scanrig

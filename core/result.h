@@ -10,40 +10,40 @@
 
 namespace scanrig {
 
-/// What went wrong, for programs. The message beside it is for the person at the rig.
+/// Kind of failure, for programs. The message beside it is for the person at the rig.
 enum class ErrorCode {
   invalid_input,  ///< a file, an option or a request that cannot be used as it is
   not_found,      ///< a named thing does not exist
   exists,         ///< the result would overwrite something
   io,             ///< the operating system refused: disk, port, socket
   timeout,        ///< no positive evidence before the deadline
-  protocol,       ///< an answer that is not one: checksum, length, wrong request
+  protocol,       ///< a malformed reply: checksum, length, wrong request
   out_of_range,   ///< a value outside what the device or the rig allows
   device_alarm,   ///< the device itself reports a fault
-  stalled,        ///< told to move, does not move
-  not_homed,      ///< no known zero
-  stopped,        ///< someone asked to stop
-  busy,           ///< something else is being done
+  stalled,        ///< commanded to move, does not move
+  not_homed,      ///< home not found
+  stopped,        ///< stopped on request
+  busy,           ///< another operation is running
   refused,        ///< a rule of the station forbids it now
   unsupported,    ///< this version or this device cannot do it
   not_closed,     ///< a surface that should bound a solid does not
   degenerate,     ///< geometry without enough content to decide
   no_overlap,     ///< two data sets share no surface
-  ambiguous,      ///< more than one answer fits the data
+  ambiguous,      ///< more than one solution fits the data
   same_rest,      ///< the object was not turned over
   moved,          ///< the object or a camera moved during a pose
-  below_limits,   ///< a model that does not reach what its recipe asks for
+  below_limits,   ///< a model outside its recipe's limits
   internal,       ///< a bug
 };
 
 std::string_view to_string(ErrorCode code);
-std::optional<ErrorCode> parse_error_code(std::string_view name);  ///< of the words of to_string()
+std::optional<ErrorCode> parse_error_code(std::string_view name);  ///< of the names of to_string()
 
 struct Error {
   ErrorCode code = ErrorCode::internal;
   std::string message;  ///< who, doing what, what happened, what to do
 
-  /// The same error seen from one level further out: "who: message".
+  /// The same error with its outer context in front: "who: message".
   [[nodiscard]] Error in(std::string_view who) const;
 };
 
@@ -65,7 +65,7 @@ template <class T>
   return tl::unexpected<Error>(result.error());
 }
 
-/// Passes an error on, saying who met it: `return pass_on(result, "turntable");`
+/// Passes an error on with its context: `return pass_on(result, "turntable");`
 template <class T>
 [[nodiscard]] tl::unexpected<Error> pass_on(const Result<T>& result, std::string_view who) {
   return tl::unexpected<Error>(result.error().in(who));

@@ -4,10 +4,10 @@
 
 namespace scanrig {
 
-/// The value below which `fraction` (0..1) of `values` lie, nearest rank; NaN if there are none.
+/// The value below which `fraction` (0..1) of `values` lie, nearest rank; NaN for no values.
 double quantile(std::vector<double> values, double fraction);
 
-/// NaN if there are none.
+/// Root mean square; NaN for no values.
 double root_mean_square(const std::vector<double>& values);
 
 }  // namespace scanrig

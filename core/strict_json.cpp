@@ -14,7 +14,7 @@ using nlohmann::json;
 
 namespace {
 
-/// Both from 1, of the byte numbered from 1.
+/// Line and column, both from 1, of the byte numbered from 1.
 std::pair<std::size_t, std::size_t> line_and_column(std::string_view text, std::size_t byte) {
   const auto before = text.substr(0, byte > 0 ? byte - 1 : 0);
   const auto line_start = before.rfind('\n');
@@ -205,9 +205,9 @@ Transform JsonObject::transform(std::string_view key) {
   if (*fault_) return result;
   const double error = (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
   if (error > 1e-5)
-    reject_at(name, fmt::format("is not a rotation: its columns are off unit and square by {:.2g}", error));
+    reject_at(name, fmt::format("is not a rotation matrix: its columns are off unit and square by {:.2g}", error));
   else if (rotation.determinant() < 0.0)
-    reject_at(name, "is a mirror, not a rotation");
+    reject_at(name, "is a mirror, not a rotation matrix");
   if (translation.size() != 3 || Eigen::Vector3d(translation[0], translation[1], translation[2]).norm() > 1e5) {
     reject_at(where(key) + ".translation", "must be three numbers, in mm, within 1e5");
   }
@@ -235,13 +235,18 @@ JsonFile& JsonFile::operator=(JsonFile&&) noexcept = default;
 Result<JsonFile> JsonFile::read(const std::filesystem::path& file, std::string_view format, int newest, int oldest) {
   const auto text = read_file(file);
   if (!text) return pass_on(text);
+  return parse(*text, file, format, newest, oldest);
+}
+
+Result<JsonFile> JsonFile::parse(std::string_view text, const std::filesystem::path& file, std::string_view format,
+                                 int newest, int oldest) {
   JsonFile result;
   result.name_ = file.string();
-  result.sha256_ = scanrig::sha256(*text);
+  result.sha256_ = scanrig::sha256(text);
   try {
-    *result.document_ = json::parse(*text);
+    *result.document_ = json::parse(text);
   } catch (const json::parse_error& e) {
-    const auto [line, column] = line_and_column(*text, e.byte);
+    const auto [line, column] = line_and_column(text, e.byte);
     return fail(ErrorCode::invalid_input, "{}:{}:{}: not valid JSON from here on", result.name_, line, column);
   } catch (const json::exception& e) {
     return fail(ErrorCode::invalid_input, "{}: not valid JSON: {}", result.name_, e.what());

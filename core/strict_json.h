@@ -15,8 +15,8 @@
 
 namespace scanrig {
 
-/// One object of a JsonFile. Every key it holds must be asked for and every key asked for must be there; the first
-/// fault is kept in the file and what is returned after it is empty, so a reader asks for everything and checks once.
+/// One object of a JsonFile. The reader must read every key of the object, and every key it reads must be present. The
+/// first fault is kept in the file and values returned after it are empty, so a reader reads all keys and checks once.
 class JsonObject {
  public:
   JsonObject(const nlohmann::json* value, std::string path, std::optional<Error>* fault);
@@ -37,12 +37,12 @@ class JsonObject {
   std::vector<JsonObject> objects(std::string_view key);
   /// { "rotation": [[..],[..],[..]], "translation": [..] }, orthonormal to 1e-5, no mirror, translation within 1e5 mm.
   Transform transform(std::string_view key);
-  /// A key whose content is not for this reader.
+  /// A key whose content this reader ignores.
   void ignore(std::string_view key);
 
-  /// Faults a key (or the object, with an empty one) for a reason of the reader's own.
+  /// Faults a key (or the object, with an empty one) for a reason of the reader.
   void reject(std::string_view key, std::string_view why, ErrorCode code = ErrorCode::invalid_input);
-  /// To be called last: faults the first key nobody asked for.
+  /// Call last: faults the first key that was not read.
   void close();
 
  private:
@@ -61,13 +61,16 @@ class JsonObject {
 /// key's path.
 class JsonFile {
  public:
-  /// Fails with `not_found`, `io`, `invalid_input` (not JSON, another format), `unsupported` (a version not known
-  /// here).
+  /// Fails with `not_found`, `io`, `invalid_input` (not JSON, another format), `unsupported` (a version newer than this
+  /// program).
   static Result<JsonFile> read(const std::filesystem::path& file, std::string_view format, int version) {
     return read(file, format, version, version);
   }
-  /// The same where versions back to `oldest` can still be read.
+  /// The same for formats whose versions back to `oldest` can still be read.
   static Result<JsonFile> read(const std::filesystem::path& file, std::string_view format, int newest, int oldest);
+  /// The same from the file's text.
+  static Result<JsonFile> parse(std::string_view text, const std::filesystem::path& file, std::string_view format,
+                                int newest, int oldest);
   ~JsonFile();
   JsonFile(JsonFile&&) noexcept;
   JsonFile& operator=(JsonFile&&) noexcept;

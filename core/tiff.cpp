@@ -11,7 +11,7 @@ namespace {
 
 using File = std::unique_ptr<TIFF, decltype(&TIFFClose)>;
 
-/// What is wrong with a file is said by a Result, not on the terminal.
+/// Errors are reported in a Result, not on the terminal.
 void be_quiet() {
   static const bool once = [] {
     TIFFSetErrorHandler(nullptr);
@@ -64,18 +64,18 @@ Result<cv::Mat> decode_tiff(std::string_view bytes) {
   be_quiet();
   std::istringstream stream{std::string(bytes)};
   const File file(TIFFStreamOpen("depth", &stream), TIFFClose);
-  if (!file) return fail(ErrorCode::invalid_input, "the TIFF image cannot be decoded: its header is not readable");
+  if (!file) return fail(ErrorCode::invalid_input, "the TIFF image cannot be decoded: its header is unreadable");
   const auto width = field<std::uint32_t>(file.get(), TIFFTAG_IMAGEWIDTH);
   const auto height = field<std::uint32_t>(file.get(), TIFFTAG_IMAGELENGTH);
   const bool fits = field<std::uint16_t>(file.get(), TIFFTAG_BITSPERSAMPLE) == 32 &&
                     field<std::uint16_t>(file.get(), TIFFTAG_SAMPLESPERPIXEL) == 1 &&
                     field<std::uint16_t>(file.get(), TIFFTAG_SAMPLEFORMAT) == SAMPLEFORMAT_IEEEFP &&
                     TIFFIsTiled(file.get()) == 0 && is_image_size(width, height);
-  if (!fits) return fail(ErrorCode::invalid_input, "the TIFF image is not one of 32-bit float depth");
+  if (!fits) return fail(ErrorCode::invalid_input, "the TIFF image is not 32-bit float depth");
   cv::Mat1f depth(static_cast<int>(height), static_cast<int>(width));
   for (std::uint32_t y = 0; y < height; ++y) {
     if (TIFFReadScanline(file.get(), depth.ptr(static_cast<int>(y)), y, 0) != 1) {
-      return fail(ErrorCode::invalid_input, "the TIFF image cannot be decoded: row {} is not readable", y);
+      return fail(ErrorCode::invalid_input, "the TIFF image cannot be decoded: row {} is unreadable", y);
     }
   }
   return cv::Mat(depth);

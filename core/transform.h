@@ -4,7 +4,7 @@
 
 namespace scanrig {
 
-/// A rigid motion. Names say the target first: `camera_from_turntable * point_in_turntable`.
+/// A rigid motion. Names put the target first: `camera_from_turntable * point_in_turntable`.
 using Transform = Eigen::Isometry3d;
 
 /// Counter-clockwise seen from above (+Y up, right-handed): the table at angle theta carries X to rot_y(theta) * X.

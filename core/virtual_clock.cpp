@@ -24,7 +24,7 @@ bool VirtualClock::wait_until(std::unique_lock<std::mutex>& lock, std::condition
     Waiter self{&changed, until, actors_.contains(std::this_thread::get_id())};
     waiters_.push_back(&self);
     if (self.actor) ++waiting_actors_;
-    // The caller's lock is released only after this waiter is listed: a change made from here on finds it.
+    // The caller's lock is released only after this waiter is listed: a later change finds the waiter.
     lock.unlock();
     move_if_idle();
     self.wake.wait(guard, [&] { return self.woken; });
@@ -53,7 +53,7 @@ void VirtualClock::wake(Waiter& waiter) {
 void VirtualClock::move_if_idle() {
   if (holds_ > 0 || looking_again_ > 0 || waiting_actors_ < actors_.size() || waiters_.empty()) return;
   const auto earliest = (*std::ranges::min_element(waiters_, {}, [](const Waiter* w) { return w->until; }))->until;
-  if (earliest == TimePoint::max()) return;  // everybody waits for somebody outside
+  if (earliest == TimePoint::max()) return;  // every waiter waits for a thread outside
   now_ = std::max(now_, earliest);
   for (auto next = waiters_.begin(); next != waiters_.end();) {
     Waiter& waiter = **next++;
@@ -64,7 +64,7 @@ void VirtualClock::move_if_idle() {
 void VirtualClock::enter() {
   const std::lock_guard guard(mutex_);
   [[maybe_unused]] const bool first = actors_.insert(std::this_thread::get_id()).second;
-  assert(first && "one Actor a thread");
+  assert(first && "one Actor per thread");
 }
 
 void VirtualClock::leave() {

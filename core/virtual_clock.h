@@ -9,10 +9,10 @@
 
 namespace scanrig {
 
-/// A clock for tests: it jumps to the earliest moment anybody waits for as soon as every actor waits in it.
-/// A waiter that was notified counts as running until it has looked again, so no wake-up is overtaken by a time-out.
-/// Threads that are no actors may wait too; they never keep the clock from moving, except while they look again.
-/// An actor that blocks on anything but this clock stops time for everybody.
+/// A clock for tests: it jumps to the earliest moment in its waiters' list as soon as every actor waits in it. A
+/// notified waiter counts as running until it has checked its condition again, so no time-out overtakes a wake-up.
+/// Threads without an Actor may wait too. They never keep the clock from moving, except while they check again. An
+/// actor that blocks on anything but this clock stops time for all threads.
 class VirtualClock final : public Clock {
  public:
   [[nodiscard]] TimePoint now() const override;
@@ -22,7 +22,7 @@ class VirtualClock final : public Clock {
 
  private:
   struct Waiter {
-    const std::condition_variable* changed;  ///< only its address is used: what the waiter listens to
+    const std::condition_variable* changed;  ///< only its address is used: the variable that the waiter waits on
     TimePoint until;
     bool actor;
     bool woken = false;
@@ -42,7 +42,7 @@ class VirtualClock final : public Clock {
   TimePoint now_{};
   std::set<std::thread::id> actors_;
   std::list<Waiter*> waiters_;      ///< asleep, not yet woken
-  std::size_t waiting_actors_ = 0;  ///< of `waiters_`
+  std::size_t waiting_actors_ = 0;  ///< actors among `waiters_`
   std::size_t looking_again_ = 0;   ///< woken, `ready()` not yet evaluated
   std::size_t holds_ = 0;
 };

@@ -32,7 +32,7 @@ bool same(const cv::Mat& a, const cv::Mat& b) {
 
 std::string_view text(const Bytes& bytes) { return {reinterpret_cast<const char*>(bytes.data()), bytes.size()}; }
 
-/// What another program makes of the bytes.
+/// The image that another program reads from the bytes.
 cv::Mat read_elsewhere(const std::vector<std::byte>& bytes) {
   const std::string_view file = as_text(bytes);
   return cv::imdecode(std::vector<char>(file.begin(), file.end()), cv::IMREAD_UNCHANGED);
@@ -60,7 +60,7 @@ TEST(Png, APartOfAnImageIsWritten) {
   EXPECT_TRUE(same(decode_png(as_text(encode_png(part).value())).value(), part));
 }
 
-TEST(Png, WhatItCannotHoldIsRefused) {
+TEST(Png, UnsupportedImagesAreRefused) {
   for (const cv::Mat& image : {cv::Mat(), noise(CV_16UC1), noise(CV_8UC4), noise(CV_32FC1)}) {
     EXPECT_EQ(encode_png(image).error().code, ErrorCode::invalid_input);
   }
@@ -104,7 +104,7 @@ TEST(Jpeg, LooksAlikeHereAndElsewhere) {
   EXPECT_NEAR(grey->at<cv::Vec3b>(3, 3)[0], 90, 2);
 }
 
-TEST(Jpeg, WhatItCannotHoldIsRefused) {
+TEST(Jpeg, UnsupportedImagesAreRefused) {
   EXPECT_EQ(encode_jpeg(cv::Mat(), 90).error().code, ErrorCode::invalid_input);
   EXPECT_EQ(encode_jpeg(noise(CV_16UC1), 90).error().code, ErrorCode::invalid_input);
 }

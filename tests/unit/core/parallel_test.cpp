@@ -21,7 +21,7 @@ TEST(Parallel, EveryIndexIsVisitedOnceForAnyNumberOfThreads) {
   }
 }
 
-TEST(Parallel, ThreadsThatHelpOneThatGivesWayGiveWayToo) {
+TEST(Parallel, ThreadsThatHelpALowPriorityThreadTakeItsPriority) {
   constexpr int kThreads = 4;
   const auto most_urgent_helper = [] {
     std::atomic<int> least = 100, met = 0;

@@ -19,7 +19,7 @@ using std::chrono::seconds;
 
 constexpr Clock::TimePoint kNever = Clock::TimePoint::max();
 
-/// A variable that threads change and wait for, as all of them do through a Clock.
+/// A variable that threads change and wait for through a Clock.
 template <class T>
 struct Shared {
   explicit Shared(Clock& c) : clock(c) {}
@@ -40,7 +40,7 @@ struct Shared {
   T value{};
 };
 
-TEST(VirtualClock, AnHourPassesAtOnceWhenNobodyElseRuns) {
+TEST(VirtualClock, AnHourPassesAtOnceWhenNoOtherActorRuns) {
   VirtualClock clock;
   const auto start = clock.now();
   clock.sleep_for(hours(1));
@@ -82,7 +82,7 @@ TEST(VirtualClock, StandsStillWhileAnActorRuns) {
   EXPECT_EQ(clock.now(), Clock::TimePoint{} + milliseconds(1));
 }
 
-TEST(VirtualClock, StandsStillWhileSomebodyIsBusy) {
+TEST(VirtualClock, StandsStillWhileAHoldExists) {
   VirtualClock clock;
   auto busy = std::make_unique<Clock::Busy>(clock);
   std::thread sleeper([&] { clock.sleep_for(seconds(1)); });
@@ -120,12 +120,12 @@ TEST(VirtualClock, ActorsWakeInTheOrderOfTheirMoments) {
 }
 
 TEST(VirtualClock, ANotifiedWaiterIsNotOvertakenByItsDeadline) {
-  // The hold ends right after the notification, when the asker may not have run yet: a clock that counted it as
+  // The hold ends right after the notification, when the waiter may not have run yet: a clock that counted it as
   // waiting would jump to its deadline.
   for (int round = 0; round < 2000; ++round) {
     const bool as_actor = round % 2 == 0;
     VirtualClock clock;
-    Shared<int> answer(clock);
+    Shared<int> message(clock);
     bool in_time = false;
     std::thread asker;
     {
@@ -135,10 +135,10 @@ TEST(VirtualClock, ANotifiedWaiterIsNotOvertakenByItsDeadline) {
         std::optional<Clock::Actor> actor;
         if (as_actor) actor.emplace(clock);
         entered.count_down();
-        in_time = answer.wait_for_value(42, clock.now() + milliseconds(10));
+        in_time = message.wait_for_value(42, clock.now() + milliseconds(10));
       });
       entered.wait();
-      answer.set(42);
+      message.set(42);
     }
     asker.join();
     ASSERT_TRUE(in_time);
@@ -146,25 +146,25 @@ TEST(VirtualClock, ANotifiedWaiterIsNotOvertakenByItsDeadline) {
   }
 }
 
-TEST(VirtualClock, TimeWaitsForANotifiedOutsiderToLookAgain) {
+TEST(VirtualClock, TimeWaitsForANotifiedOutsiderToCheckAgain) {
   for (int round = 0; round < 500; ++round) {
     VirtualClock clock;
     auto busy = std::make_unique<Clock::Busy>(clock);
     std::thread sleeper([&] { clock.sleep_for(milliseconds(1)); });
-    Shared<bool> told(clock);
+    Shared<bool> changed_value(clock);
     std::latch looked(1);
     int looks = 0;
     Clock::TimePoint second_look{};
     std::thread outsider([&] {
-      std::unique_lock lock(told.mutex);
-      clock.wait_until(lock, told.changed, kNever, [&] {
+      std::unique_lock lock(changed_value.mutex);
+      clock.wait_until(lock, changed_value.changed, kNever, [&] {
         if (++looks == 1) looked.count_down();
         if (looks == 2) second_look = clock.now();
-        return told.value;
+        return changed_value.value;
       });
     });
     looked.wait();
-    told.set(true);  // needs the lock: the outsider waits by now
+    changed_value.set(true);  // needs the lock: the outsider waits by now
     busy.reset();
     outsider.join();
     sleeper.join();
@@ -175,7 +175,7 @@ TEST(VirtualClock, TimeWaitsForANotifiedOutsiderToLookAgain) {
 TEST(VirtualClock, AMessageBetweenActorsArrivesBeforeAnyTimePasses) {
   VirtualClock clock;
   Shared<int> question(clock);
-  Shared<int> answer(clock);
+  Shared<int> message(clock);
   constexpr int kRounds = 5000;
   std::thread server;
   int late = 0;
@@ -187,7 +187,7 @@ TEST(VirtualClock, AMessageBetweenActorsArrivesBeforeAnyTimePasses) {
       entered.count_down();
       for (int i = 1; i <= kRounds; ++i) {
         if (!question.wait_for_value(i, kNever)) ++late;
-        answer.set(i);
+        message.set(i);
       }
     });
     entered.wait();
@@ -196,12 +196,12 @@ TEST(VirtualClock, AMessageBetweenActorsArrivesBeforeAnyTimePasses) {
     const Clock::Actor actor(clock);
     for (int i = 1; i <= kRounds; ++i) {
       question.set(i);
-      if (!answer.wait_for_value(i, clock.now() + milliseconds(1))) ++late;
+      if (!message.wait_for_value(i, clock.now() + milliseconds(1))) ++late;
     }
   }
   server.join();
   EXPECT_EQ(late, 0);
-  EXPECT_EQ(clock.now(), Clock::TimePoint{}) << "time moved although somebody always had work";
+  EXPECT_EQ(clock.now(), Clock::TimePoint{}) << "time moved although an actor always had work";
 }
 
 TEST(VirtualClock, NoWakeUpIsLostWhenOutsidersNotify) {
@@ -237,7 +237,7 @@ TEST(VirtualClock, NoWakeUpIsLostWhenOutsidersNotify) {
   EXPECT_EQ(sum, kMessages);
 }
 
-TEST(VirtualClock, EverybodyWaitingForeverMovesNothing) {
+TEST(VirtualClock, EndlessWaitsOfAllActorsMoveNothing) {
   VirtualClock clock;
   Shared<bool> stop(clock);
   std::thread waiter([&] {
