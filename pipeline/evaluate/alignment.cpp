@@ -9,10 +9,6 @@
 namespace scanrig {
 namespace {
 
-constexpr int kIterations = 15;
-constexpr std::size_t kMaxSamples = 20000;
-constexpr double kKept = 0.9;
-
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
@@ -23,12 +19,13 @@ struct Pair {
 
 }  // namespace
 
-Transform align(const std::vector<SurfaceSample>& samples, const Mesh& truth, const SurfaceIndex& surface) {
+Transform align(const std::vector<SurfaceSample>& samples, const Mesh& truth, const SurfaceIndex& surface,
+                const AlignmentOptions& options) {
   Transform motion = Transform::Identity();
-  const std::size_t stride = std::max<std::size_t>(1, samples.size() / kMaxSamples);
+  const std::size_t stride = std::max<std::size_t>(1, samples.size() / options.max_samples);
   std::vector<Pair> pairs(samples.size() / stride);
   if (pairs.size() < 6) return motion;
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
+  for (int iteration = 0; iteration < options.max_iterations; ++iteration) {
     parallel_for(pairs.size() / 256 + 1, [&](std::size_t block) {
       for (std::size_t i = block * 256; i < std::min(pairs.size(), (block + 1) * 256); ++i) {
         const Eigen::Vector3d p = motion * samples[i * stride].point;
@@ -42,7 +39,7 @@ Transform align(const std::vector<SurfaceSample>& samples, const Mesh& truth, co
     });
     std::vector<double> distances;
     for (const Pair& pair : pairs) distances.push_back(pair.distance);
-    const double limit = quantile(distances, kKept);
+    const double limit = quantile(distances, options.keep);
     const Eigen::Vector3d centre = motion * samples.front().point;
     Matrix6d normal = Matrix6d::Identity() * 1e-6;
     Vector6d right = Vector6d::Zero();

@@ -8,8 +8,15 @@
 
 namespace scanrig {
 
-/// The rigid motion that lays the samples best onto the surface, from where they are: point-to-plane, the worst 10 %
-/// of the pairs left out. For figures printed beside those in the absolute frame, which alone are judged.
-Transform align(const std::vector<SurfaceSample>& samples, const Mesh& truth, const SurfaceIndex& surface);
+struct AlignmentOptions {
+  int max_iterations = 15;          ///< Gauss-Newton steps
+  std::size_t max_samples = 20000;  ///< of the given ones
+  double keep = 0.9;                ///< share of the pairs that is used, the closest ones
+};
+
+/// The rigid motion that aligns the samples best with the surface, from where they are: point-to-plane, the worst 10 %
+/// of the pairs left out. Only for figures printed beside the judged ones, which are in the absolute frame.
+Transform align(const std::vector<SurfaceSample>& samples, const Mesh& truth, const SurfaceIndex& surface,
+                const AlignmentOptions& options);
 
 }  // namespace scanrig

@@ -96,15 +96,15 @@ Eigen::Vector3d centre_of(const Mesh& mesh) {
   return box.center();
 }
 
-void score_measured(const Mesh& model, const Truth& truth, const SurfaceIndex& surface, std::size_t count,
+void score_measured(const Mesh& model, const Truth& truth, const SurfaceIndex& surface, const EvaluateOptions& options,
                     Scores& scores) {
   const std::vector<std::uint32_t> faces = measured_faces(model, true);
-  const std::vector<SurfaceSample> samples = sample_surface(model, faces, count);
+  const std::vector<SurfaceSample> samples = sample_surface(model, faces, options.samples);
   const auto nearest = nearest_to(samples, surface);
   scores.measured = figures(distances(nearest), area_of(model, faces));
   score_normals(samples, nearest, truth.mesh, scores);
   score_sigma(samples, nearest, model, scores);
-  const Transform motion = align(samples, truth.mesh, surface);
+  const Transform motion = align(samples, truth.mesh, surface, options.alignment);
   scores.aligned = figures(distances(nearest_to(samples, surface, motion)), scores.measured.area_mm2);
   const Eigen::Vector3d centre = centre_of(truth.mesh);
   scores.alignment_deg = to_degrees(rotation_angle(motion.linear()));
@@ -191,7 +191,7 @@ Result<Scores> evaluate(const Claim& claim, const Truth& truth, const ScanFolder
   const auto model_surface = SurfaceIndex::create(model);
   if (!model_surface) return pass_on(model_surface, "model");
   Scores scores;
-  score_measured(model, truth, *true_surface, options.samples, scores);
+  score_measured(model, truth, *true_surface, options, scores);
   score_topology(model, truth.mesh, *model_surface, scores);
   scores.pose2 = pose_error(claim, truth);
   const std::vector<std::uint32_t> closed = measured_faces(model, false);
@@ -220,7 +220,7 @@ Result<Scores> evaluate(const Claim& claim, const Truth& truth, const ScanFolder
   if (carve) scores.closed = figures(carve->distances(sample_surface(model, closed, options.samples)), closed_area);
 
   if (photos && !claim.model.corner_uv.empty()) {
-    const auto texture = texture_figures(claim.model, truth, *photos, context);
+    const auto texture = texture_figures(claim.model, truth, *photos, options.texture, context);
     if (!texture) return pass_on(texture);
     scores.texture = *texture;
   }

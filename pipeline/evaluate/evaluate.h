@@ -5,7 +5,9 @@
 
 #include "core/context.h"
 #include "core/result.h"
+#include "pipeline/evaluate/alignment.h"
 #include "pipeline/evaluate/scores.h"
+#include "pipeline/evaluate/texture_figures.h"
 #include "pipeline/evaluate/true_view.h"
 #include "pipeline/evaluate/truth_file.h"
 #include "pipeline/mesh/mesh.h"
@@ -17,9 +19,11 @@ struct EvaluateOptions {
   std::size_t samples = 200'000;  ///< spread over each surface
   double carve_voxel_mm = 0.5;    ///< of the ideal carve
   ObservableRule observable;
+  AlignmentOptions alignment;
+  TextureFigureOptions texture;
 };
 
-/// What is to be judged.
+/// A model to be judged.
 struct Claim {
   TexturedMesh model;                         ///< pose 1's turntable frame; `views` and `sigma` are its claims
   std::optional<Transform> pose1_from_pose2;  ///< as the reconstruction found it
@@ -31,12 +35,11 @@ struct Claim {
 Result<Scores> evaluate(const Claim& claim, const Truth& truth, const ScanFolder* photos,
                         const EvaluateOptions& options, const Context& context);
 
-/// The model that a reconstruction left in `folder`: model.ply, texture coordinates of model.obj and model.png where
-/// they are, `pose1_from_pose2` of report.json where it is. Fails with `not_found`, `io`,
-/// `invalid_input`.
+/// The model that a reconstruction left in `folder`: model.ply, texture coordinates of model.obj and model.png if
+/// present, `pose1_from_pose2` of report.json if present. Fails with `not_found`, `io`, `invalid_input`.
 Result<Claim> read_claim(const std::filesystem::path& folder);
 
-/// For each sample, in how many of the truth's views it is observable.
+/// Number of the truth's views in which each sample is observable.
 std::vector<int> observable_views(const std::vector<SurfaceSample>& samples, const Truth& truth,
                                   const SurfaceIndex& surface, const ObservableRule& rule);
 

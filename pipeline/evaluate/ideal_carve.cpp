@@ -14,11 +14,11 @@ namespace {
 /// Distances are kept up to this many voxels.
 constexpr float kClampVoxels = 4.0F;
 
-/// What an image says: how far outside the outline a pixel lies, and how deep it sees.
+/// Content of one image: distance of each pixel outside the outline, and depth of what it shows.
 struct Evidence {
   const TrueImage* image = nullptr;
   cv::Mat1f outside_px;  ///< negative inside the outline
-  cv::Mat3f point;       ///< observable, truth frame, at every second pixel; NaN elsewhere; empty: none
+  cv::Mat3f point;       ///< observable, truth frame, at every second pixel; NaN elsewhere; empty: no such points
   cv::Mat3f normal;      ///< of the surface there
 };
 
@@ -66,7 +66,7 @@ Evidence evidence_of(const TrueImage& image, const TrueView& view, const Mesh& m
   return evidence;
 }
 
-/// How far outside the object the evidence puts a point, mm; -infinity if it says nothing.
+/// Distance outside the object by this evidence, mm; -infinity without evidence.
 double outside(const Evidence& evidence, const Eigen::Vector3d& point) {
   const Camera& camera = evidence.image->camera;
   const Eigen::Vector2d px = camera.project(point);
@@ -98,7 +98,7 @@ struct Cloud {
 IdealCarve::IdealCarve(const Mesh& truth, double voxel_mm) : voxel_(voxel_mm) {
   Eigen::AlignedBox3d box;
   for (const auto& vertex : truth.vertices) box.extend(vertex.cast<double>());
-  // A hull from few views stands off the object; what lies further out than this is not closed but wrong.
+  // A hull from few views extends beyond the object; surface farther out than this is wrong, not closed.
   constexpr double kMargin = 15.0;
   origin_ = box.min().array() - kMargin;
   size_ = ((box.max().array() + kMargin - origin_.array()) / voxel_).ceil().cast<int>() + 1;
@@ -109,18 +109,18 @@ IdealCarve::IdealCarve(const Mesh& truth, double voxel_mm) : voxel_(voxel_mm) {
 void IdealCarve::cut(const TrueView& view) {
   const Evidence left = evidence_of(view.left(), view, view.truth().mesh, true);
   const Evidence right = evidence_of(view.right(), view, view.truth().mesh, false);
-  const float most = kClampVoxels * static_cast<float>(voxel_);
+  const float max_distance = kClampVoxels * static_cast<float>(voxel_);
   parallel_for(static_cast<std::size_t>(size_.z()), [&](std::size_t slice) {
     const int z = static_cast<int>(slice);
     for (int y = 0; y < size_.y(); ++y) {
       for (int x = 0; x < size_.x(); ++x) {
         float& value = outside_[index(x, y, z)];
-        if (value >= most) continue;
+        if (value >= max_distance) continue;
         const Eigen::Vector3d p = centre(x, y, z);
         const Eigen::Vector3d on_table = view.table_from_truth() * p;
         double d = std::max<double>(value, std::max(outside(left, p), outside(right, p)));
         if (std::hypot(on_table.x(), on_table.z()) < view.truth().table_radius_mm) d = std::max(d, -on_table.y());
-        value = std::min(most, static_cast<float>(d));
+        value = std::min(max_distance, static_cast<float>(d));
       }
     }
   });
@@ -174,7 +174,7 @@ std::vector<double> IdealCarve::distances(const std::vector<SurfaceSample>& samp
       const Eigen::Vector3d off = samples[i].point - points[nearest];
       const double height = std::abs(off.dot(surface[nearest].normal));
       const double beside = std::sqrt(std::max(0.0, squared - height * height));
-      // Between neighbouring crossings the tangent plane stands for the surface.
+      // Between neighbouring crossings the tangent plane replaces the surface.
       result[i] = beside <= voxel_ ? height : std::sqrt(squared);
     }
   });

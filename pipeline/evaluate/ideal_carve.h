@@ -8,13 +8,13 @@
 
 namespace scanrig {
 
-/// The smallest solid that perfect silhouettes, the table and perfect free space leave of the object: the best that
-/// closing the unseen surface can do. Free space is what the left camera looks through up to an observable point.
+/// The smallest solid that perfect silhouettes, the table and perfect free space leave of the object: the best possible
+/// closing of the unseen surface. Free space is the space between the left camera and an observable point.
 class IdealCarve {
  public:
   IdealCarve(const Mesh& truth, double voxel_mm);
 
-  /// Cuts away what the view shows not to be object.
+  /// Cuts away what the view shows to be free.
   void cut(const TrueView& view);
 
   /// After the last cut: distance of each point to the solid's surface, mm, accurate to a fraction of a voxel near it.
@@ -37,7 +37,7 @@ class IdealCarve {
   double voxel_;
   Eigen::Vector3d origin_;
   Eigen::Vector3i size_;
-  std::vector<float> outside_;  ///< mm outside what is left, near its surface; clamped
+  std::vector<float> outside_;  ///< mm outside the remaining solid, near its surface; clamped
 };
 
 }  // namespace scanrig

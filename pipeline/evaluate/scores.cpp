@@ -37,7 +37,7 @@ std::vector<Gate> gates(const Scores& s) {
       {"A accuracy, p95 mm", 0.08, s.measured.p95},
       {"B observable truth covered within 0.1 mm", 0.98, s.covered_010, false},
       {"C false claims (> 0.25 mm)", 0.002, s.measured.share_over_025},
-      // As much more may be closed as B allows to miss.
+      // The closed share may exceed by what B allows to miss.
       {"E closed share less unobservable share", 0.02, s.closed_share - (1.0 - s.observable_share)},
       {"watertight", 1.0, s.watertight ? 1.0 : 0.0, false},
       {"components", 1.0, static_cast<double>(s.components)},
@@ -115,7 +115,7 @@ std::string to_table(const Scores& s) {
   text += row("beyond 2 sigma (4.6 is normal)", 100.0 * s.beyond_2_sigma, "%");
   if (s.texture) text += row("texture offset, p95", s.texture->p95_px, "px");
   text += fmt::format("{} vertices, {} faces\n\n", s.vertices, s.faces);
-  text += fmt::format("{:<44}{:>10} {:>10}  ok\n", "gate", "asked", "measured");
+  text += fmt::format("{:<44}{:>10} {:>10}  ok\n", "gate", "limit", "measured");
   for (const Gate& gate : gates(s)) {
     text += fmt::format("{:<44}{} {:>7.3f} {:>10.4f}  {}\n", gate.name, gate.at_most ? "<=" : ">=", gate.limit,
                         gate.measured, gate.ok() ? "yes" : "NO");

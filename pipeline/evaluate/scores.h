@@ -11,7 +11,7 @@ namespace scanrig {
 
 inline constexpr double kNoFigure = std::numeric_limits<double>::quiet_NaN();
 
-/// How far points spread evenly over a surface lie from another surface, mm; NaN where the surface has no area.
+/// Distances of points spread evenly over a surface to another surface, mm; NaN where the surface has no area.
 struct DistanceFigures {
   double area_mm2 = 0.0;
   double median = kNoFigure;
@@ -50,7 +50,7 @@ struct Scores {
   std::size_t components = 0;
   bool watertight = false;
   long genus = 0;
-  std::optional<long> true_genus;      ///< where the truth's mesh is watertight; an open one has none
+  std::optional<long> true_genus;      ///< of a watertight truth mesh; an open one has none
   std::size_t self_intersections = 0;  ///< faces that cross another
 
   struct PoseError {
@@ -67,7 +67,7 @@ struct Scores {
   std::optional<TextureFigures> texture;
 };
 
-/// A figure that is asked for.
+/// A figure with a limit.
 struct Gate {
   std::string name;
   double limit = 0.0;

@@ -6,7 +6,7 @@
 
 namespace scanrig {
 
-/// How many faces cross another face with which they share no vertex. `surface`: of all of the mesh.
+/// Number of faces that cross another face with which they share no vertex. `surface`: index over all of the mesh.
 std::size_t self_intersecting_faces(const Mesh& mesh, const SurfaceIndex& surface);
 
 }  // namespace scanrig

@@ -13,12 +13,6 @@
 namespace scanrig {
 namespace {
 
-constexpr int kPatch = 32;
-constexpr int kErosion = 6;
-constexpr int kReach = 6;             ///< how far a patch is looked for, px
-constexpr double kMinGradient = 1.0;  ///< deviation of the gradient over a patch, grey levels a pixel
-constexpr double kMinCorrelation = 0.6;
-
 cv::Mat1f gradient_magnitude(const cv::Mat& image) {
   cv::Mat grey;
   if (image.channels() == 3) {
@@ -41,12 +35,14 @@ double vertex(double before, double peak, double after) {
   return bend < 0.0 ? std::clamp(0.5 * (before - after) / bend, -0.5, 0.5) : 0.0;
 }
 
-/// NaN if the patch says nothing.
-double offset_of(const cv::Mat1f& drawn, const cv::Mat1f& photo, const cv::Rect& patch) {
+/// NaN for a patch without a clear match.
+double offset_of(const cv::Mat1f& drawn, const cv::Mat1f& photo, const cv::Rect& patch,
+                 const TextureFigureOptions& options) {
+  const int reach = options.reach_px;
   cv::Scalar mean, deviation;
   cv::meanStdDev(drawn(patch), mean, deviation);
-  if (deviation[0] < kMinGradient) return std::nan("");
-  const cv::Rect window(patch.x - kReach, patch.y - kReach, patch.width + 2 * kReach, patch.height + 2 * kReach);
+  if (deviation[0] < options.min_gradient) return std::nan("");
+  const cv::Rect window(patch.x - reach, patch.y - reach, patch.width + 2 * reach, patch.height + 2 * reach);
   if ((window & cv::Rect({0, 0}, photo.size())) != window) return std::nan("");
   cv::Mat1f score;
   cv::matchTemplate(photo(window), drawn(patch), score, cv::TM_CCOEFF_NORMED);
@@ -54,25 +50,27 @@ double offset_of(const cv::Mat1f& drawn, const cv::Mat1f& photo, const cv::Rect&
   cv::Point at;
   cv::minMaxLoc(score, nullptr, &best, nullptr, &at);
   const bool inside = at.x > 0 && at.y > 0 && at.x + 1 < score.cols && at.y + 1 < score.rows;
-  if (best < kMinCorrelation || !inside) return std::nan("");
-  const double dx = at.x - kReach + vertex(score(at.y, at.x - 1), best, score(at.y, at.x + 1));
-  const double dy = at.y - kReach + vertex(score(at.y - 1, at.x), best, score(at.y + 1, at.x));
+  if (best < options.min_correlation || !inside) return std::nan("");
+  const double dx = at.x - reach + vertex(score(at.y, at.x - 1), best, score(at.y, at.x + 1));
+  const double dy = at.y - reach + vertex(score(at.y - 1, at.x), best, score(at.y + 1, at.x));
   return std::hypot(dx, dy);
 }
 
 }  // namespace
 
-std::vector<double> patch_offsets(const cv::Mat& drawn, const cv::Mat& photo, const cv::Mat1b& mask) {
+std::vector<double> patch_offsets(const cv::Mat& drawn, const cv::Mat& photo, const cv::Mat1b& mask,
+                                  const TextureFigureOptions& options) {
+  const int erosion = options.erosion_px, side = options.patch_px;
   const cv::Mat1f drawn_gradient = gradient_magnitude(drawn), photo_gradient = gradient_magnitude(photo);
   cv::Mat1b eroded;
-  cv::erode(mask, eroded, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * kErosion + 1, 2 * kErosion + 1}), {-1, -1},
-            1, cv::BORDER_CONSTANT, 0);
+  cv::erode(mask, eroded, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * erosion + 1, 2 * erosion + 1}), {-1, -1}, 1,
+            cv::BORDER_CONSTANT, 0);
   std::vector<double> offsets;
-  for (int y = 0; y + kPatch <= mask.rows; y += kPatch / 2) {
-    for (int x = 0; x + kPatch <= mask.cols; x += kPatch / 2) {
-      const cv::Rect patch(x, y, kPatch, kPatch);
+  for (int y = 0; y + side <= mask.rows; y += side / 2) {
+    for (int x = 0; x + side <= mask.cols; x += side / 2) {
+      const cv::Rect patch(x, y, side, side);
       if (cv::countNonZero(eroded(patch)) < patch.area()) continue;
-      const double offset = offset_of(drawn_gradient, photo_gradient, patch);
+      const double offset = offset_of(drawn_gradient, photo_gradient, patch, options);
       if (!std::isnan(offset)) offsets.push_back(offset);
     }
   }
@@ -80,7 +78,7 @@ std::vector<double> patch_offsets(const cv::Mat& drawn, const cv::Mat& photo, co
 }
 
 Result<Scores::TextureFigures> texture_figures(const TexturedMesh& model, const Truth& truth, const ScanFolder& photos,
-                                               const Context& context) {
+                                               const TextureFigureOptions& limits, const Context& context) {
   const auto renderer = MeshRenderer::create(model);
   if (!renderer) return pass_on(renderer);
   std::vector<double> offsets;
@@ -88,14 +86,14 @@ Result<Scores::TextureFigures> texture_figures(const TexturedMesh& model, const 
     const TruePose& pose = truth.poses[p];
     for (std::size_t v = 0; v < std::min(pose.angles_deg.size(), photos.manifest().poses[p].views.size()); ++v) {
       if (context.stopped()) return fail(ErrorCode::stopped, "evaluation stopped");
-      const auto images = photos.load_images(p, v);
-      if (!images) return pass_on(images);
+      const auto photo = photos.load_usable_image(p, v, "left_plain");
+      if (!photo) return pass_on(photo);
       RenderOptions options;
       options.supersample = 2;
       const auto drawn =
           renderer->render(truth.left, rot_y(to_radians(pose.angles_deg[v])) * pose.table_from_truth, options);
       if (!drawn) return pass_on(drawn);
-      const auto found = patch_offsets(drawn->image, images->left_plain, drawn->mask);
+      const auto found = patch_offsets(drawn->image, *photo, drawn->mask, limits);
       offsets.insert(offsets.end(), found.begin(), found.end());
     }
   }

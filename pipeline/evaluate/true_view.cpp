@@ -125,7 +125,7 @@ bool TrueView::table_blocks(const Eigen::Vector3d& from, const Eigen::Vector3d& 
 
 bool TrueView::observes(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
   if ((table_from_truth_ * point).y() < rule_.min_height_mm) return false;
-  const double min_cosine = std::cos(to_radians(rule_.steepest_deg));
+  const double min_cosine = std::cos(to_radians(rule_.max_incidence_deg));
   for (const Eigen::Vector3d& centre : {left_.centre, right_.centre, projector_}) {
     if ((centre - point).normalized().dot(normal) < min_cosine) return false;
   }

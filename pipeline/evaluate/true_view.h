@@ -9,11 +9,11 @@
 
 namespace scanrig {
 
-/// What can be seen at all: pipeline/evaluate/README.md.
+/// Limits of what can be seen at all: pipeline.md, section 9.
 struct ObservableRule {
-  double steepest_deg = 70.0;  ///< incidence to left, right and projector
-  int margin_px = 8;           ///< inside both images
-  double depth_jump_mm = 1.5;  ///< between neighbouring pixels
+  double max_incidence_deg = 70.0;  ///< incidence to left, right and projector
+  int margin_px = 8;                ///< inside both images
+  double depth_jump_mm = 1.5;       ///< between neighbouring pixels
   int jump_distance_px = 6;
   double min_height_mm = 0.5;  ///< above the table
 };

@@ -12,13 +12,13 @@
 
 namespace scanrig {
 
-/// How the object really stood and turned in one pose.
+/// True placement and true table angles of one pose.
 struct TruePose {
   Transform table_from_truth = Transform::Identity();
   std::vector<double> angles_deg;  ///< of the views
 };
 
-/// What a simulator knows of a scan: truth.json and truth.ply of docs/reference/scan-folder.md.
+/// Truth of a simulated scan: truth.json and truth.ply of docs/scan-folder.md.
 struct Truth {
   Mesh mesh;  ///< in pose 1's turntable frame
   Camera left;

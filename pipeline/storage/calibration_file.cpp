@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "core/files.h"
+
 namespace scanrig {
 
 Projection read_pinhole(JsonObject& object) {
@@ -35,7 +37,13 @@ Camera read_camera(JsonObject object) {
 }
 
 Result<Calibration> read_calibration(const std::filesystem::path& file) {
-  auto json = JsonFile::read(file, "scanrig-calibration", 1);
+  const auto text = read_file(file);
+  if (!text) return pass_on(text);
+  return parse_calibration(*text, file);
+}
+
+Result<Calibration> parse_calibration(std::string_view text, const std::filesystem::path& file) {
+  auto json = JsonFile::parse(text, file, "scanrig-calibration", 1, 1);
   if (!json) return pass_on(json);
   JsonObject& root = json->root();
   Calibration calibration;

@@ -9,9 +9,9 @@
 namespace scanrig {
 namespace {
 
-/// Depth may change by this much over one cell, in units of the cell: 75 degrees of incidence.
-constexpr double kSteepest = 3.7;
-/// A plane through at least this many of the nine cells around.
+/// Maximum depth change over one cell, in units of the cell: 75 degrees of incidence.
+constexpr double kMaxSlope = 3.7;
+/// Minimum number of the nine cells around for a plane.
 constexpr int kMinNeighbours = 5;
 /// Noise along the normal, mm: Stanford's dragon scans (cells of 0.5 x 0.7 mm) lie about 0.10 mm (median) off their
 /// neighbours' surfaces at up to 50 degrees of incidence and 0.15 mm beyond, the sum of two scans' noise.
@@ -19,8 +19,8 @@ constexpr double kNoise = 0.1;
 
 constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
 
-/// Slopes dz/dx and dz/dy of the least-squares plane through the cells around (row, col) on the same surface; NaN if
-/// there are too few.
+/// Slopes dz/dx and dz/dy of the least-squares plane through the cells around (row, col) on the same surface; NaN with
+/// too few cells.
 Eigen::Vector2d slopes_at(const cv::Mat1f& depth, int row, int col, double dx, double dy) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -30,7 +30,7 @@ Eigen::Vector2d slopes_at(const cv::Mat1f& depth, int row, int col, double dx, d
     for (int i = std::max(col - 1, 0); i <= std::min(col + 1, depth.cols - 1); ++i) {
       const Eigen::Vector3d basis((i - col) * dx, (j - row) * dy, 1.0);
       const double step = depth(j, i) - centre;
-      if (!(std::abs(step) <= kSteepest * basis.head<2>().norm())) continue;
+      if (!(std::abs(step) <= kMaxSlope * basis.head<2>().norm())) continue;
       normal += basis * basis.transpose();
       right += basis * step;
       ++count;

@@ -24,23 +24,36 @@ cv::Mat demosaiced(const cv::Mat& image, const std::string& pixel_format) {
   return bgr;
 }
 
+Result<void> check_image(const char* name, const cv::Mat& image, const std::string& pixel_format) {
+  const bool is_format = pixel_format == "Mono8" || pixel_format == "BayerRG8" || pixel_format == "BGR8";
+  if (!is_format) return fail(ErrorCode::invalid_input, "unknown pixel format \"{}\"", pixel_format);
+  if (image.empty()) return fail(ErrorCode::invalid_input, "{}: the image is missing", name);
+  if (image.type() != (pixel_format == "BGR8" ? CV_8UC3 : CV_8UC1)) {
+    return fail(ErrorCode::invalid_input, "{}: {} channels of {} bytes are not {}", name, image.channels(),
+                image.elemSize1(), pixel_format);
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<void> check_images(const RawView& raw) {
-  const bool known = raw.pixel_format == "Mono8" || raw.pixel_format == "BayerRG8" || raw.pixel_format == "BGR8";
-  if (!known) return fail(ErrorCode::invalid_input, "unknown pixel format \"{}\"", raw.pixel_format);
-  const int type = raw.pixel_format == "BGR8" ? CV_8UC3 : CV_8UC1;
   for (const auto& [name, image] : named(raw)) {
-    if (image->empty()) return fail(ErrorCode::invalid_input, "{}: there is no image", name);
-    if (image->type() != type) {
-      return fail(ErrorCode::invalid_input, "{}: {} channels of {} bytes do not make {}", name, image->channels(),
-                  image->elemSize1(), raw.pixel_format);
-    }
+    if (const auto checked = check_image(name, *image, raw.pixel_format); !checked) return checked;
   }
   if (raw.left_pattern.size() != raw.left_plain.size() || raw.right_pattern.size() != raw.right_plain.size()) {
     return fail(ErrorCode::invalid_input, "the pattern and the plain image of a camera differ in size");
   }
   return {};
+}
+
+Result<cv::Mat> to_usable_image(const cv::Mat& raw, const std::string& pixel_format) {
+  if (const auto checked = check_image("image", raw, pixel_format); !checked) return pass_on(checked);
+  try {
+    return demosaiced(raw, pixel_format);
+  } catch (const cv::Exception& e) {
+    return fail(ErrorCode::invalid_input, "the image cannot be demosaiced: {}", e.what());
+  }
 }
 
 Result<ViewImages> to_view_images(const RawView& raw, const ViewRecord& record) {

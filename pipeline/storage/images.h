@@ -8,7 +8,7 @@
 
 namespace scanrig {
 
-/// The four images of a view, as the sensors delivered them.
+/// The four images of a view, as delivered by the sensors.
 struct RawView {
   std::string pixel_format;
   cv::Mat left_pattern, right_pattern, left_plain, right_plain;
@@ -21,10 +21,14 @@ struct ViewImages {
   cv::Mat left_pattern, right_pattern, left_plain, right_plain;
 };
 
-/// Demosaics where needed. Fails with `invalid_input` for a format or sizes that do not belong together.
+/// Demosaics where needed. Fails with `invalid_input` for an unknown format or inconsistent sizes.
 Result<ViewImages> to_view_images(const RawView& raw, const ViewRecord& record);
 
-/// Whether every image is 8 bit, has the format's channels and left and right each have one size. `invalid_input`.
+/// One image of a sensor, ready for use: demosaiced where its pixel format needs it. Fails with `invalid_input`.
+Result<cv::Mat> to_usable_image(const cv::Mat& raw, const std::string& pixel_format);
+
+/// Checks that every image is 8 bit and has the format's channels, and that left and right each have one size. Fails
+/// with `invalid_input`.
 Result<void> check_images(const RawView& raw);
 
 }  // namespace scanrig

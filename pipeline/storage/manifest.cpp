@@ -14,12 +14,12 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr int kVersion = 4;
-constexpr int kPresentWords = 4;  ///< before this version: "spoilt" and "closures"
+constexpr int kCurrentKeysVersion = 4;  ///< older versions use the keys "spoilt" and "closures"
 constexpr std::array kStates = {"queued",    "scanning", "waiting_for_flip", "scanned", "interrupted",
                                 "cancelled", "failed"};
 constexpr std::array kSources = {"stereo", "range"};
 
-/// A view's file has its place under "path", the calibration under "file".
+/// The path of a view's file is under "path", that of the calibration under "file".
 ordered_json to_json(const FileRecord& file, const char* key = "path") {
   return {{key, file.path}, {"sha256", file.sha256}};
 }
@@ -33,7 +33,7 @@ ordered_json to_json(const Transform& transform) {
   return {{"rotation", rows}, {"translation", {t.x(), t.y(), t.z()}}};
 }
 
-/// Nothing at all where nothing was taken again.
+/// Writes no key without retakes.
 void add_retake_reasons(ordered_json& json, const std::vector<Error>& retake_reasons) {
   for (const Error& why : retake_reasons)
     json["retake_reasons"].push_back({{"code", to_string(why.code)}, {"message", why.message}});
@@ -88,14 +88,14 @@ Projection read_grid(JsonObject object) {
 
 Error read_error(JsonObject object) {
   const auto code = parse_error_code(object.text("code"));
-  if (!code) object.reject("code", "no error code of this program");
+  if (!code) object.reject("code", "is not an error code of this program");
   Error error{code.value_or(ErrorCode::internal), object.text("message")};
   object.close();
   return error;
 }
 
 std::vector<Error> read_retake_reasons(JsonObject& object, int version) {
-  const char* const key = version >= kPresentWords ? "retake_reasons" : "spoilt";  // old name
+  const char* const key = version >= kCurrentKeysVersion ? "retake_reasons" : "spoilt";  // old name
   std::vector<Error> reasons;
   if (!object.has(key)) return reasons;
   for (const JsonObject& why : object.objects(key)) reasons.push_back(read_error(why));
@@ -140,7 +140,7 @@ MovementCheckRecord read_movement_check(JsonObject object, int version) {
   return movement_check;
 }
 
-/// The first index that is not there before the last one (0 where there is no view at all).
+/// The first missing index before the last one (0 without views).
 std::optional<int> first_gap(const PoseRecord& pose) {
   if (pose.views.empty()) return 0;
   for (int i = 0; i < static_cast<int>(pose.views.size()); ++i) {
@@ -153,7 +153,7 @@ PoseRecord read_pose(JsonObject object, bool stereo, int version) {
   PoseRecord pose;
   pose.name = object.text("name");
   if (pose.name.empty() || pose.name.front() == '.' || pose.name.find('/') != std::string::npos) {
-    object.reject("name", fmt::format("\"{}\" cannot be the name of a folder", pose.name));
+    object.reject("name", fmt::format("\"{}\" is not a valid folder name", pose.name));
   }
   pose.complete = object.flag("complete");
   for (JsonObject& view : object.objects("views")) {
@@ -163,7 +163,7 @@ PoseRecord read_pose(JsonObject object, bool stereo, int version) {
     }
   }
   if (version >= 2) {
-    const char* const key = version >= kPresentWords ? "movement_checks" : "closures";  // old name
+    const char* const key = version >= kCurrentKeysVersion ? "movement_checks" : "closures";  // old name
     for (const JsonObject& check : object.objects(key))
       pose.movement_checks.push_back(read_movement_check(check, version));
   }
@@ -211,7 +211,7 @@ Result<Manifest> read_manifest(const std::filesystem::path& file) {
   std::set<std::string> names;
   for (JsonObject& pose : root.objects("poses")) {
     manifest.poses.push_back(read_pose(pose, manifest.source == "stereo", json->version()));
-    if (!names.insert(manifest.poses.back().name).second) pose.reject("name", "is that of another pose");
+    if (!names.insert(manifest.poses.back().name).second) pose.reject("name", "is already used by another pose");
   }
   if (const auto whole = json->finish(); !whole) return pass_on(whole);
   return manifest;

@@ -16,7 +16,7 @@ constexpr const char* kCalibration = "calibration.json";
 
 std::span<const std::byte> as_span(std::string_view text) { return std::as_bytes(std::span(text.data(), text.size())); }
 
-/// The bytes of a file of the folder, the ones the manifest means.
+/// The bytes of a file of the folder, checked against the manifest's hash.
 Result<std::string> read_recorded(const std::filesystem::path& folder, const FileRecord& file) {
   auto bytes = read_file(folder / file.path);
   if (bytes && sha256(*bytes) != file.sha256) {
@@ -30,12 +30,12 @@ Result<std::string> read_recorded(const std::filesystem::path& folder, const Fil
 Result<void> check_present(const std::filesystem::path& folder, const FileRecord& file) {
   std::error_code error;
   if (std::filesystem::is_regular_file(folder / file.path, error)) return {};
-  return fail(ErrorCode::not_found, "{}: the file is missing, though {} names it", (folder / file.path).string(),
+  return fail(ErrorCode::not_found, "{}: the file is missing, but {} names it", (folder / file.path).string(),
               kManifest);
 }
 
-/// The view's folder, relative to the scan's. A view that is taken again goes to another folder than the one the
-/// manifest names, so that the old view stays whole until the new manifest is there.
+/// The view's folder, relative to the scan's. A retaken view goes to another folder than the one in the manifest, so
+/// that the old view stays whole until the new manifest is written.
 std::string view_folder(const PoseRecord& pose, const ViewRecord* replaced, int index) {
   const std::string name = fmt::format("{}/view{:02}", pose.name, index);
   const bool taken = replaced && replaced->files.begin()->second.path.starts_with(name + "/");
@@ -48,7 +48,7 @@ Result<ScanFolder> ScanFolder::create(const std::filesystem::path& folder, Manif
                                       const std::filesystem::path& calibration_file) {
   std::error_code error;
   if (std::filesystem::exists(folder, error) && !std::filesystem::is_empty(folder, error)) {
-    return fail(ErrorCode::exists, "{}: already there; name another folder or remove this one", folder.string());
+    return fail(ErrorCode::exists, "{}: already exists; name another folder or delete this one", folder.string());
   }
   if (const auto words = check_words(manifest); !words) return pass_on(words, folder.string());
   std::string calibration;
@@ -127,7 +127,7 @@ Result<void> ScanFolder::store_view(std::size_t pose, ViewRecord record, std::sp
     views.insert(place, std::move(record));
   }
   if (auto written = change_manifest(std::move(changed)); !written) return written;
-  // Nobody names the old files any more; should they stay, it is not worth an error.
+  // The manifest no longer names the old files; a failed deletion is no error.
   std::error_code ignored;
   for (const auto& file : superseded) std::filesystem::remove(file, ignored);
   if (!superseded.empty()) std::filesystem::remove(superseded.front().parent_path(), ignored);
@@ -187,7 +187,7 @@ Result<void> ScanFolder::set_state(std::string state) {
 
 Result<const ViewRecord*> ScanFolder::find_view(std::size_t pose, std::size_t view) const {
   if (pose >= manifest_.poses.size() || view >= manifest_.poses[pose].views.size()) {
-    return fail(ErrorCode::not_found, "{}: there is no view {} of pose {}", path_.string(), view, pose + 1);
+    return fail(ErrorCode::not_found, "{}: no view {} of pose {}", path_.string(), view, pose + 1);
   }
   return &manifest_.poses[pose].views[view];
 }
@@ -200,36 +200,53 @@ Result<cv::Mat> ScanFolder::load_image(const FileRecord& file) const {
   return image;
 }
 
+/// An image of the size that the calibration gives its camera.
+Result<cv::Mat> ScanFolder::load_sensor_image(const ViewRecord& record, const std::string& role) const {
+  const auto found = record.files.find(role);
+  if (found == record.files.end())
+    return fail(ErrorCode::not_found, "{}: view {} has no image {}", path_.string(), record.index, role);
+  const FileRecord& file = found->second;
+  auto image = load_image(file);
+  if (!image || !manifest_.calibration) return image;
+  const auto calibration = load_calibration();
+  if (!calibration) return pass_on(calibration);
+  const Projection& p = (role.starts_with("left") ? calibration->left : calibration->right).projection;
+  if (image->size() != cv::Size(p.width, p.height)) {
+    return fail(ErrorCode::invalid_input, "{}: {}x{} pixels, but the calibration is for {}x{}",
+                (path_ / file.path).string(), image->cols, image->rows, p.width, p.height);
+  }
+  return image;
+}
+
 Result<RawView> ScanFolder::load_raw(std::size_t pose, std::size_t view) const {
   const auto record = find_view(pose, view);
   if (!record) return pass_on(record);
   if (manifest_.source != "stereo") return fail(ErrorCode::invalid_input, "{}: not a stereo scan", path_.string());
-  cv::Size left, right;
-  if (manifest_.calibration) {
-    const auto calibration = load_calibration();
-    if (!calibration) return pass_on(calibration);
-    left = {calibration->left.projection.width, calibration->left.projection.height};
-    right = {calibration->right.projection.width, calibration->right.projection.height};
-  }
   RawView raw{(*record)->pixel_format, {}, {}, {}, {}};
-  const std::tuple<const char*, cv::Mat*, cv::Size> all[] = {{"left_pattern", &raw.left_pattern, left},
-                                                             {"right_pattern", &raw.right_pattern, right},
-                                                             {"left_plain", &raw.left_plain, left},
-                                                             {"right_plain", &raw.right_plain, right}};
-  for (const auto& [role, image, size] : all) {
-    const FileRecord& file = (*record)->files.at(role);
-    auto loaded = load_image(file);
+  const std::pair<const char*, cv::Mat*> all[] = {{"left_pattern", &raw.left_pattern},
+                                                  {"right_pattern", &raw.right_pattern},
+                                                  {"left_plain", &raw.left_plain},
+                                                  {"right_plain", &raw.right_plain}};
+  for (const auto& [role, image] : all) {
+    auto loaded = load_sensor_image(**record, role);
     if (!loaded) return pass_on(loaded);
-    if (!size.empty() && loaded->size() != size) {
-      return fail(ErrorCode::invalid_input, "{}: {}x{} pixels, but the calibration is for {}x{}",
-                  (path_ / file.path).string(), loaded->cols, loaded->rows, size.width, size.height);
-    }
     *image = std::move(*loaded);
   }
   if (const auto checked = check_images(raw); !checked) {
     return pass_on(checked, (path_ / (*record)->files.at("left_pattern").path).parent_path().string());
   }
   return raw;
+}
+
+Result<cv::Mat> ScanFolder::load_usable_image(std::size_t pose, std::size_t view, const std::string& role) const {
+  const auto record = find_view(pose, view);
+  if (!record) return pass_on(record);
+  if (manifest_.source != "stereo") return fail(ErrorCode::invalid_input, "{}: not a stereo scan", path_.string());
+  const auto raw = load_sensor_image(**record, role);
+  if (!raw) return pass_on(raw);
+  const auto image = to_usable_image(*raw, (*record)->pixel_format);
+  if (!image) return pass_on(image, (path_ / (*record)->files.at(role).path).string());
+  return image;
 }
 
 Result<ViewImages> ScanFolder::load_images(std::size_t pose, std::size_t view) const {
@@ -255,9 +272,15 @@ Result<RangeImage> ScanFolder::load_range(std::size_t pose, std::size_t view) co
 }
 
 Result<Calibration> ScanFolder::load_calibration() const {
-  if (!manifest_.calibration) return fail(ErrorCode::not_found, "{}: has no calibration", (path_ / kManifest).string());
-  if (const auto bytes = read_recorded(path_, *manifest_.calibration); !bytes) return pass_on(bytes);
-  return read_calibration(path_ / manifest_.calibration->path);
+  if (!manifest_.calibration)
+    return fail(ErrorCode::not_found, "{}: the scan has no calibration", (path_ / kManifest).string());
+  const std::lock_guard lock(loaded_->mutex);
+  if (loaded_->calibration) return *loaded_->calibration;
+  const auto text = read_recorded(path_, *manifest_.calibration);
+  if (!text) return pass_on(text);
+  auto calibration = parse_calibration(*text, path_ / manifest_.calibration->path);
+  if (calibration) loaded_->calibration = *calibration;
+  return calibration;
 }
 
 }  // namespace scanrig

@@ -1,7 +1,10 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
+#include <mutex>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
@@ -15,34 +18,34 @@
 
 namespace scanrig {
 
-/// A scan on disk, docs/reference/scan-folder.md. A pose and a view are named by their index in the manifest, from 0.
+/// A scan on disk, docs/scan-folder.md. A pose and a view are identified by their positions in the manifest, from 0.
 /// Threads: one user at a time; the const functions may be called from several.
 class ScanFolder {
  public:
-  /// Makes the folder (it must not be there, or be empty) with its manifest and a copy of the calibration file (empty
+  /// Makes the folder (which must be missing or empty) with its manifest and a copy of the calibration file (empty
   /// path: none), which is checked. Fails with `exists`, `io`, and as read_calibration().
   static Result<ScanFolder> create(const std::filesystem::path& folder, Manifest manifest,
                                    const std::filesystem::path& calibration_file);
 
-  /// Opens and checks: every named file is there. What the manifest does not name is ignored: a crash may leave it.
-  /// Fails with `not_found`, `invalid_input` (naming file and key), `unsupported` (a version not known here).
+  /// Opens and checks that every named file exists. Files that the manifest does not name are ignored: a crash may
+  /// leave some. Fails with `not_found`, `invalid_input` (naming file and key), `unsupported` (a newer version).
   static Result<ScanFolder> open(const std::filesystem::path& folder);
 
   [[nodiscard]] const Manifest& manifest() const { return manifest_; }
   [[nodiscard]] const std::filesystem::path& path() const { return path_; }
 
-  /// The views that are added to this object from now on are taken under this configuration, and the manifest says so
-  /// with the next of them. Empty: under none.
+  /// Sets the configuration of views added to this object from now on; it enters the manifest with the next of them.
+  /// Empty: no configuration.
   void taken_under(std::string config_sha256) { config_sha256_ = std::move(config_sha256); }
 
-  /// Writes the images, syncs, then the manifest: when this returns the view survives a power cut, and until then the
-  /// folder is what it was. `record.files` and `record.pixel_format` are filled in here. An index that is already there
-  /// is replaced; `pose` may be one past the last: a new pose. Fails with `invalid_input`, `io`.
+  /// Writes the images, syncs, then the manifest: after the return the view survives a power cut; before, the folder is
+  /// unchanged. Fills in `record.files` and `record.pixel_format`. Replaces a view of the same index; `pose` may be one
+  /// past the last: a new pose. Fails with `invalid_input`, `io`.
   Result<void> add_view(std::size_t pose, ViewRecord record, const RawView& images);
   /// The same for an imported range scan; `depth` in mm, NaN where unknown.
   Result<void> add_range_view(std::size_t pose, ViewRecord record, const cv::Mat1f& depth);
 
-  /// The last view of the pose is there; `state` is the scan's from then on.
+  /// Marks the pose complete; `state` is the scan's from then on.
   Result<void> complete_pose(std::size_t pose, std::string state);
   Result<void> add_movement_check(std::size_t pose, MovementCheckRecord record);
   Result<void> set_state(std::string state);
@@ -50,11 +53,20 @@ class ScanFolder {
   /// Fails with `not_found`, `invalid_input` (unreadable, truncated, wrong size, hash differs), naming the file.
   [[nodiscard]] Result<RawView> load_raw(std::size_t pose, std::size_t view) const;
   [[nodiscard]] Result<ViewImages> load_images(std::size_t pose, std::size_t view) const;
+  /// One image of a stereo view, ready for use; `role` as in RawView ("left_plain"). The others are not
+  /// read. Fails as load_raw().
+  [[nodiscard]] Result<cv::Mat> load_usable_image(std::size_t pose, std::size_t view, const std::string& role) const;
   /// A `range` view as a range image: sigma and normals filled from the depth grid.
   [[nodiscard]] Result<RangeImage> load_range(std::size_t pose, std::size_t view) const;
+  /// The scan's calibration. The file is read and checked at the first call only.
   [[nodiscard]] Result<Calibration> load_calibration() const;
 
  private:
+  /// The calibration once it was read; shared by copies of the folder, whose file never changes.
+  struct LoadedCalibration {
+    std::mutex mutex;
+    std::optional<Calibration> calibration;
+  };
   using NamedImage = std::pair<std::string, std::vector<std::byte>>;  ///< role and encoded bytes
 
   ScanFolder(std::filesystem::path path, Manifest manifest) : path_(std::move(path)), manifest_(std::move(manifest)) {}
@@ -64,10 +76,12 @@ class ScanFolder {
                           std::string_view extension);
   [[nodiscard]] Result<const ViewRecord*> find_view(std::size_t pose, std::size_t view) const;
   [[nodiscard]] Result<cv::Mat> load_image(const FileRecord& file) const;
+  [[nodiscard]] Result<cv::Mat> load_sensor_image(const ViewRecord& record, const std::string& role) const;
 
   std::filesystem::path path_;
   Manifest manifest_;
   std::string config_sha256_;
+  std::shared_ptr<LoadedCalibration> loaded_ = std::make_shared<LoadedCalibration>();
 };
 
 }  // namespace scanrig

@@ -138,13 +138,13 @@ TEST_F(EvaluateFilesTest, ATextureThatHasSlippedIsNoticed) {
   photo->image.convertTo(darker, CV_8U, 0.6);
   ASSERT_TRUE(scan->add_view(0, {}, {"BGR8", darker, darker, darker, darker}));
 
-  const auto right = texture_figures(model, truth, *scan, {});
+  const auto right = texture_figures(model, truth, *scan, {}, {});
   ASSERT_TRUE(right) << right.error().message;
   EXPECT_GT(right->patches, 20u);
   EXPECT_LT(right->median_px, 0.1);
   // Slipped by 0.4 degrees about the axis: 0.17 mm or 1.2 px where the ball faces the camera, less towards its rim.
   for (auto& v : model.mesh.vertices) v = (rot_y(to_radians(0.4)) * v.cast<double>()).cast<float>();
-  const auto slipped = texture_figures(model, truth, *scan, {});
+  const auto slipped = texture_figures(model, truth, *scan, {}, {});
   ASSERT_TRUE(slipped);
   EXPECT_NEAR(slipped->median_px, 1.0, 0.2);
 }
@@ -163,7 +163,7 @@ TEST(PatchOffsets, AShiftIsFoundInAnotherLight) {
   EXPECT_LT(quantile(patch_offsets(drawn, drawn, mask), 0.95), 0.03);
 }
 
-TEST(PatchOffsets, WithoutStructureThereIsNothingToSay) {
+TEST(PatchOffsets, PatchesWithoutStructureGiveNoOffset) {
   const cv::Mat1b flat(300, 400, uchar{100});
   const cv::Mat1b all(300, 400, uchar{255});
   EXPECT_TRUE(patch_offsets(flat, speckle(), all).empty());

@@ -67,7 +67,7 @@ TEST(Evaluate, AShiftCountsInTheAbsoluteFrameAndGoesAwayWhenAligned) {
   EXPECT_NEAR(scores.alignment_mm, 0.4, 0.01);
 }
 
-TEST(Evaluate, WhoClaimsLittleCoversLittle) {
+TEST(Evaluate, FewClaimsCoverLittle) {
   Mesh model = ball();
   for (std::size_t i = 0; i < model.vertices.size(); ++i) model.views[i] = model.vertices[i].z() >= 0.0F ? 1 : 0;
   const Scores scores = score(model);
@@ -77,7 +77,7 @@ TEST(Evaluate, WhoClaimsLittleCoversLittle) {
   EXPECT_FALSE(gates(scores)[2].ok());
 }
 
-TEST(Evaluate, WhoClaimsMuchClaimsFalsely) {
+TEST(Evaluate, ManyClaimsAreFalseClaims) {
   Mesh model = ball();
   // The lower third is flattened, as a hull might close it, yet called measured.
   for (auto& v : model.vertices) v.y() = std::max(v.y(), static_cast<float>(kCentre.y() - kRadius / 3.0));
@@ -101,7 +101,7 @@ TEST(Evaluate, NothingClaimedIsNothingCovered) {
 
 // Under a ball seen from all sides at elevation e the cones that graze it leave a tip. Its sides stand off the point of
 // the ball that lies an angle d from the lowest by R - R cos(e + asin(R / D) - d).
-TEST(Evaluate, ClosedAreaIsHeldAgainstWhatSilhouettesLeave) {
+TEST(Evaluate, ClosedAreaIsComparedWithTheIdealCarve) {
   Truth truth = rig_and_ball({0, 45, 90, 135, 180, 225, 270, 315});
   Mesh model = ball();
   for (std::size_t i = 0; i < model.vertices.size(); ++i) {
@@ -129,7 +129,7 @@ TEST(Evaluate, TurnedFacesAreNoticed) {
   EXPECT_EQ(score(model).flipped_share, 1.0);
 }
 
-TEST(Evaluate, SigmaIsHonestWhenErrorsAreAsLargeAsItSays) {
+TEST(Evaluate, SigmaIsHonestWhenErrorsAreAsLargeAsSigma) {
   Mesh model = ball(kRadius + 0.0337);
   model.sigma.assign(model.vertices.size(), 0.05F);
   const Scores honest = score(model);
@@ -165,7 +165,7 @@ TEST(Evaluate, AnOpenTruthHasNoGenusToCompareWith) {
   for (const Gate& gate : gates(scores)) EXPECT_NE(gate.name, "genus off");
 }
 
-TEST(Evaluate, TheSecondPoseIsHeldAgainstItsTruth) {
+TEST(Evaluate, TheSecondPoseIsComparedWithItsTruth) {
   Truth truth = rig_and_ball({0.0});
   truth.pose1_from_pose2 = Transform::Identity();
   truth.pose1_from_pose2->rotate(Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitX())).translate(Eigen::Vector3d(1, 2, 3));
@@ -192,7 +192,7 @@ TEST(Evaluate, TheResultDoesNotDependOnThreads) {
   EXPECT_EQ(results[0], results[1]);
 }
 
-TEST(Evaluate, WhatCannotBeScoredIsSaid) {
+TEST(Evaluate, AnUnscorableModelIsNamed) {
   EXPECT_EQ(evaluate(claim_of({}), rig_and_ball({0.0}), nullptr, quick(), {}).error().code, ErrorCode::degenerate);
   std::stop_source stop;
   stop.request_stop();

@@ -49,7 +49,7 @@ TEST(Observable, ThreeEyesSeeLessThanOne) {
   EXPECT_GT(three, share_of_cap(640.0) - 0.10);
 }
 
-TEST(Observable, TheSecondPoseStandsAsItsPlacementSays) {
+TEST(Observable, TheSecondPoseLiesAsInItsPlacement) {
   Truth truth = one_eye(22.0);
   truth.poses[0].table_from_truth.translate(Eigen::Vector3d(0.0, -18.0, 0.0));
   const double lower = observable_share(truth, truth.mesh);
@@ -65,7 +65,7 @@ TEST(Observable, TheTableHidesTheBallFromBelow) {
   EXPECT_GT(observable_share(truth, truth.mesh), 0.9 * share_of_cap(640.0));
 }
 
-TEST(Observable, WhatTheProjectorCannotReachIsNotObservable) {
+TEST(Observable, SurfaceOutOfTheProjectorsReachIsNotObservable) {
   Truth truth = rig_and_ball({0.0});
   ASSERT_GT(observable_share(truth, ball()), 0.2);
   // A plate just before the projector and out of the cameras' sight.
@@ -87,7 +87,7 @@ TEST(Observable, TheImagesMarginIsOutOfSight) {
 }
 
 TEST(Observable, NearADepthStepNothingIsObservable) {
-  // A small ball before the large one: around its outline the large one's surface is not to be trusted.
+  // A small ball before the large one: around its outline the large one's surface is not trusted.
   Truth truth = one_eye(0.0);
   truth.poses[0].angles_deg = {0.0};
   const Mesh small = ball(3.0, kCentre + Eigen::Vector3d(0, 0, kRadius + 20.0), 30);

@@ -105,7 +105,7 @@ TEST_F(BadScanFolderTest, AnImageOfSixteenBitsIsRefused) {
   expect_unloadable(ErrorCode::invalid_input, "pose1/view00");
 }
 
-TEST_F(BadScanFolderTest, AViewThatIsNotThereIsNotFound) {
+TEST_F(BadScanFolderTest, AMissingViewIsNotFound) {
   EXPECT_EQ(with_one_view().load_raw(0, 1).error().code, ErrorCode::not_found);
 }
 

@@ -41,7 +41,7 @@ TEST_F(CalibrationFileTest, NumbersThatAreNotFiniteAreRefused) {
   expect_refused("[10, 45, 640]", "[10, null, 640]", "left.camera_from_turntable.translation[1]");
 }
 
-TEST_F(CalibrationFileTest, ARotationThatIsNoneIsRefused) {
+TEST_F(CalibrationFileTest, AnInvalidRotationMatrixIsRefused) {
   expect_refused("[1, 0, 0]", "[1, 0.01, 0]", "left.camera_from_turntable.rotation");
   expect_refused("[0, 0, -1]", "[0, 0, 1]", "left.camera_from_turntable.rotation: is a mirror");
   expect_refused("[[1, 0, 0], [0, -1, 0], [0, 0, -1]]", "[[1, 0, 0], [0, -1, 0]]",

@@ -9,7 +9,7 @@ namespace {
 
 using namespace scan_samples;
 
-/// What a sensor with red at (0,0), green at (0,1) and (1,0), blue at (1,1) delivers of a scene of one colour.
+/// Sensor image of a scene of one colour: red at (0,0), green at (0,1) and (1,0), blue at (1,1).
 cv::Mat1b through_colour_filter(int red, int green, int blue) {
   cv::Mat1b image(48, 64);
   for (int r = 0; r < image.rows; ++r) {
@@ -20,7 +20,7 @@ cv::Mat1b through_colour_filter(int red, int green, int blue) {
   return image;
 }
 
-TEST(ToViewImages, ColoursComeOutAsTheyWentThroughTheFilter) {
+TEST(ToViewImages, ColoursSurviveTheBayerFilter) {
   RawView raw{"BayerRG8", {}, {}, {}, {}};
   raw.left_pattern = through_colour_filter(200, 100, 30);
   raw.right_pattern = through_colour_filter(10, 20, 250);
@@ -47,6 +47,14 @@ TEST(ToViewImages, AnEdgeStaysSharpAndGreyInGreen) {
     EXPECT_EQ(images->left_plain.at<cv::Vec3b>(row, 31)[1], 20);
     EXPECT_EQ(images->left_plain.at<cv::Vec3b>(row, 32)[1], 220);
   }
+}
+
+TEST(ToUsableImage, IsTheSameAsInAView) {
+  const RawView raw = raw_view(0);
+  EXPECT_TRUE(same(*to_usable_image(raw.left_plain, raw.pixel_format), to_view_images(raw, {})->left_plain));
+  EXPECT_TRUE(same(*to_usable_image(raw.left_plain, "Mono8"), raw.left_plain));
+  EXPECT_EQ(to_usable_image({}, "Mono8").error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(to_usable_image(raw.left_plain, "BGR8").error().code, ErrorCode::invalid_input);
 }
 
 TEST(ToViewImages, GreyAndColourPassThrough) {

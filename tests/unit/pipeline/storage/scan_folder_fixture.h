@@ -40,7 +40,7 @@ class ScanFolderTest : public FolderTest {
   void edit_manifest(const std::string& what, const std::string& with) {
     write_text(scan_ / "scan.json", replaced(read_file(scan_ / "scan.json").value(), what, with));
   }
-  /// Opening fails with this code and names these.
+  /// Checks that opening fails with this code and names these.
   void expect_refused(ErrorCode code, const std::vector<std::string>& names) {
     const auto scan = ScanFolder::open(scan_);
     ASSERT_FALSE(scan);

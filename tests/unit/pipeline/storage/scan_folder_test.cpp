@@ -42,11 +42,41 @@ TEST_F(ScanFolderTest, WhatIsWrittenIsReadBack) {
   EXPECT_EQ(calibration->sha256, manifest.calibration->sha256);
 }
 
+TEST_F(ScanFolderTest, OneImageIsLoadedWithoutTheOthers) {
+  const ScanFolder scan = with_one_view();
+  for (const char* other : {"left_pattern", "right_pattern", "right_plain"})
+    std::filesystem::remove(scan_ / "pose1/view00" / (std::string(other) + ".png"));
+  const auto image = scan.load_usable_image(0, 0, "left_plain");
+  ASSERT_TRUE(image) << image.error().message;
+  EXPECT_TRUE(same(*image, to_view_images(raw_view(0), {})->left_plain));
+  EXPECT_EQ(scan.load_usable_image(0, 0, "right_plain").error().code, ErrorCode::not_found);
+  EXPECT_EQ(scan.load_usable_image(0, 0, "upper_plain").error().code, ErrorCode::not_found);
+  EXPECT_EQ(scan.load_usable_image(0, 1, "left_plain").error().code, ErrorCode::not_found);
+}
+
+TEST_F(ScanFolderTest, TheCalibrationIsReadOnce) {
+  const ScanFolder scan = with_one_view();
+  ASSERT_TRUE(scan.load_calibration());
+  std::filesystem::remove(scan_ / scan.manifest().calibration->path);
+  EXPECT_EQ(scan.load_calibration()->right.projection.fy, 201.0);
+  EXPECT_TRUE(scan.load_images(0, 0));
+}
+
+TEST_F(ScanFolderTest, ADamagedCalibrationIsRefusedUntilItIsWhole) {
+  const ScanFolder scan = with_one_view();
+  const auto file = scan_ / scan.manifest().calibration->path;
+  const std::string whole = read_file(file).value();
+  write_text(file, whole + " ");
+  EXPECT_EQ(scan.load_calibration().error().code, ErrorCode::invalid_input);
+  write_text(file, whole);
+  EXPECT_TRUE(scan.load_calibration());
+}
+
 TEST_F(ScanFolderTest, AMovementCheckIsKeptAsEvidence) {
   ScanFolder scan = with_one_view();
   ASSERT_TRUE(scan.add_movement_check(
       0, {1, 360.01, "2026-11-21T09:31:00Z", 1.25, 0.1, false, {{ErrorCode::timeout, "left camera: no frame"}}}));
-  EXPECT_EQ(scan.add_movement_check(1, {}).error().code, ErrorCode::invalid_input) << "there is no such pose";
+  EXPECT_EQ(scan.add_movement_check(1, {}).error().code, ErrorCode::invalid_input) << "no such pose";
   const auto again = ScanFolder::open(scan_);
   ASSERT_TRUE(again) << again.error().message;
   ASSERT_EQ(again->manifest().poses[0].movement_checks.size(), 1u);
@@ -58,7 +88,7 @@ TEST_F(ScanFolderTest, AMovementCheckIsKeptAsEvidence) {
   EXPECT_EQ(movement_check.retake_reasons[0].message, "left camera: no frame");
 }
 
-TEST_F(ScanFolderTest, WhatWasWrongWithExposuresThatWereTakenAgainIsKept) {
+TEST_F(ScanFolderTest, ReasonsOfRetakesAreKept) {
   ScanFolder scan = create();
   auto view = record(0);
   view.retake_reasons = {{ErrorCode::timeout, "left camera: no frame"}, {ErrorCode::protocol, "right camera: torn"}};
@@ -115,7 +145,7 @@ TEST_F(ScanFolderTest, RetakesAndMovementChecksOfAnOlderFolderAreRead) {
   EXPECT_EQ(pose.movement_checks[0].retake_reasons[0].message, "torn");
 }
 
-TEST_F(ScanFolderTest, EachConfigurationItsViewsWereTakenUnderIsKeptOnce) {
+TEST_F(ScanFolderTest, EachConfigurationOfItsViewsIsKeptOnce) {
   const std::string a(64, 'a'), b(64, 'b');
   {
     ScanFolder scan = create();
@@ -185,7 +215,7 @@ TEST_F(ScanFolderTest, ABadCalibrationMakesNoScan) {
   EXPECT_FALSE(std::filesystem::exists(scan_));
 }
 
-TEST_F(ScanFolderTest, AViewTakenAgainReplacesTheFirst) {
+TEST_F(ScanFolderTest, ARetakenViewReplacesTheFirst) {
   ScanFolder scan = create();
   for (int i : {3, 1, 2}) ASSERT_TRUE(scan.add_view(0, record(i), raw_view(i)));
   for (int seed : {20, 30, 40}) {
@@ -211,11 +241,11 @@ TEST_F(ScanFolderTest, ACrashBeforeTheManifestLeavesTheOldScan) {
   ASSERT_TRUE(opened) << opened.error().message;
   ASSERT_EQ(opened->manifest().poses[0].views.size(), 1u);
   EXPECT_TRUE(opened->load_raw(0, 0));
-  EXPECT_TRUE(opened->add_view(0, record(1), raw_view(5))) << "the left-over folder is in nobody's way";
+  EXPECT_TRUE(opened->add_view(0, record(1), raw_view(5))) << "the left-over folder does not interfere";
   EXPECT_TRUE(same(ScanFolder::open(scan_)->load_raw(0, 1)->left_pattern, raw_view(5).left_pattern));
 }
 
-// With the manifest's rename made impossible, as on a full disk, the view that was to be replaced must still be there.
+// With the manifest's rename made impossible, as on a full disk, the view to be replaced must still exist.
 TEST_F(ScanFolderTest, AFailedReplacementLeavesTheFirstView) {
   ScanFolder scan = with_one_view();
   std::filesystem::rename(scan_ / "scan.json", scan_ / "kept.json");
@@ -229,7 +259,7 @@ TEST_F(ScanFolderTest, AFailedReplacementLeavesTheFirstView) {
   EXPECT_TRUE(same(ScanFolder::open(scan_)->load_raw(0, 0)->left_pattern, raw_view(0).left_pattern));
 }
 
-TEST_F(ScanFolderTest, ImagesThatDoNotBelongTogetherAreNotStored) {
+TEST_F(ScanFolderTest, InconsistentImagesAreNotStored) {
   ScanFolder scan = create();
   RawView raw = raw_view(0);
   raw.left_plain = cv::Mat::zeros(10, 10, CV_8UC1);
@@ -266,7 +296,7 @@ TEST_F(ScanFolderTest, ARangeViewKeepsItsDepthsAndItsGaps) {
   EXPECT_EQ(range->camera_from_pose.translation(), Eigen::Vector3d(1, 2, 3));
   EXPECT_EQ(range->depth(5, 7), depth(5, 7));
   EXPECT_TRUE(std::isnan(range->depth(20, 10)));
-  // (0.5, 0, -1) / |.| at the camera's side; also beside the step, where only one surface may be asked.
+  // (0.5, 0, -1) / |.| at the camera's side; also beside the step, where only one surface may be used.
   for (const int col : {7, 29, 30}) {
     EXPECT_NEAR(range->normal(5, col)[0], 0.44721, 1e-4) << col;
     EXPECT_NEAR(range->normal(5, col)[2], -0.89443, 1e-4) << col;
