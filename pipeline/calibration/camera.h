@@ -8,14 +8,14 @@
 
 namespace scanrig {
 
-/// How a distortion-free image maps points of its camera frame (OpenCV axes: x right, y down, z into the scene; mm) to
-/// pixels; pixel centres are at integer coordinates. Orthographic grids come from imported range scans.
+/// Mapping of points of a camera frame to pixels of a distortion-free image. Axes as in OpenCV: x right, y down, z into
+/// the scene; mm. Pixel centres are at integer coordinates. Orthographic grids come from imported range scans.
 struct Projection {
   enum class Kind { pinhole, orthographic };
   Kind kind = Kind::pinhole;
   int width = 0;
   int height = 0;
-  double fx = 0.0;  ///< pixels (pinhole) or pixels a millimetre (orthographic)
+  double fx = 0.0;  ///< pixels (pinhole) or pixels per millimetre (orthographic)
   double fy = 0.0;
   double cx = 0.0;  ///< pixels
   double cy = 0.0;
@@ -49,7 +49,7 @@ struct Camera {
   [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& point_in_turntable) const;
 };
 
-/// The rig as reconstruction needs it. The turntable frame is defined by it: +Y is the axis, y = 0 the table top.
+/// The rig's calibration for the reconstruction. It defines the turntable frame: +Y is the axis, y = 0 the table top.
 struct Calibration {
   Camera left;
   Camera right;

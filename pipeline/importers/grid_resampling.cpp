@@ -13,7 +13,7 @@ namespace {
 constexpr double kMaxEdge = 4.0;
 
 /// Direction of the scanner's rays, away from it. Within a column x, and within a row y, change with z alone: their
-/// slopes are the ray's. Least squares of x = a col + b z + c and y = a row + b z + c, robust enough as every cell
+/// slopes are the ray's. Least squares of x = a col + b z + c and y = a row + b z + c; robust enough, since every cell
 /// counts.
 Eigen::Vector3d ray_direction(const RangeGrid& scan) {
   std::array<Eigen::Matrix3d, 2> normal{Eigen::Matrix3d::Zero(), Eigen::Matrix3d::Zero()};
@@ -34,7 +34,7 @@ Eigen::Vector3d ray_direction(const RangeGrid& scan) {
   return -direction.normalized();
 }
 
-/// Camera axes: z along the rays, y down, x to the right as the scanner sees it.
+/// Camera axes: z along the rays, y down, x to the right from the scanner's side.
 Transform camera_of(const Eigen::Vector3d& ray) {
   const Eigen::Vector3d x = (-Eigen::Vector3d::UnitY()).cross(ray).normalized();
   Eigen::Matrix3d rows;
@@ -50,7 +50,7 @@ double median(std::vector<double>& values) {
   return *middle;
 }
 
-/// Draws the triangle into the depth map, the nearest surface winning.
+/// Draws the triangle into the depth map; the nearest surface wins.
 void draw(const std::array<Eigen::Vector3d, 3>& corners, const Projection& grid, cv::Mat1f& depth) {
   std::array<Eigen::Vector2d, 3> px;
   for (int k = 0; k < 3; ++k) px[k] = grid.project(corners[k]);
@@ -73,7 +73,7 @@ void draw(const std::array<Eigen::Vector3d, 3>& corners, const Projection& grid,
   }
 }
 
-/// Frames the points with a grid of the cells' median spacing, and gives that spacing's diagonal.
+/// Frames the points with a grid of the cells' median spacing, and returns that spacing's diagonal.
 Result<double> lay_grid(const RangeGrid& scan, const std::vector<Eigen::Vector3d>& points, Projection& grid) {
   std::vector<double> across, down;
   for (int row = 0; row + 1 < scan.rows; ++row) {
@@ -94,7 +94,7 @@ Result<double> lay_grid(const RangeGrid& scan, const std::vector<Eigen::Vector3d
   }
   grid = {Projection::Kind::orthographic, 0, 0, 1.0 / dx, 1.0 / dy, 1.0 - low.x() / dx, 1.0 - low.y() / dy};
   const Eigen::Vector2d last = grid.project({high.x(), high.y(), 0.0});
-  if (last.maxCoeff() > 20000.0) return fail(ErrorCode::degenerate, "the grid's spacing does not suit its extent");
+  if (last.maxCoeff() > 20000.0) return fail(ErrorCode::degenerate, "the grid's spacing does not fit its extent");
   grid.width = static_cast<int>(last.x()) + 2;
   grid.height = static_cast<int>(last.y()) + 2;
   return std::hypot(dx, dy);

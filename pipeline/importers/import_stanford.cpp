@@ -14,7 +14,7 @@
 namespace scanrig {
 namespace {
 
-/// The scans of one pose, all seen by a scanner that stands still.
+/// The scans of one pose, all taken by a scanner at rest.
 struct TurntableSet {
   std::vector<RangeGrid> grids;
   std::vector<Transform> scan0_from_scan;
@@ -38,8 +38,8 @@ struct Axis {
   Eigen::Vector3d point;
 };
 
-/// The axis in the scanner's frame. For every pair of scans, the motion (R, t) between them turns about it:
-/// R a = a, and R c + t = c but for rounding along a. Both in the least-squares sense over all pairs.
+/// The axis in the scanner's frame. For every pair of scans, the motion (R, t) between them turns about it: R a = a,
+/// and R c + t = c except for rounding along a. Both in the least-squares sense over all pairs.
 Result<Axis> turntable_axis(const TurntableSet& set) {
   std::vector<Transform> motions;
   Eigen::Matrix3d turning = Eigen::Matrix3d::Zero();
@@ -69,7 +69,7 @@ Result<Axis> turntable_axis(const TurntableSet& set) {
   return Axis{direction, normal.ldlt().solve(right)};
 }
 
-/// The pose's frame but for its height: origin on the axis, +Y along it, the scanner's +Z without its part along it.
+/// The pose's frame except its height: origin on the axis, +Y along it, the scanner's +Z without its axial component.
 Transform pose_from_scan0(const Axis& axis) {
   Eigen::Matrix3d rows;
   const Eigen::Vector3d x = axis.direction.cross(Eigen::Vector3d::UnitZ()).normalized();
@@ -92,7 +92,7 @@ double base_height(const TurntableSet& set, const Transform& pose_from_scan0) {
   return *lowest;
 }
 
-/// How far the table has turned, 0..360 degrees: at angle theta the scanner sees the object's X at Rot_y(theta) X.
+/// Table angle, 0..360 degrees: at angle theta the scanner sees the object's X at Rot_y(theta) X.
 double table_angle_deg(const Transform& scan_from_scan0, const Transform& pose_from_scan0) {
   const Eigen::Matrix3d turn = (pose_from_scan0 * scan_from_scan0 * pose_from_scan0.inverse()).linear();
   const double angle = to_degrees(std::atan2(turn(0, 2) - turn(2, 0), turn(0, 0) + turn(2, 2)));

@@ -28,7 +28,7 @@ class Words {
     rest_.remove_prefix(std::min(line.size() + 1, rest_.size()));
     return line;
   }
-  /// The next word as a finite number; NaN if it is none.
+  /// The next word as a finite number; NaN for other words.
   double number() {
     const std::string_view word = next();
     double value = 0.0;
@@ -46,7 +46,7 @@ struct GridHeader {
   int cols = 0;
   int rows = 0;
   int vertices = 0;
-  int properties = 0;  ///< numbers a vertex
+  int properties = 0;  ///< numbers per vertex
   int cells = 0;
 };
 

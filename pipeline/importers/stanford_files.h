@@ -25,8 +25,8 @@ struct RangeGrid {
   [[nodiscard]] int at(int row, int col) const { return cells[static_cast<std::size_t>(row) * cols + col]; }
 };
 
-/// The lines "bmesh NAME tx ty tz qx qy qz qw", metres, p' = R(q)^T p + t. NAME is relative to the file's folder.
-/// Fails with `not_found`, `io`, `invalid_input` (naming the line; or no such line at all).
+/// The lines "bmesh NAME tx ty tz qx qy qz qw", metres, p' = R(q)^T p + t. NAME is relative to the file's folder. Fails
+/// with `not_found`, `io`, `invalid_input` (naming the line; or without any such line).
 Result<std::vector<PlacedScan>> read_stanford_conf(const std::filesystem::path& file);
 
 /// Fails with `not_found`, `io`, `invalid_input`, `unsupported` (binary).

@@ -34,7 +34,7 @@ Result<Mesh> decimate(const Mesh& mesh, const DecimateOptions& options) {
   simplified.faces.clear();
   for (std::size_t i = 0; i + 2 < count; i += 3) simplified.faces.push_back({fewer[i], fewer[i + 1], fewer[i + 2]});
   Mesh result = kept_faces(simplified, std::vector<bool>(simplified.faces.size(), true));
-  if (!topology(result).watertight()) return mesh;  // a collapse that pinched the surface is worth nothing
+  if (!topology(result).watertight()) return mesh;  // a collapse that pinched the surface is useless
   result.normals = vertex_normals(result);
   return result;
 }

@@ -8,7 +8,7 @@
 namespace scanrig {
 
 struct DecimateOptions {
-  double max_error_mm = 0.05;  ///< no vertex of the simplified mesh strays further from the surface (quadric estimate)
+  double max_error_mm = 0.05;    ///< no vertex of the simplified mesh is farther from the surface (quadric estimate)
   std::size_t target_faces = 0;  ///< stop early at this many faces; 0: as few as the error allows
 };
 

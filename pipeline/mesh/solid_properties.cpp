@@ -26,7 +26,7 @@ std::uint64_t mix(std::uint64_t x) {  // SplitMix64
   return x ^ (x >> 31);
 }
 
-/// Each edge must be walked as often one way as the other: sums of a hash of the edge, signed by the way, cancel.
+/// Each edge must be walked equally often both ways: sums of a hash of the edge, signed by the direction, cancel.
 bool edges_cancel(const Mesh& mesh) {
   std::uint64_t sum = 0;
   for (const Mesh::Face& face : mesh.faces) {
@@ -74,8 +74,8 @@ Result<SolidProperties> solid_properties(const Mesh& mesh) {
     moment += volume * (a + b + c) / 4.0;
   }
   if (!(result.volume_mm3 > kMinFill * std::pow(result.size_mm, 3))) {
-    return fail(ErrorCode::degenerate, "mesh: the enclosed volume is {:.3g} mm3; is the surface inside out?",
-                result.volume_mm3);
+    return fail(ErrorCode::degenerate,
+                "mesh: the enclosed volume is {:.3g} mm3; check that the surface is not inside out", result.volume_mm3);
   }
   result.centre_of_mass = apex + moment / result.volume_mm3;
   result.area_mm2 = surface_area(mesh);

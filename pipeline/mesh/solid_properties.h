@@ -11,7 +11,7 @@ namespace scanrig {
 struct SolidProperties {
   double volume_mm3 = 0.0;
   double area_mm2 = 0.0;
-  Eigen::Vector3d centre_of_mass = Eigen::Vector3d::Zero();  ///< of the solid filled evenly, not of its vertices, mm
+  Eigen::Vector3d centre_of_mass = Eigen::Vector3d::Zero();  ///< of the evenly filled solid, not of its vertices, mm
   double size_mm = 0.0;                                      ///< diagonal of the box around it
 };
 
@@ -21,7 +21,7 @@ Result<SolidProperties> solid_properties(const Mesh& mesh);
 
 double surface_area(const Mesh& mesh);
 
-/// Unit normals, one a vertex, faces weighted by their angle at the vertex; zero for a vertex without faces.
+/// Unit normals, one per vertex, faces weighted by their angle at the vertex; zero for a vertex without faces.
 std::vector<Eigen::Vector3f> vertex_normals(const Mesh& mesh);
 
 }  // namespace scanrig

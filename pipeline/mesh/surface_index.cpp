@@ -77,7 +77,7 @@ Result<SurfaceIndex> SurfaceIndex::create(const Mesh& mesh, const std::vector<st
   scene->numbers = faces;
   for (const std::uint32_t face : faces) scene->faces.push_back(mesh.faces[face]);
   scene->device = new_embree_device();
-  if (!scene->device) return fail(ErrorCode::internal, "Embree gives no device");
+  if (!scene->device) return fail(ErrorCode::internal, "Embree creates no device");
   scene->scene = rtcNewScene(scene->device);
   rtcSetSceneFlags(scene->scene, RTC_SCENE_FLAG_ROBUST);  // no ray slips through between two faces
   RTCGeometry geometry = rtcNewGeometry(scene->device, RTC_GEOMETRY_TYPE_TRIANGLE);

@@ -13,9 +13,9 @@
 
 namespace scanrig {
 
-/// The triangles of a mesh, ready for rays and for the nearest point; the only place of the pipeline that knows Embree
+/// The triangles of a mesh, ready for rays and for the nearest point. The only code of the pipeline that uses Embree
 /// (3.13 or 4).
-/// Threads: the const functions may be called from any number of threads. Same question, same answer.
+/// Threads: the const functions may be called from any number of threads. Same arguments, same result.
 class SurfaceIndex {
  public:
   struct Hit {
@@ -24,12 +24,12 @@ class SurfaceIndex {
     Eigen::Vector3f weights;  ///< barycentric, of the face's three corners
   };
   struct Nearest {
-    double distance = std::numeric_limits<double>::infinity();  ///< infinite: nothing within the limit
+    double distance = std::numeric_limits<double>::infinity();  ///< infinite: no surface within the limit
     std::uint32_t face = 0;
     Eigen::Vector3d point = Eigen::Vector3d::Zero();
   };
 
-  /// All faces, or those of `faces` (numbers given back are the mesh's). Fails with `degenerate` (no face), `internal`.
+  /// All faces, or those of `faces` (returned numbers are the mesh's). Fails with `degenerate` (no face), `internal`.
   static Result<SurfaceIndex> create(const Mesh& mesh);
   static Result<SurfaceIndex> create(const Mesh& mesh, const std::vector<std::uint32_t>& faces);
   ~SurfaceIndex();

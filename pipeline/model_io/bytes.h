@@ -8,7 +8,7 @@
 
 namespace scanrig {
 
-// glTF, PLY and STL are little-endian, and so is every machine this runs on.
+// glTF, PLY and STL are little-endian, and so is every supported machine.
 static_assert(std::endian::native == std::endian::little);
 
 template <class T>

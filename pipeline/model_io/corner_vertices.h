@@ -8,8 +8,8 @@
 
 namespace scanrig {
 
-/// The mesh's vertices, doubled where faces that share one differ in its texture coordinate: what formats with one
-/// coordinate a vertex need.
+/// The mesh's vertices, doubled where faces that share one differ in its texture coordinate: for formats with one
+/// coordinate per vertex.
 struct CornerVertices {
   std::vector<std::uint32_t> vertex;  ///< of the mesh
   std::vector<Eigen::Vector2f> uv;    ///< zero without a texture

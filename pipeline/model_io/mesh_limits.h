@@ -12,10 +12,10 @@
 #include "core/result.h"
 #include "pipeline/mesh/mesh.h"
 
-// What the readers of PLY and OBJ share.
+// Shared by the readers of PLY and OBJ.
 namespace scanrig {
 
-/// Larger than any coordinate that means something, small enough to be squared in single precision.
+/// Larger than any meaningful coordinate, small enough to be squared in single precision.
 inline constexpr double kAbsurd = 1e15;
 
 inline std::string_view next_word(std::string_view& text, std::string_view blanks = " \t\r") {
@@ -41,7 +41,7 @@ std::optional<T> number(std::string_view word) {
   return value;
 }
 
-/// Adds the polygon's fan, corner by corner. False when `index` names no vertex.
+/// Adds the polygon's fan, corner by corner. False when there is no vertex `index`.
 struct Fan {
   std::array<std::uint32_t, 2> held{};
   std::size_t corners = 0;
@@ -56,9 +56,9 @@ struct Fan {
   }
 };
 
-/// What a reader gives in the end.
+/// Final result of a reader.
 inline Result<Mesh> checked(Mesh mesh, std::string_view name) {
-  if (mesh.faces.empty()) return fail(ErrorCode::invalid_input, "{}: no faces; a surface is needed, not points", name);
+  if (mesh.faces.empty()) return fail(ErrorCode::invalid_input, "{}: no faces; provide a surface, not points", name);
   if (mesh.vertices.size() > std::numeric_limits<std::int32_t>::max()) {
     return fail(ErrorCode::invalid_input, "{}: {} vertices are too many", name, mesh.vertices.size());
   }

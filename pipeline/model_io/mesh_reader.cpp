@@ -28,8 +28,7 @@ Result<Mesh> parse_obj(std::string_view text, std::string_view name) {
                           : *index < 0 ? static_cast<double>(*index) + static_cast<double>(mesh.vertices.size())
                                        : static_cast<double>(*index) - 1.0;
         if (!fan.add(at, mesh)) {
-          return fail(ErrorCode::invalid_input, "{}, line {}: a face names a vertex that is not there", name,
-                      line_number);
+          return fail(ErrorCode::invalid_input, "{}, line {}: a face names a missing vertex", name, line_number);
         }
       }
       if (fan.corners < 3) {

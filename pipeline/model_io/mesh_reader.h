@@ -8,16 +8,16 @@
 
 namespace scanrig {
 
-/// Reads a mesh; units are the file's. All fail with `not_found`, `io`, `invalid_input` (not such a file, cut short, no
-/// faces, a face that names no vertex, a vertex that is not a number, two lists of vertices), naming the file. Any
+/// Reads a mesh in the file's units. All fail with `not_found`, `io`, `invalid_input`, naming the file: not such a
+/// file, cut short, no faces, a face with a missing vertex, a vertex that is not a number, two lists of vertices. Any
 /// bytes are safe to read.
 
-/// PLY: ascii or binary of either byte order; polygons become fans of triangles. Takes normals, colour (red green blue,
-/// bytes or 0..1), `views` and `sigma` where the file has them, and skips what it does not know.
+/// PLY: ascii or binary of either byte order; polygons become fans of triangles. Reads normals, colour (red green blue,
+/// bytes or 0..1), `views` and `sigma` if present, and skips other properties.
 Result<Mesh> read_ply(const std::filesystem::path& path);
 /// Wavefront OBJ: vertices and faces only.
 Result<Mesh> read_obj(const std::filesystem::path& path);
-/// One of these by the name's ending.
+/// One of these, by the file name's extension.
 Result<Mesh> read_mesh(const std::filesystem::path& path);
 
 /// The same from bytes; `name` is for messages.

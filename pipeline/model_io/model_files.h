@@ -10,15 +10,15 @@
 
 namespace scanrig {
 
-/// What write_model_files has written, relative to the folder.
+/// Files written by write_model_files, relative to the folder.
 struct ModelFiles {
   std::vector<std::string> names;
 };
 
-/// Writes model.glb, model.ply, model.stl, and, where there is a texture, model.obj, model.mtl, model.png; and
-/// `report_json` as report.json unless empty. `model` is in mm, +Y up. Whole or nothing: everything is written and
-/// synced under a temporary name beside `folder`, which then takes its place; an older folder is replaced as a whole.
-/// Fails with `degenerate` (no faces), `io`.
+/// Writes model.glb, model.ply, model.stl, and, with a texture, model.obj, model.mtl, model.png; and `report_json` as
+/// report.json unless empty. `model` is in mm, +Y up. All or nothing: everything is written and synced under a
+/// temporary name beside `folder`, which then takes its place; an older folder is replaced as a whole. Fails with
+/// `degenerate` (no faces), `io`.
 Result<ModelFiles> write_model_files(const TexturedMesh& model, std::string_view report_json,
                                      const std::filesystem::path& folder);
 
@@ -26,13 +26,13 @@ Result<ModelFiles> write_model_files(const TexturedMesh& model, std::string_view
 /// Fails with `degenerate`, `internal` (the image cannot be encoded).
 Result<std::string> encode_glb(const TexturedMesh& model);
 
-/// Binary little-endian, mm, the closed surface: x y z nx ny nz, and where known red green blue, views, sigma.
+/// Binary little-endian, mm, the closed surface: x y z nx ny nz, and if present red green blue, views, sigma.
 std::string encode_ply(const Mesh& mesh);
 
-/// Binary; mm, said in the header.
+/// Binary; mm, stated in the header.
 std::string encode_stl(const Mesh& mesh);
 
-/// Wavefront text, mm; `material_file` is the name of what encode_mtl gives, `image_file` that of the atlas.
+/// Wavefront text, mm; `material_file` is the name of the output of encode_mtl, `image_file` that of the atlas.
 std::string encode_obj(const TexturedMesh& model, std::string_view material_file);
 std::string encode_mtl(std::string_view image_file);
 

@@ -10,7 +10,7 @@ std::string encode_obj(const TexturedMesh& model, std::string_view material_file
   std::string file = fmt::format("# scanrig, units mm, up axis +Y\nmtllib {}\nusemtl scanned\n", material_file);
   const auto out = std::back_inserter(file);
   for (const auto& v : model.mesh.vertices) fmt::format_to(out, "v {:.7g} {:.7g} {:.7g}\n", v.x(), v.y(), v.z());
-  // Texture coordinates of OBJ begin at the bottom.
+  // Texture coordinates of OBJ start at the bottom.
   for (const auto& uv : corners.uv) fmt::format_to(out, "vt {:.7f} {:.7f}\n", uv.x(), 1.0F - uv.y());
   for (std::size_t f = 0; f < corners.faces.size(); ++f) {
     const auto& [a, b, c] = model.mesh.faces[f];

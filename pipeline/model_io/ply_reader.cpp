@@ -38,7 +38,7 @@ std::optional<Type> type_named(std::string_view name) {
 struct Property {
   std::string name;
   Type type;
-  std::optional<Type> count;  ///< given: a list
+  std::optional<Type> count;  ///< present: a list
 };
 
 struct Element {
@@ -101,7 +101,7 @@ Result<Header> parse_header(std::string_view& bytes, std::string_view name) {
   return fail(ErrorCode::invalid_input, "{}: the PLY header has no end or no format", name);
 }
 
-/// Takes values from the body one after the other.
+/// Reads values from the body one after the other.
 struct Body {
   std::string_view bytes;
   Format format;
@@ -120,8 +120,8 @@ struct Body {
     value = as_number(type, raw);
     return true;
   }
-  /// The least number of bytes an entry of `element` takes.
-  [[nodiscard]] std::size_t least(const Element& element) const {
+  /// The minimum number of bytes of an entry of `element`.
+  [[nodiscard]] std::size_t min_bytes(const Element& element) const {
     std::size_t sum = 0;
     for (const auto& p : element.properties) sum += format == Format::ascii ? 1 : p.count ? p.count->size : p.type.size;
     return sum;
@@ -151,7 +151,7 @@ constexpr std::array<std::string_view, 11> kVertexProperties = {"x",   "y",     
                                                                 "red", "green", "blue", "views", "sigma"};
 using VertexValues = std::array<double, kVertexProperties.size()>;
 
-/// Which of kVertexProperties each property is, or none.
+/// Index in kVertexProperties of each property, or none.
 struct VertexLayout {
   std::vector<std::optional<std::size_t>> slot;
   std::array<bool, kVertexProperties.size()> present{};
@@ -222,7 +222,7 @@ bool read_entry(const Element& element, Body& body, const Take& take, const Leng
 
 Result<void> read_vertices(const Element& element, Body& body, std::string_view name, Mesh& mesh) {
   // A second list with other properties would leave attributes of some vertices only.
-  if (!mesh.vertices.empty()) return fail(ErrorCode::invalid_input, "{}: it lists vertices twice", name);
+  if (!mesh.vertices.empty()) return fail(ErrorCode::invalid_input, "{}: vertices are listed twice", name);
   const VertexLayout layout(element);
   if (!layout.has(0, 3)) return fail(ErrorCode::invalid_input, "{}: the vertices have no x, y, z", name);
   const auto nothing = [](std::size_t, double) {};
@@ -257,7 +257,7 @@ Result<void> read_faces(const Element& element, Body& body, std::string_view nam
     if (!read_entry(element, body, nothing, nothing, item)) {
       return fail(ErrorCode::invalid_input, "{}: cut short in face {} of {}", name, i, element.count);
     }
-    if (!known) return fail(ErrorCode::invalid_input, "{}: face {} names a vertex that is not there", name, i);
+    if (!known) return fail(ErrorCode::invalid_input, "{}: face {} names a missing vertex", name, i);
     if (indices < element.properties.size() && fan.corners < 3) {
       return fail(ErrorCode::invalid_input, "{}: face {} has {} corners", name, i, fan.corners);
     }
@@ -273,9 +273,9 @@ Result<Mesh> parse_ply(std::string_view bytes, std::string_view name) {
   Body body{bytes, header->format};
   Mesh mesh;
   for (const Element& element : header->elements) {
-    const std::size_t least = body.least(element);
-    // Before anything is allocated: the file must be able to hold what its header promises.
-    if (element.count > 0 && (least == 0 || element.count > body.bytes.size() / least)) {
+    const std::size_t min_bytes = body.min_bytes(element);
+    // Before any allocation: the file must be large enough for what its header promises.
+    if (element.count > 0 && (min_bytes == 0 || element.count > body.bytes.size() / min_bytes)) {
       return fail(ErrorCode::invalid_input, "{}: cut short: {} x \"{}\" promised, {} bytes left", name, element.count,
                   element.name, body.bytes.size());
     }

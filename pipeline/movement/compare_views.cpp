@@ -8,21 +8,21 @@
 namespace scanrig {
 namespace {
 
-constexpr std::size_t kFewest = 3;  ///< fewer squares do not speak for the scene
-
 bool usable(const cv::Mat& image) { return !image.empty() && (image.type() == CV_8UC1 || image.type() == CV_8UC3); }
 
 ViewChange compare(const cv::Mat& before, const cv::Mat& after, const CompareViewsOptions& options) {
   ViewChange change;
-  auto [squares, together_px] = image_shift(before, after);
+  auto [squares, together_px] = image_shift(before, after, options.shift);
   change.squares = static_cast<int>(squares.size());
-  if (squares.size() < kFewest) {
+  if (squares.size() < options.min_squares) {
     const double values = static_cast<double>(before.total()) * before.channels();
     change.changed = cv::norm(before, after, cv::NORM_L1) / values > options.max_grey_step ? 1.0 : 0.0;
   } else {
     std::ranges::sort(squares, std::ranges::greater(), &PatchShift::shift_px);
-    change.shift_px = std::max(together_px, squares[std::max(kFewest - 1, squares.size() / 20)].shift_px);
-    const auto others = std::ranges::count_if(squares, [](const auto& square) { return square.misfit_px > kOtherPx; });
+    change.shift_px = std::max(
+        together_px, squares[std::max(options.min_squares - 1, squares.size() / options.squares_per_moved)].shift_px);
+    const auto others = std::ranges::count_if(
+        squares, [&](const auto& square) { return square.misfit_px > options.shift.max_misfit_px; });
     change.changed = static_cast<double>(others) / static_cast<double>(squares.size());
   }
   change.unmoved = change.shift_px <= options.max_shift_px && change.changed <= options.max_changed;

@@ -10,13 +10,6 @@
 namespace scanrig {
 namespace {
 
-constexpr int kSmallest = 24, kLargest = 96;  ///< px: sides of the squares
-constexpr std::size_t kEnough = 8;            ///< squares that speak for the whole picture
-constexpr double kSmoothing = 1.0;            ///< px: against noise and the traces of demosaicing
-constexpr double kSharp = 0.05;  ///< px: a direction in which noise alone would shift a square by more is not looked at
-constexpr double kCorrelated = 15.0;    ///< pixels that share their noise after smoothing and demosaicing
-constexpr double kQuantisation = 0.01;  ///< grey levels squared: no picture has less noise
-
 /// Sums over a square of products of gradient (2) and change, free of what another gain and offset of the light
 /// explain.
 struct Square {
@@ -37,7 +30,7 @@ struct Square {
     values += other.values;
     return *this;
   }
-  /// How much it shows: gradient squared, a value.
+  /// Amount of structure: gradient squared, per value.
   [[nodiscard]] double contrast() const { return gradients().trace() / values; }
 };
 
@@ -45,13 +38,13 @@ struct Channel {
   cv::Mat1f mean, dx, dy, change;
 };
 
-Channel channel(const cv::Mat& before, const cv::Mat& after) {
+Channel channel(const cv::Mat& before, const cv::Mat& after, double smoothing_px) {
   Channel c;
   cv::Mat1f a, b;
   before.convertTo(a, CV_32F);
   after.convertTo(b, CV_32F);
-  cv::GaussianBlur(a, a, {}, kSmoothing);
-  cv::GaussianBlur(b, b, {}, kSmoothing);
+  cv::GaussianBlur(a, a, {}, smoothing_px);
+  cv::GaussianBlur(b, b, {}, smoothing_px);
   c.mean = 0.5 * (a + b);
   c.change = b - a;
   cv::Sobel(c.mean, c.dx, CV_32F, 1, 0, 1, 0.5);
@@ -68,7 +61,7 @@ void add(const Channel& c, const cv::Rect& where, Square& square) {
     }
   }
   Eigen::Matrix2d light = sums.topLeftCorner<2, 2>();
-  light(1, 1) += where.area();  // where all is one grey, gain and offset are the same
+  light(1, 1) += where.area();  // in uniform grey, gain and offset are the same
   const Eigen::Matrix<double, 2, 3> by_light = sums.topRightCorner<2, 3>();
   square.products += sums.bottomRightCorner<3, 3>() - by_light.transpose() * light.inverse() * by_light;
   square.values += where.area();
@@ -86,51 +79,53 @@ std::vector<Square> squares(const std::vector<Channel>& channels, int side) {
   return all;
 }
 
-/// Variance of a value's change where nothing happened: what is left in those squares that show least.
-double noise_of(std::vector<Square> all) {
+/// Variance of a value's change without movement: the residual in the squares with the least change.
+double noise_of(std::vector<Square> all, double min_noise) {
   std::ranges::sort(all, {}, &Square::contrast);
   all.resize((all.size() + 3) / 4);
   const auto left = [](const Square& square) { return square.unexplained() / square.values; };
   std::ranges::nth_element(all, all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2), {}, left);
-  return std::max(left(all[all.size() / 2]), kQuantisation);
+  return std::max(left(all[all.size() / 2]), min_noise);
 }
 
 using Axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>;  ///< of the sums of gradients
 
-/// The shift in those directions that show more than `least`.
-double shift_px(const Square& square, const Axes& axes, double least) {
+/// The shift in those directions with eigenvalues of at least `min_structure`.
+double shift_px(const Square& square, const Axes& axes, double min_structure) {
   const Eigen::Vector2d along = axes.eigenvectors().transpose() * square.shift();
-  return (axes.eigenvalues().array() < least).select(0.0, along.array()).matrix().norm();
+  return (axes.eigenvalues().array() < min_structure).select(0.0, along.array()).matrix().norm();
 }
 
-PictureShift shift_of(const std::vector<Square>& all) {
-  PictureShift found;
+ImageShift shift_of(const std::vector<Square>& all, const ImageShiftOptions& options) {
+  ImageShift found;
   if (all.empty()) return found;
-  const double noise = noise_of(all);
-  const double least = kCorrelated * noise / (kSharp * kSharp);
+  const double noise = noise_of(all, options.min_noise);
+  const double min_structure =
+      options.correlated_pixels * noise / (options.max_noise_shift_px * options.max_noise_shift_px);
   Square together;
   for (const auto& square : all) {
     const Axes axes(square.gradients());
-    if (axes.eigenvalues().maxCoeff() < least) continue;
+    if (axes.eigenvalues().maxCoeff() < min_structure) continue;
     const double misfit = std::max(0.0, square.unexplained() - noise * square.values);
-    found.squares.push_back({shift_px(square, axes, least), std::sqrt(misfit / square.gradients().trace())});
-    if (found.squares.back().misfit_px <= kOtherPx) together += square;
+    found.squares.push_back({shift_px(square, axes, min_structure), std::sqrt(misfit / square.gradients().trace())});
+    if (found.squares.back().misfit_px <= options.max_misfit_px) together += square;
   }
-  found.together_px = shift_px(together, Axes(together.gradients()), least);
+  found.together_px = shift_px(together, Axes(together.gradients()), min_structure);
   return found;
 }
 
 }  // namespace
 
-PictureShift image_shift(const cv::Mat& before, const cv::Mat& after) {
+ImageShift image_shift(const cv::Mat& before, const cv::Mat& after, const ImageShiftOptions& options) {
   std::vector<cv::Mat> a, b;
   cv::split(before, a);
   cv::split(after, b);
   std::vector<Channel> channels;
-  for (std::size_t i = 0; i < a.size(); ++i) channels.push_back(channel(a[i], b[i]));
-  PictureShift found;
-  for (int side = kSmallest; side <= kLargest && found.squares.size() < kEnough; side *= 2) {
-    auto larger = shift_of(squares(channels, side));
+  for (std::size_t i = 0; i < a.size(); ++i) channels.push_back(channel(a[i], b[i], options.smoothing_px));
+  ImageShift found;
+  for (int side = options.min_side_px; side <= options.max_side_px && found.squares.size() < options.good_squares;
+       side *= 2) {
+    auto larger = shift_of(squares(channels, side), options);
     if (larger.squares.size() > found.squares.size() || found.squares.empty()) found = std::move(larger);
   }
   return found;

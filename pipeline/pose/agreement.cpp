@@ -10,24 +10,19 @@
 namespace scanrig {
 namespace {
 
-constexpr double kMinFacing = 0.25;    // cosine at which a view is no longer asked about a point
-constexpr double kMinAgreement = 0.6;  // cosine between corresponding normals
-constexpr double kSilhouettePx = 2.0;  // farther outside than this is outside
-constexpr double kTolerance = 4.0;     // standard deviations
-constexpr int kClearPx = 2;            // free space must be so for neighbours this far away too
 constexpr std::size_t kBlock = 128;
 constexpr SampleCheck kFreeSpace{SampleCheck::Kind::free_space, 0.0F, 0.0F};
 
 /// True where the camera looked through `p` (camera frame) and so did its neighbours, at least `reach_mm` deep.
 bool looked_through(const RangeImage& image, const cv::Mat1b& background, int background_scale,
-                    const Eigen::Vector3d& p, double reach_mm) {
+                    const Eigen::Vector3d& p, double reach_mm, int clear_px) {
   const Projection& projection = image.projection;
   const Eigen::Vector2d pixel = projection.project(p);
-  if (!projection.contains(pixel, kClearPx)) return false;
+  if (!projection.contains(pixel, clear_px)) return false;
   const int row = static_cast<int>(std::lround(pixel.y()));
   const int column = static_cast<int>(std::lround(pixel.x()));
   for (const auto& [dr, dc] :
-       {std::pair{0, 0}, {-kClearPx, -kClearPx}, {-kClearPx, kClearPx}, {kClearPx, -kClearPx}, {kClearPx, kClearPx}}) {
+       {std::pair{0, 0}, {-clear_px, -clear_px}, {-clear_px, clear_px}, {clear_px, -clear_px}, {clear_px, clear_px}}) {
     const float depth = image.depth(row + dr, column + dc);
     if (std::isnan(depth)) {
       if (background.empty() || !background((row + dr) * background_scale, (column + dc) * background_scale))
@@ -39,34 +34,35 @@ bool looked_through(const RangeImage& image, const cv::Mat1b& background, int ba
   return true;
 }
 
-bool outside_silhouette(const Silhouette& silhouette, const Eigen::Vector3d& p) {
+bool outside_silhouette(const Silhouette& silhouette, const Eigen::Vector3d& p, double min_outside_px) {
   const Eigen::Vector3d q = silhouette.camera_from_pose * p;
   if (q.z() <= 0.0) return false;
   const Eigen::Vector2d pixel = silhouette.projection.project(q);
   if (!silhouette.projection.contains(pixel)) return false;
   return silhouette.outside_px(static_cast<int>(std::lround(pixel.y())), static_cast<int>(std::lround(pixel.x()))) >
-         kSilhouettePx;
+         min_outside_px;
 }
 
-/// What `witness` says of a point and its normal, both in its own pose's frame.
-SampleCheck check_sample(const PoseObservations& observations, int level, const SurfacePoint& sample, double reach_mm) {
+/// Checks a point and its normal against `observations`, both in that pose's frame.
+SampleCheck check_sample(const PoseObservations& observations, int level, const SurfacePoint& sample, double reach_mm,
+                         const AgreementOptions& options) {
   SampleCheck best;
-  double best_facing = kMinFacing;
+  double best_facing = options.min_facing;
   if (sample.point.y() < -2.0 * reach_mm) return kFreeSpace;  // inside the table
   const RangeLevel& images = observations.measured->images[level];
   for (std::size_t v = 0; v < images.size(); ++v) {
     for (const Silhouette& s : observations.views[v].silhouettes) {
-      if (outside_silhouette(s, sample.point)) return kFreeSpace;
+      if (outside_silhouette(s, sample.point, options.silhouette_px)) return kFreeSpace;
     }
     const Eigen::Vector3d p = images[v].camera_from_pose * sample.point;
     if (images[v].projection.kind == Projection::Kind::pinhole && p.z() <= 0.0) continue;
-    if (looked_through(images[v], observations.views[v].range.background, 1 << level, p, reach_mm)) {
+    if (looked_through(images[v], observations.views[v].range.background, 1 << level, p, reach_mm, options.clear_px)) {
       return kFreeSpace;
     }
     const Eigen::Vector3d normal = images[v].camera_from_pose.linear() * sample.normal;
     if (-normal.z() < best_facing) continue;
     const auto plane = tangent_plane_near(images[v], p);
-    if (!plane || plane->normal.dot(normal) < kMinAgreement) continue;
+    if (!plane || plane->normal.dot(normal) < options.min_agreement) continue;
     const double distance = plane->normal.dot(p - plane->point);
     if (std::abs(distance) > reach_mm) continue;
     best_facing = -normal.z();
@@ -76,7 +72,7 @@ SampleCheck check_sample(const PoseObservations& observations, int level, const 
   return best;
 }
 
-bool contradicts(const SampleCheck& t, double spread_mm, double tolerance = kTolerance) {
+bool contradicts(const SampleCheck& t, double spread_mm, double tolerance) {
   if (t.kind == SampleCheck::Kind::free_space) return true;
   return t.kind == SampleCheck::Kind::surface &&
          std::abs(t.distance_mm) > tolerance * std::hypot(static_cast<double>(t.sigma_mm), spread_mm);
@@ -85,7 +81,8 @@ bool contradicts(const SampleCheck& t, double spread_mm, double tolerance = kTol
 }  // namespace
 
 std::vector<SampleCheck> check_samples(const PoseObservations& pose1, const PoseObservations& pose2,
-                                       const Transform& pose1_from_pose2, int level, double reach_mm) {
+                                       const Transform& pose1_from_pose2, int level, double reach_mm,
+                                       const AgreementOptions& options) {
   const auto& samples2 = pose2.measured->samples[level];
   const auto& samples1 = pose1.measured->samples[level];
   std::vector<SampleCheck> sample_checks(samples2.size() + samples1.size());
@@ -97,19 +94,20 @@ std::vector<SampleCheck> check_samples(const PoseObservations& pose1, const Pose
       SurfacePoint sample = of_pose2 ? samples2[i] : samples1[i - samples2.size()];
       sample.point = motion * sample.point;
       sample.normal = motion.linear() * sample.normal;
-      sample_checks[i] = check_sample(of_pose2 ? pose1 : pose2, level, sample, reach_mm);
+      sample_checks[i] = check_sample(of_pose2 ? pose1 : pose2, level, sample, reach_mm, options);
     }
   });
   return sample_checks;
 }
 
-Agreement count_agreement(const std::vector<SampleCheck>& sample_checks, double spread_mm) {
+Agreement count_agreement(const std::vector<SampleCheck>& sample_checks, double spread_mm,
+                          const AgreementOptions& options) {
   Agreement result;
   std::vector<double> distances;
   for (const SampleCheck& t : sample_checks) {
     if (t.kind == SampleCheck::Kind::surface) distances.push_back(std::abs(t.distance_mm));
     if (t.kind == SampleCheck::Kind::free_space) ++result.free_space;
-    if (contradicts(t, spread_mm)) {
+    if (contradicts(t, spread_mm, options.tolerance)) {
       ++result.contradicted;
     } else if (t.kind == SampleCheck::Kind::surface) {
       ++result.confirmed;
@@ -123,9 +121,10 @@ Agreement count_agreement(const std::vector<SampleCheck>& sample_checks, double 
   return result;
 }
 
-AgreementGap compare(const std::vector<SampleCheck>& first, const std::vector<SampleCheck>& second, double spread_mm) {
+AgreementGap compare(const std::vector<SampleCheck>& first, const std::vector<SampleCheck>& second, double spread_mm,
+                     const AgreementOptions& options) {
   AgreementGap result;
-  for (const double tolerance : {3.0 * kTolerance, kTolerance}) {
+  for (const double tolerance : {options.wide_tolerance, options.tolerance}) {
     int only_first = 0;
     int only_second = 0;
     for (std::size_t i = 0; i < first.size(); ++i) {
@@ -135,7 +134,9 @@ AgreementGap compare(const std::vector<SampleCheck>& first, const std::vector<Sa
       only_second += b && !a;
     }
     result.contradicted_more = only_second - only_first;
-    result.separable |= result.contradicted_more > 4.0 * std::sqrt(static_cast<double>(only_first + only_second)) + 4.0;
+    result.separable |=
+        result.contradicted_more >
+        options.separable * std::sqrt(static_cast<double>(only_first + only_second)) + options.separable;
   }
   return result;
 }

@@ -8,10 +8,10 @@
 
 namespace scanrig {
 
-/// What the other pose says about one point of a pose's surface, once a motion between the poses is assumed.
+/// Check of one point of a pose's surface against the other pose, for an assumed motion between the poses.
 struct SampleCheck {
   enum class Kind : std::uint8_t {
-    unknown,    ///< nobody looked there, or something is in front of it
+    unknown,    ///< not observed, or something is in front of it
     surface,    ///< a surface was measured next to it
     free_space  ///< a camera looked through it: at the background, past the silhouette or at something behind it
   };
@@ -20,18 +20,30 @@ struct SampleCheck {
   float sigma_mm = 0.0F;     ///< `surface`: of the distance
 };
 
-/// A pose as a witness: its measured surface and its views' silhouettes.
+/// Limits of the checks.
+struct AgreementOptions {
+  double min_facing = 0.25;      ///< cosine below which a view does not judge a point
+  double min_agreement = 0.6;    ///< cosine between corresponding normals
+  double silhouette_px = 2.0;    ///< farther outside a silhouette than this is outside
+  int clear_px = 2;              ///< free space must also hold for neighbours at this distance
+  double tolerance = 4.0;        ///< standard deviations off the surface that contradict
+  double wide_tolerance = 12.0;  ///< the same, for small features that are distinct from the noise of edges
+  double separable = 4.0;        ///< standard deviations of McNemar's test
+};
+
+/// The observations of a pose: its measured surface and its views' silhouettes.
 struct PoseObservations {
   const MeasuredPose* measured = nullptr;
   std::span<const View> views;
 };
 
-/// Testimonies for all samples of pose 2, then all of pose 1, on one level, nothing trimmed. `reach_mm`: farther in
-/// front of a measured surface is free space, farther behind it is unknown.
+/// Checks of all samples of pose 2, then all of pose 1, on one level, nothing trimmed. `reach_mm`: farther in front of
+/// a measured surface is free space, farther behind it is unknown.
 std::vector<SampleCheck> check_samples(const PoseObservations& pose1, const PoseObservations& pose2,
-                                       const Transform& pose1_from_pose2, int level, double reach_mm);
+                                       const Transform& pose1_from_pose2, int level, double reach_mm,
+                                       const AgreementOptions& options);
 
-/// Testimonies in numbers.
+/// Summary of the checks.
 struct Agreement {
   double confirmed = 0.0;     ///< shares of all samples
   double contradicted = 0.0;  ///< in free space, or off the surface by more than its tolerance
@@ -40,16 +52,17 @@ struct Agreement {
   [[nodiscard]] double score() const { return confirmed - 2.0 * contradicted; }
 };
 
-/// Counts with a tolerance of 4 standard deviations, sigma joined by `spread_mm`, what sigma does not know.
-Agreement count_agreement(const std::vector<SampleCheck>& sample_checks, double spread_mm);
+/// Counts with `options.tolerance`; `spread_mm`, the error not covered by sigma, is added to sigma.
+Agreement count_agreement(const std::vector<SampleCheck>& sample_checks, double spread_mm,
+                          const AgreementOptions& options);
 
-/// How many more samples contradict `second` alone than `first` alone, and whether that is more than chance: McNemar's
-/// test at 4 standard deviations, once at the tolerance above and once at three times it, where a small feature stands
-/// out from the noise of edges.
+/// Number of samples that contradict `second` alone less those that contradict `first` alone, and whether that exceeds
+/// chance: McNemar's test, once at either tolerance.
 struct AgreementGap {
   int contradicted_more = 0;
   bool separable = false;
 };
-AgreementGap compare(const std::vector<SampleCheck>& first, const std::vector<SampleCheck>& second, double spread_mm);
+AgreementGap compare(const std::vector<SampleCheck>& first, const std::vector<SampleCheck>& second, double spread_mm,
+                     const AgreementOptions& options);
 
 }  // namespace scanrig

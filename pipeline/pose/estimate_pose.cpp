@@ -7,15 +7,11 @@
 
 #include "core/parallel.h"
 #include "core/units.h"
-#include "pipeline/pose/point_pairs.h"
 
 namespace scanrig {
 namespace {
 
-constexpr int kLevels = 4;  // of the range pyramid; the last has some 300 samples a pose
-constexpr int kPointPairMotions = 40;
-
-/// A candidate on its way, with what the measurements say of it.
+/// A candidate during the search, with its checks.
 struct Hypothesis {
   Candidate candidate;
   std::vector<SampleCheck> sample_checks;
@@ -23,7 +19,7 @@ struct Hypothesis {
   double condition = 0.0;
 };
 
-/// Everything the search needs of the two poses.
+/// Inputs of the search from both poses.
 struct Scene {
   RestingSolid solid1, solid2;
   std::vector<RestPair> pairs;
@@ -33,9 +29,9 @@ struct Scene {
   Eigen::Vector3d middle2 = Eigen::Vector3d::Zero();  ///< of pose 2's object
 };
 
-bool alike(const Transform& a, const Transform& b, const Scene& scene, double degrees) {
+bool alike(const Transform& a, const Transform& b, const Scene& scene, double degrees, double shift) {
   return rotation_angle(a.linear().transpose() * b.linear()) < to_radians(degrees) &&
-         (a * scene.middle2 - b * scene.middle2).norm() < 0.05 * scene.size_mm;
+         (a * scene.middle2 - b * scene.middle2).norm() < shift * scene.size_mm;
 }
 
 /// Confirmations fade with the distance: a ranking for motions that are still degrees off.
@@ -48,23 +44,14 @@ double soft_score(const std::vector<SampleCheck>& sample_checks, double reach_mm
   return sum / static_cast<double>(std::max<std::size_t>(sample_checks.size(), 1));
 }
 
-/// One narrowing of the field: align what is left, hear the witnesses, keep the best that are distinct.
-struct Round {
-  int level;         ///< of the pyramid
-  int iterations;    ///< of the alignment before judging; 0: judge only
-  double capture;    ///< as a share of the object's size
-  double reach;      ///< the same
-  std::size_t keep;  ///< best hypotheses that stay
-  double apart_deg;  ///< and that are this far apart
-};
-
-void narrow(std::vector<Hypothesis>& field, const Scene& scene, const Round& round) {
+void narrow(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options, const SearchRound& round) {
   parallel_for(field.size(), [&](std::size_t i) {
     Hypothesis& h = field[i];
     if (round.iterations > 0) {
       RefineOptions refine;
-      refine.iterations = round.iterations;
-      h.candidate.contacts = contacts_for(h.candidate.pose1_from_pose2, scene.pairs, scene.solid2.properties);
+      refine.max_iterations = round.iterations;
+      h.candidate.contacts =
+          contacts_for(h.candidate.pose1_from_pose2, scene.pairs, scene.solid2.properties, options.pairs);
       refine.contacts = h.candidate.contacts;
       const RefinedPose aligned = align(scene.measured1, scene.measured2, h.candidate.pose1_from_pose2, round.level,
                                         round.capture * scene.size_mm, refine);
@@ -72,8 +59,8 @@ void narrow(std::vector<Hypothesis>& field, const Scene& scene, const Round& rou
       h.condition = aligned.condition;
     }
     const double reach = round.reach * scene.size_mm;
-    h.sample_checks =
-        check_samples(scene.observations1, scene.observations2, h.candidate.pose1_from_pose2, round.level, reach);
+    h.sample_checks = check_samples(scene.observations1, scene.observations2, h.candidate.pose1_from_pose2, round.level,
+                                    reach, options.agreement);
     h.score = soft_score(h.sample_checks, reach);
   });
   std::stable_sort(field.begin(), field.end(),
@@ -81,41 +68,44 @@ void narrow(std::vector<Hypothesis>& field, const Scene& scene, const Round& rou
   std::vector<Hypothesis> kept;
   for (Hypothesis& h : field) {
     if (kept.size() == round.keep) break;
-    const bool known = std::ranges::any_of(kept, [&](const Hypothesis& k) {
-      return alike(k.candidate.pose1_from_pose2, h.candidate.pose1_from_pose2, scene, round.apart_deg);
+    const bool is_known = std::ranges::any_of(kept, [&](const Hypothesis& k) {
+      return alike(k.candidate.pose1_from_pose2, h.candidate.pose1_from_pose2, scene, round.apart_deg,
+                   options.same_shift);
     });
-    if (!known) kept.push_back(std::move(h));
+    if (!is_known) kept.push_back(std::move(h));
   }
   field = std::move(kept);
 }
 
 double height_above_table(const Mesh& solid) { return reach_along(solid.vertices, Eigen::Vector3d::UnitY()); }
 
-Result<Scene> set_scene(const PoseInput& pose1, const PoseInput& pose2) {
+Result<Scene> set_scene(const PoseInput& pose1, const PoseInput& pose2, const PoseOptions& options) {
   Scene scene;
-  const auto facts1 = solid_properties(pose1.solid);
-  if (!facts1) return pass_on(facts1, "pose 1");
-  const auto facts2 = solid_properties(pose2.solid);
-  if (!facts2) return pass_on(facts2, "pose 2");
-  scene.solid1 = {*facts1, height_above_table(pose1.solid), {}};
-  scene.solid2 = {*facts2, height_above_table(pose2.solid), {}};
-  scene.measured1 = measured_pose(pose1.views, kLevels);
-  scene.measured2 = measured_pose(pose2.views, kLevels);
+  const auto properties1 = solid_properties(pose1.solid);
+  if (!properties1) return pass_on(properties1, "pose 1");
+  const auto properties2 = solid_properties(pose2.solid);
+  if (!properties2) return pass_on(properties2, "pose 2");
+  scene.solid1 = {*properties1, height_above_table(pose1.solid), {}};
+  scene.solid2 = {*properties2, height_above_table(pose2.solid), {}};
+  scene.measured1 = measured_pose(pose1.views, options.levels);
+  scene.measured2 = measured_pose(pose2.views, options.levels);
   scene.size_mm = 0.5 * (scene.measured1.size_mm + scene.measured2.size_mm);
-  scene.middle2 = facts2->centre_of_mass;
+  scene.middle2 = properties2->centre_of_mass;
   for (const MeasuredPose* pose : {&scene.measured1, &scene.measured2}) {
-    if (pose->samples[kLevels - 2].size() < 50) {
-      return fail(ErrorCode::degenerate, "pose estimation: pose {} has no measured surface to speak of",
+    if (pose->samples[options.levels - 2].size() < options.min_samples) {
+      return fail(ErrorCode::degenerate, "pose estimation: pose {} has almost no measured surface",
                   pose == &scene.measured1 ? 1 : 2);
     }
   }
   return scene;
 }
 
-void add_pair(const RestPair& pair, const char* generator, const Scene& scene, std::vector<Hypothesis>& field) {
-  for (const double swivel : swivels_of(pair)) {
+void add_pair(const RestPair& pair, const char* generator, const Scene& scene, const RestPairOptions& options,
+              std::vector<Hypothesis>& field) {
+  for (const double swivel : swivels_of(pair, options)) {
     Hypothesis h;
-    h.candidate.pose1_from_pose2 = transform_of(pair, scene.solid1.properties, scene.solid2.properties, swivel);
+    h.candidate.pose1_from_pose2 =
+        transform_of(pair, scene.solid1.properties, scene.solid2.properties, swivel, options);
     h.candidate.generator = generator;
     h.candidate.normal1 = pair.of_pose1.normal;
     h.candidate.normal2 = pair.of_pose2.normal;
@@ -123,7 +113,7 @@ void add_pair(const RestPair& pair, const char* generator, const Scene& scene, s
   }
 }
 
-/// The paper's generator. `same rest` is always among the hypotheses: it can only be refused if it was looked for.
+/// The paper's generator. `same rest` is always among the hypotheses: it can only be refused if it was tried.
 Result<void> add_rest_hypotheses(const PoseInput& pose1, const PoseInput& pose2, const PoseOptions& options,
                                  Scene& scene, PoseEstimate& estimate, std::vector<Hypothesis>& field) {
   const bool egi = options.rests == PoseOptions::Rests::egi;
@@ -138,13 +128,14 @@ Result<void> add_rest_hypotheses(const PoseInput& pose1, const PoseInput& pose2,
   scene.solid2.rests = std::move(rests2->rests);
   scene.pairs = pair_rests(scene.solid1, scene.solid2, options.pairs);
   estimate.pairs = static_cast<int>(scene.pairs.size());
-  for (const RestPair& pair : scene.pairs) add_pair(pair, egi ? "egi" : "hull", scene, field);
+  for (const RestPair& pair : scene.pairs) add_pair(pair, egi ? "egi" : "hull", scene, options.pairs, field);
   return {};
 }
 
-void add_point_pair_hypotheses(const Scene& scene, std::vector<Hypothesis>& field) {
-  for (const Vote& vote : vote_by_point_pairs(scene.measured1.samples[kLevels - 2],
-                                              scene.measured2.samples[kLevels - 2], scene.size_mm, kPointPairMotions)) {
+void add_point_pair_hypotheses(const Scene& scene, const PoseOptions& options, std::vector<Hypothesis>& field) {
+  const auto level = static_cast<std::size_t>(options.levels - 2);
+  for (const Vote& vote : vote_by_point_pairs(scene.measured1.samples[level], scene.measured2.samples[level],
+                                              scene.size_mm, options.point_pair_motions, options.voting)) {
     Hypothesis h;
     h.candidate.pose1_from_pose2 = vote.pose1_from_pose2;
     h.candidate.generator = "point pairs";
@@ -165,19 +156,20 @@ std::string describe(const Candidate& c) {
                      100.0 * c.agreement.confirmed, 100.0 * c.agreement.contradicted);
 }
 
-/// One yardstick for all: the spread of the best fitting hypothesis that covers enough.
+/// Judges all with one tolerance: the spread of the best fitting hypothesis that covers enough.
 void judge(std::vector<Hypothesis>& field, const PoseOptions& options) {
   double spread = std::numeric_limits<double>::infinity();
   for (const Hypothesis& h : field) {
-    const Agreement loose = count_agreement(h.sample_checks, std::numeric_limits<double>::infinity());
+    const Agreement loose =
+        count_agreement(h.sample_checks, std::numeric_limits<double>::infinity(), options.agreement);
     if (loose.confirmed > options.min_overlap) spread = std::min(spread, 1.4826 * loose.median_mm);
   }
-  for (Hypothesis& h : field) h.candidate.agreement = count_agreement(h.sample_checks, spread);
+  for (Hypothesis& h : field) h.candidate.agreement = count_agreement(h.sample_checks, spread, options.agreement);
   std::stable_sort(field.begin(), field.end(), [](const Hypothesis& a, const Hypothesis& b) {
     return a.candidate.agreement.score() > b.candidate.agreement.score();
   });
   for (Hypothesis& h : field) {
-    const AgreementGap with_best = compare(field[0].sample_checks, h.sample_checks, spread);
+    const AgreementGap with_best = compare(field[0].sample_checks, h.sample_checks, spread, options.agreement);
     Candidate& c = h.candidate;
     c.contradicted_more = with_best.contradicted_more;
     c.separable = with_best.separable;
@@ -186,13 +178,13 @@ void judge(std::vector<Hypothesis>& field, const PoseOptions& options) {
   }
 }
 
-/// Another answer that the measurements do not tell from `best`.
+/// True for another solution that the measurements do not separate from `best`.
 bool is_rival(const Candidate& c, const Candidate& best, const PoseOptions& options) {
   return c.angle_to_best_deg > options.same_deg && !c.separable &&
-         c.agreement.confirmed > 0.7 * best.agreement.confirmed;
+         c.agreement.confirmed > options.rival_share * best.agreement.confirmed;
 }
 
-/// Takes what cannot be told apart yet to full resolution; what was told apart stays behind the finalists.
+/// Refines the candidates that are not yet separable at full resolution; the others stay behind these finalists.
 void settle(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options) {
   if (field.empty()) return;
   judge(field, options);
@@ -202,7 +194,10 @@ void settle(std::vector<Hypothesis>& field, const Scene& scene, const PoseOption
   if (rivals - field.begin() < 2) return;
   std::vector<Hypothesis> finalists(std::make_move_iterator(field.begin()), std::make_move_iterator(rivals));
   std::vector<Hypothesis> others(std::make_move_iterator(rivals), std::make_move_iterator(field.end()));
-  narrow(finalists, scene, {0, 10, 0.01, 0.015, finalists.size(), options.same_deg});
+  SearchRound round = options.last_round;
+  round.keep = finalists.size();
+  round.apart_deg = options.same_deg;
+  narrow(finalists, scene, options, round);
   judge(finalists, options);
   field = std::move(finalists);
   field.insert(field.end(), std::make_move_iterator(others.begin()), std::make_move_iterator(others.end()));
@@ -214,10 +209,10 @@ Result<void> decide(const std::vector<Hypothesis>& field, const Scene& scene, co
   const Candidate& best = field[0].candidate;
   const Agreement& t = best.agreement;
   if (t.confirmed < options.min_overlap || t.contradicted > options.max_contradicted * (t.confirmed + t.contradicted) ||
-      t.median_mm > options.worst_median * scene.size_mm) {
+      t.median_mm > options.max_median * scene.size_mm) {
     return fail(ErrorCode::no_overlap,
                 "pose estimation: the two poses do not fit together; the best of {} tried: {}. "
-                "Is it the same object, and do the poses show enough common surface?",
+                "Check that it is the same object and that the poses share enough surface",
                 field.size(), describe(best));
   }
   std::string others;
@@ -247,7 +242,7 @@ Result<void> decide(const std::vector<Hypothesis>& field, const Scene& scene, co
 
 Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose2, const PoseOptions& options,
                                    const Context& context) {
-  auto scene = set_scene(pose1, pose2);
+  auto scene = set_scene(pose1, pose2, options);
   if (!scene) return pass_on(scene);
   scene->observations1 = {&scene->measured1, pose1.views};
   scene->observations2 = {&scene->measured2, pose2.views};
@@ -257,19 +252,16 @@ Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose
   if (options.stable_tangent_planes) {
     if (auto ok = add_rest_hypotheses(pose1, pose2, options, *scene, estimate, field); !ok) return pass_on(ok);
   }
-  if (options.point_pairs) add_point_pair_hypotheses(*scene, field);
-  add_pair(same_rest_pair(scene->solid1, scene->solid2), "turn on the table", *scene, field);
+  if (options.point_pairs) add_point_pair_hypotheses(*scene, options, field);
+  add_pair(same_rest_pair(scene->solid1, scene->solid2), "turn on the table", *scene, options.pairs, field);
   estimate.hypotheses = static_cast<int>(field.size());
 
-  constexpr Round kRounds[] = {{3, 0, 0.00, 0.050, 120, 4.0},  // as proposed
-                               {3, 10, 0.10, 0.040, 16, 5.0},  // coarse
-                               {2, 15, 0.05, 0.025, 8, 5.0},   // middle
-                               {1, 15, 0.02, 0.015, 8, 5.0}};  // verdict
-  for (const Round& round : kRounds) {
+  std::size_t rounds_done = 0;
+  for (const SearchRound& round : options.rounds) {
     if (context.stopped()) return fail(ErrorCode::stopped, "pose estimation: stopped");
-    narrow(field, *scene, round);
+    narrow(field, *scene, options, round);
     if (round.iterations == 0) estimate.refined = static_cast<int>(field.size());
-    context.report("pose", static_cast<double>(&round - kRounds + 1) / std::size(kRounds));
+    context.report("pose", static_cast<double>(++rounds_done) / static_cast<double>(options.rounds.size()));
   }
   settle(field, *scene, options);
   if (auto ok = decide(field, *scene, options); !ok) return pass_on(ok);

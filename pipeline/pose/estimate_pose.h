@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstddef>
 #include <span>
 #include <string>
 #include <vector>
@@ -8,6 +10,7 @@
 #include "core/result.h"
 #include "pipeline/mesh/mesh.h"
 #include "pipeline/pose/agreement.h"
+#include "pipeline/pose/point_pairs.h"
 #include "pipeline/pose/rest_pairs.h"
 #include "pipeline/pose/stable_rests.h"
 #include "pipeline/range/range_image.h"
@@ -16,8 +19,18 @@ namespace scanrig {
 
 /// One pose: its partial model and the registered views it was made from, both in its own turntable frame, mm.
 struct PoseInput {
-  const Mesh& solid;  ///< closed; what no view measured is closed by hull and table
+  const Mesh& solid;  ///< closed; unmeasured surface is closed by hull and table
   std::span<const View> views;
+};
+
+/// One narrowing of the candidates: align, check the samples, keep the best distinct ones.
+struct SearchRound {
+  int level;         ///< of the range pyramid
+  int iterations;    ///< of the alignment before judging; 0: judge only
+  double capture;    ///< capture distance as a share of the object's size
+  double reach;      ///< of the checks, as a share of the object's size
+  std::size_t keep;  ///< best hypotheses that are kept
+  double apart_deg;  ///< minimum angle between them
 };
 
 struct PoseOptions {
@@ -31,7 +44,20 @@ struct PoseOptions {
   double same_rest_tilt_deg = 5.0;    ///< a motion that tilts the object less than this has not turned it over
   double min_overlap = 0.06;          ///< confirmed share of both surfaces
   double max_contradicted = 0.25;     ///< contradicted share of what was judged
-  double worst_median = 0.006;        ///< median distance as a share of the object's size
+  double max_median = 0.006;          ///< median distance as a share of the object's size
+  double rival_share = 0.7;           ///< a rival confirms at least this share of what the best one confirms
+  double same_shift = 0.05;           ///< hypotheses closer than this share of the object's size are one
+
+  int levels = 4;                ///< of the range pyramid; the last has some 300 samples per pose
+  std::size_t min_samples = 50;  ///< of a pose's measured surface on the second last level
+  int point_pair_motions = 40;   ///< hypotheses from point pairs
+  std::array<SearchRound, 4> rounds = {{{3, 0, 0.00, 0.050, 120, 4.0},   // as proposed
+                                        {3, 10, 0.10, 0.040, 16, 5.0},   // coarse
+                                        {2, 15, 0.05, 0.025, 8, 5.0},    // middle
+                                        {1, 15, 0.02, 0.015, 8, 5.0}}};  // verdict
+  SearchRound last_round = {0, 10, 0.01, 0.015, 0, 0.0};  ///< for rivals; keeps all that are `same_deg` apart
+  AgreementOptions agreement;
+  PointPairOptions voting;
 };
 
 /// A motion between the poses after refinement, with the verdict on it.
@@ -43,7 +69,7 @@ struct Candidate {
   std::vector<Contact> contacts;  ///< with the tables, for the refinement
   Agreement agreement;
   double angle_to_best_deg = 0.0;
-  int contradicted_more = 0;  ///< samples that speak against it and not against the best, less the other way round
+  int contradicted_more = 0;  ///< samples that contradict it and not the best, less those the other way round
   bool separable = false;     ///< that is more than chance
 };
 
@@ -60,11 +86,11 @@ struct PoseEstimate {
   double condition = 0.0;  ///< of the refinement, see RefinedPose
 };
 
-/// How pose 2 lies in pose 1's frame: pairs of stable tangent planes [Park and Subbarao 2002, section 3] and, as a
-/// second generator, votes of oriented point pairs; all hypotheses refined on and judged by the range images of both
-/// poses, free space and silhouettes, nothing trimmed in the verdict. Same bits for any number of threads. Fails with
-/// `not_closed` and `degenerate` (a solid or a measured surface that is none), `no_overlap` (no hypothesis fits),
-/// `same_rest` (the object was not turned over), `ambiguous` (more than one answer fits; the message lists them),
+/// Transform from pose 2's frame to pose 1's. Generators: pairs of stable tangent planes [Park and Subbarao 2002,
+/// section 3] and votes of oriented point pairs. All hypotheses are refined and judged by the range images of both
+/// poses, free space and silhouettes; the verdict trims nothing. Same bits for any number of threads.
+/// Fails with `not_closed` and `degenerate` (no valid solid or measured surface), `no_overlap` (no hypothesis fits),
+/// `same_rest` (the object was not turned over), `ambiguous` (more than one solution fits; the message lists them),
 /// `stopped`.
 Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose2, const PoseOptions& options,
                                    const Context& context);

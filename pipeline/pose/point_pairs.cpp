@@ -11,32 +11,22 @@
 namespace scanrig {
 namespace {
 
-constexpr int kDistanceSteps = 16;  // over the range of distances used
-constexpr int kAngleSteps = 15;     // over 180 deg
-constexpr int kTurnSteps = 30;      // over 360 deg
-constexpr int kKeys = kDistanceSteps * kAngleSteps * kAngleSteps * kAngleSteps;
-constexpr double kMinLength = 0.12;  // pairs, as a share of the object's size
-constexpr double kMaxLength = 0.6;
-constexpr std::size_t kReferences = 200;  // points of surface 2 that vote
-constexpr std::uint32_t kMaxAlike = 400;  // pairs looked at under one key
-constexpr std::size_t kPeaks = 3;         // motions taken from each
-
-int angle_step(double cosine) {
+int angle_step(double cosine, int steps) {
   const double share = std::acos(std::clamp(cosine, -1.0, 1.0)) / std::numbers::pi;
-  return std::min(static_cast<int>(share * kAngleSteps), kAngleSteps - 1);
+  return std::min(static_cast<int>(share * steps), steps - 1);
 }
 
 /// Key of a pair of oriented points, or -1 where its distance is not used.
-int key_of(const SurfacePoint& a, const SurfacePoint& b, double size_mm) {
+int key_of(const SurfacePoint& a, const SurfacePoint& b, double size_mm, const PointPairOptions& options) {
   const Eigen::Vector3d d = b.point - a.point;
   const double length = d.norm();
-  const double share = (length / size_mm - kMinLength) / (kMaxLength - kMinLength);
+  const double share = (length / size_mm - options.min_length) / (options.max_length - options.min_length);
   if (share < 0.0 || share >= 1.0) return -1;
   const Eigen::Vector3d u = d / length;
-  int key = static_cast<int>(share * kDistanceSteps);
-  key = key * kAngleSteps + angle_step(a.normal.dot(u));
-  key = key * kAngleSteps + angle_step(b.normal.dot(u));
-  return key * kAngleSteps + angle_step(a.normal.dot(b.normal));
+  int key = static_cast<int>(share * options.distance_steps);
+  key = key * options.angle_steps + angle_step(a.normal.dot(u), options.angle_steps);
+  key = key * options.angle_steps + angle_step(b.normal.dot(u), options.angle_steps);
+  return key * options.angle_steps + angle_step(a.normal.dot(b.normal), options.angle_steps);
 }
 
 /// The frame of an oriented point: itself at the origin, its normal along x.
@@ -59,26 +49,27 @@ struct PairTable {
     std::uint32_t reference;
     float turn;
   };
-  std::vector<std::uint32_t> begin;  ///< a key; one more at the end
+  std::vector<std::uint32_t> begin;  ///< per key; one more at the end
   std::vector<Entry> entries;
   std::vector<Transform> local;
 };
 
-PairTable make_table(std::span<const SurfacePoint> surface, double size_mm) {
+PairTable make_table(std::span<const SurfacePoint> surface, double size_mm, const PointPairOptions& options) {
+  const int keys_used = options.distance_steps * options.angle_steps * options.angle_steps * options.angle_steps;
   const std::size_t count = surface.size();
   PairTable table;
   table.local.resize(count);
   std::vector<std::int32_t> keys(count * count, -1);
   parallel_for(count, [&](std::size_t i) {
     table.local[i] = local_from_surface(surface[i]);
-    for (std::size_t j = 0; j < count; ++j) keys[i * count + j] = key_of(surface[i], surface[j], size_mm);
+    for (std::size_t j = 0; j < count; ++j) keys[i * count + j] = key_of(surface[i], surface[j], size_mm, options);
   });
-  table.begin.assign(kKeys + 1, 0);
+  table.begin.assign(keys_used + 1, 0);
   for (const std::int32_t key : keys) {
     if (key >= 0) ++table.begin[key + 1];
   }
-  for (int k = 0; k < kKeys; ++k) table.begin[k + 1] += table.begin[k];
-  table.entries.resize(table.begin[kKeys]);
+  for (int k = 0; k < keys_used; ++k) table.begin[k + 1] += table.begin[k];
+  table.entries.resize(table.begin[keys_used]);
   std::vector<std::uint32_t> next(table.begin.begin(), table.begin.end() - 1);
   for (std::size_t i = 0; i < count; ++i) {
     for (std::size_t j = 0; j < count; ++j) {
@@ -91,71 +82,75 @@ PairTable make_table(std::span<const SurfacePoint> surface, double size_mm) {
   return table;
 }
 
-/// The motions that the pairs starting at one point of surface 2 agree on most.
+/// The motions with most votes of the pairs that start at one point of surface 2.
 std::vector<Vote> votes_of(const PairTable& table, std::span<const SurfacePoint> surface2, std::size_t reference,
-                           double size_mm) {
+                           double size_mm, const PointPairOptions& options) {
+  const int turn_steps = options.turn_steps;
   constexpr double kTwoPi = 2.0 * std::numbers::pi;
   const Transform local2 = local_from_surface(surface2[reference]);
-  std::vector<float> votes(table.local.size() * kTurnSteps, 0.0F);
+  std::vector<float> votes(table.local.size() * turn_steps, 0.0F);
   for (const SurfacePoint& other : surface2) {
-    const int key = key_of(surface2[reference], other, size_mm);
+    const int key = key_of(surface2[reference], other, size_mm, options);
     if (key < 0) continue;
     const double turn2 = turn_of(local2, other.point);
-    // A common key (flat faces have them) says little: its votes count less, and a part of its pairs is enough.
+    // A common key (flat faces have them) carries little information: its votes count less, and a part of its pairs is
+    // enough.
     const std::uint32_t alike = table.begin[key + 1] - table.begin[key];
     const float weight = 1.0F / std::sqrt(static_cast<float>(alike) + 1.0F);
-    for (std::uint32_t e = table.begin[key]; e < table.begin[key + 1]; e += 1 + alike / kMaxAlike) {
+    for (std::uint32_t e = table.begin[key]; e < table.begin[key + 1]; e += 1 + alike / options.max_alike) {
       const double turn = (table.entries[e].turn - turn2) / kTwoPi;
-      const int step = static_cast<int>((turn - std::floor(turn)) * kTurnSteps) % kTurnSteps;
-      votes[table.entries[e].reference * kTurnSteps + step] += weight;
+      const int step = static_cast<int>((turn - std::floor(turn)) * turn_steps) % turn_steps;
+      votes[table.entries[e].reference * turn_steps + step] += weight;
     }
   }
   std::vector<Vote> peaks;
-  for (std::size_t peak = 0; peak < kPeaks; ++peak) {
+  for (std::size_t peak = 0; peak < options.peaks; ++peak) {
     const auto best = std::max_element(votes.begin(), votes.end());
     const auto cell = static_cast<std::size_t>(best - votes.begin());
-    const double turn = kTwoPi * (static_cast<double>(cell % kTurnSteps) + 0.5) / kTurnSteps;
+    const double turn = kTwoPi * (static_cast<double>(cell % turn_steps) + 0.5) / turn_steps;
     const Eigen::AngleAxisd about_normal(turn, Eigen::Vector3d::UnitX());
-    peaks.push_back({table.local[cell / kTurnSteps].inverse() * about_normal * local2, *best});
+    peaks.push_back({table.local[cell / turn_steps].inverse() * about_normal * local2, *best});
     *best = 0.0F;
   }
   return peaks;
 }
 
-bool alike(const Transform& a, const Transform& b, const Eigen::Vector3d& middle, double size_mm) {
-  return rotation_angle(a.linear().transpose() * b.linear()) < to_radians(12.0) &&
-         (a * middle - b * middle).norm() < 0.06 * size_mm;
+bool alike(const Transform& a, const Transform& b, const Eigen::Vector3d& middle, double size_mm,
+           const PointPairOptions& options) {
+  return rotation_angle(a.linear().transpose() * b.linear()) < to_radians(options.same_deg) &&
+         (a * middle - b * middle).norm() < options.same_shift * size_mm;
 }
 
 }  // namespace
 
 std::vector<Vote> vote_by_point_pairs(std::span<const SurfacePoint> surface1, std::span<const SurfacePoint> surface2,
-                                      double size_mm, int most) {
+                                      double size_mm, int max_motions, const PointPairOptions& options) {
   if (surface1.empty() || surface2.empty()) return {};
-  const PairTable table = make_table(surface1, size_mm);
-  const std::size_t stride = std::max<std::size_t>(1, surface2.size() / kReferences);
+  const PairTable table = make_table(surface1, size_mm, options);
+  const std::size_t stride = std::max<std::size_t>(1, surface2.size() / options.references);
   std::vector<std::vector<Vote>> parts((surface2.size() + stride - 1) / stride);
-  parallel_for(parts.size(), [&](std::size_t k) { parts[k] = votes_of(table, surface2, k * stride, size_mm); });
+  parallel_for(parts.size(),
+               [&](std::size_t k) { parts[k] = votes_of(table, surface2, k * stride, size_mm, options); });
 
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const SurfacePoint& p : surface2) middle += p.point / static_cast<double>(surface2.size());
   std::vector<Vote> all;
   for (const auto& part : parts) all.insert(all.end(), part.begin(), part.end());
-  // What different points of surface 2 vote for must be the same motion: add up the votes of its like.
+  // Votes of different points of surface 2 must give the same motion: add up the votes of similar ones.
   std::vector<Vote> summed = all;
   parallel_for(all.size(), [&](std::size_t i) {
     summed[i].votes = 0.0;
     for (const Vote& v : all) {
-      if (alike(all[i].pose1_from_pose2, v.pose1_from_pose2, middle, size_mm)) summed[i].votes += v.votes;
+      if (alike(all[i].pose1_from_pose2, v.pose1_from_pose2, middle, size_mm, options)) summed[i].votes += v.votes;
     }
   });
   std::stable_sort(summed.begin(), summed.end(), [](const Vote& a, const Vote& b) { return a.votes > b.votes; });
   std::vector<Vote> chosen;
   for (const Vote& v : summed) {
-    if (chosen.size() == static_cast<std::size_t>(most)) break;
-    const bool known = std::ranges::any_of(
-        chosen, [&](const Vote& c) { return alike(c.pose1_from_pose2, v.pose1_from_pose2, middle, size_mm); });
-    if (!known) chosen.push_back(v);
+    if (chosen.size() == static_cast<std::size_t>(max_motions)) break;
+    const bool is_known = std::ranges::any_of(
+        chosen, [&](const Vote& c) { return alike(c.pose1_from_pose2, v.pose1_from_pose2, middle, size_mm, options); });
+    if (!is_known) chosen.push_back(v);
   }
   return chosen;
 }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -8,16 +10,30 @@
 
 namespace scanrig {
 
-/// A motion that many pairs of oriented points agree on.
+/// A motion with the votes of many pairs of oriented points.
 struct Vote {
   Transform pose1_from_pose2;
   double votes = 0.0;
 };
 
-/// Global search without any knowledge of rests: oriented point pairs (distance and three angles) of surface 1 in a
-/// table; pairs of surface 2 look theirs up and vote for the motion that carries one onto the other [Drost, Ulrich,
-/// Navab, Ilic 2010]. The motions with most votes, best first, at most `most`, distinct by 12 deg or 6 % of `size_mm`.
+/// Tables and votes of the search.
+struct PointPairOptions {
+  int distance_steps = 16;        ///< over the range of distances used
+  int angle_steps = 15;           ///< over 180 deg
+  int turn_steps = 30;            ///< over 360 deg
+  double min_length = 0.12;       ///< of a pair, as a share of the object's size
+  double max_length = 0.6;        ///< of a pair, as a share of the object's size
+  std::size_t references = 200;   ///< points of surface 2 that vote
+  std::uint32_t max_alike = 400;  ///< pairs compared per key
+  std::size_t peaks = 3;          ///< motions taken from each reference point
+  double same_deg = 12.0;         ///< motions closer than this and ...
+  double same_shift = 0.06;       ///< ... this share of the object's size are one
+};
+
+/// Global search without rests: oriented point pairs (distance and three angles) of surface 1 in a table; pairs of
+/// surface 2 look theirs up and vote for the motion that carries one onto the other [Drost, Ulrich, Navab, Ilic 2010].
+/// Returns the motions with most votes, best first, at most `max_motions`, distinct by `same_deg` or `same_shift`.
 std::vector<Vote> vote_by_point_pairs(std::span<const SurfacePoint> surface1, std::span<const SurfacePoint> surface2,
-                                      double size_mm, int most);
+                                      double size_mm, int max_motions, const PointPairOptions& options = {});
 
 }  // namespace scanrig

@@ -50,12 +50,12 @@ std::vector<RestPair> pair_rests(const RestingSolid& pose1, const RestingSolid& 
     }
   }
   std::stable_sort(pairs.begin(), pairs.end(), [](const RestPair& a, const RestPair& b) { return a.cost < b.cost; });
-  if (pairs.size() > static_cast<std::size_t>(options.most)) pairs.resize(options.most);
+  if (pairs.size() > static_cast<std::size_t>(options.max_pairs)) pairs.resize(options.max_pairs);
   return pairs;
 }
 
-Transform transform_of(const RestPair& pair, const SolidProperties& pose1, const SolidProperties& pose2,
-                       double swivel) {
+Transform transform_of(const RestPair& pair, const SolidProperties& pose1, const SolidProperties& pose2, double swivel,
+                       const RestPairOptions& options) {
   const Eigen::Vector3d base = base_normal();
   const Eigen::Vector3d& contact1 = pair.of_pose1.normal;  // of pose 2's table, seen in pose 1
   const Eigen::Vector3d& contact2 = pair.of_pose2.normal;  // of pose 1's table, seen in pose 2
@@ -64,22 +64,21 @@ Transform transform_of(const RestPair& pair, const SolidProperties& pose1, const
   Transform t = Transform::Identity();
   t.linear() = Eigen::AngleAxisd(swivel, contact1).toRotationMatrix() * turn;
 
-  // Least squares over n_B.t = -D_T2, n_T1.t = D_T1 and the centres of mass, which partial models know poorly.
-  constexpr double kCentreWeight = 0.02;
+  // Least squares over n_B.t = -D_T2, n_T1.t = D_T1 and the centres of mass, which are inaccurate in partial models.
   const Eigen::Vector3d between_centres = pose1.centre_of_mass - t.linear() * pose2.centre_of_mass;
   const Eigen::Matrix3d normal =
-      base * base.transpose() + contact1 * contact1.transpose() + kCentreWeight * Eigen::Matrix3d::Identity();
+      base * base.transpose() + contact1 * contact1.transpose() + options.centre_weight * Eigen::Matrix3d::Identity();
   const Eigen::Vector3d right =
-      -pair.of_pose2.offset_mm * base + pair.of_pose1.offset_mm * contact1 + kCentreWeight * between_centres;
+      -pair.of_pose2.offset_mm * base + pair.of_pose1.offset_mm * contact1 + options.centre_weight * between_centres;
   t.translation() = normal.ldlt().solve(right);
   return t;
 }
 
 std::vector<Contact> contacts_for(const Transform& pose1_from_pose2, std::span<const RestPair> pairs,
-                                  const SolidProperties& pose2) {
+                                  const SolidProperties& pose2, const RestPairOptions& options) {
   const Eigen::Matrix3d& turn = pose1_from_pose2.linear();
   const RestPair* best = nullptr;
-  double nearest = to_radians(3.0);
+  double nearest = to_radians(options.max_contact_deg);
   for (const RestPair& pair : pairs) {
     const double apart = std::max(angle_between(pair.of_pose1.normal, turn * base_normal()),
                                   angle_between(pair.of_pose2.normal, turn.transpose() * base_normal()));
@@ -95,13 +94,14 @@ std::vector<Contact> contacts_for(const Transform& pose1_from_pose2, std::span<c
           {foot_on(base_normal(), 0.0), best->of_pose1.normal, best->of_pose1.offset_mm}};
 }
 
-std::vector<double> swivels_of(const RestPair& pair) {
+std::vector<double> swivels_of(const RestPair& pair, const RestPairOptions& options) {
   const double from_upside_down = to_degrees(angle_between(pair.of_pose1.normal, -base_normal()));
   std::vector<double> swivels;
-  if (from_upside_down < 30.0 || from_upside_down > 175.0) {
-    for (int k = 0; k < 36; ++k) swivels.push_back(to_radians(10.0 * k));
+  if (from_upside_down < options.upside_down_deg || from_upside_down > options.turned_back_deg) {
+    const double step_deg = 360.0 / options.full_circle_steps;
+    for (int k = 0; k < options.full_circle_steps; ++k) swivels.push_back(to_radians(step_deg * k));
   } else {
-    for (const double degrees : {0.0, -12.0, 12.0}) swivels.push_back(to_radians(degrees));
+    for (const double degrees : {0.0, -options.swivel_deg, options.swivel_deg}) swivels.push_back(to_radians(degrees));
   }
   return swivels;
 }

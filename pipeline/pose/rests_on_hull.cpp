@@ -25,9 +25,9 @@ std::vector<StableRest> facet_directions(const std::vector<Mesh::Face>& faces,
   std::vector<StableRest> directions;
   for (const Eigen::Vector3d& area : areas) {
     const Eigen::Vector3d normal = area.normalized();
-    const bool known =
+    const bool is_known =
         std::ranges::any_of(directions, [&](const StableRest& d) { return d.normal.dot(normal) > merged; });
-    if (!known) directions.push_back({.normal = normal});
+    if (!is_known) directions.push_back({.normal = normal});
   }
   return directions;
 }
@@ -57,7 +57,7 @@ Result<StableRests> rests_on_hull(const Mesh& solid, const SolidProperties& prop
   StableRests found;
   found.counts.tangent_planes = found.counts.after_base_plane = static_cast<int>(candidates.size());
   std::erase_if(candidates, [&](const StableRest& rest) { return rest.margin_mm < -dilation; });
-  found.rests = distinct(candidates, options.apart_deg);  // of neighbours the largest facet: it is the contact
+  found.rests = distinct(candidates, options.apart_deg);  // of neighbours the largest facet is the contact
   found.counts.after_stability = static_cast<int>(found.rests.size());
   found.counts.after_height = static_cast<int>(std::ranges::count_if(found.rests, [&](const StableRest& rest) {
     return std::abs(rest.height_mm - other_height_mm) < options.height_tolerance_mm;

@@ -65,9 +65,9 @@ std::vector<StableRest> distinct(const std::vector<StableRest>& rests, double ap
   const double same = std::cos(to_radians(apart_deg));
   std::vector<StableRest> kept;
   for (const StableRest& rest : rests) {
-    const bool known =
+    const bool is_known =
         std::any_of(kept.begin(), kept.end(), [&](const StableRest& k) { return k.normal.dot(rest.normal) > same; });
-    if (!known) kept.push_back(rest);
+    if (!is_known) kept.push_back(rest);
   }
   std::stable_sort(kept.begin(), kept.end(),
                    [](const StableRest& a, const StableRest& b) { return a.margin_mm > b.margin_mm; });

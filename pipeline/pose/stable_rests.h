@@ -10,7 +10,7 @@
 
 namespace scanrig {
 
-/// A plane the solid can stand on: n.x = offset, n the unit outward normal; no point of the solid lies beyond it.
+/// A plane on which the solid is stable: n.x = offset, n the unit outward normal; no point of the solid lies beyond it.
 struct StableRest {
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   double offset_mm = 0.0;
@@ -27,7 +27,7 @@ struct StableRestOptions {
   double apart_deg = 5.0;             ///< rests closer than this are one; neighbours farther apart are kept
 };
 
-/// What was left after each of the paper's tests; it gives 186 -> 141 -> 18 -> 9 for its example.
+/// Number of planes left after each of the paper's tests; for its example 186 -> 141 -> 18 -> 9.
 struct RestCounts {
   int tangent_planes = 0;
   int after_base_plane = 0;
@@ -52,7 +52,7 @@ Result<StableRests> rests_on_sphere(const Mesh& solid, const SolidProperties& pr
                                     const StableRestOptions& options);
 
 /// Distance from the foot of `point` on the plane with `normal` to the nearest edge of the convex hull of the feet of
-/// `supports`; negative outside. What makes a rest stable.
+/// `supports`; negative outside. It decides whether a rest is stable.
 double support_margin(std::span<const Eigen::Vector3d> supports, const Eigen::Vector3d& normal,
                       const Eigen::Vector3d& point);
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
-/// Local contrast brought to one level, 8 bit: shading and albedo go, dots stay.
+/// Local contrast normalised to one level, 8 bit: shading and albedo are removed, the pattern stays.
 cv::Mat1b flattened(const cv::Mat1f& image) {
   const cv::Size window(25, 25);
   cv::Mat1f mean, square, deviation;

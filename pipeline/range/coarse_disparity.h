@@ -11,7 +11,7 @@ struct CoarseDisparity {
 };
 
 /// Semi-global matching [Hirschmueller 2008; OpenCV, MODE_SGBM_3WAY] on images freed of shading, each image in its
-/// turn. `rows`: the only rows looked at. Throws what OpenCV throws.
+/// turn. `rows`: the only rows that are matched. Throws what OpenCV throws.
 CoarseDisparity coarse_disparity(const cv::Mat1f& left, const cv::Mat1f& right, int min_disparity, int max_disparity,
                                  cv::Range rows);
 

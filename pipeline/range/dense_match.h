@@ -16,11 +16,12 @@ struct DenseDisparity {
   cv::Mat2f slope;  ///< d value / du, d value / dv
 };
 
-/// Least-squares matching of every object pixel, from both images, and only what both agree on. Fails with `stopped`.
+/// Least-squares matching of every object pixel, from both images; only agreeing results are kept. Fails with
+/// `stopped`.
 Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDisparity& coarse,
                                        const StereoOptions& options, const Context& context);
 
-/// Takes out what its surroundings contradict: lone pixels, specks, the rims of depth steps.
+/// Removes pixels that their surroundings contradict: lone pixels, specks, the rims of depth steps.
 void remove_outliers(DenseDisparity& disparity, const StereoOptions& options);
 
 }  // namespace scanrig

@@ -13,14 +13,14 @@ namespace scanrig {
 struct RangeImage {
   Projection projection;
   Transform camera_from_pose = Transform::Identity();  ///< the pose's turntable frame at table angle 0 -> this camera
-  cv::Mat1f depth;                                     ///< z in the camera frame, mm; NaN where nothing was measured
+  cv::Mat1f depth;                                     ///< z in the camera frame, mm; NaN where unmeasured
   cv::Mat1f sigma;                                     ///< standard deviation of depth, mm; NaN where depth is
   cv::Mat3f normal;  ///< unit, camera frame, towards the camera (z < 0); NaN where depth is
-  /// 255 where a NaN pixel is known to show background (free space all along its ray); empty: nothing is known so.
+  /// 255 where a NaN pixel shows background (free space all along its ray); empty: background unknown.
   cv::Mat1b background;
 };
 
-/// One table angle of one pose, as registration and volume need it.
+/// One table angle of one pose, for registration and volume.
 struct View {
   int index = 0;
   double angle_rad = 0.0;  ///< table angle as measured

@@ -20,7 +20,8 @@ Result<Eigen::Matrix3d> common_axes(const Calibration& calibration, const Eigen:
   const Eigen::Vector3d x = baseline.normalized();
   const Eigen::Vector3d z = sight - x * x.dot(sight);
   if (!(z.norm() > 0.2 * sight.norm()) || !(sight.norm() > 0.1)) {
-    return fail(ErrorCode::invalid_input, "rectify: the cameras do not look the same way, across their baseline");
+    return fail(ErrorCode::invalid_input,
+                "rectify: the cameras do not look in the same direction across their baseline");
   }
   Eigen::Matrix3d axes;
   axes.row(0) = x;
@@ -29,7 +30,7 @@ Result<Eigen::Matrix3d> common_axes(const Calibration& calibration, const Eigen:
   return axes;
 }
 
-/// A pinhole that shows in its middle what the camera shows in its middle.
+/// A pinhole camera with the same line of sight through its middle as the camera.
 Projection centred(const Camera& camera, const Transform& rectified_from_turntable, double focal) {
   Projection p = camera.projection;
   const Transform rectified_from_camera = rectified_from_turntable * camera.camera_from_turntable.inverse();
@@ -56,7 +57,7 @@ RectifyingMap make_map(const Camera& camera, const Projection& projection, const
   return map;
 }
 
-/// The disparities that points of the working volume seen by both cameras have. False when there are none.
+/// The disparities of points of the working volume seen by both cameras. False without such points.
 bool find_disparities(Rectification& r, const WorkingVolume& volume) {
   double lowest = 1e9, highest = -1e9;
   constexpr int kRings = 4, kSteps = 12, kLevels = 10;

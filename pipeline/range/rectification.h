@@ -13,9 +13,9 @@ struct RectifyingMap {
   cv::Mat1f v;
 };
 
-/// Both cameras turned so that a point lies in the same row of both images. Made once a calibration, used for every
-/// view. The principal points are NOT equal: each image keeps looking where its toed-in camera looked, so that the
-/// disparities u_left - u_right stay small: u_left - u_right = fx * baseline / z + (left.cx - right.cx).
+/// Both cameras turned so that a point lies in the same row of both images. Made once per calibration, used for every
+/// view. The principal points are NOT equal: each image keeps the line of sight of its toed-in camera, so that the
+/// disparities stay small: u_left - u_right = fx * baseline / z + (left.cx - right.cx).
 struct Rectification {
   Projection left, right;  ///< pinhole, same size, focal length and cy
   Transform left_from_turntable = Transform::Identity();
@@ -27,7 +27,7 @@ struct Rectification {
   RectifyingMap left_map, right_map;
 };
 
-/// Above the table, around the axis: where an object may be.
+/// Working volume above the table, around the axis.
 struct WorkingVolume {
   double radius_mm = 65.0;
   double height_mm = 150.0;

@@ -7,7 +7,7 @@
 namespace scanrig {
 namespace {
 
-// Pole of the recursive filter of the cubic B-spline, sqrt(3) - 2, and how far back it remembers (1e-9).
+// Pole of the recursive filter of the cubic B-spline, sqrt(3) - 2, and its memory length (1e-9).
 constexpr float kPole = -0.26794919f;
 constexpr int kMemory = 16;
 

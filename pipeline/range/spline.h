@@ -9,8 +9,8 @@ namespace scanrig {
 /// The border is mirrored.
 cv::Mat1f spline_coefficients(const cv::Mat1f& image);
 
-/// An image as one cubic a pixel along each row: value(x + t) = c[0] + t (c[1] + t (c[2] + t c[3])), 0 <= t < 1,
-/// the cubic B-spline through the row's values. Cubics of one row lie behind one another.
+/// An image as one cubic per pixel along each row: value(x + t) = c[0] + t (c[1] + t (c[2] + t c[3])), 0 <= t < 1, the
+/// cubic B-spline through the row's values. Cubics of one row are consecutive.
 class CubicRows {
  public:
   explicit CubicRows(const cv::Mat1f& image);

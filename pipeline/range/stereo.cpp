@@ -37,8 +37,7 @@ Result<void> check(const RectifiedPair& pair) {
 }
 
 /// The rows that show the object, and some around.
-cv::Range object_rows(const cv::Mat1b& mask, int height) {
-  constexpr int kMargin = 24;
+cv::Range object_rows(const cv::Mat1b& mask, int height, int margin) {
   if (mask.empty()) return {0, height};
   int first = height, last = -1;
   for (int y = 0; y < height; ++y) {
@@ -46,10 +45,10 @@ cv::Range object_rows(const cv::Mat1b& mask, int height) {
     first = std::min(first, y);
     last = y;
   }
-  return {std::max(0, first - kMargin), std::min(height, last + 1 + kMargin)};
+  return {std::max(0, first - margin), std::min(height, last + 1 + margin)};
 }
 
-/// What disparities mean in space: depth, its sigma, the normal of the tangent plane.
+/// Converts disparities into depth, its sigma, and the normal of the tangent plane.
 RangeImage to_range(const RectifiedPair& pair, const DenseDisparity& disparity) {
   const Projection& p = pair.left_projection;
   const cv::Size size(p.width, p.height);
@@ -84,8 +83,8 @@ RangeImage to_range(const RectifiedPair& pair, const DenseDisparity& disparity) 
 
 Result<RangeImage> match_rectified(const RectifiedPair& pair, const StereoOptions& options, const Context& context) {
   if (const auto fits = check(pair); !fits) return pass_on(fits);
-  const cv::Range rows = object_rows(pair.left_object, pair.left.rows);
-  if (rows.size() < 16) return fail(ErrorCode::degenerate, "range: the mask shows no object");
+  const cv::Range rows = object_rows(pair.left_object, pair.left.rows, options.row_margin_px);
+  if (rows.size() < options.min_rows) return fail(ErrorCode::degenerate, "range: the mask shows no object");
   context.report("range", 0.0);
   if (context.stopped()) return fail(ErrorCode::stopped, "range: stopped before matching");
   CoarseDisparity coarse;
@@ -110,9 +109,9 @@ Result<RangeImage> match_stereo(const Rectification& rectification, const cv::Ma
                                 const cv::Mat& right_pattern, const cv::Mat1b& left_object,
                                 const cv::Mat1b& right_object, const StereoOptions& options, const Context& context) {
   const auto left = rectified_grey(rectification.left_map, left_pattern);
-  if (!left) return pass_on(left, "left image with dots");
+  if (!left) return pass_on(left, "left pattern image");
   const auto right = rectified_grey(rectification.right_map, right_pattern);
-  if (!right) return pass_on(right, "right image with dots");
+  if (!right) return pass_on(right, "right pattern image");
   return match_rectified({*left, *right, left_object, right_object, rectification.left, rectification.right.cx,
                           rectification.baseline_mm, rectification.min_disparity, rectification.max_disparity},
                          options, context);

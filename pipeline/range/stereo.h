@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <opencv2/core/mat.hpp>
 
 #include "core/context.h"
@@ -9,13 +11,47 @@
 
 namespace scanrig {
 
+/// Limits and steps of stereo matching; the defaults come from scans with known truth, see README.md.
 struct StereoOptions {
-  double min_zncc = 0.8;           ///< correlation below which a match is not believed
-  double left_right_px = 0.3;      ///< the match from the right image must come back this near, or within 3 sigma
-  double largest_sigma_px = 0.25;  ///< beyond it a pixel counts as not measured
-  double enough_sigma_px = 0.08;   ///< a larger window is tried only above this
-  double neighbour_px = 0.25;      ///< neighbours 4 px away must predict a pixel this well, or within 3 sigma
-  int smallest_patch_px = 150;     ///< smaller islands are dropped
+  double min_zncc = 0.8;          ///< correlation below which a match is rejected
+  double left_right_px = 0.3;     ///< the match from the right image must come back this near, or within 3 sigma
+  double max_sigma_px = 0.25;     ///< beyond it a pixel counts as not measured
+  double good_sigma_px = 0.08;    ///< a larger window is tried only above this
+  double neighbour_px = 0.25;     ///< neighbours 4 px away must predict a pixel this well, or within 3 sigma
+  int min_patch_px = 150;         ///< smaller islands are dropped
+  double tolerance_sigmas = 3.0;  ///< "within 3 sigma" above
+
+  // Windows; a radius is 5, 7, 10 or 15.
+  std::uint8_t sharp_radius_px = 7;                        ///< first window
+  std::uint8_t crease_radius_px = 5;                       ///< for creases and steps
+  std::array<std::uint8_t, 2> smooth_radii_px = {10, 15};  ///< for low signal, on smoothed images
+  double smoothing_px = 0.7;                               ///< sigma of that smoothing
+  float smooth_step_px = 1.5f;  ///< see WindowOptions: where the signal is low the coarse disparities are worse too
+  float smooth_curvature_prior = 0.15f;  ///< see WindowOptions
+  float window_sigmas = 3.0f;  ///< within this many standard deviations a larger window agrees with a smaller one
+  // Noise of neighbouring pixels is correlated (demosaicing, resampling), so the residual underestimates it. The
+  // smoothing's own share is sqrt(4 pi) times its width.
+  float sharp_inflation = 1.7f;   ///< factor on sigma of sharp windows
+  float smooth_inflation = 2.5f;  ///< factor on sigma of smooth windows
+  float tilt = 0.6f;              ///< px of disparity per px at which sigma has grown by 1.4
+
+  // Search.
+  int left_node_stride_px = 4;        ///< grid of the patches matched first
+  int right_node_stride_px = 3;       ///< the same in the right image
+  int coarse_iterations = 10;         ///< Gauss-Newton steps from a coarse disparity
+  int node_iterations = 6;            ///< Gauss-Newton steps from a neighbouring patch
+  int row_margin_px = 24;             ///< rows matched above and below the object
+  int min_rows = 16;                  ///< of the object and this margin
+  float coarse_left_right_px = 1.5f;  ///< coarse disparities of both images must agree within this
+  int plane_reach_px = 6;             ///< a start plane is fitted to coarse disparities up to this far away
+  float plane_same_px = 4.0f;         ///< disparity difference within one surface; slopes reach 0.7 px per px
+  double min_plane_pixels = 30.0;
+
+  // Outliers.
+  int beside_px = 2;     ///< a pixel this near to a depth step is removed
+  int apart_px = 4;      ///< distance of the neighbours that must predict a pixel
+  double step_px = 1.5;  ///< px of disparity: a larger difference is a depth step
+  int min_agreeing = 3;  ///< of 8 neighbours: one side of a corner
 };
 
 /// Two images whose rows correspond.
@@ -36,7 +72,7 @@ struct RectifiedPair {
 /// Fails with `invalid_input` (sizes, no disparities to search), `degenerate` (nothing matched), `stopped`.
 Result<RangeImage> match_rectified(const RectifiedPair& pair, const StereoOptions& options, const Context& context);
 
-/// The same from the sensors' images with the dots on (8 bit, BGR or grey). Masks are in the rectified grids.
+/// The same from the sensors' pattern images (8 bit, BGR or grey). Masks are in the rectified grids.
 Result<RangeImage> match_stereo(const Rectification& rectification, const cv::Mat& left_pattern,
                                 const cv::Mat& right_pattern, const cv::Mat1b& left_object,
                                 const cv::Mat1b& right_object, const StereoOptions& options, const Context& context);

@@ -7,10 +7,6 @@
 namespace scanrig {
 namespace {
 
-// Pixels this near to the outline carry light from behind the object: they stay out of the matcher's windows.
-constexpr double kMixedPx = 1.5;
-// Depth this near to the outline is left out: the surface turns away there.
-constexpr float kRimPx = 2.5f;
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 Result<Silhouette> silhouette_of(const cv::Mat& plain, const RectifyingMap& map, const Projection& projection,
@@ -26,13 +22,13 @@ Result<Silhouette> silhouette_of(const cv::Mat& plain, const RectifyingMap& map,
   }
 }
 
-cv::Mat1b inside(const Silhouette& silhouette) {
+cv::Mat1b inside(const Silhouette& silhouette, double mixed_px) {
   cv::Mat1b mask;
-  cv::compare(silhouette.outside_px, -kMixedPx, mask, cv::CMP_LT);
+  cv::compare(silhouette.outside_px, -mixed_px, mask, cv::CMP_LT);
   return mask;
 }
 
-void forget(RangeImage& range, int u, int v) {
+void clear_pixel(RangeImage& range, int u, int v) {
   range.depth(v, u) = range.sigma(v, u) = kNaN;
   range.normal(v, u) = {kNaN, kNaN, kNaN};
 }
@@ -45,7 +41,7 @@ void cut_at_table(RangeImage& range, const Rectification& rectification, double 
       const double depth = static_cast<double>(range.depth(v, u));
       if (std::isnan(depth)) continue;
       const Eigen::Vector3d p = turntable_from_left * range.projection.unproject(u, v, depth);
-      if (p.y() < clearance_mm || std::hypot(p.x(), p.z()) > rectification.table_radius_mm) forget(range, u, v);
+      if (p.y() < clearance_mm || std::hypot(p.x(), p.z()) > rectification.table_radius_mm) clear_pixel(range, u, v);
     }
   }
 }
@@ -67,8 +63,8 @@ Result<View> make_view(const Rectification& rectification, const StereoImages& i
     auto right = silhouette_of(images.right_plain, rectification.right_map, rectification.right,
                                rectification.right_from_turntable * rot_y(angle_rad), options.silhouette);
     if (!right) return pass_on(right, "right image");
-    left_object = inside(*left);
-    right_object = inside(*right);
+    left_object = inside(*left, options.mixed_px);
+    right_object = inside(*right, options.mixed_px);
     view.silhouettes = {std::move(*left), std::move(*right)};
   }
   auto range = match_stereo(rectification, images.left_pattern, images.right_pattern, left_object, right_object,
@@ -77,17 +73,17 @@ Result<View> make_view(const Rectification& rectification, const StereoImages& i
   view.range = std::move(*range);
   view.range.camera_from_pose = left_from_pose;
   if (colour) {
-    // One pixel off the outline, so that no mixed pixel claims free space.
-    cv::compare(view.silhouettes.front().outside_px, 1.0, view.range.background, cv::CMP_GT);
+    cv::compare(view.silhouettes.front().outside_px, options.background_px, view.range.background, cv::CMP_GT);
     for (int v = 0; v < view.range.depth.rows; ++v) {
       for (int u = 0; u < view.range.depth.cols; ++u) {
-        if (view.silhouettes.front().outside_px(v, u) > -kRimPx) forget(view.range, u, v);
+        if (view.silhouettes.front().outside_px(v, u) > -options.rim_px) clear_pixel(view.range, u, v);
       }
     }
   } else {
     cut_at_table(view.range, rectification, options.table_clearance_mm);
     if (cv::countNonZero(view.range.depth == view.range.depth) == 0) {
-      return fail(ErrorCode::degenerate, "range: nothing was measured above the table; is it empty?");
+      return fail(ErrorCode::degenerate,
+                  "range: no surface was measured above the table; check that the object is on the table");
     }
   }
   return view;

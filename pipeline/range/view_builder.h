@@ -14,20 +14,23 @@ namespace scanrig {
 /// The sensors' images of one view, 8 bit, all BGR or all grey.
 struct StereoImages {
   cv::Mat left_pattern, right_pattern;  ///< projector on
-  cv::Mat left_plain, right_plain;      ///< projector off, even light; not needed when grey
+  cv::Mat left_plain, right_plain;      ///< projector off, plain light; not needed when grey
 };
 
 struct ViewOptions {
   StereoOptions stereo;
   BlueScreenOptions silhouette;
+  double mixed_px = 1.5;       ///< pixels this near to the outline contain light from behind the object: not in windows
+  float rim_px = 2.5f;         ///< depth this near to the outline is left out: the surface turns away there
+  double background_px = 1.0;  ///< free space starts this far outside the outline, so that no mixed pixel claims it
   double table_clearance_mm = 0.5;  ///< without a blue screen, what is lower counts as the table
 };
 
-/// Everything one table angle gives: range image in the rectified left camera's frame with its background, and both
-/// silhouettes. Grey images have no blue screen: no silhouettes, no background, and table and surroundings are told
-/// from the object by height and radius. `angle_rad` is the table's measured angle. Fails with `invalid_input` (sizes,
-/// types), `degenerate` (no screen, nothing seen or matched), `out_of_range` (the object reaches the border of an
-/// image), `stopped`.
+/// All data of one table angle: range image in the rectified left camera's frame with its background, and both
+/// silhouettes. Grey images have no blue screen: no silhouettes and no background; table and surroundings are separated
+/// from the object by height and radius. `angle_rad` is the table's measured angle.
+/// Fails with `invalid_input` (sizes, types), `degenerate` (no screen, nothing seen or matched), `out_of_range` (the
+/// object reaches the border of an image), `stopped`.
 Result<View> make_view(const Rectification& rectification, const StereoImages& images, double angle_rad, int index,
                        const ViewOptions& options, const Context& context);
 

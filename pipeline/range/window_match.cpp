@@ -14,7 +14,7 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 constexpr std::array<int, 6> kPowerX = {0, 1, 0, 2, 1, 0};
 constexpr std::array<int, 6> kPowerY = {0, 0, 1, 0, 1, 2};
 
-/// Sums over a window, times powers of y, one a column ("lane"): adding row by row vectorises in any instruction set
+/// Sums over a window, times powers of y, one per column ("lane"): adding row by row vectorises in any instruction set
 /// and always in the same order. x and y are in units of the radius.
 template <int kLanes, int kPowers>
 struct Moments {
@@ -87,7 +87,7 @@ Window<R>::Window(const MatchImage& here, const MatchMask& mask, int u, int v, c
     for (int k = 0; k < kLanes; ++k) {
       const bool inside = k < kSide;
       const float expected = patch.at(static_cast<float>(k - R), static_cast<float>(row - R));
-      // False for NaN too: what is unknown stays out.
+      // False for NaN too: unknown pixels stay out.
       const bool same = inside && used[k] != 0 && std::abs(coarse[k] - expected) < options.step_px;
       const float w = same ? 1.0f : 0.0f;
       weight_[row][k] = w;
@@ -142,7 +142,7 @@ void Window<R>::assemble() {
   }
 }
 
-/// The other image under one row of the window, as the patch maps it.
+/// The other image under one row of the window, mapped by the patch.
 template <int R>
 void Window<R>::sample_row(const float* cubic, const DisparityPatch& patch, int row, float* out) const {
   const float y = static_cast<float>(row - R);
@@ -230,16 +230,15 @@ DisparityPatch Window<R>::match(const MatchImage& there, DisparityPatch patch, c
   Vector6 first = Vector6::Zero();
   first[0] = 1.0;
   const double variance_gain = solver.solve(first)[0];
-  constexpr double kPrecision = 3e-3;  // px
   bool converged = false;
-  for (int iteration = 0; iteration < options.iterations && !converged; ++iteration) {
+  for (int iteration = 0; iteration < options.max_iterations && !converged; ++iteration) {
     const double stretch = 1.0 - shape[1] / R;
     const Vector6 step = solver.solve(stretch * fit.rhs - prior.cwiseProduct(shape));
     if (!step.allFinite() || std::abs(step[0]) > 2.0) return patch;
     shape += step;
     for (int i = 0; i < 6; ++i) patch.c[static_cast<std::size_t>(i)] = static_cast<float>(shape[i] / unit[i]);
-    converged = std::abs(step[0]) < kPrecision && step.cwiseAbs().maxCoeff() < 10.0 * kPrecision;
-    if (iteration + 1 < options.iterations && !converged) fit = compare(there, patch);
+    converged = std::abs(step[0]) < options.precision_px && step.cwiseAbs().maxCoeff() < 10.0 * options.precision_px;
+    if (iteration + 1 < options.max_iterations && !converged) fit = compare(there, patch);
   }
   fit = compare(there, patch);
   if (std::abs(shape[0] - start) > 3.0 || std::abs(shape[1]) > 0.95 * R) return patch;

@@ -37,15 +37,16 @@ struct MatchImage {
   CubicRows cubic;
 };
 
-/// What the matcher knows about the pixels of the image it starts from.
+/// Constraints on the pixels of the image that the matcher starts from.
 struct MatchMask {
   cv::Mat1b usable;     ///< not 0: shows the object
   cv::Mat1f disparity;  ///< coarse, px; NaN unknown; keeps pixels beyond a depth step out of a window
 };
 
 struct WindowOptions {
-  int iterations = 8;
-  float step_px = 1.0f;          ///< a coarse disparity further than this from the patch belongs to another surface
+  int max_iterations = 8;        ///< Gauss-Newton steps
+  double precision_px = 3e-3;    ///< a smaller step ends the iteration
+  float step_px = 1.0f;          ///< a coarse disparity farther than this from the patch belongs to another surface
   float min_support = 0.45f;     ///< share of the window that must belong to the patch
   float curvature_prior = 0.5f;  ///< px over a window of radius 7: the second order is worth its noise only above this
 };
@@ -53,7 +54,7 @@ struct WindowOptions {
 /// Least-squares matching of the window around (u, v) with second-order shape, gain and offset [Sutton, Orteu and
 /// Schreier, Image Correlation, 2009, ch. 5]: Gauss-Newton from `patch`, with the gradient of `here` (inverse
 /// compositional). `patch.radius` is 5, 7, 10 or 15. Returns the patch where it stopped; invalid when it diverged or
-/// had too little to see.
+/// had too little signal.
 DisparityPatch match_window(const MatchImage& here, const MatchImage& there, const MatchMask& mask, int u, int v,
                             const DisparityPatch& patch, const WindowOptions& options);
 

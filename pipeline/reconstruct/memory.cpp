@@ -2,6 +2,8 @@
 
 #include <numbers>
 
+#include "pipeline/reconstruct/voxel_size.h"
+
 namespace scanrig {
 namespace {
 
@@ -10,12 +12,11 @@ namespace {
 constexpr double kProgram = 200e6;
 constexpr double kBytesPerPixel = 72.0;
 constexpr double kBytesPerSurfaceVoxel = 1100.0;
-constexpr double kUsualVoxel = 0.25;  ///< mm, where none is configured
 
 }  // namespace
 
 std::uintmax_t estimated_memory(const Calibration& calibration, int views, double voxel_mm) {
-  const double voxel = voxel_mm > 0 ? voxel_mm : kUsualVoxel;
+  const double voxel = voxel_mm > 0 ? voxel_mm : kDefaultVoxelMm;
   const auto& image = calibration.left.projection;
   const double pixels = static_cast<double>(image.width) * image.height * views;
   // A cylinder as high as it is wide, lids included.

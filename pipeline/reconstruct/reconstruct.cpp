@@ -12,6 +12,7 @@
 #include "pipeline/range/view_builder.h"
 #include "pipeline/reconstruct/report.h"
 #include "pipeline/reconstruct/stage_log.h"
+#include "pipeline/reconstruct/voxel_size.h"
 #include "pipeline/registration/refine_pose.h"
 #include "pipeline/registration/register_views.h"
 #include "pipeline/texture/texture.h"
@@ -20,15 +21,10 @@
 namespace scanrig {
 namespace {
 
-/// Partial models only have to carry the search for the pose; finer ones do not find it better.
-constexpr double kPartialVoxelMm = 0.8;
-
-constexpr double kVoxelMm = 0.25;
-
-/// Voxels finer than the data show the data's noise and nothing else. All images of a scan come from one scanner.
+/// Voxels finer than the data only resolve the data's noise. All images of a scan come from one scanner.
 double voxel_for(const RangeImage& range) {
   const bool pinhole = range.projection.kind == Projection::Kind::pinhole;
-  return pinhole ? kVoxelMm : std::max(kVoxelMm, range.projection.mm_per_pixel(0.0));
+  return pinhole ? kDefaultVoxelMm : std::max(kDefaultVoxelMm, range.projection.mm_per_pixel(0.0));
 }
 
 struct PlainPair {
@@ -37,7 +33,7 @@ struct PlainPair {
 
 struct PoseState {
   std::vector<View> views;
-  std::vector<PlainPair> plain;  ///< one a view; empty for range scans and grey sensors
+  std::vector<PlainPair> plain;  ///< one per view; empty for range scans and grey sensors
   RegistrationReport registration;
   Surface partial;
   bool finished = false;
@@ -123,7 +119,7 @@ Result<void> Reconstruction::State::finish_pose(std::size_t pose, const Context&
   }
   const StageLog::Timer timer(log, "partial model");
   const PosedViews posed{.views = state.views};
-  auto partial = integrate({&posed, 1}, {.voxel_mm = std::max(kPartialVoxelMm, options.voxel_mm)}, context);
+  auto partial = integrate({&posed, 1}, {.voxel_mm = std::max(options.partial_voxel_mm, options.voxel_mm)}, context);
   if (!partial) return pass_on(partial, fmt::format("pose {}", pose + 1));
   state.partial = std::move(*partial);
   state.finished = true;
@@ -162,7 +158,7 @@ std::vector<Photo> Reconstruction::State::photos(const Transform& pose1_from_pos
   for (std::size_t p = 0; p < poses.size(); ++p) {
     const Transform pose_from_model = p == 0 ? Transform::Identity() : pose1_from_pose2.inverse();
     for (std::size_t v = 0; v < poses[p].plain.size(); ++v) {
-      // What registration did to the view's range image holds for its photographs too.
+      // The registration of the view's range image holds for its photographs too.
       const Transform turntable_from_pose =
           rectification->left_from_turntable.inverse() * poses[p].views[v].range.camera_from_pose;
       const Transform turntable_from_model = turntable_from_pose * pose_from_model;

@@ -17,27 +17,28 @@
 namespace scanrig {
 
 struct ReconstructOptions {
-  double voxel_mm = 0.0;            ///< of the model; partial models for finding the pose are coarser. 0: 0.25 mm, or
-                                    ///< the pixels of imported range images where they are larger
-  int threads = 0;                  ///< 0: all of the machine's; the result is the same for any number
+  double voxel_mm = 0.0;  ///< of the model; partial models for finding the pose are coarser. 0: kDefaultVoxelMm, or
+                          ///< the pixels of imported range images where they are larger
+  int threads = 0;        ///< 0: all of the machine's; the result is the same for any number
   std::string fusion = "evidence";  ///< `evidence`, or `paper` for the class table as published
   std::string rests = "hull";       ///< `hull`, or `egi` for the paper's tessellated sphere
   bool texture = true;
+  double partial_voxel_mm = 0.8;  ///< minimum for partial models: they only serve the search for the pose
 };
 
-/// Where the data come from, for the report.
+/// Origin of the data, for the report.
 struct ScanIdentity {
   std::string id;
   std::string profile;  ///< hash of the simulated sensor's profile; empty for a real rig
   std::vector<std::string> config_sha256;
 };
-/// What the manifest of a whole scan says of it.
+/// The identity in the manifest of a whole scan.
 ScanIdentity identity_of(const Manifest& manifest);
 
-/// What a scan becomes.
+/// Result of a reconstruction.
 struct Model {
   TexturedMesh mesh;  ///< pose 1's turntable frame; atlas empty when there is no colour
-  /// report.json: versions, options, hashes, seconds and peak memory a stage, residuals, counts, alarms, shares.
+  /// report.json: versions, options, hashes, seconds and peak memory per stage, residuals, counts, conflicts, shares.
   std::shared_ptr<const nlohmann::json> report;
 };
 
@@ -62,7 +63,8 @@ class Reconstruction {
   /// Registers the pose's views and makes its partial model. Fails with `degenerate`, `no_overlap`, `stopped`.
   Result<void> finish_pose(std::size_t pose, const Context& context);
 
-  /// Pose 2 into pose 1, integration, texture; with one pose, its own complete model. Every pose is finished before.
+  /// Pose 2 into pose 1, integration, texture; with one pose, its own complete model. Every pose must be finished
+  /// before.
   /// Fails with `same_rest`, `ambiguous`, `no_overlap`, `degenerate`, `stopped`.
   Result<Model> finish(const ScanIdentity& identity, const Context& context);
 
@@ -71,8 +73,8 @@ class Reconstruction {
   std::unique_ptr<State> state_;
 };
 
-/// The whole of a scan folder, from its files. Same input and options, same bits. Fails as the stages and the files do;
-/// `invalid_input` too for a scan whose views are not all there.
+/// Reconstructs a scan folder from its files. Same input and options, same bits. Fails as the stages and the files do,
+/// and with `invalid_input` for an incomplete scan.
 Result<Model> reconstruct(const ScanFolder& scan, const ReconstructOptions& options, const Context& context);
 
 /// Mesh, texture and report.json into `folder` (made or replaced as a whole). Fails with `io`.

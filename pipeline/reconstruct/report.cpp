@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-/// JSON has no NaN: what is not known is null.
+/// JSON has no NaN: unknown values are null.
 json number(double value) { return std::isfinite(value) ? json(value) : json(); }
 
 json vector_json(const Eigen::Vector3d& v) { return {number(v.x()), number(v.y()), number(v.z())}; }

@@ -2,7 +2,10 @@
 
 namespace scanrig {
 
-/// What the voxels of a model may measure, the same for all who ask for one: configuration, API and command line.
+/// Limits of the voxel size of a model, shared by configuration, API and command line.
 constexpr double kMinVoxelMm = 0.02, kMaxVoxelMm = 5.0;
+
+/// Voxel size where none is configured.
+constexpr double kDefaultVoxelMm = 0.25;
 
 }  // namespace scanrig

@@ -12,7 +12,7 @@ namespace scanrig {
 namespace {
 
 constexpr double kMinSigma = 0.003;  // mm; no camera measures better, and weights stay finite
-constexpr double kMaxSlope = 6.0;    // depth change a pixel, in pixel footprints, that is still one surface
+constexpr double kMaxSlope = 6.0;    // depth change per pixel, in pixel footprints, that is still one surface
 constexpr double kMinFacing = 0.2;   // cosine of the most grazing incidence that is used
 constexpr double kMinUnity = 0.95;   // length of the mean of four normals; less is an edge, not a plane
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
@@ -183,7 +183,7 @@ std::vector<SurfacePoint> sample_surface(const RangeLevel& images, double spacin
   parallel_for(images.size(), [&](std::size_t v) {
     const RangeImage& image = images[v];
     const Transform pose_from_camera = image.camera_from_pose.inverse();
-    int stride = 0;  // known at the first measured pixel: two candidates along a cube's edge
+    int stride = 0;  // set at the first measured pixel: two candidates along a cube's edge
     for (int row = 0; row < image.depth.rows; row += std::max(stride, 1)) {
       for (int column = 0; column < image.depth.cols; column += std::max(stride, 1)) {
         const auto s = surface_point(image, row, column);

@@ -8,13 +8,13 @@
 
 namespace scanrig {
 
-/// A point of a measured surface and its tangent plane; the frame is said where it is used.
+/// A point of a measured surface and its tangent plane; the frame is stated at each use.
 struct SurfacePoint {
   Eigen::Vector3d point;   ///< mm
   Eigen::Vector3d normal;  ///< unit, outward
   double sigma = 0.0;      ///< standard deviation along the normal, mm; never below 0.003
   double facing = 0.0;     ///< cosine of the angle between the normal and the direction to the camera
-  int view = 0;            ///< which of the views measured it
+  int view = 0;            ///< index of the view that measured it
 };
 
 /// The range images of one pyramid level; level 0 shares the pixels of the input.
@@ -36,10 +36,10 @@ std::optional<SurfacePoint> tangent_plane_near(const RangeImage& image, const Ei
 /// About `count` points of one range image on a regular grid of pixels, camera frame; grazing ones (> 78 deg) left out.
 std::vector<SurfacePoint> sample_image(const RangeImage& image, int count);
 
-/// Points of all range images together, pose frame, one a cube of `spacing_mm`: the one seen most squarely.
+/// Points of all range images together, pose frame, one per cube of `spacing_mm`: the one seen most squarely.
 std::vector<SurfacePoint> sample_surface(const RangeLevel& images, double spacing_mm);
 
-/// Diagonal of the box around all measured points, pose frame, mm; 0 if there are none.
+/// Diagonal of the box around all measured points, pose frame, mm; 0 without points.
 double measured_size(const RangeLevel& images);
 
 }  // namespace scanrig

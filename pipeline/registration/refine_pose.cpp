@@ -15,10 +15,7 @@ namespace {
 using Vector6 = Eigen::Matrix<double, 6, 1>;
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
-constexpr double kMinFacing = 0.25;    // cosine at which a view is no longer asked about a point
-constexpr double kMinAgreement = 0.6;  // cosine between corresponding normals
-constexpr std::size_t kBlock = 256;    // samples handed out at once
-constexpr std::size_t kMinCorrespondences = 30;
+constexpr std::size_t kBlock = 256;  // samples per task
 
 /// A point of pose 2's surface that must lie on a plane of pose 1, or the other way round; pose 1's frame.
 struct Correspondence {
@@ -33,10 +30,10 @@ struct Found {
   std::size_t samples_seen = 0;
 };
 
-/// Holds `samples` (frame A) against the images of the other pose (frame B). `pose1_from_a` and `pose1_from_b` express
-/// the result in pose 1's frame; `moving` tells whether A is the pose that moves.
+/// Compares `samples` (frame A) with the images of the other pose (frame B). `pose1_from_a` and `pose1_from_b` express
+/// the result in pose 1's frame; `moving`: A is the pose that moves.
 Found find(const std::vector<SurfacePoint>& samples, const RangeLevel& images, const Transform& pose1_from_a,
-           const Transform& pose1_from_b, bool moving, double capture_mm) {
+           const Transform& pose1_from_b, bool moving, double capture_mm, const RefineOptions& options) {
   std::vector<Transform> camera_from_a;
   std::vector<Transform> pose1_from_camera;
   for (const RangeImage& image : images) {
@@ -50,10 +47,10 @@ Found find(const std::vector<SurfacePoint>& samples, const RangeLevel& images, c
       bool seen = false;
       for (std::size_t v = 0; v < images.size(); ++v) {
         const Eigen::Vector3d normal = camera_from_a[v].linear() * samples[i].normal;
-        if (normal.z() > -kMinFacing) continue;
+        if (normal.z() > -options.min_facing) continue;
         const Eigen::Vector3d point = camera_from_a[v] * samples[i].point;
         const auto plane = tangent_plane_near(images[v], point);
-        if (!plane || plane->normal.dot(normal) < kMinAgreement) continue;
+        if (!plane || plane->normal.dot(normal) < options.min_agreement) continue;
         const double distance = plane->normal.dot(point - plane->point);
         if (std::abs(distance) > capture_mm) continue;
         seen = true;
@@ -73,10 +70,11 @@ Found find(const std::vector<SurfacePoint>& samples, const RangeLevel& images, c
 }
 
 Found find_both_ways(const MeasuredPose& pose1, const MeasuredPose& pose2, const Transform& pose1_from_pose2, int level,
-                     double capture_mm) {
+                     double capture_mm, const RefineOptions& options) {
   const Transform same = Transform::Identity();
-  Found found = find(pose2.samples[level], pose1.images[level], pose1_from_pose2, same, true, capture_mm);
-  const Found back = find(pose1.samples[level], pose2.images[level], same, pose1_from_pose2, false, capture_mm);
+  Found found = find(pose2.samples[level], pose1.images[level], pose1_from_pose2, same, true, capture_mm, options);
+  const Found back =
+      find(pose1.samples[level], pose2.images[level], same, pose1_from_pose2, false, capture_mm, options);
   found.correspondences.insert(found.correspondences.end(), back.correspondences.begin(), back.correspondences.end());
   found.samples_seen += back.samples_seen;
   return found;
@@ -95,17 +93,17 @@ struct Equations {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
 };
 
-Equations accumulate(const Found& found, double keep) {
+Equations accumulate(const Found& found, const RefineOptions& options) {
   Equations e;
   for (const Correspondence& c : found.correspondences) e.centre += c.moving;
   e.centre /= static_cast<double>(found.correspondences.size());
   const std::vector<double> distances = distances_of(found);
   const double scale = std::max(1.4826 * quantile(distances, 0.5), 1e-6);
-  const double limit = quantile(distances, keep);
+  const double limit = quantile(distances, options.keep);
   for (const Correspondence& c : found.correspondences) {
     if (std::abs(c.distance) > limit) continue;
-    // The residuals' own spread joins sigma: what sigma does not know must not let a few points decide.
-    const double w = robust_weight(c.distance, 3.0 * scale) / (c.sigma * c.sigma + scale * scale);
+    // The residuals' own spread is added to sigma: errors not covered by sigma must not let a few points decide.
+    const double w = robust_weight(c.distance, options.robust_scales * scale) / (c.sigma * c.sigma + scale * scale);
     Vector6 j;
     j << (c.moving - e.centre).cross(c.normal), c.normal;
     e.normal.noalias() += w * j * j.transpose();
@@ -114,10 +112,9 @@ Equations accumulate(const Found& found, double keep) {
   return e;
 }
 
-void add_contacts(const std::vector<Contact>& contacts, const Transform& pose1_from_pose2, Equations& e) {
-  constexpr double kShare = 1e-3;  // of the surfaces' weight: nothing beside what they do decide
-  const double w = kShare * e.normal.bottomRightCorner<3, 3>().trace();
-  for (const Contact& c : contacts) {
+void add_contacts(const RefineOptions& options, const Transform& pose1_from_pose2, Equations& e) {
+  const double w = options.contact_share * e.normal.bottomRightCorner<3, 3>().trace();
+  for (const Contact& c : options.contacts) {
     const double distance = c.normal_in_pose1.dot(pose1_from_pose2 * c.point_in_pose2) - c.offset_mm;
     e.normal.bottomRightCorner<3, 3>() += w * c.normal_in_pose1 * c.normal_in_pose1.transpose();
     e.right.tail<3>() -= w * distance * c.normal_in_pose1;
@@ -148,28 +145,29 @@ MeasuredPose measured_pose(std::span<const View> views, int levels) {
 
 RefinedPose align(const MeasuredPose& pose1, const MeasuredPose& pose2, const Transform& initial, int level,
                   double capture_mm, const RefineOptions& options) {
-  constexpr double kSettled = 1e-4;  // mm of motion at the object's surface
   RefinedPose result;
   result.pose1_from_pose2 = initial;
   const double arm = 0.25 * (pose1.size_mm + pose2.size_mm);
-  const double narrowest = 0.01 * arm;
+  const double narrowest = 2.0 * options.min_capture * arm;
   double capture = capture_mm;
-  Found found = find_both_ways(pose1, pose2, initial, level, capture);
-  while (result.iterations < options.iterations && found.correspondences.size() >= kMinCorrespondences) {
-    Equations e = accumulate(found, options.keep);
-    add_contacts(options.contacts, result.pose1_from_pose2, e);
+  Found found = find_both_ways(pose1, pose2, initial, level, capture, options);
+  while (result.iterations < options.max_iterations && found.correspondences.size() >= options.min_correspondences) {
+    Equations e = accumulate(found, options);
+    add_contacts(options, result.pose1_from_pose2, e);
     const Matrix6 damped = e.normal + 1e-9 * e.normal.trace() * Matrix6::Identity();
     const Vector6 x = damped.ldlt().solve(e.right);
     const Eigen::Translation3d to_centre(e.centre);
     result.pose1_from_pose2 =
         to_centre * small_motion(x.head<3>(), x.tail<3>()) * to_centre.inverse() * result.pose1_from_pose2;
     ++result.iterations;
-    capture = std::clamp(8.0 * quantile(distances_of(found), 0.5), std::min(narrowest, capture), capture);
-    found = find_both_ways(pose1, pose2, result.pose1_from_pose2, level, capture);
-    if (x.head<3>().norm() * arm + x.tail<3>().norm() < kSettled * (level == 0 ? 1.0 : 50.0)) break;
+    capture =
+        std::clamp(options.capture_medians * quantile(distances_of(found), 0.5), std::min(narrowest, capture), capture);
+    found = find_both_ways(pose1, pose2, result.pose1_from_pose2, level, capture, options);
+    if (x.head<3>().norm() * arm + x.tail<3>().norm() < (level == 0 ? options.settled_mm : options.coarse_settled_mm))
+      break;
   }
-  if (found.correspondences.size() < kMinCorrespondences) return {.pose1_from_pose2 = initial};
-  const Equations e = accumulate(found, options.keep);
+  if (found.correspondences.size() < options.min_correspondences) return {.pose1_from_pose2 = initial};
+  const Equations e = accumulate(found, options);
   const std::vector<double> distances = distances_of(found);
   result.median_mm = quantile(distances, 0.5);
   result.rms_mm = root_mean_square(distances);
@@ -188,7 +186,7 @@ Result<RefinedPose> refine_pose(std::span<const View> views1, std::span<const Vi
   const MeasuredPose pose1 = measured_pose(views1, options.levels);
   const MeasuredPose pose2 = measured_pose(views2, options.levels);
   for (const MeasuredPose* pose : {&pose1, &pose2}) {
-    if (pose->samples.back().size() < kMinCorrespondences) {
+    if (pose->samples.back().size() < options.min_correspondences) {
       return fail(ErrorCode::degenerate, "pose refinement: pose {} has no measured surface", pose == &pose1 ? 1 : 2);
     }
   }
@@ -198,14 +196,15 @@ Result<RefinedPose> refine_pose(std::span<const View> views1, std::span<const Vi
   for (int level = options.levels - 1; level >= 0; --level) {
     if (context.stopped()) return fail(ErrorCode::stopped, "pose refinement: stopped");
     refined = align(pose1, pose2, start, level, capture, options);
-    if (refined.iterations == 0 || refined.overlap < 0.02) {
+    if (refined.iterations == 0 || refined.overlap < options.min_overlap) {
       return fail(ErrorCode::no_overlap,
                   "pose refinement: the two poses share {:.1f} % of their surface from this start; "
-                  "at least 2 % are needed",
-                  100.0 * refined.overlap);
+                  "at least {:.0f} % are needed",
+                  100.0 * refined.overlap, 100.0 * options.min_overlap);
     }
     start = refined.pose1_from_pose2;
-    capture = std::min(capture, std::max(8.0 * refined.median_mm, 0.005 * pose1.size_mm));
+    capture =
+        std::min(capture, std::max(options.capture_medians * refined.median_mm, options.min_capture * pose1.size_mm));
     context.report("refine", 1.0 - static_cast<double>(level) / options.levels);
   }
   return refined;

@@ -9,8 +9,8 @@
 
 namespace scanrig {
 
-/// A plane of pose 1 that a point of pose 2 is known to touch: a table top. It decides only what the surfaces leave
-/// open, such as the height of an upright prism turned upside down.
+/// A plane of pose 1 that a point of pose 2 touches: a table top. It decides only what the surfaces leave open, such as
+/// the height of an upright prism turned upside down.
 struct Contact {
   Eigen::Vector3d point_in_pose2 = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal_in_pose1 = Eigen::Vector3d::Zero();  ///< unit
@@ -21,11 +21,21 @@ struct RefineOptions {
   double capture_mm = 12.0;  ///< farthest distance between corresponding surfaces at the start
   double keep = 0.8;         ///< share of the correspondences that is used, the closest ones
   int levels = 3;
-  int iterations = 25;  ///< most Gauss-Newton steps a level
+  int max_iterations = 25;  ///< maximum Gauss-Newton steps per level
   std::vector<Contact> contacts;
+  double min_facing = 0.25;              ///< cosine below which a view does not judge a point
+  double min_agreement = 0.6;            ///< cosine between corresponding normals
+  std::size_t min_correspondences = 30;  ///< fewer are no overlap
+  double min_overlap = 0.02;             ///< share of both surfaces
+  double robust_scales = 3.0;            ///< scale of the robust weight, in standard deviations of the residuals
+  double contact_share = 1e-3;           ///< weight of the contacts against the surfaces': negligible beside them
+  double capture_medians = 8.0;          ///< the capture distance shrinks to this many median residuals ...
+  double min_capture = 0.005;            ///< ... but not below this share of the object's size
+  double settled_mm = 1e-4;              ///< motion of the surface that ends the iteration on the finest level
+  double coarse_settled_mm = 5e-3;       ///< the same on the other levels
 };
 
-/// How pose 2 lies on pose 1.
+/// Motion from pose 2 to pose 1, and its quality.
 struct RefinedPose {
   Transform pose1_from_pose2 = Transform::Identity();
   double median_mm = 0.0;  ///< of |point to plane| over all correspondences, untrimmed
@@ -33,29 +43,30 @@ struct RefinedPose {
   double overlap = 0.0;  ///< share of both poses' measured area that the other pose measured too
   int correspondences = 0;
   int iterations = 0;
-  /// Of (rotation vector in radians about `centre`, translation in mm), 1/variance; from sigma and the residuals.
+  /// Information matrix of (rotation vector in radians about `centre`, translation in mm), 1/variance; from sigma and
+  /// the residuals.
   Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< of the shared surface, pose 1's frame
-  /// Largest by smallest eigenvalue of the information, rotations measured by the arc they make at the object's size;
-  /// above about 1e4 some motion (a turn of a body of revolution, a slide along a prism) is not held by the data.
+  /// Ratio of largest to smallest eigenvalue of the information, rotations measured by their arc at the object's size;
+  /// above about 1e4 the data do not hold some motion (a turn of a body of revolution, a slide along a prism).
   double condition = 0.0;
 };
 
-/// The measured surface of one pose, ready to be compared with another: level 0 is the finest.
+/// The measured surface of one pose, ready for comparison with another: level 0 is the finest.
 struct MeasuredPose {
   std::vector<RangeLevel> images;
-  std::vector<std::vector<SurfacePoint>> samples;  ///< a level; pose frame, evenly spread
+  std::vector<std::vector<SurfacePoint>> samples;  ///< per level; pose frame, evenly spread
   double size_mm = 0.0;                            ///< diagonal of the box around the measured points
 };
 
 MeasuredPose measured_pose(std::span<const View> views, int levels = 3);
 
 /// Gauss-Newton on one level from `initial`: point to plane, both directions, robust, trimmed. `iterations` of the
-/// result is 0 when the two surfaces share nothing. The capture distance shrinks with the residuals.
+/// result is 0 when the two surfaces do not overlap. The capture distance shrinks with the residuals.
 RefinedPose align(const MeasuredPose& pose1, const MeasuredPose& pose2, const Transform& initial, int level,
                   double capture_mm, const RefineOptions& options);
 
-/// The rigid motion that lays pose 2's range images on pose 1's, from a start within about 8 deg and 5 mm [Park and
+/// The rigid motion that aligns pose 2's range images with pose 1's, from a start within about 8 deg and 5 mm [Park and
 /// Subbarao 2002, refinement]: point to plane both ways, weighted by sigma, coarse to fine.
 /// Same bits for any number of threads. Fails with `degenerate` (a pose has no measured surface), `no_overlap` (the
 /// surfaces share less than 2 % from this start), `stopped`.

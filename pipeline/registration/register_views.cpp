@@ -18,11 +18,8 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;  // (rotation vector, translation) 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
 
 constexpr int kAxisUnknowns = 4;  // tilt about x and z, shift along x and z
-constexpr double kMinLeverage = 0.02;
-constexpr double kSettled = 3e-4;  // mm
-constexpr std::size_t kMinShared = 100;
 
-/// Which view's points are held against which view's surface.
+/// One comparison: the source view's points against the target view's surface.
 struct Pairing {
   int source;
   int target;
@@ -55,7 +52,6 @@ std::vector<Pairing> ring_pairings(int views, int reach) {
 
 Matches match(const RangeImage& target, const std::vector<SurfacePoint>& source, const Transform& pose_from_source,
               const Transform& target_from_pose, double capture_mm, const RegistrationOptions& options) {
-  constexpr double kMinAgreement = 0.7;  // cosine between the two normals
   const Transform target_from_source = target_from_pose * pose_from_source;
   const Transform pose_from_target = target_from_pose.inverse();
   Matches matches;
@@ -64,7 +60,7 @@ Matches match(const RangeImage& target, const std::vector<SurfacePoint>& source,
     const Eigen::Vector3d point = target_from_source * s.point;
     const Eigen::Vector3d normal = target_from_source.linear() * s.normal;
     const auto plane = tangent_plane_near(target, point);
-    if (!plane || plane->facing < options.min_facing || plane->normal.dot(normal) < kMinAgreement) continue;
+    if (!plane || plane->facing < options.min_facing || plane->normal.dot(normal) < options.min_agreement) continue;
     if (std::abs(plane->normal.dot(point - plane->point)) > capture_mm) continue;
     matches.push_back({pose_from_source * s.point, pose_from_target * plane->point,
                        pose_from_source.linear() * s.normal, pose_from_target.linear() * plane->normal,
@@ -73,7 +69,7 @@ Matches match(const RangeImage& target, const std::vector<SurfacePoint>& source,
   return matches;
 }
 
-/// The state of one registration: corrections found so far and the level being worked on.
+/// The state of one registration: corrections found so far and the current level.
 class Solver {
  public:
   Solver(std::span<const View> views, const RegistrationOptions& options)
@@ -100,11 +96,11 @@ class Solver {
     return matches;
   }
 
-  /// One Gauss-Newton step; how far it moves the surface at most, mm.
+  /// Performs one Gauss-Newton step; returns the largest movement of the surface, mm.
   double step(const std::vector<Matches>& matches);
 
-  /// How much the surface resists turning: the slope along the turn, taken from both views' normals, whose noise is
-  /// independent, so that noise alone gives 0.
+  /// Leverage of the table angle: the slope along the turn, from both views' normals. Their noise is independent, so
+  /// noise alone gives 0.
   [[nodiscard]] static double leverage(const std::vector<Matches>& matches);
   void hold_angles() { angles_held_ = true; }
 
@@ -140,7 +136,7 @@ Matrix6 Solver::prior_information() const {
   return spread.cwiseInverse().asDiagonal();
 }
 
-/// What an error of the axis does to the view at table angle theta: the axis rides with the camera, so seen from the
+/// Effect of an error of the axis on the view at table angle theta: the axis moves with the camera, so seen from the
 /// object it turns with the table.
 Eigen::Matrix<double, 6, kAxisUnknowns> Solver::axis_effect(std::size_t v) const {
   const Eigen::Matrix3d turned = rot_y(-views_[v].angle_rad).linear();
@@ -162,7 +158,7 @@ void Solver::add_data(const std::vector<Matches>& matches, Eigen::MatrixXd& norm
   for (const Matches& pair : matches) {
     for (const Match& m : pair) all.push_back(std::abs(m.distance()) / m.sigma);
   }
-  const double scale = 1.5 * std::max(1.0, 1.4826 * quantile(std::move(all), 0.5));
+  const double scale = options_.robust_scale * std::max(1.0, 1.4826 * quantile(std::move(all), 0.5));
   std::vector<Sums> sums(matches.size());
   parallel_for(matches.size(), [&](std::size_t k) {
     for (const Match& m : matches[k]) {
@@ -172,7 +168,7 @@ void Solver::add_data(const std::vector<Matches>& matches, Eigen::MatrixXd& norm
       sums[k].g += w * m.distance() * j;
       sums[k].weight += w;
     }
-    // What two views have wrong in common does not average away with the number of points.
+    // A common error of two views does not average away with the number of points.
     const double share = 1.0 / (1.0 + sums[k].weight * options_.pair_bias_mm * options_.pair_bias_mm);
     sums[k].h *= share;
     sums[k].g *= share;
@@ -208,9 +204,9 @@ void Solver::add_priors(Eigen::MatrixXd& normal, Eigen::VectorXd& right) const {
   normal.diagonal().head<kAxisUnknowns>() += Eigen::Vector4d(tilt, tilt, shift, shift);
 }
 
-/// What all views' corrections have in common, seen from their cameras, is the axis's and only the axis's. Left to the
-/// views it would take up what scanners have wrong at grazing incidence: b (1 - cos) is what moving every view b
-/// towards its camera does, and the model grows by b.
+/// The common part of all views' corrections, seen from their cameras, belongs to the axis and only to the axis. Left
+/// to the views it would absorb scanner errors at grazing incidence: b (1 - cos) is the effect of moving every view b
+/// towards its camera, and the model grows by b.
 void Solver::hold_common_motion(Eigen::MatrixXd& normal, Eigen::VectorXd& right) const {
   constexpr double kInformation = 1e10;  // 1 / (0.01 um)^2 or 1 / (0.0006 deg)^2
   const auto views = static_cast<double>(correction_.size());
@@ -234,13 +230,12 @@ double Solver::step(const std::vector<Matches>& matches) {
   add_priors(normal, right);
   const Eigen::VectorXd solution = normal.ldlt().solve(right);
   axis_ = solution.head<kAxisUnknowns>();
-  constexpr double kArm = 50.0;  // mm, from the axis to the surface, roughly
   double largest = 0.0;
   for (std::size_t v = 0; v < correction_.size(); ++v) {
     const Vector6 delta = solution.segment<6>(kAxisUnknowns + 6 * static_cast<int>(v));
     correction_[v] += delta;
     camera_from_pose_[v] = camera_from_pose_[v] * small_motion(delta.head<3>(), delta.tail<3>());
-    largest = std::max(largest, delta.head<3>().norm() * kArm + delta.tail<3>().norm());
+    largest = std::max(largest, delta.head<3>().norm() * options_.arm_mm + delta.tail<3>().norm());
   }
   return largest;
 }
@@ -263,15 +258,15 @@ void Solver::describe(const std::vector<Matches>& matches, bool after, Registrat
   std::vector<double> all;
   for (std::size_t v = 0; v < views_.size(); ++v) {
     std::vector<double> distances;
-    std::size_t most = 0;
+    std::size_t matched = 0;
     for (std::size_t k = 0; k < matches.size(); ++k) {
       if (pairings_[k].source != static_cast<int>(v)) continue;
       for (const Match& m : matches[k]) distances.push_back(std::abs(m.distance()));
-      most = std::max(most, matches[k].size());
+      matched = std::max(matched, matches[k].size());
     }
     ViewFit& fit = report.views[v];
     fit.index = views_[v].index;
-    fit.overlap = static_cast<double>(most) / static_cast<double>(std::max<std::size_t>(samples_[v].size(), 1));
+    fit.overlap = static_cast<double>(matched) / static_cast<double>(std::max<std::size_t>(samples_[v].size(), 1));
     (after ? fit.rms_after_mm : fit.rms_before_mm) = root_mean_square(distances);
     (after ? fit.median_after_mm : fit.median_before_mm) = quantile(distances, 0.5);
     all.insert(all.end(), distances.begin(), distances.end());
@@ -295,12 +290,12 @@ void Solver::describe_corrections(RegistrationReport& report) const {
 }
 
 std::size_t largest(const std::vector<Matches>& matches) {
-  std::size_t most = 0;
-  for (const Matches& pair : matches) most = std::max(most, pair.size());
-  return most;
+  std::size_t largest = 0;
+  for (const Matches& pair : matches) largest = std::max(largest, pair.size());
+  return largest;
 }
 
-Result<void> check(std::span<const View> views) {
+Result<void> check(std::span<const View> views, std::size_t min_points) {
   int best = 0;
   for (const View& view : views) {
     const RangeImage& r = view.range;
@@ -311,9 +306,9 @@ Result<void> check(std::span<const View> views) {
     }
     best = std::max(best, cv::countNonZero(r.depth == r.depth));
   }
-  if (best < static_cast<int>(kMinShared)) {
+  if (best < static_cast<int>(min_points)) {
     return fail(ErrorCode::degenerate, "registration: no view has {} measured points; check exposure and focus",
-                kMinShared);
+                min_points);
   }
   return {};
 }
@@ -334,28 +329,28 @@ RegistrationOptions RegistrationOptions::imported() {
 
 Result<RegistrationReport> register_views(std::span<View> views, const RegistrationOptions& options,
                                           const Context& context) {
-  if (auto ok = check(views); !ok) return pass_on(ok);
+  if (auto ok = check(views, options.min_shared); !ok) return pass_on(ok);
   RegistrationReport report;
   Solver solver(views, options);
   const auto pyramid = range_pyramid(views, options.levels);
   solver.use_level(pyramid[0], options.samples);
   const auto before = solver.match_all(options.capture_mm);
-  if (views.size() > 1 && largest(before) < kMinShared) {
+  if (views.size() > 1 && largest(before) < options.min_shared) {
     return fail(ErrorCode::no_overlap,
                 "registration: no two neighbouring views share {} points within {} mm; check the "
                 "table angles and the calibration",
-                kMinShared, options.capture_mm);
+                options.min_shared, options.capture_mm);
   }
   solver.describe(before, false, report);
   report.angle_leverage = Solver::leverage(before);
-  report.angle_observable = report.angle_leverage >= kMinLeverage;
+  report.angle_observable = report.angle_leverage >= options.min_leverage;
   if (!report.angle_observable) solver.hold_angles();
   for (int level = options.levels - 1; level >= 0; --level) {
     solver.use_level(pyramid[level], options.samples >> (2 * level));
     const double capture = options.capture_mm / (1 << (options.levels - 1 - level));
-    for (int k = 0; k < options.iterations; ++k) {
+    for (int k = 0; k < options.max_iterations; ++k) {
       if (context.stopped()) return fail(ErrorCode::stopped, "registration: stopped");
-      if (solver.step(solver.match_all(capture)) < kSettled) break;
+      if (solver.step(solver.match_all(capture)) < options.settled_mm) break;
     }
     context.report("registration", 1.0 - static_cast<double>(level) / options.levels);
   }

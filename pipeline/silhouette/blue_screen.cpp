@@ -9,10 +9,7 @@
 namespace scanrig {
 namespace {
 
-constexpr int kBorder = 12;       // px; the frame around the image that shows the screen
-constexpr float kDarkLevel = 12;  // sum of B, G, R below which chroma is noise
-
-/// How much of the screen's chroma a pixel has: 0 grey, 1 the screen.
+/// Share of the screen's chroma in a pixel: 0 grey, 1 the screen.
 cv::Mat1f screen_key(const cv::Mat3f& image, double screen_share) {
   cv::Mat1f key(image.size());
   const float scale = 1.0f / static_cast<float>(screen_share - 1.0 / 3.0);
@@ -20,7 +17,7 @@ cv::Mat1f screen_key(const cv::Mat3f& image, double screen_share) {
     for (int x = 0; x < image.cols; ++x) {
       const cv::Vec3f& c = image(y, x);
       const float sum = c[0] + c[1] + c[2];
-      // The dark is drawn towards grey by less than one grey level a channel.
+      // Dark pixels are drawn towards grey by less than one grey level per channel.
       key(y, x) = ((c[0] + 1.0f) / (sum + 3.0f) - 1.0f / 3.0f) * scale;
     }
   }
@@ -28,15 +25,16 @@ cv::Mat1f screen_key(const cv::Mat3f& image, double screen_share) {
 }
 
 /// The median share of blue along the image's border; 0 when it is dark.
-double border_blue_share(const cv::Mat3f& image) {
+double border_blue_share(const cv::Mat3f& image, const BlueScreenOptions& options) {
+  const int border = options.border_px;
   std::vector<float> shares;
   for (int y = 0; y < image.rows; ++y) {
-    const bool whole_row = y < kBorder || y >= image.rows - kBorder;
+    const bool whole_row = y < border || y >= image.rows - border;
     for (int x = 0; x < image.cols; ++x) {
-      if (!whole_row && x == kBorder) x = image.cols - kBorder;
+      if (!whole_row && x == border) x = image.cols - border;
       const cv::Vec3f& c = image(y, x);
       const float sum = c[0] + c[1] + c[2];
-      if (sum > kDarkLevel) shares.push_back(c[0] / sum);
+      if (sum > options.dark_level) shares.push_back(c[0] / sum);
     }
   }
   if (shares.size() < static_cast<std::size_t>(image.cols)) return 0.0;
@@ -45,7 +43,7 @@ double border_blue_share(const cv::Mat3f& image) {
   return static_cast<double>(*middle);
 }
 
-/// Parts smaller than `smallest` pixels are cleared.
+/// Clears parts smaller than `smallest` pixels.
 void remove_parts(cv::Mat1b& mask, double smallest, int connectivity) {
   cv::Mat1i labels;
   cv::Mat stats, centroids;
@@ -68,10 +66,10 @@ int largest_part(const cv::Mat1b& mask) {
   return largest;
 }
 
-/// The colour of the pixels in `mask` around each pixel; those away from the mask's edge count first.
-cv::Mat3f colour_around(const cv::Mat3f& image, const cv::Mat1b& mask) {
+/// The colour of the pixels in `mask` around each pixel; those away from the mask's edge have priority.
+cv::Mat3f colour_around(const cv::Mat3f& image, const cv::Mat1b& mask, const BlueScreenOptions& options) {
   cv::Mat1b core;
-  cv::erode(mask, core, cv::getStructuringElement(cv::MORPH_ELLIPSE, {7, 7}));
+  cv::erode(mask, core, cv::getStructuringElement(cv::MORPH_ELLIPSE, {options.mixed_band_px, options.mixed_band_px}));
   cv::Mat1f weight(mask.size());
   cv::Mat3f weighted(mask.size());
   for (int y = 0; y < mask.rows; ++y) {
@@ -80,7 +78,7 @@ cv::Mat3f colour_around(const cv::Mat3f& image, const cv::Mat1b& mask) {
       weighted(y, x) = image(y, x) * weight(y, x);
     }
   }
-  const cv::Size window(15, 15);
+  const cv::Size window(options.colour_window_px, options.colour_window_px);
   cv::boxFilter(weighted, weighted, CV_32F, window, {-1, -1}, false);
   cv::boxFilter(weight, weight, CV_32F, window, {-1, -1}, false);
   for (int y = 0; y < mask.rows; ++y) {
@@ -89,13 +87,14 @@ cv::Mat3f colour_around(const cv::Mat3f& image, const cv::Mat1b& mask) {
   return weighted;
 }
 
-/// 1/2 - alpha, alpha the object's share in a pixel's light. Only a pixel near the mask's edge can be mixed; there it
-/// is put between the object's and the screen's colour nearby.
-cv::Mat1f outside_share(const cv::Mat3f& image, const cv::Mat1b& object) {
+/// 1/2 - alpha, alpha the object's share in a pixel's light. Only a pixel near the mask's edge can be mixed; its light
+/// is compared there with the object's and the screen's colour nearby.
+cv::Mat1f outside_share(const cv::Mat3f& image, const cv::Mat1b& object, const BlueScreenOptions& options) {
   const cv::Mat1b screen(255 - object);
-  const cv::Mat3f object_colour = colour_around(image, object), screen_colour = colour_around(image, screen);
+  const cv::Mat3f object_colour = colour_around(image, object, options);
+  const cv::Mat3f screen_colour = colour_around(image, screen, options);
   cv::Mat1b grown, shrunk;
-  const cv::Mat band = cv::getStructuringElement(cv::MORPH_ELLIPSE, {7, 7});
+  const cv::Mat band = cv::getStructuringElement(cv::MORPH_ELLIPSE, {options.mixed_band_px, options.mixed_band_px});
   cv::dilate(object, grown, band);
   cv::erode(object, shrunk, band);
   cv::Mat1f field(image.size());
@@ -105,7 +104,7 @@ cv::Mat1f outside_share(const cv::Mat3f& image, const cv::Mat1b& object) {
       if (grown(y, x) == 0 || shrunk(y, x) != 0) continue;
       const cv::Vec3f contrast = object_colour(y, x) - screen_colour(y, x);
       const float square = contrast.dot(contrast);
-      if (square < 25.0f) continue;  // too alike to tell a mixture
+      if (square < options.min_contrast) continue;  // too similar to separate a mixture
       const float alpha = (image(y, x) - screen_colour(y, x)).dot(contrast) / square;
       field(y, x) = 0.5f - std::clamp(alpha, 0.0f, 1.0f);
     }
@@ -123,36 +122,37 @@ bool touches_border(const cv::Mat1b& mask) {
 }  // namespace
 
 Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const BlueScreenOptions& options) {
-  if (image.type() != CV_8UC3 || image.cols < 4 * kBorder || image.rows < 4 * kBorder) {
+  if (image.type() != CV_8UC3 || image.cols < 4 * options.border_px || image.rows < 4 * options.border_px) {
     return fail(ErrorCode::invalid_input,
-                "silhouette: a blue screen needs a colour image (BGR, 8 bit) of {} px or more", 4 * kBorder);
+                "silhouette: a blue screen needs a colour image (BGR, 8 bit) of {} px or more", 4 * options.border_px);
   }
   cv::Mat3f colour, smooth;
   image.convertTo(colour, CV_32F);
   cv::boxFilter(colour, smooth, CV_32F, {3, 3}, {-1, -1}, true, cv::BORDER_REPLICATE);
-  const double share = border_blue_share(smooth);
+  const double share = border_blue_share(smooth, options);
   if (share < options.min_blue_share) {
-    return fail(
-        ErrorCode::degenerate,
-        "silhouette: the border of the image is not blue ({:.0f} % of its light); is the screen in place and lit?",
-        100.0 * share);
+    return fail(ErrorCode::degenerate,
+                "silhouette: the border of the image is not blue ({:.0f} % of its light); check that the screen is in "
+                "place and lit",
+                100.0 * share);
   }
   const cv::Mat1f key = screen_key(smooth, share);
   cv::Mat1b object(key.size());
   cv::compare(key, options.object_key, object, cv::CMP_LT);
   const int largest = largest_part(object);
-  if (largest < options.smallest_hole_px) {
-    return fail(ErrorCode::degenerate, "silhouette: no object before the blue screen; is the table empty?");
+  if (largest < options.min_hole_px) {
+    return fail(ErrorCode::degenerate,
+                "silhouette: no object before the blue screen; check that the object is on the table");
   }
-  remove_parts(object, std::max<double>(options.smallest_hole_px, options.smallest_part_share * largest), 8);
+  remove_parts(object, std::max<double>(options.min_hole_px, options.min_part_share * largest), 8);
   cv::Mat1b screen(255 - object);
-  remove_parts(screen, options.smallest_hole_px, 4);
+  remove_parts(screen, options.min_hole_px, 4);
   object = 255 - screen;
   if (touches_border(object)) {
     return fail(ErrorCode::out_of_range,
                 "silhouette: the object reaches the border of the image, it is larger than the working volume");
   }
-  return contour_distance(outside_share(colour, object));
+  return contour_distance(outside_share(colour, object, options));
 }
 
 }  // namespace scanrig

@@ -10,7 +10,7 @@ namespace scanrig {
 namespace {
 
 constexpr double kScaleStep = 0.95;
-constexpr double kSmallestScale = 0.01;
+constexpr double kMinScale = 0.01;
 
 /// Shelves: the tallest first, side by side until the row is full. Places in the order of `sizes`, or nothing.
 std::optional<std::vector<cv::Point>> pack(const std::vector<cv::Size>& sizes, int side) {
@@ -49,7 +49,7 @@ void draw_face(const std::array<Eigen::Vector2d, 3>& corners, double depth, int 
   }
 }
 
-/// Lets the faces at the rim of a chart own the texels next to it.
+/// Gives the faces at the rim of a chart the texels next to it.
 void pad(cv::Mat1i chart, int padding) {
   for (int round = 0; round < padding; ++round) {
     const cv::Mat1i before = chart.clone();
@@ -99,9 +99,9 @@ std::optional<AtlasLayout> lay_out(const Mesh& mesh, std::span<const ChartView> 
 
   std::optional<std::vector<cv::Point>> places;
   std::vector<cv::Size> sizes(charts.size());
-  for (double scale = max_texels_per_px; scale > kSmallestScale && !places; scale *= kScaleStep) {
+  for (double scale = max_texels_per_px; scale > kMinScale && !places; scale *= kScaleStep) {
     for (std::size_t c = 0; c < charts.size(); ++c) {
-      // In double first: a foreign mesh may be any size.
+      // In double first: an imported mesh may be any size.
       const Eigen::Vector2d size = (scale * boxes[c].sizes()).cwiseMin(1e6);
       sizes[c] = cv::Size(static_cast<int>(std::ceil(size.x())), static_cast<int>(std::ceil(size.y()))) +
                  cv::Size(2 * padding_px + 1, 2 * padding_px + 1);

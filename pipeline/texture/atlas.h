@@ -10,19 +10,19 @@
 
 namespace scanrig {
 
-/// Where every face lies in the atlas. Texel centres are at integer coordinates here.
+/// Place of every face in the atlas. Texel centres are at integer coordinates here.
 struct AtlasLayout {
   double texels_per_px = 0.0;
-  std::vector<std::array<Eigen::Vector2d, 3>> corners;  ///< one a face, texels
+  std::vector<std::array<Eigen::Vector2d, 3>> corners;  ///< one per face, texels
   cv::Mat1i owner;  ///< the face whose plane colours a texel, padding included; -1: none
 };
 
 /// Packs the charts' projections into a square of `atlas_px`, at the largest scale up to `max_texels_per_px` that fits;
-/// nothing if none does. Where two faces of a chart lie over each other the one nearer to the view owns the texel.
+/// nothing if none does. Where two faces of a chart overlap, the one nearer to the view owns the texel.
 std::optional<AtlasLayout> lay_out(const Mesh& mesh, std::span<const ChartView> views, std::span<const Chart> charts,
                                    int atlas_px, double max_texels_per_px, int padding_px);
 
-/// Barycentric weights of `at` in the triangle `corners`; nothing if it has no area.
+/// Barycentric weights of `at` in the triangle `corners`; nothing for a triangle without area.
 std::optional<Eigen::Vector3d> barycentric(const std::array<Eigen::Vector2d, 3>& corners, const Eigen::Vector2d& at);
 
 }  // namespace scanrig

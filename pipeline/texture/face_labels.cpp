@@ -12,13 +12,6 @@ namespace {
 
 using Label = std::uint16_t;
 constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-constexpr double kGoodShare = 0.7;  ///< of the best photo's cosine: good enough to lay a face flat
-constexpr double kMinGain = 0.002;  ///< of the seen area: what a further view must add to be picked
-constexpr int kSmoothingRounds = 10;
-constexpr double kBorderCost = 0.5;       ///< of one edge between two labels, against a cosine lost of 1
-constexpr std::size_t kSmallChart = 200;  ///< faces: smaller charts join a neighbour where its view shows them ...
-constexpr std::size_t kTinyChart = 24;    ///< ... and still smaller ones where they only face that view
-constexpr double kFacing = 0.2;
 
 using FaceNeighbours = std::vector<std::array<std::uint32_t, 3>>;
 
@@ -48,11 +41,16 @@ FaceNeighbours neighbours_of_faces(const Mesh& mesh) {
   return found;
 }
 
-/// How well each view lays each face flat: 255 * cosine, 0 = not at all.
+/// Quality of each view for flattening each face: 255 * cosine, 0 = cannot.
 class Quality {
  public:
-  Quality(const Mesh& mesh, std::span<const ChartView> views, std::size_t photos, const std::vector<std::uint8_t>& seen)
-      : views_(views.size()), photos_(photos), area_(mesh.faces.size()), of_(mesh.faces.size() * views.size(), 0) {
+  Quality(const Mesh& mesh, std::span<const ChartView> views, std::size_t photos, const std::vector<std::uint8_t>& seen,
+          double min_facing)
+      : views_(views.size()),
+        photos_(photos),
+        min_facing_(min_facing),
+        area_(mesh.faces.size()),
+        of_(mesh.faces.size() * views.size(), 0) {
     constexpr std::size_t block = 4096;
     parallel_for((mesh.faces.size() + block - 1) / block, [&](std::size_t b) {
       for (std::size_t f = b * block; f < std::min(mesh.faces.size(), (b + 1) * block); ++f)
@@ -85,25 +83,26 @@ class Quality {
     for (std::size_t p = 0; p < photos_; ++p) {
       if ((seen[a * photos_ + p] & seen[b * photos_ + p] & seen[c * photos_ + p]) == 0) continue;
       const auto cosine = grade(p);
-      of_[f * views_ + p] = cosine >= 255 * kFacing ? cosine : std::uint8_t{0};
+      of_[f * views_ + p] = cosine >= 255 * min_facing_ ? cosine : std::uint8_t{0};
       any |= of_[f * views_ + p] != 0;
     }
     for (std::size_t v = photos_; v < views_ && !any; ++v) of_[f * views_ + v] = grade(v);
   }
 
   std::size_t views_, photos_;
+  double min_facing_;
   std::vector<double> area_;
   std::vector<std::uint8_t> of_;
 };
 
-/// Greedy set cover: the photo that shows most of the rest well enough comes next.
-std::vector<Label> cover(const Quality& quality) {
+/// Greedy set cover: picks the photo that shows most of the rest well enough next.
+std::vector<Label> cover(const Quality& quality, const ChartOptions& options) {
   constexpr Label open = std::numeric_limits<Label>::max();
   std::vector<Label> labels(quality.faces(), open);
   std::vector<int> enough(quality.faces());
   double seen_area = 0.0;
   for (std::size_t f = 0; f < labels.size(); ++f) {
-    enough[f] = std::max(1, static_cast<int>(kGoodShare * quality.best(f)));
+    enough[f] = std::max(1, static_cast<int>(options.good_share * quality.best(f)));
     if (quality.best_view(f) < quality.photos() && quality.best(f) > 0) seen_area += quality.area(f);
   }
   for (;;) {
@@ -114,7 +113,7 @@ std::vector<Label> cover(const Quality& quality) {
       }
     });
     const auto next = static_cast<std::size_t>(std::max_element(gain.begin(), gain.end()) - gain.begin());
-    if (gain[next] <= kMinGain * seen_area) break;
+    if (gain[next] <= options.min_gain * seen_area) break;
     for (std::size_t f = 0; f < labels.size(); ++f) {
       if (labels[f] == open && quality(f, next) >= enough[f]) labels[f] = static_cast<Label>(next);
     }
@@ -126,13 +125,15 @@ std::vector<Label> cover(const Quality& quality) {
 }
 
 /// Iterated conditional modes on cost = cosine lost + borders, face by face in order.
-void smooth(const Quality& quality, const FaceNeighbours& neighbours, std::vector<Label>& labels) {
-  for (int round = 0; round < kSmoothingRounds; ++round) {
+void smooth(const Quality& quality, const FaceNeighbours& neighbours, const ChartOptions& options,
+            std::vector<Label>& labels) {
+  for (int round = 0; round < options.smoothing_rounds; ++round) {
     for (std::size_t f = 0; f < labels.size(); ++f) {
       const double best = std::max(1, quality.best(f));
       const auto cost = [&](Label label) {
         double borders = 0.0;
-        for (const auto other : neighbours[f]) borders += other != kNone && labels[other] != label ? kBorderCost : 0.0;
+        for (const auto other : neighbours[f])
+          borders += other != kNone && labels[other] != label ? options.border_cost : 0.0;
         return 1.0 - quality(f, label) / best + borders;
       };
       Label chosen = labels[f];
@@ -167,9 +168,9 @@ std::vector<Chart> connected(const FaceNeighbours& neighbours, const std::vector
 
 /// Gives each small chart as a whole to the neighbouring label with the longest common border that can take it.
 void join_small(const Mesh& mesh, std::span<const ChartView> views, const Quality& quality,
-                const FaceNeighbours& neighbours, std::vector<Label>& labels) {
+                const FaceNeighbours& neighbours, const ChartOptions& options, std::vector<Label>& labels) {
   for (const Chart& chart : connected(neighbours, labels)) {
-    if (chart.faces.size() >= kSmallChart) continue;
+    if (chart.faces.size() >= options.small_chart) continue;
     std::vector<std::uint32_t> border(views.size(), 0);
     for (const auto f : chart.faces) {
       for (const auto other : neighbours[f]) {
@@ -179,11 +180,11 @@ void join_small(const Mesh& mesh, std::span<const ChartView> views, const Qualit
     const auto can_take = [&](std::size_t view) {
       return std::all_of(chart.faces.begin(), chart.faces.end(), [&](std::uint32_t f) {
         if (quality(f, view) > 0) return true;
-        if (chart.faces.size() >= kTinyChart) return false;
+        if (chart.faces.size() >= options.tiny_chart) return false;
         const Eigen::Vector3d a = mesh.vertices[mesh.faces[f][0]].cast<double>();
         const Eigen::Vector3d b = mesh.vertices[mesh.faces[f][1]].cast<double>();
         const Eigen::Vector3d c = mesh.vertices[mesh.faces[f][2]].cast<double>();
-        return views[view].cosine(a, (b - a).cross(c - a).normalized()) > kFacing;
+        return views[view].cosine(a, (b - a).cross(c - a).normalized()) > options.min_facing;
       });
     };
     std::size_t chosen = chart.view;
@@ -224,12 +225,13 @@ std::vector<ChartView> chart_views(std::span<const PhotoView> photos, double px_
 }
 
 std::vector<Chart> cut_into_charts(const Mesh& mesh, std::span<const ChartView> views, std::size_t photos,
-                                   const std::vector<std::uint8_t>& seen) {
-  const Quality quality(mesh, views, photos, seen);
+                                   const std::vector<std::uint8_t>& seen, const ChartOptions& options) {
+  const Quality quality(mesh, views, photos, seen, options.min_facing);
   const FaceNeighbours neighbours = neighbours_of_faces(mesh);
-  std::vector<Label> labels = cover(quality);
-  smooth(quality, neighbours, labels);
-  for (int round = 0; round < 3; ++round) join_small(mesh, views, quality, neighbours, labels);
+  std::vector<Label> labels = cover(quality, options);
+  smooth(quality, neighbours, options, labels);
+  for (int round = 0; round < options.join_rounds; ++round)
+    join_small(mesh, views, quality, neighbours, options, labels);
   return connected(neighbours, labels);
 }
 

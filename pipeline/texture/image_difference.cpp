@@ -14,7 +14,7 @@ constexpr double kNoise = 2.0;  // grey levels
 constexpr int kRounds = 30;
 constexpr double kSettled = 1e-3;  // px
 
-/// A piece of the rendering with what placing it by least squares needs.
+/// A piece of the rendering with the matrices for placing it by least squares.
 class Patch {
  public:
   Patch(const cv::Mat1f& grey, const cv::Mat1f& window) : window_(window) {
@@ -27,14 +27,14 @@ class Patch {
     normal_ = {wx_.dot(dx), wx_.dot(dy), wx_.dot(dy), wy_.dot(dy)};
   }
 
-  /// Of its place along the direction in which it is placed worst.
+  /// Standard deviation of its place along the worst direction.
   [[nodiscard]] double sigma() const {
     const double half = 0.5 * (normal_(0, 0) + normal_(1, 1));
-    const double least = half - std::sqrt(std::max(0.0, half * half - cv::determinant(normal_)));
-    return kNoise / std::sqrt(std::max(least, 1e-9));
+    const double min_eigenvalue = half - std::sqrt(std::max(0.0, half * half - cv::determinant(normal_)));
+    return kNoise / std::sqrt(std::max(min_eigenvalue, 1e-9));
   }
 
-  /// Where it lies in `photo`, against `centre`: the whole pixels by phase correlation, the fraction by least squares
+  /// Its place in `photo`, relative to `centre`: the whole pixels by phase correlation, the fraction by least squares
   /// on the grey levels, whose means may differ.
   [[nodiscard]] cv::Point2d shift(cv::Point2f centre, const cv::Mat1f& photo) const {
     cv::Mat1f there;
@@ -71,14 +71,13 @@ Result<ImageDifference> compare_images(const cv::Mat3b& rendered, const cv::Mat3
   const int side = 2 * options.erosion_px + 1;
   cv::erode(mask, inside, cv::getStructuringElement(cv::MORPH_RECT, {side, side}), {-1, -1}, 1, cv::BORDER_CONSTANT, 0);
   const int pixels = cv::countNonZero(inside);
-  if (pixels == 0) return fail(ErrorCode::degenerate, "compare images: nothing is left of the mask");
+  if (pixels == 0) return fail(ErrorCode::degenerate, "compare images: the eroded mask is empty");
 
   ImageDifference result;
   const double difference = cv::norm(rendered, photo, cv::NORM_L2, inside);
   result.psnr_db = 20.0 * std::log10(255.0 / std::max(1e-6, difference / std::sqrt(3.0 * pixels)));
 
-  // Without its low frequencies: light that the model of the lamps misses is a slope across a patch, and would shift
-  // it.
+  // Without its low frequencies: light that the lamp model misses is a slope across a patch, and would shift it.
   const auto grey = [&](const cv::Mat3b& image) {
     cv::Mat3f fine;
     cv::Mat1f one, slow;

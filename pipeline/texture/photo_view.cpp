@@ -13,9 +13,8 @@ namespace scanrig {
 namespace {
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
-constexpr int kSaturated = 250;
 /// Two neighbouring pixels whose depths differ by more than this many pixel widths belong to two surfaces: steeper than
-/// any incidence that counts (tan 79 deg).
+/// any used incidence (tan 79 deg).
 constexpr float kStep = 5.0F;
 /// A point may lie this many pixel widths behind the mapped surface: half a pixel of the steepest slope.
 constexpr double kSlack = 3.0;
@@ -75,6 +74,7 @@ PhotoView::PhotoView(const Photo& photo, const Mesh& mesh, const SurfaceIndex& s
       cos_limit_(std::cos(to_radians(options.max_incidence_deg))),
       edge_px_(options.edge_px),
       edge_fade_px_(options.edge_fade_px),
+      saturated_(options.saturated),
       window_(window_of(mesh, photo)) {
   depth_ = cv::Mat1f(window_.size(), kNan);
   edge_px_away_ = cv::Mat1f(window_.size(), 0.0F);
@@ -158,7 +158,7 @@ Sample PhotoView::sample(const Eigen::Vector2d& pixel) const {
       highest = std::max({highest, c[0], c[1], c[2]});
     }
   }
-  return {sum.cwiseMax(0.0F) / 255.0F, highest >= kSaturated};
+  return {sum.cwiseMax(0.0F) / 255.0F, highest >= saturated_};
 }
 
 double typical_px_per_mm(const Mesh& mesh, std::span<const Photo> photos) {

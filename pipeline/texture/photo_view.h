@@ -9,10 +9,10 @@
 
 namespace scanrig {
 
-/// Where a camera's pixel looks: direction in the camera frame with z = 1, lens distortion taken out.
+/// Direction of a camera's pixel in the camera frame with z = 1, lens distortion taken out.
 Eigen::Vector3d pixel_ray(const Camera& camera, double u, double v);
 
-/// A point of the surface as one photo shows it.
+/// A point of the surface in one photo.
 struct Sight {
   Eigen::Vector2d pixel;  ///< in the photo, distortion included
   double weight = 0.0;    ///< 0..about 1: cos^2 of the incidence * resolution, fading out towards depth edges
@@ -20,19 +20,19 @@ struct Sight {
 
 struct Sample {
   Eigen::Vector3f bgr = Eigen::Vector3f::Zero();  ///< linear, 1 = full scale
-  bool saturated = false;  ///< a pixel of those that went in is at the sensor's end: no longer a measurement
+  bool saturated = false;                         ///< one of its pixels is at the sensor's maximum: not a measurement
 };
 
-/// A photo together with what of the mesh it shows. Refers to the photo given; threads: const functions from any.
+/// A photo together with the mesh surface it shows. Refers to the given photo; threads: const functions from any.
 class PhotoView {
  public:
-  /// Casts one ray a pixel. `typical_px_per_mm` is the resolution that counts as 1 in weights.
+  /// Casts one ray per pixel. `typical_px_per_mm` is the resolution with weight 1.
   PhotoView(const Photo& photo, const Mesh& mesh, const SurfaceIndex& scene, const TextureOptions& options,
             double typical_px_per_mm);
 
-  /// How the photo shows `point` with unit `normal` (model frame, mm); nothing if it does not.
+  /// The place of `point` with unit `normal` (model frame, mm) in the photo; nothing if the photo does not show it.
   [[nodiscard]] std::optional<Sight> look(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const;
-  /// What the photo shows there, between pixels (bicubic); `pixel` as look() gave it.
+  /// The colour there, between pixels (bicubic); `pixel` as returned by look().
   [[nodiscard]] Sample sample(const Eigen::Vector2d& pixel) const;
 
   [[nodiscard]] const Photo& photo() const { return *photo_; }
@@ -50,12 +50,13 @@ class PhotoView {
   Eigen::Vector3d centre_;
   double px_per_mm_at_1mm_;  ///< focal length over the typical resolution
   double cos_limit_, edge_px_, edge_fade_px_;
+  int saturated_;
   cv::Rect window_;         ///< the pixels that can show the mesh; the two maps cover it
   cv::Mat1f depth_;         ///< z in the camera frame, mm; NaN where the photo shows no mesh
   cv::Mat1f edge_px_away_;  ///< distance to the nearest depth edge or outline
 };
 
-/// Pixels a millimetre in the middle of the mesh, median over the photos.
+/// Pixels per millimetre in the middle of the mesh, median over the photos.
 double typical_px_per_mm(const Mesh& mesh, std::span<const Photo> photos);
 
 }  // namespace scanrig

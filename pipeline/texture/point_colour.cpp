@@ -8,14 +8,6 @@
 namespace scanrig {
 namespace {
 
-/// Difference from the majority at which a photo has lost half of its say, relative to the colour, and in full scale.
-constexpr float kOutlierShare = 0.08F;
-constexpr float kOutlierFloor = 0.02F;
-constexpr std::array<float, 4> kOutlierWidths = {4.0F, 2.0F, 1.0F, 1.0F};
-constexpr float kSaturatedSay = 0.001F;
-constexpr std::size_t kLightSpots = 20000;
-constexpr int kFillRounds = 60;
-
 struct Look {
   Eigen::Vector3f bgr;
   float weight;
@@ -46,7 +38,7 @@ struct Neighbours {
 }  // namespace
 
 PointColour blend_photos(std::span<const PhotoView> views, const RigLight& light, const Eigen::Vector3d& point,
-                         const Eigen::Vector3d& normal) {
+                         const Eigen::Vector3d& normal, const BlendOptions& options) {
   thread_local std::vector<Look> looks;
   looks.clear();
   for (const PhotoView& view : views) {
@@ -55,8 +47,8 @@ PointColour blend_photos(std::span<const PhotoView> views, const RigLight& light
     const Transform& turntable_from_model = view.photo().turntable_from_model;
     const Eigen::Vector3f lit = light.at(turntable_from_model.linear() * normal, turntable_from_model * point);
     const Sample sample = view.sample(sight->pixel);
-    const float say = sample.saturated ? kSaturatedSay : 1.0F;
-    looks.push_back({sample.bgr.cwiseQuotient(lit), say * static_cast<float>(sight->weight)});
+    const float reliability = sample.saturated ? options.saturated_weight : 1.0F;
+    looks.push_back({sample.bgr.cwiseQuotient(lit), reliability * static_cast<float>(sight->weight)});
   }
   if (looks.empty()) return {};
 
@@ -68,24 +60,24 @@ PointColour blend_photos(std::span<const PhotoView> views, const RigLight& light
   }
   best /= weight;
   // From wide to narrow, so that the majority is found without a jump anywhere on the surface.
-  for (const float width : kOutlierWidths) {
-    const float limit = width * (kOutlierFloor + kOutlierShare * best.maxCoeff());
+  for (const float width : options.outlier_widths) {
+    const float limit = width * (options.outlier_floor + options.outlier_share * best.maxCoeff());
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-    float say = 0.0F;
+    float total = 0.0F;
     for (const Look& look : looks) {
       const float off = (look.bgr - best).squaredNorm() / (limit * limit);
       const float w = look.weight / ((1.0F + off) * (1.0F + off));
       sum += w * look.bgr;
-      say += w;
+      total += w;
     }
-    best = sum / say;
+    best = sum / total;
   }
   return {best, weight};
 }
 
 RigLight light_from_photos(std::span<const PhotoView> views, const Mesh& mesh,
-                           const std::vector<Eigen::Vector3f>& normals) {
-  const std::size_t step = mesh.vertices.size() / kLightSpots + 1;
+                           const std::vector<Eigen::Vector3f>& normals, const BlendOptions& options) {
+  const std::size_t step = mesh.vertices.size() / options.light_spots + 1;
   std::vector<std::vector<LightSample>> spots;
   for (std::size_t v = 0; v < mesh.vertices.size(); v += step) {
     const Eigen::Vector3d point = mesh.vertices[v].cast<double>();
@@ -95,7 +87,7 @@ RigLight light_from_photos(std::span<const PhotoView> views, const Mesh& mesh,
       const auto sight = view.look(point, normal);
       if (!sight) continue;
       const Sample sample = view.sample(sight->pixel);
-      if (sample.saturated || sample.bgr.minCoeff() <= kOutlierFloor) continue;
+      if (sample.saturated || sample.bgr.minCoeff() <= options.outlier_floor) continue;
       const Transform& turntable_from_model = view.photo().turntable_from_model;
       spot.push_back({turntable_from_model.linear() * normal, turntable_from_model * point, sample.bgr, sight->weight});
     }
@@ -104,7 +96,7 @@ RigLight light_from_photos(std::span<const PhotoView> views, const Mesh& mesh,
   return fit_rig_light(spots);
 }
 
-void fill_unseen(const Mesh& mesh, std::vector<PointColour>& colours) {
+void fill_unseen(const Mesh& mesh, int rounds, std::vector<PointColour>& colours) {
   const Neighbours neighbours(mesh);
   std::vector<std::uint32_t> known;
   std::vector<std::uint8_t> has(colours.size(), 0);
@@ -117,7 +109,7 @@ void fill_unseen(const Mesh& mesh, std::vector<PointColour>& colours) {
   }
   if (!known.empty()) mean /= static_cast<float>(known.size());
 
-  // A wave outwards from what is known gives every vertex a start and an order ...
+  // A wave outwards from the known vertices gives every vertex a start and an order ...
   std::vector<std::uint32_t> filled;
   for (std::size_t i = 0; i < known.size() + filled.size(); ++i) {
     const std::uint32_t v = i < known.size() ? known[i] : filled[i - known.size()];
@@ -132,7 +124,7 @@ void fill_unseen(const Mesh& mesh, std::vector<PointColour>& colours) {
     if (has[v] == 0) colours[v].bgr = mean;  // a part that no photo sees at all
   }
   // ... and averaging in that order smooths it (Gauss-Seidel on the surface's Laplace equation).
-  for (int round = 0; round < kFillRounds; ++round) {
+  for (int round = 0; round < rounds; ++round) {
     for (const auto v : filled) {
       Eigen::Vector3f sum = Eigen::Vector3f::Zero();
       for (const auto other : neighbours.of(v)) sum += colours[other].bgr;

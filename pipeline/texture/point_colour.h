@@ -9,22 +9,22 @@
 
 namespace scanrig {
 
-/// The paint of a point: what the photos show there, the rig's light taken out.
+/// The paint of a point: its colour in the photos with the rig's light taken out.
 struct PointColour {
   Eigen::Vector3f bgr = Eigen::Vector3f::Zero();  ///< linear, 1 = the sensor's full scale under mean light
   float weight = 0.0F;                            ///< of all photos together; 0: no photo sees the point
 };
 
 /// Blends all photos that see `point` with unit `normal` (model frame, mm). Photos that disagree with the majority
-/// (highlights, shadows, something in the way) lose their say. Continuous over the surface.
+/// (highlights, shadows, an occlusion) lose weight. Continuous over the surface.
 PointColour blend_photos(std::span<const PhotoView> views, const RigLight& light, const Eigen::Vector3d& point,
-                         const Eigen::Vector3d& normal);
+                         const Eigen::Vector3d& normal, const BlendOptions& options);
 
-/// Light of the rig from an even choice of the mesh's vertices; `normals` unit, one a vertex.
+/// Light of the rig from an even choice of the mesh's vertices; `normals` unit, one per vertex.
 RigLight light_from_photos(std::span<const PhotoView> views, const Mesh& mesh,
-                           const std::vector<Eigen::Vector3f>& normals);
+                           const std::vector<Eigen::Vector3f>& normals, const BlendOptions& options);
 
-/// Gives the unseen vertices (weight 0) the colour of what surrounds them on the surface.
-void fill_unseen(const Mesh& mesh, std::vector<PointColour>& colours);
+/// Gives the unseen vertices (weight 0) the colour of the surface around them.
+void fill_unseen(const Mesh& mesh, int rounds, std::vector<PointColour>& colours);
 
 }  // namespace scanrig

@@ -13,7 +13,7 @@
 namespace scanrig {
 namespace {
 
-/// Between texel centres; uv as glTF has it.
+/// Colour between texel centres; uv as in glTF.
 Eigen::Vector3f fetch(const cv::Mat3b& atlas, const Eigen::Vector2f& uv) {
   const float x = std::clamp(uv.x() * static_cast<float>(atlas.cols) - 0.5F, 0.0F, static_cast<float>(atlas.cols - 1));
   const float y = std::clamp(uv.y() * static_cast<float>(atlas.rows) - 0.5F, 0.0F, static_cast<float>(atlas.rows - 1));
@@ -77,7 +77,7 @@ Eigen::Vector3f MeshRenderer::normal(const SurfaceIndex::Hit& hit) const {
 Result<Rendering> MeshRenderer::render(const Camera& camera, const Transform& turntable_from_model,
                                        const RenderOptions& options) const {
   if (options.supersample < 1 || options.supersample > 16) {
-    return fail(ErrorCode::invalid_input, "render: {} x {} rays a pixel; 1 to 16 are possible", options.supersample,
+    return fail(ErrorCode::invalid_input, "render: {} x {} rays per pixel; choose 1 to 16", options.supersample,
                 options.supersample);
   }
   if (options.surface == Paint::texture && (mesh_.atlas.empty() || mesh_.corner_uv.size() != mesh_.mesh.faces.size())) {

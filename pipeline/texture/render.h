@@ -18,8 +18,7 @@ enum class Paint {
   grey,           ///< plain grey, lit from above the camera: shows the shape
 };
 
-/// The light and the exposure of a scan's plain photos, as texture_mesh found them: TexturedModel::light,
-/// ::exposure_gain.
+/// The light and the exposure of a scan's plain photos, from texture_mesh: TexturedModel::light, ::exposure_gain.
 struct Exposure {
   RigLight light;
   double gain = 1.0;
@@ -27,26 +26,27 @@ struct Exposure {
 
 struct RenderOptions {
   Paint surface = Paint::texture;
-  int supersample = 1;  ///< n x n rays a pixel, their light averaged
+  int supersample = 1;  ///< n x n rays per pixel, their light averaged
   cv::Vec3b background{0, 0, 0};
-  /// Given: the image is linear light under the rig's lamps, to be compared with a photo. Not given: sRGB, unlit.
+  /// Present: the image is linear light under the rig's lamps, for comparison with a photo. Absent: sRGB, unlit.
   std::optional<Exposure> as_photo = std::nullopt;
 };
 
 /// All matrices have the camera's size.
 struct Rendering {
   cv::Mat3b image;  ///< BGR
-  cv::Mat1f depth;  ///< z in the camera frame, mm, at the pixel's centre; NaN where there is no mesh
+  cv::Mat1f depth;  ///< z in the camera frame, mm, at the pixel's centre; NaN without mesh
   cv::Mat1b mask;   ///< 255 where the pixel's centre shows the mesh
 };
 
-/// Draws a mesh into calibrated cameras, lens distortion included. Threads: render may be called from any.
+/// Draws a mesh into calibrated cameras, lens distortion included.
+/// Threads: render may be called from any.
 class MeshRenderer {
  public:
   /// A mesh without texture is given as TexturedMesh{mesh, {}, {}}. Fails with `degenerate` (no face).
   static Result<MeshRenderer> create(TexturedMesh mesh);
 
-  /// Fails with `invalid_input` when the mesh lacks what the surface asked for, or supersample is not in 1..16.
+  /// Fails with `invalid_input` when the mesh lacks the data of the requested surface, or supersample is not in 1..16.
   Result<Rendering> render(const Camera& camera, const Transform& turntable_from_model,
                            const RenderOptions& options = {}) const;
 

@@ -11,9 +11,9 @@ namespace {
 
 constexpr double kMetre = 1000.0;
 constexpr int kRounds = 8;
-/// Pull towards even light, as a share of the data's own weight: decides only what the data leave open.
+/// Pull towards uniform light, as a share of the data's own weight: decides only what the data leave open.
 constexpr double kRidge = 1e-3;
-/// Relative residual at which a look (a highlight, a cast shadow) has lost half its say.
+/// Relative residual at which an observation (a highlight, a cast shadow) has half its weight.
 constexpr double kOutlier = 0.05;
 constexpr double kDarkest = 0.2;
 
@@ -34,8 +34,8 @@ void add_spot(const std::vector<LightSample>& spot, int channel, const RigLight:
   if (paint <= 0.0) return;
   paint /= weights;
 
-  // With l_i the light and b_i the brightness, the paint that fits best given the light cancels out of
-  // b_i / paint - l_i, up to its weighted mean: project the mean away so that only ratios between looks count.
+  // With l_i the light and b_i the brightness, the best fitting paint for the given light cancels out of b_i / paint -
+  // l_i, up to its weighted mean: project the mean away so that only ratios between observations count.
   struct Row {
     Eigen::Matrix<double, n, 1> terms;
     double rest, weight;

@@ -1,5 +1,4 @@
 #include "pipeline/texture/texture.h"
-#include "pipeline/mesh/solid_properties.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -7,6 +6,7 @@
 #include <opencv2/core.hpp>
 
 #include "core/parallel.h"
+#include "pipeline/mesh/solid_properties.h"
 #include "pipeline/texture/atlas.h"
 #include "pipeline/texture/face_labels.h"
 #include "pipeline/texture/photo_view.h"
@@ -17,14 +17,6 @@ namespace scanrig {
 namespace {
 
 constexpr std::size_t kBlock = 1024;
-/// Say of the surroundings' colour against the photos' (about 1 for a good view): counts only where they see next to
-/// nothing, and makes the passage to unseen surface continuous.
-constexpr float kFillSay = 1e-4F;
-/// The brightest paint (this share of the vertices lies below it) is brought to this linear value ...
-constexpr double kWhiteShare = 0.99;
-constexpr double kWhite = 0.8;
-/// ... unless that takes more gain than this: a dark object stays dark.
-constexpr double kMaxGain = 3.0;
 
 Result<void> check(const Mesh& mesh, std::span<const Photo> photos, const TextureOptions& options) {
   if (mesh.faces.empty()) return fail(ErrorCode::degenerate, "texture: the mesh has no faces");
@@ -54,7 +46,7 @@ void for_blocks(std::size_t count, const std::function<void(std::size_t)>& body)
   });
 }
 
-/// One byte a vertex and photo: does the photo show it?
+/// One byte per vertex and photo: 1 where the photo shows it.
 std::vector<std::uint8_t> seen_vertices(const Mesh& mesh, std::span<const PhotoView> views) {
   std::vector<std::uint8_t> seen(mesh.vertices.size() * views.size());
   for_blocks(mesh.vertices.size(), [&](std::size_t v) {
@@ -66,19 +58,19 @@ std::vector<std::uint8_t> seen_vertices(const Mesh& mesh, std::span<const PhotoV
   return seen;
 }
 
-/// One gain for the whole scan that makes the brightest paint a sane white.
-double gain_for(const std::vector<PointColour>& colours) {
+/// One gain for the whole scan that makes the brightest paint a suitable white.
+double gain_for(const std::vector<PointColour>& colours, const TextureOptions& options) {
   std::vector<float> brightest;
   for (const auto& c : colours) {
     if (c.weight > 0.0F) brightest.push_back(c.bgr.maxCoeff());
   }
   const auto white =
-      brightest.begin() + static_cast<std::ptrdiff_t>(kWhiteShare * static_cast<double>(brightest.size() - 1));
+      brightest.begin() + static_cast<std::ptrdiff_t>(options.white_share * static_cast<double>(brightest.size() - 1));
   std::nth_element(brightest.begin(), white, brightest.end());
-  return std::min(kMaxGain, kWhite / std::max(1e-3, static_cast<double>(*white)));
+  return std::min(options.max_gain, options.white / std::max(1e-3, static_cast<double>(*white)));
 }
 
-/// What texels that no face owns show: harmless where a viewer's coarser levels reach beyond the padding.
+/// Colour of texels without a face: harmless where a viewer's coarser levels reach beyond the padding.
 Eigen::Vector3f mean_colour(const std::vector<PointColour>& colours) {
   Eigen::Vector3f sum = Eigen::Vector3f::Zero();
   for (const auto& c : colours) sum += c.bgr;
@@ -86,13 +78,15 @@ Eigen::Vector3f mean_colour(const std::vector<PointColour>& colours) {
 }
 
 /// Colour of the texel (x, y), which `face` owns.
-cv::Vec3b texel_colour(const Mesh& mesh, const AtlasLayout& layout, std::span<const PhotoView> views,
-                       const RigLight& light, const std::vector<PointColour>& at_vertices, float gain, int x, int y) {
+cv::Vec3b texel_colour(const AtlasLayout& layout, std::span<const PhotoView> views, const TexturedModel& model,
+                       const std::vector<PointColour>& at_vertices, const TextureOptions& options, int x, int y) {
+  const auto gain = static_cast<float>(model.exposure_gain);
+  const Mesh& mesh = model.mesh.mesh;
   const auto f = static_cast<std::size_t>(layout.owner(y, x));
   const Mesh::Face& face = mesh.faces[f];
   const Eigen::Vector3d weights =
       barycentric(layout.corners[f], Eigen::Vector2d(x, y)).value_or(Eigen::Vector3d(1, 0, 0));
-  // Beyond its rim a chart goes on in the plane of the face, but with the light and the fill of the rim.
+  // Beyond its rim a chart continues in the plane of the face, but with the light and the fill of the rim.
   const Eigen::Vector3d inside = weights.cwiseMax(0.0) / weights.cwiseMax(0.0).sum();
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
@@ -103,8 +97,8 @@ cv::Vec3b texel_colour(const Mesh& mesh, const AtlasLayout& layout, std::span<co
     normal += inside[k] * mesh.normals[v].cast<double>();
     fill += static_cast<float>(inside[k]) * at_vertices[v].bgr;
   }
-  const PointColour seen = blend_photos(views, light, point, normal.normalized());
-  return to_srgb(gain * (seen.weight * seen.bgr + kFillSay * fill) / (seen.weight + kFillSay));
+  const PointColour seen = blend_photos(views, model.light, point, normal.normalized(), options.blending);
+  return to_srgb(gain * (seen.weight * seen.bgr + options.fill_weight * fill) / (seen.weight + options.fill_weight));
 }
 
 double seen_share(const Mesh& mesh, const std::vector<PointColour>& colours) {
@@ -119,21 +113,23 @@ double seen_share(const Mesh& mesh, const std::vector<PointColour>& colours) {
   return seen / std::max(all, 1e-12);
 }
 
-/// Fills in the model's light, gain, seen share and vertex colours; returns the linear paint at the vertices, that of
-/// unseen ones taken from their surroundings.
-Result<std::vector<PointColour>> colour_vertices(std::span<const PhotoView> views, TexturedModel& model) {
+/// Fills in the model's light, gain, seen share and vertex colours; returns the linear paint at the vertices, unseen
+/// ones filled from their surroundings.
+Result<std::vector<PointColour>> colour_vertices(std::span<const PhotoView> views, const TextureOptions& options,
+                                                 TexturedModel& model) {
   Mesh& mesh = model.mesh.mesh;
-  model.light = light_from_photos(views, mesh, mesh.normals);
+  model.light = light_from_photos(views, mesh, mesh.normals, options.blending);
   std::vector<PointColour> colours(mesh.vertices.size());
   for_blocks(colours.size(), [&](std::size_t v) {
-    colours[v] = blend_photos(views, model.light, mesh.vertices[v].cast<double>(), mesh.normals[v].cast<double>());
+    colours[v] = blend_photos(views, model.light, mesh.vertices[v].cast<double>(), mesh.normals[v].cast<double>(),
+                              options.blending);
   });
   if (std::none_of(colours.begin(), colours.end(), [](const PointColour& c) { return c.weight > 0.0F; })) {
-    return fail(ErrorCode::degenerate, "texture: no photo sees the mesh; check the cameras' poses");
+    return fail(ErrorCode::degenerate, "texture: no photo sees the mesh; check the calibration");
   }
   model.seen_share = seen_share(mesh, colours);
-  model.exposure_gain = gain_for(colours);
-  fill_unseen(mesh, colours);
+  model.exposure_gain = gain_for(colours, options);
+  fill_unseen(mesh, options.blending.fill_rounds, colours);
   mesh.colour.resize(colours.size());
   for (std::size_t v = 0; v < colours.size(); ++v) {
     const cv::Vec3b bgr = to_srgb(static_cast<float>(model.exposure_gain) * colours[v].bgr);
@@ -144,7 +140,7 @@ Result<std::vector<PointColour>> colour_vertices(std::span<const PhotoView> view
 
 /// Draws the atlas and fills in the texture coordinates.
 void draw_atlas(const AtlasLayout& layout, std::span<const PhotoView> views, const std::vector<PointColour>& colours,
-                TexturedModel& model) {
+                const TextureOptions& options, TexturedModel& model) {
   const cv::Size size = layout.owner.size();
   const auto gain = static_cast<float>(model.exposure_gain);
   model.mesh.atlas = cv::Mat3b(size, to_srgb(gain * mean_colour(colours)));
@@ -152,7 +148,7 @@ void draw_atlas(const AtlasLayout& layout, std::span<const PhotoView> views, con
     const int y = static_cast<int>(row);
     for (int x = 0; x < size.width; ++x) {
       if (layout.owner(y, x) < 0) continue;
-      model.mesh.atlas(y, x) = texel_colour(model.mesh.mesh, layout, views, model.light, colours, gain, x, y);
+      model.mesh.atlas(y, x) = texel_colour(layout, views, model, colours, options, x, y);
     }
   });
   model.mesh.corner_uv.resize(layout.corners.size());
@@ -186,24 +182,25 @@ Result<TexturedModel> texture_mesh(const Mesh& mesh, std::span<const Photo> phot
     context.report("texture", 0.3 * static_cast<double>(views.size()) / static_cast<double>(photos.size()));
   }
 
-  const auto colours = colour_vertices(views, model);
+  const auto colours = colour_vertices(views, options, model);
   if (!colours) return pass_on(colours);
   context.report("texture", 0.4);
   if (context.stopped()) return stopped();
 
   const auto flat = chart_views(views, px_per_mm);
-  const auto charts = cut_into_charts(out, flat, views.size(), seen_vertices(out, views));
+  const auto charts = cut_into_charts(out, flat, views.size(), seen_vertices(out, views), options.charts);
   const auto layout = lay_out(out, flat, charts, options.atlas_px, options.max_texels_per_px, options.padding_px);
   if (!layout) {
-    return fail(ErrorCode::out_of_range, "texture: {} charts do not fit into an atlas of {} pixels; take a larger one",
-                charts.size(), options.atlas_px);
+    return fail(ErrorCode::out_of_range,
+                "texture: {} charts do not fit into an atlas of {} pixels; choose a larger one", charts.size(),
+                options.atlas_px);
   }
   model.charts = charts.size();
   model.texels_per_px = layout->texels_per_px;
   context.report("texture", 0.5);
   if (context.stopped()) return stopped();
 
-  draw_atlas(*layout, views, *colours, model);
+  draw_atlas(*layout, views, *colours, options, model);
   context.report("texture", 1.0);
   return model;
 }

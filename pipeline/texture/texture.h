@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <opencv2/core/mat.hpp>
 #include <span>
@@ -20,13 +21,45 @@ struct Photo {
   cv::Mat3b image;  ///< BGR, linear light, lens distortion included, pixel centres at integers
 };
 
+/// Cutting of the surface into charts.
+struct ChartOptions {
+  double good_share = 0.7;        ///< of the best photo's cosine: sufficient to flatten a face
+  double min_gain = 0.002;        ///< of the seen area: minimum gain of a further view
+  double min_facing = 0.2;        ///< cosine below which a photo does not flatten a face
+  int smoothing_rounds = 10;      ///< of iterated conditional modes
+  double border_cost = 0.5;       ///< of one edge between two labels, against a cosine lost of 1
+  std::size_t small_chart = 200;  ///< faces: smaller charts join a neighbour where its view shows them ...
+  std::size_t tiny_chart = 24;    ///< ... and still smaller ones where they only face that view
+  int join_rounds = 3;            ///< of joining small charts
+};
+
+/// Blending of the photos' colours at one point.
+struct BlendOptions {
+  /// Difference from the majority at which a photo has half of its weight, relative to the colour, and in full scale.
+  float outlier_share = 0.08F;
+  float outlier_floor = 0.02F;
+  std::array<float, 4> outlier_widths = {4.0F, 2.0F, 1.0F, 1.0F};  ///< factors on it, round after round
+  float saturated_weight = 0.001F;                                 ///< factor for saturated pixels
+  std::size_t light_spots = 20000;                                 ///< vertices from which the light is fitted
+  int fill_rounds = 60;                                            ///< of smoothing on unseen surface
+};
+
 struct TextureOptions {
   int atlas_px = 4096;              ///< side of the square atlas
   double max_texels_per_px = 2.0;   ///< of a photo's pixel; less where the charts would not fit
-  int padding_px = 4;               ///< each chart's colour goes on this far beyond its faces
+  int padding_px = 4;               ///< the colour of each chart continues this far beyond its faces
   double edge_px = 1.5;             ///< pixels this near to a depth edge are not used ...
   double edge_fade_px = 12.0;       ///< ... and the next ones fade in over this width
-  double max_incidence_deg = 75.0;  ///< a photo says nothing about surface seen more flatly than this
+  double max_incidence_deg = 75.0;  ///< a photo gives no colour to surface seen more flatly than this
+  int saturated = 250;              ///< grey level from which a pixel is no measurement
+  /// Weight of the surrounding colour against the photos' (about 1 for a good view): significant only where they see
+  /// next to nothing, and makes the passage to unseen surface continuous.
+  float fill_weight = 1e-4F;
+  double white_share = 0.99;  ///< the brightest paint: this share of the vertices lies below it ...
+  double white = 0.8;         ///< ... is brought to this linear value ...
+  double max_gain = 3.0;      ///< ... unless that takes more gain than this: a dark object stays dark
+  ChartOptions charts;
+  BlendOptions blending;
 };
 
 struct TexturedModel {
@@ -38,12 +71,12 @@ struct TexturedModel {
   double seen_share = 0.0;  ///< of the area; the rest is filled from its surroundings
 };
 
-/// Colours `mesh` (mm, model frame) from `photos`; the order of the photos does not matter much, their number is at
-/// least 1. Each texel is a blend of all photos that see its point of the surface, so chart borders carry no seam.
-/// Triangles may have any size. Stages reported: "texture".
+/// Colours `mesh` (mm, model frame) from `photos`; the order of the photos matters little, at least one is needed. Each
+/// texel is a blend of all photos that see its point of the surface, so chart borders have no seam. Triangles may have
+/// any size. Stages reported: "texture".
 /// Fails with `degenerate` (no faces, or no photo sees the mesh), `invalid_input` (no photos, a photo without image or
-/// of another size than its camera, an option out of range), `stopped`, `out_of_range` (more charts than the atlas can
-/// hold).
+/// of another size than its camera, an option out of range), `stopped`, `out_of_range` (more charts than fit into the
+/// atlas).
 Result<TexturedModel> texture_mesh(const Mesh& mesh, std::span<const Photo> photos, const TextureOptions& options,
                                    const Context& context);
 

@@ -34,7 +34,7 @@ bool BlockGrid::all_inside(const Eigen::Vector3i& block) const {
   return contains(block) && slot_[linear(block)] == kInside;
 }
 
-/// The sign of each block's first node stands for the block until it is stored.
+/// The sign of each block's first node represents the block until it is stored.
 void BlockGrid::classify_blocks(const Field& field) {
   slot_.assign(static_cast<std::size_t>(size_.prod()), kOutside);
   const Field::Neighbourhood everywhere = field.everywhere();
@@ -110,7 +110,7 @@ std::vector<Eigen::Vector3i> BlockGrid::open_neighbours(const Block& block) cons
 
 Result<void> BlockGrid::fill(const Field& field, const std::vector<Eigen::Vector3f>& seeds, const Context& context) {
   if (size_.cast<double>().prod() > kMaxBlocksInBox) {
-    return fail(ErrorCode::out_of_range, "volume: {} x {} x {} blocks of 8 voxels are too many; use larger voxels",
+    return fail(ErrorCode::out_of_range, "volume: {} x {} x {} blocks of 8 voxels exceed the limit; use larger voxels",
                 size_.x(), size_.y(), size_.z());
   }
   classify_blocks(field);

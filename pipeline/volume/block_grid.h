@@ -8,7 +8,7 @@
 
 #include "core/context.h"
 #include "core/result.h"
-#include "pipeline/volume/field.h"
+#include "pipeline/volume/distance_field.h"
 
 namespace scanrig {
 
@@ -32,7 +32,7 @@ class BlockGrid {
   /// surface from block to block until it is closed. Fails with `out_of_range`, `stopped`.
   Result<void> fill(const Field& field, const std::vector<Eigen::Vector3f>& seeds, const Context& context);
 
-  /// Gives one node a distance; its block and the blocks it touches are stored if they are not yet.
+  /// Gives one node a distance; stores its block and the blocks it touches if they are missing.
   void set(const Eigen::Vector3i& node, float distance, float band_mm);
 
   [[nodiscard]] const std::vector<Block>& blocks() const { return blocks_; }
@@ -64,7 +64,7 @@ class BlockGrid {
   Eigen::Vector3f origin_;
   float voxel_;
   Eigen::Vector3i size_;
-  std::vector<std::int32_t> slot_;  ///< one a block: its place in blocks_, or what it is
+  std::vector<std::int32_t> slot_;  ///< one per block: its place in blocks_, or its kind
   std::vector<Block> blocks_;
 };
 

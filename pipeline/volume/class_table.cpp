@@ -57,8 +57,8 @@ CombinedDistance combine_ordered(const PoseDistance& a, const PoseDistance& b, f
 PoseDistance classify(std::span<const ViewDistance> views, float threshold_mm) {
   PoseDistance result;
   if (views.empty()) return result;
-  float sum = 0.0F, least = std::numeric_limits<float>::infinity(), greatest = -least, positive = 0.0F;
-  float smallest = least;  // |d| among the views that do not see the voxel deeply occluded
+  float sum = 0.0F, lowest = std::numeric_limits<float>::infinity(), greatest = -lowest, positive = 0.0F;
+  float smallest = lowest;  // |d| among the views that do not see the voxel deeply occluded
   float nonoverlap = 0.0F;
   std::size_t outside = 0, inside = 0;
   for (const auto& view : views) {
@@ -71,7 +71,7 @@ PoseDistance classify(std::span<const ViewDistance> views, float threshold_mm) {
     if (d > threshold) ++outside;
     if (d < -threshold) ++inside;
     if (d > 0.0F) positive += 1.0F;
-    least = std::min(least, d);
+    lowest = std::min(lowest, d);
     greatest = std::max(greatest, d);
     if (d >= -threshold && std::abs(d) < smallest) {
       smallest = std::abs(d);
@@ -84,7 +84,7 @@ PoseDistance classify(std::span<const ViewDistance> views, float threshold_mm) {
     result.distance = sum / result.weight;
   } else if (outside == views.size()) {
     result.voxel_class = VoxelClass::outside;
-    result.distance = least;
+    result.distance = lowest;
   } else if (inside == views.size()) {
     result.voxel_class = VoxelClass::inside;
     result.distance = greatest;

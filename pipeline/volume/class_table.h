@@ -7,7 +7,8 @@
 
 namespace scanrig {
 
-/// How the views of one pose see a voxel [Park and Subbarao 2002, section 4]; `unseen` is ours: no view says anything.
+/// Visibility of a voxel in the views of one pose [Park and Subbarao 2002, section 4]; `unseen` is ours: no view sees
+/// it.
 enum class VoxelClass : std::uint8_t { overlap, nonoverlap, inside, outside, unseen };
 constexpr std::size_t kVoxelClasses = 5;
 
@@ -18,7 +19,7 @@ struct ViewDistance {
   float sigma = 0.0F;
 };
 
-/// A voxel as one pose has it.
+/// The state of a voxel in one pose.
 struct PoseDistance {
   VoxelClass voxel_class = VoxelClass::unseen;
   float distance = 0.0F;        ///< the pose's signed distance D, mm
@@ -27,19 +28,19 @@ struct PoseDistance {
   int surface_views = 0;        ///< views with |d| < d_TH
 };
 
-/// The class and D from the views nearest in azimuth. `threshold_mm` is d_TH; a view whose 4 sigma is larger has that.
+/// The class and D from the views nearest in azimuth. `threshold_mm` is d_TH, raised to 4 sigma for a noisier view.
 PoseDistance classify(std::span<const ViewDistance> views, float threshold_mm);
 
 struct CombinedDistance {
   float distance = 0.0F;
-  bool alarm = false;  ///< the poses contradict each other
+  bool conflict = false;  ///< the poses contradict each other
 };
 
-/// The class table for two poses [section 4, with the cells the paper leaves open filled in]. A pose to which the
-/// voxel is unseen leaves the other one's distance; neither may be unseen twice.
+/// The class table for two poses [section 4, with the cells filled in that the paper leaves open]. Where one pose does
+/// not see the voxel, the other one's distance counts; one of them must see it.
 CombinedDistance combine(const PoseDistance& a, const PoseDistance& b, float threshold_mm);
 
-/// How often each pair of classes met.
+/// Number of voxels per pair of classes.
 using ClassPairCounts = std::array<std::array<std::size_t, kVoxelClasses>, kVoxelClasses>;
 
 }  // namespace scanrig

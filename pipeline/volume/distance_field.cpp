@@ -1,4 +1,4 @@
-#include "pipeline/volume/field.h"
+#include "pipeline/volume/distance_field.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,8 +10,8 @@ namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// Full weight near the surface, none at the edge of the band, so that two faces of a wall as thin as the band do not
-/// pull at each other and nothing jumps where the band ends.
+/// Full weight near the surface, none at the edge of the band: the two faces of a wall as thin as the band do not pull
+/// at each other, and there is no jump where the band ends.
 float taper(float distance, float band) { return std::clamp(1.5F * (1.0F - std::abs(distance) / band), 0.0F, 1.0F); }
 
 /// Middle weight over all measured pixels, and their centroid.
@@ -46,9 +46,11 @@ Field::Field(std::vector<std::vector<RangeSampler>> views_of_pose, std::vector<T
     : views_of_pose_(std::move(views_of_pose)),
       hull_(std::move(hull)),
       fusion_(options.fusion),
+      images_per_outside_(options.images_per_outside),
+      view_sigmas_(options.view_sigmas),
       band_(static_cast<float>(band_mm)),
-      class_threshold_(static_cast<float>(2.0 * options.voxel_mm)),
-      hull_tolerance_(0.4F * band_) {
+      class_threshold_(static_cast<float>(options.class_voxels * options.voxel_mm)),
+      hull_tolerance_(options.hull_tolerance * band_) {
   for (const auto& transform : model_from_pose) pose_from_model_.push_back(transform.inverse());
   const SurfaceStatistics statistics = surface_statistics(views_of_pose_);
   free_weight_ = statistics.median_weight;
@@ -67,7 +69,7 @@ Field::Neighbourhood Field::near(const Eigen::Vector3f& centre, float radius) co
   Neighbourhood result{{}, hull_.near(centre, radius, band_)};
   for (const auto& views : views_of_pose_) {
     for (const auto& view : views) {
-      if (!view.knows_background() || !view.says_nothing_near(centre, radius)) result.views.push_back(&view);
+      if (!view.has_background() || !view.has_no_data_near(centre, radius)) result.views.push_back(&view);
     }
   }
   return result;
@@ -78,17 +80,17 @@ FieldValue Field::at(const Eigen::Vector3f& point, const Neighbourhood& neighbou
                                                     : from_class_table(point, neighbourhood);
 }
 
-/// Hull and, where an image has neither silhouette nor background, its footprint: a point is outside if it lies beside
-/// all they measured for more images than see it behind their surface, or for more than a fifth of them, and for two at
-/// least. A fifth: dropouts at the same place of so many images are unlikely, while most images see a gap between two
-/// parts of the object only as "behind" the nearer one.
+/// Hull and, where an image has neither silhouette nor background, its footprint. A point is outside if it lies beside
+/// the footprint of more images than see it behind their surface, or of more than a fifth of them, and of two at least.
+/// A fifth: dropouts at the same place of so many images are unlikely, while most images see a gap between two parts of
+/// the object only as "behind" the nearer one.
 float Field::bounds(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood, std::size_t views_behind) const {
   const float hull = neighbourhood.hull.distance(point);
   std::vector<float> beside;
   for (const auto* view : neighbourhood.views) {
-    if (!view->knows_background()) beside.push_back(view->beside_footprint_mm(point));
+    if (!view->has_background()) beside.push_back(view->beside_footprint_mm(point));
   }
-  const std::size_t rank = std::max<std::size_t>(1, std::min(views_behind, beside.size() / 5));
+  const std::size_t rank = std::max<std::size_t>(1, std::min(views_behind, beside.size() / images_per_outside_));
   if (beside.size() <= rank) return hull;
   const auto nth = beside.begin() + static_cast<std::ptrdiff_t>(rank);
   std::nth_element(beside.begin(), nth, beside.end(), std::greater<>());
@@ -120,7 +122,8 @@ FieldValue Field::from_evidence(const Eigen::Vector3f& point, const Neighbourhoo
     return {std::clamp(std::max(sum / weight, limit), -band_, band_), Support::measured};
   }
   const float outside = std::clamp(bounds(point, neighbourhood, views_behind), -band_, band_);
-  if (is_free) return {outside > 0.0F ? outside : band_, Support::free};  // the hull knows better how far outside
+  if (is_free)
+    return {outside > 0.0F ? outside : band_, Support::free};  // the hull gives the distance outside more exactly
   return {outside, Support::bounds};
 }
 
@@ -179,7 +182,7 @@ PointEvidence Field::evidence_at(const Eigen::Vector3f& point) const {
     sum += w * s.distance;
     variance += w * w * s.sigma * s.sigma;
     result.normal += w * s.normal;
-    if (std::abs(s.distance) < std::max(class_threshold_, 4.0F * s.sigma)) ++result.views;
+    if (std::abs(s.distance) < std::max(class_threshold_, view_sigmas_ * s.sigma)) ++result.views;
   }
   result.value = at(point, all);
   if (!(weight > 0.0F)) return result;

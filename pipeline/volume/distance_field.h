@@ -11,9 +11,9 @@
 
 namespace scanrig {
 
-/// Why the field has its value at a point.
+/// Origin of the field's value at a point.
 enum class Support : std::uint8_t {
-  bounds,    ///< nothing was measured: the hull decides, or it is unseen
+  bounds,    ///< unmeasured: the hull decides, or it is unseen
   free,      ///< seen through
   measured,  ///< near a measured surface
 };
@@ -23,7 +23,7 @@ struct FieldValue {
   Support support = Support::bounds;
 };
 
-/// What the range images know about a point of the surface.
+/// Data of the range images for a point of the surface.
 struct PointEvidence {
   FieldValue value;
   float surface_distance = 0.0F;  ///< weighted mean of the views' distances, without hull and free space
@@ -64,10 +64,12 @@ class Field {
   std::vector<Transform> pose_from_model_;
   Hull hull_;
   VolumeOptions::Fusion fusion_;
+  std::size_t images_per_outside_;
+  float view_sigmas_;
   float band_;              ///< mm
   float class_threshold_;   ///< d_TH of the paper, mm
-  float hull_tolerance_;    ///< a measured surface may stand out of the hull by this, mm
-  float free_weight_;       ///< of one view that sees through, beside the weights of measured surfaces
+  float hull_tolerance_;    ///< a measured surface may extend beyond the hull by this, mm
+  float free_weight_;       ///< of one view that sees through, against the weights of measured surfaces
   Eigen::Vector3d centre_;  ///< of what was measured; outward directions start at the vertical line through it
 };
 

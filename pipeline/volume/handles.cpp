@@ -10,11 +10,9 @@
 namespace scanrig {
 namespace {
 
-constexpr float kWidestFilledMm = 2.0F;  // a doubtful tunnel wider than this is not filled
-
-/// Only the films, joined through faces, edges or corners, of at most `most` voxels.
+/// Only the films, joined through faces, edges or corners, of at most `max_voxels` voxels.
 std::vector<std::size_t> small_films(const VoxelLabels& labels, const std::vector<std::size_t>& voxels,
-                                     std::size_t most) {
+                                     std::size_t max_voxels) {
   std::vector<std::size_t> result;
   std::vector<bool> seen(voxels.size());
   for (std::size_t start = 0; start < voxels.size(); ++start) {
@@ -31,7 +29,7 @@ std::vector<std::size_t> small_films(const VoxelLabels& labels, const std::vecto
         seen[index] = true;
       }
     }
-    if (film.size() > most) continue;
+    if (film.size() > max_voxels) continue;
     for (const auto index : film) result.push_back(voxels[index]);
   }
   return result;
@@ -52,16 +50,16 @@ std::size_t flip_if_better(BlockGrid& grid, const VoxelLabels& labels, const std
 
 }  // namespace
 
-HandleRepair repair_handles(BlockGrid& grid, long genus, float band_mm) {
+HandleRepair repair_handles(BlockGrid& grid, long genus, float band_mm, const VolumeOptions& options) {
   HandleRepair result{0, 0, genus};
   const float shallow = 0.5F * grid.voxel();  // a flipped voxel's distance: the film is about a voxel thick
-  const auto most = static_cast<std::size_t>(std::pow(kWidestFilledMm / grid.voxel(), 2.0F));
-  // Cutting comes first: what no view saw may be empty, what a view saw through is.
+  const auto max_voxels = static_cast<std::size_t>(std::pow(options.max_filled_mm / grid.voxel(), 2.0F));
+  // Cut first: space that no view saw may be empty, space that a view saw through is.
   for (const bool cutting : {true, false}) {
     if (result.genus <= 0) break;
-    VoxelLabels labels(grid);
+    VoxelLabels labels(grid, options.doubt_reach_mm);
     std::vector<std::size_t> films = labels.grow(/*inside=*/cutting);
-    if (!cutting) films = small_films(labels, films, most);
+    if (!cutting) films = small_films(labels, films, max_voxels);
     const std::size_t flipped =
         flip_if_better(grid, labels, films, cutting ? shallow : -shallow, band_mm, result.genus);
     (cutting ? result.cut : result.filled) += flipped;

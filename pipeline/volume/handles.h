@@ -3,6 +3,7 @@
 #include <cstddef>
 
 #include "pipeline/volume/block_grid.h"
+#include "pipeline/volume/integrate.h"
 
 namespace scanrig {
 
@@ -12,10 +13,10 @@ struct HandleRepair {
   long genus = 0;          ///< of the largest component, after the repair
 };
 
-/// Undoes handles that rest on nothing measured, `genus` of them or fewer. A set is rebuilt from its certain voxels
-/// (those nearer to measured surface than to closed) by adding doubtful ones only where that makes no new loop (simple
-/// points); what cannot be added is a film across a doubtful tunnel, which is filled if it is small, or across a
-/// doubtful bridge, which is cut. Loops among certain voxels stay: they were measured.
-HandleRepair repair_handles(BlockGrid& grid, long genus, float band_mm);
+/// Removes handles that are not supported by measurements, `genus` of them or fewer. A set is rebuilt from its certain
+/// voxels (those nearer to measured surface than to closed) by adding doubtful ones only where that makes no new loop
+/// (simple points). What cannot be added is a film: across a doubtful tunnel it is filled if small, across a doubtful
+/// bridge it is cut. Loops among certain voxels stay: they were measured.
+HandleRepair repair_handles(BlockGrid& grid, long genus, float band_mm, const VolumeOptions& options);
 
 }  // namespace scanrig

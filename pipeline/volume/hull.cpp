@@ -26,13 +26,13 @@ float Hull::distance(const Eigen::Vector3f& p) const {
 
 Hull Hull::near(const Eigen::Vector3f& centre, float radius, float band) const {
   Hull result = *this;
-  // A contour's distance falls or rises by about a millimetre a millimetre; a quarter is left for perspective.
+  // A contour's distance changes by about a millimetre per millimetre; a quarter is left for perspective.
   std::erase_if(result.outlines_,
                 [&](const Outline& outline) { return outline.distance(centre) < -(band + 1.25F * radius); });
   return result;
 }
 
-/// Bilinear in the image. The object is in the picture: outside the image the distance to its border adds up.
+/// Bilinear in the image. The object is inside the image: outside the image the distance to its border is added.
 float Hull::Outline::distance(const Eigen::Vector3f& point) const {
   const Eigen::Vector3f p = rotation * point + translation;
   if (!(p.z() > 0.0F)) return -std::numeric_limits<float>::infinity();

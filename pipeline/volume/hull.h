@@ -8,8 +8,8 @@
 
 namespace scanrig {
 
-/// What bounds the object from outside: silhouettes (the visual hull), the planes of the table, a box.
-/// Distances are mm, positive outside; the silhouettes' images are referred to, not copied.
+/// Outer bounds of the object: silhouettes (the visual hull), the planes of the table, a box. Distances are mm,
+/// positive outside; the silhouettes' images are referred to, not copied.
 class Hull {
  public:
   explicit Hull(const Eigen::AlignedBox3f& box) : box_(box) {}
@@ -19,8 +19,8 @@ class Hull {
   /// The largest of the distances to all bounds.
   [[nodiscard]] float distance(const Eigen::Vector3f& point_in_model) const;
 
-  /// The same hull without the silhouettes that cannot matter within `radius` of `centre` while values below
-  /// `-band` all mean the same.
+  /// The same hull without the silhouettes that cannot matter within `radius` of `centre` while values below `-band`
+  /// are equivalent.
   [[nodiscard]] Hull near(const Eigen::Vector3f& centre, float radius, float band) const;
 
  private:

@@ -7,7 +7,7 @@
 #include "core/parallel.h"
 #include "pipeline/mesh/topology.h"
 #include "pipeline/volume/block_grid.h"
-#include "pipeline/volume/field.h"
+#include "pipeline/volume/distance_field.h"
 #include "pipeline/volume/handles.h"
 #include "pipeline/volume/hull.h"
 #include "pipeline/volume/marching_cubes.h"
@@ -17,13 +17,11 @@
 namespace scanrig {
 namespace {
 
-constexpr double kHullRoomMm = 25.0;  // the hull of a pose reaches this far beyond what was measured
-
 Result<void> check(const RangeImage& range) {
   const cv::Size size(range.projection.width, range.projection.height);
   const bool fits = range.depth.size() == size && range.sigma.size() == size && range.normal.size() == size &&
                     (range.background.empty() || range.background.size() == size);
-  if (!fits) return fail(ErrorCode::invalid_input, "the matrices do not have the projection's size");
+  if (!fits) return fail(ErrorCode::invalid_input, "the matrices differ from the projection's size");
   if (!(range.projection.fx > 0.0 && range.projection.fy > 0.0)) {
     return fail(ErrorCode::invalid_input, "the focal length must be positive");
   }
@@ -62,7 +60,7 @@ Result<void> check(std::span<const PosedViews> poses, const VolumeOptions& optio
   return {};
 }
 
-/// Three voxels, or four sigma of the data (median of every pixel's) where that is more.
+/// Half width of the zone of evidence.
 double band(std::span<const PosedViews> poses, const VolumeOptions& options) {
   if (options.band_mm > 0.0) return options.band_mm;
   std::vector<float> sigmas;
@@ -72,10 +70,10 @@ double band(std::span<const PosedViews> poses, const VolumeOptions& options) {
                    [](float sigma) { return !std::isnan(sigma); });
     }
   }
-  if (sigmas.empty()) return 3.0 * options.voxel_mm;
+  if (sigmas.empty()) return options.band_voxels * options.voxel_mm;
   const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
   std::nth_element(sigmas.begin(), middle, sigmas.end());
-  return std::max(3.0 * options.voxel_mm, 4.0 * *middle);
+  return std::max(options.band_voxels * options.voxel_mm, options.band_sigmas * *middle);
 }
 
 bool has_silhouettes(const PosedViews& pose) {
@@ -90,12 +88,11 @@ struct Prepared {
 };
 
 Prepared prepare(std::span<const PosedViews> poses, const VolumeOptions& options, double band_mm) {
-  constexpr std::size_t kSeedStride = 8;
   Prepared result;
   for (const auto& pose : poses) {
     std::vector<std::optional<RangeSampler>> made(pose.views.size());
     parallel_for(made.size(), [&](std::size_t i) {
-      made[i].emplace(pose.views[i].range, pose.model_from_pose, band_mm, options.voxel_mm);
+      made[i].emplace(pose.views[i].range, pose.model_from_pose, band_mm, options.voxel_mm, options.sampler);
     });
     auto& views = result.views_of_pose.emplace_back();
     for (auto& view : made) views.push_back(std::move(*view));
@@ -104,7 +101,7 @@ Prepared prepare(std::span<const PosedViews> poses, const VolumeOptions& options
       std::size_t count = 0;
       for (const auto& pixel : view.surface()) {
         result.box.extend(pixel.point);
-        if (count++ % kSeedStride == 0) result.seeds.push_back(pixel.point);
+        if (count++ % options.seed_stride == 0) result.seeds.push_back(pixel.point);
       }
     }
   }
@@ -141,7 +138,7 @@ void count_classes(const Field& field, const BlockGrid& grid, VolumeReport& repo
       }
       if (field.poses() < 2) continue;
       ++counts[i].pairs[static_cast<std::size_t>(pose[0].voxel_class)][static_cast<std::size_t>(pose[1].voxel_class)];
-      counts[i].conflicts += combine(pose[0], pose[1], field.class_threshold()).alarm ? 1 : 0;
+      counts[i].conflicts += combine(pose[0], pose[1], field.class_threshold()).conflict ? 1 : 0;
     }
   });
   report.class_counts.assign(field.poses(), {});
@@ -168,7 +165,7 @@ Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions
 
   Eigen::AlignedBox3f box = prepared.box;
   if (std::any_of(poses.begin(), poses.end(), has_silhouettes)) {
-    const auto room = Eigen::Vector3f::Constant(static_cast<float>(kHullRoomMm));
+    const auto room = Eigen::Vector3f::Constant(static_cast<float>(options.hull_room_mm));
     box = {box.min() - room, box.max() + room};
   }
   const Field field(std::move(prepared.views_of_pose), std::move(prepared.model_from_pose),
@@ -177,7 +174,7 @@ Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions
   BlockGrid grid(box, static_cast<float>(options.voxel_mm));
   if (auto ok = grid.fill(field, prepared.seeds, context); !ok) return pass_on(ok);
   report.active_voxels = grid.blocks().size() * BlockGrid::kNodes;
-  relax_unmeasured(grid, field.band());
+  relax_unmeasured(grid, field.band(), options.relax_rounds);
   context.report("volume", 0.7);
 
   Mesh all = extract_surface(grid);
@@ -185,7 +182,7 @@ Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions
   if (result.mesh.faces.empty()) return fail(ErrorCode::degenerate, "volume: the surface encloses nothing");
   report.genus = report.genus_before_repair = topology(result.mesh).genus();
   if (options.repair_handles && report.genus > 0) {
-    const HandleRepair repair = repair_handles(grid, report.genus, field.band());
+    const HandleRepair repair = repair_handles(grid, report.genus, field.band(), options);
     report.voxels_cut = repair.cut;
     report.voxels_filled = repair.filled;
     report.genus = repair.genus;
@@ -193,7 +190,7 @@ Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions
     result.mesh = largest_component(all);
   }
   report.dropped_components = components(all).count - 1;
-  finish_surface(field, static_cast<float>(options.voxel_mm), result.mesh);
+  finish_surface(field, options, result.mesh);
   report.closed_vertices = static_cast<std::size_t>(std::count(result.mesh.views.begin(), result.mesh.views.end(), 0));
   report.measured_vertices = result.mesh.vertices.size() - report.closed_vertices;
   count_classes(field, grid, report);

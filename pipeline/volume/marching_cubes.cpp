@@ -66,7 +66,7 @@ std::array<int, 12> polygon_links(int inside) {
   return next;
 }
 
-/// Splits a polygon into triangles so that no diagonal lies on a cell face. Returns false if there is no such way.
+/// Splits a polygon into triangles so that no diagonal lies on a cell face. Returns false if that is impossible.
 bool triangulate(const std::vector<int>& polygon, CaseTriangles& triangles) {
   const std::size_t n = polygon.size();
   if (n == 3) {

@@ -9,22 +9,19 @@ namespace scanrig {
 namespace {
 
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-constexpr float kSteepest = 0.2F;           // cosine of incidence (78 deg) beyond which a range pixel is not believed
-constexpr float kFinestSigma = 0.001F;      // mm; keeps the weights of noise-free data finite
-constexpr float kFadePixels = 8.0F;         // weights fade over the last pixels before an edge
-constexpr float kFootprintGapMm = 3.0F;     // gaps up to twice this are bridged in a footprint
-constexpr float kFootprintMarginMm = 1.0F;  // range images lose this much at a limb
 constexpr int kTile = 16;
 constexpr int kBeside[4][2] = {{-1, 0}, {1, 0}, {0, -1}, {0, 1}};
 constexpr int kNeighbours[8][2] = {{-1, -1}, {0, -1}, {1, -1}, {-1, 0}, {1, 0}, {-1, 1}, {0, 1}, {1, 1}};
 
 }  // namespace
 
-RangeSampler::RangeSampler(const RangeImage& range, const Transform& model_from_pose, double band_mm, double voxel_mm)
-    : camera_from_model_(range.camera_from_pose * model_from_pose.inverse()),
+RangeSampler::RangeSampler(const RangeImage& range, const Transform& model_from_pose, double band_mm, double voxel_mm,
+                           const RangeSamplerOptions& options)
+    : options_(options),
+      camera_from_model_(range.camera_from_pose * model_from_pose.inverse()),
       rotation_(camera_from_model_.linear().cast<float>()),
       translation_(camera_from_model_.translation().cast<float>()),
-      knows_background_(!range.background.empty()),
+      has_background_(!range.background.empty()),
       band_mm_(static_cast<float>(band_mm)) {
   crop(range);
   make_planes(range);
@@ -32,7 +29,7 @@ RangeSampler::RangeSampler(const RangeImage& range, const Transform& model_from_
   const int voxel_pixels = std::max(1, static_cast<int>(std::ceil(voxel_mm / mm_per_pixel())));
   drop_specks_and_fade_edges(voxel_pixels);
   make_tiles();
-  if (!knows_background_) make_footprint();
+  if (!has_background_) make_footprint();
   erode_free_depth(voxel_pixels);
 }
 
@@ -41,7 +38,7 @@ void RangeSampler::crop(const RangeImage& range) {
   int x0 = range.depth.cols, x1 = -1, y0 = range.depth.rows, y1 = -1;
   for (int y = 0; y < range.depth.rows; ++y) {
     for (int x = 0; x < range.depth.cols; ++x) {
-      const bool dull = std::isnan(range.depth(y, x)) && (!knows_background_ || range.background(y, x) != 0);
+      const bool dull = std::isnan(range.depth(y, x)) && (!has_background_ || range.background(y, x) != 0);
       if (dull) continue;
       x0 = std::min(x0, x);
       x1 = std::max(x1, x);
@@ -69,7 +66,7 @@ void RangeSampler::make_planes(const RangeImage& range) {
       Pixel& p = pixel(x, y);
       const float depth = range.depth(v, u);
       if (std::isnan(depth)) {
-        if (knows_background_ && range.background(v, u) != 0) p = {.free_depth = kInfinity, .state = State::background};
+        if (has_background_ && range.background(v, u) != 0) p = {.free_depth = kInfinity, .state = State::background};
         continue;
       }
       const auto& n = range.normal(v, u);
@@ -78,9 +75,9 @@ void RangeSampler::make_planes(const RangeImage& range) {
       const Eigen::Vector3f ray = projection_.kind == Projection::Kind::pinhole ? Eigen::Vector3f(point.normalized())
                                                                                 : Eigen::Vector3f::UnitZ();
       const float cosine = -normal.dot(ray);
-      if (!(cosine > kSteepest)) continue;
+      if (!(cosine > options_.min_facing)) continue;
       if (std::isnan(range.sigma(v, u))) continue;
-      const float sigma = std::max(range.sigma(v, u), kFinestSigma);
+      const float sigma = std::max(range.sigma(v, u), options_.min_sigma_mm);
       p.normal = model_from_camera * normal;
       p.offset = normal.dot(point) - normal.dot(translation_);
       p.weight = cosine / (sigma * sigma);
@@ -91,7 +88,7 @@ void RangeSampler::make_planes(const RangeImage& range) {
   }
 }
 
-/// On the object, as the first measured pixel has it.
+/// Taken from the first measured pixel on the object.
 double RangeSampler::mm_per_pixel() const {
   for (const auto& p : pixels_) {
     if (p.state == State::surface) return projection_.mm_per_pixel(p.free_depth);
@@ -116,15 +113,15 @@ Eigen::Vector3f RangeSampler::point_on(const Pixel& plane, int x, int y) const {
 /// Each pixel's point lies near the other's tangent plane.
 bool RangeSampler::one_surface(int x0, int y0, int x1, int y1) const {
   const Pixel &a = pixel(x0, y0), &b = pixel(x1, y1);
-  const float tolerance = 0.5F * band_mm_;
+  const float tolerance = options_.max_step * band_mm_;
   return std::abs(a.normal.dot(point_on(b, x1, y1)) - a.offset) < tolerance &&
          std::abs(b.normal.dot(point_on(a, x0, y0)) - b.offset) < tolerance;
 }
 
 /// Unknown pixels with at least five measured neighbours that agree take the neighbours' mean plane; twice, so that
-/// gaps of up to four pixels close: less than a matching window, so it invents nothing.
+/// gaps of up to four pixels close: less than a matching window, so no surface is invented.
 void RangeSampler::close_pinholes() {
-  for (int pass = 0; pass < 2; ++pass) {
+  for (int pass = 0; pass < options_.pinhole_passes; ++pass) {
     const std::vector<Pixel> before = pixels_;
     for (int y = 1; y + 1 < height_; ++y) {
       for (int x = 1; x + 1 < width_; ++x) {
@@ -144,7 +141,7 @@ void RangeSampler::close_pinholes() {
           sigma = std::max(sigma, q.sigma);
           ++count;
         }
-        if (count < 5 || farthest - nearest > 0.5F * band_mm_) continue;
+        if (count < options_.min_pinhole_neighbours || farthest - nearest > options_.max_step * band_mm_) continue;
         Pixel filled{.normal = normal.normalized(),
                      .weight = weight,
                      .sigma = sigma,
@@ -158,8 +155,8 @@ void RangeSampler::close_pinholes() {
   }
 }
 
-/// Patches and strips too narrow to span a few voxels go: the free space in front of them would be a thread that voxels
-/// resolve into beads and loops. Weights of the rest fade towards the edges.
+/// Removes patches and strips too narrow to span a few voxels: the free space in front of them would be a thread that
+/// voxels resolve into beads and loops. Weights of the rest fade towards the edges.
 void RangeSampler::drop_specks_and_fade_edges(int radius) {
   if (pixels_.empty()) return;
   cv::Mat1b inner(height_, width_, uchar{0});
@@ -180,7 +177,7 @@ void RangeSampler::drop_specks_and_fade_edges(int radius) {
       Pixel& p = pixel(x, y);
       if (p.state != State::surface) continue;
       if (to_core(y, x) > static_cast<float>(radius) + 1.0F) p = Pixel{};
-      p.weight *= std::min(1.0F, (1.0F + to_edge(y, x)) / kFadePixels);
+      p.weight *= std::min(1.0F, (1.0F + to_edge(y, x)) / options_.fade_px);
     }
   }
 }
@@ -202,7 +199,7 @@ void RangeSampler::erode_free_depth(int radius) {
 /// The measured pixels, gaps bridged and enclosed holes filled.
 void RangeSampler::make_footprint() {
   if (pixels_.empty()) return;
-  const int gap = std::max(1, static_cast<int>(std::lround(kFootprintGapMm / mm_per_pixel())));
+  const int gap = std::max(1, static_cast<int>(std::lround(options_.footprint_gap_mm / mm_per_pixel())));
   const int margin = 2 * gap + 2;
   cv::Mat1b mask(height_ + 2 * margin, width_ + 2 * margin, uchar{0});
   for (int y = 0; y < height_; ++y) {
@@ -253,7 +250,7 @@ RangeSample RangeSampler::sample(const Eigen::Vector3f& point) const {
   if (!(at.u >= 0.0F && at.v >= 0.0F && at.u < static_cast<float>(width_ - 1) &&
         at.v < static_cast<float>(height_ - 1))) {
     const float u = at.u + static_cast<float>(crop_.x), v = at.v + static_cast<float>(crop_.y);
-    if (!knows_background_ || !projection_.contains({u, v})) return result;
+    if (!has_background_ || !projection_.contains({u, v})) return result;
     result.kind = RangeSample::Kind::free;
     result.clearly_free = true;
     result.distance = kInfinity;
@@ -287,14 +284,14 @@ RangeSample RangeSampler::sample(const Eigen::Vector3f& point) const {
   } else if (background == 0 && farthest <= -band_mm_) {
     result.kind = RangeSample::Kind::behind;
     result.distance = farthest;
-  } else if (background == 0 && farthest - nearest < 0.5F * band_mm_ && std::abs(mean) < band_mm_) {
+  } else if (background == 0 && farthest - nearest < options_.max_step * band_mm_ && std::abs(mean) < band_mm_) {
     result.kind = RangeSample::Kind::surface;
     result.distance = mean;
   }
   return result;
 }
 
-bool RangeSampler::says_nothing_near(const Eigen::Vector3f& point, float radius) const {
+bool RangeSampler::has_no_data_near(const Eigen::Vector3f& point, float radius) const {
   const PixelPosition at = project(point);
   const bool pinhole = projection_.kind == Projection::Kind::pinhole;
   if (pinhole && at.depth <= radius) return false;
@@ -302,7 +299,7 @@ bool RangeSampler::says_nothing_near(const Eigen::Vector3f& point, float radius)
       radius * static_cast<float>(std::max(projection_.fx, projection_.fy)) / (pinhole ? at.depth - radius : 1.0F) + 2;
   const bool touches_outside = at.u < pixels || at.v < pixels || at.u + pixels > static_cast<float>(width_ - 1) ||
                                at.v + pixels > static_cast<float>(height_ - 1);
-  if (touches_outside && knows_background_) return false;
+  if (touches_outside && has_background_) return false;
   const auto tile = [](float position, int count) {
     return std::clamp(static_cast<int>(position) / kTile, 0, count - 1);
   };
@@ -319,7 +316,7 @@ float RangeSampler::beside_footprint_mm(const Eigen::Vector3f& point) const {
   if (footprint_px_.empty()) return -kInfinity;
   const PixelPosition at = project(point);
   if (projection_.kind == Projection::Kind::pinhole && !(at.depth > 0.0F)) return -kInfinity;
-  // Beyond the crop the distance to the crop adds up; what lies outside the image is beside everything measured too.
+  // Beyond the crop the distance to the crop is added; points outside the image are beside everything measured too.
   const float u = std::clamp(at.u, 0.0F, static_cast<float>(width_ - 1));
   const float v = std::clamp(at.v, 0.0F, static_cast<float>(height_ - 1));
   const int x = std::min(static_cast<int>(u), width_ - 2), y = std::min(static_cast<int>(v), height_ - 2);
@@ -327,7 +324,7 @@ float RangeSampler::beside_footprint_mm(const Eigen::Vector3f& point) const {
   const float distance = (1 - b) * ((1 - a) * footprint_px_(y, x) + a * footprint_px_(y, x + 1)) +
                          b * ((1 - a) * footprint_px_(y + 1, x) + a * footprint_px_(y + 1, x + 1));
   const float beyond = std::hypot(at.u - u, at.v - v);
-  return (distance + beyond) * static_cast<float>(projection_.mm_per_pixel(at.depth)) - kFootprintMarginMm;
+  return (distance + beyond) * static_cast<float>(projection_.mm_per_pixel(at.depth)) - options_.footprint_margin_mm;
 }
 
 Eigen::Vector3d RangeSampler::towards_camera(const Eigen::Vector3d& point) const {

@@ -9,39 +9,52 @@
 
 namespace scanrig {
 
-/// What one range image says about one point.
+/// Relation of one range image to one point.
 struct RangeSample {
   enum class Kind : std::uint8_t {
-    none,     ///< nothing: not measured there, or across a depth step
-    free,     ///< seen through: the ray goes on behind the point
+    none,     ///< unmeasured there, or across a depth step
+    free,     ///< seen through: the ray continues behind the point
     surface,  ///< within the band of the measured surface
-    behind    ///< deeper than the band: the view cannot know
+    behind    ///< deeper than the band: hidden from the view
   };
   Kind kind = Kind::none;
-  bool clearly_free = false;  ///< free, and so is everything a voxel around the ray
+  bool clearly_free = false;  ///< free, together with everything within a voxel around the ray
   float distance = 0.0F;      ///< to the tangent plane of the pixel, mm, positive outside; +infinity over background
-  float weight = 0.0F;        ///< cos(incidence) / sigma^2, fading towards the edges of what was measured; 1/mm^2
+  float weight = 0.0F;        ///< cos(incidence) / sigma^2, fading towards the edges of the measured area; 1/mm^2
   float sigma = 0.0F;         ///< of `distance`, mm
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();  ///< of the surface, model frame
 };
 
-/// A range image made ready for gathering: tangent planes in the model frame, pinholes of a pixel or two closed,
-/// specks and flying pixels gone, free space eroded by a voxel. Immutable, so any number of threads may sample it.
+/// Limits for preparing and sampling a range image.
+struct RangeSamplerOptions {
+  float min_facing = 0.2F;           ///< cosine of incidence (78 deg) below which a range pixel is rejected
+  float min_sigma_mm = 0.001F;       ///< keeps the weights of noise-free data finite
+  float max_step = 0.5F;             ///< share of the band: pixels farther off each other's planes are two surfaces
+  int pinhole_passes = 2;            ///< each closes gaps by one pixel from every side
+  int min_pinhole_neighbours = 5;    ///< measured neighbours, of 8, that a closed pixel needs
+  float fade_px = 8.0F;              ///< weights fade over the last pixels before an edge
+  float footprint_gap_mm = 3.0F;     ///< gaps up to twice this are bridged in a footprint
+  float footprint_margin_mm = 1.0F;  ///< range images lose this much at a limb
+};
+
+/// A range image prepared for sampling: tangent planes in the model frame, pinholes of a pixel or two closed, specks
+/// and flying pixels removed, free space eroded by a voxel. Immutable, so any number of threads may sample it.
 class RangeSampler {
  public:
   /// `band_mm`: half width of the zone around the surface in which it is evidence.
-  RangeSampler(const RangeImage& range, const Transform& model_from_pose, double band_mm, double voxel_mm);
+  RangeSampler(const RangeImage& range, const Transform& model_from_pose, double band_mm, double voxel_mm,
+               const RangeSamplerOptions& options);
 
   [[nodiscard]] RangeSample sample(const Eigen::Vector3f& point_in_model) const;
 
-  /// True where nothing within `radius` (mm) of the point can be free or surface: the view adds nothing there.
-  [[nodiscard]] bool says_nothing_near(const Eigen::Vector3f& point_in_model, float radius) const;
+  /// True where nothing within `radius` (mm) of the point can be free or surface: the view adds no data there.
+  [[nodiscard]] bool has_no_data_near(const Eigen::Vector3f& point_in_model, float radius) const;
 
-  /// How far, in mm, the point lies beside everything this image measured; very negative if the image cannot tell.
-  /// A stand-in for a silhouette where a range image has neither silhouettes nor background.
+  /// Distance of the point beside this image's measured area, mm; very negative if the image cannot decide. Replaces a
+  /// silhouette where a range image has neither silhouettes nor background.
   [[nodiscard]] float beside_footprint_mm(const Eigen::Vector3f& point_in_model) const;
 
-  [[nodiscard]] bool knows_background() const { return knows_background_; }
+  [[nodiscard]] bool has_background() const { return has_background_; }
   struct SurfacePixel {
     Eigen::Vector3f point;  ///< model frame
     float weight;
@@ -80,16 +93,17 @@ class RangeSampler {
   [[nodiscard]] const Pixel& pixel(int x, int y) const { return pixels_[static_cast<std::size_t>(y) * width_ + x]; }
   [[nodiscard]] Pixel& pixel(int x, int y) { return pixels_[static_cast<std::size_t>(y) * width_ + x]; }
 
+  RangeSamplerOptions options_;
   Transform camera_from_model_;
   Eigen::Matrix3f rotation_;
   Eigen::Vector3f translation_;
   Projection projection_;  ///< of the crop
   cv::Rect crop_;
-  bool knows_background_ = false;  ///< then all of the image outside the crop is background
+  bool has_background_ = false;  ///< then all of the image outside the crop is background
   float band_mm_ = 0.0F;
   int width_ = 0, height_ = 0;
   std::vector<Pixel> pixels_;
-  cv::Mat1f footprint_px_;  ///< distance to the footprint, positive beside it; empty if the background is known
+  cv::Mat1f footprint_px_;  ///< distance to the footprint, positive beside it; empty if the background is given
   cv::Mat1f tile_reach_;    ///< beyond this depth nothing in the tile is free or surface
 };
 

@@ -8,7 +8,6 @@ namespace {
 using Block = BlockGrid::Block;
 constexpr int kSide = BlockGrid::kSide;
 constexpr int kPadded = kSide + 2;
-constexpr int kRounds = 8;  // of a seven-point mean: a Gaussian of 1.5 voxels
 
 /// A block's distances with one layer of its six neighbours around.
 struct Padded {
@@ -43,7 +42,7 @@ struct Padded {
     }
   }
 
-  /// A node beside a block that is not stored keeps its sign: the surface may not leave the stored blocks.
+  /// A node beside a missing block keeps its sign: the surface may not leave the stored blocks.
   [[nodiscard]] bool touches_unstored(int x, int y, int z) const {
     return (x == 0 && !open[0]) || (x == kSide - 1 && !open[1]) || (y == 0 && !open[2]) ||
            (y == kSide - 1 && !open[3]) || (z == 0 && !open[4]) || (z == kSide - 1 && !open[5]);
@@ -68,7 +67,7 @@ std::array<float, BlockGrid::kNodes> relaxed(const BlockGrid& grid, const Block&
   return result;
 }
 
-/// Nothing to do where all of a block and its surroundings is measured or of one sign; a cheap test on the block alone.
+/// True where all of a block and its surroundings is measured or of one sign; a cheap test on the block alone.
 bool has_unmeasured(const Block& block) {
   for (const Support support : block.support) {
     if (support != Support::measured) return true;
@@ -78,10 +77,10 @@ bool has_unmeasured(const Block& block) {
 
 }  // namespace
 
-void relax_unmeasured(BlockGrid& grid, float band_mm) {
+void relax_unmeasured(BlockGrid& grid, float band_mm, int rounds) {
   std::vector<Block>& blocks = grid.blocks();
   std::vector<std::array<float, BlockGrid::kNodes>> next(blocks.size());
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < rounds; ++round) {
     parallel_for(blocks.size(), [&](std::size_t i) {
       next[i] = has_unmeasured(blocks[i]) ? relaxed(grid, blocks[i], band_mm) : blocks[i].distance;
     });

@@ -4,8 +4,8 @@
 
 namespace scanrig {
 
-/// Smooths the field where nothing was measured, measured nodes held fixed: slivers of unseen space and threads of free
-/// space thinner than two or three voxels go, whose beads and loops no view has seen. Blocks stay closed.
-void relax_unmeasured(BlockGrid& grid, float band_mm);
+/// Smooths the unmeasured field with measured nodes held fixed. Slivers of unseen space and threads of free space
+/// thinner than two or three voxels disappear; no view has seen their beads and loops. Blocks stay closed.
+void relax_unmeasured(BlockGrid& grid, float band_mm, int rounds);
 
 }  // namespace scanrig

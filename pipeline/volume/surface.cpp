@@ -10,7 +10,7 @@
 namespace scanrig {
 namespace {
 
-constexpr std::size_t kChunk = 4096;  // vertices a task
+constexpr std::size_t kChunk = 4096;  // vertices per task
 
 /// Each vertex's neighbours, row after row.
 struct Adjacency {
@@ -33,12 +33,11 @@ Adjacency adjacency(const Mesh& mesh) {
   return result;
 }
 
-/// Staircases of the carved surface go; a vertex stays within half a voxel of where it was.
-void smooth_unmeasured(float voxel_mm, Mesh& mesh) {
-  constexpr int kRounds = 4;
+/// Smooths staircases of the carved surface; a vertex stays within half a voxel of where it was.
+void smooth_unmeasured(float voxel_mm, int rounds, Mesh& mesh) {
   const Adjacency around = adjacency(mesh);
   const std::vector<Eigen::Vector3f> original = mesh.vertices;
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < rounds; ++round) {
     const std::vector<Eigen::Vector3f> before = mesh.vertices;
     for (std::size_t v = 0; v < before.size(); ++v) {
       if (mesh.views[v] != 0 || around.first[v] == around.first[v + 1]) continue;
@@ -53,13 +52,13 @@ void smooth_unmeasured(float voxel_mm, Mesh& mesh) {
   }
 }
 
-/// One step along the measured normal; `views` and `sigma` where the vertex ends up on what was measured.
-void settle_vertex(const Field& field, float voxel_mm, const Eigen::Vector3f& outward, Mesh& mesh, std::size_t v) {
-  constexpr float kAcross = 0.5F;  // cosine between the surface and what was measured, below which they differ
+/// One step along the measured normal; `views` and `sigma` where the vertex ends on measured surface.
+void settle_vertex(const Field& field, const VolumeOptions& options, const Eigen::Vector3f& outward, Mesh& mesh,
+                   std::size_t v) {
   Eigen::Vector3f& position = mesh.vertices[v];
   PointEvidence evidence = field.evidence_at(position);
-  if (evidence.views == 0 || evidence.normal.dot(outward) < kAcross) return;
-  const float reach = 0.5F * voxel_mm;
+  if (evidence.views == 0 || evidence.normal.dot(outward) < options.min_agreement) return;
+  const float reach = 0.5F * static_cast<float>(options.voxel_mm);
   if (std::abs(evidence.surface_distance) > reach) return;
   const Eigen::Vector3f moved = position - evidence.surface_distance * evidence.normal;
   evidence = field.evidence_at(moved);
@@ -71,16 +70,16 @@ void settle_vertex(const Field& field, float voxel_mm, const Eigen::Vector3f& ou
 
 }  // namespace
 
-void finish_surface(const Field& field, float voxel_mm, Mesh& mesh) {
+void finish_surface(const Field& field, const VolumeOptions& options, Mesh& mesh) {
   const std::size_t count = mesh.vertices.size();
   mesh.views.assign(count, 0);
   mesh.sigma.assign(count, std::numeric_limits<float>::quiet_NaN());
   const std::vector<Eigen::Vector3f> outward = vertex_normals(mesh);
   parallel_for((count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
     const std::size_t end = std::min(count, (chunk + 1) * kChunk);
-    for (std::size_t v = chunk * kChunk; v < end; ++v) settle_vertex(field, voxel_mm, outward[v], mesh, v);
+    for (std::size_t v = chunk * kChunk; v < end; ++v) settle_vertex(field, options, outward[v], mesh, v);
   });
-  smooth_unmeasured(voxel_mm, mesh);
+  smooth_unmeasured(static_cast<float>(options.voxel_mm), options.smoothing_rounds, mesh);
   mesh.normals = vertex_normals(mesh);
 }
 

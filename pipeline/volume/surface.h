@@ -1,12 +1,12 @@
 #pragma once
 
 #include "pipeline/mesh/mesh.h"
-#include "pipeline/volume/field.h"
+#include "pipeline/volume/distance_field.h"
 
 namespace scanrig {
 
 /// Moves every vertex of an extracted surface that range images support onto the measured zero set, smooths the rest
-/// (by less than a voxel), and fills in normals, `views` and `sigma`. Topology stays.
-void finish_surface(const Field& field, float voxel_mm, Mesh& mesh);
+/// (by less than a voxel), and fills in normals, `views` and `sigma`. The topology is unchanged.
+void finish_surface(const Field& field, const VolumeOptions& options, Mesh& mesh);
 
 }  // namespace scanrig

@@ -10,7 +10,6 @@ namespace scanrig {
 namespace {
 
 constexpr int kSide = BlockGrid::kSide;
-constexpr float kDoubtReachMm = 8.0F;  // how deep below a closed surface the solid is doubtful
 
 /// The 26 neighbours of a voxel; which of them touch each other by faces (6) or by faces and edges (18).
 struct Neighbourhood {
@@ -68,7 +67,7 @@ int components_around(std::uint32_t members, bool inside) {
 
 }  // namespace
 
-VoxelLabels::VoxelLabels(const BlockGrid& grid) {
+VoxelLabels::VoxelLabels(const BlockGrid& grid, float doubt_reach_mm) {
   Eigen::Vector3i low = grid.size(), high = Eigen::Vector3i::Zero();
   for (const auto& block : grid.blocks()) {
     low = low.cwiseMin(block.index);
@@ -92,7 +91,7 @@ VoxelLabels::VoxelLabels(const BlockGrid& grid) {
       }
     }
   });
-  mark_doubtful(grid);
+  mark_doubtful(grid, doubt_reach_mm);
 }
 
 Eigen::Vector3i VoxelLabels::node(std::size_t i) const {
@@ -107,7 +106,7 @@ bool VoxelLabels::on_rim(std::size_t i) const {
 }
 
 /// Every voxel is as certain as the piece of surface nearest to it, up to a depth.
-void VoxelLabels::mark_doubtful(const BlockGrid& grid) {
+void VoxelLabels::mark_doubtful(const BlockGrid& grid, float doubt_reach_mm) {
   const std::array<std::ptrdiff_t, 6> faces = {step(1, 0, 0),  step(-1, 0, 0), step(0, 1, 0),
                                                step(0, -1, 0), step(0, 0, 1),  step(0, 0, -1)};
   const auto is_measured = [&](std::size_t i) {
@@ -135,7 +134,7 @@ void VoxelLabels::mark_doubtful(const BlockGrid& grid) {
   std::vector<std::uint8_t> reached(flags_.size());
   for (const auto i : certain) reached[i] = 1;
   for (const auto i : doubtful) reached[i] = 2;
-  const int depth = static_cast<int>(kDoubtReachMm / grid.voxel());
+  const int depth = static_cast<int>(doubt_reach_mm / grid.voxel());
   for (int layer = 0; layer < depth && !doubtful.empty(); ++layer) {
     for (auto* front : {&certain, &doubtful}) {
       std::vector<std::size_t> next;

@@ -8,12 +8,13 @@
 
 namespace scanrig {
 
-/// One byte a voxel over the stored blocks and what lies between them, with a rim of outside voxels.
+/// One byte per voxel over the stored blocks and the space between them, with a rim of outside voxels.
 class VoxelLabels {
  public:
   enum Flag : std::uint8_t { kInside = 1, kDoubtful = 2, kGrown = 4, kQueued = 8 };
 
-  explicit VoxelLabels(const BlockGrid& grid);
+  /// `doubt_reach_mm`: the solid is doubtful this deep below a closed surface.
+  VoxelLabels(const BlockGrid& grid, float doubt_reach_mm);
 
   [[nodiscard]] std::uint8_t at(std::size_t i) const { return flags_[i]; }
   [[nodiscard]] bool has(std::size_t i, Flag flag) const { return (flags_[i] & flag) != 0; }
@@ -38,7 +39,7 @@ class VoxelLabels {
     std::vector<Run> runs;
     std::vector<std::uint32_t> root;  ///< of each run's component
   };
-  void mark_doubtful(const BlockGrid& grid);
+  void mark_doubtful(const BlockGrid& grid, float doubt_reach_mm);
   [[nodiscard]] Runs certain_runs(bool inside) const;
   [[nodiscard]] bool is_in(std::size_t i, bool inside) const { return has(i, kInside) == inside; }
 

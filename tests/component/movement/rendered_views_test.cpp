@@ -28,9 +28,9 @@ Disturbance slipped(double x_mm, double z_mm) { return {.object = small_motion({
 Disturbance tipped(double degrees) { return {.object = small_motion({to_radians(degrees), 0, 0}, {0, 0, 0})}; }
 Disturbance turned(double degrees) { return {.object = small_motion({0, to_radians(degrees), 0}, {0, 0, 0})}; }
 
-constexpr double kSettled = 0.006;  // deg: as near as a table comes to where it was
+constexpr double kSettled = 0.006;  // deg: repeat accuracy of a table
 
-/// What both cameras show of a moment.
+/// Images of both cameras at one moment.
 struct Seen {
   cv::Mat left, right;
 };
@@ -39,8 +39,7 @@ Seen look(const ShotScene& scene, const Disturbance& since) {
   return {scene.look(since, true), scene.look(since, false)};
 }
 
-/// View 0 of an object, and what the movement check says of it after something has happened: as the daemon judges, by
-/// both cameras.
+/// View 0 of an object, and the movement check after a change: judged as in the daemon, by both cameras.
 class RenderedViews : public testing::TestWithParam<Object (*)()> {
  protected:
   ViewChange compared(const Seen& now, std::uint64_t noise, const Sensor& then = {}, const Sensor& sensor = {}) const {
@@ -91,9 +90,9 @@ class RenderedViews : public testing::TestWithParam<Object (*)()> {
   }
 };
 
-TEST_P(RenderedViews, WhereNothingMovedNoNoiseSaysSo) { expect_unmoved(look(scene_, {.table_deg = kSettled}), 20); }
+TEST_P(RenderedViews, NoiseAloneIsNoMovement) { expect_unmoved(look(scene_, {.table_deg = kSettled}), 20); }
 
-TEST_P(RenderedViews, LightThatBecameDimmerIsNoMovement) {
+TEST_P(RenderedViews, DimmerLightIsNoMovement) {
   expect_unmoved(look(scene_, {.table_deg = kSettled}), 3, {}, {.light = 0.95});
 }
 
@@ -104,7 +103,7 @@ TEST_P(RenderedViews, AnObjectThatSlippedIsFound) {
 
 TEST_P(RenderedViews, ATippedObjectIsFound) { expect_found(tipped(1.0)); }
 
-TEST_P(RenderedViews, AnObjectThatIsGoneOrElsewhereIsFound) {
+TEST_P(RenderedViews, AMissingOrDisplacedObjectIsFound) {
   for (const double mm : {1.0, 5.0, 20.0}) EXPECT_FALSE(compared(look(scene_, slipped(mm, 0.0)), 2).unmoved) << mm;
   EXPECT_FALSE(compared(look(scene_, slipped(0.0, 2000.0)), 2).unmoved) << "an empty table";
 }
@@ -116,7 +115,7 @@ TEST_P(RenderedViews, AKnockedCameraIsFound) {
 INSTANTIATE_TEST_SUITE_P(Objects, RenderedViews, testing::Values(painted_figurine, pebble),
                          [](const auto& object) { return object.index == 0 ? "Figurine" : "Pebble"; });
 
-/// A round, even pebble looks the same from all sides: these need something on the object.
+/// A round, even pebble looks the same from all sides: these need structure on the object.
 class FigurineViews : public RenderedViews {};
 
 TEST_P(FigurineViews, AnObjectThatTurnedAndLostStepsAreFound) {

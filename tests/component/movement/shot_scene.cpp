@@ -8,11 +8,11 @@
 #include "core/units.h"
 #include "pipeline/storage/images.h"
 #include "sim/scene/dot_pattern.h"
+#include "sim/scene/image_sensor.h"
 #include "sim/scene/polygonise.h"
 #include "sim/scene/random.h"
 #include "sim/scene/renderer.h"
 #include "sim/scene/room_light.h"
-#include "sim/scene/sensor.h"
 
 namespace scanrig::sim {
 namespace {
@@ -45,8 +45,8 @@ cv::Mat blurred(const cv::Mat& mosaic, double sigma_px) {
   return result;
 }
 
-/// Another sampling of the scene for everything that happened to it, as no two exposures sample it alike; the same for
-/// the same.
+/// Another sampling of the scene for each change, as no two exposures sample it alike; the same change gives the same
+/// sampling.
 std::uint64_t sampling_of(const Disturbance& since, bool left) {
   std::uint64_t seed = left ? 1 : 2;
   const auto stir = [&seed](double value) { seed = mix(seed, std::bit_cast<std::uint64_t>(value)); };
@@ -66,7 +66,7 @@ ShotScene::ShotScene(Object object, double image_scale)
       rays_(object_.mesh) {}
 
 cv::Mat ShotScene::look(const Disturbance& since, bool left) const {
-  static const DotPattern dots;  // of the picture without them nothing is used
+  static const DotPattern dots;  // only the plain image is used
   const Transform placement = since.object * placement_;
   const RoomLight light(object_, rays_, placement);
   Eye eye = left ? rig_.left : rig_.right;

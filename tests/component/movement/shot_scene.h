@@ -9,11 +9,11 @@
 
 namespace scanrig::sim {
 
-/// What has happened to the rig since view 0 was taken.
+/// Changes of the rig since view 0 was taken.
 struct Disturbance {
   std::string name{};
   Transform object = Transform::Identity();  ///< slipped: in the table's frame
-  double table_deg = 0.0;                    ///< the axis stands elsewhere than it says
+  double table_deg = 0.0;                    ///< the axis differs from its reported angle
   Transform camera = Transform::Identity();  ///< knocked: in the camera's own frame
 };
 
@@ -21,17 +21,17 @@ struct Disturbance {
 struct Sensor {
   double blur_px = 0.0;     ///< sigma, beside the lens's
   double noise_grey = 0.0;  ///< sigma, beside shot and read noise
-  double light = 1.0;       ///< as a share of what shone before
+  double light = 1.0;       ///< as a share of the light before
 };
 
-/// The plain pictures of view 0 for movement checks: the simulated scene, rendered, under the default rig.
+/// The plain images of view 0 for movement checks: the simulated scene, rendered, under the default rig.
 class ShotScene {
  public:
   ShotScene(Object object, double image_scale);
 
-  /// What falls on a camera's sensor: its mosaic, 32-bit float. Takes a second or two in full size.
+  /// The light on a camera's sensor: its mosaic, 32-bit float. Takes a second or two in full size.
   [[nodiscard]] cv::Mat look(const Disturbance& since, bool left = true) const;
-  /// What the daemon compares: 8 bit BGR. `noise` names the exposure.
+  /// The image that the daemon compares: 8 bit BGR. `noise` names the exposure.
   [[nodiscard]] static cv::Mat shoot(const cv::Mat& on_sensor, std::uint64_t noise, const Sensor& sensor = {});
 
  private:
@@ -42,7 +42,7 @@ class ShotScene {
   RayCaster rays_;
 };
 
-/// A pebble, smooth and of one even grey: nothing but its shading and its outline shows where it is.
+/// A pebble, smooth and of one even grey: only its shading and its outline show its position.
 Object pebble();
 
 }  // namespace scanrig::sim

@@ -1,4 +1,4 @@
-// Real range scans, imported and reconstructed like any scan; coarse voxels: `./dev bench end-to-end` does it in full.
+// Real range scans, imported and reconstructed like any scan; coarse voxels, since the full bench does it in full.
 
 #include <gtest/gtest.h>
 
@@ -30,7 +30,7 @@ Transform pose2_of(const Model& model) {
 class Dragon : public ::testing::Test {
  protected:
   void SetUp() override {
-    if (!std::filesystem::is_directory(data_)) GTEST_SKIP() << data_.string() << ": the scans are not here";
+    if (!std::filesystem::is_directory(data_)) GTEST_SKIP() << data_.string() << ": the scans are missing";
     folder_ = own_folder();
     std::filesystem::remove_all(folder_);
   }
@@ -56,7 +56,7 @@ class Dragon : public ::testing::Test {
   std::filesystem::path folder_;
 };
 
-TEST_F(Dragon, OnItsSideIsLaidIntoTheStandingOneWithoutHelp) {
+TEST_F(Dragon, LyingScansAreAlignedWithTheUprightOnesWithoutHints) {
   const auto found = measure(true);
   ASSERT_TRUE(found) << found.error().message;
   ASSERT_TRUE(found->pose2);
@@ -65,7 +65,7 @@ TEST_F(Dragon, OnItsSideIsLaidIntoTheStandingOneWithoutHelp) {
   EXPECT_GE(found->measured_share, 0.6);
 }
 
-TEST_F(Dragon, StandingLiesOnThePublishedMergedMesh) {
+TEST_F(Dragon, UprightScansMatchThePublishedMergedMesh) {
   const auto found = measure(false);
   ASSERT_TRUE(found) << found.error().message;
   EXPECT_LE(found->median_mm, 0.4);

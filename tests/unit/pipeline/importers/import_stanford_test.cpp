@@ -27,7 +27,7 @@ Transform table_turned(double degrees) {
   return turn;
 }
 
-/// What a scanner whose rays run along (-0.5, 0, -1) sees of a ball, as an ASCII PLY range grid in metres.
+/// The view of a ball by a scanner whose rays run along (-0.5, 0, -1), as an ASCII PLY range grid in metres.
 std::string scan_of_ball(const Eigen::Vector3d& centre) {
   const Eigen::Vector3d ray = Eigen::Vector3d(-0.5, 0.0, -1.0).normalized();
   const int cols = 120, rows = 90;
@@ -80,14 +80,14 @@ class ImportStanfordTest : public FolderTest {
   }
 };
 
-TEST_F(ImportStanfordTest, EveryViewSeesTheBallWhereItStandsOnTheTable) {
+TEST_F(ImportStanfordTest, EveryViewSeesTheBallAtItsPlaceOnTheTable) {
   const auto conf = write_conf("ball.conf", Transform::Identity());
   const auto imported = import_stanford(conf, std::nullopt, folder_ / "out");
   ASSERT_TRUE(imported) << imported.error().message;
   const auto scan = ScanFolder::open(folder_ / "out");
   ASSERT_TRUE(scan) << scan.error().message;
   EXPECT_EQ(scan->manifest().state, "scanned");
-  // From the axis, and its part along it: where the ball must come to lie but for the height of the lowest point.
+  // From the axis, and its component along it: the expected place of the ball except the height of the lowest point.
   const Eigen::Vector3d offset = kBall - kAxisPoint;
   const double from_axis = (offset - offset.dot(kAxis) * kAxis).norm();
   const auto& views = scan->manifest().poses.at(0).views;
@@ -123,7 +123,7 @@ TEST_F(ImportStanfordTest, EveryViewSeesTheBallWhereItStandsOnTheTable) {
 }
 
 // The second pose's file may be given in the first one's frame; that must not survive.
-TEST_F(ImportStanfordTest, WhereTheFilesWorldLiesLeavesNoTrace) {
+TEST_F(ImportStanfordTest, TheFramesOfTheFilesLeaveNoTrace) {
   Transform far = Transform::Identity();
   far.translate(Eigen::Vector3d(-150, 1110, 320))
       .rotate(Eigen::AngleAxisd(1.9, Eigen::Vector3d(1, -2, 0.5).normalized()));
@@ -148,7 +148,7 @@ TEST_F(ImportStanfordTest, AnExistingFolderIsNotTouched) {
   EXPECT_EQ(import_stanford(conf, std::nullopt, folder_ / "out").error().code, ErrorCode::exists);
 }
 
-TEST_F(ImportStanfordTest, WhatIsWrongWithTheFilesIsSaid) {
+TEST_F(ImportStanfordTest, DefectsOfTheFilesAreNamed) {
   const auto conf = write_conf("ball.conf", Transform::Identity());
   expect_refused(folder_ / "absent.conf", ErrorCode::not_found, "absent.conf");
   write_text(folder_ / "empty.conf", "camera 0 0 0 0 0 0 1\n");
@@ -174,10 +174,10 @@ std::filesystem::path shared_data() {
   return set ? std::filesystem::path(set) : std::filesystem::path(SCANRIG_SOURCE_DIR) / ".." / "shared" / "data";
 }
 
-// Stanford's dragon: 15 scans standing, 6 lying. Neighbouring scans must lie on one surface to their own noise.
+// Stanford's dragon: 15 scans upright, 6 lying. Neighbouring scans must lie on one surface to their own noise.
 TEST_F(ImportStanfordTest, TheDragonsScansFitTogether) {
   const auto dragon = shared_data() / "stanford_dragon";
-  if (!std::filesystem::exists(dragon)) GTEST_SKIP() << dragon << " is not there";
+  if (!std::filesystem::exists(dragon)) GTEST_SKIP() << dragon << " is missing";
   const auto imported = import_stanford(dragon / "stand/dragonStandRight.conf",
                                         dragon / "side/dragonSideRight_ESTIMATED.conf", folder_ / "out");
   ASSERT_TRUE(imported) << imported.error().message;

@@ -162,7 +162,7 @@ TEST(Decimate, HalvesATorusAndKeepsItsShapeWithinTheBound) {
   }
 }
 
-TEST(Decimate, StopsAtTheFacesAskedFor) {
+TEST(Decimate, StopsAtTheRequestedNumberOfFaces) {
   const auto fewer = decimate(torus(20, 5, 200, 100), {.max_error_mm = 1.0, .target_faces = 20000});
   ASSERT_TRUE(fewer);
   EXPECT_NEAR(static_cast<double>(fewer->faces.size()), 20000.0, 200.0);

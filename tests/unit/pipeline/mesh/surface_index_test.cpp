@@ -50,7 +50,7 @@ TEST(SurfaceIndex, NothingWithinTheLimitIsInfinitelyFar) {
   EXPECT_LT(index->nearest(kCentre, 26.0).distance, 25.1);
 }
 
-TEST(SurfaceIndex, RaysHitAndSegmentsAreBlockedOnlyByWhatIsBetween) {
+TEST(SurfaceIndex, RaysHitAndSegmentsAreBlockedOnlyByFacesBetween) {
   const auto index = SurfaceIndex::create(ball());
   const Eigen::Vector3d outside = kCentre + Eigen::Vector3d(100.0, 1.0, 2.0);
   const auto hit = index->first_hit(outside, Eigen::Vector3d(-2.0, 0.0, 0.0));

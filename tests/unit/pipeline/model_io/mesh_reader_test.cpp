@@ -76,7 +76,7 @@ TEST(MeshReaderTest, anUnusablePlyIsRefusedByNameAndReason) {
   EXPECT_THAT(message_of(parse_ply(with(kSquare, "double z", "double w"), "a.ply")), HasSubstr("no x, y, z"));
   EXPECT_THAT(message_of(parse_ply(with(kSquare, "element edge", "element vertex"), "a.ply")), HasSubstr("twice"));
   EXPECT_THAT(message_of(parse_ply(with(kSquare, "0 1 0 0.5", "0 nan 0 0.5"), "a.ply")), HasSubstr("vertex 3"));
-  EXPECT_THAT(message_of(parse_ply(with(kSquare, "0 1 2 3\n", "0 1 2 4\n"), "a.ply")), HasSubstr("not there"));
+  EXPECT_THAT(message_of(parse_ply(with(kSquare, "0 1 2 3\n", "0 1 2 4\n"), "a.ply")), HasSubstr("missing vertex"));
   EXPECT_THAT(message_of(parse_ply(with(kSquare, "9 4 0 1 2 3", "9 2 0 1"), "a.ply")), HasSubstr("2 corners"));
   EXPECT_THAT(message_of(parse_ply(with(kSquare, "element face 1\n", "element face 0\n"), "a.ply")),
               HasSubstr("no faces"));
@@ -123,13 +123,13 @@ TEST(MeshReaderTest, anUnusableObjIsRefusedByLine) {
   };
   EXPECT_THAT(message("v 0 0\nf 1 1 1\n"), HasSubstr("a.obj, line 1"));
   EXPECT_THAT(message("v 0 0 0\nf 1 1 2\n"), HasSubstr("a.obj, line 2"));
-  EXPECT_THAT(message("v 0 0 0\nf 1 1 0\n"), HasSubstr("not there"));
-  EXPECT_THAT(message("v 0 0 0\nf 1 1 -2\n"), HasSubstr("not there"));
+  EXPECT_THAT(message("v 0 0 0\nf 1 1 0\n"), HasSubstr("missing vertex"));
+  EXPECT_THAT(message("v 0 0 0\nf 1 1 -2\n"), HasSubstr("missing vertex"));
   EXPECT_THAT(message("v 0 0 0\nf 1 1\n"), HasSubstr("2 corners"));
   EXPECT_THAT(message("v 0 0 0\n"), HasSubstr("no faces"));
 }
 
-TEST(MeshReaderTest, aFileThatIsNotThereOrOfAnotherKindIsSaidSo) {
+TEST(MeshReaderTest, aMissingFileOrOneOfAnotherKindIsNamed) {
   EXPECT_EQ(read_ply("/nonexistent/a.ply").error().code, ErrorCode::not_found);
   EXPECT_EQ(read_obj("/nonexistent/a.obj").error().code, ErrorCode::not_found);
   EXPECT_EQ(read_mesh("/nonexistent/a.step").error().code, ErrorCode::invalid_input);

@@ -82,7 +82,7 @@ TEST_F(ModelFilesTest, aModelWithoutATextureHasNoObj) {
   EXPECT_EQ(names_in(room_ / "model"), (std::set<std::string>{"model.glb", "model.ply", "model.stl"}));
 }
 
-TEST_F(ModelFilesTest, whereNothingCanBeWrittenTheOldModelStays) {
+TEST_F(ModelFilesTest, theOldModelStaysWhenWritingFails) {
   std::ofstream(room_ / "file") << "not a folder";
   const auto files = write_model_files(tetrahedron(), "", room_ / "file" / "model");
   ASSERT_FALSE(files);
@@ -135,7 +135,7 @@ TEST_F(ModelFilesTest, theGlbOpensElsewhereInMetresWithItsTexture) {
   EXPECT_NEAR(image.image[at + 2], 0, 4);
 }
 
-TEST_F(ModelFilesTest, thePlyKeepsEveryVertexWithWhatWasMeasuredThere) {
+TEST_F(ModelFilesTest, thePlyKeepsEveryVertexWithItsMeasurements) {
   const TexturedMesh model = tetrahedron();
   const std::string bytes = encode_ply(model.mesh);
   EXPECT_THAT(bytes, HasSubstr("comment units mm"));
@@ -152,7 +152,7 @@ TEST_F(ModelFilesTest, thePlyKeepsEveryVertexWithWhatWasMeasuredThere) {
   EXPECT_LT(mesh->normals[0].x(), 0.0F) << "outwards";
 }
 
-TEST_F(ModelFilesTest, theObjReadsBackAndItsTextureBeginsAtTheBottom) {
+TEST_F(ModelFilesTest, theObjReadsBackAndItsTextureStartsAtTheBottom) {
   const TexturedMesh model = tetrahedron();
   const std::string text = encode_obj(model, "model.mtl");
   EXPECT_THAT(text, HasSubstr("mtllib model.mtl"));
@@ -165,7 +165,7 @@ TEST_F(ModelFilesTest, theObjReadsBackAndItsTextureBeginsAtTheBottom) {
   EXPECT_THAT(encode_mtl("model.png"), HasSubstr("map_Kd model.png"));
 }
 
-TEST_F(ModelFilesTest, theStlHasFiftyBytesAFaceAndSaysItsUnit) {
+TEST_F(ModelFilesTest, theStlHasFiftyBytesPerFaceAndNamesItsUnit) {
   const std::string bytes = encode_stl(tetrahedron().mesh);
   ASSERT_EQ(bytes.size(), 84u + 4u * 50u);
   EXPECT_FALSE(bytes.starts_with("solid"));

@@ -56,8 +56,8 @@ TEST(CompareViews, ASlippedObjectIsMeasuredUpToAPixel) {
   }
 }
 
-/// Stripes that rise to the right in the upper half and fall in the lower, moved by `shift` pixels to the right: no
-/// square shows more of it than what is across its own stripes.
+/// Stripes that rise to the right in the upper half and fall in the lower, moved by `shift` pixels to the right: each
+/// square shows only the shift across its own stripes.
 cv::Mat stripes(double shift, std::uint64_t noise) {
   cv::Mat1f image(1920, 240);  // so high that few squares see both
   cv::RNG(noise).fill(image, cv::RNG::NORMAL, 120, 1.5);
@@ -70,19 +70,19 @@ cv::Mat stripes(double shift, std::uint64_t noise) {
   return result;
 }
 
-TEST(CompareViews, AShiftThatNoSquareShowsAloneIsSeenInAllTogether) {
+TEST(CompareViews, AShiftThatNoSingleSquareShowsIsFoundInAllTogether) {
   const auto change = compare(stripes(0.0, 1), stripes(0.3, 2));
   EXPECT_NEAR(change.shift_px, 0.3, 0.02);
   EXPECT_FALSE(change.unmoved);
 }
 
-TEST(CompareViews, WhatMovedFartherHasMovedAtAnyRate) {
+TEST(CompareViews, ALargerMovementIsFoundToo) {
   for (const double shift : {1.5, 3.0, 6.0, 20.0, 60.0}) {
     EXPECT_FALSE(compare(scene(1), scene(1, {shift, 0}, 2)).unmoved) << shift;
   }
 }
 
-TEST(CompareViews, LightThatBecameDimmerIsNoMovement) {
+TEST(CompareViews, DimmerLightIsNoMovement) {
   const auto change = compare(scene(1), scene(1, {}, 2) * 0.9);
   EXPECT_TRUE(change.unmoved) << change.shift_px << " " << change.changed;
 }
@@ -109,7 +109,7 @@ TEST(CompareViews, ColourWorksToo) {
   EXPECT_FALSE(compare(before, after).unmoved);
 }
 
-TEST(CompareViews, ImagesThatDoNotBelongTogetherAreRefused) {
+TEST(CompareViews, ImagesOfDifferentSizeOrTypeAreRefused) {
   const cv::Mat small(10, 10, CV_8UC1, cv::Scalar(0)), deep(kSize, CV_16UC1, cv::Scalar(0));
   EXPECT_EQ(compare_views(scene(1), small).error().code, ErrorCode::invalid_input);
   EXPECT_EQ(compare_views(deep, deep).error().code, ErrorCode::invalid_input);

@@ -7,7 +7,7 @@ namespace {
 
 const double kLimit = CompareViewsOptions{}.max_shift_px;
 
-/// Cameras 500 mm from the axis, of which a pixel spans 0.25 mm there, over a table of 180 mm.
+/// Cameras 500 mm from the axis, where a pixel spans 0.25 mm, over a table of 180 mm.
 class TurnedTable : public testing::Test {
  protected:
   TurnedTable() {
@@ -19,14 +19,14 @@ class TurnedTable : public testing::Test {
   Calibration rig;
 };
 
-TEST_F(TurnedTable, ThatStandsWhereItStoodIsAllowedNothing) {
+TEST_F(TurnedTable, AtTheSameAngleAddsNothing) {
   EXPECT_DOUBLE_EQ(allowed(0.0), kLimit);
-  EXPECT_NEAR(allowed(360.0), kLimit, 1e-9) << "turns may be counted";
+  EXPECT_NEAR(allowed(360.0), kLimit, 1e-9) << "whole turns do not count";
   EXPECT_NEAR(allowed(-720.0), kLimit, 1e-9);
 }
 
-/// The rim of an object of 60 mm goes where the projection says that it goes.
-TEST_F(TurnedTable, MovesTheRimOfTheLargestObjectByWhatIsAllowed) {
+/// The rim of an object of 60 mm moves to its projected place.
+TEST_F(TurnedTable, MovesTheRimOfTheLargestObjectByTheAddedLimit) {
   const double turned = 0.02 * 3.14159265358979 / 180.0;
   const Eigen::Vector3d rim(60, 0, 0), after = Eigen::AngleAxisd(turned, Eigen::Vector3d::UnitY()) * rim;
   const double moved_px = (after - rim).norm() / rig.left.projection.mm_per_pixel(500);
@@ -34,13 +34,13 @@ TEST_F(TurnedTable, MovesTheRimOfTheLargestObjectByWhatIsAllowed) {
   EXPECT_NEAR(moved_px, 0.0838, 1e-4);
 }
 
-TEST_F(TurnedTable, EitherWayAndOverTheTurnItIsTheSame) {
+TEST_F(TurnedTable, AddsTheSameInBothDirectionsAndAcrossTheTurn) {
   EXPECT_DOUBLE_EQ(allowed(-0.02), allowed(0.02));
   EXPECT_NEAR(allowed(359.98), allowed(0.02), 1e-9);
   EXPECT_NEAR(allowed(0.04) - kLimit, 2 * (allowed(0.02) - kLimit), 1e-9);
 }
 
-TEST_F(TurnedTable, OfAnotherSizeOrSeenFromElsewhereAllowsAccordingly) {
+TEST_F(TurnedTable, AddsInProportionToSizeAndDistance) {
   const double usual = allowed(0.02) - kLimit;
   rig.table_radius_mm = 180;
   EXPECT_NEAR(allowed(0.02) - kLimit, 2 * usual, 1e-9) << "larger objects";

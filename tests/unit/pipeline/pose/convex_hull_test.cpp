@@ -31,7 +31,7 @@ TEST(SolidProperties, CentreOfMassIsThatOfTheSolidNotOfItsVertices) {
   EXPECT_LT((properties->centre_of_mass - Eigen::Vector3d(5, 10, 20)).norm(), 1e-3);
 }
 
-TEST(SolidProperties, SaysSoWhenTheMeshIsNotClosed) {
+TEST(SolidProperties, ReportsAMeshThatIsNotClosed) {
   Mesh box = testing::box_mesh({0, 0, 0}, {10, 20, 40});
   box.faces.pop_back();
   const auto properties = solid_properties(box);
@@ -39,7 +39,7 @@ TEST(SolidProperties, SaysSoWhenTheMeshIsNotClosed) {
   EXPECT_EQ(properties.error().code, ErrorCode::not_closed);
 }
 
-TEST(SolidProperties, SaysSoWhenTheMeshIsInsideOut) {
+TEST(SolidProperties, ReportsAMeshInsideOut) {
   Mesh box = testing::box_mesh({0, 0, 0}, {10, 20, 40});
   for (auto& face : box.faces) std::swap(face[0], face[1]);
   const auto properties = solid_properties(box);
@@ -63,7 +63,7 @@ TEST(ConvexHull, OfManyPointsInABallIsTheBall) {
   EXPECT_LE(hull->vertices.size(), 6667u);
 }
 
-TEST(ConvexHull, SaysSoWhenThePointsAreFlat) {
+TEST(ConvexHull, ReportsFlatPoints) {
   std::vector<Eigen::Vector3f> points;
   for (int k = 0; k < 100; ++k) points.emplace_back(k % 10, 0, k / 10);
   const auto hull = convex_hull(points);

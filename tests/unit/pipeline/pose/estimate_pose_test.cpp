@@ -62,11 +62,11 @@ void expect_found(const Result<PoseEstimate>& estimate, const Scan& s) {
   EXPECT_LT((t * middle - s.pose1_from_pose2 * middle).norm(), 0.1);
 }
 
-/// `says`: part of the message.
-void expect_error(const Result<PoseEstimate>& estimate, ErrorCode code, const std::string& says = "") {
+/// `part`: part of the message.
+void expect_error(const Result<PoseEstimate>& estimate, ErrorCode code, const std::string& part = "") {
   ASSERT_FALSE(estimate) << "found by " << estimate->best.generator;
   EXPECT_EQ(estimate.error().code, code) << estimate.error().message;
-  EXPECT_NE(estimate.error().message.find(says), std::string::npos) << estimate.error().message;
+  EXPECT_NE(estimate.error().message.find(part), std::string::npos) << estimate.error().message;
 }
 
 TEST(EstimatePose, FindsAnObjectLaidOnItsSideByTheFacetsOfItsHull) {
@@ -113,15 +113,15 @@ TEST(EstimatePose, FindsAnObjectHeldByPuttyInNoRestAtAll) {
   expect_found(s.estimate(), s);
 }
 
-TEST(EstimatePose, SeesThatTheObjectWasNotTurnedOver) {
+TEST(EstimatePose, DetectsThatTheObjectWasNotTurnedOver) {
   const Scan s = scan(testing::workpiece(), turn(65, Eigen::Vector3d::UnitY()));
   expect_error(s.estimate(), ErrorCode::same_rest, "not turned over");
 }
 
-TEST(EstimatePose, WillNotGuessHowAPlainBoxWasTurned) {
+TEST(EstimatePose, DoesNotGuessTheTurnOfAPlainBox) {
   const Scan s = scan(testing::block({-30, 0, -20}, {30, 30, 20}),
                       turn(25, Eigen::Vector3d::UnitY()) * turn(90, Eigen::Vector3d::UnitX()));
-  expect_error(s.estimate(), ErrorCode::ambiguous, "; ");  // the other answers are listed
+  expect_error(s.estimate(), ErrorCode::ambiguous, "; ");  // the other solutions are listed
 }
 
 TEST(EstimatePose, DecidesByASmallFeatureWhereTheRestIsSymmetric) {
@@ -150,7 +150,7 @@ TEST(EstimatePose, RefusesAPoseWithoutMeasurements) {
   expect_error(s.estimate(), ErrorCode::degenerate);
 }
 
-TEST(EstimatePose, StopsWhenAsked) {
+TEST(EstimatePose, StopsOnRequest) {
   std::stop_source source;
   source.request_stop();
   expect_error(workpiece_on_its_side().estimate({}, {source.get_token(), {}}), ErrorCode::stopped);

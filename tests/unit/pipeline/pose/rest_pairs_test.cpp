@@ -9,7 +9,7 @@
 namespace scanrig {
 namespace {
 
-/// What two perfect models of one object say of their contacts, the truth being `pose1_from_pose2`.
+/// Contacts of two perfect models of one object, the truth being `pose1_from_pose2`.
 struct Contacts {
   RestPair pair;
   SolidProperties solid1, solid2;

@@ -71,7 +71,7 @@ TEST(RestsOnHull, KeepsTheRestsOfAWorkPieceThatItsFacesShow) {
   }
 }
 
-TEST(RestsOnSphere, CountsWhatEachTestOfThePaperLeaves) {
+TEST(RestsOnSphere, CountsThePlanesLeftByEachTestOfThePaper) {
   const Mesh solid = testing::mesh_of(testing::workpiece(), {-34, -3, -24}, {35, 66, 36}, 2.0);
   const auto properties = solid_properties(solid);
   ASSERT_TRUE(properties) << properties.error().message;

@@ -10,12 +10,12 @@
 
 namespace scanrig::test {
 
-/// Over the true pixels in `region` and whatever was measured where nothing is.
+/// Errors over the true pixels in `region`, and over pixels measured outside the surface.
 struct RangeError {
   double median = 0.0, p95 = 0.0, bias = 0.0;  ///< mm of depth
-  double gross = 0.0;                          ///< share of measured pixels more than 0.25 mm off, or where nothing is
-  double coverage = 0.0;                       ///< share of true pixels measured
-  double sigma_ratio = 0.0;                    ///< median |error / sigma| over that of a normal distribution
+  double gross = 0.0;        ///< share of measured pixels more than 0.25 mm off, or outside the surface
+  double coverage = 0.0;     ///< share of true pixels measured
+  double sigma_ratio = 0.0;  ///< median |error / sigma| over that of a normal distribution
 };
 
 inline RangeError compare(const RangeImage& range, const cv::Mat1f& truth, const cv::Mat1b& region) {

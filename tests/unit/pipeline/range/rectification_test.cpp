@@ -43,7 +43,7 @@ TEST(Rectification, KeepsDisparitiesSmallAlthoughTheCamerasAreToedIn) {
   EXPECT_GT(std::abs(r->left.cx - r->right.cx), 900.0);
 }
 
-TEST(Rectification, ShowsAtEachPixelWhatTheSensorSawThere) {
+TEST(Rectification, ShowsAtEachPixelTheSensorsValueThere) {
   const Calibration calibration = distorted_rig();
   const auto r = rectify(calibration);
   ASSERT_TRUE(r) << r.error().message;
@@ -67,7 +67,7 @@ TEST(Rectification, ShowsAtEachPixelWhatTheSensorSawThere) {
   }
 }
 
-TEST(Rectification, RefusesACalibrationThatIsNone) {
+TEST(Rectification, RefusesAnInvalidCalibration) {
   Calibration one_place = test::default_rig({320, 240});
   one_place.right = one_place.left;
   Calibration sizes = test::default_rig({320, 240});
@@ -84,7 +84,7 @@ TEST(Rectification, RefusesACalibrationThatIsNone) {
   }
 }
 
-TEST(Rectification, SaysWhenTheCamerasDoNotSeeTheTable) {
+TEST(Rectification, ReportsCamerasThatDoNotSeeTheTable) {
   Calibration calibration = test::default_rig({320, 240});
   calibration.left.camera_from_turntable.translation().y() += 400.0;
   calibration.right.camera_from_turntable.translation().y() += 400.0;
@@ -93,7 +93,7 @@ TEST(Rectification, SaysWhenTheCamerasDoNotSeeTheTable) {
   EXPECT_EQ(r.error().code, ErrorCode::out_of_range) << r.error().message;
 }
 
-TEST(Rectification, RefusesImagesThatAreNotTheCalibrations) {
+TEST(Rectification, RefusesImagesThatDoNotFitTheCalibration) {
   const auto r = rectify(test::default_rig({320, 240}));
   ASSERT_TRUE(r);
   for (const cv::Mat& image : {cv::Mat(240, 300, CV_8UC1), cv::Mat(240, 320, CV_16UC1), cv::Mat()}) {

@@ -92,7 +92,7 @@ TEST(Stereo, MeasuresASurfaceThatTurnsAwayBySixtyDegrees) {
   EXPECT_GT(c.coverage, 0.95);
 }
 
-TEST(Stereo, SigmaTellsTheSizeOfTheErrors) {
+TEST(Stereo, SigmaEqualsTheSizeOfTheErrors) {
   const Scene scene(test::disc(kMiddle, Eigen::Vector3d(0.3, 0.2, 1.0).normalized(), 22));
   const auto range = scene.match();
   ASSERT_TRUE(range) << range.error().message;
@@ -148,7 +148,7 @@ TEST(Stereo, GivesTheSameBitsForAnyNumberOfThreads) {
   }
 }
 
-TEST(Stereo, SaysWhenNothingMatches) {
+TEST(Stereo, ReportsImagesWithoutMatches) {
   const Scene scene(test::ball(kMiddle, 10), {280, 240});
   const cv::Mat3b dark(scene.left.size(), cv::Vec3b(3, 3, 3));
   const auto blank = match_stereo(scene.rectification, dark, dark, scene.object, {}, {}, {});
@@ -160,7 +160,7 @@ TEST(Stereo, SaysWhenNothingMatches) {
   EXPECT_EQ(hidden.error().code, ErrorCode::degenerate);
 }
 
-TEST(Stereo, StopsWhenAsked) {
+TEST(Stereo, StopsOnRequest) {
   const Scene scene(test::ball(kMiddle, 10), {280, 240});
   std::stop_source stop;
   const auto at_half = [&](std::string_view, double fraction) {
@@ -171,7 +171,7 @@ TEST(Stereo, StopsWhenAsked) {
   EXPECT_EQ(range.error().code, ErrorCode::stopped);
 }
 
-TEST(Stereo, RefusesWhatDoesNotBelongTogether) {
+TEST(Stereo, RefusesInconsistentInputs) {
   const Scene scene(test::ball(kMiddle, 10), {280, 240});
   const cv::Mat1f image(240, 280, 50.0f);
   const RectifiedPair good{image, image, {}, {}, scene.rectification.left, 0.0, 160.0, -20, 20};
@@ -194,7 +194,7 @@ TEST(Stereo, MeasuresTheSheetOfARealDotPair) {
   const char* shared = std::getenv("SCANRIG_SHARED_DATA");
   const std::filesystem::path folder =
       std::filesystem::path(shared != nullptr ? shared : SCANRIG_SOURCE_DIR "/../shared/data") / "d415_ir_pair";
-  if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not here";
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is missing";
   const auto result = bench::measure_d415(folder);
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_LT(result->ours.rms_px, 0.20);

@@ -20,7 +20,7 @@ double hashed(std::int64_t x, std::int64_t y, std::uint64_t salt) {
   return static_cast<double>((h ^ (h >> 31)) >> 11) / 9007199254740992.0;
 }
 
-/// Gaussian dots, one a cell of 0.5 mm (at 640 mm), anywhere in it; 0..1.
+/// Gaussian dots, one per cell of 0.5 mm (at 640 mm), anywhere in it; 0..1.
 double dots(double x, double y) {
   constexpr double kCell = 0.5, kSigma = 0.17;
   const std::int64_t i = std::int64_t(std::floor(x / kCell)), j = std::int64_t(std::floor(y / kCell));

@@ -9,7 +9,7 @@
 
 namespace scanrig::test {
 
-/// Where a ray from `origin` (turntable frame, mm) along unit `direction` meets the object: the distance, or nothing.
+/// Distance from `origin` (turntable frame, mm) along unit `direction` to the object, or nothing.
 using Surface = std::function<std::optional<double>(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction)>;
 
 Surface ball(const Eigen::Vector3d& centre, double radius);
@@ -29,7 +29,7 @@ struct Look {
   unsigned seed = 1;
 };
 
-/// What the camera sees, BGR, 8 bit: every pixel the mean of 2x2 rays.
+/// The camera's image, BGR, 8 bit: every pixel the mean of 2x2 rays.
 cv::Mat3b render(const Camera& camera, const Surface& surface, const Look& look);
 
 /// z of the surface in a frame at the pixels of a projection; NaN where there is none.

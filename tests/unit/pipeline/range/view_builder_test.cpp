@@ -33,7 +33,7 @@ struct Rig {
   }
 };
 
-TEST(ViewBuilder, PutsTheSurfaceWhereItIsInTheTurnedBackPose) {
+TEST(ViewBuilder, PutsTheSurfaceAtItsPlaceInTheTurnedBackPose) {
   const Rig rig;
   const double angle = 0.7;
   const auto view = make_view(rig.rectification, rig.shoot(test::ball(kBall, kRadius)), angle, 3, {}, {});
@@ -90,7 +90,7 @@ TEST(ViewBuilder, DrawsBothSilhouettesAndTheBackground) {
   }
 }
 
-TEST(ViewBuilder, TellsGreyObjectsFromTheTableByHeight) {
+TEST(ViewBuilder, SeparatesGreyObjectsFromTheTableByHeight) {
   const Rig rig;
   const Surface scene = test::nearest_of(test::ball({0, 22, 0}, 10), test::disc({0, 0, 0}, {0, 1, 0}, 60));
   StereoImages images = rig.shoot(scene);
@@ -115,17 +115,17 @@ ErrorCode failure(const Rig& rig, const StereoImages& images, const Context& con
   return view ? ErrorCode::internal : view.error().code;
 }
 
-TEST(ViewBuilder, SaysWhenTheObjectIsLargerThanTheWorkingVolume) {
+TEST(ViewBuilder, ReportsAnObjectLargerThanTheWorkingVolume) {
   const Rig rig;
   EXPECT_EQ(failure(rig, rig.shoot(test::ball({0, 45, 0}, 23))), ErrorCode::out_of_range);
 }
 
-TEST(ViewBuilder, SaysWhenThereIsNothing) {
+TEST(ViewBuilder, ReportsAnEmptyTable) {
   const Rig rig;
   EXPECT_EQ(failure(rig, rig.shoot(test::ball({0, -500, 0}, 1))), ErrorCode::degenerate);
 }
 
-TEST(ViewBuilder, RefusesImagesOfAnotherSizeAndStopsWhenAsked) {
+TEST(ViewBuilder, RefusesImagesOfAnotherSizeAndStopsOnRequest) {
   const Rig rig;
   StereoImages images = rig.shoot(test::ball(kBall, kRadius));
   std::stop_source stop;

@@ -7,7 +7,7 @@
 namespace scanrig {
 namespace {
 
-TEST(Report, SaysWhichScanItIsOfAndUnderWhichConfigurationsItWasTaken) {
+TEST(Report, NamesItsScanAndTheConfigurationsOfItsViews) {
   Manifest manifest;
   manifest.id = "20261121-093000-1";
   manifest.profile = "p";

@@ -11,7 +11,7 @@
 #include "pipeline/mesh/mesh.h"
 #include "pipeline/range/range_image.h"
 
-/// Solids given by their signed distance (mm, negative inside) and what a turntable camera sees of them.
+/// Solids given by their signed distance (mm, negative inside) and their views from a turntable camera.
 namespace scanrig::testing {
 
 using Solid = std::function<double(const Eigen::Vector3d&)>;
@@ -57,10 +57,10 @@ inline Eigen::Vector3d outward_normal(const Solid& solid, const Eigen::Vector3d&
 
 struct RigModel {
   int width = 448, height = 336;
-  double focal_px = 1600.0;  ///< 0.4 mm a pixel on the object
+  double focal_px = 1600.0;  ///< 0.4 mm per pixel on the object
   double distance_mm = 640.0, elevation_deg = 22.0, aim_height_mm = 40.0;
   double noise_mm = 0.0;
-  double sigma_mm = 0.01;  ///< what the range image claims
+  double sigma_mm = 0.01;  ///< claimed by the range image
 };
 
 inline Transform camera_from_turntable(const RigModel& rig) {
@@ -73,7 +73,7 @@ inline Transform camera_from_turntable(const RigModel& rig) {
   return t;
 }
 
-/// What the camera sees of `solid` (pose frame) from `camera_from_pose`, by sphere tracing.
+/// The view of `solid` (pose frame) from `camera_from_pose`, by sphere tracing.
 inline RangeImage see(const Solid& solid, const Transform& camera_from_pose, const RigModel& rig, unsigned seed) {
   constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
   RangeImage image;
@@ -133,7 +133,7 @@ inline std::vector<View> turn_around(const Solid& solid, int count, const RigMod
   return views;
 }
 
-/// A block with a tower, a ball and a foot: no symmetry, flat sides to rest on, standing on y = 0.
+/// A block with a tower, a ball and a foot: no symmetry, flat sides to rest on, lowest point at y = 0.
 inline Solid workpiece() {
   return together({block({-30, 0, -20}, {30, 22, 20}), block({-30, 10, -20}, {-8, 62, 6}), ball({17, 24, 4}, 14),
                    block({5, 0, 15}, {30, 12, 32})});

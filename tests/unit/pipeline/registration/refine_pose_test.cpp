@@ -64,7 +64,7 @@ TEST(RefinePose, ReachesAHundredthFromEightDegreesAndFiveMillimetres) {
   }
 }
 
-TEST(RefinePose, SaysHowWellTheMotionIsKnown) {
+TEST(RefinePose, ReportsTheCertaintyOfTheMotion) {
   const auto cylinder = testing::upright_cylinder({0, 0, 0}, 20, 60);
   const auto views = testing::turn_around(cylinder, 8, {.width = 240, .height = 180, .focal_px = 850});
   const auto turned = refine_pose(views, views, rot_y(0.05), {}, Context{});
@@ -83,14 +83,14 @@ TEST(RefinePose, GivesTheSameBitsOnAnyNumberOfThreads) {
   EXPECT_EQ(0, std::memcmp(one->pose1_from_pose2.data(), many->pose1_from_pose2.data(), 16 * sizeof(double)));
 }
 
-TEST(RefinePose, SaysSoWhenAPoseIsEmpty) {
+TEST(RefinePose, ReportsAnEmptyPose) {
   const TwoPoses& scan = two_poses();
   const auto refined = refine_pose(scan.first, {}, Transform::Identity(), {}, Context{});
   ASSERT_FALSE(refined);
   EXPECT_EQ(refined.error().code, ErrorCode::degenerate);
 }
 
-TEST(RefinePose, SaysSoWhenTheSurfacesDoNotMeet) {
+TEST(RefinePose, ReportsSurfacesThatDoNotMeet) {
   const TwoPoses& scan = two_poses();
   const Transform far = Eigen::Translation3d(0, 400, 0) * scan.pose1_from_pose2;
   const auto refined = refine_pose(scan.first, scan.second, far, {}, Context{});
@@ -98,7 +98,7 @@ TEST(RefinePose, SaysSoWhenTheSurfacesDoNotMeet) {
   EXPECT_EQ(refined.error().code, ErrorCode::no_overlap);
 }
 
-TEST(RefinePose, StopsWhenAsked) {
+TEST(RefinePose, StopsOnRequest) {
   const TwoPoses& scan = two_poses();
   std::stop_source source;
   source.request_stop();

@@ -39,7 +39,7 @@ void disturb(std::vector<View>& views, double angle_deg, double shift_mm) {
   }
 }
 
-/// A scanner whose surface grows by up to `mm` where it looks along it.
+/// A scanner whose surface grows by up to `mm` at grazing incidence.
 void swell_at_grazing_incidence(std::vector<View>& views, double mm) {
   for (View& view : views) {
     RangeImage& r = view.range;
@@ -54,7 +54,7 @@ void swell_at_grazing_incidence(std::vector<View>& views, double mm) {
   }
 }
 
-/// Largest distance between where two calibrations see the object's corners, after the common motion is taken out.
+/// Largest distance between the object's corners under two calibrations, after the common motion is taken out.
 double inconsistency_mm(const std::vector<View>& views, const std::vector<View>& truth) {
   double worst = 0.0;
   const Transform common = views[0].range.camera_from_pose.inverse() * truth[0].range.camera_from_pose;
@@ -138,7 +138,7 @@ TEST(RegisterViews, DoesNotMoveAllViewsOutwardsForAScannerThatIsWrongAtGrazingIn
   EXPECT_NEAR(outwards, 0.0, 0.03);
 }
 
-TEST(RegisterViews, HoldsTheAnglesOfABodyOfRevolutionAndSaysSo) {
+TEST(RegisterViews, HoldsTheAnglesOfABodyOfRevolutionAndReportsIt) {
   RigModel rig;
   rig.noise_mm = 0.01;
   const auto vase = testing::together({testing::upright_cylinder({0, 0, 0}, 25, 50), testing::ball({0, 55, 0}, 20)});
@@ -192,14 +192,14 @@ TEST(RegisterViews, RefusesMapsOfDifferentSizes) {
   EXPECT_EQ(report.error().code, ErrorCode::invalid_input);
 }
 
-TEST(RegisterViews, SaysSoWhenNothingWasMeasured) {
+TEST(RegisterViews, ReportsViewsWithoutMeasurements) {
   auto views = testing::turn_around(testing::ball({0, -500, 0}, 1), 8, RigModel{});
   const auto report = register_views(views, {}, no_context());
   ASSERT_FALSE(report);
   EXPECT_EQ(report.error().code, ErrorCode::degenerate);
 }
 
-TEST(RegisterViews, SaysSoWhenTheViewsShareNothing) {
+TEST(RegisterViews, ReportsViewsWithoutSharedSurface) {
   auto views = testing::turn_around(testing::workpiece(), 2, RigModel{});
   views[1].range.camera_from_pose = views[1].range.camera_from_pose * Eigen::Translation3d(0, 300, 0);
   const auto report = register_views(views, {}, no_context());
@@ -207,7 +207,7 @@ TEST(RegisterViews, SaysSoWhenTheViewsShareNothing) {
   EXPECT_EQ(report.error().code, ErrorCode::no_overlap);
 }
 
-TEST(RegisterViews, StopsWhenAsked) {
+TEST(RegisterViews, StopsOnRequest) {
   auto views = clean_views();
   std::stop_source source;
   source.request_stop();

@@ -126,20 +126,20 @@ TEST(BlueScreen, KeepsHighlightsAndDarkSpots) {
   EXPECT_LT((*outside)(110, 130), -20.0f);
 }
 
-TEST(BlueScreen, SaysWhenThereIsNoObject) {
+TEST(BlueScreen, ReportsAMissingObject) {
   const auto outside = blue_screen_outline(Scene().image());
   ASSERT_FALSE(outside);
   EXPECT_EQ(outside.error().code, ErrorCode::degenerate);
 }
 
-TEST(BlueScreen, SaysWhenTheScreenIsNotBlue) {
+TEST(BlueScreen, ReportsAScreenThatIsNotBlue) {
   const auto outside = blue_screen_outline(cv::Mat3b(kHeight, kWidth, cv::Vec3b(80, 80, 80)));
   ASSERT_FALSE(outside);
   EXPECT_EQ(outside.error().code, ErrorCode::degenerate);
   EXPECT_NE(outside.error().message.find("blue"), std::string::npos);
 }
 
-TEST(BlueScreen, SaysWhenTheObjectReachesTheBorder) {
+TEST(BlueScreen, ReportsAnObjectAtTheBorder) {
   const auto outside = blue_screen_outline(Scene().paint(disc(120, 30, 50), kGrey).image());
   ASSERT_FALSE(outside);
   EXPECT_EQ(outside.error().code, ErrorCode::out_of_range);

@@ -14,8 +14,8 @@ struct Ball {
   double radius;
 };
 
-/// Painted balls on the turntable under lamps that do not turn with it, photographed by formulae of its own: ray
-/// against sphere, OpenCV's undistortion. Nothing of it is shared with the code under test.
+/// Painted balls on the turntable under fixed lamps, photographed by own formulae: ray against sphere, OpenCV's
+/// undistortion. No code is shared with the code under test.
 class PaintedScene {
  public:
   std::vector<Ball> balls;
@@ -26,7 +26,7 @@ class PaintedScene {
 
   /// Triangles of about `edge` mm, vertices on the balls, no normals.
   [[nodiscard]] Mesh mesh(double edge) const;
-  /// As `camera` takes it with the table at each angle; 3 x 3 rays a pixel.
+  /// The photo of `camera` with the table at each angle; 3 x 3 rays per pixel.
   [[nodiscard]] std::vector<Photo> photos(const Camera& camera, const std::vector<double>& angles_rad) const;
   [[nodiscard]] Photo photo(const Camera& camera, double angle_rad) const;
 

@@ -29,7 +29,7 @@ TexturedMesh square(const cv::Mat3b& atlas) {
   return model;
 }
 
-TEST(RenderTest, aTexelIsSeenExactlyWhereItsPlaceOnTheSurfaceIs) {
+TEST(RenderTest, aTexelIsSeenExactlyAtItsPlaceOnTheSurface) {
   cv::Mat3b atlas(40, 40, cv::Vec3b(0, 0, 0));
   atlas(10, 30) = {255, 255, 255};  // its centre is 30.5 mm from the left and 10.5 mm from the top
   const Camera camera = rig_camera(0.2, 0.4, 1.0);
@@ -63,7 +63,7 @@ TEST(RenderTest, depthIsTheDistanceAlongTheCamerasAxis) {
   EXPECT_EQ(image->mask(2, 2), 0);
 }
 
-TEST(RenderTest, vertexColoursAreDrawnAndTheBackgroundIsAsAsked) {
+TEST(RenderTest, vertexColoursAreDrawnWithTheRequestedBackground) {
   const auto renderer = MeshRenderer::create(square(cv::Mat3b(4, 4)));
   const auto image = renderer->render(rig_camera(0.0, 0.3, 0.25), Transform::Identity(),
                                       {.surface = Paint::vertex_colour, .background = {7, 8, 9}});
@@ -72,7 +72,7 @@ TEST(RenderTest, vertexColoursAreDrawnAndTheBackgroundIsAsAsked) {
   EXPECT_EQ(image->image(0, 0), cv::Vec3b(7, 8, 9));
 }
 
-TEST(RenderTest, whatCannotBeDrawnIsSaid) {
+TEST(RenderTest, anUndrawableMeshIsNamed) {
   EXPECT_EQ(MeshRenderer::create({}).error().code, ErrorCode::degenerate);
   TexturedMesh bare = square(cv::Mat3b(4, 4));
   bare.atlas.release();
@@ -114,7 +114,7 @@ TEST(CompareTest, aKnownShiftIsFoundAndEqualImagesDoNotDiffer) {
   EXPECT_GT(compared->patches, 20);
 }
 
-TEST(CompareTest, whatCannotBeComparedIsSaid) {
+TEST(CompareTest, incomparableImagesAreNamed) {
   const cv::Mat3b image = noise_image(3);
   const cv::Mat3b other(10, 10);
   EXPECT_EQ(compare_images(image, other, cv::Mat1b(10, 10)).error().code, ErrorCode::invalid_input);

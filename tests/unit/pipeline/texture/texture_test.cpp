@@ -88,20 +88,20 @@ TEST(TextureTest, aModelLooksTheSameFromACameraThatTookNoPhoto) {
 TEST(TextureTest, theLampsAreTakenOutOfThePaint) {
   const auto model = texture_mesh(white_ball().mesh(1.5), white_photos(), small_atlas(), {});
   ASSERT_TRUE(model);
-  // Around a parallel: what depends on height alone cannot be told from paint while the ball only turns.
+  // Around a parallel: light that depends on height alone cannot be separated from paint while the ball only turns.
   const auto parallel = greens(*model, {3, 45, -2}, {0, 1, 0}, 0.15F, 0.2F);
   const auto [least, most] = std::minmax_element(parallel.begin(), parallel.end());
   EXPECT_LE(*most - *least, 4.0) << "between photos the light on it changes by a factor of 2";
 }
 
-TEST(TextureTest, theBrightestPaintBecomesASaneWhite) {
+TEST(TextureTest, theBrightestPaintBecomesASuitableWhite) {
   const auto model = texture_mesh(white_ball().mesh(1.5), white_photos(), small_atlas(), {});
   ASSERT_TRUE(model);
   const auto all = greens(*model, {3, 45, -2}, {0, 1, 0}, -1.0F, 1.0F);
   EXPECT_NEAR(*std::max_element(all.begin(), all.end()), 231.0, 4.0) << "sRGB of 0.8";
 }
 
-TEST(TextureTest, whatNoPhotoSeesIsFilledFromAroundIt) {
+TEST(TextureTest, unseenSurfaceIsFilledFromAroundIt) {
   const std::vector<Photo> one(white_photos().begin(), white_photos().begin() + 1);
   const auto model = texture_mesh(white_ball().mesh(1.5), one, small_atlas(), {});
   ASSERT_TRUE(model);
@@ -114,7 +114,7 @@ TEST(TextureTest, whatNoPhotoSeesIsFilledFromAroundIt) {
   EXPECT_LE(*std::max_element(behind.begin(), behind.end()), *brightest + 1.0);
 }
 
-TEST(TextureTest, paintOfAThingInFrontDoesNotLandOnTheThingBehind) {
+TEST(TextureTest, paintOfAFrontObjectDoesNotLandOnTheOneBehind) {
   PaintedScene scene;
   scene.balls = {{{0.0, 45.0, -15.0}, 25.0}, {{4.0, 45.0, 30.0}, 8.0}};
   scene.paint = [](std::size_t ball, const Eigen::Vector3d&) {
@@ -180,7 +180,7 @@ TEST(TextureTest, geometryStaysAsItWas) {
   EXPECT_EQ(model->mesh.mesh.faces, mesh.faces);
 }
 
-TEST(TextureTest, whatCannotBeTexturedIsSaid) {
+TEST(TextureTest, unsuitableInputIsNamed) {
   const Mesh mesh = striped_ball().mesh(5.0);
   const auto& photos = striped_photos();
   const auto code = [](const Result<TexturedModel>& model) {

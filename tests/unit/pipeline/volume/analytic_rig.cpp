@@ -39,13 +39,13 @@ Projection projection_of(const Rig& rig) {
 }
 
 bool sees(const Cast& cast, const Eigen::Vector3d& eye, const Hit& hit, const Eigen::Vector3d& point,
-          double steepest_deg) {
+          double max_incidence_deg) {
   const Eigen::Vector3d to_eye = (eye - point).normalized();
-  if (hit.normal.dot(to_eye) < std::cos(to_radians(steepest_deg))) return false;
+  if (hit.normal.dot(to_eye) < std::cos(to_radians(max_incidence_deg))) return false;
   return !cast(point + 0.02 * hit.normal, to_eye).has_value();
 }
 
-/// One ray a pixel, nine where a neighbour says otherwise.
+/// One ray per pixel, nine where a neighbour differs.
 Silhouette take_silhouette(const Rig& rig, const Cast& cast, const Transform& camera_from_pose) {
   constexpr int kFiner = 3;  // sub-pixels a side
   Silhouette result{projection_of(rig), camera_from_pose, {}};
@@ -120,9 +120,9 @@ RangeImage take_range(const Rig& rig, const Cast& cast, const Transform& pose_fr
         continue;
       }
       const Eigen::Vector3d point = pose_from_camera.translation() + hit->distance * ray;
-      if (hit->normal.dot(-ray) < std::cos(to_radians(rig.steepest_deg))) continue;
-      if (rig.stereo &&
-          !(sees(cast, right, *hit, point, rig.steepest_deg) && sees(cast, projector, *hit, point, rig.steepest_deg))) {
+      if (hit->normal.dot(-ray) < std::cos(to_radians(rig.max_incidence_deg))) continue;
+      if (rig.stereo && !(sees(cast, right, *hit, point, rig.max_incidence_deg) &&
+                          sees(cast, projector, *hit, point, rig.max_incidence_deg))) {
         continue;
       }
       set_pixel(range, x, y, point, hit->normal, std::max(rig.noise_mm, 0.01));

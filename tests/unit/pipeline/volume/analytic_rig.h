@@ -25,7 +25,7 @@ Solid carve(Solid from, Solid what);
 /// The solid moved: `to_from` takes the old place to the new one.
 Solid moved(Solid solid, const Transform& to_from);
 
-/// A turntable rig as in the project's default, on fewer pixels; images are exact up to the noise asked for.
+/// A turntable rig as in the project's default, on fewer pixels; images are exact except for the requested noise.
 struct Rig {
   int width = 300, height = 225;
   double mm_per_pixel = 0.4;
@@ -34,8 +34,8 @@ struct Rig {
   double noise_mm = 0.0;    ///< of depth, one sigma, independent per pixel
   double dropouts = 0.0;    ///< share of measured pixels lost at random
   bool silhouettes = true;  ///< left and right, and the background in the range images
-  bool stereo = true;       ///< only what the right camera and the projector see too is measured
-  double steepest_deg = 70.0;
+  bool stereo = true;       ///< only surface that right camera and projector see too is measured
+  double max_incidence_deg = 70.0;
   unsigned seed = 1;
 };
 
@@ -47,18 +47,18 @@ struct Hit {
 using Cast = std::function<std::optional<Hit>(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction)>;
 Cast cast_into(Solid solid);
 
-/// Views of a solid standing in the pose's turntable frame at angle 0.
+/// Views of a solid in the pose's turntable frame at angle 0.
 std::vector<View> take_views(const Rig& rig, const Cast& cast);
 
-/// An orthographic range image along `direction`, nothing known about the background.
+/// An orthographic range image along `direction`, without background.
 View take_orthographic(const Cast& cast, const Eigen::Vector3d& direction, const Eigen::Vector3d& centre,
                        double half_size_mm, double mm_per_pixel);
 
-/// How far a mesh is from the solid it should be, over its measured vertices (views >= 1).
+/// Distances of a mesh to the true solid, over its measured vertices (views >= 1).
 struct Accuracy {
   double median = 0.0, p95 = 0.0, greatest = 0.0;  ///< mm
   double measured_share = 0.0;                     ///< of the vertices
-  double greatest_closed = 0.0;                    ///< over the vertices nobody measured, mm
+  double greatest_closed = 0.0;                    ///< over the unmeasured vertices, mm
 };
 Accuracy accuracy(const Mesh& mesh, const Solid& solid);
 

@@ -28,7 +28,7 @@ CombinedDistance combined(const PoseDistance& a, const PoseDistance& b) {
   const CombinedDistance result = combine(a, b, kThreshold);
   const CombinedDistance mirrored = combine(b, a, kThreshold);
   EXPECT_FLOAT_EQ(result.distance, mirrored.distance);
-  EXPECT_EQ(result.alarm, mirrored.alarm);
+  EXPECT_EQ(result.conflict, mirrored.conflict);
   return result;
 }
 
@@ -88,14 +88,14 @@ TEST(ClassTable, OverlapWithInsideIsTheOverlap) {
 TEST(ClassTable, OverlapInFrontOfItsSurfaceWithOutsideIsNoConflict) {
   const auto c = combined(pose(overlap, 0.2F), pose(outside, 4.0F));
   EXPECT_FLOAT_EQ(c.distance, 0.2F);
-  EXPECT_FALSE(c.alarm);
+  EXPECT_FALSE(c.conflict);
   EXPECT_FLOAT_EQ(combined(pose(overlap, 0.9F), pose(outside, 4.0F)).distance, kThreshold);
 }
 
-TEST(ClassTable, OverlapBehindItsSurfaceWithOutsideIsAnAlarm) {
+TEST(ClassTable, OverlapBehindItsSurfaceWithOutsideIsAConflict) {
   const auto c = combined(pose(overlap, -0.3F, 1.0F), pose(outside, 4.0F, 1.0F));
   EXPECT_FLOAT_EQ(c.distance, 0.1F);  // the mean of -0.3 and 4, which counts as 0.5
-  EXPECT_TRUE(c.alarm);
+  EXPECT_TRUE(c.conflict);
 }
 
 TEST(ClassTable, NonoverlapTwiceTakesThePoseWithMoreViewsInFront) {
@@ -111,11 +111,11 @@ TEST(ClassTable, NonoverlapWithInsideIsTheNonoverlap) {
   EXPECT_FLOAT_EQ(combined(pose(nonoverlap, 0.4F), pose(inside, -3.0F)).distance, 0.4F);
 }
 
-TEST(ClassTable, NonoverlapWithOutsideIsOutsideAndAnAlarmForASingleViewSurface) {
+TEST(ClassTable, NonoverlapWithOutsideIsOutsideAndAConflictForASingleViewSurface) {
   const auto quiet = combined(pose(nonoverlap, -0.2F, 1, 0.5F, 0), pose(outside, 2.0F));
   EXPECT_FLOAT_EQ(quiet.distance, 2.0F);
-  EXPECT_FALSE(quiet.alarm);
-  EXPECT_TRUE(combined(pose(nonoverlap, -0.2F, 1, 0.5F, 1), pose(outside, 2.0F)).alarm);
+  EXPECT_FALSE(quiet.conflict);
+  EXPECT_TRUE(combined(pose(nonoverlap, -0.2F, 1, 0.5F, 1), pose(outside, 2.0F)).conflict);
 }
 
 TEST(ClassTable, InsideTwiceTakesTheNearerSurface) {
@@ -130,7 +130,7 @@ TEST(ClassTable, OutsideTwiceTakesTheNearerSurface) {
   EXPECT_FLOAT_EQ(combined(pose(outside, 3.0F), pose(outside, 2.0F)).distance, 2.0F);
 }
 
-TEST(ClassTable, UnseenLeavesTheOtherPoseItsSay) {
+TEST(ClassTable, UnseenLeavesTheDecisionToTheOtherPose) {
   for (const auto other : {overlap, nonoverlap, inside, outside}) {
     EXPECT_FLOAT_EQ(combined(pose(unseen, 0.0F), pose(other, 0.7F)).distance, 0.7F);
   }

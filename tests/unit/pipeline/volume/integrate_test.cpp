@@ -22,7 +22,7 @@ Result<Surface> integrate_views(const std::vector<View>& views, const VolumeOpti
   return integrate({&pose, 1}, options);
 }
 
-/// One closed component without self-contact, of the genus that is true.
+/// One closed component without self-contact, of the true genus.
 void expect_closed(const Mesh& mesh, long genus) {
   const Topology shape = topology(mesh);
   EXPECT_TRUE(shape.watertight());
@@ -56,7 +56,7 @@ TEST(Integrate, NoiseFreeSphereIsClosedAndWithinFiveMicrometres) {
   EXPECT_EQ(surface->report.measured_vertices + surface->report.closed_vertices, surface->mesh.vertices.size());
 }
 
-TEST(Integrate, VerticesKnowHowManyViewsMeasuredThemAndHowWell) {
+TEST(Integrate, VerticesHaveTheNumberOfTheirViewsAndTheirSigma) {
   const auto surface = integrate_views(ball_views());
   ASSERT_TRUE(surface);
   for (std::size_t v = 0; v < surface->mesh.vertices.size(); ++v) {
@@ -200,7 +200,7 @@ TEST(Integrate, ImportedOrthographicScansWithoutBackgroundMakeAClosedSolid) {
   EXPECT_NEAR(volume(surface->mesh), truth, 0.05 * truth);
 }
 
-TEST(Integrate, TableBoundsScansWithoutSilhouettesOnlyWhereAsked) {
+TEST(Integrate, TableBoundsScansWithoutSilhouettesOnlyOnRequest) {
   const Solid sunk = sphere({0, 20, 0}, 25);  // reaches below the table
   std::vector<View> views;
   for (int i = 0; i < 8; ++i) {
@@ -217,7 +217,7 @@ TEST(Integrate, TableBoundsScansWithoutSilhouettesOnlyWhereAsked) {
   EXPECT_GT(lowest(true), -2.0F);
 }
 
-TEST(Integrate, RefusesWhatItCannotUse) {
+TEST(Integrate, RefusesUnsuitableInput) {
   const auto code = [](std::span<const PosedViews> poses, const VolumeOptions& options = {}) {
     return integrate(poses, options).error().code;
   };
@@ -247,7 +247,7 @@ TEST(Integrate, VoxelsTooSmallForTheMachineAreOutOfRange) {
   EXPECT_EQ(integrate_views(ball_views(), {.voxel_mm = 0.01}).error().code, ErrorCode::out_of_range);
 }
 
-TEST(Integrate, StopsWhenAsked) {
+TEST(Integrate, StopsOnRequest) {
   std::stop_source source;
   source.request_stop();
   const PosedViews pose{ball_views()};

@@ -7,7 +7,7 @@
 namespace scanrig {
 namespace {
 
-/// Corners that an edge of the cell joins, from the header's description alone.
+/// Corners joined by an edge of the cell, from the header's description alone.
 std::pair<int, int> ends(int edge) {
   const int axis = edge / 4, k = edge % 4;
   const int first = (axis + 1) % 3, second = (axis + 2) % 3;
