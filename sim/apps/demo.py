@@ -16,7 +16,7 @@ from control_client import ControlClient
 START_LIMIT_S = 60
 RENDER_LIMIT_S = 900
 VOXEL_MM = 0.25
-INSIDE = "SCANRIG_DEMO_NETWORK"  # set: this program has its network
+INSIDE = "SCANRIG_DEMO_NETWORK"  # set inside the network namespace
 JOB_LIMIT_S = 3600
 
 
@@ -28,7 +28,7 @@ def arguments():
     parser.add_argument("--views", type=int, default=8, help="views a pose")
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/demo"), help="folder for the scan")
     parser.add_argument("--keep", action="store_true", help="leave the daemon running")
-    parser.add_argument("--same-rest", action="store_true", help="the operator forgets to turn the object over")
+    parser.add_argument("--same-rest", action="store_true", help="the operator does not turn the object over")
     parser.add_argument("--scale", type=float, default=1.0, help="of the images: 0.25 gives 320x240")
     parser.add_argument("--no-noise", action="store_true", help="sensors without noise")
     parser.add_argument("--wire", action="store_true",
@@ -43,7 +43,7 @@ def report_error(sentence, code):
 
 
 def make_room(folder):
-    """An empty folder: an earlier demo's is replaced, anything else is left alone. Returns what is in the way."""
+    """An empty folder: an earlier demo's is replaced, anything else is left alone. Returns an error for any other content."""
     if folder.exists() and any(folder.iterdir()):
         if not (folder / "demo.log").is_file():
             return f"{folder} is not empty and not an earlier demo; name another folder with --out"
@@ -53,7 +53,7 @@ def make_room(folder):
 
 
 def scene(options):
-    """What is on the table, in the words of both simulators."""
+    """Options for the object on the table, common to both simulators."""
     words = ["--seed", options.seed, "--views", options.views, "--height-mm", options.height_mm,
              "--scale", options.scale]
     if options.object:
@@ -91,7 +91,7 @@ class WireStation:
 
     def start(self, options, log):
         """Returns the process that is the daemon; the rig where it ended instead of becoming ready."""
-        print("Rendering what the cameras will see", flush=True)
+        print("Rendering the views of the cameras", flush=True)
         rig = run([options.bin / "scanrig-sim", "rig", "--dir", self.rig, "--cameras", "gige", "--voxel-mm", VOXEL_MM,
                    *scene(options)], log, stdout=subprocess.PIPE, text=True)
         self.processes.append(rig)
@@ -99,14 +99,14 @@ class WireStation:
             return rig
         daemon = run([options.bin / "scanrigd", "--config", self.rig / "rig.toml"], log)
         self.processes.insert(0, daemon)
-        self.hand = ControlClient(self.rig / "control.sock")
-        threading.Thread(target=self.hand.operate, daemon=True).start()
+        self.control = ControlClient(self.rig / "control.sock")
+        threading.Thread(target=self.control.operate, daemon=True).start()
         return daemon
 
     def finish(self, job):
-        """The truth, which the daemon never saw, and when the simulated devices did what."""
-        self.hand.say(write_truth=str(job.resolve()))
-        stamps = {what: self.hand.say(get=what)[what] for what in ("exposures", "legs", "changes")}
+        """Saves the truth, hidden from the daemon, and the time stamps of the simulated devices."""
+        self.control.request(write_truth=str(job.resolve()))
+        stamps = {what: self.control.request(get=what)[what] for what in ("exposures", "legs", "changes")}
         (job / "stamps.json").write_text(json.dumps(stamps, indent=1) + "\n")
 
 
@@ -115,7 +115,7 @@ def run(command, log, **options):
 
 
 def said_ready(rig):
-    """The rig's one line; False when it ends without, or takes too long."""
+    """Waits for the rig's ready line; False when the rig ends without it, or takes too long."""
     alarm = threading.Timer(RENDER_LIMIT_S, rig.kill)
     alarm.start()
     line = rig.stdout.readline()
@@ -145,24 +145,24 @@ def stop(station):
 
 
 def job_folder(jobs):
-    """Of the one job."""
+    """Record of the only job."""
     return max((p for p in jobs.iterdir() if p.is_dir()), key=lambda p: p.name)
 
 
 def link_results(job, folder):
-    """The job's files directly under `folder`, while they stay where the daemon knows them."""
+    """The job's files directly under `folder`, while they stay in the job folder."""
     for entry in job.iterdir():
         (folder / entry.name).symlink_to(os.path.relpath(entry, folder))
 
 
 def scores_of(options, folder):
     """Prints the table; returns the exit code of the evaluation."""
-    answer = subprocess.run([options.bin / "scanrig", "evaluate", folder, "--json"], capture_output=True, text=True)
-    if not answer.stdout:
-        print(answer.stderr, end="", file=sys.stderr)
-        return answer.returncode
-    scores = json.loads(answer.stdout)
-    (folder / "scores.json").write_text(answer.stdout)
+    evaluated = subprocess.run([options.bin / "scanrig", "evaluate", folder, "--json"], capture_output=True, text=True)
+    if not evaluated.stdout:
+        print(evaluated.stderr, end="", file=sys.stderr)
+        return evaluated.returncode
+    scores = json.loads(evaluated.stdout)
+    (folder / "scores.json").write_text(evaluated.stdout)
     print("Scores against the truth (absolute frame, nothing aligned)")
     for gate in scores["gates"]:
         sign = "<=" if gate["at_most"] else ">="
@@ -175,7 +175,7 @@ def main():
     options = arguments()
     if options.wire and INSIDE not in os.environ:
         in_own_network(options)
-    began = time.monotonic()
+    start = time.monotonic()
     folder = options.out
     if options.object and not options.object.is_file():
         return report_error(f"no such file: {options.object}", 3)
@@ -204,9 +204,9 @@ def main():
         link_results(job, folder)
         scored = scores_of(options, folder)
         print(f"Model   {folder}/model/model.glb\nReport  {folder}/model/report.json")
-        print(f"Wall time {time.monotonic() - began:.1f} s")
+        print(f"Wall time {time.monotonic() - start:.1f} s")
         if options.keep:
-            print(f"The daemon keeps running (process {daemon.pid}); ask it with: "
+            print(f"The daemon keeps running (process {daemon.pid}); its state: "
                   f"scanrig status --socket {station.socket}")
         return scored
     finally:
@@ -215,7 +215,7 @@ def main():
 
 
 def in_own_network(options):
-    """The simulated cameras want a network of their own: this program once more, inside of one."""
+    """Runs this program again in a network namespace of its own, for the simulated cameras."""
     command = [options.bin / "scanrig-sim", "own-network", "--", sys.executable, *sys.argv]
     os.execve(command[0], [str(word) for word in command], {**os.environ, INSIDE: "1"})
 

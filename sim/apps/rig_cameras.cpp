@@ -7,7 +7,7 @@ namespace scanrig::sim {
 namespace {
 
 constexpr std::chrono::milliseconds kReadout{25};  // as the cameras of sim/devices
-constexpr std::size_t kPictures = 8;
+constexpr std::size_t kKeptImages = 8;
 
 Clock::Duration exposure_time() {
   return std::chrono::round<Clock::Duration>(std::chrono::duration<double>(profile().exposure_s));
@@ -88,30 +88,30 @@ void RigCameras::turned_over() {
   history_.turned_over(*scene_);
 }
 
-/// One exposure after the other: what it saw is noted while it lasts, then becomes two images.
+/// Handles one exposure after the other: notes its view while it lasts, then turns it into two images.
 void RigCameras::develop(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (exposed_.wait(lock, stop, [&] { return developed_ < exposures_.size(); })) {
-    const RigExposure begun = exposures_[developed_];
+    const RigExposure started = exposures_[developed_];
     lock.unlock();
-    clock_.sleep_until(begun.at + exposure_time() / 2);
+    clock_.sleep_until(started.at + exposure_time() / 2);
     const double angle_deg = truth_().angle_deg;
-    clock_.sleep_until(begun.ended);
+    clock_.sleep_until(started.ended);
     lock.lock();
     RigExposure& exposure = exposures_[developed_];
     exposure.place = {history_.placement(), angle_deg};
     history_.exposed(angle_deg);
     const RigExposure ended = exposure;
     lock.unlock();
-    StereoImages images = picture(ended);
+    StereoImages images = image(ended);
     lock.lock();
     ++developed_;
-    pictures_[ended.number] = std::move(images);
-    if (pictures_.size() > kPictures) pictures_.erase(pictures_.begin());
+    images_[ended.number] = std::move(images);
+    if (images_.size() > kKeptImages) images_.erase(images_.begin());
   }
 }
 
-StereoImages RigCameras::picture(const RigExposure& exposure) {
+StereoImages RigCameras::image(const RigExposure& exposure) {
   if (!exposure.lit) return {};
   const auto view = views_.get(exposure.place);
   return view ? scene_->expose(*view, exposure.pattern, exposure.number) : StereoImages{};
@@ -124,13 +124,13 @@ bool RigCameras::ready(const wire::GigeExposure& exposure) const {
 
 void RigCameras::read_out(wire::Side side, const wire::GigeExposure& exposure, cv::Mat& image) {
   const std::scoped_lock lock(mutex_);
-  const auto found = pictures_.find(exposure.number);
+  const auto found = images_.find(exposure.number);
   const bool left = side == wire::Side::left;
-  const cv::Mat picture = found == pictures_.end() ? cv::Mat() : left ? found->second.left : found->second.right;
-  if (picture.empty()) {
+  const cv::Mat image = found == images_.end() ? cv::Mat() : left ? found->second.left : found->second.right;
+  if (image.empty()) {
     image.setTo(0);
   } else {
-    picture.copyTo(image);
+    image.copyTo(image);
   }
   if (numbered_) number_faintly(static_cast<std::uint32_t>(exposure.number), image);
   if (exposure.number <= exposures_.size()) exposures_[exposure.number - 1].read = clock_.now();

@@ -20,27 +20,27 @@ struct RigTruth;
 
 struct RigCamerasOptions {
   SceneOptions scene;
-  std::vector<Place> expected;  ///< what is rendered before it is asked for
-  bool numbered = false;        ///< note the number of the edge in every frame, see faint_number()
+  std::vector<Place> expected;  ///< rendered before it is requested
+  bool numbered = false;        ///< write the number of the edge into every frame, see faint_number()
 };
 
-/// One edge of the light, and what became of it.
+/// One edge of the light, and its exposure.
 struct RigExposure {
   std::uint64_t number = 0;  ///< counts the edges
   bool pattern = false;
-  bool lit = true;  ///< the light burned as long as the exposure lasted
+  bool lit = true;  ///< the light was on for the whole exposure
   Place place{};    ///< in the middle of the exposure
   Clock::TimePoint at{}, ended{};
-  Clock::TimePoint read{};  ///< both frames were read out and their sending began
+  Clock::TimePoint read{};  ///< both frames were read out and their sending started
 };
 
-/// Which edge a frame with `numbered` is of: the lowest bits of its first 32 pixels. For tests: no driver knows of it.
+/// The edge that a frame with `numbered` belongs to: the lowest bits of its first 32 pixels. For tests only, not used
+/// by drivers.
 std::uint32_t faint_number(const cv::Mat& frame);
 
-/// Two GigE cameras that look at the rendered scene: every edge of the light exposes both. A frame shows the object as
-/// it lay and where the table stood in the middle of the exposure, and is on its way 37 ms after the edge; or when it
-/// is rendered, which for a view nobody expected takes as long as it takes. An exposure whose light went out early is
-/// dark; so is one by software.
+/// Two GigE cameras that look at the rendered scene: every edge of the light exposes both. A frame shows the object and
+/// the table angle in the middle of the exposure. It is sent 37 ms after the edge, or once rendered; an unexpected view
+/// takes as long as its rendering. An exposure whose light went out early is dark, and so is one by software.
 /// Threads: every function may be called from any thread, edge() and light_out() from one at a time.
 class RigCameras {
  public:
@@ -55,11 +55,11 @@ class RigCameras {
   void edge(bool pattern);
   void light_out();
   void turned_over();
-  /// All that is expected is rendered; false when `stop` came first.
+  /// Waits until all expected views are rendered; false when `stop` came first.
   bool wait_until_ready(const std::stop_token& stop) { return views_.wait_until_ready(stop); }
 
   [[nodiscard]] std::vector<RigExposure> exposures() const;
-  /// Calibration, and truth.json and truth.ply of the poses taken last. Fail with `degenerate` (nothing taken), `io`.
+  /// Calibration, and truth.json and truth.ply of the last poses taken. Fail with `degenerate` (nothing taken), `io`.
   Result<void> write_calibration(const std::filesystem::path& file) const;
   Result<void> write_truth(const std::filesystem::path& folder) const;
   [[nodiscard]] wire::GigeCameras& wire() { return *wire_; }
@@ -68,7 +68,7 @@ class RigCameras {
   RigCameras(std::unique_ptr<Scene> scene, const RigCamerasOptions& options, std::function<RigTruth()> truth,
              Clock& clock);
   void develop(const std::stop_token& stop);
-  StereoImages picture(const RigExposure& exposure);
+  StereoImages image(const RigExposure& exposure);
   bool ready(const wire::GigeExposure& exposure) const;
   void read_out(wire::Side side, const wire::GigeExposure& exposure, cv::Mat& image);
 
@@ -80,9 +80,9 @@ class RigCameras {
   mutable std::mutex mutex_;
   std::condition_variable_any exposed_;
   ExposureHistory history_;
-  std::vector<RigExposure> exposures_;              // by number, from 1
-  std::size_t developed_ = 0;                       // of them
-  std::map<std::uint64_t, StereoImages> pictures_;  // the last few, by number
+  std::vector<RigExposure> exposures_;            // by number, from 1
+  std::size_t developed_ = 0;                     // of them
+  std::map<std::uint64_t, StereoImages> images_;  // the last few, by number
 
   ViewCache views_;
   std::unique_ptr<wire::GigeCameras> wire_;

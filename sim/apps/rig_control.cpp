@@ -12,18 +12,20 @@ namespace {
 using nlohmann::json;
 using Kind = wire::WireFault::Kind;
 
-constexpr std::size_t kMaxAtOnce = 20000;  ///< frames or changes in one answer
+constexpr std::size_t kMaxAtOnce = 20000;  ///< frames or changes in one reply
 
 std::int64_t nanoseconds(Clock::TimePoint at) { return at.time_since_epoch().count(); }
 
 const std::map<std::string, Kind>& fault_kinds() {
-  static const std::map<std::string, Kind> kinds{{"silent", Kind::deaf},
-                                                 {"answer_lost", Kind::answer_lost},
+  static const std::map<std::string, Kind> kinds{{"silent", Kind::request_lost},
+                                                 {"reply_lost", Kind::reply_lost},
+                                                 {"answer_lost", Kind::reply_lost},  // old name
                                                  {"late", Kind::late},
                                                  {"wrong_crc", Kind::wrong_crc},
                                                  {"short_frame", Kind::cut_short},
                                                  {"refuse", Kind::refuse},
-                                                 {"earlier_answer", Kind::earlier_answer}};
+                                                 {"earlier_reply", Kind::earlier_reply},
+                                                 {"earlier_answer", Kind::earlier_reply}};  // old name
   return kinds;
 }
 
@@ -31,7 +33,7 @@ const std::map<std::string, Kind>& fault_kinds() {
 Result<std::optional<wire::WireFault>> fault_of(const std::string& name, const json& all) {
   if (name == "none") return std::nullopt;
   const auto kind = fault_kinds().find(name);
-  if (kind == fault_kinds().end()) return fail(ErrorCode::invalid_input, "there is no fault \"{}\"", name);
+  if (kind == fault_kinds().end()) return fail(ErrorCode::invalid_input, "no fault \"{}\"", name);
   wire::WireFault fault{.kind = kind->second};
   fault.count = all.value("fault_count", -1);
   fault.delay = std::chrono::milliseconds(all.value("fault_delay_ms", 200));
@@ -58,7 +60,7 @@ Result<wire::Parity> parity_of(const std::string& name) {
 }
 
 json to_json(const RigTruth& truth) {
-  return {{"angle_deg", truth.angle_deg},       {"speed_deg_s", truth.speed_deg_s}, {"standing", truth.standing},
+  return {{"angle_deg", truth.angle_deg},       {"speed_deg_s", truth.speed_deg_s}, {"stopped", truth.stopped},
           {"projector_on", truth.projector_on}, {"counter", truth.counter},         {"powered", truth.powered}};
 }
 
@@ -92,7 +94,7 @@ json to_json(const wire::AxisLeg& leg, std::size_t number) {
           {"to_deg", leg.to_deg}};
 }
 
-/// Those from number `since` on; "next" is the number to ask for the time after.
+/// Entries from number `since` on; "next" is the number for the next request.
 template <class Entry>
 json since(const char* name, const std::vector<Entry>& all, std::size_t since) {
   json list = json::array();
@@ -103,13 +105,13 @@ json since(const char* name, const std::vector<Entry>& all, std::size_t since) {
 
 }  // namespace
 
-std::string RigControl::answer(const std::string& line) {
-  const auto say = [](const json& answer) { return answer.dump(-1, ' ', false, json::error_handler_t::replace); };
+std::string RigControl::reply_to(const std::string& line) {
+  const auto dumped = [](const json& reply) { return reply.dump(-1, ' ', false, json::error_handler_t::replace); };
   try {
     const auto done = obey(json::parse(line));
-    return say(done ? *done : json{{"error", done.error().message}});
+    return dumped(done ? *done : json{{"error", done.error().message}});
   } catch (const json::exception& wrong) {
-    return say({{"error", wrong.what()}});
+    return dumped({{"error", wrong.what()}});
   }
 }
 
@@ -169,24 +171,24 @@ Result<RigCameras*> RigControl::cameras() {
   return fail(ErrorCode::invalid_input, "this rig has no cameras on the wire: start it with --cameras gige");
 }
 
-/// Knobs of one camera, "camera": "left" or "right"; nothing for a name that is none of them.
+/// Knobs of one camera, "camera": "left" or "right"; nothing for any other name.
 std::optional<Result<void>> RigControl::set_camera(const std::string& knob, const json& value, const json& all) {
   if (knob != "camera_fault" && knob != "camera_unplugged") return std::nullopt;
   const auto cameras = this->cameras();
   if (!cameras) return pass_on(cameras);
   const auto name = all.value("camera", "");
   if (name != "left" && name != "right") {
-    return fail(ErrorCode::invalid_input, "beside {} say which \"camera\": left or right", knob);
+    return fail(ErrorCode::invalid_input, "name the \"camera\" beside {}: left or right", knob);
   }
   const auto side = name == "left" ? wire::Side::left : wire::Side::right;
   if (knob == "camera_unplugged") return (*cameras)->wire().plug(side, !value.get<bool>());
   const auto fault = wire::parse_gige_fault(value.get<std::string>());
-  if (!fault) return fail(ErrorCode::invalid_input, "there is no fault {} of a camera", value.dump());
+  if (!fault) return fail(ErrorCode::invalid_input, "no camera fault {}", value.dump());
   (*cameras)->wire().inject(side, *fault, all.value("fault_count", 1));
   return Result<void>();
 }
 
-/// Knobs of the panel and of the wiring; nothing for a name that is none of them.
+/// Knobs of the panel and of the wiring; nothing for any other name.
 std::optional<Result<void>> RigControl::set_panel(const std::string& knob, const json& value, const json& all) {
   auto* module = rig_.panel().module_port();
   if (knob == "wiring") {
@@ -212,7 +214,7 @@ std::optional<Result<void>> RigControl::set_panel(const std::string& knob, const
   return Result<void>();
 }
 
-/// Knobs of the drive's port; nothing for a name that is none of them.
+/// Knobs of the drive's port; nothing for any other name.
 std::optional<Result<void>> RigControl::set_port(const std::string& knob, const json& value, const json& all) {
   if (knob == "fault") {
     const auto fault = fault_of(value.get<std::string>(), all);
@@ -254,7 +256,7 @@ Result<void> RigControl::set(const std::string& knob, const json& value, const j
       {"estop_cuts_power", [&] { rig_.set_estop_cuts_power(value.get<bool>()); }},
       {"positive", [&] { rig_.set_positive_ccw(value.get<std::string>() == "ccw"); }}};
   const auto found = knobs.find(knob);
-  if (found == knobs.end()) return fail(ErrorCode::invalid_input, "there is no knob \"{}\"", knob);
+  if (found == knobs.end()) return fail(ErrorCode::invalid_input, "no knob \"{}\"", knob);
   found->second();
   return {};
 }

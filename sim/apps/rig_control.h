@@ -8,14 +8,14 @@
 
 namespace scanrig::sim {
 
-/// What the lines on the control socket mean; the list is in docs/reference/simulated-rig.md.
+/// Meaning of the lines on the control socket; the list is in sim/wire/README.md.
 /// Threads: one at a time.
 class RigControl {
  public:
   explicit RigControl(WireRig& rig, Clock& clock) : rig_(rig), clock_(clock) {}
 
-  /// One request, one answer; an answer with "error" says what was not understood or could not be done.
-  std::string answer(const std::string& line);
+  /// One request, one reply; a reply with "error" names what was not understood or failed.
+  std::string reply_to(const std::string& line);
 
  private:
   Result<nlohmann::json> obey(const nlohmann::json& request);

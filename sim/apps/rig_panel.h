@@ -17,15 +17,15 @@
 namespace scanrig::sim {
 
 /// The operator's side of the simulated rig: buttons, contacts, lamps and the projector's trigger line, behind the GPIO
-/// socket; or, but for the trigger, behind a Modbus I/O module, unit 2. A closed contact pulls its GPIO line low and
+/// socket; or, except the trigger, behind a Modbus I/O module, unit 2. A closed contact pulls its GPIO line low and
 /// sets its input of the module.
 /// Threads: every function may be called from any thread.
 class RigPanel {
  public:
-  /// What became of a wire: as drawn, broken, or bridged by somebody.
+  /// State of a wire: as drawn, broken, or bridged.
   enum class Wiring { wired, broken, bridged };
 
-  /// One change of a hand's doing, or of an output line.
+  /// One change of an input by hand, or of an output line.
   struct Change {
     Clock::TimePoint at;
     std::string name;
@@ -36,14 +36,14 @@ class RigPanel {
   static Result<std::unique_ptr<RigPanel>> start(const std::filesystem::path& folder, bool on_module, Clock& clock);
 
   /// "start", "stop", "reset", "estop" (pressed: its contact opens), "guard" (pressed: closed), "part", "flipped".
-  /// Returns when the level changed. Fails with `not_found`.
+  /// Returns the time of the change. Fails with `not_found`.
   Result<Clock::TimePoint> press(const std::string& input, bool pressed);
   Result<void> rewire(const std::string& input, Wiring wiring);
   [[nodiscard]] std::map<std::string, bool> inputs() const;   ///< pressed
   [[nodiscard]] std::map<std::string, bool> outputs() const;  ///< by the keys of rig.toml: "lamp_red"
   [[nodiscard]] bool pressed(const std::string& input) const;
-  [[nodiscard]] bool light() const;  ///< dots or even light
-  /// Called when dots (`pattern`) or even light go on or out, from the line's thread; empty: nobody any more.
+  [[nodiscard]] bool light() const;  ///< pattern or plain light
+  /// Called when pattern or plain light is switched, from the line's thread; empty: no listener.
   void on_light(std::function<void(bool pattern, bool on)> listener);
   [[nodiscard]] std::vector<Change> changes() const;
   [[nodiscard]] wire::ModbusServer* module_port() { return server_.get(); }  ///< null on GPIO

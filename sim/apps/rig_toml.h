@@ -7,7 +7,7 @@
 
 namespace scanrig::sim {
 
-/// What rig.toml says of the simulated rig.
+/// Content of rig.toml of the simulated rig.
 struct RigTomlOptions {
   std::filesystem::path folder;       ///< where rig.toml, the sockets and the ports are
   std::string drive;                  ///< "leadshine-rs", "oriental-az", "grbl"
@@ -23,8 +23,7 @@ struct RigTomlOptions {
   double voxel_mm = 1.0;
 };
 
-/// Writes FOLDER/rig.toml for scanrigd and scanrigd-sim, and FOLDER/drives, where the profiles are found. Fails with
-/// `io`.
+/// Writes FOLDER/rig.toml for scanrigd and scanrigd-sim, and FOLDER/drives with the profiles. Fails with `io`.
 Result<void> write_rig_toml(const RigTomlOptions& options);
 
 }  // namespace scanrig::sim

@@ -16,7 +16,7 @@ namespace {
 
 using namespace scanrig;
 
-/// The verb that was asked for; set while the command line is read.
+/// The requested verb; set while the command line is read.
 using Chosen = std::function<Result<void>()>;
 
 struct ShootVerb {
@@ -24,13 +24,13 @@ struct ShootVerb {
   std::string folder;
 };
 
-/// What is on the table and how it is seen.
+/// The object on the table and the resolution of its images.
 void add_scene(CLI::App& app, sim::SceneOptions& scene) {
   app.add_option("--object", scene.object, "OBJ, PLY or GLB file; the built-in figurine if not given");
   app.add_option("--height-mm", scene.height_mm, "Largest extent of the object")->capture_default_str();
   app.add_option("--seed", scene.seed, "Placements, noise and table errors")->capture_default_str();
   app.add_option("--scale", scene.image_scale, "Resolution, as a share of 1280x960")->capture_default_str();
-  app.add_flag("--same-rest", scene.same_rest_twice, "The operator forgets to turn the object over");
+  app.add_flag("--same-rest", scene.same_rest_twice, "The operator does not turn the object over");
   app.add_flag("--any-size", scene.any_size, "Put the object down although it is too large");
   app.add_flag("!--no-noise", scene.noise, "Leave the sensors' noise out");
 }
@@ -40,8 +40,9 @@ void add_shoot(CLI::App& app, ShootVerb& verb, Chosen& chosen) {
   auto* shoot = app.add_subcommand("shoot", "Render a whole scan, with its truth, into a folder");
   shoot->add_option("--out", verb.folder, "The scan folder to make")->required();
   add_scene(*shoot, options.scene);
-  shoot->add_option("--poses", options.scene.poses, "How often the object is put down")->capture_default_str();
-  shoot->add_option("--views", options.views, "Table angles a pose")->check(CLI::Range(1, 99))->capture_default_str();
+  shoot->add_option("--poses", options.scene.poses, "Number of poses: how often the object is put down")
+      ->capture_default_str();
+  shoot->add_option("--views", options.views, "Table angles per pose")->check(CLI::Range(1, 99))->capture_default_str();
   shoot->callback([&] { chosen = [&] { return sim::shoot(verb.options, verb.folder); }; });
 }
 
@@ -52,7 +53,7 @@ Result<void> serve_rig(const sim::WireRigOptions& options) {
   if (!rig) return pass_on(rig);
   sim::RigControl control(**rig, clock);
   const auto socket = sim::wire::ControlSocket::start(options.toml.folder / "control.sock",
-                                                      [&](const std::string& line) { return control.answer(line); });
+                                                      [&](const std::string& line) { return control.reply_to(line); });
   if (!socket) return pass_on(socket);
   const auto stopped = stop.token();
   if ((*rig)->cameras() && !(*rig)->cameras()->wait_until_ready(stopped)) return {};
@@ -77,7 +78,7 @@ void add_rig(CLI::App& app, sim::WireRigOptions& o, sim::SceneOptions& scene, Ch
   rig->add_option("--acceleration-deg-s2", o.toml.acceleration_deg_s2, "in rig.toml")->capture_default_str();
   rig->add_option("--views", o.toml.views, "in rig.toml")->capture_default_str();
   rig->add_option("--poses", o.toml.poses, "in rig.toml")->capture_default_str();
-  rig->add_option("--start-deg", o.axis.start_deg, "where the table stands, from the switch")->capture_default_str();
+  rig->add_option("--start-deg", o.axis.start_deg, "table angle at the start, from the switch")->capture_default_str();
   rig->add_option("--backlash-deg", o.axis.backlash_deg, "play of the gear")->capture_default_str();
   rig->add_option("--vibration-deg", o.axis.vibration_deg, "of the table, when a motion ends")->capture_default_str();
   rig->add_option("--voxel-mm", o.toml.voxel_mm, "in rig.toml")->capture_default_str();
@@ -103,14 +104,14 @@ struct ControlVerb {
 };
 
 Result<void> control(const ControlVerb& verb) {
-  const auto answer = sim::control(verb.folder, verb.words);
-  if (!answer) return pass_on(answer);
-  std::printf("%s\n", answer->c_str());
+  const auto reply = sim::control(verb.folder, verb.words);
+  if (!reply) return pass_on(reply);
+  std::printf("%s\n", reply->c_str());
   return {};
 }
 
 void add_control(CLI::App& app, ControlVerb& verb, Chosen& chosen) {
-  auto* ctl = app.add_subcommand("ctl", "Say one thing to a running rig: get WHAT, set KEY=VALUE..., press INPUT");
+  auto* ctl = app.add_subcommand("ctl", "Send one request to a running rig: get WHAT, set KEY=VALUE..., press INPUT");
   ctl->add_option("DIR", verb.folder, "the rig's folder")->required();
   ctl->add_option("WORDS", verb.words, "get WHAT [SINCE] | set KEY=VALUE... | press|release|tap INPUT | JSON")
       ->required();

@@ -12,7 +12,7 @@ using nlohmann::json;
 
 constexpr std::chrono::milliseconds kTap{200};  ///< as a hand does; a panel debounces for 50 ms
 
-/// A number, true, false or null as such, everything else as text.
+/// A number, true, false or null as such, all other words as text.
 json value_of(const std::string& word) {
   auto value = json::parse(word, nullptr, false);
   return value.is_discarded() || value.is_structured() ? json(word) : value;
@@ -23,7 +23,7 @@ json value_of(const std::string& word) {
 Result<std::string> control_request(const std::vector<std::string>& words) {
   const auto wrong = [] {
     return fail(ErrorCode::invalid_input,
-                "say one of: get WHAT [SINCE], set KEY=VALUE..., press|release|tap INPUT, or a JSON object");
+                "give one of: get WHAT [SINCE], set KEY=VALUE..., press|release|tap INPUT, or a JSON object");
   };
   if (words.empty()) return wrong();
   if (words[0].starts_with('{')) return words[0];
@@ -54,13 +54,13 @@ Result<std::string> control(const std::filesystem::path& folder, const std::vect
   }
   const auto request = control_request(words);
   if (!request) return request;
-  auto answer = wire::say_to_control_socket(folder / "control.sock", *request);
-  if (!answer) return answer;
-  const auto heard = json::parse(*answer, nullptr, false);
-  if (heard.is_object() && heard.contains("error")) {
-    return fail(ErrorCode::invalid_input, "{}", heard["error"].dump());
+  auto reply = wire::send_to_control_socket(folder / "control.sock", *request);
+  if (!reply) return reply;
+  const auto parsed = json::parse(*reply, nullptr, false);
+  if (parsed.is_object() && parsed.contains("error")) {
+    return fail(ErrorCode::invalid_input, "{}", parsed["error"].dump());
   }
-  return answer;
+  return reply;
 }
 
 }  // namespace scanrig::sim

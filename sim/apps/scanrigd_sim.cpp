@@ -9,7 +9,7 @@
 #include "daemon/rig/make_safe.h"
 #include "daemon/rig/open_devices.h"
 #include "daemon/service/service.h"
-#include "sim/apps/operator.h"
+#include "sim/apps/simulated_operator.h"
 #include "sim/apps/troubled_camera.h"
 #include "sim/apps/wire_camera.h"
 #include "sim/devices/sim_rig.h"
@@ -35,7 +35,7 @@ struct SimOptions {
 
 void add_options(CLI::App& app, SimOptions& o) {
   auto* config = app.add_option("--config", o.config,
-                                "open turntable, projector and panel as this rig.toml says; its [stereo_camera] driver "
+                                "open turntable, projector and panel as in this rig.toml; its [stereo_camera] driver "
                                 "may be \"simulated\"");
   app.add_flag("--make-safe", o.make_safe, "as scanrigd --make-safe")->needs(config);
   app.add_flag("--beside-daemon", o.beside_daemon, "likewise")->needs(config);
@@ -46,32 +46,29 @@ void add_options(CLI::App& app, SimOptions& o) {
       ->capture_default_str()
       ->check(CLI::Range(1.0, 1000.0));
   app.add_option("--seed", o.rig.seed, "placements, sensor noise, table errors")->capture_default_str();
-  app.add_option("--views", o.views, "views a pose")->capture_default_str()->check(CLI::Range(1, 360));
+  app.add_option("--views", o.views, "views per pose")->capture_default_str()->check(CLI::Range(1, 360));
   app.add_option("--scale", o.rig.image_scale, "of the images: 0.25 gives 320x240")
       ->capture_default_str()
       ->check(CLI::Range(0.05, 1.0));
   app.add_flag("!--no-noise", o.rig.noise, "leave the sensors' noise out");
-  app.add_flag("--same-rest", o.rig.same_rest_twice, "the operator forgets to turn the object over");
+  app.add_flag("--same-rest", o.rig.same_rest_twice, "the operator does not turn the object over");
   app.add_option("--voxel-mm", o.voxel_mm, "size of a voxel")->capture_default_str()->check(CLI::Range(0.05, 10.0));
   app.add_option("--threads", o.threads, "of the reconstruction; 0: all")->check(CLI::Range(0, 1024));
   app.add_option("--clock", o.clock, "real, or virtual: no waiting for the rig")
       ->capture_default_str()
       ->check(CLI::IsMember({"real", "virtual"}));
   app.add_option("--operator", o.operator_at_rig,
-                 "auto: somebody scans one object; helper: somebody turns objects over, sees to faults and presses "
-                 "Reset, the rest is for the API; none: all of it is")
+                 "auto: an operator scans one object; helper: an operator turns objects over, fixes faults and presses "
+                 "Reset, the API does the rest; none: the API does all")
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "helper", "none"}));
   app.add_option("--trouble", o.trouble,
-                 "share of the exposures before which a frame is lost, the camera falls silent, the table is blocked "
+                 "share of the exposures before which a frame is lost, the camera stops sending, the table is blocked "
                  "or the e-stop is pressed")
       ->check(CLI::Range(0.0, 1.0));
 }
 
-/// A simulated image takes as long as its rendering: that is no camera that hangs.
-constexpr auto kRenderingMargin = std::chrono::minutes(2);
-
-/// The object must be one that the rig can take before anything is written.
+/// Checks that the rig can take the object before anything is written.
 Result<void> run(const SimOptions& o, const SignalStop& stop) {
   std::unique_ptr<Clock> clock;
   if (o.clock == "virtual") {
@@ -98,15 +95,14 @@ Result<void> run(const SimOptions& o, const SignalStop& stop) {
                   .profile = r.profile_sha256()};
   options.recipes["default"] = {.poses = o.rig.poses, .views = o.views};
   options.api.socket = o.socket;
-  options.hang_margin = kRenderingMargin;
-  options.remote = options.guard = true;  // nobody can reach a simulated table
+  options.remote = options.guard = true;  // a simulated table cannot hurt a person
   options.reconstructor = pipeline_reconstructor(reconstruct);
   options.on_scanned = [&r](const std::filesystem::path& folder) { return r.write_truth(folder); };
 
-  std::optional<sim::Operator> somebody;
+  std::optional<sim::Operator> operator_thread;
   using Role = sim::Operator::Role;
   if (o.operator_at_rig != "none")
-    somebody.emplace(r, *clock, o.operator_at_rig == "auto" ? Role::alone : Role::helper);
+    operator_thread.emplace(r, *clock, o.operator_at_rig == "auto" ? Role::alone : Role::helper);
   sim::TroubledCamera camera(r, o.trouble, o.rig.seed);
   Journal journal(standard_sink());
   options.journal = [&journal](JournalEntry entry) { journal.write(std::move(entry)); };
@@ -114,7 +110,7 @@ Result<void> run(const SimOptions& o, const SignalStop& stop) {
   return ended ? Result<void>() : pass_on(ended);
 }
 
-/// The shipped drivers on the wires that the configuration names, with rendered images where it says so.
+/// The shipped drivers on the wires of the configuration, with rendered images where it selects them.
 Result<Ended> run_on_wires(const SimOptions& o, const config::RigConfig& config, DaemonOptions options,
                            const SignalStop& stop) {
   RealClock clock;

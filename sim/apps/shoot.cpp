@@ -8,7 +8,7 @@
 #include "core/units.h"
 #include "sim/scene/profile.h"
 #include "sim/scene/random.h"
-#include "sim/scene/standing.h"
+#include "sim/scene/rest_error.h"
 #include "sim/scene/truth_writer.h"
 
 namespace scanrig::sim {
@@ -68,7 +68,7 @@ Result<ordered_json> manifest(const fs::path& folder, const SceneOptions& option
 
 Result<void> shoot(const ShootOptions& options, const fs::path& folder) {
   if (options.views < 1 || options.views > 99) {
-    return fail(ErrorCode::out_of_range, "shoot: {} views a pose: 1 to 99 are possible", options.views);
+    return fail(ErrorCode::out_of_range, "shoot: {} views per pose; choose 1 to 99", options.views);
   }
   std::error_code ignored;
   if (fs::exists(folder / "scan.json", ignored)) {

@@ -1,4 +1,4 @@
-#include "sim/apps/operator.h"
+#include "sim/apps/simulated_operator.h"
 
 #include <utility>
 

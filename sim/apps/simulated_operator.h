@@ -7,9 +7,9 @@
 
 namespace scanrig::sim {
 
-/// Somebody at the simulated rig who looks at nothing but the lamps: turns the object over and presses Start each time
-/// the flip lamp comes on. Alone he also presses Reset once and Start once. As a helper he begins no job, but sees to
-/// whatever is wrong with the rig and presses Reset as often as it is asked for.
+/// Simulated operator who watches only the lamps: turns the object over and presses Start each time the flip lamp
+/// lights. Alone the operator also presses Reset once and Start once. As a helper the operator starts no job, but fixes
+/// any fault of the rig and presses Reset whenever it is requested.
 class Operator {
  public:
   enum class Role { alone, helper };
@@ -27,7 +27,7 @@ class Operator {
   bool has_reset_ = false;
   bool has_started_ = false;
   bool flip_was_requested_ = false;
-  std::jthread thread_;  ///< last: it is joined before the rest goes
+  std::jthread thread_;  ///< last: joined before the other members are destroyed
 };
 
 }  // namespace scanrig::sim

@@ -6,9 +6,9 @@
 
 namespace scanrig::sim {
 
-/// The rig's camera; before a `share` of its exposures something goes wrong with the rig: one pair of frames is lost,
-/// all frames from now on are, the table is blocked, or the e-stop is pressed. What and when follows from `seed`.
-/// But for the first, it stays until somebody sees to it.
+/// The rig's camera with faults. Before a `share` of its exposures one fault occurs: one pair of frames is lost, all
+/// further frames are lost, the table is blocked, or the e-stop is pressed. Kind and time follow from `seed`. Each
+/// fault except the first stays until an operator fixes it.
 class TroubledCamera final : public StereoCamera {
  public:
   TroubledCamera(SimRig& rig, double share, std::uint64_t seed) : rig_(rig), share_(share), seed_(seed) {}

@@ -26,7 +26,7 @@ tl::unexpected<Error> TruthSocket::lost(ErrorCode code, const std::string& why) 
   if (descriptor_ >= 0) ::close(descriptor_);
   descriptor_ = -1;
   pending_.clear();
-  return fail(code, "simulated camera: asking {} for the table's angle: {}", path_.string(), why);
+  return fail(code, "simulated camera: reading the table's angle from {}: {}", path_.string(), why);
 }
 
 Result<void> TruthSocket::connect() {
@@ -41,9 +41,9 @@ Result<void> TruthSocket::connect() {
   return lost(ErrorCode::io, std::strerror(errno));
 }
 
-Result<std::string> TruthSocket::ask() {
-  constexpr std::string_view kQuestion = "{\"get\":\"truth\"}\n";
-  if (::send(descriptor_, kQuestion.data(), kQuestion.size(), MSG_NOSIGNAL) != ssize_t{kQuestion.size()}) {
+Result<std::string> TruthSocket::request() {
+  constexpr std::string_view kRequest = "{\"get\":\"truth\"}\n";
+  if (::send(descriptor_, kRequest.data(), kRequest.size(), MSG_NOSIGNAL) != ssize_t{kRequest.size()}) {
     return lost(ErrorCode::io, "the simulator has gone");
   }
   for (;;) {
@@ -54,26 +54,26 @@ Result<std::string> TruthSocket::ask() {
     }
     std::array<char, 512> bytes;
     const ssize_t count = ::recv(descriptor_, bytes.data(), bytes.size(), 0);
-    if (count < 0 && (errno == EAGAIN || errno == EINTR)) return lost(ErrorCode::timeout, "no answer within 1 s");
+    if (count < 0 && (errno == EAGAIN || errno == EINTR)) return lost(ErrorCode::timeout, "no reply within 1 s");
     if (count <= 0) return lost(ErrorCode::io, "the simulator has gone");
     pending_.append(bytes.data(), static_cast<std::size_t>(count));
-    if (pending_.size() > kMaxReplyLength) return lost(ErrorCode::protocol, "an answer without end");
+    if (pending_.size() > kMaxReplyLength) return lost(ErrorCode::protocol, "the reply has no end");
   }
 }
 
 Result<TableTruth> TruthSocket::get() {
   if (auto connected = connect(); !connected) return pass_on(connected);
-  const auto line = ask();
+  const auto line = request();
   if (!line) return pass_on(line);
   const auto json = nlohmann::json::parse(*line, nullptr, false);
   const auto is = [&](const char* key, bool (nlohmann::json::*kind)() const noexcept) {
     return json.is_object() && json.contains(key) && (json[key].*kind)();
   };
   if (!is("angle_deg", &nlohmann::json::is_number) || !is("speed_deg_s", &nlohmann::json::is_number) ||
-      !is("standing", &nlohmann::json::is_boolean) || !is("projector_on", &nlohmann::json::is_boolean)) {
-    return lost(ErrorCode::protocol, "the answer is none: " + *line);
+      !is("stopped", &nlohmann::json::is_boolean) || !is("projector_on", &nlohmann::json::is_boolean)) {
+    return lost(ErrorCode::protocol, "malformed reply: " + *line);
   }
-  return TableTruth{json["angle_deg"], json["speed_deg_s"], json["standing"], json["projector_on"]};
+  return TableTruth{json["angle_deg"], json["speed_deg_s"], json["stopped"], json["projector_on"]};
 }
 
 }  // namespace scanrig::sim

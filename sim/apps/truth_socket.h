@@ -7,15 +7,15 @@
 
 namespace scanrig::sim {
 
-/// Where the table really is, as the far end of the wire knows it.
+/// True position of the table at the far end of the wire.
 struct TableTruth {
   double angle_deg = 0.0;  ///< counter-clockwise seen from above, from home
   double speed_deg_s = 0.0;
-  bool standing = false;
+  bool stopped = false;
   bool projector_on = false;
 };
 
-/// Client of the wire simulator's control socket: a line of JSON asks, `{"get":"truth"}`, a line of JSON answers.
+/// Client of the wire simulator's control socket: one line of JSON per request, `{"get":"truth"}`, one per reply.
 /// Threads: one user at a time.
 class TruthSocket {
  public:
@@ -24,12 +24,12 @@ class TruthSocket {
   TruthSocket(const TruthSocket&) = delete;
   TruthSocket& operator=(const TruthSocket&) = delete;
 
-  /// Connects where it is not connected. Fails with `io` (nobody there, or gone), `timeout`, `protocol`.
+  /// Connects if not connected. Fails with `io` (no simulator, or its end), `timeout`, `protocol`.
   Result<TableTruth> get();
 
  private:
   Result<void> connect();
-  Result<std::string> ask();
+  Result<std::string> request();
   tl::unexpected<Error> lost(ErrorCode code, const std::string& why);
 
   const std::filesystem::path path_;

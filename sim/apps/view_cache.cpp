@@ -29,7 +29,7 @@ void ViewCache::end() {
 
 std::shared_ptr<const View> ViewCache::get(const Place& place) {
   std::unique_lock lock(mutex_);
-  if (!views_.contains(place)) wanted_.push_back(place);
+  if (!views_.contains(place)) requested_.push_back(place);
   changed_.notify_all();
   changed_.wait(lock, [&] { return ended_ || views_.contains(place); });
   return ended_ ? nullptr : views_.at(place);
@@ -37,15 +37,15 @@ std::shared_ptr<const View> ViewCache::get(const Place& place) {
 
 bool ViewCache::wait_until_ready(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
-  return changed_.wait(lock, stop, [&] { return expected_.empty() && wanted_.empty(); });
+  return changed_.wait(lock, stop, [&] { return expected_.empty() && requested_.empty(); });
 }
 
 void ViewCache::run(const std::stop_token& stop) {
-  lower_priority();  // a rig does not compute what it shows
+  lower_priority();  // a real rig does not compute its images
   std::unique_lock lock(mutex_);
-  while (changed_.wait(lock, stop, [&] { return !wanted_.empty() || !expected_.empty(); })) {
-    const bool surprise = !wanted_.empty();
-    auto& queue = surprise ? wanted_ : expected_;
+  while (changed_.wait(lock, stop, [&] { return !requested_.empty() || !expected_.empty(); })) {
+    const bool surprise = !requested_.empty();
+    auto& queue = surprise ? requested_ : expected_;
     const Place place = queue.front();
     if (!views_.contains(place)) {
       lock.unlock();
@@ -54,7 +54,7 @@ void ViewCache::run(const std::stop_token& stop) {
       with_threads(0, [&] { view = std::make_shared<const View>(look()); });
       lock.lock();
       views_[place] = std::move(view);
-      if (surprise) surprises_.push_back(place);
+      if (surprise) unexpected_.push_back(place);
       keep_few();
     }
     queue.pop_front();
@@ -62,10 +62,10 @@ void ViewCache::run(const std::stop_token& stop) {
   }
 }
 
-/// With `mutex_` held: a view in full size has 20 MB.
+/// Call with `mutex_` held: a view in full size has 20 MB.
 void ViewCache::keep_few() {
   constexpr std::size_t kFew = 8;
-  for (; surprises_.size() > kFew; surprises_.pop_front()) views_.erase(surprises_.front());
+  for (; unexpected_.size() > kFew; unexpected_.pop_front()) views_.erase(unexpected_.front());
 }
 
 }  // namespace scanrig::sim

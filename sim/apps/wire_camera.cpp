@@ -22,7 +22,7 @@ Result<void> WireCamera::expose(Light light, const std::function<Result<void>()>
   auto firing = std::async(std::launch::async, fire);
   Result<TableTruth> middle = truth_.get();
   bool lit = middle && middle->projector_on;
-  // Asked as long as the light may burn: it is on for a few milliseconds only.
+  // Polled as long as the light may be on: it is on for a few milliseconds only.
   while (middle && firing.wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
     const auto now = truth_.get();
     if (!now) {
@@ -49,7 +49,7 @@ Result<StereoFrame> WireCamera::collect(Deadline deadline) {
   armed_ = false;
   if (!exposed_) {
     clock_.sleep_until(deadline.at);
-    return fail(ErrorCode::timeout, "simulated camera: there was no trigger edge");
+    return fail(ErrorCode::timeout, "simulated camera: no trigger edge");
   }
   const auto e = *std::exchange(exposed_, std::nullopt);
   if (!e) return pass_on(e);

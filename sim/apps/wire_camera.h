@@ -16,8 +16,8 @@
 
 namespace scanrig::sim {
 
-/// Cameras over a rendered scene for a rig whose other devices are real drivers on simulated wires: each exposure shows
-/// the object at the table's true angle and in the light there really was, as the far end of the wire tells them.
+/// Cameras over a rendered scene for a rig whose other devices are real drivers on simulated wires. Each exposure shows
+/// the object at the table's true angle and in the true light, as read from the far end of the wire.
 /// Threads: the owner of the camera; turned_over() and write_truth() from any.
 class WireCamera final : public StereoCamera {
  public:
@@ -27,14 +27,14 @@ class WireCamera final : public StereoCamera {
   Result<void> prepare(Deadline deadline) override;
   Result<void> arm(Deadline deadline) override;
   Result<StereoFrame> collect(Deadline deadline) override;
-  /// Fails with `unsupported`: to render takes too long.
+  /// Fails with `unsupported`: rendering takes too long.
   Result<StereoFrame> capture_preview(Deadline deadline) override;
 
-  /// The trigger line: an exposure begins, and lasts as long as `fire` does.
+  /// The trigger line: an exposure starts, and lasts as long as `fire` does.
   Result<void> expose(Light light, const std::function<Result<void>()>& fire);
   void turned_over();
 
-  /// truth.json and truth.ply of the poses taken last, into a scan folder. Fails with `degenerate`, `io`.
+  /// truth.json and truth.ply of the last poses taken, into a scan folder. Fails with `degenerate`, `io`.
   Result<void> write_truth(const std::filesystem::path& folder) const;
 
  private:
@@ -56,7 +56,7 @@ class WireCamera final : public StereoCamera {
   ExposureHistory history_;  // guarded by mutex_
 };
 
-/// In front of the real projector: what the trigger line does on a bench.
+/// In front of the real projector: replaces the trigger line of a bench.
 class WatchedProjector final : public Projector {
  public:
   WatchedProjector(Projector& projector, WireCamera& camera) : projector_(projector), camera_(camera) {}
@@ -71,7 +71,7 @@ class WatchedProjector final : public Projector {
   WireCamera& camera_;
 };
 
-/// In front of the real panel: whoever presses Start when the flip lamp burns has turned the object over.
+/// In front of the real panel: Start pressed while the flip lamp is on means that the object was turned over.
 class WatchedPanel final : public Panel {
  public:
   WatchedPanel(Panel& panel, WireCamera& camera) : panel_(panel), camera_(camera) {}

@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "core/files.h"
-#include "sim/scene/standing.h"
+#include "sim/scene/rest_error.h"
 #include "sim/wire/grbl_server.h"
 #include "sim/wire/leadshine_drive.h"
 #include "sim/wire/modbus_server.h"
@@ -14,8 +14,8 @@ namespace {
 
 constexpr std::chrono::milliseconds kLineWatch{5};
 
-/// Where the table will stand in a job: it is wound up from pose to pose, and each pose may end with its first view
-/// once more. What comes after two turns looks alike, see rest_error_deg().
+/// Table angles of a job: the table is wound up from pose to pose, and each pose may end with its first view once more.
+/// Angles beyond two turns repeat, see rest_error_deg().
 std::vector<Place> places_of_job(const WireRigOptions& o) {
   const double pulses_per_deg = o.toml.pulses_per_motor_rev * o.toml.gear_ratio / 360.0;
   std::vector<Place> places;
@@ -29,12 +29,12 @@ std::vector<Place> places_of_job(const WireRigOptions& o) {
   return places;
 }
 
-/// The mechanics of the profile instead of the given ones, as sim/devices has them: what a scan sees must not depend on
-/// how the rig is simulated.
+/// The mechanics of the profile instead of the given ones, as in sim/devices: the images of a scan must not depend on
+/// the kind of simulation.
 wire::AxisOptions axis_of(const WireRigOptions& o) {
   wire::AxisOptions axis = o.axis;
   if (!o.scene) return axis;
-  constexpr double kDecays = 5.0;  // in which the vibration is gone
+  constexpr double kDecays = 5.0;  // after so many, the vibration is gone
   axis.vibration_deg = profile().vibration_deg;
   axis.vibration_decay_s = profile().settling_s / kDecays;
   axis.encoder_step_deg = profile().encoder_step_deg;
@@ -69,7 +69,7 @@ WireRig::~WireRig() {
 Result<void> WireRig::start_cameras(const WireRigOptions& o, Clock& clock) {
   if (!o.scene) return {};
   auto expected = places_of_job(o);
-  expected.push_back({0, truth().angle_deg});  // for who tries the cameras before the table is homed
+  expected.push_back({0, truth().angle_deg});  // for cameras tested before homing
   auto cameras = RigCameras::start(
       {.scene = *o.scene, .expected = expected, .numbered = o.numbered_frames}, [this] { return truth(); }, clock);
   if (!cameras) return pass_on(cameras);
@@ -104,7 +104,7 @@ RigTruth WireRig::truth() const {
   const double sign = positive_ccw_ ? 1.0 : -1.0;
   return {.angle_deg = sign * axis.table_deg,
           .speed_deg_s = sign * axis.speed_deg_s,
-          .standing = !axis.moving,
+          .stopped = !axis.moving,
           .projector_on = panel_->light(),
           .counter = drive_->counter(),
           .powered = powered_};
@@ -129,8 +129,8 @@ void WireRig::set_fault(std::optional<wire::WireFault> fault) {
 
 void WireRig::apply_fault() {
   server_->clear_faults();
-  if (!powered_ || !understood_) {
-    server_->inject({.kind = wire::WireFault::Kind::deaf});
+  if (!powered_ || !settings_match_) {
+    server_->inject({.kind = wire::WireFault::Kind::request_lost});
   } else if (fault_) {
     server_->inject(*fault_);
   }
@@ -157,15 +157,15 @@ void WireRig::set_line(const wire::LineSettings& settings) {
   drive_settings_ = settings;
 }
 
-/// A driver that sets the port otherwise than the drive's own is noise to it.
+/// A driver with other port settings than the drive's sends only noise.
 void WireRig::watch_line(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     const auto settings = wire::line_settings(port_);
     {
       const std::scoped_lock lock(mutex_);
       const bool understood = !settings || *settings == drive_settings_;
-      if (understood != understood_) {
-        understood_ = understood;
+      if (understood != settings_match_) {
+        settings_match_ = understood;
         apply_fault();
       }
     }

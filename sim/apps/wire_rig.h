@@ -23,27 +23,28 @@
 namespace scanrig::sim {
 
 struct WireRigOptions {
-  RigTomlOptions toml;       ///< what rig.toml says: folder, drive, panel, gear
-  wire::AxisOptions axis;    ///< what the mechanics are
-  bool positive_ccw = true;  ///< which way positive pulses turn the table, seen from above
+  RigTomlOptions toml;       ///< content of rig.toml: folder, drive, panel, gear
+  wire::AxisOptions axis;    ///< of the simulated mechanics
+  bool positive_ccw = true;  ///< direction of the table for positive pulses, seen from above
   std::optional<std::int32_t> preload_counter;
-  std::optional<SceneOptions> scene;  ///< what two GigE cameras see; nothing: there are none
+  std::optional<SceneOptions> scene;  ///< scene of two GigE cameras; nothing: no cameras
   bool numbered_frames = false;       ///< see RigCamerasOptions
 };
 
-/// How far and how fast things really are.
+/// True state of the mechanics.
 struct RigTruth {
-  double angle_deg = 0;  ///< of the table, counter-clockwise from the home switch, many turns wide
+  double angle_deg = 0;  ///< of the table, counter-clockwise from the home switch, turns counted
   double speed_deg_s = 0;
-  bool standing = true;
-  bool projector_on = false;  ///< dots or even light
+  bool stopped = true;
+  bool projector_on = false;  ///< pattern or plain light
   std::int32_t counter = 0;   ///< the drive's, pulses
-  bool powered = true;        ///< the drive has power: no e-stop is pressed
+  bool powered = true;        ///< the drive has power: the e-stop is released
 };
 
 /// The simulated rig on the wire: drive, panel and projector behind their ports in one folder, cameras on the loopback,
 /// and rig.toml that points at them; with cameras calibration.json beside it. A pressed e-stop takes the drive's power
-/// away, as the relay of a real rig does. Threads: every function may be called from any thread.
+/// away, as the relay of a real rig does.
+/// Threads: every function may be called from any thread.
 class WireRig {
  public:
   /// Creates the folder. Fails with `io`, `unsupported` (no such drive or panel), as RigCameras::start.
@@ -56,11 +57,11 @@ class WireRig {
   Result<Clock::TimePoint> press(const std::string& input, bool pressed);
   [[nodiscard]] std::vector<wire::WireFrame> frames() const { return server_->log(); }
 
-  /// Towards every request from now on, until told otherwise; nothing: the line is sound.
+  /// For every request from now on, until changed; nothing: no fault.
   void set_fault(std::optional<wire::WireFault> fault);
   Result<void> plug_in(bool plugged);
   void set_estop_cuts_power(bool cuts);
-  /// How the drive's own port is set: it hears only who speaks like that.
+  /// Settings of the drive's own port: it receives only requests with the same settings.
   void set_line(const wire::LineSettings& settings);
   void set_positive_ccw(bool ccw);
   [[nodiscard]] wire::SimulatedDrive& drive() { return *drive_; }
@@ -79,13 +80,13 @@ class WireRig {
   bool estop_cuts_power_ = true;
   bool powered_ = true;
   wire::LineSettings drive_settings_;
-  bool understood_ = true;  ///< the port is set as the drive's own
+  bool settings_match_ = true;  ///< the client's port settings equal the drive's
   std::optional<wire::WireFault> fault_;
   std::unique_ptr<wire::SimulatedDrive> drive_;
   std::unique_ptr<wire::WireServer> server_;
   std::unique_ptr<RigPanel> panel_;
   std::unique_ptr<RigCameras> cameras_;
-  std::jthread line_watch_;  ///< last: it is joined before the rest goes
+  std::jthread line_watch_;  ///< last: joined before the other members are destroyed
 };
 
 }  // namespace scanrig::sim

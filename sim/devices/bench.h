@@ -15,10 +15,10 @@
 
 namespace scanrig::sim {
 
-/// A button springs back once it has been seen: no press is lost, however late somebody looks.
-enum class Button { released, pressed, seen };
+/// A button springs back once it has been reported: no press is lost, however late the panel is read.
+enum class Button { released, pressed, reported };
 
-/// What the cameras saw at an edge; it becomes images when they are asked for.
+/// State seen by the cameras at an edge; becomes images when they are collected.
 struct Exposure {
   int placement = 0;
   double angle_deg = 0.0;
@@ -29,9 +29,9 @@ struct Exposure {
   Clock::TimePoint arrival;  ///< of the frames at the host
 };
 
-/// What the devices share: the scene on the table, and what operator and tests do to it.
-/// `mutex` guards everything but `scene`, which belongs to the camera (its const part to all). Whoever changes
-/// something somebody may wait for calls clock.notify_all(changed).
+/// Shared state of the devices: the scene on the table, and the actions of operator and tests. `mutex` guards
+/// everything except `scene`, which belongs to the camera (its const part to all). Code that changes a state that
+/// another thread may wait for calls clock.notify_all(changed).
 struct Bench {
   Bench(std::unique_ptr<Scene> the_scene, Clock& the_clock) : clock(the_clock), scene(std::move(the_scene)) {}
 

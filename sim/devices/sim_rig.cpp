@@ -1,6 +1,6 @@
 #include "sim/devices/sim_rig.h"
 
-#include "sim/devices/devices.h"
+#include "sim/devices/simulated_devices.h"
 #include "sim/scene/profile.h"
 
 namespace scanrig::sim {

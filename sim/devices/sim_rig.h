@@ -22,7 +22,7 @@ struct SimRigOptions {
   std::uint64_t seed = 1;  ///< placements, sensor noise, table errors
   int poses = 2;
   double image_scale = 1.0;      ///< 0.25 gives 320x240 with the same field of view, for fast tests
-  bool same_rest_twice = false;  ///< the operator forgets to turn the object over
+  bool same_rest_twice = false;  ///< the operator does not turn the object over
   bool noise = true;
 };
 
@@ -40,7 +40,7 @@ class SimRig {
   virtual StereoCamera& camera() = 0;
   virtual Panel& panel() = 0;
 
-  // What the operator does at the rig.
+  // Actions of the operator at the rig.
   virtual void press_start() = 0;
   virtual void press_stop() = 0;
   virtual void press_reset() = 0;
@@ -55,7 +55,7 @@ class SimRig {
   /// The calibration of docs/reference/scan-folder.md, exact.
   virtual Result<void> write_calibration(const std::filesystem::path& file) const = 0;
   /// truth.json and truth.ply, into a scan folder, for the latest `poses` times the object was put down and exposed; a
-  /// view taken again replaces the one before. Fails with `degenerate` (nothing exposed yet), `io`.
+  /// retaken view replaces the one before. Fails with `degenerate` (nothing exposed yet), `io`.
   virtual Result<void> write_truth(const std::filesystem::path& folder) const = 0;
   virtual std::string profile_sha256() const = 0;
   virtual std::array<std::string, 2> camera_serials() const = 0;  ///< left, right

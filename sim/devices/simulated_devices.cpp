@@ -1,4 +1,4 @@
-#include "sim/devices/devices.h"
+#include "sim/devices/simulated_devices.h"
 
 #include "core/units.h"
 #include "sim/scene/profile.h"
@@ -13,7 +13,7 @@ Result<void> SimProjector::fire(Light light, Deadline deadline) {
   const auto over =
       b.clock.now() + std::chrono::round<Clock::Duration>(std::chrono::duration<double>(profile().exposure_s));
   const bool cut = b.clock.wait_until(lock, b.changed, std::min(over, deadline.at), [&b] { return b.dark_requested; });
-  if (cut || deadline.at < over) b.in_flight.reset();  // half an exposure is none
+  if (cut || deadline.at < over) b.in_flight.reset();  // half an exposure does not count
   if (cut) return fail(ErrorCode::io, "projector: went dark on request before the pulse was over");
   if (deadline.at < over) return fail(ErrorCode::timeout, "projector: the pulse was not over in time");
   return {};
@@ -41,9 +41,9 @@ Result<void> SimStereoCamera::arm(Deadline) {
 Result<StereoFrame> SimStereoCamera::collect(Deadline deadline) {
   Bench& b = bench_;
   std::unique_lock lock(b.mutex);
-  if (!collectable_) return fail(ErrorCode::protocol, "camera: nothing to collect, it was not armed");
+  if (!collectable_) return fail(ErrorCode::protocol, "camera: nothing to collect: not armed");
   collectable_ = false;
-  // First the edge, then the frames' way to us.
+  // First the edge, then the transfer of the frames.
   const bool exposed = b.clock.wait_until(lock, b.changed, deadline.at, [&b] { return b.in_flight.has_value(); });
   if (exposed) {
     const auto arrival = std::min(b.in_flight->arrival, deadline.at);
@@ -69,7 +69,7 @@ Result<PanelInputs> SimPanel::wait_change(const PanelInputs& known, Deadline dea
   Bench& b = bench_;
   std::unique_lock lock(b.mutex);
   for (Button* button : {&b.start, &b.stop, &b.reset}) {
-    if (*button == Button::seen) *button = Button::released;
+    if (*button == Button::reported) *button = Button::released;
   }
   const auto inputs = [&b] {
     PanelInputs now;
@@ -82,7 +82,7 @@ Result<PanelInputs> SimPanel::wait_change(const PanelInputs& known, Deadline dea
   b.clock.wait_until(lock, b.changed, deadline.at, [&] { return inputs() != known; });
   const PanelInputs now = inputs();
   for (Button* button : {&b.start, &b.stop, &b.reset}) {
-    if (*button == Button::pressed) *button = Button::seen;
+    if (*button == Button::pressed) *button = Button::reported;
   }
   return now;
 }

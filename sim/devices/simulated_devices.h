@@ -8,8 +8,8 @@
 
 namespace scanrig::sim {
 
-/// Fails as Turntable says, of its codes: `not_homed`, `out_of_range` (beyond ten turns), `timeout`, `stalled`,
-/// `device_alarm` (the E-stop has cut the motor's power), `stopped`. A target out of range leaves the zero known.
+/// Fails as Turntable does, with these codes: `not_homed`, `out_of_range` (beyond ten turns), `timeout`, `stalled`,
+/// `device_alarm` (the e-stop has cut the motor's power), `stopped`. A target out of range leaves the table homed.
 class SimTurntable final : public Turntable {
  public:
   explicit SimTurntable(Bench& bench);
@@ -42,8 +42,8 @@ class SimProjector final : public Projector {
   Bench& bench_;
 };
 
-/// collect() fails with `timeout`, and with `protocol` if it was not armed; capture_preview() with `unsupported`: to
-/// render takes too long.
+/// collect() fails with `timeout`, and with `protocol` if it was not armed; capture_preview() with `unsupported`:
+/// rendering takes too long.
 class SimStereoCamera final : public StereoCamera {
  public:
   explicit SimStereoCamera(Bench& bench) : bench_(bench) {}

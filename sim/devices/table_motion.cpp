@@ -61,12 +61,12 @@ void Axis::rename(double degrees) {
 }
 
 double Axis::angle(Clock::TimePoint now) const {
-  const double standing = now < arrival() ? from_ + sign_ * state(seconds(now - start_)).way : rest_;
+  const double position = now < arrival() ? from_ + sign_ * state(seconds(now - start_)).way : rest_;
   const double since = seconds(now - arrival());
-  if (!vibrates_ || since < 0.0 || now >= still()) return standing;
+  if (!vibrates_ || since < 0.0 || now >= still()) return position;
   constexpr double kFrequency = 18.0;  // Hz, of an object on its table
   const double fading = std::exp(-5.0 * since / profile().settling_s);
-  return standing + profile().vibration_deg * fading * std::sin(2.0 * std::numbers::pi * kFrequency * since);
+  return position + profile().vibration_deg * fading * std::sin(2.0 * std::numbers::pi * kFrequency * since);
 }
 
 Clock::TimePoint Axis::arrival() const { return start_ + duration(accelerating_ + cruising_ + braking_); }

@@ -4,17 +4,17 @@
 
 namespace scanrig::sim {
 
-/// The motion of the table as a function of time: a trapezoid of speed, then a vibration that dies out.
-/// Angles in degrees. No threads, no clock: whoever owns it passes the time in.
+/// The motion of the table as a function of time: a trapezoid of speed, then a decaying vibration. Angles in degrees.
+/// No threads, no clock: the owner passes the time in.
 class Axis {
  public:
-  /// From where it is at `now` (it must stand) to `target`, no faster than told.
+  /// From its position at `now` (it must be stopped) to `target`, no faster than given.
   void go(double target, double speed_deg_s, Clock::TimePoint now);
   /// Brakes as hard as it accelerates.
   void brake(Clock::TimePoint now);
-  /// Stands from now on, wherever it is: blocked.
+  /// Stops at once, wherever it is: blocked.
   void freeze(Clock::TimePoint now);
-  /// Takes `degrees` off the count: the same place, another name.
+  /// Takes `degrees` off the count: the same position, another number.
   void rename(double degrees);
 
   [[nodiscard]] double angle(Clock::TimePoint now) const;
@@ -31,7 +31,7 @@ class Axis {
 
   Clock::TimePoint start_{};
   double from_ = 0.0;
-  double rest_ = 0.0;  // where it stands in the end
+  double rest_ = 0.0;  // position at the end
   double sign_ = 1.0;
   double first_speed_ = 0.0;                                    // deg/s at the start
   double accelerating_ = 0.0, cruising_ = 0.0, braking_ = 0.0;  // s

@@ -2,14 +2,14 @@
 #include <cmath>
 #include <utility>
 
-#include "sim/devices/devices.h"
+#include "sim/devices/simulated_devices.h"
 #include "sim/scene/profile.h"
-#include "sim/scene/standing.h"
+#include "sim/scene/rest_error.h"
 
 namespace scanrig::sim {
 namespace {
 
-constexpr double kFarthest = 3600.0;  // deg either way
+constexpr double kMaxAngleDeg = 3600.0;  // deg either way
 
 }  // namespace
 
@@ -21,14 +21,14 @@ Result<void> SimTurntable::limit_speed(std::optional<DegreesPerSecond> limit) {
   return {};
 }
 
-/// Waits until `moment`; meanwhile anything that ends a move ends the wait.
+/// Waits until `moment`; any event that ends a move ends the wait.
 Result<void> SimTurntable::wait_for(std::unique_lock<std::mutex>& lock, Clock::TimePoint moment, Deadline deadline) {
   Bench& b = bench_;
   const auto disturbed = [&b] { return b.stop_requested || !b.estop_ok || b.stalled; };
   if (b.clock.wait_until(lock, b.changed, std::min(moment, deadline.at), disturbed)) {
     if (std::exchange(b.stop_requested, false)) return fail(ErrorCode::stopped, "turntable: stopped on request");
-    if (!b.estop_ok) return fail(ErrorCode::device_alarm, "turntable: the drive has no power: E-stop");
-    // Blocked: after two seconds without progress the drive's owner gives up.
+    if (!b.estop_ok) return fail(ErrorCode::device_alarm, "turntable: the drive has no power: release the e-stop");
+    // Blocked: after two seconds without progress the driver gives up.
     b.axis.freeze(b.clock.now());
     const auto given_up = b.clock.now() + std::chrono::seconds(2);
     const auto called_off = [&b] { return b.stop_requested || !b.estop_ok; };
@@ -36,7 +36,7 @@ Result<void> SimTurntable::wait_for(std::unique_lock<std::mutex>& lock, Clock::T
       return wait_for(lock, moment, deadline);
     }
     if (deadline.at < given_up) return fail(ErrorCode::timeout, "turntable: not at its target in time");
-    return fail(ErrorCode::stalled, "turntable: does not move; see what blocks the table");
+    return fail(ErrorCode::stalled, "turntable: does not move; remove what blocks the table");
   }
   if (deadline.at < moment) return fail(ErrorCode::timeout, "turntable: not at its target in time");
   return {};
@@ -64,8 +64,8 @@ Result<void> SimTurntable::home(Deadline deadline) {
   Bench& b = bench_;
   std::unique_lock lock(b.mutex);
   homed_ = false;
-  // A table that still brakes is let come to a stand first.
-  if (auto standing = wait_for(lock, b.axis.still(), deadline); !standing) return standing;
+  // A table that still brakes is stopped first.
+  if (auto stopped = wait_for(lock, b.axis.still(), deadline); !stopped) return stopped;
   const double turns = 360.0 * std::round(b.axis.angle(b.clock.now()) / 360.0);
   b.axis.rename(turns);
   Move move;
@@ -77,10 +77,10 @@ Result<void> SimTurntable::home(Deadline deadline) {
 Result<Move> SimTurntable::rotate_to(Degrees target, Deadline deadline) {
   Bench& b = bench_;
   std::unique_lock lock(b.mutex);
-  if (!b.stop_requested && !homed_) return fail(ErrorCode::not_homed, "turntable: has no zero; home it first");
-  if (!(std::abs(target.value) <= kFarthest)) {
-    return fail(ErrorCode::out_of_range, "turntable: {} degrees: only {} either way are possible", target.value,
-                kFarthest);
+  if (!b.stop_requested && !homed_) return fail(ErrorCode::not_homed, "turntable: not homed; home first");
+  if (!(std::abs(target.value) <= kMaxAngleDeg)) {
+    return fail(ErrorCode::out_of_range, "turntable: {} degrees is out of range; limit {} either way", target.value,
+                kMaxAngleDeg);
   }
   Move move;
   if (const auto done = travel(lock, target.value, deadline, move); !done) return pass_on(done);
@@ -91,16 +91,16 @@ Result<void> SimTurntable::stop(Deadline deadline) {
   Bench& b = bench_;
   std::unique_lock lock(b.mutex);
   b.axis.brake(b.clock.now());
-  const auto standing = b.axis.still();
-  b.clock.wait_until(lock, b.changed, std::min(standing, deadline.at), [] { return false; });
-  if (deadline.at < standing)
+  const auto standstill = b.axis.still();
+  b.clock.wait_until(lock, b.changed, std::min(standstill, deadline.at), [] { return false; });
+  if (deadline.at < standstill)
     return fail(ErrorCode::timeout, "turntable: standstill not confirmed in time; the table may be moving");
   return {};
 }
 
 Result<void> SimTurntable::reset_alarm(Deadline) {
   const std::scoped_lock lock(bench_.mutex);
-  if (!bench_.estop_ok) return fail(ErrorCode::device_alarm, "turntable: the drive has no power: release the E-stop");
+  if (!bench_.estop_ok) return fail(ErrorCode::device_alarm, "turntable: the drive has no power: release the e-stop");
   return {};
 }
 
@@ -111,7 +111,7 @@ Result<TurntableStatus> SimTurntable::status(Deadline) {
   status.motion = now < bench_.axis.still() ? TurntableStatus::Motion::moving : TurntableStatus::Motion::stopped;
   status.homed = homed_;
   status.angle = Degrees{encoder_reading(bench_.axis.angle(now))};
-  if (!bench_.estop_ok) status.alarm = "no motor power: E-stop";
+  if (!bench_.estop_ok) status.alarm = "no motor power: e-stop";
   return status;
 }
 

@@ -14,7 +14,7 @@ namespace {
 cv::Mat mirrors(double image_scale) {
   const Profile& p = profile();
   cv::Mat on = cv::Mat::zeros(p.projector_height, p.projector_width, CV_8U);
-  // Projector pixels a camera pixel, at the aim point.
+  // Projector pixels per camera pixel, at the aim point.
   const double camera_pixel = p.projector_focal_px /
                               std::hypot(p.distance_mm * std::sin(p.elevation_deg * CV_PI / 180) + p.projector_above_mm,
                                          p.distance_mm * std::cos(p.elevation_deg * CV_PI / 180)) *
@@ -50,7 +50,7 @@ DotPattern::DotPattern(double image_scale) {
   cv::resize(on, on, {}, per_pixel, per_pixel, cv::INTER_NEAREST);
   for (int level = 0; level < 9; ++level, sigma *= std::sqrt(2.0)) {
     if (sigma * per_pixel > 4.0 && per_pixel > 0.25) {
-      // Blurred this far, half the samples carry it all.
+      // Blurred this far, half the samples are sufficient.
       cv::Mat half;
       cv::GaussianBlur(on, half, {}, 0.5);
       cv::resize(half, on, {}, 0.5, 0.5, cv::INTER_AREA);

@@ -5,8 +5,8 @@
 
 namespace scanrig::sim {
 
-/// What the projector throws: random dots on its mirrors, seen through its lens, averaged over any width.
-/// A pyramid of Gaussian blurs, so that a lookup never meets an edge sharper than what it averages over.
+/// The projector's pattern: random dots on its mirrors, seen through its lens, averaged over any width. A pyramid of
+/// Gaussian blurs, so that a lookup never meets an edge sharper than its averaging width.
 class DotPattern {
  public:
   /// Dots sized for a camera of `image_scale` times the full resolution: 3 of ITS pixels mixed with 2 and 5.

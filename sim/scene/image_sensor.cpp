@@ -1,4 +1,4 @@
-#include "sim/scene/sensor.h"
+#include "sim/scene/image_sensor.h"
 
 #include <algorithm>
 #include <cmath>

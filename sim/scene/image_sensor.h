@@ -5,12 +5,12 @@
 
 namespace scanrig::sim {
 
-/// What passes lens and colour filters (RGGB) of the light (32-bit float RGB, 1.0 = full scale): one channel, 32-bit
-/// float. `image_scale`: resolution as a share of the full sensor's; the blur is that of the full sensor.
+/// The light (32-bit float RGB, 1.0 = full scale) behind lens and colour filters (RGGB): one channel, 32-bit float.
+/// `image_scale`: resolution as a share of the full sensor's; the blur is that of the full sensor.
 cv::Mat through_lens(const cv::Mat& light, double image_scale);
 
-/// What the sensor makes of that: vignetting, shot and read noise, 8 bits, linear. `noise_key` names the exposure: the
-/// same key gives the same noise; 0 gives none.
+/// The sensor's image of that light: vignetting, shot and read noise, 8 bits, linear. `noise_key` names the exposure:
+/// the same key gives the same noise; 0 gives none.
 cv::Mat expose(const cv::Mat& on_sensor, std::uint64_t noise_key);
 
 }  // namespace scanrig::sim

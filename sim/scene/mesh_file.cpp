@@ -60,8 +60,8 @@ std::array<int, 2> obj_corner(std::string_view word, std::size_t positions, std:
   return {from_zero(index[0], positions), from_zero(index[1], coordinates)};
 }
 
-/// The image an OBJ's material names, or the one beside it called <name>_texture.png (and <stem>_texture.png where the
-/// name goes on after an underscore).
+/// The image of an OBJ's material, or the one beside it with the name <name>_texture.png (and <stem>_texture.png for a
+/// name with a suffix after an underscore).
 cv::Mat obj_image(const fs::path& file, const std::string& library) {
   std::string name;
   if (!library.empty()) {
@@ -142,7 +142,7 @@ class PlyBody {
 struct PlyHeader {
   std::string format;
   std::vector<PlyElement> elements;
-  std::size_t end = 0;  ///< where the body begins; 0: there is no whole header
+  std::size_t end = 0;  ///< start of the body; 0: the header is incomplete
 };
 
 PlyHeader ply_header(std::string_view text) {

@@ -11,7 +11,7 @@
 
 namespace scanrig::sim {
 
-/// A mesh as a file has it. Vertices at the same place are one vertex; what differs there is kept by corner.
+/// A mesh as in a file. Vertices at the same place are one vertex; differences there are kept by corner.
 struct MeshFile {
   TriangleMesh mesh;
   std::vector<std::array<Eigen::Vector2f, 3>> corners;  ///< texture coordinates by triangle, (0,0) lower left; or empty

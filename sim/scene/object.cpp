@@ -56,7 +56,7 @@ std::shared_ptr<const SurfaceColour> colour_of(MeshFile& file) {
 
 Result<Object> load_object(const std::filesystem::path& file, double height_mm) {
   if (!(height_mm > 0.0)) {
-    return fail(ErrorCode::invalid_input, "object: a height of {} mm cannot be", height_mm);
+    return fail(ErrorCode::invalid_input, "object: a height of {} mm is not possible", height_mm);
   }
   Object object;
   if (file.empty()) {

@@ -55,7 +55,7 @@ Vector2d Eye::project(const Vector3d& point_in_turntable) const {
 Vector3d Eye::ray(double u, double v) const {
   const Vector2d target((u - cx) / fx, (v - cy) / fy);
   Vector2d p = target;
-  // The distortion is mild (it moves a corner by 0.3 %), so the fixed point gains two digits and more a step.
+  // The distortion is mild (it moves a corner by 0.3 %), so the fixed point gains two or more digits per step.
   for (int i = 0; i < 6; ++i) p += target - distort(distortion, p);
   return {p.x(), p.y(), 1.0};
 }

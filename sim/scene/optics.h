@@ -8,7 +8,7 @@
 
 namespace scanrig::sim {
 
-/// A lens and a raster: camera, or projector run backwards. Axes as OpenCV's: x right, y down, z forward; mm; pixel
+/// A lens and a raster: camera, or projector run backwards. Axes as in OpenCV: x right, y down, z forward; mm; pixel
 /// centres at integer coordinates; distortion k1 k2 p1 p2 k3 as in OpenCV.
 struct Eye {
   std::string serial;
@@ -25,7 +25,7 @@ struct Eye {
   [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& point_in_turntable) const;
   /// Direction in the eye's frame, z = 1, of a (distorted) pixel.
   [[nodiscard]] Eigen::Vector3d ray(double u, double v) const;
-  /// Where the eye is, in the turntable frame.
+  /// Position of the eye in the turntable frame.
   [[nodiscard]] Eigen::Vector3d centre() const { return eye_from_turntable.inverse().translation(); }
 };
 

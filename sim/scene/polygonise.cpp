@@ -17,7 +17,7 @@ using Field = std::function<double(const Vector3d&)>;
 
 constexpr int kBlock = 8;  // cells along a block's edge
 
-/// A vertex is named by the lattice edge it lies on: the node it starts from and one of the cube's seven directions.
+/// A vertex is identified by its lattice edge: the node it starts from and one of the cube's seven directions.
 using EdgeKey = std::uint64_t;
 
 struct Lattice {
@@ -79,7 +79,7 @@ void add_tetrahedron(const Vector3i& base, const std::array<int, 4>& t, const st
   for (int i = 0; i < 4; ++i) (f[t[i]] < 0.0 ? in[n_in++] : outside[n_out++]) = i;
   if (n_in == 0 || n_out == 0) return;
   const auto e = [&](int i, int j) { return edge_key(base, t[i], t[j]); };
-  // Parity of the order (in..., out...) as a permutation of 0123 tells on which side the triangle must look.
+  // Parity of the order (in..., out...) as a permutation of 0123 decides on which side the triangle must look.
   std::array<int, 4> order{};
   std::copy_n(in.begin(), n_in, order.begin());
   std::copy_n(outside.begin(), n_out, order.begin() + n_in);

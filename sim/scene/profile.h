@@ -23,16 +23,16 @@ struct Profile {
   double distortion_left[5] = {-0.080, 0.15, 1.2e-4, -0.9e-4, 0.0};
   double distortion_right[5] = {-0.084, 0.17, -0.8e-4, 1.1e-4, 0.0};
   double lens_sigma_px = 0.6;           ///< the same all over the field
-  double defocus_px_per_mm = 0.0054;    ///< sigma a mm off the focus plane: 1.3 px circle at 60 mm
+  double defocus_px_per_mm = 0.0054;    ///< sigma per mm off the focus plane: 1.3 px circle at 60 mm
   double vignetting = 0.12;             ///< loss in the corner
   double read_noise = 0.8;              ///< grey levels
-  double shot_noise_variance = 0.0263;  ///< grey levels squared a grey level: 2 levels in all at 128
+  double shot_noise_variance = 0.0263;  ///< grey levels squared per grey level: 2 levels in all at 128
 
   // Projector: above the midpoint of the cameras, looking at the same point.
   int projector_width = 1920;
   int projector_height = 1080;
   double projector_above_mm = 90.0;
-  double projector_focal_px = 4526.0;            ///< 0.15 mm a mirror at the aim point
+  double projector_focal_px = 4526.0;            ///< 0.15 mm per mirror at the aim point
   double projector_sigma_px = 0.7;               ///< its lens, in its own pixels
   double projector_defocus_px_per_mm = 0.006;    ///< sigma, sharp over +-60 mm
   double dot_diameters_px[3] = {3.0, 2.0, 5.0};  ///< camera pixels, whatever the image scale
@@ -61,7 +61,7 @@ struct Profile {
   double acceleration_deg_s2 = 90.0;
   double settling_s = 0.2;
   double vibration_deg = 0.02;       ///< amplitude at the end of a move; dies out within settling_s
-  double repeatability_deg = 0.003;  ///< sigma of where the axis comes to rest
+  double repeatability_deg = 0.003;  ///< sigma of the axis's rest position
   double encoder_step_deg = 0.004;
   double exposure_s = 0.012;
 
@@ -70,10 +70,10 @@ struct Profile {
   double largest_height_mm = 115.0;
 };
 
-/// The one profile there is.
+/// The only profile.
 const Profile& profile();
 
-/// Name and value of every constant, one a line.
+/// Name and value of every constant, one per line.
 std::string canonical_text(const Profile& profile);
 
 /// SHA-256 of the canonical text of profile().

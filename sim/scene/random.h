@@ -6,8 +6,8 @@
 
 namespace scanrig::sim {
 
-/// Mixes a counter into 64 random bits (SplitMix64's finaliser). Random numbers here are functions of what they are
-/// for, never of a running state: the same pixel gets the same noise whichever thread computes it.
+/// Mixes a counter into 64 random bits (SplitMix64's finaliser). Random numbers here are functions of their purpose,
+/// never of a running state: the same pixel gets the same noise from any thread.
 constexpr std::uint64_t mix(std::uint64_t x) {
   x += 0x9e3779b97f4a7c15ULL;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;

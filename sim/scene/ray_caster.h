@@ -6,7 +6,7 @@
 
 namespace scanrig::sim {
 
-/// First hits on one mesh, by Embree: the only file that knows its version.
+/// First hits on one mesh, by Embree: the only file that depends on its version.
 /// Threads: const functions from any.
 class RayCaster {
  public:
@@ -23,7 +23,7 @@ class RayCaster {
 
   /// Both sides of a triangle count. `direction` need not be a unit vector.
   [[nodiscard]] Hit first_hit(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
-  /// Anything between `from` and `from + way`?
+  /// Whether any triangle lies between `from` and `from + way`.
   [[nodiscard]] bool blocked(const Eigen::Vector3d& from, const Eigen::Vector3d& way) const;
 
  private:

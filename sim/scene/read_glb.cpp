@@ -98,9 +98,9 @@ void add_node(const tinygltf::Model& model, int index, const Affine3d& parent, M
   if (node.mesh >= 0) {
     for (const auto& primitive : model.meshes.at(node.mesh).primitives) add_primitive(model, primitive, placed, out);
   }
-  constexpr int kDeepest = 64;  // a file that contains itself must end somewhere
+  constexpr int kMaxDepth = 64;  // ends the reading of a file that contains itself
   for (const int child : node.children) {
-    if (depth < kDeepest) add_node(model, child, placed, out, depth + 1);
+    if (depth < kMaxDepth) add_node(model, child, placed, out, depth + 1);
   }
 }
 

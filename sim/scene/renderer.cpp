@@ -76,13 +76,13 @@ class Shot {
   }
 
   [[nodiscard]] bool in_shadow(const Vector3d& point, const Vector3d& normal) const {
-    const Vector3d from = point + 0.02 * normal;  // off the surface it stands on
+    const Vector3d from = point + 0.02 * normal;  // off its own surface
     const Vector3d way = lamp_ - from;
     if (!near_object(from, way)) return false;
     return placed_.rays.blocked(object_from_turntable_ * from, object_from_turntable_.linear() * way);
   }
 
-  /// Adds what the projector throws on a surface; `footprint`: mm on the surface.
+  /// Adds the projector's light on a surface; `footprint`: mm on the surface.
   void light_up(Sample& s, const Vector3d& point, const Vector3d& normal, const Vector3f& albedo,
                 double footprint) const {
     const Profile& p = profile();
@@ -101,7 +101,7 @@ class Shot {
     s.pattern += static_cast<float>(light) * albedo;
   }
 
-  /// Standard deviation of what one sample averages over, as the width of a box with the same: mm on the surface.
+  /// Standard deviation of the averaging width of one sample, as the width of a box with the same: mm on the surface.
   [[nodiscard]] double footprint(double depth, double cosine, double width) const {
     const double blur = profile().defocus_px_per_mm * std::abs(depth - focus_) * camera_.fx / profile().focal_px;
     const double pixels = std::hypot(width, blur / kBoxSigma);
@@ -193,7 +193,7 @@ class Shot {
   double radius_ = 0.0, focus_ = 0.0, lamp_focus_ = 0.0;
 };
 
-/// Do these samples see one smooth surface?
+/// Whether these samples see one smooth surface.
 bool differ(const std::array<Sample, 4>& s) {
   constexpr double kStep = 0.8;  // mm of depth within a pixel: a slope of 80 degrees
   for (int i = 1; i < 4; ++i) {

@@ -10,13 +10,13 @@
 
 namespace scanrig::sim {
 
-/// The light that falls on one sensor, before the lens's blur: 32-bit float RGB, 1.0 = full scale.
+/// The light on one sensor, before the lens's blur: 32-bit float RGB, 1.0 = full scale.
 struct Radiance {
   cv::Mat pattern;
   cv::Mat plain;
 };
 
-/// One object on the table, as it lies in one pose.
+/// One object on the table in one pose.
 struct Placed {
   const Object& object;
   const RayCaster& rays;
@@ -24,10 +24,10 @@ struct Placed {
   Transform table_from_object;
 };
 
-/// Both exposures of one camera with the table at `angle` (radians).
-/// Each pixel is a square of four samples turned by a random angle: what is prefiltered (dots, textures, shading) then
-/// comes out the same up to third order for every angle; pixels on an edge take sixteen jittered samples.
-/// `sampling_seed` chooses the random angles. Same arguments, same bits, for any number of threads.
+/// Both exposures of one camera with the table at `angle` (radians). Each pixel is a square of four samples turned by a
+/// random angle: prefiltered signals (dots, textures, shading) are then the same up to third order for every angle;
+/// pixels on an edge take sixteen jittered samples. `sampling_seed` chooses the random angles. Same arguments, same
+/// bits, for any number of threads.
 Radiance render(const Placed& placed, const Eye& camera, const Eye& projector, const DotPattern& dots, double angle,
                 std::uint64_t sampling_seed = 0);
 

@@ -40,7 +40,8 @@ struct Touch {
   int point = -1;
 };
 
-/// Turns `down` towards `side` (unit, perpendicular to it) about the contact `pivot`: which point touches next?
+/// Turns `down` towards `side` (unit, perpendicular to it) about the contact `pivot`; returns the point that touches
+/// next.
 Touch next_touch(const Points& points, const Vector3d& pivot, const Vector3d& down, const Vector3d& side,
                  const std::vector<int>& contacts) {
   Touch first;
@@ -58,7 +59,7 @@ Touch next_touch(const Points& points, const Vector3d& pivot, const Vector3d& do
 /// Direction in which turning `down` sinks the centre of mass fastest while `contacts` stay down, or nothing.
 std::optional<Vector3d> rolling_side(const Points& points, const Vector3d& down, const std::vector<int>& contacts) {
   const Vector3d& pivot = points[contacts[0]];
-  // The height is down . pivot; turning towards `side` changes it by side . pivot a radian.
+  // The height is down . pivot; turning towards `side` changes it by side . pivot per radian.
   Vector3d side = -(pivot - down.dot(pivot) * down);
   if (contacts.size() == 2) {
     const Vector3d axis = (points[contacts[1]] - pivot).normalized();
@@ -118,12 +119,12 @@ bool is_firm(const Points& points, const Vector3d& down) {
 
 double angle_between(const Vector3d& a, const Vector3d& b) { return std::atan2(a.cross(b).norm(), a.dot(b)); }
 
-/// Draws by chance among the rests that `allowed` accepts; -1: there is none.
+/// Draws by chance among the rests that `allowed` accepts; -1: no rest.
 template <class Allowed>
 int draw(const std::vector<Rest>& rests, double random, const Allowed& allowed) {
-  // Every firm rest deserves to be met now and then, however seldom a drop would end there.
-  constexpr double kSmallestChance = 0.03;
-  const auto weight = [&](const Rest& r) { return allowed(r) ? std::max(r.chance, kSmallestChance) : 0.0; };
+  // Every firm rest is drawn now and then, however seldom a drop would end there.
+  constexpr double kMinChance = 0.03;
+  const auto weight = [&](const Rest& r) { return allowed(r) ? std::max(r.chance, kMinChance) : 0.0; };
   double total = 0.0;
   for (const auto& r : rests) total += weight(r);
   int last = -1;
@@ -153,7 +154,7 @@ Result<Transform> put_down(const TriangleMesh& mesh, const Vector3d& down, std::
     return fail(
         ErrorCode::invalid_input,
         "object: larger than the working volume ({:.0f} mm across and {:.0f} mm high in one of its rests, {:.0f} "
-        "and {:.0f} fit): give a smaller height",
+        "and {:.0f} fit): choose a smaller height",
         2.0 * circle.radius, high - low, p.largest_diameter_mm, p.largest_height_mm);
   }
   const double offset = 3.0 * std::sqrt(uniform(mix(seed, 2))), phi = 2.0 * std::numbers::pi * uniform(mix(seed, 3));
@@ -195,7 +196,7 @@ Result<std::vector<Transform>> draw_placements(const TriangleMesh& mesh, std::ui
     second = draw(rests, uniform(mix(seed, 5)), turned_over);
   }
   if (second < 0) {
-    return fail(ErrorCode::degenerate, "object: it has {} firm way(s) to lie on a table, two are needed", rests.size());
+    return fail(ErrorCode::degenerate, "object: it has {} stable rest(s) on a table, two are needed", rests.size());
   }
   std::vector<Transform> placements;
   for (int i = 0; i < count; ++i) {

@@ -8,9 +8,9 @@
 
 namespace scanrig::sim {
 
-/// A way the object can lie still on a plane.
+/// A stable orientation of the object on a plane.
 struct Rest {
-  Eigen::Vector3d down = -Eigen::Vector3d::UnitY();  ///< unit, in the object's frame: what points to the table
+  Eigen::Vector3d down = -Eigen::Vector3d::UnitY();  ///< unit, in the object's frame: direction to the table
   double height = 0.0;                               ///< mm from the plane to the centre of mass
   double chance = 0.0;                               ///< share of random drops that end here
 };
@@ -20,11 +20,10 @@ struct Rest {
 /// Most likely first. Same seed, same rests.
 std::vector<Rest> stable_rests(const TriangleMesh& mesh, std::uint64_t seed);
 
-/// Two of the rests more than 30 degrees apart, drawn by chance, and the placements that put the object down so: lowest
-/// point on y = 0, bounding cylinder within 3 mm of the axis, turned at random.
-/// `count` placements alternate between the two; with `same_rest` all use the first (turned and moved anew each time).
-/// Fails with `degenerate` (there are no two such rests), `invalid_input` (larger than the working volume, unless
-/// `any_size`).
+/// Two of the rests more than 30 degrees apart, drawn by chance, and the placements for them: lowest point on y = 0,
+/// bounding cylinder within 3 mm of the axis, turned at random. `count` placements alternate between the two; with
+/// `same_rest` all use the first (turned and moved anew each time). Fails with `degenerate` (fewer than two such
+/// rests), `invalid_input` (larger than the working volume, unless `any_size`).
 Result<std::vector<Transform>> draw_placements(const TriangleMesh& mesh, std::uint64_t seed, int count, bool same_rest,
                                                bool any_size = false);
 

@@ -17,7 +17,7 @@ using Eigen::Vector3f;
 
 constexpr int kVertexRays = 28;   // smoothed over the neighbours afterwards
 constexpr int kTableRays = 300;   // a shadow on an even table shows every step
-constexpr double kReach = 200.0;  // mm; nothing of the object is farther
+constexpr double kReach = 200.0;  // mm; no part of the object is farther
 constexpr int kGrid = 73;         // nodes across the table
 constexpr int kMiddle = kGrid / 2;
 constexpr double kStep = 2.5;  // mm between them
@@ -34,7 +34,7 @@ std::vector<Vector3d> hemisphere(int count) {
   return directions;
 }
 
-/// What a ray that leaves `from` (table frame) and meets no part of the object brings back.
+/// Light along a ray that leaves `from` (table frame) and meets no part of the object.
 Vector3f room(const Vector3d& from, const Vector3d& direction) {
   const Profile& p = profile();
   if (direction.y() >= 0.0) return Vector3f::Constant(static_cast<float>(0.7 + 0.3 * direction.y()));
@@ -66,7 +66,7 @@ Surroundings gather(const RayCaster& rays, const Transform& object_from_table, c
   return s;
 }
 
-/// One step of averaging over the edges: takes the grain of the few rays out.
+/// One step of averaging over the edges: removes the grain of the few rays.
 void smooth(const std::vector<Eigen::Vector3i>& triangles, std::vector<Surroundings>& values) {
   std::vector<Surroundings> sum = values;
   std::vector<float> count(values.size(), 1.0F);

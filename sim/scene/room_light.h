@@ -9,15 +9,15 @@
 
 namespace scanrig::sim {
 
-/// How open a surface is to the room, and what it gets from around it.
+/// Openness of a surface to the room, and the light from around it.
 struct Surroundings {
   Eigen::Vector3f ambient = Eigen::Vector3f::Zero();  ///< from sky, table and the object itself; a free, upward face: 1
   float openness = 1.0F;                              ///< share of the hemisphere that no part of the object covers
 };
 
-/// The plain exposure's light: a sky that is the same all around, and three large soft boxes that stand in the room.
-/// The sky's part turns with the object, so it is gathered once for each placement: by rays at the mesh's vertices and
-/// on a grid over the table.
+/// The plain exposure's light: a sky that is the same all around, and three large soft boxes fixed in the room. The
+/// sky's part turns with the object, so it is gathered once for each placement: by rays at the mesh's vertices and on a
+/// grid over the table.
 class RoomLight {
  public:
   RoomLight(const Object& object, const RayCaster& rays, const Transform& table_from_object);

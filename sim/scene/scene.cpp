@@ -4,17 +4,16 @@
 #include <cassert>
 #include <tuple>
 
+#include "sim/scene/image_sensor.h"
 #include "sim/scene/random.h"
 #include "sim/scene/rests.h"
-#include "sim/scene/sensor.h"
 
 namespace scanrig::sim {
 
 Result<std::unique_ptr<Scene>> Scene::create(const SceneOptions& options) {
   if (!(options.image_scale >= 0.1 && options.image_scale <= 1.0) || options.poses < 1) {
-    return fail(ErrorCode::out_of_range,
-                "scene: image scale {} and {} poses: 0.1 to 1 and at least one pose are possible", options.image_scale,
-                options.poses);
+    return fail(ErrorCode::out_of_range, "scene: image scale {} and {} poses: choose 0.1 to 1 and at least one pose",
+                options.image_scale, options.poses);
   }
   auto object = load_object(options.object, options.height_mm);
   if (!object) return pass_on(object);

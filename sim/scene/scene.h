@@ -18,7 +18,7 @@ struct SceneOptions {
   int poses = 2;
   double image_scale = 1.0;
   bool same_rest_twice = false;  ///< every pose is the first rest, only turned and moved
-  bool any_size = false;         ///< put it down although it is larger than the working volume, as a person can
+  bool any_size = false;         ///< put it down although it is larger than the working volume, as an operator can
   bool noise = true;
 };
 
@@ -28,7 +28,7 @@ struct StereoImages {
   cv::Mat right;
 };
 
-/// What falls on both sensors, in both lights; see through_lens().
+/// The light on both sensors, in both lights; see through_lens().
 struct View {
   cv::Mat left_pattern, right_pattern, left_plain, right_plain;
 };
@@ -42,7 +42,7 @@ class Scene {
   /// For tests: a given object in given placements.
   Scene(Object object, std::vector<Transform> placements, const SceneOptions& options);
 
-  /// The table stands at `angle` (radians). Same pose and angle, same bits. Takes about 2 s in full size.
+  /// The scene with the table at `angle` (radians). Same pose and angle, same bits. Takes about 2 s in full size.
   View look(int pose, double angle);
   /// `exposure` counts exposures; with the seed it names the noise.
   [[nodiscard]] StereoImages expose(const View& view, bool pattern, std::uint64_t exposure) const;

@@ -8,17 +8,18 @@
 
 namespace scanrig::sim {
 
-/// A point of the object's surface that is about to be coloured.
+/// A point of the object's surface to be coloured.
 struct SurfacePoint {
   Eigen::Vector3d position;  ///< in the object's own frame, mm
   int triangle = 0;
   double u = 0.0;  ///< weights of the triangle's second and third corner
   double v = 0.0;
-  double footprint_mm = 0.0;  ///< width on the surface of what is being averaged
+  double footprint_mm = 0.0;  ///< averaging width on the surface
 };
 
-/// Diffuse colour of an object. All implementations prefilter: what is finer than the footprint is averaged, not
-/// sampled. Colours are linear RGB albedo, held to what a blue screen can key and a camera can measure (`measurable`).
+/// Diffuse colour of an object. All implementations prefilter: details finer than the footprint are averaged, not
+/// sampled. Colours are linear RGB albedo, limited to what a blue screen can key and a camera can measure
+/// (`measurable`).
 /// Threads: const functions from any.
 class SurfaceColour {
  public:
@@ -26,8 +27,7 @@ class SurfaceColour {
   [[nodiscard]] virtual Eigen::Vector3f albedo(const SurfacePoint& point) const = 0;
 };
 
-/// Lightens what is darker than 0.12, darkens what is brighter than 0.9, and takes blue back to at most 1.1 times the
-/// stronger of red and green.
+/// Lightens albedo below 0.12, darkens albedo above 0.9, and limits blue to 1.1 times the stronger of red and green.
 Eigen::Vector3f measurable(const Eigen::Vector3f& albedo);
 
 /// Painted solid: coloured patches, stripes, spots and fine grain, all in space, with contrast everywhere.
@@ -36,7 +36,7 @@ std::unique_ptr<SurfaceColour> painted_colour();
 /// Grey-brown stone with grain from 0.5 to 16 mm.
 std::unique_ptr<SurfaceColour> stone_colour();
 
-/// One colour a vertex (linear RGB), interpolated.
+/// One colour per vertex (linear RGB), interpolated.
 std::unique_ptr<SurfaceColour> vertex_colour(std::vector<Eigen::Vector3f> colours,
                                              std::vector<Eigen::Vector3i> triangles);
 

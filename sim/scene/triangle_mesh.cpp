@@ -105,8 +105,8 @@ std::vector<Vector3d> vertex_normals(const TriangleMesh& mesh) {
 }
 
 std::vector<Vector3d> extreme_vertices(const std::vector<Vector3d>& vertices) {
-  // A few directions first: what is farthest in a direction near one of them is nearly farthest in that one, by at most
-  // the size of the mesh times the angle between the two. Only such vertices are looked at again.
+  // A few directions first: the farthest vertex in a direction near one of them is nearly farthest in that one, by at
+  // most the size of the mesh times the angle between the two. Only such vertices are tested again.
   const auto cones = spread_directions(1000), directions = spread_directions(20000);
   Vector3d middle = Vector3d::Zero();
   for (const auto& v : vertices) middle += v / static_cast<double>(vertices.size());
@@ -125,10 +125,10 @@ std::vector<Vector3d> extreme_vertices(const std::vector<Vector3d>& vertices) {
     double chord = 0.0;
     for (const auto& d : members[c]) chord = std::max(chord, (cones[c] - d).norm());
     const Eigen::VectorXf along = all * cones[c].cast<float>();
-    const float least = along.maxCoeff() - static_cast<float>(2.0 * reach * chord);
+    const float threshold = along.maxCoeff() - static_cast<float>(2.0 * reach * chord);
     std::vector<int> near;
     for (int v = 0; v < along.size(); ++v) {
-      if (along[v] >= least) near.push_back(v);
+      if (along[v] >= threshold) near.push_back(v);
     }
     const Columns candidates = all(near, Eigen::all);
     for (const auto& d : members[c]) {
@@ -155,7 +155,7 @@ double largest_extent(const std::vector<Vector3d>& vertices) {
 }
 
 Circle smallest_circle(const std::vector<Vector2d>& points) {
-  // The circle of a few points, the farthest of all others added until none is outside: exact, and a few rounds do.
+  // The circle of a few points, the farthest of all others added until none is outside: exact after a few rounds.
   if (points.empty()) return {};
   std::vector<Vector2d> chosen = {points[0]};
   for (;;) {

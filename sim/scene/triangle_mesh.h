@@ -14,10 +14,11 @@ struct TriangleMesh {
 /// Every edge belongs to exactly two triangles that run through it in opposite directions.
 bool is_closed(const TriangleMesh& mesh);
 
-/// Of the solid if the mesh is closed, else of its surface, of even density. Needs at least one triangle with area.
+/// Centre of mass of the solid if the mesh is closed, else of its surface, of even density. Needs at least one triangle
+/// with area.
 Eigen::Vector3d centre_of_mass(const TriangleMesh& mesh);
 
-/// Signed volume by the divergence theorem; means something for closed meshes only.
+/// Signed volume by the divergence theorem; meaningful for closed meshes only.
 double volume(const TriangleMesh& mesh);
 
 /// Area-weighted unit normals of the vertices.
@@ -26,7 +27,7 @@ std::vector<Eigen::Vector3d> vertex_normals(const TriangleMesh& mesh);
 /// Vertices that are farthest in at least one of about 20,000 directions: enough for contact with a plane.
 std::vector<Eigen::Vector3d> extreme_vertices(const std::vector<Eigen::Vector3d>& vertices);
 
-/// Distance of the two points that lie farthest apart.
+/// Distance of the two points that are farthest apart.
 double largest_extent(const std::vector<Eigen::Vector3d>& vertices);
 
 /// Smallest circle around points in the plane.

@@ -11,8 +11,8 @@ constexpr std::chrono::microseconds kStep{500};
 constexpr double kStepSeconds = std::chrono::duration<double>(kStep).count();
 constexpr double kQuickStopFactor = 4.0;
 constexpr double kStillDeg = 0.001;
-constexpr double kDecays = 5.0;      ///< of a vibration, until it is gone
-constexpr double kBackOffDeg = 2.0;  ///< closer than this to the home switch it is closed already
+constexpr double kDecays = 5.0;      ///< of a vibration, until its end
+constexpr double kBackOffDeg = 2.0;  ///< closer than this the home switch is already closed
 
 /// Two's complement, as the drive's counter wraps.
 std::int32_t wrapped(double pulses) {
@@ -118,7 +118,7 @@ void Axis::finish() {
 }
 
 void Axis::end() {
-  mode_ = Mode::standing;
+  mode_ = Mode::stopped;
   velocity_ = 0.0;
   ended_ = now_;
   shaking_ = !blocked_;

@@ -35,7 +35,7 @@ bool send_all(int descriptor, const std::string& text) {
   return true;
 }
 
-/// What has arrived is appended; false at the end of the connection.
+/// Appends received bytes; false at the end of the connection.
 bool receive(int descriptor, std::string& pending) {
   std::array<char, 4096> bytes;
   const ssize_t count = ::recv(descriptor, bytes.data(), bytes.size(), 0);
@@ -54,7 +54,7 @@ std::optional<std::string> take_line(std::string& pending) {
 
 }  // namespace
 
-Result<std::unique_ptr<ControlSocket>> ControlSocket::start(std::filesystem::path path, Answer answer) {
+Result<std::unique_ptr<ControlSocket>> ControlSocket::start(std::filesystem::path path, Handler handler) {
   const auto address = address_of(path);
   if (!address) return fail(ErrorCode::io, "the path {} is too long for a socket", path.string());
   ::unlink(path.c_str());
@@ -66,12 +66,12 @@ Result<std::unique_ptr<ControlSocket>> ControlSocket::start(std::filesystem::pat
     return fail(ErrorCode::io, "listen on {}: {}", path.string(), std::strerror(reason));
   }
   const int wake = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
-  return std::unique_ptr<ControlSocket>(new ControlSocket(std::move(path), std::move(answer), listener, wake));
+  return std::unique_ptr<ControlSocket>(new ControlSocket(std::move(path), std::move(handler), listener, wake));
 }
 
-ControlSocket::ControlSocket(std::filesystem::path path, Answer answer, int listener, int wake)
+ControlSocket::ControlSocket(std::filesystem::path path, Handler handler, int listener, int wake)
     : path_(std::move(path)),
-      answer_(std::move(answer)),
+      handler_(std::move(handler)),
       listener_(listener),
       wake_(wake),
       thread_([this](const std::stop_token& stop) { serve(stop); }) {}
@@ -92,7 +92,7 @@ void ControlSocket::serve(const std::stop_token& stop) {
     for (const Client& client : clients) watched.push_back({client.descriptor, POLLIN, 0});
     ::poll(watched.data(), watched.size(), -1);
     for (std::size_t i = 0; i < clients.size(); ++i) {
-      if (!watched[i + 2].revents || listen_to(clients[i])) continue;
+      if (!watched[i + 2].revents || read_from(clients[i])) continue;
       ::close(clients[i].descriptor);
       clients[i].descriptor = -1;
     }
@@ -106,31 +106,31 @@ void ControlSocket::serve(const std::stop_token& stop) {
   for (const Client& client : clients) ::close(client.descriptor);
 }
 
-/// False when the client has gone or is not worth listening to.
-bool ControlSocket::listen_to(Client& client) {
+/// False when the client has gone or sends no valid line.
+bool ControlSocket::read_from(Client& client) {
   if (!receive(client.descriptor, client.pending)) return false;
   while (const auto line = take_line(client.pending)) {
-    if (!send_all(client.descriptor, answer_(*line) + "\n")) return false;
+    if (!send_all(client.descriptor, handler_(*line) + "\n")) return false;
   }
   return true;
 }
 
-Result<std::string> say_to_control_socket(const std::filesystem::path& path, const std::string& line) {
+Result<std::string> send_to_control_socket(const std::filesystem::path& path, const std::string& line) {
   const auto address = address_of(path);
   if (!address) return fail(ErrorCode::io, "the path {} is too long for a socket", path.string());
   const int peer = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
   std::string pending;
-  std::optional<std::string> answer;
+  std::optional<std::string> reply;
   bool open = ::connect(peer, reinterpret_cast<const sockaddr*>(&*address), sizeof *address) == 0 &&
               send_all(peer, line + "\n");
   const int reason = errno;
-  while (open && !answer) {
+  while (open && !reply) {
     open = receive(peer, pending);
-    answer = take_line(pending);
+    reply = take_line(pending);
   }
   ::close(peer);
-  if (answer) return *answer;
-  return fail(ErrorCode::io, "no simulated rig answers at {}: {}", path.string(), std::strerror(reason));
+  if (reply) return *reply;
+  return fail(ErrorCode::io, "no simulated rig listens at {}: {}", path.string(), std::strerror(reason));
 }
 
 }  // namespace scanrig::sim::wire

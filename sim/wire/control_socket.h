@@ -10,15 +10,15 @@
 
 namespace scanrig::sim::wire {
 
-/// Where tests and people play the world: a Unix socket on which any number of clients say a line and hear a line.
-/// What the lines mean is the answerer's business.
-/// Threads: the answerer is called from the socket's own thread, one line at a time; it must not wait long.
+/// Access to the simulated rig for tests and people: a Unix socket. Any number of clients send a line and receive a
+/// line. The handler defines the meaning of the lines.
+/// Threads: the handler is called from the socket's own thread, one line at a time; it must not wait long.
 class ControlSocket {
  public:
-  using Answer = std::function<std::string(const std::string& line)>;
+  using Handler = std::function<std::string(const std::string& line)>;
 
   /// Fails with `io`.
-  static Result<std::unique_ptr<ControlSocket>> start(std::filesystem::path path, Answer answer);
+  static Result<std::unique_ptr<ControlSocket>> start(std::filesystem::path path, Handler handler);
   ~ControlSocket();
 
  private:
@@ -27,18 +27,18 @@ class ControlSocket {
     std::string pending{};
   };
 
-  ControlSocket(std::filesystem::path path, Answer answer, int listener, int wake);
+  ControlSocket(std::filesystem::path path, Handler handler, int listener, int wake);
   void serve(const std::stop_token& stop);
-  bool listen_to(Client& client);
+  bool read_from(Client& client);
 
   const std::filesystem::path path_;
-  const Answer answer_;
+  const Handler handler_;
   const int listener_;
-  const int wake_;  // an eventfd: the end
+  const int wake_;  // an eventfd: stop request
   std::jthread thread_;
 };
 
-/// One line said to the socket at `path` and the line it answers. Fails with `io`.
-Result<std::string> say_to_control_socket(const std::filesystem::path& path, const std::string& line);
+/// Sends one line to the socket at `path` and returns the reply. Fails with `io`.
+Result<std::string> send_to_control_socket(const std::filesystem::path& path, const std::string& line);
 
 }  // namespace scanrig::sim::wire

@@ -2,13 +2,13 @@
 //
 //   scanrig-edge-camera IMAGES (lines DOTS PLAIN | lightcrafter PORT) (v4l2 LEFT RIGHT | gige LEFT RIGHT)
 //
-// IMAGES is a rendered scan folder; of it pose 1 is shown. An edge exposes both cameras: 12 ms later one frame comes
-// from each, of the view that belongs to the table's angle and of the light that was on.
+// IMAGES is a rendered scan folder; its pose 1 is shown. An edge exposes both cameras: 12 ms later each delivers one
+// frame, of the view at the table's angle and of the light that was on.
 //   lines         files that hold the trigger lines' levels (gpio-sim's `value`)
 //   lightcrafter  a LightCrafter 4500 behind USB/IP at this port of 127.0.0.1; its trigger output is the edge
-//   v4l2          v4l2loopback devices: what is written there is what their readers get, one frame a write
-//   gige          addresses at which two GigE Vision cameras answer
-// The angle comes in degrees, one a line, on the standard input; at its end the program ends.
+//   v4l2          v4l2loopback devices: their readers get the written frames, one frame per write
+//   gige          addresses of two GigE Vision cameras
+// The angle comes in degrees, one per line, on the standard input; at its end the program ends.
 
 #include <fcntl.h>
 #include <linux/videodev2.h>
@@ -34,12 +34,12 @@
 namespace scanrig::sim::wire {
 namespace {
 
-constexpr auto kLook = std::chrono::milliseconds(1);  // at the lines: gpio-sim tells nobody of an edge
+constexpr auto kLook = std::chrono::milliseconds(1);  // polling of the lines: gpio-sim signals no edges
 constexpr auto kExposure = std::chrono::milliseconds(12);
 
 using Edge = std::function<void(bool pattern)>;
 
-/// What the cameras see: the images of one pose, and where the table stands.
+/// The cameras' view: the images of one pose, and the table's angle.
 class Sight {
  public:
   explicit Sight(const std::filesystem::path& folder) {
@@ -72,7 +72,7 @@ class Sight {
   std::atomic<double> angle_deg_ = 0;
 };
 
-/// A trigger line, and whether it has risen since it was looked at.
+/// A trigger line, with detection of a rise since the last poll.
 class TriggerLine {
  public:
   explicit TriggerLine(const std::string& value_file) : descriptor_(::open(value_file.c_str(), O_RDONLY | O_CLOEXEC)) {}
@@ -108,9 +108,10 @@ Result<int> open_video(const std::string& device, cv::Size size) {
   if (descriptor < 0 || ::ioctl(descriptor, VIDIOC_S_FMT, &format) < 0) {
     return fail(ErrorCode::io, "{}: {}", device, std::strerror(errno));
   }
-  // Nobody can read before something has been written: a dark frame, as of a sensor that is switched on.
+  // Nothing can be read before the first write: a dark frame, as of a sensor after power-on.
   const std::vector<std::uint8_t> dark(static_cast<std::size_t>(size.area()));
-  if (::write(descriptor, dark.data(), dark.size()) < 0) return fail(ErrorCode::io, "{}: no frame taken", device);
+  if (::write(descriptor, dark.data(), dark.size()) < 0)
+    return fail(ErrorCode::io, "{}: the device accepts no frame", device);
   return descriptor;
 }
 

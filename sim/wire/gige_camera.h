@@ -12,31 +12,31 @@ namespace scanrig::sim::wire {
 
 enum class Side { left, right };
 
-/// One trigger edge, as the sensors saw it.
+/// One trigger edge, as seen by the sensors.
 struct GigeExposure {
   std::uint64_t number = 0;  ///< counts the edges since the start, from 1
-  bool pattern = false;      ///< the dots were on
+  bool pattern = false;      ///< the pattern was on
   Clock::TimePoint at;
 };
 
-/// Writes what a sensor sees into `image` (8 bit, one channel, of the size set up), just before it is sent. From the
-/// cameras' threads.
+/// Writes a sensor's view into `image` (8 bit, one channel, of the configured size), just before it is sent. Called
+/// from the cameras' threads.
 using FrameSource = std::function<void(Side side, const GigeExposure& exposure, cv::Mat& image)>;
 
-/// What can happen to the frame of an edge.
+/// Faults of the frame of an edge.
 enum class GigeFault {
   none,
   lost,     ///< exposed, never sent
-  missed,   ///< the edge was not seen: the camera does not count it
+  missed,   ///< the edge was not detected: the camera does not count it
   late,     ///< sent, long after
   torn,     ///< some of its packets are lost
   stale,    ///< the frame of the edge before is sent again
   dark,     ///< without light
   blurred,  ///< out of focus
-  swapped,  ///< what the other sensor sees
+  swapped,  ///< the other sensor's image
 };
 
-/// By the word of the enumerator; nothing if there is none.
+/// By the name of the enumerator; nothing for other names.
 std::optional<GigeFault> parse_gige_fault(std::string_view word);
 
 struct GigeCamerasOptions {
@@ -46,29 +46,29 @@ struct GigeCamerasOptions {
   std::string right_serial = "40012346";
   cv::Size size{160, 120};
   std::chrono::milliseconds late_by{150};
-  std::string trigger_selector = "FrameStart";  ///< what the trigger that starts a frame is called
+  std::string trigger_selector = "FrameStart";  ///< name of the trigger that starts a frame
   std::chrono::microseconds frame_after{0};     ///< from the edge to the frame: exposure and readout
-  /// Whether a frame that is due can be read out; empty: always.
+  /// Whether a due frame can be read out; empty: always.
   std::function<bool(const GigeExposure& exposure)> ready;
-  bool numbered = true;  ///< hide the number of the edge in every frame
+  bool numbered = true;  ///< write the number of the edge into every frame
 };
 
-/// Share of the frames each fault happens to, by chance, to one of the two sensors at a time.
+/// Share of the frames with each fault, by chance, on one of the two sensors at a time.
 struct FaultRates {
   double lost = 0.0, late = 0.0, torn = 0.0, stale = 0.0;
   std::uint64_t seed = 1;
 };
 
-/// How often each fault happened by chance.
+/// Number of each fault that occurred by chance.
 struct FaultCounts {
   std::uint64_t lost = 0, late = 0, torn = 0, stale = 0;
 };
 
-/// Two GigE Vision cameras that answer on the wire, with a line as their trigger input. Stamps are taken from each
-/// camera's own clock: neither begins with the other's or with the host's, and they drift apart. A trigger number may
-/// be hidden in the upper left corner of every frame, see hidden_number(). All such cameras on a host share one control
-/// port: run them in a network namespace of their own, see loopback.h. Threads: every function may be called from any
-/// thread.
+/// Two GigE Vision cameras on the wire, with a line as their trigger input. Stamps are taken from each camera's own
+/// clock: neither starts with the other's or with the host's, and they drift apart. A trigger number may be hidden in
+/// the upper left corner of every frame, see hidden_number(). All such cameras on a host share one control port: run
+/// them in their own network namespace, see loopback.h.
+/// Threads: every function may be called from any thread.
 class GigeCameras {
  public:
   /// Fails with `io` (the addresses cannot be used, no temporary file).
@@ -78,7 +78,7 @@ class GigeCameras {
 
   /// The edge of the trigger line. Returns its number; a camera that is not waiting for a trigger counts nothing.
   virtual std::uint64_t edge(bool pattern) = 0;
-  /// To the frames of the next `count` edges, of one sensor.
+  /// Applies the fault to the frames of the next `count` edges, of one sensor.
   virtual void inject(Side side, GigeFault fault, int count) = 0;
   virtual void happen(const FaultRates& rates) = 0;
   [[nodiscard]] virtual FaultCounts happened() const = 0;
@@ -88,11 +88,11 @@ class GigeCameras {
   virtual void set_clock(Side side, std::chrono::nanoseconds by) = 0;
 };
 
-/// Grey texture that changes with every exposure; bright with the dots, dim without.
+/// Grey texture that changes with every exposure; bright with the pattern, dim without.
 void draw_test_image(Side side, const GigeExposure& exposure, cv::Mat& image);
 
-/// Writes a number into the upper left corner, 32 bits of 3x3 pixels each in 4 rows; reads it there. An image of fewer
-/// than 24x12 pixels holds none. For tests: no driver knows of it.
+/// Writes a number into the upper left corner, 32 bits of 3x3 pixels each in 4 rows; reads it there. An image smaller
+/// than 24x12 pixels holds none. For tests only, not used by drivers.
 void hide_number(std::uint32_t number, cv::Mat& image);
 std::uint32_t hidden_number(const cv::Mat& image);
 

@@ -2,11 +2,11 @@
 //
 //   scanrig-gige-camera GPIO_SOCKET WIDTH HEIGHT LATE_MS [TRIGGER_SELECTOR]
 //
-// Serves the trigger lines DOTS and PLAIN on GPIO_SOCKET (see gpio_socket.h): a rising edge exposes both cameras. Says
-// "ready" when both answer on the wire. Obeys, one line each, answered by "ok" or words:
+// Serves the trigger lines DOTS and PLAIN on GPIO_SOCKET (see gpio_socket.h): a rising edge exposes both cameras.
+// Prints "ready" when both are on the wire. Accepts commands, one per line, with the reply "ok" or words:
 //   fault left|right KIND COUNT        rates LOST LATE TORN STALE SEED      counts
 //   plug left|right 0|1                clock left|right MILLISECONDS        edge 0|1
-// Ends at the end of its input. Run it in a network namespace of its own.
+// Ends at the end of its input. Run it in its own network namespace.
 
 #include <iostream>
 #include <sstream>

@@ -16,7 +16,7 @@
 namespace scanrig::sim::wire {
 namespace {
 
-/// Aravis' own description, with Line0 standing for the software trigger, and with `selector` for FrameStart.
+/// Aravis' own description, with Line0 in place of the software trigger, and with `selector` for FrameStart.
 std::string genicam_description(const std::string& selector) {
   ArvFakeCamera* sample = arv_fake_camera_new("sample");
   std::size_t size = 0;
@@ -33,7 +33,7 @@ std::string genicam_description(const std::string& selector) {
   return text;
 }
 
-/// Mean over 5x5 pixels, of those there are at the rim.
+/// Mean over 5x5 pixels, fewer at the rim.
 void blur(cv::Mat& image) {
   constexpr int kReach = 2;
   const cv::Mat sharp = image.clone();
@@ -57,15 +57,15 @@ int socket_to(const std::string& address) {
   return descriptor;
 }
 
-/// How often Aravis' camera looks at its trigger register; it waits for the last millisecond before with all of a
-/// processor's time.
+/// Polling interval of Aravis' camera for its trigger register; before it, the camera waits for a millisecond with all
+/// of a processor's time.
 constexpr double kLooksPerSecond = 250.0;
 
-/// Now and then it looks only after 100 ms or the next packet: a discovery request [GigE Vision 1.2, 14.1] is one.
+/// Sometimes it polls only after 100 ms or the next packet: a discovery request [GigE Vision 1.2, 14.1] is one.
 void nudge(int descriptor) {
   constexpr std::array<std::uint8_t, 8> kDiscovery{0x42, 0x01, 0x00, 0x02, 0x00, 0x00, 0x00, 0x01};
-  std::array<std::uint8_t, 512> answer;
-  while (::recv(descriptor, answer.data(), answer.size(), 0) > 0) {
+  std::array<std::uint8_t, 512> reply;
+  while (::recv(descriptor, reply.data(), reply.size(), 0) > 0) {
   }
   std::ignore = ::send(descriptor, kDiscovery.data(), kDiscovery.size(), 0);
 }
@@ -142,10 +142,10 @@ void GigeSensor::set_clock(std::chrono::nanoseconds by) {
   set_by_ += by;
 }
 
-/// With `mutex_` held.
+/// Call with `mutex_` held.
 bool GigeSensor::streaming() const { return core_ && arv_fake_camera_get_acquisition_status(core_) != 0; }
 
-/// With `mutex_` held.
+/// Call with `mutex_` held.
 GigeSensor::Frame GigeSensor::new_frame(const GigeExposure& exposure) {
   last_id_ = id_after(last_id_);
   const double since = static_cast<double>((exposure.at - started_).count());
@@ -180,7 +180,7 @@ void GigeSensor::send_frames(const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
     const auto now = clock_.now();
-    if (!streaming()) {  // a camera that is not acquiring forgets its edges
+    if (!streaming()) {  // a camera that is not acquiring drops its edges
       queue_.clear();
       triggered_.reset();
       if (core_) arv_fake_camera_write_register(core_, ARV_FAKE_CAMERA_REGISTER_TRIGGER_SOFTWARE, 0);
@@ -210,7 +210,8 @@ void GigeSensor::fill(ArvBuffer* buffer, void* self, std::uint32_t, std::uint32_
   static_cast<GigeSensor*>(self)->fill(buffer);
 }
 
-/// From the camera's thread, once a frame, before its packets are sent. Without an edge it was the host's own trigger.
+/// Called from the camera's thread, once per frame, before its packets are sent. Without an edge it was the host's own
+/// trigger.
 void GigeSensor::fill(ArvBuffer* buffer) {
   Frame frame;
   ArvGvFakeCamera* camera = nullptr;

@@ -27,7 +27,7 @@ struct GigeSensorOptions {
   bool numbered = true;
 };
 
-/// One of GigeCameras: Aravis' GigE Vision camera on the wire, frames, ids and stamps of our own. Line0 has the value
+/// One of GigeCameras: Aravis' GigE Vision camera on the wire with its own frames, ids and stamps. Line0 has the value
 /// of Software in its GenICam description, and an edge writes the software trigger's register from within.
 class GigeSensor {
  public:
@@ -66,11 +66,11 @@ class GigeSensor {
   std::condition_variable changed_;
   _ArvGvFakeCamera* camera_ = nullptr;
   _ArvFakeCamera* core_ = nullptr;  // belongs to camera_
-  std::uint16_t last_id_ = 65000;   // the ids begin again soon
+  std::uint16_t last_id_ = 65000;   // the ids wrap soon
   std::chrono::nanoseconds set_by_{0};
   std::deque<Frame> queue_;
-  std::optional<Frame> triggered_;  // the one the register was written for
-  std::optional<Frame> last_;       // the one before, for `stale`
+  std::optional<Frame> triggered_;  // the frame of the last register write
+  std::optional<Frame> last_;       // the frame before, for `stale`
   std::uint64_t by_software_ = 0;
   std::jthread sender_;
 };

@@ -18,9 +18,9 @@ struct GpioSocket::Client {
   int descriptor = -1;
   std::string pending;
   std::vector<std::string> watched;
-  std::string told;  // the levels it knows
+  std::string sent_levels;  // the levels last sent to it
 
-  void say(const std::string& word) const {
+  void send(const std::string& word) const {
     const std::string line = word + "\n";
     std::ignore = ::send(descriptor, line.data(), line.size(), MSG_NOSIGNAL);
   }
@@ -83,7 +83,7 @@ std::vector<GpioSocket::Edge> GpioSocket::edges() const {
 }
 
 void GpioSocket::on_edge(std::function<void(const Edge&)> listener) {
-  const std::scoped_lock lock(telling_);
+  const std::scoped_lock lock(calling_);
   on_edge_ = std::move(listener);
 }
 
@@ -109,7 +109,7 @@ void GpioSocket::serve(const std::stop_token& stop) {
       for (auto end = client.pending.find('\n'); end != std::string::npos; end = client.pending.find('\n')) {
         const std::string words = client.pending.substr(0, end);
         client.pending.erase(0, end + 1);
-        client.say(obey(client, words));
+        client.send(obey(client, words));
       }
     }
     std::erase_if(clients, [](const Client& client) { return client.descriptor < 0; });
@@ -118,7 +118,7 @@ void GpioSocket::serve(const std::stop_token& stop) {
         clients.push_back({accepted, {}, {}, {}});
       }
     }
-    tell_changes(clients);
+    send_changes(clients);
   }
   for (const Client& client : clients) ::close(client.descriptor);
 }
@@ -134,19 +134,19 @@ std::string GpioSocket::obey(Client& client, const std::string& words) {
   }
   if (verb != "inputs") return "what?";
   const std::scoped_lock lock(mutex_);
-  client.told.clear();
+  client.sent_levels.clear();
   while (in >> name) {
     const auto line = lines_.find(name);
     if (line == lines_.end()) return "unknown " + name;
     client.watched.push_back(name);
-    client.told += line->second ? '1' : '0';
+    client.sent_levels += line->second ? '1' : '0';
   }
-  return client.told;
+  return client.sent_levels;
 }
 
 std::string GpioSocket::drive(const std::string& name, bool high) {
   std::optional<Edge> edge;
-  const std::scoped_lock telling(telling_);
+  const std::scoped_lock calling(calling_);
   {
     const std::scoped_lock lock(mutex_);
     const auto line = lines_.find(name);
@@ -158,14 +158,14 @@ std::string GpioSocket::drive(const std::string& name, bool high) {
   return "ok";
 }
 
-void GpioSocket::tell_changes(std::vector<Client>& clients) {
+void GpioSocket::send_changes(std::vector<Client>& clients) {
   const std::scoped_lock lock(mutex_);
   for (Client& client : clients) {
     std::string levels;
     for (const auto& name : client.watched) levels += lines_.at(name) ? '1' : '0';
-    if (levels == client.told) continue;
-    client.told = levels;
-    client.say(levels);
+    if (levels == client.sent_levels) continue;
+    client.sent_levels = levels;
+    client.send(levels);
   }
 }
 

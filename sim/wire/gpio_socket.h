@@ -14,13 +14,13 @@
 
 namespace scanrig::sim::wire {
 
-/// The far end of GPIO lines on a machine without a chip: a Unix socket. A client says "output NAME 0|1" and hears
-/// "ok" once the level has changed, or "inputs NAME..." and hears the levels as digits, at once and at every change;
-/// "unknown NAME" for a line that is not there.
+/// The far end of GPIO lines on a machine without a chip: a Unix socket. A client sends "output NAME 0|1" and receives
+/// "ok" once the level has changed, or sends "inputs NAME..." and receives the levels as digits, at once and at every
+/// change; "unknown NAME" for a missing line.
 /// Threads: every function may be called from any thread.
 class GpioSocket {
  public:
-  /// One edge of an output, as it passed.
+  /// One edge of an output.
   struct Edge {
     Clock::TimePoint at;
     std::string line;
@@ -32,11 +32,11 @@ class GpioSocket {
                                                    Clock& clock);
   ~GpioSocket();
 
-  void set(const std::string& line, bool high);  ///< what a hand on a button does
+  void set(const std::string& line, bool high);  ///< action of a hand on a button
   [[nodiscard]] bool level(const std::string& line) const;
   [[nodiscard]] std::vector<Edge> edges() const;
-  /// Called with every edge of an output, before the client hears "ok"; from the server's thread. Once this returns the
-  /// listener of before is not called any more.
+  /// Called with every edge of an output, before the client receives "ok"; from the server's thread. After the return
+  /// the previous listener is no longer called.
   void on_edge(std::function<void(const Edge&)> listener);
 
  private:
@@ -46,18 +46,18 @@ class GpioSocket {
   void serve(const std::stop_token& stop);
   std::string obey(Client& client, const std::string& words);
   std::string drive(const std::string& name, bool high);
-  void tell_changes(std::vector<Client>& clients);
+  void send_changes(std::vector<Client>& clients);
 
   const std::filesystem::path path_;
   Clock& clock_;
   const int listener_;
-  const int wake_;  // an eventfd: something changed, or the end
+  const int wake_;  // an eventfd: a change, or the end
 
   mutable std::mutex mutex_;
   std::map<std::string, bool> lines_;
   std::vector<Edge> edges_;
-  std::mutex telling_;                        // held while the listener is called; before mutex_
-  std::function<void(const Edge&)> on_edge_;  // guarded by telling_
+  std::mutex calling_;                        // held while the listener is called; before mutex_
+  std::function<void(const Edge&)> on_edge_;  // guarded by calling_
   std::jthread thread_;
 };
 

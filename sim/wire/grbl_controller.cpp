@@ -13,14 +13,14 @@ namespace {
 constexpr const char* kGreeting = "\r\nGrbl 1.1h ['$' for help]\r\n";
 constexpr const char* kLocked = "[MSG:'$H'|'$X' to unlock]\r\n";
 constexpr const char* kOk = "ok\r\n";
-constexpr float kPullOff = 1.0F;       ///< $27, units: home is this far from the machine's zero
+constexpr float kPullOff = 1.0F;       ///< $27, units: distance of home from the machine's zero
 constexpr double kHomingTravel = 1.5;  ///< of the axis' travel, one table turn; then homing is given up
 constexpr std::size_t kMaxLineLength = 80;
 constexpr double kJogDegS = 90;
 
 std::string error(int number) { return fmt::format("error:{}\r\n", number); }
 
-/// The words of a line, "G53 G1 X1.5" as {'X', 1.5} and so on; nothing if it is none.
+/// The words of a line, "G53 G1 X1.5" as {'X', 1.5} and so on; nothing for other text.
 std::optional<std::multimap<char, double>> words_of(const std::string& text) {
   std::multimap<char, double> words;
   for (std::size_t at = 0; at < text.size();) {
@@ -70,7 +70,7 @@ std::string GrblController::realtime(char byte) {
   const std::scoped_lock lock(mutex_);
   refresh();
   switch (byte) {
-    // While it homes, GRBL looks for nothing but a reset.
+    // While homing, GRBL accepts nothing but a reset.
     case '?': return state_ == State::home ? std::string() : report();
     case '!':
       if (state_ == State::run) axis_.slow_down();
@@ -82,7 +82,7 @@ std::string GrblController::realtime(char byte) {
     case 0x18: {
       const bool moved = axis_.running();
       if (moved) {
-        said_ += fmt::format("ALARM:{}\r\n", state_ == State::home ? 6 : 3);
+        output_ += fmt::format("ALARM:{}\r\n", state_ == State::home ? 6 : 3);
         state_ = State::alarm;
       }
       if (state_ != State::alarm) state_ = State::idle;
@@ -93,16 +93,16 @@ std::string GrblController::realtime(char byte) {
   }
 }
 
-/// After a reset: the position is kept, as far as it is known, and the lock too.
+/// After a reset: the position is kept, as far as it is valid, and the lock too.
 void GrblController::restart() const {
   axis_.quick_stop();
   lines_.clear();
-  said_ += kGreeting;
-  if (state_ == State::alarm) said_ += kLocked;
+  output_ += kGreeting;
+  if (state_ == State::alarm) output_ += kLocked;
   critical_ = false;
   if (stays_ != 0) {
     critical_ = true;
-    said_ += fmt::format("ALARM:{}\r\n", stays_);
+    output_ += fmt::format("ALARM:{}\r\n", stays_);
   }
 }
 
@@ -113,10 +113,10 @@ void GrblController::line(const std::string& text) {
   advance();
 }
 
-std::string GrblController::said() {
+std::string GrblController::take_output() {
   const std::scoped_lock lock(mutex_);
   refresh();
-  return std::exchange(said_, {});
+  return std::exchange(output_, {});
 }
 
 void GrblController::follow() const {
@@ -125,17 +125,17 @@ void GrblController::follow() const {
     if (!axis_.running() && axis_.reached_switch()) {
       axis_.set_counter(-static_cast<std::int32_t>(std::lround(kPullOff * steps_per_unit_)));
       state_ = State::idle;
-      said_ += kOk;
+      output_ += kOk;
     } else if (clock_.now() >= give_up_homing_) {
       axis_.quick_stop();
       state_ = State::alarm;
-      said_ += "ALARM:9\r\n";
+      output_ += "ALARM:9\r\n";
     }
   }
   advance();
 }
 
-/// Lines are read only where GRBL reads them: not in a hold, not while it homes, not after a critical alarm.
+/// Lines are read only where GRBL reads them: not in a hold, not while homing, not after a critical alarm.
 void GrblController::advance() const {
   while (!lines_.empty() && state_ != State::hold && state_ != State::home && !critical_) {
     const std::string text = lines_.front();
@@ -146,22 +146,22 @@ void GrblController::advance() const {
 
 void GrblController::carry_out(const std::string& text) const {
   if (text.empty()) {
-    said_ += kOk;
+    output_ += kOk;
   } else if (text.size() > kMaxLineLength) {
-    said_ += error(11);
+    output_ += error(11);
   } else if (text == "$H") {
-    settings_.homing ? start_homing() : static_cast<void>(said_ += error(5));
+    settings_.homing ? start_homing() : static_cast<void>(output_ += error(5));
   } else if (text == "$X") {
     if (state_ == State::alarm) state_ = State::idle;
-    said_ += kOk;
+    output_ += kOk;
   } else if (text == "$$") {
-    said_ += list_settings();
+    output_ += list_settings();
   } else if (text == "$I") {
-    said_ += "[VER:1.1h.20190830:]\r\n[OPT:V,15,128]\r\nok\r\n";
+    output_ += "[VER:1.1h.20190830:]\r\n[OPT:V,15,128]\r\nok\r\n";
   } else if (text.front() == '$') {
-    said_ += error(3);
+    output_ += error(3);
   } else {
-    said_ += state_ == State::alarm ? error(9) : g_code(text);
+    output_ += state_ == State::alarm ? error(9) : g_code(text);
   }
 }
 
@@ -180,7 +180,7 @@ void GrblController::start_homing() const {
                                        static_cast<int>(1000.0 * kHomingTravel * 360.0 / settings_.homing_deg_s));
 }
 
-/// Straight moves of X in machine coordinates; whatever else there is in G-code is refused.
+/// Straight moves of X in machine coordinates; all other G-code is refused.
 std::string GrblController::g_code(const std::string& text) const {
   const auto words = words_of(text);
   if (!words) return error(1);
@@ -216,7 +216,7 @@ void GrblController::raise_alarm(std::uint16_t code, bool can_be_reset) {
   state_ = State::alarm;
   critical_ = code == 1 || code == 2;
   stays_ = can_be_reset ? 0 : code;
-  said_ += fmt::format("ALARM:{}\r\n", code);
+  output_ += fmt::format("ALARM:{}\r\n", code);
 }
 
 void GrblController::power_cycle() {

@@ -8,7 +8,7 @@
 
 namespace scanrig::sim::wire {
 
-/// What is set in the controller, of its first axis; at the table.
+/// Settings of the controller's first axis; at the table.
 struct GrblSettings {
   double homing_deg_s = 60;
   double acceleration_deg_s2 = 90;
@@ -23,12 +23,12 @@ class GrblController final : public SimulatedDrive {
  public:
   GrblController(const AxisOptions& axis, const GrblSettings& settings, Clock& clock);
 
-  /// '?', '!', '~', 0x18, 0x85: at once. Returns what is answered.
+  /// Realtime bytes '?', '!', '~', 0x18, 0x85: handled at once. Returns the reply.
   std::string realtime(char byte);
-  /// A whole line has arrived; it is answered in its turn, see said().
+  /// Takes a whole line; its reply comes in turn, see take_output().
   void line(const std::string& text);
-  /// What the controller says by itself or in answer to lines, since last asked.
-  std::string said();
+  /// Output of the controller, unsolicited or in reply to lines, since the last call.
+  std::string take_output();
   static bool is_realtime(char byte);
 
   using SimulatedDrive::raise_alarm;
@@ -55,9 +55,9 @@ class GrblController final : public SimulatedDrive {
   const float steps_per_unit_;
   mutable State state_;
   mutable std::deque<std::string> lines_;
-  mutable std::string said_;
+  mutable std::string output_;
   mutable Clock::TimePoint give_up_homing_;
-  mutable bool critical_ = false;  // nothing but a reset helps
+  mutable bool critical_ = false;  // only a reset helps
   mutable int stays_ = 0;          // the alarm that comes back after a reset
 };
 

@@ -7,7 +7,7 @@
 namespace scanrig::sim::wire {
 namespace {
 
-constexpr std::chrono::milliseconds kLook{2};  ///< how soon what the controller says by itself is on the wire
+constexpr std::chrono::milliseconds kPollInterval{2};  ///< maximum delay of unsolicited output
 
 Bytes bytes_of(const std::string& text) { return {text.begin(), text.end()}; }
 
@@ -28,7 +28,7 @@ void GrblServer::on_request(std::function<void(const std::string&)> listener) {
 void GrblServer::serve(const std::stop_token& stop, Pty& pty) {
   std::string line;
   while (!stop.stop_requested()) {
-    for (const auto byte : pty.read(kLook)) {
+    for (const auto byte : pty.read(kPollInterval)) {
       const char c = static_cast<char>(byte);
       if (GrblController::is_realtime(c)) {
         if (c == 0x18) line.clear();
@@ -39,8 +39,9 @@ void GrblServer::serve(const std::stop_token& stop, Pty& pty) {
         line += c;
       }
     }
-    // What is said late is the answer to "$H", or an alarm.
-    if (const std::string said = controller_.said(); !said.empty()) send(stop, pty, bytes_of(said), next_fault('$'));
+    // Late output is the reply to "$H", or an alarm.
+    if (const std::string output = controller_.take_output(); !output.empty())
+      send(stop, pty, bytes_of(output), next_fault('$'));
   }
 }
 
@@ -48,7 +49,7 @@ void GrblServer::handle(const std::stop_token& stop, Pty& pty, const std::string
   note(true, bytes_of(realtime ? request : request + "\n"));
   const auto fault = next_fault(request.empty() ? std::uint8_t{'\n'} : static_cast<std::uint8_t>(request.front()));
   using Kind = WireFault::Kind;
-  if (fault && fault->kind == Kind::deaf) return;
+  if (fault && fault->kind == Kind::request_lost) return;
   std::function<void(const std::string&)> listener;
   {
     const std::scoped_lock lock(listener_mutex_);
@@ -58,14 +59,14 @@ void GrblServer::handle(const std::stop_token& stop, Pty& pty, const std::string
   if (fault && fault->kind == Kind::refuse) {
     return send(stop, pty, bytes_of(fmt::format("error:{}\r\n", fault->exception)), fault);
   }
-  std::string answer = controller_.said();  // before: an alarm, for one
+  std::string reply = controller_.take_output();  // output so far, for example an alarm
   if (realtime) {
-    answer += controller_.realtime(request.front());
+    reply += controller_.realtime(request.front());
   } else {
     controller_.line(request);
   }
-  answer += controller_.said();
-  send(stop, pty, bytes_of(answer), fault);
+  reply += controller_.take_output();
+  send(stop, pty, bytes_of(reply), fault);
 }
 
 }  // namespace scanrig::sim::wire

@@ -14,16 +14,16 @@
 namespace scanrig::sim::wire {
 
 /// A GRBL controller on a pseudo-terminal. A request is a realtime byte or a line; a fault's `function` is its first
-/// byte, and the exception that it is refused with becomes error:N.
+/// byte, and a refusal's exception becomes error:N.
 /// Threads: every function may be called from any thread.
 class GrblServer final : public WireServer {
  public:
-  /// `link`: the name a driver opens. Fails with `io`.
+  /// `link`: the port name that a driver opens. Fails with `io`.
   static Result<std::unique_ptr<GrblServer>> start(std::filesystem::path link, GrblController& controller,
                                                    Clock& clock);
   ~GrblServer() override { vanish(); }
 
-  /// Called with every request that was heard, before it is carried out; from the server's thread.
+  /// Called with every received request, before it is carried out; from the server's thread.
   void on_request(std::function<void(const std::string&)> listener);
 
  private:

@@ -15,13 +15,13 @@ std::uint32_t word(const Bytes& bytes, std::size_t at) {
 
 }  // namespace
 
-void LightCrafter::hear(const Report& report) {
+void LightCrafter::receive(const Report& report) {
   std::optional<Flash> flash;
   std::function<void(const Flash&)> listener;
   {
     const std::scoped_lock lock(mutex_);
     settle();
-    heard_.push_back(report);
+    received_.push_back(report);
     message_.insert(message_.end(), report.begin(), report.end());
     const std::size_t announced = 4u + message_[2] + 256u * message_[3];
     if (message_.size() < announced) return;
@@ -35,11 +35,11 @@ void LightCrafter::hear(const Report& report) {
   if (flash && listener) listener(*flash);
 }
 
-std::optional<LightCrafter::Report> LightCrafter::say() {
+std::optional<LightCrafter::Report> LightCrafter::next_report() {
   const std::scoped_lock lock(mutex_);
-  if (to_say_.empty()) return std::nullopt;
-  const Report report = to_say_.front();
-  to_say_.pop_front();
+  if (outgoing_.empty()) return std::nullopt;
+  const Report report = outgoing_.front();
+  outgoing_.pop_front();
   return report;
 }
 
@@ -72,9 +72,9 @@ bool LightCrafter::lit() const {
   return state_.lit_until && clock_.now() < *state_.lit_until;
 }
 
-std::vector<LightCrafter::Report> LightCrafter::heard() const {
+std::vector<LightCrafter::Report> LightCrafter::received() const {
   const std::scoped_lock lock(mutex_);
-  return heard_;
+  return received_;
 }
 
 void LightCrafter::inject(Fault fault, int replies) {
@@ -92,7 +92,7 @@ void LightCrafter::power_cycle() {
   const std::scoped_lock lock(mutex_);
   state_ = {};
   message_.clear();
-  to_say_.clear();
+  outgoing_.clear();
 }
 
 void LightCrafter::act() {
@@ -102,18 +102,18 @@ void LightCrafter::act() {
   if (fault == Fault::refuse || message_.size() < 6) return reply(0x20, sequence, {});
   const auto command = static_cast<std::uint16_t>(message_[4] + 256 * message_[5]);
   const bool is_read = flags & 0x80;
-  Bytes answer;
+  Bytes data;
   bool done = true;
   if (is_read) {
-    answer = read(command);
-    done = !answer.empty();
+    data = read(command);
+    done = !data.empty();
   } else {
     done = write(command, Bytes(message_.begin() + 6, message_.end()));
   }
   if (fault == Fault::silent) return;
   if (fault == Fault::earlier_reply) reply(0, static_cast<std::uint8_t>(sequence - 1), {0});
-  if (fault == Fault::endless_reply) answer.resize(5000);
-  if (flags & 0x40) reply(done ? 0 : 0x20, sequence, answer);
+  if (fault == Fault::endless_reply) data.resize(5000);
+  if (flags & 0x40) reply(done ? 0 : 0x20, sequence, data);
 }
 
 bool LightCrafter::write(std::uint16_t command, const Bytes& data) {
@@ -169,7 +169,7 @@ bool LightCrafter::write_setting(std::uint16_t command, const Bytes& data) {
     }
     case 0x1A1D: return data.size() == 3 && data[1] <= 0xD5 && data[2] <= 0xD5;
     case 0x1A35: return data.size() == 4;
-    case 0x1A07: return data[0] == 8;  // the LEDs follow the sequencer; it knows no other way here
+    case 0x1A07: return data[0] == 8;  // the LEDs follow the sequencer; the simulator supports no other mode
     case 0x0B01:
       if (data.size() != 3) return false;
       std::copy(data.begin(), data.end(), state_.current.begin());
@@ -215,7 +215,7 @@ void LightCrafter::light_up() {
   flashes_.push_back(flash);
 }
 
-/// The sequence is shown once.
+/// Shows the sequence once.
 void LightCrafter::settle() {
   if (!state_.lit_until || clock_.now() < *state_.lit_until) return;
   state_.lit_until.reset();
@@ -229,7 +229,7 @@ void LightCrafter::reply(std::uint8_t flags, std::uint8_t sequence, const Bytes&
     Report report{};
     std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(at), std::min<std::size_t>(64, bytes.size() - at),
                 report.begin());
-    to_say_.push_back(report);
+    outgoing_.push_back(report);
   }
 }
 

@@ -12,14 +12,14 @@
 
 namespace scanrig::sim::wire {
 
-/// A TI DLP LightCrafter 4500 as its programmer's guide has it, at the level of HID reports: settings, tables, checks,
-/// sequencer, light. Settings are taken only while it stands; nothing plays that has not been validated.
+/// A TI DLP LightCrafter 4500 as in its programmer's guide, at the level of HID reports: settings, tables, checks,
+/// sequencer, light. Settings are accepted only while it is stopped; only a validated sequence plays.
 /// Threads: every function may be called from any thread.
 class LightCrafter {
  public:
   using Report = std::array<std::uint8_t, 64>;
 
-  /// One exposure, as somebody in front of it would see it.
+  /// One exposure, as seen in front of the projector.
   struct Flash {
     Clock::TimePoint at;
     std::chrono::microseconds exposure{0};
@@ -32,19 +32,19 @@ class LightCrafter {
 
   explicit LightCrafter(Clock& clock) : clock_(clock) {}
 
-  void hear(const Report& report);
-  /// The next report it has to send; nothing if there is none yet.
-  std::optional<Report> say();
+  void receive(const Report& report);
+  /// The next report to send; nothing if there is none yet.
+  std::optional<Report> next_report();
 
   void trigger_in();  ///< an edge at TRIG_IN_1
-  /// Called at the rising edge of TRIG_OUT_1, from the thread that calls hear() or trigger_in().
+  /// Called at the rising edge of TRIG_OUT_1, from the thread that calls receive() or trigger_in().
   void on_trigger_out(std::function<void(const Flash&)> listener);
   [[nodiscard]] std::vector<Flash> flashes() const;
   [[nodiscard]] bool lit() const;
-  [[nodiscard]] std::vector<Report> heard() const;
+  [[nodiscard]] std::vector<Report> received() const;
 
   void inject(Fault fault, int replies);
-  void set_hardware_status(std::uint8_t status);  ///< 0x01: nothing wrong
+  void set_hardware_status(std::uint8_t status);  ///< 0x01: no fault
   void power_cycle();
 
  private:
@@ -76,9 +76,9 @@ class LightCrafter {
   Clock& clock_;
   mutable std::mutex mutex_;
   State state_;
-  std::vector<std::uint8_t> message_;  // of the reports heard so far
-  std::deque<Report> to_say_;
-  std::vector<Report> heard_;
+  std::vector<std::uint8_t> message_;  // of the reports received so far
+  std::deque<Report> outgoing_;
+  std::vector<Report> received_;
   std::vector<Flash> flashes_;
   std::function<void(const Flash&)> listener_;
   Fault fault_ = Fault::none;

@@ -15,8 +15,8 @@ std::uint16_t modbus_crc(std::span<const std::uint8_t> bytes);
 Bytes with_crc(Bytes bytes);
 bool crc_fits(std::span<const std::uint8_t> frame);
 
-/// A request of one of the functions that drives and I/O modules know. Registers: 03 read, 06 write one, 16 write
-/// several. Bits: 01 read coils, 02 read inputs, 05 write one coil, 15 write several.
+/// A request of one of the functions of drives and I/O modules. Registers: 03 read, 06 write one, 16 write several.
+/// Bits: 01 read coils, 02 read inputs, 05 write one coil, 15 write several.
 struct ModbusRequest {
   std::uint8_t unit = 0;
   std::uint8_t function = 0;
@@ -30,10 +30,10 @@ struct ModbusRequest {
   }
 };
 
-/// How long the frame that begins with these bytes is, as far as they tell; nothing: more bytes are needed.
+/// Length of the frame that starts with these bytes; nothing: more bytes are needed.
 std::optional<std::size_t> request_length(std::span<const std::uint8_t> bytes);
 
-/// Reads a frame of the right length and checksum; nothing when its function is not known or its lengths disagree.
+/// Reads a frame of the right length and checksum; nothing for an unknown function or inconsistent lengths.
 std::optional<ModbusRequest> parse_request(std::span<const std::uint8_t> frame);
 
 Bytes read_answer(const ModbusRequest& request, std::span<const std::uint16_t> values);

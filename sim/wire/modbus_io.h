@@ -7,7 +7,7 @@
 
 namespace scanrig::sim::wire {
 
-/// A Modbus I/O module: discrete inputs that hands and contacts move, coils that drive lamps. Registers it has none.
+/// A Modbus I/O module without registers: discrete inputs that hands and contacts move, coils that drive lamps.
 /// Threads: every function may be called from any thread.
 class ModbusIoModule final : public RegisterDevice {
  public:
@@ -18,7 +18,7 @@ class ModbusIoModule final : public RegisterDevice {
   std::uint8_t read_bits(std::uint8_t function, std::uint16_t address, std::vector<bool>& bits) override;
   std::uint8_t write_coils(std::uint16_t address, const std::vector<bool>& bits) override;
 
-  void set(std::size_t input, bool closed);  ///< what a hand on a button does
+  void set(std::size_t input, bool closed);  ///< action of a hand on a button
   void power_cycle();                        ///< all coils are off again
 
   [[nodiscard]] bool coil(std::size_t number) const;

@@ -7,9 +7,9 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPatience{20};  ///< a frame that stops this long in the middle is dropped
+constexpr milliseconds kFrameTimeout{20};  ///< a frame that pauses this long in the middle is dropped
 constexpr std::uint8_t kIllegalFunction = 1;
-constexpr std::uint8_t kWrongCrc = 8;  ///< Leadshine's answer to a damaged request
+constexpr std::uint8_t kWrongCrc = 8;  ///< Leadshine's reply to a damaged request
 constexpr std::size_t kMaxRegisters = 125;
 constexpr std::size_t kMaxBits = 2000;
 
@@ -30,9 +30,9 @@ void ModbusServer::on_request(std::function<void(const ModbusRequest&)> listener
 void ModbusServer::serve(const std::stop_token& stop, Pty& pty) {
   Bytes pending;
   while (!stop.stop_requested()) {
-    const Bytes heard = pty.read(kPatience);
-    if (heard.empty()) pending.clear();
-    pending.insert(pending.end(), heard.begin(), heard.end());
+    const Bytes received = pty.read(kFrameTimeout);
+    if (received.empty()) pending.clear();
+    pending.insert(pending.end(), received.begin(), received.end());
     for (;;) {
       const auto length = request_length(pending);
       if (!length || pending.size() < *length) break;
@@ -49,7 +49,7 @@ void ModbusServer::handle(const std::stop_token& stop, Pty& pty, const Bytes& fr
   if (frame[0] != unit_) return;
   const auto fault = next_fault(frame[1]);
   using Kind = WireFault::Kind;
-  if (fault && fault->kind == Kind::deaf) return;
+  if (fault && fault->kind == Kind::request_lost) return;
   const bool obey = !fault || fault->kind != Kind::refuse;
   send(stop, pty, carry_out(frame, obey, fault ? fault->exception : std::uint8_t{0}), fault);
 }

@@ -33,12 +33,12 @@ class RegisterDevice {
 /// Threads: every function may be called from any thread.
 class ModbusServer final : public WireServer {
  public:
-  /// `link`: the name a driver opens. Fails with `io`.
+  /// `link`: the port name that a driver opens. Fails with `io`.
   static Result<std::unique_ptr<ModbusServer>> start(std::filesystem::path link, std::uint8_t unit,
                                                      RegisterDevice& device, Clock& clock);
   ~ModbusServer() override { vanish(); }
 
-  /// Called with every request that was heard, before it is carried out; from the server's thread.
+  /// Called with every received request, before it is carried out; from the server's thread.
   void on_request(std::function<void(const ModbusRequest&)> listener);
 
  private:

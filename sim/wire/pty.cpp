@@ -57,7 +57,7 @@ Bytes Pty::read(std::chrono::milliseconds wait) {
 void Pty::write(std::span<const std::uint8_t> bytes) {
   while (!bytes.empty()) {
     const ssize_t count = ::write(master_, bytes.data(), bytes.size());
-    if (count <= 0) return;  // nobody reads: as on a wire
+    if (count <= 0) return;  // no reader: as on a wire
     bytes = bytes.subspan(static_cast<std::size_t>(count));
   }
 }

@@ -10,8 +10,8 @@
 
 namespace scanrig::sim::wire {
 
-/// The far end of a serial line: the master side of a pseudo-terminal, with a symbolic link to the side a driver opens.
-/// Closing it is what pulling the adapter is: the link disappears and the driver's descriptor hangs up.
+/// The far end of a serial line: the master side of a pseudo-terminal, with a symbolic link to the side that a driver
+/// opens. Closing it equals pulling the adapter: the link disappears and the driver's descriptor hangs up.
 /// Threads: one user at a time.
 class Pty {
  public:
@@ -21,7 +21,7 @@ class Pty {
   Pty& operator=(Pty&&) = delete;
   ~Pty();
 
-  /// What arrives within `wait`; empty when nothing does.
+  /// Bytes that arrive within `wait`; empty without any.
   Bytes read(std::chrono::milliseconds wait);
   void write(std::span<const std::uint8_t> bytes);
 

@@ -20,7 +20,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-constexpr int kLookMs = 1;  // for reports that the device has to say by now
+constexpr int kLookMs = 1;  // poll interval for reports of the device
 constexpr std::uint16_t kVersion = 0x0111, kImport = 0x8003, kImported = 0x0003;
 constexpr std::uint32_t kSubmit = 1, kUnlink = 2, kSubmitted = 3, kUnlinked = 4;
 constexpr std::int32_t kStall = -EPIPE, kUnlinkedInTime = -ECONNRESET;
@@ -30,7 +30,7 @@ constexpr std::uint32_t kFullSpeed = 2;
 constexpr std::array<std::uint8_t, 18> kDeviceDescriptor{18,   1,    0x00, 0x02, 0,    0,    0, 64,  // of endpoint 0
                                                          0x51, 0x04, 0x01, 0x64, 0x00, 0x01, 1, 2,  3, 1};
 constexpr std::array<std::uint8_t, 29> kReportDescriptor{
-    0x06, 0x00, 0xFF, 0x09, 0x01, 0xA1, 0x01,                                       // a collection of the maker's own
+    0x06, 0x00, 0xFF, 0x09, 0x01, 0xA1, 0x01,                                       // a vendor-defined collection
     0x15, 0x00, 0x26, 0xFF, 0x00, 0x75, 0x08, 0x95, 0x40,                           // 64 bytes
     0x09, 0x01, 0x81, 0x02, 0x09, 0x01, 0x91, 0x02, 0x09, 0x01, 0xB1, 0x02, 0xC0};  // in, out, feature
 constexpr std::array<std::uint8_t, 41> kConfiguration{9,  2,    41,   0,    1,  1,  0,    0xC0,
@@ -90,7 +90,7 @@ class Session {
     while (!stop.stop_requested()) {
       pollfd watched{socket_, POLLIN, 0};
       if (::poll(&watched, 1, kLookMs) > 0 && !take_command()) return;
-      if (!say_reports()) return;
+      if (!send_reports()) return;
     }
   }
 
@@ -136,20 +136,20 @@ class Session {
     }
     LightCrafter::Report report{};
     std::copy_n(data.begin(), std::min(data.size(), report.size()), report.begin());
-    device_.hear(report);
-    return answer(number, 0, static_cast<std::uint32_t>(data.size()), {});
+    device_.receive(report);
+    return send_reply(number, 0, static_cast<std::uint32_t>(data.size()), {});
   }
 
-  /// Requests to endpoint 0: descriptors are told, settings of USB and HID taken as they come.
+  /// Requests to endpoint 0: descriptors are sent, settings of USB and HID accepted.
   bool control(const Bytes& setup, std::uint32_t number, std::uint32_t length) {
     constexpr std::uint8_t kGetDescriptor = 6;
     const bool in = setup[0] & 0x80;
-    if (!in) return answer(number, 0, length, {});
-    if (setup[1] != kGetDescriptor) return answer(number, 0, 0, Bytes(std::min<std::uint32_t>(length, 2)));
+    if (!in) return send_reply(number, 0, length, {});
+    if (setup[1] != kGetDescriptor) return send_reply(number, 0, 0, Bytes(std::min<std::uint32_t>(length, 2)));
     Bytes found = descriptor(setup[3], setup[2]);
-    if (found.empty()) return answer(number, kStall, 0, {});
+    if (found.empty()) return send_reply(number, kStall, 0, {});
     found.resize(std::min<std::size_t>(found.size(), length));
-    return answer(number, 0, 0, found);
+    return send_reply(number, 0, 0, found);
   }
 
   bool unlink(std::uint32_t number, std::uint32_t unlinked) {
@@ -160,18 +160,18 @@ class Session {
     return write(reply.bytes());
   }
 
-  bool say_reports() {
+  bool send_reports() {
     while (!waiting_.empty()) {
-      const auto report = device_.say();
+      const auto report = device_.next_report();
       if (!report) return true;
-      if (!answer(waiting_.front(), 0, 0, {report->begin(), report->end()})) return false;
+      if (!send_reply(waiting_.front(), 0, 0, {report->begin(), report->end()})) return false;
       waiting_.pop_front();
     }
     return true;
   }
 
-  /// `taken`: bytes the device was given; or `data` that it gives.
-  bool answer(std::uint32_t number, std::int32_t status, std::uint32_t taken, const Bytes& data) {
+  /// `taken`: bytes given to the device; or `data` from it.
+  bool send_reply(std::uint32_t number, std::int32_t status, std::uint32_t taken, const Bytes& data) {
     Writer reply;
     reply.u32(kSubmitted).u32(number).u32(0).u32(0).u32(0);
     reply.u32(static_cast<std::uint32_t>(status)).u32(data.empty() ? taken : static_cast<std::uint32_t>(data.size()));
@@ -181,7 +181,7 @@ class Session {
 
   const int socket_;
   LightCrafter& device_;
-  std::deque<std::uint32_t> waiting_;  // numbers of interrupt transfers that ask for a report
+  std::deque<std::uint32_t> waiting_;  // numbers of interrupt transfers that wait for a report
 };
 
 }  // namespace
@@ -219,7 +219,7 @@ void UsbIpServer::serve(const std::stop_token& stop) {
     if (socket < 0) continue;
     const int yes = 1;
     ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &yes, sizeof yes);
-    const timeval limit{2, 0};  // for the rest of a command that has begun
+    const timeval limit{2, 0};  // for the rest of a command that has started
     ::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
     Session(socket, device_).run(stop);
     ::close(socket);

@@ -59,16 +59,16 @@ std::optional<WireFault> WireServer::next_fault(std::uint8_t function) {
   return std::nullopt;
 }
 
-void WireServer::send(const std::stop_token& stop, Pty& pty, Bytes answer, const std::optional<WireFault>& fault) {
+void WireServer::send(const std::stop_token& stop, Pty& pty, Bytes reply, const std::optional<WireFault>& fault) {
   using Kind = WireFault::Kind;
-  const Bytes good = answer;
-  if (fault && !answer.empty()) {
+  const Bytes good = reply;
+  if (fault && !reply.empty()) {
     switch (fault->kind) {
-      case Kind::deaf:
-      case Kind::answer_lost: answer.clear(); break;
-      case Kind::wrong_crc: answer[answer.size() - 1 - answer.size() / 4] ^= 0x9A; break;
-      case Kind::cut_short: answer.resize(answer.size() / 2); break;
-      case Kind::earlier_answer: answer = last_answer_; break;
+      case Kind::request_lost:
+      case Kind::reply_lost: reply.clear(); break;
+      case Kind::wrong_crc: reply[reply.size() - 1 - reply.size() / 4] ^= 0x9A; break;
+      case Kind::cut_short: reply.resize(reply.size() / 2); break;
+      case Kind::earlier_reply: reply = last_reply_; break;
       case Kind::late: {
         // In slices, so that the adapter can be pulled meanwhile.
         for (const auto at = clock_.now() + fault->delay; clock_.now() < at && !stop.stop_requested();) {
@@ -79,10 +79,10 @@ void WireServer::send(const std::stop_token& stop, Pty& pty, Bytes answer, const
       case Kind::refuse: break;
     }
   }
-  last_answer_ = good;
-  if (answer.empty()) return;
-  note(false, answer);
-  pty.write(answer);
+  last_reply_ = good;
+  if (reply.empty()) return;
+  note(false, reply);
+  pty.write(reply);
 }
 
 }  // namespace scanrig::sim::wire

@@ -16,20 +16,20 @@
 
 namespace scanrig::sim::wire {
 
-/// A way to misbehave towards the next requests.
+/// A fault for the next requests.
 struct WireFault {
   enum class Kind {
-    deaf,           ///< does not hear the request
-    answer_lost,    ///< obeys, its answer is lost
-    late,           ///< obeys, answers `delay` later; meanwhile it hears nothing else
-    wrong_crc,      ///< obeys, the answer is damaged
-    cut_short,      ///< obeys, half of the answer arrives
-    refuse,         ///< does not obey, answers with `exception`
-    earlier_answer  ///< obeys, repeats the answer it gave before
+    request_lost,  ///< does not receive the request
+    reply_lost,    ///< obeys, its reply is lost
+    late,          ///< obeys, replies `delay` later; meanwhile it receives nothing else
+    wrong_crc,     ///< obeys, the reply is damaged
+    cut_short,     ///< obeys, half of the reply arrives
+    refuse,        ///< does not obey, replies with `exception`
+    earlier_reply  ///< obeys, repeats its previous reply
   };
-  Kind kind = Kind::deaf;
-  int count = -1;                          ///< requests to spoil; negative: all
-  std::optional<std::uint8_t> function{};  ///< spoil only requests of this kind: Modbus function, or first letter
+  Kind kind = Kind::request_lost;
+  int count = -1;                          ///< requests with the fault; negative: all
+  std::optional<std::uint8_t> function{};  ///< only requests of this kind: Modbus function, or first letter
   std::chrono::milliseconds delay{0};
   std::uint8_t exception = 4;
 };
@@ -41,7 +41,7 @@ struct WireFrame {
   Bytes bytes;
 };
 
-/// A device on a pseudo-terminal, in a thread of its own. The device's state changes before it answers.
+/// A device on a pseudo-terminal, in a thread of its own. The device's state changes before its reply.
 /// Threads: every function may be called from any thread.
 class WireServer {
  public:
@@ -59,13 +59,13 @@ class WireServer {
  protected:
   WireServer(std::filesystem::path link, Clock& clock) : link_(std::move(link)), clock_(clock) {}
 
-  /// Serves the line until stopped. Who derives from this calls vanish() in its destructor.
+  /// Serves the line until stopped. A derived class calls vanish() in its destructor.
   virtual void serve(const std::stop_token& stop, Pty& pty) = 0;
 
   void note(bool from_master, const Bytes& bytes);
   std::optional<WireFault> next_fault(std::uint8_t function);
-  /// Sends the answer to a request, spoilt as the fault says.
-  void send(const std::stop_token& stop, Pty& pty, Bytes answer, const std::optional<WireFault>& fault);
+  /// Sends the reply to a request, changed by the fault.
+  void send(const std::stop_token& stop, Pty& pty, Bytes reply, const std::optional<WireFault>& fault);
 
   Clock& clock() { return clock_; }
 
@@ -76,7 +76,7 @@ class WireServer {
   mutable std::mutex mutex_;
   std::deque<WireFault> faults_;
   std::vector<WireFrame> log_;
-  Bytes last_answer_;  // server's thread only
+  Bytes last_reply_;  // server's thread only
 
   std::mutex port_mutex_;
   std::optional<Pty> pty_;

@@ -14,7 +14,7 @@
 #include "drivers/turntable/modbus_turntable.h"
 #include "sim/apps/rig_control.h"
 #include "sim/apps/wire_rig.h"
-#include "sim/scene/standing.h"
+#include "sim/scene/rest_error.h"
 #include "tests/own_folder.h"
 #include "tests/slowness.h"
 
@@ -78,7 +78,7 @@ class RigCamerasTest : public testing::Test {
     if (auto fired = projector_->fire(light, within(seconds(2))); !fired) return pass_on(fired);
     return camera_->collect(within(seconds(2)));
   }
-  json say(const json& request) { return json::parse(RigControl(*rig_, clock_).answer(request.dump())); }
+  json send(const json& request) { return json::parse(RigControl(*rig_, clock_).reply_to(request.dump())); }
   static double difference(const cv::Mat& a, const cv::Mat& b) { return cv::norm(a, b, cv::NORM_INF); }
 
   RealClock clock_;
@@ -91,7 +91,7 @@ class RigCamerasTest : public testing::Test {
   std::unique_ptr<SensorCamera> camera_;
 };
 
-TEST_F(RigCamerasTest, AFrameIsTheSceneWhereTheTableCameToRestBitByBit) {
+TEST_F(RigCamerasTest, AFrameShowsTheSceneAtTheTablesRestPositionBitByBit) {
   auto table = ModbusTurntable::create(config_.turntable.modbus, clock_).value();
   ASSERT_TRUE(table->home(within(seconds(20))));
   const auto move = table->rotate_to({120}, within(seconds(10)));
@@ -120,13 +120,13 @@ TEST_F(RigCamerasTest, AnExposureWhoseLightWentOutEarlyIsDark) {
   const auto frame = camera_->collect(within(seconds(2)));
   ASSERT_TRUE(frame) << frame.error().message;
   EXPECT_EQ(cv::countNonZero(frame->left), 0);
-  EXPECT_EQ(say({{"get", "exposures"}})["exposures"][0]["lit"], false);
+  EXPECT_EQ(send({{"get", "exposures"}})["exposures"][0]["lit"], false);
 }
 
-TEST_F(RigCamerasTest, TellsWhenEachExposureBeganEndedAndWasReadOut) {
+TEST_F(RigCamerasTest, ReportsStartEndAndReadoutOfEachExposure) {
   ASSERT_TRUE(expose(Light::pattern));
   ASSERT_TRUE(expose(Light::plain));
-  const auto all = say({{"get", "exposures"}})["exposures"];
+  const auto all = send({{"get", "exposures"}})["exposures"];
   ASSERT_EQ(all.size(), 2u);
   EXPECT_EQ(all[0]["pattern"], true);
   EXPECT_EQ(all[1]["pattern"], false);
@@ -134,11 +134,11 @@ TEST_F(RigCamerasTest, TellsWhenEachExposureBeganEndedAndWasReadOut) {
     EXPECT_EQ(each["ended_ns"].get<std::int64_t>() - each["at_ns"].get<std::int64_t>(), 12'000'000);
     EXPECT_GE(each["read_ns"].get<std::int64_t>() - each["ended_ns"].get<std::int64_t>(), 25'000'000);
   }
-  EXPECT_EQ(say({{"get", "exposures"}, {"since", 1}})["exposures"].size(), 1u);
+  EXPECT_EQ(send({{"get", "exposures"}, {"since", 1}})["exposures"].size(), 1u);
 }
 
 TEST_F(RigCamerasTest, ALostFrameIsNamedAndTheNextExposureIsSound) {
-  say({{"set", {{"camera_fault", "lost"}, {"camera", "right"}}}});
+  send({{"set", {{"camera_fault", "lost"}, {"camera", "right"}}}});
   const auto lost = expose(Light::pattern);
   ASSERT_FALSE(lost);
   EXPECT_EQ(lost.error().code, ErrorCode::timeout);
@@ -146,7 +146,7 @@ TEST_F(RigCamerasTest, ALostFrameIsNamedAndTheNextExposureIsSound) {
   EXPECT_TRUE(expose(Light::pattern));
 }
 
-TEST_F(RigCamerasTest, NotesTheNumberOfTheEdgeInEveryFrameWhereItIsAsked) {
+TEST_F(RigCamerasTest, WritesTheNumberOfTheEdgeIntoEveryFrameOnRequest) {
   start(true);
   ASSERT_TRUE(expose(Light::plain));
   const auto second = expose(Light::plain);
@@ -155,14 +155,14 @@ TEST_F(RigCamerasTest, NotesTheNumberOfTheEdgeInEveryFrameWhereItIsAsked) {
   EXPECT_EQ(faint_number(second->right), 2u);
 }
 
-TEST_F(RigCamerasTest, ShowsTheOtherSideOfAnObjectTurnedOverAndWritesTheTruthOfBoth) {
-  EXPECT_THAT(say({{"write_truth", folder_}})["error"], HasSubstr("no exposure"));
+TEST_F(RigCamerasTest, ShowsTheOtherSideAfterTheFlipAndWritesTheTruthOfBoth) {
+  EXPECT_THAT(send({{"write_truth", folder_}})["error"], HasSubstr("no exposure"));
   const auto before = expose(Light::plain);
-  EXPECT_EQ(say({{"turn_over", true}})["ok"], true);
+  EXPECT_EQ(send({{"turn_over", true}})["ok"], true);
   const auto after = expose(Light::plain);
   ASSERT_TRUE(before && after);
   EXPECT_GT(difference(before->left, after->left), 40);
-  EXPECT_EQ(say({{"write_truth", folder_}})["ok"], true);
+  EXPECT_EQ(send({{"write_truth", folder_}})["ok"], true);
   const auto truth = json::parse(*read_file(folder_ / "truth.json"));
   EXPECT_EQ(truth["poses"].size(), 2u);
   EXPECT_TRUE(truth.contains("pose1_from_pose2"));
@@ -171,24 +171,24 @@ TEST_F(RigCamerasTest, ShowsTheOtherSideOfAnObjectTurnedOverAndWritesTheTruthOfB
 
 TEST_F(RigCamerasTest, AnUnpluggedCameraIsLostAndComesBack) {
   ASSERT_TRUE(expose(Light::plain));
-  say({{"set", {{"camera_unplugged", true}, {"camera", "left"}}}});
+  send({{"set", {{"camera_unplugged", true}, {"camera", "left"}}}});
   EXPECT_FALSE(expose(Light::plain));
-  say({{"set", {{"camera_unplugged", false}, {"camera", "left"}}}});
+  send({{"set", {{"camera_unplugged", false}, {"camera", "left"}}}});
   const auto by = within(seconds(20));
   auto back = expose(Light::plain);
   while (!back && !by.expired(clock_)) back = expose(Light::plain);
   EXPECT_TRUE(back) << back.error().message;
 }
 
-TEST_F(RigCamerasTest, WhatItDoesNotUnderstandIsSaid) {
-  EXPECT_THAT(say({{"set", {{"camera_fault", "lost"}}}})["error"], HasSubstr("left or right"));
-  EXPECT_THAT(say({{"set", {{"camera_fault", "tired"}, {"camera", "left"}}}})["error"], HasSubstr("no fault"));
+TEST_F(RigCamerasTest, AnInvalidRequestIsNamed) {
+  EXPECT_THAT(send({{"set", {{"camera_fault", "lost"}}}})["error"], HasSubstr("left or right"));
+  EXPECT_THAT(send({{"set", {{"camera_fault", "tired"}, {"camera", "left"}}}})["error"], HasSubstr("no fault"));
   WireRigOptions blind;
   blind.toml = {.folder = folder_ / "blind", .drive = "leadshine-rs", .panel = "gpio"};
   const auto rig = WireRig::start(blind, clock_).value();
   RigControl control(*rig, clock_);
-  EXPECT_THAT(control.answer(R"({"turn_over":true})"), HasSubstr("--cameras gige"));
-  EXPECT_THAT(control.answer(R"({"get":"exposures"})"), HasSubstr("--cameras gige"));
+  EXPECT_THAT(control.reply_to(R"({"turn_over":true})"), HasSubstr("--cameras gige"));
+  EXPECT_THAT(control.reply_to(R"({"get":"exposures"})"), HasSubstr("--cameras gige"));
 }
 
 }  // namespace

@@ -91,12 +91,12 @@ TEST_F(Shoot, DoesNotOverwriteAScan) {
   EXPECT_EQ(shoot(options_, folder_).error().code, ErrorCode::exists);
 }
 
-TEST_F(Shoot, RefusesANumberOfViewsThatCannotBe) {
+TEST_F(Shoot, RefusesAnImpossibleNumberOfViews) {
   options_.views = 0;
   EXPECT_EQ(shoot(options_, folder_).error().code, ErrorCode::out_of_range);
 }
 
-TEST_F(Shoot, SaysWhichFolderCannotBeMade) {
+TEST_F(Shoot, NamesTheFolderThatCannotBeMade) {
   std::ofstream(folder_) << "a file in the way";
   const auto done = shoot(options_, folder_);
   ASSERT_FALSE(done);
@@ -112,8 +112,8 @@ TEST(View, RendersInTimeOnTwoCores) {
     (void)scene->shoot(0, 1.0, false, 3);
     const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
     testing::Test::RecordProperty("processor_seconds", std::to_string(seconds));
-    // The promise, 4 s on two idle cores, is for the bench; here whatever else runs must not count, and only something
-    // grossly wrong shall fail.
+    // The promise, 4 s on two idle cores, is tested by the bench. Other programs run here, so only a gross excess
+    // fails.
     EXPECT_LT(seconds, 12.0 * kSlowness);
   });
 }

@@ -20,7 +20,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using testing::HasSubstr;
 
-/// The simulated rig in this process, asked through its socket.
+/// The simulated rig in this process, accessed through its socket.
 class WireRigTest : public testing::Test {
  protected:
   void SetUp() override { start("leadshine-rs", "gpio"); }
@@ -45,13 +45,13 @@ class WireRigTest : public testing::Test {
     rig_ = std::move(*rig);
     control_ = std::make_unique<RigControl>(*rig_, clock_);
     auto socket = wire::ControlSocket::start(folder_ / "control.sock",
-                                             [this](const std::string& line) { return control_->answer(line); });
+                                             [this](const std::string& line) { return control_->reply_to(line); });
     ASSERT_TRUE(socket) << socket.error().message;
     socket_ = std::move(*socket);
   }
-  json say(const json& request) {
-    const auto answer = wire::say_to_control_socket(folder_ / "control.sock", request.dump());
-    return answer ? json::parse(*answer) : json{{"error", answer.error().message}};
+  json send(const json& request) {
+    const auto reply = wire::send_to_control_socket(folder_ / "control.sock", request.dump());
+    return reply ? json::parse(*reply) : json{{"error", reply.error().message}};
   }
   Result<config::RigConfig> config() const {
     return config::read_rig_config(folder_ / "rig.toml", {}, config::Cameras::or_simulated);
@@ -80,68 +80,68 @@ TEST_F(WireRigTest, WritesAConfigurationThatTheDaemonReadsForEitherPanel) {
   }
 }
 
-TEST_F(WireRigTest, TellsWhereTheTableReallyIs) {
+TEST_F(WireRigTest, ReportsTheTruePositionOfTheTable) {
   const auto table = driver();
   ASSERT_TRUE(table->home(within(seconds(20))));
-  const double home = say({{"get", "truth"}})["angle_deg"];
+  const double home = send({{"get", "truth"}})["angle_deg"];
   ASSERT_TRUE(table->rotate_to({90}, within(seconds(10))));
-  const auto truth = say({{"get", "truth"}});
+  const auto truth = send({{"get", "truth"}});
   EXPECT_NEAR(truth["angle_deg"].get<double>() - home, 90, 0.5);
-  EXPECT_EQ(truth["standing"], true);
+  EXPECT_EQ(truth["stopped"], true);
   EXPECT_EQ(truth["speed_deg_s"], 0.0);
   EXPECT_EQ(truth["projector_on"], false);
 }
 
-TEST_F(WireRigTest, ListsTheFramesItHeardAndSaidWithTheirTimes) {
+TEST_F(WireRigTest, ListsReceivedAndSentFramesWithTheirTimes) {
   const auto table = driver();
   ASSERT_TRUE(table->status(within(seconds(2))));
-  const auto all = say({{"get", "frames"}});
+  const auto all = send({{"get", "frames"}});
   ASSERT_GE(all["frames"].size(), 2u);
   EXPECT_EQ(all["frames"][0]["bytes"], "01 03 10 03 00 01 70 CA");
   EXPECT_EQ(all["frames"][0]["from_master"], true);
   EXPECT_EQ(all["frames"][1]["from_master"], false);
   EXPECT_LE(all["frames"][0]["at_ns"], all["frames"][1]["at_ns"]);
-  EXPECT_TRUE(say({{"get", "frames"}, {"since", all["next"]}})["frames"].empty());
+  EXPECT_TRUE(send({{"get", "frames"}, {"since", all["next"]}})["frames"].empty());
 }
 
 TEST_F(WireRigTest, FaultsComeAndGoWhileItRuns) {
   const auto table = driver();
-  EXPECT_EQ(say({{"set", {{"fault", "silent"}}}})["ok"], true);
+  EXPECT_EQ(send({{"set", {{"fault", "silent"}}}})["ok"], true);
   EXPECT_EQ(table->status(within(milliseconds(500))).error().code, ErrorCode::timeout);
-  say({{"set", {{"fault", "refuse"}}}});
+  send({{"set", {{"fault", "refuse"}}}});
   EXPECT_EQ(table->status(within(milliseconds(1000))).error().code, ErrorCode::protocol);
-  say({{"set", {{"fault", "none"}}}});
+  send({{"set", {{"fault", "none"}}}});
   EXPECT_TRUE(table->status(within(seconds(1))));
-  say({{"set", {{"unplugged", true}}}});
+  send({{"set", {{"unplugged", true}}}});
   EXPECT_EQ(table->status(within(milliseconds(500))).error().code, ErrorCode::io);
-  say({{"set", {{"unplugged", false}}}});
+  send({{"set", {{"unplugged", false}}}});
   EXPECT_TRUE(table->status(within(seconds(1))));
-  say({{"set", {{"alarm", 0x20}}}});
+  send({{"set", {{"alarm", 0x20}}}});
   EXPECT_THAT(table->status(within(seconds(1)))->alarm, HasSubstr("following error"));
 }
 
-TEST_F(WireRigTest, HearsOnlyWhoSpeaksWithItsParity) {
+TEST_F(WireRigTest, ReceivesOnlyRequestsWithItsParity) {
   const auto rig = config();
   ASSERT_TRUE(rig);
   auto options = rig->turntable.modbus;
-  say({{"set", {{"line", {{"parity", "odd"}}}}}});
-  const auto heard = [&](modbus::Parity parity) {
+  send({{"set", {{"line", {{"parity", "odd"}}}}}});
+  const auto received = [&](modbus::Parity parity) {
     options.line.parity = parity;
     auto table = ModbusTurntable::create(options, clock_).value();
     return table->status(within(seconds(1))).has_value();
   };
-  EXPECT_FALSE(heard(modbus::Parity::none));
-  EXPECT_FALSE(heard(modbus::Parity::even));
-  EXPECT_TRUE(heard(modbus::Parity::odd));
+  EXPECT_FALSE(received(modbus::Parity::none));
+  EXPECT_FALSE(received(modbus::Parity::even));
+  EXPECT_TRUE(received(modbus::Parity::odd));
 }
 
 TEST_F(WireRigTest, APressedEmergencyStopTakesThePowerFromTheDrive) {
   const auto table = driver();
   ASSERT_TRUE(table->home(within(seconds(20))));
-  EXPECT_EQ(say({{"press", "estop"}})["ok"], true);
-  EXPECT_EQ(say({{"get", "truth"}})["powered"], false);
+  EXPECT_EQ(send({{"press", "estop"}})["ok"], true);
+  EXPECT_EQ(send({{"get", "truth"}})["powered"], false);
   EXPECT_EQ(table->status(within(milliseconds(500))).error().code, ErrorCode::timeout);
-  say({{"release", "estop"}});
+  send({{"release", "estop"}});
   const auto status = table->status(within(seconds(1)));
   ASSERT_TRUE(status) << status.error().message;
   EXPECT_FALSE(status->homed);
@@ -153,70 +153,70 @@ TEST_F(WireRigTest, ContactsAreBridgedBrokenAndMended) {
     const auto panel = GpioPanel::open(config::gpio_panel_options(*config()), *lines, clock_);
     return panel.value()->wait_change({}, within(milliseconds(100)))->estop_ok;
   };
-  const auto wire = [&](const char* how) { say({{"set", {{"wiring", {{"estop", how}}}}}}); };
+  const auto wire = [&](const char* how) { send({{"set", {{"wiring", {{"estop", how}}}}}}); };
   EXPECT_TRUE(estop_ok());
-  say({{"press", "estop"}});
+  send({{"press", "estop"}});
   EXPECT_FALSE(estop_ok());
   wire("bridged");
   EXPECT_TRUE(estop_ok());
-  say({{"release", "estop"}});
+  send({{"release", "estop"}});
   wire("broken");
   EXPECT_FALSE(estop_ok());
   wire("wired");
   EXPECT_TRUE(estop_ok());
-  const auto changes = say({{"get", "changes"}})["changes"];
+  const auto changes = send({{"get", "changes"}})["changes"];
   ASSERT_EQ(changes.size(), 2u);
   EXPECT_EQ(changes[0]["name"], "estop");
   EXPECT_EQ(changes[0]["on"], true);
 }
 
 TEST_F(WireRigTest, ThePanelsModuleHasFaultsOfItsOwn) {
-  EXPECT_TRUE(say({{"set", {{"panel_fault", "silent"}}}}).contains("error"));  // on GPIO
+  EXPECT_TRUE(send({{"set", {{"panel_fault", "silent"}}}}).contains("error"));  // on GPIO
   start("leadshine-rs", "modbus-io");
   ModbusIoPanel panel(config::modbus_io_panel_options(*config()), clock_);
   EXPECT_TRUE(panel.wait_change({}, within(milliseconds(300))));
-  EXPECT_FALSE(say({{"get", "panel_frames"}})["frames"].empty());
-  say({{"set", {{"panel_fault", "silent"}}}});
+  EXPECT_FALSE(send({{"get", "panel_frames"}})["frames"].empty());
+  send({{"set", {{"panel_fault", "silent"}}}});
   EXPECT_FALSE(panel.wait_change({}, within(milliseconds(1000))));
-  say({{"set", {{"panel_fault", "none"}, {"panel_unplugged", true}}}});
+  send({{"set", {{"panel_fault", "none"}, {"panel_unplugged", true}}}});
   EXPECT_FALSE(panel.wait_change({}, within(milliseconds(1000))));
-  say({{"set", {{"panel_unplugged", false}}}});
+  send({{"set", {{"panel_unplugged", false}}}});
   EXPECT_TRUE(panel.wait_change({}, within(milliseconds(1000))));
 }
 
 TEST_F(WireRigTest, PhysicsChangesWhileItRuns) {
   const auto table = driver();
   ASSERT_TRUE(table->home(within(seconds(20))));
-  const auto seen = [&] { return say({{"get", "truth"}})["angle_deg"].get<double>(); };
+  const auto seen = [&] { return send({{"get", "truth"}})["angle_deg"].get<double>(); };
   EXPECT_NEAR(seen(), 0.3, 0.01);  // home is found turning back: the table lags behind by the play
-  say({{"set", {{"physics", {{"backlash_deg", 2.0}}}}}});
+  send({{"set", {{"physics", {{"backlash_deg", 2.0}}}}}});
   ASSERT_TRUE(table->home(within(seconds(20))));
   EXPECT_NEAR(seen(), 2.0, 0.01);
   ASSERT_TRUE(table->rotate_to({90}, within(seconds(10))));
   EXPECT_NEAR(seen(), 90, 0.01);
 }
 
-TEST_F(WireRigTest, SeveralClientsAreHeardAtOnce) {
+TEST_F(WireRigTest, SeveralClientsAreServedAtOnce) {
   std::vector<std::jthread> clients;
-  std::atomic<int> heard = 0;
+  std::atomic<int> replies = 0;
   for (int i = 0; i < 4; ++i) {
     clients.emplace_back([&] {
-      for (int n = 0; n < 25; ++n) heard += say({{"get", "truth"}}).contains("angle_deg");
+      for (int n = 0; n < 25; ++n) replies += send({{"get", "truth"}}).contains("angle_deg");
     });
   }
   clients.clear();
-  EXPECT_EQ(heard, 100);
+  EXPECT_EQ(replies, 100);
 }
 
-TEST_F(WireRigTest, WhatItDoesNotUnderstandIsSaid) {
+TEST_F(WireRigTest, AnInvalidRequestIsNamed) {
   for (const json& request : {json{{"get", "weather"}}, json{{"set", {{"colour", "red"}}}}, json{{"press", "doorbell"}},
                               json{{"set", {{"fault", "bad luck"}}}}, json{{"dance", true}}, json::array()}) {
-    EXPECT_TRUE(say(request).contains("error")) << request;
+    EXPECT_TRUE(send(request).contains("error")) << request;
   }
-  const auto garbled = wire::say_to_control_socket(folder_ / "control.sock", "{not json");
+  const auto garbled = wire::send_to_control_socket(folder_ / "control.sock", "{not json");
   ASSERT_TRUE(garbled);
   EXPECT_THAT(*garbled, HasSubstr("error"));
-  EXPECT_EQ(wire::say_to_control_socket(folder_ / "nobody.sock", "{}").error().code, ErrorCode::io);
+  EXPECT_EQ(wire::send_to_control_socket(folder_ / "absent.sock", "{}").error().code, ErrorCode::io);
 }
 
 TEST_F(WireRigTest, ADriveOrPanelThatIsNotSimulatedIsRefused) {

@@ -1,4 +1,4 @@
-// The LightCrafter on its USB/IP cable, asked as Linux' vhci-hcd asks.
+// The LightCrafter on its USB/IP cable, with the requests of Linux' vhci-hcd.
 #include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -18,7 +18,7 @@ namespace {
 using Bytes = std::vector<std::uint8_t>;
 using ::testing::ElementsAre;
 
-/// One that nobody has now.
+/// A port that is free now.
 std::uint16_t free_port() {
   const int probe = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};
@@ -84,7 +84,7 @@ class Host {
     send(request);
   }
 
-  /// The header of the next answer.
+  /// The header of the next reply.
   Bytes header() { return receive(48); }
 
   void send(const Bytes& bytes) {
@@ -124,7 +124,7 @@ TEST_F(UsbIp, TheDeviceIsImportedByItsBusIdAsALightCrafter) {
   EXPECT_EQ(word(reply, 8 + 256 + 32 + 12), 0x04516401u);
 }
 
-TEST_F(UsbIp, ItsDeviceDescriptorIsToldAsFarAsItIsAskedFor) {
+TEST_F(UsbIp, ItsDeviceDescriptorIsSentUpToTheRequestedLength) {
   Host host;
   host.import();
   host.submit(7, true, 0, 8, {0x80, 6, 0, 1, 0, 0, 8, 0});
@@ -136,14 +136,14 @@ TEST_F(UsbIp, ItsDeviceDescriptorIsToldAsFarAsItIsAskedFor) {
   EXPECT_THAT(host.receive(8), ElementsAre(18, 1, 0x00, 0x02, 0, 0, 0, 64));
 }
 
-TEST_F(UsbIp, ADescriptorItDoesNotHaveStalls) {
+TEST_F(UsbIp, AMissingDescriptorStalls) {
   Host host;
   host.import();
   host.submit(1, true, 0, 10, {0x80, 6, 0, 6, 0, 0, 10, 0});
   EXPECT_EQ(static_cast<std::int32_t>(word(host.header(), 20)), -EPIPE);
 }
 
-TEST_F(UsbIp, AReportThatIsReadWaitsUntilTheDeviceHasSomethingToSay) {
+TEST_F(UsbIp, AReadWaitsUntilTheDeviceHasAReport) {
   Host host;
   host.import();
   host.submit(1, true, 1, 64, {});
@@ -154,13 +154,13 @@ TEST_F(UsbIp, AReportThatIsReadWaitsUntilTheDeviceHasSomethingToSay) {
   const Bytes taken = host.header();
   EXPECT_EQ(word(taken, 4), 2u);
   EXPECT_EQ(word(taken, 24), 64u);
-  const Bytes said = host.header();
-  EXPECT_EQ(word(said, 4), 1u);
-  ASSERT_EQ(word(said, 24), 64u);
+  const Bytes header = host.header();
+  EXPECT_EQ(word(header, 4), 1u);
+  ASSERT_EQ(word(header, 24), 64u);
   EXPECT_EQ(host.receive(64)[1], 0x11);  // the reply has the request's sequence number
 }
 
-TEST_F(UsbIp, AReadThatIsGivenUpIsNotAnsweredLater) {
+TEST_F(UsbIp, ACancelledReadGetsNoLaterReply) {
   Host host;
   host.import();
   host.submit(1, true, 1, 64, {});
@@ -179,7 +179,7 @@ TEST_F(UsbIp, AnotherKernelCanHaveItAfterTheFirstHungUp) {
   EXPECT_EQ(second.import().size(), 320u);
 }
 
-TEST_F(UsbIp, WhoDoesNotAskForTheDeviceIsHungUpOn) {
+TEST_F(UsbIp, AClientThatDoesNotImportTheDeviceIsDisconnected) {
   Host host;
   host.send(Bytes(40, 0xFF));
   EXPECT_TRUE(host.receive(1).empty());

@@ -7,7 +7,7 @@
 
 namespace scanrig::sim {
 
-/// A clock for one thread: waiting moves it. Events planned for a moment happen on the way there.
+/// A clock for one thread: waiting moves it. Planned events happen on the way.
 class ManualClock final : public Clock {
  public:
   [[nodiscard]] TimePoint now() const override { return now_; }

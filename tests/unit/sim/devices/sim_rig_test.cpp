@@ -72,7 +72,7 @@ TEST_F(SimTurntable, ReadsAnEncoderWithSteps) {
   EXPECT_NEAR(std::remainder(move->measured.value, 0.004), 0.0, 1e-9);
 }
 
-TEST_F(SimTurntable, NeedsAZeroAfterAFailure) {
+TEST_F(SimTurntable, NeedsHomingAfterAFailure) {
   EXPECT_TRUE(fails_with(rig_->turntable().rotate_to({90.0}, clock_->within(1s)), ErrorCode::timeout));
   EXPECT_TRUE(fails_with(rig_->turntable().rotate_to({0.0}, soon()), ErrorCode::not_homed));
   EXPECT_FALSE(rig_->turntable().status(soon())->homed);
@@ -80,7 +80,7 @@ TEST_F(SimTurntable, NeedsAZeroAfterAFailure) {
   EXPECT_TRUE(rig_->turntable().rotate_to({10.0}, soon()));
 }
 
-TEST_F(SimTurntable, StopsOnRequestFromElsewhere) {
+TEST_F(SimTurntable, StopsOnRequestOfAnotherThread) {
   clock_->at(1s, [] { rig_->turntable().request_stop(); });
   EXPECT_TRUE(fails_with(rig_->turntable().rotate_to({180.0}, soon()), ErrorCode::stopped));
   ASSERT_TRUE(rig_->turntable().stop(soon()));
@@ -111,13 +111,13 @@ TEST_F(SimTurntable, HasNoPowerWhileTheEmergencyStopIsPressed) {
   EXPECT_TRUE(rig_->turntable().home(soon()));
 }
 
-TEST_F(SimTurntable, RefusesAnAngleOutOfRangeAndKeepsItsZero) {
+TEST_F(SimTurntable, RefusesAnAngleOutOfRangeAndStaysHomed) {
   EXPECT_TRUE(fails_with(rig_->turntable().rotate_to({1e6}, soon()), ErrorCode::out_of_range));
   EXPECT_TRUE(fails_with(rig_->turntable().rotate_to({std::nan("")}, soon()), ErrorCode::out_of_range));
   EXPECT_TRUE(rig_->turntable().rotate_to({1.0}, soon()));
 }
 
-TEST_F(SimTurntable, SaysThatItMayBeMovingWhenStoppingTakesTooLong) {
+TEST_F(SimTurntable, ReportsThatItMayBeMovingWhenStoppingTakesTooLong) {
   EXPECT_TRUE(fails_with(rig_->turntable().rotate_to({90.0}, clock_->within(1s)), ErrorCode::timeout));
   EXPECT_EQ(rig_->turntable().status(soon())->motion, TurntableStatus::Motion::moving);
   EXPECT_TRUE(fails_with(rig_->turntable().stop(clock_->within(10ms)), ErrorCode::timeout));
@@ -141,7 +141,7 @@ TEST_F(SimCamera, DeliversThePairOfTheEdgeAfterArming) {
   EXPECT_GT(cv::norm(pattern->left, plain->left, cv::NORM_INF), 20.0);
 }
 
-TEST_F(SimCamera, SeesTheTableWhereItStands) {
+TEST_F(SimCamera, SeesTheTableAtItsAngle) {
   ASSERT_TRUE(rig_->turntable().rotate_to({0.0}, soon()));
   const auto before = expose(Light::plain);
   ASSERT_TRUE(rig_->turntable().rotate_to({90.0}, soon()));
@@ -175,7 +175,7 @@ TEST_F(SimCamera, TimesOutWhenTheFramesComeTooLate) {
   EXPECT_TRUE(fails_with(rig_->camera().collect(clock_->within(5ms)), ErrorCode::timeout));
 }
 
-TEST_F(SimCamera, ThrowsAwayWhatIsOlderThanArming) {
+TEST_F(SimCamera, DiscardsFramesOlderThanArming) {
   ASSERT_TRUE(rig_->camera().arm(soon()));
   ASSERT_TRUE(rig_->projector().fire(Light::plain, soon()));
   ASSERT_TRUE(rig_->camera().arm(soon()));
@@ -215,7 +215,7 @@ TEST_F(SimPanel, ReportsAPressOnceAndThenTheRelease) {
   EXPECT_EQ(*inputs, known);
 }
 
-TEST_F(SimPanel, DoesNotLoseAPressThatNobodyWaitedFor) {
+TEST_F(SimPanel, DoesNotLoseAPressWithoutAWaitingReader) {
   rig_->press_stop();
   clock_->sleep_for(10s);
   EXPECT_TRUE(rig_->panel().wait_change({}, soon())->stop);
@@ -278,7 +278,7 @@ TEST(SimRigTruth, HoldsTheTrueAnglesOfTheLatestPosesAndNoViewTwice) {
   EXPECT_EQ(rig->write_truth(folder).error().code, ErrorCode::io);
 }
 
-TEST(SimRigCreation, RefusesWhatCannotBeScanned) {
+TEST(SimRigCreation, RefusesAnUnsuitableObject) {
   ManualClock clock;
   SimRigOptions options;
   options.object = "/nonexistent/teapot.obj";

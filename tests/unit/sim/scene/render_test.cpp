@@ -6,10 +6,10 @@
 #include "core/parallel.h"
 #include "core/units.h"
 #include "sim/scene/figurine.h"
+#include "sim/scene/image_sensor.h"
 #include "sim/scene/profile.h"
 #include "sim/scene/rests.h"
 #include "sim/scene/scene.h"
-#include "sim/scene/sensor.h"
 #include "tests/unit/sim/scene/shapes.h"
 
 namespace scanrig::sim {
@@ -79,8 +79,8 @@ double sample(const cv::Mat& image, double x, double y) {
 }
 
 TEST(Rendering, OfATiltedPlaneMatchesItsGeometry) {
-  // A grey sheet in mid-air, tilted both ways. Points of it are looked up in both images where the geometry says they
-  // are; the shift along the rows that is left between the two looks is the renderer's error.
+  // A grey sheet in mid-air, tilted both ways. Points of it are looked up in both images at their geometric places; the
+  // remaining shift along the rows between the two lookups is the renderer's error.
   TriangleMesh sheet;
   sheet.vertices = {{-25, -25, 0}, {25, -25, 0}, {25, 25, 0}, {-25, 25, 0}};
   sheet.triangles = {{0, 1, 2}, {0, 2, 3}};

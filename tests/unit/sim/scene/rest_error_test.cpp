@@ -1,4 +1,4 @@
-#include "sim/scene/standing.h"
+#include "sim/scene/rest_error.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 namespace scanrig::sim {
 namespace {
 
-TEST(RestingTable, IsAsFarOffEveryTimeItIsSentThereAndInTheNextJob) {
+TEST(RestingTable, IsEquallyFarOffEveryTimeAndInTheNextJob) {
   for (const double angle : {-45.0, 0.0, 45.0, 315.0, 360.0}) {
     EXPECT_EQ(rest_error_deg(angle, 1), rest_error_deg(angle, 1));
     EXPECT_EQ(rest_error_deg(angle, 1), rest_error_deg(angle + 720.0, 1));

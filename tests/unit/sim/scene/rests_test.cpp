@@ -95,14 +95,14 @@ TEST(Placements, OfAnObjectLargerThanTheWorkingVolumeAreRefused) {
   ASSERT_FALSE(placed);
   EXPECT_EQ(placed.error().code, ErrorCode::invalid_input);
   EXPECT_NE(placed.error().message.find("larger than the working volume"), std::string::npos);
-  EXPECT_TRUE(draw_placements(box({60.0, 20.0, 10.0}), 1, 2, false, true)) << "a person can put anything down";
+  EXPECT_TRUE(draw_placements(box({60.0, 20.0, 10.0}), 1, 2, false, true)) << "an operator can put anything down";
 }
 
 TEST(Placements, OfScannedObjectsFitAtHundredMillimetres) {
   const char* given = std::getenv("SCANRIG_SHARED_DATA");
   const std::filesystem::path meshes =
       std::filesystem::path(given ? given : SCANRIG_SOURCE_DIR "/../shared/data") / "meshes";
-  if (!std::filesystem::exists(meshes)) GTEST_SKIP() << meshes << " is not here";
+  if (!std::filesystem::exists(meshes)) GTEST_SKIP() << meshes << " is missing";
   for (const char* file : {"spot/spot_triangulated.obj", "igea_tri.ply", "ycb_banana/textured_simple_reoriented.obj"}) {
     const auto object = load_object(meshes / file, 100.0);
     ASSERT_TRUE(object) << object.error().message;
