@@ -59,16 +59,16 @@ class Rig:
         return answer
 
     def truth(self):
-        return self.say(get="truth")
+        return self.request(get="truth")
 
     def set(self, **knobs):
-        return self.say(set=knobs)["at_ns"]
+        return self.request(set=knobs)["at_ns"]
 
     def press(self, name):
-        return self.say(press=name)["at_ns"]
+        return self.request(press=name)["at_ns"]
 
     def release(self, name):
-        return self.say(release=name)["at_ns"]
+        return self.request(release=name)["at_ns"]
 
     def tap(self, name):
         self.press(name)
@@ -79,7 +79,7 @@ class Rig:
         """Frames from number `since` on, and the number to go on from."""
         found = []
         while True:
-            answer = self.say(get="frames", since=since)
+            answer = self.request(get="frames", since=since)
             if not answer["frames"]:
                 return found, since
             found += answer["frames"]

@@ -100,7 +100,7 @@ def scan_once(rig):
     asked = [False]
 
     def flip_or_begun():
-        flip = rig.say(get="outputs")["flip_request"]
+        flip = rig.request(get="outputs")["flip_request"]
         if flip and not asked[0]:
             rig.tap("start")
         asked[0] = flip
@@ -149,7 +149,7 @@ def killed_while_turning(rig, n):
     begun = time.monotonic()
     rig.kill_daemon(signal.SIGKILL)
     # With the daemon dead nothing begins to move again: the first moment of both is when the rig became safe.
-    safe = lambda: rig.truth()["standing"] and not rig.truth()["projector_on"]
+    safe = lambda: rig.truth()["stopped"] and not rig.truth()["projector_on"]
     with concurrent.futures.ThreadPoolExecutor(1) as systemd:
         made = systemd.submit(rig.make_safe)
         standing = rig.wait(safe, 10, 0.005)
@@ -190,7 +190,7 @@ def restarted(rig, n):
         unasked += what in ("move", "home") and (reset_at is None or frame["at_ns"] < reset_at)
         home_lost += what == "move" and not homed
         homed = homed or what == "home"
-    return unasked, home_lost, moves, not rig.truth()["standing"]
+    return unasked, home_lost, moves, not rig.truth()["stopped"]
 
 
 def restarts(bench, scratch):

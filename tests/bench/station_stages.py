@@ -58,7 +58,7 @@ class Trial:
             return None
         died = time.monotonic()
         self.rig.make_safe()
-        safe = self.rig.wait(lambda: (t := self.rig.truth())["standing"] and not t["projector_on"], 10, 0.005)
+        safe = self.rig.wait(lambda: (t := self.rig.truth())["stopped"] and not t["projector_on"], 10, 0.005)
         return time.monotonic() - died if safe else None
 
     def dies(self):

@@ -214,7 +214,7 @@ def turning(station):
 
 def seen_safe(station, begin):
     """Seconds from `begin` until the table stands and the light is off, by the simulation and the lines."""
-    station.wait("the table standing", lambda: station.rig.truth()["standing"], 30)
+    station.wait("the table standing", lambda: station.rig.truth()["stopped"], 30)
     took = time.monotonic() - begin
     dark = station.machine.do("cat /run/hil/PROJ_TRIG/value /run/hil/PROJ_PLAIN/value").split()
     expect(dark == ["0", "0"], f"the light is on: {dark}")

@@ -81,10 +81,10 @@ class ModuleEnd final : public PanelEnd {
   void begin(Fault fault) override {
     using Kind = WireFault::Kind;
     switch (fault) {
-      case Fault::silent: return server_->inject({.kind = Kind::deaf});
+      case Fault::silent: return server_->inject({.kind = Kind::request_lost});
       case Fault::late: return server_->inject({.kind = Kind::late, .delay = kLate});
       case Fault::damaged: return server_->inject({.kind = Kind::wrong_crc});
-      case Fault::earlier_answer: return server_->inject({.kind = Kind::earlier_answer});
+      case Fault::earlier_answer: return server_->inject({.kind = Kind::earlier_reply});
       case Fault::device_error: return server_->inject({.kind = Kind::refuse});
       case Fault::stalled: return;
       case Fault::unplugged:

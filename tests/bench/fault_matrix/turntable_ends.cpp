@@ -36,10 +36,10 @@ class WireEnd : public TurntableEnd {
     // The drive still hears a stop; what it says of itself is spoilt.
     const auto spoil = [&](Kind kind) { server_->inject({.kind = kind, .function = asks_, .delay = kLate}); };
     switch (fault) {
-      case Fault::silent: return server_->inject({.kind = Kind::deaf});
+      case Fault::silent: return server_->inject({.kind = Kind::request_lost});
       case Fault::late: return spoil(Kind::late);
       case Fault::damaged: return spoil(Kind::wrong_crc);
-      case Fault::earlier_answer: return spoil(Kind::earlier_answer);
+      case Fault::earlier_answer: return spoil(Kind::earlier_reply);
       case Fault::device_error: return drive_->raise_alarm(alarm_, alarm_can_be_reset_);
       case Fault::stalled: return drive_->block(true);
       case Fault::unplugged:

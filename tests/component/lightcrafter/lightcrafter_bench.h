@@ -16,13 +16,13 @@ class SimulatedUsb final : public dlpc350::Transport {
 
   Result<void> send(const dlpc350::Report& report, Deadline) override {
     if (!plugged_) return gone();
-    device_.hear(report);
+    device_.receive(report);
     return {};
   }
   Result<dlpc350::Report> receive(Deadline deadline) override {
     for (;;) {
       if (!plugged_) return pass_on(Result<void>(gone()));
-      if (const auto report = device_.say()) return *report;
+      if (const auto report = device_.next_report()) return *report;
       if (deadline.expired(clock_)) return fail(ErrorCode::timeout, "no reply");
       clock_.sleep_for(std::chrono::milliseconds(1));
     }

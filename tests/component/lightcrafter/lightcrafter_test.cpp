@@ -25,9 +25,9 @@ class LightCrafterTest : public testing::Test {
     EXPECT_TRUE(fired) << fired.error().message;
   }
   std::size_t reports_for(Light light) {
-    const auto before = bench_.device().heard().size();
+    const auto before = bench_.device().received().size();
     EXPECT_TRUE(fire(light));
-    return bench_.device().heard().size() - before;
+    return bench_.device().received().size() - before;
   }
 };
 

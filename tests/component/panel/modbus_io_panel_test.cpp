@@ -121,7 +121,7 @@ TEST_F(ModbusIoPanelTest, CoilsWithOthersBetweenThemAreSetOneByOne) {
 
 TEST_F(ModbusIoPanelTest, OneMissedAnswerIsRepeatedAndCounted) {
   EXPECT_EQ(wait({}, 10), PanelInputs{});
-  for (const auto kind : {WireFault::Kind::deaf, WireFault::Kind::wrong_crc, WireFault::Kind::cut_short}) {
+  for (const auto kind : {WireFault::Kind::request_lost, WireFault::Kind::wrong_crc, WireFault::Kind::cut_short}) {
     server_->inject({kind, 1, std::uint8_t{2}});
     EXPECT_EQ(wait({}, 60), PanelInputs{});
   }
@@ -131,8 +131,8 @@ TEST_F(ModbusIoPanelTest, OneMissedAnswerIsRepeatedAndCounted) {
 TEST_F(ModbusIoPanelTest, AModuleThatCannotBeReadIsAnErrorByItsName) {
   EXPECT_EQ(wait({}, 10), PanelInputs{});
   const std::pair<WireFault, ErrorCode> faults[] = {
-      {{WireFault::Kind::deaf}, ErrorCode::timeout},
-      {{WireFault::Kind::answer_lost}, ErrorCode::timeout},
+      {{WireFault::Kind::request_lost}, ErrorCode::timeout},
+      {{WireFault::Kind::reply_lost}, ErrorCode::timeout},
       {{.kind = WireFault::Kind::late, .delay = milliseconds(45)}, ErrorCode::timeout},
       {{WireFault::Kind::wrong_crc}, ErrorCode::protocol},
       {{WireFault::Kind::cut_short}, ErrorCode::timeout},
@@ -151,7 +151,7 @@ TEST_F(ModbusIoPanelTest, AModuleThatCannotBeReadIsAnErrorByItsName) {
 
 TEST_F(ModbusIoPanelTest, TheAnswerOfAnEarlierQuestionIsNeverBelieved) {
   EXPECT_EQ(wait({}, 10), PanelInputs{});
-  server_->inject({WireFault::Kind::earlier_answer});
+  server_->inject({WireFault::Kind::earlier_reply});
   module_.set(kEstop, false);
   const auto inputs = panel_->wait_change({}, within(200));
   ASSERT_FALSE(inputs) << "estop_ok = " << inputs->estop_ok;
@@ -182,7 +182,7 @@ TEST_F(ModbusIoPanelTest, AModuleThatWasSwitchedOffAndOnIsNoticedByItsDarkLamps)
 
 TEST_F(ModbusIoPanelTest, APressThatBeganWhileNobodyCouldReadIsNoPress) {
   EXPECT_EQ(wait({}, 10), PanelInputs{});
-  server_->inject({WireFault::Kind::deaf});
+  server_->inject({WireFault::Kind::request_lost});
   EXPECT_EQ(code_of_wait(), ErrorCode::timeout);
   module_.set(kStart, true);
   server_->clear_faults();

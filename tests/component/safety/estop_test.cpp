@@ -165,7 +165,7 @@ TEST_F(DaemonOnWires, AnEstopThatSilencesTheDriveReadsAsAnEstop) {
   get_ready();
   rig.press("START");
   ASSERT_TRUE(rig.wait_moving());
-  rig.serial->inject({sim::wire::WireFault::Kind::deaf});
+  rig.serial->inject({sim::wire::WireFault::Kind::request_lost});
   rig.clock.sleep_for(milliseconds(30));
   rig.set_estop(false);
   ASSERT_TRUE(rig.wait_fault());
@@ -181,7 +181,7 @@ TEST_F(DaemonOnWires, AnEstopDoesNotWaitForASilentDriveToAnswer) {
   get_ready();
   rig.press("START");
   ASSERT_TRUE(rig.wait_moving());
-  rig.serial->inject({sim::wire::WireFault::Kind::answer_lost});
+  rig.serial->inject({sim::wire::WireFault::Kind::reply_lost});
   rig.clock.sleep_for(milliseconds(80));  // longer than a reply may take: the line is waited for to fall silent
   const auto pressed = rig.clock.now();
   rig.set_estop(false);

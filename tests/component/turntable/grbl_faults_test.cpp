@@ -38,13 +38,13 @@ class GrblFaults : public testing::Test, protected TurntableFaults {
 TEST_F(GrblFaults, SpoiledAnswersEndInTheirErrorWithinTheDeadlineWithTheTableAtRest) {
   constexpr auto forever = -1;
   const std::vector<Spoiled> all{
-      {"Silent", {WireFault::Kind::deaf}, ErrorCode::timeout, false},
-      {"AnswersLost", {WireFault::Kind::answer_lost, forever, kReport}, ErrorCode::timeout, true},
+      {"Silent", {WireFault::Kind::request_lost}, ErrorCode::timeout, false},
+      {"AnswersLost", {WireFault::Kind::reply_lost, forever, kReport}, ErrorCode::timeout, true},
       {"Late", {WireFault::Kind::late, forever, kReport, milliseconds(50)}, ErrorCode::timeout, true},
       {"AsLateAsIsWaitedFor", {WireFault::Kind::late, forever, kReport, milliseconds(80)}, ErrorCode::timeout, true},
       {"Damaged", {WireFault::Kind::wrong_crc, forever, kReport}, ErrorCode::protocol, true},
       {"CutShort", {WireFault::Kind::cut_short, forever, kReport}, ErrorCode::timeout, true},
-      {"EarlierAnswers", {WireFault::Kind::earlier_answer, forever, kReport}, ErrorCode::protocol, true}};
+      {"EarlierAnswers", {WireFault::Kind::earlier_reply, forever, kReport}, ErrorCode::protocol, true}};
   for (const Spoiled& spoiled : all) {
     SCOPED_TRACE(spoiled.name);
     start_at_zero(slow);

@@ -10,13 +10,13 @@ using testing::HasSubstr;
 TEST_P(ModbusFaults, SpoiledAnswersEndInTheirErrorWithinTheDeadlineWithTheTableAtRest) {
   constexpr auto forever = -1;
   const std::vector<Spoiled> all{
-      {"Silent", {WireFault::Kind::deaf, forever}, ErrorCode::timeout, false},
-      {"AnswersLost", {WireFault::Kind::answer_lost, forever, kRead}, ErrorCode::timeout, true},
+      {"Silent", {WireFault::Kind::request_lost, forever}, ErrorCode::timeout, false},
+      {"AnswersLost", {WireFault::Kind::reply_lost, forever, kRead}, ErrorCode::timeout, true},
       {"Late", {WireFault::Kind::late, forever, kRead, milliseconds(50)}, ErrorCode::timeout, true},
       {"WrongCrc", {WireFault::Kind::wrong_crc, forever, kRead}, ErrorCode::protocol, true},
       {"CutShort", {WireFault::Kind::cut_short, forever, kRead}, ErrorCode::timeout, true},
       {"Refused", {WireFault::Kind::refuse, forever, kRead, {}, 4}, ErrorCode::protocol, true},
-      {"EarlierAnswers", {WireFault::Kind::earlier_answer, forever, kRead}, ErrorCode::protocol, true}};
+      {"EarlierAnswers", {WireFault::Kind::earlier_reply, forever, kRead}, ErrorCode::protocol, true}};
   for (const Spoiled& spoiled : all) {
     SCOPED_TRACE(spoiled.name);
     start_at_zero(slow);
@@ -64,7 +64,7 @@ TEST_P(ModbusFaults, TwoMastersCannotShareALine) {
 
 TEST_P(ModbusFaults, StopIsNotClaimedWithoutAnAnswer) {
   start_at_zero();
-  bench_->server().inject({WireFault::Kind::deaf});
+  bench_->server().inject({WireFault::Kind::request_lost});
   const auto stopped = bench_->turntable().stop(within(milliseconds(600)));
   ASSERT_FALSE(stopped);
   EXPECT_EQ(stopped.error().code, ErrorCode::timeout);

@@ -104,7 +104,7 @@ inline void TurntableFaults::expect_one_damaged_answer_asked_for_again() {
 }
 
 inline void TurntableFaults::expect_move_not_sent_again_once_seen_running() {
-  bench().server().inject({WireFault::Kind::answer_lost, 1, moving()});
+  bench().server().inject({WireFault::Kind::reply_lost, 1, moving()});
   const auto moved = rotate_to(45);
   ASSERT_TRUE(moved) << moved.error().message;
   EXPECT_NEAR(moved->measured.value, 45, 0.05);
@@ -113,7 +113,7 @@ inline void TurntableFaults::expect_move_not_sent_again_once_seen_running() {
 
 inline void TurntableFaults::expect_move_sent_again_only_after_reading() {
   const auto before = bench().counted();
-  bench().server().inject({WireFault::Kind::deaf, 1, moving()});
+  bench().server().inject({WireFault::Kind::request_lost, 1, moving()});
   const auto moved = rotate_to(45);
   ASSERT_TRUE(moved) << moved.error().message;
   ASSERT_EQ(moves_sent(), 2);

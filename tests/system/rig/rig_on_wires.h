@@ -55,7 +55,7 @@ class RigOnWires : public testing::Test {
     ASSERT_TRUE(soon([&] { return machine() == "Halted" && next_action().starts_with("Press Reset"); })) << log();
   }
   json say(const json& request) {
-    const auto answer = sim::wire::say_to_control_socket(folder_ / "control.sock", request.dump());
+    const auto answer = sim::wire::send_to_control_socket(folder_ / "control.sock", request.dump());
     return answer ? json::parse(*answer) : json::object();
   }
   /// Held until it has its effect.

@@ -185,7 +185,7 @@ TEST_F(MakeSafe, WithNothingKeptADeviceBadlyConfiguredLeavesTheOthersToBeMadeSaf
 }
 
 TEST_F(MakeSafe, ASilentDriveIsToldToStopAndIsNotCalledStopped) {
-  rig.serial->inject({sim::wire::WireFault::Kind::deaf});
+  rig.serial->inject({sim::wire::WireFault::Kind::request_lost});
   const auto begun = rig.clock.now();
   EXPECT_EQ(make_safe(), 5);
   EXPECT_LT(seconds_since(begun), 1.3 * kSlowness);

@@ -32,7 +32,7 @@ class CameraOnWires : public testing::Test {
                       const auto t = rig.drive.truth();
                       return nlohmann::json{{"angle_deg", t.table_deg},
                                             {"speed_deg_s", t.speed_deg_s},
-                                            {"standing", !t.moving},
+                                            {"stopped", !t.moving},
                                             {"projector_on", rig.lamp("DOTS")}}
                           .dump();
                     }};

@@ -74,7 +74,7 @@ TEST_F(LineTest, AnAnswerLaterThanTheQuietLineIsRefusedByItsLength) {
 TEST_F(LineTest, WhoHurriesDoesNotWaitForAQuietLineAndAStopGetsThroughAtOnce) {
   modbus::Client line(options_, clock_);
   expect_read(line, 1);
-  server_->inject({WireFault::Kind::answer_lost, 1});
+  server_->inject({WireFault::Kind::reply_lost, 1});
   EXPECT_EQ(code_of_read(line, 2), ErrorCode::timeout);
   line.set_fail_fast(true);
   const auto begun = clock_.now();
