@@ -9,7 +9,7 @@
 
 namespace scanrig {
 
-/// log.jsonl of a job's folder: what the log holds of the job, one object per line, docs/journal.md.
+/// log.jsonl of a job's folder: what the log holds of the job, one object per line, docs/reference/journal.md.
 std::filesystem::path job_log_file(const std::filesystem::path& job_folder);
 
 constexpr std::uintmax_t kMaxJobLogBytes = 4u << 20;

@@ -55,7 +55,7 @@ struct Maintenance {
   bool moved = false;  ///< something has moved outside a job
   bool homed = false;
   std::string requester{};           ///< who switched it on, as event::MaintenanceRequested names him
-  bool consent = false;              ///< to jog, by Reset at the panel; ends as docs/safety.md lists
+  bool consent = false;              ///< to jog, by Reset at the panel; ends as docs/reference/safety.md lists
   bool guard_was_opened = false;     ///< since it began, and no Reset at the panel after it
   std::optional<action::Jog> jog{};  ///< to be done when the warning is over
 

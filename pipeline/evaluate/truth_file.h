@@ -18,7 +18,7 @@ struct TruePose {
   std::vector<double> angles_deg;  ///< of the views
 };
 
-/// Truth of a simulated scan: truth.json and truth.ply of docs/scan-folder.md.
+/// Truth of a simulated scan: truth.json and truth.ply of docs/reference/scan-folder.md.
 struct Truth {
   Mesh mesh;  ///< in pose 1's turntable frame
   Camera left;

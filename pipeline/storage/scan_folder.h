@@ -18,7 +18,7 @@
 
 namespace scanrig {
 
-/// A scan on disk, docs/scan-folder.md. A pose and a view are identified by their positions in the manifest, from 0.
+/// A scan on disk, docs/reference/scan-folder.md. A pose and a view are identified by their positions in the manifest, from 0.
 /// Threads: one user at a time; the const functions may be called from several.
 class ScanFolder {
  public:

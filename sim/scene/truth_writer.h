@@ -8,7 +8,7 @@
 
 namespace scanrig::sim {
 
-/// The exact calibration of a scene's cameras, in the format of docs/scan-folder.md. Fails with `io`.
+/// The exact calibration of a scene's cameras, in the format of docs/reference/scan-folder.md. Fails with `io`.
 Result<void> write_calibration(const Scene& scene, const std::filesystem::path& file);
 
 /// True table angles of one pose.
