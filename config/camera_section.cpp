@@ -28,6 +28,14 @@ std::vector<Choice<std::string>> v4l2_formats() {
                   "GB10", "BG10", "MJPG"});
 }
 
+/// The object is cut out before its blue screen by colour; nothing else finds its outline yet.
+void expect_colour(Section& s, const std::string& format, std::string_view such_as) {
+  const bool grey = format.starts_with("Mono") || format == "GREY" || format.starts_with("Y1");
+  if (!grey) return;
+  s.report("pixel_format",
+           fmt::format("{} is grey, and the blue screen needs a colour format, such as {}", format, such_as));
+}
+
 /// No frame comes before its exposure is over.
 void expect_longer(Section& s, std::chrono::milliseconds timeout, std::chrono::microseconds exposure) {
   if (timeout > exposure) return;
@@ -60,7 +68,9 @@ void read_aravis(Section& s, AravisOptions& options) {
     trigger.text("source", options.trigger_source);
     trigger.choice<bool>("edge", options.falling_edge, {{"rising", false}, {"falling", true}});
   });
-  s.choice("pixel_format", options.pixel_format, aravis_formats());
+  if (s.choice("pixel_format", options.pixel_format, aravis_formats())) {
+    expect_colour(s, options.pixel_format, "BayerRG8");
+  }
   s.number("exposure_us", options.exposure, kExposureUs);
   if (s.has("gain")) s.number("gain", options.gain.emplace(), {-100, 10'000});
   if (s.has("region")) s.section("region", [&](Section& r) { read_region(r, options.region.emplace()); });
@@ -119,7 +129,7 @@ void read_v4l2(Section& s, bool side_by_side, V4l2Options& options) {
     }
   }
   s.flag("external_trigger", options.external_trigger);
-  s.choice("pixel_format", options.pixel_format, v4l2_formats());
+  if (s.choice("pixel_format", options.pixel_format, v4l2_formats())) expect_colour(s, options.pixel_format, "RGGB");
   s.section("size", [&](Section& size) {
     size.number("width", options.size.width, kPixels);
     size.number("height", options.size.height, kPixels);

@@ -157,6 +157,12 @@ void read_alarm(Section& s, DriveProfile::Alarm& alarm) {
   });
 }
 
+/// Shorter, a line with faults would trip it; longer, it would stop nothing that does not end by itself.
+void read_communication_timeout(Section& s, DriveProfile::CommunicationTimeout& timeout) {
+  s.number("register", timeout.address, kWord);
+  s.number("timeout_ms", timeout.timeout, {500, 10'000});
+}
+
 }  // namespace
 
 Result<DriveProfile> read_drive_profile(const std::filesystem::path& file) {
@@ -197,6 +203,11 @@ Result<DriveProfile> parse_drive_profile(std::string_view text, const std::files
                    [&](Section& s) { read_soft_limits(s, profile.soft_limits.emplace(DriveProfile::SoftLimits{})); });
     }
     root.section("alarm", [&](Section& s) { read_alarm(s, profile.alarm); });
+    if (root.has("communication_timeout")) {
+      root.section("communication_timeout", [&](Section& s) {
+        read_communication_timeout(s, profile.communication_timeout.emplace(DriveProfile::CommunicationTimeout{}));
+      });
+    }
   });
   if (!read) return pass_on(read);
   warnings.insert(warnings.end(), read->begin(), read->end());

@@ -21,6 +21,14 @@ const std::map<std::string, bool PanelOutputs::*>& outputs_by_key() {
   return fields;
 }
 
+gpio::LineSpec line_spec(const Pin& pin) {
+  return {.name = pin.line,
+          .active_low = pin.active_low,
+          .bias = pin.bias,
+          .chip = pin.chip,
+          .offset = static_cast<unsigned>(pin.offset)};
+}
+
 /// Every wired signal at its place, as `wiring` of the driver at hand has it.
 template <class Options, class Wiring>
 Options panel_options(const RigConfig& rig, const Wiring& wiring) {
@@ -36,15 +44,23 @@ Options panel_options(const RigConfig& rig, const Wiring& wiring) {
 
 GpioProjectorOptions gpio_projector_options(const ProjectorConfig& projector) {
   GpioProjectorOptions options;
-  options.pattern_line = {projector.line, projector.active_low};
-  if (projector.plain_line) options.plain_line = {*projector.plain_line, projector.active_low};
+  options.pattern_line = line_spec(projector.line);
+  if (projector.plain_line) options.plain_line = line_spec(*projector.plain_line);
   options.pulse = projector.pulse;
   return options;
 }
 
-GpioPanelOptions gpio_panel_options(const RigConfig& rig) {
-  return panel_options<GpioPanelOptions>(rig, [](const Pin& pin) { return gpio::LineSpec{pin.line, pin.active_low}; });
+ModbusIoProjectorOptions modbus_io_projector_options(const ProjectorConfig& projector) {
+  ModbusIoProjectorOptions options;
+  options.line = projector.io_module;
+  options.pattern_coil = static_cast<std::uint16_t>(projector.line.channel);
+  if (projector.plain_line) options.plain_coil = static_cast<std::uint16_t>(projector.plain_line->channel);
+  options.active_low = projector.line.active_low;
+  options.pulse = projector.pulse;
+  return options;
 }
+
+GpioPanelOptions gpio_panel_options(const RigConfig& rig) { return panel_options<GpioPanelOptions>(rig, line_spec); }
 
 ModbusIoPanelOptions modbus_io_panel_options(const RigConfig& rig) {
   auto options = panel_options<ModbusIoPanelOptions>(rig, [](const Pin& pin) {

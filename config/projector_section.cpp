@@ -1,5 +1,7 @@
 #include "config/projector_section.h"
 
+#include "config/pin.h"
+
 namespace scanrig::config {
 namespace {
 
@@ -10,12 +12,24 @@ void expect_as_long_as(std::chrono::microseconds exposure, std::string_view key,
            fmt::format("{} is shorter than the exposure_us of {} in [stereo_camera]", light.count(), exposure.count()));
 }
 
-void read_gpio(Section& s, std::chrono::microseconds exposure, ProjectorConfig& projector) {
-  s.text("line", projector.line);
-  if (s.has("plain_line")) s.text("plain_line", projector.plain_line.emplace());
-  if (s.has("active")) s.choice<bool>("active", projector.active_low, {{"low", true}, {"high", false}});
+/// Of both lines.
+void read_pulse(Section& s, std::chrono::microseconds exposure, ProjectorConfig& projector) {
+  if (s.has("active")) s.choice<bool>("active", projector.line.active_low, {{"low", true}, {"high", false}});
+  if (projector.plain_line) projector.plain_line->active_low = projector.line.active_low;
   s.number("pulse_us", projector.pulse, {10, 1'000'000});
   expect_as_long_as(exposure, "pulse_us", projector.pulse, s);
+}
+
+void read_gpio(Section& s, std::chrono::microseconds exposure, ProjectorConfig& projector) {
+  projector.line = read_output_line(s, "line");
+  if (s.has("plain_line")) projector.plain_line = read_output_line(s, "plain_line");
+  read_pulse(s, exposure, projector);
+}
+
+void read_modbus_io(Section& s, std::chrono::microseconds exposure, ProjectorConfig& projector) {
+  s.number("channel", projector.line.channel, {0, 255});
+  if (s.has("plain_channel")) s.number("plain_channel", projector.plain_line.emplace().channel, {0, 255});
+  read_pulse(s, exposure, projector);
 }
 
 /// The ranges are the device's, see LightCrafterProjector::create().
@@ -52,12 +66,34 @@ void read_lightcrafter(Section& s, std::chrono::microseconds exposure, Projector
 
 void read_projector(Section& s, std::chrono::microseconds exposure, ProjectorConfig& projector) {
   using Driver = ProjectorConfig::Driver;
-  s.choice<Driver>(
-      "driver", projector.driver,
-      {{"gpio", Driver::gpio}, {"lightcrafter4500", Driver::lightcrafter4500}, {"manual", Driver::manual}});
+  s.choice<Driver>("driver", projector.driver,
+                   {{"gpio", Driver::gpio},
+                    {"modbus-io", Driver::modbus_io},
+                    {"lightcrafter4500", Driver::lightcrafter4500},
+                    {"manual", Driver::manual}});
   if (projector.driver == Driver::gpio) read_gpio(s, exposure, projector);
+  if (projector.driver == Driver::modbus_io) read_modbus_io(s, exposure, projector);
   if (projector.driver == Driver::lightcrafter4500) read_lightcrafter(s, exposure, projector);
   s.number("warm_up_s", projector.warm_up, {0, 7200});
+}
+
+void check_projector(Section& s, const RigConfig& rig) {
+  using Driver = ProjectorConfig::Driver;
+  const Driver driver = rig.projector.driver;
+  if (driver != Driver::gpio && driver != Driver::modbus_io) return;
+  const bool by_channel = driver == Driver::modbus_io;
+  const bool module = rig.panel.driver == PanelConfig::Driver::modbus_io;
+  const char* const line = by_channel ? "channel" : "line";
+  const char* const plain_line = by_channel ? "plain_channel" : "plain_line";
+  if (by_channel && !module) {
+    s.report("driver", "\"modbus-io\" uses the panel's I/O module: it needs driver = \"modbus-io\" in [panel]");
+  }
+  if (!rig.projector.plain_line) {
+    s.report(plain_line, "missing: every view needs an image in even light; name the output that fires it");
+  }
+  if (!s.sound()) return;
+  std::map<std::string, Pin> outputs{{line, rig.projector.line}, {plain_line, *rig.projector.plain_line}};
+  report_shared(s, outputs, by_channel == module ? rig.panel.outputs : std::map<std::string, Pin>{});
 }
 
 }  // namespace scanrig::config

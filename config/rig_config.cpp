@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "config/camera_section.h"
+#include "config/pin.h"
 #include "config/projector_section.h"
 #include "config/section.h"
 #include "config/turntable_section.h"
@@ -15,40 +16,12 @@
 namespace scanrig::config {
 namespace {
 
-/// { line = "NAME", active = "low" } or { channel = 3 }; active high unless told otherwise.
-Pin read_pin(Section& section, std::string_view key, bool by_channel) {
-  Pin pin;
-  section.section(key, [&](Section& s) {
-    if (by_channel) {
-      s.number("channel", pin.channel, {0, 255});
-    } else {
-      s.text("line", pin.line);
-    }
-    if (s.has("active")) s.choice<bool>("active", pin.active_low, {{"low", true}, {"high", false}});
-  });
-  return pin;
-}
-
-/// Two signals on one contact would hide each other. `others` are compared with, and not with one another.
-void report_shared(Section& s, const std::map<std::string, Pin>& pins, const std::map<std::string, Pin>& others) {
-  const auto compare = [&](const std::string& key, const Pin& pin, const std::map<std::string, Pin>& with) {
-    for (const auto& [name, other] : with) {
-      if (name == key || pin.line != other.line || pin.channel != other.channel) continue;
-      return s.report(key, fmt::format("is on the same contact as {}", name));
-    }
-  };
-  for (auto pin = pins.begin(); pin != pins.end(); ++pin) {
-    compare(pin->first, pin->second, {pins.begin(), pin});
-    compare(pin->first, pin->second, others);
-  }
-}
-
 /// The panel's driver watches e-stop and guard.
 void read_safety(Section& s, const PanelConfig& panel, SafetyConfig& safety) {
   using Home = SafetyConfig::HomeAfterRestart;
-  const bool by_channel = panel.driver == PanelConfig::Driver::modbus_io;
-  safety.estop = read_pin(s, "estop", by_channel);
-  if (s.has("guard")) safety.guard = read_pin(s, "guard", by_channel);
+  const Wiring wiring = panel.driver == PanelConfig::Driver::modbus_io ? Wiring::channel : Wiring::gpio_input;
+  safety.estop = read_pin(s, "estop", wiring);
+  if (s.has("guard")) safety.guard = read_pin(s, "guard", wiring);
   s.choice<Home>("home_after_restart", safety.home_after_restart,
                  {{"on_reset", Home::on_reset}, {"guarded", Home::guarded}});
   s.flag("remote_start", safety.remote_start);
@@ -68,17 +41,29 @@ void read_panel(Section& s, PanelConfig& panel) {
     read_modbus_line(s, panel.io_module);
     s.number("poll_ms", panel.poll, {5, 200});
   }
-  panel.inputs["start"] = read_pin(s, "start", by_channel);
+  const Wiring input = by_channel ? Wiring::channel : Wiring::gpio_input;
+  const Wiring output = by_channel ? Wiring::channel : Wiring::gpio_output;
+  panel.inputs["start"] = read_pin(s, "start", input);
   for (const char* key : {"stop", "reset", "part_present", "flipped"}) {
-    if (s.has(key)) panel.inputs[key] = read_pin(s, key, by_channel);
+    if (s.has(key)) panel.inputs[key] = read_pin(s, key, input);
   }
   for (const char* key :
        {"lamp_red", "lamp_amber", "lamp_green", "start_lamp", "flip_request", "busy", "pass", "fail"}) {
-    if (s.has(key)) panel.outputs[key] = read_pin(s, key, by_channel);
+    if (s.has(key)) panel.outputs[key] = read_pin(s, key, output);
   }
   if (!s.sound()) return;
   report_shared(s, panel.inputs, {});
   report_shared(s, panel.outputs, {});
+}
+
+/// Without these no job could ever begin, or a fault would stay unseen.
+void check_can_operate(Section& s, const PanelConfig& panel) {
+  if (!panel.inputs.contains("reset")) {
+    s.report("reset", "missing: the table is homed, and a fault cleared, by Reset only; name its input");
+  }
+  if (!panel.outputs.contains("lamp_red")) {
+    s.report("lamp_red", "missing: a fault would not be visible at the rig; name the output of the red lamp");
+  }
 }
 
 void read_limits(Section& s, RecipeConfig& recipe) {
@@ -199,9 +184,17 @@ void read_gpio(Section& root, const std::filesystem::path& base, RigConfig& rig)
   root.section("gpio", [&](Section& s) { s.path("socket", base, rig.gpio_socket.emplace()); });
 }
 
-void read_panel_and_safety(Section& root, RigConfig& rig) {
-  root.section("panel", [&](Section& s) { read_panel(s, rig.panel); });
+void read_safety(Section& root, RigConfig& rig) {
   root.section("safety", [&](Section& s) { read_safety(s, rig.panel, rig.safety); });
+}
+
+/// The panel's I/O module may drive the projector, too.
+void read_module_of_projector(Section& root, ProjectorConfig& projector) {
+  if (projector.driver != ProjectorConfig::Driver::modbus_io) return;
+  root.section("panel", [&](Section& s) {
+    for (const auto& key : s.free_keys()) std::ignore = s.has(key);  // of no concern
+    read_modbus_line(s, projector.io_module);
+  });
 }
 
 void read_rig(Section& root, const std::filesystem::path& base, const std::vector<std::filesystem::path>& drives,
@@ -210,8 +203,16 @@ void read_rig(Section& root, const std::filesystem::path& base, const std::vecto
   root.one_of("schema", schema, {1});
   root.section("turntable", [&](Section& s) { read_turntable(s, drives, rig.turntable); });
   root.section("stereo_camera", [&](Section& s) { read_stereo_camera(s, base, cameras, rig.stereo_camera); });
-  root.section("projector", [&](Section& s) { read_projector(s, rig.stereo_camera.exposure, rig.projector); });
-  read_panel_and_safety(root, rig);
+  root.section("panel", [&](Section& s) {
+    read_panel(s, rig.panel);
+    check_can_operate(s, rig.panel);
+  });
+  read_safety(root, rig);
+  root.section("projector", [&](Section& s) {
+    read_projector(s, rig.stereo_camera.exposure, rig.projector);
+    check_projector(s, rig);
+  });
+  rig.projector.io_module = rig.panel.io_module;
   root.section("calibration", [&](Section& s) { s.path("file", base, rig.calibration_file); });
   root.section("recipe", [&](Section& s) { read_recipes(s, rig); });
   root.section("storage", [&](Section& s) { read_storage(s, base, rig.storage); });
@@ -263,8 +264,12 @@ Result<RigConfig> read_device_config(SafetyDevice device, const std::filesystem:
         return root.section("turntable", [&](Section& s) { read_turntable(s, usual_drives(file), rig.turntable); });
       case SafetyDevice::projector:
         root.section("projector", [&](Section& s) { read_projector(s, {}, rig.projector); });
+        read_module_of_projector(root, rig.projector);
         return read_gpio(root, base, rig);
-      case SafetyDevice::panel: read_panel_and_safety(root, rig); return read_gpio(root, base, rig);
+      case SafetyDevice::panel:
+        root.section("panel", [&](Section& s) { read_panel(s, rig.panel); });
+        read_safety(root, rig);
+        return read_gpio(root, base, rig);
     }
   });
   if (!read) return pass_on(read);

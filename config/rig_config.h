@@ -10,17 +10,25 @@
 #include "core/result.h"
 #include "drivers/camera/aravis_stereo_camera.h"
 #include "drivers/camera/v4l2_stereo_camera.h"
+#include "drivers/gpio/lines.h"
 #include "drivers/projector/lightcrafter_projector.h"
 #include "drivers/turntable/grbl_turntable.h"
 #include "drivers/turntable/modbus_turntable.h"
 
 namespace scanrig::config {
 
-/// A digital input or output: a GPIO line by its name, or a channel of a Modbus I/O module.
+/// A digital input or output: a GPIO line by its name or by chip and offset, or a channel of a Modbus I/O module.
 struct Pin {
-  std::string line;
+  std::string line;  ///< empty: by chip and offset, or a channel
+  std::string chip;  ///< empty: by name, or a channel
+  int offset = 0;    ///< on `chip`
   int channel = 0;
   bool active_low = false;
+  gpio::Bias bias = gpio::Bias::as_is;  ///< inputs only
+
+  [[nodiscard]] bool is_same_contact(const Pin& other) const {
+    return line == other.line && chip == other.chip && offset == other.offset && channel == other.channel;
+  }
 };
 
 struct SafetyConfig {
@@ -54,12 +62,12 @@ struct TurntableConfig {
 };
 
 struct ProjectorConfig {
-  enum class Driver { gpio, lightcrafter4500, manual };
+  enum class Driver { gpio, modbus_io, lightcrafter4500, manual };
   Driver driver = Driver::gpio;
-  std::string line;                        ///< gpio: fires the dots and both cameras
-  std::optional<std::string> plain_line;   ///< gpio: fires the cameras and even light, without the dots
-  bool active_low = false;                 ///< gpio: both lines
-  std::chrono::microseconds pulse{15000};  ///< gpio: at least the exposure
+  Pin line;                                ///< gpio, modbus_io: fires the dots and both cameras
+  std::optional<Pin> plain_line;           ///< gpio, modbus_io: fires the cameras and even light, without the dots
+  modbus::ClientOptions io_module;         ///< modbus_io: the panel's
+  std::chrono::microseconds pulse{15000};  ///< gpio, modbus_io: at least the exposure
   std::string serial;                      ///< lightcrafter4500: empty: the only one there is
   LightCrafterOptions lightcrafter;
   std::chrono::seconds warm_up{600};  ///< no job begins by itself before it has been there for so long

@@ -94,20 +94,22 @@ class Section {
     }
     report(key, fmt::format("{} is not one of {}", *found, fmt::join(allowed, ", ")));
   }
+  /// Whether it is one of them.
   template <class T>
-  void choice(std::string_view key, T& value, const std::vector<Choice<T>>& allowed) {
+  bool choice(std::string_view key, T& value, const std::vector<Choice<T>>& allowed) {
     std::string name;
     text(key, name);
-    if (name.empty()) return;
+    if (name.empty()) return false;
     std::vector<std::string_view> names;
     for (const auto& one : allowed) {
       if (one.name == name) {
         value = one.value;
-        return;
+        return true;
       }
       names.push_back(one.name);
     }
     report(key, fmt::format("\"{}\" is not one of {}", name, fmt::join(names, ", ")));
+    return false;
   }
 
   /// From now on `key` may also be spelt `old_key`, its name in the version before: accepted with a warning.
@@ -116,6 +118,7 @@ class Section {
   void accept_old_value(std::string_view key, std::string_view value, std::string_view old_value);
   /// Whether an optional key is there; from then on the key is known.
   [[nodiscard]] bool has(std::string_view key);
+  [[nodiscard]] bool is_table(std::string_view key) const { return table_.get(key) && table_.get(key)->is_table(); }
   void section(std::string_view key, const std::function<void(Section&)>& read);
   /// Each value of an array: an integer or a text.
   void items(std::string_view key, const std::function<void(std::optional<std::int64_t>, std::string_view)>& read);

@@ -48,6 +48,18 @@ void check_against_profile(Section& s, const ModbusTurntableOptions& options) {
   }
 }
 
+/// Three attempts at a request and the quiet line between them: a drive must not stop by itself while they are made.
+constexpr int kReplyTimeouts = 20;
+
+void check_reply_timeout(Section& s, const ModbusTurntableOptions& options) {
+  const auto& drive = options.profile.communication_timeout;
+  if (!drive || kReplyTimeouts * options.line.reply_timeout <= drive->timeout) return;
+  s.report("reply_timeout_ms",
+           fmt::format("{} is too long for {}, which stops after {} ms without a request; at most {} ms",
+                       options.line.reply_timeout.count(), options.profile.name, drive->timeout.count(),
+                       drive->timeout.count() / kReplyTimeouts));
+}
+
 void check_tolerance(Section& s, const AxisTurntableOptions& options) {
   if (options.tolerance.value * options.scale.pulses_per_degree() >= kMinTolerancePulses) return;
   s.report("tolerance_deg",
@@ -98,6 +110,7 @@ void read_modbus(Section& s, const std::vector<std::filesystem::path>& drive_fol
   read_motion(s, modes, options);
   if (!s.sound()) return;
   check_against_profile(s, options);
+  check_reply_timeout(s, options);
   check_tolerance(s, options);
 }
 

@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <tuple>
 #include <utility>
 
 namespace scanrig {
@@ -52,6 +53,16 @@ void set_limit(int resource, rlim_t value) {
   ::setrlimit(static_cast<__rlimit_resource>(resource), &limit);
 }
 
+/// Of all that this machine runs, a reconstruction is what the kernel ends first when memory runs out: it can be made
+/// again. To raise it needs no capability.
+void give_up_first() {
+  constexpr std::string_view kScore = "500";
+  const int file = ::open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
+  if (file < 0) return;
+  std::ignore = ::write(file, kScore.data(), kScore.size());
+  ::close(file);
+}
+
 /// In the child, between fork and exec: only what is safe in a process that had threads.
 [[noreturn]] void become(char* const* words, int out, int error, const ChildCommand& command, pid_t parent) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
@@ -63,6 +74,7 @@ void set_limit(int resource, rlim_t value) {
   ::dup2(error, STDERR_FILENO);
   ::close_range(3, ~0U, 0);
   ::setpriority(PRIO_PROCESS, 0, 10);
+  give_up_first();
   if (command.memory_bytes) set_limit(RLIMIT_DATA, *command.memory_bytes);
   set_limit(RLIMIT_CORE, 0);
   sigset_t none;

@@ -9,6 +9,7 @@
 #include "drivers/projector/gpio_projector.h"
 #include "drivers/projector/lightcrafter_projector.h"
 #include "drivers/projector/manual_projector.h"
+#include "drivers/projector/modbus_io_projector.h"
 #include "drivers/turntable/grbl_turntable.h"
 #include "drivers/turntable/modbus_turntable.h"
 
@@ -28,11 +29,14 @@ std::unique_ptr<gpio::Lines> open_lines(const config::RigConfig& config, Clock& 
   return config.gpio_socket ? gpio::socket_lines(*config.gpio_socket, clock) : gpio::chip_lines(clock);
 }
 
-/// A LightCrafter connects when it is used, GPIO lines are opened then.
+/// A LightCrafter and an I/O module connect when they are used, GPIO lines are opened then.
 Result<std::unique_ptr<Projector>> open_projector(const config::ProjectorConfig& config, gpio::Lines& lines,
                                                   Clock& clock) {
   using Driver = config::ProjectorConfig::Driver;
   if (config.driver == Driver::manual) return std::make_unique<ManualProjector>();
+  if (config.driver == Driver::modbus_io) {
+    return std::make_unique<ModbusIoProjector>(config::modbus_io_projector_options(config), clock);
+  }
   if (config.driver == Driver::lightcrafter4500) {
     auto projector =
         LightCrafterProjector::create(config.lightcrafter, dlpc350::usb_transport(config.serial, clock), clock);

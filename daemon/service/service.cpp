@@ -7,18 +7,33 @@
 
 #include "core/version.h"
 #include "daemon/api/socket_file.h"
+#include "daemon/service/crash_report.h"
 #include "daemon/rig/saved_config.h"
 #include "daemon/service/daemon_options.h"
 
 namespace scanrig {
+namespace {
+
+/// Something would be lost if this machine fell asleep now.
+bool is_job_active(const Snapshot& snapshot) {
+  const bool scans = !snapshot.job.empty() || snapshot.machine == MachineState::single_execution ||
+                     snapshot.machine == MachineState::continuous_execution;
+  return scans || std::ranges::any_of(snapshot.jobs,
+                                      [](const auto& job) { return job.second->state == JobState::reconstructing; });
+}
+
+}  // namespace
 
 Result<void> Service::run(SignalStop& stop, const Run& run) {
   auto config = read();
   if (!config) return pass_on(config);
+  report_crashes_to(crash_folder(config->storage.root));
   journal_.emplace(standard_sink());
+  awake_.emplace([this](const std::string& problem) { tell(Priority::warning, problem); });
   stop.on_hangup([this] { reload([](const auto&) {}); });
   auto ended = run_again_and_again(run, std::move(*config));
   stop.on_hangup({});
+  awake_.reset();
   tell(Priority::notice, name_ + " ends.");
   journal_.reset();
   return ended;
@@ -72,6 +87,9 @@ DaemonOptions Service::options_for(const config::RigConfig& config, bool again) 
   options.alive = [this](const std::string& sentence) {
     begun_ = true;
     manager_.alive(sentence);
+  };
+  options.published = [this](const std::shared_ptr<const Snapshot>& snapshot) {
+    awake_->keep_awake(is_job_active(*snapshot));
   };
   options.journal = [this](JournalEntry entry) { journal_->write(std::move(entry)); };
   return options;

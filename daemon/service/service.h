@@ -12,6 +12,7 @@
 #include "daemon/service/passed_sockets.h"
 #include "daemon/service/run_daemon.h"
 #include "daemon/service/service_manager.h"
+#include "daemon/service/sleep_inhibitor.h"
 
 namespace scanrig {
 
@@ -48,6 +49,7 @@ class Service {
   const PassedSockets sockets_ = take_passed_sockets();
   ServiceManager manager_;
   std::optional<Journal> journal_;
+  std::optional<SleepInhibitor> awake_;
   bool begun_ = false;  ///< the control loop goes round; of run()'s thread
   std::mutex mutex_;    ///< of all that follows
   ControlLoop* loop_ = nullptr;

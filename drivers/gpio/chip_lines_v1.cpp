@@ -16,9 +16,30 @@ struct Closer {
 };
 using LinePtr = std::unique_ptr<gpiod_line, Closer>;
 
-int flags(const LineSpec& line) { return line.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0; }
+int flags(const LineSpec& line) {
+  int flags = line.active_low ? GPIOD_LINE_REQUEST_FLAG_ACTIVE_LOW : 0;
+  switch (line.bias) {
+    case Bias::as_is: break;
+    case Bias::disabled: flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_DISABLE; break;
+    case Bias::pull_up: flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_UP; break;
+    case Bias::pull_down: flags |= GPIOD_LINE_REQUEST_FLAG_BIAS_PULL_DOWN; break;
+  }
+  return flags;
+}
+
+/// The line owns its chip: both are closed by Closer.
+Result<LinePtr> find_on_chip(const LineSpec& line) {
+  gpiod_chip* const chip = gpiod_chip_open_lookup(line.chip.c_str());
+  if (!chip) return fail(ErrorCode::not_found, "gpio: no chip {}; gpiodetect lists those there are", line.chip);
+  LinePtr found(gpiod_chip_get_line(chip, line.offset));
+  if (found) return found;
+  const unsigned count = gpiod_chip_num_lines(chip);
+  gpiod_chip_close(chip);
+  return fail(ErrorCode::not_found, "gpio: {} has no offset {}, only 0 to {}", line.chip, line.offset, count - 1);
+}
 
 Result<LinePtr> find(const LineSpec& line) {
+  if (line.name.empty()) return find_on_chip(line);
   LinePtr found(gpiod_line_find(line.name.c_str()));
   if (!found) return fail(ErrorCode::not_found, "gpio: no chip has a line named {}", line.name);
   return found;
@@ -36,7 +57,7 @@ class ChipOutput final : public Output {
   }
 
   Result<void> set(bool active) override {
-    if (gpiod_line_set_value(line_.get(), active ? 1 : 0) != 0) return failed("set " + spec_.name);
+    if (gpiod_line_set_value(line_.get(), active ? 1 : 0) != 0) return failed("set " + spec_.contact());
     return {};
   }
 
@@ -86,7 +107,8 @@ class ChipLines final : public Lines {
   Result<std::unique_ptr<Output>> output(const LineSpec& spec) override {
     auto line = find(spec);
     if (!line) return pass_on(line);
-    if (gpiod_line_request_output_flags(line->get(), kConsumer, flags(spec), 0) != 0) return failed("use " + spec.name);
+    if (gpiod_line_request_output_flags(line->get(), kConsumer, flags(spec), 0) != 0)
+      return failed("use " + spec.contact());
     return std::make_unique<ChipOutput>(std::move(*line), spec);
   }
 
@@ -96,7 +118,7 @@ class ChipLines final : public Lines {
       auto line = find(spec);
       if (!line) return pass_on(line);
       if (gpiod_line_request_both_edges_events_flags(line->get(), kConsumer, flags(spec)) != 0) {
-        return failed("use " + spec.name);
+        return failed("use " + spec.contact());
       }
       lines.push_back(std::move(*line));
     }

@@ -3,6 +3,8 @@
 
 #include <cerrno>
 #include <cstring>
+#include <optional>
+#include <tuple>
 
 #include "drivers/gpio/lines.h"
 
@@ -20,6 +22,7 @@ struct Release {
   }
 };
 using Chip = std::unique_ptr<gpiod_chip, Release<gpiod_chip_close>>;
+using ChipInfo = std::unique_ptr<gpiod_chip_info, Release<gpiod_chip_info_free>>;
 using Settings = std::unique_ptr<gpiod_line_settings, Release<gpiod_line_settings_free>>;
 using Config = std::unique_ptr<gpiod_line_config, Release<gpiod_line_config_free>>;
 using RequestConfig = std::unique_ptr<gpiod_request_config, Release<gpiod_request_config_free>>;
@@ -36,30 +39,62 @@ struct Line {
   unsigned offset = 0;
 };
 
+gpiod_line_bias bias(const LineSpec& line) {
+  switch (line.bias) {
+    case Bias::as_is: break;
+    case Bias::disabled: return GPIOD_LINE_BIAS_DISABLED;
+    case Bias::pull_up: return GPIOD_LINE_BIAS_PULL_UP;
+    case Bias::pull_down: return GPIOD_LINE_BIAS_PULL_DOWN;
+  }
+  return GPIOD_LINE_BIAS_AS_IS;
+}
+
+Result<Line> request_offset(gpiod_chip* chip, unsigned offset, const LineSpec& line, bool output) {
+  const Settings settings(gpiod_line_settings_new());
+  const Config config(gpiod_line_config_new());
+  const RequestConfig request_config(gpiod_request_config_new());
+  if (!settings || !config || !request_config) return failed("use " + line.contact());
+  gpiod_line_settings_set_active_low(settings.get(), line.active_low);
+  gpiod_line_settings_set_direction(settings.get(), output ? GPIOD_LINE_DIRECTION_OUTPUT : GPIOD_LINE_DIRECTION_INPUT);
+  gpiod_line_settings_set_bias(settings.get(), bias(line));
+  if (!output) gpiod_line_settings_set_edge_detection(settings.get(), GPIOD_LINE_EDGE_BOTH);
+  gpiod_request_config_set_consumer(request_config.get(), kConsumer);
+  Line found{nullptr, offset};
+  if (gpiod_line_config_add_line_settings(config.get(), &found.offset, 1, settings.get()) != 0) {
+    return failed("use " + line.contact());
+  }
+  found.request.reset(gpiod_chip_request_lines(chip, request_config.get(), config.get()));
+  if (!found.request) return failed("use " + line.contact());
+  return found;
+}
+
+/// Where on this chip the line is; nothing if it is on another. Fails with `not_found`: the chip has fewer lines.
+Result<std::optional<unsigned>> offset_on(gpiod_chip* chip, const LineSpec& line) {
+  if (!line.name.empty()) {
+    const int offset = gpiod_chip_get_line_offset_from_name(chip, line.name.c_str());
+    return offset < 0 ? std::nullopt : std::optional(static_cast<unsigned>(offset));
+  }
+  const ChipInfo info(gpiod_chip_get_info(chip));
+  if (!info ||
+      (gpiod_chip_info_get_name(info.get()) != line.chip && gpiod_chip_info_get_label(info.get()) != line.chip))
+    return std::nullopt;
+  const std::size_t count = gpiod_chip_info_get_num_lines(info.get());
+  if (line.offset < count) return line.offset;
+  return fail(ErrorCode::not_found, "gpio: {} has no offset {}, only 0 to {}", line.chip, line.offset, count - 1);
+}
+
 Result<Line> request_line(const LineSpec& line, bool output) {
   std::error_code ignored;
   for (const auto& device : std::filesystem::directory_iterator("/dev", ignored)) {
     if (!gpiod_is_gpiochip_device(device.path().c_str())) continue;
     const Chip chip(gpiod_chip_open(device.path().c_str()));
     if (!chip) continue;
-    const int offset = gpiod_chip_get_line_offset_from_name(chip.get(), line.name.c_str());
-    if (offset < 0) continue;
-    const Settings settings(gpiod_line_settings_new());
-    const Config config(gpiod_line_config_new());
-    const RequestConfig request_config(gpiod_request_config_new());
-    if (!settings || !config || !request_config) return failed("use " + line.name);
-    gpiod_line_settings_set_active_low(settings.get(), line.active_low);
-    gpiod_line_settings_set_direction(settings.get(),
-                                      output ? GPIOD_LINE_DIRECTION_OUTPUT : GPIOD_LINE_DIRECTION_INPUT);
-    if (!output) gpiod_line_settings_set_edge_detection(settings.get(), GPIOD_LINE_EDGE_BOTH);
-    gpiod_request_config_set_consumer(request_config.get(), kConsumer);
-    Line found{nullptr, static_cast<unsigned>(offset)};
-    if (gpiod_line_config_add_line_settings(config.get(), &found.offset, 1, settings.get()) != 0) {
-      return failed("use " + line.name);
-    }
-    found.request.reset(gpiod_chip_request_lines(chip.get(), request_config.get(), config.get()));
-    if (!found.request) return failed("use " + line.name);
-    return found;
+    const auto offset = offset_on(chip.get(), line);
+    if (!offset) return pass_on(offset);
+    if (*offset) return request_offset(chip.get(), **offset, line, output);
+  }
+  if (line.name.empty()) {
+    return fail(ErrorCode::not_found, "gpio: no chip {}; gpiodetect lists those there are", line.chip);
   }
   return fail(ErrorCode::not_found, "gpio: no chip has a line named {}", line.name);
 }
@@ -73,7 +108,8 @@ class ChipOutput final : public Output {
 
   Result<void> set(bool active) override {
     const auto value = active ? GPIOD_LINE_VALUE_ACTIVE : GPIOD_LINE_VALUE_INACTIVE;
-    if (gpiod_line_request_set_value(line_.request.get(), line_.offset, value) != 0) return failed("set " + spec_.name);
+    if (gpiod_line_request_set_value(line_.request.get(), line_.offset, value) != 0)
+      return failed("set " + spec_.contact());
     return {};
   }
 

@@ -10,10 +10,20 @@
 
 namespace scanrig::gpio {
 
+/// The resistor inside the chip; `as_is`: whatever the board or an earlier program has set.
+enum class Bias { as_is, disabled, pull_up, pull_down };
+
+/// A line by its name, or by its chip and its number on that chip where nobody gave it a name.
 struct LineSpec {
-  std::string name;  ///< as the kernel knows it, see gpioinfo(1)
+  std::string name;  ///< as the kernel knows it, see gpioinfo(1); empty: by chip and offset
   bool active_low = false;
   bool keep = false;  ///< an output that is left as it is when destroyed, as far as its chip does that
+  Bias bias = Bias::as_is;
+  std::string chip{};   ///< "gpiochip0", or the chip's label, which stays the same from one start to the next
+  unsigned offset = 0;  ///< on `chip`
+
+  /// "START", or "gpiochip0:17".
+  [[nodiscard]] std::string contact() const { return name.empty() ? chip + ":" + std::to_string(offset) : name; }
 };
 
 /// One output line; inactive when made, and when destroyed unless it is to be kept.
@@ -39,7 +49,8 @@ class Inputs {
 class Lines {
  public:
   virtual ~Lines() = default;
-  /// Fail with `not_found` (no chip has a line of that name), `io` (the line is in use, access is refused).
+  /// Fail with `not_found` (no chip has a line of that name, no such chip or offset), `io` (the line is in use, access
+  /// is refused, the chip has no such resistor).
   virtual Result<std::unique_ptr<Output>> output(const LineSpec& line) = 0;
   virtual Result<std::unique_ptr<Inputs>> inputs(const std::vector<LineSpec>& lines) = 0;
 };

@@ -79,13 +79,13 @@ class SocketOutput final : public Output {
   }
 
   Result<void> set(bool active) override {
-    auto sent = connection_.send(fmt::format("output {} {}", line_.name, active != line_.active_low ? 1 : 0));
+    auto sent = connection_.send(fmt::format("output {} {}", line_.contact(), active != line_.active_low ? 1 : 0));
     if (!sent) return sent;
     const auto answer = connection_.receive(kAnswerTime);
     if (!answer) return pass_on(answer);
     if (*answer == "ok") return {};
     if (answer->starts_with("unknown")) return fail(ErrorCode::not_found, "gpio: {} line", *answer);
-    return fail(ErrorCode::io, "gpio: setting {} was not confirmed", line_.name);
+    return fail(ErrorCode::io, "gpio: setting {} was not confirmed", line_.contact());
   }
 
  private:
@@ -141,7 +141,7 @@ class SocketLines final : public Lines {
     auto connection = Connection::open(socket_);
     if (!connection) return pass_on(connection);
     std::string words = "inputs";
-    for (const auto& line : lines) words += " " + line.name;
+    for (const auto& line : lines) words += " " + line.contact();
     if (auto sent = connection->send(words); !sent) return pass_on(sent);
     const auto answer = connection->receive(kAnswerTime);
     if (!answer) return pass_on(answer);

@@ -21,7 +21,7 @@ ModbusIoPanel::Span ModbusIoPanel::span_of(const Wired& wired) {
 ModbusIoPanel::ModbusIoPanel(ModbusIoPanelOptions options, Clock& clock)
     : options_(std::move(options)),
       clock_(clock),
-      line_(options_.line, clock),
+      bus_(modbus::Bus::at(options_.line, clock)),
       inputs_(span_of(options_.inputs)),
       coils_(span_of(options_.outputs)),
       next_poll_(clock.now()) {}
@@ -46,20 +46,21 @@ Result<PanelInputs> ModbusIoPanel::wait_change(const PanelInputs& known, Deadlin
 
 /// Whoever cannot read forgets what it knew: a button that is pressed by then is not a press.
 Result<void> ModbusIoPanel::poll() {
-  auto read = read_once();
-  for (int attempt = 1; attempt < kAttempts && !read && line_.reply_missed(); ++attempt) {
-    line_.count_retry();
-    read = read_once();
+  const auto bus = bus_->turn();
+  auto read = read_once(bus);
+  for (int attempt = 1; attempt < kAttempts && !read && bus->reply_missed(); ++attempt) {
+    bus->count_retry();
+    read = read_once(bus);
   }
   next_poll_ = clock_.now() + options_.poll;
   if (!read) debounce_.reset();
   return read;
 }
 
-Result<void> ModbusIoPanel::read_once() {
+Result<void> ModbusIoPanel::read_once(const Turn& bus) {
   const auto deadline = Deadline::after(clock_, kReplyTimeouts * options_.line.reply_timeout);
-  if (auto as_shown = coils_as_shown(deadline); !as_shown) return as_shown;
-  const auto bits = line_.read_inputs(inputs_.first, inputs_.count, deadline);
+  if (auto as_shown = coils_as_shown(bus, deadline); !as_shown) return as_shown;
+  const auto bits = bus->read_inputs(inputs_.first, inputs_.count, deadline);
   if (!bits) return pass_on(bits);
   std::vector<bool> levels;
   std::vector<bool PanelInputs::*> fields;
@@ -73,9 +74,9 @@ Result<void> ModbusIoPanel::read_once() {
 }
 
 /// Without outputs the question is asked too, and the module may refuse it.
-Result<void> ModbusIoPanel::coils_as_shown(Deadline deadline) {
-  const auto bits = line_.read_coils(coils_.first, coils_.count, deadline);
-  if (options_.outputs.empty() && !bits && bits.error().code == ErrorCode::protocol && !line_.reply_missed()) {
+Result<void> ModbusIoPanel::coils_as_shown(const Turn& bus, Deadline deadline) {
+  const auto bits = bus->read_coils(coils_.first, coils_.count, deadline);
+  if (options_.outputs.empty() && !bits && bits.error().code == ErrorCode::protocol && !bus->reply_missed()) {
     return {};
   }
   if (!bits) return pass_on(bits);
@@ -90,10 +91,11 @@ Result<void> ModbusIoPanel::coils_as_shown(Deadline deadline) {
 }
 
 Result<void> ModbusIoPanel::show(const PanelOutputs& outputs, Deadline deadline) {
-  auto written = write(outputs, deadline);
-  if (!written && line_.reply_missed()) {  // writing twice does no harm
-    line_.count_retry();
-    written = write(outputs, deadline);
+  const auto bus = bus_->turn();
+  auto written = write(bus, outputs, deadline);
+  if (!written && bus->reply_missed()) {  // writing twice does no harm
+    bus->count_retry();
+    written = write(bus, outputs, deadline);
   }
   shown_.reset();
   if (!written) return pass_on(written, "panel");
@@ -102,17 +104,17 @@ Result<void> ModbusIoPanel::show(const PanelOutputs& outputs, Deadline deadline)
 }
 
 /// Coils between ours belong to somebody else and are left alone.
-Result<void> ModbusIoPanel::write(const PanelOutputs& outputs, Deadline deadline) {
+Result<void> ModbusIoPanel::write(const Turn& bus, const PanelOutputs& outputs, Deadline deadline) {
   if (options_.outputs.size() == static_cast<std::size_t>(coils_.count)) {
     std::vector<bool> bits(options_.outputs.size());
     for (const auto& [field, signal] : options_.outputs) {
       bits[signal.address - coils_.first] = outputs.*field != signal.active_low;
     }
-    return line_.write_coils(coils_.first, bits, deadline);
+    return bus->write_coils(coils_.first, bits, deadline);
   }
   for (const auto& [field, signal] : options_.outputs) {
     if (shown_ && (*shown_).*field == outputs.*field) continue;
-    auto written = line_.write_coil(signal.address, outputs.*field != signal.active_low, deadline);
+    auto written = bus->write_coil(signal.address, outputs.*field != signal.active_low, deadline);
     if (!written) return written;
   }
   return {};

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "drivers/modbus/client.h"
+#include "drivers/modbus/bus.h"
 #include "drivers/panel/debounce.h"
 
 namespace scanrig {
@@ -33,7 +33,7 @@ class ModbusIoPanel final : public Panel {
   Result<PanelInputs> wait_change(const PanelInputs& known, Deadline deadline) override;
   Result<void> show(const PanelOutputs& outputs, Deadline deadline) override;
 
-  [[nodiscard]] const modbus::ClientStatistics& statistics() const { return line_.statistics(); }
+  [[nodiscard]] modbus::ClientStatistics statistics() const { return bus_->statistics(); }
 
  private:
   struct Span {
@@ -44,13 +44,14 @@ class ModbusIoPanel final : public Panel {
   template <class Wired>
   static Span span_of(const Wired& wired);
   Result<void> poll();
-  Result<void> read_once();
-  Result<void> coils_as_shown(Deadline deadline);
-  Result<void> write(const PanelOutputs& outputs, Deadline deadline);
+  using Turn = modbus::Bus::Turn;
+  Result<void> read_once(const Turn& bus);
+  Result<void> coils_as_shown(const Turn& bus, Deadline deadline);
+  Result<void> write(const Turn& bus, const PanelOutputs& outputs, Deadline deadline);
 
   ModbusIoPanelOptions options_;
   Clock& clock_;
-  modbus::Client line_;
+  const std::shared_ptr<modbus::Bus> bus_;  // the projector may hang on the same module
   const Span inputs_;
   const Span coils_;
   std::optional<PanelDebounce> debounce_;  // nothing: the inputs are unknown

@@ -50,6 +50,10 @@ class AxisDrive {
   virtual Result<void> set_speed(DegreesPerSecond speed) = 0;
   virtual Result<void> start_move(std::int32_t target, Deadline deadline) = 0;
 
+  /// While on, the drive stops by itself once nothing reaches it any more: before a motion on, at standstill off.
+  /// Nothing where the drive has no communication time-out.
+  virtual Result<void> guard_connection(bool /*on*/, Deadline /*deadline*/) { return {}; }
+
   virtual Result<void> stop(Deadline deadline) = 0;
   /// The same at once where the answer to the last request was missed, when stop() would first wait for a quiet line.
   /// Whoever calls it calls stop() next.

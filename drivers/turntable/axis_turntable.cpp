@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <tuple>
 #include <utility>
 
 namespace scanrig {
@@ -41,6 +42,7 @@ bool AxisTurntable::near(std::int32_t a, std::int32_t b) const {
 Result<void> AxisTurntable::home(Deadline deadline) {
   homed_ = flank_loaded_ = false;
   if (auto found = find_home(deadline); !found) return give_up(found.error());
+  if (auto off = drive_->guard_connection(false, deadline); !off) return give_up(off.error());
   homed_ = true;
   return {};
 }
@@ -54,6 +56,7 @@ Result<void> AxisTurntable::find_home(Deadline deadline) {
   if (!here) {
     if (auto prepared = drive_->prepare_homing(deadline); !prepared) return prepared;
   }
+  if (auto on = drive_->guard_connection(true, deadline); !on) return on;
   // Where the zero is sought, the homed bit may still be that of the last homing: something must be seen to happen.
   const bool sought = !here && !drive_->knows_zero();
   bool begun = false;
@@ -122,6 +125,7 @@ Result<Move> AxisTurntable::turn(Degrees target, const DriveState& before, const
     return before.running ? fail(ErrorCode::protocol, "the table moves although nothing was commanded")
                           : fail(ErrorCode::not_homed, "the drive has lost its home (switched off in between?)");
   }
+  if (auto on = drive_->guard_connection(true, deadline); !on) return pass_on(on);
   flank_loaded_ = false;
   DriveState state = before;
   if (plan.before) {
@@ -131,6 +135,7 @@ Result<Move> AxisTurntable::turn(Degrees target, const DriveState& before, const
   }
   const auto arrival = run_to(plan.target, state, options_.settle, deadline);
   if (!arrival) return pass_on(arrival);
+  if (auto off = drive_->guard_connection(false, deadline); !off) return pass_on(off);
   flank_loaded_ = true;
   const Degrees measured = options_.scale.angle(arrival->position);
   return Move{target, target + Degrees{std::remainder((measured - target).value, 360.0)}, arrival->in_position - begun,
@@ -292,6 +297,7 @@ Result<void> AxisTurntable::stop(Deadline deadline) {
       since = clock_.now();
       last = state->position;
     } else if (clock_.now() - since >= kStandingTime) {
+      std::ignore = drive_->guard_connection(false, deadline);  // or the drive has an alarm later, at standstill
       return {};
     }
   }

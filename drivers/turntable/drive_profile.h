@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -77,6 +78,12 @@ struct DriveProfile {
     Trigger reset_trigger;
   };
 
+  /// The drive stops by itself when it has received nothing for so long; 0 in the register: never.
+  struct CommunicationTimeout {
+    std::uint16_t address = 0;  ///< milliseconds
+    std::chrono::milliseconds timeout{3000};
+  };
+
   enum class SpeedUnit { rpm, pulses_per_s };
   enum class AccelerationUnit { ms_per_1000_rpm, pulses_per_s2 };
 
@@ -96,6 +103,7 @@ struct DriveProfile {
   Homing homing;
   std::optional<SoftLimits> soft_limits;
   Alarm alarm;
+  std::optional<CommunicationTimeout> communication_timeout;  ///< nothing: the drive has none, or none is documented
 };
 
 }  // namespace scanrig

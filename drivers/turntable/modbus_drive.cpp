@@ -7,6 +7,8 @@ namespace scanrig {
 namespace {
 
 constexpr int kAttempts = 3;
+/// What a communication time-out may be at most: a register that holds more is another one.
+constexpr std::uint16_t kMaxCommunicationTimeoutMs = 10'000;
 
 constexpr std::uint16_t high_word(std::int32_t value) {
   return static_cast<std::uint16_t>(static_cast<std::uint32_t>(value) >> 16);
@@ -138,6 +140,36 @@ Result<void> ModbusDrive::write(const DriveProfile::Block& block, std::int32_t t
 Result<void> ModbusDrive::enable(Deadline deadline) {
   if (!profile_.enable) return {};
   return repeat([&] { return write(*profile_.enable, deadline); });
+}
+
+Result<std::uint16_t> ModbusDrive::read_communication_timeout(Deadline deadline) {
+  return repeat([&]() -> Result<std::uint16_t> {
+    const auto words = line_.read(profile_.communication_timeout->address, 1, deadline);
+    if (!words) return pass_on(words);
+    return words->front();
+  });
+}
+
+Result<void> ModbusDrive::guard_connection(bool on, Deadline deadline) {
+  if (!profile_.communication_timeout) return {};
+  const std::uint16_t address = profile_.communication_timeout->address;
+  if (!is_timeout_seen_) {
+    const auto before = read_communication_timeout(deadline);
+    if (!before) return pass_on(before);
+    if (*before > kMaxCommunicationTimeoutMs) {
+      return fail(ErrorCode::protocol, "register 0x{:04X} holds {}, not a communication time-out; check the profile {}",
+                  address, *before, profile_.name);
+    }
+    is_timeout_seen_ = true;
+  }
+  const auto wanted =
+      on ? static_cast<std::uint16_t>(profile_.communication_timeout->timeout.count()) : std::uint16_t{0};
+  if (auto written = repeat([&] { return line_.write(address, wanted, deadline); }); !written) return written;
+  const auto now = read_communication_timeout(deadline);
+  if (!now) return pass_on(now);
+  if (*now == wanted) return {};
+  return fail(ErrorCode::protocol, "the drive does not take a communication time-out of {} ms, it has {} ms", wanted,
+              *now);
 }
 
 Result<void> ModbusDrive::stop(Deadline deadline) {

@@ -40,6 +40,9 @@ class ModbusDrive {
   Result<std::string> read_alarm(Deadline deadline);
 
   Result<void> enable(Deadline deadline);
+  /// Sets the drive's communication time-out as the profile has it, or to none, and reads it back. Nothing where the
+  /// profile has none. Fails with `protocol` where the register holds something else than a time-out.
+  Result<void> guard_connection(bool on, Deadline deadline);
   Result<void> stop(Deadline deadline);
   /// The same at once where the answer to the last request was missed, when stop() would first wait for a quiet line.
   /// Whoever calls it calls stop() next.
@@ -69,12 +72,14 @@ class ModbusDrive {
                      Deadline deadline);
   Result<void> pull(const DriveProfile::Trigger& trigger, Deadline deadline);
   Result<void> release(Deadline deadline);
+  Result<std::uint16_t> read_communication_timeout(Deadline deadline);
   template <class Request>
   auto repeat(const Request& request) -> decltype(request());
 
   modbus::Client line_;
   DriveProfile profile_;
   std::optional<std::uint16_t> to_release_;  // the register of a trigger that is still pulled
+  bool is_timeout_seen_ = false;             // the register of the communication time-out was found to hold one
   bool homed_ = false;                       // where the encoder knows the zero: since the last homing
 };
 

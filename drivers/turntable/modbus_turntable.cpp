@@ -62,6 +62,7 @@ class ModbusTurntable::Drive final : public AxisDrive {
     return drive_.start_move(target, motion_, deadline);
   }
 
+  Result<void> guard_connection(bool on, Deadline deadline) override { return drive_.guard_connection(on, deadline); }
   Result<void> stop(Deadline deadline) override { return drive_.stop(deadline); }
   void stop_without_reply() override { drive_.stop_without_reply(); }
   void set_fail_fast(bool on) noexcept override { drive_.set_fail_fast(on); }

@@ -11,12 +11,13 @@ constexpr std::uint8_t kIllegalAddress = 2, kIllegalValue = 3;
 constexpr std::uint16_t kDirectData = 0x0058, kType = 0x005A, kPosition = 0x005C, kSpeed = 0x005E,
                         kAcceleration = 0x0060, kDeceleration = 0x0062, kCurrent = 0x0064, kTrigger = 0x0066,
                         kInput = 0x007D, kStatus = 0x007F, kAlarm = 0x0080, kCommandPosition = 0x00C6,
-                        kFeedback = 0x00CC, kPreset = 0x018A, kGearA = 0x0380, kGearB = 0x0382;
+                        kFeedback = 0x00CC, kPreset = 0x018A, kGearA = 0x0380, kGearB = 0x0382, kTimeout = 0x138A;
 constexpr std::uint16_t kZhome = 1u << 4, kStop = 1u << 5, kAlarmReset = 1u << 7;
 constexpr double kInPositionPulses = 18;   ///< 1.8 degrees of a motor with 1000 pulses are 5; wider with a finer gear
 constexpr double kZhomeTurnsPerS = 100;    ///< of the motor
 constexpr double kZhomeTurnsPerS2 = 1000;  ///< of the motor
 constexpr double kFactoryPulses = 1000;
+constexpr std::uint16_t kTimeoutAlarm = 0x85;
 
 }  // namespace
 
@@ -27,6 +28,7 @@ OrientalDrive::OrientalDrive(const AxisOptions& axis, Clock& clock) : RegisterDr
   add_registers(kFeedback, kFeedback + 1);
   add_registers(kPreset, kPreset + 1);
   add_registers(kGearA, kGearB + 1);
+  add_registers(kTimeout, kTimeout + 1);
   put_pair(kGearA, 1);
   put_pair(kGearB, static_cast<std::int32_t>(axis.pulses_per_motor_rev / kFactoryPulses));
   axis_.set_counter(
@@ -82,6 +84,16 @@ void OrientalDrive::start_direct_data() {
                  static_cast<double>(pair(kDeceleration))});
 }
 
+/// Nothing was received for as long as the parameter allows: alarm, and the motor stops.
+void OrientalDrive::pass_time(Clock::TimePoint now) const {
+  const std::chrono::milliseconds timeout(pair(kTimeout));
+  if (timeout.count() <= 0 || now - last_request_ <= timeout || pair(kAlarm) != 0) return;
+  axis_.advance(last_request_ + timeout);
+  put_pair(kAlarm, kTimeoutAlarm);
+  homing_ = false;
+  axis_.quick_stop();
+}
+
 void OrientalDrive::follow() const {
   if (homing_ && !axis_.running()) {
     homing_ = false;
@@ -121,6 +133,7 @@ void OrientalDrive::power_cycle() {
   homed_ = homing_ = false;
   put_pair(kAlarm, 0);
   registers_[kInput] = 0;
+  put_pair(kTimeout, 0);
 }
 
 void OrientalDrive::send(std::int32_t pulses) {

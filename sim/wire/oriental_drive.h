@@ -25,6 +25,7 @@ class OrientalDrive final : public RegisterDrive {
   void input(std::uint16_t before, std::uint16_t now);
   void start_direct_data();
   [[nodiscard]] std::uint16_t status() const;
+  void pass_time(Clock::TimePoint now) const override;
   void follow() const override;
 };
 

@@ -10,6 +10,7 @@ constexpr std::uint8_t kIllegalAddress = 2;
 std::uint8_t RegisterDrive::read(std::uint16_t address, std::span<std::uint16_t> values) {
   const std::scoped_lock lock(mutex_);
   refresh();
+  last_request_ = clock_.now();
   for (std::uint16_t& value : values) {
     const auto found = registers_.find(address++);
     if (found == registers_.end()) return kIllegalAddress;
@@ -21,6 +22,7 @@ std::uint8_t RegisterDrive::read(std::uint16_t address, std::span<std::uint16_t>
 std::uint8_t RegisterDrive::write(std::uint16_t address, std::span<const std::uint16_t> values) {
   const std::scoped_lock lock(mutex_);
   refresh();
+  last_request_ = clock_.now();
   for (std::size_t i = 0; i < values.size(); ++i) {
     if (!registers_.contains(static_cast<std::uint16_t>(address + i))) return kIllegalAddress;
   }

@@ -35,6 +35,7 @@ class RegisterDrive : public RegisterDevice, public SimulatedDrive {
   mutable bool homed_ = false;
   mutable bool homing_ = false;
   bool alarm_can_be_reset_ = true;
+  Clock::TimePoint last_request_{};  ///< that reached the drive
 };
 
 }  // namespace scanrig::sim::wire

@@ -3,7 +3,9 @@
 namespace scanrig::sim::wire {
 
 void SimulatedDrive::refresh() const {
-  axis_.advance(clock_.now());
+  const auto now = clock_.now();
+  pass_time(now);
+  axis_.advance(now);
   follow();
 }
 

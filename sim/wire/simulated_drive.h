@@ -36,6 +36,8 @@ class SimulatedDrive {
       : clock_(clock), pulses_per_motor_rev_(axis.pulses_per_motor_rev), axis_(axis, clock.now()) {}
   /// Advances the axis and what follows from it; with `mutex_` held.
   void refresh() const;
+  /// What happens to the axis by itself before `now`, other than its motion.
+  virtual void pass_time(Clock::TimePoint /*now*/) const {}
   /// What follows from an axis that has moved on.
   virtual void follow() const {}
 

@@ -39,6 +39,7 @@ bool drive_still_enabled(const config::RigConfig& rig, Clock& clock) {
 }
 
 std::string name_of(const config::Pin& pin) {
+  if (!pin.chip.empty()) return fmt::format("line {}:{}", pin.chip, pin.offset);
   return pin.line.empty() ? fmt::format("channel {}", pin.channel) : fmt::format("line {}", pin.line);
 }
 

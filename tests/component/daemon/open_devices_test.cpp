@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include "daemon/rig/make_safe.h"
+#include "sim/wire/modbus_io.h"
+
 #include "tests/unit/config/rig_file.h"
 
 namespace scanrig {
@@ -17,7 +20,7 @@ class OpenDevicesTest : public config::RigFile {
     std::string text = with_section("[stereo_camera]", "[panel]",
                                     "[stereo_camera]\ndriver = \"v4l2\"\nleft = { device = \"/dev/no-left\" }\n"
                                     "right = { device = \"/dev/no-right\" }\nexternal_trigger = true\n"
-                                    "pixel_format = \"GREY\"\nsize = { width = 320, height = 240 }\n"
+                                    "pixel_format = \"RGGB\"\nsize = { width = 320, height = 240 }\n"
                                     "exposure_us = 8000\nframe_timeout_ms = 400\n");
     if (!projector.empty()) {
       const auto begin = text.find("\n[projector]") + 1;
@@ -57,6 +60,36 @@ TEST_F(OpenDevicesTest, AProjectorOnUsbThatIsNotThereFailsByNameAtEveryUse) {
     EXPECT_THAT(fired.error().message, HasSubstr("LightCrafter"));
   }
   EXPECT_FALSE(devices_.projector->turn_off(soon()));
+}
+
+/// Light and lamps are switched at once, by two threads, and the module has one port.
+TEST_F(OpenDevicesTest, AProjectorOnThePanelsModuleIsMadeDarkBesideARedLamp) {
+  constexpr std::size_t kRed = 2, kDots = 5, kPlain = 6;
+  sim::wire::ModbusIoModule io{8, 8};
+  const auto module = sim::wire::ModbusServer::start(folder_ / "io", 3, io, clock_);
+  ASSERT_TRUE(module) << module.error().message;
+  io.write_coils(kDots, {true, true});
+  const std::string port = "device = \"" + (folder_ / "io").string() +
+                           "\"\nbaud = 115200\nparity = \"none\"\nunit_id = 3\nreply_timeout_ms = 50\n";
+  std::string text = with_section("[projector]", "[stereo_camera]",
+                                  "[projector]\ndriver = \"modbus-io\"\nchannel = 5\nplain_channel = 6\n"
+                                  "pulse_us = 40000\nwarm_up_s = 0\n");
+  const auto panel = text.find("\n[panel]") + 1;
+  text.replace(panel, text.find("\n[calibration]") + 1 - panel,
+               "[panel]\ndriver = \"modbus-io\"\n" + port +
+                   "poll_ms = 20\nstart = { channel = 0 }\nreset = { channel = 1 }\nlamp_red = { channel = 2 }\n\n");
+  text = replaced(text, "{ line = \"ESTOP_OK\", active = \"low\" }", "{ channel = 7 }");
+  text = replaced(text, "{ line = \"GUARD_OK\", active = \"low\" }", "{ channel = 6 }");
+  write(text);
+  const auto of = [&](config::SafetyDevice device) { return config::read_device_config(device, file_, folder_); };
+  const DeviceConfigs configs{of(config::SafetyDevice::turntable), of(config::SafetyDevice::projector),
+                              of(config::SafetyDevice::panel)};
+  ASSERT_TRUE(configs.projector) << configs.projector.error().message;
+  const auto made = make_safe(configs, clock_, Deadline::after(clock_, std::chrono::seconds(5)));
+  EXPECT_TRUE(made.projector) << made.projector.error().message;
+  EXPECT_TRUE(made.panel) << made.panel.error().message;
+  EXPECT_TRUE(io.coil(kRed));
+  EXPECT_FALSE(io.coil(kDots) || io.coil(kPlain));
 }
 
 TEST_F(OpenDevicesTest, SimulatedCamerasAreTheirOwners) {

@@ -148,7 +148,9 @@ class WireRig {
                                                 {"GREEN", false},
                                                 {"BUSY", false},
                                                 {"START_LAMP", false},
-                                                {"FLIP", false}},
+                                                {"FLIP", false},
+                                                {"PASS", false},
+                                                {"FAIL", false}},
                                                clock);
     EXPECT_TRUE(socket) << socket.error().message;
     lines = std::move(*socket);
@@ -162,15 +164,17 @@ class WireRig {
     replace("guard = { line = \"GUARD_OK\", active = \"low\" }", "guard = { line = \"GUARD_OK\" }");
     replace("/dev/scanrig/turntable", device());
     replace("gear_ratio = 90.0", "gear_ratio = " + fmt::format("{:.1f}", gear_ratio));
-    replace("line = \"PROJ_TRIG\"", "line = \"DOTS\"\nplain_line = \"PLAIN\"");
-    replace("start = { line = \"START\", active = \"low\" }\nlamp_green = { line = \"LAMP_GREEN\" }",
-            "start = { line = \"START\" }\nstop = { line = \"STOP\" }\nreset = { line = \"RESET\" }\n"
-            "lamp_red = { line = \"RED\" }\nlamp_amber = { line = \"AMBER\" }\nlamp_green = { line = \"GREEN\" }\n"
-            "busy = { line = \"BUSY\" }\nstart_lamp = { line = \"START_LAMP\" }\nflip_request = { line = \"FLIP\" }\n"
-            "\n[gpio]\nsocket = \"gpio.sock\"");
+    replace("\"PROJ_TRIG\"", "\"DOTS\"");
+    replace("\"PROJ_PLAIN\"", "\"PLAIN\"");
+    for (const char* button : {"START", "STOP", "RESET"}) {
+      replace(fmt::format("{{ line = \"{}\", active = \"low\" }}", button), fmt::format("{{ line = \"{}\" }}", button));
+    }
+    for (const char* lamp : {"RED", "AMBER", "GREEN"})
+      replace(fmt::format("\"LAMP_{}\"", lamp), fmt::format("\"{}\"", lamp));
+    text += "\n[gpio]\nsocket = \"gpio.sock\"\n";
     text = replace_section(text, "[stereo_camera]", "[panel]",
                            "[stereo_camera]\ndriver = \"v4l2-side-by-side\"\nboth = { device = \"no-camera\" }\n"
-                           "external_trigger = true\npixel_format = \"GREY\"\n"
+                           "external_trigger = true\npixel_format = \"RGGB\"\n"
                            "size = { width = 640, height = 240 }\nexposure_us = 12000\nframe_timeout_ms = 500\n\n");
     replace("/var/lib/scanrig/calibration.json", "calibration.json");
     replace("/var/lib/scanrig/jobs", "jobs");

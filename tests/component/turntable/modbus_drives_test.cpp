@@ -1,3 +1,5 @@
+#include <atomic>
+
 #include "tests/component/turntable/modbus_faults.h"
 
 // The wire is sound; the drive has its own mind.
@@ -15,6 +17,16 @@ class ModbusDrives : public ModbusFaults {
 
 /// What only this family has.
 class LeadshineDrives : public ModbusFaults {};
+
+/// Drives with a communication time-out.
+class TimeoutDrives : public ModbusFaults {
+ protected:
+  std::uint16_t held() {
+    std::uint16_t held = 0;
+    bench_->registers().read(bench_->options().profile.communication_timeout->address, {&held, 1});
+    return held;
+  }
+};
 
 TEST_P(ModbusDrives, AnAlarmIsToldInWordsAndHoldsUntilItIsReset) {
   start_at_zero(slow);
@@ -182,6 +194,48 @@ TEST_P(ModbusDrives, HereCanBeHome) {
   EXPECT_NEAR(bench_->seen_deg() - here, 45, 0.3);
 }
 
+TEST_P(TimeoutDrives, ATableWhoseCommanderIsGoneStopsByItself) {
+  constexpr milliseconds kTimeout{500};
+  start_at_zero([&](auto& options) {
+    options.profile.communication_timeout->timeout = kTimeout;
+    options.speed = {20};
+  });
+  const double begin = bench_->seen_deg();
+  bench_->when_moving([&] { bench_->server().inject({.kind = WireFault::Kind::deaf}); });  // nothing arrives any more
+  EXPECT_FALSE(rotate_to(170));
+  const auto by = within(milliseconds(20'000));
+  while (bench_->seen_moving() && !by.expired(bench_->clock())) bench_->clock().sleep_for(milliseconds(5));
+  ASSERT_FALSE(bench_->seen_moving());
+  EXPECT_LT(bench_->seen_deg() - begin, 100) << "it was sent 170 deg far, at 20 deg/s";
+  bench_->server().clear_faults();
+  const auto seen = status();
+  ASSERT_TRUE(seen) << seen.error().message;
+  EXPECT_THAT(seen->alarm, HasSubstr("communication time-out"));
+  ASSERT_TRUE(reset_alarm());
+  expect_home_is_needed_and_helps();
+}
+
+TEST_P(TimeoutDrives, AtStandstillTheDriveWaitsForNobody) {
+  start_at_zero();
+  EXPECT_EQ(held(), 0);
+  std::atomic<std::uint16_t> moving = 0;
+  bench_->when_moving([&] { moving = held(); });
+  ASSERT_TRUE(rotate_to(45));
+  EXPECT_EQ(moving, bench_->options().profile.communication_timeout->timeout.count());
+  EXPECT_EQ(held(), 0);
+}
+
+TEST_P(TimeoutDrives, ARegisterThatHoldsNoTimeoutIsNotWritten) {
+  start([&](auto& options) { options.profile.communication_timeout->address = 0x0065; });  // the operating current
+  const std::uint16_t other = 20'000;
+  bench_->registers().write(0x0065, {&other, 1});
+  const auto homed = home();
+  ASSERT_FALSE(homed);
+  EXPECT_EQ(homed.error().code, ErrorCode::protocol);
+  EXPECT_THAT(homed.error().message, HasSubstr("register 0x0065 holds 20000, not a communication time-out"));
+  EXPECT_EQ(held(), other);
+}
+
 TEST(ModbusTurntableOptionsTest, WhatTheDriveCannotFollowIsRefusedBeforeThePortIsOpened) {
   RealClock clock;
   ModbusTurntableOptions options;
@@ -193,6 +247,7 @@ TEST(ModbusTurntableOptionsTest, WhatTheDriveCannotFollowIsRefusedBeforeThePortI
 }
 
 INSTANTIATE_TEST_SUITE_P(Modbus, ModbusDrives, testing::Values(kLeadshine, kOriental), drive_name);
+INSTANTIATE_TEST_SUITE_P(Modbus, TimeoutDrives, testing::Values(kOriental), drive_name);
 INSTANTIATE_TEST_SUITE_P(Modbus, LeadshineDrives, testing::Values(kLeadshine), drive_name);
 
 }  // namespace

@@ -36,7 +36,7 @@ class RigOnWires : public testing::Test {
                                      "--dir",
                                      folder_,
                                      "--speed-deg-s",
-                                     "180",
+                                     std::to_string(speed_deg_s_),
                                      "--acceleration-deg-s2",
                                      "1000",
                                      "--views",
@@ -93,6 +93,7 @@ class RigOnWires : public testing::Test {
 
   RealClock clock_;
   int views_ = 4;  ///< a pose; GigE cameras have them all rendered before the rig is ready
+  int speed_deg_s_ = 180;
   const std::filesystem::path folder_ = own_folder("wires_");
   std::optional<Process> rig_, daemon_;
   std::string output_;

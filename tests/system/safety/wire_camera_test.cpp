@@ -17,7 +17,7 @@ using testing::HasSubstr;
 
 const WireRig::Changes kSimulatedCamera{
     {"driver = \"v4l2-side-by-side\"\nboth = { device = \"no-camera\" }\nexternal_trigger = true\n"
-     "pixel_format = \"GREY\"\nsize = { width = 640, height = 240 }\n",
+     "pixel_format = \"RGGB\"\nsize = { width = 640, height = 240 }\n",
      "driver = \"simulated\"\ntruth = \"control.sock\"\n"},
     {"frame_timeout_ms = 500\n", ""},
     {"views = 8", "views = 3"},

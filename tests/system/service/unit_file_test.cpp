@@ -3,12 +3,15 @@
 #include <sys/wait.h>
 
 #include <array>
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <string>
+
+#include "daemon/service/run_daemon.h"
 
 namespace {
 
@@ -94,6 +97,24 @@ TEST(UnitFiles, LimitNeitherStartsNorTriggersSoThatTheSocketStays) {
   EXPECT_LT(limit, service.find("[Service]")) << "in [Unit], or it is not heard";
   EXPECT_NE(socket.find("\nTriggerLimitIntervalSec=0\n"), socket.npos);
   EXPECT_NE(socket.find("\nFlushPending=yes\n"), socket.npos) << "one who waits must not start it again and again";
+}
+
+/// exit_timeout of the daemon and what its control loop takes before; see daemon/service/run_daemon.h.
+TEST(UnitFiles, LeaveTheDaemonMoreTimeToEndThanItTakesItself) {
+  const auto service = text_of(kUnit);
+  const std::string key = "\nTimeoutStopSec=";
+  const auto at = service.find(key);
+  ASSERT_NE(at, service.npos);
+  const auto seconds = std::chrono::seconds(std::stoi(service.substr(at + key.size())));
+  constexpr auto kControlLoop = std::chrono::seconds(5);
+  EXPECT_GT(seconds, scanrig::DaemonOptions{}.exit_timeout + kControlLoop);
+}
+
+TEST(UnitFiles, LetTheServiceOutliveAReconstructionThatTheKernelEnds) {
+  const auto service = text_of(kUnit);
+  for (const char* line : {"OOMPolicy=continue", "OOMScoreAdjust=-500", "MemoryMax=90%", "Nice=-5", "LimitCORE=0"}) {
+    EXPECT_NE(service.find("\n" + std::string(line) + "\n"), service.npos) << line;
+  }
 }
 
 TEST_F(UnitFile, AMistakeInItWouldBeNoticed) {

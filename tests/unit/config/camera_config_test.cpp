@@ -16,7 +16,7 @@ class EyesConfigTest : public RigFile {
  protected:
   static constexpr const char* kV4l2 =
       "[stereo_camera]\ndriver = \"v4l2\"\nleft = { device = \"/dev/video0\" }\nright = { serial = \"R7\" }\n"
-      "external_trigger = true\npixel_format = \"Y10\"\nsize = { width = 320, height = 240 }\nexposure_us = 8000\n"
+      "external_trigger = true\npixel_format = \"RG10\"\nsize = { width = 320, height = 240 }\nexposure_us = 8000\n"
       "frame_timeout_ms = 400\n";
   static constexpr const char* kLightCrafter =
       "[projector]\ndriver = \"lightcrafter4500\"\nimage = 3\npattern = 5\ndepth_bits = 8\n"
@@ -47,7 +47,7 @@ TEST_F(EyesConfigTest, AravisCamerasTakeTheirOptions) {
   text = replaced(text, "# idle_refresh_s = 10", "idle_refresh_s = 60");
   text = replaced(text, "\"Line0\", edge = \"rising\"", "\"Line0\", edge = \"falling\"");
   text = replaced(text, "clock = \"interval\"", "clock = \"ptp\"");
-  const auto rig = read(replaced(text, "\"Mono8\"", "\"BayerGB12\""));
+  const auto rig = read(replaced(text, "\"BayerRG8\"", "\"BayerGB12\""));
   ASSERT_TRUE(rig) << rig.error().message;
   const AravisOptions& options = rig->stereo_camera.aravis;
   EXPECT_EQ(options.right.serial, "40012346");
@@ -93,7 +93,7 @@ TEST_F(EyesConfigTest, V4l2CamerasTakeTheirOptions) {
   EXPECT_EQ(options.right->serial, "R7");
   EXPECT_EQ(options.right->device, "");
   EXPECT_TRUE(options.external_trigger);
-  EXPECT_EQ(options.pixel_format, "Y10");
+  EXPECT_EQ(options.pixel_format, "RG10");
   EXPECT_EQ(options.size, cv::Size(320, 240));
   EXPECT_EQ(options.exposure, microseconds(8000));
   EXPECT_EQ(rig->stereo_camera.exposure, microseconds(8000));
@@ -128,7 +128,7 @@ TEST_F(EyesConfigTest, WhatACameraCannotDoIsToldWithLineAndRange) {
                  "frame_timeout_ms = 12");
   expect_problem("# idle_refresh_s = 10", "idle_refresh_s = 0",
                  "[stereo_camera] idle_refresh_s: 0 is not between 1 and 3600");
-  const auto format = read(replaced(example_, "\"Mono8\"", "\"Mono12Packed\""));
+  const auto format = read(replaced(example_, "\"BayerRG8\"", "\"Mono12Packed\""));
   ASSERT_FALSE(format);
   EXPECT_THAT(format.error().message, HasSubstr("pixel_format: \"Mono12Packed\" is not one of Mono8, Mono10, "));
 }
@@ -143,6 +143,12 @@ TEST_F(EyesConfigTest, WhatAV4l2CameraCannotDoIsToldWithLineAndRange) {
                     "[stereo_camera] right.device: unknown key; known here: serial", "right = ");
   expect_problem_in(v4l2(), "external_trigger = true\n", "", "[stereo_camera] external_trigger: missing",
                     "[stereo_camera]\ndriver = \"v4l2\"");
+  expect_problem_in(v4l2(), "\"RG10\"", "\"GREY\"",
+                    "[stereo_camera] pixel_format: GREY is grey, and the blue screen needs a colour format, such as "
+                    "RGGB");
+  expect_problem_in(v4l2(), "\"RG10\"", "\"Y16\"",
+                    "[stereo_camera] pixel_format: Y16 is grey, and the blue screen needs a colour format, such as "
+                    "RGGB");
   expect_problem_in(v4l2(), "width = 320", "width = 0", "[stereo_camera] size.width: 0 is not between 16 and 65535");
   expect_problem_in(v4l2(), "exposure_us = 8000", "exposure_us = 50",
                     "[stereo_camera] exposure_us: 50 is not between 100 and 1000000");

@@ -33,9 +33,29 @@ TEST_F(DeviceConfigTest, IsReadWhateverIsWrongWithTheRest) {
   ASSERT_TRUE(turntable && projector && panel);
   EXPECT_EQ(turntable->turntable.device(), "/dev/scanrig/turntable");
   EXPECT_EQ(turntable->turntable.profile_file->name, "leadshine-rs.toml");
-  EXPECT_EQ(projector->projector.line, "PROJ_TRIG");
+  EXPECT_EQ(projector->projector.line.line, "PROJ_TRIG");
   EXPECT_EQ(panel->safety.estop.line, "ESTOP_OK");
   EXPECT_EQ(panel->panel.inputs.at("start").line, "START");
+}
+
+TEST_F(DeviceConfigTest, APanelThatCouldNeverStartAJobCanStillShowRed) {
+  write(replaced(example_, "reset = { line", "# reset = { line"));
+  EXPECT_TRUE(read(SafetyDevice::panel));
+  EXPECT_FALSE(read_rig_config(file_, drives_));
+}
+
+TEST_F(DeviceConfigTest, AProjectorOnThePanelsModuleFindsItWhateverElseIsWrongThere) {
+  const std::string module =
+      "[panel]\ndriver = \"modbus-io\"\ndevice = \"/dev/io\"\nbaud = 9600\nparity = \"even\"\nunit_id = 3\n"
+      "reply_timeout_ms = 100\nunknown = 1\n";
+  const auto text = with_section("[panel]", "[calibration]", module);
+  const auto begin = text.find("\n[projector]") + 1;
+  write(text.substr(0, begin) + "[projector]\ndriver = \"modbus-io\"\nchannel = 8\npulse_us = 15000\nwarm_up_s = 0\n" +
+        text.substr(text.find("\n[stereo_camera]")));
+  const auto projector = read(SafetyDevice::projector);
+  ASSERT_TRUE(projector) << projector.error().message;
+  EXPECT_EQ(projector->projector.io_module.device, "/dev/io");
+  EXPECT_EQ(projector->projector.io_module.unit_id, 3);
 }
 
 TEST_F(DeviceConfigTest, IsRefusedForItsOwnSectionOnly) {

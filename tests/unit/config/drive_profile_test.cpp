@@ -83,6 +83,18 @@ TEST_F(DriveProfileTest, ValuesOf32BitsLieInTwoWordsAndInputsAreLetGo) {
   EXPECT_EQ(profile->pulses_per_motor_rev.base, 1000);
 }
 
+TEST_F(DriveProfileTest, ADriveHasACommunicationTimeoutOrNone) {
+  auto profile = read_drive_profile(SCANRIG_SOURCE_DIR "/config/drives/oriental-az.toml");
+  ASSERT_TRUE(profile) << profile.error().message;
+  ASSERT_TRUE(profile->communication_timeout);
+  EXPECT_EQ(profile->communication_timeout->timeout, std::chrono::milliseconds(3000));
+  profile = read_drive_profile(SCANRIG_SOURCE_DIR "/config/drives/leadshine-rs.toml");
+  ASSERT_TRUE(profile) << profile.error().message;
+  EXPECT_FALSE(profile->communication_timeout);
+  expect_problem("[alarm]\n", "[communication_timeout]\nregister = 1\ntimeout_ms = 400\n\n[alarm]\n",
+                 "[communication_timeout] timeout_ms: 400 is not between 500 and 10000");
+}
+
 TEST_F(DriveProfileTest, AMoveThatSaysHalfAValueIsNone) {
   expect_problem("\"acceleration\"", "\"acceleration_high\"",
                  "[move] words: must contain \"acceleration\", or \"acceleration_high\" and \"acceleration_low\"");

@@ -19,13 +19,14 @@ class GpioOptionsTest : public FileUnderTest {
 
 TEST_F(GpioOptionsTest, EveryWiredLineReachesItsPlace) {
   std::string text = shipped("rigs/example.toml");
-  text = replaced(text, "[calibration]",
-                  "stop = { line = \"A\" }\nreset = { line = \"B\" }\npart_present = { line = \"C\" }\n"
-                  "flipped = { line = \"K\" }\n"
-                  "lamp_red = { line = \"D\" }\nlamp_amber = { line = \"E\" }\nstart_lamp = { line = \"F\" }\n"
-                  "busy = { line = \"G\" }\nflip_request = { line = \"H\" }\npass = { line = \"I\" }\n"
-                  "fail = { line = \"J\" }\n\n[gpio]\nsocket = \"gpio.sock\"\n\n[calibration]");
-  text = replaced(text, "pulse_us", "plain_line = \"PLAIN\"\nactive = \"low\"\npulse_us");
+  text = replaced(text, "# part_present =", "part_present =");
+  text = replaced(text, "# flipped =", "flipped =");
+  text = replaced(text, "lamp_amber = { line = \"LAMP_AMBER\" }",
+                  "lamp_amber = { chip = \"gpiochip2\", offset = 5, active = \"low\" }");
+  text = replaced(text, "{ line = \"STOP\", active = \"low\" }",
+                  "{ chip = \"gpiochip0\", offset = 17, bias = \"pull-down\" }");
+  text = replaced(text, "[calibration]", "[gpio]\nsocket = \"gpio.sock\"\n\n[calibration]");
+  text = replaced(text, "pulse_us", "active = \"low\"\npulse_us");
   const auto rig = read(text);
   ASSERT_TRUE(rig) << rig.error().message;
   EXPECT_EQ(rig->gpio_socket, folder_ / "gpio.sock");
@@ -35,42 +36,47 @@ TEST_F(GpioOptionsTest, EveryWiredLineReachesItsPlace) {
   EXPECT_EQ(panel.outputs.size(), 8u);
   const auto line_of = [](const auto& wired, auto field) {
     for (const auto& [one, line] : wired) {
-      if (one == field) return line.name;
+      if (one == field) return line.contact();
     }
     return std::string();
   };
   EXPECT_EQ(line_of(panel.inputs, &PanelInputs::estop_ok), "ESTOP_OK");
   EXPECT_EQ(line_of(panel.inputs, &PanelInputs::guard_closed), "GUARD_OK");
   EXPECT_EQ(line_of(panel.inputs, &PanelInputs::start), "START");
-  EXPECT_EQ(line_of(panel.inputs, &PanelInputs::stop), "A");
-  EXPECT_EQ(line_of(panel.inputs, &PanelInputs::reset), "B");
-  EXPECT_EQ(line_of(panel.inputs, &PanelInputs::part_present), "C");
-  EXPECT_EQ(line_of(panel.inputs, &PanelInputs::flipped), "K");
-  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::red), "D");
-  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::amber), "E");
+  EXPECT_EQ(line_of(panel.inputs, &PanelInputs::stop), "gpiochip0:17");
+  EXPECT_EQ(line_of(panel.inputs, &PanelInputs::reset), "RESET");
+  EXPECT_EQ(line_of(panel.inputs, &PanelInputs::part_present), "PART_PRESENT");
+  EXPECT_EQ(line_of(panel.inputs, &PanelInputs::flipped), "FLIPPED");
+  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::red), "LAMP_RED");
+  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::amber), "gpiochip2:5");
   EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::green), "LAMP_GREEN");
-  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::start_lamp), "F");
-  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::busy), "G");
-  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::flip_request), "H");
-  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::pass), "I");
-  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::fail), "J");
+  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::start_lamp), "START_LAMP");
+  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::busy), "BUSY");
+  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::flip_request), "FLIP");
+  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::pass), "PASS");
+  EXPECT_EQ(line_of(panel.outputs, &PanelOutputs::fail), "FAIL");
 
   const auto by_line = [](const auto& wired) { return wired.first == &PanelInputs::estop_ok; };
   EXPECT_TRUE(std::ranges::find_if(panel.inputs, by_line)->second.active_low);
 
+  const auto stop = [](const auto& wired) { return wired.first == &PanelInputs::stop; };
+  EXPECT_EQ(std::ranges::find_if(panel.inputs, stop)->second.bias, gpio::Bias::pull_down);
+
   const auto projector = gpio_projector_options(rig->projector);
   EXPECT_EQ(projector.pattern_line.name, "PROJ_TRIG");
   EXPECT_TRUE(projector.pattern_line.active_low);
-  EXPECT_EQ(projector.plain_line.value().name, "PLAIN");
+  EXPECT_TRUE(projector.plain_line.value().active_low);
+  EXPECT_EQ(projector.plain_line.value().name, "PROJ_PLAIN");
   EXPECT_EQ(projector.pulse, std::chrono::microseconds(15000));
 }
 
 TEST_F(GpioOptionsTest, EveryChannelOfAModuleReachesItsPlace) {
   std::string text = shipped("rigs/example.toml");
-  const auto begin = text.find("[panel]"), end = text.find("[calibration]");
+  const auto begin = text.find("\n[panel]") + 1, end = text.find("[calibration]");
   text.replace(begin, end - begin,
                "[panel]\ndriver = \"modbus-io\"\ndevice = \"/dev/io\"\nbaud = 19200\nparity = \"none\"\n"
                "unit_id = 3\nreply_timeout_ms = 40\npoll_ms = 15\nstart = { channel = 0 }\n"
+               "reset = { channel = 1 }\n"
                "flipped = { channel = 2, active = \"low\" }\nlamp_red = { channel = 4 }\n\n");
   text = replaced(text, "line = \"ESTOP_OK\"", "channel = 6");
   text = replaced(text, "line = \"GUARD_OK\"", "channel = 7");

@@ -47,7 +47,11 @@ TEST_F(RigConfigTest, TheShippedExampleIsReadAsItIsWritten) {
   EXPECT_EQ(rig.stereo_camera.aravis.right.address, "192.168.10.12");
   EXPECT_EQ(rig.stereo_camera.aravis.packet_bytes, 8192);
   EXPECT_EQ(rig.panel.inputs.at("start").line, "START");
+  EXPECT_EQ(rig.panel.inputs.at("reset").line, "RESET");
   EXPECT_EQ(rig.panel.outputs.at("lamp_green").line, "LAMP_GREEN");
+  EXPECT_EQ(rig.panel.outputs.size(), 8u);
+  EXPECT_EQ(rig.projector.plain_line.value().line, "PROJ_PLAIN");
+  EXPECT_EQ(rig.stereo_camera.aravis.pixel_format, "BayerRG8");
   EXPECT_EQ(rig.calibration_file, "/var/lib/scanrig/calibration.json");
   EXPECT_EQ(rig.recipes.at("default").views, 8);
   EXPECT_EQ(rig.recipes.at("default").flip_timeout, std::chrono::minutes(30));
@@ -130,6 +134,12 @@ TEST_F(RigConfigTest, RulesBetweenKeysAreChecked) {
                  "[turntable] tolerance_deg: 0.0005 is less than 2 pulses of the motor; at least 0.0008 is possible");
   expect_problem("settle_ms = 200", "soft_limits = { min_deg = 10, max_deg = 10 }\nsettle_ms = 200",
                  "[turntable] soft_limits.max_deg: must be more than min_deg", "soft_limits");
+  std::string oriental = replaced(example_, "\"leadshine-rs\"", "\"oriental-az\"");
+  oriental = replaced(oriental, "mode = \"switch\"", "mode = \"absolute\"");
+  EXPECT_TRUE(read(oriental));
+  expect_problem_in(oriental, "reply_timeout_ms = 60\n", "reply_timeout_ms = 151\n",
+                    "[turntable] reply_timeout_ms: 151 is too long for oriental-az, which stops after 3000 ms without "
+                    "a request; at most 150 ms");
   const std::string no_guard = replaced(example_, "guard = { line", "#guard = { line");
   const auto remote = read(replaced(no_guard, "remote_start = false", "remote_start = true"));
   ASSERT_FALSE(remote);
@@ -138,6 +148,58 @@ TEST_F(RigConfigTest, RulesBetweenKeysAreChecked) {
   ASSERT_FALSE(guarded);
   EXPECT_THAT(guarded.error().message, HasSubstr("[safety] home_after_restart: \"guarded\" needs a guard"));
   EXPECT_TRUE(read(no_guard));
+}
+
+TEST_F(RigConfigTest, ARigThatCouldNeverScanIsRefusedWithTheReason) {
+  const std::string start = "start = { line = \"START\"", panel = "[panel]\n";
+  expect_problem("reset = { line = \"RESET\"", "# reset = {",
+                 "[panel] reset: missing: the table is homed, and a fault cleared, by Reset only; name its input",
+                 panel);
+  expect_problem("lamp_red = { line", "# lamp_red = { line",
+                 "[panel] lamp_red: missing: a fault would not be visible at the rig; name the output of the red lamp",
+                 panel);
+  expect_problem("plain_line = ", "# plain_line = ",
+                 "[projector] plain_line: missing: every view needs an image in even light; name the output that fires "
+                 "it",
+                 "[projector]\n");
+  expect_problem("\"BayerRG8\"", "\"Mono12\"",
+                 "[stereo_camera] pixel_format: Mono12 is grey, and the blue screen needs a colour format, such as "
+                 "BayerRG8");
+}
+
+TEST_F(RigConfigTest, OneOutputIsNotTwoSignals) {
+  expect_problem("\"PROJ_PLAIN\"", "\"PROJ_TRIG\"", "[projector] plain_line: is on the same contact as line",
+                 "plain_line = ");
+  expect_problem("\"PROJ_PLAIN\"", "\"LAMP_RED\"", "[projector] plain_line: is on the same contact as lamp_red",
+                 "plain_line = ");
+}
+
+TEST_F(RigConfigTest, LinesHaveANameOrAChipAndAnOffset) {
+  std::string text = replaced(example_, "reset = { line = \"RESET\", active = \"low\" }",
+                              "reset = { chip = \"gpiochip4\", offset = 21, active = \"low\", bias = \"pull-down\" }");
+  text = replaced(text, "lamp_red = { line = \"LAMP_RED\" }", "lamp_red = { chip = \"pinctrl\", offset = 4 }");
+  text = replaced(text, "plain_line = \"PROJ_PLAIN\"", "plain_line = { chip = \"gpiochip1\", offset = 3 }");
+  const auto rig = read(text);
+  ASSERT_TRUE(rig) << rig.error().message;
+  const Pin& reset = rig->panel.inputs.at("reset");
+  EXPECT_EQ(reset.line, "");
+  EXPECT_EQ(reset.chip, "gpiochip4");
+  EXPECT_EQ(reset.offset, 21);
+  EXPECT_TRUE(reset.active_low);
+  EXPECT_EQ(reset.bias, gpio::Bias::pull_down);
+  EXPECT_EQ(rig->panel.inputs.at("start").bias, gpio::Bias::as_is);
+  EXPECT_EQ(rig->panel.outputs.at("lamp_red").chip, "pinctrl");
+  EXPECT_EQ(rig->projector.plain_line.value().chip, "gpiochip1");
+  expect_problem_in(text, "offset = 21, ", "", "[panel] reset.offset: missing", "reset = {");
+  expect_problem_in(text, "offset = 21", "offset = -1", "[panel] reset.offset: -1 is not between 0 and 4095");
+  expect_problem_in(text, "\"pull-down\" }", "\"up\" }",
+                    "[panel] reset.bias: \"up\" is not one of pull-up, pull-down, disabled, as-is");
+  expect_problem_in(text, "\"pinctrl\", offset = 4", "\"pinctrl\", offset = 4, bias = \"pull-up\"",
+                    "[panel] lamp_red.bias: unknown key; known here: active, chip, offset", "lamp_red = {");
+  expect_problem_in(text, "chip = \"gpiochip4\", offset", "line = \"RESET\", offset",
+                    "[panel] reset.offset: unknown key; known here: active, bias, chip, line", "reset = {");
+  expect_problem_in(text, "{ line = \"STOP\", active = \"low\" }", "{ chip = \"gpiochip4\", offset = 21 }",
+                    "[panel] stop: is on the same contact as reset");
 }
 
 TEST_F(RigConfigTest, TcpNeedsTokensAndIsOnThisMachineUnlessToldOtherwise) {
@@ -176,12 +238,13 @@ TEST_F(RigConfigTest, AProfileThatIsNotThereOrWrongIsToldAtItsKey) {
 }
 
 TEST_F(RigConfigTest, OtherDriversAreCheckedWithTheirOwnKeys) {
-  std::string text = replaced(example_, "driver = \"gpio\"                         # gpio | light",
-                              "driver = \"manual\"                       # gpio | light");
+  std::string text = replaced(example_, "driver = \"gpio\"                         # gpio | modbus",
+                              "driver = \"manual\"                       # gpio | modbus");
   auto rig = read(text);
   ASSERT_FALSE(rig);
   EXPECT_THAT(rig.error().message, HasSubstr("[projector] line: unknown key; known here: driver, warm_up_s"));
   text = replaced(replaced(text, "line = \"PROJ_TRIG\"", "#"), "pulse_us", "#");
+  text = replaced(text, "plain_line = \"PROJ_PLAIN\"", "#");
   rig = read(text);
   ASSERT_TRUE(rig) << rig.error().message;
   EXPECT_EQ(rig->projector.driver, ProjectorConfig::Driver::manual);
@@ -207,6 +270,40 @@ TEST_F(RigConfigTest, OtherDriversAreCheckedWithTheirOwnKeys) {
   EXPECT_EQ(rig->panel.io_module.unit_id, 3);
   EXPECT_EQ(rig->panel.inputs.at("reset").channel, 1);
   EXPECT_TRUE(rig->panel.inputs.at("reset").active_low);
+}
+
+TEST_F(RigConfigTest, AProjectorOnAnIoModuleNeedsThePanelsModuleAndChannelsOfItsOwn) {
+  const std::string projector =
+      "[projector]\ndriver = \"modbus-io\"\nchannel = 8\nplain_channel = 9\nactive = \"low\"\npulse_us = 40000\n"
+      "warm_up_s = 0\n";
+  const std::string panel =
+      "[panel]\ndriver = \"modbus-io\"\ndevice = \"/dev/ttyUSB1\"\nbaud = 9600\nparity = \"even\"\nunit_id = 3\n"
+      "reply_timeout_ms = 100\npoll_ms = 25\nstart = { channel = 0 }\nreset = { channel = 1 }\n"
+      "lamp_red = { channel = 0 }\n";
+  const std::string on_gpio = with_section("[projector]", "[stereo_camera]", projector);
+  auto rig = read(on_gpio);
+  ASSERT_FALSE(rig);
+  EXPECT_THAT(rig.error().message, HasSubstr("[projector] driver: \"modbus-io\" uses the panel's I/O module: it needs "
+                                             "driver = \"modbus-io\" in [panel]"));
+  std::string text = on_gpio.substr(0, on_gpio.find("\n[panel]") + 1) + panel + "\n" +
+                     on_gpio.substr(on_gpio.find("\n[calibration]") + 1);
+  text = replaced(text, "{ line = \"ESTOP_OK\", active = \"low\" }", "{ channel = 7 }");
+  text = replaced(text, "{ line = \"GUARD_OK\", active = \"low\" }", "{ channel = 6 }");
+  rig = read(text);
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->projector.driver, ProjectorConfig::Driver::modbus_io);
+  EXPECT_EQ(rig->projector.line.channel, 8);
+  EXPECT_EQ(rig->projector.plain_line.value().channel, 9);
+  EXPECT_TRUE(rig->projector.line.active_low);
+  EXPECT_EQ(rig->projector.io_module.device, "/dev/ttyUSB1");
+  EXPECT_EQ(rig->projector.io_module.unit_id, 3);
+  expect_problem_in(text, "plain_channel = 9\n", "",
+                    "[projector] plain_channel: missing: every view needs an image in even light; name the output that "
+                    "fires it",
+                    "[projector]\n");
+  expect_problem_in(text, "channel = 8", "channel = 0", "[projector] channel: is on the same contact as lamp_red");
+  expect_problem_in(text, "pulse_us = 40000", "pulse_us = 11000",
+                    "[projector] pulse_us: 11000 is shorter than the exposure_us of 12000 in [stereo_camera]");
 }
 
 TEST_F(RigConfigTest, SimulatedCamerasAreKnownOnlyToThoseWhoAskForThem) {

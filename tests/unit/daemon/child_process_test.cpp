@@ -23,6 +23,14 @@ TEST(Child, EndsWithItsCodeItsLinesAndItsLastWords) {
   EXPECT_THAT(lines, ElementsAre("one", "two"));
 }
 
+TEST(Child, IsTheFirstThatTheKernelEndsWhenMemoryRunsOut) {
+  std::vector<std::string> lines;
+  auto command = shell("cat /proc/self/oom_score_adj");
+  command.on_line = [&](std::string_view line) { lines.emplace_back(line); };
+  ASSERT_TRUE(run_child(command, {}));
+  EXPECT_THAT(lines, ElementsAre("500"));
+}
+
 TEST(Child, SaysWhichSignalEndedIt) {
   const auto end = run_child(shell("kill -SEGV $$"), {});
   ASSERT_TRUE(end) << end.error().message;

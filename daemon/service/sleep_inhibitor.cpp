@@ -1,0 +1,125 @@
+#include "daemon/service/sleep_inhibitor.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <systemd/sd-bus.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <memory>
+#include <utility>
+
+namespace scanrig {
+namespace {
+
+using std::chrono::microseconds;
+using SteadyClock = std::chrono::steady_clock;
+
+struct CloseBus {
+  void operator()(sd_bus* bus) const { ::sd_bus_close_unref(bus); }
+};
+struct Unref {
+  void operator()(sd_bus_message* message) const { ::sd_bus_message_unref(message); }
+};
+using Bus = std::unique_ptr<sd_bus, CloseBus>;
+using Message = std::unique_ptr<sd_bus_message, Unref>;
+
+std::uint64_t us_until(SteadyClock::time_point by) {
+  const auto left = std::chrono::duration_cast<microseconds>(by - SteadyClock::now()).count();
+  return left > 1 ? static_cast<std::uint64_t>(left) : 1;
+}
+
+/// sd_bus_call() by itself would wait for a bus that does not greet for as long as the library likes.
+int open_bus(Bus& bus, SteadyClock::time_point by) {
+  sd_bus* opened = nullptr;
+  if (const int failed = ::sd_bus_open_system(&opened); failed < 0) return failed;
+  bus.reset(opened);
+  for (;;) {
+    if (const int ready = ::sd_bus_is_ready(opened); ready != 0) return ready;
+    if (SteadyClock::now() >= by) return -ETIMEDOUT;
+    const int processed = ::sd_bus_process(opened, nullptr);
+    if (processed < 0) return processed;
+    if (processed > 0) continue;
+    if (const int waited = ::sd_bus_wait(opened, us_until(by)); waited < 0 && waited != -EINTR) return waited;
+  }
+}
+
+/// The descriptor that is the lock, or a negative error number.
+int inhibit(const SleepInhibitorOptions& options, std::string& detail) {
+  const auto by = SteadyClock::now() + options.reply_timeout;
+  Bus bus;
+  if (const int failed = open_bus(bus, by); failed < 0) return failed;
+  sd_bus_message* made = nullptr;
+  int failed = ::sd_bus_message_new_method_call(bus.get(), &made, "org.freedesktop.login1", "/org/freedesktop/login1",
+                                                "org.freedesktop.login1.Manager", "Inhibit");
+  if (failed < 0) return failed;
+  const Message call(made);
+  failed = ::sd_bus_message_append(made, "ssss", "sleep:idle", options.who.c_str(), options.why.c_str(), "block");
+  if (failed < 0) return failed;
+  sd_bus_error error = SD_BUS_ERROR_NULL;
+  sd_bus_message* answered = nullptr;
+  failed = ::sd_bus_call(bus.get(), made, us_until(by), &error, &answered);
+  const Message reply(answered);
+  if (error.message) detail = error.message;
+  ::sd_bus_error_free(&error);
+  if (failed < 0) return failed;
+  int lock = -1;
+  if (failed = ::sd_bus_message_read(answered, "h", &lock); failed < 0) return failed;
+  const int own = ::fcntl(lock, F_DUPFD_CLOEXEC, 3);  // the message's own is closed with it
+  return own < 0 ? -errno : own;
+}
+
+}  // namespace
+
+SleepInhibitor::SleepInhibitor(std::function<void(const std::string&)> report, SleepInhibitorOptions options)
+    : report_(std::move(report)),
+      options_(std::move(options)),
+      thread_([this](const std::stop_token& stop) { run(stop); }) {}
+
+SleepInhibitor::~SleepInhibitor() {
+  thread_.request_stop();
+  thread_.join();
+  release();
+}
+
+void SleepInhibitor::keep_awake(bool on) {
+  const std::scoped_lock lock(mutex_);
+  if (is_wanted_ == on) return;
+  is_wanted_ = on;
+  changed_.notify_all();
+}
+
+bool SleepInhibitor::is_settled() const {
+  const std::scoped_lock lock(mutex_);
+  return is_applied_ == is_wanted_;
+}
+
+void SleepInhibitor::run(const std::stop_token& stop) {
+  std::unique_lock lock(mutex_);
+  while (changed_.wait(lock, stop, [this] { return is_wanted_ != is_applied_; })) {
+    const bool on = is_wanted_;
+    lock.unlock();
+    on ? take() : release();
+    lock.lock();
+    is_applied_ = on;
+  }
+}
+
+void SleepInhibitor::take() {
+  std::string detail;
+  const int lock = inhibit(options_, detail);
+  if (lock >= 0) {
+    lock_ = lock;
+    return;
+  }
+  if (std::exchange(is_reported_, true)) return;
+  report_(fmt::format("Sleep is not blocked during jobs: logind: {}. Disable suspend on this machine.",
+                      detail.empty() ? std::strerror(-lock) : detail));
+}
+
+void SleepInhibitor::release() {
+  if (lock_ >= 0) ::close(std::exchange(lock_, -1));
+}
+
+}  // namespace scanrig

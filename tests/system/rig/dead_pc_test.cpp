@@ -1,0 +1,50 @@
+#include <cmath>
+
+#include "tests/system/rig/rig_on_wires.h"
+
+namespace scanrig {
+namespace {
+
+/// The service is gone and nothing makes the rig safe: no systemd, no PC. What is left is the drive's own time-out.
+class DeadPc : public RigOnWires {
+ protected:
+  DeadPc() { speed_deg_s_ = 6; }  // a quarter turn takes 15 s
+
+  json truth() { return say({{"get", "truth"}}); }
+  bool is_turning() { return std::abs(truth().value("speed_deg_s", 0.0)) > 1; }
+  /// How far the table still turns, once the service was killed in the middle of a job's turn.
+  double degrees_after_the_end() {
+    EXPECT_TRUE(press_until("reset", [&] { return machine() == "Operational.Ready"; })) << log();
+    EXPECT_TRUE(press_until("start", [&] { return machine() == "Operational.SingleExecution"; })) << log();
+    EXPECT_TRUE(soon([&] { return is_turning(); })) << log();
+    const double before = truth()["angle_deg"];
+    EXPECT_TRUE(soon([&] { return std::abs(truth()["angle_deg"].get<double>() - before) > 6; })) << "the turn itself";
+    daemon_->signal(SIGKILL);
+    daemon_->wait();
+    const double killed = truth()["angle_deg"];
+    EXPECT_TRUE(soon([&] { return truth().value("standing", false); }));
+    return std::abs(truth()["angle_deg"].get<double>() - killed);
+  }
+};
+
+TEST_F(DeadPc, ADriveWithACommunicationTimeoutStopsTheTableByItself) {
+  start_rig({"--drive", "oriental-az"});
+  start_daemon();
+  const double turned = degrees_after_the_end();
+  EXPECT_LT(turned, 3 * speed_deg_s_ + 8) << "3 s of the profile, and some";
+  EXPECT_GT(turned, 6) << "it was turning";
+  daemon_.emplace(std::vector<std::string>{SCANRIGD_SIM_PROGRAM, "--scale", "0.25", "--config", folder_ / "rig.toml"},
+                  folder_ / "daemon.log");
+  ASSERT_TRUE(soon([&] { return machine() == "Halted" || machine() == "Error"; })) << log();
+  ASSERT_TRUE(press_until("reset", [&] { return machine() == "Operational.Ready"; })) << log();
+}
+
+/// The profile says that it has none; what the drive was told last is carried out to its end.
+TEST_F(DeadPc, ADriveWithoutOneEndsTheTurnThatHadBegun) {
+  start_rig();
+  start_daemon();
+  EXPECT_GT(degrees_after_the_end(), 40);
+}
+
+}  // namespace
+}  // namespace scanrig
