@@ -58,8 +58,8 @@ struct TextureOptions {
   double white_share = 0.99;  ///< the brightest paint: this share of the vertices lies below it ...
   double white = 0.8;         ///< ... is brought to this linear value ...
   double max_gain = 3.0;      ///< ... unless that takes more gain than this: a dark object stays dark
-  ChartOptions charts;
-  BlendOptions blending;
+  ChartOptions charts{};
+  BlendOptions blending{};
 };
 
 struct TexturedModel {

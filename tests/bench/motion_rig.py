@@ -51,7 +51,7 @@ class Rig:
         self.process.terminate()
         self.process.wait(timeout=10)
 
-    def say(self, **request):
+    def request(self, **request):
         self.peer.sendall((json.dumps(request) + "\n").encode())
         answer = json.loads(self.lines.readline())
         if "error" in answer:
