@@ -50,7 +50,7 @@ Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle) {
   const unsigned before = interrupts_;
   if (id.job != std::exchange(job_, id.job)) image_checker_.begin();
   // What the cameras need before they can expose is done before the table stands; if they fail, the exposure says so.
-  std::ignore = devices_.camera.prepare(Deadline::after(clock_, options_.exposure_limit));
+  std::ignore = devices_.camera.prepare(Deadline::after(clock_, options_.connect_limit));
   const auto move = turn_to(angle);
   if (!move) return pass_on(move);
 

@@ -17,7 +17,8 @@ struct AcquisitionOptions {
   Clock::Duration exposure_limit = std::chrono::seconds(2);  ///< arm, fire and collect, each
   Clock::Duration stop_limit = std::chrono::seconds(3);
   Clock::Duration check_limit = std::chrono::milliseconds(500);  ///< for each device
-  Clock::Duration connect_limit = std::chrono::seconds(3);       ///< for cameras that have to be connected
+  /// For cameras that have to be connected: of a GigE camera that vanished the library takes 2.5 s to notice it, each.
+  Clock::Duration connect_limit = std::chrono::seconds(8);
   int retake_limit = 3;                                          ///< spoilt exposures in a row before the view fails
 };
 

@@ -128,8 +128,7 @@ constexpr bool kHasOwnReports = false;
 std::filesystem::path crash_folder(const std::filesystem::path& storage_root) {
   const char* const state = std::getenv("STATE_DIRECTORY");  // several are separated by colons
   const std::string_view first = state ? std::string_view(state).substr(0, std::string_view(state).find(':')) : "";
-  const auto root = storage_root.filename().empty() ? storage_root.parent_path() : storage_root;
-  return (first.empty() ? root.parent_path() : std::filesystem::path(first)) / "crash";
+  return (first.empty() ? storage_root / ".state" : std::filesystem::path(first)) / "crash";
 }
 
 void report_crashes_to(const std::filesystem::path& folder) {

@@ -4,7 +4,8 @@
 
 namespace scanrig {
 
-/// Where crash reports of a rig with this storage root are: $STATE_DIRECTORY/crash, or `crash` beside the root.
+/// Where crash reports of a rig with this storage root are: $STATE_DIRECTORY/crash, or in `.state` of the root: no
+/// job's id begins with a dot.
 std::filesystem::path crash_folder(const std::filesystem::path& storage_root);
 
 /// From now on a crash of this process (SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT) leaves FOLDER/SECONDS-PID.txt: the

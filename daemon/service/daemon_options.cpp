@@ -1,11 +1,10 @@
 #include "daemon/service/daemon_options.h"
 
-#include <cstdlib>
-
 #include "core/hash.h"
 #include "daemon/jobs/pipeline_reconstructor.h"
 #include "daemon/jobs/process_reconstructor.h"
 #include "daemon/rig/open_devices.h"
+#include "daemon/service/crash_report.h"
 
 namespace scanrig {
 namespace {
@@ -23,13 +22,6 @@ CameraSerials cameras_from(const config::StereoCameraConfig& config) {
     case Driver::simulated: break;  // their owner knows
   }
   return {};
-}
-
-/// Beside the jobs where no service manager names a state folder.
-std::filesystem::path crash_folder(const config::RigConfig& config) {
-  const char* const state = std::getenv("STATE_DIRECTORY");  // systemd.exec(5); several are separated by colons
-  const std::string first = state ? std::string(state).substr(0, std::string_view(state).find(':')) : "";
-  return (first.empty() ? config.storage.root.parent_path() : std::filesystem::path(first)) / "crash";
 }
 
 Recipe recipe_from(const std::string& name, const config::RecipeConfig& config) {
@@ -57,12 +49,6 @@ ReconstructorFactory reconstructor_from(const config::ReconstructionConfig& conf
   return pipeline_reconstructor(options, gib(config.memory_gib));
 }
 
-/// systemd's, else beside the jobs; no job's id begins with a dot.
-std::filesystem::path state_folder(const std::filesystem::path& root) {
-  const char* const given = std::getenv("STATE_DIRECTORY");
-  return given && *given ? std::filesystem::path(given) : root / ".state";
-}
-
 }  // namespace
 
 DaemonOptions options_from(const config::RigConfig& config) {
@@ -73,14 +59,14 @@ DaemonOptions options_from(const config::RigConfig& config) {
                   .profile = "",
                   .config_sha256 = sha256(config.text),
                   .reserve_bytes = gib(config.storage.reserve_gib)};
-  options.state_folder = state_folder(config.storage.root);
+  options.state_folder = crash_folder(config.storage.root).parent_path();
   options.recipes.clear();
   for (const auto& [name, recipe] : config.recipes) options.recipes[name] = recipe_from(name, recipe);
   options.retention.keep_for = config.storage.keep_days;
   if (config.storage.keep_gib) options.retention.keep_bytes = gib(*config.storage.keep_gib);
   options.bundle.rig_texts["rig.toml"] = config.text;
   if (const auto& profile = config.turntable.profile_file) options.bundle.rig_texts[profile->name] = profile->text;
-  options.bundle.crash_folder = crash_folder(config);
+  options.bundle.crash_folder = crash_folder(config.storage.root);
   if (config.quiet_hours) options.quiet_hours = QuietHours{config.quiet_hours->from, config.quiet_hours->to};
   options.warm_up = config.projector.warm_up;
   options.api = {.socket = config.api.socket,

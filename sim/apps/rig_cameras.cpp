@@ -126,11 +126,11 @@ void RigCameras::read_out(wire::Side side, const wire::GigeExposure& exposure, c
   const std::scoped_lock lock(mutex_);
   const auto found = images_.find(exposure.number);
   const bool left = side == wire::Side::left;
-  const cv::Mat image = found == images_.end() ? cv::Mat() : left ? found->second.left : found->second.right;
-  if (image.empty()) {
+  const cv::Mat rendered = found == images_.end() ? cv::Mat() : left ? found->second.left : found->second.right;
+  if (rendered.empty()) {
     image.setTo(0);
   } else {
-    image.copyTo(image);
+    rendered.copyTo(image);
   }
   if (numbered_) number_faintly(static_cast<std::uint32_t>(exposure.number), image);
   if (exposure.number <= exposures_.size()) exposures_[exposure.number - 1].read = clock_.now();

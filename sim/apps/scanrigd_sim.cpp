@@ -68,6 +68,9 @@ void add_options(CLI::App& app, SimOptions& o) {
       ->check(CLI::Range(0.0, 1.0));
 }
 
+/// A simulated image takes as long as its rendering: that is no camera that hangs.
+constexpr auto kRenderingMargin = std::chrono::minutes(2);
+
 /// Checks that the rig can take the object before anything is written.
 Result<void> run(const SimOptions& o, const SignalStop& stop) {
   std::unique_ptr<Clock> clock;

@@ -98,8 +98,8 @@ TEST(CrashFolder, IsThatOfTheServicesStateOrBesideTheJobs) {
   ::setenv("STATE_DIRECTORY", "/var/lib/scanrig:/var/lib/other", 1);
   EXPECT_EQ(crash_folder("/data/jobs"), "/var/lib/scanrig/crash");
   ::unsetenv("STATE_DIRECTORY");
-  EXPECT_EQ(crash_folder("/data/jobs"), "/data/crash");
-  EXPECT_EQ(crash_folder("/data/jobs/"), "/data/crash");
+  EXPECT_EQ(crash_folder("/data/jobs"), "/data/jobs/.state/crash");
+  EXPECT_EQ(crash_folder("/data/jobs/"), "/data/jobs/.state/crash");
 }
 
 }  // namespace
