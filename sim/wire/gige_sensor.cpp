@@ -16,7 +16,15 @@
 namespace scanrig::sim::wire {
 namespace {
 
-/// Aravis' own description, with Line0 in place of the software trigger, and with `selector` for FrameStart.
+/// The packet delay of a GigE Vision camera, ns. Where a description has none, Aravis allows 1 us at most.
+constexpr const char* kPacketDelay =
+    R"(<Integer Name="GevSCPD"><pValue>GevSCPDReg</pValue><Min>0</Min><Max>1000000000</Max></Integer>
+<IntReg Name="GevSCPDReg"><Address>0xd08</Address><Length>4</Length><AccessMode>RW</AccessMode><pPort>Device</pPort>
+<Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>
+)";
+
+/// Aravis' own description, with a packet delay, with Line0 standing for the software trigger, and with `selector` for
+/// FrameStart.
 std::string genicam_description(const std::string& selector) {
   ArvFakeCamera* sample = arv_fake_camera_new("sample");
   std::size_t size = 0;
@@ -30,6 +38,7 @@ std::string genicam_description(const std::string& selector) {
   if (const auto name = text.find(frame_start); name != std::string::npos) {
     text.replace(name, frame_start.size(), "Name=\"" + selector + "\"");
   }
+  if (const auto end = text.rfind("</RegisterDescription>"); end != std::string::npos) text.insert(end, kPacketDelay);
   return text;
 }
 

@@ -107,9 +107,9 @@ TEST_F(AcquisitionTest, ACameraThatStaysAwayFailsTheViewByItsName) {
   const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
   ASSERT_FALSE(view);
   EXPECT_EQ(view.error().message, "left camera 4711: no answer");
-  EXPECT_EQ(acquisition.check().at(2).problem->message, "left camera 4711: no answer");
+  EXPECT_EQ(acquisition.check().devices.at(2).problem->message, "left camera 4711: no answer");
   rig.line.absent = 0;
-  EXPECT_FALSE(acquisition.check().at(2).problem);
+  EXPECT_FALSE(acquisition.check().devices.at(2).problem);
   EXPECT_TRUE(acquisition.take_view({"job", 0, 0}, {0.0}));
 }
 

@@ -26,6 +26,9 @@ struct Situation {
 
 class StopInEveryState : public Daemon, public testing::WithParamInterface<std::tuple<Situation, By>> {
  public:
+  using Daemon::ask, Daemon::clock_waits_for, Daemon::get_ready, Daemon::loop, Daemon::rig, Daemon::wait_fault,
+      Daemon::wait_flip, Daemon::wait_halted;
+
   void SetUp() override {
     Daemon::SetUp();
     options.guard = true;
@@ -181,14 +184,16 @@ TEST_P(StopInEveryState, IsSentToTheDriveAtOnceAndReportedTruly) {
   }
 }
 
+std::string name_of(const testing::TestParamInfo<std::tuple<Situation, By>>& info) {
+  static constexpr const char* kBy[] = {"panel", "api", "command_line"};
+  const auto& [situation, by] = info.param;
+  return std::string(situation.name) + "_by_" + kBy[static_cast<int>(by)];
+}
+
 INSTANTIATE_TEST_SUITE_P(ByPanelApiAndCommandLine, StopInEveryState,
                          testing::Combine(testing::ValuesIn(kSituations),
                                           testing::Values(By::panel, By::api, By::command_line)),
-                         [](const auto& info) {
-                           static constexpr const char* kBy[] = {"panel", "api", "command_line"};
-                           return std::string(std::get<0>(info.param).name) + "_by_" +
-                                  kBy[static_cast<int>(std::get<1>(info.param))];
-                         });
+                         name_of);
 
 }  // namespace
 }  // namespace scanrig

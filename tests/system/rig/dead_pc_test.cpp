@@ -22,7 +22,7 @@ class DeadPc : public RigOnWires {
     daemon_->signal(SIGKILL);
     daemon_->wait();
     const double killed = truth()["angle_deg"];
-    EXPECT_TRUE(soon([&] { return truth().value("standing", false); }));
+    EXPECT_TRUE(soon([&] { return truth().value("stopped", false); }));
     return std::abs(truth()["angle_deg"].get<double>() - killed);
   }
 };
