@@ -20,7 +20,7 @@ constexpr const char* kWarning = "The table is going to turn. Is everyone clear?
 
 std::string_view word(TurntableStatus::Motion motion) {
   switch (motion) {
-    case TurntableStatus::Motion::stopped: return "standing";
+    case TurntableStatus::Motion::stopped: return "stopped";
     case TurntableStatus::Motion::moving: return "moving";
     case TurntableStatus::Motion::unknown: break;
   }

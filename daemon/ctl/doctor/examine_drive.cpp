@@ -90,7 +90,7 @@ void tell_registers(ModbusDrive& drive, const ModbusTurntableOptions& options, C
   const auto pulses = drive.read_pulses_per_motor_rev(Deadline::after(clock, kAskLimit));
   if (state) {
     report.note(fmt::format("position {} pulses, {}, {}, {}", state->position, state->enabled ? "enabled" : "off",
-                            state->running ? "running" : "standing", state->homed ? "homed" : "no home"));
+                            state->running ? "running" : "stopped", state->homed ? "homed" : "no home"));
   }
   if (alarm && !alarm->empty()) {
     report.find("drive_alarm", fmt::format("The drive reports an alarm: {}.", *alarm),

@@ -201,7 +201,7 @@ TEST_P(TimeoutDrives, ATableWhoseCommanderIsGoneStopsByItself) {
     options.speed = {20};
   });
   const double begin = bench_->seen_deg();
-  bench_->when_moving([&] { bench_->server().inject({.kind = WireFault::Kind::deaf}); });  // nothing arrives any more
+  bench_->when_moving([&] { bench_->server().inject({.kind = WireFault::Kind::request_lost}); });  // nothing arrives any more
   EXPECT_FALSE(rotate_to(170));
   const auto by = within(milliseconds(20'000));
   while (bench_->seen_moving() && !by.expired(bench_->clock())) bench_->clock().sleep_for(milliseconds(5));

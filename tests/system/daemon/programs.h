@@ -59,7 +59,7 @@ class Programs : public scan_samples::FolderTest {
     RealClock clock;
     for (const auto end = Deadline::after(clock, kSlowness * std::chrono::minutes(2)); !end.expired(clock);
          clock.sleep_for(std::chrono::milliseconds(20))) {
-      const auto answer = ctl::ask(socket(), "GET", "/api/v1/" + target);
+      const auto answer = ctl::send_request(socket(), "GET", "/api/v1/" + target);
       if (answer && wanted(*answer)) return *answer;
     }
     ADD_FAILURE() << target << " never became as wanted; the daemon said: " << *read_file(folder_ / "daemon.log");
@@ -70,7 +70,7 @@ class Programs : public scan_samples::FolderTest {
     const auto jobs = ask_until("jobs", [&](const json& answer) {
       return !answer["jobs"].empty() && answer["jobs"][0]["stored"].get<int>() >= views;
     });
-    const auto answer = ctl::ask(socket(), "GET", "/api/v1/jobs/" + jobs["jobs"][0]["id"].get<std::string>());
+    const auto answer = ctl::send_request(socket(), "GET", "/api/v1/jobs/" + jobs["jobs"][0]["id"].get<std::string>());
     return answer ? *answer : json();
   }
   static void expect_readable(const json& job) {

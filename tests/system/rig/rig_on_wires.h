@@ -75,7 +75,7 @@ class RigOnWires : public testing::Test {
     return false;
   }
   json ask(const std::string& target) {
-    const auto answer = ctl::ask(folder_ / "api.sock", "GET", "/api/v1/" + target);
+    const auto answer = ctl::send_request(folder_ / "api.sock", "GET", "/api/v1/" + target);
     return answer ? *answer : json::object();
   }
   std::string machine() { return ask("status").value("machine", ""); }

@@ -39,7 +39,7 @@ TEST_F(RigOnWires, TheTurntableIsMovedOnlyByConsentAndWhileNoDaemonHasIt) {
   EXPECT_EQ(scanrig({"turntable", "read", "--json"}), 0);
   EXPECT_NEAR(json::parse(output_)["angle_deg"], 90, 0.02);
   EXPECT_EQ(scanrig({"turntable", "status"}), 0);
-  EXPECT_THAT(output_, HasSubstr("standing"));
+  EXPECT_THAT(output_, HasSubstr("motion: stopped"));
   EXPECT_EQ(scanrig({"panel", "watch", "--seconds", "1"}), 0);
   EXPECT_THAT(output_, HasSubstr("e-stop ok"));
 

@@ -193,14 +193,14 @@ TEST_F(MakeSafe, ASilentDriveIsToldToStopAndIsNotCalledStopped) {
 
 TEST_F(MakeSafe, AbsentCamerasLeaveTheRestRunningAndShown) {
   boot();
-  const auto status = ctl::ask(rig.api(), "GET", "/api/v1/status");
+  const auto status = ctl::send_request(rig.api(), "GET", "/api/v1/status");
   ASSERT_TRUE(status);
   rig.press("RESET");
   ASSERT_TRUE(rig.wait_ready()) << "homed without cameras";
   rig.press("START");
   nlohmann::json devices;
   ASSERT_TRUE(rig.wait_for([&] {
-    devices = (*ctl::ask(rig.api(), "GET", "/api/v1/status"))["devices"];
+    devices = (*ctl::send_request(rig.api(), "GET", "/api/v1/status"))["devices"];
     const auto ok = [&](int i) { return devices[i]["ok"].get<bool>(); };
     return devices.size() == 4 && ok(0) && ok(1) && ok(3);  // one that was slow to answer is asked again
   }));
@@ -213,7 +213,7 @@ TEST_F(MakeSafe, AbsentCamerasLeaveTheRestRunningAndShown) {
 TEST_F(MakeSafe, MaintenanceThroughTheApiHomesJogsAndLeavesTheTableUnhomed) {
   boot();
   const auto post = [&](const std::string& what, const std::string& body = "") {
-    const auto answer = ctl::ask(rig.api(), "POST", "/api/v1/maintenance/" + what, body);
+    const auto answer = ctl::send_request(rig.api(), "POST", "/api/v1/maintenance/" + what, body);
     return answer ? std::string() : answer.error().message;
   };
   EXPECT_THAT(post("jog", R"({"by_deg": 5})"), HasSubstr("off"));
@@ -222,7 +222,7 @@ TEST_F(MakeSafe, MaintenanceThroughTheApiHomesJogsAndLeavesTheTableUnhomed) {
   EXPECT_THAT(post("dance"), HasSubstr("nothing of that name"));
   EXPECT_THAT(post("home"), HasSubstr("panel"));
   rig.press("RESET");
-  const auto activity = [&] { return (*ctl::ask(rig.api(), "GET", "/api/v1/status"))["activity"]; };
+  const auto activity = [&] { return (*ctl::send_request(rig.api(), "GET", "/api/v1/status"))["activity"]; };
   ASSERT_TRUE(rig.wait_for([&] { return activity() == "homing"; }));
   ASSERT_TRUE(rig.wait_for([&] { return activity() == "none"; }));
   EXPECT_EQ(post("jog", R"({"by_deg": -10, "speed_deg_s": 5})"), "");
@@ -234,10 +234,10 @@ TEST_F(MakeSafe, MaintenanceThroughTheApiHomesJogsAndLeavesTheTableUnhomed) {
   EXPECT_NEAR(std::remainder(rig.drive.truth().table_deg, 360.0), -10.0, 0.3);
   EXPECT_LT(fastest, 5.5);
   EXPECT_EQ(post("pulse"), "");
-  EXPECT_TRUE((*ctl::ask(rig.api(), "GET", "/api/v1/io"))["inputs"]["estop_ok"]);
+  EXPECT_TRUE((*ctl::send_request(rig.api(), "GET", "/api/v1/io"))["inputs"]["estop_ok"]);
   ASSERT_TRUE(rig.wait_for([&] { return activity() == "none"; }));
   EXPECT_EQ(post("off"), "");
-  EXPECT_EQ((*ctl::ask(rig.api(), "GET", "/api/v1/status"))["machine"], "Halted");
+  EXPECT_EQ((*ctl::send_request(rig.api(), "GET", "/api/v1/status"))["machine"], "Halted");
 }
 
 }  // namespace

@@ -133,7 +133,7 @@ TEST_F(ToolRules, AToolWhoseGuardianIsKilledStopsTheTable) {
 TEST_F(ToolRules, ADriveThatDoesNotRespondIsNotCalledStoppedAndGetsStopUntilItResponds) {
   bench.start(kHome);
   ASSERT_TRUE(rig.wait_moving());
-  rig.serial->inject({sim::wire::WireFault::Kind::deaf});
+  rig.serial->inject({sim::wire::WireFault::Kind::request_lost});
   ASSERT_TRUE(rig.wait_for([&] { return bench.output().find("Keep clear") != std::string::npos; })) << bench.output();
   rig.serial->clear_faults();
   const auto back = rig.clock.now();

@@ -154,7 +154,7 @@ TEST_F(JobStoreTest, AJobThatTookTwoDaemonsWithItIsInQuarantineWithItsImages) {
 TEST_F(JobStoreTest, AnOrderOfVersion1IsRead) {
   const auto store = open();
   ASSERT_TRUE(store.create("job", JobFile{.part = "4711", .place = 7}));
-  ASSERT_TRUE(write_file_atomically(root_ / "job" / "job.json", R"({
+  ASSERT_TRUE(write_file_atomically(options.root / "job" / "job.json", R"({
     "format": "scanrig-job", "version": 1, "part": "4711", "place": 7, "exported": false,
     "recipe": { "name": "small", "poses": 1, "views": 5, "flip_timeout_min": 30, "flip_by_line": true,
                 "start_on_part": false, "limits": { "least_measured_share": 0.9, "most_residual_mm": 0.05 } } })"));
