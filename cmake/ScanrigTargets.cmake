@@ -18,7 +18,7 @@ add_compile_options(-pthread)  # for all alike, or a precompiled header does not
 add_library(scanrig_warnings INTERFACE)
 target_compile_options(scanrig_warnings INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
                                                   -Wnon-virtual-dtor -Wold-style-cast)
-# Same bits on every dispatch level: no contraction of a*b+c behind our back.
+# Same bits on every dispatch level: the compiler must not contract a*b+c.
 target_compile_options(scanrig_warnings INTERFACE -ffp-contract=off)
 if(SCANRIG_SANITIZE)
   add_compile_options(-fsanitize=${SCANRIG_SANITIZE} -fno-omit-frame-pointer)
@@ -31,7 +31,7 @@ if(NOT CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
   set(SCANRIG_PRECOMPILE OFF)
 endif()
 if(SCANRIG_PRECOMPILE AND SCANRIG_CCACHE)
-  add_compile_options(-fpch-preprocess)  # what ccache needs to see through it
+  add_compile_options(-fpch-preprocess)  # ccache needs this option with a precompiled header
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${SCANRIG_CCACHE})
 endif()
 
@@ -52,7 +52,7 @@ function(scanrig_use_precompiled target name)
   endif()
 endfunction()
 
-# What reads or writes JSON, by the libraries it links, has that header precompiled too.
+# Targets whose libraries read or write JSON have the JSON header precompiled, too.
 function(scanrig_use_precompiled_for target)
   if("nlohmann_json::nlohmann_json" IN_LIST ARGN)
     scanrig_use_precompiled(${target} scanrig_precompiled_json_headers)
@@ -86,7 +86,7 @@ function(scanrig_program name)
   scanrig_use_precompiled_for(${name} ${ARG_LINK})
 endfunction()
 
-# The seconds that a test may take, and what may take longest begins first; under a sanitizer everything is several
+# Time-out of a test in seconds; the test that may take longest starts first. Under a sanitizer everything is several
 # times slower.
 function(scanrig_time_limit test seconds)
   if(SCANRIG_SANITIZE)
@@ -95,12 +95,12 @@ function(scanrig_time_limit test seconds)
   set_tests_properties(${test} PROPERTIES TIMEOUT ${seconds} COST ${seconds})
 endfunction()
 
-# A test's own code is not optimised: that costs the compiler half its time. Where it renders or computes, it is.
+# Test code is not optimised: that would take half of the compile time. Tests that render or compute are optimised.
 set(SCANRIG_QUICK_TO_COMPILE -O0)
 set(SCANRIG_TESTS_THAT_COMPUTE "/tests/(unit|component)/(core|pipeline|sim|reconstruct|movement)(/|$)")
 
 # scanrig_test(NAME LABEL unit|component|system SOURCES a_test.cpp ... LINK libs [TIMEOUT seconds] [REAL_TIME])
-# REAL_TIME: it holds deadlines of tens of milliseconds against a wire; nothing else runs beside it.
+# REAL_TIME: the test has deadlines of tens of milliseconds on a wire; no other test runs at the same time.
 function(scanrig_test name)
   cmake_parse_arguments(ARG "REAL_TIME" "LABEL;TIMEOUT" "SOURCES;LINK" ${ARGN})
   if(NOT ARG_TIMEOUT)

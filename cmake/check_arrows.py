@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks which folder may include which: the arrows of docs/reference/architecture.md.
 
-Usage: check_arrows.py ROOT. Prints one line a forbidden include and exits 1 if there is any.
+Usage: check_arrows.py ROOT. Prints one line per forbidden include and exits 1 if there is any.
 """
 import pathlib
 import re
@@ -27,7 +27,7 @@ ALLOWED = {
 # Leaves of the pipeline, lowest first: a leaf may include those before it.
 PIPELINE_ORDER = ["calibration", "silhouette", "movement", "range", "registration", "mesh", "volume", "pose", "texture",
                   "model_io", "storage", "importers", "reconstruct", "evaluate"]
-# Rooms of the daemon, and which others each may include.
+# Folders of the daemon, and which others each may include.
 DAEMON_ROOMS = {
     "runtime": set(),
     "station": {"runtime"},
@@ -48,7 +48,7 @@ def room(path):
 
 
 def forbidden(source, target):
-    """Why `source` may not include `target`, or None."""
+    """Reason why `source` may not include `target`, or None."""
     here, there = room(source), target.split("/")[0]
     if there not in FOLDERS:
         return "an include starts at the repository root"

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks the documents: what they cite exists, and they stay short and in the glossary's words.
+"""Checks the documents: their citations exist, and they stay short and in the glossary's words.
 
 Usage: check_docs.py ROOT. Prints one line per finding and exits 1 if there is any.
 """
@@ -30,7 +30,7 @@ LIST_ITEM = re.compile(r"^\s*([-*]|\d+\.)\s")
 
 
 class Tree:
-    """The files of a repository: git's list, or where there is none what lies in its folders."""
+    """Files of a repository: git's list, or without git the files in its folders."""
 
     def __init__(self, root):
         self.root = root
@@ -60,7 +60,7 @@ def is_leaf(document):
 
 
 def without_fences(lines):
-    """(number, line) of what is not inside a code fence."""
+    """(number, line) of each line outside code fences."""
     inside = False
     for number, line in enumerate(lines, 1):
         if FENCE.match(line):
@@ -86,7 +86,7 @@ def paragraphs(lines):
 
 
 def missing(tree, document, line):
-    """What `line` of `document` cites and the tree does not have."""
+    """Citations in `line` of `document` that the tree does not have."""
     folder = pathlib.PurePosixPath(document).parent
     for target in LINK.findall(line):
         if re.match(r"[a-z]+:|#", target):
@@ -125,7 +125,7 @@ def check_document(tree, document):
 
 
 def check_code(tree, name):
-    """Documents that comments and texts of programs cite; one without a folder only in a comment."""
+    """Documents that comments and texts of programs cite; a name without a folder counts only in a comment."""
     for number, line in enumerate((tree.root / name).read_text(errors="replace").splitlines(), 1):
         comment = COMMENT.search(line)
         for target in DOCUMENT.findall(line):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks that no word of cmake/words.txt is written any more: old names and words that a reader may misread.
+"""Checks that no term of cmake/words.txt is in use: old names, and words that a reader may misread.
 
 Usage: check_words.py ROOT [TABLE]. Prints `file:line: term -> use X` and exits 1 if there is any.
 """
@@ -13,7 +13,7 @@ CODE, COMMENT, STRING = "code", "comment", "string"
 CPP, MARKDOWN = {".h", ".cpp"}, {".md"}
 HASH = {".toml", ".cmake", ".txt", ".in", ".service", ".socket", ".rules", ".yml", ""}
 SUFFIXES = CPP | MARKDOWN | HASH | {".py"}
-LEFT_OUT = {"build", "out"}  # of ROOT; and what begins with a dot
+LEFT_OUT = {"build", "out"}  # folders of ROOT; names that start with a dot are left out, too
 TEST_FOLDERS = ("tests/unit/", "tests/component/", "tests/system/", "tests/bench/", "tests/fuzz/")
 MARK = re.compile(r"\b(old names?|alias(es)?)\b")
 KINDS = {"text": {COMMENT, STRING}, "strings": {STRING}, "sentences": {STRING}, "names": {CODE}, "files": set()}
@@ -30,7 +30,7 @@ class Rule:
         self.kind, self.folders, self.use = kind, folders, use
         self.public = term.startswith("!")
         self.term = term.lstrip("!")
-        self.piece = max(re.findall(r"\w+", self.term), key=len).lower()  # without it in a file there is no hit
+        self.piece = max(re.findall(r"\w+", self.term), key=len).lower()  # a file without it has no hit
         escaped = re.escape(self.term).replace(r"\*", r"\w*").replace(r"\ ", r"\s+")
         word_at_start, word_at_end = (re.match(r"[\w*]", self.term[at]) for at in (0, -1))
         if kind == "sentences":
@@ -57,7 +57,7 @@ def within(path, folder):
 
 
 class Table:
-    """What words.txt holds: rules, and paths with aliases or to be skipped, each with its reason."""
+    """Content of words.txt: rules, and paths with aliases or to be skipped, each with its reason."""
 
     def __init__(self, text):
         self.rules, self.aliases, self.skipped = [], {}, {}
@@ -82,7 +82,7 @@ class Table:
 
 
 def parts_by(pattern, text):
-    """(kind, where it begins, text) of code, comments and strings, in order."""
+    """(kind, start, text) of code, comments and strings, in order."""
     at = 0
     for match in pattern.finditer(text):
         yield CODE, at, text[at:match.start()]
@@ -115,7 +115,7 @@ def python_parts(text):
 
 
 def markdown_parts(text):
-    """What stands between backticks is code and may be quoted text; the rest is text."""
+    """Text between backticks is code and may be quoted text; the rest is text."""
     at = 0
     for match in MARKDOWN_PART.finditer(text):
         yield COMMENT, at, text[at:match.start()]

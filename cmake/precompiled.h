@@ -1,6 +1,6 @@
 #pragma once
 
-// The headers that cost the compiler most in this project, measured over a whole build. Sources still include what
+// The headers with the highest compile time in this project, measured over a whole build. Sources still include what
 // they use: the fuzz preset (clang) and ./dev lint --tidy compile without this file.
 
 #include <fmt/format.h>

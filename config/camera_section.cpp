@@ -15,20 +15,20 @@ std::vector<Choice<std::string>> choices(std::initializer_list<const char*> name
   return all;
 }
 
-/// What AravisSensor reads, by its SFNC name.
+/// Pixel formats that AravisSensor reads, by SFNC name.
 std::vector<Choice<std::string>> aravis_formats() {
   return choices({"Mono8",     "Mono10",   "Mono12",    "Mono14",    "Mono16",    "BayerRG8", "BayerRG10", "BayerRG12",
                   "BayerRG16", "BayerGR8", "BayerGR10", "BayerGR12", "BayerGR16", "BayerGB8", "BayerGB10", "BayerGB12",
                   "BayerGB16", "BayerBG8", "BayerBG10", "BayerBG12", "BayerBG16", "RGB8",     "BGR8",      "YUV422_8"});
 }
 
-/// What V4l2Sensor reads, by its four characters.
+/// Pixel formats that V4l2Sensor reads, by their four characters.
 std::vector<Choice<std::string>> v4l2_formats() {
   return choices({"GREY", "Y10", "Y12", "Y16", "YUYV", "RGB3", "BGR3", "RGGB", "GRBG", "GBRG", "BA81", "RG10", "BA10",
                   "GB10", "BG10", "MJPG"});
 }
 
-/// The object is cut out before its blue screen by colour; nothing else finds its outline yet.
+/// Colour is required: the object is separated from its blue screen by colour. No other outline detection exists yet.
 void expect_colour(Section& s, const std::string& format, std::string_view such_as) {
   const bool grey = format.starts_with("Mono") || format == "GREY" || format.starts_with("Y1");
   if (!grey) return;
@@ -36,7 +36,7 @@ void expect_colour(Section& s, const std::string& format, std::string_view such_
            fmt::format("{} is grey, and the blue screen needs a colour format, such as {}", format, such_as));
 }
 
-/// No frame comes before its exposure is over.
+/// A frame arrives only after its exposure has ended.
 void expect_longer(Section& s, std::chrono::milliseconds timeout, std::chrono::microseconds exposure) {
   if (timeout > exposure) return;
   s.report("frame_timeout_ms",
@@ -97,7 +97,7 @@ void read_v4l2_sensor(Section& section, std::string_view key, V4l2SensorOptions&
   });
 }
 
-/// { 0x009A0901 = 1 }: controls of the maker's own, by the number that `v4l2-ctl -L` shows.
+/// { 0x009A0901 = 1 }: vendor controls, by the number that `v4l2-ctl -L` shows.
 void read_controls(Section& s, std::map<std::uint32_t, int>& controls) {
   for (const std::string& key : s.free_keys()) {
     std::uint32_t id = 0;

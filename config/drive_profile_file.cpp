@@ -47,7 +47,7 @@ struct WordName {
   bool high;
 };
 
-/// A value of 16 bits, or either half of one of 32.
+/// A 16-bit value, or either half of a 32-bit value.
 const std::vector<WordName>& word_names() {
   using Word = DriveProfile::Block::Word;
   static const std::vector<WordName> names{{"position_high", Word::position, true},
@@ -80,7 +80,7 @@ void read_block(Section& s, DriveProfile::Block& block) {
   });
 }
 
-/// A move says everything once: a position, and how fast.
+/// A move contains each value once: a position and a speed.
 void read_move(Section& s, DriveProfile::Block& move) {
   using Word = DriveProfile::Block::Word;
   read_block(s, move);
@@ -157,7 +157,7 @@ void read_alarm(Section& s, DriveProfile::Alarm& alarm) {
   });
 }
 
-/// Shorter, a line with faults would trip it; longer, it would stop nothing that does not end by itself.
+/// A shorter one would trip on a line with faults. A longer one would stop only motions that end on their own anyway.
 void read_communication_timeout(Section& s, DriveProfile::CommunicationTimeout& timeout) {
   s.number("register", timeout.address, kWord);
   s.number("timeout_ms", timeout.timeout, {500, 10'000});

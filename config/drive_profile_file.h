@@ -14,7 +14,7 @@ namespace scanrig::config {
 /// with file and line).
 Result<DriveProfile> read_drive_profile(const std::filesystem::path& file);
 
-/// The same of its text; `file` is only named. Warnings are added to `warnings`. Fails with `invalid_input`.
+/// Reads a profile from its text; `file` is only a name. Warnings go to `warnings`. Fails with `invalid_input`.
 Result<DriveProfile> parse_drive_profile(std::string_view text, const std::filesystem::path& file,
                                          std::vector<std::string>& warnings);
 

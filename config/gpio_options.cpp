@@ -29,7 +29,7 @@ gpio::LineSpec line_spec(const Pin& pin) {
           .offset = static_cast<unsigned>(pin.offset)};
 }
 
-/// Every wired signal at its place, as `wiring` of the driver at hand has it.
+/// Every wired signal at its place, as `wiring` of the driver requires.
 template <class Options, class Wiring>
 Options panel_options(const RigConfig& rig, const Wiring& wiring) {
   Options options;

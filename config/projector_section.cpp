@@ -12,7 +12,7 @@ void expect_as_long_as(std::chrono::microseconds exposure, std::string_view key,
            fmt::format("{} is shorter than the exposure_us of {} in [stereo_camera]", light.count(), exposure.count()));
 }
 
-/// Of both lines.
+/// Reads polarity and pulse of both lines.
 void read_pulse(Section& s, std::chrono::microseconds exposure, ProjectorConfig& projector) {
   if (s.has("active")) s.choice<bool>("active", projector.line.active_low, {{"low", true}, {"high", false}});
   if (projector.plain_line) projector.plain_line->active_low = projector.line.active_low;

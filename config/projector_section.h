@@ -5,7 +5,7 @@
 
 namespace scanrig::config {
 
-/// [projector]; its light is to last at least the cameras' `exposure`.
+/// [projector]; its light must last at least the cameras' `exposure`.
 void read_projector(Section& s, std::chrono::microseconds exposure, ProjectorConfig& projector);
 
 /// Rules between [projector] and the rest of a whole rig, whose [panel] has been read.

@@ -56,7 +56,7 @@ void read_panel(Section& s, PanelConfig& panel) {
   report_shared(s, panel.outputs, {});
 }
 
-/// Without these no job could ever begin, or a fault would stay unseen.
+/// Without these no job could start, or a fault would not be noticed.
 void check_can_operate(Section& s, const PanelConfig& panel) {
   if (!panel.inputs.contains("reset")) {
     s.report("reset", "missing: the table is homed, and a fault cleared, by Reset only; name its input");
@@ -75,7 +75,7 @@ void read_limits(Section& s, RecipeConfig& recipe) {
   if (s.has("max_residual_mm")) s.number("max_residual_mm", recipe.max_residual_mm.emplace(), {0.001, 10});
 }
 
-/// What begins by a signal begins without a person: nobody may be able to reach the table then.
+/// A start by signal needs no person. No person may be able to reach the table then.
 void expect_guard(Section& s, const RigConfig& rig, std::string_view key, std::string_view value) {
   if (!rig.safety.guard) s.report(key, fmt::format("\"{}\" needs a guard in [safety]", value));
 }
@@ -192,7 +192,7 @@ void read_safety(Section& root, RigConfig& rig) {
 void read_module_of_projector(Section& root, ProjectorConfig& projector) {
   if (projector.driver != ProjectorConfig::Driver::modbus_io) return;
   root.section("panel", [&](Section& s) {
-    for (const auto& key : s.free_keys()) std::ignore = s.has(key);  // of no concern
+    for (const auto& key : s.free_keys()) std::ignore = s.has(key);  // not checked here
     read_modbus_line(s, projector.io_module);
   });
 }
@@ -258,7 +258,7 @@ Result<RigConfig> read_device_config(SafetyDevice device, const std::filesystem:
   RigConfig rig;
   rig.text = std::move(*text);
   const auto read = read_toml(rig.text, file, [&](Section& root) {
-    for (const auto& key : root.free_keys()) std::ignore = root.has(key);  // known, or of no concern
+    for (const auto& key : root.free_keys()) std::ignore = root.has(key);  // known, or not checked here
     switch (device) {
       case SafetyDevice::turntable:
         return root.section("turntable", [&](Section& s) { read_turntable(s, usual_drives(file), rig.turntable); });

@@ -39,7 +39,7 @@ struct SafetyConfig {
   bool remote_start = false;  ///< only with a guard
 };
 
-/// A file as it was read.
+/// Content of a file when it was read.
 struct SourceFile {
   std::string name;  ///< without its folder
   std::string text;
@@ -64,13 +64,13 @@ struct TurntableConfig {
 struct ProjectorConfig {
   enum class Driver { gpio, modbus_io, lightcrafter4500, manual };
   Driver driver = Driver::gpio;
-  Pin line;                                ///< gpio, modbus_io: fires the dots and both cameras
-  std::optional<Pin> plain_line;           ///< gpio, modbus_io: fires the cameras and even light, without the dots
+  Pin line;                                ///< gpio, modbus_io: fires the pattern and both cameras
+  std::optional<Pin> plain_line;           ///< gpio, modbus_io: fires the cameras and plain light, without the pattern
   modbus::ClientOptions io_module;         ///< modbus_io: the panel's
   std::chrono::microseconds pulse{15000};  ///< gpio, modbus_io: at least the exposure
-  std::string serial;                      ///< lightcrafter4500: empty: the only one there is
+  std::string serial;                      ///< lightcrafter4500: empty: the only one connected
   LightCrafterOptions lightcrafter;
-  std::chrono::seconds warm_up{600};  ///< no job begins by itself before it has been there for so long
+  std::chrono::seconds warm_up{600};  ///< a job starts automatically only after the projector was connected this long
 };
 
 struct StereoCameraConfig {
@@ -78,7 +78,7 @@ struct StereoCameraConfig {
   Driver driver = Driver::aravis;
   AravisOptions aravis;
   V4l2Options v4l2;             ///< with `right` for v4l2, without for v4l2-side-by-side
-  std::filesystem::path truth;  ///< simulated: the control socket that tells where the table is
+  std::filesystem::path truth;  ///< simulated: the control socket that returns the position of the table
   std::chrono::microseconds exposure{12000};
 };
 
@@ -87,7 +87,7 @@ struct PanelConfig {
   Driver driver = Driver::gpio;
   modbus::ClientOptions io_module;     ///< modbus_io
   std::chrono::milliseconds poll{20};  ///< modbus_io
-  std::map<std::string, Pin> inputs;   ///< by the names of PanelInputs; `start` is always there
+  std::map<std::string, Pin> inputs;   ///< by the names of PanelInputs; always includes `start`
   std::map<std::string, Pin> outputs;  ///< by their keys, such as lamp_green
 };
 
@@ -103,12 +103,12 @@ struct RecipeConfig {
   std::optional<double> max_residual_mm;
 };
 
-/// Minutes of the day; over midnight where `from` is the later one.
+/// Minutes of the day; if `from` is later than `to`, over midnight.
 struct QuietHoursConfig {
   std::chrono::minutes from{}, to{};
 };
 
-/// Whom a failed job is told: `http://HOST[:PORT]/PATH`.
+/// Receiver of reports about failed jobs: `http://HOST[:PORT]/PATH`.
 struct WebhookConfig {
   std::string host, port, path;
 };
@@ -116,7 +116,7 @@ struct WebhookConfig {
 struct StorageConfig {
   std::filesystem::path root;
   double reserve_gib = 20;
-  std::optional<std::chrono::days> keep_days;  ///< then ended jobs are removed
+  std::optional<std::chrono::days> keep_days;  ///< then ended jobs are deleted
   std::optional<double> keep_gib;              ///< of all jobs
 };
 
@@ -132,13 +132,13 @@ struct ApiConfig {
   std::filesystem::path socket;
   std::optional<int> http_port;  ///< TCP; every request over it needs a token
   std::string http_address = "127.0.0.1";
-  std::filesystem::path tokens;  ///< the file of tokens; empty: there are none
-  std::string proxy;             ///< the reverse proxy in front: its address, or "unix:USER"; empty: none
-  /// Groups of local users by what they may do over the socket. Without any, the daemon's own group operates.
+  std::filesystem::path tokens;  ///< the file of tokens; empty: no tokens
+  std::string proxy;             ///< address of the reverse proxy in front, or "unix:USER"; empty: no proxy
+  /// Groups of local users by what they may do over the socket. Without groups, the daemon's own group may operate.
   std::optional<std::string> viewer_group, operator_group, engineer_group;
 };
 
-/// rig.toml, checked; relative paths are made relative to the file's folder.
+/// Checked content of rig.toml; relative paths start at the file's folder.
 struct RigConfig {
   std::string text;                   ///< of the file
   std::vector<std::string> warnings;  ///< "FILE:LINE: [table] key: ...", about keys under their old names
@@ -148,7 +148,7 @@ struct RigConfig {
   StereoCameraConfig stereo_camera;
   PanelConfig panel;
   std::filesystem::path calibration_file;
-  std::map<std::string, RecipeConfig> recipes;  ///< `default` is always there
+  std::map<std::string, RecipeConfig> recipes;  ///< always includes `default`
   StorageConfig storage;
   ReconstructionConfig reconstruction;
   std::optional<QuietHoursConfig> quiet_hours;
@@ -157,7 +157,7 @@ struct RigConfig {
   std::optional<std::filesystem::path> gpio_socket;  ///< tests only: GPIO lines behind a socket instead of chips
 };
 
-/// Simulated cameras are for scanrigd-sim: to any other program they are not a known driver.
+/// Simulated cameras are for scanrigd-sim: all other programs reject them as an unknown driver.
 enum class Cameras { real, or_simulated };
 
 /// Drive profiles are looked for in `drives`; by default in `drives` beside the file, in `../drives`, and in
@@ -166,10 +166,10 @@ enum class Cameras { real, or_simulated };
 Result<RigConfig> read_rig_config(const std::filesystem::path& file, const std::filesystem::path& drives = {},
                                   Cameras cameras = Cameras::real);
 
-/// What has to be made safe when nobody controls the rig.
+/// Devices that make-safe switches off when no program controls the rig.
 enum class SafetyDevice { turntable, projector, panel };
 
-/// Of the same file only what `device` needs, whatever is wrong with the rest; all else is left as it is by default.
+/// Reads only what `device` needs, whatever is wrong with the rest; everything else keeps its default.
 /// Relative paths start at `base`. Fails as read_rig_config().
 Result<RigConfig> read_device_config(SafetyDevice device, const std::filesystem::path& file,
                                      const std::filesystem::path& base);

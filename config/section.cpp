@@ -8,7 +8,7 @@ namespace scanrig::config {
 namespace {
 
 constexpr std::size_t kMaxProblems = 20;
-/// Every dot of a key opens a table in a table, and toml++ takes those down by recursion: 100 000 deep are too many for
+/// Every dot of a key opens a table in a table, and toml++ destroys those by recursion: 100 000 levels are too many for
 /// a stack of 8 MiB.
 constexpr std::size_t kMaxBytes = 64 * 1024;
 
@@ -40,7 +40,7 @@ const toml::node* Section::get(std::string_view key) const {
 }
 
 void Section::accept_old_name(std::string_view key, std::string_view old_key) {
-  if (!table_.contains(old_key) || table_.contains(key)) return;  // with both, the old one is an unknown key
+  if (!table_.contains(old_key) || table_.contains(key)) return;  // with both, the old key is reported as unknown
   known_.emplace(old_key);
   old_names_.emplace(key, old_key);
   warn(old_key, fmt::format("this key is called {} now; the next version refuses the old name", key));

@@ -19,12 +19,12 @@
 
 namespace scanrig::config {
 
-/// All problems of one file, reported at once and in the order of its lines.
+/// Collects all problems of one file, reported together and in the order of its lines.
 class Problems {
  public:
   explicit Problems(std::string file) : file_(std::move(file)) {}
   void add(int line, std::string text) { found_.emplace_back(line, std::move(text)); }
-  /// "FILE:LINE: text", for what is accepted but ought to be changed.
+  /// "FILE:LINE: text", for accepted content that should be changed.
   void warn(int line, std::string_view text) { warnings_.push_back(fmt::format("{}:{}: {}", file_, line, text)); }
   [[nodiscard]] std::size_t count() const { return found_.size(); }
   [[nodiscard]] std::vector<std::string> warnings() const { return warnings_; }
@@ -47,8 +47,8 @@ struct Choice {
   T value;
 };
 
-/// One table of a file. Each reader takes a key that must be there, checks its value and stores it; what does not fit
-/// is reported and leaves the variable as it was. Keys nobody asked for are unknown keys.
+/// One table of a file. Each reader takes a required key, checks its value and stores it. A value that does not fit is
+/// reported and leaves the variable unchanged. Keys that no reader takes are reported as unknown.
 class Section {
  public:
   Section(const toml::table& table, std::string name, std::string prefix, Problems& problems)
@@ -94,7 +94,7 @@ class Section {
     }
     report(key, fmt::format("{} is not one of {}", *found, fmt::join(allowed, ", ")));
   }
-  /// Whether it is one of them.
+  /// True if it is one of them.
   template <class T>
   bool choice(std::string_view key, T& value, const std::vector<Choice<T>>& allowed) {
     std::string name;
@@ -112,20 +112,20 @@ class Section {
     return false;
   }
 
-  /// From now on `key` may also be spelt `old_key`, its name in the version before: accepted with a warning.
+  /// Also accepts `old_key` for `key` from now on, its name in the version before, with a warning.
   void accept_old_name(std::string_view key, std::string_view old_key);
-  /// The same for one value of a text.
+  /// Also accepts one old value of a text.
   void accept_old_value(std::string_view key, std::string_view value, std::string_view old_value);
-  /// Whether an optional key is there; from then on the key is known.
+  /// True if the file has an optional key; from then on the key counts as known.
   [[nodiscard]] bool has(std::string_view key);
   [[nodiscard]] bool is_table(std::string_view key) const { return table_.get(key) && table_.get(key)->is_table(); }
   void section(std::string_view key, const std::function<void(Section&)>& read);
-  /// Each value of an array: an integer or a text.
+  /// Reads each value of an array: an integer or a text.
   void items(std::string_view key, const std::function<void(std::optional<std::int64_t>, std::string_view)>& read);
-  /// The keys of a table whose names are free.
+  /// Keys of a table whose names are free.
   [[nodiscard]] std::vector<std::string> free_keys() const;
 
-  /// Nothing was wrong in this table so far: rules between its keys can be checked.
+  /// True if this table had no problem so far: rules between its keys can be checked.
   [[nodiscard]] bool sound() const { return problems_.count() == problems_before_; }
   void report(std::string_view key, std::string_view problem);
   void warn(std::string_view key, std::string_view warning);
@@ -139,13 +139,13 @@ class Section {
   bool within(std::string_view key, double value, Range allowed);
 
   const toml::table& table_;
-  std::string name_;    // of the table in brackets
-  std::string prefix_;  // of the keys of an inline table: "home."
+  std::string name_;    // name of the table in brackets
+  std::string prefix_;  // prefix of the keys of an inline table: "home."
   Problems& problems_;
   std::size_t problems_before_;
   std::set<std::string, std::less<>> known_;
-  std::map<std::string, std::string, std::less<>> old_names_;   // of keys that the file spells so
-  std::map<std::string, std::string, std::less<>> new_values_;  // of keys whose value the file spells as before
+  std::map<std::string, std::string, std::less<>> old_names_;   // keys that the file has under their old name
+  std::map<std::string, std::string, std::less<>> new_values_;  // keys whose value the file has in the old spelling
 };
 
 /// Reads the text of `file` through `read` and returns the warnings. Fails with `invalid_input` with every problem on a

@@ -8,7 +8,7 @@
 namespace scanrig::config {
 namespace {
 
-/// A tolerance finer than this many pulses cannot be told from the drive's own rounding.
+/// A tolerance of fewer pulses cannot be distinguished from the drive's own rounding.
 constexpr double kMinTolerancePulses = 2.0;
 
 void read_profile(Section& s, const std::vector<std::filesystem::path>& folders, TurntableConfig& turntable) {
@@ -48,7 +48,7 @@ void check_against_profile(Section& s, const ModbusTurntableOptions& options) {
   }
 }
 
-/// Three attempts at a request and the quiet line between them: a drive must not stop by itself while they are made.
+/// Three attempts at a request and the silence between them: meanwhile a drive must not stop on its own.
 constexpr int kReplyTimeouts = 20;
 
 void check_reply_timeout(Section& s, const ModbusTurntableOptions& options) {
@@ -78,7 +78,7 @@ void read_soft_limits(Section& s, std::optional<AngleRange>& limits) {
   limits = range;
 }
 
-/// How the table is to be turned, whatever turns it. `modes`: how the drive can home; empty if that is not known.
+/// Motion settings, for every driver. `modes`: how the drive can home; empty if unknown.
 void read_motion(Section& s, const std::vector<std::string>& modes, AxisTurntableOptions& options) {
   s.number("gear_ratio", options.scale.gear_ratio, {0.1, 1000});
   s.choice<bool>("positive", options.scale.positive_ccw, {{"ccw", true}, {"cw", false}});
@@ -114,7 +114,7 @@ void read_modbus(Section& s, const std::vector<std::filesystem::path>& drive_fol
   check_tolerance(s, options);
 }
 
-/// A controller's unit is a degree of its motor, or with gear_ratio = 1 of the table.
+/// A controller's unit is one degree of its motor, or with gear_ratio = 1 one degree of the table.
 void read_grbl(Section& s, GrblTurntableOptions& options) {
   auto& link = options.drive.link;
   s.text("device", link.device);

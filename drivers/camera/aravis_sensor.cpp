@@ -57,14 +57,14 @@ const char* in_words(ArvBufferStatus status) {
 
 using Lost = std::shared_ptr<std::atomic<bool>>;
 
-/// By exchange, so that whoever reads the flag after several marks has seen what each of them did before.
+/// By exchange: a thread that reads the flag after several marks sees everything done before each of them.
 void mark(const Lost& lost) { lost->exchange(true); }
 
 void on_control_lost(ArvDevice*, gpointer lost) { mark(*static_cast<Lost*>(lost)); }
 
 void forget(gpointer lost, GClosure*) {
   const std::unique_ptr<Lost> last(static_cast<Lost*>(lost));
-  std::ignore = (*last)->load();  // what the signal's thread did with it comes before its end
+  std::ignore = (*last)->load();  // the signal's thread finishes with it before this point
 }
 
 /// The name of the device with this serial number, or nothing.
@@ -99,7 +99,7 @@ AravisSensor::AravisSensor(const std::string& side, const AravisSensorOptions& s
 AravisSensor::~AravisSensor() {
   if (!*lost_) stop_stream();
   std::ignore = let_go({clock_.now()});
-  // Nobody waits longer for a device that is gone: the thread owns all it needs.
+  // No caller waits longer for a lost device: the thread owns everything it needs.
   constexpr auto kLastWait = std::chrono::seconds(3);
   if (giving_up_.valid()) giving_up_.wait_for(kLastWait);
 }
@@ -115,13 +115,13 @@ Result<bool> AravisSensor::prepare(Deadline deadline) {
   if (connected) connected = start_stream();
   if (connected) return true;
   mark(lost_);
-  std::ignore = let_go({clock_.now()});  // if that has to wait, the next call does
+  std::ignore = let_go({clock_.now()});  // if it would have to wait, the next call does it
   return pass_on(connected);
 }
 
-/// The library's own heartbeat takes many seconds to give a camera up.
+/// The library's own heartbeat takes many seconds to detect a lost camera.
 void AravisSensor::ask_whether_there() {
-  constexpr auto kSilence = std::chrono::seconds(3);  // longer than a move: while all is well a scan asks nothing
+  constexpr auto kSilence = std::chrono::seconds(3);  // longer than a move: a healthy scan sends no check
   constexpr guint64 kVersion = 0;  // a register every GigE Vision and USB3 Vision device has [GigE Vision 1.2, 28]
   if (!in_doubt_ && clock_.now() - heard_ < kSilence) return;
   const auto asked = attempt_("ask whether it is there", [&](GError** error) {
@@ -143,7 +143,7 @@ Result<void> AravisSensor::connect() {
     }
     device = *found;
   }
-  // A flag for each connection, which the signal owns too: it may come while nobody is left to hear it. It is there
+  // A flag for each connection. The signal owns it too, since it may come after the sensor is gone. The flag exists
   // before the threads that the library starts for the connection and that raise the signal.
   lost_ = std::make_shared<std::atomic<bool>>(false);
   auto flag = std::make_unique<Lost>(lost_);
@@ -176,11 +176,11 @@ Result<void> AravisSensor::start_stream() {
       attempt_("read PayloadSize", [&](GError** error) { payload = arv_camera_get_payload(camera_.get(), error); });
   if (!asked) return asked;
   if (ARV_IS_GV_STREAM(stream_.get())) {
-    // A frame with packets missing is given up early enough to be told from one that never came.
+    // A frame with missing packets is given up early enough to be distinguished from one that never came.
     const auto retention = std::chrono::microseconds(options_.frame_timeout) / 2;
     g_object_set(stream_.get(), "frame-retention", static_cast<guint>(retention.count()), "packet-timeout",
                  static_cast<guint>(retention.count() / 5), nullptr);
-    // A whole frame, with what the kernel adds to it, may wait until this process has the processor.
+    // A whole frame, with the kernel's overhead, may wait until this process gets the processor.
     g_object_set(stream_.get(), "socket-buffer", ARV_GV_STREAM_SOCKET_BUFFER_FIXED, "socket-buffer-size",
                  static_cast<gint>(2 * payload), nullptr);
   }
@@ -196,8 +196,8 @@ void AravisSensor::stop_stream() {
   std::ignore = attempt_("stop", [&](GError** error) { arv_camera_stop_acquisition(camera_.get(), error); });
 }
 
-/// The library takes some ten seconds to give up a device that does not answer: on a thread of its own, one at a time.
-/// Fails with `timeout` while the one before is still being given up.
+/// The library takes some ten seconds to give up a device that does not reply: done on its own thread, one at a time.
+/// Fails with `timeout` while the previous device is still being given up.
 Result<void> AravisSensor::let_go(Deadline deadline) {
   if (!camera_) return {};
   if (giving_up_.valid() && giving_up_.wait_for(deadline.left(clock_)) != std::future_status::ready) {
@@ -268,7 +268,7 @@ Result<void> AravisSensor::listen_to_line(bool line) {
   if (wanted == listens_to_line_) return {};
   auto set = set_trigger_source(camera_.get(), wanted ? options_.trigger_source : "Software", attempt_);
   if (set) listens_to_line_ = wanted;
-  if (!set) mark(lost_);  // what does not answer is connected again
+  if (!set) mark(lost_);  // a device that does not reply is connected again
   return set;
 }
 

@@ -40,7 +40,7 @@ class GenicamCall {
 Result<void> set_up(ArvCamera* camera, const AravisOptions& options, const std::string& address,
                     const GenicamCall& attempt);
 
-/// Whether `line` (or else the software trigger) starts an exposure.
+/// True if `line` (or else the software trigger) starts an exposure.
 Result<void> set_trigger_source(ArvCamera* camera, const std::string& source, const GenicamCall& attempt);
 
 /// One GigE Vision or USB3 Vision camera.
@@ -72,11 +72,11 @@ class AravisSensor final : public Sensor {
   const GenicamCall attempt_;
   GRef<ArvCamera> camera_;
   GRef<ArvStream> stream_;
-  std::future<void> giving_up_;         // ready when the connection lost last is given up
-  std::optional<std::string> finding_;  // about this machine, see host_finding()
+  std::future<void> giving_up_;         // ready when the last lost connection is given up
+  std::optional<std::string> finding_;  // a problem of this machine's settings, see host_finding()
   std::shared_ptr<std::atomic<bool>> lost_ = std::make_shared<std::atomic<bool>>(false);  // a library's thread sets it
-  Clock::TimePoint heard_{};                                                              // the last answer or frame
-  bool in_doubt_ = false;  // a frame was waited for and did not come
+  Clock::TimePoint heard_{};                                                              // of the last reply or frame
+  bool in_doubt_ = false;  // an expected frame did not come
   bool listens_to_line_ = true;
 };
 

@@ -31,7 +31,7 @@ Result<void> set_text(ArvCamera* camera, const char* feature, const std::string&
                  [&](GError** error) { arv_camera_set_string(camera, feature, value.c_str(), error); });
 }
 
-/// Frames come on triggers only, and one kind of trigger only.
+/// Frames come on triggers only, and on one kind of trigger only.
 Result<void> set_up_trigger(ArvCamera* camera, const AravisOptions& options, const GenicamCall& attempt) {
   if (has(camera, "AcquisitionFrameRateEnable")) {
     auto off = attempt("set AcquisitionFrameRateEnable", [&](GError** error) {
@@ -93,7 +93,7 @@ Result<void> set_up_image(ArvCamera* camera, const AravisOptions& options, const
   return {};
 }
 
-/// Largest datagram on the way to `address`, bytes with headers; 0 where it cannot be told.
+/// Largest datagram on the way to `address`, bytes with headers; 0 if unknown.
 int path_mtu(const std::string& address) {
   sockaddr_in peer{};
   peer.sin_family = AF_INET;
@@ -113,7 +113,7 @@ int path_mtu(const std::string& address) {
 Result<void> set_up_packets(ArvCamera* camera, const AravisOptions& options, const std::string& address,
                             const GenicamCall& attempt) {
   if (!arv_camera_is_gv_device(camera)) return {};
-  // A raw packet socket would need a capability the service does not have.
+  // A raw packet socket would need a capability that the service does not have.
   arv_camera_gv_set_stream_options(camera, ARV_GV_STREAM_OPTION_PACKET_SOCKET_DISABLED);
   const int mtu = path_mtu(address);
   if (mtu > 0 && options.packet_bytes > mtu) {
@@ -150,7 +150,7 @@ Result<void> set_up_clock(ArvCamera* camera, const AravisOptions& options, const
   return fail(ErrorCode::unsupported, "{}: the camera has no PTP; use clock = \"interval\"", attempt.who());
 }
 
-/// The first number in a file of the kernel's; nothing if there is none.
+/// First number in a kernel file; nothing if there is none.
 std::optional<std::uint64_t> read_number(const std::string& file) {
   std::ifstream in(file);
   std::uint64_t number = 0;

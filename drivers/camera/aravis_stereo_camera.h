@@ -13,7 +13,7 @@ struct AravisSensorOptions {
   std::string address;  ///< IP address of a GigE camera; empty: looked for by serial number
 };
 
-/// Part of the sensor that is read out, pixels.
+/// Region of the sensor that is read out, pixels.
 struct Region {
   int x = 0, y = 0, width = 0, height = 0;
 };
@@ -26,7 +26,7 @@ struct AravisOptions {
   bool falling_edge = false;
   std::string pixel_format = "Mono8";  ///< Mono8..16, BayerRG8 and its like, RGB8, BGR8, YUV422_8; not packed ones
   std::chrono::microseconds exposure{12000};
-  std::optional<double> gain;    ///< as the camera counts it; empty: as it is
+  std::optional<double> gain;    ///< in the camera's own units; empty: unchanged
   std::optional<Region> region;  ///< empty: the whole sensor
   int packet_bytes = 0;          ///< GigE: with IP and UDP headers, at most the MTU; 0: as large as passes
   std::chrono::microseconds packet_delay{0};
@@ -35,19 +35,19 @@ struct AravisOptions {
   std::chrono::seconds idle_refresh{10};
 };
 
-/// Two cameras that prepare() or arm() connects. See open_aravis() for its errors.
+/// Two cameras, connected by prepare() or arm(). See open_aravis() for its errors.
 std::unique_ptr<SensorCamera> aravis_camera(const AravisOptions& options, Clock& clock);
 
-/// The same, connected and set up. Fails with `not_found` (no such camera), `io`, `timeout`, `invalid_input`
-/// (another serial number, a feature that does not take the value, packets larger than the network passes),
+/// Two cameras, connected and set up. Fails with `not_found` (no such camera), `io`, `timeout`, `invalid_input`
+/// (another serial number, a feature that rejects the value, packets larger than the network passes),
 /// `unsupported` (no trigger, no such pixel format).
 Result<std::unique_ptr<SensorCamera>> open_aravis(const AravisOptions& options, Clock& clock, Deadline deadline);
 
 enum class CameraBus { gige, usb3 };
 
-/// What of this machine's settings would lose frames of `frame_bytes` although the cameras work: a sentence with what
-/// to do, or nothing. Socket buffers for GigE, usbfs memory for USB3; read from /proc and /sys below `root`. An error
-/// about a torn frame says it too.
+/// Setting of this machine that would lose frames of `frame_bytes` although the cameras work: a sentence with the
+/// remedy, or nothing. Checks socket buffers for GigE, usbfs memory for USB3, in /proc and /sys below `root`. An error
+/// about a torn frame includes the sentence.
 std::optional<std::string> host_finding(CameraBus bus, std::size_t frame_bytes, const std::string& root = "");
 
 }  // namespace scanrig

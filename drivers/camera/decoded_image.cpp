@@ -18,7 +18,7 @@ int channels(Layout layout) {
   }
 }
 
-/// From what the camera's colour layout is called here to BGR; nothing for layouts that stay as they are.
+/// Conversion from the camera's colour layout to BGR; nothing for layouts that are kept.
 /// OpenCV names a Bayer pattern by the pixels at (1,1) and (1,2).
 std::optional<int> to_bgr(Layout layout) {
   switch (layout) {

@@ -6,12 +6,12 @@
 
 namespace scanrig {
 
-/// How the bytes a sensor delivers are laid out. Bayer patterns are named by the two pixels at the upper left.
+/// Layout of the bytes that a sensor delivers. Bayer patterns are named by the two pixels at the upper left.
 enum class Layout { mono, bayer_rg, bayer_gr, bayer_gb, bayer_bg, rgb, bgr, yuyv, jpeg };
 
 struct RawImage {
   Layout layout = Layout::mono;
-  int bits = 8;  ///< of a value; more than 8 stand in 16-bit little-endian words, low bits first
+  int bits = 8;  ///< per value; values of more than 8 bits are 16-bit little-endian words, low bits first
   cv::Size size;
   std::size_t stride = 0;  ///< bytes from row to row; 0: rows without a gap
   std::span<const std::uint8_t> bytes;
@@ -22,8 +22,8 @@ struct DecodedImage {
   PixelFormat format = PixelFormat::mono8;
 };
 
-/// What the interface hands out: of more than 8 bits the upper 8; mono and Bayer RGGB as they are, everything else as
-/// BGR. Fails with `protocol` (fewer bytes than the image needs, or a JPEG that is none), `unsupported` (bits).
+/// Image as StereoFrame holds it: the upper 8 bits of longer values. Mono and Bayer RGGB stay as they are; the rest is
+/// BGR. Fails with `protocol` (fewer bytes than the image needs, or not a valid JPEG), `unsupported` (bits).
 Result<DecodedImage> decode_image(const RawImage& raw);
 
 }  // namespace scanrig

@@ -9,7 +9,7 @@
 namespace scanrig {
 namespace {
 
-/// What cv::Mat asks for memory, see cv::MatAllocator.
+/// Allocator that cv::Mat uses, see cv::MatAllocator.
 class ImageMemory final : public cv::MatAllocator {
  public:
   cv::UMatData* allocate(int dims, const int* sizes, int type, void* data, std::size_t* step, cv::AccessFlag,
@@ -39,7 +39,7 @@ class ImageMemory final : public cv::MatAllocator {
   std::uint8_t* take(std::size_t bytes) const {
     {
       const std::scoped_lock lock(mutex_);
-      // The one let go last is the likeliest to be in a cache.
+      // The block released last is the likeliest to be in a cache.
       const auto found = std::find_if(free_.rbegin(), free_.rend(), [&](Block block) { return block.size() == bytes; });
       if (found != free_.rend()) {
         auto* data = found->data();

@@ -14,7 +14,7 @@ struct Plane {
   const cv::Mat& image;
   int first;     // byte within the row
   int step;      // pixels between samples, both ways
-  int channels;  // bytes a pixel
+  int channels;  // bytes per pixel
 
   [[nodiscard]] int rows() const { return image.rows / step; }
   [[nodiscard]] int cols() const { return image.cols / step; }
@@ -36,7 +36,7 @@ int bend_at(const std::uint8_t* above, const std::uint8_t* here, const std::uint
   return here[i + pitch] + here[i - pitch] + below[i] + above[i] - 4 * here[i];
 }
 
-/// Enough for statistics, and the exposure that follows waits for them. Rows of a mosaic are rows of one colour.
+/// Enough for statistics; the next exposure waits for them. Rows of a mosaic are rows of one colour.
 constexpr int kEveryRow = 4;
 
 /// For independent grains seen through a Gaussian blur of standard deviation s, the spectrum falls as exp(-s^2 w^2),
@@ -85,7 +85,7 @@ double left_right_correlation(const cv::Mat& left, const cv::Mat& right, PixelFo
     return std::numeric_limits<double>::quiet_NaN();
   }
   const Plane a = plane_of(left, format), b = plane_of(right, format);
-  // Row by row: a mark in one corner, or an edge that lies along a row, says nothing about the pictures.
+  // Row by row: a mark in one corner, or an edge along a row, is no evidence that the images are alike.
   std::vector<double> rows;
   for (int y = 1; y + 1 < a.rows(); y += kEveryRow) {
     std::int64_t both = 0, only_a = 0, only_b = 0;

@@ -29,7 +29,7 @@ Result<void> SensorCamera::prepare(Deadline deadline) {
 }
 
 Result<void> SensorCamera::arm(Deadline deadline) {
-  if (std::exchange(armed_, false)) in_step_ = false;  // an exposure given up; its frames may be on their way
+  if (std::exchange(armed_, false)) in_step_ = false;  // an exposure given up; its frames may still arrive
   if (auto connected = connect(deadline); !connected) return connected;
   for (Channel& channel : channels_) {
     if (auto thrown = throw_away(channel, clock_.now()); !thrown) return thrown;
@@ -60,7 +60,7 @@ Result<void> SensorCamera::connect(Channel& channel, Deadline deadline) {
   return {};
 }
 
-/// Its clock may have begun again, so neither it nor the pair's common time is known.
+/// The sensor's clock may have restarted, so neither it nor the pair's common time is known.
 void SensorCamera::forget(Channel& channel) {
   channel.ledger.forget();
   channel.warm = false;
@@ -68,7 +68,7 @@ void SensorCamera::forget(Channel& channel) {
   refused_pair_.reset();
 }
 
-/// What came unasked: an edge that was none, or the frame of an exposure given up.
+/// Discards unexpected frames: of a false edge, or of an exposure given up.
 Result<void> SensorCamera::throw_away(Channel& channel, Clock::TimePoint until) {
   for (;;) {
     const auto stray = channel.sensor->next({until});
@@ -80,7 +80,7 @@ Result<void> SensorCamera::throw_away(Channel& channel, Clock::TimePoint until) 
   }
 }
 
-/// Nothing to do while one good exposure follows the other.
+/// Does nothing while good exposures follow each other.
 Result<void> SensorCamera::get_in_step(Deadline deadline) {
   const bool all = !in_step_ || clock_.now() - last_in_step_ > options_.idle_refresh;
   for (Channel& channel : channels_) {
@@ -100,7 +100,7 @@ Result<void> SensorCamera::warm_up(Channel& channel, Deadline deadline) {
   if (can_trigger) {
     if (auto deaf = channel.sensor->listen_to_line(false); !deaf) return deaf;
   }
-  // So long that the clocks tell an exposure of before from one of after.
+  // Long enough for the clocks to distinguish earlier exposures from later ones.
   const auto gap = can_trigger ? channel.ledger.uncertainty().value_or(options_.frame_timeout / 2)
                                : Clock::Duration(options_.frame_timeout / 2);
   if (deadline.left(clock_) < gap) {
@@ -111,7 +111,7 @@ Result<void> SensorCamera::warm_up(Channel& channel, Deadline deadline) {
     channel.ledger.forget_id();
     return {};
   }
-  // Nothing is known of a new clock: only a second exposure shows that the first frame was no earlier one.
+  // A new clock is unknown: only a second exposure proves that the first frame was not an earlier one.
   int wanted = channel.ledger.knows_clock() ? 1 : 2;
   for (int i = 0; i < kWarmUpTries && wanted > 0; ++i) {
     ++counts_.warm_up;
@@ -127,13 +127,13 @@ Result<void> SensorCamera::warm_up(Channel& channel, Deadline deadline) {
   return listen(channel);
 }
 
-/// To the projector's edge again, after exposures by software.
+/// Returns to the projector's edge, after exposures by software.
 Result<void> SensorCamera::listen(Channel& channel) {
   if (!channel.sensor->can_trigger()) return {};
   return channel.sensor->listen_to_line(options_.by == TriggeringOptions::By::line);
 }
 
-/// One exposure by software. Nothing if its frame was torn, or did not come; the next one may.
+/// Makes one exposure by software. Returns nothing if its frame was torn or did not come; the next one may succeed.
 Result<std::optional<SensorFrame>> SensorCamera::expose_once(Channel& channel, Deadline deadline) {
   const auto begin = clock_.now();
   if (auto triggered = channel.sensor->trigger(); !triggered) return pass_on(triggered);
@@ -151,7 +151,7 @@ Result<std::optional<SensorFrame>> SensorCamera::expose_once(Channel& channel, D
     if (!(*frame)->damage.empty()) return std::nullopt;
     const HostWindow window{begin, (*frame)->arrival};
     const auto finding = channel.ledger.check((*frame)->stamp, window);
-    if (finding == Finding::old_frame) continue;  // of an exposure given up; ours is still to come
+    if (finding == Finding::old_frame) continue;  // of an exposure given up; the right one is still to come
     if (finding == Finding::clock_jumped) forget(channel);
     channel.ledger.accept((*frame)->stamp, window);
     if (finding == Finding::clock_jumped) return std::nullopt;
@@ -181,13 +181,13 @@ Result<StereoFrame> SensorCamera::collect(Deadline deadline) {
 
 Result<StereoFrame> SensorCamera::capture_preview(Deadline deadline) {
   const bool running = options_.by == TriggeringOptions::By::free_run;
-  if (std::exchange(armed_, false)) in_step_ = running;  // its frames may be on their way
+  if (std::exchange(armed_, false)) in_step_ = running;  // its frames may still arrive
   if (auto connected = connect(deadline); !connected) return pass_on(connected);
   for (const Channel& channel : channels_) {
     if (running || channel.sensor->can_trigger()) continue;
     return fail(ErrorCode::unsupported, "{}: exposes at an edge of its trigger input only", channel.sensor->name());
   }
-  const bool in_step = std::exchange(in_step_, false) || running;  // false until it is seen to go well
+  const bool in_step = std::exchange(in_step_, false) || running;  // false until the exposure has succeeded
   trigger_after_ = clock_.now();
   std::vector<SensorFrame> frames;
   for (Channel& channel : channels_) {
@@ -263,7 +263,7 @@ Result<SensorFrame> SensorCamera::take(Channel& channel, Deadline deadline) {
   return std::move(frame);
 }
 
-/// Frames never stop: those that began before they were asked for are passed over, damaged ones too.
+/// Frames never stop: those that started before the request are skipped, damaged ones too.
 Result<SensorFrame> SensorCamera::take_running(Channel& channel, Deadline deadline) {
   for (;;) {
     auto next = channel.sensor->next(deadline);
@@ -293,10 +293,10 @@ bool SensorCamera::Moments::agrees_with(const Moments& before) const {
   return std::chrono::abs(apart_since(before)) <= pair_tolerance(left - before.left);
 }
 
-/// A wrong stamp may be the pair's before, which was the first and compared with none: a pair that agrees with the one
-/// refused last is as good as one that agrees with the one taken last.
+/// A wrong stamp may belong to the previous pair, which was the first and compared with none. So a pair is good if it
+/// agrees with the pair rejected last or with the pair accepted last.
 Result<void> SensorCamera::expect_one_moment(const std::vector<SensorFrame>& frames) {
-  // Without a common edge there is no common moment: the light stays on, and the table stands.
+  // Without a common edge there is no common moment: the light stays on, and the table is stopped.
   if (frames.size() < 2 || options_.by != TriggeringOptions::By::line) return {};
   const Moments now{frames[0].stamp.time, frames[1].stamp.time};
   std::chrono::nanoseconds apart{0};

@@ -10,50 +10,50 @@
 
 namespace scanrig {
 
-/// How a pair's frames are matched with their trigger.
+/// Method by which a pair's frames are matched with their trigger.
 struct TriggeringOptions {
   enum class By {
-    line,      ///< the edge on the sensors' input exposes; collect() comes after it
+    line,      ///< the edge on the sensors' input exposes; collect() is called after it
     software,  ///< collect() exposes, for light that stays on
-    free_run,  ///< the sensors never stop; collect() takes the first pair that begins after it was called
+    free_run,  ///< the sensors never stop; collect() takes the first pair that starts after the call
   };
-  enum class FrameClock { interval, ptp };  ///< ptp: both sensors' clocks are one, so their stamps are compared
+  enum class FrameClock { interval, ptp };  ///< ptp: both sensors share one clock, so their stamps are compared
   By by = By::line;
   FrameClock frame_clock = FrameClock::interval;
   std::chrono::milliseconds frame_timeout{500};  ///< from collect() to the whole pair
-  std::chrono::seconds idle_refresh{10};         ///< after this long without an exposure one is made and thrown away
+  std::chrono::seconds idle_refresh{10};         ///< after this long without an exposure one is made and discarded
 };
 
-/// What has happened to triggers so far.
+/// Counts of trigger results so far.
 struct TriggerCounts {
-  std::uint64_t pairs = 0;    ///< handed out
+  std::uint64_t pairs = 0;    ///< returned to the caller
   std::uint64_t lost = 0;     ///< a frame did not come in time
-  std::uint64_t torn = 0;     ///< came with parts missing
-  std::uint64_t old = 0;      ///< came, but was exposed before its trigger
+  std::uint64_t torn = 0;     ///< a frame came with parts missing
+  std::uint64_t old = 0;      ///< a frame came, but was exposed before its trigger
   std::uint64_t odd = 0;      ///< ids skipped, more frames than triggers, sensors that do not agree, clocks set
-  std::uint64_t strays = 0;   ///< thrown away by arm()
-  std::uint64_t warm_up = 0;  ///< exposures made and thrown away
+  std::uint64_t strays = 0;   ///< discarded by arm()
+  std::uint64_t warm_up = 0;  ///< exposures made and discarded
   std::uint64_t returns = 0;  ///< connected again after a loss
 };
 
-/// A stereo camera of two sensors, or of one that delivers both images side by side. Every exposure is counted: one
+/// A stereo camera of two sensors, or of one that delivers both images side by side. Every exposure is checked: one
 /// trigger, one whole frame from each sensor, ids without a gap, each sensor's interval since its last trigger in step
-/// with the host's and with the other sensor's. After a failure, a return or dead air prepare(), or else arm(), waits
-/// for what may be on its way and makes an exposure of its own (with sensors that have a software trigger) from which
-/// the count begins again.
+/// with the host's and with the other sensor's. After a failure, a reconnection or idle time prepare(), or else arm(),
+/// waits for late frames. It then makes an exposure of its own (with sensors that have a software trigger), from which
+/// the count restarts.
 class SensorCamera final : public StereoCamera {
  public:
   /// `sensors`: left and right, or one for both.
   SensorCamera(std::vector<std::unique_ptr<Sensor>> sensors, const TriggeringOptions& options, Clock& clock);
 
-  /// Fails with `protocol` too, for a sensor that exposes and gives no frame in order.
+  /// Also fails with `protocol`, for a sensor that exposes and delivers no valid frame.
   Result<void> prepare(Deadline deadline) override;
-  /// Fails with `timeout`, `protocol`, `io`, and with `not_found`, `unsupported`, `invalid_input` for a sensor that has
-  /// to be connected again and is not what it was.
+  /// Fails with `timeout`, `protocol`, `io`; also with `not_found`, `unsupported`, `invalid_input` for a sensor that
+  /// must be reconnected and has changed.
   Result<void> arm(Deadline deadline) override;
-  /// Fails with `timeout` (a frame is missing), `protocol` (torn, old, skipped, too many, not one moment), `io`.
+  /// Fails with `timeout` (a frame is missing), `protocol` (torn, old, skipped, too many, different moments), `io`.
   Result<StereoFrame> collect(Deadline deadline) override;
-  /// By software, one sensor after the other; of freely running ones the next pair.
+  /// Takes a pair by software, one sensor after the other; of freely running sensors the next pair.
   Result<StereoFrame> capture_preview(Deadline deadline) override;
 
   [[nodiscard]] const TriggerCounts& counts() const { return counts_; }
@@ -91,9 +91,9 @@ class SensorCamera final : public StereoCamera {
   std::vector<Channel> channels_;
   std::optional<Moments> last_pair_, refused_pair_;  // since both sensors' clocks are known
   bool armed_ = false;
-  bool in_step_ = false;  // nothing has failed since the ledgers were last known to be right
+  bool in_step_ = false;  // no failure since the ledgers were last verified
   Clock::TimePoint trigger_after_{};
-  Clock::TimePoint last_in_step_{};  // a good exposure, or a warm-up
+  Clock::TimePoint last_in_step_{};  // time of the last good exposure or warm-up
   TriggerCounts counts_;
 };
 

@@ -10,13 +10,13 @@
 
 namespace scanrig {
 
-/// How the bytes of a frame are to be read. `bayer_rggb8`: one byte a pixel, red at (0,0).
+/// Layout of a frame's bytes. `bayer_rggb8`: one byte per pixel, red at (0,0).
 enum class PixelFormat { mono8, bayer_rggb8, bgr8 };
 
-/// The name used in manifests: "Mono8", "BayerRG8", "BGR8" (GenICam PFNC).
+/// Name used in manifests: "Mono8", "BayerRG8", "BGR8" (GenICam PFNC).
 std::string to_string(PixelFormat format);
 
-/// How good an image is, whatever it shows; NaN where the driver does not measure it.
+/// Quality of an image, independent of its content; NaN where the driver does not measure it.
 struct ImageQuality {
   double brightness = std::numeric_limits<double>::quiet_NaN();  ///< mean grey value, 0 to 1
   double saturated = std::numeric_limits<double>::quiet_NaN();   ///< share of the pixels at full scale, 0 to 1
@@ -29,12 +29,12 @@ struct StereoFrame {
   cv::Mat left;   ///< 8 bit; 1 channel for mono8 and bayer_rggb8, 3 for bgr8
   cv::Mat right;  ///< same size and type as `left`
   PixelFormat format = PixelFormat::mono8;
-  std::uint64_t trigger = 0;  ///< how many triggers since arm(), this one included
+  std::uint64_t trigger = 0;  ///< number of triggers since arm(), including this one
   Clock::TimePoint taken;
   ImageQuality left_evidence = {};
   ImageQuality right_evidence = {};
   /// Correlation of the fine texture at the same places of both images, upper quartile of the rows: near 1 when both
-  /// show one picture, near 0 for two viewpoints; NaN where it is not measured.
+  /// show one image, near 0 for two viewpoints; NaN where it is not measured.
   double left_right_correlation = std::numeric_limits<double>::quiet_NaN();
 };
 
@@ -45,23 +45,23 @@ class StereoCamera {
  public:
   virtual ~StereoCamera() = default;
 
-  /// Connected, set up and warm; what was lost is connected again, and exposures that the next arm() would otherwise
-  /// make and throw away are made here. A loss in quiet times is noticed within seconds. Between arm() and collect() it
+  /// Connects, sets up and warms up the camera. Reconnects a lost camera. Makes the exposures that the next arm() would
+  /// otherwise make and discard. A loss while idle is noticed within seconds. Between arm() and collect() prepare()
   /// exposes nothing.
-  /// Fails with `not_found`, `timeout`, `io`, `protocol`, and with `unsupported`, `invalid_input` for what is not as it
-  /// was told.
+  /// Fails with `not_found`, `timeout`, `io`, `protocol`, and with `unsupported`, `invalid_input` for a camera that
+  /// differs from its configuration.
   virtual Result<void> prepare(Deadline deadline) = 0;
 
-  /// Makes both sensors wait for the next edge; frames still in flight are thrown away.
+  /// Makes both sensors wait for the next edge; frames still in flight are discarded.
   /// Fails with `timeout`, `protocol`, `io`.
   virtual Result<void> arm(Deadline deadline) = 0;
 
   /// The pair that belongs to the edge after arm(). Fails with `timeout` (a frame is missing), `protocol` (torn, or the
-  /// two frames do not belong together), `io`. After a failure arm() again and redo the exposure.
+  /// two frames do not belong together), `io`. After a failure, arm() again and repeat the exposure.
   virtual Result<StereoFrame> collect(Deadline deadline) = 0;
 
-  /// A pair without an edge, in whatever light there is, for looking only: left and right may be two moments. Ends what
-  /// arm() began. Fails as arm() and collect(), and with `unsupported` where only an edge exposes.
+  /// Takes a pair without an edge, in the present light, for preview only: left and right may be two moments. Ends what
+  /// arm() started. Fails as arm() and collect(), and with `unsupported` where only an edge exposes.
   virtual Result<StereoFrame> capture_preview(Deadline deadline) = 0;
 };
 

@@ -7,7 +7,7 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-constexpr double kDrift = 200e-6;  // of a camera's crystal against the host's, generously
+constexpr double kDrift = 200e-6;  // of a camera's crystal against the host's, with margin
 constexpr nanoseconds kJitter = std::chrono::milliseconds(1);
 
 nanoseconds drift_over(nanoseconds span) {
@@ -36,7 +36,7 @@ std::optional<Clock::Duration> TriggerTracker::uncertainty() const {
 }
 
 std::int64_t TriggerTracker::steps_to(std::uint64_t id) const {
-  // A camera with ids of 64 bits may speak of the same protocol: it shows when one no longer fits the ring.
+  // A camera with ids of 64 bits may use the same protocol: this shows when an id no longer fits the ring.
   if (id_ring_ == 0 || id > id_ring_ || *id_ > id_ring_) return static_cast<std::int64_t>(id - *id_);
   const auto ring = static_cast<std::int64_t>(id_ring_);
   const std::int64_t ahead = (static_cast<std::int64_t>(id) - static_cast<std::int64_t>(*id_) + ring) % ring;

@@ -4,44 +4,44 @@
 
 namespace scanrig {
 
-/// The moments between which an exposure must have begun, on the host's clock.
+/// Bounds of the start of an exposure, on the host's clock.
 struct HostWindow {
   Clock::TimePoint begin;
   Clock::TimePoint end;
 };
 
-/// The book a sensor's triggers are counted in. It knows the id of the last frame and, as an interval that every frame
-/// narrows, where the sensor's clock stands against the host's: neither a skipped id nor an exposure from before its
-/// trigger goes unseen, and the clocks of two sensors are never compared.
+/// Tracks the triggers of one sensor. It holds the id of the last frame. It also holds, as an interval that every frame
+/// narrows, the offset of the sensor's clock to the host's. So a skipped id or an exposure from before its trigger is
+/// always detected, and the clocks of two sensors are never compared.
 class TriggerTracker {
  public:
   enum class Finding {
     in_order,
     old_frame,       ///< its id or its stamp is not new, or it was exposed before the window
     frames_missing,  ///< newer than expected: triggers or frames in between are lost
-    clock_jumped,    ///< exposed after it had arrived: the sensor's clock was set
+    clock_jumped,    ///< exposed after its arrival: the sensor's clock was set
   };
 
-  /// `id_ring`: how many ids there are before they begin again; 0: they never do. `host_clock`: stamps are the host's.
+  /// `id_ring`: number of ids until they restart; 0: they never do. `host_clock`: stamps are the host's.
   TriggerTracker(std::uint64_t id_ring, bool host_clock);
 
   [[nodiscard]] bool knows_id() const { return id_.has_value(); }
   [[nodiscard]] bool knows_clock() const { return clock_.has_value(); }
 
-  /// Exposures further apart than this cannot be taken for each other; nothing while the clock is not known.
+  /// Exposures further apart than this cannot be confused; nothing while the clock is unknown.
   [[nodiscard]] std::optional<Clock::Duration> uncertainty() const;
 
   [[nodiscard]] Finding check(const FrameStamp& frame, const HostWindow& window) const;
   /// Takes a frame that is in order, or at least not old, as the last one.
   void accept(const FrameStamp& frame, const HostWindow& window);
-  /// Host time of an exposure on the sensor's clock, at best guess within the window.
+  /// Host time of an exposure on the sensor's clock, the best estimate within the window.
   [[nodiscard]] Clock::TimePoint host_time(const FrameStamp& frame, const HostWindow& window) const;
 
   void forget_id() { id_.reset(); }
   void forget();
 
  private:
-  /// Host minus sensor, from `low` to `high`, as of the last stamp `at` on the sensor's clock.
+  /// Host minus sensor, from `low` to `high`, at the last stamp `at` on the sensor's clock.
   struct Offset {
     std::chrono::nanoseconds low, high, at;
   };
@@ -55,7 +55,7 @@ class TriggerTracker {
   std::optional<Offset> clock_;
 };
 
-/// How far two sensors' times since their last common trigger may differ: jitter of the input and drift of two
+/// Largest difference of two sensors' times since their last common trigger: jitter of the input and drift of two
 /// crystals.
 std::chrono::nanoseconds pair_tolerance(std::chrono::nanoseconds since);
 

@@ -29,7 +29,7 @@ constexpr std::array kFormats{
     Fourcc{V4L2_PIX_FMT_SBGGR10, Layout::bayer_bg, 10}, Fourcc{V4L2_PIX_FMT_MJPEG, Layout::jpeg, 8},
 };
 
-/// "Y10" is the code "Y10 ".
+/// "Y10" means the code "Y10 ".
 std::uint32_t code_of(std::string name) {
   name.resize(4, ' ');
   return v4l2_fourcc(name[0], name[1], name[2], name[3]);
@@ -54,7 +54,7 @@ tl::unexpected<Error> V4l2Sensor::failed(const std::string& what, int reason) {
   auto code = ErrorCode::io;
   if (reason == ENOENT || reason == ENXIO) code = ErrorCode::not_found;
   if (reason == EINVAL || reason == ERANGE) code = ErrorCode::invalid_input;
-  if (code != ErrorCode::invalid_input) lost_ = true;  // connected again by the next arm()
+  if (code != ErrorCode::invalid_input) lost_ = true;  // reconnected by the next arm()
   return fail(code, "{}: {}: {}", name_, what, std::strerror(reason));
 }
 
@@ -66,7 +66,7 @@ Result<void> V4l2Sensor::call(unsigned long request, void* argument, const char*
 Result<bool> V4l2Sensor::prepare(Deadline deadline) {
   if (descriptor_ >= 0 && !lost_) {
     v4l2_capability capability{};
-    std::ignore = call(VIDIOC_QUERYCAP, &capability, "ask whether it is there");  // notes the loss
+    std::ignore = call(VIDIOC_QUERYCAP, &capability, "ask whether it is there");  // detects a loss
   }
   if (descriptor_ >= 0 && !lost_) return false;
   disconnect();
@@ -80,7 +80,7 @@ Result<bool> V4l2Sensor::prepare(Deadline deadline) {
 
 Result<std::string> V4l2Sensor::find_device() const {
   if (sensor_.serial.empty()) return sensor_.device;
-  // usb-MAKER_MODEL_SERIAL-video-index0 [udev, 60-persistent-v4l.rules]; index0 is the one that delivers images.
+  // usb-MAKER_MODEL_SERIAL-video-index0 [udev, 60-persistent-v4l.rules]; index0 delivers images.
   const std::string tail = "_" + sensor_.serial + "-video-index0";
   std::error_code none;
   for (const auto& entry : std::filesystem::directory_iterator(options_.by_id, none)) {
@@ -121,7 +121,7 @@ Result<void> V4l2Sensor::set_format() {
   const v4l2_pix_format wanted = format.fmt.pix;
   if (auto set = call(VIDIOC_S_FMT, &format, "set the image format"); !set) return set;
   format_ = format.fmt.pix;
-  // The driver may answer with what it likes better.
+  // The driver may reply with other values.
   if (format_.pixelformat != code || format_.width != wanted.width || format_.height != wanted.height) {
     return fail(ErrorCode::unsupported, "{}: asked for {} of {}x{} it delivers {}x{} or another format", name_,
                 options_.pixel_format, wanted.width, wanted.height, format_.width, format_.height);

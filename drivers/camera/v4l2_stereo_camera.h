@@ -20,9 +20,9 @@ struct V4l2SensorOptions {
 struct V4l2Options {
   V4l2SensorOptions left;
   std::optional<V4l2SensorOptions> right;  ///< empty: `left` delivers both, left half first
-  bool external_trigger = false;           ///< one frame an edge; otherwise the devices run freely
-  std::string pixel_format = "GREY";       ///< as V4L2 calls it: GREY Y10 Y12 Y16 YUYV RGGB GRBG GBRG BA81 MJPG ...
-  cv::Size size{640, 480};                 ///< of what one device delivers
+  bool external_trigger = false;           ///< one frame per edge; otherwise the devices run freely
+  std::string pixel_format = "GREY";       ///< V4L2's name: GREY Y10 Y12 Y16 YUYV RGGB GRBG GBRG BA81 MJPG ...
+  cv::Size size{640, 480};                 ///< size of the images of one device
   std::chrono::microseconds exposure{12000};
   std::optional<int> gain;
   std::map<std::uint32_t, int> controls;  ///< more controls by id, such as a maker's trigger mode; set last
@@ -30,10 +30,10 @@ struct V4l2Options {
   std::filesystem::path by_id = "/dev/v4l/by-id";
 };
 
-/// Devices that prepare() or arm() opens. See open_v4l2() for its errors.
+/// Devices, opened by prepare() or arm(). See open_v4l2() for its errors.
 std::unique_ptr<SensorCamera> v4l2_camera(const V4l2Options& options, VideoCalls& calls, Clock& clock);
 
-/// The same, opened and started. Fails with `not_found`, `io` (in use, access refused), `unsupported` (no capture
+/// Devices, opened and started. Fails with `not_found`, `io` (in use, access refused), `unsupported` (no capture
 /// device, no such pixel format or size, time stamps that are not monotonic), `invalid_input` (a control's value).
 Result<std::unique_ptr<SensorCamera>> open_v4l2(const V4l2Options& options, VideoCalls& calls, Clock& clock,
                                                 Deadline deadline);

@@ -68,7 +68,7 @@ Result<Line> request_offset(gpiod_chip* chip, unsigned offset, const LineSpec& l
   return found;
 }
 
-/// Where on this chip the line is; nothing if it is on another. Fails with `not_found`: the chip has fewer lines.
+/// Number of the line on this chip; nothing if it is on another. Fails with `not_found`: the chip has fewer lines.
 Result<std::optional<unsigned>> offset_on(gpiod_chip* chip, const LineSpec& line) {
   if (!line.name.empty()) {
     const int offset = gpiod_chip_get_line_offset_from_name(chip, line.name.c_str());

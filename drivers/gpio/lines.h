@@ -10,23 +10,23 @@
 
 namespace scanrig::gpio {
 
-/// The resistor inside the chip; `as_is`: whatever the board or an earlier program has set.
+/// Resistor inside the chip; `as_is`: as the board or an earlier program has set it.
 enum class Bias { as_is, disabled, pull_up, pull_down };
 
-/// A line by its name, or by its chip and its number on that chip where nobody gave it a name.
+/// A line by its name, or a line without a name by its chip and its number on that chip.
 struct LineSpec {
-  std::string name;  ///< as the kernel knows it, see gpioinfo(1); empty: by chip and offset
+  std::string name;  ///< the kernel's name, see gpioinfo(1); empty: by chip and offset
   bool active_low = false;
-  bool keep = false;  ///< an output that is left as it is when destroyed, as far as its chip does that
+  bool keep = false;  ///< an output that keeps its level when destroyed, as far as its chip allows
   Bias bias = Bias::as_is;
-  std::string chip{};   ///< "gpiochip0", or the chip's label, which stays the same from one start to the next
+  std::string chip{};   ///< "gpiochip0", or the chip's label, which stays the same at every start
   unsigned offset = 0;  ///< on `chip`
 
   /// "START", or "gpiochip0:17".
   [[nodiscard]] std::string contact() const { return name.empty() ? chip + ":" + std::to_string(offset) : name; }
 };
 
-/// One output line; inactive when made, and when destroyed unless it is to be kept.
+/// One output line; inactive when made. Inactive when destroyed, too, unless `keep` is set.
 /// Threads: one owner.
 class Output {
  public:
@@ -35,7 +35,7 @@ class Output {
   virtual Result<void> set(bool active) = 0;
 };
 
-/// Several input lines, in the order they were asked for; true is active. Not debounced.
+/// Several input lines, in the requested order; true is active. Not debounced.
 /// Threads: one owner.
 class Inputs {
  public:
@@ -45,7 +45,7 @@ class Inputs {
   virtual Result<std::vector<bool>> wait_change(const std::vector<bool>& known, Deadline deadline) = 0;
 };
 
-/// Where lines come from.
+/// Source of lines.
 class Lines {
  public:
   virtual ~Lines() = default;
@@ -58,7 +58,7 @@ class Lines {
 /// The GPIO chips of this machine, through libgpiod 1 or 2.
 std::unique_ptr<Lines> chip_lines(Clock& clock);
 
-/// Stand-in for machines without a GPIO chip, for tests: lines behind a Unix socket. See README.md for its words.
+/// Stand-in for machines without a GPIO chip, for tests: lines behind a Unix socket. README.md lists its commands.
 std::unique_ptr<Lines> socket_lines(std::filesystem::path socket, Clock& clock);
 
 }  // namespace scanrig::gpio

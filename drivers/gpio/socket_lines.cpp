@@ -18,7 +18,7 @@ using std::chrono::milliseconds;
 
 constexpr milliseconds kAnswerTime{1000};
 
-/// Words by line over one connection.
+/// Text commands by line over one connection.
 class Connection {
  public:
   static Result<Connection> open(const std::filesystem::path& socket) {
@@ -46,7 +46,7 @@ class Connection {
     if (::send(descriptor_, line.data(), line.size(), MSG_NOSIGNAL) != static_cast<ssize_t>(line.size())) return gone();
     return {};
   }
-  /// The next line; empty when none is whole within `wait`.
+  /// Next line; empty when no whole line arrives within `wait`.
   Result<std::string> receive(milliseconds wait) {
     for (;;) {
       if (const auto end = pending_.find('\n'); end != std::string::npos) {
@@ -93,7 +93,7 @@ class SocketOutput final : public Output {
   LineSpec line_;
 };
 
-/// "101", one digit a line, high or low; nothing when it is something else.
+/// "101", one digit per line, high or low; nothing for any other text.
 std::optional<std::vector<bool>> parse_levels(const std::string& word, const std::vector<LineSpec>& lines) {
   if (word.size() != lines.size() || word.find_first_not_of("01") != std::string::npos) return std::nullopt;
   std::vector<bool> levels;

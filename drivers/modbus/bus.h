@@ -11,8 +11,8 @@ namespace scanrig::modbus {
 /// trigger. Threads: any; one request, or one group of requests, at a time.
 class Bus {
  public:
-  /// The same Bus for the same port, as long as somebody holds it: a port has one master. `options` are those of the
-  /// first who asks for it.
+  /// Returns the same Bus for the same port, as long as a driver holds it: a port has one master. `options` are those
+  /// of the first caller.
   static std::shared_ptr<Bus> at(const ClientOptions& options, Clock& clock);
 
   /// Holds the bus until destroyed.

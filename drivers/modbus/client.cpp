@@ -37,16 +37,16 @@ bool refused(int error) { return error >= EMBXILFUN && error <= EMBXGTAR; }
 /// Leadshine's "wrong CRC": the request reached the device damaged and was not carried out.
 constexpr int kDeviceSawWrongCrc = EMBXMEMPAR;
 
-/// How soon somebody who waits for a quiet line sees that he is to hurry.
+/// Longest time until a caller that waits for a quiet line notices set_fail_fast().
 constexpr Clock::Duration kLook = milliseconds(5);
 
 enum class Heard { nothing, something, hangup };
 
-/// Throws away what arrives within `wait`, up to the first byte.
+/// Discards bytes that arrive within `wait`, up to the first byte.
 Heard discard(int port, Clock::Duration wait) {
   pollfd watched{port, POLLIN, 0};
   if (::poll(&watched, 1, static_cast<int>(std::chrono::ceil<milliseconds>(wait).count())) <= 0) return Heard::nothing;
-  // Reading would not tell: a port that hung up reads as one with nothing to say.
+  // Reading would not show it: a port that hung up reads like one without data.
   if (watched.revents & (POLLHUP | POLLERR | POLLNVAL)) return Heard::hangup;
   std::array<char, 256> bytes;
   return ::read(port, bytes.data(), bytes.size()) > 0 ? Heard::something : Heard::nothing;
@@ -167,19 +167,19 @@ Result<void> Client::open() {
   }
   modbus_set_slave(context_.get(), options_.unit_id);
   modbus_set_error_recovery(context_.get(), MODBUS_ERROR_RECOVERY_NONE);
-  modbus_set_byte_timeout(context_.get(), 0, 0);  // the response timeout is for the whole answer
+  modbus_set_byte_timeout(context_.get(), 0, 0);  // the response timeout is for the whole reply
   const auto give_up = [&](std::string_view reason) {
     context_.reset();
     ++statistics_.io_errors;
     return fail(ErrorCode::io, "open {}: {}", options_.device, reason);
   };
   if (modbus_connect(context_.get()) != 0) return give_up(std::strerror(errno));
-  // libmodbus does not lock: two masters on one line would take each other's answers.
+  // libmodbus does not lock: two masters on one line would take each other's replies.
   if (!options_.is_shared && ::flock(modbus_get_socket(context_.get()), LOCK_EX | LOCK_NB) != 0) {
     return give_up(errno == EWOULDBLOCK ? "another program is using it" : std::strerror(errno));
   }
   ++statistics_.openings;
-  reply_missed_ = true;  // whatever the device was sending before is not for us
+  reply_missed_ = true;  // earlier data of the device are not for this request
   return {};
 }
 

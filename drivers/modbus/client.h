@@ -23,15 +23,15 @@ struct ClientOptions {
   int baud = 115200;
   Parity parity = Parity::none;  ///< one stop bit with even and odd, and with none
   int unit_id = 1;
-  std::chrono::milliseconds reply_timeout{60};  ///< request sent to whole answer received
-  bool is_shared = false;                       ///< the port is used although another program has it, one that hangs
+  std::chrono::milliseconds reply_timeout{60};  ///< from request sent to whole reply received
+  bool is_shared = false;                       ///< the port is used although another, hanging program has it
 };
 
-/// What happened on the line since it was made; every miss and every retry is visible here.
+/// Counts of line events since construction; every miss and every retry is visible here.
 struct ClientStatistics {
   std::uint64_t requests = 0;
-  std::uint64_t timeouts = 0;  ///< no answer, or only part of one
-  std::uint64_t corrupt = 0;   ///< wrong checksum, wrong length, answer to something else
+  std::uint64_t timeouts = 0;  ///< no reply, or only part of one
+  std::uint64_t corrupt = 0;   ///< wrong checksum, wrong length, reply to another request
   std::uint64_t refused = 0;   ///< Modbus exceptions
   std::uint64_t io_errors = 0;
   std::uint64_t retries = 0;  ///< requests sent again by the layer above, see count_retry()
@@ -40,9 +40,9 @@ struct ClientStatistics {
 
 /// One device on a Modbus RTU line, over libmodbus. Waits in real time, never longer than `reply_timeout` or the
 /// deadline. Never retries. The port is opened by the first request and again after it was lost.
-/// After a missed answer the next request is held back until the line has been silent for twice `reply_timeout`, so
-/// that a late answer is thrown away and not taken for the next one. Every request fails with `timeout` (no whole
-/// answer), `protocol` (corrupt, or refused by the device: a Modbus exception), `io` (the port is absent, gone, or used
+/// After a missed reply the next request is held back until the line has been silent for twice `reply_timeout`. So a
+/// late reply is discarded and not taken for the next one. Every request fails with `timeout` (no whole
+/// reply), `protocol` (corrupt, or refused by the device: a Modbus exception), `io` (the port is absent, gone, or used
 /// by another program). Threads: one owner.
 class Client {
  public:
@@ -64,17 +64,17 @@ class Client {
   /// Function 16.
   Result<void> write(std::uint16_t address, std::span<const std::uint16_t> values, Deadline deadline);
 
-  /// Function 06 sent at once, whatever is on the line, its answer thrown away with the rest: for a stop that must not
-  /// wait. It may collide with a late answer, so it is to be repeated as a request. Fails with `io`.
+  /// Function 06 sent at once, whatever is on the line; its reply is discarded with the rest: for a stop that must not
+  /// wait. It may collide with a late reply, so it must be repeated as a request. Fails with `io`.
   Result<void> write_without_reply(std::uint16_t address, std::uint16_t value);
 
-  /// From any thread. While on, no request waits for a quiet line: it fails with `stopped` instead.
+  /// Callable from any thread. While on, no request waits for a quiet line: it fails with `stopped` instead.
   void set_fail_fast(bool on) noexcept { fail_fast_ = on; }
 
-  /// The last request was sent, but whether the device has acted on it is not known: its answer was missed or corrupt.
+  /// True if the last request was sent, but its reply was missed or corrupt: the device may have acted on it or not.
   [[nodiscard]] bool reply_missed() const { return reply_missed_; }
 
-  /// Told by the layer above when it sends something again.
+  /// Called by the layer above when it sends a request again.
   void count_retry() { ++statistics_.retries; }
   [[nodiscard]] const ClientStatistics& statistics() const { return statistics_; }
 

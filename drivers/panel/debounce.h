@@ -9,9 +9,9 @@
 
 namespace scanrig {
 
-/// From levels to what counts, the same for every panel. A level counts once it has held for kDebounce, a press that
-/// starts something once it has held for kMinimumPress; an e-stop or guard that opens counts at once. A button that is
-/// pressed in the first levels is stuck until it has been released.
+/// Debounces levels, the same way for every panel. A level counts once it has held for kDebounce, a press that
+/// starts something once it has held for kMinimumPress; an e-stop or guard that opens counts at once. A button pressed
+/// in the first levels is stuck until it is released.
 class PanelDebounce {
  public:
   static constexpr std::chrono::milliseconds kDebounce{50};
@@ -19,21 +19,21 @@ class PanelDebounce {
 
   explicit PanelDebounce(const std::vector<bool PanelInputs::*>& fields);
 
-  /// `levels` in the order of the fields, true as the field's name says.
+  /// `levels` in the order of the fields; true has the meaning of the field's name.
   void take(const std::vector<bool>& levels, Clock::TimePoint now);
 
-  /// What is not wired has its rest value; a stuck button is not pressed.
+  /// Debounced inputs. Unwired inputs have their rest value; a stuck button is not pressed.
   [[nodiscard]] PanelInputs settled() const;
-  /// When a level that has not counted yet will, unless it changes.
+  /// Time when a level that has not counted yet will count, unless it changes.
   [[nodiscard]] std::optional<Clock::TimePoint> due() const;
-  /// Fails with `device_alarm` while a button is stuck, naming it.
+  /// Fails with `device_alarm` while a button is stuck; the error names it.
   [[nodiscard]] Result<void> none_stuck() const;
 
  private:
   struct Input {
     bool PanelInputs::*field;
-    bool level = false;    // as it is
-    bool settled = false;  // as it counts
+    bool level = false;    // present level
+    bool settled = false;  // level that counts
     bool stuck = false;
     Clock::TimePoint since{};
   };

@@ -13,7 +13,7 @@ Result<std::unique_ptr<GpioPanel>> GpioPanel::open(const GpioPanelOptions& optio
   }
   std::unique_ptr<GpioPanel> panel(new GpioPanel(fields, clock));
   for (auto [field, spec] : options.outputs) {
-    spec.keep = true;  // the last word of a daemon that ends is its lamps
+    spec.keep = true;  // the lamps keep their state when the daemon ends
     auto line = lines.output(spec);
     if (!line) return pass_on(line, "panel");
     panel->lamps_.push_back({field, std::move(*line)});
@@ -34,7 +34,7 @@ Result<PanelInputs> GpioPanel::wait_change(const PanelInputs& known, Deadline de
     if (now != known || deadline.expired(clock_)) {
       const auto free = debounce_.none_stuck();
       if (free) return now;
-      // Or a button that is released would stay stuck; what fails here fails again next time.
+      // Without this a released button would stay stuck. A failure here occurs again at the next call.
       std::ignore = look(Deadline::after(clock_, PanelDebounce::kDebounce));
       return pass_on(free);
     }

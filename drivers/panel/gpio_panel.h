@@ -9,16 +9,16 @@
 
 namespace scanrig {
 
-/// Which line is which input or output; what is not wired keeps its rest value.
+/// Lines of the inputs and outputs; unwired ones keep their rest value.
 struct GpioPanelOptions {
   std::vector<std::pair<bool PanelInputs::*, gpio::LineSpec>> inputs{};
   std::vector<std::pair<bool PanelOutputs::*, gpio::LineSpec>> outputs{};
 };
 
-/// Buttons, switches and lamps on GPIO lines, debounced as PanelDebounce says. The lamps keep what they show last.
+/// Buttons, switches and lamps on GPIO lines, debounced by PanelDebounce. When destroyed, the lamps keep their state.
 class GpioPanel final : public Panel {
  public:
-  /// All lamps off. Fails with `not_found`, `io`.
+  /// Switches all lamps off. Fails with `not_found`, `io`.
   static Result<std::unique_ptr<GpioPanel>> open(const GpioPanelOptions& options, gpio::Lines& lines, Clock& clock);
 
   Result<PanelInputs> wait_change(const PanelInputs& known, Deadline deadline) override;

@@ -6,7 +6,7 @@ namespace scanrig {
 namespace {
 
 constexpr int kAttempts = 2;
-constexpr int kReplyTimeouts = 8;  ///< of one reading: coils and inputs, each after a quiet line, and some room
+constexpr int kReplyTimeouts = 8;  ///< of one reading: coils and inputs, each after a quiet line, and some margin
 
 }  // namespace
 
@@ -32,7 +32,7 @@ Result<PanelInputs> ModbusIoPanel::wait_change(const PanelInputs& known, Deadlin
       const PanelInputs now = debounce_->settled();
       if (now != known || deadline.expired(clock_)) {
         if (auto free = debounce_->none_stuck(); !free) {
-          std::ignore = poll();  // or a button released would stay stuck; what fails here fails again next time
+          std::ignore = poll();  // or a released button would stay stuck; a failure occurs again at the next call
           return pass_on(free);
         }
         return now;
@@ -44,7 +44,7 @@ Result<PanelInputs> ModbusIoPanel::wait_change(const PanelInputs& known, Deadlin
   }
 }
 
-/// Whoever cannot read forgets what it knew: a button that is pressed by then is not a press.
+/// After a failed reading the earlier inputs are discarded: a button pressed at the next reading is not a press.
 Result<void> ModbusIoPanel::poll() {
   const auto bus = bus_->turn();
   auto read = read_once(bus);
@@ -73,7 +73,7 @@ Result<void> ModbusIoPanel::read_once(const Turn& bus) {
   return {};
 }
 
-/// Without outputs the question is asked too, and the module may refuse it.
+/// Reads the coils even without outputs; then the module may refuse the request.
 Result<void> ModbusIoPanel::coils_as_shown(const Turn& bus, Deadline deadline) {
   const auto bits = bus->read_coils(coils_.first, coils_.count, deadline);
   if (options_.outputs.empty() && !bits && bits.error().code == ErrorCode::protocol && !bus->reply_missed()) {
@@ -103,7 +103,7 @@ Result<void> ModbusIoPanel::show(const PanelOutputs& outputs, Deadline deadline)
   return {};
 }
 
-/// Coils between ours belong to somebody else and are left alone.
+/// Coils between the panel's belong to other drivers and are not written.
 Result<void> ModbusIoPanel::write(const Turn& bus, const PanelOutputs& outputs, Deadline deadline) {
   if (options_.outputs.size() == static_cast<std::size_t>(coils_.count)) {
     std::vector<bool> bits(options_.outputs.size());

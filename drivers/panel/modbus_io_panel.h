@@ -10,7 +10,7 @@
 
 namespace scanrig {
 
-/// Which discrete input or coil of the module is which signal; what is not wired keeps its rest value.
+/// Discrete inputs and coils of the module by signal; unwired ones keep their rest value.
 struct ModbusIoPanelOptions {
   struct Signal {
     std::uint16_t address = 0;
@@ -22,9 +22,9 @@ struct ModbusIoPanelOptions {
   std::chrono::milliseconds poll{20};
 };
 
-/// Buttons, switches and lamps on a Modbus RTU I/O module, debounced as PanelDebounce says. The inputs are read every
-/// polling period, each time after the coils: so no answer can be taken for that of an earlier question, and a module
-/// that was switched off and on, its lamps dark, is noticed. A reading that was missed is repeated once.
+/// Buttons, switches and lamps on a Modbus RTU I/O module, debounced by PanelDebounce. The inputs are read every
+/// polling period, each time after the coils: so no reply can be taken for that of an earlier request. A module that
+/// was switched off and on, its lamps dark, is noticed. A missed reading is repeated once.
 class ModbusIoPanel final : public Panel {
  public:
   /// The port is opened by the first use.
@@ -51,7 +51,7 @@ class ModbusIoPanel final : public Panel {
 
   ModbusIoPanelOptions options_;
   Clock& clock_;
-  const std::shared_ptr<modbus::Bus> bus_;  // the projector may hang on the same module
+  const std::shared_ptr<modbus::Bus> bus_;  // the projector may be on the same module
   const Span inputs_;
   const Span coils_;
   std::optional<PanelDebounce> debounce_;  // nothing: the inputs are unknown

@@ -5,7 +5,7 @@
 
 namespace scanrig {
 
-/// Debounced inputs; true is the word said by the name.
+/// Debounced inputs; true has the meaning of the name.
 struct PanelInputs {
   bool start = false;
   bool stop = false;
@@ -13,7 +13,7 @@ struct PanelInputs {
   bool estop_ok = true;
   bool guard_closed = true;
   bool part_present = true;
-  bool flipped = false;  ///< something else than the operator says that the object was turned over
+  bool flipped = false;  ///< a signal other than the operator's reports that the object was turned over
   bool operator==(const PanelInputs&) const = default;
 };
 
@@ -21,7 +21,7 @@ struct PanelOutputs {
   bool red = false;
   bool amber = false;
   bool green = false;
-  bool start_lamp = false;    ///< Start would do something now
+  bool start_lamp = false;    ///< Start has an effect now
   bool flip_request = false;  ///< turn the object over, then press Start
   bool busy = false;
   bool pass = false;
@@ -36,8 +36,8 @@ class Panel {
   virtual ~Panel() = default;
 
   /// Waits until the inputs differ from `known` or the deadline passes; returns the inputs either way.
-  /// Fails with `timeout`, `protocol`, `io` (the inputs are unknown: whoever moves something stops), `device_alarm`
-  /// (a button is pressed since the panel was opened).
+  /// Fails with `timeout`, `protocol`, `io` (the inputs are unknown: a caller that moves the table stops it),
+  /// `device_alarm` (a button is pressed since the panel was opened).
   virtual Result<PanelInputs> wait_change(const PanelInputs& known, Deadline deadline) = 0;
 
   /// Fails with `timeout`, `protocol`, `io`.

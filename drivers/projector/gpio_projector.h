@@ -11,8 +11,8 @@
 namespace scanrig {
 
 struct GpioProjectorOptions {
-  gpio::LineSpec pattern_line;               ///< fires the dots and both cameras
-  std::optional<gpio::LineSpec> plain_line;  ///< fires even light and both cameras
+  gpio::LineSpec pattern_line;               ///< fires the pattern and both cameras
+  std::optional<gpio::LineSpec> plain_line;  ///< fires plain light and both cameras
   std::chrono::microseconds pulse{15000};    ///< at least the cameras' exposure
 };
 

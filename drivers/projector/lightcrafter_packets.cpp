@@ -10,7 +10,7 @@ constexpr std::size_t kHeaderBytes = 4;
 
 struct Bit {
   int bit;
-  bool bad_when;  // the value that is a fault
+  bool bad_when;  // value that means a fault
   const char* words;
 };
 
@@ -84,7 +84,7 @@ std::string system_faults(std::uint8_t status) {
 }
 
 std::string validation_faults(std::uint8_t validation) {
-  // Bits 2 and 3 are remarks: they concern sequences of several patterns.
+  // Bits 2 and 3 are remarks, not faults: they concern sequences of several patterns.
   constexpr std::array kBits{Bit{0, true, "exposure or period out of range"}, Bit{1, true, "no such pattern"},
                              Bit{4, true, "period and exposure must be equal or 230 us apart"}};
   return in_words(validation, kBits);

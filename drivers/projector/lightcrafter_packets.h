@@ -20,7 +20,7 @@ inline constexpr std::size_t kReportBytes = 64;
 inline constexpr std::size_t kLargestPayload = 512;
 using Report = std::array<std::uint8_t, kReportBytes>;
 
-/// By their numbers CMD2 CMD3.
+/// Commands by their numbers CMD2 CMD3.
 enum class Command : std::uint16_t {
   hardware_status = 0x1A0A,
   system_status = 0x1A0B,
@@ -42,7 +42,7 @@ enum class Command : std::uint16_t {
   power = 0x0200,
 };
 
-/// A write (with a reply asked for), or a read when `read`.
+/// A write (with a reply requested), or a read when `read`.
 std::vector<Report> encode(Command command, bool read, std::uint8_t sequence, std::span<const std::uint8_t> data);
 
 /// Puts a reply together, report by report.
@@ -50,9 +50,9 @@ class ReplyReader {
  public:
   explicit ReplyReader(std::uint8_t sequence) : sequence_(sequence) {}
 
-  /// True once the reply is whole. Fails with `protocol`: of another request, refused by the device, longer than any.
+  /// True once the reply is whole. Fails with `protocol`: reply to another request, refused by the device, or too long.
   Result<bool> add(const Report& report);
-  /// Whether the last error was a reply to an earlier request, after which the right one may still come.
+  /// True if the last error was a reply to an earlier request, after which the right one may still come.
   [[nodiscard]] bool was_earlier() const { return earlier_; }
   [[nodiscard]] const std::vector<std::uint8_t>& payload() const { return payload_; }
 
@@ -72,18 +72,18 @@ struct LutEntry {
   std::uint8_t leds = 7;  ///< b0 red, b1 green, b2 blue
   bool invert = false;
   bool black_after = false;
-  bool swap_buffer = false;  ///< load the image from flash before it
+  bool swap_buffer = false;  ///< load the image from flash before the pattern
 };
 std::array<std::uint8_t, 3> encode(const LutEntry& entry);
 
-/// What is wrong according to the device, in words; empty if nothing is.
+/// Errors that the device reports, as text; empty if there are none.
 std::string hardware_faults(std::uint8_t hardware_status);
 std::string system_faults(std::uint8_t system_status);
 std::string validation_faults(std::uint8_t validation);
 
-/// The sequencer runs: light.
+/// The sequencer runs: the light is on.
 bool runs(std::uint8_t main_status);
-/// The device has not yet come to a result.
+/// The device has no result yet.
 bool validating(std::uint8_t validation);
 
 }  // namespace scanrig::dlpc350

@@ -90,11 +90,11 @@ Result<void> LightCrafterProjector::connect(Deadline deadline) {
   set_up_ = false;
   if (auto awake = write(Command::power, {0}, deadline); !awake) return awake;
   if (auto healthy = expect_healthy(deadline); !healthy) return healthy;
-  if (auto stopped = stop(deadline); !stopped) return stopped;  // what it showed when it was lost
+  if (auto stopped = stop(deadline); !stopped) return stopped;  // ends what the device showed when it was lost
   return write(Command::display_mode, {1}, deadline);
 }
 
-/// Whatever does not depend on the light: once for each connection. The order matters; the device takes settings only
+/// Sends all settings that do not depend on the light, once per connection. Order matters; the device takes settings
 /// when stopped.
 Result<void> LightCrafterProjector::set_up(Deadline deadline) {
   set_up_ = false;
@@ -122,8 +122,8 @@ Result<void> LightCrafterProjector::set_up(Deadline deadline) {
   return {};
 }
 
-/// The one entry of the pattern table, six commands: the device checks nothing before it is told to validate, and each
-/// exposure before this one has been seen to be over.
+/// Writes the one entry of the pattern table, six commands. The device checks nothing before the validate command, and
+/// every earlier exposure has been confirmed to be over.
 Result<void> LightCrafterProjector::load(Light light, Deadline deadline) {
   loaded_.reset();
   LutEntry entry;
@@ -194,14 +194,14 @@ Result<bool> LightCrafterProjector::running(Deadline deadline) {
   return dlpc350::runs(*status);
 }
 
-/// True, and at once, if it is to go dark.
+/// Waits for `time`; returns true, and at once, if request_off() was called.
 bool LightCrafterProjector::pause(Clock::Duration time) {
   std::unique_lock lock(mutex_);
   return clock_.wait_until(lock, wake_, clock_.now() + time, [&] { return dark_requested_; });
 }
 
 Result<void> LightCrafterProjector::wait_until_over(Deadline deadline) {
-  // Not asked before it can be over.
+  // First checked when it can be over.
   for (Clock::Duration time = options_.exposure;; time = kPoll) {
     if (pause(time)) return fail(ErrorCode::io, "projector: went dark on request before the exposure was over");
     const auto on = running(deadline);
@@ -236,7 +236,7 @@ Result<std::uint8_t> LightCrafterProjector::read_byte(Command command, Deadline 
   return reply->front();
 }
 
-/// A device that is gone, or no longer makes sense, is connected and set up again by the next call.
+/// A device that is lost or sends nonsense is connected and set up again by the next call.
 Result<LightCrafterProjector::Bytes> LightCrafterProjector::talk(Command command, bool read, const Bytes& data,
                                                                  Deadline deadline) {
   if (!transport_) return fail(ErrorCode::io, "projector: the LightCrafter is not connected");
@@ -257,7 +257,7 @@ Result<LightCrafterProjector::Bytes> LightCrafterProjector::exchange(Command com
     const auto report = transport_->receive(deadline);
     if (!report) return pass_on(report);
     const auto whole = reader.add(*report);
-    if (!whole && reader.was_earlier() && !deadline.expired(clock_)) continue;  // a reply given up before
+    if (!whole && reader.was_earlier() && !deadline.expired(clock_)) continue;  // reply to a request given up before
     if (!whole) return pass_on(whole);
     if (*whole) return reader.payload();
   }

@@ -9,11 +9,11 @@
 namespace scanrig {
 
 struct LightCrafterOptions {
-  int image = 0;    ///< the random dots: index of the image in the device's flash
+  int image = 0;    ///< the random-dot pattern: index of the image in the device's flash
   int pattern = 0;  ///< and bit plane of that image, 0 to 23
   int depth = 1;    ///< bits, 1 to 8
   std::array<std::uint8_t, 3> led_current{100, 100,
-                                          100};  ///< red, green, blue; 0 to 255 of what the LEDs' driver gives
+                                          100};  ///< red, green, blue; 0 to 255, steps of the LED driver's current
   std::chrono::microseconds exposure{15000};     ///< of the light: at least the cameras' exposure
   dlpc350::LutEntry::Trigger trigger_in = dlpc350::LutEntry::Trigger::internal;  ///< else waits for TRIG_IN_1
   bool trigger_out_inverted = false;
@@ -22,13 +22,13 @@ struct LightCrafterOptions {
   std::chrono::milliseconds reply_timeout{2000};
 };
 
-/// A TI DLP LightCrafter 4500 that shows dots from its flash, or all white, once for each fire(); TRIG_OUT_1 is the
-/// cameras' trigger. Connected when first used, and again after a loss. request_off() ends a running exposure, and
-/// fire() then fails with `io`. Faults the device reports are `device_alarm` in words; what it does not accept of the
-/// options is `invalid_input`.
+/// A TI DLP LightCrafter 4500 that shows the pattern from its flash, or all white, once per fire(); TRIG_OUT_1 is the
+/// cameras' trigger. Connected by the first use, and again after a loss. request_off() ends a running exposure, and
+/// fire() then fails with `io`. Faults that the device reports are `device_alarm` with their text. Options that it
+/// rejects are `invalid_input`.
 class LightCrafterProjector final : public Projector {
  public:
-  /// Fails with `out_of_range` (an option outside what the device can do).
+  /// Fails with `out_of_range` (an option outside the device's range).
   static Result<std::unique_ptr<LightCrafterProjector>> create(const LightCrafterOptions& options,
                                                                dlpc350::OpenTransport open, Clock& clock);
 
@@ -63,8 +63,8 @@ class LightCrafterProjector final : public Projector {
   Clock& clock_;
   std::unique_ptr<dlpc350::Transport> transport_;  // null while the device is lost
   std::uint8_t sequence_ = 0;
-  bool set_up_ = false;          // since it was connected
-  std::optional<Light> loaded_;  // what the device's table shows
+  bool set_up_ = false;          // since the last connection
+  std::optional<Light> loaded_;  // content of the device's table
 
   std::mutex mutex_;
   std::condition_variable wake_;

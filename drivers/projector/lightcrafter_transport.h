@@ -21,7 +21,7 @@ class Transport {
 /// Opens a transport, and again after the device was lost. Fails with `not_found`, `io`.
 using OpenTransport = std::function<Result<std::unique_ptr<Transport>>()>;
 
-/// The LightCrafter 4500 on USB with this serial number; the only one there is when `serial` is empty.
+/// The LightCrafter 4500 on USB with this serial number; the only one connected when `serial` is empty.
 OpenTransport usb_transport(std::string serial, Clock& clock);
 
 }  // namespace scanrig::dlpc350

@@ -51,7 +51,7 @@ class Usb final : public Transport {
   Result<void> transfer(std::uint8_t endpoint, Report& bytes, Deadline deadline, const char* what) {
     const auto wait = std::chrono::ceil<std::chrono::milliseconds>(deadline.left(clock_)).count();
     int moved = 0;
-    // 0 would mean for ever.
+    // 0 would mean no limit.
     const auto limit = static_cast<unsigned>(std::clamp<long>(wait, 1, 60'000));
     const int code =
         libusb_interrupt_transfer(handle_, endpoint, bytes.data(), static_cast<int>(bytes.size()), &moved, limit);

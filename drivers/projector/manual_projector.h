@@ -4,8 +4,8 @@
 
 namespace scanrig {
 
-/// A projector without a wire to us: its dots burn always, or a hand switches them. Every exposure succeeds, with
-/// whatever light there is; that it is dark is never known, so the station tells the operator to switch it.
+/// A projector without a wire to this machine: its light is always on, or the operator switches it. Every exposure
+/// succeeds with the present light. The driver cannot detect whether it is off, so the station prompts the operator.
 class ManualProjector final : public Projector {
  public:
   Result<void> fire(Light, Deadline) override { return {}; }

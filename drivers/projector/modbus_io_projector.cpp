@@ -4,7 +4,7 @@ namespace scanrig {
 namespace {
 
 constexpr int kAttempts = 2;
-constexpr int kReplyTimeouts = 8;  ///< to switch off and see it: two requests, each twice, each after a quiet line
+constexpr int kReplyTimeouts = 8;  ///< to switch off and confirm it: two requests, each twice, each after a quiet line
 
 }  // namespace
 
@@ -22,7 +22,7 @@ Result<void> ModbusIoProjector::fire(Light light, Deadline deadline) {
     const std::scoped_lock lock(mutex_);
     dark_requested_ = false;
   }
-  // Off has a deadline of its own: the light must not stay on because the pulse came late.
+  // Off has a deadline of its own: a late pulse must not keep the light on.
   const auto off = [&] {
     return switch_off(*coil, Deadline::after(clock_, kReplyTimeouts * options_.line.reply_timeout));
   };

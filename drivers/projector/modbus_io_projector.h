@@ -12,16 +12,16 @@ namespace scanrig {
 
 struct ModbusIoProjectorOptions {
   modbus::ClientOptions line;               ///< of the I/O module
-  std::uint16_t pattern_coil = 0;           ///< fires the dots and both cameras
-  std::optional<std::uint16_t> plain_coil;  ///< fires even light and both cameras
-  bool active_low = false;                  ///< both coils: off is lit
+  std::uint16_t pattern_coil = 0;           ///< fires the pattern and both cameras
+  std::optional<std::uint16_t> plain_coil;  ///< fires plain light and both cameras
+  bool active_low = false;                  ///< both coils: light is on when the coil is off
   std::chrono::microseconds pulse{15000};   ///< at least the cameras' exposure
 };
 
 /// A dot projector fired by an output of a Modbus RTU I/O module, whose edge is also the cameras' trigger. The module
-/// may be the panel's: they share its bus. A pulse lasts as asked and up to two requests of the panel longer. That it
-/// is dark is read back. request_off() ends a running pulse, and fire() then fails with `io`. A plain exposure fails
-/// with `unsupported` when there is no coil for it.
+/// may be the panel's: they share its bus. A pulse lasts as configured, plus up to two requests of the panel. Off is
+/// confirmed by reading back. request_off() ends a running pulse, and fire() then fails with `io`. A plain exposure
+/// fails with `unsupported` when there is no coil for it.
 class ModbusIoProjector final : public Projector {
  public:
   /// The port is opened by the first use.

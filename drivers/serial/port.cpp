@@ -20,7 +20,7 @@ tl::unexpected<Error> gone(const std::string& device, std::string_view reason) {
   return fail(ErrorCode::io, "{}: the port is gone ({}); check the cable and the adapter", device, reason);
 }
 
-/// Fails with what is wrong.
+/// Fails with the cause.
 Result<void> set_up(int descriptor, int baud, Port::Lock lock) {
   static const std::map<int, speed_t> speeds{{9600, B9600},   {19200, B19200},   {38400, B38400},
                                              {57600, B57600}, {115200, B115200}, {230400, B230400}};
@@ -33,7 +33,7 @@ Result<void> set_up(int descriptor, int baud, Port::Lock lock) {
   if (::tcgetattr(descriptor, &settings) != 0) return fail(ErrorCode::io, "{}", std::strerror(errno));
   ::cfmakeraw(&settings);
   settings.c_cflag |= CLOCAL | CREAD;
-  // A controller that restarts when DTR falls shall not do so whenever we end.
+  // A controller that restarts when DTR falls must not do so whenever this process ends.
   settings.c_cflag &= ~static_cast<tcflag_t>(HUPCL | CSTOPB | PARENB | CRTSCTS);
   ::cfsetspeed(&settings, speed->second);
   if (::tcsetattr(descriptor, TCSANOW, &settings) != 0) return fail(ErrorCode::io, "{}", std::strerror(errno));

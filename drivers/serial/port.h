@@ -12,7 +12,7 @@ namespace scanrig::serial {
 /// Waits in real time. Threads: one owner.
 class Port {
  public:
-  /// `shared`: used although another program has it, one that hangs.
+  /// `shared`: the port is used although another, hanging program has it.
   enum class Lock { exclusive, shared };
   /// Fails with `io`: absent, not a terminal, no such speed, or used by another program.
   static Result<Port> open(const std::string& device, int baud, Lock lock = Lock::exclusive);
@@ -20,14 +20,14 @@ class Port {
   Port& operator=(Port&& other) noexcept;
   ~Port();
 
-  /// All of `bytes`. Fails with `timeout` (the line takes no more within `wait`), `io` (the port is gone).
+  /// Writes all of `bytes`. Fails with `timeout` (the line takes no more within `wait`), `io` (the port is gone).
   Result<void> write(std::string_view bytes, Clock::Duration wait);
-  /// What arrives within `wait`, as soon as something does; empty when nothing does. Fails with `io`.
+  /// Reads bytes as soon as any arrive within `wait`; empty when none do. Fails with `io`.
   Result<std::string> read(Clock::Duration wait);
 
  private:
   Port(int descriptor, std::string device) : descriptor_(descriptor), device_(std::move(device)) {}
-  /// Whether `events` happen within `wait`. Fails with `io`.
+  /// True if `events` happen within `wait`. Fails with `io`.
   Result<bool> ready(short events, Clock::Duration wait);
 
   int descriptor_ = -1;

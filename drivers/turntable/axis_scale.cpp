@@ -8,7 +8,7 @@
 namespace scanrig {
 namespace {
 
-/// The most that the profile's move block can hold of a value.
+/// Largest value that the profile's move block can hold.
 double most(DriveProfile::Block::Word word, const DriveProfile& profile) {
   return profile.move.has(word, true) ? std::numeric_limits<std::int32_t>::max()
                                       : std::numeric_limits<std::uint16_t>::max();

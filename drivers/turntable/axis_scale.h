@@ -18,24 +18,24 @@ struct AxisScale {
   Degrees home_offset;       ///< from the drive's home to the table's zero, counter-clockwise
 
   [[nodiscard]] double pulses_per_degree() const { return pulses_per_motor_rev * gear_ratio / 360.0; }
-  /// Not rounded and not limited to 32 bits.
+  /// Neither rounded nor limited to 32 bits.
   [[nodiscard]] double pulses(Degrees angle) const;
   [[nodiscard]] Degrees angle(double pulses) const;
   [[nodiscard]] double motor_rpm(DegreesPerSecond speed) const { return speed.value * gear_ratio / 6.0; }
 
-  /// What a drive is told as speed and acceleration. Fails with `out_of_range`.
+  /// Speed and acceleration in the drive's units. Fails with `out_of_range`.
   [[nodiscard]] Result<std::uint32_t> speed_word(DegreesPerSecond speed, const DriveProfile& profile) const;
   [[nodiscard]] Result<std::uint32_t> acceleration_word(DegreesPerSecond2 acceleration,
                                                         const DriveProfile& profile) const;
 };
 
-/// Table angles, many turns wide or less than one.
+/// Range of table angles, many turns wide or less than one.
 struct AngleRange {
   Degrees min;
   Degrees max;
 };
 
-/// Where the drive is sent: to `target`, by way of `before` if the angle must first be passed backwards.
+/// Targets of a move: `target`, by way of `before` if the angle must first be passed backwards.
 struct MovePlan {
   std::optional<std::int32_t> before;
   std::int32_t target = 0;
@@ -51,15 +51,15 @@ struct MovePlanner {
     double min;
     double max;
   };
-  /// What the device can count.
+  /// Range that the device can count.
   Counter device{std::numeric_limits<std::int32_t>::min(), std::numeric_limits<std::int32_t>::max()};
 
   /// The shortest way to `target`, an angle modulo 360 degrees, that stays inside the soft limits and the device's
-  /// counter: near its end the axis goes the other way round, so the counter never overflows. `backlash_taken_up`: the
+  /// counter: near the counter's end the axis turns the other way, so it never overflows. `backlash_taken_up`: the
   /// last move ended counter-clockwise, so the backlash is taken up. Nothing when no equivalent of `target` fits.
   [[nodiscard]] std::optional<MovePlan> plan(std::int32_t from, Degrees target, bool backlash_taken_up) const;
 
-  /// The counter values that may be used.
+  /// Range of counter values that may be used.
   [[nodiscard]] Counter counter_range() const;
 };
 

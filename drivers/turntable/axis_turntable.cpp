@@ -11,14 +11,14 @@ namespace {
 
 using std::chrono::milliseconds;
 
-constexpr milliseconds kPollPeriod{5};  ///< between an answer and the next question
+constexpr milliseconds kPollPeriod{5};  ///< between a reply and the next request
 constexpr milliseconds kStalledAfter{2000};
 constexpr milliseconds kEnableTime{1000};
-/// For so long the position must not change to be called standing: longer than a table rings after a quick stop.
+/// The table is stopped when the position has not changed for this long: longer than a table rings after a quick stop.
 constexpr milliseconds kStandingTime{100};
 constexpr int kAttempts = 3;
-/// Three attempts of five each: an answer may come two late, the line is quiet for two after it, the next one takes
-/// one. The rest is room, for a reset too.
+/// Three attempts of five each: a reply may come two late, the line is quiet for two after it, the next one takes
+/// one. The rest is margin, for a reset too.
 constexpr int kStopReplyTimeouts = 20;
 
 }  // namespace
@@ -57,7 +57,7 @@ Result<void> AxisTurntable::find_home(Deadline deadline) {
     if (auto prepared = drive_->prepare_homing(deadline); !prepared) return prepared;
   }
   if (auto on = drive_->guard_connection(true, deadline); !on) return on;
-  // Where the zero is sought, the homed bit may still be that of the last homing: something must be seen to happen.
+  // Where homing searches for the zero, the homed bit may still be that of the last homing: a change must be seen.
   const bool sought = !here && !drive_->knows_zero();
   bool begun = false;
   const auto begins = [&](const DriveState& state) {
@@ -92,7 +92,7 @@ Result<void> AxisTurntable::check_and_enable(Deadline deadline) {
   if (state->running) {
     if (auto stopped = stop(deadline); !stopped) return stopped;
   }
-  if (state->fault) return healthy(*state, deadline);  // with an alarm a device may answer nothing else
+  if (state->fault) return healthy(*state, deadline);  // with an alarm a device may reply to nothing else
   if (auto fit = drive_->check(deadline); !fit) return fit;
   if (state = ask(deadline); !state) return pass_on(state);
   if (!state->fault && !state->enabled) {
@@ -169,7 +169,7 @@ Result<AxisTurntable::Arrival> AxisTurntable::run_to(std::int32_t target, const 
         }
         if (!in_position) in_position = now;
         if (now - *in_position < settle) {
-          again = std::min(again, *in_position + settle);  // not a period too late
+          again = std::min(again, *in_position + settle);  // not one period too late
           return Seen::progress;
         }
         arrival = {*in_position, now, state.position};
@@ -180,8 +180,8 @@ Result<AxisTurntable::Arrival> AxisTurntable::run_to(std::int32_t target, const 
   return arrival;
 }
 
-/// Sends what starts a motion. When the answer is missed, the drive is asked whether it has obeyed before it is sent
-/// again.
+/// Sends a request that starts a motion. When the reply is missed, the drive's state is checked before the request is
+/// sent again.
 Result<void> AxisTurntable::command(const std::function<Result<void>()>& send,
                                     const std::function<bool(const DriveState&)>& obeyed, Deadline deadline) {
   for (int attempt = 1;; ++attempt) {
@@ -195,8 +195,8 @@ Result<void> AxisTurntable::command(const std::function<Result<void>()>& send,
   }
 }
 
-/// Polls until `look` says done. Fails with `stopped`, `not_homed`, `device_alarm`, `stalled`, `timeout`, `protocol`,
-/// `io`.
+/// Polls until `look` returns done. Fails with `stopped`, `not_homed`, `device_alarm`, `stalled`, `timeout`, `io`,
+/// `protocol`.
 Result<void> AxisTurntable::watch(std::string_view doing, const Look& look, Deadline deadline) {
   for (auto last_progress = clock_.now();;) {
     const auto state = ask(deadline);
@@ -213,7 +213,7 @@ Result<void> AxisTurntable::watch(std::string_view doing, const Look& look, Dead
       return fail(ErrorCode::stalled, "{}: no progress for 2 s, the axis reads {:.3f} deg; is something in the way?",
                   doing, options_.scale.angle(state->position).value);
     }
-    // Of a drive that is blind nothing is known: there must be time left for a stop that goes unheard.
+    // A blind drive's state is unknown: there must be time left for a stop that gets no reply.
     const auto for_stop = state->blind ? kStopReplyTimeouts * reply_timeout_ : Clock::Duration::zero();
     if (deadline.left(clock_) <= for_stop) {
       return fail(ErrorCode::timeout, "{}: not there by the deadline, the axis reads {:.3f} deg", doing,
@@ -241,7 +241,7 @@ Result<void> AxisTurntable::not_stopped() {
   return {};
 }
 
-/// The drive's state, unless someone has asked to stop.
+/// Reads the drive's state, unless a stop was requested.
 Result<DriveState> AxisTurntable::ask(Deadline deadline) {
   if (auto free = not_stopped(); !free) return pass_on(free);
   return read_after_owed_stop(deadline);
@@ -261,12 +261,12 @@ Result<void> AxisTurntable::stop_drive(Deadline deadline) {
   return drive_->stop(deadline);
 }
 
-/// After any failure: no known zero, and the motor is told to stop.
+/// After any failure: the table is not homed, and a stop is sent to the motor.
 tl::unexpected<Error> AxisTurntable::give_up(const Error& error) {
   homed_ = flank_loaded_ = false;
   ErrorCode code = error.code;
   if (code == ErrorCode::stopped || code == ErrorCode::timeout) {
-    // Whoever asks to stop calls waiting requests off: that is no time-out.
+    // A stop request aborts waiting requests: that is not a time-out.
     const std::scoped_lock lock(mutex_);
     if (std::exchange(stop_requested_, false)) code = ErrorCode::stopped;
   }
@@ -275,7 +275,7 @@ tl::unexpected<Error> AxisTurntable::give_up(const Error& error) {
               stop_pending_ ? "the stop was not confirmed: the table may be moving" : "the motor was told to stop");
 }
 
-/// Waits until the next poll is due or someone asks to stop.
+/// Waits until the next poll is due or a stop is requested.
 void AxisTurntable::pause(Clock::TimePoint until) {
   std::unique_lock lock(mutex_);
   clock_.wait_until(lock, wake_, until, [&] { return stop_requested_; });
@@ -297,7 +297,7 @@ Result<void> AxisTurntable::stop(Deadline deadline) {
       since = clock_.now();
       last = state->position;
     } else if (clock_.now() - since >= kStandingTime) {
-      std::ignore = drive_->guard_connection(false, deadline);  // or the drive has an alarm later, at standstill
+      std::ignore = drive_->guard_connection(false, deadline);  // or the drive raises an alarm later, at standstill
       return {};
     }
   }

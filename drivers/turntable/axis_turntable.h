@@ -24,11 +24,11 @@ struct AxisTurntableOptions {
   std::optional<AngleRange> soft_limits;
 };
 
-/// A turntable moved by a motor drive: what a move is, whatever the drive speaks. A move has arrived when the drive
-/// says in position and its position is within the tolerance, both without a break for the settle time. rotate_to()
-/// takes the angle modulo 360 degrees and goes the shorter way, ending counter-clockwise; `out_of_range` and
+/// A turntable moved by a motor drive: the logic of a move, for every kind of drive. A move has arrived when the drive
+/// reports in position and its position is within the tolerance, both without a break for the settle time. rotate_to()
+/// takes the angle modulo 360 degrees and turns the shorter way, ending counter-clockwise. `out_of_range` and
 /// `not_homed` found before anything was sent leave home as it is. When the stop after a failure could not be
-/// delivered, it is the first thing sent once the drive answers again.
+/// delivered, it is the first request sent once the drive replies again.
 class AxisTurntable : public Turntable {
  public:
   Result<void> home(Deadline deadline) override;
@@ -40,7 +40,7 @@ class AxisTurntable : public Turntable {
   void request_stop() noexcept override;
 
  protected:
-  /// `reply_timeout`: the longest that the drive takes to answer. `counter`: what it can count.
+  /// `reply_timeout`: the longest reply time of the drive. `counter`: the range that it can count.
   AxisTurntable(AxisTurntableOptions options, std::unique_ptr<AxisDrive> drive, Clock::Duration reply_timeout,
                 MovePlanner::Counter counter, Clock& clock);
 
@@ -51,7 +51,7 @@ class AxisTurntable : public Turntable {
     Clock::TimePoint still;
     std::int32_t position = 0;
   };
-  /// `again`: when the drive is asked the next time, unless it is brought forward.
+  /// `again`: time of the next poll of the drive, unless it is brought forward.
   using Look = std::function<Seen(const DriveState&, Clock::TimePoint& again)>;
 
   Result<void> find_home(Deadline deadline);

@@ -9,14 +9,14 @@
 
 namespace scanrig {
 
-/// What one family of Modbus drives is like: registers, bits and units, as data (a file in config/drives/).
-/// 32-bit values lie in two registers, high word first.
+/// Description of one family of Modbus drives: registers, bits and units, as data (a file in config/drives/).
+/// 32-bit values are in two registers, high word first.
 struct DriveProfile {
-  /// A value that makes the drive do something when written.
+  /// A value that starts an action of the drive when written.
   struct Trigger {
     std::uint16_t address = 0;
     std::uint16_t value = 0;
-    bool momentary = false;  ///< an input that must be let go: 0 is written after the value
+    bool momentary = false;  ///< an input that must be reset: 0 is written after the value
   };
 
   /// Words written in one request.
@@ -25,7 +25,7 @@ struct DriveProfile {
     struct Item {
       Word word = Word::constant;
       bool high = false;        ///< the upper half of a 32-bit value
-      std::uint16_t value = 0;  ///< of a constant
+      std::uint16_t value = 0;  ///< value of a constant
     };
     std::uint16_t address = 0;
     std::vector<Item> words;
@@ -38,7 +38,7 @@ struct DriveProfile {
     }
   };
 
-  /// Pulses a motor turn: `base`, times and by what two registers hold, where there are any.
+  /// Pulses per motor turn: `base`, times and divided by the content of two registers, where there are any.
   struct Resolution {
     int base = 1;
     std::optional<std::uint16_t> multiply_address;
@@ -49,7 +49,7 @@ struct DriveProfile {
   struct Status {
     std::uint16_t address = 0;
     std::uint16_t fault = 0;
-    std::uint16_t enabled = 0;  ///< 0: the drive does not tell, and is taken for enabled
+    std::uint16_t enabled = 0;  ///< 0: the drive does not report it, and counts as enabled
     std::uint16_t running = 0;
     std::uint16_t in_position = 0;
     std::uint16_t homed = 0;
@@ -58,7 +58,7 @@ struct DriveProfile {
   struct Homing {
     std::optional<std::uint16_t> mode_address;
     std::map<std::string, std::uint16_t> modes;  ///< "switch", "limit", "absolute"
-    bool absolute = false;  ///< the encoder knows the zero: homing seeks nothing, it only goes there
+    bool absolute = false;  ///< the encoder stores the zero: homing searches for nothing, it only moves there
     std::optional<Block> speeds;
     Trigger start;
     Trigger set_zero;  ///< declares the present position home
@@ -78,7 +78,7 @@ struct DriveProfile {
     Trigger reset_trigger;
   };
 
-  /// The drive stops by itself when it has received nothing for so long; 0 in the register: never.
+  /// The drive stops on its own when it has received nothing for this long; 0 in the register: never.
   struct CommunicationTimeout {
     std::uint16_t address = 0;  ///< milliseconds
     std::chrono::milliseconds timeout{3000};

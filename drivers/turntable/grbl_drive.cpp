@@ -12,12 +12,12 @@ using std::chrono::milliseconds;
 
 constexpr int kAttempts = 3;
 constexpr double kPulsesPerUnit = 1000;
-constexpr double kExactIntegers = 1 << 23;  ///< up to here a 32-bit floating point number tells 1 from 1.5
+constexpr double kExactIntegers = 1 << 23;  ///< up to here a 32-bit floating point number distinguishes 1 from 1.5
 constexpr milliseconds kListen{20};
 /// GRBL's settings [gnea/grbl wiki: Configuration].
 constexpr int kReports = 10, kInches = 13, kHomingOn = 22, kSteps = 100, kAcceleration = 120;
-constexpr double kAccelerationSlack = 1.001;  ///< settings are told with three decimals
-/// Alarms after which GRBL wants a person: a limit switch, a move beyond its limits, the probe.
+constexpr double kAccelerationSlack = 1.001;  ///< settings are reported with three decimals
+/// Alarms after which GRBL needs the operator: a limit switch, a move beyond its limits, the probe.
 bool wants_reset(int alarm) { return alarm == 1 || alarm == 2 || alarm == 4 || alarm == 5 || alarm > 10; }
 bool switch_not_found(int alarm) { return alarm == 8 || alarm == 9 || alarm == 10; }
 
@@ -37,8 +37,8 @@ Result<double> GrblDrive::position_in(const grbl::Report& report) const {
   return fail(ErrorCode::protocol, "the controller does not report the machine position of axis {}: set $10=1", axis_);
 }
 
-/// A report, and in turn with it the probe: what follows a missed answer is never the same request again, so even an
-/// answer later than the quiet line, or one that is repeated, is refused, not believed.
+/// Requests a report and the probe in turn: the request after a missed reply is never the same one. So a reply that is
+/// later than the quiet line, or repeated, is rejected.
 Result<grbl::Report> GrblDrive::exchange(Deadline deadline) {
   bool report_first = true;
   for (int attempt = 1;; ++attempt) {
@@ -125,7 +125,7 @@ Result<std::string> GrblDrive::read_alarm(Deadline) {
   }
 }
 
-/// Never "$X": that would let it move with its position lost.
+/// Never sends "$X": that would allow moves although the position is lost.
 Result<void> GrblDrive::reset_alarm(Deadline deadline) {
   homed_ = false;
   link_.forget_alarm();
@@ -133,8 +133,8 @@ Result<void> GrblDrive::reset_alarm(Deadline deadline) {
 }
 
 Result<void> GrblDrive::check(Deadline deadline) {
-  // Locked, or waiting for a reset after an alarm that was told before we listened: the reset settles it, unlocks
-  // nothing.
+  // Locked, or waiting for a reset after an alarm that was raised before the connection: the reset ends the wait and
+  // unlocks nothing.
   if (last_ == State::alarm || last_ == State::hold) {
     if (auto restarted = link_.reset(deadline); !restarted) return restarted;
   }
@@ -162,7 +162,7 @@ Result<void> GrblDrive::check(Deadline deadline) {
   return {};
 }
 
-/// From a completed hold a reset throws away what was queued and keeps the position.
+/// After a completed hold a reset discards queued moves and keeps the position.
 Result<void> GrblDrive::leave_hold(Deadline deadline) {
   if (last_ != State::hold) return {};
   if (auto restarted = link_.reset(deadline); !restarted) return restarted;
@@ -191,7 +191,7 @@ Result<void> GrblDrive::set_zero(Deadline deadline) {
   return {};
 }
 
-/// Every line says all modes: nothing depends on what was said before.
+/// Every line states all modes: nothing depends on earlier lines.
 Result<void> GrblDrive::start_move(std::int32_t target, Deadline deadline) {
   if (auto left = leave_hold(deadline); !left) return left;
   return link_.command(fmt::format("G21G90G94G53G1{}{:.3f}F{:.1f}", axis_, (zero_ + target) / kPulsesPerUnit,
@@ -210,7 +210,7 @@ Result<void> GrblDrive::stop(Deadline deadline) {
       if (attempt == kAttempts) break;
     }
   }
-  // It homes, or does not listen: the reset stops it wherever it is.
+  // GRBL homes, or does not read lines: the reset stops it in any state.
   auto restarted = link_.reset(deadline);
   if (!restarted) return restarted;
   homing_ = homed_ = false;

@@ -17,8 +17,8 @@ struct GrblDriveOptions {
 class GrblDrive final : public AxisDrive {
  public:
   static constexpr int kPulsesPerMotorRev = 360'000;
-  /// GRBL holds positions as 32-bit floating point: how far the axis may be from its zero for them to be known within
-  /// `pulses`. Never beyond what GRBL can report.
+  /// GRBL holds positions as 32-bit floating point. Largest distance of the axis from its zero at which positions are
+  /// known within `pulses`. Never beyond the range that GRBL can report.
   static MovePlanner::Counter counter(double pulses);
 
   GrblDrive(GrblDriveOptions options, const AxisScale& scale, std::string home_mode, DegreesPerSecond speed,
@@ -55,7 +55,7 @@ class GrblDrive final : public AxisDrive {
  private:
   Result<DriveState> watch_homing(Deadline deadline);
   Result<grbl::Report> exchange(Deadline deadline);
-  /// Of the machine, in pulses.
+  /// Position of the machine in pulses.
   Result<double> position_in(const grbl::Report& report) const;
   Result<void> leave_hold(Deadline deadline);
   [[nodiscard]] int index() const;
@@ -68,9 +68,9 @@ class GrblDrive final : public AxisDrive {
   const DegreesPerSecond2 acceleration_;
   grbl::State last_ = grbl::State::idle;
   double zero_ = 0;  // machine position of home, pulses
-  double seen_ = 0;  // machine position last told, pulses
+  double seen_ = 0;  // machine position reported last, pulses
   bool homed_ = false;
-  bool homing_ = false;  // "$H" was sent and is not answered yet; meanwhile GRBL answers nothing else
+  bool homing_ = false;  // "$H" was sent and has no reply yet; meanwhile GRBL replies to nothing else
 };
 
 }  // namespace scanrig

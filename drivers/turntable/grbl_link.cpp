@@ -10,7 +10,7 @@ using Kind = Line::Kind;
 
 constexpr std::size_t kMaxLineLength = 200;
 constexpr milliseconds kRestart{1500};              ///< from a reset to the greeting
-constexpr Clock::Duration kLook = milliseconds(5);  ///< how soon somebody who waits sees that he is to hurry
+constexpr Clock::Duration kLook = milliseconds(5);  ///< longest time until a waiting caller notices set_fail_fast()
 constexpr char kReset = 0x18;
 
 }  // namespace
@@ -31,11 +31,11 @@ Result<void> Link::open() {
   port_.emplace(std::move(*port));
   heard_.clear();
   ++statistics_.openings;
-  reply_missed_ = true;  // whatever the controller was saying before is not for us
+  reply_missed_ = true;  // earlier output of the controller is not for this request
   return {};
 }
 
-/// The next whole line; empty ones are none.
+/// Reads the next whole line; empty lines are skipped.
 Result<std::optional<Line>> Link::next_line(Clock::Duration wait) {
   for (const auto until = clock_.now() + wait;;) {
     const auto end = heard_.find_first_of("\r\n");
@@ -92,7 +92,7 @@ Result<void> Link::send(std::string_view bytes, Deadline deadline) {
     return fail(ErrorCode::timeout, "{}: the deadline passed before it could be asked", options_.device);
   }
   ++statistics_.requests;
-  reply_missed_ = true;  // until the answer is there
+  reply_missed_ = true;  // until the reply has arrived
   if (auto sent = port_->write(bytes, options_.reply_timeout); !sent) return lost(sent.error());
   return {};
 }
@@ -142,7 +142,7 @@ Result<void> Link::command(std::string_view line, Deadline deadline) {
 
 Result<void> Link::begin(std::string_view line, Deadline deadline) {
   if (auto sent = send(std::string(line) + "\n", deadline); !sent) return sent;
-  reply_missed_ = false;  // it is not late before it has been carried out
+  reply_missed_ = false;  // it is not late before the line has been carried out
   return {};
 }
 
@@ -176,7 +176,7 @@ Result<std::map<int, double>> Link::settings(Deadline deadline) {
     if (!line) return pass_on(line);
     if (line->kind == Kind::ok) return all;
     all[line->number] = line->value;
-    reply_missed_ = true;  // the list goes on
+    reply_missed_ = true;  // the list continues
   }
 }
 
@@ -196,7 +196,7 @@ Result<void> Link::reset(Deadline deadline) {
     if (!line) return pass_on(line);
     if (!*line || (*line)->kind != Kind::banner) continue;
     restarted_ = false;
-    reply_missed_ = true;  // what it adds to its greeting is not for the next request
+    reply_missed_ = true;  // output after its greeting is not for the next request
     return {};
   }
   ++statistics_.timeouts;

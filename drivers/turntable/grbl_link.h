@@ -19,15 +19,15 @@ namespace scanrig::grbl {
 struct LinkOptions {
   std::string device;
   int baud = 115200;
-  std::chrono::milliseconds reply_timeout{100};  ///< request sent to its answer received
+  std::chrono::milliseconds reply_timeout{100};  ///< from request sent to its reply received
   serial::Port::Lock lock = serial::Port::Lock::exclusive;
 };
 
-/// What happened on the line since it was made.
+/// Counts of line events since construction.
 struct LinkStatistics {
   std::uint64_t requests = 0;
   std::uint64_t timeouts = 0;
-  std::uint64_t corrupt = 0;  ///< not to be understood, or the answer to something else
+  std::uint64_t corrupt = 0;  ///< not understood, or the reply to another request
   std::uint64_t refused = 0;  ///< error:N
   std::uint64_t io_errors = 0;
   std::uint64_t retries = 0;
@@ -36,36 +36,36 @@ struct LinkStatistics {
 
 /// A GRBL 1.1 controller at the other end of a serial line. Waits in real time, never longer than `reply_timeout` or
 /// the deadline; never retries. The port is opened by the first request and again after it was lost. After a missed
-/// answer the next request is held back until the line has been silent for twice `reply_timeout`. Every request fails
-/// with `timeout`, `protocol` (not understood, or refused: error:N in words), `io`; alarms and restarts are told by the
-/// controller when they happen, and kept here until asked for. Threads: one owner; set_fail_fast() from any thread.
+/// reply the next request is held back until the line has been silent for twice `reply_timeout`. Every request fails
+/// with `timeout`, `protocol` (not understood, or refused: error:N with its text), `io`. The controller reports alarms
+/// and restarts when they happen; they are kept until read. Threads: one owner; set_fail_fast() from any thread.
 class Link {
  public:
   Link(LinkOptions options, Clock& clock) : options_(std::move(options)), clock_(clock) {}
 
-  /// Sends a line, returns once it is answered with ok: queued, not carried out. Fails with `device_alarm`, `not_homed`
-  /// (the controller restarted meanwhile) too.
+  /// Sends a line, returns once it is acknowledged with ok: queued, not carried out. Also fails with `device_alarm`,
+  /// `not_homed` (the controller restarted meanwhile).
   Result<void> command(std::string_view line, Deadline deadline);
-  /// Sends a line whose answer comes when it has been carried out, and is found by listen().
+  /// Sends a line whose reply comes when it has been carried out, and is read by listen().
   Result<void> begin(std::string_view line, Deadline deadline);
-  /// What is said next within `wait`; nothing when nothing is. Alarms and restarts too.
+  /// Reads the next line within `wait`; nothing when there is none. Includes alarms and restarts.
   Result<std::optional<Line>> listen(Clock::Duration wait);
-  /// "?"
+  /// Sends "?".
   Result<Report> report(Deadline deadline);
-  /// A line that no state of the controller carries out, for its answer: what is answered late or repeated cannot be
-  /// taken for a report again and again, and what was left of a line by a lost byte is thrown away with it.
+  /// Sends a line that no state of the controller carries out, for its reply. So a late or repeated reply is not taken
+  /// for a report again and again. The rest of a line with a lost byte is discarded with it.
   Result<void> probe(Deadline deadline);
-  /// "$$"
+  /// Sends "$$".
   Result<std::map<int, double>> settings(Deadline deadline);
-  /// A byte that takes effect at once and has no answer: '!', whatever is on the line. Fails with `io`, `timeout`.
+  /// Sends a byte that takes effect at once and has no reply: '!', whatever is on the line. Fails with `io`, `timeout`.
   Result<void> at_once(char byte);
-  /// 0x18, until it says that it has restarted, which then does not count as a restart.
+  /// Sends 0x18, waits until the controller reports its restart, which then does not count as a restart.
   Result<void> reset(Deadline deadline);
 
-  /// The last alarm since forgotten; 0: none.
+  /// Last alarm since it was last cleared; 0: none.
   [[nodiscard]] int alarm() const { return alarm_; }
   void forget_alarm() { alarm_ = 0; }
-  /// Whether the controller has restarted since last asked.
+  /// True if the controller has restarted since the last call.
   bool restarted() { return std::exchange(restarted_, false); }
 
   /// While on, no request waits for a quiet line: it fails with `timeout` instead.
@@ -77,7 +77,7 @@ class Link {
  private:
   Result<void> open();
   Result<void> send(std::string_view bytes, Deadline deadline);
-  /// Until `wanted` says yes to a line.
+  /// Reads until `wanted` accepts a line.
   Result<Line> answer(std::string_view to, const std::function<bool(const Line&)>& wanted, Deadline deadline);
   Result<std::optional<Line>> next_line(Clock::Duration wait);
   Result<void> wait_until_quiet(Deadline deadline);
@@ -86,7 +86,7 @@ class Link {
   LinkOptions options_;
   Clock& clock_;
   std::optional<serial::Port> port_;
-  std::string heard_;  // of the line that has not ended
+  std::string heard_;  // start of a line that has not ended
   int alarm_ = 0;
   bool restarted_ = false;
   bool reply_missed_ = false;

@@ -36,7 +36,7 @@ std::optional<double> real(std::string_view text) {
   return value;
 }
 
-/// Up to `separator`, which is taken away too.
+/// Takes the text up to `separator`, and removes the separator too.
 std::string_view take(std::string_view& text, char separator) {
   const auto at = text.find(separator);
   const auto part = text.substr(0, at);
@@ -54,7 +54,7 @@ std::optional<std::vector<double>> coordinates(std::string_view text) {
   return values;
 }
 
-/// The text between the angle brackets.
+/// Parses the text between the angle brackets.
 std::optional<Report> parse_report(std::string_view text) {
   auto first = take(text, '|');
   const auto word = take(first, ':');
@@ -62,7 +62,7 @@ std::optional<Report> parse_report(std::string_view text) {
   if (known == kStates.end()) return std::nullopt;
   Report report{known->second, false, {}};
   if (!first.empty()) {
-    // Hold:0 and Door:0 (closed), Door:1 (open): standing. Hold:1, Door:2, Door:3: not yet.
+    // Hold:0 and Door:0 (closed), Door:1 (open): stopped. Hold:1, Door:2, Door:3: not yet.
     const auto part = number<int>(first);
     if (!part || (report.state != State::hold && report.state != State::door)) return std::nullopt;
     report.underway = report.state == State::hold ? *part != 0 : *part >= 2;

@@ -7,7 +7,7 @@
 
 namespace scanrig::grbl {
 
-// What a GRBL 1.1 controller says [gnea/grbl wiki: Interface, Commands; doc/csv].
+// Output of a GRBL 1.1 controller [gnea/grbl wiki: Interface, Commands; doc/csv].
 
 enum class State { idle, run, hold, jog, alarm, door, check, home, sleep };
 
@@ -15,7 +15,7 @@ enum class State { idle, run, hold, jog, alarm, door, check, home, sleep };
 struct Report {
   State state = State::idle;
   bool underway = false;         ///< a hold or door that is not complete: the axes still move
-  std::vector<double> position;  ///< of the machine, mm or degrees, one value an axis; empty if not told (see $10)
+  std::vector<double> position;  ///< of the machine, mm or degrees, one value per axis; empty if not reported (see $10)
 };
 
 struct Line {
@@ -26,10 +26,10 @@ struct Line {
   Report report;
 };
 
-/// One line without its end. Whatever is not understood to the last character is `noise`.
+/// Parses one line without its end. A line that is not understood to the last character is `noise`.
 Line parse_line(std::string_view text);
 
-/// "ALARM:1", "error:9" in words, with what to do; the number alone where it is none of GRBL 1.1.
+/// Text of "ALARM:1" or "error:9" with its remedy; the number alone where GRBL 1.1 does not define it.
 std::string alarm_words(int number);
 std::string error_words(int number);
 std::string_view name_of(State state);

@@ -5,7 +5,7 @@
 namespace scanrig {
 namespace {
 
-/// The share of the tolerance that GRBL's arithmetic may take.
+/// Share of the tolerance that GRBL's arithmetic may take.
 constexpr double kRoundingShare = 0.25;
 
 MovePlanner::Counter counter_of(const GrblTurntableOptions& options) {

@@ -7,13 +7,13 @@
 
 namespace scanrig {
 
-/// `scale.gear_ratio`: the controller's units a table degree; 1 where its steps ($100) are set for the table's degrees.
+/// `scale.gear_ratio`: the controller's units per table degree; 1 where its steps ($100) are set for table degrees.
 struct GrblTurntableOptions : AxisTurntableOptions {
   GrblDriveOptions drive;
 };
 
-/// A turntable moved by a GRBL 1.1 controller. There is no feedback: positions are counted steps, a blocked table and
-/// lost steps are not seen by it; home() finds the zero again.
+/// A turntable moved by a GRBL 1.1 controller. There is no feedback: positions are counted steps. It does not detect a
+/// blocked table or lost steps; home() finds the zero again.
 class GrblTurntable final : public AxisTurntable {
  public:
   /// Checks the options; the port is opened by the first use. Fails with `out_of_range`.

@@ -7,7 +7,7 @@ namespace scanrig {
 namespace {
 
 constexpr int kAttempts = 3;
-/// What a communication time-out may be at most: a register that holds more is another one.
+/// Largest communication time-out: a register that holds more is a different register.
 constexpr std::uint16_t kMaxCommunicationTimeoutMs = 10'000;
 
 constexpr std::uint16_t high_word(std::int32_t value) {
@@ -116,7 +116,7 @@ Result<void> ModbusDrive::write(const DriveProfile::Trigger& trigger, Deadline d
   return line_.write(trigger.address, trigger.value, deadline);
 }
 
-/// Lets go of what is still pulled: the drive acts on the edge, and would not see the next one.
+/// Resets a trigger that is still set: the drive acts on the edge, and would not detect the next one.
 Result<void> ModbusDrive::release(Deadline deadline) {
   if (!to_release_) return {};
   const auto momentary = repeat([&] { return line_.write(*to_release_, 0, deadline); });
@@ -173,7 +173,7 @@ Result<void> ModbusDrive::guard_connection(bool on, Deadline deadline) {
 }
 
 Result<void> ModbusDrive::stop(Deadline deadline) {
-  // Whatever is still pulled waits: the stop comes first.
+  // A trigger that is still set waits: the stop comes first.
   if (auto told = repeat([&] { return write(profile_.stop, deadline); }); !told) return told;
   return release(deadline);
 }

@@ -8,7 +8,7 @@ namespace {
 constexpr double kSlowHoming = 0.2;  ///< of the working speed, for the last approach of the switch
 constexpr double kFastHoming = 0.5;
 
-/// In the drive's own units. Fails with `out_of_range`.
+/// Motion values in the drive's own units. Fails with `out_of_range`.
 Result<DriveMotion> motion_of(const ModbusTurntableOptions& options, double share) {
   const auto speed = [&](double of) { return options.scale.speed_word({options.speed.value * of}, options.profile); };
   const auto usual = speed(share), slow = speed(kSlowHoming);
@@ -21,7 +21,7 @@ Result<DriveMotion> motion_of(const ModbusTurntableOptions& options, double shar
 
 }  // namespace
 
-/// The drive, with the motions it is to make.
+/// The drive, with the motions that it will make.
 class ModbusTurntable::Drive final : public AxisDrive {
  public:
   Drive(const ModbusTurntableOptions& options, const DriveMotion& motion, const DriveMotion& homing, Clock& clock)

@@ -1,10 +1,10 @@
-"""Operator of the simulated rig on the wire: what tests and people do through its control socket."""
+"""Operator of the simulated rig on the wire: actions of tests and users through its control socket."""
 import json
 import socket
 import time
 
 GLANCE_S = 0.1
-TAP_S = 0.2  # as a hand does; the panel debounces for 50 ms
+TAP_S = 0.2  # like a hand; the panel debounces for 50 ms
 
 
 class ControlClient:

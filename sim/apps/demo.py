@@ -87,7 +87,7 @@ class WireStation:
         self.rig = folder / "rig"
         self.jobs = self.rig / "jobs"
         self.socket = self.rig / "api.sock"
-        self.processes = []  # in the order in which they are to end
+        self.processes = []  # in the order in which they must end
 
     def start(self, options, log):
         """Returns the process that is the daemon; the rig where it ended instead of becoming ready."""

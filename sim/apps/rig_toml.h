@@ -12,7 +12,7 @@ struct RigTomlOptions {
   std::filesystem::path folder;       ///< where rig.toml, the sockets and the ports are
   std::string drive;                  ///< "leadshine-rs", "oriental-az", "grbl"
   std::string panel;                  ///< "gpio", "modbus-io"
-  std::string cameras = "simulated";  ///< "gige": those of RigCameras; "simulated": scanrigd-sim renders by itself
+  std::string cameras = "simulated";  ///< "gige": those of RigCameras; "simulated": scanrigd-sim renders alone
   bool positive_ccw = true;
   double gear_ratio = 90;
   double pulses_per_motor_rev = 10000;

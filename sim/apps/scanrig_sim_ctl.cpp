@@ -10,7 +10,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::chrono::milliseconds kTap{200};  ///< as a hand does; a panel debounces for 50 ms
+constexpr std::chrono::milliseconds kTap{200};  ///< like a hand; a panel debounces for 50 ms
 
 /// A number, true, false or null as such, all other words as text.
 json value_of(const std::string& word) {
