@@ -1,4 +1,4 @@
-"""Bad input of every kind: one sentence that names the file, the documented exit code, nothing left, nothing changed."""
+"""Bad input of every kind: one sentence that names the file, the documented exit code, no leftovers, no changes."""
 import hashlib
 import json
 import os
@@ -19,7 +19,7 @@ def tree(folder):
 
 
 class Desk:
-    """A good small scan with its model, copies of it to spoil, and the programs."""
+    """A good small scan with its model, copies of it to damage, and the programs."""
 
     def __init__(self, binaries, scratch):
         self.bin = pathlib.Path(binaries).resolve()
@@ -49,7 +49,7 @@ class Desk:
 
 
 def verdict(desk, code, named, program, *words):
-    """Runs, and compares all that the desk holds before and after. Returns (ok, what was seen)."""
+    """Runs a program, and compares all content of the desk before and after. Returns (ok, what was seen)."""
     before = tree(desk.home)
     done = desk.run(program, *words)
     told = done.stderr.strip()
@@ -74,7 +74,7 @@ def edit_json(path, change):
 
 
 def rebind_calibration(folder):
-    """The manifest names the hash of the calibration: a spoilt one must not hide behind a wrong hash."""
+    """The manifest contains the hash of the calibration: a damaged calibration must not be masked by a wrong hash."""
     digest = hashlib.sha256((folder / "calibration.json").read_bytes()).hexdigest()
     edit_json(folder / "scan.json", lambda scan: scan["calibration"].update(sha256=digest))
 

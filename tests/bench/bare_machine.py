@@ -1,4 +1,4 @@
-"""A bare Debian in a folder, and what the project's own commands do there."""
+"""A bare Debian in a folder, and commands of the project that run there."""
 import contextlib
 import os
 import pathlib
@@ -12,7 +12,7 @@ CORES = "0,1"
 
 
 def archive():
-    """The Debian archive that this machine itself is installed from, or None."""
+    """Debian archive that this machine is installed from, or None."""
     form = "$(REPO_URI) $(LABEL)"
     try:
         answer = subprocess.run(["apt-get", "indextargets", "--format", form], capture_output=True, text=True)
@@ -26,7 +26,7 @@ def archive():
 
 
 def why_not():
-    """A sentence where this machine cannot make one, else None."""
+    """Sentence that gives the reason why this machine cannot make one, else None."""
     if os.geteuid() != 0:
         return "not measured: making a bare machine wants root"
     if not shutil.which("mmdebstrap"):
@@ -37,14 +37,14 @@ def why_not():
 
 
 def make(suite, root):
-    """A machine with nothing but essential packages and apt."""
+    """Makes a machine with nothing but essential packages and apt."""
     subprocess.run(["mmdebstrap", "--quiet", "--variant=minbase", suite, root, archive()], check=True, timeout=600)
     shutil.copy("/etc/resolv.conf", root / "etc/resolv.conf")
 
 
 @contextlib.contextmanager
 def bare_machine(suite):
-    """The root folder of a bare machine; gone afterwards."""
+    """Root folder of a bare machine; removed afterwards."""
     root = pathlib.Path(tempfile.mkdtemp(prefix="scanrig-bare-"))
     try:
         make(suite, root)
@@ -54,8 +54,8 @@ def bare_machine(suite):
 
 
 def entrance(root, command, binds=()):
-    """The command line that runs `command` (a shell line) inside `root` with its own /proc and /dev.
-    `binds`: pairs of a folder here and where it is to be seen inside. Every mount ends with the command."""
+    """Command line that runs `command` (a shell line) inside `root` with its own /proc and /dev.
+    `binds`: pairs of a folder here and its place inside. Every mount ends with the command."""
     mounts = [f"mount -t proc proc {root}/proc", f"mount --rbind /dev {root}/dev"]
     for source, target in binds:
         inside = shlex.quote(f"{root}/{target}")
@@ -74,7 +74,7 @@ def run_inside(root, command, timeout):
 
 
 def build_seconds(tree):
-    """From the first compile's start to the last one's end, as ninja logged it."""
+    """Time from the first compile's start to the last one's end, as ninja logged it."""
     spans = [line.split("\t")[:2] for line in (tree / ".ninja_log").read_text().splitlines() if line[:1].isdigit()]
     return (max(int(end) for _, end in spans) - min(int(start) for start, _ in spans)) / 1000
 

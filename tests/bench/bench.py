@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
-"""The one place where figures are made: ./dev bench GROUP... [--long] [--quick] [--only PART...] [--record]
+"""The one program that makes figures: ./dev bench GROUP... [--long] [--quick] [--only PART...] [--record]
 
-Every group is a module beside this file with PARTS, the functions that measure its parts; each calls bench.line() for
+Every group is a module beside this file with PARTS, the functions that measure its parts. Each calls bench.line() for
 each figure that an issue or a design page requires. Without --long a part takes samples and ends within its budget
 (budget.py), so that a group ends within 45 minutes on two cores. Prints what | asked | measured | ok, writes
-out/bench.json, exits 1 when a line falls short. A line that this machine cannot measure does not count as held.
+out/bench.json, exits 1 when a line does not hold. A line that this machine cannot measure does not count as held.
 """
 import argparse
 import importlib
@@ -50,7 +50,7 @@ class Bench:
         return not self.only or part in self.only
 
     def pick(self, full, sampled, quick):
-        """How many of something this run takes."""
+        """Number of items that this run takes."""
         return quick if self.quick else full if self.long else sampled
 
     def begin_group(self, group):
@@ -58,11 +58,11 @@ class Bench:
         self.deadline = None if self.long else time.monotonic() + 60 * budget.LIMIT_MIN
 
     def seconds_left(self):
-        """Of the minutes of the group; without end with --long."""
+        """Deadline from the minutes of the group; no deadline with --long."""
         return float("inf") if self.deadline is None else self.deadline - time.monotonic()
 
     def in_time(self, points):
-        """The points, until the minutes of the group are over."""
+        """Yields the points, until the minutes of the group are over."""
         for point in points:
             yield point
             if self.seconds_left() <= 0:
@@ -70,7 +70,7 @@ class Bench:
                 return
 
     def line(self, what, asked, measured, ok):
-        """`ok` is True, False or None (not measured; `measured` says why)."""
+        """`ok` is True, False or None (not measured; `measured` gives the reason)."""
         self.lines.append({"group": self.group, "what": what, "asked": asked, "measured": measured, "ok": ok})
         print(f"{what} | {asked} | {measured} | {'-' if ok is None else 'ok' if ok else 'NO'}", flush=True)
 
@@ -100,7 +100,7 @@ class Bench:
 
 
 def commit():
-    """What is measured; the tables of an earlier part, not yet committed, change nothing about it."""
+    """Commit that is measured; uncommitted tables of an earlier part do not make it dirty."""
     def git(*words):
         return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True).stdout.strip()
 
@@ -113,7 +113,7 @@ def group_names():
 
 
 def load(group):
-    """The module of a group, its parts checked against the budgets."""
+    """Module of a group, its parts checked against the budgets."""
     module = importlib.import_module("group_" + group.replace("-", "_"))
     if problems := budget.problems(group, module.PARTS):
         sys.exit("budget.py: " + "; ".join(problems))

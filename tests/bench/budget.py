@@ -1,6 +1,6 @@
-"""The minutes that each part of a group may take on two cores, without --long: the one place that states them.
+"""Minutes that each part of a group may take on two cores, without --long: the only place that states them.
 
-The build comes before and is not part of it. What is in LONG runs with --long only.
+The earlier build does not count. Parts in LONG run with --long only.
 """
 LIMIT_MIN = 45
 CORES = 2
@@ -25,7 +25,7 @@ def runs(group, part, is_long):
 
 
 def problems(group, parts):
-    """What is wrong with the budgets of a group that has these parts, one sentence each."""
+    """Problems of the budgets for a group with these parts, one sentence each."""
     minutes, long_only, found = MINUTES.get(group, {}), LONG.get(group, set()), []
     for part in parts:
         if (part in minutes) == (part in long_only):

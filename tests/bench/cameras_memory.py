@@ -2,7 +2,7 @@
 import json
 
 HOUR_S, SAMPLED_S, QUICK_S = 3600, 600, 60
-FLAT_KIB = 8192  # what an allocator keeps and gives; 36,000 frames of 160x120 that stayed would be 1.3 GiB
+FLAT_KIB = 8192  # kept and reused by the allocator; 36,000 leaked frames of 160x120 would be 1.3 GiB
 
 
 def slope_kib(samples):

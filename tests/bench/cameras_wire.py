@@ -1,4 +1,4 @@
-"""The whole job over the wire: what the daemon's software takes beside the devices, the same bits as in one process,
+"""The whole job over the wire: time of the daemon's software beside the devices, the same bits as in one process,
 and the accuracy of the group end-to-end."""
 import hashlib
 import json
@@ -11,7 +11,7 @@ MODEL = ("model.glb", "model.ply", "model.obj", "model.stl")
 
 
 def views(stamps):
-    """The exposures of each view: pattern and plain, and those that were redone."""
+    """Exposures of each view: pattern and plain, and retakes."""
     grouped, angle = [], None
     for exposure in stamps["exposures"]:
         here = (exposure["placement"], round(exposure["angle_deg"]))
@@ -23,7 +23,7 @@ def views(stamps):
 
 
 def overheads_ms(stamps):
-    """Of each view the table was turned for: from the last frame of the view before (of a pose's first: from the last
+    """Time of each view that the table turned for: from the last frame of the view before (of a pose's first: the last
     motion) to its own last frame, without motion, settling, exposure and readout as the simulator stamped them."""
     found, before = [], None
     for view in views(stamps):
@@ -49,7 +49,7 @@ def p95(values):
 
 
 def hashes(folder):
-    """Of every frame in its place, and of every model file."""
+    """Hashes of every frame in its place, and of every model file."""
     scan = json.loads((folder / "scan.json").read_text())
     frames = {file["path"]: file["sha256"] for pose in scan["poses"] for view in pose["views"]
               for file in view["files"].values()}
@@ -58,7 +58,7 @@ def hashes(folder):
 
 
 def demo(bench, name, options):
-    """Folder of a demo that ended well, or None; says why not."""
+    """Folder of a demo that ended well, or None; prints the reason."""
     folder = bench.out / name
     shutil.rmtree(folder, ignore_errors=True)
     done, _ = group_end_to_end.demo(bench, folder, options)

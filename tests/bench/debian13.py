@@ -17,7 +17,7 @@ KEPT = ROOT / "build" / "debian13"
 
 
 def machine():
-    """The root folder of the kept machine."""
+    """Root folder of the kept machine."""
     root = KEPT / "root"
     if not root.is_dir():
         making = KEPT / "making"
@@ -29,7 +29,7 @@ def machine():
 
 
 def command(verb):
-    """The command line that runs `./dev VERB...` on this tree inside; its build/ and out/ are not ours."""
+    """Command line that runs `./dev VERB...` on this tree inside; its build/ and out/ are separate."""
     binds = [(ROOT, "scanrig")]
     for folder in ("build", "out"):
         (KEPT / folder).mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""The Stanford dragon, standing (15 scans) and on its side (6), imported and reconstructed like any scan."""
+"""The Stanford dragon, upright (15 scans) and on its side (6), imported and reconstructed like any scan."""
 import json
 import shutil
 
@@ -23,7 +23,7 @@ def measure(bench):
 
 
 def figures(bench, name, data, confs):
-    """What bench_dragon says of the model made of these poses, or None with a line that says what failed."""
+    """Result of bench_dragon for the model made of these poses, or None with a line that gives the failure."""
     scan = bench.out / name
     shutil.rmtree(scan, ignore_errors=True)
     scanrig = bench.bin / "scanrig"

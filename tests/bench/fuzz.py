@@ -11,21 +11,21 @@ CPU_S, QUICK_CPU_S = 600, 5
 WALL_LIMIT_S = 3600
 BUILD_LIMIT_S = 3600
 LOOK_S = 0.5
-HANG_S = 60  # for one input, on a machine that has more to do than it can
+HANG_S = 60  # for one input, on an overloaded machine
 CRASH = re.compile(r"SUMMARY: .*")
-INPUT = re.compile(r"Test unit written to \S*/(\S+)(?:\nBase64: (\S+))?")  # short ones in base64 too
+INPUT = re.compile(r"Test unit written to \S*/(\S+)(?:\nBase64: (\S+))?")  # short inputs in base64 too
 TICKS = os.sysconf("SC_CLK_TCK")
 
 
 class Parser:
-    """A target, what it reads in words, and how many processes share its work: more where it mostly waits."""
+    """A target, the text for its input, and the number of processes that share its work: more where it mostly waits."""
 
     def __init__(self, target, words, processes=1):
         self.target, self.words, self.processes = target, words, processes
 
 
 def build(root, parsers):
-    """The targets, built with clang; "" or why they are not there."""
+    """The targets, built with clang; "" or why they are missing."""
     if shutil.which("clang++") is None:
         return "clang++ is not installed"
     targets = [f"{parser.target}_fuzz" for parser in parsers]
@@ -38,14 +38,14 @@ def build(root, parsers):
 
 
 def cpu_s(process):
-    """Processor seconds of a process that has not been waited for."""
+    """Processor seconds of a process that has not been waited for yet."""
     with open(f"/proc/{process.pid}/stat") as stat:
         fields = stat.read().rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / TICKS
 
 
 def crash_in(told):
-    """What libFuzzer says of a crash, and of which input; "" where there was none."""
+    """Description of a crash by libFuzzer, and its input; "" without a crash."""
     found, kept = CRASH.search(told), INPUT.search(told)
     if not found:
         return ""
@@ -54,7 +54,7 @@ def crash_in(told):
 
 
 def run(bench, root, scratch, parser):
-    """Inputs tried, processor seconds, and the first crash in words or ""."""
+    """Inputs tried, processor seconds, and a description of the first crash or ""."""
     wanted = QUICK_CPU_S if bench.quick else CPU_S
     grown, log = scratch / f"corpus-{parser.target}", scratch / f"{parser.target}-{{}}.log"
     grown.mkdir(parents=True)
@@ -69,7 +69,7 @@ def run(bench, root, scratch, parser):
         time.sleep(LOOK_S)
         spent = sum(map(cpu_s, crew))
         if any(os.waitid(os.P_PID, one.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT) for one in crew):
-            break  # nobody ends by himself but in a crash
+            break  # a process ends early only in a crash
     ended_early = [one.poll() is not None for one in crew]
     for one in crew:
         one.send_signal(signal.SIGINT)
@@ -91,7 +91,7 @@ def run(bench, root, scratch, parser):
 
 
 def measure(bench, root, scratch, parsers):
-    """One line for each of the parsers; all at once."""
+    """One line per parser; all run at once."""
     wanted = QUICK_CPU_S if bench.quick else CPU_S
     asked = f"no crash in {wanted} s of processor time"
     problem = build(root, parsers)

@@ -44,4 +44,4 @@ PARTS = {"triggers": triggers,
          "debian13": lambda bench, _: cameras_debian13.measure(bench),
          "memory": lambda bench, _: cameras_memory.measure(bench),
          "fuzz": fuzzed}
-BESIDE = ("memory",)  # an hour: that has to hold on a busy machine too
+BESIDE = ("memory",)  # an hour: it must also hold on a busy machine

@@ -21,7 +21,7 @@ def two_cores(command):
 
 
 def objects(bench):
-    """Name and mesh of each object asked for; None where the data are absent."""
+    """Name and mesh of each requested object; None where the data are absent."""
     meshes = bench.data / "meshes" if bench.data else None
     yield "figurine", []
     for name, file in (("spot", "spot/spot_triangulated.obj"), ("igea", "igea_tri.ply")):

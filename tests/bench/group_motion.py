@@ -26,4 +26,4 @@ PARTS = {"matrix": lambda bench, scratch: motion_matrix.measure(bench, ROOT, scr
          "doctor": motion_doctor.measure,
          "fuzz": lambda bench, scratch: fuzz.measure(bench, ROOT, scratch, PARSERS)}
 BESIDE = ("turns",)
-ALONE = ("fuzz",)  # dozens of processes: not beside what is measured in milliseconds
+ALONE = ("fuzz",)  # dozens of processes: not beside measurements in milliseconds

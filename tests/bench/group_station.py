@@ -1,4 +1,4 @@
-"""The station: jobs that survive, and what operators and programs see of it."""
+"""The station: jobs that survive, and their state as operators and programs see it."""
 import station_movement
 import station_disturbed
 import station_fuzz

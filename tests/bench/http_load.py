@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
-"""Loads the API of a daemon until standard input ends, then prints what it saw as JSON.
+"""Loads the API of a daemon until standard input ends, then prints the results as JSON.
 
 Event streams, requests at a steady rate over kept connections, and slow-loris clients, over TCP and the Unix socket.
-Every request has its moment; one that is sent late counts from its moment, so a stall is not hidden by the waiting.
+Every request has a scheduled time. A late request counts from its scheduled time, so the waiting does not hide a stall.
 """
 import argparse
 import asyncio

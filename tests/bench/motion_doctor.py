@@ -13,7 +13,7 @@ PROMPT_SIGN, PROMPT_MARK, PROMPT_MARK_OFF = "which way", "Put a mark", "By how m
 
 
 def consult(rig, present=True, as_user=None):
-    """Runs the doctor and plays the operator: the ids of its findings, and how it ended."""
+    """Runs the doctor and plays the operator: ids of its findings, and its result."""
     command = [rig.bin / "scanrig", "doctor", "--config", rig.config, "--json", "--yes-move"]
     if present:
         command.append("--answers")
@@ -40,7 +40,7 @@ def consult(rig, present=True, as_user=None):
                 answer("")
         elif PROMPT_SIGN in prompt:
             # The operator has watched the table: home is 0, the quarter turn ends at +90 or at -90 (or, from there, at
-            # 270) as the world sees it.
+            # 270) in the true angle.
             answer("ccw" if rig.truth()["angle_deg"] % 360 < 180 else "cw")
         elif PROMPT_MARK in prompt:
             marked_deg = rig.truth()["angle_deg"]
@@ -59,14 +59,14 @@ def consult(rig, present=True, as_user=None):
 
 
 def cases():
-    """name, the finding it must lead to, what to spoil, options of the doctor, options of the rig."""
+    """Name, expected finding, setting to falsify, options of the doctor, options of the rig."""
     def swap(rig):
         os.symlink(os.readlink(rig.folder / "panel"), rig.folder / "other")
         rig.edit_config(f'device = "{rig.folder}/turntable"', f'device = "{rig.folder}/other"')
 
     def wrong_gear(rig):
         rig.edit_config("gear_ratio = 90", "gear_ratio = 72")
-        if rig.drive == "grbl":  # keeps its acceleration in motor units: as whoever believes 72 would have set it
+        if rig.drive == "grbl":  # GRBL keeps acceleration in motor units: as set by an installer who assumes 72
             rig.edit_config("acceleration_deg_s2 = 1000", "acceleration_deg_s2 = 1250")
 
     yield "a sound rig", None, lambda rig: None, {}, ()
@@ -93,7 +93,7 @@ def cases():
 
 
 def attempt(bench, folder, finding, spoil, how, options):
-    """What the doctor finds, as a line's end: measured and ok."""
+    """Result of the doctor, as a line's end: measured and ok."""
     if spoil is None:
         return "not measured: needs root to become another user", None
     with motion_rig.Rig(bench.bin, folder, *FAST, *options) as rig:

@@ -1,4 +1,4 @@
-"""Words for every alarm, the frames of the manuals, what a job tells of its moves; and ten thousand turns."""
+"""Texts for every alarm, the frames of the manuals, a job's record of its moves; and ten thousand turns."""
 import concurrent.futures
 import json
 import re
@@ -64,7 +64,7 @@ def alarms(bench, root, scratch):
 
 
 def golden(bench, root):
-    """Of the test suite's own build; made when it is not there."""
+    """Program of the test suite's own build; built if missing."""
     program = root / "build" / "dev" / "bin" / GOLDEN_TESTS
     for command in (["cmake", "--preset", "dev"], ["cmake", "--build", "--preset", "dev", "--target", GOLDEN_TESTS]):
         bench.run(command, BUILD_LIMIT_S, cwd=root)

@@ -6,12 +6,12 @@ LIMIT_S = 900
 WORKERS = 8  # the cells mostly wait
 INTERFACES = {"Turntable": "drivers/turntable/turntable.h", "Projector": "drivers/projector/projector.h",
               "Panel": "drivers/panel/panel.h", "StereoCamera": "drivers/camera/stereo_camera.h"}
-SHARED = {"AxisTurntable": "Turntable", "SensorCamera": "StereoCamera"}  # what several drivers have in common
+SHARED = {"AxisTurntable": "Turntable", "SensorCamera": "StereoCamera"}  # common base of several drivers
 CAMERAS = ("StereoCamera", "LightCrafterProjector")  # interfaces and drivers whose rows are the cameras group's
 
 
 def methods(root, interface):
-    """The functions that the interface asks every driver for."""
+    """Functions that the interface requires of every driver."""
     text = (root / INTERFACES[interface]).read_text()
     return re.findall(r"virtual [\w:<>, ]+? (\w+)\([^;]*\) (?:noexcept )?= 0;", text)
 
@@ -35,7 +35,7 @@ def devices(root, driver):
 
 
 def rows(root, cameras):
-    """Of the cameras group, or of the motion group."""
+    """Row of the cameras group, or of the motion group."""
     return [(name, device, method) for interface, name in shipped(root) if bool({interface, name} & set(CAMERAS)) == cameras
             for device in devices(root, name) for method in methods(root, interface)]
 

@@ -1,4 +1,4 @@
-"""The simulated rig on the wire, the daemon beside it, and the hand of an operator, for the groups of the bench."""
+"""The simulated rig on the wire, the daemon beside it, and the operator's actions, for the groups of the bench."""
 import json
 import os
 import pathlib
@@ -10,9 +10,9 @@ import time
 
 READY_S = 10
 DAEMON_READY_S = 60
-TAP_S = 0.2  # as a hand does; the panel debounces for 50 ms
+TAP_S = 0.2  # like a hand; the panel debounces for 50 ms
 
-# How a frame begins that starts or ends a motion, after the unit id where there is one [manuals of the drives; GRBL 1.1].
+# First bytes of a frame that starts or ends a motion, after the unit id if any [manuals of the drives; GRBL 1.1].
 MOTIONS = {
     "leadshine-rs": {"10 62 00": "move", "06 60 02 00 20": "home", "06 60 02 00 40": "stop"},
     "oriental-az": {"10 00 58": "move", "06 00 7D 00 10": "home", "06 00 7D 00 20": "stop"},
@@ -76,7 +76,7 @@ class Rig:
         self.release(name)
 
     def frames(self, since=0):
-        """Frames from number `since` on, and the number to go on from."""
+        """Frames from number `since` on, and the number to continue from."""
         found = []
         while True:
             answer = self.request(get="frames", since=since)
@@ -86,7 +86,7 @@ class Rig:
             since = answer["next"]
 
     def kind(self, frame):
-        """"move", "home", "stop" or "" of a frame that the drive heard."""
+        """"move", "home", "stop" or "" for a frame that the drive received."""
         if not frame["from_master"]:
             return ""
         words = frame["bytes"] if self.drive == "grbl" else frame["bytes"][3:]
@@ -101,7 +101,7 @@ class Rig:
     # The daemon
 
     def start_daemon(self, scale=0.25, wait=True, environment=None):
-        """One that simulates its cameras itself, at this scale."""
+        """For a daemon that simulates its cameras itself, at this scale."""
         self.run_daemon([self.bin / "scanrigd-sim", "--scale", scale], wait, environment)
 
     def start_shipped_daemon(self, wait=True):
@@ -128,12 +128,12 @@ class Rig:
         self.daemon = None
 
     def make_safe(self):
-        """As systemd's ExecStopPost= does after the daemon's end."""
+        """Runs make-safe like systemd's ExecStopPost= after the daemon's end."""
         return subprocess.run([self.bin / "scanrigd-sim", "--make-safe", "--config", self.config],
                               capture_output=True, text=True, timeout=20)
 
     def ask(self, target="status"):
-        """A GET of the daemon's API; None when nobody answers."""
+        """A GET of the daemon's API; None without a reply."""
         try:
             with socket.socket(socket.AF_UNIX) as peer:
                 peer.settimeout(5)
@@ -165,7 +165,7 @@ class Rig:
         return "Reset" in (self.status() or {}).get("next_action", "")
 
     def get_ready(self, limit_s=30):
-        """Reset at the panel until the table is homed."""
+        """Presses Reset at the panel until the table is homed."""
         self.wait(self.asks_for_reset, limit_s)
         self.tap("reset")
         return self.wait(lambda: self.machine_is("Operational.Ready"), limit_s)

@@ -1,4 +1,4 @@
-"""Emergency stop, a killed daemon, restarts: what the drive hears, by the wire's own time stamps."""
+"""Emergency stop, a killed daemon, restarts: the frames that the drive receives, by the wire's own time stamps."""
 import concurrent.futures
 import random
 import signal
@@ -14,7 +14,7 @@ SAFE_LIMIT_S = 1.0
 
 
 def in_parallel(bench, scratch, name, jobs, work, *options):
-    """`work(rig, n)` for each job number, over rigs with each of the drives at once; the results of all."""
+    """Results of `work(rig, n)` for each job number, run over rigs with each of the drives at once."""
     def crew(member):
         results = []
         drive = motion_rig.DRIVES[member % len(motion_rig.DRIVES)]
@@ -33,7 +33,7 @@ def percentile(values, share):
 
 
 def stop_after(rig, at_ns, since, limit_s=1.0):
-    """Milliseconds from `at_ns` to the first stop that the drive heard after it; None when there was none."""
+    """Milliseconds from `at_ns` to the first stop that the drive received after it; None without a stop."""
     end = time.monotonic() + limit_s
     while time.monotonic() < end:
         frames, _ = rig.frames(since)
@@ -45,7 +45,7 @@ def stop_after(rig, at_ns, since, limit_s=1.0):
 
 
 def recover(rig):
-    """After an edge: the button released, Reset at the panel, until the table is homed."""
+    """Recovers after an edge: releases the button, presses Reset at the panel, until the table is homed."""
     rig.release("estop")
     return rig.get_ready()
 
@@ -93,7 +93,7 @@ def reconstructing(rig):
 
 
 def scan_once(rig):
-    """A whole job, until its reconstruction has begun."""
+    """A whole job, until its reconstruction has started."""
     if not rig.machine_is("Operational.Ready") and not recover(rig):
         return False
     rig.tap("start")
@@ -110,7 +110,7 @@ def scan_once(rig):
 
 
 def estop_reconstruction(bench, scratch):
-    """Edges for as long as reconstructions run; every one needs Reset and home before the next."""
+    """Edges while reconstructions run; after each, Reset and home are required before the next."""
     crews = len(motion_rig.DRIVES)
     wanted = bench.pick(full=100, sampled=30, quick=crews)
     crew_share = -(-wanted // crews)
@@ -138,7 +138,7 @@ def estop_reconstruction(bench, scratch):
 
 
 def killed_while_turning(rig, n):
-    """Seconds from SIGKILL to standing and dark, make-safe run as systemd would; and whether it said so."""
+    """Seconds from SIGKILL to stopped and dark, with make-safe run as in systemd; and whether it reported success."""
     rig.start_daemon()
     if not rig.get_ready():
         return None
@@ -148,7 +148,7 @@ def killed_while_turning(rig, n):
     time.sleep(random.Random(n).uniform(0, 0.3))
     begun = time.monotonic()
     rig.kill_daemon(signal.SIGKILL)
-    # With the daemon dead nothing begins to move again: the first moment of both is when the rig became safe.
+    # With the daemon dead no motion starts again: the rig became safe at the first time when both hold.
     safe = lambda: rig.truth()["stopped"] and not rig.truth()["projector_on"]
     with concurrent.futures.ThreadPoolExecutor(1) as systemd:
         made = systemd.submit(rig.make_safe)
@@ -167,7 +167,7 @@ def killed(bench, scratch):
 
 
 def restarted(rig, n):
-    """One life of the daemon, ended at a random moment: moves and homings heard before any Reset, moves without home."""
+    """One life of the daemon, ended at random: moves and homings received before any Reset, moves without home."""
     chance = random.Random(n)
     _, since = rig.frames()
     rig.start_daemon(wait=chance.random() < 0.7)

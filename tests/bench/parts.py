@@ -10,7 +10,7 @@ import budget
 
 
 def time_line(bench, what, timeout_min, minutes):
-    """Held or not by the budget; reported where there is none."""
+    """True or False by the budget; only reported where there is none."""
     measured = f"{minutes:.1f} min on {bench.cores} cores"
     if timeout_min is None:
         bench.line(what, "reported", measured, True)
@@ -27,7 +27,7 @@ def run_part(bench, name, measure, scratch):
     begun = time.monotonic()
     try:
         measure(bench, scratch)
-    except Exception as error:  # one part costs no other its lines
+    except Exception as error:  # a part that fails does not affect the lines of others
         traceback.print_exc()
         bench.line(f"part {name}", "measured", f"ended early: {type(error).__name__}: {error}", False)
     if not bench.quick:
@@ -36,7 +36,7 @@ def run_part(bench, name, measure, scratch):
 
 
 def run_group(bench, group, module):
-    """Every part that is wanted, in order. With --long those of module.BESIDE run beside the others, but not beside
+    """Runs every requested part, in order. With --long those of module.BESIDE run beside the others, but not beside
     those of module.ALONE."""
     wanted = [name for name in module.PARTS if bench.wants(name) and budget.runs(group, name, bench.long)]
     beside = [name for name in wanted if bench.long and name in getattr(module, "BESIDE", ())]

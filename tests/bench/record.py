@@ -1,4 +1,4 @@
-"""docs/measured.md: the last table of every group, with the command that makes it again; that of --long by itself."""
+"""docs/measured.md: the last table of every group, with the command that repeats it; --long has its own table."""
 import pathlib
 import re
 
@@ -37,7 +37,7 @@ def section(group, record):
 
 
 def amended(text, group, record):
-    """The section `text` with the lines of `record` in the place of those of the same name; what came later says so."""
+    """Section `text` in which lines of `record` replace those of the same name; later lines are marked as such."""
     head, _, body = text.partition("\n\n| what | asked | measured | ok |\n|---|---|---|---|\n")
     rows = [line.strip("| ").split(" | ") for line in body.splitlines() if line.startswith("| ")]
     later = {line["what"]: row(line) for line in record["lines"] if line["group"] == group}

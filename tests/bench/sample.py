@@ -1,10 +1,10 @@
-"""A choice by chance from a list of points, repeatable, with every kind of point in it."""
+"""A random, repeatable choice from a list of points that includes every kind of point."""
 import random
 
 
 def choose(points, count, kind_of, seed):
-    """All points, in order, where `count` allows; else one of each kind first, then the rest by chance, so that a run
-    that ends early has tried all kinds too."""
+    """All points, in order, where `count` allows; else one of each kind first, then random ones, so that a run that
+    ends early has also tried all kinds."""
     points = list(points)
     if count is None or count >= len(points):
         return points

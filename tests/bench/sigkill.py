@@ -1,4 +1,4 @@
-"""A daemon killed at random in the middle of a scan: what it had acknowledged is there, and the job is interrupted."""
+"""A daemon killed at random times during a scan: acknowledged data are still there, and the job is interrupted."""
 import hashlib
 import http.client
 import json
@@ -11,7 +11,7 @@ import subprocess
 import time
 
 START_LIMIT_S = 60
-VIEWS = 4  # a pose
+VIEWS = 4  # per pose
 
 
 class UnixConnection(http.client.HTTPConnection):
@@ -26,7 +26,7 @@ class UnixConnection(http.client.HTTPConnection):
 
 
 def ask(path, target):
-    """The answer's JSON, or None where nobody answers."""
+    """JSON of the reply, or None without a reply."""
     try:
         connection = UnixConnection(path)
         connection.request("GET", "/api/v1/" + target)
@@ -44,7 +44,7 @@ def start(binaries, home, operator):
 
 
 def acknowledged(home, at_least, limit_s=START_LIMIT_S):
-    """The only job as the daemon tells it, once that many of its views are acknowledged."""
+    """The only job as the daemon reports it, once this many of its views are acknowledged."""
     end = time.monotonic() + limit_s
     while time.monotonic() < end:
         jobs = ask(home / "api.sock", "jobs")
@@ -54,7 +54,7 @@ def acknowledged(home, at_least, limit_s=START_LIMIT_S):
 
 
 def lost_views(job):
-    """Names of the views of `job` that are not on disk as the manifest says."""
+    """Names of the views of `job` whose files on disk do not match the manifest."""
     folder = pathlib.Path(job["folder"])
     scan = json.loads((folder / "scan.json").read_text())
     lost = []

@@ -1,4 +1,4 @@
-"""A daemon over the simulated rig in its own process, spoken to over its API."""
+"""A daemon over the simulated rig in its own process, accessed over its API."""
 import json
 import os
 import pathlib
@@ -13,7 +13,7 @@ ENDED = ("done", "failed", "interrupted", "cancelled")
 
 
 def order(socket, method, target):
-    """The status of the answer, 0 where nobody answers, and its words."""
+    """Status of the reply, 0 without a reply, and its text."""
     try:
         connection = sigkill.UnixConnection(socket)
         connection.request(method, "/api/v1/" + target)
@@ -24,7 +24,7 @@ def order(socket, method, target):
 
 
 class Daemon:
-    """Jobs in home/jobs; a helper turns objects over and sees to faults, all else is asked for here."""
+    """Jobs in home/jobs; a helper turns objects over and fixes faults, everything else is requested here."""
 
     def __init__(self, binaries, home, *options, environment=None):
         self.home, self.jobs, self.socket = home, home / "jobs", home / "api.sock"
@@ -39,7 +39,7 @@ class Daemon:
         self.unanswered = 0
 
     def ask(self, target):
-        """None where nobody answers, asked more than once."""
+        """None without a reply, after several attempts."""
         for _ in range(TRIES):
             if (answer := sigkill.ask(self.socket, target)) is not None:
                 return answer
@@ -53,7 +53,7 @@ class Daemon:
         return order(self.socket, method, target)
 
     def job(self):
-        """The newest one."""
+        """The newest job."""
         jobs = (self.ask("jobs?limit=1") or {"jobs": []})["jobs"]
         return self.ask("jobs/" + jobs[0]["id"]) if jobs else None
 
@@ -69,7 +69,7 @@ class Daemon:
         self.wait(lambda: (self.status() or {}).get("machine") == "Operational.Ready", "the station does not get ready")
 
     def start(self):
-        """The head of the queue, or a new job, gets the rig."""
+        """Gives the rig to the head of the queue, or to a new job."""
         self.wait_ready()
         status, words = self.order("POST", "start")
         if status != 200:

@@ -1,8 +1,8 @@
 """A disk that has lost its power: replays the calls that tests/bench/station/disk_calls.cpp has logged and keeps only
-what was synced.
+synced data.
 
 A file's content is durable as of its last fsync; a folder's entries, its files' names, as of the folder's own last fsync.
-Nothing else is. That is less than what ext4 or xfs keep.
+Nothing else is durable. That is less than what ext4 or xfs keep.
 """
 import atexit
 import pathlib
@@ -13,8 +13,8 @@ MEMORY = pathlib.Path("/dev/shm")
 
 
 def quick_folder(otherwise):
-    """A folder in memory, where syncing costs nothing, removed at the end; `otherwise` where there is none. What a kill
-    leaves there is what it leaves on a disk; what a power cut leaves is reckoned."""
+    """A folder in memory, where syncing costs nothing, removed at the end; `otherwise` where there is none. A kill
+    leaves there the same as on a disk; the result of a power cut is calculated."""
     if not MEMORY.is_dir() or shutil.disk_usage(MEMORY).free < 256 << 20:
         return pathlib.Path(otherwise)
     folder = pathlib.Path(tempfile.mkdtemp(dir=MEMORY, prefix="scanrig-"))
@@ -33,7 +33,7 @@ class Folder:
 
 
 class Disk:
-    """`root` is there and durable from the beginning."""
+    """`root` exists and is durable from the start."""
 
     def __init__(self, root):
         self.root_path, self.root = root.rstrip("/"), Folder()
@@ -84,7 +84,7 @@ class Disk:
             raise ValueError(kind)
 
     def write_durable(self, target, node=None):
-        """Makes the folder `target` with what a machine finds that starts again now."""
+        """Makes the folder `target` with the content that a restarted machine finds."""
         target.mkdir(parents=True)
         for name, entry in (node or self.root).durable.items():
             if isinstance(entry, Folder):

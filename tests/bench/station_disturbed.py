@@ -1,7 +1,7 @@
-"""A disk that is full, read-only or slow, and a wall clock that jumps, under a daemon that scans.
+"""A disk that is full, read-only or slow, and a wall clock that jumps, under a scanning daemon.
 
-Each trial runs this file again in a mount namespace of its own, where the folder of the jobs is a small file system in
-memory that can be filled, locked and let go without touching the machine's disks.
+Each trial runs this file again in a mount namespace of its own. There the job folder is a small file system in
+memory that can be filled, locked and released without changes to the machine's disks.
 """
 import json
 import pathlib
@@ -15,7 +15,7 @@ import sigkill
 import station_daemon
 
 VIEWS = 4
-DISK_MIB = 192  # a job is not begun without room for its model
+DISK_MIB = 192  # a job does not start without room for its model
 HOUR_S = 3600
 SLOW_FSYNC_MS = 400
 TRIAL_LIMIT_S = 600
@@ -23,7 +23,7 @@ ASKED = "named, nothing lost, no Reset asked for, goes on when the cause is gone
 
 
 class Station(station_daemon.Daemon):
-    """Its jobs on a file system of its own."""
+    """Daemon with its jobs on a file system of its own."""
 
     def __init__(self, binaries, home):
         jobs, self.knobs = home / "jobs", home / "disturb"
@@ -38,7 +38,7 @@ class Station(station_daemon.Daemon):
             file.write(struct.pack("=qq", fsync_ms, ahead_s))
 
     def fill(self):
-        """Takes all that is left of the disk."""
+        """Fills the rest of the disk."""
         with open(self.jobs / "ballast", "wb", buffering=0) as ballast:
             for block in (1 << 20, 4096, 1):
                 try:
@@ -54,7 +54,7 @@ class Station(station_daemon.Daemon):
         subprocess.run(["mount", "-o", f"remount,{how}", self.jobs], check=True)
 
     def begin(self, views=1):
-        """A job with that many views acknowledged."""
+        """A job with this many views acknowledged."""
         self.start()
         self.wait(lambda: (self.job() or {"stored": []})["stored"][views - 1:], "no view is acknowledged")
 
@@ -63,7 +63,7 @@ class Station(station_daemon.Daemon):
 
 
 def takes_nothing(station, spoil, mend, words):
-    """The disk fails in the middle of a scan; what is wrong, and what was seen."""
+    """The disk fails in the middle of a scan; returns the failures and the observations."""
     wrongs = []
     station.begin(views=2)
     spoil()
@@ -132,7 +132,7 @@ TRIALS = {"full disk": full, "read-only disk": read_only, "slow disk": slow, "cl
 
 
 def inside(binaries, home, name):
-    """In the namespace: one trial; prints what was seen."""
+    """Runs one trial in the namespace; prints the observations."""
     station = None
     try:
         station = Station(binaries, home)

@@ -1,4 +1,4 @@
-"""What the station reads from outside, under libFuzzer."""
+"""External input of the station, under libFuzzer."""
 import pathlib
 
 import fuzz

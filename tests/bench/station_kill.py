@@ -1,8 +1,8 @@
-"""Kills a daemon before and after every call by which it changes its files, and cuts the power there; then starts again.
+"""Kills a daemon before and after every call that changes its files, and cuts the power there; then restarts it.
 
-The job is a two-pose job of three views over devices that only pretend (tests/bench/station/one_job.cpp): all of the
-daemon's own file handling, in a fraction of a second. After each start every job found must come to its end, by resuming
-or by being ended, and every view that was acknowledged must be there and whole.
+The job is a two-pose job of three views over simulated devices (tests/bench/station/one_job.cpp): all of the
+daemon's own file handling, in a fraction of a second. After each start every job found must come to its end, resumed
+or ended, and every acknowledged view must exist and be whole.
 """
 import errno
 import os
@@ -48,12 +48,12 @@ class Rig:
             return subprocess.CompletedProcess([], 124, f"still running after {LIMIT_S} s", "")
 
     def recovers(self, home, again=False):
-        """None, or what is wrong. `again`: somebody asks for the model of a job that failed once more."""
+        """None, or the failure. `again`: a client requests the model of a failed job once more."""
         done = self.run("recover", home, again=again)
         return None if done.returncode == 0 else (done.stdout + done.stderr).strip().replace("\n", "; ")
 
     def record(self):
-        """The log of one whole job."""
+        """Log of one whole job."""
         home = self.fresh("record")
         log = self.home / "log"
         done = self.run("scan", home, log=log, acks=home / "acks")
@@ -63,7 +63,7 @@ class Rig:
 
 
 def one_kill(rig, number, when):
-    """SIGKILL before or after the `number`-th call. Returns what is wrong, or None; and whether the kill took place."""
+    """SIGKILL before or after the `number`-th call. Returns the failure, or None; and whether the kill took place."""
     home = rig.fresh("killed")
     end = rig.run("scan", home, kill=number, when=when)
     if end.returncode not in (0, -9):
@@ -77,12 +77,12 @@ def calls_of(log):
 
 
 def call_numbers(calls, count=None, seed=1):
-    """Numbers of calls: all of them, or `count` by chance with every kind of call among them, ascending."""
+    """Numbers of calls: all of them, or `count` random ones with every kind of call among them, ascending."""
     return sorted(sample.choose(range(1, len(calls) + 1), count, lambda number: calls[number - 1][0], seed))
 
 
 def kill_points(calls, count=None, seed=1):
-    """(number, side) of calls: both sides of all, or `count` by chance with both sides of every kind among them."""
+    """(number, side) of calls: both sides of all, or `count` random ones with both sides of every kind among them."""
     return sample.choose([(number, side) for number in range(1, len(calls) + 1) for side in SIDES], count,
                          lambda point: (calls[point[0] - 1][0], point[1]), seed)
 
@@ -96,7 +96,7 @@ def kills(rig, points):
 
 
 def random_kills(rig, count, seed=6):
-    """SIGKILL at any moment, also between two calls."""
+    """SIGKILL at any time, also between two calls."""
     chance = random.Random(seed)
     for _ in range(count):
         home = rig.fresh("killed_at_random")
@@ -107,13 +107,13 @@ def random_kills(rig, count, seed=6):
         except subprocess.TimeoutExpired:
             daemon.kill()
             daemon.wait()
-        # Too early for a calibration there is no rig at all.
+        # Before the calibration exists there is no rig.
         if (home / "calibration.json").exists():
             yield f"killed after {1000 * after:.0f} ms", rig.recovers(home)
 
 
 def second_kills(rig, calls, count, seed=2):
-    """A second kill during the recovery from a first one: both may have come while the model was made."""
+    """A second kill during the recovery from a first one: both may have come during reconstruction."""
     chance = random.Random(seed)
     for _ in range(count):
         first, second = chance.randint(1, calls), chance.randint(1, calls)
@@ -144,7 +144,7 @@ def power_cuts(rig, home, log, numbers):
 
 
 def bad_disks(rig, numbers, seed=5, failures=0):
-    """A disk that is full, read-only or failing from each of these calls on, or for so many calls. The cause must be
+    """A disk that is full, read-only or failing from each of these calls on, or for this many calls. The cause must be
     named, no acknowledged view may be lost, and with a good disk the job must come to its model. A single failure while
     the model was written leaves a failed job: its model is requested again."""
     chance = random.Random(seed)
@@ -162,7 +162,7 @@ def bad_disks(rig, numbers, seed=5, failures=0):
 
 
 def crashes(rig):
-    """A model whose making kills the daemon: tried twice, then in quarantine; the station goes on."""
+    """A model whose reconstruction kills the daemon: tried twice, then quarantined; the station continues."""
     home = rig.fresh("crash")
     for verb in ("scan", "recover"):
         end = rig.run(verb, home, crash=True)
@@ -223,11 +223,11 @@ def measure(bench, scratch):
 
 
 NOTHING_LOST = "0 acknowledged views lost, 0 unreadable folders, 0 jobs without an end"
-ENOUGH = 0.9  # of the planned points: a kill may come when the job is over
+ENOUGH = 0.9  # of the planned points: a kill may come after the end of the job
 
 
 def report(bench, what, points, planned, of, asked=NOTHING_LOST):
-    """A line about what happened at the points; `of` is how many there are with --long."""
+    """A line with the results at the points; `of` is the number of points with --long."""
     faults, done = [], 0
     for where, fault in bench.in_time(points):
         done += 1

@@ -1,7 +1,7 @@
-"""The API under load during scans and reconstructions: how late status is, how old, and what it costs the scan.
+"""The API under load during scans and reconstructions: delay and age of the status, and the cost for the scan.
 
-The shipped daemon and two simulated GigE cameras with pictures rendered beforehand: a renderer that wants every core
-would be slowed by whatever else runs. This file runs again in a network of its own.
+The shipped daemon and two simulated GigE cameras with images rendered beforehand: a renderer that uses every core
+would be slowed by other programs. This file runs again in a network of its own.
 """
 import json
 import pathlib
@@ -20,7 +20,7 @@ SAMPLED = dict(FULL, jobs=3)
 QUICK = {"jobs": 1, "views": "4", "scale": 0.25, "voxel": "1"}
 JOB_LIMIT_S = 300
 LIMIT_S = 2400
-LOOK_S = 0.005  # more often would be too often for the API
+LOOK_S = 0.005  # a higher rate would exceed the API's limit
 P99_LIMIT_MS, AGE_LIMIT_MS, SLOWER_LIMIT_PERCENT = 20, 200, 2
 
 
@@ -57,7 +57,7 @@ class Load:
 
 
 def age_ms(rig):
-    """From an edge at the panel until the API shows it."""
+    """Time from an edge at the panel until the API shows it."""
     pressed = not rig.ask("io")["inputs"]["part_present"]
     at_ns = rig.press("part") if pressed else rig.release("part")
     end = time.monotonic() + 5
@@ -69,7 +69,7 @@ def age_ms(rig):
 
 
 def one_job(rig, ages):
-    """Seconds of acquisition of one job that is followed to its end; notes how old snapshots are meanwhile."""
+    """Seconds of acquisition of one job, watched to its end; notes the age of snapshots meanwhile."""
     before = {job["id"] for job in rig.ask("jobs")["jobs"]}
     rig.tap("start")
     rig.wait(lambda: rig.status()["activity"] == "scanning", 30)
@@ -96,17 +96,17 @@ def seconds(values):
 
 
 def inside(binaries, scratch, size):
-    """What the load saw, how old snapshots were, and the seconds of each acquisition without load and with it."""
+    """Results of the load, age of snapshots, and the seconds of each acquisition without load and with it."""
     ages, quiet, loaded = [], [], []
     with motion_rig.Rig(binaries, scratch / "load", *OPTIONS, "--scale", size["scale"], "--views", size["views"],
                         "--voxel-mm", size["voxel"]) as rig:
         port, token = open_api(rig)
         rig.start_shipped_daemon()
         rig.get_ready()
-        for _ in range(2):  # the table rests a little elsewhere in every other turn: both are rendered now
+        for _ in range(2):  # the table stops at slightly different angles in every other turn: both are rendered now
             one_job(rig, None)
         for _ in range(size["jobs"]):
-            quiet.append(one_job(rig, []))  # looked at in the same way: what is compared is the load
+            quiet.append(one_job(rig, []))  # watched in the same way: only the load differs
         with Load(rig, port, token) as load:
             for _ in range(size["jobs"]):
                 loaded.append(one_job(rig, ages))

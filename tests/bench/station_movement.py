@@ -1,14 +1,14 @@
-"""The movement check on rendered views: never an alarm where nothing moved, whatever the object and the sensor, and every
-movement that a model of the issue's accuracy would suffer from is found."""
+"""The movement check on rendered views: no alarm without movement, whatever the object and the sensor. It must find
+every movement that would degrade a model of the issue's accuracy."""
 
 OBJECTS = ("figurine", "pebble")
 MESHES = ("spot/spot_triangulated.obj", "igea_tri.ply")
 LIMIT_S = 3600
 
-# The smallest amount that has to be found in every exposure: at full size, at a quarter of it.
+# The smallest amount that must be found in every exposure: at full size, at a quarter of it.
 FOUND = {"slipped along x, mm": (0.05, 0.2), "slipped along z, mm": (0.1, 0.5), "tipped, deg": (0.5, 1.0),
          "camera knocked, deg": (0.005, 0.02)}
-# A round pebble of one even grey does not show these.
+# A round pebble of one uniform grey does not show these.
 FOUND_ON_TEXTURE = {"turned, deg": (0.1, 0.5), "lost steps, deg": (0.1, 0.5)}
 
 

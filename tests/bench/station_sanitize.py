@@ -1,4 +1,4 @@
-"""The whole suite under a sanitizer; either is a part of its own, since each takes about an hour on two cores."""
+"""The whole suite under a sanitizer; each sanitizer is its own part, since it takes about an hour on two cores."""
 import pathlib
 import time
 

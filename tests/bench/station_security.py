@@ -1,4 +1,4 @@
-"""The API's doors, generated from the document it serves: roles, tokens, traversal, bodies; no secret in a log; the unit's exposure."""
+"""The API's access rules, by its document: roles, tokens, traversal, bodies; no secret in logs; the unit's exposure."""
 import re
 import socket
 import time
@@ -21,7 +21,7 @@ class Door:
         self.port = port
 
     def ask(self, method, target, token="", body="", more=""):
-        """The status of one request, asked again for as long as it comes too often; 0 when there is no answer."""
+        """Status of one request, repeated while it is rate-limited; 0 without a reply."""
         status = self.once(method, target, token, body, more)
         while status == TOO_MANY:
             time.sleep(PAUSE_S)
@@ -29,7 +29,7 @@ class Door:
         return status
 
     def connect(self):
-        """A daemon that was asked for a reload closes its door for a moment."""
+        """A daemon that reloads its configuration closes its socket for a moment."""
         end = time.monotonic() + PATIENCE_S
         while True:
             try:

@@ -1,7 +1,7 @@
-"""A shift without end: hundreds of two-pose jobs with trouble in between; what the daemon keeps of memory and descriptors.
+"""A shift without end: hundreds of two-pose jobs with faults in between; memory and descriptors that the daemon keeps.
 
-Over the simulated rig on the virtual clock. 2 % of the exposures meet trouble (a lost frame, a silent camera, a blocked
-table, the e-stop); whoever is at the rig sees to it, and what was interrupted is resumed.
+Over the simulated rig on the virtual clock. 2 % of the exposures meet a fault (a lost frame, a silent camera, a blocked
+table, the e-stop). The simulated operator fixes it, and the interrupted job is resumed.
 """
 import concurrent.futures
 import pathlib
@@ -11,7 +11,7 @@ import time
 import station_daemon
 
 TROUBLE = 0.02
-KEPT_JOBS = 20  # on disk: older ones are removed, as retention would
+KEPT_JOBS = 20  # on disk: older ones are deleted, as by retention
 JOB_LIMIT_S = 300
 GROWTH_LIMIT_PERCENT = 2
 PARTS = {"low-resolution": (500, ("--scale", "0.15", "--views", "4", "--voxel-mm", "3", "--threads", "2")),
@@ -21,7 +21,7 @@ QUICK = {"low-resolution": 16, "full-size": 1}
 
 
 def memory_kib(pid):
-    """Resident: the share of what two daemons have in common (PSS) would rise when the other one ends."""
+    """Resident size: the share of memory common to two daemons (PSS) would rise when the other one ends."""
     rollup = pathlib.Path(f"/proc/{pid}/smaps_rollup").read_text()
     return next(int(line.split()[1]) for line in rollup.splitlines() if line.startswith("Rss:"))
 
@@ -36,7 +36,7 @@ class Shift:
         self.memory, self.open = [], []
 
     def one_job(self):
-        """From Start to the end, however often it is interrupted; how it ended."""
+        """A job from Start to the end, however often it is interrupted; returns its result."""
         daemon, before = self.daemon, (self.daemon.job() or {}).get("id")
         daemon.start()
         job = daemon.wait(lambda: (j := daemon.job()) and j["id"] != before and j, "no new job", JOB_LIMIT_S)
@@ -72,7 +72,7 @@ def job_count(bench, part):
 
 
 def soak(bench, scratch, part):
-    """What the shift saw, seconds, and what ended it early or ''."""
+    """Observations of the shift, seconds, and the cause of an early end or ''."""
     _, options = PARTS[part]
     home = scratch / f"soak_{part}"
     begun, stuck = time.monotonic(), ""
@@ -112,7 +112,7 @@ def report(bench, part, shift, seconds, stuck):
 
 
 def measure(bench, scratch, parts=tuple(PARTS)):
-    """Both parts at once; of the command line each alone."""
+    """Runs both parts at once; by command line each alone."""
     with concurrent.futures.ThreadPoolExecutor(len(parts)) as pool:
         for part, seen in zip(parts, pool.map(lambda part: soak(bench, scratch, part), parts)):
             report(bench, part, *seen)

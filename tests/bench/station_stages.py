@@ -1,4 +1,4 @@
-"""Stages that segfault, throw or eat all memory, in the daemon's process and in one of their own, on the wire rig."""
+"""Stages that segfault, throw or take all memory, in the daemon's process and in their own, on the wire rig."""
 import resource
 import signal
 import time
@@ -28,7 +28,7 @@ class Trial:
         self.rig.get_ready()
 
     def start_daemon(self, wait=True):
-        """Its memory has an end, as systemd's MemoryMax= would give it one."""
+        """Limits its memory, like systemd's MemoryMax=."""
         self.rig.start_daemon(wait=wait, environment={"LD_PRELOAD": str(self.rig.bin / "sick_stage.so"),
                                                       "SICK_STAGE": str(self.knob)})
         limit = MEMORY_GIB << 30
@@ -42,7 +42,7 @@ class Trial:
         return jobs[0] if jobs else None
 
     def scan(self):
-        """A job to its end; None when it does not come to one."""
+        """A job to its end; None if it does not end."""
         before = (self.job() or {}).get("id")
         self.rig.wait(lambda: self.rig.machine_is("Operational.Ready"), JOB_LIMIT_S)
         self.rig.tap("start")
@@ -51,7 +51,7 @@ class Trial:
         return self.job() if over else None
 
     def scan_to_death(self):
-        """Start; when the daemon is dead, makes the rig safe as systemd does. Seconds from death to standing and dark."""
+        """Presses Start; makes the rig safe like systemd if the daemon dies. Seconds from death to stopped and dark."""
         self.rig.wait(lambda: self.rig.machine_is("Operational.Ready"), JOB_LIMIT_S)
         self.rig.tap("start")
         if not self.dies():
@@ -71,7 +71,7 @@ class Trial:
 
 
 def is_survived(trial, how, words):
-    """The stage costs its job, and the daemon nothing; what is wrong."""
+    """The stage costs its job, and the daemon nothing; returns the failure."""
     daemon = trial.rig.daemon.pid
     trial.be_sick(how)
     job = trial.scan()
@@ -86,8 +86,8 @@ def is_survived(trial, how, words):
 
 
 def deaths(trial):
-    """A segmentation fault in the daemon's own process, during a scan and twice over its model; what is wrong, and
-    seconds until safe."""
+    """A segmentation fault in the daemon's own process, during a scan and twice over its model; returns the failure
+    and the seconds until safe."""
     trial.be_sick("segv")
     wrongs, safe_s = [], [trial.scan_to_death()]
     if trial.rig.daemon.returncode != -signal.SIGSEGV:
@@ -97,7 +97,7 @@ def deaths(trial):
     status, refused = station_daemon.order(trial.rig.api, "POST", f"jobs/{job['id']}/resume")
     if status != 200:
         return wrongs + [f"the job is {job['state']}, resume is refused: {refused}"], safe_s
-    # As sick as before; but the views are taken alone now, and the model is made of all of them.
+    # The fault is the same; but now the views are taken alone, and the model is made of all of them.
     safe_s.append(trial.scan_to_death())
     trial.start_daemon(wait=False)
     if not trial.dies() or trial.rig.daemon.returncode != -signal.SIGSEGV:

@@ -1,5 +1,5 @@
-"""From the start of the shipped daemon to its first answer, to devices that are there or said why not, to the state that
-the rules ask for.
+"""From the start of the shipped daemon to its first reply, to devices that are ready or report why not, to the state
+that the rules require.
 
 Two of the devices are simulated GigE cameras: this file runs again in a network of its own.
 """
@@ -18,7 +18,7 @@ OPTIONS = ("--cameras", "gige", "--scale", "0.25", "--views", "4", "--poses", "1
 
 
 def boot(rig, devices, state):
-    """Seconds to the API's first answer, to what the devices are known to be, to the state; None for what does not come."""
+    """Seconds to the API's first reply, to known states of the devices, to the state; None for missing events."""
     begun = time.monotonic()
     rig.start_shipped_daemon(wait=False)
 
@@ -37,7 +37,7 @@ def require_devices(status):
 
 
 def missing(name):
-    """Named, with its cause."""
+    """The problem is named, with its cause."""
     return lambda status: bool((problems(status).get(name) or {"message": ""})["message"])
 
 
@@ -50,7 +50,7 @@ def guarded(rig):
 
 
 def old_jobs(rig):
-    """As many folders of jobs as a year leaves, and no index of them."""
+    """As many job folders as a year leaves, and no index of them."""
     def ask(*words):
         subprocess.run([rig.bin / "scanrig", *words, "--socket", rig.api], check=True, capture_output=True, timeout=20)
 
@@ -77,7 +77,7 @@ def other_camera(rig):
 
 
 def unplugged(section, key):
-    """What the section names is not there."""
+    """The device that the section names is missing."""
     def change(rig):
         before, after = rig.config.read_text().split(f"[{section}]", 1)
         head, line = after.split(f"\n{key} =", 1)

@@ -1,6 +1,6 @@
-"""What storing costs the scan: how long the table stands between a view's last frame and the next move.
+"""Cost of storing during a scan: how long the table is stopped between a view's last frame and the next move.
 
-The time holds everything the daemon does between two views, so what encoding and syncing add is no more.
+The time includes everything the daemon does between two views, so encoding and syncing add no more than that.
 """
 import statistics
 

@@ -1,4 +1,4 @@
-"""The model does not depend on the truth's presence nor on the number of threads; the report holds what is asked."""
+"""The model depends neither on the truth's presence nor on the number of threads; the report has the required keys."""
 import hashlib
 import pathlib
 import shutil

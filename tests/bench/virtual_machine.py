@@ -1,4 +1,4 @@
-"""The virtual machine's lines: ./dev hil, run as a person would, its images made anew and with them cached."""
+"""Lines of the virtual machine: ./dev hil, run as by a person, with new images and with cached ones."""
 import json
 import pathlib
 

@@ -2,7 +2,7 @@
 """./dev hil: the installed daemon in a virtual machine, against the kernel's own interfaces.
 
 Boots Debian's kernel in QEMU (software emulation) with systemd as PID 1. Prints what | asked | measured | ok, writes
-out/hil.json, exits 1 when a line falls short.
+out/hil.json, exits 1 when a line does not hold.
 """
 import argparse
 import json
@@ -34,7 +34,7 @@ class Table:
         print(f"{what} | {asked} | {measured} | {'ok' if ok else 'NO'}", flush=True)
 
     def row(self, what, asked, act, *args):
-        """A row that holds if `act` returns, with what it returns."""
+        """A row that holds if `act` returns, with its result."""
         begin = time.monotonic()
         try:
             measured = act(*args)
@@ -46,7 +46,7 @@ class Table:
 
 
 def render(bench_bin, cache):
-    """The images that the cameras show, rendered once; and their hashes."""
+    """Images that the cameras show, rendered once; and their hashes."""
     folder = cache / "images"
     if not folder.is_dir():
         making = cache / "images.part"
@@ -59,7 +59,7 @@ def render(bench_bin, cache):
 
 
 def rows(rendered):
-    """Name, what, asked, act; a life of the machine a list. Each life but the last is ended by a kill."""
+    """Name, what, asked, act; one list per life of the machine. Each life but the last is ended by a kill."""
     return [
         [("unit", "installed daemon under its unit", "active, exposure <= 2.0", scenario.unit),
          ("failing", f"daemon failing {scenario.FAILURES} times in a row", "socket stays; then answered",
@@ -84,7 +84,7 @@ def live(table, station, acts):
 
 
 def live_and_die(table, boot, lives):
-    """The machine is killed at random, during a scan; each life looks after what the one before had acknowledged."""
+    """Kills the machine at random times, during a scan; each life checks the acknowledged views of the one before."""
     seen = scenario.Acknowledged()
     problems = []
     for number, acts in enumerate(lives):
@@ -104,7 +104,7 @@ def live_and_die(table, boot, lives):
 
 
 def cpu_s():
-    """Of all that this program started and saw the end of."""
+    """Processor seconds of all ended processes that this program started."""
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
@@ -112,7 +112,7 @@ def cpu_s():
 def run(options, work, table):
     cache = image.ROOT / "build" / "hil"
     build = options.bin.parent
-    begin, cpu_before_s = time.monotonic(), cpu_s()  # what built the programs was this process before
+    begin, cpu_before_s = time.monotonic(), cpu_s()  # earlier processes built the programs
     if options.cold:
         shutil.rmtree(cache, ignore_errors=True)
     cached, was_there = image.prepare(cache, [options.bin / name for name in stations.PROGRAMS])
@@ -154,7 +154,7 @@ def main():
     parser.add_argument("--bin", type=pathlib.Path, required=True, help=argparse.SUPPRESS)
     options = parser.parse_args()
     options.bin = options.bin.resolve()
-    os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:CORES])  # of all that it starts, too
+    os.sched_setaffinity(0, sorted(os.sched_getaffinity(0))[:CORES])  # also for all child processes
     work = image.ROOT / "out" / "hil"
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)

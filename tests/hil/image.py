@@ -1,9 +1,9 @@
-"""The virtual machine's disks, made without root mounts and kept under build/hil until what they are made of changes.
+"""The virtual machine's disks, made without root mounts and kept under build/hil until their sources change.
 
 base.sqfs   Debian: systemd, udev and the packages that the installed programs' libraries are in
 kernel/     Debian's kernel, the modules that the scenario needs, gpio-sim built from the same kernel's source
-initrd      busybox: lays system.sqfs over base.sqfs and a tmpfs over both
-system-*/   what makes Debian this machine: system.sqfs of tests/hil/guest and the modules, and the machine booted
+initrd      busybox: mounts system.sqfs over base.sqfs and a tmpfs over both
+system-*/   what turns Debian into this machine: system.sqfs of tests/hil/guest and the modules, and the machine booted
 app.sqfs    what `cmake --install` installs; made anew every time
 """
 import hashlib
@@ -34,17 +34,17 @@ def run(*command, **options):
 
 
 def kernel_version():
-    """Of the installed headers: kernel, modules and gpio-sim have to be of one version."""
+    """Version of the installed headers: kernel, modules and gpio-sim must be of one version."""
     wanted = run("dpkg-query", "-W", "-f", "${Depends}", "linux-headers-amd64")
     return re.search(r"linux-headers-(\S+)", wanted)[1]
 
 
 def library_packages(programs):
-    """The Debian packages with the shared libraries of these programs."""
+    """Debian packages with the shared libraries of these programs."""
     files = set()
     for program in programs:
         files |= {str(pathlib.Path(file).resolve()) for file in re.findall(r"(/\S+)", run("ldd", program))}
-    # dpkg knows files by their place before /lib became /usr/lib, or after.
+    # dpkg lists files by their place before /lib became /usr/lib, or after.
     names = [name for file in files for name in (file, file.removeprefix("/usr"))]
     found = subprocess.run(["dpkg", "-S", *names], capture_output=True, text=True).stdout
     return sorted({line.split(":")[0] for line in found.splitlines() if ": " in line})
@@ -68,7 +68,7 @@ def build_module(build, version, name, sources):
 
 
 def build_v4l2loopback(folder, version):
-    """A video device whose frames a program writes. Its stamps are the monotonic clock's, but it does not say so."""
+    """A video device whose frames a program writes. Its stamps are the monotonic clock's, but it does not report so."""
     run("apt-get", "download", "-qq", "v4l2loopback-dkms", cwd=folder)
     package = next(folder.glob("v4l2loopback-dkms_*.deb"))
     run("dpkg-deb", "-x", package, folder / "v4l2loopback")
@@ -97,7 +97,7 @@ def build_gpio_sim(folder, version):
 
 
 def make_kernel(folder, version):
-    """Returns the modules of the initrd, each after those it needs."""
+    """Modules of the initrd, each after those it needs."""
     package = folder / "package"
     run("apt-get", "download", "-qq", f"linux-image-{version}", cwd=folder)
     run("dpkg-deb", "-x", next(folder.glob("linux-image-*.deb")), package)
@@ -147,13 +147,13 @@ def make_initrd(folder, modules):
 
 
 def make_app(tree, target):
-    """`tree`: an installation of the project and what else is installed in the booted machine."""
+    """`tree`: an installation of the project and other files that are installed in the booted machine."""
     run("mksquashfs", tree, target, *SQUASH)
     os.truncate(target, APP_SIZE)  # the machine was booted with a disk of that size
 
 
 def prepare_system(cached):
-    """The folder with system.sqfs, made if it is not there; and whether the machine booted with it has been kept."""
+    """Folder with system.sqfs, made if missing; and whether the machine booted with it has been kept."""
     parts = sorted(file for file in [*(HERE / "guest").rglob("*"), HERE / "machine.py"] if file.is_file())
     recipe = [run("qemu-system-x86_64", "--version"), *(f"{file.relative_to(HERE)} {file.read_text()}" for file in parts)]
     done = cached / f"system-{key_of(recipe)}"
@@ -175,7 +175,7 @@ def key_of(recipe):
 
 
 def prepare(cache, programs):
-    """The folder with base.sqfs, vmlinuz, initrd and kernel/, made if it is not there; and whether it was."""
+    """Folder with base.sqfs, vmlinuz, initrd and kernel/, made if missing; and whether it was."""
     version = kernel_version()
     packages = SYSTEM_PACKAGES + library_packages(programs)
     recipe = [version, *packages, pathlib.Path(__file__).read_text(), (HERE / "initrd_init.sh").read_text()]
@@ -183,7 +183,7 @@ def prepare(cache, programs):
     done = cache / key
     if done.is_dir():
         return done, True
-    shutil.rmtree(cache, ignore_errors=True)  # of another recipe, or left by a run that was broken off
+    shutil.rmtree(cache, ignore_errors=True)  # of another recipe, or left by an interrupted run
     making = cache / f"{key}.part"
     making.mkdir(parents=True)
     make_kernel(making, version)

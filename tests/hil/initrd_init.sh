@@ -1,5 +1,5 @@
 #!/bin/busybox sh
-# The initrd's only program: the disks as one tree, then systemd.
+# The initrd's only program: mounts the disks as one tree, then starts systemd.
 b=/bin/busybox
 $b mkdir -p /proc /sys /dev /base /system /over /root
 $b mount -t proc proc /proc

@@ -1,4 +1,4 @@
-"""One QEMU machine: software emulation, Debian's kernel, systemd, and a way to have commands run in it."""
+"""One QEMU machine: software emulation, Debian's kernel, systemd, and a way to run commands in it."""
 import base64
 import json
 import os
@@ -14,7 +14,7 @@ UNPLUG_S = 10
 
 
 class Gone(RuntimeError):
-    """The machine does not answer any more."""
+    """The machine does not respond any more."""
 
 
 class Wire:
@@ -67,8 +67,8 @@ def free_port():
 
 
 class Machine:
-    """`folder` keeps its disk, its sockets and what its console said. `system`: system.sqfs, and in the folder above
-    vmlinuz, initrd, base.sqfs. `kept`: what keep() wrote, to begin with; None to boot."""
+    """`folder` keeps its disk, its sockets and its console output. `system`: system.sqfs, and in the folder above
+    vmlinuz, initrd, base.sqfs. `kept`: output of keep(), to start from; None to boot."""
 
     def __init__(self, folder, system, app, turntable_port, kept=None, cores=2):
         self.folder = pathlib.Path(folder)
@@ -83,7 +83,7 @@ class Machine:
         def drive(file, options=""):
             return ["-drive", f"file={file},format=raw,if=virtio,{options}"]
 
-        # Nehalem: little of what a newer processor has is used here, and leaving it out makes emulation quicker.
+        # Nehalem: features of newer processors are little used here, and leaving them out makes emulation quicker.
         command = [
             "qemu-system-x86_64", "-accel", "tcg,thread=multi", "-machine", "q35", "-cpu", "Nehalem", "-smp", cores,
             "-m", 2048, "-nodefaults", "-no-user-config", "-display", "none", "-no-reboot",
@@ -92,7 +92,7 @@ class Machine:
             "systemd.show_status=0 systemd.log_target=journal "
             "systemd.unit=hil.target systemd.mask=e2scrub_reap.service systemd.mask=getty.target",
             *drive(cached / "base.sqfs", "readonly=on"), *drive(system / "system.sqfs", "readonly=on"),
-            # The host's page cache survives the machine: what it holds back is only what the guest never wrote out.
+            # The host's page cache survives the machine: only data that the guest never wrote out are lost.
             *drive(self.folder / "disk.ext4", "cache=writeback"), *drive(app, "readonly=on"),
             "-chardev", f"file,id=console,path={self.console},append=on", "-serial", "chardev:console",
             "-chardev", "null,id=uart", "-serial", "chardev:uart",
@@ -125,7 +125,7 @@ class Machine:
         self.kill()
 
     def kill(self):
-        """As when somebody pulls the mains plug."""
+        """Cuts the machine's power, like a pulled mains plug."""
         self.process.kill()
         self.process.wait()
         for wire in (self.agent, self.eyes, self.monitor):
@@ -141,7 +141,7 @@ class Machine:
                 return answer["return"]
 
     def unplug_chardev(self, name):
-        """Once the device that used it has let go of it."""
+        """Waits until the device that used it has released it."""
         end = time.monotonic() + UNPLUG_S
         while True:
             try:
@@ -152,7 +152,7 @@ class Machine:
                 time.sleep(0.1)
 
     def keep(self, file):
-        """Writes to `file` what another machine can begin with, and goes on."""
+        """Writes the machine's state to `file`, for another machine to start from, and continues."""
         part = file.with_suffix(".part")
         self.qmp("stop")
         self.qmp("migrate-set-parameters", **{"max-bandwidth": 1 << 40})
@@ -169,9 +169,9 @@ class Machine:
             time.sleep(0.05)
 
     def wait_for_boot(self):
-        """Until its agent says that it is there."""
+        """Waits until its agent reports that it runs."""
         if self.kept:
-            self.wait_for("query-status", "paused", KEEP_S)  # as it was when it was kept
+            self.wait_for("query-status", "paused", KEEP_S)  # in the state in which it was kept
             self.qmp("cont")
             return
         try:

@@ -9,11 +9,11 @@ from station import IMAGES, JOBS, VIEWS, Unmet
 
 SCAN_S = 120
 RECOVERY_S = 60
-UNITS = "scanrigd.socket scanrigd.service"  # both: whoever connects to the socket starts the daemon
+UNITS = "scanrigd.socket scanrigd.service"  # both: a client that connects to the socket starts the daemon
 CONFIGS = "/etc/scanrig"
 UART_DEG = 40.0
 MOST_EXPOSURE = 2.0
-FAILURES = 6  # one more than systemd lets a unit have in a row, if nothing is said
+FAILURES = 6  # one more failure in a row than systemd allows a unit by default
 FAILS = "[Service]\\nExecStart=\\nExecStart=/bin/false\\nExecStopPost=\\nRestartSec=200ms\\n"
 PAIRS, VIVID_SIZE = 8, (320, 180)
 
@@ -39,7 +39,7 @@ def unit(station):
 
 
 def failing(station):
-    """A daemon that cannot begin is tried again and again and keeps its socket; who connects once it can is answered."""
+    """A daemon that cannot start is restarted repeatedly and keeps its socket; once it starts, clients get replies."""
     drop_in = "/run/systemd/system/scanrigd.service.d"
     station.machine.do(f"mkdir -p {drop_in} && printf '{FAILS}' >{drop_in}/fails.conf && systemctl daemon-reload && "
                        "systemctl restart scanrigd; true", 60)
@@ -91,7 +91,7 @@ def usb_and_gige(station, rendered):
     """The same with a LightCrafter behind vhci-hcd, whose trigger output exposes two GigE cameras."""
     trigger = 'TRIGGER=lightcrafter 3240\nCAMERAS=gige 10.77.0.11 10.77.0.12'
     station.machine.do(f"echo '{trigger}' >/run/hil/cameras && systemctl restart hil-cameras && modprobe vhci_hcd")
-    station.told = None  # the angle has to be said again
+    station.told = None  # the angle must be sent again
     attach = "ip netns exec cameras usbip attach -r 127.0.0.1 -b 1-1"
     station.wait("the LightCrafter attached", lambda: station.machine.call(attach)[0] == 0, 20)
     end_job(station)
@@ -134,14 +134,14 @@ def vivid(station):
 
 
 def end_job(station):
-    """The station stopped, its job's folder taken away: in an emulated machine a reconstruction would take minutes."""
+    """Stops the station and removes its job's folder: in an emulated machine a reconstruction would take minutes."""
     away = f" && rm -rf {JOBS}/{station.job}" if station.job else ""
     station.machine.do(f"systemctl stop {UNITS}{away}", 60)
     station.job = None
 
 
 def scanning(station):
-    """A job with a view stored, while it goes on: the one that has shown that the rig recovered, or a new one."""
+    """A job with a view stored, still running: the one that proved that the rig recovered, or a new one."""
     known = station.job and station.ask(f"jobs/{station.job}")
     if not known or known["state"] != "scanning" or len(known["stored"]) > VIEWS / 2:
         station.get_ready()
@@ -151,7 +151,7 @@ def scanning(station):
 
 
 def job_ends(station, job, words):
-    """The job's sentence, once it has failed and said one of `words`."""
+    """Message of the job, once it has failed with one of `words`."""
     def ended():
         known = station.ask(f"jobs/{job}")
         return known if known and known["state"] in ("failed", "interrupted") else None
@@ -163,7 +163,7 @@ def job_ends(station, job, words):
 
 
 def recovers(station):
-    """A Reset at the panel, and the next job takes a view. It goes on, for the next fault to meet."""
+    """Presses Reset at the panel, and the next job takes a view. It continues, for the next fault."""
     station.get_ready()
     wait_for_views(station, station.start(), 1)
 
@@ -195,12 +195,12 @@ def estop(station):
 
 
 def cameras_lost(station):
-    """Both cameras stop delivering; then they are back."""
+    """Both cameras stop delivering frames; then they return."""
     job = scanning(station)
     station.machine.do("systemctl stop hil-cameras")
     state, sentence = job_ends(station, job, ("camera",))
     station.machine.do("systemctl start hil-cameras")
-    station.told = None  # the angle has to be said again
+    station.told = None  # the angle must be sent again
     recovers(station)
     return f"job {state}: {sentence}"
 
@@ -213,7 +213,7 @@ def turning(station):
 
 
 def seen_safe(station, begin):
-    """Seconds from `begin` until the table stands and the light is off, by the simulation and the lines."""
+    """Seconds from `begin` until the table is stopped and the light is off, by the simulation and the lines."""
     station.wait("the table standing", lambda: station.rig.truth()["stopped"], 30)
     took = time.monotonic() - begin
     dark = station.machine.do("cat /run/hil/PROJ_TRIG/value /run/hil/PROJ_PLAIN/value").split()
@@ -222,11 +222,11 @@ def seen_safe(station, begin):
 
 
 def killed(station):
-    """The configuration is away when the daemon dies, and back before it begins again."""
+    """The configuration is missing when the daemon dies, and back before it restarts."""
     job = turning(station)
     away = f"mv {CONFIGS}/rig.toml {CONFIGS}/away.toml; trap 'mv {CONFIGS}/away.toml {CONFIGS}/rig.toml' EXIT"
     begin = time.monotonic()
-    # The lamp is red until the daemon is there again: looked at from within.
+    # The lamp is red until the daemon runs again: read inside the machine.
     red = "for i in {1..100}; do read -r red </run/hil/LAMP_RED/value; [ $red = 1 ] && exit; sleep 0.1; done; exit 1"
     lit, _ = station.machine.call(f"{away}; systemctl kill -s SIGKILL --kill-whom=main scanrigd; {red}")
     expect(lit == 0, f"the red lamp has not been lit; {station.journal()}")
@@ -254,14 +254,14 @@ def watchdog(station):
 
 
 class Acknowledged:
-    """Views that the station said were stored, and whether they still are after the machine was killed."""
+    """Views that the station reported as stored, and whether they still are after the machine was killed."""
 
     def __init__(self):
         self.job, self.views = None, set()
         self.kills, self.checked, self.lost = 0, 0, 0
 
     def kill(self, station, max_s):
-        """During a scan, `max_s` after the view that is stored by now at the latest."""
+        """Random time during a scan, at most `max_s` after the view that is stored by now."""
         self.job, self.views = scanning(station), set()
         end = time.monotonic() + random.uniform(0, max_s)
         while True:
@@ -273,7 +273,7 @@ class Acknowledged:
         self.kills += 1
 
     def check(self, station):
-        """In the next life. The manifest has every view that was acknowledged, the files are what it says."""
+        """Check in the next life. The manifest has every acknowledged view, and the files match it."""
         station.wait("the daemon", station.status, 60)
         manifest = {view["index"]: view for view in station.views(self.job)}
         hashes = station.image_hashes(self.job)

@@ -17,11 +17,11 @@ sys.path.insert(0, str(image.ROOT / "tests" / "bench"))
 import motion_rig  # noqa: E402
 
 VIEWS = 8
-PROGRAMS = ["scanrigd", "scanrig", "scanrig-edge-camera"]  # what runs in the machine
+PROGRAMS = ["scanrigd", "scanrig", "scanrig-edge-camera"]  # programs that run in the machine
 READY = "Operational.Ready"
 JOBS = "/var/lib/scanrig/jobs"
 CONFIGS = image.HERE / "configs"
-# As a package is installed in a running system.
+# Same as for a package installed in a running system.
 INSTALL = ("mkdir /run/app && mount -t squashfs -o ro /dev/vdd /run/app && cp -a /run/app/. / && umount /run/app && "
            "systemd-sysusers scanrig.conf && systemd-tmpfiles --create scanrig.conf && "
            "udevadm control --reload && udevadm trigger -s gpio && udevadm settle -t 10 && "
@@ -30,11 +30,11 @@ IMAGES = [f"{side}_{light}.png" for side in ("left", "right") for light in ("pat
 
 
 class Unmet(RuntimeError):
-    """What had to happen did not."""
+    """A required event did not happen."""
 
 
 def make_tree(build, tree, images):
-    """What is installed in the booted machine: the project, its configurations, the cameras and what they show."""
+    """Files installed in the booted machine: the project, its configurations, the cameras and their images."""
     image.run("cmake", "--install", build, "--prefix", "/usr", "--strip", env={**os.environ, "DESTDIR": str(tree)})
     configs, programs = tree / "etc" / "scanrig", tree / "usr" / "lib" / "hil"
     for folder in (configs, programs):
@@ -50,7 +50,7 @@ def make_tree(build, tree, images):
 
 
 def with_sections(config, sections):
-    """The configuration with these sections in the place of its own."""
+    """Configuration in which these sections replace its own."""
     def split(file):
         parts = re.split(r"^(?=\[)", file.read_text(), flags=re.M)
         return {part.split("]")[0]: part.rstrip() + "\n\n" for part in parts}
@@ -59,12 +59,12 @@ def with_sections(config, sections):
 
 
 def install(folder, system, app, port):
-    """Boots, if no run before has kept that; installs what is in `app`; returns what every life begins with."""
+    """Boots, unless an earlier run has kept that; installs the content of `app`; returns the start of every life."""
     booted, installed = system / "booted", folder / "installed"
     with machine.Machine(folder, system, app, port, booted if booted.is_file() else None) as fresh:
         fresh.wait_for_boot()
         if not booted.is_file():
-            fresh.do("systemctl start hil.target", 60)  # returns when it is reached
+            fresh.do("systemctl start hil.target", 60)  # returns when the target is reached
             fresh.keep(booted)
         fresh.do(INSTALL)
         fresh.keep(installed)
@@ -72,13 +72,13 @@ def install(folder, system, app, port):
 
 
 class Station:
-    """One life of the machine, until it is left."""
+    """One life of the machine, until the block ends."""
 
     def __init__(self, folder, system, app, rig, installed):
         self.rig = rig
         self.machine = machine.Machine(folder, system, app, rig.folder / "turntable", installed)
-        self.told = None  # the angle that the cameras know of
-        self.job = None  # the last one that was started
+        self.told = None  # angle last sent to the cameras
+        self.job = None  # job started last
         self.leaving = threading.Event()
         self.teller = threading.Thread(target=self.tell_angle, daemon=True)
 
@@ -100,7 +100,7 @@ class Station:
         self.machine.kill()
 
     def tell_angle(self):
-        """The cameras in the machine see the table where the host's simulation says that it is."""
+        """The cameras in the machine see the table at the angle of the host's simulation."""
         while not self.leaving.wait(0.02):
             angle = round(self.rig.truth()["angle_deg"], 1)
             if angle != self.told:
@@ -117,13 +117,13 @@ class Station:
             self.machine.qmp("device_del", id="adapter")
 
     def wire_uart(self):
-        """The drive's cable goes from the USB adapter to the machine's second 16550A."""
+        """Moves the drive's cable from the USB adapter to the machine's second 16550A."""
         self.plug_serial(False)
         self.machine.unplug_chardev("turntable")
         self.machine.qmp("chardev-change", id="uart",
                          backend={"type": "serial", "data": {"device": str(self.rig.folder / "turntable")}})
 
-    # The operator's hands
+    # Actions of the operator
 
     def pull(self, line, up):
         self.machine.do(f"echo pull-{'up' if up else 'down'} >/run/hil/{line}/pull")
@@ -156,7 +156,7 @@ class Station:
         return self.ask("status")
 
     def says(self):
-        """The station's state, and what is wrong with its devices."""
+        """State of the station, and problems of its devices."""
         status = self.status()
         if not status:
             return "the station does not answer"
@@ -164,7 +164,7 @@ class Station:
         return "; ".join([f"the station says: {status['machine']}, {status['sentence']}", *wrong])
 
     def wait(self, what, ready, limit_s):
-        """What `ready` returned, once it is true. Fails with Unmet."""
+        """Result of `ready`, once it is true. Fails with Unmet."""
         end = time.monotonic() + limit_s
         while True:
             found = ready()
@@ -182,7 +182,7 @@ class Station:
         return self.wait(f'"{words}" in {key}', ready, limit_s)
 
     def get_ready(self):
-        """Halted until somebody presses Reset; then it homes."""
+        """Halted until the operator presses Reset; then it homes."""
         def asks():
             status = self.status()
             return status and ("Reset" in status["next_action"] or status["machine"] == READY) and status["machine"]
@@ -196,7 +196,7 @@ class Station:
         return status and status["machine"] == READY and all(device["ok"] for device in status["devices"])
 
     def start(self):
-        """The new job's id."""
+        """Id of the new job."""
         before = set(self.jobs())
         self.tap("START")
         self.job = self.wait("a new job", lambda: next(iter(set(self.jobs()) - before), None), 10)
@@ -206,7 +206,7 @@ class Station:
         return self.machine.do(f"ls {JOBS} 2>/dev/null || true").split()
 
     def manifest(self, job):
-        """scan.json as it is on the disk; empty before the first view."""
+        """Content of scan.json on the disk; empty before the first view."""
         text = self.machine.do(f"cat {JOBS}/{job}/scan.json 2>/dev/null || echo '{{}}'")
         return json.loads(text)
 

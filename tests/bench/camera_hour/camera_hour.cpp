@@ -11,10 +11,10 @@
 #include "tests/component/daemon/fake_rig.h"
 #include "tests/resident_memory.h"
 
-/// camera_hour SECONDS: the daemon's rig thread over two GigE cameras, in turns ten seconds of scanning and ten of live
-/// preview, both at 10 frames/s of each camera. Prints a line of JSON every two seconds: memory, descriptors, what was
-/// done; the last one after the cameras have been given back, beside `before`, the descriptors before they were opened
-/// (for a second time).
+/// camera_hour SECONDS: the daemon's rig thread over two GigE cameras, alternating ten seconds of scan and of live
+/// preview, both at 10 frames/s of each camera. Prints a line of JSON every two seconds: memory, descriptors, work
+/// done. The last line follows the release of the cameras. It also has `before`, the descriptors before they were
+/// opened for the second time.
 namespace scanrig::bench {
 namespace {
 
@@ -44,7 +44,7 @@ std::ptrdiff_t descriptors() {
   return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator());
 }
 
-/// Waits for the rig's answer to the last command.
+/// Waits for the rig's reply to the last command.
 class Answers {
  public:
   void tell(const Event& event) {
@@ -130,7 +130,7 @@ int work(seconds time, Done& done) {
 
 int run(seconds time) {
   Done done;
-  // The libraries keep some descriptors for good from their first use on.
+  // The libraries keep some descriptors permanently from their first use on.
   if (const int failed = work(seconds(1), done); failed != 0) return failed;
   const auto before = descriptors();
   done = {};

@@ -14,7 +14,7 @@ using Spoil = StereoCameraBench::Fault;
 
 constexpr milliseconds kFrameLimit{1000};
 constexpr seconds kConnectLimit{10};
-constexpr milliseconds kNoticed{3100};  ///< a camera is asked whether it is there when it was silent for three seconds
+constexpr milliseconds kNoticed{3100};  ///< a camera is checked when it was silent for three seconds
 constexpr seconds kAbsence{2};
 
 std::unique_ptr<StereoCameraBench> make_bench(const std::string& device) {
@@ -22,7 +22,7 @@ std::unique_ptr<StereoCameraBench> make_bench(const std::string& device) {
   return std::make_unique<V4l2Bench>(device == "v4l2-side-by-side");
 }
 
-/// One method of a camera under one fault, and good exposures afterwards: never those of an earlier edge.
+/// One method of a camera under one fault, and good exposures afterwards: never frames of an earlier edge.
 class CameraTrial {
  public:
   explicit CameraTrial(const std::string& device) : device_(device), bench_(make_bench(device)) {}
@@ -59,7 +59,7 @@ class CameraTrial {
     if (collects) std::ignore = camera().arm(ample());
     const auto begun = clock().now();
     bench_->plug(false);
-    // The silence itself is what the driver goes by: nothing happens that could be waited for.
+    // The driver detects the silence itself: there is no event to wait for.
     if (method == "ready" || method == "arm") clock().sleep_for(kNoticed);
     if (collects) bench_->fire();
     auto outcome = timed(clock(), collects ? Clock::Duration(kFrameLimit) : kConnectLimit,
@@ -77,7 +77,7 @@ class CameraTrial {
     if (!frame) return pass_on(frame);
     return {};
   }
-  /// False if another edge's frames were handed out. An exposure that fails is redone, as the daemon does.
+  /// False if another edge's frames were returned. A failed exposure is retaken, as in the daemon.
   Result<bool> expose() {
     Result<bool> last = false;
     for (int i = 0; i < 4; ++i) {

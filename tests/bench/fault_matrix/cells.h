@@ -12,7 +12,7 @@
 
 namespace scanrig::bench {
 
-/// What goes wrong on the wire: the columns of the matrix.
+/// Faults on the wire: the columns of the matrix.
 enum class Fault { silent, late, damaged, device_error, stalled, unplugged, back_after_2s, earlier_answer };
 
 inline constexpr std::array kFaults{std::pair(Fault::silent, "silent"),
@@ -24,11 +24,11 @@ inline constexpr std::array kFaults{std::pair(Fault::silent, "silent"),
                                     std::pair(Fault::back_after_2s, "back after 2 s"),
                                     std::pair(Fault::earlier_answer, "answer of an earlier request")};
 
-/// How one call of one driver ended under one fault.
+/// Result of one call of one driver under one fault.
 struct Outcome {
   bool applicable = true;
-  std::string told{};                 ///< the error it ended in, or why the cell is not applicable
-  std::vector<std::string> wrongs{};  ///< what did not hold; empty: held
+  std::string told{};                 ///< error of the call, or why the cell is not applicable
+  std::vector<std::string> wrongs{};  ///< violated requirements; empty: held
   bool hung = false;
   bool wrong_position = false;
 
@@ -56,12 +56,12 @@ std::vector<Cell> panel_cells(const std::filesystem::path& scratch);
 std::vector<Cell> camera_cells();
 std::vector<Cell> lightcrafter_cells();
 
-constexpr std::chrono::milliseconds kGrace{50};  ///< past its deadline a call may still need this
+constexpr std::chrono::milliseconds kGrace{50};  ///< margin of a call past its deadline
 
-/// Whether `holds` becomes true within `limit`; looks every millisecond.
+/// True if `holds` becomes true within `limit`; checks every millisecond.
 bool soon(Clock& clock, Clock::Duration limit, const std::function<bool()>& holds);
 
-/// Runs `call` and notes how it ended: in time or not, in one of `named` (none: success is meant) or not.
+/// Runs `call` and notes its result: in time or not, with an error of `named` (empty: success is required) or not.
 Outcome timed(Clock& clock, Clock::Duration limit, const std::vector<ErrorCode>& named,
               const std::function<Result<void>(Deadline)>& call);
 

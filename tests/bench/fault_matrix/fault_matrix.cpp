@@ -13,7 +13,7 @@
 #include "tests/bench/fault_matrix/cells.h"
 
 /// fault_matrix PROFILES SCRATCH WORKERS motion|cameras: every cell of that part of the fault matrix, one line of JSON
-/// each.
+/// per cell.
 namespace scanrig::bench {
 
 bool soon(Clock& clock, Clock::Duration limit, const std::function<bool()>& holds) {

@@ -22,7 +22,7 @@ class LightCrafterTrial {
     std::jthread meanwhile;
     if (method == "request_off") {
       meanwhile = std::jthread([&] {
-        soon(clock(), kLimit, [&] { return bench_.device().lit(); });  // the fault comes while the light burns
+        soon(clock(), kLimit, [&] { return bench_.device().lit(); });  // the fault occurs while the light is on
         begin(fault);
         bench_.projector().request_off();
       });
@@ -36,14 +36,14 @@ class LightCrafterTrial {
     if (fault == Fault::back_after_2s) clock().sleep_until(begun + kAbsence);
     end();
     auto fired = fire();
-    if (!fired) fired = fire();  // as the daemon does
+    if (!fired) fired = fire();  // as in the daemon
     outcome.expect(fired.has_value(), "does not fire afterwards");
     outcome.expect(!bench_.device().lit(), "is not dark afterwards");
     return outcome;
   }
 
  private:
-  /// None: it succeeds all the same.
+  /// Errors that the call may end in; none: it still succeeds.
   static std::vector<ErrorCode> named(const std::string& method, Fault fault) {
     if (method == "request_off") return {ErrorCode::io};
     switch (fault) {

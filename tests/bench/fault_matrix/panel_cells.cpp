@@ -29,7 +29,7 @@ class PanelEnd {
   virtual void end() = 0;
   virtual void press_start(bool pressed) = 0;
   virtual bool lamp() = 0;
-  /// Opens the driver again, as the daemon does with a device that failed.
+  /// Opens the driver again, like the daemon after a device failure.
   virtual Result<void> open() = 0;
 };
 
@@ -139,12 +139,12 @@ Outcome trial(PanelEnd& end, RealClock& clock, const std::string& method, Fault 
     return {};
   });
   if (method == "show" && outcome.told == "ok" && end.lamp()) {
-    // The repeated request has the earlier one's answer for its own; what counts is that the lamp burns.
+    // The repeated request takes the earlier one's reply as its own; the requirement is that the lamp is on.
     outcome = {.told = "ok: sent again, and the lamp burns"};
   }
   if (fault == Fault::back_after_2s) clock.sleep_until(begun + kAbsence);
   end.end();
-  // As the daemon does: what failed is asked again, and opened again where that does not help.
+  // As in the daemon: a failed call is repeated, and the device reopened if that does not help.
   auto shown = end.panel().show(green(), within(kAmple));
   if (!shown && end.open()) shown = end.panel().show(green(), within(kAmple));
   outcome.expect(shown && end.lamp(), "the lamp does not burn afterwards");

@@ -28,7 +28,7 @@ class Trial {
       far_end_.reset();
     } else {
       meanwhile = std::jthread([&] {
-        soon(clock_, kLimit, [&] { return far_end_->level(kLine); });  // the fault comes while the light burns
+        soon(clock_, kLimit, [&] { return far_end_->level(kLine); });  // the fault occurs while the light is on
         begun = clock_.now();
         far_end_.reset();
         if (method == "request_off") projector_->request_off();
@@ -40,7 +40,7 @@ class Trial {
     if (meanwhile.joinable()) meanwhile.join();
     if (fault == Fault::back_after_2s) clock_.sleep_until(begun + kAbsence);
     plug_in();
-    // As the daemon does: used again, and opened again where that does not help.
+    // As in the daemon: the device is used again, and reopened if that does not help.
     auto fired = fire();
     if (!fired && open()) fired = fire();
     outcome.expect(fired.has_value(), "does not fire afterwards");

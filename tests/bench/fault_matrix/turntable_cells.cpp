@@ -10,16 +10,16 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-constexpr seconds kMotionLimit{4};  ///< for a call that moves: longer than the 2 s after which it is a stall
+constexpr seconds kMotionLimit{4};  ///< for a call that moves: longer than the 2 s after which a stall is detected
 constexpr milliseconds kAskLimit{1500};
 constexpr seconds kAmple{15};
 constexpr milliseconds kAbsence{2000};
 constexpr double kFarDeg = 170;
-/// From full speed, as the drive was told to; and what the table is given on top.
+/// Deceleration from full speed, as commanded to the drive; and the extra margin of the table.
 constexpr milliseconds kDeceleration{static_cast<int>(1000 * kSpeedDegS / kAccelerationDegS2)};
 constexpr milliseconds kRestGrace{100};
 
-/// Whether the table comes to turn, and then no faster any more.
+/// True if the table starts to turn, and then no longer accelerates.
 bool at_full_speed(TurntableEnd& end, Clock& clock, Clock::Duration limit, const std::stop_token& stop = {}) {
   constexpr milliseconds kApart{20};
   double before = 0;
@@ -33,7 +33,7 @@ bool at_full_speed(TurntableEnd& end, Clock& clock, Clock::Duration limit, const
   });
 }
 
-/// Does something once the table turns at full speed, from another thread.
+/// Runs an action once the table turns at full speed, from another thread.
 class Onlooker {
  public:
   Onlooker(TurntableEnd& end, Clock& clock, std::function<void()> act)
@@ -69,7 +69,7 @@ const std::map<std::string, Method>& methods() {
           if (!status) return pass_on(status);
           return {};
         }}},
-      // Its effect is seen in the call that it ends.
+      // Its effect shows in the call that it ends.
       {"request_stop", {true, [](Turntable& table, Deadline by) -> Result<void> {
                           const auto moved = table.rotate_to({kFarDeg}, by);
                           if (!moved) return pass_on(moved);
@@ -104,19 +104,19 @@ std::vector<ErrorCode> named(const std::string& method, Fault fault) {
     case Fault::back_after_2s: codes = {ErrorCode::io}; break;
     case Fault::device_error: codes = {ErrorCode::device_alarm}; break;
   }
-  if (fault == Fault::device_error && (method == "stop" || method == "status")) codes = {};  // tell, do not fail
+  if (fault == Fault::device_error && (method == "stop" || method == "status")) codes = {};  // reports, does not fail
   if (method == "request_stop") codes.push_back(ErrorCode::stopped);
   return codes;
 }
 
-/// What GRBL says unasked, an alarm for one, is no wrong answer when it is said again: the right one is missing.
+/// Unrequested output of GRBL, such as an alarm, is no wrong reply when repeated: the right reply is missing.
 std::vector<ErrorCode> named(const TurntableKind& kind, const std::string& method, Fault fault) {
   auto codes = named(method, fault);
   if (kind.driver == "GrblTurntable" && fault == Fault::earlier_answer) codes.push_back(ErrorCode::timeout);
   return codes;
 }
 
-/// Whether the drive hears a stop while the fault lasts.
+/// True if the drive receives a stop while the fault lasts.
 bool reachable(Fault fault) {
   return fault != Fault::silent && fault != Fault::unplugged && fault != Fault::back_after_2s;
 }
@@ -163,7 +163,7 @@ class Trial {
     };
     std::unique_ptr<Onlooker> onlooker;
     if (method.moves && fault_ == Fault::stalled) {
-      begin();  // from the start: nothing will be seen turning
+      begin();  // from the start: no turning will be seen
     } else if (method.moves) {
       onlooker = std::make_unique<Onlooker>(*end_, clock_, begin);
     } else {
@@ -183,7 +183,7 @@ class Trial {
     return soon(clock_, kDeceleration + kRestGrace, [&] { return !end_->truth().moving; });
   }
 
-  /// Standing, or owned up that it may not be.
+  /// Checks that the table is stopped, or that the driver reports that it may be moving.
   void expect_rest(Outcome& outcome) {
     const bool meant_to_stop = method_ != "status" && method_ != "reset_alarm";
     if (!meant_to_stop) return;
@@ -194,7 +194,7 @@ class Trial {
     outcome.expect(comes_to_rest(), "the table still turns");
   }
 
-  /// The fault is over: reset, home, a move that ends where it says.
+  /// After the fault: reset, home, a move that ends at its reported angle.
   void recover(Outcome& outcome) {
     if (fault_ == Fault::back_after_2s) clock_.sleep_until(begun_ + kAbsence);
     end_->end(fault_);
@@ -206,7 +206,7 @@ class Trial {
     if (auto stopped = table.stop(within(kAmple)); !stopped) return fail_with("stop", stopped.error());
     if (auto reset = table.reset_alarm(within(kAmple)); !reset) return fail_with("reset", reset.error());
     auto homed = table.home(within(kAmple));
-    // A stop that was asked for after the call had failed holds for the next one.
+    // A stop requested after the failed call applies to the next one.
     if (!homed && homed.error().code == ErrorCode::stopped) homed = table.home(within(kAmple));
     if (!homed) return fail_with("home", homed.error());
     const auto moved = table.rotate_to({45}, within(kAmple));

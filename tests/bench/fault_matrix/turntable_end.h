@@ -21,11 +21,11 @@ class TurntableEnd {
   virtual Turntable& table() = 0;
   [[nodiscard]] virtual sim::wire::AxisTruth truth() = 0;
 
-  /// Makes the fault happen, now. A fault of the drive itself (alarm, blocked shaft) included.
+  /// Starts the fault now, including faults of the drive itself (alarm, blocked shaft).
   virtual void begin(Fault fault) = 0;
-  /// All is well again; an alarm is still there if it can be reset.
+  /// Ends the fault; an alarm stays if it can be reset.
   virtual void end(Fault fault) = 0;
-  /// Somebody else sends the table round, behind the driver's back.
+  /// Turns the table by another controller, without the driver.
   virtual void send_round() = 0;
   virtual void raise_alarm(bool can_be_reset) = 0;
   virtual void power_cycle() = 0;

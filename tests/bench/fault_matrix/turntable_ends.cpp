@@ -17,7 +17,7 @@ using sim::wire::WireFault;
 using std::chrono::milliseconds;
 
 constexpr milliseconds kReplyTimeout{30};
-constexpr milliseconds kLate{50};  ///< later than any answer is waited for
+constexpr milliseconds kLate{50};  ///< later than the driver waits for any reply
 constexpr std::uint8_t kReadFunction = 3;
 
 std::string fresh_port(const std::filesystem::path& scratch) {
@@ -25,7 +25,7 @@ std::string fresh_port(const std::filesystem::path& scratch) {
   return scratch / fmt::format("port{}", count++);
 }
 
-/// What every end has in common: a drive that can go wrong, and a server whose line can.
+/// Common part of all ends: a drive that can fail, and a server whose line can fail.
 class WireEnd : public TurntableEnd {
  public:
   Turntable& table() override { return *table_; }
@@ -33,7 +33,7 @@ class WireEnd : public TurntableEnd {
 
   void begin(Fault fault) override {
     using Kind = WireFault::Kind;
-    // The drive still hears a stop; what it says of itself is spoilt.
+    // The drive still receives a stop; its own replies are damaged.
     const auto spoil = [&](Kind kind) { server_->inject({.kind = kind, .function = asks_, .delay = kLate}); };
     switch (fault) {
       case Fault::silent: return server_->inject({.kind = Kind::request_lost});
@@ -81,7 +81,7 @@ class WireEnd : public TurntableEnd {
   std::unique_ptr<Turntable> table_;
 
  private:
-  const std::uint8_t asks_;  ///< the function that only asks
+  const std::uint8_t asks_;  ///< the function that only reads
   const std::uint16_t alarm_;
   bool alarm_can_be_reset_ = true;
   std::unique_ptr<sim::wire::SimulatedDrive> drive_;
@@ -118,7 +118,7 @@ class GrblEnd final : public WireEnd {
   }
 };
 
-/// The far end that speaks what a profile describes, and one of its alarms.
+/// Far end that implements a profile, and one of its alarms.
 std::unique_ptr<TurntableEnd> modbus_end(const std::filesystem::path& scratch, const DriveProfile& profile,
                                          Clock& clock) {
   if (profile.name == "oriental-az") {

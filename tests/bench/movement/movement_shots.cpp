@@ -1,6 +1,6 @@
-// movement_shots SCALE OBJECT...: what the movement check says of rendered views, for each object (`figurine`, `pebble`
-// or a file), of everything that may have happened since view 0. A line: object, sensor, what happened, how much, the
-// shift in px, the changed share, moved or unmoved; of both cameras the worse.
+// movement_shots SCALE OBJECT...: results of the movement check on rendered views, for each object (`figurine`,
+// `pebble` or a file), for every change that may have happened since view 0. A line: object, sensor, change, amount,
+// the shift in px, the changed share, moved or unmoved; the worse of both cameras.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -48,7 +48,7 @@ constexpr NamedSensor kSensors[] = {{"as simulated", {}},
                                     {"4 grey more noise", {.noise_grey = 4.0}},
                                     {"5 % less light", {.light = 0.95}}};
 
-/// Of both cameras the worse; `noise` names the exposures.
+/// The worse of both cameras; `noise` names the exposures.
 ViewChange worse(const cv::Mat (&before)[2], const cv::Mat (&now)[2], std::uint64_t noise, const NamedSensor& with) {
   ViewChange worst;
   const Sensor first{.blur_px = with.sensor.blur_px, .noise_grey = with.sensor.noise_grey};

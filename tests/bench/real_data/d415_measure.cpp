@@ -39,7 +39,7 @@ Vector6 terms(int u, int v) {
   return Vector6(Vector6{1.0, x, y, x * x, x * y, y * y});
 }
 
-/// Fits the sheet, then again without what is more than 1 px off.
+/// Fits the sheet, then again without pixels more than 1 px off.
 Vector6 fit_sheet(const cv::Mat1f& disparity, const cv::Mat1b& sheet, D415Measure& measure) {
   Vector6 quadric = Vector6::Zero();
   for (const double limit : {1e9, 3.0, 1.0, 1.0}) {

@@ -12,7 +12,7 @@ namespace scanrig::bench {
 /// Rim: heights over the sheet's quadric along 120 rays from the bowl's centre. The bowl's wall is the median height 46
 /// to 56 px from it; rays count whose wall both matchers measure and see more than 1 px nearer than the sheet. Coming
 /// from outside, the rim lies between 10 and 90 % of the wall. Its width is given twice, as the median over the rays:
-/// the length that carries measured values between the two (a smeared edge), and the distance between the two with
+/// the length that contains measured values between the two (a smeared edge), and the distance between the two with
 /// unmeasured pixels bridged (a matcher that leaves an edge out is wide here without being wrong).
 struct D415Measure {
   double rms_px = 0.0;    ///< of the sheet from its fitted quadric, after taking out pixels more than 1 px off
@@ -24,7 +24,7 @@ struct D415Measure {
 struct D415Comparison {
   D415Measure ours;
   D415Measure sgbm;  ///< OpenCV's SGBM, block 9, 3WAY, on the images brightened three times
-  int rim_rays = 0;  ///< that count
+  int rim_rays = 0;  ///< number of rays that count
   double seconds = 0.0;
 };
 

@@ -17,8 +17,8 @@ namespace {
 constexpr std::size_t kSamples = 100'000;
 constexpr float kMmPerMetre = 1000.0F;
 
-/// The imported pose's turntable frame, seen from the world of the .conf: through the first scan, which both know.
-/// The last scan must say the same, or the folder was made from something else.
+/// Turntable frame of the imported pose, in the world of the .conf: through the first scan, which is in both.
+/// The last scan must give the same result, or the folder was made from other data.
 Result<Transform> turntable_from_world(const std::filesystem::path& conf, const PoseRecord& pose) {
   const auto scans = read_stanford_conf(conf);
   if (!scans) return pass_on(scans);

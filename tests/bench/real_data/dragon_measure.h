@@ -10,8 +10,8 @@
 
 namespace scanrig::bench {
 
-/// How a model of the Stanford dragon compares with what came with the scans. Nothing is aligned: the model is in pose
-/// 1's turntable frame, and where that lies in the frame of the published poses follows from the scans' own files.
+/// Comparison of a Stanford dragon model with the data that came with the scans. Nothing is aligned: the model is in
+/// pose 1's turntable frame. Its place in the frame of the published poses follows from the scans' own files.
 struct DragonMeasure {
   double measured_area_mm2 = 0.0;
   double measured_share = 0.0;  ///< of the model's area
@@ -25,7 +25,7 @@ struct DragonMeasure {
 };
 
 /// `data`: the folder with stand/, side/ and recon/. `scan`: imported from stand/, and from side/ if it has two poses.
-/// Fails as the files do, and with `invalid_input` where the scan's views are not those of the .conf.
+/// Fails as reading the files, and with `invalid_input` where the scan's views are not those of the .conf.
 Result<DragonMeasure> measure_dragon(const std::filesystem::path& data, const ScanFolder& scan, const Mesh& model,
                                      const std::optional<Transform>& pose1_from_pose2);
 

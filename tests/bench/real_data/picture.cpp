@@ -1,5 +1,5 @@
-// bench_picture MODEL.ply AZIMUTH_DEG ELEVATION_DEG OUT: a shaded picture of a model for the documentation, seen from
-// afar. Measured surface is grey, what was closed without being measured (`views` 0) is orange.
+// bench_picture MODEL.ply AZIMUTH_DEG ELEVATION_DEG OUT: a shaded image of a model for the documentation, seen from
+// afar. Measured surface is grey; surface closed without measurement (`views` 0) is orange.
 
 #include <fmt/format.h>
 
@@ -18,7 +18,7 @@ namespace {
 
 using namespace scanrig;
 
-constexpr int kWidth = 900, kSamples = 2;  // px; samples a px and axis
+constexpr int kWidth = 900, kSamples = 2;  // px; samples per px and axis
 constexpr double kMarginMm = 4.0;
 
 cv::Vec3b shade(const Mesh& mesh, const SurfaceIndex::Hit& hit, const Eigen::Vector3d& towards_eye,

@@ -1,8 +1,8 @@
-// LD_PRELOAD: watches every call by which a program changes files below $DISK_CALLS_ROOT.
+// LD_PRELOAD: watches every call that changes files below $DISK_CALLS_ROOT.
 //   $DISK_CALLS_KILL=N, $DISK_CALLS_WHEN=before|after   SIGKILL at the N-th of them, counted from 1
-//   $DISK_CALLS_FAIL=N, $DISK_CALLS_ERROR=ERRNO           from the N-th on everything but removing fails like that,
-//   $DISK_CALLS_FAILURES=COUNT                          so many of them; all where it is not set
-//   $DISK_CALLS_LOG=FILE                                what was done, one line a call; data as hexadecimal digits
+//   $DISK_CALLS_FAIL=N, $DISK_CALLS_ERROR=ERRNO           from the N-th on all calls but removals fail with it,
+//   $DISK_CALLS_FAILURES=COUNT                          at most this many of them; all if not set
+//   $DISK_CALLS_LOG=FILE                                the calls, one line each; data as hexadecimal digits
 //   $DISK_CALLS_ACKS=FILE                               writes to this file are logged too, as acknowledgements
 // A log line: KIND, PATH, OTHER (second path, offset, size or flags), DATA; separated by tabs. Calls that fail are left
 // out.
@@ -52,13 +52,13 @@ const Settings& settings() {
   return all;
 }
 
-/// Whether the program is up. The runtime of a sanitizer makes the folder of its reports before anything can be asked
-/// of it, and memory and guards are asked of it.
+/// True once the program has started. A sanitizer's runtime makes the folder of its reports before it can serve calls
+/// for memory and guards.
 bool is_up = false;
 [[gnu::constructor]] void come_up() { is_up = true; }
 
 std::atomic<long> count{0};
-std::mutex in_order;  // the log tells the order in which the calls happened
+std::mutex in_order;  // the log has the order in which the calls happened
 
 template <class Function>
 Function real(const char* name) {
@@ -96,7 +96,7 @@ void log_line(const char* kind, const std::string& path, const std::string& othe
   ::syscall(SYS_write, settings().log, line.data(), line.size());
 }
 
-/// Does `call`, counted, killed and logged as asked for.
+/// Makes `call`, counted, failed or killed, and logged as configured.
 template <class Call>
 auto change(const char* kind, const std::string& path, const std::string& other, const Call& call,
             const void* data = nullptr, std::size_t size = 0) {

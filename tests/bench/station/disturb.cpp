@@ -1,4 +1,4 @@
-// Preloaded into a daemon: a disk that syncs slowly and a wall clock that jumps, as a file says while it runs.
+// Preloaded into a daemon: a disk that syncs slowly and a wall clock that jumps, as a file states at run time.
 // SCANRIG_DISTURB names the file: two 64-bit numbers, milliseconds that each fsync takes and seconds that the wall
 // clock is ahead.
 #include <dlfcn.h>

@@ -1,10 +1,10 @@
-// A whole daemon over devices that only pretend, on a virtual clock, with its files in a real folder: what the kill
-// test kills and starts again.
+// A whole daemon over simulated devices, on a virtual clock, with its files in a real folder: the program that the kill
+// test kills and restarts.
 //   station_one_job scan FOLDER      one two-pose job from Reset to the model; acknowledged views go to FOLDER/acks
-//   station_one_job recover FOLDER   starts again, brings every job it finds to its end, checks that no acknowledged
-//                                    view is lost; prints what it saw, exits 1 when something is not as it should be
-// With $ONE_JOB_CRASH set the making of the model ends in a segmentation fault. With $ONE_JOB_AGAIN set the model of a
-// job that failed is asked for again, once.
+//   station_one_job recover FOLDER   restarts, brings every job it finds to its end, checks that no acknowledged
+//                                    view is lost; prints the results, exits 1 when a check fails
+// With $ONE_JOB_CRASH set the reconstruction ends in a segmentation fault. With $ONE_JOB_AGAIN set the model of a
+// failed job is requested again, once.
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -46,7 +46,7 @@ class TriangleMaker final : public Reconstructor {
   }
 };
 
-/// What the station tells the world: "JOB POSE VIEW", a line for each view, as soon as it is published.
+/// Output of the station: "JOB POSE VIEW", a line for each view, as soon as it is published.
 class Acknowledged {
  public:
   explicit Acknowledged(const fs::path& file) : fd_(::open(file.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0644)) {}
@@ -68,7 +68,7 @@ class Acknowledged {
   std::set<std::string> noted_;
 };
 
-/// The operator: looks at the lamps, presses what they ask for, until no job is left to be done.
+/// The operator: watches the lamps, presses the buttons that they request, until no job is left.
 class Shift {
  public:
   explicit Shift(const fs::path& folder) : folder_(folder), acknowledged_(folder / "acks") {
@@ -80,7 +80,7 @@ class Shift {
     options_.on_loop = [this](ControlLoop& loop) { loop_ = &loop; };
   }
 
-  /// `resume`: jobs found unfinished are brought to their end; otherwise a new one is made.
+  /// `resume`: unfinished jobs are brought to their end; otherwise a new job is made.
   Result<void> work(bool resume) {
     std::stop_source stop;
     Result<Ended> ended;
@@ -171,8 +171,8 @@ class Shift {
   std::string said_;
 };
 
-/// What is wrong with the folders after everything has been brought to its end. A job that had been acknowledged a view
-/// has to be done, not just ended.
+/// Faults of the folders after every job has come to its end. A job with an acknowledged view must be done, not only
+/// ended.
 std::vector<std::string> faults(const fs::path& folder) {
   std::vector<std::string> found;
   std::set<std::string> begun;
@@ -197,7 +197,7 @@ std::vector<std::string> faults(const fs::path& folder) {
 }
 
 int recover(const fs::path& folder) {
-  // What the daemon that was killed had acknowledged must be there before anything else is done.
+  // Views that the killed daemon had acknowledged must exist before anything else happens.
   const auto done = Shift(folder).work(true);
   if (!done) fmt::print("{}\n", done.error().message);
   const auto found = faults(folder);

@@ -1,8 +1,8 @@
-// Preloaded into a daemon or a reconstruction: a stage that goes wrong as the file $SICK_STAGE says.
+// Preloaded into a daemon or a reconstruction: a stage that fails as the file $SICK_STAGE states.
 //   segv    a segmentation fault
-//   throw   an exception that nobody foresaw
-//   eat     takes all the memory it is given, until there is no more
-// A stage is whatever asks for a large piece of memory in the program scanrig or, in a daemon, in a nice thread.
+//   throw   an unexpected exception
+//   eat     allocates all memory, until there is no more
+// A stage is any code that allocates a large piece of memory in the program scanrig or, in a daemon, in a nice thread.
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -47,7 +47,7 @@ bool in_a_stage() {
 }
 
 void be_sick() {
-  thread_local bool asking = false;  // to look into the file takes memory too
+  thread_local bool asking = false;  // reading the file allocates memory too
   const char* const file = std::getenv("SICK_STAGE");
   if (!file || asking || !in_a_stage()) return;
   asking = true;

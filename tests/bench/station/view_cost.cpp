@@ -1,9 +1,9 @@
-// What storing a view costs the scan: a daemon over the simulated rig on the real clock, full-size images, the real
+// Cost of storing a view during a scan: a daemon over the simulated rig on the real clock, full-size images, the real
 // reconstruction beside it.
-//   station_view_cost FOLDER JOBS   a line for each view of JOBS jobs but its first: milliseconds from the last frame
-//   of
-//                                   the view before, in memory, to the command of the next move
-// Everything the daemon does between two views is in it. Rendering is not: the images of a job before them come again.
+//   station_view_cost FOLDER JOBS   a line for each view of JOBS jobs but its first: milliseconds from the
+//                                   last frame of the view before, in memory, to the command of the next
+//                                   move
+// Includes everything the daemon does between two views. Rendering is excluded: images of the first job are reused.
 #include <atomic>
 #include <charconv>
 #include <cstdio>
@@ -19,12 +19,12 @@ namespace {
 using namespace scanrig;
 
 constexpr int kViews = 8;
-constexpr int kMoves = kViews + 1;  // view 0 is taken again
+constexpr int kMoves = kViews + 1;  // view 0 is repeated
 constexpr std::size_t kExposures = 2 * kMoves;
 constexpr auto kReadout = std::chrono::milliseconds(25);
 constexpr auto kLimit = std::chrono::minutes(5);
 
-/// Remembers the frames of the first job and gives them again in all others.
+/// Keeps the frames of the first job and returns them again in all others.
 class ReplayedCamera final : public StereoCamera {
  public:
   ReplayedCamera(StereoCamera& camera, Clock& clock) : camera_(camera), clock_(clock) {}
@@ -54,7 +54,7 @@ class ReplayedCamera final : public StereoCamera {
   Clock::TimePoint last_;
 };
 
-/// Notes how long it was let stand; in the thread that owns the devices.
+/// Notes how long the table was stopped; in the thread that owns the devices.
 class TimedTurntable final : public Turntable {
  public:
   TimedTurntable(Turntable& table, const ReplayedCamera& camera, Clock& clock)

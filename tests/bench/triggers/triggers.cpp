@@ -8,16 +8,16 @@
 #include "sim/wire/loopback.h"
 #include "tests/component/camera/aravis_bench.h"
 
-/// triggers COUNT: the shipped driver over two GigE cameras of which 1 % of the frames are lost, 1 % late, 1 % torn and
-/// 0.5 % older ones; takes COUNT good pairs and prints what was handed out and what was named as one line of JSON.
+/// triggers COUNT: the shipped driver over two GigE cameras, where 1 % of the frames are lost, 1 % late, 1 % torn and
+/// 0.5 % older ones. Takes COUNT good pairs and prints the counts of returned and rejected frames as one line of JSON.
 namespace scanrig::bench {
 namespace {
 
-constexpr int kReplyTimeout = 20;  ///< exposures in a row that may fail
+constexpr int kReplyTimeout = 20;  ///< consecutive exposures that may fail
 
 struct Seen {
   int good = 0, wrong = 0, named = 0;
-  std::vector<double> overhead_ms;  ///< arm and collect of good pairs: what an exposure takes beside light and motion
+  std::vector<double> overhead_ms;  ///< arm and collect of good pairs: time of an exposure without light and motion
 };
 
 double milliseconds(Clock::Duration time) { return std::chrono::duration<double, std::milli>(time).count(); }

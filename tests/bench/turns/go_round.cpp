@@ -18,10 +18,10 @@ namespace {
 
 constexpr int kFaster = 100;
 constexpr double kStepDeg = 120;
-constexpr std::chrono::minutes kMoveLimit{10};  ///< six of the wall's seconds: a busy machine is not the subject
-constexpr double kMaxWayDeg = 361;              ///< a way longer than a turn was not asked for by anybody
+constexpr std::chrono::minutes kMoveLimit{10};  ///< six seconds of the wall clock: a busy machine is not the subject
+constexpr double kMaxWayDeg = 361;              ///< no request needs a way longer than a turn
 
-/// The wall's clock, faster. The wire's own time-outs stay in the wall's time.
+/// The wall clock, faster. The wire's own time-outs stay in wall time.
 class FastClock final : public Clock {
  public:
   [[nodiscard]] TimePoint now() const override { return origin_ + kFaster * (wall_.now() - origin_); }
@@ -38,8 +38,8 @@ class FastClock final : public Clock {
 
 const sim::wire::AxisOptions kAxis{.gear_ratio = 90, .vibration_decay_s = 0.005};
 constexpr double kPulsesPerTurn = 900'000;
-constexpr std::chrono::milliseconds kModbusReply{1000};  ///< of the wall: a busy machine is no fault of the wire
-/// Of the fast clock: long enough that the wall's delays are no time-outs.
+constexpr std::chrono::milliseconds kModbusReply{1000};  ///< wall time: a busy machine is no fault of the wire
+/// Fast-clock time: long enough that the wall clock's delays are no time-outs.
 constexpr std::chrono::milliseconds kGrblReply{20000};
 
 /// A driver, and the drive at the other end of its wire.

@@ -5,11 +5,11 @@
 
 namespace scanrig::bench {
 
-/// What the world saw of a table that was turned round and round.
+/// True results for a table that was turned round and round.
 struct Seen {
   int turns = 0;
   double drift_deg = 0;        ///< of the table at the end of a turn, against the first
-  double worst_angle_deg = 0;  ///< what the driver measured, against the true angle
+  double worst_angle_deg = 0;  ///< measured angle of the driver against the true angle
   double longest_way_deg = 0;
   std::string error{};
 };

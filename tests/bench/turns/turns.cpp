@@ -7,7 +7,7 @@
 
 #include "tests/bench/turns/go_round.h"
 
-/// turns PROFILE|grbl PORT TURNS PRELOAD_TURNS up|down: what the world saw, as one line of JSON.
+/// turns PROFILE|grbl PORT TURNS PRELOAD_TURNS up|down: the results as one line of JSON.
 int main(int argc, char** argv) {
   if (argc != 6) {
     std::fputs("usage: turns PROFILE|grbl PORT TURNS PRELOAD_TURNS up|down\n", stderr);
