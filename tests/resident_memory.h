@@ -6,7 +6,7 @@
 
 namespace scanrig {
 
-/// Of this process [proc(5), statm].
+/// Resident memory of this process [proc(5), statm].
 inline long resident_kib() {
   std::ifstream statm("/proc/self/statm");
   long all = 0, resident = 0;

@@ -2,7 +2,7 @@
 
 namespace scanrig {
 
-/// How many times longer work may take in this build, for tests with a limit that is not their subject.
+/// Factor by which work may take longer in this build, for tests whose subject is not the time limit.
 #if defined(__SANITIZE_THREAD__) || defined(__SANITIZE_ADDRESS__)
 inline constexpr int kSlowness = 8;
 #else

@@ -3,9 +3,9 @@
 #include "drivers/projector/lightcrafter_projector.h"
 #include "tests/unit/sim/devices/manual_clock.h"
 
-// The LightCrafter's driver against a device that answers anything. The input is a row of reports: a byte that says how
-// many bytes follow (7 bits), and whether (top bit) they come behind the header of a right reply, so that they are read
-// at all. Whatever comes: no crash, and an end before the deadline and the reply time-out are over.
+// The LightCrafter's driver against a device that replies anything. The input is a row of reports. Before each, a byte
+// gives its length (7 bits). Its top bit puts the report behind the header of a right reply, so that it is read
+// at all. For any input: no crash, and an end before the deadline and the reply time-out are over.
 
 namespace {
 

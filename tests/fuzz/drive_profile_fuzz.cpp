@@ -7,7 +7,7 @@
 
 #include "config/drive_profile_file.h"
 
-// A drive profile is any text: it is read whole, or every problem is told; never half a profile.
+// A drive profile is any text: it is read whole, or every problem is reported; never half a profile.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const auto file =
       std::filesystem::temp_directory_path() / ("fuzz-profile-" + std::to_string(::getpid()) + ".toml");

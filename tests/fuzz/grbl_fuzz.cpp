@@ -6,7 +6,7 @@
 
 #include "drivers/turntable/grbl_protocol.h"
 
-// A controller says anything: each line is understood to the last character or is noise, never half a report.
+// A controller sends anything: each line is understood to the last character or is noise, never half a report.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using scanrig::grbl::Line;
   std::string_view rest(reinterpret_cast<const char*>(data), size);

@@ -23,7 +23,7 @@ bool leaves(std::string_view segment) {
 
 }  // namespace
 
-// "METHOD target": whatever comes is understood to names that stay below their folder, or refused with an error that
+// "METHOD target": any input is decoded to names that stay below their folder, or refused with an error that
 // the API documents.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const Router router;

@@ -24,8 +24,8 @@ void check(const RequestField& field, const Values& values) {
 
 }  // namespace
 
-// A body of any bytes: every field is what the route describes, or nothing is taken. Tried with the body of every
-// route and with one that has fields of all types.
+// A body of any bytes: every field has the type of the route's schema, or nothing is taken. Tried with the body of
+// every route and with one that has fields of all types.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using Type = RequestField::Type;
   static const std::vector<RequestField> all_types{

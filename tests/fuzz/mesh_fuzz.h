@@ -9,7 +9,7 @@
 
 namespace scanrig {
 
-/// Any bytes: a mesh whose faces name vertices that are there and whose attributes are none or one a vertex, or an
+/// Any bytes: a mesh whose faces refer to existing vertices and whose attributes are none or one per vertex, or an
 /// error that names the file.
 template <class Parse>
 int mesh_fuzz(Parse parse, const std::uint8_t* data, std::size_t size) {

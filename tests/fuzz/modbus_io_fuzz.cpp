@@ -10,9 +10,9 @@
 #include "drivers/panel/modbus_io_panel.h"
 #include "sim/wire/pty.h"
 
-// The panel's driver against a module that answers anything. The input is a row of answers: a byte that says how many
-// bytes follow, and whether (top bit) they get a unit and a checksum that fit, so that they are read at all.
-// Whatever comes: no crash, and no wait without end (libFuzzer's own limit).
+// The panel's driver against a module that replies anything. The input is a row of replies. Before each, a byte gives
+// its length. Its top bit adds a unit and a checksum that fit, so that the reply is read at all.
+// For any input: no crash, and no endless wait (libFuzzer's own limit).
 
 namespace {
 

@@ -7,7 +7,7 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
-/// Gives every file of a folder to the fuzz target that this is linked with.
+/// Feeds every file of a folder to the linked fuzz target.
 int main(int argc, char** argv) {
   if (argc != 2) return 2;
   std::error_code error;

@@ -3,7 +3,7 @@
 #include "config/rig_config.h"
 #include "tests/fuzz/input_file.h"
 
-// A rig.toml is any text: it is read whole, or every problem is told; never half a rig.
+// A rig.toml is any text: it is read whole, or every problem is reported; never half a rig.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const auto file = scanrig::input_file(data, size, "toml");
   const auto rig = scanrig::config::read_rig_config(file, std::filesystem::path(SCANRIG_SOURCE_DIR) / "config/drives");

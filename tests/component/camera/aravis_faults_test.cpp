@@ -8,7 +8,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// The hidden number decides: what is handed out is of this trigger, in both images.
+/// Checks by the hidden number: a returned frame belongs to this trigger, in both images.
 TEST(AravisFaults, OfAThousandTriggersWithLossesNoneGivesAMismatchedOrOlderPair) {
   AravisBench bench([](AravisOptions& options) { options.frame_timeout = milliseconds(100); }, 150);
   ASSERT_TRUE(bench.opened()) << bench.opened().error().message;
@@ -34,7 +34,7 @@ TEST(AravisFaults, OfAThousandTriggersWithLossesNoneGivesAMismatchedOrOlderPair)
   int lost = 0, late = 0, torn = 0, stale = 0;
   counts >> lost >> late >> torn >> stale;
   EXPECT_GT(lost * late * torn * stale, 0);
-  // At least as many: on a busy machine a frame can be late by itself, and hide what happened to the other sensor's.
+  // At least as many: on a busy machine a frame can be late on its own, and mask the fault of the other sensor's frame.
   EXPECT_GE(named[ErrorCode::timeout] + named[ErrorCode::protocol], lost + late + torn + stale);
   const TriggerCounts& seen = bench.camera().counts();
   EXPECT_GT(seen.torn, 0u);

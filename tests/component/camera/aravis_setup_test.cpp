@@ -20,7 +20,7 @@ Result<StereoFrame> expose(AravisBench& bench) {
   return bench.camera().collect(deadline);
 }
 
-/// What opening fails with after `change`.
+/// Error of opening after `change`.
 Error refused(const AravisBench::Change& change) {
   const AravisBench bench(change);
   EXPECT_FALSE(bench.opened());
@@ -154,7 +154,7 @@ TEST(AravisTriggers, AfterDeadAirAnExposureIsMadeAndThrownAway) {
 }
 
 TEST(AravisTriggers, CamerasThatAreReadyNeedNoExposureBeforeTheFirst) {
-  AravisBench bench;  // ready, when it is open
+  AravisBench bench;  // ready once it is open
   ASSERT_TRUE(bench.opened()) << bench.opened().error().message;
   const auto before = bench.camera().counts().warm_up;
   EXPECT_GT(before, 0u);
@@ -169,7 +169,7 @@ TEST(AravisTriggers, AfterDeadAirReadyMakesTheExposureThatArmNeedsNot) {
   const auto deadline = Deadline::after(bench.clock(), std::chrono::seconds(5));
   ASSERT_TRUE(bench.camera().prepare(deadline));
   EXPECT_EQ(bench.camera().counts().warm_up, before) << "no dead air yet";
-  bench.clock().sleep_for(milliseconds(1100));  // the dead air itself
+  bench.clock().sleep_for(milliseconds(1100));  // the idle time itself
   ASSERT_TRUE(bench.camera().prepare(deadline));
   EXPECT_EQ(bench.camera().counts().warm_up, before + 2);
   ASSERT_TRUE(expose(bench));
@@ -202,7 +202,7 @@ TEST(AravisLoss, NobodyWaitsUntilTheLibraryHasGivenALostCameraUp) {
   ASSERT_TRUE(expose(bench));
   const auto open = descriptors();
   ASSERT_TRUE(bench.plug(false));
-  EXPECT_FALSE(expose(bench));  // a frame that does not come makes the next call ask
+  EXPECT_FALSE(expose(bench));  // a frame that does not come makes the next call check
   const auto begun = bench.clock().now();
   const auto lost = bench.camera().prepare(Deadline::after(bench.clock(), std::chrono::seconds(10)));
   ASSERT_FALSE(lost);

@@ -10,7 +10,7 @@
 
 namespace scanrig {
 
-/// The program scanrig-gige-camera, as a child: words to its input, answers from its output. It ends with its owner.
+/// The program scanrig-gige-camera, as a child: commands to its input, replies from its output. It ends with its owner.
 class FarCameras {
  public:
   FarCameras(const std::string& program, const std::vector<std::string>& arguments) {
@@ -40,7 +40,7 @@ class FarCameras {
     if (out_) std::fclose(out_);
   }
 
-  /// The next line it says; empty if it has ended.
+  /// Next line of its output; empty if it has ended.
   std::string hear() {
     std::array<char, 256> line{};
     if (!out_ || !std::fgets(line.data(), static_cast<int>(line.size()), out_)) return {};

@@ -4,7 +4,7 @@
 
 #include "sim/wire/loopback.h"
 
-// The cameras of these tests are found on a loopback of their own, so that several tests can run at once.
+// The cameras of these tests are on their own loopback, so that several tests can run at once.
 int main(int argc, char** argv) {
   testing::InitGoogleTest(&argc, argv);
   if (const auto own = scanrig::sim::wire::enter_own_loopback(); !own) {

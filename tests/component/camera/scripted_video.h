@@ -16,8 +16,8 @@
 
 namespace scanrig {
 
-/// A V4L2 device of the tests, behind the same calls as the kernel's: buffers, sequence numbers and stamps as the V4L2
-/// documentation has them. Frames come when the test says so.
+/// A V4L2 device of the tests, behind the same calls as the kernel's. Buffers, sequence numbers and stamps follow the
+/// V4L2 documentation. The test determines when frames come.
 /// Threads: every function may be called from any thread.
 class ScriptedVideo final : public VideoCalls {
  public:
@@ -33,7 +33,7 @@ class ScriptedVideo final : public VideoCalls {
 
   std::uint32_t capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
   std::uint32_t stamps = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC | V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
-  bool other_size = false;             ///< answers S_FMT with a size of its own
+  bool other_size = false;             ///< replies to S_FMT with another size
   std::map<std::uint32_t, int> known;  ///< controls and their values
   std::map<std::uint32_t, int> limit;  ///< largest value of a control
 

@@ -8,7 +8,7 @@
 
 namespace scanrig {
 
-/// A stereo camera on the bench, with the hand that makes edges and spoils frames. See stereo_camera_compliance.h.
+/// A stereo camera on the bench, with control of edges and frame faults. See stereo_camera_compliance.h.
 class StereoCameraBench {
  public:
   enum class Fault { lost, late, torn, stale };
@@ -17,13 +17,13 @@ class StereoCameraBench {
   virtual StereoCamera& camera() = 0;
   virtual Clock& clock() = 0;
 
-  /// One exposure with the dots on; returns its number, the one hidden in both frames.
+  /// Makes one exposure with the pattern on; returns its number, the one hidden in both frames.
   virtual std::uint64_t fire() = 0;
-  /// The number hidden in an image of a StereoFrame; nothing if this bench hides none.
+  /// Number hidden in an image of a StereoFrame; nothing if this bench hides none.
   virtual std::optional<std::uint64_t> number_in(const cv::Mat& image) = 0;
-  /// Happens to the next exposure's frame of one sensor. False if this bench cannot do it.
+  /// Fault of the next exposure's frame of one sensor. False if this bench cannot make it.
   virtual bool spoil(Fault fault) = 0;
-  /// Pulls the camera's plug, puts it in again. False if this bench cannot do it.
+  /// Unplugs the camera, plugs it in again. False if this bench cannot do it.
   virtual bool plug(bool in) = 0;
   [[nodiscard]] virtual cv::Size size() const = 0;
   [[nodiscard]] virtual Clock::Duration ample() const { return std::chrono::seconds(10); }

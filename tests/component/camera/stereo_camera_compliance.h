@@ -1,6 +1,6 @@
 #pragma once
 
-// What every StereoCamera must do. To test an implementation, derive a StereoCameraBench for it and write, in one
+// Requirements on every StereoCamera. To test an implementation, derive a StereoCameraBench for it and write, in one
 // source file of a test program: INSTANTIATE_TEST_SUITE_P(Name, StereoCameraCompliance, testing::Values(&make_bench));
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ class StereoCameraCompliance : public testing::TestWithParam<MakeStereoCameraBen
   Result<void> arm() { return bench_->camera().arm(ample()); }
   Result<StereoFrame> collect() { return bench_->camera().collect(ample()); }
 
-  /// One exposure as the station takes it.
+  /// Takes one exposure like the station.
   Result<StereoFrame> expose(std::uint64_t* number = nullptr) {
     if (auto armed = arm(); !armed) return pass_on(armed);
     const auto fired = bench_->fire();
@@ -44,7 +44,7 @@ class StereoCameraCompliance : public testing::TestWithParam<MakeStereoCameraBen
     ASSERT_TRUE(frame) << frame.error().message;
     expect_shows(*frame, number);
   }
-  /// A spoilt exposure is an error of this kind, and never its frames; the next one is good.
+  /// A faulty exposure is an error of this kind, and never returns its frames; the next one is good.
   void expect_named_and_redone(CameraFault fault, ErrorCode code) {
     expect_good_exposure();
     if (!bench_->spoil(fault)) GTEST_SKIP() << "this bench cannot spoil frames so";

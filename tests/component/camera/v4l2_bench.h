@@ -58,7 +58,7 @@ class V4l2Bench : public StereoCameraBench {
     fault_.reset();
     return fired_;
   }
-  /// The next left frame's stamp is that much late.
+  /// Delays the next left frame's stamp by this much.
   void put_left_stamp_off(Clock::Duration by) { left_stamp_off_ = by; }
   std::optional<std::uint64_t> number_in(const cv::Mat& image) override { return sim::wire::hidden_number(image); }
   bool spoil(Fault fault) override {
@@ -92,7 +92,7 @@ class V4l2Bench : public StereoCameraBench {
   std::optional<Fault> fault_;
   Clock::Duration left_stamp_off_{};
   std::uint64_t fired_ = 0;
-  std::uint32_t sequence_ = 0xFFFFFFF0;  // the sequence number begins again soon
+  std::uint32_t sequence_ = 0xFFFFFFF0;  // the sequence number restarts soon
 };
 
 }  // namespace scanrig

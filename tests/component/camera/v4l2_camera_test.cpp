@@ -16,7 +16,7 @@ std::unique_ptr<StereoCameraBench> side_by_side() { return std::make_unique<V4l2
 
 INSTANTIATE_TEST_SUITE_P(V4l2, StereoCameraCompliance, testing::Values(&two_devices, &side_by_side));
 
-/// What opening fails with after `change`.
+/// Error of opening after `change`.
 Error refused(const V4l2Bench::Change& change) {
   const V4l2Bench bench(false, change);
   EXPECT_FALSE(bench.opened());
@@ -71,7 +71,7 @@ TEST(V4l2Camera, ExposureIsManualAndFocusFixed) {
     video.known = {{V4L2_CID_EXPOSURE_AUTO, 3}, {V4L2_CID_EXPOSURE_ABSOLUTE, 1}, {V4L2_CID_FOCUS_AUTO, 1}};
   });
   EXPECT_EQ(bench.video().known[V4L2_CID_EXPOSURE_AUTO], V4L2_EXPOSURE_MANUAL);
-  EXPECT_EQ(bench.video().known[V4L2_CID_EXPOSURE_ABSOLUTE], 20);  // of 100 us
+  EXPECT_EQ(bench.video().known[V4L2_CID_EXPOSURE_ABSOLUTE], 20);  // units of 100 us
   EXPECT_EQ(bench.video().known[V4L2_CID_FOCUS_AUTO], 0);
 }
 
@@ -123,7 +123,7 @@ TEST(V4l2Camera, AFreeRunningPairBeginsAfterItWasAskedFor) {
   EXPECT_GE(frame->taken, asked);
 }
 
-/// One exposure whose left stamp is that much late; "taken", or what was said.
+/// One exposure with the left stamp late by this much; "taken", or the error.
 std::string expose(V4l2Bench& bench, std::chrono::microseconds left_stamp_off) {
   const auto deadline = Deadline::after(bench.clock(), bench.ample());
   if (const auto armed = bench.camera().arm(deadline); !armed) return armed.error().message;

@@ -10,7 +10,7 @@
 
 namespace scanrig {
 
-/// Lines behind a socket: what the drivers drive is seen, what they look at is moved.
+/// Lines behind a socket: the test reads outputs and sets inputs of the drivers.
 class GpioBench : public testing::Test {
  protected:
   RealClock clock_;

@@ -57,7 +57,7 @@ TEST_F(GpioPanelTest, ABounceIsNoPress) {
 TEST_F(GpioPanelTest, AnOpenedEmergencyStopCountsAtOnce) {
   open();
   far_end_->set("ESTOP_OK", true);
-  // Less time than any debouncing takes.
+  // Shorter than any debouncing.
   EXPECT_FALSE(wait({}, 40).estop_ok);
 }
 

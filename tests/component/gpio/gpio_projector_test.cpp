@@ -55,7 +55,7 @@ TEST_F(GpioProjectorTest, AnActiveLowLineRestsHigh) {
   EXPECT_TRUE(far_end_->level("DOTS"));
   ASSERT_TRUE(projector_->fire(Light::pattern, within(500)));
   EXPECT_TRUE(far_end_->level("DOTS"));
-  EXPECT_EQ(far_end_->edges().size(), 3u);  // to rest, and the pulse
+  EXPECT_EQ(far_end_->edges().size(), 3u);  // the initial level, and the pulse
 }
 
 TEST_F(GpioProjectorTest, DarkOnRequestEndsThePulse) {

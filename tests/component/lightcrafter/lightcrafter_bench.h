@@ -8,7 +8,7 @@
 
 namespace scanrig {
 
-/// Between driver and simulated device instead of USB; each report is logged by the device.
+/// Transport between driver and simulated device instead of USB; the device logs each report.
 class SimulatedUsb final : public dlpc350::Transport {
  public:
   SimulatedUsb(sim::wire::LightCrafter& device, const std::atomic<bool>& plugged, Clock& clock)

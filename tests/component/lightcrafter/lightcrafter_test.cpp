@@ -42,7 +42,7 @@ TEST_F(LightCrafterTest, ShowsTheDotsOfTheImageInItsFlashWithTheCurrentsAskedFor
   EXPECT_THAT(flash.current, ElementsAre(100, 100, 100));
 }
 
-/// Each command is a report there and one back, a few milliseconds on USB.
+/// Each command is a report and a reply, a few milliseconds on USB.
 TEST_F(LightCrafterTest, AnotherLightTakesAFewCommandsMoreThanTheSame) {
   const auto first = reports_for(Light::pattern);
   EXPECT_GT(first, 20u) << "set up when connected";
@@ -84,7 +84,7 @@ TEST_F(LightCrafterTest, SilenceIsATimeoutAndTheNextFireBeginsAnew) {
   expect_fires();
 }
 
-/// The device may have started, and only its answer was lost.
+/// The device may have started, and only its reply was lost.
 TEST_F(LightCrafterTest, AStartWhoseReplyIsLostIsMadeDark) {
   expect_fires();
   const auto before = bench_.device().flashes().size();

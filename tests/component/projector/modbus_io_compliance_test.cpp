@@ -20,7 +20,7 @@ class Module {
  public:
   Module() { plug(true); }
   ~Module() { end(); }
-  /// Nobody looks any more.
+  /// Ends the server and the onlooker.
   void end() {
     server.reset();
     if (onlooker_.joinable()) onlooker_.join();
@@ -135,7 +135,7 @@ TEST_F(ModbusIoProjectorTest, AModuleThatRefusesIsNamedAndItsLightIsInDoubt) {
   EXPECT_THAT(dark.error().message, testing::HasSubstr("the light may be on"));
 }
 
-/// One port has one master: both drivers go through it, each whole request by itself.
+/// One port has one master: both drivers use it, each whole request on its own.
 TEST_F(ModbusIoProjectorTest, SharesItsModuleWithAPanelThatKeepsReading) {
   ModbusIoPanel panel({.line = module_.line(),
                        .inputs = {{&PanelInputs::start, {0}}},

@@ -1,7 +1,7 @@
 #pragma once
 
-// What every Projector must do. To test an implementation, derive a ProjectorBench for it and write, in one source file
-// of a test program: INSTANTIATE_TEST_SUITE_P(Name, ProjectorCompliance, testing::Values(&make_bench));
+// Requirements on every Projector. To test an implementation, derive a ProjectorBench for it and write, in one source
+// file of a test program: INSTANTIATE_TEST_SUITE_P(Name, ProjectorCompliance, testing::Values(&make_bench));
 
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@
 
 namespace scanrig {
 
-/// A projector on the bench, with what an onlooker and the cameras see of it.
+/// A projector on the bench, as an onlooker and the cameras see it.
 class ProjectorBench {
  public:
   struct Flash {
@@ -24,10 +24,10 @@ class ProjectorBench {
   virtual ~ProjectorBench() = default;
   virtual Projector& projector() = 0;
   virtual Clock& clock() = 0;
-  /// Trigger edges so far and what they showed.
+  /// Trigger edges so far and the light of each.
   virtual std::vector<Flash> seen() = 0;
   virtual bool seen_lit() = 0;
-  /// Does `act`, once, when it is next lit, from another thread or before fire() can return.
+  /// Runs `act`, once, when it is next lit, from another thread or before fire() can return.
   virtual void when_lit(std::function<void()> act) = 0;
   [[nodiscard]] virtual Clock::Duration exposure() const = 0;
   /// Cuts the connection, and restores it.

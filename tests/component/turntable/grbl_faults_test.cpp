@@ -131,7 +131,7 @@ TEST_F(GrblFaults, AControllerThatRestartedAtRestHasNoHome) {
 }
 
 TEST_F(GrblFaults, AControllerThatRestartsInTheMiddleOfAMoveHasNoHome) {
-  // Even one that is not locked after a restart and would take the next move.
+  // This also covers a controller that is not locked after a restart and would accept the next move.
   start_at_zero([](auto& options, auto& settings) {
     slow(options, settings);
     options.home_mode = "here";

@@ -11,7 +11,7 @@
 
 namespace scanrig {
 
-/// A shipped profile, and the far end that it fits.
+/// A shipped profile, and the matching far end.
 struct ModbusKind {
   std::string_view profile;
   std::string_view home_mode;
@@ -49,7 +49,7 @@ class ModbusBench : public WireBench {
 
   const ModbusTurntableOptions& options() const { return options_; }
   sim::wire::RegisterDevice& registers() { return *registers_; }
-  /// Hears every request before it is carried out.
+  /// Receives every request before it is carried out.
   void on_request(std::function<void(const sim::wire::ModbusRequest&)> listener) {
     far_end_->on_request(std::move(listener));
   }

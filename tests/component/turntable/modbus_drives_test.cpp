@@ -2,7 +2,7 @@
 
 #include "tests/component/turntable/modbus_faults.h"
 
-// The wire is sound; the drive has its own mind.
+// The wire is sound; the drive misbehaves.
 
 namespace scanrig {
 namespace {
@@ -15,7 +15,7 @@ class ModbusDrives : public ModbusFaults {
   static std::uint16_t following_error() { return GetParam().profile == kOriental.profile ? 0x10 : 0x20; }
 };
 
-/// What only this family has.
+/// Data of this family only.
 class LeadshineDrives : public ModbusFaults {};
 
 /// Drives with a communication time-out.
@@ -142,7 +142,7 @@ TEST_P(ModbusDrives, ATableWhoseMotorRunsTheOtherWayStillCountsCounterClockwise)
   EXPECT_NEAR(bench_->drive().counter(), -25000, 12);
   EXPECT_NEAR(bench_->seen_deg() - zero, 90, 0.05);
   ASSERT_TRUE(rotate_to(45));
-  EXPECT_NEAR(bench_->seen_deg() - zero, 45, 0.05);  // the play of the gear does not show
+  EXPECT_NEAR(bench_->seen_deg() - zero, 45, 0.05);  // the backlash of the gear has no effect
 }
 
 TEST_P(ModbusDrives, EveryMoveEndsCounterClockwise) {
@@ -201,7 +201,7 @@ TEST_P(TimeoutDrives, ATableWhoseCommanderIsGoneStopsByItself) {
     options.speed = {20};
   });
   const double begin = bench_->seen_deg();
-  bench_->when_moving([&] { bench_->server().inject({.kind = WireFault::Kind::request_lost}); });  // nothing arrives any more
+  bench_->when_moving([&] { bench_->server().inject({.kind = WireFault::Kind::request_lost}); });  // no more input
   EXPECT_FALSE(rotate_to(170));
   const auto by = within(milliseconds(20'000));
   while (bench_->seen_moving() && !by.expired(bench_->clock())) bench_->clock().sleep_for(milliseconds(5));

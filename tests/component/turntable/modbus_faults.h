@@ -5,7 +5,7 @@
 
 namespace scanrig {
 
-/// What every profile must do; the parameter is the drive.
+/// Requirements on every profile; the parameter is the drive.
 class ModbusFaults : public testing::TestWithParam<ModbusKind>, protected TurntableFaults {
  protected:
   static constexpr std::uint8_t kRead = 0x03, kWriteOne = 0x06, kWriteSeveral = 0x10;

@@ -20,7 +20,7 @@ TEST_P(ModbusFaults, SpoiledAnswersEndInTheirErrorWithinTheDeadlineWithTheTableA
   for (const Spoiled& spoiled : all) {
     SCOPED_TRACE(spoiled.name);
     start_at_zero(slow);
-    // From the next move on, after it has been heard.
+    // From the next move on, after the drive has received it.
     bench_->on_request([&](const sim::wire::ModbusRequest& request) {
       if (request.address == bench_->options().profile.move.address) bench_->server().inject(spoiled.fault);
     });

@@ -6,7 +6,7 @@
 #include "tests/component/turntable/turntable_compliance.h"
 
 // The turntable of a real rig: SCANRIG_RIG_TOML names its configuration, `ctest -L rig` runs this. The table turns:
-// nobody near it, nothing on it. The table is its own onlooker.
+// keep people away from it, and put nothing on it. The table is its own onlooker.
 
 namespace scanrig {
 namespace {
@@ -25,7 +25,7 @@ class RigBench final : public TurntableBench {
   bool can_block() override { return false; }
   void block(bool) override {}
   void when_moving(std::function<void()> act) override {
-    // The device must not be asked meanwhile: by then it moves.
+    // The device must not be read meanwhile: it is moving by then.
     onlooker_ = std::jthread([this, act = std::move(act)](const std::stop_token& stop) {
       clock_.sleep_for(milliseconds(700));
       if (!stop.stop_requested()) act();

@@ -2,7 +2,7 @@
 #include "tests/component/turntable/turntable_compliance.h"
 #include "tests/unit/sim/devices/manual_clock.h"
 
-// The turntable that lives in this process, on a clock of its own. It is its own onlooker.
+// The in-process turntable, on a clock of its own. It is its own onlooker.
 
 namespace scanrig {
 namespace {
@@ -12,7 +12,7 @@ using std::chrono::milliseconds;
 class SimBench final : public TurntableBench {
  public:
   SimBench() {
-    // One rig for all tests, since making it takes long: each begins without a zero and with the table standing.
+    // One rig for all tests, since making it takes long: each starts not homed and with the table stopped.
     rig().stall_turntable(false);
     turntable().request_stop();
     std::ignore = turntable().home(Deadline::after(clock(), std::chrono::minutes(2)));

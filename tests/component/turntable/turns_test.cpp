@@ -3,7 +3,7 @@
 
 #include "tests/bench/turns/go_round.h"
 
-// A hundred turns from home and at either end of what the drive can count. The bench turns ten thousand.
+// A hundred turns from home and at either end of what the drive can count. The bench makes ten thousand.
 
 namespace scanrig::bench {
 namespace {

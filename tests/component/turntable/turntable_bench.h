@@ -18,14 +18,14 @@ class TurntableBench {
   /// The table's angle as an onlooker sees it, counter-clockwise; its zero is arbitrary but fixed.
   virtual double seen_deg() = 0;
   virtual bool seen_moving() = 0;
-  /// Whether the device measures where the table is; without, a table that is in the way is not seen by a move.
+  /// True if the device measures the table's position; if not, a move does not detect a table that is blocked.
   virtual bool has_feedback() { return true; }
-  /// Something is in the table's way; nobody is there to put it there where the bench cannot block.
+  /// True if the bench can block the table; otherwise no operator does it. block() blocks or releases it.
   virtual bool can_block() { return true; }
   virtual void block(bool blocked) = 0;
-  /// Does `act`, once, from another thread, as soon as the table is seen moving; finished when the bench is destroyed.
+  /// Runs `act`, once, from another thread, as soon as the table is seen moving; ends when the bench is destroyed.
   virtual void when_moving(std::function<void()> act) = 0;
-  /// A time in which home() and any move are finished by far, and one that is over before a quarter turn is.
+  /// Time in which home() and any move end with margin, and one that is over before a quarter turn is.
   virtual Clock::Duration ample() { return std::chrono::seconds(10); }
   virtual Clock::Duration too_short() = 0;
   virtual Degrees tolerance() = 0;

@@ -1,7 +1,7 @@
 #pragma once
 
-// What every Turntable must do. To test an implementation, derive a TurntableBench for it and write, in one source file
-// of a test program: INSTANTIATE_TEST_SUITE_P(Name, TurntableCompliance, testing::Values(&make_bench));
+// Requirements on every Turntable. To test an implementation, derive a TurntableBench for it and write, in one source
+// file of a test program: INSTANTIATE_TEST_SUITE_P(Name, TurntableCompliance, testing::Values(&make_bench));
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@
 
 namespace scanrig {
 
-/// Nothing where there is no such turntable here.
+/// Null where this machine has no such turntable.
 using MakeTurntableBench = std::unique_ptr<TurntableBench> (*)();
 
 class TurntableCompliance : public testing::TestWithParam<MakeTurntableBench> {
@@ -35,7 +35,7 @@ class TurntableCompliance : public testing::TestWithParam<MakeTurntableBench> {
     return false;
   }
 
-  /// After a failure: at rest, turns only after home, and then as before.
+  /// Checks after a failure: stopped, turns only after home, and then as before.
   void expect_home_is_needed_and_helps() {
     EXPECT_TRUE(comes_to_rest());
     const double rest = bench_->seen_deg();

@@ -8,14 +8,14 @@
 
 namespace scanrig {
 
-/// What every drive on a wire must do when the wire or the drive misbehaves; a test fixture adds the drive.
+/// Requirements on every drive on a wire when the wire or the drive misbehaves; a test fixture adds the drive.
 class TurntableFaults {
  protected:
   using milliseconds = std::chrono::milliseconds;
   using WireFault = sim::wire::WireFault;
   using WireFrame = sim::wire::WireFrame;
 
-  /// Answers spoilt during a move, and how the move has to end.
+  /// Replies damaged during a move, and the required end of the move.
   struct Spoiled {
     const char* name;
     WireFault fault;
@@ -25,11 +25,11 @@ class TurntableFaults {
 
   virtual ~TurntableFaults() = default;
   virtual WireBench& bench() = 0;
-  // What passes on the wire.
+  // Messages on the wire.
   virtual bool is_move(const WireFrame& frame) const = 0;
   virtual bool is_read(const WireFrame& frame) const = 0;
   virtual bool is_stop(const WireFrame& frame) const = 0;
-  // The same as the far end calls it; see WireFault::function.
+  // The far end's name for it; see WireFault::function.
   virtual std::uint8_t moving() const = 0;
   virtual std::uint8_t reading() const = 0;
 
@@ -86,7 +86,7 @@ inline void TurntableFaults::expect_named_end(const Spoiled& spoiled) {
   EXPECT_THAT(moved.error().message, testing::HasSubstr(spoiled.hears_stop ? "told to stop" : "may be moving"));
   bench().server().clear_faults();
   if (!spoiled.hears_stop) {
-    // The first thing the drive hears when it listens again.
+    // The first request that the drive receives when it listens again.
     bench().server().clear_log();
     EXPECT_TRUE(bench().turntable().status(within(milliseconds(2000))));
     ASSERT_FALSE(bench().server().log().empty());

@@ -24,7 +24,7 @@ class WireBench : public TurntableBench {
   void block(bool blocked) override { drive_->block(blocked); }
   void when_moving(std::function<void()> act) override {
     onlooker_ = std::jthread([this, act = std::move(act)](const std::stop_token& stop) {
-      while (!WireBench::seen_moving()) {  // not through the table of virtual functions: it changes when the bench goes
+      while (!WireBench::seen_moving()) {  // not a virtual call: the table of functions changes on destruction
         if (stop.stop_requested()) return;
         clock_.sleep_for(std::chrono::milliseconds(1));
       }
@@ -38,14 +38,14 @@ class WireBench : public TurntableBench {
   sim::wire::WireServer& server() { return *server_; }
   const std::string& device() const { return link_; }
 
-  /// What the driver counted on its line.
+  /// Counts of the driver on its line.
   struct Counted {
     std::uint64_t corrupt = 0, retries = 0;
   };
   virtual Counted counted() const = 0;
 
  protected:
-  /// `name` says what is at the end of the line.
+  /// `name` identifies the end of the line.
   explicit WireBench(const std::string& name)
       : link_(testing::TempDir() + name + std::to_string(::getpid()) + "-" +
               std::to_string(reinterpret_cast<std::uintptr_t>(this))) {}
@@ -59,7 +59,7 @@ class WireBench : public TurntableBench {
     options.tolerance = kTolerance;
     options.settle = std::chrono::milliseconds(60);
   }
-  /// Plugs `table` and `server` together; returns the table as what it is.
+  /// Connects `table` and `server`; returns the table with its own type.
   template <class Table, class Server>
   Table* connect(Result<std::unique_ptr<Table>> table, Result<std::unique_ptr<Server>> server, bool positive_ccw) {
     EXPECT_TRUE(table) << table.error().message;

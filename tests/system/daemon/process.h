@@ -12,7 +12,7 @@
 
 namespace scanrig {
 
-/// A program of ours, its output in a file. Killed when it outlives the test.
+/// A program of this build, its output in a file. Killed when it outlives the test.
 class Process {
  public:
   Process(std::vector<std::string> command, const std::filesystem::path& output) {
@@ -38,7 +38,7 @@ class Process {
   void signal(int number) const {
     if (pid_ > 0) ::kill(pid_, number);
   }
-  /// The exit code; -1 where there is none: killed, or never started.
+  /// Exit code; -1 where there is none: killed, or never started.
   int wait() {
     int status = 0;
     const bool ended = pid_ > 0 && ::waitpid(pid_, &status, 0) == pid_;

@@ -19,7 +19,7 @@ namespace scanrig {
 
 using nlohmann::json;
 
-/// The programs as they are shipped, against each other; small images, and a rig that costs no waiting.
+/// The shipped programs, against each other; small images, and a rig without waiting times.
 class Programs : public scan_samples::FolderTest {
  protected:
   void TearDown() override {
@@ -53,7 +53,7 @@ class Programs : public scan_samples::FolderTest {
   }
   std::string socket() const { return folder_ / "api.sock"; }
 
-  /// Asks again and again until the answer is as wanted; null after two minutes, in a build without a sanitizer.
+  /// Repeats a request until the reply is as wanted; null after two minutes, in a build without a sanitizer.
   template <class Wanted>
   json ask_until(const std::string& target, const Wanted& wanted) {
     RealClock clock;
@@ -65,7 +65,7 @@ class Programs : public scan_samples::FolderTest {
     ADD_FAILURE() << target << " never became as wanted; the daemon said: " << *read_file(folder_ / "daemon.log");
     return nullptr;
   }
-  /// The only job once at least `views` of its views are acknowledged.
+  /// The only job, once at least `views` of its views are acknowledged.
   json job_with_views(int views) {
     const auto jobs = ask_until("jobs", [&](const json& answer) {
       return !answer["jobs"].empty() && answer["jobs"][0]["stored"].get<int>() >= views;

@@ -5,14 +5,14 @@
 namespace scanrig {
 namespace {
 
-/// The service is gone and nothing makes the rig safe: no systemd, no PC. What is left is the drive's own time-out.
+/// The service is dead and nothing makes the rig safe: no systemd, no PC. Only the drive's own time-out is left.
 class DeadPc : public RigOnWires {
  protected:
   DeadPc() { speed_deg_s_ = 6; }  // a quarter turn takes 15 s
 
   json truth() { return say({{"get", "truth"}}); }
   bool is_turning() { return std::abs(truth().value("speed_deg_s", 0.0)) > 1; }
-  /// How far the table still turns, once the service was killed in the middle of a job's turn.
+  /// How far the table still turns after the service was killed in the middle of a job's turn.
   double degrees_after_the_end() {
     EXPECT_TRUE(press_until("reset", [&] { return machine() == "Operational.Ready"; })) << log();
     EXPECT_TRUE(press_until("start", [&] { return machine() == "Operational.SingleExecution"; })) << log();
@@ -39,7 +39,7 @@ TEST_F(DeadPc, ADriveWithACommunicationTimeoutStopsTheTableByItself) {
   ASSERT_TRUE(press_until("reset", [&] { return machine() == "Operational.Ready"; })) << log();
 }
 
-/// The profile says that it has none; what the drive was told last is carried out to its end.
+/// The profile states that it has none; the last command to the drive is carried out to its end.
 TEST_F(DeadPc, ADriveWithoutOneEndsTheTurnThatHadBegun) {
   start_rig();
   start_daemon();

@@ -5,7 +5,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// How a scan that is started over the API ends for whoever started it.
+/// Result of a scan that was started over the API, for the client that started it.
 class StartedOverTheApi : public RigOnWires {
  protected:
   void change_config(const std::string& from, const std::string& to) {

@@ -15,7 +15,7 @@ using testing::HasSubstr;
 /// The shipped daemon with every one of its drivers, cameras too.
 class CamerasOnWires : public RigOnWires {
  protected:
-  /// Of one pose: rendering is most of what these tests take.
+  /// Views per pose: these tests mostly render.
   void start() {
     start_rig({"--cameras", "gige", "--scale", "0.25", "--poses", "1"});
     start_daemon({SCANRIGD_PROGRAM});
@@ -28,12 +28,12 @@ class CamerasOnWires : public RigOnWires {
     ASSERT_EQ(say({{"set", {{"camera_fault", fault}, {"camera", "right"}, {"fault_count", count}}}})["ok"], true);
   }
   void plug_right(bool in) { ASSERT_EQ(say({{"set", {{"camera_unplugged", !in}, {"camera", "right"}}}})["ok"], true); }
-  /// Of the newest job.
+  /// Record of the newest job.
   json job() { return ask("jobs/" + jobs().back()["id"].get<std::string>()); }
   bool wait_stored(std::size_t views) {
     return soon([&] { return !jobs().empty() && job()["stored"].size() >= views; });
   }
-  /// What is wrong with the cameras; empty: nothing.
+  /// Problem of the cameras; empty: none.
   std::string camera_problem() {
     const auto devices = ask("status")["devices"];
     for (const auto& device : devices) {
@@ -68,7 +68,7 @@ TEST_F(CamerasOnWires, AScanRedoesALostExposureUsesTheFramesOfOneEdgeOnlyAndEnds
   std::uint32_t last = 0;
   for (std::size_t i = 0; i < 8; ++i) {
     const auto& stored = job["stored"][i];
-    const auto retakes = stored["retakes"].get<std::uint32_t>();  // on a busy machine more than the one that was lost
+    const auto retakes = stored["retakes"].get<std::uint32_t>();  // on a busy machine more than the lost one
     EXPECT_EQ(stored["retake_reasons"].size(), retakes);
     const auto view =
         folder / fmt::format("pose{}/view{:02}", stored["pose"].get<int>() + 1, stored["view"].get<int>());
@@ -78,7 +78,7 @@ TEST_F(CamerasOnWires, AScanRedoesALostExposureUsesTheFramesOfOneEdgeOnlyAndEnds
     EXPECT_EQ(edge_of("right_plain.png"), plain);
     EXPECT_GT(pattern, last);
     EXPECT_GT(plain, pattern);
-    if (i != 4) {  // after a pose view 0 was looked at again
+    if (i != 4) {  // after a pose view 0 was checked again
       EXPECT_LE(plain, last + 2 + retakes);
     }
     last = plain;
@@ -104,7 +104,7 @@ TEST_F(CamerasOnWires, PicturesThatAreDarkBlurredOrOfTheOtherSideAreRedone) {
 }
 
 TEST_F(CamerasOnWires, ACameraThatStaysDarkEndsTheJobInItsName) {
-  views_ = 3;  // the fewest
+  views_ = 3;  // the minimum
   start();
   spoil("dark", 100);
   begin_scan();
@@ -129,7 +129,7 @@ TEST_F(CamerasOnWires, ACameraPulledInAScanInterruptsTheJobAndIsBackWithoutARest
 }
 
 TEST_F(CamerasOnWires, TheCommandListsTunesGrabsAndPreviews) {
-  views_ = 3;  // the fewest
+  views_ = 3;  // the minimum
   start_rig({"--cameras", "gige", "--scale", "0.25", "--poses", "1"});
   const auto pictures = folder_ / "pictures";
   EXPECT_EQ(Process({SCANRIG_PROGRAM, "camera", "list"}, folder_ / "output").wait(), 0);
@@ -150,7 +150,7 @@ TEST_F(CamerasOnWires, TheCommandListsTunesGrabsAndPreviews) {
 }
 
 TEST_F(CamerasOnWires, TheCommandTellsProgramsInJsonALineAPair) {
-  views_ = 3;  // the fewest
+  views_ = 3;  // the minimum
   start_rig({"--cameras", "gige", "--scale", "0.25", "--poses", "1"});
   const auto lines = [this] {
     std::vector<json> all;

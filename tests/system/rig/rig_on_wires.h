@@ -17,7 +17,7 @@ namespace scanrig {
 
 using nlohmann::json;
 
-/// The programs as they are shipped, on the wires of a simulated rig; the test is the hand at the panel.
+/// The shipped programs, on the wires of a simulated rig; the test operates the panel.
 class RigOnWires : public testing::Test {
  protected:
   void SetUp() override {
@@ -29,7 +29,7 @@ class RigOnWires : public testing::Test {
     rig_.reset();
     std::filesystem::remove_all(folder_);
   }
-  /// What its cameras will see is rendered when this returns: a frame that is not there in time is a lost one.
+  /// The expected views are rendered when this returns: a frame that is late is lost.
   void start_rig(std::vector<std::string> more = {}) {
     std::vector<std::string> command{SCANRIG_SIM_PROGRAM,
                                      "rig",
@@ -58,7 +58,7 @@ class RigOnWires : public testing::Test {
     const auto answer = sim::wire::send_to_control_socket(folder_ / "control.sock", request.dump());
     return answer ? json::parse(*answer) : json::object();
   }
-  /// Held until it has its effect.
+  /// Held until it has an effect.
   template <class Effect>
   bool press_until(const char* button, const Effect& effect) {
     say({{"press", button}});
@@ -92,7 +92,7 @@ class RigOnWires : public testing::Test {
   }
 
   RealClock clock_;
-  int views_ = 4;  ///< a pose; GigE cameras have them all rendered before the rig is ready
+  int views_ = 4;  ///< per pose; GigE cameras have them all rendered before the rig is ready
   int speed_deg_s_ = 180;
   const std::filesystem::path folder_ = own_folder("wires_");
   std::optional<Process> rig_, daemon_;

@@ -6,7 +6,7 @@
 namespace scanrig {
 namespace {
 
-/// config/rigs/example.toml as it is shipped; only where its devices and folders are is another.
+/// config/rigs/example.toml as shipped; only the places of its devices and folders differ.
 class ShippedExample : public RigOnWires {
  protected:
   ShippedExample() { views_ = 8; }

@@ -17,7 +17,7 @@ namespace {
 using std::chrono::milliseconds;
 using testing::HasSubstr;
 
-/// The shipped daemon, and scanrigd --make-safe called as systemd calls it: when the daemon has died.
+/// The shipped daemon, and scanrigd --make-safe called like by systemd: when the daemon has died.
 class MakeSafe : public testing::Test {
  protected:
   void boot(const char* program = SCANRIGD_PROGRAM, std::vector<std::string> more = {}) {
@@ -202,7 +202,7 @@ TEST_F(MakeSafe, AbsentCamerasLeaveTheRestRunningAndShown) {
   ASSERT_TRUE(rig.wait_for([&] {
     devices = (*ctl::send_request(rig.api(), "GET", "/api/v1/status"))["devices"];
     const auto ok = [&](int i) { return devices[i]["ok"].get<bool>(); };
-    return devices.size() == 4 && ok(0) && ok(1) && ok(3);  // one that was slow to answer is asked again
+    return devices.size() == 4 && ok(0) && ok(1) && ok(3);  // a device that replied late is tried again
   }));
   EXPECT_EQ(devices[2]["name"], "camera");
   EXPECT_EQ(devices[2]["problem"]["code"], "not_found");

@@ -42,7 +42,7 @@ class ToolBench {
   }
   [[nodiscard]] std::string output() const { return read_file(output_).value_or(""); }
   [[nodiscard]] bool is_moving() const { return rig.drive.truth().moving; }
-  /// How long after `event` the table was seen moving last; watches it for `watched`.
+  /// Time from `event` to the last seen motion of the table; watches it for `watched`.
   Clock::Duration moving_after(Clock::TimePoint event, Clock::Duration watched) {
     auto last = event;
     for (const auto end = rig.clock.now() + watched; rig.clock.now() < end;
@@ -51,7 +51,7 @@ class ToolBench {
     }
     return last - event;
   }
-  /// The process that guards this rig's tool; 0: none.
+  /// Process that guards this rig's tool; 0: none.
   [[nodiscard]] pid_t guardian() const {
     for (const auto& entry : std::filesystem::directory_iterator("/proc")) {
       std::ifstream name(entry.path() / "comm"), arguments(entry.path() / "cmdline");

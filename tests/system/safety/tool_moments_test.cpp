@@ -12,11 +12,11 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// What ends a run.
+/// Ways to end a run.
 enum class Way { interrupt, terminate, kill, pull_cable };
 constexpr Way kWays[] = {Way::interrupt, Way::terminate, Way::kill, Way::pull_cable};
 
-constexpr std::size_t kAtOnce = 8;  ///< runs, each on a rig of its own; more, and the rigs themselves reply late
+constexpr std::size_t kAtOnce = 8;  ///< concurrent runs, each on its own rig; with more, the rigs themselves reply late
 constexpr auto kStandstill = kSlowness * seconds(1);
 constexpr seconds kWarning{2};
 
@@ -78,7 +78,7 @@ class Ending {
     rig_.serial->clear_log();
     const auto back = rig_.clock.now();
     ASSERT_TRUE(rig_.serial->come_back());
-    if (!run_.was_moving) {  // it may still begin, or fail: only its end counts
+    if (!run_.was_moving) {  // it may still start, or fail: only its end counts
       bench_.wait();
       EXPECT_FALSE(bench_.is_moving()) << name();
       return;
@@ -100,7 +100,7 @@ class Ending {
   WireRig& rig_ = bench_.rig;
 };
 
-/// How long a run takes that nobody disturbs.
+/// Duration of an undisturbed run.
 Clock::Duration undisturbed(const Tool& tool) {
   ToolBench bench;
   const auto started = bench.rig.clock.now();
@@ -115,7 +115,7 @@ void end_at_random_moments(const Tool& tool, unsigned seed) {
   std::vector<Run> runs;
   for (const Way way : kWays) {
     for (int i = 0; i < moments(); ++i) {
-      const bool in_warning = i % 5 == 4;  // most of the interest is in the moves
+      const bool in_warning = i % 5 == 4;  // the moves are the most important part
       const auto from = in_warning ? Clock::Duration::zero() : Clock::Duration(kWarning);
       const auto to = in_warning ? Clock::Duration(kWarning) : whole;
       const double share = std::uniform_real_distribution(0.0, 1.0)(random);

@@ -21,7 +21,7 @@ class ToolRules : public testing::Test {
     }
     EXPECT_TRUE(rig.moves({}).empty());
   }
-  /// A tool that is moving is stopped by `event`, and says so.
+  /// A moving tool is stopped by `event`, and reports it.
   void expect_stopped_by(const Tool& tool, const std::function<void()>& event, int code, const std::string& why) {
     bench.start(tool);
     ASSERT_TRUE(rig.wait_moving()) << bench.output();

@@ -14,7 +14,7 @@
 
 namespace scanrig {
 
-/// The control socket of a wire simulator, as far as a camera asks it: lines of JSON, any question has the same answer.
+/// Control socket of a wire simulator, as far as a camera uses it: lines of JSON, every request gets the same reply.
 class TruthServer {
  public:
   TruthServer(const std::filesystem::path& path, std::function<std::string()> truth) : truth_(std::move(truth)) {
@@ -57,7 +57,7 @@ class TruthServer {
   }
 
   std::function<std::string()> truth_;
-  std::string last_question_;  // by the thread, read once it has ended or nothing more is asked
+  std::string last_question_;  // set by the thread, read once it has ended or no more requests come
   int listener_ = -1;
   std::jthread thread_;
 };

@@ -1,4 +1,4 @@
-// What a crash leaves behind: the crash is that of a child of the test.
+// Files left by a crash: the crash is that of a child of the test.
 #include "daemon/service/crash_report.h"
 
 #include <gmock/gmock.h>
@@ -32,7 +32,7 @@ class CrashReport : public testing::Test {
     std::filesystem::remove_all(folder_);
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
-  /// The signal that ended a child which does this after it was told where reports go.
+  /// Signal that ended a child which does this after the folder for reports was set.
   template <class Crash>
   int crash(const Crash& crash) const {
     const pid_t child = ::fork();

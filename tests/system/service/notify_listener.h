@@ -31,7 +31,7 @@ class Listener {
     std::filesystem::remove(file_);
   }
 
-  /// What has been said, in order; one message each.
+  /// Messages received, in order.
   std::vector<std::string> heard() {
     std::vector<std::string> messages;
     std::array<char, 4096> text{};

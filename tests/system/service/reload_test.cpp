@@ -1,4 +1,4 @@
-// The daemon under a configuration that changes, and with sockets that somebody else has opened, as systemd sees it.
+// The daemon under a changing configuration, and with sockets opened by another process, as systemd sees it.
 #include <algorithm>
 #include <atomic>
 #include <fstream>
@@ -25,7 +25,7 @@ class Reload : public RigOnWires {
     ASSERT_TRUE(soon([&] { return listening_to_daemon_.load(); }));
     start_daemon(program);
   }
-  /// Over a scene that is made at once, whenever the daemon begins: the built-in figurine takes seconds.
+  /// Uses a scene that is made at once, at every start of the daemon: the built-in figurine takes seconds.
   std::vector<std::string> quick_daemon() const {
     const auto box = folder_ / "box.obj";
     std::ofstream(box) << "v 0 0 0\nv 0 0 60\nv 0 30 0\nv 0 30 60\nv 40 0 0\nv 40 0 60\nv 40 30 0\nv 40 30 60\n"
@@ -34,7 +34,7 @@ class Reload : public RigOnWires {
   }
   void configure(const std::string& more) const { std::ofstream(config(), std::ios::app) << more; }
   std::string config() const { return folder_ / "rig.toml"; }
-  /// What systemd has heard since RELOADING=1, once `words` are in it.
+  /// Messages to systemd since RELOADING=1, once they contain `words`.
   bool hears(const std::string& words) {
     return soon([&] {
       const std::lock_guard guard(mutex_);
@@ -45,14 +45,14 @@ class Reload : public RigOnWires {
       return std::ranges::any_of(since_, [&](const auto& message) { return message.find(words) != message.npos; });
     });
   }
-  /// Until the daemon is ready, or ready again.
+  /// Waits until the daemon is ready, or ready again.
   bool reload() {
     if (!hears("READY=1")) return false;
     since_.clear();
     daemon_->signal(SIGHUP);
     return hears("READY=1");
   }
-  /// What came with READY=1.
+  /// Message with READY=1.
   std::string ready() const {
     const auto found = std::ranges::find_if(since_, [](const auto& one) { return one.find("READY=1") != one.npos; });
     return found == since_.end() ? std::string() : *found;
@@ -66,10 +66,10 @@ class Reload : public RigOnWires {
     return code;
   }
   std::string socket() const { return folder_ / "api.sock"; }
-  /// What make-safe would be told.
+  /// Configuration that make-safe would use.
   std::string kept() const { return read_file(folder_ / "rig.running/rig.toml").value_or(""); }
 
-  /// Always, or the daemon would have to wait until somebody does.
+  /// Listens all the time; otherwise the daemon would have to wait for a listener.
   void listen(const std::stop_token& end) {
     Listener listener;
     listening_to_daemon_ = true;
@@ -160,7 +160,7 @@ TEST_F(Reload, AConfigurationThatTurnsOutToBeOfNoUseIsGivenUpForTheOneBefore) {
   EXPECT_THAT(kept(), Not(HasSubstr("no-such-group")));
 }
 
-/// The daemon as systemd starts it with scanrigd.socket.
+/// The daemon, started like by systemd with scanrigd.socket.
 class PassedSocket : public Reload {
  protected:
   void SetUp() override {

@@ -1,4 +1,4 @@
-// What the daemon tells systemd, heard on the socket that systemd would listen to.
+// Messages of the daemon to systemd, received on the socket that systemd would use.
 #include "daemon/service/service_manager.h"
 
 #include <gmock/gmock.h>

@@ -52,12 +52,12 @@ class Logind {
 
   std::atomic<bool> refuses = false, is_silent = false;
   std::atomic<int> taken = 0;
-  /// "WHAT MODE" of the last one.
+  /// "WHAT MODE" of the last lock.
   [[nodiscard]] std::string asked() const {
     const std::scoped_lock lock(mutex_);
     return asked_;
   }
-  /// Somebody holds the lock that was given last.
+  /// True while the lock that was given last is held.
   [[nodiscard]] bool is_held() const {
     pollfd end{watched_.load(), POLLIN, 0};
     return watched_ >= 0 && ::poll(&end, 1, 0) == 0;

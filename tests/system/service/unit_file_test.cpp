@@ -1,4 +1,4 @@
-// The unit file as systemd itself judges it, without a systemd that runs.
+// The unit file checked by systemd's own tool, without a running systemd.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
@@ -62,7 +62,7 @@ class UnitFile : public ::testing::Test {
 };
 
 TEST_F(UnitFile, IsVerifiedBySystemdWithoutAWord) {
-  // systemd looks whether the programs are there: they are those of this build.
+  // systemd checks that the programs exist: they are those of this build.
   const auto verified = run("systemd-analyze verify " + changed("/usr/bin", SCANRIG_PROGRAMS).string());
   EXPECT_EQ(verified.code, 0);
   EXPECT_EQ(verified.output, "");
@@ -82,7 +82,7 @@ std::string text_of(const std::filesystem::path& file) {
   return text.str();
 }
 
-/// $RUNTIME_DIRECTORY of the daemon and of what makes the rig safe after it: the configuration is kept there.
+/// $RUNTIME_DIRECTORY of the daemon and of make-safe after it: the configuration is kept there.
 TEST(UnitFiles, LeaveWhoeverMakesTheRigSafeTheConfigurationOfTheDaemonThatDied) {
   const auto service = text_of(kUnit);
   EXPECT_NE(service.find("\nRuntimeDirectory=scanrig\n"), service.npos);
@@ -90,7 +90,7 @@ TEST(UnitFiles, LeaveWhoeverMakesTheRigSafeTheConfigurationOfTheDaemonThatDied) 
   EXPECT_NE(service.find("\nExecStopPost=/usr/bin/scanrigd --make-safe "), service.npos);
 }
 
-/// A service at its start limit takes the socket that triggers it along [systemd.socket(5), systemd.unit(5)].
+/// A service at its start limit stops the socket that triggers it [systemd.socket(5), systemd.unit(5)].
 TEST(UnitFiles, LimitNeitherStartsNorTriggersSoThatTheSocketStays) {
   const auto service = text_of(kUnit), socket = text_of(kSocket);
   const auto limit = service.find("\nStartLimitIntervalSec=0\n");
@@ -99,7 +99,7 @@ TEST(UnitFiles, LimitNeitherStartsNorTriggersSoThatTheSocketStays) {
   EXPECT_NE(socket.find("\nFlushPending=yes\n"), socket.npos) << "one who waits must not start it again and again";
 }
 
-/// exit_timeout of the daemon and what its control loop takes before; see daemon/service/run_daemon.h.
+/// exit_timeout of the daemon and the time its control loop takes before; see daemon/service/run_daemon.h.
 TEST(UnitFiles, LeaveTheDaemonMoreTimeToEndThanItTakesItself) {
   const auto service = text_of(kUnit);
   const std::string key = "\nTimeoutStopSec=";

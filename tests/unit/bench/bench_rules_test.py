@@ -127,7 +127,7 @@ class Samples(unittest.TestCase):
 
 
 class FakeRig:
-    """A job of 40 calls that survives everything; of each call it remembers what was done to it."""
+    """A job of 40 calls that survives every fault; records the fault of each call."""
 
     KINDS = ("create", "write", "sync", "rename")
     program = "true"

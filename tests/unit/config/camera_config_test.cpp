@@ -31,7 +31,7 @@ class EyesConfigTest : public RigFile {
   [[nodiscard]] std::string lightcrafter() const {
     return with_section("[projector]", "[stereo_camera]", kLightCrafter);
   }
-  /// The alternative to a section that stands in the example as a comment.
+  /// Alternative to a section, from the comments of the example.
   [[nodiscard]] std::string commented(const std::string& heading) const {
     const auto begin = example_.find("\n# " + heading) + 1;
     std::istringstream lines(example_.substr(begin, example_.find("\n\n", begin) - begin));

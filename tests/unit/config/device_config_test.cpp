@@ -10,14 +10,14 @@ namespace {
 
 using testing::HasSubstr;
 
-/// When the daemon has died there is no time for what is wrong elsewhere.
+/// After the daemon's death, problems elsewhere in the file must not cost time.
 class DeviceConfigTest : public RigFile {
  protected:
   void SetUp() override {
     RigFile::SetUp();
     std::filesystem::copy(drives_, folder_ / "drives");
   }
-  /// The example, with something wrong in these sections.
+  /// The example, with a fault in these sections.
   void break_in(const std::vector<std::string>& sections) const {
     auto text = example_;
     for (const auto& section : sections) text = replaced(text, "\n" + section, "\n" + section + "\nunknown = 1");

@@ -8,7 +8,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// What rig.toml says about jobs: recipes, storage, quiet hours, whom failures are told.
+/// Job settings in rig.toml: recipes, storage, quiet hours, receivers of failure reports.
 class RecipeConfigTest : public FileUnderTest {
  protected:
   Result<RigConfig> read(const std::string& text) {

@@ -5,7 +5,7 @@
 #include "sim/wire/modbus_frame.h"
 #include "tests/unit/drivers/scripted_peer.h"
 
-// Frames as printed in the Leadshine RS manuals and docs; the peer compares bytes and answers bytes.
+// Frames as printed in the Leadshine RS manuals and docs; the peer compares bytes and replies with bytes.
 
 namespace scanrig {
 namespace {
@@ -66,7 +66,7 @@ TEST_F(GoldenFrames, AlarmReset) {
               [&](ModbusDrive& drive) { return drive.reset_alarm(soon()); });
 }
 
-// The answers' checksums were computed with another program.
+// The replies' checksums were computed with another program.
 TEST_F(GoldenFrames, StatusAndANegativePosition) {
   ScriptedPeer peer(
       {{"01 03 10 03 00 01 70 CA", "01 03 02 00 72 38 61"}, {"01 03 60 2C 00 02 1B C2", "01 03 04 FF FE 79 60 88 6F"}});
@@ -98,7 +98,7 @@ class OrientalFrames : public GoldenFrames {
  protected:
   const std::string release_ = "01 06 00 7D 00 00 19 D2";
 
-  /// The input is let go before, since whoever was here earlier may have been killed, and after.
+  /// The input is reset before, since an earlier program may have been killed, and after.
   void expect_pulled(const std::string& request, const std::function<Result<void>(ModbusDrive&)>& act) {
     ScriptedPeer peer(ScriptedPeer::Answers{{request, request}, {release_, release_}});
     auto drive = drive_on(peer, profile("oriental-az"));
@@ -133,7 +133,7 @@ TEST_F(OrientalFrames, StopComesFirstAndIsLetGo) {
   EXPECT_THAT(peer.heard(), ElementsAre(stop, release_));
 }
 
-// MOVE, HOME-END and INFO; the answers' checksums were computed with another program.
+// MOVE, HOME-END and INFO; the replies' checksums were computed with another program.
 TEST_F(OrientalFrames, StatusAndANegativePosition) {
   ScriptedPeer peer(
       {{"01 03 00 7F 00 01 B5 D2", "01 03 02 20 50 A1 B8"}, {"01 03 00 CC 00 02 04 34", "01 03 04 FF FE 79 60 88 6F"}});

@@ -67,7 +67,7 @@ TEST(GrblProtocolTest, EveryAlarmAndErrorIsToldInWords) {
   for (int alarm = 1; alarm <= 10; ++alarm)
     EXPECT_THAT(alarm_words(alarm), HasSubstr(fmt::format("(ALARM:{})", alarm)));
   for (int error = 1; error <= 38; ++error) {
-    if (error == 18 || error == 19) continue;  // there are none
+    if (error == 18 || error == 19) continue;  // these numbers do not exist
     EXPECT_THAT(error_words(error), HasSubstr(fmt::format("(error:{})", error)));
   }
   EXPECT_THAT(alarm_words(11), HasSubstr("see the controller's manual"));

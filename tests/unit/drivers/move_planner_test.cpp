@@ -8,7 +8,7 @@
 namespace scanrig {
 namespace {
 
-// 10000 pulses a motor turn, 90 motor turns a table turn: 2500 pulses a degree.
+// 10000 pulses per motor turn, 90 motor turns per table turn: 2500 pulses per degree.
 constexpr AxisScale kScale{10000, 90.0, true, {0}};
 constexpr std::int64_t kTurn = 900'000;
 
@@ -23,7 +23,7 @@ TEST(AxisScaleTest, DegreesBecomePulsesThroughGearSignAndOffset) {
 
 TEST(AxisScaleTest, SpeedAndAccelerationComeInTheDrivesUnits) {
   DriveProfile profile;  // rpm and ms per 1000 rpm
-  // 45 deg/s are 7.5 turns a minute at the table, 675 at the motor; 90 deg/s2 are 1350 rpm/s: 1000 rpm take 741 ms.
+  // 45 deg/s are 7.5 turns per minute at the table, 675 at the motor; 90 deg/s2 are 1350 rpm/s: 1000 rpm take 741 ms.
   EXPECT_EQ(kScale.speed_word({45}, profile).value(), 675);
   EXPECT_EQ(kScale.acceleration_word({90}, profile).value(), 741);
   profile.speed_unit = DriveProfile::SpeedUnit::pulses_per_s;

@@ -15,8 +15,8 @@
 
 namespace scanrig {
 
-/// The far end of a line that knows bytes only: it answers each request it is told of with given bytes and records
-/// what it hears. Bytes are written as in manuals, "01 03 10 03 00 01 70 CA".
+/// The far end of a line that handles bytes only. It replies to each expected request with given bytes and records
+/// the bytes it receives. Bytes are written as in manuals, "01 03 10 03 00 01 70 CA".
 class ScriptedPeer {
  public:
   using Answers = std::map<std::string, std::string>;
@@ -28,7 +28,7 @@ class ScriptedPeer {
   }
 
   [[nodiscard]] const std::string& device() const { return link_; }
-  /// Requests heard so far, whole ones only.
+  /// Requests received so far, whole ones only.
   [[nodiscard]] std::vector<std::string> heard() const {
     const std::scoped_lock lock(mutex_);
     return heard_;

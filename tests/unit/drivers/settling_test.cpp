@@ -8,7 +8,7 @@ namespace {
 
 using std::chrono::milliseconds;
 
-/// A drive that is where it is sent at once, and answers after a while.
+/// A drive that reaches its target at once, and replies after a while.
 class PromptDrive final : public AxisDrive {
  public:
   explicit PromptDrive(Clock& clock) : clock_(clock) {}

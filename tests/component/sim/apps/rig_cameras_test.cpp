@@ -26,7 +26,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using testing::HasSubstr;
 
-/// A block with one corner cut off: no two of its sides look alike.
+/// A block with one corner cut off: no two of its sides are alike.
 constexpr const char* kBlock =
     "v 0 0 0\nv 60 0 0\nv 60 0 40\nv 0 0 40\nv 0 30 0\nv 40 30 0\nv 40 30 40\nv 0 30 40\n"
     "f 1 2 3\nf 1 3 4\nf 5 8 7\nf 5 7 6\nf 1 5 6\nf 1 6 2\nf 2 6 7\nf 2 7 3\nf 3 7 8\nf 3 8 4\nf 4 8 5\nf 4 5 1\n";

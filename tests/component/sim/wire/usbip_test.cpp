@@ -18,7 +18,7 @@ namespace {
 using Bytes = std::vector<std::uint8_t>;
 using ::testing::ElementsAre;
 
-/// A port that is free now.
+/// Returns a free port.
 std::uint16_t free_port() {
   const int probe = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_in address{};
@@ -90,7 +90,7 @@ class Host {
   void send(const Bytes& bytes) {
     EXPECT_EQ(::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL), static_cast<ssize_t>(bytes.size()));
   }
-  /// As many bytes; fewer when the other end hung up.
+  /// Reads this many bytes; fewer when the other end hung up.
   Bytes receive(std::size_t count) {
     Bytes bytes(count);
     const auto size = ::recv(socket_, bytes.data(), count, MSG_WAITALL);

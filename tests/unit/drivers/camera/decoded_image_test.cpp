@@ -47,7 +47,7 @@ TEST(DecodedImage, BitsAboveTheSensorsOwnDoNotWrapRound) {
   EXPECT_EQ(picture(raw(Layout::mono, 10, {1, 1}, bytes)).image.at<std::uint8_t>(0, 0), 255);
 }
 
-/// A mosaic of an even colour, from the pattern's own definition: `at` names the colour of each of its four pixels.
+/// A mosaic of one colour, from the pattern's own definition: `at` names the colour of each of its four pixels.
 Bytes mosaic(const char* at, cv::Size size, std::uint8_t red, std::uint8_t green, std::uint8_t blue) {
   Bytes bytes;
   for (int y = 0; y < size.height; ++y) {

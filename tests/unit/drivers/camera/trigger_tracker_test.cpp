@@ -12,7 +12,7 @@ using std::chrono::seconds;
 constexpr std::uint64_t kGigeIds = 65535;
 constexpr auto kAhead = std::chrono::hours(3);  // the sensor's clock against the host's
 
-/// A frame exposed `after` the beginning, by a sensor whose clock runs ahead.
+/// A frame exposed `after` the start, by a sensor whose clock runs ahead.
 FrameStamp frame(std::uint64_t id, std::chrono::nanoseconds after) { return {id, kAhead + after}; }
 HostWindow window(std::chrono::nanoseconds begin, std::chrono::nanoseconds end) {
   return {Clock::TimePoint(begin), Clock::TimePoint(end)};
