@@ -22,7 +22,7 @@ Result<TurntableStatus> known_motion(Result<TurntableStatus> status) {
   return fail(ErrorCode::timeout, "turntable: its drive cannot be reached; check its power and cable");
 }
 
-/// What the same exposure, taken again, may not have: frames are lost, plugs are pulled and put in.
+/// Failures that the same exposure, taken again, may not have: lost frames, a plug pulled and put back.
 bool may_pass(const Error& error) {
   return error.code == ErrorCode::timeout || error.code == ErrorCode::protocol || error.code == ErrorCode::io ||
          error.code == ErrorCode::not_found;
@@ -49,7 +49,7 @@ Result<void> Acquisition::home() {
 Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle) {
   const unsigned before = interrupts_;
   if (id.job != std::exchange(job_, id.job)) image_checker_.begin();
-  // What the cameras need before they can expose is done before the table stands; if they fail, the exposure says so.
+  // The cameras are prepared before the table has stopped. If they fail, the exposure returns the error.
   std::ignore = devices_.camera.prepare(Deadline::after(clock_, options_.connect_limit));
   const auto move = turn_to(angle);
   if (!move) return pass_on(move);
@@ -115,7 +115,7 @@ Result<Move> Acquisition::turn_to(Degrees angle) {
   auto move = from(kTurntable, devices_.turntable.rotate_to({target}, Deadline::after(clock_, options_.move_limit)));
   if (!move) return move;
   position_deg_ = target;
-  // Some turntables count turns, some do not: recorded is the angle within the turn that was asked for.
+  // Some turntables count turns, some do not: the recorded angle is the angle within the requested turn.
   move->commanded = angle;
   move->measured.value = nearest_turn(move->measured.value, angle.value);
   return move;

@@ -9,8 +9,8 @@
 
 namespace scanrig {
 
-/// A device that need not be there: it is opened by its first use, and again after it failed with `io`. Until then
-/// every use fails as opening does, so the rest of the rig runs on and the device is back without a restart.
+/// A device that may be missing: its first use opens it, and so does the next use after a failure with `io`. Until then
+/// every use fails as opening does. The rest of the rig runs on, and the device returns without a restart.
 template <class Device>
 class AutoReopen {
  public:
@@ -25,7 +25,7 @@ class AutoReopen {
     if (!done && done.error().code == ErrorCode::io) forget();
     return done;
   }
-  /// The device if it is open; from any thread.
+  /// The device if it is open. From any thread.
   std::shared_ptr<Device> open_device() {
     const std::lock_guard guard(mutex_);
     return device_;

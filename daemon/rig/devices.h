@@ -7,7 +7,7 @@
 
 namespace scanrig {
 
-/// The things on the bench, opened by main(); they outlive the daemon.
+/// The devices of the rig, opened by main(); they outlive the daemon.
 struct Devices {
   Turntable& turntable;
   Projector& projector;

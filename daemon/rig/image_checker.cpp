@@ -8,16 +8,16 @@
 namespace scanrig {
 namespace {
 
-// Rendered scans of twelve objects: pictures with dots have 0.044 to 0.064 of full scale, 1.1 to 1.3 px of blur, 2.2 to
-// 2.6 px when blurred over 9x9 pixels, and a left_right_correlation of 0.02 at most; one object's pictures differ by a
-// tenth.
+// Rendered scans of twelve objects: images with pattern have 0.044 to 0.064 of full scale, 1.1 to 1.3 px of blur, 2.2
+// to 2.6 px when blurred over 9x9 pixels, and a left_right_correlation of at most 0.02. Images of one object differ by
+// a tenth.
 constexpr double kDark = 0.02;        ///< of full scale: five grey values of 255
-constexpr double kDarker = 0.4;       ///< of the pictures before
+constexpr double kDarker = 0.4;       ///< of the images before
 constexpr double kSaturated = 0.1;    ///< share of the pixels
-constexpr double kMoreBlurred = 1.6;  ///< than the pictures before
+constexpr double kMoreBlurred = 1.6;  ///< times the blur of the images before
 constexpr double kOnePicture = 0.25;  ///< left_right_correlation
 
-/// NaN where nothing is known.
+/// NaN where nothing was measured.
 double middle(const std::vector<double>& ascending) {
   return ascending.empty() ? std::numeric_limits<double>::quiet_NaN() : ascending[ascending.size() / 2];
 }

@@ -11,19 +11,19 @@
 
 namespace scanrig {
 
-/// Says of a pair whether it can be what was exposed, by the evidence its driver measured: against limits that hold for
-/// any rig, and against the pairs of the same job before it. What was not measured is not judged.
+/// Checks whether a pair can be what was exposed, by the values its driver measured. Compares them with limits that
+/// hold for any rig, and with earlier pairs of the same job. Values that were not measured are not judged.
 class ImageChecker {
  public:
-  /// Another job: nothing is known of its pictures.
+  /// Starts another job: no images to compare with.
   void begin() { seen_.clear(); }
 
-  /// Fails with `protocol`: a picture is dark, overexposed or out of focus, or both sides show the same picture.
+  /// Fails with `protocol`: an image is dark, overexposed or out of focus, or both sides show the same image.
   Result<void> judge(Light light, const StereoFrame& frame);
 
  private:
   struct Seen {
-    std::vector<double> brightness, blur_px;  ///< of the pictures that passed, in ascending order
+    std::vector<double> brightness, blur_px;  ///< of the images that passed, in ascending order
   };
   Result<void> judge(Light light, const char* side, const ImageQuality& evidence) const;
   void remember(Light light, const char* side, const ImageQuality& evidence);

@@ -26,7 +26,7 @@ using config::SafetyDevice;
 constexpr auto kLimit = std::chrono::milliseconds(900);
 constexpr auto kAgain = std::chrono::milliseconds(20);
 
-/// Of one attempt: a stop that gets no confirmation is sent again.
+/// Limit of one attempt: a stop without confirmation is sent again.
 Deadline attempt_deadline(Clock& clock, Deadline all) { return all.at_most(clock, kLimit); }
 
 template <class Try>
@@ -45,7 +45,7 @@ Result<void> stop_table(const Result<config::RigConfig>& config, Clock& clock, D
   return until(clock, deadline, [&] { return (*turntable)->stop(attempt_deadline(clock, deadline)); });
 }
 
-/// Kept until all is done: a line that is let go falls back, and the lamp on it goes out.
+/// Kept until all is done: a released line falls back, and its lamp goes out.
 template <class Device>
 struct Held {
   std::unique_ptr<gpio::Lines> lines;
@@ -72,7 +72,7 @@ void report_error(const char* program, const std::set<std::string>& why) {
   for (const auto& message : why) fmt::print(stderr, "{}: make-safe: {}\n", program, message);
 }
 
-/// Says once what the daemon's own configuration was not good for.
+/// Reports once why the daemon's own configuration could not be used.
 DeviceConfigs config_to_use(const std::filesystem::path& file, const char* program) {
   const auto kept = saved_config_folder(file) / "rig.toml";
   const auto base = file.parent_path();
@@ -90,7 +90,7 @@ DeviceConfigs config_to_use(const std::filesystem::path& file, const char* progr
   return config;
 }
 
-/// A process that is given up is killed, and waited for: no other may be left with its number.
+/// Kills a process that ran out of time, and waits for it: no other process may be left with its number.
 std::optional<int> wait_for_end(pid_t child, Clock& clock, Deadline deadline) {
   int status = 0;
   while (::waitpid(child, &status, WNOHANG) == 0) {

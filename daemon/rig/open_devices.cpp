@@ -15,7 +15,7 @@
 
 namespace scanrig {
 
-/// The one place where a turntable's driver is chosen.
+/// The only place where a turntable's driver is chosen.
 Result<std::unique_ptr<Turntable>> open_turntable(const config::TurntableConfig& config, Clock& clock) {
   const auto made = [](auto turntable) -> Result<std::unique_ptr<Turntable>> {
     if (!turntable) return pass_on(turntable);
@@ -29,7 +29,7 @@ std::unique_ptr<gpio::Lines> open_lines(const config::RigConfig& config, Clock& 
   return config.gpio_socket ? gpio::socket_lines(*config.gpio_socket, clock) : gpio::chip_lines(clock);
 }
 
-/// A LightCrafter and an I/O module connect when they are used, GPIO lines are opened then.
+/// A LightCrafter and an I/O module connect at their first use; GPIO lines are opened then.
 Result<std::unique_ptr<Projector>> open_projector(const config::ProjectorConfig& config, gpio::Lines& lines,
                                                   Clock& clock) {
   using Driver = config::ProjectorConfig::Driver;
@@ -52,7 +52,7 @@ Result<std::unique_ptr<Projector>> open_projector(const config::ProjectorConfig&
 
 namespace {
 
-/// The cameras connect when they are used. Null for simulated ones.
+/// The cameras connect at their first use. Null for simulated ones.
 std::unique_ptr<StereoCamera> make_camera(const config::StereoCameraConfig& config, Clock& clock) {
   using Driver = config::StereoCameraConfig::Driver;
   switch (config.driver) {
@@ -94,8 +94,8 @@ Result<OpenDevices> open_devices(const config::RigConfig& config, Clock& clock) 
   return open;
 }
 
-/// On a module's bus: until the next polling, then coils and inputs; one reply is missed, the bus is left quiet for two
-/// reply timeouts, and both are read again (drivers/panel/modbus_io_panel.h).
+/// On a module's bus: wait for the next polling, then read coils and inputs. One reply is missed, the bus is left quiet
+/// for two reply timeouts, and both are read again (drivers/panel/modbus_io_panel.h).
 Clock::Duration panel_read_time(const config::PanelConfig& config) {
   if (config.driver != config::PanelConfig::Driver::modbus_io) return Clock::Duration::zero();
   constexpr int kReplyTimeouts = 1 + 2 + 2;

@@ -10,8 +10,8 @@
 
 namespace scanrig {
 
-/// The devices of a real rig. One that is not there fails at every use until it is: nothing else suffers, and nobody
-/// has to start anything again.
+/// The devices of a real rig. A missing device fails at every use until it responds. Nothing else is affected, and no
+/// restart is needed.
 struct OpenDevices {
   std::unique_ptr<gpio::Lines> lines;
   std::unique_ptr<Turntable> turntable;
@@ -22,18 +22,18 @@ struct OpenDevices {
   [[nodiscard]] Devices devices() const { return {*turntable, *projector, *camera, *panel}; }
 };
 
-/// `config` outlives the devices. Fails with `out_of_range` for a turntable or projector that cannot do what it is
-/// asked for.
+/// `config` outlives the devices. Fails with `out_of_range` for a turntable or projector that cannot do what the
+/// configuration requires.
 Result<OpenDevices> open_devices(const config::RigConfig& config, Clock& clock);
 
-/// One by one, for who needs no more. `config` and `lines` outlive what is made. Fail with `out_of_range`.
+/// Single devices, for callers that need no more. `config` and `lines` outlive them. Fail with `out_of_range`.
 std::unique_ptr<gpio::Lines> open_lines(const config::RigConfig& config, Clock& clock);
 Result<std::unique_ptr<Turntable>> open_turntable(const config::TurntableConfig& config, Clock& clock);
 Result<std::unique_ptr<Projector>> open_projector(const config::ProjectorConfig& config, gpio::Lines& lines,
                                                   Clock& clock);
 std::unique_ptr<Panel> open_panel(const config::RigConfig& config, gpio::Lines& lines, Clock& clock);
 
-/// How long a reading of the panel may take beyond its deadline, for PanelThreadOptions: 0 unless it is a module on a
+/// Time a reading of the panel may take beyond its deadline, for PanelThreadOptions: 0 unless it is a module on a
 /// bus.
 Clock::Duration panel_read_time(const config::PanelConfig& config);
 

@@ -26,7 +26,7 @@ void OutsideStop::run() {
     is_under_way_ = false;
   }
   if (!stopped) return report_(event::StopFailed{stopped.error()});
-  // The projector is told to be dark by its own thread's stop, which waits behind the turntable.
+  // The projector's own thread turns it off by its stop, which waits behind the turntable.
   report_(event::Stopped{Error{ErrorCode::timeout, "projector: not confirmed dark, the turntable hangs"}});
 }
 

@@ -9,11 +9,11 @@
 
 namespace scanrig {
 
-/// Stops the table past a turntable that hangs, on a thread of its own: one attempt at a time.
+/// Stops the table past a turntable that hangs, on a separate thread: one attempt at a time.
 /// Threads: begin() from any, one at a time.
 class OutsideStop {
  public:
-  /// `stop` returns once the table is seen standing; it may wait, but not for ever. `report` takes Stopped or
+  /// `stop` returns once standstill is confirmed; it may wait, but not for ever. `report` is called with Stopped or
   /// StopFailed.
   OutsideStop(Clock& clock, std::function<Result<void>()> stop, std::function<void(Event)> report)
       : clock_(clock), stop_(std::move(stop)), report_(std::move(report)) {}
@@ -21,7 +21,7 @@ class OutsideStop {
   OutsideStop(const OutsideStop&) = delete;
   OutsideStop& operator=(const OutsideStop&) = delete;
 
-  /// Does not wait. While an attempt is under way, that one reports.
+  /// Does not wait. An attempt already under way makes the report.
   void begin();
 
  private:

@@ -11,7 +11,7 @@ namespace {
 /// Longest wait of a lamp for a quiet panel; part of panel_latency().
 constexpr auto kPoll = std::chrono::milliseconds(20);
 constexpr auto kShowLimit = std::chrono::milliseconds(500);
-constexpr auto kRetry = std::chrono::seconds(1);  ///< after a panel that did not answer
+constexpr auto kRetry = std::chrono::seconds(1);  ///< after a panel that did not respond
 
 }  // namespace
 
@@ -58,14 +58,14 @@ void PanelThread::run() {
     auto done = show_wanted();
     if (done) done = read_inputs();
     if (!done) {
-      known_.reset();  // what a panel says that comes back is news
+      known_.reset();  // a returning panel reports all inputs as new
       post_event_(event::PanelFailed{done.error()});
     }
     std::unique_lock lock(mutex_);
     const auto pause = done ? clock_.now() : clock_.now() + kRetry;
     if (clock_.wait_until(lock, changed_, pause, [this] { return stop_; })) break;
   }
-  std::ignore = show_wanted();  // the last word of the station; a panel that fails here was reported before
+  std::ignore = show_wanted();  // the last lamps of the station; a panel that fails here was reported before
 }
 
 Result<void> PanelThread::show_wanted() {
@@ -82,7 +82,7 @@ Result<void> PanelThread::show_wanted() {
 }
 
 Result<void> PanelThread::read_inputs() {
-  // A panel that does not know its first state differs from nothing: ask with what a quiet panel says.
+  // A panel whose first state is unread differs from nothing: compare with a quiet panel.
   const auto inputs = panel_.wait_change(known_.value_or(PanelInputs{}),
                                          known_ ? Deadline::after(clock_, kPoll) : Deadline{clock_.now()});
   if (!inputs) return pass_on(inputs);

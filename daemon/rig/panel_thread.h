@@ -13,21 +13,21 @@
 
 namespace scanrig {
 
-/// What the change of the panel's inputs means: buttons count when they go down.
+/// Translates changes of the panel's inputs: buttons count when they go down.
 std::vector<Event> changes(const PanelInputs& before, const PanelInputs& after);
 
 struct PanelThreadOptions {
-  Clock::Duration read_time{0};  ///< how long a reading may take beyond its deadline: a module on a bus
-  Clock::Duration hang_margin = DeviceWatch::kMargin;  ///< a call that is so late hangs
+  Clock::Duration read_time{0};  ///< time a reading may take beyond its deadline: a module on a bus
+  Clock::Duration hang_margin = DeviceWatch::kMargin;  ///< a call that is this late hangs
 };
 
-/// From an input's edge to its event, at worst: debouncing, the polling period of the panel's thread, `read_time`.
+/// Worst time from an input's edge to its event: debouncing, the polling period of the panel's thread, `read_time`.
 Clock::Duration panel_latency(Clock::Duration read_time);
 
-/// The owner of the panel: reports its inputs, shows what it is told.
+/// The owner of the panel: reports its inputs, shows the lamps it is given.
 class PanelThread {
  public:
-  /// `on_estop` is called first, before anybody is told, and must not wait.
+  /// `on_estop` is called first, before any report, and must not wait.
   PanelThread(Panel& panel, Clock& clock, PanelThreadOptions options, std::function<void(Event)> post_event,
               std::function<void()> on_estop);
   ~PanelThread();
@@ -36,7 +36,7 @@ class PanelThread {
 
   /// Lamps for the panel; shown within the polling period. Does not wait.
   void show(const PanelOutputs& outputs);
-  /// The call of the panel this thread hangs in. From any thread.
+  /// The call of the panel in which this thread hangs. From any thread.
   [[nodiscard]] std::optional<HungCall> hung() const { return panel_.hung(); }
 
  private:
@@ -52,7 +52,7 @@ class PanelThread {
   std::condition_variable changed_;
   PanelOutputs wanted_;
   bool stop_ = false;
-  // Of the thread only.
+  // Only for the thread.
   std::optional<PanelOutputs> shown_;
   std::optional<PanelInputs> known_;
   std::thread thread_;

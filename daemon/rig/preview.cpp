@@ -8,8 +8,8 @@
 namespace scanrig {
 namespace {
 
-constexpr auto kAgain = std::chrono::seconds(2);  ///< after cameras that did not answer
-constexpr int kQuality = 80;                      ///< of a JPEG, per cent
+constexpr auto kAgain = std::chrono::seconds(2);  ///< after cameras that did not respond
+constexpr int kQuality = 80;                      ///< JPEG quality, per cent
 
 Result<std::string> encode(const cv::Mat& image, PixelFormat format) {
   try {
@@ -45,7 +45,7 @@ Result<std::string> Preview::jpeg(Side side) {
   return bytes;
 }
 
-/// One look at a time.
+/// Takes one preview at a time.
 void Preview::ask_for_more() {
   if (!look_ || asked_ || clock_.now() < not_before_) return;
   asked_ = true;

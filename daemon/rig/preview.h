@@ -14,21 +14,21 @@ namespace scanrig {
 
 enum class Side { left, right };
 
-/// What the cameras see, for people: the pair of the latest exposure, or of a look taken because somebody asks and
-/// nothing else is to be done. A scan is never disturbed.
+/// Camera images for people: the pair of the latest exposure, or of a preview. A preview is taken on request, when
+/// nothing else has to be done. It never disturbs a scan.
 /// Threads: every function may be called from any.
 class Preview {
  public:
   /// `quiet`: no scan is running and nothing moves, so the cameras are free.
   Preview(Clock& clock, std::function<bool()> quiet) : clock_(clock), quiet_(std::move(quiet)) {}
 
-  /// The latest picture of one side as a JPEG; asks for a newer pair. Fails with `not_found` (no pair yet: ask again),
-  /// and as the look failed while the cameras are free.
+  /// The latest image of one side as a JPEG; requests a newer pair. Fails with `not_found` (no pair yet: try again),
+  /// and as the preview failed while the cameras are free.
   Result<std::string> jpeg(Side side);
 
-  // The rig's side.
+  // For the rig.
 
-  /// `look` is called when a pair is wanted; it is answered by one keep() or failed(). Null: nobody can look any more.
+  /// `look` is called when a pair is wanted; one keep() or failed() replies to it. Null: no more previews.
   void on_wanted(std::function<void()> look);
   void keep(const StereoFrame& pair);
   void failed(const Error& error);
@@ -47,10 +47,10 @@ class Preview {
   // Guarded by mutex_.
   std::function<void()> look_;
   bool asked_ = false;
-  Clock::TimePoint not_before_{};  ///< no look until then
+  Clock::TimePoint not_before_{};  ///< no preview until then
   std::uint64_t pairs_ = 0;
   StereoFrame latest_;
-  std::optional<Error> problem_;  ///< of the last look
+  std::optional<Error> problem_;  ///< of the last preview
   std::array<Encoded, 2> encoded_;
 };
 

@@ -74,10 +74,10 @@ void RigThread::capture_preview() {
   pair ? preview_.keep(*pair) : preview_.failed(pair.error());
 }
 
-/// `interrupts`: when it was asked for.
+/// `interrupts`: the count when the work was requested.
 Result<void> RigThread::home_now(unsigned interrupts) {
   auto home = acquisition_.home();
-  // A stop that found nothing running is still kept by the turntable, and ends the next move: that was this one.
+  // The turntable keeps a stop that found nothing running, and ends the next move by it: that was this one.
   const bool stale = !home && home.error().code == ErrorCode::stopped && acquisition_.interrupts() == interrupts;
   return stale ? acquisition_.home() : home;
 }

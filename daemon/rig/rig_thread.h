@@ -13,12 +13,12 @@
 
 namespace scanrig {
 
-/// The owner of projector and camera, and through TurntableThread of the turntable: does one thing after the other and
-/// tells the station how it went.
+/// The owner of projector and camera, and through TurntableThread of the turntable. Does one thing after the other and
+/// reports the outcome to the station.
 class RigThread {
  public:
-  /// `preview` outlives it, is given every pair and is served with looks.
-  /// `hang_margin`: a call that is so late hangs.
+  /// `preview` outlives it, is given every pair and gets its images from it.
+  /// `hang_margin`: a call that is this late hangs.
   RigThread(const Devices& devices, Clock& clock, AcquisitionOptions options, Preview& preview,
             std::function<void(Event)> post_event, Clock::Duration hang_margin = DeviceWatch::kMargin);
   /// Stops what moves and joins.
@@ -31,15 +31,15 @@ class RigThread {
   void jog(action::Jog jog) { post(jog); }
   void pulse() { post(action::Pulse{}); }
   void check_devices() { post(action::CheckDevices{}); }
-  /// Cuts short what runs, and what is still to begin: a motion or a flash asked for before does not begin. Then waits
-  /// for evidence that the table stands and the projector is dark.
+  /// Cuts short what runs and what is still to start: a motion or flash requested before does not start. Then waits
+  /// for evidence that the table has stopped and the projector is off.
   void stop();
-  /// The e-stop's short cut: the motor is told to stop and the light goes out at once. From any thread; the station
+  /// The e-stop's short cut: commands the motor to stop and turns the light off at once. From any thread; the station
   /// follows with stop().
   void interrupt() noexcept;
-  /// While a call of projector or camera hangs: stop() through the turntable's own thread, past this one.
+  /// For a projector or camera call that hangs: stop() through the turntable's own thread, past this one.
   void stop_directly();
-  /// The call this thread or the turntable's hangs in, the turntable's first. From any thread.
+  /// The call in which this thread or the turntable's hangs, the turntable's first. From any thread.
   [[nodiscard]] std::optional<HungCall> hung() const;
 
  private:
@@ -49,7 +49,7 @@ class RigThread {
 
   struct Asked {
     Command what;
-    unsigned interrupts;  ///< so many had been when it was asked for
+    unsigned interrupts;  ///< count when the work was requested
   };
 
   template <class What>

@@ -23,7 +23,7 @@ Result<void> save_config(const config::RigConfig& config, const std::filesystem:
   auto prepared = folder;
   prepared += ".new";
   std::error_code ignored;
-  std::filesystem::remove_all(prepared, ignored);  // of a daemon that died while it wrote
+  std::filesystem::remove_all(prepared, ignored);  // left by a daemon that died while it wrote
   if (auto made = create_directories_synced(prepared / "drives"); !made) return made;
   if (const auto& profile = config.turntable.profile_file) {
     const FileContent file{profile->name, bytes_of(profile->text)};

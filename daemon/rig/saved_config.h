@@ -6,13 +6,13 @@
 
 namespace scanrig {
 
-/// The configuration a daemon runs under, kept for whoever makes the rig safe when that daemon has died: rig.toml may
-/// have been edited since, damaged or moved away. `rig.toml` in this folder, with its drive profile in `drives`.
-/// For the daemon of `file`: in the folder that systemd makes for the service ($RUNTIME_DIRECTORY), without one beside
+/// The configuration a daemon runs under, saved for the process that makes the rig safe after the daemon's death.
+/// rig.toml may have been edited since, damaged or moved. `rig.toml` in this folder, its drive profile in `drives`.
+/// Folder for the daemon of `file`: the one that systemd makes for the service ($RUNTIME_DIRECTORY), otherwise beside
 /// `file`.
 std::filesystem::path saved_config_folder(const std::filesystem::path& file);
 
-/// Before a device is used. Fails with `io`; then what was kept before is kept still.
+/// Saves before a device is used. Fails with `io`; then the older saved configuration remains.
 Result<void> save_config(const config::RigConfig& config, const std::filesystem::path& folder);
 
 }  // namespace scanrig

@@ -29,7 +29,7 @@ Answer TurntableThread::ask(const std::function<Answer()>& what) {
   std::unique_lock lock(mutex_);
   task_ = [&] { answer = what(); };
   clock_.notify_all(changed_);
-  // The task keeps to its own deadline.
+  // The task keeps its own deadline.
   clock_.wait_until(lock, changed_, Clock::TimePoint::max(), [this] { return !task_; });
   return std::move(*answer);
 }
@@ -41,13 +41,13 @@ void TurntableThread::run() {
     if (std::exchange(stop_wanted_, false)) {
       const auto direct = std::exchange(direct_stop_, std::nullopt);
       lock.unlock();
-      // Without an answer: the station asks for evidence through stop(), and the driver owes the stop from now on.
+      // No reply: the station requests evidence through stop(), and the driver has a stop pending from now on.
       const auto stopped = turntable_.stop(Deadline::after(clock_, direct ? direct->limit : kStopLimit));
       if (direct) direct->done(stopped);
       lock.lock();
     } else if (task_) {
       lock.unlock();
-      task_();  // nobody changes it while it is there
+      task_();  // no thread changes it while it is set
       lock.lock();
       task_ = nullptr;
       clock_.notify_all(changed_);

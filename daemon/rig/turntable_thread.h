@@ -11,9 +11,9 @@
 
 namespace scanrig {
 
-/// The owner of the turntable: carries out what the rig asks for, one thing at a time, while the rig waits. A stop is
-/// sent at once, whatever the rig is doing with the cameras meanwhile.
-/// Threads: as Turntable says; the functions may be called from another thread than the turntable's own.
+/// The owner of the turntable: carries out the rig's requests one at a time, while the rig waits. Sends a stop
+/// at once, whatever the rig is doing with the cameras meanwhile.
+/// Threads: as for Turntable; the functions may be called from another thread than the turntable's own.
 class TurntableThread final : public Turntable {
  public:
   TurntableThread(Turntable& turntable, Clock& clock);
@@ -27,10 +27,10 @@ class TurntableThread final : public Turntable {
   Result<void> reset_alarm(Deadline deadline) override;
   Result<TurntableStatus> status(Deadline deadline) override;
   Result<void> limit_speed(std::optional<DegreesPerSecond> limit) override;
-  /// Ends what runs, and tells the drive to stop even when nothing does.
+  /// Ends what runs, and commands the drive to stop even when nothing does.
   void request_stop() noexcept override;
-  /// The same from any thread, with evidence: `done` is called from the turntable's own thread with what stop()
-  /// returned by `limit`, and not at all where the turntable itself hangs.
+  /// The same from any thread, with evidence: the turntable's own thread calls `done` with what stop() returned by
+  /// `limit`. It does not call `done` where the turntable itself hangs.
   void stop_directly(Clock::Duration limit, std::function<void(const Result<void>&)> done);
 
  private:
@@ -48,7 +48,7 @@ class TurntableThread final : public Turntable {
     Clock::Duration limit;
     std::function<void(const Result<void>&)> done;
   };
-  std::optional<DirectStop> direct_stop_;  // of the stop that is wanted
+  std::optional<DirectStop> direct_stop_;  // for the requested stop
   bool end_ = false;
   std::thread thread_;
 };

@@ -8,7 +8,7 @@
 
 namespace scanrig {
 
-/// Devices whose every call is recorded in a DeviceWatch for as long as it takes. The device outlives its wrapper.
+/// Devices whose every call is recorded in a DeviceWatch while it lasts. The device outlives its wrapper.
 /// To add a call to a device's interface: forward it here with a Call of its name.
 
 class WatchedTurntable final : public Turntable {
@@ -103,10 +103,10 @@ class WatchedCamera final : public StereoCamera {
   DeviceWatch watch_;
 };
 
-/// A panel that hung is one that failed, whatever it returns in the end: the station has been told so.
+/// A panel that hung has failed, whatever it returns in the end: the hang has been reported to the station.
 class WatchedPanel final : public Panel {
  public:
-  /// `read_time`: how long a reading may take beyond its deadline.
+  /// `read_time`: time a reading may take beyond its deadline.
   WatchedPanel(Panel& panel, const Clock& clock, Clock::Duration margin, Clock::Duration read_time)
       : panel_(panel), read_time_(read_time), watch_(clock, "panel", margin) {}
 

@@ -7,16 +7,16 @@
 
 namespace scanrig {
 
-/// How long a thread has been at what it does now: for what nobody can tell to stop.
-/// Threads: one works, any may ask.
+/// Measures how long a thread has been at its present work: for work that cannot be stopped.
+/// Threads: one works, any may read.
 class BusyTimer {
  public:
   explicit BusyTimer(const Clock& clock) : clock_(clock) {}
 
-  /// It begins, or has got on with what it does.
+  /// Marks the start of work, or progress in it.
   void begins() { since_ = clock_.now().time_since_epoch().count(); }
   void ends() { since_ = kIdle; }
-  /// Zero where it does nothing.
+  /// Zero without work.
   [[nodiscard]] Clock::Duration lasts() const {
     const auto since = since_.load();
     return since == kIdle ? Clock::Duration::zero() : clock_.now().time_since_epoch() - Clock::Duration(since);

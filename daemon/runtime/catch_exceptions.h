@@ -9,8 +9,8 @@
 
 namespace scanrig {
 
-/// Runs one job's work. The libraries below may throw what nobody foresaw, or run out of memory: that is this job's
-/// bad luck. Fails as `work`, with `out_of_range` (memory) and `internal`, naming `what`.
+/// Runs one job's work. Libraries may throw unforeseen exceptions or run out of memory: then only this job
+/// fails. Fails as `work`, with `out_of_range` (memory) and `internal`, naming `what`.
 template <class Work>
 std::invoke_result_t<const Work&> catch_exceptions(std::string_view what, const Work& work) {
   try {

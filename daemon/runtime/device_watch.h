@@ -19,7 +19,7 @@ struct HungCall {
   Clock::Duration late{};  ///< since its deadline
 };
 
-/// The same for people; `timeout`.
+/// The same as a message for people; `timeout`.
 inline Error hung_error(const HungCall& call) {
   return {
       ErrorCode::timeout,
@@ -27,26 +27,26 @@ inline Error hung_error(const HungCall& call) {
                   call.device, call.call, std::chrono::duration<double>(call.late).count())};
 }
 
-/// Records which call of a device's driver is under way and by when it must be back, because the thread that waits for
-/// it cannot report that it hangs.
-/// Threads: one makes the calls, any may look.
+/// Records which call of a device's driver is under way and by when it must return. The thread that waits for it
+/// cannot report the hang itself.
+/// Threads: one makes the calls, any may read.
 class DeviceWatch {
  public:
-  /// A call that is this late is hung. With the control loop's polling period it is named within a second.
+  /// A call that is this late hangs. With the control loop's polling period it is named within a second.
   static constexpr Clock::Duration kMargin = std::chrono::milliseconds(700);
 
   /// `device`: as DeviceHealth names it; outlives this.
   DeviceWatch(const Clock& clock, const char* device, Clock::Duration margin = kMargin)
       : clock_(clock), device_(device), margin_(margin) {}
 
-  /// Under way for as long as it lives, or until end().
+  /// Lasts for as long as this lives, or until end().
   class Call {
    public:
     Call(DeviceWatch& watch, const char* name, Deadline deadline) : watch_(watch) { watch_.begin({name, deadline}); }
     ~Call() { end(); }
     Call(const Call&) = delete;
     Call& operator=(const Call&) = delete;
-    /// How late it is, where anybody may have seen it hang.
+    /// How late it is, where another thread may have seen it hang.
     std::optional<HungCall> end() { return watch_.end(); }
 
    private:

@@ -10,7 +10,7 @@
 
 namespace scanrig {
 
-/// The only thing threads of the daemon share: messages in order, from any thread to one.
+/// The only data that threads of the daemon share: messages in order, from any thread to one.
 template <class Message>
 class Mailbox {
  public:
@@ -36,7 +36,7 @@ class Mailbox {
     return message;
   }
 
-  /// What was posted is still delivered; nothing more is accepted.
+  /// Still delivers what was posted; accepts nothing more.
   void close() {
     {
       const std::lock_guard guard(mutex_);

@@ -12,7 +12,7 @@
 namespace scanrig {
 namespace {
 
-/// Blocked in this thread, and in those it starts.
+/// Signals blocked in this thread, and in those it starts.
 int catch_signals(bool hangup) {
   sigset_t signals;
   sigemptyset(&signals);

@@ -20,7 +20,7 @@ class SignalStop {
 
   [[nodiscard]] std::stop_token token() const { return source_.get_token(); }
 
-  /// SIGHUP calls `what` from now on, on a thread of this object's; with nothing it is ignored. Waits for a call under
+  /// SIGHUP calls `what` from now on, on a thread of this object; without one it is ignored. Waits for a call under
   /// way. From any thread but that one.
   void on_hangup(std::function<void()> what);
 

@@ -10,7 +10,7 @@
 namespace scanrig {
 namespace {
 
-/// Between two looks at the calls under way: with DeviceWatch::kMargin one that hangs is named within a second.
+/// Time between two checks of the calls under way: with DeviceWatch::kMargin a hang is named within a second.
 constexpr auto kLook = std::chrono::milliseconds(250);
 constexpr auto kBlink = std::chrono::milliseconds(500);
 constexpr auto kLampTest = std::chrono::seconds(3);
@@ -89,7 +89,7 @@ void ControlLoop::handle(Message message, const StationPorts& ports) {
   if (std::holds_alternative<event::CheckDue>(message.event)) look_at_the_time(ports);
 }
 
-/// Adds to the event what only this loop knows.
+/// Adds to the event what only this loop has.
 void ControlLoop::prepare(Message& message, const StationPorts& ports) {
   auto& event = message.event;
   if (auto* pressed = std::get_if<event::Pressed>(&event)) {
@@ -106,7 +106,7 @@ void ControlLoop::prepare(Message& message, const StationPorts& ports) {
   }
 }
 
-/// Of jobs that do not have the rig.
+/// Actions for jobs other than the active one.
 std::string ControlLoop::still_doing() const {
   for (const auto& [id, job] : jobs_) {
     if (job->state == JobState::reconstructing) return fmt::format("job {} is being reconstructed", id);
@@ -114,7 +114,7 @@ std::string ControlLoop::still_doing() const {
   return waiting_.empty() ? "" : "something that was asked of a job is being done";
 }
 
-/// Whoever asked for something that takes a while is answered when it is done.
+/// Sends the reply to a requester when its longer work is done.
 void ControlLoop::answer(Message& message, const Step& step) {
   if (const auto* answered = std::get_if<event::RequestDone>(&message.event)) {
     if (auto waiting = waiting_.extract(answered->request_id)) waiting.mapped()(answered->result);
@@ -131,7 +131,7 @@ void ControlLoop::answer(Message& message, const Step& step) {
   }
 }
 
-/// Quiet hours come and go by the clock on the wall, and the projector gets warm.
+/// Watches quiet hours, which follow the wall clock, and the projector's warm-up.
 void ControlLoop::look_at_the_time(const StationPorts& ports) {
   const bool quiet = ports.quiet_hours();
   if (quiet != state_.quiet) handle({event::QuietHours{quiet}, {}}, ports);
@@ -139,14 +139,14 @@ void ControlLoop::look_at_the_time(const StationPorts& ports) {
   if (left != state_.warm_up_left) handle({event::WarmingUp{left}, {}}, ports);
 }
 
-/// It is told when it stops answering, and when it answers again.
+/// Reports when the disk stops responding, and when it responds again.
 void ControlLoop::look_at_the_disk(const StationPorts& ports) {
   auto problem = ports.disk_problem();
   if (problem.has_value() != state_.disk_problem.has_value())
     handle({event::DiskChecked{std::move(problem)}, {}}, ports);
 }
 
-/// Its return is told by its owner.
+/// Its owner reports its return.
 void ControlLoop::look_at_the_panel(const StationPorts& ports) {
   const auto call = ports.panel_hangs();
   if (!call) return;
@@ -154,7 +154,7 @@ void ControlLoop::look_at_the_panel(const StationPorts& ports) {
   if (is_lost(*call)) lost_ = hung_error(*call);
 }
 
-/// One that hangs may keep the stop by its own path, or another one by the path past it, from returning too.
+/// A hang may also keep a stop from returning, by its own path or by the path past it.
 void ControlLoop::look_at_the_rig(const StationPorts& ports) {
   auto call = ports.rig_hangs();
   const auto device_of = [](const std::optional<HungCall>& one) { return one ? one->device : std::string(); };
@@ -162,13 +162,13 @@ void ControlLoop::look_at_the_rig(const StationPorts& ports) {
   if (call && is_lost(*call)) lost_ = hung_error(*call);
 }
 
-/// Where no other process can stop the drive either while this one has it, this one ends at once.
+/// Where no other process can stop the drive while this one has it, this one ends at once.
 bool ControlLoop::is_lost(const HungCall& call) const {
   const bool unreached = call.device == "turntable" && state_.may_be_moving && state_.activity == Activity::none;
   return unreached || call.late >= options_.hang_limit;
 }
 
-/// A projector that was away may have been without power: it begins anew.
+/// A projector that was away may have been without power: its warm-up restarts.
 std::chrono::seconds ControlLoop::warm_up_left() {
   const auto now = clock_.now();
   const auto projector = std::ranges::find(state_.devices, "projector", &DeviceHealth::name);
@@ -205,7 +205,7 @@ void ControlLoop::blink(const StationPorts& ports) {
   show(ports);
 }
 
-/// Lamps that blink, or are all on for a test, are looked at again soon.
+/// Blinking lamps, and a lamp test, need an update soon.
 void ControlLoop::show(const StationPorts& ports) {
   const bool testing = clock_.now() < lamps_tested_;
   shown_ = testing ? kAllOn : lamps(state_, jobs_, blink_);

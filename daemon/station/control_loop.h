@@ -16,18 +16,18 @@
 
 namespace scanrig {
 
-/// Where the decisions of the control loop go. Called from its thread; none may wait.
+/// Receivers of the control loop's decisions. Called from its thread; none may wait.
 struct StationPorts {
-  std::function<void()> alive = [] {};         ///< the loop goes round; at least four times a second
+  std::function<void()> alive = [] {};         ///< called by the running loop, at least four times a second
   std::function<void(const Action&)> perform;  ///< everything but Warn
   std::function<void(const PanelOutputs&)> show;
-  /// A latch was set, changed or cleared: returns once it is durable, within a third of a second. What it fails with is
-  /// for the log; the latch holds all the same.
+  /// Stores a latch that was set, changed or cleared. Returns once it is durable, within a third of a second. An error
+  /// goes to the log only; the latch holds all the same.
   std::function<void(const std::optional<Latch>&)> store_latch = [](const auto&) {};
   std::function<std::string()> new_job_id;  ///< another one each time
   std::function<bool()> quiet_hours = [] { return false; };
-  std::function<std::optional<Error>()> disk_problem = [] { return std::nullopt; };  ///< the jobs' does not answer
-  /// Calls that hang: what waits for them cannot report it. `rig_hangs`: of turntable, projector and camera.
+  std::function<std::optional<Error>()> disk_problem = [] { return std::nullopt; };  ///< the job disk does not respond
+  /// Calls that hang: their waiting threads cannot report it. `rig_hangs`: of turntable, projector and camera.
   std::function<std::optional<HungCall>()> rig_hangs = [] { return std::nullopt; };
   std::function<std::optional<HungCall>()> panel_hangs = [] { return std::nullopt; };
   std::function<void(const std::shared_ptr<const Snapshot>&)> published = [](const auto&) {};
@@ -40,18 +40,18 @@ enum class Ended { shut_down, reload };
 struct ControlLoopOptions {
   StationRules rules;
   Clock::Duration warning = std::chrono::seconds(2);  ///< lamp before the first move
-  /// A device that fails may only lack power: an e-stop that took it is reported by then (panel_latency()).
+  /// A failing device may only lack power: an e-stop that took the power is reported by then (panel_latency()).
   Clock::Duration estop_window = std::chrono::milliseconds(200);
   Clock::Duration stop_retry = std::chrono::seconds(1);      ///< while the table may be moving
   Clock::Duration check_period = std::chrono::seconds(2);    ///< of the devices, in quiet times
-  Clock::Duration shutdown_limit = std::chrono::seconds(5);  ///< for the rig to be seen stopped
-  Clock::Duration hang_limit = std::chrono::seconds(10);     ///< a call that is so late ends the loop
-  std::chrono::seconds warm_up{0};  ///< of the projector: no job begins by itself before it was there for so long
+  Clock::Duration shutdown_limit = std::chrono::seconds(5);  ///< for confirmation that the rig has stopped
+  Clock::Duration hang_limit = std::chrono::seconds(10);     ///< a call that is this late ends the loop
+  std::chrono::seconds warm_up{0};  ///< of the projector: no job starts automatically before
   std::optional<Latch> latch{};     ///< that an earlier process left
 };
 
 /// The thread of the state machine: takes events one by one, decides, hands out actions, publishes a snapshot.
-/// Threads: run() has its own; all the rest may be called from any.
+/// Threads: run() has its own; all others may be called from any.
 class ControlLoop {
  public:
   using Reply = std::function<void(const Result<std::string>&)>;  ///< the job's id, empty without one
@@ -59,25 +59,25 @@ class ControlLoop {
   ControlLoop(Clock& clock, ControlLoopOptions options, JobTable known_jobs);
 
   void post(Event event) { inbox_.post({std::move(event), {}}); }
-  /// `reply` is called from the control loop's thread, soon, and must not wait. After a shutdown it may never be.
+  /// The control loop's thread calls `reply` soon; it must not wait. After a shutdown it may never be called.
   void press(Button button, Origin origin, Reply reply) {
     inbox_.post({event::Pressed{button, origin, {}}, std::move(reply)});
   }
-  /// The same for what an engineer asks for.
+  /// The same for an engineer's requests.
   void ask(event::MaintenanceRequested what, Reply reply) { inbox_.post({what, std::move(reply)}); }
   /// Queues jobs. `reply` comes when their folders are durable, with the id of the first one. Fails with `not_found`
   /// (the recipe), `invalid_input`, `refused`, `io`.
   void order(JobOrder order, Reply reply) { inbox_.post({event::JobsOrdered{std::move(order)}, std::move(reply)}); }
-  /// What event::JobRequested lists. `reply` comes when it is done (a bundle: after a while), with the job's id or the
+  /// Does what event::JobRequested lists. `reply` comes when it is done (a bundle: later), with the job's id or the
   /// bundle's path. Fails with `not_found`, `busy`, `refused`, `exists`, `io`.
   void ask(event::JobRequested what, Reply reply) { inbox_.post({std::move(what), std::move(reply)}); }
-  /// Ends the loop if nothing is being done. Fails with `busy`, `refused`.
+  /// Ends the loop if the rig is idle. Fails with `busy`, `refused`.
   void ask(event::ReloadRequested what, Reply reply) { inbox_.post({std::move(what), std::move(reply)}); }
   [[nodiscard]] std::shared_ptr<const Snapshot> snapshot() const { return published_.get(); }
 
-  /// Runs until a Shutdown or a reload is done. Fails with `timeout` when the rig was not seen stopped by it: under a
-  /// new configuration another drive might be asked. Likewise once a device's call hangs for good: only another process
-  /// can use that device again.
+  /// Runs until a Shutdown or a reload is done. Fails with `timeout` when standstill was not confirmed: a new
+  /// configuration might address another drive. Fails likewise once a device's call hangs for good: only another
+  /// process can use that device again.
   Result<Ended> run(const StationPorts& ports);
 
  private:
@@ -106,13 +106,13 @@ class ControlLoop {
   ControlLoopOptions options_;
   Mailbox<Message> inbox_;
   Published published_;
-  // Of run()'s thread only.
+  // Only for run()'s thread.
   StationState state_;
   JobTable jobs_;
   EventCounter counter_;
   std::uint64_t revision_ = 0;
   RequestId last_request_id_ = 0;
-  std::map<RequestId, Reply> waiting_;  // for what takes a while
+  std::map<RequestId, Reply> waiting_;  // for requests that take longer
   struct Later {
     Clock::TimePoint at;
     Event event;
@@ -122,9 +122,9 @@ class ControlLoop {
   bool blink_ = false;
   Clock::TimePoint next_blink_ = Clock::TimePoint::max();
   Clock::TimePoint lamps_tested_ = Clock::TimePoint::min();
-  std::optional<Error> lost_;  // why the loop ends although nobody has asked for it
+  std::optional<Error> lost_;  // why the loop ends without a request
   Clock::TimePoint give_up_ = Clock::TimePoint::max();
-  std::optional<Clock::TimePoint> projector_since_;  // has been there; nothing: it is not
+  std::optional<Clock::TimePoint> projector_since_;  // when the projector came; nothing: absent
 };
 
 }  // namespace scanrig

@@ -10,7 +10,7 @@
 
 namespace scanrig {
 
-/// What has happened since the daemon began. Only ever grows.
+/// Counts since the daemon started. They only grow.
 struct Counters {
   std::uint64_t views_stored = 0;
   std::uint64_t retakes = 0;

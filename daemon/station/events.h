@@ -17,7 +17,7 @@
 
 namespace scanrig {
 
-/// Which view of which job; poses and views count from 0.
+/// One view of one job; poses and views count from 0.
 struct ViewId {
   std::string job;
   int pose = 0;
@@ -34,10 +34,10 @@ struct JobOrder {
   int repeat = 1;      ///< 1 to 100
 };
 
-/// Names whoever waits for an answer; 0: nobody.
+/// Identifies the requester waiting for a reply; 0: no requester.
 using RequestId = std::uint64_t;
 
-/// Whether a device answers. One that does not leaves the rest running.
+/// Whether a device responds. One that does not leaves the rest running.
 struct DeviceHealth {
   std::string name;
   std::optional<Error> problem{};
@@ -47,11 +47,11 @@ struct DeviceHealth {
   }
 };
 
-/// What happened: told to the station by its threads, the panel and the API.
+/// What happened: reported to the station by its threads, the panel and the API.
 namespace event {
 struct PanelFound {
   bool estop_ok, guard_closed;
-};  ///< the panel's first answer, or its first after it could not be read
+};  ///< the panel's first reading, or its first after a failure
 struct InputsRead {
   PanelInputs inputs;
 };  ///< for the I/O table
@@ -67,16 +67,16 @@ struct GuardChanged {
   bool closed;
 };
 struct WarningOver {};
-struct EstopWindowOver {};  ///< an e-stop would have been seen by now
+struct EstopWindowOver {};  ///< an e-stop would have been read by now
 struct StopRetryDue {};
 struct CheckDue {};
 struct QuietHours {
   bool quiet;
-};  ///< they have begun or ended
+};  ///< they have started or ended
 struct WarmingUp {
   std::chrono::seconds left;
-};  ///< the projector will be warm then; 0: it is
-/// Whose calibration was looked at, as action::CheckCalibration says, and why it refuses a scan.
+};  ///< time when the projector is warm; 0: it is
+/// Whose calibration was checked, as in action::CheckCalibration, and why it refuses a scan.
 struct CalibrationChecked {
   std::string job{};
   std::optional<Error> problem{};
@@ -94,11 +94,11 @@ struct DevicesChecked {
 struct HungCallChanged {
   std::optional<HungCall> call{};
 };
-/// What an engineer asks for.
+/// Actions that an engineer requests.
 struct MaintenanceRequested {
   enum class What { on, off, home, jog, pulse, lamp_test };
   What what;
-  Degrees angle{};  ///< jog: where to, or by how much
+  Degrees angle{};  ///< jog: target, or change
   bool relative = false;
   DegreesPerSecond speed{};  ///< jog
   std::string requester{};   ///< the user of this machine or the address that sent the request; empty: unknown
@@ -113,65 +113,65 @@ struct ViewTaken {
   std::shared_ptr<const TakenView> view;
 };
 struct Stopped {
-  std::optional<Error> light{};  ///< why the projector is not known to be dark
-};                               ///< the table is seen standing
+  std::optional<Error> light{};  ///< why the projector may not be off
+};                               ///< standstill confirmed
 struct RigFailed {
   Error error;
   std::string device{};  ///< whose failure it is, as DeviceHealth names it
-};                       ///< a move or an exposure; the motor has been told to stop
+};                       ///< a move or an exposure; the motor has been commanded to stop
 struct StopFailed {
   Error error;
-};  ///< nobody knows whether the table moves
+};  ///< unconfirmed: the table may be moving
 struct PanelFailed {
   Error error;
 };
-/// Somebody wants scans. RequestDone when every job's folder is durable, with the first one's id.
+/// A client requests scans. RequestDone when every job's folder is durable, with the first one's id.
 struct JobsOrdered {
   JobOrder order;
-  std::vector<std::string> new_ids{};  ///< one a job
+  std::vector<std::string> new_ids{};  ///< one per job
   RequestId request_id = 0;
 };
-/// Somebody wants something done with one job. RequestDone when it is done.
+/// A client requests an action on one job. RequestDone when it is done.
 struct JobRequested {
   enum class What {
     cancel,        ///< queued, interrupted or reconstructing: ends cancelled, with its evidence
-    resume,        ///< interrupted: the next Start goes on with it
-    to_front,      ///< queued: the next Start begins it
-    remove,        ///< the folder goes; only of a job that has ended
+    resume,        ///< interrupted: the next Start continues it
+    to_front,      ///< queued: the next Start starts it
+    remove,        ///< deletes the folder; only of a job that has ended
     reprocess,     ///< the reconstruction again, from the images; `voxel_mm` and `fusion` may change it
-    set_exported,  ///< retention may remove it
-    bundle,        ///< packed into the file `path`, for whoever must help
+    set_exported,  ///< retention may delete it
+    bundle,        ///< packed into the file `path`, for support
   };
   What what;
   std::string job;
-  std::string path{};                ///< bundle: absolute, .tar.gz, must not be there
+  std::string path{};                ///< bundle: absolute, .tar.gz, must not exist
   std::optional<double> voxel_mm{};  ///< reprocess
   std::string fusion{};              ///< reprocess: `evidence`, `paper`; empty: as configured
   RequestId request_id = 0;
 };
-/// What was asked for under `request_id` has been done, or why not.
+/// The request `request_id` has been done, or why not.
 struct RequestDone {
   RequestId request_id;
   Result<std::string> result;
 };
-/// What a job's folder says now; a new job, or one that changed in other ways than by being scanned.
+/// The present content of a job's folder: a new job, or one changed in other ways than by being scanned.
 struct JobUpdated {
   std::shared_ptr<const JobInfo> info;
 };
 struct JobRemoved {
   std::string job;
 };
-/// The job has the rig: it goes on after `stored` views of `pose`.
+/// The job is active: it continues after `stored` views of `pose`.
 struct JobStarted {
   std::string job;
   int pose, stored;
 };
-/// The job was not begun: the disk is too full. It stays queued.
+/// The job did not start: the disk is too full. It stays queued.
 struct JobNotStarted {
   std::string job;
   Error why;
 };
-/// The job was not begun and never will be: its folder is damaged. It has failed.
+/// The job did not start and never will: its folder is damaged. It has failed.
 struct JobUnreadable {
   std::string job;
   Error why;
@@ -209,7 +209,7 @@ struct StoreFailed {
 };
 struct DiskChecked {
   std::optional<Error> problem{};
-};  ///< the jobs' disk has stopped answering, or answers again
+};  ///< the job disk has stopped responding, or responds again
 struct StageProgress {
   std::string job, stage;
   double fraction;
@@ -221,11 +221,11 @@ struct ReconstructionFailed {
 };
 struct ModelReady {
   std::string job, model, report;          ///< paths of the files
-  std::optional<Error> limit_violation{};  ///< why it does not pass
+  std::optional<Error> limit_violation{};  ///< why the model did not pass
 };
-/// The daemon is to begin again under a new configuration; taken only while nothing is being done.
+/// The daemon is to restart under a new configuration; accepted only while the rig is idle.
 struct ReloadRequested {
-  std::string still_doing{};  ///< what goes on beside the rig; empty: nothing
+  std::string still_doing{};  ///< work that continues beside the rig; empty: none
 };
 struct Shutdown {};
 }  // namespace event
@@ -251,13 +251,13 @@ struct EndConsentLater {
   std::chrono::minutes after;
 };                       ///< ConsentTimeout comes after it, counted anew each time
 struct CheckLater {};    ///< CheckDue comes after a while
-struct CheckDevices {};  ///< answered by DevicesChecked
-/// Is it of the rig's cameras? RequestDone by CalibrationChecked.
+struct CheckDevices {};  ///< replied to by DevicesChecked
+/// Checks that it belongs to the rig's cameras. RequestDone by CalibrationChecked.
 struct CheckCalibration {
-  std::string job;  ///< whose views were taken with it; empty: the rig's, for a scan that has none yet
+  std::string job;  ///< whose views were taken with it; empty: the rig's, for a scan without one so far
 };
 struct Home {};     ///< clears a device alarm first
-struct StopRig {};  ///< answered by Stopped or StopFailed
+struct StopRig {};  ///< replied to by Stopped or StopFailed
 /// The same past a projector or camera that hangs, on the turntable's own thread.
 struct StopTableDirectly {};
 /// The same past a turntable that hangs, by another process.
@@ -266,19 +266,19 @@ struct Jog {
   Degrees angle;
   bool relative;
   DegreesPerSecond speed;
-};                ///< answered by Jogged or RigFailed
-struct Pulse {};  ///< answered by Pulsed or RigFailed
+};                ///< replied to by Jogged or RigFailed
+struct Pulse {};  ///< replied to by Pulsed or RigFailed
 struct TestLamps {};
 struct TakeView {
   ViewId id;
   Degrees angle;
-  bool movement_check = false;  ///< view 0 again, for comparison: answered by CheckViewTaken instead of ViewTaken
+  bool movement_check = false;  ///< view 0 again, for comparison: CheckViewTaken follows instead of ViewTaken
 };
 struct WaitForFlip {
   std::string job;
   std::chrono::minutes limit;
 };  ///< FlipTimedOut comes after it
-/// Job folders in the state queued, one after the other. Each is told as JobUpdated.
+/// Creates job folders in the state queued, one after the other. Each is reported as JobUpdated.
 struct CreateJobs {
   std::vector<std::string> ids;
   Recipe recipe;
@@ -288,14 +288,14 @@ struct CreateJobs {
 };
 struct StartJob {
   std::string job;
-};  ///< answered by JobStarted, JobNotStarted or JobUnreadable
+};  ///< replied to by JobStarted, JobNotStarted or JobUnreadable
 struct MoveJob {
   std::string job;
   std::int64_t place;
   bool resume;  ///< an interrupted job is queued again
   RequestId request_id;
 };
-/// Everything else somebody wants done with a job that does not have the rig.
+/// All other requested actions on a job that is not active.
 struct RunJobRequest {
   event::JobRequested asked;
 };
@@ -309,10 +309,10 @@ struct FinishPose {
   std::string job;
   int pose;
   bool last;
-};  ///< the manifest says: complete; waiting or scanned
+};  ///< sets the manifest to: complete; waiting or scanned
 struct ResumeJob {
   std::string job;
-};  ///< after the flip the manifest says: scanning again
+};  ///< after the flip, sets the manifest to: scanning again
 struct CloseJob {
   std::string job;
   JobState state;

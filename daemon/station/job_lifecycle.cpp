@@ -38,7 +38,7 @@ void set_pose_stored(JobInfo& job, int pose) {
   const bool last = pose + 1 == job.recipe.poses;
   job.complete = pose + 1;
   job.state = last ? JobState::reconstructing : JobState::waiting_for_flip;
-  if (last && job.error) job.state = JobState::failed;  // the reconstruction gave up earlier
+  if (last && job.error) job.state = JobState::failed;  // the reconstruction failed earlier
 }
 
 }  // namespace
@@ -52,7 +52,7 @@ std::optional<JobEnd> update(JobTable& table, const Event& event) {
           [&](const event::JobRemoved& e) { table.erase(e.job); },
           [&](const event::JobStarted& e) {
             change(e.job, [](JobInfo& job) {
-              if (is_final(job.state)) return;  // it was closed before the disk had let it begin
+              if (is_final(job.state)) return;  // it was closed before the disk had let it start
               job.state = JobState::scanning;
               job.error.reset();
             });
@@ -117,7 +117,7 @@ Error quarantine_error() {
 
 namespace {
 
-/// A scan that has all its views.
+/// Ends a scan that has all its views.
 void set_scanned_state(JobInfo& job, const FolderFacts& facts) {
   if (!facts.has_report) job.model = job.report = "";
   job.quarantined = !facts.is_running && facts.deaths >= kAttemptsThatQuarantine;

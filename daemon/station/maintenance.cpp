@@ -24,7 +24,7 @@ void begin(StepBuilder& m, const std::string& requester) {
   m.enter(MachineState::maintenance, "Maintenance was requested.");
 }
 
-/// Only who found the table homed and has moved nothing may go on scanning.
+/// Only a requester who found the table homed and has moved nothing may continue scanning.
 void end(StepBuilder& m) {
   auto& s = m.s();
   const auto& was = *s.maintenance;
@@ -34,7 +34,7 @@ void end(StepBuilder& m) {
   m.enter(next, s.latch ? s.latch->cause : "Maintenance has ended.");
 }
 
-/// Whoever lets the table move in maintenance stands at the panel, or there is a guard between him and the table.
+/// A person who moves the table in maintenance is at the panel, or a guard is between that person and the table.
 void jog(StepBuilder& m, const event::MaintenanceRequested& asked) {
   auto& maintenance = *m.s().maintenance;
   if (!m.require_safe()) return;
@@ -57,7 +57,7 @@ void jog(StepBuilder& m, const event::MaintenanceRequested& asked) {
   m.warn();
 }
 
-/// Light hurts as a motion does: the same rules but for home and consent.
+/// Light is as dangerous as a motion: the same rules apply, except home and consent.
 void pulse(StepBuilder& m) {
   if (!m.require_safe()) return;
   m.s().activity = Activity::pulsing;

@@ -14,7 +14,7 @@ constexpr const char* kKeepAway = "Keep clear.";
 constexpr const char* kWaitForStanding = "Wait until the table has stopped.";
 constexpr const char* kSeeToPanel = "Check the panel's power and cable.";
 
-/// What is between here and a button that lets the table move: "release the e-stop, close the guard, ".
+/// Steps before a button may let the table move: "release the e-stop, close the guard, ".
 std::string steps_before_motion(const StationState& state) {
   std::string steps;
   if (!state.estop_ok) steps += "release the e-stop, ";
@@ -22,7 +22,7 @@ std::string steps_before_motion(const StationState& state) {
   return steps;
 }
 
-/// "Close the guard, then press Reset."; `action` begins with a small letter.
+/// "Close the guard, then press Reset."; `action` starts with a small letter.
 std::string after_steps(const StationState& state, const std::string& action) {
   const auto steps = steps_before_motion(state);
   auto text = steps.empty() ? action + "." : steps + "then " + action + ".";
@@ -43,7 +43,7 @@ std::string how_to_reset(const StationState& state, const StationRules& rules) {
   return steps_before_motion(state).empty() ? fmt::format("Fix the cause, then {}.", reset) : after_steps(state, reset);
 }
 
-/// No job begins without it.
+/// Condition without which no job starts.
 std::string see_to_absent(const StationState& state) {
   const auto absent =
       std::ranges::find_if(state.devices, [](const auto& device) { return device.problem.has_value(); });
@@ -89,7 +89,7 @@ std::string working(const StationState& state) {
   }
 }
 
-/// What Start would do: the head of the queue tells, and what of it is there already.
+/// Effect of Start: depends on the head of the queue, and on how much of that job exists.
 std::string how_to_start(const StationState& state) {
   const auto start = steps_before_motion(state) + "then press Start.";
   if (state.queue.empty()) return "Put a part on the table, " + start;
@@ -107,7 +107,7 @@ std::string see_to_calibration(const Error& problem) {
 
 bool warming_up(const StationState& state) { return state.warm_up_left > std::chrono::seconds(0); }
 
-/// What keeps the next job from beginning by itself: its part, or everything else although its part may be there.
+/// Reason why the next job does not start automatically: its part, or anything else although its part may be there.
 std::string what_holds_the_line(const StationState& state) {
   if (const auto* problem = calibration_problem(state)) return see_to_calibration(*problem);
   if (state.quiet) return "Quiet hours: the queue continues when they end.";
@@ -131,14 +131,14 @@ OperatorMessage when_ready(const StationState& state, const StationRules& rules)
           with_light(rules, "Switch the projector on. ", see_to_absent(state) + how_to_start(state))};
 }
 
-/// What has to be seen to besides: the next action alone would lead into the same trouble again.
+/// Further checks for the operator: the next action alone would lead to the same problem again.
 OperatorMessage with_disk(const StationState& state, OperatorMessage words) {
   if (state.disk_problem) words.sentence += " The job disk does not respond.";
   if (state.disk_trouble) words.next_action.insert(0, "Check the job disk. ");
   return words;
 }
 
-/// The line has turned the object over.
+/// The automation turned the part over.
 std::string how_to_go_on(const StationState& state) {
   return state.guard_closed ? "The scan continues." : "Close the guard: the scan continues.";
 }
@@ -192,7 +192,7 @@ namespace {
 
 std::string why(const JobInfo& job) { return job.error ? job.error->message : "no reason recorded"; }
 
-/// Of the pose that is being scanned.
+/// Views of the current pose.
 auto views_of_pose(const JobInfo& job) {
   return std::ranges::count(job.stored, job.complete, [](const StoredView& view) { return view.pose; });
 }

@@ -9,7 +9,7 @@ namespace scanrig {
 
 /// What the panel, the page and the command line show to a person.
 struct OperatorMessage {
-  std::string sentence;     ///< what is going on
+  std::string sentence;     ///< what happens now
   std::string next_action;  ///< what the operator should do, if only to wait
 };
 
@@ -19,7 +19,7 @@ OperatorMessage describe(const StationState& state, const StationRules& rules);
 /// One job: its state, the reason for it, and what to do about it.
 OperatorMessage describe(const JobInfo& job);
 
-/// What to do when a pose is complete.
+/// Next action when a pose is complete.
 std::string how_to_flip(const Recipe& recipe, bool guard_closed = true);
 
 }  // namespace scanrig

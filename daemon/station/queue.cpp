@@ -26,7 +26,7 @@ std::int64_t first_place(const StationState& s) { return s.queue.empty() ? 0 : s
 
 bool goes_on_by_itself(const StationState& s) { return !s.queue.empty() && s.queue.front()->recipe.start_on_part; }
 
-/// Waiting for a part is of use only while a job is there for it.
+/// A part is awaited only while a job exists for it.
 void look_at_queue(StepBuilder& m) {
   auto& s = m.s();
   if (s.activity != Activity::waiting_for_part) return;
@@ -76,7 +76,7 @@ void ask_job(StepBuilder& m, const event::JobRequested& asked) {
 
 void job_updated(StepBuilder& m, const std::shared_ptr<const JobInfo>& info) {
   auto& s = m.s();
-  if (m.is_active(info->id)) return;  // a fresh job that already has the rig
+  if (m.is_active(info->id)) return;  // a new job that is already active
   s.unjudged.erase(info->id);         // cancelled
   leave_queue(s, info->id);
   if (info->state != JobState::queued) return look_at_queue(m);
@@ -113,7 +113,7 @@ void start_next_job(StepBuilder& m, const std::string& new_job_id, std::string c
 
 void job_not_started(StepBuilder& m, const event::JobNotStarted& e) {
   auto& not_started = m.s().not_started;
-  if (!not_started || not_started->job != e.job) not_started = {e.job, e.why};  // what came first is the reason
+  if (!not_started || not_started->job != e.job) not_started = {e.job, e.why};  // the first reason counts
   if (!m.is_active(e.job)) return;
   m.s().job.reset();
   m.s().disk_trouble = e.why.code == ErrorCode::io;
@@ -121,8 +121,8 @@ void job_not_started(StepBuilder& m, const event::JobNotStarted& e) {
   m.enter(MachineState::ready, fmt::format("Job {} did not start: {}.", e.job, e.why.message));
 }
 
-/// One damaged folder stops no line. The part on the table is meant for this job: the next one begins with it only
-/// where it was ordered in the same words, and waits for its own otherwise.
+/// One damaged folder does not stop the automation. The part on the table is meant for this job. The next job starts
+/// with it only if it was ordered with the same part text, and otherwise waits for its own.
 void job_unreadable(StepBuilder& m, const event::JobUnreadable& e) {
   if (!m.is_active(e.job)) return;
   auto& s = m.s();

@@ -11,7 +11,7 @@ void finish_pose(StepBuilder& m) {
   m.act(action::FinishPose{job.id, job.pose, job.pose + 1 == job.recipe.poses});
 }
 
-/// What the views of this pose show does not belong together: no model can come of them.
+/// The views of this pose do not belong together: no model can come of them.
 void moved(StepBuilder& m, const MovementCheck& movement_check) {
   const auto& job = *m.s().job;
   const bool resuming = job.taken < job.recipe.views;
@@ -28,20 +28,20 @@ void moved(StepBuilder& m, const MovementCheck& movement_check) {
   release_rig(m, cause);
 }
 
-/// No use turning the object over.
+/// Reports that turning the object over is useless.
 void fail_before_flip(StepBuilder& m) {
   const auto job = *m.s().job;
   m.close_job(JobState::failed, *job.reconstruction);
   release_rig(m, fmt::format("Job {} failed.", job.id));
 }
 
-/// A disk that takes nothing more is no fault of the rig: what moves is stopped, as by Stop, and nothing latches. What
-/// is stored stays, and with room again the job can be resumed.
+/// A full disk is no fault of the rig: what moves is stopped, as by Stop, and nothing latches. What
+/// is stored remains, and with free space the job can be resumed.
 void interrupt(StepBuilder& m, const Error& why, const char* then) {
   const auto id = m.s().job->id;
   const bool begun = m.s().job->is_started;
   m.close_job(JobState::interrupted, why);
-  if (m.s().machine == MachineState::error) return;  // a fault came first and has the word
+  if (m.s().machine == MachineState::error) return;  // a fault came first and keeps its message
   auto cause =
       fmt::format("Job {} {}: {}{}.", id, begun ? "is interrupted" : "was not begun", why.message, begun ? then : "");
   if (m.s().activity != Activity::scanning) return m.enter(MachineState::ready, std::move(cause));  // nothing moves
@@ -124,7 +124,7 @@ void pose_stored(StepBuilder& m, const event::PoseStored& e) {
   }
 }
 
-/// A pose that is being scanned is scanned to its end.
+/// A pose is always scanned to its end.
 void model_given_up(StepBuilder& m, const Error& why) {
   m.s().job->reconstruction = why;
   if (m.s().activity == Activity::waiting_for_flip) fail_before_flip(m);
@@ -148,7 +148,7 @@ void store_failed(StepBuilder& m, const event::StoreFailed& e) {
   interrupt(m, e.error, disk ? "; check the disk, then resume the job" : "");
 }
 
-/// Whoever has the rig waits for the disk sooner or later; better it ends by its name than by a time-out of its own.
+/// The active job waits for the disk sooner or later: end it with the disk's name, not with a time-out elsewhere.
 void disk_checked(StepBuilder& m, const event::DiskChecked& e) {
   m.s().disk_problem = e.problem;
   if (!e.problem) return handle_part_signals(m);

@@ -14,7 +14,7 @@
 
 namespace scanrig {
 
-/// Whether the table is known to stand still.
+/// Whether the table is confirmed to be stopped.
 enum class Standstill {
   confirmed,
   pending,  ///< stop was sent, the drive has not confirmed yet
@@ -31,12 +31,12 @@ struct Snapshot {
   std::string sentence{};
   std::string next_action{};
   bool may_be_moving = false;  ///< the last stop was not confirmed
-  std::string fault_device{};  ///< in Error: whose failure it is; empty: nobody's, as of an e-stop
+  std::string fault_device{};  ///< in Error: the failed device; empty: none, as of an e-stop
   PanelInputs inputs{};
   PanelOutputs outputs{};
   std::vector<DeviceHealth> devices{};         ///< as of the last check
   std::optional<Error> calibration_problem{};  ///< why the calibration refuses the next scan
-  std::string job{};                           ///< the one that has the rig; empty: none
+  std::string job{};                           ///< the active one; empty: none
   std::optional<NotStarted> not_started{};     ///< by the last Start; until the next one
   std::vector<std::string> queue{};            ///< ids of the jobs to come, the next one first
   JobTable jobs{};

@@ -130,7 +130,7 @@ bool StepBuilder::require_devices() {
   const auto* const absent = absent_device();
   if (!absent) return true;
   const auto& why = *absent->problem;
-  // To whoever asked it is a device that does not answer, and neither the disk nor a file, whatever its port says.
+  // For the requester a device does not respond: the cause is neither the disk nor a file, whatever its port returns.
   const auto code = exit_code(why.code) == ExitCode::device ? why.code : ErrorCode::timeout;
   refuse(code, "The {} is not responding: {}.", absent->name, why.message);
   return false;

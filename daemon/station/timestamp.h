@@ -8,7 +8,7 @@ namespace scanrig {
 /// "2026-11-21T09:30:00Z"
 std::string iso_time(std::chrono::system_clock::time_point when);
 
-/// "20261121-093000-1": sorts by time; `serial` tells apart what starts in the same second.
+/// "20261121-093000-1": sorts by time; `serial` distinguishes what starts in the same second.
 std::string job_id(std::chrono::system_clock::time_point when, int serial);
 
 }  // namespace scanrig

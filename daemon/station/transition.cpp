@@ -92,12 +92,12 @@ class Transition : public StepBuilder {
 
   void operator()(const event::EstopWindowOver&) { classify_fault(); }
 
-  /// Where nobody knows whether the table moves, stop is asked for again and again: the first frame that gets through.
+  /// While standstill is unconfirmed, stop is requested repeatedly: the first frame that gets through counts.
   void operator()(const event::StopRetryDue&) {
     if (s().may_be_moving && s().activity == Activity::none && !s().shutting_down) send_stop();
   }
 
-  /// Asking devices is for quiet times only.
+  /// Requests to devices are for quiet times only.
   void operator()(const event::CheckDue&) {
     const bool standing = s().activity == Activity::none || s().activity == Activity::waiting_for_flip ||
                           s().activity == Activity::waiting_for_part;
@@ -115,7 +115,7 @@ class Transition : public StepBuilder {
     handle_part_signals(*this);
   }
 
-  /// The call that returns in the end may have been a stop that has no evidence yet.
+  /// The call that finally returns may have been a stop that has no evidence yet.
   void operator()(const event::HungCallChanged& e) {
     const auto before = std::exchange(s().hung, e.call);
     if (s().shutting_down && !e.call) return;
@@ -149,7 +149,7 @@ class Transition : public StepBuilder {
     s().may_be_moving = false;
     if (e.light) set_problem("projector", *e.light);
     stopped();
-    if (!s().shutting_down) check();  // what is wrong is shown before somebody presses Start
+    if (!s().shutting_down) check();  // problems are shown before the operator presses Start
     auto_home_if_allowed();
   }
 
@@ -158,7 +158,7 @@ class Transition : public StepBuilder {
     fault_unclassified(e);
   }
 
-  /// The first cause stays: an e-stop is an e-stop, whatever a drive without power answers.
+  /// The first cause stays: an e-stop is an e-stop, whatever a drive without power returns.
   void operator()(const event::StopFailed& e) {
     if (s().machine != MachineState::error) {
       s().cause = fmt::format("The table may be moving: {}.", e.error.message);
@@ -169,12 +169,12 @@ class Transition : public StepBuilder {
     s().auto_home_allowed = false;
     s().maintenance.reset();
     s().may_be_moving = true;
-    set_problem("turntable", e.error);  // nobody else will ask it now
-    stopped();                          // no more evidence will come by itself
+    set_problem("turntable", e.error);  // no other check of it will follow
+    stopped();                          // no further evidence will come
     if (!s().shutting_down) act(action::RetryStopLater{});
   }
 
-  /// What cannot be read proves nothing: no motion.
+  /// An unreadable panel proves nothing: no motion.
   void operator()(const event::PanelFailed& e) {
     s().panel_known = false;
     s().panel_problem = e.error;
@@ -205,7 +205,7 @@ class Transition : public StepBuilder {
 
   void operator()(const event::ModelReady& e) { count_result(*this, e.job, !e.limit_violation); }
 
-  /// A latched fault is not to be got rid of by a reload.
+  /// A reload must not clear a latched fault.
   void operator()(const event::ReloadRequested& e) {
     constexpr const char* kStays = "The configuration is not reloaded";
     if (s().shutting_down) return refuse(ErrorCode::busy, "{}: the service is ending or reloading.", kStays);
@@ -239,16 +239,16 @@ class Transition : public StepBuilder {
     stop_rig();
   }
 
-  /// Whatever the folder said while it was on its way to the rig, the job does not wait for the rig any more.
+  /// Whatever state the folder had on its way to the rig, the job does not wait for the rig any more.
   void operator()(const event::JobClosed& e) { job_removed(*this, e.job); }
 
-  // These concern the list of jobs or whoever asked.
+  // These concern the list of jobs or the requester.
   void operator()(const event::StageProgress&) {}
   void operator()(const event::RequestDone&) {}
 
  private:
-  /// Requested motion is over before the devices are checked. An alarm that was there when the daemon started, or that
-  /// came with a latched fault, is left to Reset; an e-stop takes the drive's power away and must keep its name.
+  /// Requested motion has ended before the devices are checked. An alarm from before the daemon's start, or with a
+  /// latched fault, is left to Reset. An e-stop takes the drive's power away and must keep its name.
   void check_drive(const event::DriveReport& drive) {
     if (s().shutting_down) return;
     if (drive.is_moving) {
@@ -296,8 +296,8 @@ class Transition : public StepBuilder {
     start_next_job(*this, new_job_id, "Start was pressed.");
   }
 
-  /// Never refused: in every state the drive is told to stop and the light goes out. The job stays resumable. Home is
-  /// lost only where something was moving, or about to.
+  /// Never refused: in every state the drive is commanded to stop and the light goes out. The job stays resumable. Home
+  /// is lost only where something was moving, or about to.
   void stop() {
     const bool was_active = may_move();
     if (!s().unclassified) close_job(JobState::interrupted, {ErrorCode::stopped, "Stop was pressed"});
