@@ -14,15 +14,15 @@ namespace scanrig {
 /// Decides what a client may do. Threads: any.
 class Access {
  public:
-  /// `tokens`: the file; empty: there are none.
+  /// `tokens`: the file; empty: no tokens.
   Access(PeerRoles peers, std::filesystem::path tokens);
 
   [[nodiscard]] const PeerRoles& peers() const { return peers_; }
-  /// Reads the file of tokens again. Tokens that cannot be read are void. Touches the disk.
+  /// Reads the file of tokens again. Unreadable tokens are void. Touches the disk.
   void refresh();
   /// Why tokens are void.
   [[nodiscard]] std::optional<Error> problem() const;
-  /// `authorization` is the header's value. Where there is one, the token decides and nothing else; without one,
+  /// `authorization` is the header's value. With one, only the token decides; without one,
   /// `peer`.
   [[nodiscard]] std::optional<Role> role_of(std::optional<Role> peer, std::string_view authorization) const;
 

@@ -6,7 +6,7 @@
 namespace scanrig {
 namespace {
 
-constexpr std::size_t kMaxAccounts = 1024;  ///< then those that have their full allowance again are forgotten
+constexpr std::size_t kMaxAccounts = 1024;  ///< then those with their full allowance again are dropped
 
 }  // namespace
 
@@ -52,14 +52,14 @@ Admission::SeatPtr Admission::enter(Pool& pool, const std::string& peer, OnEvict
   return seat;
 }
 
-/// One that was evicted has left already.
+/// An evicted one has left already.
 void Admission::leave(Pool& pool, std::uint64_t number) {
   const std::lock_guard guard(mutex_);
   const auto place = std::ranges::find(pool.taken, number, &Taken::number);
   if (place != pool.taken.end()) remove(pool, place);
 }
 
-/// Where several peers have most, the oldest of all of theirs: a newcomer is never the first to go.
+/// Where several peers have most, the oldest of all of theirs: a newcomer is never evicted first.
 Admission::Places::iterator Admission::oldest_of_largest(Pool& pool) {
   std::size_t most = 0;
   for (const auto& [peer, count] : pool.by_peer) most = std::max(most, count);

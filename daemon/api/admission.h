@@ -12,23 +12,23 @@
 
 namespace scanrig {
 
-/// What one client, and all of them together, may use up. A peer is a user of this machine, or an address.
+/// Limits for one client, and for all of them together. A peer is a user of this machine, or an address.
 struct ApiLimits {
-  // A connection waits until its first request has shown who sends it, then has a seat. Local connections have waiting
-  // places and seats of their own. All of them together stay well below the 1024 descriptors of a process.
+  // A connection waits until its first request has shown its sender, then has a seat. Local connections have separate
+  // waiting places and seats. All of them together stay well below the 1024 descriptors of a process.
   std::size_t waiting = 128, local_waiting = 64;
   std::size_t connections = 256, local_connections = 64;
   std::size_t connections_a_peer = 128;
   std::size_t reserved = 16;            ///< for Stop and status where no seat is free, each for one request
-  double requests_a_second = 1000.0;    ///< a peer, on average
-  double requests_at_once = 1000.0;     ///< a peer, after a pause
+  double requests_a_second = 1000.0;    ///< per peer, on average
+  double requests_at_once = 1000.0;     ///< per peer, after a pause
   double price_of_a_bad_token = 100.0;  ///< in requests: 10 guesses a second
   std::uint32_t header_bytes = 8 * 1024;
   std::uint64_t body_bytes = 64 * 1024;
   // Absolute: a client that sends or reads a byte now and then gains nothing.
   std::chrono::milliseconds header_time{5000};
   std::chrono::milliseconds body_time{5000};
-  std::chrono::milliseconds answer_time{10000};  ///< for the station to decide, and for an answer to be taken
+  std::chrono::milliseconds answer_time{10000};  ///< for the station to decide, and for a reply to be taken
   double slowest_bytes_a_second = 64 * 1024.0;   ///< of a download
   std::chrono::milliseconds heartbeat{10000};    ///< of an event stream
 };
@@ -38,7 +38,7 @@ class Admission : public std::enable_shared_from_this<Admission> {
  public:
   using Clock = std::chrono::steady_clock;
   enum class Door { local, tcp };
-  /// The seat was given to another connection: close this one. From any thread; must not wait.
+  /// Called when the seat went to another connection: close this one. From any thread; must not wait.
   using OnEvicted = std::function<void()>;
 
   explicit Admission(const ApiLimits& limits);
@@ -78,13 +78,13 @@ class Admission : public std::enable_shared_from_this<Admission> {
 
   /// A waiting place. There is always one: where all are taken, the peer with the most of them loses its oldest.
   SeatPtr wait(Door door, const std::string& peer, OnEvicted on_evicted);
-  /// A seat for an authenticated peer. Where all are taken, a peer that has at least two more than this one loses its
-  /// oldest. Null where there is none, or where this peer has its share.
+  /// A seat for an authenticated peer. Where all are taken, a peer with at least two more than this one loses its
+  /// oldest. Null where none is free, or where this peer has its share.
   SeatPtr enter(Door door, const std::string& peer, OnEvicted on_evicted);
   /// A seat for one request that must not be refused, as wait().
   SeatPtr enter_reserved(const std::string& peer, OnEvicted on_evicted);
 
-  /// Counts a request. False: too many since the last pause. Hanging up buys no new ones.
+  /// Counts a request. False: too many since the last pause. Hanging up gains no new ones.
   bool may_request(const std::string& account, Clock::time_point now) { return take(account, 1.0, now); }
   void charge_bad_token(const std::string& account, Clock::time_point now) {
     take(account, limits_.price_of_a_bad_token, now);
@@ -94,7 +94,7 @@ class Admission : public std::enable_shared_from_this<Admission> {
 
  private:
   struct Account {
-    double requests = 0.0;  ///< that it may make at once
+    double requests = 0.0;  ///< allowed at once
     Clock::time_point counted{};
   };
   SeatPtr enter(Pool& pool, const std::string& peer, OnEvicted on_evicted, bool always);

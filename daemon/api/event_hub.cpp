@@ -30,7 +30,7 @@ void EventHub::see(std::shared_ptr<const Snapshot> snapshot) {
     const auto& known = seen_ ? seen_->jobs : kNone;
     for (const auto& [id, job] : snapshot->jobs) {
       const auto old = known.find(id);
-      // At the first look all jobs are old: a client lists them.
+      // In the first snapshot all jobs are old: a client lists them.
       if (seen_ && (old == known.end() || old->second != job)) add("job", to_line(to_detailed_json(*job)));
     }
     for (const auto& [id, job] : known) {

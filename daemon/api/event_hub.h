@@ -14,13 +14,13 @@
 
 namespace scanrig {
 
-/// Makes events of what changes between snapshots and keeps the newest for clients that come back. Threads: any.
+/// Makes events of changes between snapshots and keeps the newest for returning clients. Threads: any.
 class EventHub {
  public:
-  /// `life` tells this daemon's numbers from those of the one before.
+  /// `life` distinguishes this daemon's numbers from those of the one before.
   explicit EventHub(std::string life, std::size_t kept = 1024) : life_(std::move(life)), kept_(kept) {}
 
-  /// Tells all subscribers when something that clients see is different from the last time.
+  /// Notifies all subscribers when something that clients can read has changed.
   void see(std::shared_ptr<const Snapshot> snapshot);
 
   using Text = std::shared_ptr<const std::string>;  ///< of server-sent events, ready to be sent
@@ -28,10 +28,10 @@ class EventHub {
     std::uint64_t last = 0;  ///< number of the newest event
     std::vector<Text> texts{};
   };
-  /// For a client that begins: what it missed since `last_event_id`; without one, or when that is not kept any more
+  /// For a new client: what it missed since `last_event_id`. Without one, or when that is not kept any more
   /// (then after an event `lost`), the present status.
   [[nodiscard]] Batch join(std::string_view last_event_id) const;
-  /// What came after event `last`; as join() when that is not kept any more.
+  /// Events after `last`; as join() when that is not kept any more.
   [[nodiscard]] Batch after(std::uint64_t last) const;
 
   /// `wake` is called from any thread when there are new events, and must not wait. Returns its number.

@@ -68,7 +68,7 @@ Result<Values::Value> value_of(const RequestField& field, const json& value) {
   return value.get<std::int64_t>();
 }
 
-/// nlohmann's parser keeps the last of two equal keys; here that is a mistake to be told, as is too deep a nesting.
+/// nlohmann's parser keeps the last of two equal keys; here that is reported as an error, as is too deep a nesting.
 json parse_strictly(std::string_view body) {
   std::vector<std::set<std::string>> keys;
   bool sound = true;

@@ -12,7 +12,7 @@
 
 namespace scanrig {
 
-/// One value a request may carry: in its path, behind its question mark, or in its JSON body. The same description
+/// One value that a request may carry: in its path, in its query, or in its JSON body. The same description
 /// checks requests and is printed in the OpenAPI document.
 struct RequestField {
   enum class Type { text, number, integer, flag };
@@ -24,13 +24,13 @@ struct RequestField {
   std::vector<std::string_view> words{};  ///< a text must be one of these; empty: any
 };
 
-/// What a request carries, checked against its fields; all their names in one list.
+/// Values of a request, checked against its fields; all their names in one list.
 class Values {
  public:
   using Value = std::variant<std::string, double, std::int64_t, bool>;
   void set(std::string_view name, Value value) { values_.insert_or_assign(std::string(name), std::move(value)); }
   [[nodiscard]] bool has(std::string_view name) const { return values_.contains(name); }
-  /// Of the field's type; nothing when the request does not carry it.
+  /// A value of the field's type; nothing when the request does not carry it.
   [[nodiscard]] std::optional<std::string> text(std::string_view name) const { return get<std::string>(name); }
   [[nodiscard]] std::optional<double> number(std::string_view name) const { return get<double>(name); }
   [[nodiscard]] std::optional<std::int64_t> integer(std::string_view name) const { return get<std::int64_t>(name); }
@@ -50,7 +50,7 @@ class Values {
   std::string requester_;
 };
 
-/// Reads the text of a parameter as what `field` describes. Fails with `invalid_input`, naming the field.
+/// Reads the text of a parameter as `field` describes it. Fails with `invalid_input`, naming the field.
 Result<Values::Value> parse_value(const RequestField& field, const std::string& text);
 
 /// Reads a JSON body into `values`: an object of known keys, each as its field describes. An empty body is an empty

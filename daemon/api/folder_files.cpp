@@ -27,7 +27,7 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 10> kTypes{{
                                                                                 {".mtl", "text/plain; charset=utf-8"}}};
 
 Result<int> open_component(int folder, const std::string& name, bool last) {
-  // O_NONBLOCK: whatever somebody has put there, opening it does not wait.
+  // O_NONBLOCK: whatever kind of file is there, opening it does not wait.
   const int flags = O_RDONLY | O_CLOEXEC | O_NOFOLLOW | (last ? O_NONBLOCK : O_DIRECTORY);
   const int fd = ::openat(folder, name.c_str(), flags);
   if (fd >= 0) return fd;

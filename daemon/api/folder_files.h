@@ -23,7 +23,7 @@ Result<std::vector<FolderFile>> list_files(const std::filesystem::path& folder);
 /// Opens a file below `folder`, component by component, following no link. Fails with `not_found`, `io`.
 Result<std::shared_ptr<OpenFile>> open_below(const std::filesystem::path& folder, std::string_view path);
 
-/// By its ending: "model/gltf-binary", "image/png", ...
+/// Media type by the file's ending: "model/gltf-binary", "image/png", ...
 std::string_view media_type(std::string_view path);
 
 }  // namespace scanrig

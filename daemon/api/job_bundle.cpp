@@ -25,7 +25,7 @@ void send_bundle(const ApiStation& station, const Values& values, Send send) {
   if (!find_job(station, values)) return send(no_such_job());
   const auto packed = station.storage / fmt::format("{}{}{}", kPrefix, ++number, kEnding);
   const event::JobRequested asked{.what = event::JobRequested::What::bundle, .job = *values.text("id"), .path = packed};
-  // The answer comes on the control loop's thread, which must not touch the disk.
+  // The reply comes on the control loop's thread, which must not touch the disk.
   station.loop.ask(asked,
                    [send = std::move(send), packed, on_worker = station.on_worker](const Result<std::string>& done) {
                      if (!done) return send(error_response(done.error()));

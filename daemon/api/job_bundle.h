@@ -6,10 +6,10 @@
 
 namespace scanrig {
 
-/// Packs a job into a file of its own beside the jobs and sends it; the file's name is gone before the first byte is.
+/// Packs a job into a separate file beside the jobs and sends it; the file's name is gone before the first byte is.
 void send_bundle(const ApiStation& station, const Values& values, Send send);
 
-/// What a daemon that died while packing has left.
+/// Deletes what a daemon that died while packing has left.
 void remove_old_bundles(const std::filesystem::path& storage);
 
 }  // namespace scanrig

@@ -59,7 +59,7 @@ ordered_json to_json(const std::vector<Error>& errors) {
   return list;
 }
 
-/// How often and why it was exposed again.
+/// Number and reasons of the retakes.
 void add_retakes(ordered_json& json, const std::vector<Error>& reasons) {
   json["retakes"] = json["redone"] = reasons.size();           // redone: old name
   json["retake_reasons"] = json["spoilt"] = to_json(reasons);  // spoilt: old name

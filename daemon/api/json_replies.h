@@ -8,7 +8,7 @@
 
 namespace scanrig {
 
-/// What the API says, as JSON. The shapes are those of schemas.cpp.
+/// The API's replies as JSON, in the shapes of schemas.cpp.
 nlohmann::ordered_json to_json(const Error& error);
 nlohmann::ordered_json to_json(const std::optional<Error>& error);
 nlohmann::ordered_json to_json(const Snapshot& snapshot);     ///< Status
@@ -16,7 +16,7 @@ nlohmann::ordered_json to_json(const JobInfo& job);           ///< Job
 nlohmann::ordered_json to_detailed_json(const JobInfo& job);  ///< JobDetail
 nlohmann::ordered_json io_table(const Snapshot& snapshot);    ///< Io
 
-/// Paths come from the file system and need not be UTF-8: what is not is replaced.
+/// Paths come from the file system and need not be UTF-8: invalid bytes are replaced.
 std::string to_text(const nlohmann::ordered_json& json);
 /// The same without line breaks.
 std::string to_line(const nlohmann::ordered_json& json);

@@ -5,7 +5,7 @@
 namespace scanrig {
 namespace {
 
-/// Backslash, quote and line break are all that a label's value must escape.
+/// A label's value must escape only backslash, quote and line break.
 std::string escaped(std::string_view text) {
   std::string plain;
   for (const char c : text) {

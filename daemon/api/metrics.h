@@ -7,7 +7,7 @@
 
 namespace scanrig {
 
-/// In the text format 0.0.4 of Prometheus. Names begin with scanrig_, units are base units.
+/// Metrics in the text format 0.0.4 of Prometheus. Names start with scanrig_, units are base units.
 std::string metrics_text(const Snapshot& snapshot, const ServiceStatus& facts);
 
 }  // namespace scanrig

@@ -12,7 +12,7 @@
 
 namespace scanrig {
 
-/// Who is at the other end of a Unix socket, as the kernel saw it when it connected.
+/// The process at the other end of a Unix socket, as the kernel recorded it on connection.
 struct PeerCredentials {
   uid_t uid = 0;
   std::vector<gid_t> groups;  ///< all of them
@@ -21,7 +21,7 @@ struct PeerCredentials {
 /// Fails with `io`.
 Result<PeerCredentials> peer_credentials(int socket);
 
-/// Which groups make a local user what. Root and the daemon's own user are engineers.
+/// Groups that give a local user each role. Root and the daemon's own user are engineers.
 struct PeerRoles {
   std::optional<gid_t> viewer, operating, engineer;
 
@@ -35,7 +35,7 @@ struct PeerGroups {
   [[nodiscard]] bool any() const { return viewer || operating || engineer; }
 };
 
-/// The reverse proxy in front of the API. What it forwards counts for the address that it names.
+/// The reverse proxy in front of the API. Requests it forwards count for the address that it names.
 struct Proxy {
   std::optional<std::string> address{};  ///< over TCP, as plain_address() writes it
   std::optional<uid_t> user{};           ///< over the Unix socket
@@ -45,13 +45,13 @@ struct Proxy {
 /// Fails with `invalid_input`, `not_found` (the user).
 Result<Proxy> find_proxy(const std::string& name);
 
-/// The address in one spelling, IPv4 as such where it is mapped to IPv6. Nothing where `text` is no address.
+/// The address in one spelling, IPv4 as such where it is mapped to IPv6. Nothing where `text` is not an address.
 std::optional<std::string> plain_address(std::string_view text);
 
 /// The client that the nearest proxy names in X-Forwarded-For: the last address. Those before it come from the client.
 std::optional<std::string> forwarded_address(std::string_view header);
 
-/// Without any group named, the caller's own one operates. Fails with `not_found`.
+/// Without any group named, the caller's own group operates. Fails with `not_found`.
 Result<PeerRoles> find_groups(const PeerGroups& groups);
 
 }  // namespace scanrig

@@ -17,7 +17,7 @@ int hexadecimal(char c) {
 
 bool is_control(char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; }
 
-/// Nothing for a bad escape and for characters that have no business here, escaped or not.
+/// Nothing for a bad escape and for forbidden characters, escaped or not.
 std::optional<std::string> decode(std::string_view text) {
   std::string plain;
   for (std::size_t i = 0; i < text.size(); ++i) {

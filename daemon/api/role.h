@@ -6,7 +6,7 @@
 
 namespace scanrig {
 
-/// Who may do what: each role may do what those before it may.
+/// Rights of a client: each role may do what those before it may.
 enum class Role { viewer, operating, engineer };
 
 inline constexpr std::array kRoles{Role::viewer, Role::operating, Role::engineer};

@@ -35,7 +35,7 @@ unsigned http_status(ErrorCode code) {
     case ErrorCode::not_found: return 404;
     case ErrorCode::io:
     case ErrorCode::internal: return 500;
-    default: return 409;  // a rule or the state of the rig is against it
+    default: return 409;  // a rule or the state of the rig forbids it
   }
 }
 

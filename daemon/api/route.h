@@ -19,7 +19,7 @@ namespace scanrig {
 enum class Method { get, post, del };
 std::string_view to_string(Method method);  ///< "GET", "POST", "DELETE"
 
-/// A file to be sent: open already, so that what is checked is what is sent.
+/// A file to be sent: already open, so that the checked file is the one sent.
 class OpenFile {
  public:
   OpenFile(int fd, std::uint64_t size) : fd_(fd), size_(size) {}
@@ -54,7 +54,7 @@ struct ApiStation {
   std::function<Result<std::string>(std::string_view side)> preview_jpeg{};  ///< of "left" or "right"
   std::function<Result<void>()> check_config{};            ///< of the file that the daemon was started with
   std::function<void(ControlLoop::Reply)> reload{};        ///< of it; reads the disk
-  std::function<void(std::function<void()>)> on_worker{};  ///< for what touches the disk
+  std::function<void(std::function<void()>)> on_worker{};  ///< for work that touches the disk
 };
 
 using Send = std::function<void(ApiResponse)>;
@@ -66,27 +66,27 @@ struct Reply {
   std::string_view type = "application/json";
 };
 
-/// One thing the API does. Dispatch, checks and the OpenAPI document all read this and nothing else.
+/// One operation of the API. Dispatch, checks and the OpenAPI document all read only this.
 struct Route {
   Method method;
   std::string_view path;  ///< "/api/v1/jobs/{id}"
-  Role role;              ///< that is enough
+  Role role;              ///< the lowest sufficient one
   std::string_view description;
   std::vector<RequestField> in_path{}, in_query{}, in_body{};
   Reply reply;
-  std::vector<unsigned> errors{};        ///< beside those that every route has
+  std::vector<unsigned> errors{};        ///< beside those of every route
   bool slow = false;                     ///< touches the disk: done by a worker, not by an I/O thread
   bool reserved = false;                 ///< served where no seat is free
-  std::chrono::seconds reply_timeout{};  ///< for the answer; 0: as the limits say
+  std::chrono::seconds reply_timeout{};  ///< for the reply; 0: as in the limits
   /// Calls `send` once, from this thread or, soon, from the control loop's.
   std::function<void(const ApiStation&, const Values&, Send)> handle;
 };
 
-/// The job that the value `id` names; null where there is none. What is no job's name gets no further than this.
+/// The job that the value `id` names; null where there is none. Text that cannot be a job's id is stopped here.
 std::shared_ptr<const JobInfo> find_job(const ApiStation& station, const Values& values);
 ApiResponse no_such_job();
 
-/// Status of an answer that is an error.
+/// HTTP status of an error reply.
 unsigned http_status(ErrorCode code);
 /// {"error": {"code", "message"}}
 ApiResponse error_response(const Error& error);

@@ -8,7 +8,7 @@ namespace scanrig {
 
 std::vector<Route> station_routes();  ///< status, events, buttons, maintenance, inputs and outputs
 std::vector<Route> job_routes();      ///< jobs as they are, their files and models
-std::vector<Route> order_routes();    ///< what is done with jobs: queued, cancelled, bundled, removed, ...
+std::vector<Route> order_routes();    ///< actions on jobs: queued, cancelled, bundled, deleted, ...
 std::vector<Route> service_routes();  ///< health, metrics, the OpenAPI document
 
 }  // namespace scanrig

@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-/// What is wrong now, of whatever kind.
+/// Present problems, of any kind.
 ordered_json problems_of(const Snapshot& snapshot, const ServiceStatus& facts) {
   ordered_json problems = ordered_json::array();
   for (const auto& device : snapshot.devices) {
@@ -53,7 +53,7 @@ void metrics(const ApiStation& station, const Values&, const Send& send) {
   send({.body = metrics_text(*station.loop.snapshot(), station.facts()), .type = "text/plain; version=0.0.4"});
 }
 
-/// A camera that does not answer now may do so later.
+/// A camera that does not respond now may do so later.
 void preview(const ApiStation& station, const Values& values, const Send& send) {
   auto jpeg = station.preview_jpeg(*values.text("side"));
   send(jpeg ? ApiResponse{.body = std::move(*jpeg), .type = "image/jpeg"} : error_response(503, jpeg.error()));

@@ -32,7 +32,7 @@ Route press(std::string_view path, Button button, Role role, std::string_view de
           }};
 }
 
-/// The snapshot is that of the stop, or a later one.
+/// The snapshot of the stop, or a later one.
 ApiResponse stopped(const Result<std::string>& job, const Snapshot& snapshot) {
   if (!job) return error_response(job.error());
   return {.body = to_text({{"job", job->empty() ? ordered_json(nullptr) : ordered_json(*job)},

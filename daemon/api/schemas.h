@@ -4,7 +4,7 @@ namespace scanrig {
 
 /// The shapes of the API's replies: a JSON object of OpenAPI 3.0 schemas by name.
 extern const char* const kSchemas;
-/// What makes the schema Job into JobDetail: a JSON merge patch (RFC 7396), but what it requires comes on top.
+/// Additions that make the schema Job into JobDetail: a JSON merge patch (RFC 7396), but its `required` is added.
 extern const char* const kJobDetail;
 
 }  // namespace scanrig

@@ -29,7 +29,7 @@ using ErrorCondition = boost::system::error_code;
 
 constexpr int kThreads = 2;
 constexpr auto kEventPeriod = std::chrono::milliseconds(50);  ///< changes closer together become one event
-constexpr auto kLookPeriod = std::chrono::seconds(1);         ///< at disk, sensors and the file of tokens
+constexpr auto kLookPeriod = std::chrono::seconds(1);         ///< of disk, sensors and the file of tokens
 constexpr auto kLastAnswers = std::chrono::milliseconds(200), kLookAgain = std::chrono::milliseconds(1);
 constexpr auto kAcceptPause = std::chrono::milliseconds(100);  ///< when there are no descriptors left
 
@@ -133,7 +133,7 @@ struct ApiServer::Impl {
     std::make_shared<ApiSession>(std::move(socket), core, std::move(peer))->start();
   }
 
-  /// On a worker, again and again.
+  /// Runs on a worker, repeatedly.
   void look() {
     look_timer.expires_after(kLookPeriod);
     look_timer.async_wait([this](ErrorCondition) {
@@ -221,7 +221,7 @@ Result<std::unique_ptr<ApiServer>> ApiServer::start(const ApiOptions& options, C
 
 ApiServer::ApiServer(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 
-/// What the control loop has answered last still reaches who asked, such as for the reload that ends this server.
+/// The control loop's last reply still reaches its requester, such as for the reload that ends this server.
 ApiServer::~ApiServer() {
   const auto last = Steady::now() + kLastAnswers;
   while (impl_->core.answers.use_count() > 1 && Steady::now() < last) std::this_thread::sleep_for(kLookAgain);

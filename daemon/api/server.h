@@ -17,7 +17,7 @@ namespace scanrig {
 
 struct ApiOptions {
   std::filesystem::path socket;
-  PeerGroups groups{};             ///< which may what over the socket
+  PeerGroups groups{};             ///< rights of each over the socket
   std::optional<int> http_port{};  ///< TCP, where every request needs a token; 0: any free port
   std::string http_address = "127.0.0.1";
   std::filesystem::path tokens{};  ///< the file of tokens
@@ -27,8 +27,8 @@ struct ApiOptions {
   std::filesystem::path storage{};                                                      ///< whose disk is watched
   std::function<Result<std::string>(std::string_view side)> preview_jpeg = no_preview;  ///< from any thread
   std::function<Result<void>()> check_config = no_config;  ///< of the file that the daemon was started with; likewise
-  /// Reads that file again and begins anew with it, where nothing is being done; the reply as ControlLoop::ask().
-  std::function<void(ControlLoop::Reply)> reload = no_reload;  ///< may take its time; from any thread
+  /// Reads that file again and restarts with it if the rig is idle; the reply as for orders to the ControlLoop.
+  std::function<void(ControlLoop::Reply)> reload = no_reload;  ///< may take long; from any thread
   ApiLimits limits{};
   std::function<void(JournalEntry)> journal = [](const auto&) {};  ///< orders refused; from any thread, must not wait
 
@@ -39,7 +39,7 @@ struct ApiOptions {
   static void no_reload(const ControlLoop::Reply& reply) { reply(pass_on(no_config())); }
 };
 
-/// The HTTP API on a Unix socket and, if wanted, on TCP: two I/O threads, a strand a connection, every step of a
+/// The HTTP API on a Unix socket and, if wanted, on TCP: two I/O threads, a strand per connection, every step of a
 /// request with an absolute limit. It reads snapshots and posts to the control loop, and neither waits for the other.
 class ApiServer {
  public:
@@ -51,7 +51,7 @@ class ApiServer {
   ApiServer(const ApiServer&) = delete;
   ApiServer& operator=(const ApiServer&) = delete;
 
-  /// There is a new snapshot. From any thread; does not wait.
+  /// Takes a new snapshot. From any thread; does not wait.
   void wake();
   [[nodiscard]] int http_port() const;  ///< 0 without TCP
 

@@ -12,7 +12,7 @@
 
 namespace scanrig {
 
-/// What all connections share. Outlives them.
+/// State shared by all connections. Outlives them.
 struct ServerCore {
   ServerCore(ApiStation what, PeerRoles peers, Proxy in_front, const ApiOptions& options, std::string life)
       : station(std::move(what)),
@@ -32,8 +32,8 @@ struct ServerCore {
   const std::shared_ptr<Admission> admission;
   EventHub hub;
   std::atomic<std::uint64_t> requests = 0, refused = 0;
-  const std::shared_ptr<int> answers = std::make_shared<int>();  ///< one more owner for every answer on its way out
-  boost::asio::thread_pool workers{2};                           ///< for what touches the disk
+  const std::shared_ptr<int> answers = std::make_shared<int>();  ///< one more owner for every reply on its way out
+  boost::asio::thread_pool workers{2};                           ///< for work that touches the disk
 };
 
 }  // namespace scanrig

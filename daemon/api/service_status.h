@@ -12,21 +12,21 @@
 namespace scanrig {
 
 struct Temperature {
-  std::string sensor;  ///< the kernel's name of it
+  std::string sensor;  ///< the kernel's name for it
   double celsius = 0.0;
 };
 
-/// What the API knows beside the station.
+/// Data that the API has beside the station's.
 struct ServiceStatus {
   double uptime_s = 0.0;
-  std::uint64_t disk_bytes = 0, disk_free_bytes = 0;  ///< where jobs are kept; 0: not known
+  std::uint64_t disk_bytes = 0, disk_free_bytes = 0;  ///< where jobs are kept; 0: unknown
   std::vector<Temperature> temperatures{};            ///< empty where the machine has no sensors
   std::optional<Error> tokens_problem{};              ///< why no token is accepted
   std::size_t connections = 0, event_streams = 0;
   std::uint64_t requests = 0, refused = 0;  ///< refused: by role, token or limits
 };
 
-/// Disk and temperatures as they are now. Touches the disk.
+/// Present state of disk and temperatures. Touches the disk.
 ServiceStatus read_machine(const std::filesystem::path& storage);
 
 }  // namespace scanrig

@@ -52,7 +52,7 @@ void ApiSession::take(Place place, Admission::SeatPtr seat) {
   seat_ = std::move(seat);
 }
 
-/// For the request that has just been read. A connection of a proxy may carry requests of many.
+/// Sender of the request just read. A connection of a proxy may carry requests of many.
 bool ApiSession::take_seat(bool may_use_reserved) {
   if (place_ == Place::seat && seat_->peer() == requester_) return true;
   const auto door = peer_.is_proxy ? Admission::Door::tcp : peer_.door;
@@ -61,14 +61,14 @@ bool ApiSession::take_seat(bool may_use_reserved) {
     take(Place::seat, std::move(seat));
     return true;
   }
-  seat_number_ = had;  // the place that it has may still be taken away
+  seat_number_ = had;  // its present place may still be taken away
   if (!may_use_reserved) return false;
   last_ = true;
   take(Place::reserved, core_.admission->enter_reserved(requester_, when_evicted()));
   return true;
 }
 
-/// A seat that was left for another is no reason to hang up when it is taken away late.
+/// A seat exchanged for another is no reason to hang up when it is taken away late.
 Admission::OnEvicted ApiSession::when_evicted() {
   return [weak = weak_from_this(), strand = stream_.get_executor(), number = ++seat_number_] {
     net::post(strand, [weak, number] {
@@ -124,7 +124,7 @@ void ApiSession::on_header(Error error) {
                    [self = shared_from_this()](Error failed, std::size_t) { self->on_body(failed); });
 }
 
-/// What Stop and status may cost is counted apart from all else: neither bad tokens nor other requests use it up.
+/// Stop and status have a separate allowance: neither bad tokens nor other requests use it up.
 bool ApiSession::may_request(const Route* route, bool authenticated) {
   const auto now = Admission::Clock::now();
   if (route && route->reserved) return core_.admission->may_request(fmt::format("{} {}", route->path, requester_), now);
@@ -132,7 +132,7 @@ bool ApiSession::may_request(const Route* route, bool authenticated) {
   return core_.admission->may_request(requester_, now);
 }
 
-/// A body that nobody has read is in the way of a next request.
+/// An unread body would block the next request.
 void ApiSession::refuse(ApiResponse response, bool must_close) {
   ++core_.refused;
   last_ = last_ || must_close || !parser_->is_done();
@@ -147,7 +147,7 @@ void ApiSession::on_body(Error error) {
   write_text(std::move(*complaint));
 }
 
-/// The answer may come from a worker or from the control loop; until then only the timer keeps this session.
+/// The reply may come from a worker or from the control loop; until then only the timer keeps this session.
 void ApiSession::call() {
   await_answer(match_->route->reply_timeout);
   const bool slow = match_->route->slow;
@@ -215,7 +215,7 @@ void ApiSession::answer(ApiResponse response) {
   }
 }
 
-/// The same for all answers. What comes out of a job's folder is shown, never run.
+/// Headers common to all replies. Content of a job's folder is shown, never run.
 void ApiSession::set_head(unsigned status, std::string_view type) {
   response_ = {static_cast<http::status>(status), 11};
   response_.set(http::field::content_type, {type.data(), type.size()});
@@ -244,7 +244,7 @@ void ApiSession::on_written(Error error) {
 
 void ApiSession::hang_up() { stream_.close(); }
 
-/// A socket closed while the client still sends would take the answer with it.
+/// A socket closed while the client still sends would lose the reply.
 void ApiSession::drain() {
   Error ignored;
   stream_.socket().shutdown(net::socket_base::shutdown_send, ignored);
@@ -266,7 +266,7 @@ std::optional<Role> ApiSession::role() const {
   return core_.access.role_of(peer_.role, header(http::field::authorization));
 }
 
-/// Several lines of one header are one list.
+/// Several lines of one header form one list.
 std::string ApiSession::requester() const {
   if (!peer_.is_proxy) return peer_.name;
   const auto lines = parser_->get().equal_range("X-Forwarded-For");

@@ -12,15 +12,15 @@
 
 namespace scanrig {
 
-/// Where a connection comes from.
+/// Origin of a connection.
 struct ApiPeer {
   Admission::Door door = Admission::Door::tcp;
   std::string name{};          ///< a user of this machine, or an address
-  std::optional<Role> role{};  ///< by the kernel's record of the peer; nothing over TCP and for a proxy
-  bool is_proxy = false;       ///< names in each request whom it is from
+  std::optional<Role> role{};  ///< from the kernel's record of the peer; nothing over TCP and for a proxy
+  bool is_proxy = false;       ///< names the sender in each request
 };
 
-/// One connection, over TCP or a Unix socket: reads a request, answers, reads the next. Lives as long as something
+/// One connection, over TCP or a Unix socket: reads a request, replies, reads the next. Lives as long as a step
 /// is under way on it, each with an absolute limit. All of it runs on the socket's strand.
 class ApiSession : public std::enable_shared_from_this<ApiSession> {
  public:
@@ -35,7 +35,7 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
  private:
   using Error = boost::beast::error_code;
 
-  /// An order, as the log tells it when it is refused. Holds no more of the request than its path.
+  /// An order, as the log records its refusal. Holds no more of the request than its path.
   struct JobOrder {
     std::string asked;
     std::string job{};
@@ -85,15 +85,15 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
   const ApiPeer peer_;
   Admission::SeatPtr seat_;
   Place place_ = Place::waiting;
-  std::uint64_t seat_number_ = 0;  ///< counts the seats that this connection has had
-  std::string requester_;          ///< whose request this is
+  std::uint64_t seat_number_ = 0;  ///< number of seats this connection has had
+  std::string requester_;          ///< sender of this request
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::string_body>> parser_;
   std::optional<Router::Match> match_;
-  std::optional<JobOrder> order_;    ///< that is being answered; of what only looks: nothing
-  bool waiting_ = false;             ///< for an answer to the request
+  std::optional<JobOrder> order_;    ///< the order in progress; nothing for requests that only read
+  bool waiting_ = false;             ///< for a reply to the request
   bool last_ = false;                ///< no request can follow
-  std::shared_ptr<int> on_its_way_;  ///< while an answer is being written
+  std::shared_ptr<int> on_its_way_;  ///< while a reply is being written
   boost::beast::http::response<boost::beast::http::string_body> response_;
   std::string chunk_;  ///< head or part of a file, or what is left of a drained request
 

@@ -24,7 +24,7 @@ std::string ApiSession::head_text() const {
   return text.str();
 }
 
-/// One limit for all of it, long enough for the slowest client that is served.
+/// One limit for the whole file, long enough for the slowest client that is served.
 void ApiSession::begin_file(std::shared_ptr<OpenFile> file, std::string_view type) {
   file_ = std::move(file);
   sent_ = 0;
@@ -46,14 +46,14 @@ void ApiSession::write_chunk() {
   });
 }
 
-/// On a worker: a slow disk keeps no connection waiting but this one.
+/// Runs on a worker: a slow disk delays only this connection.
 void ApiSession::read_chunk() {
   net::post(core_.workers, [self = shared_from_this()] {
     self->chunk_.resize(std::min<std::uint64_t>(kChunk, self->file_->size() - self->sent_));
     const auto got =
         ::pread(self->file_->fd(), self->chunk_.data(), self->chunk_.size(), static_cast<off_t>(self->sent_));
     net::post(self->stream_.get_executor(), [self, got] {
-      if (got <= 0) return self->hang_up();  // the file became shorter: better no answer than a wrong one
+      if (got <= 0) return self->hang_up();  // the file became shorter: better no reply than a wrong one
       self->chunk_.resize(static_cast<std::size_t>(got));
       self->sent_ += static_cast<std::uint64_t>(got);
       self->write_chunk();
@@ -101,7 +101,7 @@ void ApiSession::wait_for_events() {
   });
 }
 
-/// A heartbeat; whoever has lost the right to listen is cut off with it.
+/// Sends a heartbeat; a client without the right to listen any more is cut off then.
 void ApiSession::beat() {
   if (writing_events_) return;
   if (!role()) return hang_up();

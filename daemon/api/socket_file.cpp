@@ -85,7 +85,7 @@ Result<int> take_over_socket(int passed, mode_t mode) {
   const int own = ::fcntl(passed, F_DUPFD_CLOEXEC, 0);
   struct stat file {};
   if (own < 0 || ::stat(path.c_str(), &file) != 0) return fail_errno("use the passed", path, own);
-  // Whoever made it has most likely said so already, and may be another user.
+  // Its creator has most likely set the mode already, and may be another user.
   if ((file.st_mode & 0777) != mode && ::chmod(path.c_str(), mode) != 0)
     return fail_errno("set the mode of", path, own);
   return own;
@@ -97,7 +97,7 @@ Result<int> listen_on_socket(const fs::path& path, mode_t mode) {
     if (auto made = create_directories_synced(path.parent_path()); !made) return pass_on(made);
   }
   if (auto free = check_free(path); !free) return pass_on(free);
-  // Bound under another name, so that nobody can connect before the mode is set; the rename also removes a stale file.
+  // Bound under another name: no client can connect before the mode is set. The rename also removes a stale file.
   fs::path temporary = path;
   temporary += fmt::format(".{}", ::getpid());
   const auto address = address_of(temporary);

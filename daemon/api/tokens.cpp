@@ -50,7 +50,7 @@ bool is_name(const std::string& name) {
   return !name.empty() && name.size() <= 32 && std::ranges::all_of(name, allowed);
 }
 
-/// Who could read it could try to guess; who could write it would be an engineer.
+/// A reader of the file could try to guess tokens; a writer would be an engineer.
 Result<void> check_private(const fs::path& path) {
   struct stat status {};
   if (::stat(path.c_str(), &status) != 0) {
@@ -66,7 +66,7 @@ Result<void> check_private(const fs::path& path) {
   return {};
 }
 
-/// Written by root in the daemon's folder, it is the daemon that reads it.
+/// The daemon reads a file that root has written in the daemon's folder.
 Result<void> give_to_owner_of_folder(const fs::path& path) {
   struct stat folder {};
   const fs::path parent = path.has_parent_path() ? path.parent_path() : fs::path(".");

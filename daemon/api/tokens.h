@@ -11,7 +11,7 @@
 
 namespace scanrig {
 
-/// One token as the file keeps it. The token itself is 256 random bits and is not kept: a fast hash is enough.
+/// One token as the file keeps it. The token itself is 256 random bits and is not stored: a fast hash is enough.
 struct TokenRecord {
   std::string name;
   Role role = Role::viewer;
@@ -23,14 +23,14 @@ struct TokenRecord {
 /// The tokens of the API. A file of mode 0600 (or less), JSON, replaced as a whole.
 class TokenFile {
  public:
-  /// A file that is not there has no tokens. Fails with `io`, `refused` (others may read or write it, or it is neither
+  /// A missing file has no tokens. Fails with `io`, `refused` (others may read or write it, or it is neither
   /// the caller's nor root's), `invalid_input`.
   static Result<TokenFile> read(const std::filesystem::path& path);
 
-  /// Role of the one who shows `token`. Takes the same time whichever token it is, or none.
+  /// Role of the bearer of `token`. Takes the same time whichever token it is, or none.
   [[nodiscard]] std::optional<Role> role_of(std::string_view token) const;
 
-  /// The new token, "scanrig_..." - shown once. Names are 1 to 32 of A-Z a-z 0-9 . _ -
+  /// Adds a token and returns it, "scanrig_..." - shown once. Names are 1 to 32 of A-Z a-z 0-9 . _ -
   /// Fails with `exists`, `invalid_input`.
   Result<std::string> add(const std::string& name, Role role, std::string created);
   Result<void> revoke(const std::string& name);  ///< fails with `not_found`

@@ -44,13 +44,13 @@ Answer understand(const http::response<http::string_body>& response, const std::
       RequestError{exit_code(code.value_or(ErrorCode::internal)), json["error"].value("message", "")});
 }
 
-/// A file that is gone in the end, whatever happens.
+/// A file that is removed in the end, whatever happens.
 struct Removed {
   std::filesystem::path path;
   ~Removed() { ::unlink(path.c_str()); }
 };
 
-/// A connection to the daemon on which every wait ends: a daemon that was stopped, or hangs, says nothing at all.
+/// A connection to the daemon on which every wait ends: a stopped or hanging daemon sends nothing at all.
 class Link {
  public:
   static tl::expected<std::unique_ptr<Link>, RequestError> open(const std::filesystem::path& path,
@@ -64,7 +64,7 @@ class Link {
         ExitCode::unreachable, why.message + (why.code == ErrorCode::not_found ? "; is the daemon running?" : "")});
   }
 
-  /// What comes from now on has `limit`.
+  /// Sets `limit` for what follows.
   void give(Clock::Duration limit) {
     limit_ = limit;
     by_ = Clock::TimePoint::clock::now() + limit;
@@ -98,7 +98,7 @@ class Link {
                         path.string(), std::chrono::duration<double>(limit).count())};
   }
 
-  /// Until what `begin` begins is done. Too late is the end of the connection.
+  /// Runs until the operation that `begin` starts is done. A time-out ends the connection.
   template <class Begin>
   error_code wait(const Begin& begin) {
     error_code result;
@@ -142,7 +142,7 @@ tl::expected<Response, RequestError> exchange_once(const std::filesystem::path& 
   return response;
 }
 
-/// Who asks too often is told so, and asks again a little later.
+/// A client that sends too many requests gets an error, and repeats its request a little later.
 tl::expected<Response, RequestError> exchange(const std::filesystem::path& path, const std::string& method,
                                               const std::string& target, const std::string& body,
                                               Clock::Duration limit) {
@@ -202,7 +202,7 @@ tl::expected<void, RequestError> download(const std::filesystem::path& path, con
   if (!error) error = link.read_header(parser);
   if (error) return link.failed(error);
   if (parser.get().result() != http::status::ok) return request_error_of(link, std::move(parser), target);
-  // The name is taken at the end, and never from somebody who has it.
+  // The name is taken at the end, and never from an existing file.
   const std::filesystem::path part = out.string() + fmt::format(".part-{}", ::getpid());
   const Removed remove_part{part};
   const std::unique_ptr<std::FILE, int (*)(std::FILE*)> file(std::fopen(part.c_str(), "wbx"), std::fclose);

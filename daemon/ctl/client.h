@@ -12,35 +12,35 @@
 
 namespace scanrig::ctl {
 
-/// Why a request was not answered with success.
+/// Why a request did not succeed.
 struct RequestError {
   ExitCode exit = ExitCode::internal;
   std::string message;
 };
 
-/// For a whole request: connecting, sending it, the answer.
+/// Limit for a whole request: connecting, sending it, the reply.
 constexpr std::chrono::seconds kReplyTimeout{15};
 
-/// One request to the daemon behind `socket` and its JSON answer. Fails with `unreachable` (no daemon, or it has not
-/// answered within `limit`) or with the exit code of the API's error.
+/// Sends one request to the daemon behind `socket` and returns its JSON reply. Fails with `unreachable` (no daemon, or
+/// no reply within `limit`) or with the exit code of the API's error.
 tl::expected<nlohmann::json, RequestError> send_request(const std::filesystem::path& socket, const std::string& method,
                                                         const std::string& target, const std::string& body = "",
                                                         Clock::Duration limit = kReplyTimeout);
 
-/// The same for an answer that is no JSON: its bytes, such as a picture.
+/// The same for a reply that is not JSON: its bytes, such as an image.
 tl::expected<std::string, RequestError> fetch(const std::filesystem::path& socket, const std::string& target);
 
-/// How much of how much has come.
+/// Bytes received so far, and in total.
 using Arrived = std::function<void(std::uint64_t bytes, std::uint64_t of)>;
 
-/// Writes what the daemon sends for GET `target` to `out`, which must not be there; after a failure it is not there.
-/// It has `limit` to begin with the file, then kReplyTimeout for each piece. Fails as send_request(), with `bad_input`
-/// (the file is there) and `disk`.
+/// Writes the daemon's reply to GET `target` to `out`, which must not exist; after a failure it does not exist.
+/// It has `limit` to start the file, then kReplyTimeout for each piece. Fails as send_request(), with `bad_input`
+/// (the file exists) and `disk`.
 tl::expected<void, RequestError> download(const std::filesystem::path& socket, const std::string& target,
                                           const std::filesystem::path& out, const Arrived& arrived,
                                           Clock::Duration limit = kReplyTimeout);
 
-/// `text` as one segment of a target: what is no letter, digit or one of ._- is escaped.
+/// `text` as one segment of a target: all but letters, digits and ._- is escaped.
 std::string segment(std::string_view text);
 
 }  // namespace scanrig::ctl

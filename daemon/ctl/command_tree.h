@@ -6,14 +6,14 @@
 
 namespace scanrig::ctl {
 
-/// What completion and manual pages need of a CLI11 tree, hidden verbs left out.
+/// Data for completion and manual pages from a CLI11 tree, hidden verbs left out.
 struct OptionWords {
   std::vector<std::string> names{};  ///< "--json"; empty: positional
   std::string description{};
-  std::string label{};                ///< of its value: "ID", "FILE", ...; empty: a flag
-  std::vector<std::string> values{};  ///< that it may have; empty: any
+  std::string label{};                ///< for its value: "ID", "FILE", ...; empty: a flag
+  std::vector<std::string> values{};  ///< allowed ones; empty: any
   std::string fallback{};             ///< value without it
-  std::string variable{};             ///< of the environment
+  std::string variable{};             ///< in the environment
   bool required = false;
 };
 

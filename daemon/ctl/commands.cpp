@@ -185,7 +185,7 @@ void add_camera(CLI::App& app, Chosen& chosen) {
   }
 }
 
-/// Started by the tools that move, on their socket.
+/// Started by the tools that move the table, on their socket.
 void add_guardian(CLI::App& app, Chosen& chosen) {
   const auto config = std::make_shared<std::filesystem::path>();
   auto* sub = app.add_subcommand("guard-motion", "stop the table when the program that moves it ends")->group("");

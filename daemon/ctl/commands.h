@@ -8,7 +8,7 @@
 #include "daemon/ctl/verbs.h"
 
 namespace scanrig::ctl {
-/// The verb that was asked for; set while the command line is read.
+/// The requested verb; set while the command line is read.
 using Chosen = std::function<ExitCode()>;
 
 // The one description of the command line: parsing, help, completion and manual pages are all made from it.
@@ -18,7 +18,7 @@ void add_offline_commands(CLI::App& app, Chosen& chosen);  ///< reconstruct, eva
 void add_rig_commands(CLI::App& app, Chosen& chosen);      ///< at the rig, while no daemon runs
 void add_pages_command(CLI::App& app, Chosen& chosen);     ///< hidden: writes completion and manual pages
 
-/// A verb that talks to the daemon: `run` gets its connection. `Verb` are its own options.
+/// A verb that sends requests to the daemon: `run` gets its connection. `Verb` holds its options.
 template <class Verb, class Run>
 CLI::App* add_client(CLI::App& app, Chosen& chosen, const char* name, const char* description,
                      std::shared_ptr<Verb> verb, Run run) {

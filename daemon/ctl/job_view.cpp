@@ -13,7 +13,7 @@ namespace {
 
 using nlohmann::json;
 
-/// Of a view or a movement check.
+/// Retakes of a view or a movement check.
 std::string retakes(const json& taken) {
   const int count = taken.at("retakes");
   std::string text = count == 0 ? "" : fmt::format(", {} exposure{} redone", count, count == 1 ? "" : "s");

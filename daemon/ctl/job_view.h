@@ -10,21 +10,21 @@
 #include "daemon/ctl/output.h"
 
 namespace scanrig::ctl {
-/// Why the last Start did not begin `job`; nothing if it did, or still may. `status` as GET status gives it.
+/// Why the last Start did not start `job`; nothing if it did, or still may. `status` as GET status gives it.
 std::optional<Error> why_not_started(const nlohmann::json& status, const std::string& job);
 
-/// Tells a job's story line by line from what the API says of it, again and again.
+/// Prints a job's progress line by line from the API's replies, repeatedly.
 class JobStory {
  public:
   explicit JobStory(StageBars& bars) : bars_(bars) {}
 
-  /// No job has the rig yet: tells what the station waits for, when that is another thing.
+  /// Without an active job: prints what the station waits for, when that has changed.
   void wait(const nlohmann::json& status);
 
   /// `status` and `job` as GET status and GET jobs/ID give them. Returns true when the job is over.
   bool tell(const nlohmann::json& status, const nlohmann::json& job);
 
-  /// How the job ended: `ok`, or the exit code of its error, which is told on stderr. A model that does not pass is
+  /// Result of the job: `ok`, or the exit code of its error, which is printed on stderr. A model that does not pass is
   /// an error, too.
   [[nodiscard]] ExitCode end(const nlohmann::json& job);
 
@@ -33,13 +33,13 @@ class JobStory {
   std::size_t views_told_ = 0;
   std::size_t movement_checks_reported_ = 0;
   bool introduced_ = false;
-  std::string waited_{};     ///< the cause of the last wait told
-  std::string asked_ = "-";  ///< what the operator was last asked to do
+  std::string waited_{};     ///< the last printed cause of a wait
+  std::string asked_ = "-";  ///< the last action requested from the operator
   RealClock clock_;
   Clock::TimePoint begun_ = clock_.now();
 };
 
-/// What a person wants to know of one job: `job` as GET jobs/ID gives it.
+/// Summary of one job for a person: `job` as GET jobs/ID gives it.
 std::vector<std::string> job_lines(const nlohmann::json& job);
 
 }  // namespace scanrig::ctl

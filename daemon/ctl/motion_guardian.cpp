@@ -25,7 +25,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 constexpr seconds kStartTimeout{5};
-constexpr seconds kLifeTimeout{2};       ///< a program in a move that reports nothing for so long is killed
+constexpr seconds kLifeTimeout{2};       ///< a program in a move without reports for this long is killed
 constexpr seconds kMakeSafeTimeout{60};  ///< for a drive whose cable or power is gone
 constexpr seconds kResultTimeout = kMakeSafeTimeout + seconds(5);
 constexpr seconds kExitTimeout{2};
@@ -84,7 +84,7 @@ Result<pid_t> spawn_guardian(const std::filesystem::path& config, int socket) {
   return child;
 }
 
-/// What follows the end of the program or its silence in a move.
+/// Handles the end of the program, or its silence in a move.
 enum class End { dismissed, gone, hangs };
 
 End wait_for_end(int socket) {
@@ -156,7 +156,7 @@ void MotionGuardian::wait_for_exit() {
 
 ExitCode guard_motion(const std::filesystem::path& config) {
   ::prctl(PR_SET_NAME, kName);
-  std::signal(SIGPIPE, SIG_IGN);  // whoever reads our messages may be gone
+  std::signal(SIGPIPE, SIG_IGN);  // the receiver of the messages may be gone
   const pid_t parent = ::getppid();
   const auto base = config.parent_path();
   const auto read = [&](config::SafetyDevice device) { return config::read_device_config(device, config, base); };

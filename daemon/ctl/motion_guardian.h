@@ -12,7 +12,7 @@
 namespace scanrig::ctl {
 
 /// A child process that makes the rig safe when the program that moves it ends without a confirmed standstill, whatever
-/// ended it, or stops running in the middle of a move (SIGSTOP, a device call that hangs): then it is killed first.
+/// ended it. A program that stops running in a move (SIGSTOP, a device call that hangs) is killed first.
 /// The child has a session of its own, so a terminal's Ctrl-C and hangup do not reach it, and its own process name.
 /// Threads: report() from any; all else from the owner's.
 class MotionGuardian {
@@ -27,9 +27,9 @@ class MotionGuardian {
 
   /// Sign of life, at least every half second while something moves. False: the guardian is gone.
   bool report(bool is_moving);
-  /// The table is seen stopped, or nothing has moved it. The guardian ends.
+  /// Standstill is confirmed, or nothing has moved the table. The guardian ends.
   void dismiss();
-  /// The guardian stops the table; all devices are closed before. Returns once it is seen stopped. Fails with
+  /// The guardian stops the table; all devices are closed before. Returns once standstill is confirmed. Fails with
   /// `timeout`: the table may be moving.
   Result<void> take_over();
 

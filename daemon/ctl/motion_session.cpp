@@ -22,14 +22,14 @@ namespace {
 using std::chrono::milliseconds;
 using std::chrono::seconds;
 
-/// The daemon's 2 s, and what the panel's thread may take until the lamp is lit.
+/// The daemon's 2 s, plus the longest time of the panel's thread until the lamp is lit.
 constexpr milliseconds kWarning{2600};
 constexpr seconds kPanelTimeout{2};
 constexpr milliseconds kSupervisePeriod{50};
 constexpr milliseconds kStandstillTimeout{1500};
 constexpr milliseconds kDriveStopTimeout{500};
 
-/// SignalStop leaves signals blocked; a prompt after the motion is to end with Ctrl-C as before it.
+/// SignalStop leaves signals blocked; a prompt after the motion must end with Ctrl-C as before it.
 class RestoredSignals {
  public:
   RestoredSignals() { ::pthread_sigmask(SIG_SETMASK, nullptr, &before_); }
@@ -41,7 +41,7 @@ class RestoredSignals {
   sigset_t before_{};
 };
 
-/// Why nothing may move, from what the panel reads.
+/// Why nothing may move, from the panel's inputs.
 std::optional<Error> obstacle(const PanelInputs& inputs) {
   if (!inputs.estop_ok) return Error{ErrorCode::refused, "e-stop: pressed. Release it, then try again"};
   if (!inputs.guard_closed) return Error{ErrorCode::refused, "guard: open. Close it, then try again"};
@@ -66,7 +66,7 @@ class MotionSession final : public Motion {
   Result<void> check_panel();
   Result<void> turn(const std::function<Result<void>(Turntable&)>& move) override;
   Result<void> turn_drive(const DriveMove& move) override;
-  /// `result`: of all the moves. Success only with the table seen stopped.
+  /// `result`: of all the moves. Success only with standstill confirmed.
   Result<void> end(Result<void> result);
 
  private:
@@ -90,7 +90,7 @@ class MotionSession final : public Motion {
   std::condition_variable changed_;
   std::optional<PanelInputs> inputs_;   // under the mutex, as all up to the threads
   std::optional<Error> cause_;          // the first reason to stop
-  std::function<void()> request_stop_;  // of what moves now
+  std::function<void()> request_stop_;  // for what moves now
   bool is_moving_ = false;
   bool is_ending_ = false;
 
@@ -98,14 +98,14 @@ class MotionSession final : public Motion {
   std::unique_ptr<Panel> panel_;
   std::optional<PanelThread> panel_thread_;
   std::thread supervisor_;
-  // Of the owner's thread only.
+  // Only for the owner's thread.
   std::unique_ptr<Turntable> table_;
   bool has_warned_ = false;
   bool has_moved_ = false;
   bool is_handed_over_ = false;  // to the guardian
 };
 
-/// Before everything else; one that was pressed all along is an obstacle.
+/// Reads the inputs first; one that was pressed all along is an obstacle.
 void MotionSession::estop() {
   {
     const std::lock_guard lock(mutex_);
@@ -160,7 +160,7 @@ Result<void> MotionSession::check_panel() {
   return {};
 }
 
-/// The lamp, before the first move.
+/// Lights the lamp, before the first move.
 Result<void> MotionSession::warn() {
   if (!std::exchange(has_warned_, true)) {
     panel_thread_->show({.amber = true, .busy = true});
@@ -241,7 +241,7 @@ Result<void> MotionSession::end(Result<void> result) {
   return result && cause_ ? tl::unexpected(*cause_) : result;
 }
 
-/// Panel, table and threads; the lamps as they were shown last.
+/// Closes panel, table and threads; the lamps stay as shown last.
 void MotionSession::close() {
   {
     const std::lock_guard lock(mutex_);

@@ -12,7 +12,7 @@
 
 namespace scanrig::ctl {
 
-/// What a program without the daemon may move, under the daemon's rules: see with_motion().
+/// Motions of a program without the daemon, under the daemon's rules: see with_motion().
 /// Threads: the one that called with_motion().
 class Motion {
  public:
@@ -23,15 +23,15 @@ class Motion {
   /// what to do), as the panel does, or as `move`.
   virtual Result<void> turn(const std::function<Result<void>(Turntable&)>& move) = 0;
 
-  /// The same for a Modbus drive itself. `move` returns soon after `is_stop_requested`; the drive is told to stop after
-  /// any failure.
+  /// The same for a Modbus drive itself. `move` returns soon after `is_stop_requested`; the drive is commanded to stop
+  /// after any failure.
   using DriveMove = std::function<Result<void>(ModbusDrive&, const std::atomic<bool>& is_stop_requested)>;
   virtual Result<void> turn_drive(const DriveMove& move) = 0;
 };
 
-/// The one way for a tool to move the rig `config`, read from `file`. Starts a guardian process, opens the panel,
-/// refuses while e-stop or guard are open or not readable, runs `moves`, and returns success only when the table is
-/// seen stopped after it. SIGINT, SIGTERM and SIGHUP stop the table; whatever else ends the program, the guardian stops
+/// The only way for a tool to move the rig `config`, read from `file`. Starts a guardian process, opens the panel,
+/// refuses while e-stop or guard are open or not readable, runs `moves`, and returns success only with confirmed
+/// standstill after it. SIGINT, SIGTERM and SIGHUP stop the table; at any other end of the program the guardian stops
 /// it. Fails with `refused`, `stopped`, `timeout` (the table may be moving), as the panel or as `moves`.
 Result<void> with_motion(const config::RigConfig& config, const std::filesystem::path& file, Clock& clock,
                          const std::function<Result<void>(Motion&)>& moves);

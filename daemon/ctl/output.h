@@ -10,7 +10,7 @@
 #include "daemon/ctl/client.h"
 
 namespace scanrig::ctl {
-/// What the verbs that talk to the daemon do with its answers.
+/// Output of the daemon's replies, for the verbs that send requests to it.
 ExitCode report_error(const RequestError& error);
 void print(const nlohmann::json& answer);
 /// The text behind `key`; empty where there is none.
@@ -18,7 +18,7 @@ std::string text(const nlohmann::json& object, const char* key);
 /// "1.2 GiB"
 std::string bytes_text(double bytes);
 
-/// Lines and a bar a stage. On a terminal the running stage's bar is drawn over itself; in a log each stage is one
+/// Lines and a bar per stage. On a terminal the running stage's bar is drawn over itself; in a log each stage is one
 /// line, written when it is complete. Threads: one user at a time.
 class StageBars {
  public:
@@ -26,7 +26,7 @@ class StageBars {
 
   void line(std::string_view text);
   void update(const std::string& stage, double fraction);
-  /// The work is over: stages that never said 1 are complete (or stay where they are, if it failed).
+  /// Ends the output: stages that never reported 1 are complete (or stay where they are, if the work failed).
   void end(bool success);
 
  private:

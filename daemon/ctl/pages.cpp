@@ -26,7 +26,7 @@ std::string quoted(const std::string& text) {
   return quoted + "'";
 }
 
-/// Which command the words before the cursor name: the same walk in both shells.
+/// The command that the words before the cursor name: the same walk in both shells.
 std::string known_paths(const CommandWords& root) {
   std::vector<std::string> paths;
   for (const auto* command : flattened(root)) {
@@ -112,7 +112,7 @@ _{0} "$@"
                      root.name, known_paths(root), value_cases(root, say, "_files"), word_cases(root, say, "_files"));
 }
 
-/// fish asks option by option; whether the words before the cursor name `command` is one function.
+/// fish completes option by option; one function tests whether the words before the cursor name `command`.
 std::string fish(const CommandWords& root) {
   std::string text = fmt::format(R"(# fish completion for {0}; generated from its command line
 function __{0}_path
@@ -160,7 +160,7 @@ std::string completion(const CLI::App& app, const std::string& shell) {
 
 namespace {
 
-/// For roff: no line begins with a control character, dashes can be copied, backslashes are shown.
+/// Escapes for roff: no line starts with a control character, dashes can be copied, backslashes are shown.
 std::string roff(const std::string& text) {
   std::string plain = text.starts_with('.') || text.starts_with('\'') ? "\\&" : "";
   for (const char c : text) {
@@ -185,7 +185,7 @@ std::string upper(std::string text) {
   return text;
 }
 
-/// "What is said of a verb."
+/// "Description of a verb."
 std::string sentence(const std::string& description) {
   auto text = roff(description);
   text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
@@ -262,7 +262,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Where an installation below `share` has them.
+/// Places of the files in an installation below `share`.
 Result<void> write_pages(const CLI::App& app, const fs::path& share) {
   std::map<fs::path, std::string> files{{"bash-completion/completions/scanrig", completion(app, "bash")},
                                         {"zsh/vendor-completions/_scanrig", completion(app, "zsh")},

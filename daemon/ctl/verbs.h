@@ -11,19 +11,19 @@
 /// The verbs of the scanrig command. Each prints its result on stdout, or one sentence "scanrig: ..." on stderr.
 namespace scanrig::ctl {
 
-/// Tells an error and gives the exit code that belongs to it.
+/// Prints an error and returns its exit code.
 ExitCode report_error(const Error& error);
 ExitCode report_error(ExitCode code, const std::string& message);
 
-/// An error of a device itself: a port, a line or a socket that cannot be used is a device that does not answer, no
-/// disk or file.
+/// An error of a device itself: a port, a line or a socket that cannot be used is a device that does not respond, not
+/// a disk or file.
 Error of_device(Error error);
 
 // Clients of the daemon.
 
 struct Connection {
   std::filesystem::path socket = "/run/scanrig/api.sock";
-  bool json = false;  ///< print the API's answer as it is
+  bool json = false;  ///< print the API's reply as it is
 };
 
 struct StatusVerb {
@@ -31,15 +31,15 @@ struct StatusVerb {
   bool watch = false;
 };
 ExitCode status(const Connection& connection, const StatusVerb& verb);
-/// One screen, redrawn when something changes, until SIGINT; on what is no terminal the lines that change. With JSON
-/// a line a change.
+/// Shows one screen, redrawn on changes, until SIGINT; without a terminal, the lines that change. With JSON
+/// one line per change.
 ExitCode watch(const Connection& connection);
 ExitCode health(const Connection& connection);
 
 struct StopVerb {
   bool wait = true;
 };
-/// Stop, and then what is known of the table: `ok` (standstill confirmed) or `standstill_unknown`.
+/// Stops, then reports the table's standstill: `ok` (standstill confirmed) or `standstill_unknown`.
 ExitCode stop(const Connection& connection, const StopVerb& verb);
 
 struct StartVerb {
@@ -76,7 +76,7 @@ struct JobVerb {
   std::string id;
   std::optional<double> voxel_mm{};  ///< reprocess
   std::string fusion{};              ///< reprocess
-  bool yes = false;                  ///< delete: do not ask
+  bool yes = false;                  ///< delete: without confirmation
 };
 ExitCode change_job(const Connection& connection, const JobVerb& verb);
 
@@ -112,7 +112,7 @@ struct EvaluateVerb {
 ExitCode evaluate(const EvaluateVerb& verb);
 
 struct ImportVerb {
-  std::vector<std::filesystem::path> conf;  ///< one a pose
+  std::vector<std::filesystem::path> conf;  ///< one per pose
   std::filesystem::path out;
   bool json = false;
 };
@@ -120,7 +120,7 @@ ExitCode import_stanford(const ImportVerb& verb);
 
 struct CheckConfigVerb {
   std::filesystem::path file = "/etc/scanrig/rig.toml";
-  std::filesystem::path drives;  ///< empty: where the daemon looks
+  std::filesystem::path drives;  ///< empty: the daemon's own places
   bool json = false;
 };
 ExitCode check_config(const CheckConfigVerb& verb);
@@ -144,7 +144,7 @@ struct TurntableVerb {
   bool yes = false;
   bool json = false;
 };
-/// `move` homes first: an angle without a known zero is none.
+/// `move` homes first: no angle is valid before homing.
 ExitCode turntable(const TurntableVerb& verb);
 
 struct PanelVerb {
@@ -157,23 +157,23 @@ ExitCode watch_panel(const PanelVerb& verb);
 struct CameraVerb {
   std::string what;  ///< "list", "tune", "grab", "preview"
   std::filesystem::path config = "/etc/scanrig/rig.toml";
-  std::filesystem::path out = ".";  ///< grab, preview: folder of the pictures
-  std::string light = "none";       ///< what the projector does: none, pattern, plain
+  std::filesystem::path out = ".";  ///< grab, preview: folder of the images
+  std::string light = "none";       ///< projector mode: none, pattern, plain
   std::optional<int> exposure_us;   ///< instead of the configuration's
   std::optional<double> gain;
   int count = 0;  ///< tune, preview: how many pairs; 0: until interrupted
   bool json = false;
 };
-/// `preview` asks the daemon where one runs; the others want the cameras for themselves.
+/// `preview` uses a running daemon; the others need the cameras for themselves.
 ExitCode camera(const CameraVerb& verb);
 
 struct DoctorVerb {
   std::filesystem::path config = "/etc/scanrig/rig.toml";
   bool yes_move = false;  ///< the table may be turned
-  bool answers = false;   ///< somebody at the rig answers on standard input although it is no terminal
+  bool answers = false;   ///< a person at the rig replies on standard input although it is no terminal
   bool json = false;
 };
-/// `device` when something was found.
+/// `device` when there is a finding.
 ExitCode examine_rig(const DoctorVerb& verb);
 
 }  // namespace scanrig::ctl

@@ -23,7 +23,7 @@ constexpr seconds kExposureLimit{2};
 constexpr milliseconds kPeriod{200};
 constexpr int kTries = 4;
 
-/// The cameras, and the light that goes with them, of a rig that no daemon has its hands on.
+/// The cameras, and their light, of a rig that no daemon uses.
 class Bench {
  public:
   static Result<std::unique_ptr<Bench>> open(const CameraVerb& verb) {
@@ -47,7 +47,7 @@ class Bench {
     return bench;
   }
 
-  /// `light`: none, pattern or plain. A spoilt exposure is repeated, as the daemon does.
+  /// `light`: none, pattern or plain. A bad exposure is retaken, as the daemon does.
   Result<StereoFrame> expose(const std::string& light) {
     auto pair = expose_once(light);
     for (int i = 1; i < kTries && !pair; ++i) {
@@ -103,7 +103,7 @@ void tell_files(const CameraVerb& verb, const std::filesystem::path& left, const
   fmt::print("{}\n{}\n", left.string(), right.string());
 }
 
-/// What to do about a picture; empty: nothing.
+/// Remedy for an image; empty: nothing.
 std::string_view advice(const ImageQuality& evidence) {
   constexpr double kDim = 0.03, kFull = 0.01;
   if (evidence.saturated > kFull) return "too bright: lower exposure_us or gain";
@@ -163,7 +163,7 @@ ExitCode grab(const CameraVerb& verb, Bench& bench) {
   return ExitCode::ok;
 }
 
-/// One picture of each side, newer than the last; what went wrong where there is none.
+/// One image of each side, newer than the last; the error where there is none.
 using TakePictures = std::function<tl::expected<std::array<std::string, 2>, RequestError>()>;
 
 ExitCode preview(const CameraVerb& verb, const TakePictures& take, Clock& clock) {
@@ -184,7 +184,7 @@ ExitCode preview(const CameraVerb& verb, const TakePictures& take, Clock& clock)
   return ExitCode::ok;
 }
 
-/// The daemon's first answer only asks the cameras for a picture.
+/// The daemon's first reply only requests an image from the cameras.
 ExitCode preview_of_daemon(const CameraVerb& verb, const std::filesystem::path& socket) {
   RealClock clock;
   const auto fetch_side = [&](const char* side) {

@@ -14,14 +14,14 @@ using nlohmann::json;
 
 constexpr int kPage = 500;
 constexpr std::chrono::seconds kPackingTimeout{200};  ///< a bundle has to be made first
-constexpr std::chrono::seconds kPerJobTimeout{1};     ///< a queued job's folder is on the disk when it is answered
+constexpr std::chrono::seconds kPerJobTimeout{1};     ///< a queued job's folder is on the disk at the reply
 
 void print_job(const json& job) {
   fmt::print("{:<22} {:<16} {:>2} views  {:<12} {}\n", text(job, "id"), text(job, "state"), job.at("stored").get<int>(),
              text(job, "part"), job.at("error").is_object() ? text(job.at("error"), "message") : text(job, "model"));
 }
 
-/// As many as are wanted, over as many pages as that takes.
+/// The wanted number of jobs, over as many pages as needed.
 tl::expected<json, RequestError> list(const Connection& connection, const JobsVerb& verb) {
   auto all = json::array();
   const std::string filter = verb.state.empty() ? "" : "&state=" + verb.state;
@@ -37,7 +37,7 @@ tl::expected<json, RequestError> list(const Connection& connection, const JobsVe
   }
 }
 
-/// Copies what the daemon sends to a file here, with a bar.
+/// Copies the daemon's reply to a file here, with a bar.
 ExitCode save(const Connection& connection, const std::string& target, const std::string& name, const std::string& out,
               Clock::Duration limit = kReplyTimeout) {
   std::FILE* told = connection.json ? stderr : stdout;
@@ -91,7 +91,7 @@ ExitCode export_file(const Connection& connection, const ExportVerb& verb) {
   if (const auto done = save(connection, job + "/files/" + segment(verb.file), verb.file, out); done != ExitCode::ok) {
     return done;
   }
-  // Who may only look may copy, but retention goes on as if nobody had.
+  // A viewer may copy, but retention continues as without a copy.
   const auto noted = send_request(connection.socket, "POST", job + "/exported");
   return noted || noted.error().exit == ExitCode::refused ? ExitCode::ok : report_error(noted.error());
 }

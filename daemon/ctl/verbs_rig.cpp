@@ -78,7 +78,7 @@ ExitCode move(const TurntableVerb& verb, const config::RigConfig& rig, Clock& cl
   return ExitCode::ok;
 }
 
-/// What the drive's registers say, whether or not it was homed by us.
+/// Registers of the drive, whether or not this program homed it.
 ExitCode read_registers(const config::RigConfig& rig, Clock& clock, bool json) {
   const auto& options = rig.turntable.modbus;
   ModbusDrive drive(options.line, options.profile, clock);
@@ -111,7 +111,7 @@ ExitCode turntable(const TurntableVerb& verb) {
   const auto rig = offline_rig_config(verb.config);
   if (!rig) return report_error(rig.error());
   RealClock clock;
-  // A GRBL controller has no registers: what it says is its status.
+  // A GRBL controller has no registers: its reply is its status.
   const bool registers = rig->turntable.driver == config::TurntableConfig::Driver::modbus;
   if (verb.what == "read" && registers) return read_registers(*rig, clock, verb.json);
   if (verb.what != "status" && verb.what != "read") return move(verb, *rig, clock);

@@ -15,7 +15,7 @@ using nlohmann::json;
 constexpr auto kPoll = std::chrono::milliseconds(100);
 constexpr auto kStandstillTimeout = std::chrono::seconds(10);  ///< the service gives the drive less
 
-/// `id` empty: the job that has the rig, now or as soon as there is one.
+/// `id` empty: the active job, now or as soon as there is one.
 ExitCode follow(const Connection& connection, std::string id) {
   RealClock clock;
   std::FILE* told = connection.json ? stderr : stdout;

@@ -33,7 +33,7 @@ std::size_t bytes_of(std::string_view text, int width) {
   return i;
 }
 
-/// A line that is too long goes on below, further in; it is broken between words where there are any.
+/// A line that is too long continues below, further in; it is broken between words where possible.
 void wrap(std::string_view line, int width, std::vector<std::string>& lines) {
   const auto indent = std::min<std::size_t>(line.find_first_not_of(' '), static_cast<std::size_t>(width) / 4);
   std::string margin;
@@ -95,7 +95,7 @@ void Screen::show(const std::vector<std::string>& lines) {
     if (fit == shown_) return;
     for (std::size_t i = 0; i < fit.size(); ++i) {
       text += (i == 0 ? "\x1b[H" : "\r\n") + fit[i];
-      // Behind a line that is full the cursor still stands on its last letter, which would be erased.
+      // After a full line the cursor is still on its last letter, which would be erased.
       if (points(fit[i]) < window.width) text += "\x1b[K";
     }
     const bool full = !fit.empty() && points(fit.back()) >= window.width;
@@ -119,7 +119,7 @@ namespace {
 using nlohmann::json;
 
 constexpr auto kGlance = std::chrono::milliseconds(250);
-constexpr auto kGlancePatience = std::chrono::seconds(3);  ///< who watches wants to see that a daemon hangs
+constexpr auto kGlancePatience = std::chrono::seconds(3);  ///< a hanging daemon must show soon
 
 tl::expected<json, RequestError> glance(const Connection& connection, const std::string& target) {
   return send_request(connection.socket, "GET", "/api/v1/" + target, "", kGlancePatience);
@@ -195,7 +195,7 @@ std::vector<std::string> watch_lines(const json& status, const json& health, con
   return lines;
 }
 
-/// A daemon that goes away is waited for: it is what somebody who watches wants to see.
+/// Waits for a daemon that has ended: its return is what the user wants to see.
 ExitCode watch(const Connection& connection) {
   const SignalStop stop;
   RealClock clock;

@@ -22,7 +22,7 @@ constexpr const char* kTar = "/bin/tar";
 constexpr auto kLimit = std::chrono::minutes(30);
 constexpr std::size_t kMaxCrashFiles = 20;
 constexpr std::uintmax_t kMaxTextBytes = 1u << 20;
-constexpr std::uintmax_t kHeaderBytes = 4096;  ///< per file, of tar; what is compressed badly grows by less
+constexpr std::uintmax_t kHeaderBytes = 4096;  ///< per file, of tar; poorly compressed files grow by less
 
 Result<void> sync(const fs::path& file) {
   const int fd = ::open(file.c_str(), O_WRONLY | O_CLOEXEC);
@@ -32,7 +32,7 @@ Result<void> sync(const fs::path& file) {
   return fail(ErrorCode::io, "cannot write {}", file.string());
 }
 
-/// What is half packed when the packing ends in whatever way.
+/// Removes a half packed bundle, whatever ended the packing.
 class Remains {
  public:
   explicit Remains(fs::path path) : path_(std::move(path)) {}
@@ -47,7 +47,7 @@ class Remains {
   fs::path path_;
 };
 
-/// The newest first.
+/// Sorted, newest first.
 std::vector<fs::path> crash_files(const fs::path& folder) {
   std::vector<std::pair<fs::file_time_type, fs::path>> found;
   std::error_code error;
@@ -64,7 +64,7 @@ std::vector<fs::path> crash_files(const fs::path& folder) {
   return files;
 }
 
-/// Whatever cannot be read is left out: the rest is what support needs the more.
+/// Unreadable files are left out: support then needs the rest even more.
 std::map<std::string, std::string> texts_of(const BundleOptions& options) {
   std::map<std::string, std::string> texts;
   const auto add_file = [&](const std::string& name, const fs::path& file) {

@@ -18,7 +18,7 @@ namespace {
 
 using SteadyClock = std::chrono::steady_clock;
 
-constexpr int kLookEvery = 100;  ///< milliseconds: how late a stop may be seen
+constexpr int kLookEvery = 100;  ///< milliseconds: the longest delay until a stop is noticed
 constexpr int kNotStarted = 127;
 
 /// One output of the child, line by line.
@@ -30,7 +30,7 @@ class Lines {
   Lines& operator=(const Lines&) = delete;
 
   [[nodiscard]] int fd() const { return open_ ? fd_ : -1; }
-  /// Reads what is there; `take` gets every whole line.
+  /// Reads the available data; `take` gets every whole line.
   void read(const std::function<void(std::string_view)>& take) {
     char buffer[4096];
     ssize_t got = 0;
@@ -53,8 +53,8 @@ void set_limit(int resource, rlim_t value) {
   ::setrlimit(static_cast<__rlimit_resource>(resource), &limit);
 }
 
-/// Of all that this machine runs, a reconstruction is what the kernel ends first when memory runs out: it can be made
-/// again. To raise it needs no capability.
+/// A reconstruction is what the kernel ends first when memory runs out, before all else on this machine: it can be
+/// repeated. Raising the value needs no capability.
 void give_up_first() {
   constexpr std::string_view kScore = "500";
   const int file = ::open("/proc/self/oom_score_adj", O_WRONLY | O_CLOEXEC);
@@ -63,11 +63,11 @@ void give_up_first() {
   ::close(file);
 }
 
-/// In the child, between fork and exec: only what is safe in a process that had threads.
+/// Runs in the child, between fork and exec: only what is safe in a process that had threads.
 [[noreturn]] void become(char* const* words, int out, int error, const ChildCommand& command, pid_t parent) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::setpgid(0, 0);
-  if (::getppid() != parent) ::_exit(kNotStarted);  // it died before we said so
+  if (::getppid() != parent) ::_exit(kNotStarted);  // the parent died before this was set
   const int nothing = ::open("/dev/null", O_RDONLY);
   ::dup2(nothing, STDIN_FILENO);
   ::dup2(out, STDOUT_FILENO);

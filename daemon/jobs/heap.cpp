@@ -4,7 +4,7 @@
 
 namespace scanrig {
 
-// Other C libraries than glibc do so by themselves, or cannot be told.
+// Other C libraries than glibc do so already, or have no such setting.
 
 void keep_heaps_small() {
 #ifdef M_MMAP_THRESHOLD

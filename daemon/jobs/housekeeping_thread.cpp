@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 
 fs::path ledger_file(const JobStore& store) { return store.options().root / "retention.json"; }
 
-/// Another one after the job has ended anew.
+/// Differs after the job has ended again.
 std::string end_mark(const fs::path& folder) {
   std::string mark;
   for (const auto& file : {folder / "scan.json", report_file(folder)}) {
@@ -62,7 +62,7 @@ void HousekeepingThread::handle(const event::JobRequested& asked) {
   post_event_(event::RequestDone{asked.request_id, catch_exceptions("housekeeping", [&] { return keep(asked); })});
 }
 
-/// None where the station does not know it.
+/// Empty where the station does not list it.
 std::optional<JobState> HousekeepingThread::state_of(const std::string& job) const {
   const auto jobs = jobs_();
   const auto known = jobs.find(job);
@@ -71,7 +71,7 @@ std::optional<JobState> HousekeepingThread::state_of(const std::string& job) con
 
 Result<std::string> HousekeepingThread::keep(const event::JobRequested& asked) {
   if (asked.what == event::JobRequested::What::bundle) {
-    // A folder that cannot be read is what somebody wants to see.
+    // A folder that cannot be read is what a person wants to see.
     const auto job = store_.read(asked.job);
     if (!job && job.error().code == ErrorCode::not_found) return fail(ErrorCode::not_found, "no job {}", asked.job);
     if (auto packed = bundle(store_.folder(asked.job), asked.path, bundle_, {stop_.get_token(), {}}); !packed) {
@@ -93,7 +93,7 @@ Result<void> HousekeepingThread::remove(const std::string& job) {
   return removed;
 }
 
-/// What fails is tried again at the next sweep.
+/// A failure is tried again at the next sweep.
 void HousekeepingThread::handle(const Sweep&) {
   if (!retention_.keep_for && !retention_.keep_bytes) return;
   std::ignore = catch_exceptions("retention", [this] { return sweep_now(); });
@@ -103,16 +103,16 @@ Result<void> HousekeepingThread::sweep_now() {
   if (!ledger_) ledger_ = RetentionLedger::read(ledger_file(store_));
   ledger_->advance(retention_.time->read(stop_.get_token()));
   auto kept = ended_jobs();
-  // Where the disk does not take it, what was counted now counts again after the next start: jobs stay longer.
+  // If the disk refuses it, the time is counted again after the next start: jobs stay longer.
   std::ignore = ledger_->write(ledger_file(store_));
   for (const auto& job : jobs_to_remove(std::move(kept), retention_)) {
-    const auto state = state_of(job);  // measuring takes its time, in which a job may have been reprocessed
+    const auto state = state_of(job);  // measuring takes time, in which a job may have been reprocessed
     if (state && is_final(*state)) std::ignore = remove(job);
   }
   return {};
 }
 
-/// What cannot be read is left for a person to see. Both the station and the folder must have it ended and exported.
+/// Unreadable jobs are left for a person. Both the station and the folder must have it ended and exported.
 std::vector<KeptJob> HousekeepingThread::ended_jobs() {
   std::vector<KeptJob> kept;
   std::set<std::string> ids;

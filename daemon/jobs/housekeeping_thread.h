@@ -15,10 +15,10 @@
 
 namespace scanrig {
 
-/// What takes its time and concerns ended jobs only: removing, bundling, retention; at nice +10.
+/// Longer work on ended jobs only: deleting, bundling, retention; at nice +10.
 class HousekeepingThread {
  public:
-  /// `jobs`: what the station knows of them now; from this thread. A folder alone does not say who works in it.
+  /// `jobs`: the station's present list; called from this thread. A folder alone does not show who works in it.
   HousekeepingThread(Clock& clock, const JobStore& store, RetentionOptions retention, std::function<JobTable()> jobs,
                      std::function<void(Event)> post_event, BundleOptions bundle = {});
   /// Stops a bundle that is being packed, drops the rest and joins.
@@ -26,9 +26,9 @@ class HousekeepingThread {
   HousekeepingThread(const HousekeepingThread&) = delete;
   HousekeepingThread& operator=(const HousekeepingThread&) = delete;
 
-  /// `remove` or `bundle`.
+  /// Takes `remove` or `bundle`.
   void post(event::JobRequested asked) { inbox_.post(std::move(asked)); }
-  /// Time for retention.
+  /// Starts a retention sweep.
   void sweep() { inbox_.post(Sweep{}); }
 
  private:
@@ -48,7 +48,7 @@ class HousekeepingThread {
   std::function<JobTable()> jobs_;
   std::function<void(Event)> post_event_;
   BundleOptions bundle_;
-  std::optional<RetentionLedger> ledger_;  ///< once it was read
+  std::optional<RetentionLedger> ledger_;  ///< set once it was read
   Mailbox<std::variant<event::JobRequested, Sweep>> inbox_;
   std::stop_source stop_;
   std::thread thread_;

@@ -26,7 +26,7 @@ Result<void> write_json(const fs::path& file, const ordered_json& json) {
 }
 
 void remove_file(const fs::path& file) {
-  std::error_code ignored;  // a file that stays is seen again at the next start
+  std::error_code ignored;  // a remaining file is found again at the next start
   fs::remove(file, ignored);
 }
 
@@ -62,7 +62,7 @@ Recipe read_recipe(JsonObject object, int version) {
   return recipe;
 }
 
-/// Tells this run of the daemon from all others; process ids come again.
+/// Distinguishes this run of the daemon from all others; process ids repeat.
 const std::string& this_process() {
   static const std::string name = [] {
     std::random_device random;
@@ -71,7 +71,7 @@ const std::string& this_process() {
   return name;
 }
 
-/// Null where `json` is no object or has no such member.
+/// Null where `json` is not an object or has no such member.
 nlohmann::json member(const nlohmann::json& json, const char* key) {
   return json.is_object() ? json.value(key, nlohmann::json()) : nlohmann::json();
 }

@@ -12,7 +12,7 @@ namespace scanrig {
 
 /// The files of a job beside scan.json, docs/reference/scan-folder.md.
 
-/// Where a job's model and report are.
+/// Paths of a job's model and report.
 std::filesystem::path model_folder(const std::filesystem::path& job_folder);
 std::filesystem::path model_file(const std::filesystem::path& job_folder);
 std::filesystem::path report_file(const std::filesystem::path& job_folder);
@@ -21,10 +21,10 @@ struct FolderSize {
   std::uintmax_t bytes = 0;
   std::size_t files = 0;
 };
-/// All that is below `folder`. What cannot be read counts as nothing.
+/// Size of everything below `folder`. Unreadable files count as nothing.
 FolderSize measure_folder(const std::filesystem::path& folder);
 
-/// job.json: how the job was ordered.
+/// job.json: the order of the job.
 struct JobFile {
   Recipe recipe{};
   std::string part{};
@@ -33,29 +33,29 @@ struct JobFile {
 };
 /// Fails with `io`.
 Result<void> write_job_file(const std::filesystem::path& job_folder, const JobFile& job);
-/// What a folder from elsewhere does not have is the default. Fails with `invalid_input`, `unsupported`, `io`.
+/// Keys missing in a folder from elsewhere have the default. Fails with `invalid_input`, `unsupported`, `io`.
 Result<JobFile> read_job_file(const std::filesystem::path& job_folder);
 
-/// Notes durably that the job has no model, and why: failure.json. Fails with `io`.
+/// Records durably that the job has no model, and why: failure.json. Fails with `io`.
 Result<void> write_failure(const std::filesystem::path& job_folder, const Error& error);
-/// Of an earlier run; nothing where there is no such file.
+/// Error of an earlier run; nothing where there is no such file.
 std::optional<Error> read_failure(const std::filesystem::path& job_folder);
 void remove_failure(const std::filesystem::path& job_folder);
 
-/// attempt.json, written durably before a model is made of a whole scan, and removed when that ends in any way but the
-/// daemon's death. While views are being taken there is none.
+/// attempt.json, written durably before a model is made of a whole scan, and removed at any end of that but the
+/// daemon's death. Missing while views are being taken.
 struct AttemptRecord {
   int ended_by_death = 0;
   bool running = false;  ///< in this process, now
 };
 AttemptRecord read_attempt_record(const std::filesystem::path& job_folder);
-/// Another one begins. Fails with `io`.
+/// Records another attempt. Fails with `io`.
 Result<void> begin_attempt(const std::filesystem::path& job_folder);
-/// Durable. Where the disk does not take it, the mark counts once too often.
+/// Durable. If the disk refuses it, the mark counts once too often.
 void forget_attempts(const std::filesystem::path& job_folder);
 
-/// Why the model of report.json is beyond the limits; nothing when it is within, or when none are set. A report that
-/// cannot be read passes nothing.
+/// Why the model of report.json is beyond the limits; nothing when it is within, or without limits. An unreadable
+/// report never passes.
 std::optional<Error> limit_violation(const std::filesystem::path& report, const Limits& limits);
 
 }  // namespace scanrig

@@ -37,7 +37,7 @@ void set_text(sqlite3_stmt* statement, int parameter, const std::string& value) 
   sqlite3_bind_text(statement, parameter, value.data(), static_cast<int>(value.size()), SQLITE_TRANSIENT);
 }
 
-/// Differs when any of the files that tell a job's state has been written since, or the record is not what it was.
+/// Differs when a file with the job's state has been written since, or the record has changed.
 std::string stamp(const fs::path& folder, const std::string& record) {
   std::string stamp;
   for (const char* name : {"scan.json", "job.json", "failure.json", "attempt.json", "model/report.json"}) {
@@ -69,7 +69,7 @@ bool JobIndex::open() {
   if (sqlite3_open_v2(file_.c_str(), &database_, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, nullptr) != SQLITE_OK) {
     return false;
   }
-  sqlite3_busy_timeout(database_, 200);  // milliseconds: somebody reads it
+  sqlite3_busy_timeout(database_, 200);  // milliseconds: another process may read it
   const auto check = prepare(database_, "PRAGMA quick_check(1)");
   if (!check || sqlite3_step(check.get()) != SQLITE_ROW || text(check.get(), 0) != "ok") return false;
   return run(database_,
@@ -103,7 +103,7 @@ void JobIndex::replace(const JobTable& jobs) {
   bool whole = insert != nullptr;
   for (const auto& [id, job] : jobs) {
     if (!whole) break;
-    if (!is_final(job->state) || job->quarantined) continue;  // these are looked at in their folders
+    if (!is_final(job->state) || job->quarantined) continue;  // these are read from their folders
     set_text(insert.get(), 1, id);
     set_text(insert.get(), 2, std::string(to_string(job->state)));
     set_text(insert.get(), 3, job->part);

@@ -9,23 +9,23 @@ struct sqlite3;
 
 namespace scanrig {
 
-/// index.sqlite beside the job folders: what the folders of ended jobs said when they were last read, so that a start
-/// with thousands of jobs does not open thousands of manifests. It may be deleted or damaged at any time: what it does
-/// not know, or what is older than the folder's files, is read from the folder. Whatever SQLite refuses, the daemon
+/// index.sqlite beside the job folders: the content of ended jobs' folders when they were last read. With it, a start
+/// with thousands of jobs does not open thousands of manifests. It may be deleted or damaged at any time: jobs that
+/// are missing, or older than the folder's files, are read from the folder. If SQLite refuses, the daemon
 /// works without an index. Others may read it: table `jobs` (id, state, part, recipe, stamp, info).
 /// Threads: one user.
 class JobIndex {
  public:
-  /// A file that is no sound index is replaced by an empty one.
+  /// Replaces a file that is not a sound index by an empty one.
   explicit JobIndex(std::filesystem::path file);
   ~JobIndex();
   JobIndex(const JobIndex&) = delete;
   JobIndex& operator=(const JobIndex&) = delete;
 
-  /// What is known of the job in this folder, if its files have not changed since.
+  /// Record of the job in this folder, if its files have not changed since.
   [[nodiscard]] std::optional<JobInfo> find(const std::filesystem::path& job_folder) const;
 
-  /// From now on the index knows these jobs and no others.
+  /// Replaces the jobs of the index by these.
   void replace(const JobTable& jobs);
 
  private:

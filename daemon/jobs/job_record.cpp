@@ -9,7 +9,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kLayout = 6;  ///< to be raised with every change below
+constexpr int kLayout = 6;  ///< increase with every change below
 
 json to_json(const std::optional<Error>& error) {
   if (!error) return nullptr;

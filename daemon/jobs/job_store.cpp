@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Names of folders that are being made or removed; no job's id begins with a dot.
+// Names of folders that are being made or deleted; no job's id starts with a dot.
 constexpr const char* kNew = ".new-";
 constexpr const char* kGone = ".gone-";
 constexpr std::uintmax_t kModelBytes = 128u
@@ -77,7 +77,7 @@ JobInfo recover_job(const fs::path& folder) {
   auto scan = ScanFolder::open(folder);
   auto job = scan ? read_folder(folder, *scan) : pass_on(scan);
   if (job && job->state == JobState::interrupted && scan->manifest().state != "interrupted") {
-    // On a disk that takes nothing it stays as it is, and whoever reads it again sees the same.
+    // On a full disk it stays unchanged, and every reader sees the same.
     std::ignore = scan->set_state("interrupted");
   }
   if (job) return *job;
@@ -92,7 +92,7 @@ void remove_remains(const fs::path& root, const std::string& name) {
 
 double gib(std::uintmax_t bytes) { return static_cast<double>(bytes) / (1u << 30); }
 
-/// Both pairs in words where the calibration is not of the rig's; a serial number that either lacks is not compared.
+/// Both pairs as text where the calibration is not of the rig's cameras. A missing serial number is not compared.
 std::optional<std::string> other_cameras(const Calibration& calibration, const CameraSerials& rig) {
   const auto other = [](const std::string& own, const std::string& rigs) {
     return !own.empty() && !rigs.empty() && own != rigs;
@@ -165,7 +165,7 @@ Result<JobInfo> JobStore::create(const std::string& id, const JobFile& job) cons
   manifest.state = "queued";
   manifest.profile = options_.profile;
   if (auto made = make(std::move(manifest), job); !made) {
-    fs::remove_all(folder(id), ignored);  // renamed, but its name not synced: nobody is told of it
+    fs::remove_all(folder(id), ignored);  // renamed, but its name not synced: no client has its id
     return pass_on(made);
   }
   return read(id);
@@ -177,7 +177,7 @@ Result<void> JobStore::make(Manifest manifest, const JobFile& job) const {
   auto scan = ScanFolder::create(prepared, std::move(manifest), options_.calibration_file);
   auto made = scan ? write_job_file(prepared, job) : Result<void>(pass_on(scan));
   std::error_code ignored;
-  fs::copy_file(job_log_file(folder(id)), job_log_file(prepared), ignored);  // of the folder that is replaced
+  fs::copy_file(job_log_file(folder(id)), job_log_file(prepared), ignored);  // from the folder that is replaced
   if (made) made = replace_folder(prepared, folder(id));
   if (!made) fs::remove_all(prepared, ignored);
   return made;
@@ -241,7 +241,7 @@ Result<void> JobStore::remove(const std::string& id) const {
   }
   const fs::path gone = options_.root / (kGone + id);
   if (auto moved = replace_folder(folder(id), gone); !moved) return moved;
-  fs::remove_all(gone, error);  // what stays goes at the next start
+  fs::remove_all(gone, error);  // remaining files are deleted at the next start
   return {};
 }
 

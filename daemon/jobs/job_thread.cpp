@@ -18,7 +18,7 @@ namespace {
 
 using What = event::JobRequested::What;
 
-/// Images without a match are what a person looks at first: kept beside the views.
+/// A person looks first at images without a match: they are kept beside the views.
 Result<void> keep_images(const ScanFolder& scan, int pose, std::size_t number, const RawView& again) {
   const auto folder = scan.path() / scan.manifest().poses[static_cast<std::size_t>(pose)].name;
   std::vector<FileContent> files;
@@ -30,7 +30,7 @@ Result<void> keep_images(const ScanFolder& scan, int pose, std::size_t number, c
   return write_files_synced(folder, files);
 }
 
-/// The job has the calibration that it is scanned with, and that is of the rig's cameras.
+/// Checks that the job has the calibration it is scanned with, and that this belongs to the rig's cameras.
 Result<void> settle_calibration(const JobStore& store, const JobInfo& job) {
   if (!has_views(job)) {
     if (auto same = store.check_rig_cameras(); !same) return same;
@@ -68,7 +68,7 @@ void JobThread::run() {
   }
 }
 
-/// What was thrown ends as what fails: whoever waits is answered, and the job that has the rig is interrupted.
+/// An exception ends as a failure does: the requester gets a reply, and the active job is interrupted.
 void JobThread::fail_task(const Task& task, const Error& why) {
   const Result<void> failed = tl::unexpected(why);
   std::visit(Overloaded{[&](const action::CreateJobs& t) {
@@ -100,12 +100,12 @@ void JobThread::tell_known(const std::string& job) {
   if (auto info = store_.read(job)) post_event_(event::JobUpdated{std::make_shared<const JobInfo>(std::move(*info))});
 }
 
-/// A disk that does not take it does not take what the job needs either, and that is reported.
+/// A disk that refuses this also refuses what the job needs, and that is reported.
 void JobThread::handle(const LogLine& line) {
   std::ignore = append_job_log(store_.folder(line.entry.job), line.entry, line.when);
 }
 
-/// A calibration that cannot be read is named when a job is made.
+/// An unreadable calibration is named when a job is made.
 void JobThread::handle(const action::CheckCalibration& task) {
   const auto same = task.job.empty() ? store_.check_rig_cameras() : store_.check_job_cameras(task.job);
   const bool refused = !same && same.error().code == ErrorCode::refused;
@@ -139,7 +139,7 @@ void JobThread::handle(const action::StartJob& task) {
   tell_known(task.job);
 }
 
-/// With what the scan will be in need of: its calibration, and the view that is taken again before it goes on.
+/// Checks what the scan will need: its calibration, and the view that is taken again before it continues.
 Result<JobInfo> JobThread::read_whole(const std::string& id) const {
   auto job = store_.read(id);
   if (!job) return job;
@@ -153,8 +153,8 @@ Result<JobInfo> JobThread::read_whole(const std::string& id) const {
   return job;
 }
 
-/// Noted where the folder is still good for that: what cannot be read at all is found failed at the next start too, and
-/// a disk that does not answer now may do so then.
+/// Recorded where the folder still allows that. An unreadable folder is found failed at the next start too, and
+/// a disk that does not respond now may do so then.
 void JobThread::set_aside(const std::string& id, const Error& why) {
   auto scan = ScanFolder::open(store_.folder(id));
   if (scan && why.code != ErrorCode::io && scan->set_state("failed")) std::ignore = write_failure(scan->path(), why);
@@ -163,13 +163,13 @@ void JobThread::set_aside(const std::string& id, const Error& why) {
   if (!std::filesystem::exists(store_.folder(id), ignored)) post_event_(event::JobRemoved{id});
 }
 
-/// Goes on where the manifest ends.
+/// Continues where the manifest ends.
 Result<void> JobThread::begin(const JobInfo& job) {
   auto scan = ScanFolder::open(job.folder);
   if (!scan) return pass_on(scan);
   if (auto state = scan->set_state("scanning"); !state) return state;
-  // Of a scan whose end nobody noted the daemon died; its views may have been the reason, and are not looked at beside
-  // the moving table again.
+  // The daemon died in a scan without a recorded end. Its views may have been the reason, and are not examined again
+  // beside the moving table.
   later_ = !job.stored.empty() && !read_failure(job.folder) ? std::optional(job.recipe) : std::nullopt;
   remove_failure(job.folder);
   scan_ = std::move(*scan);
@@ -228,7 +228,7 @@ Result<void> JobThread::keep(const event::JobRequested& asked) {
   return {};
 }
 
-/// Its evidence stays, and of a scan that has all its views a model can be made later.
+/// Its evidence stays, and a scan with all its views can be reconstructed later.
 Result<void> JobThread::cancel(const JobInfo& job) {
   if (job.state == JobState::queued || job.state == JobState::interrupted) {
     auto scan = ScanFolder::open(job.folder);
@@ -240,7 +240,7 @@ Result<void> JobThread::cancel(const JobInfo& job) {
                 to_string(job.state));
   }
   if (auto noted = write_failure(job.folder, {ErrorCode::stopped, "cancelled on request"}); !noted) {
-    // Nobody works on it any more, and nobody else tells so.
+    // No thread works on it any more, and no other thread reports that.
     if (job.state != JobState::reconstructing) tell_known(job.id);
     if (job.state == JobState::reconstructing) post_event_(event::ReconstructionFailed{job.id, noted.error()});
     return noted;
@@ -249,7 +249,7 @@ Result<void> JobThread::cancel(const JobInfo& job) {
   return {};
 }
 
-/// The images are all that is needed; an older model stays until the new one is there.
+/// The images are all it needs; an older model stays until the new one is complete.
 Result<void> JobThread::reprocess(JobInfo job, const event::JobRequested& asked) {
   if (job.complete < job.recipe.poses) {
     return fail(ErrorCode::refused, "job {} has only {} of {} poses: there is nothing to make a model of", asked.job,
@@ -262,12 +262,12 @@ Result<void> JobThread::reprocess(JobInfo job, const event::JobRequested& asked)
   job.error.reset();
   job.passed.reset();
   const auto known = std::make_shared<const JobInfo>(std::move(job));
-  post_event_(event::JobUpdated{known});  // before anything that the reconstruction has to tell
+  post_event_(event::JobUpdated{known});  // before any report of the reconstruction
   reconstruction_.rebuild(known->id, known->folder, known->recipe, {asked.voxel_mm, asked.fusion});
   return {};
 }
 
-/// The views that were taken meanwhile are dropped, until the job is closed: a pose without one of its views could
+/// Drops the views taken meanwhile, until the job is closed: a pose without one of its views could
 /// never be completed.
 void JobThread::give_up(const std::string& job, const Error& why) {
   broken_ = true;
@@ -276,7 +276,7 @@ void JobThread::give_up(const std::string& job, const Error& why) {
 
 void JobThread::handle(const action::StoreView& task) {
   const TakenView& view = *task.view;
-  if (!storing()) return;  // the job could not be begun or gone on with, and that was told
+  if (!storing()) return;  // the job could not start or continue, and that was reported
   const auto stored = scan_->add_view(static_cast<std::size_t>(view.id.pose), view.record, view.images);
   if (!stored) return give_up(view.id.job, stored.error());
   reconstruction_.add_view(task.view);
@@ -291,7 +291,7 @@ void JobThread::handle(const action::CheckMovement& task) {
   post_event_(event::MovementChecked{task.view->id.job, *movement_check});
 }
 
-/// Compares the plain images with those of the first time, and keeps the verdict as evidence.
+/// Compares the plain images with the first ones, and keeps the result as evidence.
 Result<MovementCheck> JobThread::judge(const TakenView& again) {
   const auto pose = static_cast<std::size_t>(again.id.pose);
   const auto first = scan_->load_images(pose, 0);
@@ -309,7 +309,7 @@ Result<MovementCheck> JobThread::judge(const TakenView& again) {
       compare_views(first->right_plain, now->right_plain, allowing_for(turned, calibration->right, *calibration));
   if (!right) return pass_on(right);
 
-  busy_timer_.begins();  // comparing takes its time too
+  busy_timer_.begins();  // comparing takes time too
   const MovementCheck movement_check{again.id.pose, std::max(left->shift_px, right->shift_px),
                                      std::max(left->changed, right->changed), left->unmoved && right->unmoved,
                                      again.record.retake_reasons};
@@ -351,10 +351,10 @@ void JobThread::handle(const action::ResumeJob& task) {
 
 void JobThread::handle(const action::CloseJob& task) {
   reconstruction_.abandon(task.job);
-  if (!scan_) return tell_known(task.job);  // it was not begun
+  if (!scan_) return tell_known(task.job);  // it did not start
   auto closed = scan_->set_state(std::string(to_string(task.state)));
   if (closed) closed = write_failure(scan_->path(), task.why);
-  // On a disk that takes nothing more the job is found unfinished at the next start, and interrupted then.
+  // On a full disk the job is found unfinished at the next start, and interrupted then.
   scan_.reset();
   post_event_(event::JobClosed{task.job, task.state, task.why});
 }

@@ -15,11 +15,11 @@
 
 namespace scanrig {
 
-/// Puts jobs and views on disk while the table moves. A view is told as stored, and handed to the reconstruction, only
-/// when it survives a power cut.
+/// Puts jobs and views on disk while the table moves. A view is reported as stored, and handed to the reconstruction,
+/// only when it survives a power cut.
 class JobThread {
  public:
-  /// A line for the job's own log.
+  /// An entry for the job's own log.
   struct LogLine {
     JournalEntry entry;
     std::chrono::system_clock::time_point when;
@@ -29,7 +29,7 @@ class JobThread {
                             action::ResumeJob, action::CloseJob>;
   using ScannedHook = std::function<Result<void>(const std::filesystem::path& job_folder)>;
 
-  /// `on_scanned` (may be empty) is called when all views of a job are on disk, before anybody is told.
+  /// `on_scanned` (may be empty) is called when all views of a job are on disk, before any report.
   JobThread(Clock& clock, const JobStore& store, ReconstructionThread& reconstruction, ScannedHook on_scanned,
             std::function<void(Event)> post_event);
   /// Does what was posted, then joins.
@@ -38,9 +38,9 @@ class JobThread {
   JobThread& operator=(const JobThread&) = delete;
 
   void post(Task task) { inbox_.post(std::move(task)); }
-  /// The same for an entry of the log: it goes to the log of the job that it names.
+  /// The same for an entry of the log: it goes to the log of the job it names.
   void log(JournalEntry entry) { post(LogLine{std::move(entry), std::chrono::system_clock::now()}); }
-  /// For how long the disk has kept it from going on. From any thread.
+  /// Time for which the disk has blocked this thread. From any thread.
   [[nodiscard]] Clock::Duration waiting() const { return busy_timer_.lasts(); }
 
  private:
@@ -78,10 +78,10 @@ class JobThread {
   std::function<void(Event)> post_event_;
   Mailbox<Task> inbox_;
   BusyTimer busy_timer_;
-  // Of the thread only.
-  std::optional<ScanFolder> scan_;  ///< of the job that has the rig
-  std::optional<Recipe> later_;     ///< its recipe, where the model is made after the last view only
-  bool broken_ = false;             ///< it did not take something: nothing that comes after may stand in it
+  // Only for the thread.
+  std::optional<ScanFolder> scan_;  ///< of the active job
+  std::optional<Recipe> later_;     ///< its recipe, where the reconstruction starts only after the last view
+  bool broken_ = false;             ///< it refused a view: no later view may be stored in it
   std::thread thread_;
 };
 

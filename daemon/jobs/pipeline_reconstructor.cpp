@@ -19,7 +19,7 @@ class PipelineReconstructor final : public Reconstructor {
     return reconstruction_.finish_pose(pose, context);
   }
   Result<void> finish(const std::filesystem::path& folder, const Context& context) override {
-    const auto scan = ScanFolder::open(scan_);  // now that it is whole
+    const auto scan = ScanFolder::open(scan_);  // now that it is complete
     if (!scan) return pass_on(scan);
     const auto model = reconstruction_.finish(identity_of(scan->manifest()), context);
     if (!model) return pass_on(model);

@@ -8,12 +8,12 @@
 
 namespace scanrig {
 
-/// The real reconstruction, in this process. A job that would need more than `memory_bytes` is refused before it
+/// The real reconstruction, in this process. Refuses a job that would need more than `memory_bytes` before it
 /// starts.
 ReconstructorFactory pipeline_reconstructor(ReconstructOptions options,
                                             std::uintmax_t memory_bytes = std::numeric_limits<std::uintmax_t>::max());
 
-/// Whether the estimated memory is within `memory_bytes`. Fails with `out_of_range`, saying what to do.
+/// Checks that the estimated memory is within `memory_bytes`. Fails with `out_of_range` and the remedy.
 Result<void> check_memory(const ReconstructionTask& task, double voxel_mm, std::uintmax_t memory_bytes);
 
 }  // namespace scanrig

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What `scanrig reconstruct --lines` writes: "STAGE<tab>FRACTION", and at last "failed<tab>CODE<tab>MESSAGE".
+/// Output of `scanrig reconstruct --lines`: "STAGE<tab>FRACTION", and at last "failed<tab>CODE<tab>MESSAGE".
 class ProgressLines {
  public:
   explicit ProgressLines(const Context& context) : context_(context) {}

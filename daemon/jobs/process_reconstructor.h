@@ -15,8 +15,8 @@ struct ProcessExecutorOptions {
   double voxel_mm = 0.25;
 };
 
-/// The same reconstruction in a process of its own, `scanrig reconstruct`, after the last view: whatever it does, the
-/// daemon lives. It tells nothing before: an object that cannot be reconstructed is turned over for nothing.
+/// The same reconstruction in a separate process, `scanrig reconstruct`, after the last view: whatever it does, the
+/// daemon lives. It reports nothing earlier: an object that cannot be reconstructed is turned over in vain.
 ReconstructorFactory process_reconstructor(ProcessExecutorOptions options);
 
 }  // namespace scanrig

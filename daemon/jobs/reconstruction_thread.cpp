@@ -15,7 +15,7 @@
 namespace scanrig {
 namespace {
 
-/// More views are not kept in memory while an earlier job is being worked on.
+/// Limit of views in memory while an earlier job is being reconstructed.
 constexpr int kMaxViewsWaiting = 4;
 
 constexpr const char* kWork = "the reconstruction";
@@ -91,7 +91,7 @@ ReconstructionThread::Begin ReconstructionThread::enlist(std::string job, std::f
   return {std::move(job), std::move(folder), std::move(recipe), std::move(changes), run.stop};
 }
 
-/// The work has ended; false when somebody had cancelled it before. From then on it cannot be.
+/// Ends the work; false when it was cancelled before. From then on it cannot be cancelled.
 bool ReconstructionThread::dismiss(const std::stop_source& stop) {
   const std::lock_guard guard(mutex_);
   runs_.remove_if([&](const Run& run) { return run.stop == stop; });
@@ -119,10 +119,10 @@ void ReconstructionThread::run() {
       perform(Finish{next.job});
     }
   }
-  if (current_) end();  // told to stop: that is not the job's fault
+  if (current_) end();  // requested to stop: not the job's fault
 }
 
-/// What is thrown beside the pipeline is the job's bad luck too.
+/// An exception outside the pipeline also fails only this job.
 template <class SomeMessage>
 void ReconstructionThread::perform(const SomeMessage& message) {
   const auto done = catch_exceptions(kWork, [&]() -> Result<void> {
@@ -131,7 +131,7 @@ void ReconstructionThread::perform(const SomeMessage& message) {
   });
   if (done || !current_) return;
   check(done);
-  if constexpr (std::is_same_v<SomeMessage, Finish>) end();  // nothing else would
+  if constexpr (std::is_same_v<SomeMessage, Finish>) end();  // otherwise the job would never end
 }
 
 bool ReconstructionThread::works_on(const std::string& job) const {
@@ -167,7 +167,7 @@ Result<void> ReconstructionThread::start(const Begin& message, const ScanFolder&
   });
 }
 
-/// What was taken before: of a job that is resumed or reprocessed.
+/// Takes the earlier views of a job that is resumed or reprocessed.
 Result<void> ReconstructionThread::catch_up(const ScanFolder& scan) {
   const auto& poses = scan.manifest().poses;
   for (std::size_t pose = 0; pose < poses.size(); ++pose) {
@@ -185,7 +185,7 @@ void ReconstructionThread::handle(const Rebuild& message) { rebuilds_.push_back(
 
 Result<void> ReconstructionThread::add(int pose, const Result<ViewImages>& images) {
   if (!images) return pass_on(images);
-  // One stage for all views of the scan: the bar of the time in which the table turns.
+  // One stage for all views of the scan: its bar covers the time in which the table turns.
   const int views = current_->recipe.poses * current_->recipe.views;
   const auto progress = [&](std::string_view, double fraction) {
     tell_progress("range", (current_->views_done + fraction) / views);
@@ -237,7 +237,7 @@ void ReconstructionThread::handle(const Finish& message) {
   if (ready) {
     remove_failure(current_->folder);
   } else if (!current_->quarantined) {
-    // A note that cannot be written costs the reason after a restart, nothing else.
+    // A record that cannot be written costs the reason after a restart, nothing else.
     std::ignore = write_failure(current_->folder, *current_->error);
   }
   end();
@@ -277,7 +277,7 @@ void ReconstructionThread::check(const Result<void>& done) {
 }
 
 void ReconstructionThread::tell_progress(std::string stage, double fraction) {
-  // A hundred steps a stage are enough for any bar.
+  // A hundred steps per stage are enough for any bar.
   if (stage == told_stage_ && fraction < 1.0 && std::abs(fraction - told_fraction_) < 0.01) return;
   told_stage_ = stage;
   told_fraction_ = fraction;

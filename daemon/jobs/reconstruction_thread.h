@@ -20,10 +20,10 @@
 
 namespace scanrig {
 
-/// Makes models, one job after the other, while the rig goes on; at nice +10, so that acquisition comes first.
-/// Work on a job ends with its first error; nothing that is thrown here leaves the thread. A job that has all its views
-/// is marked on disk before its model is made and until that ends: what is found marked at the next start took the
-/// daemon with it.
+/// Makes models, one job after the other, while the rig continues; at nice +10, so that acquisition comes first.
+/// Work on a job ends with its first error; no exception leaves the thread. A job with all its views
+/// is marked on disk before its reconstruction and until that ends. A mark found at the next start means that the
+/// daemon died in it.
 class ReconstructionThread {
  public:
   ReconstructionThread(Clock& clock, ReconstructorFactory factory, std::function<void(Event)> post_event);
@@ -32,21 +32,21 @@ class ReconstructionThread {
   ReconstructionThread(const ReconstructionThread&) = delete;
   ReconstructionThread& operator=(const ReconstructionThread&) = delete;
 
-  /// A scan begins or goes on; what its folder holds now is taken first, what comes later as views.
+  /// Starts or continues a scan: first takes what its folder holds now, then later views as they come.
   void begin(std::string job, ScanFolder scan, Recipe recipe);
   void add_view(std::shared_ptr<const TakenView> view);
   void finish_pose(std::string job, int pose) { inbox_.post(FinishPose{std::move(job), pose}); }
   void finish(std::string job) { inbox_.post(Finish{std::move(job)}); }
   void abandon(std::string job) { inbox_.post(Abandon{std::move(job)}); }
-  /// A whole scan, from its folder, when no scan is being followed.
+  /// Reconstructs a whole scan, from its folder, when no scan is being followed.
   void rebuild(std::string job, std::filesystem::path folder, Recipe recipe, ReconstructionChanges changes);
-  /// Ends the work on this job, begun or waiting, soon: nothing more is told of it and its folder is left alone, but
-  /// for the model that may be there. False when nothing was to be done on it: then it has ended, and that was told.
+  /// Ends the work on this job, started or waiting, soon. Nothing more is reported of it and its folder is left alone,
+  /// but for a finished model. False when there was no work: then it has ended, and that was reported.
   bool cancel(const std::string& job);
-  /// Whether work on this job is begun or waiting, and not cancelled.
+  /// Whether work on this job is started or waiting, and not cancelled.
   bool has(const std::string& job);
-  /// The daemon ends, on purpose: asks the running stage to stop, takes the mark away before a caller gives up on
-  /// that stage, and drops the rest.
+  /// Ends for a planned end of the daemon: requests the running stage to stop, removes the mark before a caller stops
+  /// waiting for that stage, and drops the rest.
   void stop();
 
  private:
@@ -56,14 +56,14 @@ class ReconstructionThread {
     Recipe recipe;
     ReconstructionChanges changes;
     std::stop_source stop;
-    std::optional<ScanFolder> scan{};  ///< as it was when this was asked for; empty: as it is when its turn comes
+    std::optional<ScanFolder> scan{};  ///< as it was at the request; empty: as it is when its turn comes
   };
   struct Rebuild {
     Begin begin;
   };
   struct AddView {
     ViewId id;
-    std::shared_ptr<const TakenView> view;  ///< null: it is read from the disk when its turn comes
+    std::shared_ptr<const TakenView> view;  ///< null: read from the disk when its turn comes
   };
   struct FinishPose {
     std::string job;
@@ -83,7 +83,7 @@ class ReconstructionThread {
     Recipe recipe;
     std::stop_source stop;
     std::unique_ptr<Reconstructor> reconstructor{};
-    bool quarantined = false;  ///< the scan goes on without
+    bool quarantined = false;  ///< the scan continues without a model
     int views_done = 0;
     std::optional<Error> error{};
   };
@@ -123,11 +123,11 @@ class ReconstructionThread {
     std::stop_source stop;
   };
   std::mutex mutex_;
-  std::list<Run> runs_;                          ///< asked for and not ended; under mutex_
-  std::optional<std::filesystem::path> marked_;  ///< the folder whose model is being made; under mutex_
+  std::list<Run> runs_;                          ///< requested and not ended; under mutex_
+  std::optional<std::filesystem::path> marked_;  ///< the folder being reconstructed; under mutex_
   std::atomic<bool> ending_ = false;
   std::atomic<int> views_waiting_ = 0;  ///< in the inbox, with their images
-  // Of the thread only.
+  // Only for the thread.
   std::optional<Current> current_;
   std::deque<Begin> rebuilds_;
   std::string told_stage_;

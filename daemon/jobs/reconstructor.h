@@ -14,18 +14,18 @@
 
 namespace scanrig {
 
-/// A scan on its way to a model, as the daemon sees it: views come while the table turns.
+/// A scan on its way to a model, as the daemon uses it: views come while the table turns.
 /// Threads: one user at a time.
 class Reconstructor {
  public:
   virtual ~Reconstructor() = default;
   virtual Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context) = 0;
   virtual Result<void> finish_pose(std::size_t pose, const Context& context) = 0;
-  /// Makes the model and writes its files and report.json as a whole: after a failure there is no `folder`.
+  /// Makes the model and writes its files and report.json together: after a failure there is no `folder`.
   virtual Result<void> finish(const std::filesystem::path& folder, const Context& context) = 0;
 };
 
-/// What a reprocessing changes; what is empty is as configured.
+/// Changes for a reprocessing; empty members are as configured.
 struct ReconstructionChanges {
   std::optional<double> voxel_mm{};
   std::string fusion{};
@@ -34,11 +34,11 @@ struct ReconstructionChanges {
 struct ReconstructionTask {
   const Calibration& calibration;
   std::filesystem::path folder;  ///< of the job
-  int views = 0;                 ///< of all poses, once they are there
+  int views = 0;                 ///< of all poses, once they exist
   ReconstructionChanges changes{};
 };
 
-/// Fails with `out_of_range` when the work would need more memory than it may have.
+/// Fails with `out_of_range` when the work would need more memory than allowed.
 using ReconstructorFactory = std::function<Result<std::unique_ptr<Reconstructor>>(const ReconstructionTask&)>;
 
 }  // namespace scanrig

@@ -14,7 +14,7 @@ using std::chrono::seconds;
 
 constexpr const char* kFormat = "scanrig-retention";
 
-/// In seconds some 270 years: sums stay far from overflow, in nanoseconds too. Throws for all others.
+/// Some 270 years, in seconds: sums stay far from overflow, in nanoseconds too. Throws for all others.
 std::int64_t bounded(const json& number) {
   constexpr std::int64_t kMax = std::int64_t{1} << 33;
   if (!number.is_number_integer()) throw std::out_of_range("not an integer");
@@ -67,7 +67,7 @@ Result<void> RetentionLedger::write(const std::filesystem::path& file) const {
   return write_file_atomically(file, j.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
-/// Since another start of the machine more time has passed than it runs by now: the difference is never too large.
+/// Since an earlier start of the machine more time has passed than its present run: the difference is never too large.
 void RetentionLedger::advance(const TimeReading& now) {
   if (last_) {
     auto passed = std::max(now.running - last_->running, seconds(0));

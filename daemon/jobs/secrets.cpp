@@ -8,7 +8,7 @@ namespace {
 constexpr std::string_view kRemoved = "(removed)";
 constexpr std::string_view kTokenCharacters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789-_";
 
-/// Replaces what follows each `prefix`, up to the first character that `end` finds.
+/// Replaces the text after each `prefix`, up to the first character that `end` finds.
 template <class End>
 std::string masked(std::string_view text, std::string_view prefix, const End& end) {
   std::string out;

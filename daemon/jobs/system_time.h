@@ -14,7 +14,7 @@ struct TimeReading {
       0};  ///< of the machine since it was switched on; only ever counts up until the next time
 };
 
-/// Where retention gets the time from. Threads: one user.
+/// Source of time for retention. Threads: one user.
 class SystemTime {
  public:
   virtual ~SystemTime() = default;
@@ -22,7 +22,7 @@ class SystemTime {
   [[nodiscard]] virtual TimeReading read(const std::stop_token& stop) const = 0;
 };
 
-/// The kernel's clocks. Synchronized means what `timedatectl` calls so, whichever program keeps the time.
+/// The kernel's clocks. Synchronized means the same as in `timedatectl`, whichever program sets the time.
 std::shared_ptr<const SystemTime> system_time();
 
 }  // namespace scanrig

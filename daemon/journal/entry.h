@@ -5,7 +5,7 @@
 
 namespace scanrig {
 
-/// As syslog(3) numbers them.
+/// Numbers as in syslog(3).
 enum class Priority { error = 3, warning = 4, notice = 5, info = 6 };
 
 /// One line of the log; the fields are those of docs/reference/journal.md. Poses and views count from 0, as in
@@ -13,9 +13,9 @@ enum class Priority { error = 3, warning = 4, notice = 5, info = 6 };
 struct JournalEntry {
   Priority priority = Priority::info;
   std::string message{};
-  std::string job{};  ///< empty: of none
+  std::string job{};  ///< empty: no job
   std::optional<int> pose{}, view{};
-  std::string device{};  ///< empty: of none
+  std::string device{};  ///< empty: no device
 };
 
 }  // namespace scanrig

@@ -51,7 +51,7 @@ Journal::~Journal() {
   shared_->changed.wait_for(lock, kLastWords, [this] { return shared_->ended; });
 }
 
-/// Text from files and devices may hold anything; a line of the log stays one line.
+/// Text from files and devices may hold any bytes; a line of the log stays one line.
 void Journal::write(JournalEntry entry) {
   for (auto* text : {&entry.message, &entry.job, &entry.device}) {
     std::ranges::replace_if(

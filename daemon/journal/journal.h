@@ -11,15 +11,15 @@
 
 namespace scanrig {
 
-/// Takes the log's lines away from those who must not wait: its own thread writes them. What does not fit while the
-/// sink is stalled is dropped, counted, and the number is told when the sink takes lines again.
+/// Takes the log's lines from threads that must not wait: its own thread writes them. Lines that do not fit while the
+/// sink is stalled are dropped and counted. The count is logged when the sink takes lines again.
 class Journal {
  public:
   /// Called from the journal's thread only; may take its time.
   using Sink = std::function<void(const JournalEntry&)>;
 
   explicit Journal(Sink sink, std::size_t max_waiting = 1024);
-  /// Writes what is waiting, for at most `kLastWords`; a sink that still stalls then is left behind.
+  /// Writes the waiting lines, for at most `kLastWords`; a sink that still stalls then is abandoned.
   ~Journal();
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
@@ -38,7 +38,7 @@ class Journal {
 /// fields. Otherwise lines of text on stderr.
 Journal::Sink standard_sink();
 
-/// "NAME=value", as the journal takes them; those that do not apply are left out.
+/// "NAME=value", as the journal takes them; fields that do not apply are left out.
 std::vector<std::string> journal_fields(const JournalEntry& entry);
 
 /// "2026-11-21T13:00:00Z notice job 20261121-130000-1 pose 0 view 3: ...", without an end of line.

@@ -16,7 +16,7 @@ std::string with_next(std::string text, const std::string& next_action) {
   return next_action.empty() ? text : fmt::format("{} Next: {}", text, next_action);
 }
 
-/// A fault concerns the job that had the rig when it happened.
+/// A fault concerns the job that was active when it happened.
 void tell_fault(const Snapshot& before, const Snapshot& now, Entries& entries) {
   const bool other = before.machine != now.machine || before.cause != now.cause;
   if (other || before.may_be_moving != now.may_be_moving) {
@@ -87,7 +87,7 @@ void tell_views(const JobInfo& before, const JobInfo& now, Entries& entries) {
   }
 }
 
-/// The counters grow when a stage ends, by what it took.
+/// The counters grow when a stage ends, by its duration.
 double seconds_of(const std::string& stage, const Snapshot& before, const Snapshot& now) {
   const auto total = [&](const Snapshot& snapshot) {
     const auto found = snapshot.counters.stage_seconds.find(stage);

@@ -7,12 +7,12 @@
 
 namespace scanrig {
 
-/// What the log says of the change from one published snapshot to the next: states of machine and jobs with their
-/// causes, faults with what to do, views acknowledged and exposures redone, devices lost and back, stages of the
-/// reconstruction. The one place where the log's lines about the station's states are made.
+/// Log entries for the change from one published snapshot to the next: states of machine and jobs with their
+/// causes, faults with the next action, stored views and retakes, devices lost and back, stages of the
+/// reconstruction. The log's lines about the station's states are made only here.
 std::vector<JournalEntry> log_entries(const Snapshot& before, const Snapshot& now);
 
-/// A button that changed nothing. What the API refuses is told by the API, which knows who asked.
+/// Entry for a button that changed nothing. The API reports its refusals itself, because it has the requester's name.
 JournalEntry refused_at_panel(const event::Pressed& pressed, const Error& why, const Snapshot& now);
 
 }  // namespace scanrig

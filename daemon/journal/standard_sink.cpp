@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <vector>
 
-#define SD_JOURNAL_SUPPRESS_LOCATION  // a line of our code tells the operator nothing
+#define SD_JOURNAL_SUPPRESS_LOCATION  // source lines are no use to the operator
 #include <systemd/sd-journal.h>
 
 #include "daemon/journal/journal.h"

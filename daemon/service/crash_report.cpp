@@ -38,7 +38,7 @@ void put(int file, std::string_view text) {
   }
 }
 
-/// A text that grows without the allocator.
+/// A text buffer that grows without the allocator.
 struct Text {
   std::array<char, 768> bytes{};
   std::size_t size = 0;
@@ -110,7 +110,7 @@ void keep_newest(const std::filesystem::path& folder, std::size_t count) {
   for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
     if (entry.path().extension() == ".txt") reports.push_back(entry.path());
   }
-  std::ranges::sort(reports);  // by time: the names begin with ten digits
+  std::ranges::sort(reports);  // by time: the names start with ten digits
   while (reports.size() > count) {
     std::filesystem::remove(reports.front(), ignored);
     reports.erase(reports.begin());
@@ -137,11 +137,11 @@ void report_crashes_to(const std::filesystem::path& folder) {
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed) return;
-  keep_newest(folder, kKept - 1);  // and the next one
+  keep_newest(folder, kKept - 1);  // room for the next one
   std::ranges::copy(prefix, folder_and_slash.begin());
   folder_and_slash[prefix.size()] = '\0';
   void* frame = nullptr;
-  ::backtrace(&frame, 1);  // loads the library it needs now, not in a process that has crashed
+  ::backtrace(&frame, 1);  // loads its library now, not in a process that has crashed
   const stack_t stack{.ss_sp = signal_stack.data(), .ss_flags = 0, .ss_size = signal_stack.size()};
   ::sigaltstack(&stack, nullptr);
   struct sigaction action {};

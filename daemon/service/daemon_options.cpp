@@ -11,7 +11,7 @@ namespace {
 
 std::uintmax_t gib(double count) { return static_cast<std::uintmax_t>(count * (1u << 30)); }
 
-/// V4L2 devices that are named by their path are nobody in particular; two sensors in one device have one number.
+/// V4L2 devices named by their path have no identity; two sensors in one device have one number.
 CameraSerials cameras_from(const config::StereoCameraConfig& config) {
   using Driver = config::StereoCameraConfig::Driver;
   switch (config.driver) {
@@ -19,7 +19,7 @@ CameraSerials cameras_from(const config::StereoCameraConfig& config) {
     case Driver::v4l2:
     case Driver::v4l2_side_by_side:
       return {config.v4l2.left.serial, config.v4l2.right.value_or(config.v4l2.left).serial};
-    case Driver::simulated: break;  // their owner knows
+    case Driver::simulated: break;  // their owner has the numbers
   }
   return {};
 }

@@ -5,7 +5,7 @@
 
 namespace scanrig {
 
-/// What a rig's configuration says about the daemon.
+/// Options of the daemon from a rig's configuration.
 DaemonOptions options_from(const config::RigConfig& config);
 
 }  // namespace scanrig

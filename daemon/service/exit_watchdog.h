@@ -12,9 +12,9 @@
 
 namespace scanrig {
 
-/// Whether the daemon's ending comes to its end: threads that wait for a disk or a panel cannot be told to stop.
+/// Checks that the daemon's shutdown completes: threads that wait for a disk or a panel cannot be stopped.
 /// On the real clock: a virtual one runs away when the threads that hold it have ended.
-/// To be made before those threads and destroyed after them.
+/// Make it before those threads and destroy it after them.
 class ExitWatchdog {
  public:
   ExitWatchdog(std::chrono::nanoseconds limit, std::function<void(const Error&)> hangs)
@@ -30,7 +30,7 @@ class ExitWatchdog {
     if (thread_.joinable()) thread_.join();
   }
 
-  /// From now on it counts. `lost`: why it cannot come to its end; then nothing is waited for.
+  /// Starts the count. `lost`: why shutdown cannot complete; then there is no wait.
   void begin(const std::optional<Error>& lost) {
     if (lost) return hangs_(*lost);
     thread_ = std::thread([this] {

@@ -19,8 +19,8 @@
 namespace scanrig {
 namespace {
 
-/// The serial number tells apart jobs of one second; one that is known is never taken. The disk is not asked: it may
-/// hang, and a folder that somebody else has put there is not overwritten later either.
+/// The serial number distinguishes jobs of one second; a listed one is never taken. The disk is not checked: it may
+/// hang, and a folder put there by another program is not overwritten later either.
 class NewIds {
  public:
   std::string operator()(const JobTable& known) {
@@ -40,7 +40,7 @@ class NewIds {
   int serial_ = 0;
 };
 
-/// For as long as it lives the loop may be asked by others.
+/// Lets other threads use the loop for as long as this lives.
 class OnLoop {
  public:
   OnLoop(const DaemonOptions& options, ControlLoop& loop) : options_(options) { options.on_loop(loop); }
@@ -52,7 +52,7 @@ class OnLoop {
   const DaemonOptions& options_;
 };
 
-/// Entries of the log go to the log of their job too, while its thread is there.
+/// Entries of the log also go to the log of their job, while its thread runs.
 class JobLogs {
  public:
   explicit JobLogs(const std::function<void(JournalEntry)>& journal) : journal_(journal) {}
@@ -92,7 +92,7 @@ struct Workers {
   HousekeepingThread& housekeeping;
 };
 
-/// What takes its time is kept away from the thread that stores views.
+/// Longer work is kept away from the thread that stores views.
 void keep(const action::RunJobRequest& task, const Workers& workers) {
   using What = event::JobRequested::What;
   const auto what = task.asked.what;
@@ -122,7 +122,7 @@ void perform(const Action& action, const Workers& workers) {
       action);
 }
 
-/// What the last daemon left to be reconstructed.
+/// Jobs that the last daemon left to be reconstructed.
 void go_on_reconstructing(const JobTable& jobs, ReconstructionThread& reconstruction) {
   for (const auto& [id, job] : jobs) {
     if (job->state == JobState::reconstructing) reconstruction.rebuild(id, job->folder, job->recipe, {});
@@ -136,14 +136,14 @@ std::optional<Error> disk_problem(Clock::Duration waiting, const DaemonOptions& 
                            std::chrono::duration_cast<std::chrono::seconds>(waiting).count())};
 }
 
-/// The record of one run, if there is one. An end counts as unexpected unless nothing was using the devices.
+/// The record of one run, if there is one. An end counts as unexpected unless no devices were in use.
 class RecordedRun {
  public:
   explicit RecordedRun(const std::filesystem::path& state_folder) {
     if (state_folder.empty()) return;
     record_.emplace(state_folder);
     auto latch = record_->begin();
-    // Where nothing can be read, the last process may have left a fault: a person has to look first.
+    // Where nothing can be read, the last process may have left a fault: a person has to check first.
     latch_ = latch ? std::move(*latch) : Latch{as_sentence(latch.error().message)};
   }
   ~RecordedRun() {
@@ -168,7 +168,7 @@ class RecordedRun {
   bool uses_devices_ = false;
 };
 
-/// By the clock on the wall of this machine.
+/// Uses this machine's wall clock.
 bool quiet_now(const std::optional<QuietHours>& hours) {
   if (!hours) return false;
   const auto now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
@@ -216,8 +216,8 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
   if (auto may = options.takes_devices(); !may) return pass_on(may);
   record.begin_devices();
 
-  // Time stands until every thread is there. They end in reverse order: the panel shows the last lamps, the rig is
-  // seen standing, what was taken goes to disk, then the reconstruction that all of them feed is stopped.
+  // Time stands still until every thread runs. They end in reverse order: the panel shows the last lamps, the rig's
+  // standstill is confirmed, views go to disk, then the reconstruction that all of them feed is stopped.
   std::optional<Clock::Busy> starting(clock);
   ReconstructionThread reconstruction(clock, options.reconstructor, post_event);
   go_on_reconstructing(*known, reconstruction);
@@ -272,7 +272,7 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
                          .refused_at_panel = refused});
   const auto hung = ended ? std::nullopt : rig.hung() ? rig.hung() : panel.hung();
   ending.begin(hung ? std::optional(hung_error(*hung)) : std::nullopt);
-  reconstruction.stop();  // before views that are still being stored cost the time it has
+  reconstruction.stop();  // before views that are still being stored use up its time
   if (ended) record.end_devices();
   return ended;
 }

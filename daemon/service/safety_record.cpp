@@ -42,7 +42,7 @@ Moment read_moment(JsonObject object) {
   return moment;
 }
 
-/// Within one start of the machine its own clock decides: the wall clock may have been set meanwhile.
+/// Within one run of the machine its own clock decides: the wall clock may have been set meanwhile.
 bool is_recent(const Moment& end, const Moment& now) {
   const auto age = end.boot_id == now.boot_id ? now.boot - end.boot : now.wall - end.wall;
   return age >= std::chrono::seconds(0) && age <= SafetyRecord::kWithin;

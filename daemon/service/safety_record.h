@@ -14,7 +14,7 @@
 
 namespace scanrig {
 
-/// The time of one moment, by two clocks: the wall clock may jump, the other one starts again with the machine.
+/// One moment by two clocks: the wall clock may jump, the other one restarts with the machine.
 struct Moment {
   std::string boot_id;          ///< /proc/sys/kernel/random/boot_id
   std::chrono::seconds boot{};  ///< since the machine started, suspended time included
@@ -22,7 +22,7 @@ struct Moment {
 };
 Moment moment_now();
 
-/// What outlives the process, in the state folder: the latch (latch.json), and how often the service ended
+/// Records that outlive the process, in the state folder: the latch (latch.json), and how often the service ended
 /// unexpectedly (run.json). Every change is durable when its call returns.
 /// Threads: one user at a time.
 class SafetyRecord {
@@ -33,18 +33,18 @@ class SafetyRecord {
   explicit SafetyRecord(std::filesystem::path folder, std::function<Moment()> now = moment_now)
       : folder_(std::move(folder)), now_(std::move(now)) {}
 
-  /// Notes that the service runs, and returns the latch that the last process left. kUnexpectedEnds within kWithin are
-  /// a latch too, and so is a record that cannot be read: whatever it held, a person has to look first.
+  /// Records that the service runs, and returns the latch of the last process. kUnexpectedEnds within kWithin are
+  /// a latch too, and so is an unreadable record: whatever it held, a person has to check first.
   /// Fails with `io`.
   Result<std::optional<Latch>> begin();
-  /// Notes a clean end: the unexpected ones before it count no more. Fails with `io`.
+  /// Records a clean end: the unexpected ones before it count no more. Fails with `io`.
   Result<void> end();
-  /// Nothing: the latch is cleared. Fails with `io`.
+  /// Stores the latch; nothing: it is cleared. Fails with `io`.
   Result<void> store_latch(const std::optional<Latch>& latch);
 
  private:
   [[nodiscard]] std::optional<Latch> read_latch() const;
-  /// The ends so far, and the one that this start is the proof of.
+  /// The ends so far, including the one that this start proves.
   [[nodiscard]] Result<std::vector<Moment>> unexpected_ends() const;
   Result<void> write_run(bool running, const std::vector<Moment>& ends);
 
@@ -52,7 +52,7 @@ class SafetyRecord {
   const std::function<Moment()> now_;
 };
 
-/// Writes latches on a thread of its own: a disk that hangs holds its caller for kMaxWait and no longer.
+/// Writes latches on a separate thread: a disk that hangs holds its caller for kMaxWait and no longer.
 /// Threads: store() from one thread.
 class LatchWriter {
  public:
@@ -63,7 +63,7 @@ class LatchWriter {
   LatchWriter(const LatchWriter&) = delete;
   LatchWriter& operator=(const LatchWriter&) = delete;
 
-  /// Returns once `latch` is durable. Fails with `timeout` where that takes longer than kMaxWait (the writing goes on)
+  /// Returns once `latch` is durable. Fails with `timeout` where that takes longer than kMaxWait (writing continues)
   /// and as SafetyRecord::store_latch.
   Result<void> store(std::optional<Latch> latch);
 

@@ -14,7 +14,7 @@
 namespace scanrig {
 namespace {
 
-/// Something would be lost if this machine fell asleep now.
+/// True if a sleep of this machine would lose something now.
 bool is_job_active(const Snapshot& snapshot) {
   const bool scans = !snapshot.job.empty() || snapshot.machine == MachineState::single_execution ||
                      snapshot.machine == MachineState::continuous_execution;
@@ -62,7 +62,7 @@ Result<void> Service::run_again_and_again(const Run& run, config::RigConfig conf
 
 DaemonOptions Service::options_for(const config::RigConfig& config, bool again) {
   auto options = options_from(config);
-  if (again) options.auto_home = false;  // a restart is somebody's doing at the rig, a reload need not be
+  if (again) options.auto_home = false;  // a person at the rig restarts; a reload needs no person there
   options.takes_devices = [this, &config] { return save_config(config, saved_config_folder(file_)); };
   options.api.passed_socket = sockets_.local;
   options.api.passed_tcp = sockets_.tcp;
@@ -119,7 +119,7 @@ void Service::reload(ControlLoop::Reply reply) {
   if (!config) return give_up(config.error(), reply);
   const std::lock_guard guard(mutex_);
   next_ = std::move(*config);
-  if (!loop_) return;  // the daemon has ended: nobody is left to be answered
+  if (!loop_) return;  // the daemon has ended: no client waits for a reply
   loop_->ask(event::ReloadRequested{}, [this, reply = std::move(reply)](const Result<std::string>& taken) {
     if (!taken) return give_up(taken.error(), reply);
     tell(Priority::notice, "The new configuration is valid: the service restarts with it.");
@@ -129,7 +129,7 @@ void Service::reload(ControlLoop::Reply reply) {
 
 void Service::give_up(const Error& why, const ControlLoop::Reply& reply) {
   auto sentence = "Reload refused, configuration unchanged: " + why.message;
-  std::ranges::replace(sentence, '\n', ' ');  // one a problem; a status is one line
+  std::ranges::replace(sentence, '\n', ' ');  // one line per problem; a status is one line
   {
     const std::lock_guard guard(mutex_);
     next_.reset();

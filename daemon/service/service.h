@@ -16,22 +16,22 @@
 
 namespace scanrig {
 
-/// A program that runs the daemon under a configuration file, and in the same process again when SIGHUP or the API asks
-/// for the file as it is now. The file is checked first, and what cannot be used or comes at a bad time changes
-/// nothing: the daemon goes on as it was, and says why in log, answer and `systemctl status`.
+/// A program that runs the daemon under a configuration file. On SIGHUP or an API request it runs it again, in the same
+/// process, with the present file. The file is checked first; an unusable file or a bad time changes
+/// nothing: the daemon continues as before, and reports why in log, reply and `systemctl status`.
 class Service {
  public:
   /// Opens the devices and runs the daemon until it ends. The configuration outlives the call.
   using Run = std::function<Result<Ended>(const config::RigConfig&, const DaemonOptions&)>;
 
-  /// `name`: of the program, `file` its rig.toml. Takes the sockets that systemd passes; to be made before threads that
+  /// `name`: of the program, `file` its rig.toml. Takes the sockets that systemd passes; make it before threads that
   /// read the environment.
   Service(std::string name, std::filesystem::path file, config::Cameras cameras)
       : name_(std::move(name)), file_(std::move(file)), cameras_(cameras) {}
 
-  /// Until `stop`. What the daemon runs under is kept (rig/saved_config.h) before it uses a device. Fails as
-  /// read_rig_config(), `run` and save_config() do; a changed configuration under which `run` does not get as far as
-  /// the control loop is given up for the one before.
+  /// Runs until `stop`. Saves the configuration in use (rig/saved_config.h) before the daemon uses a device. Fails as
+  /// read_rig_config(), `run` and save_config() do. If `run` does not reach the control loop under a changed
+  /// configuration, the one before is restored.
   Result<void> run(SignalStop& stop, const Run& run);
 
  private:
@@ -50,8 +50,8 @@ class Service {
   ServiceManager manager_;
   std::optional<Journal> journal_;
   std::optional<SleepInhibitor> awake_;
-  bool begun_ = false;  ///< the control loop goes round; of run()'s thread
-  std::mutex mutex_;    ///< of all that follows
+  bool begun_ = false;  ///< the control loop runs; for run()'s thread
+  std::mutex mutex_;    ///< guards all that follows
   ControlLoop* loop_ = nullptr;
   bool reloading_ = false;
   std::optional<config::RigConfig> next_;

@@ -5,8 +5,8 @@
 
 namespace scanrig {
 
-/// What systemd is told of the service (sd_notify(3)): ready, that it makes progress (the watchdog), what it does, that
-/// it reads its configuration again, that it ends. Where the daemon was not started by systemd, nobody is told.
+/// Reports to systemd on the service (sd_notify(3)): ready, progress (the watchdog), its activity, a reload of the
+/// configuration, its end. Without systemd as the parent of the daemon, nothing is reported.
 /// Threads: any.
 class ServiceManager {
  public:
@@ -15,13 +15,13 @@ class ServiceManager {
   ServiceManager(const ServiceManager&) = delete;
   ServiceManager& operator=(const ServiceManager&) = delete;
 
-  /// The control loop goes round; the first time, the service is ready. `sentence`: for `systemctl status`.
+  /// The control loop runs; the first time, the service is ready. `sentence`: for `systemctl status`.
   void alive(const std::string& sentence);
-  /// The configuration is being read again: not ready until it stays(), or the daemon has begun again.
+  /// The configuration is being read again: not ready until it stays(), or the daemon has restarted.
   void reloading();
-  /// The daemon goes on as it was; `sentence` says why.
+  /// The daemon continues as before; `sentence` gives the reason.
   void stays(const std::string& sentence);
-  /// Another daemon begins in this process: ready when it goes round.
+  /// Another daemon starts in this process: ready when its loop runs.
   void begins_again();
 
  private:

@@ -30,7 +30,7 @@ std::uint64_t us_until(SteadyClock::time_point by) {
   return left > 1 ? static_cast<std::uint64_t>(left) : 1;
 }
 
-/// sd_bus_call() by itself would wait for a bus that does not greet for as long as the library likes.
+/// sd_bus_call() alone would wait for a bus that does not greet for as long as the library likes.
 int open_bus(Bus& bus, SteadyClock::time_point by) {
   sd_bus* opened = nullptr;
   if (const int failed = ::sd_bus_open_system(&opened); failed < 0) return failed;

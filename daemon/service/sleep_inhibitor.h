@@ -27,7 +27,7 @@ class SleepInhibitor {
   SleepInhibitor& operator=(const SleepInhibitor&) = delete;
 
   void keep_awake(bool on);
-  /// What was asked for last has been done, or has failed.
+  /// True when the last request has been done, or has failed.
   [[nodiscard]] bool is_settled() const;
 
  private:

@@ -29,8 +29,8 @@ struct Lookup {
   Tcp::resolver::results_type found;
 };
 
-/// A name server answers when it likes, and the C library's look-up cannot be called off: it has a thread of its own,
-/// and who no longer waits for it leaves it to itself.
+/// A name server may take any time, and the C library's look-up cannot be cancelled: it has a separate thread,
+/// and a caller that stops waiting abandons it.
 std::shared_ptr<Lookup> look_up(const HttpAddress& address) {
   auto lookup = std::make_shared<Lookup>();
   std::thread([lookup, host = address.host, port = address.port] {
@@ -51,7 +51,7 @@ std::shared_ptr<Lookup> look_up(const HttpAddress& address) {
   return lookup;
 }
 
-/// One exchange, step after step; every step runs in the io_context of the caller.
+/// One exchange, step by step; every step runs in the io_context of the caller.
 class Exchange {
  public:
   Exchange(net::io_context& io, const HttpAddress& address, const Tcp::resolver::results_type& found,
@@ -68,7 +68,7 @@ class Exchange {
     });
   }
 
-  /// Nothing while it is not over.
+  /// Empty while it is not over.
   std::optional<boost::system::error_code> ended{};
   http::response<http::string_body> response;
 

@@ -57,7 +57,7 @@ Webhook::~Webhook() {
   thread_.join();
 }
 
-/// What is bad already when the daemon starts is no news.
+/// Problems from before the daemon's start are not reported.
 void Webhook::look(std::shared_ptr<const Snapshot> now) {
   if (before_) {
     for (auto& message : alerts(*before_, *now)) inbox_.post(std::move(message));

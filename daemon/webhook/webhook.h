@@ -15,16 +15,16 @@
 
 namespace scanrig {
 
-/// What between two snapshots is worth a message, as JSON: a job that failed, was interrupted or does not pass, and a
+/// Messages for the change between two snapshots, as JSON: a job that failed, was interrupted or did not pass, and a
 /// fault of the machine.
 std::vector<std::string> alerts(const Snapshot& before, const Snapshot& now);
 
-/// Tells one address over HTTP what goes wrong; tries three times, then drops the message: whoever must not miss
-/// anything asks the API.
+/// Reports failures to one address over HTTP; tries three times, then drops the message. A client that must not miss
+/// anything reads the API.
 class Webhook {
  public:
   Webhook(Clock& clock, HttpAddress address);
-  /// At once: what has not been sent is dropped.
+  /// Stops at once: unsent messages are dropped.
   ~Webhook();
   Webhook(const Webhook&) = delete;
   Webhook& operator=(const Webhook&) = delete;
@@ -38,7 +38,7 @@ class Webhook {
 
   Clock& clock_;
   HttpAddress address_;
-  std::shared_ptr<const Snapshot> before_;  ///< of look()'s thread
+  std::shared_ptr<const Snapshot> before_;  ///< for look()'s thread
   Mailbox<std::string> inbox_;
   std::stop_source stop_;
   std::mutex mutex_;

@@ -8,9 +8,9 @@
 #include "daemon/ctl/doctor/findings.h"
 
 namespace scanrig::ctl::doctor {
-/// Whether the drive answers at its port as configured, how fast, and what its registers say. Where it does not: who
-/// answers there instead (`wrong_parity`, `wrong_baud`, `wrong_unit_id`, `swapped_adapter`, `no_answer`, ...).
-/// Returns whether the drive can be worked with.
+/// Checks whether the drive responds at its port as configured, how fast, and reads its registers. Otherwise finds what
+/// responds there instead (`wrong_parity`, `wrong_baud`, `wrong_unit_id`, `swapped_adapter`, `no_answer`, ...).
+/// Returns whether the drive can be used.
 bool examine_drive(const config::RigConfig& rig, Clock& clock, Report& report);
 
 /// The rig to be examined, and the file that a motion's guardian reads again.
@@ -19,22 +19,22 @@ struct Rig {
   const std::filesystem::path& file;
 };
 
-/// Turns the table under the rules of with_motion(): home, a quarter turn for the sign (the operator says which way it
-/// went), one revolution from home switch to home switch for the gear ratio. Findings: `cannot_turn`, `reversed_sign`,
-/// `gear_ratio`. Fails with `stopped` (somebody stopped it) and `refused` (e-stop, guard): the examination ends.
+/// Turns the table under the rules of with_motion(): home, a quarter turn for the sign (the operator enters its
+/// direction), one revolution from home switch to home switch for the gear ratio. Findings: `cannot_turn`,
+/// `reversed_sign`, `gear_ratio`. Fails with `stopped` (on request) and `refused` (e-stop, guard): examination ends.
 Result<void> examine_motion(const Rig& rig, const Operator& person, Clock& clock, Report& report);
 
-/// Lamps can be lit, inputs read; with somebody there, whether the e-stop's input follows the button and whether the
-/// drive loses its power. Findings: `panel`, `estop_not_wired`, `estop_keeps_power`.
-/// Returns whether the table may be turned: nothing speaks against the emergency stop.
+/// Checks that lamps can be lit and inputs read. With a person there, checks whether the e-stop's input follows the
+/// button and whether the drive loses its power. Findings: `panel`, `estop_not_wired`, `estop_keeps_power`.
+/// Returns whether the table may be turned: no finding against the emergency stop.
 bool examine_panel(const config::RigConfig& rig, bool drive_answers, const Operator& person, Clock& clock,
                    Report& report);
 
 /// Lists serial adapters, GPIO chips with their named lines, USB devices and the groups of the user.
 void list_what_is_connected(Report& report);
 
-/// Whether this user may open `device` for reading and writing. Where not, a finding says why: no such device, or the
-/// group that is missing (`device_missing`, `missing_group`).
+/// Checks whether this user may open `device` for reading and writing. If not, a finding gives the reason: no such
+/// device, or the missing group (`device_missing`, `missing_group`).
 bool may_open(const std::filesystem::path& device, const std::string& section, Report& report);
 
 /// The udev rule that gives the adapter behind `device` the name the configuration uses, and the systemd unit, where

@@ -15,7 +15,7 @@ using std::chrono::milliseconds;
 constexpr int kReads = 50;
 constexpr std::chrono::seconds kAskLimit{2};
 
-/// Nobody understood us as configured: who is there?
+/// No device understood the configured settings: find out which device is there.
 void find_out_who_is_there(const ModbusTurntableOptions& options, Clock& clock, Report& report) {
   const auto& line = options.line;
   if (const auto grbl = grbl_answer(line.device, clock)) {
@@ -136,7 +136,7 @@ bool examine_drive(const config::RigConfig& rig, Clock& clock, Report& report) {
     tell_registers(*drive, options, clock, report);
     return reliable;
   }
-  drive.reset();  // the port is free for other questions
+  drive.reset();  // the port is free for other requests
   report.note(first.error().message);
   if (first.error().code == ErrorCode::io) {
     report.find("port", fmt::format("The port cannot be used: {}.", first.error().message),

@@ -30,7 +30,7 @@ class Revolution {
              const std::atomic<bool>& is_stop_requested)
       : options_(options), clock_(clock), drive_(drive), is_stop_requested_(is_stop_requested) {}
 
-  /// Pulses from the home switch to the home switch, once around. The table stands at home before.
+  /// Pulses from the home switch to the home switch, once around. The table is at home before.
   Result<double> pulses() {
     for (const int side : {-1, +1}) {
       const auto gone = step_aside(side);
@@ -70,7 +70,7 @@ class Revolution {
     return way;
   }
 
-  /// How far it was to the switch, pulses.
+  /// Distance to the switch, pulses.
   Result<double> seek_switch() {
     const auto by = Deadline::after(clock_, kRevolutionLimit);
     const auto before = read_state(by);
@@ -79,7 +79,7 @@ class Revolution {
     if (!fast) return pass_on(fast);
     if (auto set = drive_.set_homing(options_.home_mode, *fast, by); !set) return pass_on(set);
     if (auto started = drive_.start_homing(by); !started) return pass_on(started);
-    // The furthest way seen, not the last: state and position are read in turn, and home sets the position to zero.
+    // The furthest reading, not the last: state and position are read in turn, and home sets the position to zero.
     double furthest = 0.0;
     for (bool begun = false;; clock_.sleep_for(kPoll)) {
       const auto state = read_state(by);
@@ -137,7 +137,7 @@ void compare_gear(double configured, double ratio, Report& report) {
       fmt::format("Set gear_ratio = {:.2f} (or the gear's exact ratio near it) in [turntable].", ratio));
 }
 
-/// By the drive's own counter, from the home switch to the home switch.
+/// Measures by the drive's own counter, from the home switch to the home switch.
 Result<void> check_gear_by_switch(const Rig& rig, Clock& clock, Report& report) {
   const auto& options = rig.config.turntable.modbus;
   double pulses = 0.0;
@@ -159,8 +159,8 @@ Result<void> check_gear_by_switch(const Rig& rig, Clock& clock, Report& report) 
   return {};
 }
 
-/// By a mark that somebody puts on the table: for drives that cannot count from a switch. Nothing may move while the
-/// mark is put there, so there are two motions; home is the same place in both.
+/// Measures by a mark that the operator puts on the table: for drives that cannot count from a switch. Nothing may move
+/// meanwhile, so there are two motions; home is the same place in both.
 Result<void> check_gear_by_mark(const Rig& rig, const Operator& person, Clock& clock, Report& report) {
   if (!person.there()) {
     report.note("gear: not checked, nobody is here to watch a mark on the table");

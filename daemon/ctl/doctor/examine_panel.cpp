@@ -15,7 +15,7 @@ constexpr seconds kAskLimit{1};
 constexpr std::chrono::milliseconds kGlance{100};
 constexpr std::chrono::milliseconds kPowerGone{500};  ///< after the e-stop, until the drive must be off
 
-/// Waits until the e-stop's input is `ok`; whether it came.
+/// Waits until the e-stop's input is `ok`; returns whether it came.
 Result<bool> wait_for_estop(Panel& panel, bool ok, Clock& clock) {
   PanelInputs known;
   for (const auto by = Deadline::after(clock, kPressLimit); !by.expired(clock);) {
@@ -27,10 +27,10 @@ Result<bool> wait_for_estop(Panel& panel, bool ok, Clock& clock) {
   return false;
 }
 
-/// After the e-stop was pressed: does the drive still hold the motor?
+/// Checks after the e-stop was pressed: does the drive still hold the motor?
 bool drive_still_enabled(const config::RigConfig& rig, Clock& clock) {
   if (rig.turntable.driver == config::TurntableConfig::Driver::grbl)
-    return false;  // it does not know of the motor's power
+    return false;  // it has no reading of the motor's power
   clock.sleep_for(kPowerGone);
   const auto& options = rig.turntable.modbus;
   ModbusDrive drive(options.line, options.profile, clock);

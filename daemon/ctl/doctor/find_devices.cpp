@@ -14,7 +14,7 @@ namespace {
 using modbus::Parity;
 using std::chrono::milliseconds;
 
-constexpr milliseconds kReplyTimeout{40};  ///< longer than any frame asked for takes at 9600 baud
+constexpr milliseconds kReplyTimeout{40};  ///< longer than any requested frame takes at 9600 baud
 constexpr milliseconds kGrblPatience{300};
 
 std::vector<modbus::ClientOptions> ways_to_ask(const modbus::ClientOptions& configured, int max_unit) {

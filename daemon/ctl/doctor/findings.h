@@ -6,14 +6,14 @@
 #include <vector>
 
 namespace scanrig::ctl::doctor {
-/// Something that is wrong, in one sentence, and what to do about it in another.
+/// A problem in one sentence, and its remedy in another.
 struct Finding {
   std::string id;  ///< one word for programs: "gear_ratio"
   std::string problem;
   std::string remedy;
 };
 
-/// What the doctor saw, section by section, and what is wrong.
+/// Results of the doctor, section by section, and its findings.
 class Report {
  public:
   void section(std::string heading) { sections_.push_back({std::move(heading), {}}); }
@@ -38,13 +38,13 @@ class Report {
 /// The person at the rig, at a terminal or at the other end of standard input.
 class Operator {
  public:
-  /// `answers`: somebody answers on standard input although it is no terminal. Prompts go to standard error with
+  /// `answers`: a person replies on standard input although it is no terminal. Prompts go to standard error with
   /// `quiet_output`, so that standard output stays JSON.
   Operator(bool answers, bool quiet_output);
 
   [[nodiscard]] bool there() const { return there_; }
   void tell(const std::string& text) const;
-  /// The line that was answered; nothing when nobody is there.
+  /// The line that was entered; nothing without a person there.
   [[nodiscard]] std::optional<std::string> ask(const std::string& question) const;
 
  private:

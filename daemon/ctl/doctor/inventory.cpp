@@ -74,7 +74,7 @@ void list_serial(Report& report) {
   if (seen.empty()) report.note("none");
 }
 
-/// The chip's lines that have a name, as the kernel tells them.
+/// The chip's lines that have a name, as the kernel lists them.
 void list_chip(const fs::path& device, Report& report) {
   const int chip = ::open(device.c_str(), O_RDWR | O_CLOEXEC);
   if (chip < 0) return report.note(fmt::format("{}: {}", device.string(), std::strerror(errno)));
