@@ -18,12 +18,12 @@
 namespace scanrig::api_bench {
 
 struct Answer {
-  int status = 0;  ///< 0: hung up without a word
+  int status = 0;  ///< 0: hung up without a reply
   std::string head, body;
   [[nodiscard]] nlohmann::json json() const { return nlohmann::json::parse(body, nullptr, false); }
 };
 
-/// A client that says exactly what it is told to. Reading gives up after 5 s.
+/// A client that sends exactly the given bytes. Reading gives up after 5 s.
 class Wire {
  public:
   explicit Wire(int fd) : fd_(fd) {
@@ -39,7 +39,7 @@ class Wire {
   bool say(const std::string& text) const {
     return ::send(fd_, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());
   }
-  /// Reads until `end` was seen; all that came up to and with it, or all until the other end hung up.
+  /// Reads until `end`; returns everything up to and including it, or everything until the other end hung up.
   std::string hear(const std::string& end) {
     std::size_t found = 0;
     while ((found = read_.find(end)) == std::string::npos && more()) {
@@ -118,7 +118,7 @@ class ApiBench : public scan_samples::FolderTest {
   }
 
   Wire local() const { return Wire(connect_to_socket(options.socket).value_or(-1)); }
-  /// From 127.0.0.`host`.
+  /// A client at 127.0.0.`host`.
   Wire tcp(std::uint32_t host = 1) const {
     const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
     sockaddr_in here{};

@@ -75,7 +75,7 @@ TEST_F(Client, SendsABodyAndHearsWhy) {
   EXPECT_EQ(answer.error().exit, ExitCode::refused);
 }
 
-/// A daemon that was stopped, or hangs: it listens, and says nothing unless the test does.
+/// A stopped or hanging daemon: it listens, and sends nothing unless the test does.
 class HangingDaemon : public Client {
  protected:
   void SetUp() override {
@@ -88,7 +88,7 @@ class HangingDaemon : public Client {
     ::close(listening);
     Client::TearDown();
   }
-  /// Until the kernel keeps no more connections for the daemon.
+  /// Connects until the kernel keeps no more connections for the daemon.
   void fill_the_backlog() {
     ASSERT_EQ(::listen(listening, 0), 0);
     for (auto one = connect_to_socket(options.socket, kSoon); one; one = connect_to_socket(options.socket, kSoon)) {

@@ -17,7 +17,7 @@ class EventsOverHttp : public ApiBench {
     EXPECT_THAT(wire.hear("\r\n\r\n"), AllOf(HasSubstr("200 OK"), HasSubstr("Content-Type: text/event-stream")));
     return wire;
   }
-  /// The next event of that kind; a status may be told in more steps than one.
+  /// The next event of that kind; a status may be reported in more steps than one.
   static std::string hear_of(Wire& wire, const std::string& kind, const std::string& words) {
     std::string event;
     for (int i = 0; i < 10; ++i) {

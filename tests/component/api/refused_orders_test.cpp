@@ -1,4 +1,4 @@
-// What the log says of orders that the API refuses.
+// The log's entries for orders that the API refuses.
 #include "tests/component/api/api_bench.h"
 
 namespace scanrig {
@@ -81,7 +81,7 @@ TEST_F(RefusedOrders, AreNotWhatIsObeyedOrOnlyLooks) {
   EXPECT_THAT(told(), testing::SizeIs(1)) << "the last one";
 }
 
-/// Where only somebody at the panel lets an engineer jog.
+/// A rig where only a person at the panel lets an engineer jog.
 class WithoutAGuard : public ApiBench {
  protected:
   void SetUp() override {

@@ -10,7 +10,7 @@ using nlohmann::json;
 using testing::HasSubstr;
 using testing::Not;
 
-/// The implementation against its own document.
+/// Compares the implementation with its own document.
 class Document : public ApiBench {
  protected:
   void SetUp() override {
@@ -143,7 +143,7 @@ TEST_F(ApiBench, ARevokedTokenIsVoidSoon) {
   RealClock clock;
   for (const auto end = Deadline::after(clock, std::chrono::seconds(10)); !end.expired(clock);) {
     if (ask(tcp(), status).status == 401) return;
-    clock.sleep_for(std::chrono::milliseconds(200));  // guessing is dear: not more often
+    clock.sleep_for(std::chrono::milliseconds(200));  // guessing costs much: wait between guesses
   }
   FAIL() << "still good";
 }

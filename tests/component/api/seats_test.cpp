@@ -40,7 +40,7 @@ class SeatsOfTheApi : public ApiBench {
     request();
     return std::chrono::duration<double, std::milli>(Steady::now() - begun).count();
   }
-  /// What the client of the command line does for `scanrig stop`.
+  /// The same steps as the command line's client for `scanrig stop`.
   void stop_locally() const {
     const auto stopped = ctl::send_request(options.socket, "POST", "/api/v1/stop");
     EXPECT_TRUE(stopped) << (stopped ? "" : stopped.error().message);

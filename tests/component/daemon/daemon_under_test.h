@@ -13,7 +13,7 @@
 
 namespace scanrig {
 
-/// A whole daemon over fake devices on a virtual clock; the test is the operator, for whom time waits too.
+/// A whole daemon over fake devices on a virtual clock; the test is the operator, and time waits for it too.
 class Daemon : public scan_samples::FolderTest {
  protected:
   void SetUp() override {
@@ -79,7 +79,7 @@ class Daemon : public scan_samples::FolderTest {
     rig.panel.press(&PanelInputs::start);
   }
 
-  /// Looks again and again, for a virtual minute at most; a look takes none of it.
+  /// Checks repeatedly, for a virtual minute at most; a check takes no time.
   bool clock_waits_for(const std::function<bool()>& as_wanted) {
     for (const auto by = Deadline::after(clock, std::chrono::seconds(60)); !by.expired(clock);
          clock.sleep_for(std::chrono::milliseconds(10))) {
@@ -112,7 +112,7 @@ class Daemon : public scan_samples::FolderTest {
     }
   }
 
-  /// What the daemon answers to an order, a wish or a press over the API; it has an hour of the clock.
+  /// The daemon's reply to an order, a job request or a press over the API; it has an hour of the clock.
   template <class Asked>
   Result<std::string> ask(const Asked& what) {
     struct Waiting {
@@ -144,7 +144,7 @@ class Daemon : public scan_samples::FolderTest {
     const auto jobs = loop->snapshot()->jobs;
     return jobs.contains(id) ? jobs.at(id) : nullptr;
   }
-  /// The newest one's, or nothing.
+  /// The newest job's, or nothing.
   std::shared_ptr<const JobInfo> newest() const {
     const auto jobs = loop->snapshot()->jobs;
     return jobs.empty() ? nullptr : jobs.rbegin()->second;

@@ -9,7 +9,7 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using What = event::JobRequested::What;
 
-/// Jobs whose folders are not what they were when their turn comes.
+/// Jobs whose folders have been damaged when their turn comes.
 class Damaged : public Daemon {
  protected:
   void SetUp() override {

@@ -30,7 +30,7 @@ class BadDisk : public Daemon {
   Result<std::string> resume(const std::string& id) {
     return ask(event::JobRequested{.what = What::resume, .job = id});
   }
-  /// From now on whoever syncs a file of the first pose's second view waits for release().
+  /// From now on a thread that syncs a file of the first pose's second view waits for release().
   void hang() {
     released_ = false;
     fakes::disk().at_sync([this](const std::string& path) {
@@ -53,7 +53,7 @@ class BadDisk : public Daemon {
     const std::lock_guard guard(mutex_);
     return hanging_;
   }
-  /// A scan whose second view is being stored, for as long as the disk likes.
+  /// A scan whose second view is being stored, for as long as the disk takes.
   std::string scan_until_it_hangs() {
     hang();
     boot();
@@ -217,7 +217,7 @@ TEST_F(BadDisk, HangingItDoesNotKeepTheDaemonFromEnding) {
   options.exit_timeout = std::chrono::milliseconds(200);
   options.on_exit_hang = [this, told](const Error& why) {
     *told = why.message;
-    release();  // in the place of the end of the process
+    release();  // instead of the end of the process
   };
   const auto id = scan_until_it_hangs();
   shut_down();

@@ -17,10 +17,10 @@ using testing::IsEmpty;
 using testing::Not;
 using What = event::JobRequested::What;
 
-/// Reconstructions that go wrong: the rig goes on, and the job says what happened.
+/// Reconstructions that go wrong: the rig continues, and the job reports what happened.
 class Executor : public Daemon {
  protected:
-  /// A program in the place of the scanrig command: `script` finds the model's folder in $out.
+  /// A program in place of the scanrig command: `script` finds the model's folder in $out.
   void execute(const std::string& script) {
     const auto program = folder_ / "scanrig";
     scan_samples::write_text(program, "#!/bin/sh\nout=$5\n" + script);
@@ -39,18 +39,18 @@ class Executor : public Daemon {
     EXPECT_FALSE(fs::exists(model_folder(job(id)->folder)));
     EXPECT_FALSE(fs::exists(fs::path(job(id)->folder) / "attempt.json"));
   }
-  /// As daemons leave it that died over the model.
+  /// A folder as left by daemons that died during the reconstruction.
   static void write_attempts(const fs::path& folder, int count) {
     scan_samples::write_text(
         folder / "attempt.json",
         fmt::format(R"({{"format": "scanrig-attempt", "version": 1, "count": {}, "process": "x"}})", count));
   }
-  /// Start; then in the exposure that follows `fires` others the power goes: the next daemon finds the disk as it was.
+  /// Start; then in the exposure after `fires` others the power fails: the next daemon finds the disk as it was.
   void cut_power_after(int fires) {
     std::atomic<bool> cut = false;
     rig.line.fires_before = fires;
     rig.line.at_fire = [&] {
-      clock.sleep_for(std::chrono::seconds(2));  // the disk rests
+      clock.sleep_for(std::chrono::seconds(2));  // the disk is idle
       fs::copy(folder_ / "jobs", folder_ / "cut", fs::copy_options::recursive);
       cut = true;
     };
@@ -61,7 +61,7 @@ class Executor : public Daemon {
     fs::rename(folder_ / "cut", folder_ / "jobs");
     for (const auto& folder : job_folders()) {
       const auto attempts = read_attempt_record(folder);
-      if (attempts.running) write_attempts(folder, attempts.ended_by_death + 1);  // that process is no more
+      if (attempts.running) write_attempts(folder, attempts.ended_by_death + 1);  // that process has ended
     }
     boot();
     get_ready();

@@ -8,7 +8,7 @@ namespace scanrig::fakes {
 
 /// The disk of a test program that is linked with fake_disk.cpp: every fsync of the program passes here.
 struct FakeDisk {
-  /// Called with the path of what is to be synced, from the thread that asks for it; may wait. Returns the number of
+  /// Called with the path to be synced, from the requesting thread; may wait. Returns the number of
   /// the error with which the sync fails, or 0: then the real one is done. Empty: as 0.
   using Sync = std::function<int(const std::string& path)>;
 

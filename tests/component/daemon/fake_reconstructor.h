@@ -9,11 +9,11 @@
 
 namespace scanrig::fakes {
 
-/// What fake reconstructions were given and are to answer.
+/// Inputs of fake reconstructions, and the results they return.
 struct ReconstructionLog {
   std::mutex mutex;
   std::vector<std::string> calls;                ///< "view 0/3", "pose 0", "finish"
-  std::vector<std::pair<int, int>> grey_levels;  ///< of pattern and plain, a view
+  std::vector<std::pair<int, int>> grey_levels;  ///< of pattern and plain, per view
   Result<void> answer_to_view{};
   Result<void> answer_to_finish{};
   std::function<void()> at_finish = [] {};  ///< may throw

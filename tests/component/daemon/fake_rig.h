@@ -12,8 +12,8 @@
 
 namespace scanrig::fakes {
 
-/// Devices that keep to their interfaces and remember what was done to them; nothing is rendered.
-/// The test's thread is the operator: it looks at the lamps and presses buttons.
+/// Devices that keep to their interfaces and record their calls; nothing is rendered.
+/// The test's thread is the operator: it reads the lamps and presses buttons.
 
 class FakeTurntable final : public Turntable {
  public:
@@ -62,7 +62,7 @@ class FakeTurntable final : public Turntable {
     clock_.notify_all(changed_);
   }
 
-  std::mutex mutex;  ///< of all that follows
+  std::mutex mutex;  ///< guards all that follows
   bool moving = false;
   bool stalled = false;
   bool unreachable = false;
@@ -74,7 +74,7 @@ class FakeTurntable final : public Turntable {
   std::vector<Clock::TimePoint> move_starts;                            ///< of the same
 
  private:
-  /// 45 degrees a second; a stop ends it, and one from before it too.
+  /// 45 degrees a second; a stop ends it, and an earlier stop does too.
   Result<Move> turn_to(double target, Deadline deadline) {
     std::unique_lock lock(mutex);
     const auto start = clock_.now();
@@ -111,20 +111,20 @@ struct TriggerLine {
   std::mutex mutex;
   bool lit = false;
   bool armed = false;
-  int exposures = 0;  ///< since the beginning
+  int exposures = 0;  ///< since the start
   int lose = 0;       ///< the next exposures whose frames never arrive
-  int looks = 0;      ///< since the beginning
+  int looks = 0;      ///< since the start
   int looks_before_exposures = 0;
   int looks_in_between = 0;  ///< between the first exposure and the latest
-  int dark = 0;              ///< the next exposures whose right picture is dark
+  int dark = 0;              ///< the next exposures whose right image is dark
   bool projector_absent = false;
-  int absent = 0;  ///< how often more the camera does not answer when it is armed; -1: it is not there at all
-  std::function<void()> at_fire;  ///< happens during the next exposure, or
-  int fires_before = 0;           ///< after so many more
-  Clock::TimePoint ready_at{};    ///< when the cameras were asked to get ready last
-  Clock::Duration ready_takes{};  ///< what they need for that
+  int absent = 0;  ///< further failures of the camera when it is armed; -1: it is missing
+  std::function<void()> at_fire;  ///< called during the next exposure, or
+  int fires_before = 0;           ///< after this many more
+  Clock::TimePoint ready_at{};    ///< time of the last request to prepare the cameras
+  Clock::Duration ready_takes{};  ///< time they need for that
   Light last = Light::plain;
-  int scene = 0;  ///< what the cameras look at: another number, another picture
+  int scene = 0;  ///< the cameras' scene: another number, another image
 };
 
 class FakeProjector final : public Projector {
@@ -254,20 +254,20 @@ class FakePanel final : public Panel {
 
   // The operator's side.
 
-  /// Until somebody drives the panel, in real time: the clock knows nobody yet who could keep it from running away.
+  /// Waits until a thread drives the panel, in real time: the clock has no actor yet that keeps it from running away.
   void wait_attached() {
     std::unique_lock lock(mutex_);
     attach_.wait(lock, [&] { return attached_; });
   }
 
-  /// Nobody drives it any more.
+  /// No thread drives it any more.
   void detach() {
     const std::lock_guard guard(mutex_);
     attached_ = false;
     outputs_ = {};
   }
 
-  /// Looks at the lamps until `as_wanted`, for a virtual hour at most.
+  /// Reads the lamps until `as_wanted`, for a virtual hour at most.
   bool wait_for_lamps(const std::function<bool(const PanelOutputs&)>& as_wanted) {
     std::unique_lock lock(mutex_);
     return clock_.wait_until(lock, changed_, clock_.now() + std::chrono::hours(1), [&] { return as_wanted(outputs_); });
@@ -276,7 +276,7 @@ class FakePanel final : public Panel {
     const std::lock_guard guard(mutex_);
     return outputs_;
   }
-  /// Presses until the panel's owner has seen it, then lets go.
+  /// Presses until the panel's owner has read it, then lets go.
   void press(bool PanelInputs::*button) {
     set(button, true);
     set(button, false);
@@ -294,7 +294,7 @@ class FakePanel final : public Panel {
     }
     clock_.notify_all(changed_);
   }
-  /// Whoever looks at it waits, whatever his deadline.
+  /// A reader of it waits, whatever the deadline.
   void hang(bool hangs) {
     {
       const std::lock_guard guard(mutex_);

@@ -31,7 +31,7 @@ class Gate {
     }
     clock_.notify_all(changed_);
   }
-  /// The deadline of the call that hangs; nothing: none does.
+  /// The deadline of the call that hangs; nothing: no call does.
   std::optional<Deadline> deadline() const {
     const std::lock_guard guard(mutex_);
     return deadline_;
@@ -61,7 +61,7 @@ class Gate {
   int released_ = 0;
 };
 
-/// A driver's thread that hangs obeys no stop either, and what its motor was commanded to do goes on.
+/// A driver's thread that hangs obeys no stop either, and its motor continues its last command.
 class HangingTurntable final : public Turntable {
  public:
   HangingTurntable(Turntable& turntable, Gate& gate, Clock& clock)

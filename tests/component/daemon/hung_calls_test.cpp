@@ -1,5 +1,5 @@
-// A driver's call that does not return, in each call of each interface: it is named within a second after its deadline,
-// the table is stopped past it, and a daemon whose device does not come back ends.
+// A driver's call that does not return, in each call of each interface: it is named within a second after its deadline.
+// The table is stopped past it, and a daemon whose device does not come back ends.
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ using testing::HasSubstr;
 using testing::StartsWith;
 using What = event::MaintenanceRequested::What;
 
-/// The fake rig with the simulator's turntable, whose truth is what it reports; each call can be made to hang.
+/// The fake rig with the simulator's turntable, which reports its true state; each call can be made to hang.
 class HungCalls : public Daemon {
  protected:
   void SetUp() override {
@@ -35,7 +35,7 @@ class HungCalls : public Daemon {
     };
     options.on_exit_hang = [this](const Error& why) {
       given_up = why.message;
-      gate.release();  // in the place of the end of the process
+      gate.release();  // instead of the end of the process
     };
   }
   void TearDown() override {
@@ -58,7 +58,7 @@ class HungCalls : public Daemon {
     ASSERT_TRUE(table_moves());
   }
 
-  // How each call comes about; the last one of them hangs.
+  // Steps that lead to each call; the last one of them hangs.
 
   void while_homing(const std::string& call) {
     ASSERT_TRUE(wait_halted());
@@ -74,7 +74,7 @@ class HungCalls : public Daemon {
     rig.panel.press(&PanelInputs::start);
     gate.close(call);
   }
-  /// The second view's: the first is at home. `move_limit` is less than it takes: the table turns when the call hangs.
+  /// Collect of the second view: the first is at home. `move_limit` is less than it takes: the table turns at the hang.
   void while_turning(const std::string& call) {
     get_ready();
     {

@@ -16,7 +16,7 @@ using What = event::JobRequested::What;
 
 constexpr std::chrono::seconds kAmple{30};
 
-/// What the station can order next for a job.
+/// Next orders that the station can give for a job.
 enum class Step {
   start,
   view,
@@ -140,7 +140,7 @@ class JobHistory : public scan_samples::FolderTest, public testing::WithParamInt
     }
   }
 
-  /// What the rules of the station allow next.
+  /// Next steps that the rules of the station allow.
   std::vector<Step> next_steps() {
     const auto job = told();
     const auto views = static_cast<int>(job.stored.size());
@@ -169,7 +169,7 @@ class JobHistory : public scan_samples::FolderTest, public testing::WithParamInt
                        moved_, turned_, job.model.empty(), job.error ? job.error->message : "");
   }
 
-  /// What differs between the folder and what was reported; the folder has a while to become so.
+  /// Differences between the folder and the reports; the folder has a while to catch up.
   std::string difference() {
     const auto deadline = Deadline::after(clock_, kAmple);
     for (;;) {

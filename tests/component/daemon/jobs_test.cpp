@@ -25,7 +25,7 @@ class Jobs : public Daemon {
   Result<std::string> ask_for(What what, const std::string& id) {
     return ask(event::JobRequested{.what = what, .job = id});
   }
-  /// Interrupts a scan of three views a pose by the e-stop, in the exposure that follows `views` of its first pose.
+  /// Interrupts a scan of three views per pose by the e-stop, in the exposure after `views` of its first pose.
   std::string interrupted_after(int views) {
     rig.line.fires_before = 2 * views;
     rig.line.at_fire = [this] {
@@ -301,7 +301,7 @@ TEST_F(Jobs, ALineWaitsForItsProjectorToBeWarmAndAPersonNeedNot) {
   ASSERT_TRUE(wait_state(ids[0], JobState::done));
   EXPECT_LT(clock.now() - begin, options.warm_up) << "a cold projector is no matter to who presses Start";
 
-  // One that was away begins anew.
+  // A projector that was away restarts its warm-up.
   const auto set_absent = [&](bool absent) {
     {
       const std::lock_guard guard(rig.line.mutex);

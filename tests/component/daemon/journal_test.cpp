@@ -1,4 +1,4 @@
-// What the log says of the station, and that nobody waits for it.
+// The log's entries about the station; no thread waits for them.
 #include "daemon/journal/journal.h"
 
 #include <gmock/gmock.h>
@@ -36,7 +36,7 @@ class LoggedDaemon : public Daemon {
       lines.push_back(std::move(entry));
     };
   }
-  /// Those of one view, in order.
+  /// Entries of one view, in order.
   std::vector<std::string> of_view(int pose, int view) const {
     std::vector<std::string> messages;
     for (const auto& line : lines) {
@@ -44,7 +44,7 @@ class LoggedDaemon : public Daemon {
     }
     return messages;
   }
-  /// What was told of the job's states, in order.
+  /// Reported states of the job, in order.
   std::vector<std::string> states(const std::string& id) const {
     std::vector<std::string> words;
     for (const auto& line : lines) {

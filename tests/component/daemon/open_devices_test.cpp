@@ -12,10 +12,10 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Rigs of which nothing is plugged in.
+/// Rigs without any device plugged in.
 class OpenDevicesTest : public config::RigFile {
  protected:
-  /// The example with other cameras, so that nothing is looked for on a network.
+  /// The example with other cameras, so that no network search starts.
   void open(const std::string& projector = "") {
     std::string text = with_section("[stereo_camera]", "[panel]",
                                     "[stereo_camera]\ndriver = \"v4l2\"\nleft = { device = \"/dev/no-left\" }\n"

@@ -1,4 +1,4 @@
-// A calibration of other cameras than the rig's: nothing moves for a scan, and it is said why.
+// A calibration of other cameras than the rig's: nothing moves for a scan, and the reason is reported.
 #include <gmock/gmock.h>
 
 #include <mutex>
@@ -24,7 +24,7 @@ class OtherCameras : public Daemon {
       lines.push_back(entry.message);
     };
   }
-  /// A new file in the place of the calibration.
+  /// A new file in place of the calibration.
   void calibrate(const std::string& left, const std::string& right) const {
     auto text = scan_samples::calibration_json();
     const std::string one = "\"A1\"";
@@ -46,7 +46,7 @@ class OtherCameras : public Daemon {
       return std::ranges::any_of(lines, [&](const auto& line) { return line.find(words) != std::string::npos; });
     });
   }
-  /// A scan of three views a pose, interrupted by the e-stop after one.
+  /// A scan of three views per pose, interrupted by the e-stop after one.
   std::string interrupted() {
     rig.line.fires_before = 2;
     rig.line.at_fire = [this] {

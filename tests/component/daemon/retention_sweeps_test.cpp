@@ -47,7 +47,7 @@ class RetentionSweeps : public scan_samples::FolderTest {
     options.time = time;
     restart();
   }
-  /// One that has ended now, with files of the time that the wall clock shows.
+  /// A job that has ended now, with file times from the wall clock.
   void make_job(const std::string& id, const std::string& state = "cancelled", bool exported = true) {
     ASSERT_TRUE(store->create(id, {.recipe = {.poses = 1, .views = 2}, .exported = exported}));
     auto scan = ScanFolder::open(store->folder(id));
@@ -63,7 +63,7 @@ class RetentionSweeps : public scan_samples::FolderTest {
     const std::lock_guard guard(mutex);
     table[id] = std::make_shared<const JobInfo>(std::move(*info));
   }
-  /// The daemon ends and another one begins.
+  /// The daemon ends and another one starts.
   void restart() {
     housekeeping.reset();
     housekeeping.emplace(
@@ -86,7 +86,7 @@ class RetentionSweeps : public scan_samples::FolderTest {
     if (std::holds_alternative<event::RequestDone>(event)) ++answers;
     changed.notify_all();
   }
-  /// Sweeps; the jobs that are left then.
+  /// Sweeps; returns the remaining jobs.
   std::vector<std::string> sweep() {
     std::unique_lock lock(mutex);
     const int before = answers;
@@ -134,7 +134,7 @@ TEST_F(RetentionSweeps, WhatWasNotExportedOrCanBeResumedStays) {
   EXPECT_THAT(sweep(), ElementsAre("cancelled", "interrupted"));
 }
 
-/// The clock goes ten years on or back and returns, while the daemon runs, over a restart and over a time switched
+/// The clock jumps ten years ahead or back and returns, while the daemon runs, over a restart and over a time switched
 /// off, before and after it is synchronized; a job ends under every clock. None of them is 30 days old in the end.
 TEST_F(RetentionSweeps, NoJobIsLostToAClockSetTenYearsOnAndBack) {
   const auto move_on = [this](int how) {

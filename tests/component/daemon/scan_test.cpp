@@ -88,7 +88,7 @@ TEST_F(Daemon, WhatIsRedoneInAClosureShotIsTold) {
 }
 
 TEST_F(Daemon, APanelThatHangsStopsTheTableAndIsNamed) {
-  options.hang_limit = std::chrono::hours(1);  // it comes back
+  options.hang_limit = std::chrono::hours(1);  // it returns
   rig.line.fires_before = 2;
   rig.line.at_fire = [this] { rig.panel.hang(true); };
   boot();
@@ -177,7 +177,7 @@ TEST_F(Daemon, ACameraPulledInAScanInterruptsTheJobAndIsUsedWhenItIsBack) {
   ASSERT_TRUE(wait_ready());
   EXPECT_EQ(only_job().manifest().state, "interrupted");
   EXPECT_THAT(read_failure(only_job().path())->message, HasSubstr("left camera 4711"));
-  clock.sleep_for(seconds(5));  // the next look after the devices
+  clock.sleep_for(seconds(5));  // the next check of the devices
   scan_both_poses();
   EXPECT_TRUE(wait_pass());
 }
@@ -236,7 +236,7 @@ TEST_F(Daemon, TheEstopStopsAMovingTableAndNothingResumesByItself) {
   EXPECT_TRUE(wait_ready());
 }
 
-/// The thread of the rig may be asking cameras that are not there when homing is due, and does it next.
+/// The thread of the rig may be at a request to missing cameras when homing is due, and homes next.
 TEST_F(Daemon, HomingThatWasStoppedBeforeItBeganDoesNotBegin) {
   boot();
   ASSERT_TRUE(wait_halted());
@@ -251,7 +251,7 @@ TEST_F(Daemon, HomingThatWasStoppedBeforeItBeganDoesNotBegin) {
       return rig.line.ready_at > since;
     }));
     rig.panel.press(&PanelInputs::reset);
-    clock.sleep_for(std::chrono::milliseconds(2500));  // the warning is over, the cameras have not answered
+    clock.sleep_for(std::chrono::milliseconds(2500));  // the warning is over, the cameras have not responded
     EXPECT_EQ(loop->snapshot()->activity, Activity::homing);
     rig.panel.set(stop_it, stop_it == &PanelInputs::stop);
     ASSERT_TRUE(clock_waits_for([&] { return loop->snapshot()->activity == Activity::none; }));
@@ -305,7 +305,7 @@ TEST_F(Daemon, AShutdownWithAnUnreachableTableSaysSo) {
   EXPECT_THAT(result.error().message, HasSubstr("may be moving"));
 }
 
-/// Under a new configuration it may be another drive that is asked.
+/// Under a new configuration another drive may be addressed.
 TEST_F(Daemon, AReloadWithAnUnreachableTableEndsTheDaemonInsteadOfForgettingIt) {
   boot();
   get_ready();

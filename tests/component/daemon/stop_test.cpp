@@ -61,7 +61,7 @@ class StopInEveryState : public Daemon, public testing::WithParamInterface<std::
     const std::lock_guard guard(rig.turntable.mutex);
     return rig.turntable.stops;
   }
-  /// The reply: what is known of the table then; nothing by the panel, which has no reply.
+  /// The reply: the table's standstill at that time; nothing by the panel, which has no reply.
   std::optional<std::string> press_stop(By by) {
     if (by == By::panel) {
       rig.panel.press(&PanelInputs::stop);

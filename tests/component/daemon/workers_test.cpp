@@ -27,7 +27,7 @@ class Workers : public scan_samples::FolderTest {
     ASSERT_TRUE(opened) << opened.error().message;
     store.emplace(std::move(*opened));
   }
-  /// A scanned folder of one pose with two views in this state, known to the station as `state`.
+  /// A scanned folder of one pose with two views in this state, listed by the station as `state`.
   void make_job(const std::string& id, const std::string& written, JobState state, bool exported = false) {
     auto info = store->create(id, {.recipe = {.poses = 1, .views = 2}, .exported = exported});
     ASSERT_TRUE(info) << info.error().message;
@@ -45,7 +45,7 @@ class Workers : public scan_samples::FolderTest {
     events.push_back(std::move(event));
     changed.notify_all();
   }
-  /// The first event of this kind, once it is there.
+  /// Waits for the first event of this kind.
   template <class Kind>
   std::optional<Kind> wait_for() {
     std::unique_lock lock(mutex);
@@ -121,7 +121,7 @@ TEST_F(Workers, HousekeepingOutlivesWhatIsThrown) {
 TEST_F(Workers, ReconstructionOutlivesWhatIsThrownBesideIt) {
   make_job("job", "scanned", JobState::reconstructing);
   fakes::ReconstructionLog log;
-  int until_thrown = 1;  // the second word of progress comes when the first view is done
+  int until_thrown = 1;  // the second report of progress comes when the first view is done
   const auto tell_or_throw = [&](Event event) {
     const bool progress = std::holds_alternative<event::StageProgress>(event);
     if (progress && until_thrown-- == 0) throw std::runtime_error("out of the blue");

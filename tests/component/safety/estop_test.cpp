@@ -24,7 +24,7 @@ const WireRig::Changes kFast{{"speed_deg_s = 45", "speed_deg_s = 360"},
                              {"acceleration_deg_s2 = 90", "acceleration_deg_s2 = 3600"},
                              {"settle_ms = 200", "settle_ms = 60"}};
 
-/// The daemon with the shipped drivers of turntable, projector and panel; only the cameras are of paper.
+/// The daemon with the shipped drivers of turntable, projector and panel; only the cameras are fakes.
 class DaemonOnWires : public testing::Test {
  protected:
   void SetUp() override {
@@ -72,7 +72,7 @@ class DaemonOnWires : public testing::Test {
   std::thread thread;
 };
 
-/// All cores at work, as a reconstruction is: niced.
+/// Keeps all cores at work, as a reconstruction does: niced.
 class Load {
  public:
   Load() {
@@ -182,7 +182,7 @@ TEST_F(DaemonOnWires, AnEstopDoesNotWaitForASilentDriveToAnswer) {
   rig.press("START");
   ASSERT_TRUE(rig.wait_moving());
   rig.serial->inject({sim::wire::WireFault::Kind::reply_lost});
-  rig.clock.sleep_for(milliseconds(80));  // longer than a reply may take: the line is waited for to fall silent
+  rig.clock.sleep_for(milliseconds(80));  // longer than a reply may take: the driver waits for a quiet bus
   const auto pressed = rig.clock.now();
   rig.set_estop(false);
   ASSERT_TRUE(rig.wait_for([&] { return !rig.stops(pressed).empty(); }));
@@ -200,7 +200,7 @@ TEST_F(DaemonOnWires, APanelThatVanishesAndComesBackNeedsNoRestart) {
   ASSERT_TRUE(rig.wait_for([&] { return !rig.stops(gone).empty(); }));
   rig.plug_in_lines();
   ASSERT_TRUE(rig.wait_fault());
-  EXPECT_TRUE(rig.wait_for([&] {  // the projector is back when it was asked again
+  EXPECT_TRUE(rig.wait_for([&] {  // the projector returns at the next request
     rig.press("RESET");
     return rig.lamp("BUSY");
   }));

@@ -7,7 +7,7 @@
 namespace scanrig {
 namespace {
 
-/// A daemon that hangs still has the turntable's port: whoever makes the rig safe beside it gets the stop through.
+/// A daemon that hangs still has the turntable's port: the process that makes the rig safe beside it sends the stop.
 TEST(SharedPort, TheStopReachesADriveWhosePortAHungDaemonHas) {
   WireRig rig({});
   const auto config = config::read_rig_config(rig.config());

@@ -25,7 +25,7 @@ class WireRig {
  public:
   static constexpr auto kReplyTimeout = kSlowness * std::chrono::seconds(20);
 
-  /// Texts of rig.toml and what stands there instead.
+  /// Texts of rig.toml and their replacements.
   using Changes = std::vector<std::pair<std::string, std::string>>;
 
   explicit WireRig(const sim::wire::AxisOptions& axis, const Changes& changes = {}) : drive(axis, clock) {
@@ -45,14 +45,14 @@ class WireRig {
 
   void press(const std::string& button) {
     lines->set(button, true);
-    clock.sleep_for(std::chrono::milliseconds(200));  // a hand's time, more than the minimum press
+    clock.sleep_for(std::chrono::milliseconds(200));  // the duration of a hand's press, more than the minimum
     lines->set(button, false);
-    clock.sleep_for(std::chrono::milliseconds(80));  // and the debouncing of letting go
+    clock.sleep_for(std::chrono::milliseconds(80));  // and the debouncing of the release
   }
   void set_estop(bool ok) { lines->set("ESTOP_OK", ok); }
   [[nodiscard]] bool lamp(const std::string& name) const { return lines->level(name); }
 
-  /// Looks again and again, without disturbing anybody.
+  /// Checks repeatedly, without disturbing any thread.
   bool wait_for(const std::function<bool()>& as_wanted) {
     for (const auto end = Deadline::after(clock, kReplyTimeout); !end.expired(clock);
          clock.sleep_for(std::chrono::milliseconds(1))) {
@@ -73,7 +73,7 @@ class WireRig {
     return wait_for([&] { return std::abs(drive.truth().speed_deg_s) > 1; });
   }
 
-  /// Frames from the master since `since` that tell the drive to stop, and those that make it move.
+  /// Frames from the master since `since` that command the drive to stop, and those that make it move.
   [[nodiscard]] std::vector<Clock::TimePoint> stops(Clock::TimePoint since) const { return frames(since, is_stop); }
   [[nodiscard]] std::vector<Clock::TimePoint> moves(Clock::TimePoint since) const { return frames(since, is_move); }
 
@@ -113,7 +113,7 @@ class WireRig {
     ASSERT_NE(at, std::string::npos) << from;
     text.replace(at, from.size(), to);
   }
-  /// Another text from the heading `begin` to the heading `end`.
+  /// Replaces the text from the heading `begin` to the heading `end`.
   static std::string replace_section(const std::string& text, const std::string& begin, const std::string& end,
                                      const std::string& section) {
     return text.substr(0, text.find("\n" + begin) + 1) + section + text.substr(text.find("\n" + end) + 1);
@@ -126,7 +126,7 @@ class WireRig {
   }
 
  public:
-  /// The folder of the one job there is.
+  /// The folder of the only job.
   [[nodiscard]] std::filesystem::path only_job() const {
     for (const auto& entry : std::filesystem::directory_iterator(folder / "jobs")) {
       if (entry.is_directory()) return entry.path();

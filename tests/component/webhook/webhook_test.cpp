@@ -19,7 +19,7 @@ std::atomic<bool> name_server_is_dead = false;
 
 }  // namespace
 
-/// The C library's, but for a name server that may be dead: then an answer comes late, as from a real one.
+/// The C library's, but for a name server that may be dead: then a reply comes late, as from a real one.
 extern "C" int getaddrinfo(const char* node, const char* service, const addrinfo* hints, addrinfo** found) {
   for (int i = 0; i < 600 && name_server_is_dead; ++i) ::usleep(10'000);
   return reinterpret_cast<decltype(&::getaddrinfo)>(::dlsym(RTLD_NEXT, "getaddrinfo"))(node, service, hints, found);
@@ -34,7 +34,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 
-/// Somebody who takes one request on the loopback interface and answers as told.
+/// A server that takes one request on the loopback interface and sends the given reply.
 class Listener {
  public:
   Listener() : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
@@ -51,7 +51,7 @@ class Listener {
   Listener(const Listener&) = delete;
   Listener& operator=(const Listener&) = delete;
 
-  /// Until somebody has connected; he is never answered.
+  /// Waits until a client has connected; it never gets a reply.
   void wait_for_peer() {
     pollfd watched{socket_, POLLIN, 0};
     ::poll(&watched, 1, -1);
@@ -148,10 +148,10 @@ TEST(Webhook, TellsWhatGoesWrongAfterItsStart) {
   EXPECT_THAT(request.get(), HasSubstr(R"("job":"new")"));
 }
 
-/// The daemon ends to begin again: systemd's watchdog waits 5 s, and the rig is stopped meanwhile.
+/// The daemon ends to restart: systemd's watchdog waits 5 s, and the rig is stopped meanwhile.
 class ClosingAWebhook : public testing::Test {
  protected:
-  /// One that has something to tell.
+  /// A webhook with a message to send.
   void open(const std::string& port) {
     webhook_.emplace(clock_, HttpAddress{"127.0.0.1", port, "/"});
     webhook_->look(std::make_shared<Snapshot>(with({})));

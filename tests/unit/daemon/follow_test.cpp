@@ -12,7 +12,7 @@ using nlohmann::json;
 using testing::HasSubstr;
 using testing::Not;
 
-/// What is written for a log, not for a terminal.
+/// Output for a log, not for a terminal.
 class Follow : public testing::Test {
  protected:
   ~Follow() override { std::fclose(out); }

@@ -8,7 +8,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// The jobs' disk does not answer.
+/// The job disk does not respond.
 class HangingDisk : public Station {
  protected:
   void hang() {

@@ -14,14 +14,14 @@ namespace {
 
 constexpr std::size_t kPicture = 24 << 20, kPiece = 256 << 10, kPieces = 100, kPage = 4096;
 
-/// Every page written to; nothing here may be left out by the compiler.
+/// Writes to every page; the compiler must leave nothing out here.
 void* used(std::size_t size) {
   auto* block = static_cast<volatile char*>(std::malloc(size));
   for (std::size_t i = 0; i < size; i += kPage) block[i] = 1;
   return const_cast<char*>(block);
 }
 
-/// What a thread used in pieces too small to be pages of their own, and freed.
+/// Memory that a thread used in pieces too small for separate pages, and freed.
 void work() {
   std::array<void*, kPieces> pieces{};
   for (void*& piece : pieces) piece = used(kPiece);

@@ -8,7 +8,7 @@ namespace {
 
 using testing::HasSubstr;
 
-/// What the drive reports while nobody requested motion, and calls that hang.
+/// Reports of the drive without a requested motion, and calls that hang.
 class IdleChecks : public Safety {
  protected:
   void drive_reports(bool is_moving, const std::string& alarm = {}) {

@@ -62,7 +62,7 @@ TEST_F(Index, KnowsEndedJobsAndNoOthers) {
 }
 
 TEST_F(Index, IsAnsweredFromWithoutOpeningTheManifest) {
-  // A change that leaves the stamp as it was could not be noticed: that is what the index saves.
+  // A change that leaves the stamp as it was could not be noticed: that check is what the index saves.
   const auto manifest = store->folder("a") / "scan.json";
   const auto when = fs::last_write_time(manifest);
   auto text = *read_file(manifest);

@@ -41,7 +41,7 @@ class JobStoreTest : public scan_samples::FolderTest {
     EXPECT_TRUE(jobs && jobs->contains(id));
     return *jobs->at(id);
   }
-  /// As daemons leave it that died over the model.
+  /// A folder as left by daemons that died during the reconstruction.
   static void write_attempts(const fs::path& folder, int count) {
     scan_samples::write_text(
         folder / "attempt.json",

@@ -167,7 +167,7 @@ TEST_F(MaintenanceMode, StopEstopAndGuardEndAJog) {
   EXPECT_NE(asked_for<action::StopRig>(), nullptr);
 }
 
-// --- A flash obeys what a motion obeys -----------------------------------------------------------------------------
+// --- A flash follows the rules of a motion -------------------------------------------------------------------------
 
 TEST_F(MaintenanceMode, APulseNeedsTheEstopTheGuardAndAPanelThatCanBeRead) {
   get_ready();

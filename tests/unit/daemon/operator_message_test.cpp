@@ -18,7 +18,7 @@ class StationWords : public Station {
     seen.inputs.part_present = part;
     tell(seen);
   }
-  /// The first of two parts is scanned and still lies there.
+  /// The first of two parts is scanned and is still on the table.
   void wait_for_part() {
     rules.recipes["default"] = {.poses = 1, .views = 4, .start_on_part = true};
     get_ready();

@@ -11,7 +11,7 @@ using testing::HasSubstr;
 
 const Error kNothingSeen{ErrorCode::degenerate, "nothing seen"};
 
-/// Part after part, with nobody there.
+/// Part after part, with no person there.
 class Line : public Queue {
  protected:
   void scan_next(const std::string& job) {

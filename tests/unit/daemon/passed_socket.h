@@ -7,7 +7,7 @@
 
 namespace scanrig {
 
-/// A listening Unix socket, bound where it stays: as systemd makes those that it passes. -1: it could not be made.
+/// A listening Unix socket, bound where it stays, like those that systemd passes. -1: it could not be made.
 inline int make_passed_socket(const std::filesystem::path& path) {
   const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
   sockaddr_un address{};

@@ -20,7 +20,7 @@ class PreviewTest : public testing::Test {
     frame.right = cv::Mat(48, 64, CV_8UC1, cv::Scalar(right));
     return frame;
   }
-  /// The grey value of the picture's middle; -1 without a picture.
+  /// The grey value of the image's middle; -1 without an image.
   int grey(Side side) {
     const auto jpeg = preview_.jpeg(side);
     if (!jpeg) return -1;

@@ -277,7 +277,7 @@ TEST_F(Queue, ThreeFailuresInARowStopTheLineAndStartForgivesThem) {
   }
   failed("0");
   failed("1");
-  tell(event::ModelReady{"2", "m", "r"});  // a good one lies between
+  tell(event::ModelReady{"2", "m", "r"});  // a good one in between
   failed("3");
   failed("4");
   tell(event::ModelReady{"5", "m", "r", Error{ErrorCode::below_limits, "beyond"}});

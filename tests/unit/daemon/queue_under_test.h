@@ -7,7 +7,7 @@
 
 namespace scanrig {
 
-/// The rules of which job has the rig next.
+/// The rules for the next active job.
 class Queue : public Station {
  protected:
   void order(const std::string& recipe, int repeat = 1, const std::string& part = {}) {
@@ -30,7 +30,7 @@ class Queue : public Station {
     return ids;
   }
   static Recipe by_parts() { return {.name = "line", .poses = 1, .views = 1, .start_on_part = true}; }
-  /// All of a one-view job of by_parts().
+  /// All events of a one-view job of by_parts().
   void scan(const std::string& job) {
     tell(event::JobStarted{job, 0, 0});
     tell(event::WarningOver{});

@@ -8,10 +8,10 @@ namespace {
 
 using testing::HasSubstr;
 
-/// Movement checks, and jobs that go on after an interruption.
+/// Movement checks, and jobs that continue after an interruption.
 class Resume : public Station {
  protected:
-  /// The job "job" gets the rig again, with `stored` views of `pose`.
+  /// The job "job" becomes active again, with `stored` views of `pose`.
   void resume(int pose, int stored) {
     get_ready();
     auto job = queued("job", -1, rules.recipes.at("default"));

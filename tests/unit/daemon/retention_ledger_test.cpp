@@ -37,7 +37,7 @@ struct StepBuilder {
 
 class Ledger : public scan_samples::FolderTest {
  protected:
-  /// As at each sweep.
+  /// The steps of each sweep.
   seconds age_of(const std::string& id, const std::string& mark = "") {
     ledger.advance(machine.read());
     return ledger.age(ledger.note(id, mark));
@@ -133,7 +133,7 @@ TEST_F(Ledger, ADamagedFileMakesEveryJobCountFromNow) {
   EXPECT_EQ(age_of("a"), days(9));
 }
 
-/// Whatever the clock does, synchronized or not: no age is ever larger than the true one.
+/// Whatever the clock does, synchronized or not, no age is ever larger than the true one.
 TEST_F(Ledger, NoSequenceOfWrongClocksMakesAJobOlderThanItIs) {
   std::mt19937 random(1);
   const auto pick = [&](int count) { return static_cast<int>(random() % static_cast<unsigned>(count)); };

@@ -16,7 +16,7 @@ using testing::HasSubstr;
 
 class SafetyRecordTest : public testing::Test {
  protected:
-  /// A process that begins, and ends as `clean` says.
+  /// A process that starts, and ends cleanly if `clean`.
   std::optional<Latch> run(bool clean) {
     SafetyRecord record(folder_ / "state", [this] { return now_; });
     auto latch = record.begin();

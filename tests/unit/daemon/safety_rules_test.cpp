@@ -9,7 +9,7 @@ namespace {
 
 using testing::HasSubstr;
 
-// --- Who may let the table move -------------------------------------------------------------------------------------
+// --- Permission to move the table -----------------------------------------------------------------------------------
 
 TEST_F(Safety, RemoteStartAndResetNeedTheSettingAndAGuardThatIsClosed) {
   start_up();
@@ -166,7 +166,7 @@ TEST_F(Safety, APanelThatIsAbsentAtStartUpStillHasTheTableStopped) {
   EXPECT_EQ(state.machine, MachineState::error);
 }
 
-// --- What a failure is called ---------------------------------------------------------------------------------------
+// --- Names of failures ----------------------------------------------------------------------------------------------
 
 TEST_F(Safety, ADeviceThatFailsStopsTheRigAtOnceAndIsNamedAfterTheWindow) {
   begin_scan();

@@ -10,7 +10,7 @@ namespace scanrig {
 
 inline const Error kNoReply{ErrorCode::timeout, "turntable: no reply"};
 
-/// The station with what its rules of safety are asked about.
+/// The station with helpers for tests of its safety rules.
 class Safety : public Station {
  protected:
   void expect_refused(const std::string& why) {

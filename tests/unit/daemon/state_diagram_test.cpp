@@ -1,6 +1,6 @@
-// Walks through the transition function from its first state with every kind of event, and draws what it finds.
-// SCANRIG_WRITE_DOCS=1 writes docs/reference/states.md; without it the test fails when the file is not what the code
-// does.
+// Walks through the transition function from its first state with every kind of event, and draws the result.
+// SCANRIG_WRITE_DOCS=1 writes docs/reference/states.md; without it the test fails when the file differs from the
+// code.
 #include <gmock/gmock.h>
 
 #include <cstdlib>
@@ -57,7 +57,7 @@ std::vector<Named> of_the_rig() {
   };
 }
 
-/// What keeps things from moving.
+/// Conditions that prevent motion.
 std::vector<Named> of_safety() {
   return {
       {"e-stop released", event::EstopChanged{true}},
@@ -69,7 +69,7 @@ std::vector<Named> of_safety() {
   };
 }
 
-/// Everything a job goes through.
+/// All events of a job.
 std::vector<Named> of_jobs() {
   const auto view = std::make_shared<TakenView>(TakenView{.id = {"job", 0, 0}});
   return {
@@ -97,7 +97,7 @@ std::vector<Named> of_jobs() {
   };
 }
 
-/// What an engineer does.
+/// All requests of an engineer.
 std::vector<Named> of_maintenance() {
   using What = event::MaintenanceRequested::What;
   return {
@@ -128,11 +128,11 @@ std::string machine_state(const Node& node) {
   return machine + ": " + std::string(to_string(node.state.activity));
 }
 
-/// What of a state makes a difference to what comes next.
+/// Parts of a state that make a difference to what comes next.
 std::string key(const Node& node, bool with_jobs) {
   const auto& s = node.state;
   std::string key = machine_state(node) + (with_jobs ? job_state(node) : "");
-  const bool line = s.machine == MachineState::continuous_execution;  // parts matter to nobody else
+  const bool line = s.machine == MachineState::continuous_execution;  // parts matter only there
   const bool require_devices =
       std::ranges::none_of(s.devices, [](const auto& device) { return device.problem.has_value(); });
   for (const bool flag : {s.panel_known, s.estop_ok, s.guard_closed, s.latch.has_value(), s.unclassified.has_value(),
@@ -156,14 +156,14 @@ using Edges = std::map<std::pair<std::string, std::string>, std::set<std::string
 
 struct Walk {
   Edges machine, job;
-  std::map<std::string, OperatorMessage> words;  ///< of the machine, where it was met first
-  std::set<std::string> wordless;                ///< states that say nothing, or not what to do
-  std::set<std::string> untrue;                  ///< what they say to do and is refused
+  std::map<std::string, OperatorMessage> words;  ///< for the machine, where it was first reached
+  std::set<std::string> wordless;                ///< states without a message, or without a next action
+  std::set<std::string> untrue;                  ///< next actions that are refused
   std::set<std::string> unstoppable;             ///< states in which Stop is refused, not sent, or cancels a job
   std::size_t states = 0;
 };
 
-/// Whoever does what he is told is not refused.
+/// An operator who follows the next action is not refused.
 void listen(const Node& node, const StationRules& rules, Walk& walk) {
   const auto name = machine_state(node);
   const auto words = describe(node.state, rules);
@@ -206,7 +206,7 @@ void press_stop(const Node& node, const StationRules& rules, Walk& walk) {
   }
 }
 
-/// The rest of the station answers as it would: a job that is closed is closed on disk.
+/// The rest of the station replies as in operation: a job that is closed is closed on disk.
 void close_jobs(Node& node, const std::vector<Action>& actions) {
   for (const auto& action : actions) {
     if (const auto* close = std::get_if<action::CloseJob>(&action)) {
@@ -216,12 +216,12 @@ void close_jobs(Node& node, const std::vector<Action>& actions) {
   }
 }
 
-/// A fresh job takes the place of the last one in the walk; that is no way of a job.
+/// A new job takes the place of the last one in the walk; that is not a transition of a job.
 bool is_another_job(const std::vector<Action>& actions) {
   return std::ranges::any_of(actions, [](const Action& a) { return std::holds_alternative<action::CreateJobs>(a); });
 }
 
-/// Nobody answers what was not asked.
+/// No reply comes without a request.
 bool can_happen(const Node& node, const Event& event) {
   const auto& s = node.state;
   const auto* const job = s.job && s.job->id == "job" ? &*s.job : nullptr;
@@ -260,7 +260,7 @@ bool can_happen(const Node& node, const Event& event) {
       event);
 }
 
-/// `with_jobs`: what the list of jobs says makes a difference too.
+/// `with_jobs`: the list of jobs makes a difference too.
 void walk(const std::vector<Named>& events, bool with_jobs, Walk& walk) {
   StationRules rules{.recipes = {{"default", {.poses = 2, .views = 1}}}, .guard = true};
   std::deque<Node> open{Node{}};
@@ -280,7 +280,7 @@ void walk(const std::vector<Named>& events, bool with_jobs, Walk& walk) {
       if (machine_state(before) != machine_state(after)) {
         walk.machine[{machine_state(before), machine_state(after)}].insert(name);
       }
-      // A late event of a job that has ended is no way of a job.
+      // A late event of a job that has ended is not a transition of a job.
       const bool alive =
           !before.jobs.contains("job") || (!is_final(before.jobs.at("job")->state) && !is_another_job(step.actions));
       if (with_jobs && alive && job_state(before) != job_state(after)) {
@@ -292,7 +292,7 @@ void walk(const std::vector<Named>& events, bool with_jobs, Walk& walk) {
   walk.states += seen.size();
 }
 
-/// In parts, because what is independent need not be multiplied.
+/// In parts, because independent parts need not be multiplied.
 Walk walk_everywhere() {
   Walk all;
   walk(together({of_the_rig(), of_safety(), of_maintenance()}), false, all);
@@ -384,8 +384,8 @@ TEST_F(StateDiagram, StopIsObeyedInEveryState) { EXPECT_THAT(whole().unstoppable
 
 TEST_F(StateDiagram, WhatAStateSaysToDoIsNotRefused) { EXPECT_THAT(whole().untrue, testing::IsEmpty()); }
 
-/// Whoever closes the guard before a line that a person has started is told what comes then. Where a job's folder is
-/// damaged, the next one of the same words takes the part that its Start was pressed for, after a warning of its own.
+/// An operator who closes the guard before a started queue is told the next step. Where a job's folder is damaged,
+/// the next one with the same part text takes the part that Start was pressed for, after a separate warning.
 TEST_F(StateDiagram, NothingMovesWithoutResetStartOrANewPart) {
   const std::set<std::string> allowed{"Reset", "Start", "new part", "jog", "folder damaged"};
   for (const auto& [ends, why] : whole().machine) {

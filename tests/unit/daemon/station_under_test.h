@@ -10,7 +10,7 @@
 
 namespace scanrig {
 
-/// Drives the pure transition function and keeps what it asked for.
+/// Drives the pure transition function and keeps the requested actions.
 class Station : public testing::Test {
  protected:
   void tell(const Event& event) {
@@ -57,7 +57,7 @@ class Station : public testing::Test {
     }
     close_pose(pose);
   }
-  /// View 0 again, and nothing has moved.
+  /// Takes view 0 again; nothing has moved.
   void close_pose(int pose, bool unmoved = true) {
     tell(event::CheckViewTaken{std::make_shared<TakenView>(TakenView{.id = {"job", pose, 0}})});
     tell(event::MovementChecked{"job", {.pose = pose, .unmoved = unmoved}});

@@ -15,7 +15,7 @@ using Door = Admission::Door;
 class Seats : public testing::Test {
  protected:
   void open(const ApiLimits& limits) { admission = std::make_shared<Admission>(limits); }
-  /// Names the connection that has to go.
+  /// Name of the connection that has to leave.
   Admission::OnEvicted as(const std::string& connection) {
     return [this, connection] { evicted.push_back(connection); };
   }

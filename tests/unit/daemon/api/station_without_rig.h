@@ -44,7 +44,7 @@ class StationWithoutRig {
   ControlLoop loop;
 
  private:
-  /// Nobody keeps jobs here.
+  /// No jobs are kept here.
   void answer(RequestId request_id) {
     loop.post(event::RequestDone{request_id, fail(ErrorCode::refused, "there is no rig")});
   }

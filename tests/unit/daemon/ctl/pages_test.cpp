@@ -28,7 +28,7 @@ class Pages : public scan_samples::FolderTest {
     add_rig_commands(app, chosen);
     add_pages_command(app, chosen);
   }
-  /// What a command prints, its errors too; "" with `absent` where the program is not installed.
+  /// Output of a command, its errors too; "" with `absent` where the program is not installed.
   static std::string output_of(const std::string& command) {
     std::string text;
     const std::unique_ptr<std::FILE, int (*)(std::FILE*)> pipe(::popen((command + " 2>&1").c_str(), "r"), ::pclose);

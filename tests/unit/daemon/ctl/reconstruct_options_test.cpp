@@ -9,7 +9,7 @@
 namespace scanrig::ctl {
 namespace {
 
-/// Whether `scanrig reconstruct` takes these words.
+/// Whether `scanrig reconstruct` accepts these words.
 bool takes(const std::string& words) {
   CLI::App app;
   Chosen chosen;

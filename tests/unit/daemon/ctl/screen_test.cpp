@@ -57,7 +57,7 @@ class Terminal : public testing::Test {
     ::tcsetattr(::fileno(out.get()), TCSANOW, &raw);
   }
   void TearDown() override { ::close(master); }
-  /// What has come since the last look; the kernel hands it over soon after it was written.
+  /// New output since the last read; the kernel hands it over soon after it was written.
   std::string seen() const {
     std::string text;
     std::array<char, 4096> room{};
