@@ -30,7 +30,7 @@ void EventHub::see(std::shared_ptr<const Snapshot> snapshot) {
     const auto& known = seen_ ? seen_->jobs : kNone;
     for (const auto& [id, job] : snapshot->jobs) {
       const auto old = known.find(id);
-      // In the first snapshot all jobs are old: a client lists them.
+      // All jobs are old in the first snapshot: a client lists them.
       if (seen_ && (old == known.end() || old->second != job)) add("job", to_line(to_detailed_json(*job)));
     }
     for (const auto& [id, job] : known) {

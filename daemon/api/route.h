@@ -46,7 +46,7 @@ struct ApiResponse {
 
 struct ServiceStatus;
 
-/// What routes act on. All of it may be used from any thread.
+/// Dependencies of the routes. All of it may be used from any thread.
 struct ApiStation {
   ControlLoop& loop;
   std::function<ServiceStatus()> facts;  ///< of the machine and of the API itself; the latest, without waiting

@@ -6,7 +6,7 @@
 
 #include "daemon/api/session.h"
 
-// What a session sends piece by piece: files and events.
+// Files and events, which a session sends piece by piece.
 
 namespace scanrig {
 namespace {

@@ -142,7 +142,7 @@ void MotionSession::supervise() {
   }
 }
 
-/// From any thread.
+/// Stops the table. From any thread.
 void MotionSession::stop(Error cause) {
   const std::lock_guard lock(mutex_);
   if (cause_) return;

@@ -30,7 +30,7 @@ class Motion {
 };
 
 /// The only way for a tool to move the rig `config`, read from `file`. Starts a guardian process, opens the panel,
-/// refuses while e-stop or guard are open or not readable, runs `moves`, and returns success only with confirmed
+/// refuses while e-stop or guard are open or not readable, and runs `moves`. Success requires a confirmed
 /// standstill after it. SIGINT, SIGTERM and SIGHUP stop the table; at any other end of the program the guardian stops
 /// it. Fails with `refused`, `stopped`, `timeout` (the table may be moving), as the panel or as `moves`.
 Result<void> with_motion(const config::RigConfig& config, const std::filesystem::path& file, Clock& clock,

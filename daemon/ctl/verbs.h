@@ -15,7 +15,7 @@ namespace scanrig::ctl {
 ExitCode report_error(const Error& error);
 ExitCode report_error(ExitCode code, const std::string& message);
 
-/// An error of a device itself: a port, a line or a socket that cannot be used is a device that does not respond, not
+/// An error of a device itself. A port, a line or a socket that cannot be used is a device that does not respond, not
 /// a disk or file.
 Error of_device(Error error);
 
@@ -135,7 +135,7 @@ struct TokenVerb {
 };
 ExitCode token(const TokenVerb& verb);
 
-// At the rig, on the devices themselves, while no daemon runs.
+// Verbs at the rig, on the devices themselves, while no daemon runs.
 
 struct TurntableVerb {
   std::string what;  ///< "home", "move", "status", "read"

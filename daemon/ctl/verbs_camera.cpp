@@ -76,7 +76,7 @@ class Bench {
   OpenDevices devices_;
 };
 
-/// At once; on a line, if not indented.
+/// Prints at once; on one line, if not indented.
 void print_json(const nlohmann::ordered_json& all, int indent = -1) {
   fmt::print("{}\n", all.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace));
   std::fflush(stdout);

@@ -45,7 +45,7 @@ class ReconstructionThread {
   bool cancel(const std::string& job);
   /// Whether work on this job is started or waiting, and not cancelled.
   bool has(const std::string& job);
-  /// Ends for a planned end of the daemon: requests the running stage to stop, removes the mark before a caller stops
+  /// Prepares a planned end of the daemon. Requests the running stage to stop, removes the mark before a caller stops
   /// waiting for that stage, and drops the rest.
   void stop();
 

@@ -13,7 +13,7 @@
 
 namespace scanrig {
 
-/// Ages of ended jobs, counted so that no wrong clock can make a job look older than it is:
+/// Ages of ended jobs, counted so that no wrong clock can make a job look older than it is.
 /// - The machine's running time counts always.
 /// - Time while it was off, or without a count, is the difference of two wall clock readings. It counts only where
 ///   both clocks were synchronized and the difference is plausible (`kMaxPause`).

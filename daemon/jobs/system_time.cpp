@@ -12,8 +12,8 @@ namespace {
 constexpr const char* kTimedatectl = "/usr/bin/timedatectl";
 constexpr auto kLimit = std::chrono::seconds(5);
 
-/// The kernel's estimate of the error starts at 16 s, returns there when the clock is set by hand, and is kept smaller
-/// by timesyncd, chrony and ntpd alike [ntp_synced() of systemd-timedated]. STA_UNSYNC is no
+/// The kernel's estimate of the error starts at 16 s, and returns there when the clock is set by hand. It is kept
+/// smaller by timesyncd, chrony and ntpd alike [ntp_synced() of systemd-timedated]. STA_UNSYNC is no
 /// criterion: chrony sets it to keep the kernel away from the clock chip. Nothing where the kernel refuses.
 std::optional<bool> kernel_synchronized() {
   constexpr long kUnsynchronizedUs = 16'000'000;

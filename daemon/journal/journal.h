@@ -24,7 +24,7 @@ class Journal {
   Journal(const Journal&) = delete;
   Journal& operator=(const Journal&) = delete;
 
-  /// From any thread. Does not wait.
+  /// Takes an entry from any thread. Does not wait.
   void write(JournalEntry entry);
 
   static constexpr auto kLastWords = std::chrono::seconds(1);

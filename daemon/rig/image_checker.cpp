@@ -8,8 +8,8 @@
 namespace scanrig {
 namespace {
 
-// Rendered scans of twelve objects: images with pattern have 0.044 to 0.064 of full scale, 1.1 to 1.3 px of blur, 2.2
-// to 2.6 px when blurred over 9x9 pixels, and a left_right_correlation of at most 0.02. Images of one object differ by
+// Rendered scans of twelve objects. Images with pattern have 0.044 to 0.064 of full scale. Blur is 1.1 to 1.3 px, 2.2
+// to 2.6 px when blurred over 9x9 pixels, left_right_correlation at most 0.02. Images of one object differ by
 // a tenth.
 constexpr double kDark = 0.02;        ///< of full scale: five grey values of 255
 constexpr double kDarker = 0.4;       ///< of the images before

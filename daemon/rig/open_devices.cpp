@@ -94,8 +94,8 @@ Result<OpenDevices> open_devices(const config::RigConfig& config, Clock& clock) 
   return open;
 }
 
-/// On a module's bus: wait for the next polling, then read coils and inputs. One reply is missed, the bus is left quiet
-/// for two reply timeouts, and both are read again (drivers/panel/modbus_io_panel.h).
+/// Sum for a module's bus: wait for the next polling, then read coils and inputs. One reply is missed, the bus is left
+/// quiet for two reply timeouts, and both are read again (drivers/panel/modbus_io_panel.h).
 Clock::Duration panel_read_time(const config::PanelConfig& config) {
   if (config.driver != config::PanelConfig::Driver::modbus_io) return Clock::Duration::zero();
   constexpr int kReplyTimeouts = 1 + 2 + 2;

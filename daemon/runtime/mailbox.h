@@ -16,7 +16,7 @@ class Mailbox {
  public:
   explicit Mailbox(Clock& clock) : clock_(clock) {}
 
-  /// From any thread. After close() the message is dropped.
+  /// Adds a message, from any thread. After close() the message is dropped.
   void post(Message message) {
     {
       const std::lock_guard guard(mutex_);

@@ -216,7 +216,7 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
   if (auto may = options.takes_devices(); !may) return pass_on(may);
   record.begin_devices();
 
-  // Time stands still until every thread runs. They end in reverse order: the panel shows the last lamps, the rig's
+  // Time stands still until every thread runs. They end in reverse order. The panel shows the last lamps, the rig's
   // standstill is confirmed, views go to disk, then the reconstruction that all of them feed is stopped.
   std::optional<Clock::Busy> starting(clock);
   ReconstructionThread reconstruction(clock, options.reconstructor, post_event);

@@ -34,7 +34,7 @@ class SafetyRecord {
       : folder_(std::move(folder)), now_(std::move(now)) {}
 
   /// Records that the service runs, and returns the latch of the last process. kUnexpectedEnds within kWithin are
-  /// a latch too, and so is an unreadable record: whatever it held, a person has to check first.
+  /// a latch too. So is an unreadable record: whatever it held, a person has to check first.
   /// Fails with `io`.
   Result<std::optional<Latch>> begin();
   /// Records a clean end: the unexpected ones before it count no more. Fails with `io`.

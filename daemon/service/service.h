@@ -17,7 +17,7 @@
 namespace scanrig {
 
 /// A program that runs the daemon under a configuration file. On SIGHUP or an API request it runs it again, in the same
-/// process, with the present file. The file is checked first; an unusable file or a bad time changes
+/// process, with the present file. The file is checked first. An unusable file or a bad time changes
 /// nothing: the daemon continues as before, and reports why in log, reply and `systemctl status`.
 class Service {
  public:

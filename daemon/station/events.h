@@ -47,7 +47,7 @@ struct DeviceHealth {
   }
 };
 
-/// What happened: reported to the station by its threads, the panel and the API.
+/// Events reported to the station by its threads, the panel and the API.
 namespace event {
 struct PanelFound {
   bool estop_ok, guard_closed;
@@ -81,7 +81,7 @@ struct CalibrationChecked {
   std::string job{};
   std::optional<Error> problem{};
 };
-/// What the turntable's drive reports while no motion is requested.
+/// Reports of the turntable's drive while no motion is requested.
 struct DriveReport {
   bool is_moving = false;
   std::string alarm{};  ///< in words; empty: none
@@ -242,7 +242,7 @@ using Event =
                  event::StoreFailed, event::DiskChecked, event::StageProgress, event::ReconstructionFailed,
                  event::ModelReady, event::ReloadRequested, event::Shutdown>;
 
-/// What is to be done about it. None of them waits.
+/// Actions that the station requests. None of them waits.
 namespace action {
 struct Warn {};            ///< WarningOver comes after the warning time
 struct WaitForEstop {};    ///< EstopWindowOver comes after the window

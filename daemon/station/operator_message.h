@@ -7,7 +7,7 @@
 
 namespace scanrig {
 
-/// What the panel, the page and the command line show to a person.
+/// Text for a person, on the panel, the page and the command line.
 struct OperatorMessage {
   std::string sentence;     ///< what happens now
   std::string next_action;  ///< what the operator should do, if only to wait

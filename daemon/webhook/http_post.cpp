@@ -29,7 +29,7 @@ struct Lookup {
   Tcp::resolver::results_type found;
 };
 
-/// A name server may take any time, and the C library's look-up cannot be cancelled: it has a separate thread,
+/// A name server may take any time, and the C library's look-up cannot be cancelled. It has a separate thread,
 /// and a caller that stops waiting abandons it.
 std::shared_ptr<Lookup> look_up(const HttpAddress& address) {
   auto lookup = std::make_shared<Lookup>();

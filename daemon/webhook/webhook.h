@@ -29,7 +29,7 @@ class Webhook {
   Webhook(const Webhook&) = delete;
   Webhook& operator=(const Webhook&) = delete;
 
-  /// From one thread. Does not wait.
+  /// Takes a snapshot, from one thread. Does not wait.
   void look(std::shared_ptr<const Snapshot> now);
 
  private:

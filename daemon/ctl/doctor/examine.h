@@ -19,8 +19,8 @@ struct Rig {
   const std::filesystem::path& file;
 };
 
-/// Turns the table under the rules of with_motion(): home, a quarter turn for the sign (the operator enters its
-/// direction), one revolution from home switch to home switch for the gear ratio. Findings: `cannot_turn`,
+/// Turns the table under the rules of with_motion(). Homes, then a quarter turn for the sign (the operator enters its
+/// direction), then one revolution from home switch to home switch for the gear ratio. Findings: `cannot_turn`,
 /// `reversed_sign`, `gear_ratio`. Fails with `stopped` (on request) and `refused` (e-stop, guard): examination ends.
 Result<void> examine_motion(const Rig& rig, const Operator& person, Clock& clock, Report& report);
 

@@ -134,8 +134,8 @@ TEST_F(RetentionSweeps, WhatWasNotExportedOrCanBeResumedStays) {
   EXPECT_THAT(sweep(), ElementsAre("cancelled", "interrupted"));
 }
 
-/// The clock jumps ten years ahead or back and returns, while the daemon runs, over a restart and over a time switched
-/// off, before and after it is synchronized; a job ends under every clock. None of them is 30 days old in the end.
+/// The clock jumps ten years ahead or back and returns: while the daemon runs, over a restart and over a time off,
+/// before and after it is synchronized. A job ends under every clock. None of them is 30 days old in the end.
 TEST_F(RetentionSweeps, NoJobIsLostToAClockSetTenYearsOnAndBack) {
   const auto move_on = [this](int how) {
     time->now += hours(1);

@@ -292,7 +292,7 @@ void walk(const std::vector<Named>& events, bool with_jobs, Walk& walk) {
   walk.states += seen.size();
 }
 
-/// In parts, because independent parts need not be multiplied.
+/// Walks in parts, because independent parts need not be multiplied.
 Walk walk_everywhere() {
   Walk all;
   walk(together({of_the_rig(), of_safety(), of_maintenance()}), false, all);
