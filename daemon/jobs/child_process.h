@@ -15,9 +15,9 @@
 namespace scanrig {
 
 struct ChildCommand {
-  std::vector<std::string> words;                      ///< the program's path first
-  std::chrono::seconds limit = std::chrono::hours(1);  ///< then it is killed
-  std::optional<std::uintmax_t> memory_bytes{};        ///< of private memory; larger requests fail
+  std::vector<std::string> words;                                           ///< the program's path first
+  std::chrono::seconds limit = std::chrono::hours(1);                       ///< then it is killed
+  std::optional<std::uintmax_t> memory_bytes{};                             ///< of private memory; larger requests fail
   std::function<void(std::string_view)> on_line = [](std::string_view) {};  ///< each line of its standard output
 };
 

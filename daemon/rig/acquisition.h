@@ -19,7 +19,7 @@ struct AcquisitionOptions {
   Clock::Duration check_limit = std::chrono::milliseconds(500);  ///< for each device
   /// For cameras that have to be connected: the library takes 2.5 s to notice each GigE camera that vanished.
   Clock::Duration connect_limit = std::chrono::seconds(8);
-  int retake_limit = 3;                                          ///< exposures to retake in a row before the view fails
+  int retake_limit = 3;  ///< exposures to retake in a row before the view fails
 };
 
 /// The order in which the devices do one thing. Every wait has a deadline.

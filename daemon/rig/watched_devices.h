@@ -3,8 +3,8 @@
 #include <chrono>
 #include <optional>
 
-#include "daemon/runtime/device_watch.h"
 #include "daemon/rig/devices.h"
+#include "daemon/runtime/device_watch.h"
 
 namespace scanrig {
 

@@ -46,7 +46,7 @@ struct DaemonOptions {
   std::function<void(const Error&)> on_exit_hang = [](const auto&) {};
   Clock::Duration hang_margin = DeviceWatch::kMargin;     ///< a device's call that is this late hangs
   Clock::Duration hang_limit = std::chrono::seconds(10);  ///< one that is this late ends the daemon
-  Clock::Duration panel_read_time{0};  ///< time a reading of the panel may take beyond its deadline
+  Clock::Duration panel_read_time{0};                     ///< time a reading of the panel may take beyond its deadline
   /// Stops the table by another path than the given devices: their turntable hangs. On a separate thread; returns
   /// once standstill is confirmed. Fails with why the table may be moving; then the daemon ends.
   std::function<Result<void>()> stop_table_outside = [] {

@@ -7,8 +7,8 @@
 
 #include "core/version.h"
 #include "daemon/api/socket_file.h"
-#include "daemon/service/crash_report.h"
 #include "daemon/rig/saved_config.h"
+#include "daemon/service/crash_report.h"
 #include "daemon/service/daemon_options.h"
 
 namespace scanrig {

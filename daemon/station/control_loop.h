@@ -46,8 +46,8 @@ struct ControlLoopOptions {
   Clock::Duration check_period = std::chrono::seconds(2);    ///< of the devices, in quiet times
   Clock::Duration shutdown_limit = std::chrono::seconds(5);  ///< for confirmation that the rig has stopped
   Clock::Duration hang_limit = std::chrono::seconds(10);     ///< a call that is this late ends the loop
-  std::chrono::seconds warm_up{0};  ///< of the projector: no job starts automatically before
-  std::optional<Latch> latch{};     ///< that an earlier process left
+  std::chrono::seconds warm_up{0};                           ///< of the projector: no job starts automatically before
+  std::optional<Latch> latch{};                              ///< that an earlier process left
 };
 
 /// The thread of the state machine: takes events one by one, decides, hands out actions, publishes a snapshot.

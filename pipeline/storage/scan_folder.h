@@ -18,8 +18,8 @@
 
 namespace scanrig {
 
-/// A scan on disk, docs/reference/scan-folder.md. A pose and a view are identified by their positions in the manifest, from 0.
-/// Threads: one user at a time; the const functions may be called from several.
+/// A scan on disk, docs/reference/scan-folder.md. A pose and a view are identified by their positions in the manifest,
+/// from 0. Threads: one user at a time; the const functions may be called from several.
 class ScanFolder {
  public:
   /// Makes the folder (which must be missing or empty) with its manifest and a copy of the calibration file (empty

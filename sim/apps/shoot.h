@@ -12,9 +12,9 @@ struct ShootOptions {
   int views = 8;  ///< per pose, evenly around the circle
 };
 
-/// Renders a whole scan into the new folder `folder` (docs/reference/scan-folder.md, truth included), without devices or daemon.
-/// The small errors of the table come from the profile. The same options give the same bytes. Fails as Scene::create,
-/// and with `exists` (the folder has a scan), `out_of_range` (views), `io`.
+/// Renders a whole scan into the new folder `folder` (docs/reference/scan-folder.md, truth included), without devices
+/// or daemon. The small errors of the table come from the profile. The same options give the same bytes. Fails as
+/// Scene::create, and with `exists` (the folder has a scan), `out_of_range` (views), `io`.
 Result<void> shoot(const ShootOptions& options, const std::filesystem::path& folder);
 
 }  // namespace scanrig::sim

@@ -118,7 +118,7 @@ struct TriggerLine {
   int looks_in_between = 0;  ///< between the first exposure and the latest
   int dark = 0;              ///< the next exposures whose right image is dark
   bool projector_absent = false;
-  int absent = 0;  ///< further failures of the camera when it is armed; -1: it is missing
+  int absent = 0;                 ///< further failures of the camera when it is armed; -1: it is missing
   std::function<void()> at_fire;  ///< called during the next exposure, or
   int fires_before = 0;           ///< after this many more
   Clock::TimePoint ready_at{};    ///< time of the last request to prepare the cameras

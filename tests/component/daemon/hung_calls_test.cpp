@@ -135,7 +135,7 @@ class EachHungCall : public HungCalls, public testing::WithParamInterface<std::p
         {"turntable.rotate_to", &EachHungCall::while_turning}, {"turntable.stop", &EachHungCall::by_stop},
         {"turntable.status", &EachHungCall::while_idle},       {"turntable.limit_speed", &EachHungCall::by_jog},
         {"projector.fire", &EachHungCall::while_exposing},     {"projector.turn_off", &EachHungCall::by_stop},
-        {"camera.prepare", &EachHungCall::while_idle},           {"camera.arm", &EachHungCall::while_exposing},
+        {"camera.prepare", &EachHungCall::while_idle},         {"camera.arm", &EachHungCall::while_exposing},
         {"camera.collect", &EachHungCall::while_exposing},     {"camera.capture_preview", &EachHungCall::by_preview},
         {"panel.wait_change", &EachHungCall::while_moving},    {"panel.show", &EachHungCall::by_stop}};
     (this->*ways.at(call))(call);

@@ -120,7 +120,8 @@ TEST_F(ModbusIoProjectorTest, AnActiveLowCoilRestsOn) {
 TEST_F(ModbusIoProjectorTest, ALostReplyToSwitchingOffLeavesNoLight) {
   ModbusIoProjector projector(module_.projector(), module_.clock);
   ASSERT_TRUE(projector.turn_off(within(2000)));
-  module_.when_lit([this] { module_.server->inject({.kind = WireFault::Kind::request_lost, .count = 1, .function = 5}); });
+  module_.when_lit(
+      [this] { module_.server->inject({.kind = WireFault::Kind::request_lost, .count = 1, .function = 5}); });
   const auto fired = projector.fire(Light::pattern, within(2000));
   EXPECT_TRUE(fired) << fired.error().message;
   EXPECT_FALSE(module_.is_lit());
