@@ -9,7 +9,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent.parent
 TABLE = """
 [text]
 spoilt, see to -> retake
-[text drivers docs/safety.md]
+[text drivers docs/reference/safety.md]
 standing -> stopped
 [strings daemon]
 the daemon -> the service
@@ -56,7 +56,7 @@ class Checked(unittest.TestCase):
     def test_words_in_comments_strings_and_documents_are_found_in_any_case(self):
         self.assert_found({"core/a.cpp": "int a;  // Spoilt\nauto b = \"see  to it\";\n"},
                           "core/a.cpp:1: spoilt -> use retake", "core/a.cpp:2: see to -> use retake")
-        self.assert_found({"docs/a.md": "# A\n\nIt is spoilt.\n"}, "docs/a.md:3: spoilt -> use retake")
+        self.assert_found({"docs/status.md": "# A\n\nIt is spoilt.\n"}, "docs/status.md:3: spoilt -> use retake")
         self.assert_found({"tests/a.py": '"""One\nspoilt"""\n'}, "tests/a.py:2: spoilt -> use retake")
         self.assert_found({"config/a.toml": "a = 1  # spoilt\n"}, "config/a.toml:1: spoilt -> use retake")
 
@@ -69,11 +69,11 @@ class Checked(unittest.TestCase):
                           "daemon/a.cpp:1: the daemon -> use the service")
 
     def test_a_folder_limits_a_rule_to_itself_and_the_tests_that_mirror_it(self):
-        self.assert_clean({"pipeline/a.cpp": "Words a;  // standing\n", "docs/states.md": "standing\n",
+        self.assert_clean({"pipeline/a.cpp": "Words a;  // standing\n", "docs/reference/states.md": "standing\n",
                            "drivers2/a.cpp": "// standing\n"})
         self.assert_found({"tests/unit/daemon/station/a_test.cpp": "Words a;\n"},
                           "tests/unit/daemon/station/a_test.cpp:1: Words -> use OperatorMessage")
-        self.assert_found({"docs/safety.md": "standing\n"}, "docs/safety.md:1: standing -> use stopped")
+        self.assert_found({"docs/reference/safety.md": "standing\n"}, "docs/reference/safety.md:1: standing -> use stopped")
 
     def test_sentences_for_operators_are_not_searched_in_tests(self):
         self.assert_clean({"tests/unit/daemon/a.cpp": 'f("the daemon", "Resume it, leave it");\n'})
