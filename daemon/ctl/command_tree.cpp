@@ -41,7 +41,9 @@ OptionWords words_of(const CLI::Option& option) {
 CommandWords words_of(const CLI::App& app, const std::string& path_of_parent) {
   CommandWords command{
       .path = path_of_parent + app.get_name(), .name = app.get_name(), .description = app.get_description()};
-  for (const auto* option : app.get_options()) command.options.push_back(words_of(*option));
+  // Old names are hidden: accepted, not offered.
+  for (const auto* option : app.get_options([](const CLI::Option* one) { return !one->get_group().empty(); }))
+    command.options.push_back(words_of(*option));
   for (const auto* verb : app.get_subcommands([](const CLI::App* one) { return !one->get_group().empty(); })) {
     command.verbs.push_back(words_of(*verb, command.path + " "));
   }

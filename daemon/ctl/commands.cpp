@@ -144,8 +144,10 @@ void add_doctor(CLI::App& app, Chosen& chosen) {
   const auto verb = std::make_shared<DoctorVerb>();
   auto* sub = app.add_subcommand("doctor", "try everything the configuration names and tell what is wrong");
   sub->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
-  sub->add_flag("--yes-move", verb->yes_move, "the table may turn: nobody is near it");
-  sub->add_flag("--answers", verb->answers, "somebody answers on standard input although it is no terminal");
+  sub->add_flag("--allow-motion", verb->yes_move, "the table may turn: everyone is clear");
+  sub->add_flag("--interactive", verb->answers, "replies come on standard input although it is no terminal");
+  sub->add_flag("--yes-move", verb->yes_move)->group("");  // old name
+  sub->add_flag("--answers", verb->answers)->group("");    // old name
   sub->add_flag("--json", verb->json, "print JSON");
   sub->callback([&chosen, verb] { chosen = [verb] { return examine_rig(*verb); }; });
 }

@@ -14,9 +14,9 @@ PROMPT_SIGN, PROMPT_MARK, PROMPT_MARK_OFF = "which way", "Put a mark", "By how m
 
 def consult(rig, present=True, as_user=None):
     """Runs the doctor and plays the operator: ids of its findings, and its result."""
-    command = [rig.bin / "scanrig", "doctor", "--config", rig.config, "--json", "--yes-move"]
+    command = [rig.bin / "scanrig", "doctor", "--config", rig.config, "--json", "--allow-motion"]
     if present:
-        command.append("--answers")
+        command.append("--interactive")
 
     def become():
         if as_user is not None:

@@ -24,7 +24,7 @@ inline const WireRig::Changes kToolSpeeds{{"speed_deg_s = 45", "speed_deg_s = 12
 using Tool = std::vector<std::string>;
 inline const Tool kHome{"turntable", "home", "--yes"};
 inline const Tool kMove{"turntable", "move", "90", "--yes"};
-inline const Tool kDoctor{"doctor", "--yes-move"};
+inline const Tool kDoctor{"doctor", "--allow-motion"};
 
 /// A rig on wires and one run of a tool on it.
 class ToolBench {
