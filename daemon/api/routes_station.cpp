@@ -25,7 +25,6 @@ Route press(std::string_view path, Button button, Role role, std::string_view de
           .description = description,
           .reply = kPressed,
           .errors = {409},
-          .reserved = button == Button::stop,
           .handle = [button](const ApiStation& station, const Values&, Send send) {
             station.loop.press(button, Origin::remote,
                                [send = std::move(send)](const Result<std::string>& job) { send(pressed(job)); });
@@ -48,6 +47,7 @@ Route stop_route() {
               "Sends stop to the drive and switches the light off, in every state; an active job is "
               "interrupted and stays resumable. Any role may. `standstill` of the status follows.",
           .reply = kStopped,
+          .reserved = true,
           .handle = [](const ApiStation& station, const Values&, Send send) {
             station.loop.press(Button::stop, Origin::remote,
                                [&loop = station.loop, send = std::move(send)](const Result<std::string>& job) {

@@ -41,7 +41,7 @@ TEST_F(RefusedOrders, AreToldWithWhoAskedWhatAndWhy) {
   ASSERT_EQ(log.size(), 1u);
   EXPECT_EQ(log[0].priority, Priority::notice);
   EXPECT_THAT(log[0].message, testing::StartsWith("POST /api/v1/start, asked for by " + me +
-                                                  " (engineer), is refused: The station is Preoperational"));
+                                                  " (engineer), is refused: The rig is Preoperational"));
   EXPECT_EQ(log[0].job, "");
 }
 

@@ -174,7 +174,7 @@ TEST_F(BadDisk, HangingItIsNamedInTimeAndTheJobGoesOnWhenItAnswers) {
   EXPECT_THAT(job(id)->error->message,
               HasSubstr((folder_ / "jobs").string() + " has not answered for 30 s: see to it"));
   EXPECT_THAT(loop->snapshot()->cause, HasSubstr("has not answered for 30 s: see to it, then resume the job"));
-  EXPECT_THAT(loop->snapshot()->next_action, HasSubstr("See to the disk"));
+  EXPECT_THAT(loop->snapshot()->next_action, HasSubstr("Check the job disk"));
 
   rig.panel.press(&PanelInputs::reset);
   ASSERT_TRUE(wait_ready()) << "the rig itself is well";

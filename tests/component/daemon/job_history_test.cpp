@@ -107,6 +107,15 @@ class JobHistory : public scan_samples::FolderTest, public testing::WithParamInt
       post<event::PoseStored>(task);
     }
     checked_ = turned_ = false;
+    wait_for_reconstruction();
+  }
+  /// A failure is reported before its reconstruction has ended.
+  void wait_for_reconstruction() {
+    const auto deadline = Deadline::after(clock_, kAmple);
+    while (told().complete == 2 && reconstruction_->has(id_)) {
+      ASSERT_FALSE(deadline.expired(clock_));
+      clock_.sleep_for(std::chrono::milliseconds(1));
+    }
   }
   void reprocess(bool model) {
     {
@@ -115,6 +124,7 @@ class JobHistory : public scan_samples::FolderTest, public testing::WithParamInt
     }
     post<event::ModelReady, event::ReconstructionFailed>(
         action::RunJobRequest{{.what = What::reprocess, .job = id_, .request_id = 1}});
+    wait_for_reconstruction();
   }
   void take(Step step) {
     const int pose = told().complete;

@@ -177,9 +177,9 @@ TEST_F(LoggedDaemon, TellsAPressAtThePanelThatIsRefused) {
   rig.panel.press(&PanelInputs::reset);
   shut_down();
   const auto id = job_folders().at(0).filename().string();
-  EXPECT_THAT(lines, Contains(AllOf(says("Pressed at the panel, start is refused: The station is Halted"),
+  EXPECT_THAT(lines, Contains(AllOf(says("Pressed at the panel, start is refused: The rig is Halted"),
                                     has(Priority::notice), Field(&JournalEntry::device, "panel"))));
-  EXPECT_THAT(lines, Contains(AllOf(says("Pressed at the panel, reset is refused: There is nothing to reset"),
+  EXPECT_THAT(lines, Contains(AllOf(says("Pressed at the panel, reset is refused: Nothing to reset"),
                                     Field(&JournalEntry::job, id))));
 }
 

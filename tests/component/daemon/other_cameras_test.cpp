@@ -82,7 +82,7 @@ TEST_F(OtherCameras, RefuseAScanUntilTheFileIsReplaced) {
   EXPECT_TRUE(wait_line("start is refused: Check the calibration: "));
 
   calibrate("L1", "R1");
-  ASSERT_TRUE(wait_next_action("Put an object on the table"));
+  ASSERT_TRUE(wait_next_action("Put a part on the table"));
   EXPECT_TRUE(wait_line("does not refuse the next scan any more"));
   EXPECT_TRUE(ask(Button::start));
   EXPECT_TRUE(wait_flip());
@@ -111,7 +111,7 @@ TEST_F(OtherCameras, AQueuedJobTakesTheCalibrationThatIsThereWhenItBegins) {
   ASSERT_TRUE(wait_next_action("Check the calibration: "));
   EXPECT_FALSE(ask(Button::start));
   calibrate("L1", "R1");
-  ASSERT_TRUE(wait_next_action("Put the object for 4711"));
+  ASSERT_TRUE(wait_next_action("Put the part for 4711"));
   scan_both_poses();
   ASSERT_TRUE(wait_state(*id, JobState::done));
   const auto calibration = only_job().load_calibration();
@@ -173,7 +173,7 @@ TEST_F(OtherCameras, AJobOfOthersThatIsQueuedRefusesStart) {
   clock.sleep_for(minutes(1));
   EXPECT_EQ(moves(), before);
   ASSERT_TRUE(ask(event::JobRequested{.what = What::cancel, .job = id}));
-  ASSERT_TRUE(wait_next_action("Put an object on the table"));
+  ASSERT_TRUE(wait_next_action("Put a part on the table"));
   EXPECT_TRUE(ask(Button::start));
 }
 

@@ -262,7 +262,7 @@ TEST_F(Daemon, HomingThatWasStoppedBeforeItBeganDoesNotBegin) {
   }
 }
 
-TEST_F(Daemon, StopCancelsTheJob) {
+TEST_F(Daemon, StopInterruptsTheJob) {
   boot();
   get_ready();
   rig.panel.press(&PanelInputs::start);
@@ -272,7 +272,7 @@ TEST_F(Daemon, StopCancelsTheJob) {
   rig.panel.press(&PanelInputs::reset);
   ASSERT_TRUE(wait_ready()) << "a stop asked for in the past must not end the homing";
   shut_down();
-  EXPECT_EQ(only_job().manifest().state, "cancelled");
+  EXPECT_EQ(only_job().manifest().state, "interrupted");
 }
 
 TEST_F(Daemon, AShutdownInTheMiddleOfAScanIsCleanAndKeepsWhatIsStored) {

@@ -106,7 +106,7 @@ TEST_F(Programs, AStartWithACalibrationOfOtherCamerasIsRefusedByItsCode) {
   EXPECT_EQ(scanrig({"start", "--socket", socket()}), 6);
   EXPECT_THAT(output, HasSubstr("of the cameras 40012345 (left) and SIM-R (right), but the rig has SIM-L and SIM-R"));
   ASSERT_TRUE(write_file_atomically(file, own));
-  wait_for("next_action", "Put an object on the table");
+  wait_for("next_action", "Put a part on the table");
   EXPECT_EQ(scanrig({"start", "--socket", socket()}), 0) << output;
 }
 

@@ -32,8 +32,8 @@ TEST_F(StartedOverTheApi, AJobThatDoesNotFitOnTheDiskIsNotWaitedFor) {
   change_config("reserve_gib = 1", "reserve_gib = 100000");
   get_ready();
   EXPECT_EQ(start({"--follow"}), ExitCode::disk) << output_;
-  EXPECT_THAT(output_, HasSubstr("was not begun: the disk of"));
-  EXPECT_THAT(output_, HasSubstr("Next: See to the disk of the jobs."));
+  EXPECT_THAT(output_, HasSubstr("did not start: the disk of"));
+  EXPECT_THAT(output_, HasSubstr("Next: Check the job disk."));
   EXPECT_EQ(jobs()[0]["state"], "queued") << "the next Start begins it";
   EXPECT_EQ(start({"--follow", "--json"}), ExitCode::disk) << output_;
 }
@@ -53,7 +53,7 @@ TEST_F(StartedOverTheApi, AnAbsentDeviceIsADeviceAndNoFile) {
   change_config("truth = \"control.sock\"", "truth = \"nowhere.sock\"");
   get_ready();
   EXPECT_EQ(start({}), ExitCode::device) << output_;
-  EXPECT_THAT(output_, HasSubstr("The camera is not there: "));
+  EXPECT_THAT(output_, HasSubstr("The camera is not responding: "));
 }
 
 }  // namespace

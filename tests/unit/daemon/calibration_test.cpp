@@ -67,7 +67,7 @@ TEST_F(CalibrationRules, AJobWithViewsIsHeldByItsOwnOnly) {
   get_ready();
   know(half_done("a"));
   see_calibration("", kOthers);
-  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("goes on where it stopped"));
+  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("Do not move the part of"));
   see_calibration("a", kOthers);
   press(Button::start);
   EXPECT_TRUE(refused);

@@ -124,7 +124,7 @@ TEST_F(Follow, AJobThatWasNotBegunIsToldWithWhatToDo) {
   const auto why = why_not_started(status, "J");
   ASSERT_TRUE(why);
   EXPECT_EQ(why->code, ErrorCode::io);
-  EXPECT_EQ(why->message, "job J was not begun: the disk is full. Next: Turn the object over.");
+  EXPECT_EQ(why->message, "job J did not start: the disk is full. Next: Turn the object over.");
   EXPECT_FALSE(why_not_started(status, "another"));
 }
 

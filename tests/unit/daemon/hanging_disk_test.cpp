@@ -46,7 +46,7 @@ TEST_F(HangingDisk, BeginsNothingUntilItAnswers) {
   know(queued("a", 1));
   hang();
   EXPECT_EQ(state.machine, MachineState::ready);
-  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("See to the disk"));
+  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("Check the job disk"));
   EXPECT_THAT(describe(state, rules).sentence, HasSubstr("does not answer"));
   const auto expect_refused = [&] {
     ASSERT_TRUE(refused);

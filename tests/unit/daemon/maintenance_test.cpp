@@ -97,7 +97,7 @@ TEST_F(MaintenanceMode, RemoteHomingInMaintenanceFollowsTheSameRule) {
   start_up();
   ask(What::on);
   ask(What::home);
-  expect_refused("switched off");
+  expect_refused("disabled");
   allow_remote();
   ask(What::home);
   EXPECT_FALSE(refused);

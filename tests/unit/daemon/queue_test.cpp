@@ -244,7 +244,7 @@ TEST_F(Queue, AProjectorThatWarmsUpHoldsTheLineAndSaysForHowLong) {
   see(true);
   EXPECT_TRUE(actions.empty());
   EXPECT_EQ(state.activity, Activity::waiting_for_part);
-  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("goes on in 600 s, or at once with Start"));
+  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("warming up: 600 s. Press Start to skip"));
   tell(event::QuietHours{true});
   tell(event::WarmingUp{std::chrono::seconds(0)});
   EXPECT_EQ(state.activity, Activity::waiting_for_part) << "warm, but not now";

@@ -28,7 +28,7 @@ class Resume : public Station {
 
 TEST_F(Resume, TakesView0AgainBeforeAnythingElse) {
   resume(0, 2);
-  EXPECT_THAT(said, HasSubstr("leave its object as it lies"));
+  EXPECT_THAT(said, HasSubstr("Do not move the part"));
   ASSERT_NE(asked_for<action::TakeView>(), nullptr);
   EXPECT_TRUE(asked_for<action::TakeView>()->movement_check);
   tell(event::CheckViewTaken{});

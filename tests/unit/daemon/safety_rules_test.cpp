@@ -14,10 +14,10 @@ using testing::HasSubstr;
 TEST_F(Safety, RemoteStartAndResetNeedTheSettingAndAGuardThatIsClosed) {
   start_up();
   press(Button::reset, Origin::remote);
-  expect_refused("switched off");
+  expect_refused("disabled");
   rules.remote = true;
   press(Button::reset, Origin::remote);
-  expect_refused("switched off");
+  expect_refused("disabled");
   rules.guard = true;
   tell(event::GuardChanged{false});
   press(Button::reset, Origin::remote);
@@ -31,7 +31,7 @@ TEST_F(Safety, RemoteStartAndResetNeedTheSettingAndAGuardThatIsClosed) {
 TEST_F(Safety, ARemoteStartNeedsTheSameWhenReady) {
   get_ready();
   press(Button::start, Origin::remote);
-  expect_refused("switched off");
+  expect_refused("disabled");
   allow_remote();
   tell(event::GuardChanged{false});
   press(Button::start, Origin::remote);

@@ -282,7 +282,7 @@ TEST_F(Station, AFullDiskWhileNothingMovesKeepsTheTableHomed) {
   press(Button::start);
   tell(full);  // the job's folder could not be made
   EXPECT_EQ(state.machine, MachineState::ready);
-  EXPECT_THAT(state.cause, HasSubstr("was not begun: cannot write: No space left on device."));
+  EXPECT_THAT(state.cause, HasSubstr("did not start: cannot write: No space left on device."));
   tell(event::WarningOver{});
   EXPECT_EQ(asked_for<action::TakeView>(), nullptr);
 
