@@ -172,8 +172,8 @@ TEST_F(BadDisk, HangingItIsNamedInTimeAndTheJobGoesOnWhenItAnswers) {
   EXPECT_FALSE(table_moves());
   EXPECT_EQ(job(id)->state, JobState::interrupted);
   EXPECT_THAT(job(id)->error->message,
-              HasSubstr((folder_ / "jobs").string() + " has not answered for 30 s: see to it"));
-  EXPECT_THAT(loop->snapshot()->cause, HasSubstr("has not answered for 30 s: see to it, then resume the job"));
+              HasSubstr((folder_ / "jobs").string() + " has not responded for 30 s; check it"));
+  EXPECT_THAT(loop->snapshot()->cause, HasSubstr("has not responded for 30 s; check it, then resume the job"));
   EXPECT_THAT(loop->snapshot()->next_action, HasSubstr("Check the job disk"));
 
   rig.panel.press(&PanelInputs::reset);
@@ -204,11 +204,11 @@ TEST_F(BadDisk, HangingItKeepsNobodyWaitingWhoPressesStop) {
   EXPECT_LT(clock.now() - pressed, seconds(5));
   EXPECT_TRUE(hanging());
   EXPECT_FALSE(table_moves());
-  EXPECT_EQ(job(id)->state, JobState::cancelled);
+  EXPECT_EQ(job(id)->state, JobState::interrupted);
   EXPECT_EQ(job(id)->error->message, "Stop was pressed");
   release();
-  ASSERT_TRUE(clock_waits_for([&] { return only_job().manifest().state == "cancelled"; }));
-  EXPECT_EQ(job(id)->state, JobState::cancelled);
+  ASSERT_TRUE(clock_waits_for([&] { return only_job().manifest().state == "interrupted"; }));
+  EXPECT_EQ(job(id)->state, JobState::interrupted);
   EXPECT_THAT(loop->snapshot()->queue, testing::IsEmpty());
 }
 

@@ -24,7 +24,7 @@ class HungCalls : public Daemon {
  protected:
   void SetUp() override {
     Daemon::SetUp();
-    auto made = sim::SimRig::create({.image_scale = 0.05}, clock);
+    auto made = sim::SimRig::create({.image_scale = 0.1}, clock);
     ASSERT_TRUE(made) << made.error().message;
     sim = std::move(*made);
     turntable.emplace(sim->turntable(), gate, clock);

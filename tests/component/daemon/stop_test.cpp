@@ -154,7 +154,7 @@ const Situation kSituations[] = {
      }},
 };
 
-TEST_P(StopInEveryState, IsSentToTheDriveAtOnceAndReportedTruly) {
+TEST_P(StopInEveryState, IsObeyed) {
   const auto& [situation, by] = GetParam();
   boot();
   ASSERT_NO_FATAL_FAILURE(situation.reach(*this));
