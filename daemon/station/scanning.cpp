@@ -43,7 +43,7 @@ void interrupt(StepBuilder& m, const Error& why, const char* then) {
   m.close_job(JobState::interrupted, why);
   if (m.s().machine == MachineState::error) return;  // a fault came first and keeps its message
   auto cause =
-      fmt::format("Job {} {}: {}{}.", id, begun ? "is interrupted" : "was not begun", why.message, begun ? then : "");
+      fmt::format("Job {} {}: {}{}.", id, begun ? "is interrupted" : "did not start", why.message, begun ? then : "");
   if (m.s().activity != Activity::scanning) return m.enter(MachineState::ready, std::move(cause));  // nothing moves
   m.s().machine = MachineState::halted;
   m.s().auto_home_allowed = false;

@@ -47,7 +47,7 @@ TEST_F(HangingDisk, BeginsNothingUntilItAnswers) {
   hang();
   EXPECT_EQ(state.machine, MachineState::ready);
   EXPECT_THAT(describe(state, rules).next_action, HasSubstr("Check the job disk"));
-  EXPECT_THAT(describe(state, rules).sentence, HasSubstr("does not answer"));
+  EXPECT_THAT(describe(state, rules).sentence, HasSubstr("does not respond"));
   const auto expect_refused = [&] {
     ASSERT_TRUE(refused);
     EXPECT_EQ(refused->code, ErrorCode::io);

@@ -51,7 +51,7 @@ TEST(JobWords, AModelBeyondTheLimitsSaysWhatMayBeDone) {
   j.passed = false;
   j.error = Error{ErrorCode::below_limits, "0.8 of it is measured, 0.9 are asked for"};
   EXPECT_EQ(describe(j).sentence, "Model outside the recipe's limits: 0.8 of it is measured, 0.9 are asked for.");
-  EXPECT_NE(describe(j).next_action.find("limits of the recipe default"), std::string::npos);
+  EXPECT_NE(describe(j).next_action.find("limits of recipe default"), std::string::npos);
 }
 
 TEST(JobWords, AFailureSaysWhetherItsImagesAreOfUse) {

@@ -136,7 +136,7 @@ TEST_F(MaintenanceMode, MaintenanceDoesNotClearAFault) {
   ASSERT_EQ(state.machine, MachineState::maintenance);
   allow_remote();
   ask(What::home);
-  expect_refused("at the panel only");
+  expect_refused("Reset at the panel");
   ask(What::off);
   EXPECT_EQ(state.machine, MachineState::error);
 }
@@ -182,7 +182,7 @@ TEST_F(MaintenanceMode, APulseNeedsTheEstopTheGuardAndAPanelThatCanBeRead) {
   state.estop_ok = true;
   state.panel_known = false;
   ask(What::pulse);
-  expect_refused("panel cannot be read");
+  expect_refused("check the panel");
 }
 
 TEST_F(MaintenanceMode, StopEstopGuardAndPanelEndAPulse) {

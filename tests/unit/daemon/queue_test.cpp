@@ -290,7 +290,7 @@ TEST_F(Queue, ThreeFailuresInARowStopTheLineAndStartForgivesThem) {
 
 TEST_F(Queue, AFlipNobodyMakesParksTheJobAndFreesTheRig) {
   reach_flip();
-  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("Turn the object over"));
+  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("Turn the part over"));
   tell(event::FlipTimedOut{"another"});
   EXPECT_EQ(state.activity, Activity::waiting_for_flip);
   tell(event::FlipTimedOut{"job"});

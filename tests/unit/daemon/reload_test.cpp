@@ -27,7 +27,7 @@ TEST_F(AskedToReload, AnIdleStationStopsTheRigAndEndsWhenItIsSeenStanding) {
   EXPECT_FALSE(refused);
   EXPECT_TRUE(asked_for<action::StopRig>());
   EXPECT_FALSE(state.finished);
-  EXPECT_THAT(describe(state, rules).sentence, HasSubstr("new configuration"));
+  EXPECT_THAT(describe(state, rules).sentence, HasSubstr("Reloading the configuration"));
   press(Button::start);
   EXPECT_TRUE(refused);
   tell(event::Stopped{});
@@ -45,7 +45,7 @@ TEST_F(AskedToReload, NothingThatIsBeingDoneIsDisturbed) {
   expect_refused("Preoperational");
   start_up();
   press(Button::reset);
-  expect_refused("Operational.Initialized (warning)");
+  expect_refused("Operational.Initialized, warning");
   tell(event::WarningOver{});
   expect_refused("homing");
   tell(event::Homed{});
@@ -87,7 +87,7 @@ TEST_F(AskedToReload, AShutdownThatComesMeanwhileWins) {
   EXPECT_FALSE(state.reloading);
   tell(event::Stopped{});
   EXPECT_TRUE(state.finished);
-  expect_refused("the daemon is ending");
+  expect_refused("the service is ending");
 }
 
 }  // namespace

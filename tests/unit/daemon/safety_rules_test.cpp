@@ -46,7 +46,7 @@ TEST_F(Safety, AFaultIsResetAtThePanelOnly) {
   begin_scan();
   fault_and_stand();
   press(Button::reset, Origin::remote);
-  expect_refused("at the panel only");
+  expect_refused("Reset at the panel");
   press(Button::reset);
   EXPECT_EQ(state.machine, MachineState::initialized);
 }
@@ -59,7 +59,7 @@ TEST_F(Safety, AnEstopIsResetAtThePanelOnlyAndRestartsNothing) {
   tell(event::EstopChanged{true});
   EXPECT_TRUE(actions.empty());
   press(Button::reset, Origin::remote);
-  expect_refused("at the panel only");
+  expect_refused("Reset at the panel");
   press(Button::start);
   EXPECT_TRUE(refused);
   press(Button::reset);
@@ -143,7 +143,7 @@ TEST_F(Safety, APanelThatCannotBeReadStopsTheTableAndAllowsNoMotion) {
   EXPECT_NE(asked_for<action::StopRig>(), nullptr);
   tell(event::Stopped{});
   press(Button::reset);
-  expect_refused("panel cannot be read");
+  expect_refused("check the panel");
   EXPECT_THAT(describe(state, rules).next_action, HasSubstr("panel"));
   tell(event::PanelFound{true, true});
   EXPECT_EQ(state.machine, MachineState::error) << "still latched";

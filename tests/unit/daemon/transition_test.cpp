@@ -89,7 +89,7 @@ TEST_F(Station, AsksForTheFlipWhenThePoseIsOnDisk) {
   EXPECT_EQ(state.activity, Activity::storing) << "not before the manifest says so";
   tell(event::PoseStored{"job", 0});
   EXPECT_EQ(state.activity, Activity::waiting_for_flip);
-  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("Turn the object over"));
+  EXPECT_THAT(describe(state, rules).next_action, HasSubstr("Turn the part over"));
 }
 
 TEST_F(Station, StartMeansContinueAfterTheFlipAndWarnsAgain) {
@@ -268,7 +268,7 @@ TEST_F(Station, AFullDiskInterruptsTheJobAndStopsTheTableButLatchesNothing) {
   EXPECT_EQ(state.machine, MachineState::halted);
   EXPECT_FALSE(state.latch);
   EXPECT_NE(asked_for<action::StopRig>(), nullptr);
-  EXPECT_THAT(state.cause, HasSubstr("No space left on device; see to the disk"));
+  EXPECT_THAT(state.cause, HasSubstr("No space left on device; check the disk"));
   ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
   EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::interrupted) << "with room again it can be resumed";
   tell(event::Stopped{});
