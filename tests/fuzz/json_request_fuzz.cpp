@@ -29,11 +29,11 @@ void check(const RequestField& field, const Values& values) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using Type = RequestField::Type;
   static const std::vector<RequestField> all_types{
-      {.name = "t", .about = "", .required = true, .min = 1, .max = 8},
-      {.name = "w", .about = "", .words = {"a", "b"}},
-      {.name = "n", .type = Type::number, .about = "", .min = -1, .max = 1},
-      {.name = "i", .type = Type::integer, .about = "", .min = -5, .max = 5},
-      {.name = "f", .type = Type::flag, .about = ""}};
+      {.name = "t", .description = "", .required = true, .min = 1, .max = 8},
+      {.name = "w", .description = "", .words = {"a", "b"}},
+      {.name = "n", .type = Type::number, .description = "", .min = -1, .max = 1},
+      {.name = "i", .type = Type::integer, .description = "", .min = -5, .max = 5},
+      {.name = "f", .type = Type::flag, .description = ""}};
   static const Router router;
   const std::string_view body(reinterpret_cast<const char*>(data), size);
   const auto attempt = [&](const std::vector<RequestField>& fields) {

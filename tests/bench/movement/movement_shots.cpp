@@ -71,10 +71,10 @@ void measure(const std::string& name, double scale) {
   }
   const std::string title = object->name;
   const ShotScene scene(std::move(*object), scale);
-  const cv::Mat before[2] = {scene.capture_preview({}, true), scene.capture_preview({}, false)};
+  const cv::Mat before[2] = {scene.look({}, true), scene.look({}, false)};
   std::uint64_t noise = 0;
   for (const auto& one : cases()) {
-    const cv::Mat now[2] = {scene.capture_preview(one.since, true), scene.capture_preview(one.since, false)};
+    const cv::Mat now[2] = {scene.look(one.since, true), scene.look(one.since, false)};
     const bool still = one.what.starts_with("unmoved");
     for (const auto& with : kSensors) {
       if (!still && &with != &kSensors[0]) break;
