@@ -82,8 +82,8 @@ TEST(RestPairs, TheTruePairSurvivesNormalsThatJitterAndModelsThatAreTooTall) {
     c.pair.of_pose1.normal = small_motion(turn, Eigen::Vector3d::Zero()).linear() * c.pair.of_pose1.normal;
     c.pair.of_pose1.height_mm = 84;
     c.pair.of_pose2.height_mm = 62;
-    const RestingSolid solid1{{0, Eigen::Vector3d::Zero(), 100}, 60, {c.pair.of_pose1}};
-    const RestingSolid solid2{{0, Eigen::Vector3d::Zero(), 100}, 80, {c.pair.of_pose2}};
+    const RestingSolid solid1{{.size_mm = 100}, 60, {c.pair.of_pose1}};
+    const RestingSolid solid2{{.size_mm = 100}, 80, {c.pair.of_pose2}};
     EXPECT_EQ(pair_rests(solid1, solid2, {}).size(), 1u);
   }
 }
@@ -91,8 +91,8 @@ TEST(RestPairs, TheTruePairSurvivesNormalsThatJitterAndModelsThatAreTooTall) {
 TEST(RestPairs, TheBestAgreementComesFirst) {
   const StableRest right{base_normal(), 0, 60, 5};
   const StableRest too_tall{base_normal(), 0, 66, 5};
-  const RestingSolid solid1{{0, Eigen::Vector3d::Zero(), 100}, 60, {too_tall, right}};
-  const RestingSolid solid2{{0, Eigen::Vector3d::Zero(), 100}, 60, {right}};
+  const RestingSolid solid1{{.size_mm = 100}, 60, {too_tall, right}};
+  const RestingSolid solid2{{.size_mm = 100}, 60, {right}};
   const auto pairs = pair_rests(solid1, solid2, {});
   ASSERT_EQ(pairs.size(), 2u);
   EXPECT_EQ(pairs[0].of_pose1.height_mm, 60);
