@@ -170,7 +170,7 @@ def crashes(rig):
             yield f"{verb} with a stage that crashes", f"ended with {end.returncode}: {end.stdout}{end.stderr}"
             return
     end = rig.run("recover", home, crash=True)
-    said = "in quarantine" in end.stdout and "lost" not in end.stdout
+    said = "quarantined" in end.stdout and "lost" not in end.stdout
     yield "the third start leaves the job alone", None if said else f"{end.returncode}: {end.stdout}{end.stderr}"
     end = rig.run("scan", home)
     yield "the next job runs", None if end.returncode == 0 else f"{end.returncode}: {end.stdout}{end.stderr}"

@@ -61,7 +61,9 @@ TEST_F(Damaged, AQueuedJobWhoseFolderIsGoneIsForgotten) {
   boot();
   get_ready();
   const auto [first, second] = order_two();
-  fs::remove_all(folder_ / "jobs" / first);
+  std::error_code not_empty;  // its log is written beside
+  for (int i = 0; i < 1000 && fs::exists(folder_ / "jobs" / first); ++i)
+    fs::remove_all(folder_ / "jobs" / first, not_empty);
   rig.panel.press(&PanelInputs::start);
   EXPECT_TRUE(wait_state(second, JobState::done)) << to_string(job(second)->state);
   EXPECT_EQ(job(first), nullptr);

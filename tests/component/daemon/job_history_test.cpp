@@ -234,7 +234,10 @@ TEST_P(JobHistory, WhatIsReadBackIsWhatWasReported) {
     const auto history = open.back();
     open.pop_back();
     ASSERT_NO_FATAL_FAILURE(begin_history());
-    for (const auto step : history) ASSERT_NO_FATAL_FAILURE(take(step));
+    for (const auto step : history) {
+      ASSERT_NO_FATAL_FAILURE(take(step));
+      ASSERT_EQ(difference(), "");  // what is under way has ended, too
+    }
     std::string steps;
     for (const auto step : history) steps += fmt::format(" {}", static_cast<int>(step));
     EXPECT_EQ(difference(), "") << "after the steps" << steps;

@@ -85,7 +85,7 @@ TEST_F(Programs, AScanThatIsStoppedEndsForWhoFollowsIt) {
   ask_until("status", [](const json& status) { return status["activity"] == "waiting_for_flip"; });
   ASSERT_EQ(scanrig({"stop", "--socket", socket()}), 0) << output;
   EXPECT_EQ(follower.wait(), code_of(ExitCode::stopped)) << *read_file(folder_ / "followed");
-  EXPECT_THAT(*read_file(folder_ / "followed"), HasSubstr("cancelled: Stop was pressed"));
+  EXPECT_THAT(*read_file(folder_ / "followed"), HasSubstr("interrupted: Stop was pressed"));
 }
 
 TEST_F(Programs, WhatCannotBeWrittenIsTheDisk) {

@@ -104,7 +104,7 @@ TEST_F(Programs, AStartWithACalibrationOfOtherCamerasIsRefusedByItsCode) {
   ASSERT_TRUE(write_file_atomically(file, std::regex_replace(own, std::regex("SIM-L"), "40012345")));
   wait_for("next_action", "Check the calibration: ");
   EXPECT_EQ(scanrig({"start", "--socket", socket()}), 6);
-  EXPECT_THAT(output, HasSubstr("of the cameras 40012345 (left) and SIM-R (right), but the rig has SIM-L and SIM-R"));
+  EXPECT_THAT(output, HasSubstr("for the cameras 40012345 (left) and SIM-R (right), but the rig has SIM-L and SIM-R"));
   ASSERT_TRUE(write_file_atomically(file, own));
   wait_for("next_action", "Put a part on the table");
   EXPECT_EQ(scanrig({"start", "--socket", socket()}), 0) << output;

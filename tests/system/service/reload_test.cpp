@@ -104,7 +104,7 @@ TEST_F(Reload, WhileIdleTheNewConfigurationIsTakenAndTheStationWaitsForReset) {
   for (const auto& message : since_) EXPECT_THAT(message, Not(HasSubstr("STOPPING=1")));
   EXPECT_TRUE(soon([&] { return machine() == "Halted" && next_action() == "Press Reset."; })) << log();
   EXPECT_EQ(queue("quick"), 0) << *read_file(folder_ / "output");
-  EXPECT_THAT(log(), HasSubstr("The configuration was read again and is valid"));
+  EXPECT_THAT(log(), HasSubstr("The new configuration is valid"));
   daemon_->signal(SIGTERM);
   EXPECT_EQ(daemon_->wait(), 0) << log();
   EXPECT_TRUE(hears("STOPPING=1"));
@@ -129,7 +129,7 @@ TEST_F(Reload, AFileThatIsNotValidChangesNothing) {
   EXPECT_THAT(output_, HasSubstr("no_such_key"));
   EXPECT_EQ(queue("quick"), 3);
   EXPECT_EQ(queue("default"), 0) << *read_file(folder_ / "output");
-  EXPECT_THAT(log(), HasSubstr("warning: No reload"));
+  EXPECT_THAT(log(), HasSubstr("warning: Reload refused"));
 }
 
 TEST_F(Reload, WhileItScansItIsRefusedAndTheJobGoesOn) {
