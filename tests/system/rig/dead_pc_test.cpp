@@ -35,7 +35,7 @@ TEST_F(DeadPc, ADriveWithACommunicationTimeoutStopsTheTableByItself) {
   EXPECT_GT(turned, 6) << "it was turning";
   daemon_.emplace(std::vector<std::string>{SCANRIGD_SIM_PROGRAM, "--scale", "0.25", "--config", folder_ / "rig.toml"},
                   folder_ / "daemon.log");
-  ASSERT_TRUE(soon([&] { return machine() == "Halted" || machine() == "Error"; })) << log();
+  ASSERT_TRUE(soon([&] { return next_action().find("ress Reset") != std::string::npos; })) << log();
   ASSERT_TRUE(press_until("reset", [&] { return machine() == "Operational.Ready"; })) << log();
 }
 
