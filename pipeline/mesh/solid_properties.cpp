@@ -56,10 +56,10 @@ double surface_area(const Mesh& mesh) {
 }
 
 Result<SolidProperties> solid_properties(const Mesh& mesh) {
-  if (mesh.faces.size() < 4) return fail(ErrorCode::degenerate, "mesh: {} faces bound no solid", mesh.faces.size());
   if (!edges_cancel(mesh)) {
     return fail(ErrorCode::not_closed, "mesh: the surface bounds no solid: an edge has only one face");
   }
+  if (mesh.faces.size() < 4) return fail(ErrorCode::degenerate, "mesh: {} faces bound no solid", mesh.faces.size());
   SolidProperties result;
   Eigen::AlignedBox3d box;
   for (const Eigen::Vector3f& v : mesh.vertices) box.extend(v.cast<double>());

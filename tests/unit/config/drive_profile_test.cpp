@@ -63,7 +63,7 @@ TEST_F(DriveProfileTest, WhatDoesNotFitIsTold) {
                  "[alarm] reset: \"hope\" is not one of register, power_cycle");
   expect_problem("speed_unit = \"rpm\"", "speed_unit = \"mph\"", "speed_unit: \"mph\" is not one of rpm, pulses_per_s");
   expect_problem("value = 0x0040", "valeu = 0x0040",
-                 "[stop] valeu: unknown key; known here: register, released, value");
+                 "[stop] valeu: unknown key; known here: momentary, register, value");
 }
 
 TEST_F(DriveProfileTest, ValuesOf32BitsLieInTwoWordsAndInputsAreLetGo) {

@@ -19,7 +19,7 @@ const json kStatus = json::parse(R"({"machine": "Operational.SingleExecution", "
 const json kHealth = json::parse(R"({"devices": [{"name": "turntable", "ok": true, "problem": null},
   {"name": "camera", "ok": false, "problem": {"code": "timeout", "message": "no answer"}}],
   "disk": {"bytes": 4294967296, "free_bytes": 1073741824}, "temperatures": [{"sensor": "cpu", "celsius": 51.4}],
-  "deadlines_missed": 1, "retries": 2, "faults": 3})");
+  "deadlines_missed": 1, "retakes": 2, "faults": 3})");
 const json kJob = json::parse(R"({"id": "j1", "state": "scanning", "part": "4711",
   "sentence": "Pose 1 of 2: 4 of 8 views stored.", "next_action": "", "poses": 2, "views": 8, "stored": [{}, {}, {},
   {"pose": 0, "view": 3, "retake_reasons": [{"code": "timeout", "message": "left camera: no frame in time"}]}],
