@@ -6,7 +6,7 @@ LIMIT_MIN = 45
 CORES = 2
 
 MINUTES = {
-    "station": {"startup": 2, "movement check": 6, "kill": 5, "disturbed": 4, "stages": 4, "view_cost": 4, "load": 7,
+    "station": {"startup": 2, "movement": 6, "kill": 5, "disturbed": 4, "stages": 4, "view_cost": 4, "load": 7,
                 "security": 4, "soak": 9},
     "motion": {"matrix": 6, "estop": 12, "killed": 3, "restarts": 5, "turns": 5, "words": 8, "doctor": 4},
     "cameras": {"triggers": 4, "matrix": 3, "wire": 12, "hil": 8, "memory": 12},

@@ -153,7 +153,7 @@ class FakeRig:
 
     def run(self, _, __, crash=False, kill=0, when="", fail=0, **___):
         if crash:
-            return subprocess.CompletedProcess([], -11 if next(self.crashes) < 2 else 0, "in quarantine", "")
+            return subprocess.CompletedProcess([], -11 if next(self.crashes) < 2 else 0, "quarantined", "")
         self.killed += [(kill, when)] if kill else []
         self.failed += [fail] if fail else []
         return subprocess.CompletedProcess([], -9 if kill else 0, "", "")
