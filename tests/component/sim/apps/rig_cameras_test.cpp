@@ -182,7 +182,7 @@ TEST_F(RigCamerasTest, AnUnpluggedCameraIsLostAndComesBack) {
 
 TEST_F(RigCamerasTest, AnInvalidRequestIsNamed) {
   EXPECT_THAT(send({{"set", {{"camera_fault", "lost"}}}})["error"], HasSubstr("left or right"));
-  EXPECT_THAT(send({{"set", {{"camera_fault", "tired"}, {"camera", "left"}}}})["error"], HasSubstr("no fault"));
+  EXPECT_THAT(send({{"set", {{"camera_fault", "tired"}, {"camera", "left"}}}})["error"], HasSubstr("no camera fault"));
   WireRigOptions blind;
   blind.toml = {.folder = folder_ / "blind", .drive = "leadshine-rs", .panel = "gpio"};
   const auto rig = WireRig::start(blind, clock_).value();
