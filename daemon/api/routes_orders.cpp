@@ -71,16 +71,17 @@ Route order_route() {
 }
 
 Route bundle_route() {
-  return {.method = Method::get,
-          .path = "/api/v1/jobs/{id}/bundle",
-          .role = Role::operating,
-          .description =
-              "The whole folder of a job that has ended, packed for whoever must help. The job counts as exported.",
-          .in_path = {kId},
-          .reply = {.description = "a compressed tar archive", .type = "application/gzip"},
-          .errors = {409, 500},
-          .reply_timeout = std::chrono::seconds(180),
-          .handle = send_bundle};
+  return {
+      .method = Method::get,
+      .path = "/api/v1/jobs/{id}/bundle",
+      .role = Role::operating,
+      .description =
+          "The whole folder of a job that has ended, as one archive to send to support. The job counts as exported.",
+      .in_path = {kId},
+      .reply = {.description = "a compressed tar archive", .type = "application/gzip"},
+      .errors = {409, 500},
+      .reply_timeout = std::chrono::seconds(180),
+      .handle = send_bundle};
 }
 
 }  // namespace

@@ -98,11 +98,11 @@ void add_job_commands(CLI::App& app, Chosen& chosen) {
                    export_file);
   add_id(sub, out->id)->required();
   sub->add_option("--file", out->file, "which, as `scanrig files` names it")->capture_default_str();
-  sub->add_option("--out", out->out, "where to, not there yet (default: ID and the file's name, here)");
+  sub->add_option("--out", out->out, "new file to write (default: ID-FILE in the current folder)");
   const auto pack = std::make_shared<BundleVerb>();
-  sub = add_client(app, chosen, "bundle", "pack a job for whoever must help", pack, bundle);
+  sub = add_client(app, chosen, "bundle", "pack a job into one archive to send to support", pack, bundle);
   add_id(sub, pack->id)->required();
-  sub->add_option("--out", pack->out, "the archive, not there yet (default: ID.tar.gz, here)");
+  sub->add_option("--out", pack->out, "new archive to write (default: ID.tar.gz in the current folder)");
 }
 
 namespace {
@@ -123,7 +123,8 @@ void add_turntable(CLI::App& app, Chosen& chosen) {
   auto* home = add("home", "find home");
   auto* move = add("move", "find home, then turn to ANGLE, the shorter way");
   move->add_option("ANGLE", verb->angle_deg, "degrees, counter-clockwise")->required();
-  for (auto* action : {home, move}) action->add_flag("--yes", verb->yes, "nobody is near: do not ask");
+  for (auto* action : {home, move})
+    action->add_flag("--yes", verb->yes, "do not ask first: you have checked that nobody is near the rig");
   auto* status = add("status", "moving, home, alarm");
   auto* read = add("read", "what the drive's registers say");
   for (auto* action : {home, move, status, read}) action->add_flag("--json", verb->json, "print JSON");
@@ -211,7 +212,7 @@ void add_reconstruct(CLI::App& app, Chosen& chosen) {
   const auto verb = std::make_shared<ReconstructVerb>();
   auto* sub = app.add_subcommand("reconstruct", "make the model of a scan folder");
   sub->add_option("DIR", verb->scan, "the scan folder")->required();
-  sub->add_option("--out", verb->out, "folder for the model, not there yet (default: DIR/model)");
+  sub->add_option("--out", verb->out, "new folder for the model (default: DIR/model)");
   sub->add_option("--threads", verb->options.threads, "threads; 0: all of the machine's")->check(CLI::Range(0, 1024));
   sub->add_option("--voxel-mm", verb->options.voxel_mm,
                   "size of a voxel (default: 0.25, or what suits imported range images)")

@@ -41,8 +41,9 @@ class ProgressLines {
 Error told_by(const ChildEnd& end, const std::optional<Error>& failure) {
   if (failure) return *failure;
   if (end.signal != 0) {
-    return {ErrorCode::internal, fmt::format("the reconstruction crashed ({}); bundle the job for whoever must help",
-                                             ::strsignal(end.signal))};
+    return {ErrorCode::internal,
+            fmt::format("the reconstruction crashed ({}); run `scanrig bundle` and send the archive to support",
+                        ::strsignal(end.signal))};
   }
   return {ErrorCode::internal, fmt::format("the reconstruction ended with {}: {}", end.code, end.last_words)};
 }
