@@ -12,7 +12,7 @@
 #include "core/clock.h"
 #include "core/result.h"
 
-struct _modbus;  // libmodbus' context
+struct _modbus;  // libmodbus' context NOLINT(bugprone-reserved-identifier): the library's own name
 
 namespace scanrig::modbus {
 

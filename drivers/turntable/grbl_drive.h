@@ -23,7 +23,7 @@ class GrblDrive final : public AxisDrive {
 
   GrblDrive(GrblDriveOptions options, const AxisScale& scale, std::string home_mode, DegreesPerSecond speed,
             DegreesPerSecond2 acceleration, Clock& clock)
-      : link_(options.link, clock),
+      : link_(std::move(options.link), clock),
         axis_(options.axis),
         scale_(scale),
         home_mode_(std::move(home_mode)),
