@@ -3,6 +3,7 @@ import pathlib
 
 import fuzz
 import motion_doctor
+import motion_latch
 import motion_long
 import motion_matrix
 import motion_safety
@@ -21,6 +22,7 @@ PARTS = {"matrix": lambda bench, scratch: motion_matrix.measure(bench, ROOT, scr
          "estop": estop,
          "killed": motion_safety.killed,
          "restarts": motion_safety.restarts,
+         "latches": motion_latch.latches,
          "turns": lambda bench, scratch: motion_long.turns(bench, ROOT, scratch),
          "words": lambda bench, scratch: motion_long.words(bench, ROOT, scratch),
          "doctor": motion_doctor.measure,
