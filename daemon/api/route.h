@@ -11,7 +11,7 @@
 
 #include "core/result.h"
 #include "daemon/api/field.h"
-#include "daemon/api/role.h"
+#include "daemon/api/roles.h"
 #include "daemon/station/control_loop.h"
 
 namespace scanrig {

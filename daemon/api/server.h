@@ -9,7 +9,7 @@
 
 #include "core/result.h"
 #include "daemon/api/admission.h"
-#include "daemon/api/peer.h"
+#include "daemon/api/roles.h"
 #include "daemon/journal/entry.h"
 #include "daemon/station/control_loop.h"
 
