@@ -2,7 +2,7 @@
 
 #include "daemon/api/folder_files.h"
 #include "daemon/api/json_replies.h"
-#include "daemon/api/routes.h"
+#include "daemon/api/route.h"
 
 namespace scanrig {
 namespace {

@@ -2,7 +2,7 @@
 
 #include "daemon/api/job_bundle.h"
 #include "daemon/api/json_replies.h"
-#include "daemon/api/routes.h"
+#include "daemon/api/route.h"
 #include "pipeline/reconstruct/voxel_size.h"
 
 namespace scanrig {

@@ -5,8 +5,7 @@
 #include "daemon/api/json_replies.h"
 #include "daemon/api/metrics.h"
 #include "daemon/api/openapi.h"
-#include "daemon/api/router.h"
-#include "daemon/api/routes.h"
+#include "daemon/api/route.h"
 #include "daemon/api/service_status.h"
 
 namespace scanrig {

@@ -1,7 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/api/json_replies.h"
-#include "daemon/api/routes.h"
+#include "daemon/api/route.h"
 
 namespace scanrig {
 namespace {

@@ -7,7 +7,7 @@
 #include "daemon/api/access.h"
 #include "daemon/api/admission.h"
 #include "daemon/api/event_hub.h"
-#include "daemon/api/router.h"
+#include "daemon/api/route.h"
 #include "daemon/api/server.h"
 
 namespace scanrig {

@@ -1,4 +1,4 @@
-#include "daemon/api/router.h"
+#include "daemon/api/route.h"
 
 #include <gmock/gmock.h>
 

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "daemon/api/router.h"
+#include "daemon/api/route.h"
 #include "daemon/api/service_status.h"
 
 namespace scanrig {
