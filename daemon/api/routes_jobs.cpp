@@ -1,6 +1,6 @@
 #include <nlohmann/json.hpp>
 
-#include "daemon/api/folder_files.h"
+#include "daemon/api/downloads.h"
 #include "daemon/api/json_replies.h"
 #include "daemon/api/route.h"
 

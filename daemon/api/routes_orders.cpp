@@ -1,6 +1,6 @@
 #include <nlohmann/json.hpp>
 
-#include "daemon/api/job_bundle.h"
+#include "daemon/api/downloads.h"
 #include "daemon/api/json_replies.h"
 #include "daemon/api/route.h"
 #include "pipeline/reconstruct/voxel_size.h"

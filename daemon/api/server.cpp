@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/api/job_bundle.h"
+#include "daemon/api/downloads.h"
 #include "daemon/api/service_status.h"
 #include "daemon/api/session.h"
 #include "daemon/api/socket_file.h"

@@ -1,4 +1,4 @@
-#include "daemon/api/folder_files.h"
+#include "daemon/api/downloads.h"
 
 #include <gmock/gmock.h>
 #include <sys/stat.h>
