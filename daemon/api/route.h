@@ -63,7 +63,7 @@ using Send = std::function<void(ApiResponse)>;
 struct Reply {
   unsigned status = 200;
   std::string_view description;
-  std::string_view schema{};  ///< a name in schemas.h; empty: not JSON
+  std::string_view schema{};  ///< a name in openapi.cpp; empty: not JSON
   std::string_view type = "application/json";
 };
 

@@ -6,7 +6,6 @@
 #include "daemon/api/metrics.h"
 #include "daemon/api/openapi.h"
 #include "daemon/api/route.h"
-#include "daemon/api/service_status.h"
 
 namespace scanrig {
 namespace {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "daemon/api/downloads.h"
-#include "daemon/api/service_status.h"
+#include "daemon/api/metrics.h"
 #include "daemon/api/session.h"
 #include "daemon/api/socket_file.h"
 
