@@ -9,7 +9,6 @@
 #include "daemon/jobs/bundle.h"
 #include "daemon/jobs/job_store.h"
 #include "daemon/jobs/retention.h"
-#include "daemon/jobs/retention_ledger.h"
 #include "daemon/runtime/mailbox.h"
 #include "daemon/station/events.h"
 
