@@ -19,7 +19,7 @@
 #include "daemon/rig/acquisition.h"
 #include "daemon/rig/devices.h"
 #include "daemon/station/control_loop.h"
-#include "daemon/webhook/http_post.h"
+#include "daemon/webhook/webhook.h"
 
 namespace scanrig {
 
