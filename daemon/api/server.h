@@ -10,7 +10,7 @@
 #include "core/result.h"
 #include "daemon/api/admission.h"
 #include "daemon/api/roles.h"
-#include "daemon/journal/entry.h"
+#include "daemon/journal/journal.h"
 #include "daemon/station/control_loop.h"
 
 namespace scanrig {
