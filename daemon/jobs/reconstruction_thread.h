@@ -15,7 +15,7 @@
 
 #include "daemon/jobs/reconstructor.h"
 #include "daemon/rig/taken_view.h"
-#include "daemon/runtime/mailbox.h"
+#include "daemon/runtime/actor.h"
 #include "pipeline/storage/scan_folder.h"
 
 namespace scanrig {

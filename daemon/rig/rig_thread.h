@@ -9,7 +9,7 @@
 #include "daemon/rig/preview.h"
 #include "daemon/rig/turntable_thread.h"
 #include "daemon/rig/watched_devices.h"
-#include "daemon/runtime/mailbox.h"
+#include "daemon/runtime/actor.h"
 
 namespace scanrig {
 

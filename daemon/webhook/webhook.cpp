@@ -14,7 +14,7 @@
 #include <thread>
 #include <utility>
 
-#include "daemon/runtime/actor_thread.h"
+#include "daemon/runtime/actor.h"
 
 namespace scanrig {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "core/clock.h"
 #include "core/result.h"
-#include "daemon/runtime/mailbox.h"
+#include "daemon/runtime/actor.h"
 #include "daemon/station/snapshot.h"
 
 namespace scanrig {
