@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "daemon/runtime/overloaded.h"
-#include "daemon/station/lamps.h"
 #include "daemon/station/operator_message.h"
 
 namespace scanrig {

@@ -8,7 +8,6 @@
 
 #include "core/clock.h"
 #include "daemon/runtime/actor.h"
-#include "daemon/station/event_counter.h"
 #include "daemon/station/events.h"
 #include "daemon/station/snapshot.h"
 #include "daemon/station/transition.h"
