@@ -14,7 +14,7 @@
 #include <variant>
 
 #include "daemon/jobs/reconstructor.h"
-#include "daemon/rig/taken_view.h"
+#include "daemon/rig/acquisition.h"
 #include "daemon/runtime/actor.h"
 #include "pipeline/storage/scan_folder.h"
 

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "core/files.h"
-#include "daemon/rig/taken_view.h"
+#include "daemon/rig/acquisition.h"
 #include "daemon/runtime/overloaded.h"
 #include "daemon/station/job_lifecycle.h"
 #include "daemon/station/operator_message.h"
