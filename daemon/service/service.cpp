@@ -7,7 +7,7 @@
 
 #include "core/version.h"
 #include "daemon/api/socket_file.h"
-#include "daemon/rig/saved_config.h"
+#include "daemon/rig/make_safe.h"
 #include "daemon/service/crash_report.h"
 #include "daemon/service/daemon_options.h"
 

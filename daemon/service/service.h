@@ -29,7 +29,7 @@ class Service {
   Service(std::string name, std::filesystem::path file, config::Cameras cameras)
       : name_(std::move(name)), file_(std::move(file)), cameras_(cameras) {}
 
-  /// Runs until `stop`. Saves the configuration in use (rig/saved_config.h) before the daemon uses a device. Fails as
+  /// Runs until `stop`. Saves the configuration in use (rig/make_safe.h) before the daemon uses a device. Fails as
   /// read_rig_config(), `run` and save_config() do. If `run` does not reach the control loop under a changed
   /// configuration, the one before is restored.
   Result<void> run(SignalStop& stop, const Run& run);
