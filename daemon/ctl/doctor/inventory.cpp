@@ -1,7 +1,4 @@
-#include "daemon/ctl/doctor/examine.h"
-
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <grp.h>
 #include <linux/gpio.h>
 #include <pwd.h>
@@ -9,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -16,6 +14,7 @@
 #include <vector>
 
 #include "core/files.h"
+#include "daemon/ctl/doctor/examine.h"
 
 namespace scanrig::ctl::doctor {
 namespace {

@@ -1,12 +1,14 @@
-#include "daemon/ctl/doctor/findings.h"
+#include "daemon/ctl/doctor/examine.h"
+
+#include <unistd.h>
 
 #include <fmt/format.h>
-#include <unistd.h>
 #include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
 namespace scanrig::ctl::doctor {
+
 std::string Report::text() const {
   std::string text;
   for (const Section& section : sections_) {
