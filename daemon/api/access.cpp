@@ -128,7 +128,8 @@ std::optional<Role> TokenFile::role_of(std::string_view token) const {
 
 Result<std::string> TokenFile::add(const std::string& name, Role role, std::string created) {
   if (!is_name(name)) {
-    return fail(ErrorCode::invalid_input, "\"{}\": a token's name is 1 to 32 letters, digits, dots, dashes", name);
+    return fail(ErrorCode::invalid_input, "\"{}\": a token's name is 1 to 32 letters, digits, \".\", \"_\" or \"-\"",
+                name);
   }
   if (std::ranges::find(records_, name, &TokenRecord::name) != records_.end()) {
     return fail(ErrorCode::exists, "there is a token {} already: revoke it first", name);

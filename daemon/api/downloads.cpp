@@ -65,7 +65,7 @@ Result<std::vector<FolderFile>> list_files(const fs::path& folder) {
 
 Result<std::shared_ptr<OpenFile>> open_below(const fs::path& folder, std::string_view path) {
   int at = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (at < 0) return fail(ErrorCode::not_found, "the job's folder is not there any more");
+  if (at < 0) return fail(ErrorCode::not_found, "the job's folder does not exist any more");
   for (bool last = false; !last;) {
     const auto slash = path.find('/');
     last = slash == std::string_view::npos;

@@ -61,8 +61,8 @@ std::string_view words_of(unsigned status) {
     case 413: return "the body is too large";
     case 429: return "too many requests";
     case 431: return "the header is too large";
-    case 503: return "too many connections, or the daemon is too busy to answer in time";
-    default: return "the disk or the daemon failed";
+    case 503: return "too many connections, or the service is too busy to reply in time";
+    default: return "the disk or the service failed";
   }
 }
 
@@ -110,15 +110,16 @@ ordered_json schemas() {
 }  // namespace
 
 std::string openapi_document(const std::vector<Route>& routes) {
-  ordered_json document{{"openapi", "3.0.3"},
-                        {"info",
-                         {{"title", "scanrig"},
-                          {"version", kVersion},
-                          {"description",
-                           "The station's API. x-role: the least role a request needs; the roles are viewer, operator, "
-                           "engineer, each may what those before it may."}}},
-                        {"servers", {{{"url", "/"}}}},
-                        {"security", {{{"token", ordered_json::array()}}}}};
+  ordered_json document{
+      {"openapi", "3.0.3"},
+      {"info",
+       {{"title", "scanrig"},
+        {"version", kVersion},
+        {"description",
+         "The API of the rig. x-role: the lowest role a request needs; the roles are viewer, operator, "
+         "engineer, each may what those before it may."}}},
+      {"servers", {{{"url", "/"}}}},
+      {"security", {{{"token", ordered_json::array()}}}}};
   auto& paths = document["paths"];
   for (const auto& route : routes) {
     ordered_json operation{
@@ -145,7 +146,7 @@ const char* const kSchemas = R"({
 "MaybeProblem": {"allOf": [{"$ref": "#/components/schemas/Problem"}], "nullable": true},
 "Nothing": {"type": "object", "additionalProperties": false, "properties": {}},
 "Pressed": {"type": "object", "required": ["job"], "additionalProperties": false, "properties": {
-  "job": {"type": "string", "nullable": true, "description": "the job that has the rig now"}}},
+  "job": {"type": "string", "nullable": true, "description": "the active job"}}},
 "Stopped": {"type": "object", "required": ["job", "sent", "standstill"], "additionalProperties": false, "properties": {
   "job": {"type": "string", "nullable": true, "description": "the job that was interrupted"},
   "sent": {"type": "string", "description": "what was done"},
@@ -165,7 +166,7 @@ const char* const kSchemas = R"({
   "sentence": {"type": "string", "description": "what is going on"},
   "next_action": {"type": "string", "description": "what the operator should do, if only to wait"},
   "devices": {"type": "array", "items": {"$ref": "#/components/schemas/Device"}},
-  "job": {"type": "string", "nullable": true, "description": "the job that has the rig"},
+  "job": {"type": "string", "nullable": true, "description": "the active job"},
   "not_started": {"allOf": [{"$ref": "#/components/schemas/NotStarted"}], "nullable": true},
   "not_begun": {"allOf": [{"$ref": "#/components/schemas/NotStarted"}], "nullable": true, "deprecated": true, "description": "old name of not_started"},
   "queue": {"type": "array", "items": {"type": "string"}, "description": "jobs to come, the next one first"}}},
@@ -200,7 +201,7 @@ const char* const kSchemas = R"({
   "jobs": {"type": "array", "items": {"$ref": "#/components/schemas/Job"}},
   "next": {"type": "string", "nullable": true, "description": "`before` of the next page; null on the last"}}},
 "StoredView": {"type": "object", "additionalProperties": false,
-  "required": ["pose", "view", "measured_deg", "error_deg", "settling_ms", "retakes", "retake_reasons", "redone", "spoilt"], "properties": {
+  "description": "redone and spoilt are old names of retakes and retake_reasons", "required": ["pose", "view", "measured_deg", "error_deg", "settling_ms", "retakes", "retake_reasons", "redone", "spoilt"], "properties": {
   "pose": {"type": "integer"}, "view": {"type": "integer"}, "measured_deg": {"type": "number"},
   "error_deg": {"type": "number", "description": "measured less commanded"}, "settling_ms": {"type": "number"},
   "retakes": {"type": "integer", "description": "exposures that were lost or unusable and taken again"},
@@ -208,7 +209,7 @@ const char* const kSchemas = R"({
   "retake_reasons": {"type": "array", "items": {"$ref": "#/components/schemas/Problem"}, "description": "what was wrong with each"},
   "spoilt": {"type": "array", "items": {"$ref": "#/components/schemas/Problem"}, "deprecated": true, "description": "old name of retake_reasons"}}},
 "MovementCheck": {"type": "object", "additionalProperties": false,
-  "required": ["pose", "shift_px", "changed", "unmoved", "retakes", "retake_reasons", "redone", "spoilt"],
+  "description": "redone and spoilt are old names of retakes and retake_reasons", "required": ["pose", "shift_px", "changed", "unmoved", "retakes", "retake_reasons", "redone", "spoilt"],
   "description": "view 0, taken again, against the first one", "properties": {
   "pose": {"type": "integer"}, "shift_px": {"type": "number"}, "changed": {"type": "number"},
   "unmoved": {"type": "boolean"},
@@ -245,7 +246,7 @@ const char* const kSchemas = R"({
 })";
 
 const char* const kJobDetail = R"({
-"required": ["movement_checks", "closures", "stages"],
+"description": "closures is the old name of movement_checks", "required": ["movement_checks", "closures", "stages"],
 "properties": {
   "stored": {"type": "array", "description": null, "items": {"$ref": "#/components/schemas/StoredView"}},
   "movement_checks": {"type": "array", "items": {"$ref": "#/components/schemas/MovementCheck"}},

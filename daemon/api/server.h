@@ -34,7 +34,7 @@ struct ApiOptions {
 
   static Result<std::string> no_preview(std::string_view) { return fail(ErrorCode::not_found, "there are no cameras"); }
   static Result<void> no_config() {
-    return fail(ErrorCode::refused, "the daemon was started without a configuration file");
+    return fail(ErrorCode::refused, "the service was started without a configuration file");
   }
   static void no_reload(const ControlLoop::Reply& reply) { reply(pass_on(no_config())); }
 };

@@ -14,7 +14,7 @@ namespace http = boost::beast::http;
 
 const scanrig::Error kTooMany{ErrorCode::busy, "there are too many connections: try again later"};
 const scanrig::Error kTooOften{ErrorCode::busy, "too many requests: wait a moment"};
-const scanrig::Error kNoAnswer{ErrorCode::timeout, "the station did not answer in time: see scanrig status"};
+const scanrig::Error kNoAnswer{ErrorCode::timeout, "the rig did not respond in time: see scanrig status"};
 constexpr unsigned kFirstError = 400, kForbidden = 403;
 constexpr std::size_t kMaxPathLength = 200;  ///< in the log
 constexpr auto kDrainTime = std::chrono::seconds(1);
@@ -172,7 +172,7 @@ std::optional<ApiSession::JobOrder> ApiSession::order_of(Role as) const {
   const auto method = plain(parser_->get().method_string());
   if (method == to_string(Method::get)) return std::nullopt;
   const auto target = plain(parser_->get().target());
-  return JobOrder{fmt::format("{} {}, asked for by {} ({})", method,
+  return JobOrder{fmt::format("{} {}, requested by {} ({})", method,
                               target.substr(0, target.find('?')).substr(0, kMaxPathLength), requester_, to_string(as))};
 }
 
