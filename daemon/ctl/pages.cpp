@@ -282,7 +282,7 @@ std::string options(const CommandWords& command) {
 
 constexpr const char* kExit =
     ".SH EXIT STATUS\n0 when done; every other code has a meaning of its own: 2 the command line, 3 bad input, 4 the\n"
-    "disk, 5 a device, 6 refused, 7 no model, 8 below the limits, 9 no daemon answers, 10 stopped, 1 a bug. One\n"
+    "disk, 5 a device, 6 refused, 7 no model, 8 below the limits, 9 no service responds, 10 stopped, 1 a bug. One\n"
     "sentence on standard error says what happened and what to do.\n";
 
 std::string page_of(const CommandWords& verb, const std::string& program) {

@@ -43,14 +43,14 @@ class Report {
 /// The person at the rig, at a terminal or at the other end of standard input.
 class Operator {
  public:
-  /// `answers`: a person replies on standard input although it is no terminal. Prompts go to standard error with
+  /// `interactive`: a person replies on standard input although it is no terminal. Prompts go to standard error with
   /// `quiet_output`, so that standard output stays JSON.
-  Operator(bool answers, bool quiet_output);
+  Operator(bool interactive, bool quiet_output);
 
   [[nodiscard]] bool there() const { return there_; }
   void tell(const std::string& text) const;
   /// The line that was entered; nothing without a person there.
-  [[nodiscard]] std::optional<std::string> ask(const std::string& question) const;
+  [[nodiscard]] std::optional<std::string> prompt(const std::string& question) const;
 
  private:
   bool there_;

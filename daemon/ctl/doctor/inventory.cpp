@@ -194,7 +194,7 @@ void print_missing_snippets(const fs::path& device, const fs::path& config, Repo
                                                                  : "scanrig/turntable"));
   }
   if (unit_is_installed()) return;
-  report.section("Missing: the daemon's unit, /etc/systemd/system/scanrigd.service");
+  report.section("Missing: the service's unit, /etc/systemd/system/scanrigd.service");
   const auto file = fs::absolute(config).string();
   for (const auto& line :
        {std::string("[Service]"), "ExecStart=/usr/bin/scanrigd --config " + file,
