@@ -77,8 +77,7 @@ Result<Values::Value> check_text(const RequestField& field, const std::string& t
   if (field.words.empty() && (size < field.min || size > field.max)) {
     return bad(field, fmt::format("must have {} to {} bytes", field.min, field.max));
   }
-  const auto control = [](char c) { return static_cast<unsigned char>(c) < 0x20 || c == 0x7f; };
-  if (std::ranges::any_of(text, control)) return bad(field, "has control characters");
+  if (std::ranges::any_of(text, is_control)) return bad(field, "has control characters");
   return text;
 }
 

@@ -24,12 +24,12 @@
 namespace scanrig {
 namespace {
 
-std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
-
 using config::SafetyDevice;
 
 constexpr auto kLimit = std::chrono::milliseconds(900);
 constexpr auto kAgain = std::chrono::milliseconds(20);
+
+std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
 
 /// Limit of one attempt: a stop without confirmation is sent again.
 Deadline attempt_deadline(Clock& clock, Deadline all) { return all.at_most(clock, kLimit); }

@@ -18,14 +18,14 @@
 namespace scanrig {
 namespace {
 
+using std::chrono::microseconds;
+using SteadyClock = std::chrono::steady_clock;
+
 unsigned long long monotonic_us() {
   timespec now{};
   ::clock_gettime(CLOCK_MONOTONIC, &now);
   return static_cast<unsigned long long>(now.tv_sec) * 1'000'000 + static_cast<unsigned long long>(now.tv_nsec) / 1000;
 }
-
-using std::chrono::microseconds;
-using SteadyClock = std::chrono::steady_clock;
 
 struct CloseBus {
   void operator()(sd_bus* bus) const { ::sd_bus_close_unref(bus); }
