@@ -31,8 +31,7 @@ bool may_pass(const Error& error) {
 }  // namespace
 
 Result<void> Acquisition::home() {
-  if (auto dark = from(kProjector, devices_.projector.turn_off(Deadline::after(clock_, options_.exposure_limit)));
-      !dark) {
+  if (auto dark = from(kProjector, devices_.projector.turn_off(Deadline::after(clock_, options_.fire_limit))); !dark) {
     return pass_on(dark);
   }
   if (auto reset = from(kTurntable, devices_.turntable.reset_alarm(Deadline::after(clock_, options_.stop_limit)));
@@ -83,11 +82,11 @@ Result<Degrees> Acquisition::jog(const action::Jog& jog) {
 }
 
 Result<void> Acquisition::pulse() {
-  return from(kProjector, devices_.projector.fire(Light::pattern, Deadline::after(clock_, options_.exposure_limit)));
+  return from(kProjector, devices_.projector.fire(Light::pattern, Deadline::after(clock_, options_.fire_limit)));
 }
 
 Result<StereoFrame> Acquisition::capture_preview() {
-  return devices_.camera.capture_preview(Deadline::after(clock_, options_.exposure_limit));
+  return devices_.camera.capture_preview(Deadline::after(clock_, options_.camera_limit));
 }
 
 event::DevicesChecked Acquisition::check() {
@@ -134,14 +133,14 @@ Result<StereoFrame> Acquisition::expose(Light light, unsigned before, std::vecto
 }
 
 Result<StereoFrame> Acquisition::expose_once(Light light) {
-  if (auto armed = from(kCamera, devices_.camera.arm(Deadline::after(clock_, options_.exposure_limit))); !armed) {
+  if (auto armed = from(kCamera, devices_.camera.arm(Deadline::after(clock_, options_.camera_limit))); !armed) {
     return pass_on(armed);
   }
-  if (auto fired = from(kProjector, devices_.projector.fire(light, Deadline::after(clock_, options_.exposure_limit)));
+  if (auto fired = from(kProjector, devices_.projector.fire(light, Deadline::after(clock_, options_.fire_limit)));
       !fired) {
     return pass_on(fired);
   }
-  auto frame = from(kCamera, devices_.camera.collect(Deadline::after(clock_, options_.exposure_limit)));
+  auto frame = from(kCamera, devices_.camera.collect(Deadline::after(clock_, options_.camera_limit)));
   if (!frame) return frame;
   if (auto good = from(kCamera, image_checker_.judge(light, *frame)); !good) return pass_on(good);
   seen_(*frame);

@@ -21,8 +21,11 @@ struct TakenView {
 
 struct AcquisitionOptions {
   Clock::Duration home_limit = std::chrono::seconds(60);
-  Clock::Duration move_limit = std::chrono::seconds(60);     ///< the longest move is one unwinding of all poses
-  Clock::Duration exposure_limit = std::chrono::seconds(2);  ///< arm, fire and collect, each
+  Clock::Duration move_limit = std::chrono::seconds(60);  ///< the longest move is one unwinding of all poses
+  Clock::Duration fire_limit = std::chrono::seconds(2);
+  /// Arm, collect and preview, each. The drivers wait half a second for a frame; for each GigE camera that vanished
+  /// the library takes 2.5 s more.
+  Clock::Duration camera_limit = std::chrono::seconds(7);
   Clock::Duration stop_limit = std::chrono::seconds(3);
   Clock::Duration check_limit = std::chrono::milliseconds(500);  ///< for each device
   /// For cameras that have to be connected: the library takes 2.5 s to notice each GigE camera that vanished.

@@ -94,28 +94,25 @@ class WatchedCamera final : public StereoCamera {
       : camera_(camera), watch_(clock, "camera", margin) {}
 
   Result<void> prepare(Deadline deadline) override {
-    const DeviceWatch::Call call(watch_, "prepare", with_overrun(deadline));
+    const DeviceWatch::Call call(watch_, "prepare", deadline);
     return camera_.prepare(deadline);
   }
   Result<void> arm(Deadline deadline) override {
-    const DeviceWatch::Call call(watch_, "arm", with_overrun(deadline));
+    const DeviceWatch::Call call(watch_, "arm", deadline);
     return camera_.arm(deadline);
   }
   Result<StereoFrame> collect(Deadline deadline) override {
-    const DeviceWatch::Call call(watch_, "collect", with_overrun(deadline));
+    const DeviceWatch::Call call(watch_, "collect", deadline);
     return camera_.collect(deadline);
   }
   Result<StereoFrame> capture_preview(Deadline deadline) override {
-    const DeviceWatch::Call call(watch_, "capture_preview", with_overrun(deadline));
+    const DeviceWatch::Call call(watch_, "capture_preview", deadline);
     return camera_.capture_preview(deadline);
   }
 
   [[nodiscard]] std::optional<HungCall> hung() const { return watch_.hung(); }
 
  private:
-  /// Of a GigE camera that vanished the library returns 2.5 s late, each: that is not a driver that hangs.
-  static Deadline with_overrun(Deadline deadline) { return {deadline.at + std::chrono::seconds(5)}; }
-
   StereoCamera& camera_;
   DeviceWatch watch_;
 };

@@ -72,15 +72,16 @@ class HangingTurntable final : public Turntable {
     return turntable_.home(deadline);
   }
   Result<Move> rotate_to(Degrees target, Deadline deadline) override {
-    std::thread motion;
-    if (gate_.is_closed("turntable.rotate_to")) {
-      motion = start_actor(
-          clock_, [&] { std::ignore = turntable_.rotate_to(target, Deadline::after(clock_, std::chrono::hours(1))); });
-      gate_.pass("turntable.rotate_to", deadline);
-      motion.join();
-      return fail(ErrorCode::timeout, "turntable: hung");
-    }
-    return turntable_.rotate_to(target, deadline);
+    if (!gate_.is_closed("turntable.rotate_to")) return turntable_.rotate_to(target, deadline);
+    Ended ended;
+    auto motion = start_actor(clock_, [&] {
+      std::ignore = turntable_.rotate_to(target, Deadline::after(clock_, std::chrono::hours(1)));
+      ended.tell(clock_);
+    });
+    gate_.pass("turntable.rotate_to", deadline);
+    ended.wait(clock_);  // by the clock: it stands still while an actor waits for a join
+    motion.join();
+    return fail(ErrorCode::timeout, "turntable: hung");
   }
   Result<void> stop(Deadline deadline) override {
     gate_.pass("turntable.stop", deadline);
@@ -103,6 +104,23 @@ class HangingTurntable final : public Turntable {
   }
 
  private:
+  struct Ended {
+    void tell(Clock& clock) {
+      {
+        const std::lock_guard guard(mutex);
+        ended = true;
+      }
+      clock.notify_all(changed);
+    }
+    void wait(Clock& clock) {
+      std::unique_lock lock(mutex);
+      clock.wait_until(lock, changed, Clock::TimePoint::max(), [this] { return ended; });
+    }
+    std::mutex mutex;
+    std::condition_variable changed;
+    bool ended = false;
+  };
+
   Turntable& turntable_;
   Gate& gate_;
   Clock& clock_;
