@@ -4,12 +4,46 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <string_view>
+#include <vector>
 
-#include "daemon/api/peer.h"
-#include "daemon/api/tokens.h"
+#include "core/result.h"
+#include "daemon/api/roles.h"
 
 namespace scanrig {
+
+/// One token as the file keeps it. The token itself is 256 random bits and is not stored: a fast hash is enough.
+struct TokenRecord {
+  std::string name;
+  Role role = Role::viewer;
+  std::string created;  ///< "2026-11-21T09:30:00Z"
+  std::string salt;     ///< 32 hexadecimal digits
+  std::string sha256;   ///< of salt + token
+};
+
+/// The tokens of the API. A file of mode 0600 (or less), JSON, replaced as a whole.
+class TokenFile {
+ public:
+  /// A missing file has no tokens. Fails with `io`, `refused` (others may read or write it, or it is neither
+  /// the caller's nor root's), `invalid_input`.
+  static Result<TokenFile> read(const std::filesystem::path& path);
+
+  /// Role of the bearer of `token`. Takes the same time whichever token it is, or none.
+  [[nodiscard]] std::optional<Role> role_of(std::string_view token) const;
+
+  /// Adds a token and returns it, "scanrig_..." - shown once. Names are 1 to 32 of A-Z a-z 0-9 . _ -
+  /// Fails with `exists`, `invalid_input`.
+  Result<std::string> add(const std::string& name, Role role, std::string created);
+  Result<void> revoke(const std::string& name);  ///< fails with `not_found`
+  /// Durable, mode 0600. Fails with `io`.
+  [[nodiscard]] Result<void> write(const std::filesystem::path& path) const;
+
+  [[nodiscard]] const std::vector<TokenRecord>& records() const { return records_; }
+
+ private:
+  std::vector<TokenRecord> records_;
+};
 
 /// Decides what a client may do. Threads: any.
 class Access {

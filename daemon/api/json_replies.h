@@ -8,7 +8,7 @@
 
 namespace scanrig {
 
-/// The API's replies as JSON, in the shapes of schemas.cpp.
+/// The API's replies as JSON, in the shapes of openapi.cpp.
 nlohmann::ordered_json to_json(const Error& error);
 nlohmann::ordered_json to_json(const std::optional<Error>& error);
 nlohmann::ordered_json to_json(const Snapshot& snapshot);     ///< Status

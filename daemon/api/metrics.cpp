@@ -1,9 +1,20 @@
 #include "daemon/api/metrics.h"
 
 #include <fmt/format.h>
+#include <algorithm>
+#include <charconv>
+
+#include "core/files.h"
 
 namespace scanrig {
 namespace {
+
+namespace fs = std::filesystem;
+
+std::string first_line(const fs::path& path) {
+  const auto text = read_file(path);
+  return text ? text->substr(0, text->find('\n')) : std::string();
+}
 
 /// A label's value must escape only backslash, quote and line break.
 std::string escaped(std::string_view text) {
@@ -45,7 +56,7 @@ void station(const Snapshot& snapshot, Text& text) {
   text.begin("machine_state", "gauge", "1 for the state the machine is in.");
   for (const auto state : kMachineStates) text.value("state", to_string(state), state == snapshot.machine ? 1 : 0);
   text.one("may_be_moving", "gauge", "1 while the last stop is not confirmed.", snapshot.may_be_moving ? 1 : 0);
-  text.begin("device_up", "gauge", "1 for a device that answers.");
+  text.begin("device_up", "gauge", "1 for a device that responds.");
   for (const auto& device : snapshot.devices) text.value("device", device.name, device.problem ? 0 : 1);
   std::map<std::string_view, double> jobs;
   for (const auto& [id, job] : snapshot.jobs) ++jobs[to_string(job->state)];
@@ -67,19 +78,40 @@ void counters(const Counters& counts, Text& text) {
 }
 
 void machine(const ServiceStatus& facts, Text& text) {
-  text.one("uptime_seconds", "gauge", "Since the daemon began.", facts.uptime_s);
+  text.one("uptime_seconds", "gauge", "Since the service started.", facts.uptime_s);
   text.one("disk_bytes", "gauge", "Size of the disk that keeps the jobs.", static_cast<double>(facts.disk_bytes));
   text.one("disk_free_bytes", "gauge", "Free on it.", static_cast<double>(facts.disk_free_bytes));
   text.begin("temperature_celsius", "gauge", "Sensors of the machine.");
   for (const auto& one : facts.temperatures) text.value("sensor", one.sensor, one.celsius);
   text.one("api_connections", "gauge", "Open connections.", static_cast<double>(facts.connections));
   text.one("api_event_streams", "gauge", "Of them streams of events.", static_cast<double>(facts.event_streams));
-  text.one("api_requests_total", "counter", "Requests answered.", static_cast<double>(facts.requests));
+  text.one("api_requests_total", "counter", "Requests received.", static_cast<double>(facts.requests));
   text.one("api_refused_total", "counter", "Requests and connections refused by role or limit.",
            static_cast<double>(facts.refused));
 }
 
 }  // namespace
+
+ServiceStatus read_machine(const fs::path& storage) {
+  ServiceStatus facts;
+  std::error_code error;
+  const auto space = fs::space(storage, error);
+  if (!error) {
+    facts.disk_bytes = space.capacity;
+    facts.disk_free_bytes = space.available;
+  }
+  for (fs::directory_iterator next("/sys/class/thermal", error), end; !error && next != end; next.increment(error)) {
+    if (!next->path().filename().string().starts_with("thermal_zone")) continue;
+    const auto text = first_line(next->path() / "temp");
+    int millidegrees = 0;
+    const auto read = std::from_chars(text.data(), text.data() + text.size(), millidegrees);
+    if (read.ec != std::errc()) continue;
+    const auto name = first_line(next->path() / "type");
+    facts.temperatures.push_back({name.empty() ? next->path().filename().string() : name, millidegrees / 1000.0});
+  }
+  std::ranges::sort(facts.temperatures, {}, &Temperature::sensor);
+  return facts;
+}
 
 std::string metrics_text(const Snapshot& snapshot, const ServiceStatus& facts) {
   Text text;

@@ -4,14 +4,15 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <variant>
 #include <vector>
 
 #include "core/result.h"
-#include "daemon/api/field.h"
-#include "daemon/api/role.h"
+#include "daemon/api/request.h"
+#include "daemon/api/roles.h"
 #include "daemon/station/control_loop.h"
 
 namespace scanrig {
@@ -62,7 +63,7 @@ using Send = std::function<void(ApiResponse)>;
 struct Reply {
   unsigned status = 200;
   std::string_view description;
-  std::string_view schema{};  ///< a name in schemas.h; empty: not JSON
+  std::string_view schema{};  ///< a name in openapi.cpp; empty: not JSON
   std::string_view type = "application/json";
 };
 
@@ -91,5 +92,36 @@ unsigned http_status(ErrorCode code);
 /// {"error": {"code", "message"}}
 ApiResponse error_response(const Error& error);
 ApiResponse error_response(unsigned status, const Error& error);
+
+/// Every route of the API, in the order of the OpenAPI document.
+std::vector<Route> all_routes();
+
+/// Finds the route of a request and checks all its values.
+class Router {
+ public:
+  explicit Router(std::vector<Route> routes = all_routes());
+
+  /// A request whose path, method, role and parameters are right.
+  struct Match {
+    const Route* route = nullptr;
+    Values values{};
+  };
+  /// The match, or the error reply: 400, 401 (`role` is nothing), 403, 404, 405.
+  [[nodiscard]] tl::expected<Match, ApiResponse> find(std::string_view method, std::string_view target,
+                                                      std::optional<Role> role) const;
+  /// Reads the body and runs the route; `send` as in Route. 400 for a body that does not fit.
+  static void call(Match match, std::string_view body, const ApiStation& station, Send send);
+
+  [[nodiscard]] const std::vector<Route>& routes() const { return routes_; }
+
+ private:
+  std::vector<Route> routes_;
+  std::vector<std::vector<std::string_view>> paths_;  // of each route, in segments
+};
+
+std::vector<Route> station_routes();  ///< status, events, buttons, maintenance, inputs and outputs
+std::vector<Route> job_routes();      ///< jobs as they are, their files and models
+std::vector<Route> order_routes();    ///< actions on jobs: queued, cancelled, bundled, deleted, ...
+std::vector<Route> service_routes();  ///< health, metrics, the OpenAPI document
 
 }  // namespace scanrig

@@ -1,8 +1,8 @@
 #include <nlohmann/json.hpp>
 
-#include "daemon/api/folder_files.h"
+#include "daemon/api/downloads.h"
 #include "daemon/api/json_replies.h"
-#include "daemon/api/routes.h"
+#include "daemon/api/route.h"
 
 namespace scanrig {
 namespace {
@@ -66,7 +66,7 @@ Route list_route() {
           .description = "All jobs, newest first, a page at a time.",
           .in_query = {{.name = "limit",
                         .type = RequestField::Type::integer,
-                        .description = "jobs a page, 50 without it",
+                        .description = "jobs per page, 50 without it",
                         .min = 1,
                         .max = kMaxPerPage},
                        {.name = "before", .description = "`next` of the page before", .min = 1, .max = 128},
@@ -93,7 +93,7 @@ std::vector<Route> job_routes() {
       {.method = Method::get,
        .path = "/api/v1/jobs/{id}/files",
        .role = Role::viewer,
-       .description = "The files in a job's folder: pictures, manifest, model, report.",
+       .description = "The files in a job's folder: images, manifest, model, report.",
        .in_path = {kId},
        .reply = {.description = "as they are now", .schema = "FileList"},
        .errors = {500},

@@ -1,8 +1,8 @@
 #include <nlohmann/json.hpp>
 
-#include "daemon/api/job_bundle.h"
+#include "daemon/api/downloads.h"
 #include "daemon/api/json_replies.h"
-#include "daemon/api/routes.h"
+#include "daemon/api/route.h"
 #include "pipeline/reconstruct/voxel_size.h"
 
 namespace scanrig {
@@ -53,21 +53,22 @@ Route job_route(Method method, std::string_view path, Role role, What what, std:
 }
 
 Route order_route() {
-  return {.method = Method::post,
-          .path = "/api/v1/jobs",
-          .role = Role::operating,
-          .description = "Queues scans; answered when their folders are durable, with the first one's id.",
-          .in_body =
-              {{.name = "recipe", .description = "one of the configuration's; default without it", .min = 1, .max = 64},
-               {.name = "part", .description = "of what is scanned: barcode or free text", .min = 0, .max = 200},
-               {.name = "repeat",
-                .type = Type::integer,
-                .description = "so many jobs; 1 without it",
-                .min = 1,
-                .max = 100}},
-          .reply = kDone,
-          .errors = {404, 409, 500},
-          .handle = order};
+  return {
+      .method = Method::post,
+      .path = "/api/v1/jobs",
+      .role = Role::operating,
+      .description = "Queues scans. The reply comes when their folders are durable, and has the id of the first one.",
+      .in_body =
+          {{.name = "recipe", .description = "one of the configuration's; default without it", .min = 1, .max = 64},
+           {.name = "part", .description = "of what is scanned: barcode or free text", .min = 0, .max = 200},
+           {.name = "repeat",
+            .type = Type::integer,
+            .description = "so many jobs; 1 without it",
+            .min = 1,
+            .max = 100}},
+      .reply = kDone,
+      .errors = {404, 409, 500},
+      .handle = order};
 }
 
 Route bundle_route() {
@@ -92,9 +93,9 @@ std::vector<Route> order_routes() {
       job_route(Method::post, "/api/v1/jobs/{id}/cancel", Role::operating, What::cancel,
                 "Ends a job that is queued, interrupted or being reconstructed."),
       job_route(Method::post, "/api/v1/jobs/{id}/resume", Role::operating, What::resume,
-                "The next Start goes on with this interrupted job."),
+                "The next Start continues this interrupted job."),
       job_route(Method::post, "/api/v1/jobs/{id}/first", Role::operating, What::to_front,
-                "The next Start begins this queued job."),
+                "The next Start starts this queued job."),
       job_route(Method::post, "/api/v1/jobs/{id}/exported", Role::operating, What::set_exported,
                 "Marks the job exported; retention may delete it."),
       job_route(Method::post, "/api/v1/jobs/{id}/reprocess", Role::engineer, What::reprocess,
@@ -106,7 +107,7 @@ std::vector<Route> order_routes() {
                   .max = kMaxVoxelMm},
                  {.name = "fusion", .description = "as configured without it", .words = {"evidence", "paper"}}}),
       job_route(Method::del, "/api/v1/jobs/{id}", Role::engineer, What::remove,
-                "Removes a job that has ended, with all its files."),
+                "Deletes a job that has ended, with all its files."),
       bundle_route(),
   };
 }

@@ -5,9 +5,7 @@
 #include "daemon/api/json_replies.h"
 #include "daemon/api/metrics.h"
 #include "daemon/api/openapi.h"
-#include "daemon/api/router.h"
-#include "daemon/api/routes.h"
-#include "daemon/api/service_status.h"
+#include "daemon/api/route.h"
 
 namespace scanrig {
 namespace {
@@ -82,51 +80,50 @@ void document(const ApiStation&, const Values&, const Send& send) {
 }  // namespace
 
 std::vector<Route> service_routes() {
-  return {
-      {.method = Method::get,
-       .path = "/api/v1/health",
-       .role = Role::viewer,
-       .description = "Devices, disk, temperatures, deadlines missed, retakes.",
-       .reply = {.description = "`ok` is false when something is wrong", .schema = "Health"},
-       .handle = health},
-      {.method = Method::get,
-       .path = "/api/v1/preview/{side}",
-       .role = Role::viewer,
-       .description = "What a camera sees: the latest picture; asks for a newer one while the rig is idle.",
-       .in_path = {{.name = "side", .description = "of the rig", .required = true, .words = {"left", "right"}}},
-       .reply = {.description = "a picture", .type = "image/jpeg"},
-       .slow = true,
-       .handle = preview},
-      {.method = Method::post,
-       .path = "/api/v1/config/check",
-       .role = Role::engineer,
-       .description = "Reads the daemon's configuration file again and tells what is wrong with it. Changes nothing.",
-       .reply = {.description = "every problem, with its line", .schema = "ConfigCheck"},
-       .errors = {409},
-       .slow = true,
-       .handle = check_config},
-      {.method = Method::post,
-       .path = "/api/v1/reload",
-       .role = Role::engineer,
-       .description =
-           "The daemon begins again with its configuration file as it is now, if that is valid and nothing is "
-           "being done; otherwise everything stays. Afterwards it waits for Reset. Connections are cut.",
-       .reply = {.description = "it begins again", .schema = "Nothing"},
-       .errors = {404, 409, 500},
-       .slow = true,
-       .handle = reload},
-      {.method = Method::get,
-       .path = "/api/v1/openapi.json",
-       .role = Role::viewer,
-       .description = "This document.",
-       .reply = {.description = "OpenAPI 3.0", .schema = "OpenApi"},
-       .handle = document},
-      {.method = Method::get,
-       .path = "/metrics",
-       .role = Role::viewer,
-       .description = "For Prometheus.",
-       .reply = {.description = "text format 0.0.4", .type = "text/plain; version=0.0.4"},
-       .handle = metrics}};
+  return {{.method = Method::get,
+           .path = "/api/v1/health",
+           .role = Role::viewer,
+           .description = "Devices, disk, temperatures, deadlines missed, retakes.",
+           .reply = {.description = "`ok` is false when something is wrong", .schema = "Health"},
+           .handle = health},
+          {.method = Method::get,
+           .path = "/api/v1/preview/{side}",
+           .role = Role::viewer,
+           .description = "The latest image of a camera. Requests a newer one while the rig is idle.",
+           .in_path = {{.name = "side", .description = "of the rig", .required = true, .words = {"left", "right"}}},
+           .reply = {.description = "an image", .type = "image/jpeg"},
+           .slow = true,
+           .handle = preview},
+          {.method = Method::post,
+           .path = "/api/v1/config/check",
+           .role = Role::engineer,
+           .description = "Reads the service's configuration file again and lists its problems. Changes nothing.",
+           .reply = {.description = "every problem, with its line", .schema = "ConfigCheck"},
+           .errors = {409},
+           .slow = true,
+           .handle = check_config},
+          {.method = Method::post,
+           .path = "/api/v1/reload",
+           .role = Role::engineer,
+           .description =
+               "Restarts the service with its configuration file as it is now, if that is valid and the rig is idle; "
+               "otherwise nothing changes. Afterwards the service waits for Reset. Connections are cut.",
+           .reply = {.description = "the service restarts", .schema = "Nothing"},
+           .errors = {404, 409, 500},
+           .slow = true,
+           .handle = reload},
+          {.method = Method::get,
+           .path = "/api/v1/openapi.json",
+           .role = Role::viewer,
+           .description = "This document.",
+           .reply = {.description = "OpenAPI 3.0", .schema = "OpenApi"},
+           .handle = document},
+          {.method = Method::get,
+           .path = "/metrics",
+           .role = Role::viewer,
+           .description = "For Prometheus.",
+           .reply = {.description = "text format 0.0.4", .type = "text/plain; version=0.0.4"},
+           .handle = metrics}};
 }
 
 }  // namespace scanrig

@@ -1,7 +1,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/api/json_replies.h"
-#include "daemon/api/routes.h"
+#include "daemon/api/route.h"
 
 namespace scanrig {
 namespace {
@@ -11,7 +11,7 @@ using What = event::MaintenanceRequested::What;
 
 constexpr Reply kPressed{.description = "obeyed", .schema = "Pressed"};
 constexpr Reply kStopped{.description = "stop was sent", .schema = "Stopped"};
-constexpr Reply kDone{.description = "obeyed; the state tells how it goes on", .schema = "Nothing"};
+constexpr Reply kDone{.description = "obeyed; the status reports its progress", .schema = "Nothing"};
 
 ApiResponse pressed(const Result<std::string>& job) {
   if (!job) return error_response(job.error());
@@ -132,7 +132,7 @@ Route look(std::string_view path, std::string_view description, Reply reply, ord
 std::vector<Route> station_routes() {
   return {
       look(
-          "/api/v1/status", "What the station does, why, and what to do next.",
+          "/api/v1/status", "What the rig does, why, and what to do next.",
           {.description = "the latest snapshot", .schema = "Status"}, [](const Snapshot& s) { return to_json(s); },
           true),
       look("/api/v1/io", "The panel's inputs and outputs.", {.description = "as last seen", .schema = "Io"}, io_table),
@@ -145,7 +145,7 @@ std::vector<Route> station_routes() {
            "and the present status when that is too long ago. A comment every 10 s is the heartbeat.",
        .reply = {.description = "events without end", .type = "text/event-stream"},
        .handle = [](const ApiStation&, const Values&, const Send& send) { send({.body = EventStream{}}); }},
-      press("/api/v1/start", Button::start, Role::operating, "Starts a scan; after the flip: goes on."),
+      press("/api/v1/start", Button::start, Role::operating, "Starts a scan, or continues it after the flip."),
       stop_route(),
       press("/api/v1/reset", Button::reset, Role::operating, "Clears a fault and homes the table."),
       maintenance("/api/v1/maintenance/on", What::on, "Maintenance mode begins: no jobs."),

@@ -13,8 +13,8 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/api/job_bundle.h"
-#include "daemon/api/service_status.h"
+#include "daemon/api/downloads.h"
+#include "daemon/api/metrics.h"
 #include "daemon/api/session.h"
 #include "daemon/api/socket_file.h"
 

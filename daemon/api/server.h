@@ -9,8 +9,8 @@
 
 #include "core/result.h"
 #include "daemon/api/admission.h"
-#include "daemon/api/peer.h"
-#include "daemon/journal/entry.h"
+#include "daemon/api/roles.h"
+#include "daemon/journal/journal.h"
 #include "daemon/station/control_loop.h"
 
 namespace scanrig {
@@ -34,7 +34,7 @@ struct ApiOptions {
 
   static Result<std::string> no_preview(std::string_view) { return fail(ErrorCode::not_found, "there are no cameras"); }
   static Result<void> no_config() {
-    return fail(ErrorCode::refused, "the daemon was started without a configuration file");
+    return fail(ErrorCode::refused, "the service was started without a configuration file");
   }
   static void no_reload(const ControlLoop::Reply& reply) { reply(pass_on(no_config())); }
 };

@@ -4,6 +4,7 @@
 
 #include <boost/asio/post.hpp>
 #include <boost/asio/write.hpp>
+#include <sstream>
 
 namespace scanrig {
 namespace {
@@ -13,7 +14,7 @@ namespace http = boost::beast::http;
 
 const scanrig::Error kTooMany{ErrorCode::busy, "there are too many connections: try again later"};
 const scanrig::Error kTooOften{ErrorCode::busy, "too many requests: wait a moment"};
-const scanrig::Error kNoAnswer{ErrorCode::timeout, "the station did not answer in time: see scanrig status"};
+const scanrig::Error kNoAnswer{ErrorCode::timeout, "the rig did not respond in time: see scanrig status"};
 constexpr unsigned kFirstError = 400, kForbidden = 403;
 constexpr std::size_t kMaxPathLength = 200;  ///< in the log
 constexpr auto kDrainTime = std::chrono::seconds(1);
@@ -33,6 +34,11 @@ std::optional<ApiResponse> understand(boost::beast::error_code error) {
   }
   return std::nullopt;  // gone, or too slow
 }
+
+namespace net = boost::asio;
+namespace http = boost::beast::http;
+
+constexpr std::size_t kChunk = 64 * 1024;
 
 }  // namespace
 
@@ -166,7 +172,7 @@ std::optional<ApiSession::JobOrder> ApiSession::order_of(Role as) const {
   const auto method = plain(parser_->get().method_string());
   if (method == to_string(Method::get)) return std::nullopt;
   const auto target = plain(parser_->get().target());
-  return JobOrder{fmt::format("{} {}, asked for by {} ({})", method,
+  return JobOrder{fmt::format("{} {}, requested by {} ({})", method,
                               target.substr(0, target.find('?')).substr(0, kMaxPathLength), requester_, to_string(as))};
 }
 
@@ -272,6 +278,98 @@ std::string ApiSession::requester() const {
   const auto lines = parser_->get().equal_range("X-Forwarded-For");
   if (lines.first == lines.second) return peer_.name;
   return forwarded_address(plain(std::prev(lines.second)->value())).value_or(peer_.name);
+}
+
+// Files and events, which a session sends piece by piece.
+
+std::string ApiSession::head_text() const {
+  std::ostringstream text;
+  text << response_.base();
+  return text.str();
+}
+
+/// One limit for the whole file, long enough for the slowest client that is served.
+void ApiSession::begin_file(std::shared_ptr<OpenFile> file, std::string_view type) {
+  file_ = std::move(file);
+  sent_ = 0;
+  set_head(200, type);
+  response_.content_length(file_->size());
+  chunk_ = head_text();
+  const std::chrono::duration<double> download(static_cast<double>(file_->size()) /
+                                               core_.limits.slowest_bytes_a_second);
+  stream_.expires_after(core_.limits.answer_time + std::chrono::ceil<std::chrono::milliseconds>(download));
+  write_chunk();
+}
+
+void ApiSession::write_chunk() {
+  net::async_write(stream_, net::buffer(chunk_), [self = shared_from_this()](Error error, std::size_t) {
+    if (error) return self->hang_up();
+    if (self->sent_ < self->file_->size()) return self->read_chunk();
+    self->file_.reset();
+    self->on_written({});
+  });
+}
+
+/// Runs on a worker: a slow disk delays only this connection.
+void ApiSession::read_chunk() {
+  net::post(core_.workers, [self = shared_from_this()] {
+    self->chunk_.resize(std::min<std::uint64_t>(kChunk, self->file_->size() - self->sent_));
+    const auto got =
+        ::pread(self->file_->fd(), self->chunk_.data(), self->chunk_.size(), static_cast<off_t>(self->sent_));
+    net::post(self->stream_.get_executor(), [self, got] {
+      if (got <= 0) return self->hang_up();  // the file became shorter: better no reply than a wrong one
+      self->chunk_.resize(static_cast<std::size_t>(got));
+      self->sent_ += static_cast<std::uint64_t>(got);
+      self->write_chunk();
+    });
+  });
+}
+
+void ApiSession::begin_events() {
+  last_ = true;
+  subscription_ = core_.hub.subscribe([weak = weak_from_this(), strand = stream_.get_executor()] {
+    net::post(strand, [weak] {
+      if (const auto self = weak.lock()) self->events_due();
+    });
+  });
+  set_head(200, "text/event-stream");
+  const auto last_event_id = parser_->get().find("Last-Event-ID");
+  auto batch = core_.hub.join(last_event_id == parser_->get().end() ? "" : std::string(last_event_id->value()));
+  batch.texts.insert(batch.texts.begin(), std::make_shared<const std::string>(head_text()));
+  send_events(std::move(batch));
+}
+
+void ApiSession::events_due() {
+  if (!writing_events_) send_events(core_.hub.after(last_event_));
+}
+
+void ApiSession::send_events(EventHub::Batch batch) {
+  last_event_ = batch.last;
+  batch_ = std::move(batch.texts);
+  if (batch_.empty()) return wait_for_events();
+  std::vector<net::const_buffer> buffers;
+  for (const auto& text : batch_) buffers.push_back(net::buffer(*text));
+  writing_events_ = true;
+  stream_.expires_after(core_.limits.answer_time);
+  net::async_write(stream_, std::move(buffers), [self = shared_from_this()](Error error, std::size_t) {
+    self->writing_events_ = false;
+    if (error) return self->hang_up();
+    self->events_due();
+  });
+}
+
+void ApiSession::wait_for_events() {
+  timer_.expires_after(core_.limits.heartbeat);
+  timer_.async_wait([self = shared_from_this()](Error error) {
+    if (!error) self->beat();
+  });
+}
+
+/// Sends a heartbeat; a client without the right to listen any more is cut off then.
+void ApiSession::beat() {
+  if (writing_events_) return;
+  if (!role()) return hang_up();
+  send_events({last_event_, {std::make_shared<const std::string>(":\n\n")}});
 }
 
 }  // namespace scanrig

@@ -69,8 +69,8 @@ Result<int> connect_to_socket(const fs::path& path, std::chrono::microseconds li
   if (why != ENOENT && why != ECONNREFUSED && why != EAGAIN) return fail_errno("connect to", path, fd);
   ::close(fd);
   if (why == ENOENT) return fail(ErrorCode::not_found, "{}: no such socket", path.string());
-  if (why == ECONNREFUSED) return fail(ErrorCode::not_found, "{}: nobody listens", path.string());
-  return fail(ErrorCode::timeout, "{}: nobody takes the connection", path.string());
+  if (why == ECONNREFUSED) return fail(ErrorCode::not_found, "{}: no service listens", path.string());
+  return fail(ErrorCode::timeout, "{}: the service does not accept the connection", path.string());
 }
 
 fs::path socket_path(int listening) {

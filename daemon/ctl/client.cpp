@@ -37,7 +37,7 @@ Answer understand(const http::response<http::string_body>& response, const std::
   auto json = nlohmann::json::parse(response.body(), nullptr, false);
   if (response.result() == http::status::ok && json.is_object()) return json;
   if (!json.is_object() || !json.contains("error") || !json["error"].is_object()) {
-    return unreachable(fmt::format("{}: an answer that is not the API's (HTTP {})", target, response.result_int()));
+    return unreachable(fmt::format("{}: not a reply of the API (HTTP {})", target, response.result_int()));
   }
   const auto code = parse_error_code(json["error"].value("code", ""));
   return tl::unexpected(
@@ -61,7 +61,7 @@ class Link {
     const auto& why = connected.error();
     if (why.code == ErrorCode::timeout) return tl::unexpected(too_late(path, limit));
     return tl::unexpected(RequestError{
-        ExitCode::unreachable, why.message + (why.code == ErrorCode::not_found ? "; is the daemon running?" : "")});
+        ExitCode::unreachable, why.message + (why.code == ErrorCode::not_found ? "; is the service running?" : "")});
   }
 
   /// Sets `limit` for what follows.
@@ -84,7 +84,7 @@ class Link {
   [[nodiscard]] tl::unexpected<RequestError> failed(const error_code& error) const {
     if (error == net::error::timed_out) return tl::unexpected(too_late(path_, limit_));
     return tl::unexpected(RequestError{
-        ExitCode::unreachable, fmt::format("{}: the daemon does not answer: {}", path_.string(), error.message())});
+        ExitCode::unreachable, fmt::format("{}: the service does not respond: {}", path_.string(), error.message())});
   }
 
  private:
@@ -93,7 +93,7 @@ class Link {
 
   static RequestError too_late(const std::filesystem::path& path, Clock::Duration limit) {
     return {ExitCode::unreachable,
-            fmt::format("{}: the daemon has not answered within {:g} s; see what `systemctl status scanrigd` says, and "
+            fmt::format("{}: the service has not responded within {:g} s; check `systemctl status scanrigd`, and "
                         "restart it where it hangs",
                         path.string(), std::chrono::duration<double>(limit).count())};
   }

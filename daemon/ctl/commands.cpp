@@ -31,9 +31,8 @@ void add_maintenance(CLI::App& app, Chosen& chosen) {
 
 void add_station_commands(CLI::App& app, Chosen& chosen) {
   const auto look = std::make_shared<StatusVerb>();
-  auto* sub = add_client(app, chosen, "status", "what the station does, why, and what to do next", look, status);
-  auto* follow =
-      sub->add_flag("--follow", look->follow, "follow the job that has the rig, or the next one, to its end");
+  auto* sub = add_client(app, chosen, "status", "what the rig does, why, and what to do next", look, status);
+  auto* follow = sub->add_flag("--follow", look->follow, "follow the active job, or the next one, to its end");
   sub->add_flag("--watch", look->watch, "one screen, kept up to date until interrupted")->excludes(follow);
   const auto begin = std::make_shared<StartVerb>();
   add_client(app, chosen, "start", "start a scan; after the flip: continue", begin, start)
@@ -42,7 +41,8 @@ void add_station_commands(CLI::App& app, Chosen& chosen) {
   add_client(app, chosen, "stop", "stop the table, in every state, and wait until it has stopped", halt, stop)
       ->add_flag("!--no-wait", halt->wait, "do not wait for standstill");
   add_button(app, chosen, "reset", "clear a fault and home the table");
-  add_button(app, chosen, "reload", "begin again with the configuration file as it is now, while the rig is idle");
+  add_button(app, chosen, "reload",
+             "restart the service with the configuration file as it is now, while the rig is idle");
   add_client(app, chosen, "health", "devices, disk, temperatures, deadlines missed, retakes", std::make_shared<int>(),
              [](const Connection& connection, int) { return health(connection); });
   add_maintenance(app, chosen);
@@ -72,7 +72,7 @@ void add_changes(CLI::App& app, Chosen& chosen) {
   sub->add_option("--fusion", again->fusion, "how poses are integrated")->check(CLI::IsMember({"evidence", "paper"}));
   const auto removed = verb();
   add_change(app, chosen, "delete", "remove a job that has ended, with all its files", removed)
-      ->add_flag("--yes", removed->yes, "do not ask");
+      ->add_flag("--yes", removed->yes, "do not prompt");
 }
 
 }  // namespace
@@ -94,7 +94,7 @@ void add_job_commands(CLI::App& app, Chosen& chosen) {
   const auto files = std::make_shared<std::string>();
   add_id(add_client(app, chosen, "files", "the files of a job", files, job_files), *files)->required();
   const auto out = std::make_shared<ExportVerb>();
-  sub = add_client(app, chosen, "export", "copy a file of a job, by default its model, from the daemon", out,
+  sub = add_client(app, chosen, "export", "copy a file of a job, by default its model, from the service", out,
                    export_file);
   add_id(sub, out->id)->required();
   sub->add_option("--file", out->file, "which, as `scanrig files` names it")->capture_default_str();
@@ -109,7 +109,7 @@ namespace {
 
 void add_turntable(CLI::App& app, Chosen& chosen) {
   const auto verb = std::make_shared<TurntableVerb>();
-  auto* sub = app.add_subcommand("turntable", "move or ask the turntable itself, while no daemon runs");
+  auto* sub = app.add_subcommand("turntable", "move or query the turntable itself, while no service runs");
   sub->require_subcommand(1);
   const auto add = [&](const char* name, const char* description) {
     auto* action = sub->add_subcommand(name, description);
@@ -124,7 +124,7 @@ void add_turntable(CLI::App& app, Chosen& chosen) {
   auto* move = add("move", "find home, then turn to ANGLE, the shorter way");
   move->add_option("ANGLE", verb->angle_deg, "degrees, counter-clockwise")->required();
   for (auto* action : {home, move})
-    action->add_flag("--yes", verb->yes, "do not ask first: you have checked that nobody is near the rig");
+    action->add_flag("--yes", verb->yes, "do not prompt first: you have checked that no person is near the rig");
   auto* status = add("status", "moving, home, alarm");
   auto* read = add("read", "what the drive's registers say");
   for (auto* action : {home, move, status, read}) action->add_flag("--json", verb->json, "print JSON");
@@ -169,7 +169,7 @@ void add_camera(CLI::App& app, Chosen& chosen) {
       ->add_flag("--json", verb->json, "print JSON");
   auto* tune = add("tune", "brightness, saturation and blur of what the cameras see");
   auto* grab = add("grab", "one pair as PNG files");
-  auto* preview = add("preview", "two JPEG files that follow the cameras, through the daemon where one runs");
+  auto* preview = add("preview", "two JPEG files that follow the cameras, through the service where one runs");
   for (auto* action : {tune, grab, preview}) {
     action->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
     action->add_option("--light", verb->light, "what the projector does; without a daemon")
@@ -279,7 +279,7 @@ void add_token(CLI::App& app, Chosen& chosen) {
       ->check(CLI::IsMember({"viewer", "operator", "engineer"}))
       ->capture_default_str();
   add("list", "names, roles and dates; never the tokens");
-  add("revoke", "make a token void; the daemon knows within a second")
+  add("revoke", "make a token void; the service refuses it within a second")
       ->add_option("NAME", verb->name, "of the token")
       ->required();
 }

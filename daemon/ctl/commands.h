@@ -24,7 +24,7 @@ CLI::App* add_client(CLI::App& app, Chosen& chosen, const char* name, const char
                      std::shared_ptr<Verb> verb, Run run) {
   auto* sub = app.add_subcommand(name, description);
   auto connection = std::make_shared<Connection>();
-  sub->add_option("--socket", connection->socket, "the daemon's socket")
+  sub->add_option("--socket", connection->socket, "the service's socket")
       ->envname("SCANRIG_SOCKET")
       ->capture_default_str();
   sub->add_flag("--json", connection->json, "print JSON");

@@ -16,8 +16,8 @@ using nlohmann::json;
 /// Retakes of a view or a movement check.
 std::string retakes(const json& taken) {
   const int count = taken.at("retakes");
-  std::string text = count == 0 ? "" : fmt::format(", {} exposure{} redone", count, count == 1 ? "" : "s");
-  for (const auto& why : taken.at("retake_reasons")) text += "\n      redone: " + why.at("message").get<std::string>();
+  std::string text = count == 0 ? "" : fmt::format(", {} exposure{} retaken", count, count == 1 ? "" : "s");
+  for (const auto& why : taken.at("retake_reasons")) text += "\n      retaken: " + why.at("message").get<std::string>();
   return text;
 }
 
@@ -95,7 +95,7 @@ using nlohmann::json;
 /// `taken`: a view or a movement check.
 void add_retakes(const json& taken, const std::string& name, std::vector<std::string>& lines) {
   for (const auto& why : taken.value("retake_reasons", json::array())) {
-    lines.push_back(fmt::format("  pose {} {}: an exposure was redone: {}", taken.at("pose").get<int>() + 1, name,
+    lines.push_back(fmt::format("  pose {} {}: an exposure was retaken: {}", taken.at("pose").get<int>() + 1, name,
                                 text(why, "message")));
   }
 }

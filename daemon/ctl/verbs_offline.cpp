@@ -7,7 +7,7 @@
 #include <system_error>
 
 #include "config/rig_config.h"
-#include "daemon/api/tokens.h"
+#include "daemon/api/access.h"
 #include "daemon/ctl/output.h"
 #include "daemon/ctl/verbs.h"
 #include "daemon/runtime/catch_exceptions.h"

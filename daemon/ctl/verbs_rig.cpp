@@ -175,7 +175,9 @@ ExitCode examine_rig(const DoctorVerb& verb) {
   doctor::list_what_is_connected(report);
   const bool drive_answers = doctor::examine_drive(*rig, clock, report);
   const bool estop_works = doctor::examine_panel(*rig, drive_answers, person, clock, report);
-  const auto may_turn = [&] { return verb.yes_move || person.ask("Is everyone clear? Turn the table? [y/N]") == "y"; };
+  const auto may_turn = [&] {
+    return verb.yes_move || person.prompt("Is everyone clear? Turn the table? [y/N]") == "y";
+  };
   Result<void> moved;
   if (drive_answers && estop_works && may_turn()) {
     moved = doctor::examine_motion({*rig, verb.config}, person, clock, report);

@@ -4,11 +4,15 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <string_view>
 
 #include "core/context.h"
 #include "core/result.h"
 
 namespace scanrig {
+
+/// `text` with API tokens and the addresses of URLs, which may carry credentials, replaced by "(removed)".
+std::string without_secrets(std::string_view text);
 
 /// Content of a bundle beside the job's folder.
 struct BundleOptions {

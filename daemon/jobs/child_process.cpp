@@ -21,7 +21,7 @@ using SteadyClock = std::chrono::steady_clock;
 constexpr int kLookEvery = 100;  ///< milliseconds: the longest delay until a stop is noticed
 constexpr int kNotStarted = 127;
 
-/// One output of the child, line by line.
+/// The lines of one output of the child.
 class Lines {
  public:
   explicit Lines(int fd) : fd_(fd) { ::fcntl(fd_, F_SETFL, O_NONBLOCK); }

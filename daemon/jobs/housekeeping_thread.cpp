@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "daemon/jobs/bundle.h"
-#include "daemon/runtime/actor_thread.h"
+#include "daemon/runtime/actor.h"
 #include "daemon/runtime/catch_exceptions.h"
 
 namespace scanrig {

@@ -9,8 +9,7 @@
 #include "daemon/jobs/bundle.h"
 #include "daemon/jobs/job_store.h"
 #include "daemon/jobs/retention.h"
-#include "daemon/jobs/retention_ledger.h"
-#include "daemon/runtime/mailbox.h"
+#include "daemon/runtime/actor.h"
 #include "daemon/station/events.h"
 
 namespace scanrig {

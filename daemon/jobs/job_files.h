@@ -6,7 +6,7 @@
 #include <string>
 
 #include "core/result.h"
-#include "daemon/station/recipe.h"
+#include "daemon/station/job_info.h"
 
 namespace scanrig {
 

@@ -2,12 +2,19 @@
 
 #include <filesystem>
 #include <optional>
+#include <string>
 
+#include "daemon/station/job_info.h"
 #include "daemon/station/job_lifecycle.h"
 
 struct sqlite3;
 
 namespace scanrig {
+
+/// A job as one line of JSON, for the index. Nothing else reads it, so it has no version and changes freely.
+std::string to_record(const JobInfo& job);
+/// False when the text is not what to_record() writes today.
+bool from_record(const std::string& text, JobInfo& job);
 
 /// index.sqlite beside the job folders: the content of ended jobs' folders when they were last read. With it, a start
 /// with thousands of jobs does not open thousands of manifests. It may be deleted or damaged at any time: jobs that

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
-#include "daemon/jobs/secrets.h"
+#include "daemon/jobs/bundle.h"
 #include "daemon/station/timestamp.h"
 
 namespace scanrig {

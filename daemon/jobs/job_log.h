@@ -5,7 +5,7 @@
 #include <filesystem>
 
 #include "core/result.h"
-#include "daemon/journal/entry.h"
+#include "daemon/journal/journal.h"
 
 namespace scanrig {
 

@@ -199,7 +199,7 @@ Result<void> JobStore::check_job_cameras(const std::string& id) const {
   if (!calibration) return pass_on(calibration);
   const auto others = other_cameras(*calibration, options_.cameras);
   if (!others) return {};
-  return fail(ErrorCode::refused, "job {} was begun with {}; cancel it and scan the object again", id, *others);
+  return fail(ErrorCode::refused, "job {} was started with {}; cancel it and scan the part again", id, *others);
 }
 
 Result<void> JobStore::renew_calibration(const JobInfo& job) const {

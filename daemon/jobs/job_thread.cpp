@@ -7,7 +7,7 @@
 
 #include "core/files.h"
 #include "core/image_codec.h"
-#include "daemon/runtime/actor_thread.h"
+#include "daemon/runtime/actor.h"
 #include "daemon/runtime/catch_exceptions.h"
 #include "daemon/runtime/overloaded.h"
 #include "daemon/station/job_lifecycle.h"

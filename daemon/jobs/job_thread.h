@@ -9,8 +9,7 @@
 #include "daemon/jobs/job_log.h"
 #include "daemon/jobs/job_store.h"
 #include "daemon/jobs/reconstruction_thread.h"
-#include "daemon/runtime/busy_timer.h"
-#include "daemon/runtime/mailbox.h"
+#include "daemon/runtime/actor.h"
 #include "daemon/station/events.h"
 
 namespace scanrig {

@@ -8,7 +8,7 @@
 #include "core/priority.h"
 #include "daemon/jobs/heap.h"
 #include "daemon/jobs/job_files.h"
-#include "daemon/runtime/actor_thread.h"
+#include "daemon/runtime/actor.h"
 #include "daemon/runtime/catch_exceptions.h"
 #include "daemon/station/job_lifecycle.h"
 

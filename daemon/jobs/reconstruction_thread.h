@@ -14,8 +14,8 @@
 #include <variant>
 
 #include "daemon/jobs/reconstructor.h"
-#include "daemon/rig/taken_view.h"
-#include "daemon/runtime/mailbox.h"
+#include "daemon/rig/acquisition.h"
+#include "daemon/runtime/actor.h"
 #include "pipeline/storage/scan_folder.h"
 
 namespace scanrig {

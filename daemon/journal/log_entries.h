@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "daemon/journal/entry.h"
+#include "daemon/journal/journal.h"
 #include "daemon/station/snapshot.h"
 
 namespace scanrig {

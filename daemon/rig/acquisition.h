@@ -7,9 +7,17 @@
 #include "core/clock.h"
 #include "daemon/rig/devices.h"
 #include "daemon/rig/image_checker.h"
-#include "daemon/rig/taken_view.h"
+#include "daemon/station/events.h"
+#include "pipeline/storage/scan_folder.h"
 
 namespace scanrig {
+
+/// One view as the rig delivered it, in memory only.
+struct TakenView {
+  ViewId id;
+  ViewRecord record{};  ///< `files` still empty
+  RawView images{};
+};
 
 struct AcquisitionOptions {
   Clock::Duration home_limit = std::chrono::seconds(60);

@@ -26,7 +26,7 @@ void insert(std::vector<double>& ascending, double value) {
   if (!std::isnan(value)) ascending.insert(std::ranges::upper_bound(ascending, value), value);
 }
 
-const char* name_of(Light light) { return light == Light::pattern ? "the dots" : "even light"; }
+const char* name_of(Light light) { return light == Light::pattern ? "pattern" : "plain"; }
 
 }  // namespace
 
@@ -35,7 +35,7 @@ Result<void> ImageChecker::judge(Light light, const StereoFrame& frame) {
   if (auto right = judge(light, "right", frame.right_evidence); !right) return right;
   if (light == Light::pattern && frame.left_right_correlation > kOnePicture) {
     return fail(ErrorCode::protocol,
-                "camera: left and right show the same picture (left_right_correlation {:.2f}); see to the cables and "
+                "camera: left and right show the same image (left_right_correlation {:.2f}); check the cables and "
                 "serial numbers",
                 frame.left_right_correlation);
   }
@@ -51,20 +51,19 @@ Result<void> ImageChecker::judge(Light light, const char* side, const ImageQuali
   // Comparisons with NaN are false.
   if (evidence.brightness < kDark || evidence.brightness < kDarker * usual) {
     return fail(ErrorCode::protocol,
-                "{} camera: the picture in {} is dark ({:.3f} of full scale{}); see to light, lens and exposure_us",
-                side, name_of(light), evidence.brightness,
+                "{} camera: the {} image is dark ({:.3f} of full scale{}); check light, lens and exposure_us", side,
+                name_of(light), evidence.brightness,
                 std::isnan(usual) ? "" : fmt::format(", {:.3f} in the views before", usual));
   }
   if (evidence.saturated > kSaturated) {
     return fail(ErrorCode::protocol,
-                "{} camera: the picture in {} is overexposed ({:.0f} % at full scale); lower exposure_us or gain", side,
+                "{} camera: the {} image is overexposed ({:.0f} % at full scale); lower exposure_us or gain", side,
                 name_of(light), 100.0 * evidence.saturated);
   }
   if (light == Light::pattern && evidence.blur_px > kMoreBlurred * sharp) {
     return fail(
         ErrorCode::protocol,
-        "{} camera: the picture in {} is blurred ({:.1f} px, {:.1f} px in the views before); see to the focus and "
-        "to what shakes",
+        "{} camera: the {} image is blurred ({:.1f} px, {:.1f} px in the views before); check focus and vibration",
         side, name_of(light), evidence.blur_px, sharp);
   }
   return {};

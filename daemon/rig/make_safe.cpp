@@ -6,17 +6,20 @@
 
 #include <cerrno>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
 
+#include "core/files.h"
 #include "daemon/rig/open_devices.h"
-#include "daemon/rig/saved_config.h"
 
 namespace scanrig {
 namespace {
@@ -25,6 +28,8 @@ using config::SafetyDevice;
 
 constexpr auto kLimit = std::chrono::milliseconds(900);
 constexpr auto kAgain = std::chrono::milliseconds(20);
+
+std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
 
 /// Limit of one attempt: a stop without confirmation is sent again.
 Deadline attempt_deadline(Clock& clock, Deadline all) { return all.at_most(clock, kLimit); }
@@ -112,6 +117,26 @@ std::set<std::string> errors_of(const Result<Value>&... results) {
 }
 
 }  // namespace
+
+std::filesystem::path saved_config_folder(const std::filesystem::path& file) {
+  if (const char* runtime = std::getenv("RUNTIME_DIRECTORY")) return std::filesystem::path(runtime) / "running";
+  return file.parent_path() / (file.stem().string() + ".running");
+}
+
+Result<void> save_config(const config::RigConfig& config, const std::filesystem::path& folder) {
+  auto prepared = folder;
+  prepared += ".new";
+  std::error_code ignored;
+  std::filesystem::remove_all(prepared, ignored);  // left by a daemon that died while it wrote
+  if (auto made = create_directories_synced(prepared / "drives"); !made) return made;
+  if (const auto& profile = config.turntable.profile_file) {
+    const FileContent file{profile->name, bytes_of(profile->text)};
+    if (auto written = write_files_synced(prepared / "drives", {&file, 1}); !written) return written;
+  }
+  const FileContent file{"rig.toml", bytes_of(config.text)};
+  if (auto written = write_files_synced(prepared, {&file, 1}); !written) return written;
+  return replace_folder(prepared, folder);
+}
 
 MadeSafe make_safe(const DeviceConfigs& config, Clock& clock, Deadline deadline) {
   MadeSafe made;

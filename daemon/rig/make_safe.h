@@ -8,6 +8,15 @@
 
 namespace scanrig {
 
+/// The configuration a daemon runs under, saved for the process that makes the rig safe after the daemon's death.
+/// rig.toml may have been edited since, damaged or moved. `rig.toml` in this folder, its drive profile in `drives`.
+/// Folder for the daemon of `file`: the one that systemd makes for the service ($RUNTIME_DIRECTORY), otherwise beside
+/// `file`.
+std::filesystem::path saved_config_folder(const std::filesystem::path& file);
+
+/// Saves before a device is used. Fails with `io`; then the older saved configuration remains.
+Result<void> save_config(const config::RigConfig& config, const std::filesystem::path& folder);
+
 /// Configuration of each device to be made safe, read separately: see config::read_device_config().
 struct DeviceConfigs {
   Result<config::RigConfig> turntable, projector, panel;
@@ -29,7 +38,7 @@ MadeSafe make_safe(const DeviceConfigs& config, Clock& clock, Deadline deadline)
 enum class Beside { nobody, hung_daemon };
 
 /// For systemd's ExecStopPost=: returns within a second, with a line on standard error for what was not reached. Uses
-/// what the last daemon of `file` has saved (saved_config.h), and the present `file` for what is missing there.
+/// what the last daemon of `file` has saved (save_config()), and the present `file` for what is missing there.
 /// `ok`, `device` (the table may be moving), `partly_safe` (the table is stopped, but light or lamp were not reached),
 /// `bad_input` (nothing of the configuration can be used).
 ExitCode make_safe_now(const std::filesystem::path& file, const char* program, Beside beside = Beside::nobody);

@@ -1,7 +1,7 @@
 #include "daemon/rig/open_devices.h"
 
 #include "config/gpio_options.h"
-#include "daemon/rig/auto_reopen_devices.h"
+#include "daemon/rig/devices.h"
 #include "drivers/camera/aravis_stereo_camera.h"
 #include "drivers/camera/v4l2_stereo_camera.h"
 #include "drivers/panel/gpio_panel.h"

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "daemon/runtime/actor_thread.h"
+#include "daemon/runtime/actor.h"
 #include "drivers/panel/debounce.h"
 
 namespace scanrig {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/clock.h"
-#include "daemon/rig/watched_devices.h"
+#include "daemon/rig/devices.h"
 #include "daemon/station/events.h"
 #include "drivers/panel/panel.h"
 

@@ -32,7 +32,7 @@ Result<std::string> Preview::jpeg(Side side) {
   // Where only the projector's edge exposes, the latest exposure stays.
   const bool blind = problem_ && (problem_->code != ErrorCode::unsupported || pairs_ == 0);
   if (quiet && blind) return tl::unexpected(*problem_);
-  if (pairs_ == 0) return fail(ErrorCode::not_found, "preview: the cameras have taken no picture yet; ask again");
+  if (pairs_ == 0) return fail(ErrorCode::not_found, "preview: the cameras have taken no image yet; try again");
   Encoded& encoded = encoded_[static_cast<std::size_t>(side)];
   if (encoded.pair == pairs_) return encoded.bytes;
   const std::uint64_t pair = pairs_;

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "daemon/runtime/actor_thread.h"
+#include "daemon/runtime/actor.h"
 
 namespace scanrig {
 

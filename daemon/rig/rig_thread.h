@@ -6,10 +6,10 @@
 #include <variant>
 
 #include "daemon/rig/acquisition.h"
+#include "daemon/rig/devices.h"
 #include "daemon/rig/preview.h"
 #include "daemon/rig/turntable_thread.h"
-#include "daemon/rig/watched_devices.h"
-#include "daemon/runtime/mailbox.h"
+#include "daemon/runtime/actor.h"
 
 namespace scanrig {
 

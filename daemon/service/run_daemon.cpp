@@ -7,9 +7,9 @@
 #include "daemon/jobs/heap.h"
 #include "daemon/jobs/housekeeping_thread.h"
 #include "daemon/journal/log_entries.h"
-#include "daemon/rig/outside_stop.h"
 #include "daemon/rig/panel_thread.h"
 #include "daemon/rig/rig_thread.h"
+#include "daemon/rig/turntable_thread.h"
 #include "daemon/runtime/overloaded.h"
 #include "daemon/service/exit_watchdog.h"
 #include "daemon/service/safety_record.h"
@@ -85,41 +85,9 @@ class Attached {
   JobLogs& logs_;
 };
 
-struct Workers {
-  RigThread& rig;
-  OutsideStop& outside;
-  JobThread& jobs;
-  HousekeepingThread& housekeeping;
-};
-
-/// Longer work is kept away from the thread that stores views.
-void keep(const action::RunJobRequest& task, const Workers& workers) {
-  using What = event::JobRequested::What;
-  const auto what = task.asked.what;
-  if (what == What::remove || what == What::bundle) return workers.housekeeping.post(task.asked);
-  workers.jobs.post(task);
-}
-
 bool cameras_are_free(const Snapshot& snapshot) {
   return snapshot.activity == Activity::none || snapshot.activity == Activity::waiting_for_flip ||
          snapshot.activity == Activity::waiting_for_part;
-}
-
-void perform(const Action& action, const Workers& workers) {
-  auto& rig = workers.rig;
-  std::visit(
-      Overloaded{[](const action::Warn&) {},  // these are the control loop's own
-                 [](const action::WaitForEstop&) {}, [](const action::RetryStopLater&) {},
-                 [](const action::EndConsentLater&) {}, [](const action::CheckLater&) {},
-                 [](const action::TestLamps&) {}, [](const action::WaitForFlip&) {},
-                 [&](const action::Home&) { rig.home(); }, [&](const action::StopRig&) { rig.stop(); },
-                 [&](const action::StopTableDirectly&) { rig.stop_directly(); },
-                 [&](const action::StopTableOutside&) { workers.outside.begin(); },
-                 [&](const action::TakeView& a) { rig.take_view(a); }, [&](const action::Jog& a) { rig.jog(a); },
-                 [&](const action::Pulse&) { rig.pulse(); }, [&](const action::CheckDevices&) { rig.check_devices(); },
-                 [&](const action::RunJobRequest& a) { keep(a, workers); },
-                 [&](const auto& task) { workers.jobs.post(task); }},
-      action);
 }
 
 /// Jobs that the last daemon left to be reconstructed.
@@ -177,6 +145,142 @@ bool quiet_now(const std::optional<QuietHours>& hours) {
   return hours->contain(std::chrono::hours(local.tm_hour) + std::chrono::minutes(local.tm_min));
 }
 
+ControlLoopOptions loop_options(const DaemonOptions& options, const std::optional<Latch>& latch) {
+  const StationRules rules{.recipes = options.recipes,
+                           .remote = options.remote,
+                           .guard = options.guard,
+                           .auto_home = options.auto_home,
+                           .manual_light = options.manual_light};
+  ControlLoopOptions for_loop{.rules = rules,
+                              .warning = options.warning,
+                              .hang_limit = options.hang_limit,
+                              .warm_up = options.warm_up,
+                              .latch = latch};
+  for_loop.estop_window = std::max(for_loop.estop_window, panel_latency(options.panel_read_time));
+  return for_loop;
+}
+
+ApiOptions api_options(const DaemonOptions& options, const JobStore& store, JobLogs& logs, Preview& preview) {
+  auto for_api = options.api;
+  for_api.storage = store.options().root;
+  for_api.journal = [&logs](JournalEntry entry) { logs.write(std::move(entry)); };
+  for_api.preview_jpeg = [&preview](std::string_view side) {
+    return preview.jpeg(side == "left" ? Side::left : Side::right);
+  };
+  return for_api;
+}
+
+BundleOptions bundle_options(const DaemonOptions& options) {
+  auto for_bundles = options.bundle;
+  for_bundles.calibration_file = options.jobs.calibration_file;
+  for_bundles.reserve_bytes = options.jobs.reserve_bytes;
+  return for_bundles;
+}
+
+/// Objects that the threads of a run use, and that outlive them.
+struct Shared {
+  const DaemonOptions& options;
+  Clock& clock;
+  const JobStore& store;
+  ControlLoop& loop;
+  JobLogs& logs;
+  Preview& preview;
+  RecordedRun& record;
+};
+
+/// The threads of a run, all but the API's. They end in reverse order. The panel shows the last lamps, the rig's
+/// standstill is confirmed, views go to disk, then the reconstruction that all of them feed is stopped.
+struct Threads {
+  Threads(const Devices& devices, const Shared& shared)
+      : post_event([&loop = shared.loop](Event event) { loop.post(std::move(event)); }),
+        reconstruction(shared.clock, shared.options.reconstructor, post_event),
+        housekeeping(
+            shared.clock, shared.store, shared.options.retention,
+            [&loop = shared.loop] { return loop.snapshot()->jobs; }, post_event, bundle_options(shared.options)),
+        jobs(shared.clock, shared.store, reconstruction, shared.options.on_scanned, post_event),
+        attached(shared.logs, jobs),
+        rig(devices, shared.clock, shared.options.acquisition, shared.preview, post_event, shared.options.hang_margin),
+        outside(shared.clock, shared.options.stop_table_outside, post_event),
+        panel(devices.panel, shared.clock, {shared.options.panel_read_time, shared.options.hang_margin}, post_event,
+              [this] { rig.interrupt(); }) {
+    if (shared.options.webhook) webhook.emplace(shared.clock, *shared.options.webhook);
+  }
+  /// The call of a device that hangs.
+  [[nodiscard]] std::optional<HungCall> hung() const {
+    const auto call = rig.hung();
+    return call ? call : panel.hung();
+  }
+
+  const std::function<void(Event)> post_event;
+  ReconstructionThread reconstruction;
+  HousekeepingThread housekeeping;
+  JobThread jobs;
+  const Attached attached;
+  RigThread rig;
+  OutsideStop outside;
+  std::optional<Webhook> webhook;
+  PanelThread panel;
+};
+
+/// Longer work is kept away from the thread that stores views.
+void keep(const action::RunJobRequest& task, Threads& threads) {
+  using What = event::JobRequested::What;
+  const auto what = task.asked.what;
+  if (what == What::remove || what == What::bundle) return threads.housekeeping.post(task.asked);
+  threads.jobs.post(task);
+}
+
+void perform(const Action& action, Threads& threads) {
+  auto& rig = threads.rig;
+  std::visit(
+      Overloaded{[](const action::Warn&) {},  // these are the control loop's own
+                 [](const action::WaitForEstop&) {}, [](const action::RetryStopLater&) {},
+                 [](const action::EndConsentLater&) {}, [](const action::CheckLater&) {},
+                 [](const action::TestLamps&) {}, [](const action::WaitForFlip&) {},
+                 [&](const action::Home&) { rig.home(); }, [&](const action::StopRig&) { rig.stop(); },
+                 [&](const action::StopTableDirectly&) { rig.stop_directly(); },
+                 [&](const action::StopTableOutside&) { threads.outside.begin(); },
+                 [&](const action::TakeView& a) { rig.take_view(a); }, [&](const action::Jog& a) { rig.jog(a); },
+                 [&](const action::Pulse&) { rig.pulse(); }, [&](const action::CheckDevices&) { rig.check_devices(); },
+                 [&](const action::RunJobRequest& a) { keep(a, threads); },
+                 [&](const auto& task) { threads.jobs.post(task); }},
+      action);
+}
+
+/// Connections of the control loop to the rest of the service.
+StationPorts ports_of(const Shared& shared, Threads& threads, ApiServer& api) {
+  const auto perform_all = [&threads](const Action& action) {
+    perform(action, threads);
+    if (std::holds_alternative<action::StartJob>(action)) threads.housekeeping.sweep();
+  };
+  const auto store_latch = [&record = shared.record, &logs = shared.logs](const std::optional<Latch>& latch) {
+    if (auto stored = record.store(latch); !stored) {
+      logs.write({Priority::error, as_sentence(stored.error().message)});
+    }
+  };
+  const auto published = [shared, &threads, &api,
+                          last = shared.loop.snapshot()](const std::shared_ptr<const Snapshot>& snapshot) mutable {
+    for (auto& line : log_entries(*std::exchange(last, snapshot), *snapshot)) shared.logs.write(std::move(line));
+    if (threads.webhook) threads.webhook->look(snapshot);
+    shared.options.published(snapshot);
+    api.wake();
+  };
+  const auto refused = [shared](const event::Pressed& pressed, const Error& why) {
+    shared.logs.write(refused_at_panel(pressed, why, *shared.loop.snapshot()));
+  };
+  return {.alive = [shared] { shared.options.alive(shared.loop.snapshot()->sentence); },
+          .perform = perform_all,
+          .show = [&threads](const PanelOutputs& outputs) { threads.panel.show(outputs); },
+          .store_latch = store_latch,
+          .new_job_id = [new_id = NewIds(), &loop = shared.loop]() mutable { return new_id(loop.snapshot()->jobs); },
+          .quiet_hours = [shared] { return quiet_now(shared.options.quiet_hours); },
+          .disk_problem = [shared, &threads] { return disk_problem(threads.jobs.waiting(), shared.options); },
+          .rig_hangs = [&threads] { return threads.rig.hung(); },
+          .panel_hangs = [&threads] { return threads.panel.hung(); },
+          .published = published,
+          .refused_at_panel = refused};
+}
+
 }  // namespace
 
 Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, Clock& clock, std::stop_token stop) {
@@ -188,91 +292,27 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
   if (!known) return pass_on(known);
 
   RecordedRun record(options.state_folder);
-  const StationRules rules{.recipes = options.recipes,
-                           .remote = options.remote,
-                           .guard = options.guard,
-                           .auto_home = options.auto_home,
-                           .manual_light = options.manual_light};
-  ControlLoopOptions loop_options{.rules = rules,
-                                  .warning = options.warning,
-                                  .hang_limit = options.hang_limit,
-                                  .warm_up = options.warm_up,
-                                  .latch = record.latch()};
-  loop_options.estop_window = std::max(loop_options.estop_window, panel_latency(options.panel_read_time));
-  ControlLoop loop(clock, loop_options, *known);
-  const auto post_event = [&loop](Event event) { loop.post(std::move(event)); };
-
+  ControlLoop loop(clock, loop_options(options, record.latch()), *known);
   JobLogs logs(options.journal);
   const OnLoop reachable(options, loop);
   Preview preview(clock, [&loop] { return cameras_are_free(*loop.snapshot()); });
-  auto api_options = options.api;
-  api_options.storage = store->options().root;
-  api_options.journal = [&logs](JournalEntry entry) { logs.write(std::move(entry)); };
-  api_options.preview_jpeg = [&preview](std::string_view side) {
-    return preview.jpeg(side == "left" ? Side::left : Side::right);
-  };
-  auto api = ApiServer::start(api_options, loop);
+  auto api = ApiServer::start(api_options(options, *store, logs, preview), loop);
   if (!api) return pass_on(api);
   if (auto may = options.takes_devices(); !may) return pass_on(may);
   record.begin_devices();
 
-  // Time stands still until every thread runs. They end in reverse order. The panel shows the last lamps, the rig's
-  // standstill is confirmed, views go to disk, then the reconstruction that all of them feed is stopped.
-  std::optional<Clock::Busy> starting(clock);
-  ReconstructionThread reconstruction(clock, options.reconstructor, post_event);
-  go_on_reconstructing(*known, reconstruction);
-  auto in_bundle = options.bundle;
-  in_bundle.calibration_file = options.jobs.calibration_file;
-  in_bundle.reserve_bytes = options.jobs.reserve_bytes;
-  HousekeepingThread housekeeping(
-      clock, *store, options.retention, [&loop] { return loop.snapshot()->jobs; }, post_event, in_bundle);
-  housekeeping.sweep();
-  JobThread jobs(clock, *store, reconstruction, options.on_scanned, post_event);
-  const Attached attached(logs, jobs);
-  RigThread rig(devices, clock, options.acquisition, preview, post_event, options.hang_margin);
-  OutsideStop outside(clock, options.stop_table_outside, post_event);
-  const auto store_latch = [&](const std::optional<Latch>& latch) {
-    if (auto stored = record.store(latch); !stored) {
-      logs.write({Priority::error, as_sentence(stored.error().message)});
-    }
-  };
-  std::optional<Webhook> webhook;
-  if (options.webhook) webhook.emplace(clock, *options.webhook);
-  PanelThread panel(devices.panel, clock, {options.panel_read_time, options.hang_margin}, post_event,
-                    [&rig] { rig.interrupt(); });
-
+  std::optional<Clock::Busy> starting(clock);  // time does not pass until every thread runs
+  const Shared shared{options, clock, *store, loop, logs, preview, record};
+  Threads threads(devices, shared);
+  go_on_reconstructing(*known, threads.reconstruction);
+  threads.housekeeping.sweep();
   const std::stop_callback shut_down(stop, [&loop] { loop.post(event::Shutdown{}); });
   const Clock::Actor actor(clock);
   starting.reset();
-  const Workers workers{rig, outside, jobs, housekeeping};
-  NewIds new_id;
-  const auto perform_all = [&](const Action& action) {
-    perform(action, workers);
-    if (std::holds_alternative<action::StartJob>(action)) housekeeping.sweep();
-  };
-  const auto published = [&, told = loop.snapshot()](const std::shared_ptr<const Snapshot>& snapshot) mutable {
-    for (auto& line : log_entries(*std::exchange(told, snapshot), *snapshot)) logs.write(std::move(line));
-    if (webhook) webhook->look(snapshot);
-    options.published(snapshot);
-    (*api)->wake();
-  };
-  const auto refused = [&](const event::Pressed& pressed, const Error& why) {
-    logs.write(refused_at_panel(pressed, why, *loop.snapshot()));
-  };
-  auto ended = loop.run({.alive = [&] { options.alive(loop.snapshot()->sentence); },
-                         .perform = perform_all,
-                         .show = [&](const PanelOutputs& outputs) { panel.show(outputs); },
-                         .store_latch = store_latch,
-                         .new_job_id = [&] { return new_id(loop.snapshot()->jobs); },
-                         .quiet_hours = [&] { return quiet_now(options.quiet_hours); },
-                         .disk_problem = [&] { return disk_problem(jobs.waiting(), options); },
-                         .rig_hangs = [&] { return rig.hung(); },
-                         .panel_hangs = [&] { return panel.hung(); },
-                         .published = published,
-                         .refused_at_panel = refused});
-  const auto hung = ended ? std::nullopt : rig.hung() ? rig.hung() : panel.hung();
+  auto ended = loop.run(ports_of(shared, threads, **api));
+  const auto hung = ended ? std::nullopt : threads.hung();
   ending.begin(hung ? std::optional(hung_error(*hung)) : std::nullopt);
-  reconstruction.stop();  // before views that are still being stored use up its time
+  threads.reconstruction.stop();  // before views that are still being stored use up its time
   if (ended) record.end_devices();
   return ended;
 }

@@ -15,11 +15,11 @@
 #include "daemon/jobs/job_thread.h"
 #include "daemon/jobs/reconstructor.h"
 #include "daemon/jobs/retention.h"
-#include "daemon/journal/entry.h"
+#include "daemon/journal/journal.h"
 #include "daemon/rig/acquisition.h"
 #include "daemon/rig/devices.h"
 #include "daemon/station/control_loop.h"
-#include "daemon/webhook/http_post.h"
+#include "daemon/webhook/webhook.h"
 
 namespace scanrig {
 

@@ -24,11 +24,11 @@ Result<void> run(const std::filesystem::path& file, SignalStop& stop) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("scanrigd: the daemon of a scanning rig. Exit codes: docs/reference/exit-codes.md");
+  CLI::App app("scanrigd: the service of a scanning rig. Exit codes: docs/reference/exit-codes.md");
   std::filesystem::path config = "/etc/scanrig/rig.toml";
   bool make_safe = false, beside_daemon = false;
   app.add_option("--config", config, "the rig's configuration")->capture_default_str();
-  app.add_flag("--make-safe", make_safe, "stop the table, light off, red lamp; for when the daemon has ended");
+  app.add_flag("--make-safe", make_safe, "stop the table, light off, red lamp; for when the service has ended");
   app.add_flag("--beside-daemon", beside_daemon,
                "with --make-safe: use the turntable's port although a daemon that hangs still has it");
   try {

@@ -9,12 +9,13 @@
 #include "config/rig_config.h"
 #include "daemon/journal/journal.h"
 #include "daemon/runtime/signal_stop.h"
-#include "daemon/service/passed_sockets.h"
 #include "daemon/service/run_daemon.h"
-#include "daemon/service/service_manager.h"
-#include "daemon/service/sleep_inhibitor.h"
+#include "daemon/service/systemd.h"
 
 namespace scanrig {
+
+/// Options of the daemon from a rig's configuration.
+DaemonOptions options_from(const config::RigConfig& config);
 
 /// A program that runs the daemon under a configuration file. On SIGHUP or an API request it runs it again, in the same
 /// process, with the present file. The file is checked first. An unusable file or a bad time changes
@@ -29,7 +30,7 @@ class Service {
   Service(std::string name, std::filesystem::path file, config::Cameras cameras)
       : name_(std::move(name)), file_(std::move(file)), cameras_(cameras) {}
 
-  /// Runs until `stop`. Saves the configuration in use (rig/saved_config.h) before the daemon uses a device. Fails as
+  /// Runs until `stop`. Saves the configuration in use (rig/make_safe.h) before the daemon uses a device. Fails as
   /// read_rig_config(), `run` and save_config() do. If `run` does not reach the control loop under a changed
   /// configuration, the one before is restored.
   Result<void> run(SignalStop& stop, const Run& run);

@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "daemon/runtime/overloaded.h"
-#include "daemon/station/lamps.h"
 #include "daemon/station/operator_message.h"
 
 namespace scanrig {
@@ -66,7 +65,7 @@ Result<Ended> ControlLoop::run(const StationPorts& ports) {
   inbox_.close();
   if (lost_) return tl::unexpected(*lost_);
   if (!state_.finished || state_.may_be_moving) {
-    return fail(ErrorCode::timeout, "the rig was not seen stopped before the daemon ended: the table may be moving");
+    return fail(ErrorCode::timeout, "the rig was not seen stopped before the service ended: the table may be moving");
   }
   return state_.reloading ? Ended::reload : Ended::shut_down;
 }

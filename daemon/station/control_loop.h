@@ -7,8 +7,7 @@
 #include <string>
 
 #include "core/clock.h"
-#include "daemon/runtime/mailbox.h"
-#include "daemon/station/event_counter.h"
+#include "daemon/runtime/actor.h"
 #include "daemon/station/events.h"
 #include "daemon/station/snapshot.h"
 #include "daemon/station/transition.h"

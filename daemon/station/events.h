@@ -25,7 +25,7 @@ struct ViewId {
   bool operator==(const ViewId&) const = default;
 };
 
-struct TakenView;  // daemon/rig/taken_view.h
+struct TakenView;  // daemon/rig/acquisition.h
 
 /// Scans to be done: one job each.
 struct JobOrder {

@@ -39,9 +39,8 @@ void jog(StepBuilder& m, const event::MaintenanceRequested& asked) {
   auto& maintenance = *m.s().maintenance;
   if (!m.require_safe()) return;
   if (!maintenance.may_jog(m.rules().guard)) {
-    return m.refuse(
-        ErrorCode::refused,
-        "A jog needs somebody at the panel, or a guard that stayed closed: press Reset at the panel first.");
+    return m.refuse(ErrorCode::refused,
+                    "Without a closed guard a jog needs an operator at the panel: press Reset there first.");
   }
   const bool is_by_guard = m.rules().guard && !maintenance.guard_was_opened;
   if (!is_by_guard && asked.requester != maintenance.requester) {

@@ -17,11 +17,10 @@ void moved(StepBuilder& m, const MovementCheck& movement_check) {
   const bool resuming = job.taken < job.recipe.views;
   const Error why{
       ErrorCode::moved,
-      fmt::format(
-          "the object, the table or a camera has moved during pose {}: view 0, taken again, is off by {} px and "
-          "differs on {:.0f} % of what it shows; scan the object again",
-          job.pose + 1, movement_check.shift_px > 1.0 ? "more than 1" : fmt::format("{:.2f}", movement_check.shift_px),
-          100 * movement_check.changed)};
+      fmt::format("something moved in pose {} ({} px, {:.0f} % of the image changed); scan the part again",
+                  job.pose + 1,
+                  movement_check.shift_px > 1.0 ? "more than 1" : fmt::format("{:.2f}", movement_check.shift_px),
+                  100 * movement_check.changed)};
   const std::string cause = fmt::format("Job {}: {}.", job.id, why.message);
   if (!resuming) count_result(m, job.id, false);
   m.close_job(resuming ? JobState::interrupted : JobState::failed, why);

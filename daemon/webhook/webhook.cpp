@@ -1,12 +1,98 @@
 #include "daemon/webhook/webhook.h"
 
+#include <boost/asio/connect.hpp>
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/beast/core/flat_buffer.hpp>
+#include <boost/beast/core/tcp_stream.hpp>
+#include <boost/beast/http.hpp>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <thread>
 #include <utility>
 
-#include "daemon/runtime/actor_thread.h"
+#include "daemon/runtime/actor.h"
 
 namespace scanrig {
 namespace {
+
+namespace net = boost::asio;
+namespace beast = boost::beast;
+namespace http = beast::http;
+using Tcp = net::ip::tcp;
+
+struct Lookup {
+  std::mutex mutex;
+  std::condition_variable_any changed;
+  bool over = false;
+  boost::system::error_code error;
+  Tcp::resolver::results_type found;
+};
+
+/// A name server may take any time, and the C library's look-up cannot be cancelled. It has a separate thread,
+/// and a caller that stops waiting abandons it.
+std::shared_ptr<Lookup> look_up(const HttpAddress& address) {
+  auto lookup = std::make_shared<Lookup>();
+  std::thread([lookup, host = address.host, port = address.port] {
+    boost::system::error_code error;
+    Tcp::resolver::results_type found;
+    try {
+      net::io_context io;
+      found = Tcp::resolver(io).resolve(host, port, error);
+    } catch (const boost::system::system_error& e) {
+      error = e.code();
+    }
+    const std::lock_guard guard(lookup->mutex);
+    lookup->error = error;
+    lookup->found = std::move(found);
+    lookup->over = true;
+    lookup->changed.notify_all();
+  }).detach();
+  return lookup;
+}
+
+/// One exchange, step by step; every step runs in the io_context of the caller.
+class Exchange {
+ public:
+  Exchange(net::io_context& io, const HttpAddress& address, const Tcp::resolver::results_type& found,
+           const std::string& json)
+      : stream_(io) {
+    request_ = {http::verb::post, address.path, 11};
+    request_.set(http::field::host, address.host);
+    request_.set(http::field::content_type, "application/json");
+    request_.keep_alive(false);
+    request_.body() = json;
+    request_.prepare_payload();
+    stream_.async_connect(found, [this](auto error, const auto&) {
+      if (!end(error)) write();
+    });
+  }
+
+  /// Empty while it is not over.
+  std::optional<boost::system::error_code> ended{};
+  http::response<http::string_body> response;
+
+ private:
+  bool end(boost::system::error_code error) {
+    if (error) ended = error;
+    return ended.has_value();
+  }
+  void write() {
+    http::async_write(stream_, request_, [this](auto error, auto) {
+      if (!end(error)) read();
+    });
+  }
+  void read() {
+    http::async_read(stream_, buffer_, response, [this](auto error, auto) { ended = error; });
+  }
+
+  beast::tcp_stream stream_;
+  beast::flat_buffer buffer_{64 * 1024};
+  http::request<http::string_body> request_;
+};
 
 constexpr int kTries = 3;
 constexpr auto kLimit = std::chrono::seconds(5);
@@ -28,6 +114,36 @@ std::string news_of(const JobInfo& job) {
 }
 
 }  // namespace
+
+Result<void> http_post(const HttpAddress& address, const std::string& json, std::chrono::milliseconds limit,
+                       const std::stop_token& stop) {
+  const auto end = std::chrono::steady_clock::now() + limit;
+  const auto failed = [&](boost::system::error_code error) {
+    return fail(ErrorCode::io, "{}:{}: {}", address.host, address.port, error.message());
+  };
+  const auto unanswered = [&] {
+    if (stop.stop_requested()) return fail(ErrorCode::stopped, "{}:{}: stopped", address.host, address.port);
+    return fail(ErrorCode::timeout, "{}:{} did not answer within {} ms", address.host, address.port, limit.count());
+  };
+  try {
+    const auto lookup = look_up(address);
+    std::unique_lock lock(lookup->mutex);
+    if (!lookup->changed.wait_until(lock, stop, end, [&] { return lookup->over; })) return unanswered();
+    if (lookup->error) return failed(lookup->error);
+
+    net::io_context io;
+    Exchange exchange(io, address, lookup->found, json);
+    const std::stop_callback stopping(stop, [&io] { io.stop(); });
+    io.run_until(end);
+    if (!exchange.ended) return unanswered();
+    if (*exchange.ended) return failed(*exchange.ended);
+    const auto status = exchange.response.result_int();
+    if (status / 100 == 2) return {};
+    return fail(ErrorCode::protocol, "{}:{} answered with {}", address.host, address.port, status);
+  } catch (const std::exception& e) {
+    return fail(ErrorCode::io, "{}:{}: {}", address.host, address.port, e.what());
+  }
+}
 
 std::vector<std::string> alerts(const Snapshot& before, const Snapshot& now) {
   std::vector<std::string> log_entries;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <memory>
 #include <mutex>
@@ -9,11 +10,20 @@
 #include <vector>
 
 #include "core/clock.h"
-#include "daemon/runtime/mailbox.h"
+#include "core/result.h"
+#include "daemon/runtime/actor.h"
 #include "daemon/station/snapshot.h"
-#include "daemon/webhook/http_post.h"
 
 namespace scanrig {
+
+struct HttpAddress {
+  std::string host, port, path;
+};
+
+/// Sends `json` by POST. Fails with `timeout` (of the whole exchange, the look-up of the name included), `io` (cannot
+/// connect, cut off), `protocol` (a reply other than 2xx). `stopped` comes at once, whatever it is waiting for.
+Result<void> http_post(const HttpAddress& address, const std::string& json, std::chrono::milliseconds limit,
+                       const std::stop_token& stop = {});
 
 /// Messages for the change between two snapshots, as JSON: a job that failed, was interrupted or did not pass, and a
 /// fault of the machine.

@@ -3,8 +3,8 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "daemon/api/request_target.h"
-#include "daemon/api/router.h"
+#include "daemon/api/request.h"
+#include "daemon/api/route.h"
 
 namespace {
 

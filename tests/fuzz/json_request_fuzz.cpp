@@ -4,8 +4,8 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "daemon/api/field.h"
-#include "daemon/api/router.h"
+#include "daemon/api/request.h"
+#include "daemon/api/route.h"
 
 namespace {
 

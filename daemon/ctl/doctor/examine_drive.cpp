@@ -21,13 +21,13 @@ void find_out_who_is_there(const ModbusTurntableOptions& options, Clock& clock, 
   if (const auto grbl = grbl_answer(line.device, clock)) {
     return report.find(
         "swapped_adapter",
-        fmt::format("At {} a GRBL controller answers ({}), not a {} drive.", line.device, *grbl, options.profile.name),
+        fmt::format("At {} a GRBL controller responds ({}), not a {} drive.", line.device, *grbl, options.profile.name),
         "Is the right adapter named in [turntable]? If this is the turntable, set driver = \"grbl\".");
   }
   const auto found = find_modbus(line, options.profile.status.address, options.profile.max_unit_id, clock);
   if (!found) {
     return report.find("no_answer",
-                       fmt::format("Nothing answers at {}: no Modbus device with any parity, speed or unit id, and no "
+                       fmt::format("Nothing responds at {}: no Modbus device with any parity, speed or unit id, and no "
                                    "GRBL controller.",
                                    line.device),
                        "Check the drive's power, A and B of the RS-485 line, its termination, and that this is the "
@@ -36,7 +36,7 @@ void find_out_who_is_there(const ModbusTurntableOptions& options, Clock& clock, 
   if (!found->knows_register) {
     return report.find(
         "swapped_adapter",
-        fmt::format("At {} unit {} answers, but it has no register 0x{:04X}: it is not a {} drive.", line.device,
+        fmt::format("At {} unit {} responds, but it has no register 0x{:04X}: it is not a {} drive.", line.device,
                     found->line.unit_id, options.profile.status.address, options.profile.name),
         "The adapters are swapped, or the profile is wrong: name the drive's adapter in [turntable].");
   }
@@ -49,17 +49,18 @@ void find_out_who_is_there(const ModbusTurntableOptions& options, Clock& clock, 
   if (found->line.baud != line.baud) {
     return report.find(
         "wrong_baud",
-        fmt::format("The drive at {} answers at {} baud with parity {}, the configuration says {}.", line.device,
+        fmt::format("The drive at {} responds at {} baud with parity {}, the configuration says {}.", line.device,
                     found->line.baud, word(found->line.parity), line.baud),
         fmt::format("Set baud = {} and parity = \"{}\" in [turntable].", found->line.baud, word(found->line.parity)));
   }
   if (found->line.parity != line.parity) {
     return report.find("wrong_parity",
-                       fmt::format("The drive at {} answers with parity {}, the configuration says {}.", line.device,
+                       fmt::format("The drive at {} responds with parity {}, the configuration says {}.", line.device,
                                    word(found->line.parity), word(line.parity)),
                        fmt::format("Set parity = \"{}\" in [turntable].", word(found->line.parity)));
   }
-  report.find("unreliable_line", fmt::format("The drive at {} answers some requests only as configured.", line.device),
+  report.find("unreliable_line",
+              fmt::format("The drive at {} responds to some requests only as configured.", line.device),
               "Check termination, shielding and the length of the RS-485 line.");
 }
 
@@ -114,7 +115,7 @@ bool examine_grbl(const config::RigConfig& rig, Clock& clock, Report& report) {
     report.find("silent", status.error().message + ".", "Check power, wiring and baud of the controller.");
     return false;
   }
-  report.note("it answers as GRBL 1.1 does");
+  report.note("it responds as GRBL 1.1 does");
   if (!status->alarm.empty()) {
     report.find("drive_alarm", fmt::format("The controller reports an alarm: {}.", status->alarm),
                 "Remove its cause; Reset at the panel clears it.");

@@ -114,11 +114,11 @@ Result<void> home_and_turn(Turntable& table, std::initializer_list<double> degre
 }
 
 void check_sign(const config::RigConfig& rig, const Operator& person, Report& report) {
-  const auto said = person.ask(
+  const auto said = person.prompt(
       "The table was told to go home and then a quarter turn counter-clockwise. Seen from "
       "above, which way did the quarter turn go? [ccw/cw]");
   if (!said || (*said != "ccw" && *said != "cw")) {
-    return report.note("sign: not checked, nobody has said which way the table turned");
+    return report.note("sign: not checked, no direction was entered");
   }
   const char* configured = rig.turntable.motion().scale.positive_ccw ? "ccw" : "cw";
   report.note(fmt::format("sign: told counter-clockwise, seen {}", *said));
@@ -163,7 +163,7 @@ Result<void> check_gear_by_switch(const Rig& rig, Clock& clock, Report& report) 
 /// meanwhile, so there are two motions; home is the same place in both.
 Result<void> check_gear_by_mark(const Rig& rig, const Operator& person, Clock& clock, Report& report) {
   if (!person.there()) {
-    report.note("gear: not checked, nobody is here to watch a mark on the table");
+    report.note("gear: not checked, no operator to watch a mark on the table");
     return {};
   }
   const auto turn_to = [&](std::initializer_list<double> degrees) {
@@ -172,14 +172,14 @@ Result<void> check_gear_by_mark(const Rig& rig, const Operator& person, Clock& c
     });
   };
   if (auto moved = turn_to({0}); !moved) return moved;
-  std::ignore = person.ask("Put a mark on the table and one on the base beside it, keep clear, then press Enter.");
+  std::ignore = person.prompt("Put a mark on the table and one on the base beside it, keep clear, then press Enter.");
   if (auto moved = turn_to({120, 240, 0}); !moved) return moved;
-  const auto said = person.ask(
+  const auto said = person.prompt(
       "The table was told to make one whole turn. By how many degrees is its mark away from the other one? [0; -10: "
       "it stopped 10 degrees short; 10: it went 10 degrees too far]");
   double off_deg = 0.0;
   if (!said || std::sscanf(said->c_str(), "%lf", &off_deg) != 1 || std::abs(off_deg) >= 360.0) {
-    report.note("gear: not checked, nobody has said where the mark stopped");
+    report.note("gear: not checked, no angle of the mark was entered");
     return {};
   }
   const double configured = rig.config.turntable.motion().scale.gear_ratio;

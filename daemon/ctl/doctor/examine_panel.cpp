@@ -47,13 +47,13 @@ void check_estop(const config::RigConfig& rig, Panel& panel, bool drive_answers,
                  Report& report) {
   const std::string line = name_of(rig.safety.estop);
   if (!person.there()) {
-    return report.note("e-stop: its button was not tried, nobody is there to press it");
+    return report.note("e-stop: its button was not tried, no operator to press it");
   }
   person.tell(fmt::format("Press the emergency stop within {} s and leave it pressed.", kPressLimit.count()));
   const auto pressed = wait_for_estop(panel, false, clock);
   if (!pressed) return report.find("panel", pressed.error().message + ".", "Check the panel's wiring.");
   if (!*pressed) {
-    std::ignore = person.ask("Release the emergency stop, then press Enter.");
+    std::ignore = person.prompt("Release the emergency stop, then press Enter.");
     return report.find("estop_not_wired",
                        fmt::format("The emergency stop was to be pressed, and its input ({}) did not change.", line),
                        "Wire the second, normally closed contact of the emergency stop to this input; look for a "
@@ -61,7 +61,7 @@ void check_estop(const config::RigConfig& rig, Panel& panel, bool drive_answers,
   }
   report.note(fmt::format("e-stop: its input ({}) follows the button", line));
   if (drive_answers && drive_still_enabled(rig, clock)) {
-    report.find("estop_keeps_power", "The emergency stop is pressed, and the drive still answers and is enabled.",
+    report.find("estop_keeps_power", "The emergency stop is pressed, and the drive still responds and is enabled.",
                 "The emergency stop must take the motor's power away by a relay or the drive's STO input.");
   }
   person.tell("Release the emergency stop.");

@@ -1,7 +1,4 @@
-#include "daemon/ctl/doctor/examine.h"
-
 #include <fcntl.h>
-#include <fmt/format.h>
 #include <grp.h>
 #include <linux/gpio.h>
 #include <pwd.h>
@@ -9,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <array>
 #include <cerrno>
@@ -16,6 +14,7 @@
 #include <vector>
 
 #include "core/files.h"
+#include "daemon/ctl/doctor/examine.h"
 
 namespace scanrig::ctl::doctor {
 namespace {
@@ -195,7 +194,7 @@ void print_missing_snippets(const fs::path& device, const fs::path& config, Repo
                                                                  : "scanrig/turntable"));
   }
   if (unit_is_installed()) return;
-  report.section("Missing: the daemon's unit, /etc/systemd/system/scanrigd.service");
+  report.section("Missing: the service's unit, /etc/systemd/system/scanrigd.service");
   const auto file = fs::absolute(config).string();
   for (const auto& line :
        {std::string("[Service]"), "ExecStart=/usr/bin/scanrigd --config " + file,

@@ -9,9 +9,9 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "daemon/api/access.h"
 #include "daemon/api/server.h"
 #include "daemon/api/socket_file.h"
-#include "daemon/api/tokens.h"
 #include "tests/unit/daemon/api/station_without_rig.h"
 #include "tests/unit/pipeline/storage/scan_samples.h"
 

@@ -40,7 +40,7 @@ TEST_F(RefusedOrders, AreToldWithWhoAskedWhatAndWhy) {
   const auto log = told();
   ASSERT_EQ(log.size(), 1u);
   EXPECT_EQ(log[0].priority, Priority::notice);
-  EXPECT_THAT(log[0].message, testing::StartsWith("POST /api/v1/start, asked for by " + me +
+  EXPECT_THAT(log[0].message, testing::StartsWith("POST /api/v1/start, requested by " + me +
                                                   " (engineer), is refused: The rig is Preoperational"));
   EXPECT_EQ(log[0].job, "");
 }
@@ -48,17 +48,17 @@ TEST_F(RefusedOrders, AreToldWithWhoAskedWhatAndWhy) {
 TEST_F(RefusedOrders, NameTheJobTheyAreAbout) {
   EXPECT_EQ(ask(local(), request("POST", "/api/v1/jobs/old/resume")).status, 409);
   EXPECT_EQ(ask(local(), request("DELETE", "/api/v1/jobs/new")).status, 404);
-  EXPECT_THAT(told(), ElementsAre(AllOf(says("POST /api/v1/jobs/old/resume, asked for by " + me +
+  EXPECT_THAT(told(), ElementsAre(AllOf(says("POST /api/v1/jobs/old/resume, requested by " + me +
                                              " (engineer), is refused: there is no rig"),
                                         Field(&JournalEntry::job, "old")),
-                                  AllOf(says("DELETE /api/v1/jobs/new, asked for by " + me +
+                                  AllOf(says("DELETE /api/v1/jobs/new, requested by " + me +
                                              " (engineer), is refused: there is no job of that name"),
                                         Field(&JournalEntry::job, ""))));
 }
 
 TEST_F(RefusedOrders, ForWantOfARoleAreToldToo) {
   EXPECT_EQ(ask(tcp(), request("POST", "/api/v1/maintenance/on", tokens[Role::viewer])).status, 403);
-  EXPECT_THAT(told(), ElementsAre(says("POST /api/v1/maintenance/on, asked for by 127.0.0.1 (viewer), is refused: "
+  EXPECT_THAT(told(), ElementsAre(says("POST /api/v1/maintenance/on, requested by 127.0.0.1 (viewer), is refused: "
                                        "this needs the role engineer; yours is viewer")));
 }
 

@@ -65,7 +65,7 @@ TEST_F(AcquisitionTest, ALostExposureIsRedoneAndNamed) {
   EXPECT_EQ(view->record.retake_reasons[0].code, ErrorCode::timeout);
   EXPECT_FALSE(view->record.retake_reasons[0].message.empty());
   EXPECT_EQ(rig.line.exposures, 4);
-  EXPECT_EQ(view->images.left_pattern.at<unsigned char>(0, 0), 200) << "the redone exposure is the pattern again";
+  EXPECT_EQ(view->images.left_pattern.at<unsigned char>(0, 0), 200) << "the retake is the pattern again";
 }
 
 TEST_F(AcquisitionTest, ACameraThatStaysSilentFailsTheView) {
@@ -74,7 +74,7 @@ TEST_F(AcquisitionTest, ACameraThatStaysSilentFailsTheView) {
   const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
   ASSERT_FALSE(view);
   EXPECT_EQ(view.error().code, ErrorCode::timeout);
-  EXPECT_EQ(rig.line.exposures, 4) << "one and three redone";
+  EXPECT_EQ(rig.line.exposures, 4) << "one and three retakes";
 }
 
 TEST_F(AcquisitionTest, ADarkPictureIsRedoneAndFailsTheViewByNameWhenItStaysDark) {
@@ -83,13 +83,12 @@ TEST_F(AcquisitionTest, ADarkPictureIsRedoneAndFailsTheViewByNameWhenItStaysDark
   const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
   ASSERT_TRUE(view) << view.error().message;
   ASSERT_EQ(view->record.retake_reasons.size(), 3u);
-  EXPECT_TRUE(view->record.retake_reasons.back().message.starts_with("right camera: the picture in the dots is dark"));
+  EXPECT_TRUE(view->record.retake_reasons.back().message.starts_with("right camera: the pattern image is dark"));
   rig.line.dark = 100;
   const auto next = acquisition.take_view({"job", 0, 1}, {45.0});
   ASSERT_FALSE(next);
   EXPECT_EQ(next.error().code, ErrorCode::protocol);
-  EXPECT_TRUE(next.error().message.starts_with("right camera: the picture in the dots is dark"))
-      << next.error().message;
+  EXPECT_TRUE(next.error().message.starts_with("right camera: the pattern image is dark")) << next.error().message;
 }
 
 TEST_F(AcquisitionTest, AnExposureDuringWhichTheCameraVanishedIsRedone) {

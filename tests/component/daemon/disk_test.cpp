@@ -178,7 +178,7 @@ TEST_F(BadDisk, HangingItIsNamedInTimeAndTheJobGoesOnWhenItAnswers) {
 
   rig.panel.press(&PanelInputs::reset);
   ASSERT_TRUE(wait_ready()) << "the rig itself is well";
-  EXPECT_EQ(ask(JobOrder{}).error().code, ErrorCode::io) << "nobody is kept waiting for it";
+  EXPECT_EQ(ask(JobOrder{}).error().code, ErrorCode::io) << "no client is kept waiting for it";
   EXPECT_EQ(resume(id).error().code, ErrorCode::io);
   const auto before = exposures();
   rig.panel.press(&PanelInputs::start);

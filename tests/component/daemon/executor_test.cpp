@@ -161,7 +161,7 @@ TEST_F(Executor, TheDaemonsDeathIsTriedOnceMoreThenTheJobIsInQuarantine) {
   EXPECT_TRUE(job(id)->quarantined);
   EXPECT_THAT(job(id)->error->message, HasSubstr("quarantine"));
   EXPECT_TRUE(ask(event::JobRequested{.what = What::reprocess, .job = id}));
-  EXPECT_TRUE(wait_state(id, JobState::done)) << "somebody asked for another try";
+  EXPECT_TRUE(wait_state(id, JobState::done)) << "a client requested another try";
 }
 
 TEST_F(Executor, AScanThatGoesOnInQuarantineTakesItsViewsAndSaysSo) {
@@ -259,7 +259,7 @@ TEST_F(Executor, AJobThatWouldNeedTooMuchMemoryIsRefusedBeforeItStarts) {
   boot();
   get_ready();
   rig.panel.press(&PanelInputs::start);
-  ASSERT_TRUE(wait_fail()) << "and nobody turns the object over for nothing";
+  ASSERT_TRUE(wait_fail()) << "and no operator turns the part over for nothing";
   EXPECT_THAT(newest()->error->message, HasSubstr("12 GiB"));
 }
 

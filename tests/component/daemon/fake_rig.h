@@ -93,7 +93,7 @@ class FakeTurntable final : public Turntable {
       return fail(ErrorCode::stopped, "turntable: stopped on request");
     }
     if (stalled) return fail(ErrorCode::stalled, "turntable: no progress for 2 s");
-    if (until < arrival) return fail(ErrorCode::timeout, "turntable: not there in time");
+    if (until < arrival) return fail(ErrorCode::timeout, "turntable: not in position in time");
     angle_ = target;
     return Move{{target}, {target + 0.01}, arrival - start, std::chrono::milliseconds(200)};
   }

@@ -8,7 +8,7 @@
 
 #include "core/clock.h"
 #include "daemon/rig/devices.h"
-#include "daemon/runtime/actor_thread.h"
+#include "daemon/runtime/actor.h"
 
 namespace scanrig::fakes {
 

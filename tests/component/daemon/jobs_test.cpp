@@ -108,7 +108,7 @@ TEST_F(Jobs, AReconstructionCanBeCancelledAndTheModelBeMadeLater) {
   ASSERT_TRUE(wait_state(id, JobState::cancelled)) << to_string(job(id)->state);
   EXPECT_TRUE(answer) << answer.error().message;
   restart();
-  EXPECT_EQ(job(id)->state, JobState::cancelled) << "it does not begin again by itself";
+  EXPECT_EQ(job(id)->state, JobState::cancelled) << "it does not restart";
   EXPECT_EQ(job(id)->error->message, "cancelled on request");
 
   log.at_finish = [] {};

@@ -230,7 +230,7 @@ TEST_F(LoggedDaemon, IsNotHeldUpByALogThatStalls) {
     boot();
     get_ready();
     scan_both_poses();
-    EXPECT_TRUE(wait_pass()) << "a whole job, and nobody has read a line";
+    EXPECT_TRUE(wait_pass()) << "a whole job, and no line was read";
     shut_down();
     EXPECT_EQ(written, 0);
     goes_on.set_value();

@@ -113,7 +113,7 @@ TEST_F(Daemon, APanelThatHangsStopsTheTableAndIsNamed) {
   ASSERT_TRUE(clock_waits_for([&] {
     return !std::ranges::find(snapshot()->devices, "panel", &DeviceHealth::name)->problem;
   })) << "a button that is down when a panel comes back is no press";
-  EXPECT_TRUE(wait_fault()) << "the fault stays until somebody has seen to it";
+  EXPECT_TRUE(wait_fault()) << "the fault stays until the operator resets it";
   rig.panel.press(&PanelInputs::reset);
   ASSERT_TRUE(wait_ready());
 }

@@ -56,7 +56,7 @@ TEST_F(Programs, EveryVerbGivesUpOnADaemonThatWasStopped) {
   }
   for (auto& client : clients) EXPECT_EQ(client.wait(), code_of(ExitCode::unreachable));
   for (const auto& file : outputs) {
-    EXPECT_THAT(*read_file(file), HasSubstr("api.sock: the daemon has not answered within 15 s; see what"));
+    EXPECT_THAT(*read_file(file), HasSubstr("api.sock: the service has not responded within 15 s; check"));
   }
   daemon->signal(SIGCONT);
   EXPECT_EQ(scanrig({"status", "--socket", socket()}), 0) << output;

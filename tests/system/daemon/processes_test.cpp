@@ -126,7 +126,7 @@ TEST_F(Programs, WatchTellsWhatChangesUntilItIsInterrupted) {
   EXPECT_TRUE(watched("disk "));
   daemon->signal(SIGTERM);
   daemon->wait();
-  EXPECT_TRUE(watched("is the daemon running?")) << "it goes on without one";
+  EXPECT_TRUE(watched("is the service running?")) << "it goes on without one";
   watch.signal(SIGINT);
   EXPECT_EQ(watch.wait(), 0);
   EXPECT_THAT(*read_file(folder_ / "watched"), Not(HasSubstr("\x1b"))) << "a file is no terminal";

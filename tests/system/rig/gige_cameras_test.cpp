@@ -92,7 +92,7 @@ TEST_F(CamerasOnWires, PicturesThatAreDarkBlurredOrOfTheOtherSideAreRedone) {
   begin_scan();
   ASSERT_TRUE(wait_stored(1)) << log();
   EXPECT_GE(job()["stored"][0]["retakes"], 2);
-  EXPECT_THAT(job()["stored"][0]["retake_reasons"].dump(), HasSubstr("right camera: the picture in the dots is dark"));
+  EXPECT_THAT(job()["stored"][0]["retake_reasons"].dump(), HasSubstr("right camera: the pattern image is dark"));
   spoil("swapped", 2);
   ASSERT_TRUE(wait_stored(3)) << log();
   spoil("blurred", 2);
@@ -109,7 +109,7 @@ TEST_F(CamerasOnWires, ACameraThatStaysDarkEndsTheJobInItsName) {
   spoil("dark", 100);
   begin_scan();
   ASSERT_TRUE(soon([&] { return !jobs().empty() && jobs().back()["state"] == "interrupted"; })) << log();
-  EXPECT_THAT(job()["error"]["message"].get<std::string>(), HasSubstr("right camera: the picture in the dots is dark"));
+  EXPECT_THAT(job()["error"]["message"].get<std::string>(), HasSubstr("right camera: the pattern image is dark"));
 }
 
 TEST_F(CamerasOnWires, ACameraPulledInAScanInterruptsTheJobAndIsBackWithoutARestart) {

@@ -1,5 +1,5 @@
 // Messages of the daemon to systemd, received on the socket that systemd would use.
-#include "daemon/service/service_manager.h"
+#include "daemon/service/systemd.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

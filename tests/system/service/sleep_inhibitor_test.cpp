@@ -1,5 +1,5 @@
 // The lock against sleep, with a bus of the test's own and a logind that is a thread of the test.
-#include "daemon/service/sleep_inhibitor.h"
+#include "daemon/service/systemd.h"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>

@@ -1,4 +1,4 @@
-#include "daemon/station/event_counter.h"
+#include "daemon/station/snapshot.h"
 
 #include <gtest/gtest.h>
 

@@ -59,9 +59,9 @@ TEST_F(Follow, EachViewIsToldOnce) {
   EXPECT_EQ(text(),
             "Job J\n"
             "  pose 1/2  view 1/8    45.010 deg  stored\n"
-            "  pose 1/2  view 2/8    45.010 deg  stored, 2 exposures redone\n"
-            "      redone: left camera: no frame in time\n"
-            "      redone: left camera: no frame in time\n");
+            "  pose 1/2  view 2/8    45.010 deg  stored, 2 exposures retaken\n"
+            "      retaken: left camera: no frame in time\n"
+            "      retaken: left camera: no frame in time\n");
 }
 
 TEST_F(Follow, AMovementCheckIsToldWithWhatWasRedone) {
@@ -73,8 +73,8 @@ TEST_F(Follow, AMovementCheckIsToldWithWhatWasRedone) {
   for (int i = 0; i < 2; ++i) story.tell(status, j);
   EXPECT_EQ(text(),
             "Job J\n"
-            "  pose 1/2  view 1 again  nothing moved, off by 0.04 px, 1 exposure redone\n"
-            "      redone: left camera: no frame in time\n"
+            "  pose 1/2  view 1 again  nothing moved, off by 0.04 px, 1 exposure retaken\n"
+            "      retaken: left camera: no frame in time\n"
             "  pose 2/2  view 1 again  MOVED, off by 3.50 px\n");
 }
 

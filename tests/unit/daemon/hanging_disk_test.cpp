@@ -12,7 +12,7 @@ using testing::HasSubstr;
 class HangingDisk : public Station {
  protected:
   void hang() {
-    tell(event::DiskChecked{Error{ErrorCode::io, "the disk with /jobs has not answered for 30 s: see to it"}});
+    tell(event::DiskChecked{Error{ErrorCode::io, "the disk with /jobs has not responded for 30 s; check it"}});
   }
   void expect_interrupted() {
     ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
@@ -30,7 +30,7 @@ TEST_F(HangingDisk, InterruptsTheScanAndStopsTheRig) {
   expect_interrupted();
   EXPECT_NE(asked_for<action::StopRig>(), nullptr);
   EXPECT_EQ(state.machine, MachineState::halted);
-  EXPECT_THAT(state.cause, HasSubstr("for 30 s: see to it, then resume the job."));
+  EXPECT_THAT(state.cause, HasSubstr("for 30 s; check it, then resume the job."));
 }
 
 TEST_F(HangingDisk, InterruptsTheJobWhereNothingMovesToo) {
@@ -51,7 +51,7 @@ TEST_F(HangingDisk, BeginsNothingUntilItAnswers) {
   const auto expect_refused = [&] {
     ASSERT_TRUE(refused);
     EXPECT_EQ(refused->code, ErrorCode::io);
-    EXPECT_THAT(refused->message, HasSubstr("/jobs has not answered for 30 s: see to it"));
+    EXPECT_THAT(refused->message, HasSubstr("/jobs has not responded for 30 s; check it"));
     EXPECT_TRUE(actions.empty());
   };
   press(Button::start);

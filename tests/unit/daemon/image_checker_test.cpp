@@ -35,15 +35,14 @@ TEST_F(PictureJudgeTest, GoodPicturesPassAndSoDoThoseNobodyMeasured) {
 }
 
 TEST_F(PictureJudgeTest, ADarkPictureIsNamedWithItsSideAndLight) {
-  expect_refused(Light::pattern, frame(kGood, {0.012, 0.0, 1.2}),
-                 "right camera: the picture in the dots is dark (0.012");
-  expect_refused(Light::plain, frame({0.012, 0.0, 1.2}, kGood), "left camera: the picture in even light is dark");
+  expect_refused(Light::pattern, frame(kGood, {0.012, 0.0, 1.2}), "right camera: the pattern image is dark (0.012");
+  expect_refused(Light::plain, frame({0.012, 0.0, 1.2}, kGood), "left camera: the plain image is dark");
 }
 
 TEST_F(PictureJudgeTest, APictureMuchDarkerThanTheViewsBeforeIsDark) {
   ASSERT_TRUE(image_checker_.judge(Light::plain, frame({0.30, 0.0, 1.2}, {0.30, 0.0, 1.2})));
   EXPECT_TRUE(image_checker_.judge(Light::pattern, frame({0.10, 0.0, 1.2}, {0.10, 0.0, 1.2})))
-      << "the dots are another light";
+      << "the pattern is another light";
   expect_refused(Light::plain, frame({0.30, 0.0, 1.2}, {0.10, 0.0, 1.2}), "0.100 of full scale, 0.300 in the views");
   image_checker_.begin();
   EXPECT_TRUE(image_checker_.judge(Light::plain, frame({0.10, 0.0, 1.2}, {0.10, 0.0, 1.2})))
@@ -51,19 +50,18 @@ TEST_F(PictureJudgeTest, APictureMuchDarkerThanTheViewsBeforeIsDark) {
 }
 
 TEST_F(PictureJudgeTest, AnOverexposedPictureIsNamed) {
-  expect_refused(Light::plain, frame(kGood, {0.9, 0.4, 1.2}), "right camera: the picture in even light is overexposed");
+  expect_refused(Light::plain, frame(kGood, {0.9, 0.4, 1.2}), "right camera: the plain image is overexposed");
 }
 
 TEST_F(PictureJudgeTest, APictureMoreBlurredThanTheViewsBeforeIsNamed) {
   for (int i = 0; i < 3; ++i) ASSERT_TRUE(image_checker_.judge(Light::pattern, frame(kGood, kGood)));
-  expect_refused(Light::pattern, frame({0.05, 0.0, 2.3}, kGood),
-                 "left camera: the picture in the dots is blurred (2.3 px");
+  expect_refused(Light::pattern, frame({0.05, 0.0, 2.3}, kGood), "left camera: the pattern image is blurred (2.3 px");
   EXPECT_TRUE(image_checker_.judge(Light::plain, frame({0.05, 0.0, 2.3}, kGood)))
       << "an object may have no fine texture";
 }
 
 TEST_F(PictureJudgeTest, OnePictureOnBothSidesIsNamed) {
-  expect_refused(Light::pattern, frame(kGood, kGood, 0.8), "left and right show the same picture");
+  expect_refused(Light::pattern, frame(kGood, kGood, 0.8), "left and right show the same image");
   EXPECT_TRUE(image_checker_.judge(Light::plain, frame(kGood, kGood, 0.8))) << "evenly lit objects may look alike";
 }
 

@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "core/files.h"
-#include "daemon/jobs/secrets.h"
+#include "daemon/jobs/bundle.h"
 #include "tests/unit/pipeline/storage/scan_samples.h"
 
 namespace scanrig {

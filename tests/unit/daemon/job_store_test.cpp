@@ -148,7 +148,7 @@ TEST_F(JobStoreTest, AJobThatTookTwoDaemonsWithItIsInQuarantineWithItsImages) {
   EXPECT_THAT(job.error->message, HasSubstr("quarantine"));
   EXPECT_EQ(job.stored.size(), 1u);
   ASSERT_TRUE(begin_attempt(folder));
-  EXPECT_EQ(recovered(store, "job").state, JobState::reconstructing) << "somebody has asked for another try";
+  EXPECT_EQ(recovered(store, "job").state, JobState::reconstructing) << "a client has requested another try";
 }
 
 TEST_F(JobStoreTest, AnOrderOfVersion1IsRead) {

@@ -1,4 +1,4 @@
-#include "daemon/station/lamps.h"
+#include "daemon/station/operator_message.h"
 
 #include <gtest/gtest.h>
 

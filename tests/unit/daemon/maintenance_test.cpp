@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "daemon/station/lamps.h"
 #include "daemon/station/operator_message.h"
 #include "tests/unit/daemon/safety_under_test.h"
 

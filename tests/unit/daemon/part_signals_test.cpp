@@ -1,6 +1,5 @@
 #include <gmock/gmock.h>
 
-#include "daemon/station/lamps.h"
 #include "daemon/station/operator_message.h"
 #include "tests/unit/daemon/queue_under_test.h"
 
@@ -42,7 +41,7 @@ TEST_F(Line, PassAndFailSpeakOfThePartPutOnLast) {
   see(false);
   see(true);
   list("earlier", JobState::scanning);
-  EXPECT_FALSE(outputs().pass) << "nobody knows yet how this one ends";
+  EXPECT_FALSE(outputs().pass) << "this one has not ended yet";
   EXPECT_FALSE(outputs().fail);
   scan("earlier");
   list("earlier", JobState::failed);

@@ -210,7 +210,7 @@ TEST_F(Queue, StopEndsTheLineAndStartIsAPartToo) {
   run_a_line_of(3);
   scan("0");
   press(Button::start);
-  EXPECT_NE(asked_for<action::StartJob>(), nullptr) << "somebody says that the part is there";
+  EXPECT_NE(asked_for<action::StartJob>(), nullptr) << "the operator vouches for the part";
   scan("1");
   press(Button::stop);
   tell(event::Stopped{});

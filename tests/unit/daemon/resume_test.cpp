@@ -47,7 +47,7 @@ TEST_F(Resume, AnObjectThatMovedSinceEndsTheAttemptAndTheRigIsFree) {
   EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::interrupted);
   EXPECT_EQ(asked_for<action::CloseJob>()->why.code, ErrorCode::moved);
   EXPECT_EQ(state.machine, MachineState::ready);
-  EXPECT_EQ(state.failures, 0) << "nobody's part was bad";
+  EXPECT_EQ(state.failures, 0) << "no part was bad";
 }
 
 TEST_F(Resume, WithAllViewsThereTheCheckIsTheMovementCheck) {
@@ -85,7 +85,7 @@ TEST_F(Resume, AnObjectThatSlippedDuringThePoseFailsTheJob) {
   close_pose(0, false);
   ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
   EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::failed);
-  EXPECT_THAT(asked_for<action::CloseJob>()->why.message, HasSubstr("has moved during pose 1"));
+  EXPECT_THAT(asked_for<action::CloseJob>()->why.message, HasSubstr("something moved in pose 1"));
   EXPECT_EQ(state.machine, MachineState::ready);
   EXPECT_EQ(state.failures, 1);
 }

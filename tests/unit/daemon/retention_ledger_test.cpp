@@ -1,4 +1,4 @@
-#include "daemon/jobs/retention_ledger.h"
+#include "daemon/jobs/retention.h"
 
 #include <gmock/gmock.h>
 

@@ -1,6 +1,5 @@
 #include <gmock/gmock.h>
 
-#include "daemon/station/lamps.h"
 #include "daemon/station/operator_message.h"
 #include "tests/unit/daemon/safety_under_test.h"
 

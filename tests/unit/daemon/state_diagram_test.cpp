@@ -8,7 +8,7 @@
 #include <set>
 
 #include "core/files.h"
-#include "daemon/rig/taken_view.h"
+#include "daemon/rig/acquisition.h"
 #include "daemon/runtime/overloaded.h"
 #include "daemon/station/job_lifecycle.h"
 #include "daemon/station/operator_message.h"
@@ -51,7 +51,7 @@ std::vector<Named> of_the_rig() {
       {"e-stop", event::EstopChanged{false}},
       {"2 s of warning", event::WarningOver{}},
       {"homed", event::Homed{}},
-      {"seen standing", event::Stopped{}},
+      {"seen stopped", event::Stopped{}},
       {"device failed", event::RigFailed{kError}},
       {"no e-stop", event::EstopWindowOver{}},
   };
@@ -63,7 +63,7 @@ std::vector<Named> of_safety() {
       {"e-stop released", event::EstopChanged{true}},
       {"guard opened", event::GuardChanged{false}},
       {"guard closed", event::GuardChanged{true}},
-      {"not seen standing", event::StopFailed{kError}},
+      {"not seen stopped", event::StopFailed{kError}},
       {"panel failed", event::PanelFailed{kError}},
       {"moved without a request", event::DevicesChecked{{}, event::DriveReport{true, {}}}},
   };

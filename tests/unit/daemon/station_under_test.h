@@ -5,7 +5,7 @@
 #include <memory>
 #include <utility>
 
-#include "daemon/rig/taken_view.h"
+#include "daemon/rig/acquisition.h"
 #include "daemon/station/transition.h"
 
 namespace scanrig {

@@ -42,7 +42,7 @@ TEST_F(Station, MovesForAJobOnlyWhenWarnedAndTheFolderIsThere) {
   EXPECT_NE(asked_for<action::CreateJobs>(), nullptr);
   EXPECT_NE(asked_for<action::Warn>(), nullptr);
   tell(event::WarningOver{});
-  EXPECT_EQ(asked_for<action::TakeView>(), nullptr) << "the job's folder is not there yet";
+  EXPECT_EQ(asked_for<action::TakeView>(), nullptr) << "the job's folder does not exist yet";
   tell(event::JobStarted{"job", 0, 0});
   ASSERT_NE(asked_for<action::TakeView>(), nullptr);
   EXPECT_EQ(asked_for<action::TakeView>()->id, (ViewId{"job", 0, 0}));
@@ -82,7 +82,7 @@ TEST_F(Station, AsksForTheFlipWhenThePoseIsOnDisk) {
   tell(event::CheckViewTaken{});
   EXPECT_EQ(state.activity, Activity::storing);
   store(0, 3);
-  EXPECT_EQ(asked_for<action::FinishPose>(), nullptr) << "nobody knows yet whether something moved";
+  EXPECT_EQ(asked_for<action::FinishPose>(), nullptr) << "the movement check is still missing";
   tell(event::MovementChecked{"job", {.unmoved = true}});
   ASSERT_NE(asked_for<action::FinishPose>(), nullptr);
   EXPECT_FALSE(asked_for<action::FinishPose>()->last);
@@ -256,7 +256,7 @@ TEST_F(Station, ATableThatCannotBeSeenStandingIsSaidToMayBeMoving) {
   EXPECT_EQ(state.machine, MachineState::error);
   EXPECT_THAT(state.cause, HasSubstr("may be moving"));
   EXPECT_EQ(state.activity, Activity::none) << "or Reset could never be pressed";
-  ASSERT_EQ(state.devices.size(), 1u) << "shown as absent too, although nobody checks devices now";
+  ASSERT_EQ(state.devices.size(), 1u) << "shown as absent too, although no device is checked now";
   EXPECT_EQ(state.devices[0].name, "turntable");
   EXPECT_EQ(state.devices[0].problem->message, "turntable: no reply");
 }

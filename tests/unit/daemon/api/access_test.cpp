@@ -64,7 +64,7 @@ TEST(PeerCredentials, AGroupIsFoundByItsName) {
   EXPECT_EQ(roles->operating, 0u);
   EXPECT_FALSE(roles->viewer || roles->engineer);
   EXPECT_EQ(find_groups({.viewer = "no-such-group-here"}).error().code, ErrorCode::not_found);
-  EXPECT_EQ(find_groups({})->operating, ::getegid()) << "nobody named: the daemon's own group";
+  EXPECT_EQ(find_groups({})->operating, ::getegid()) << "no group named: the service's own group";
 }
 
 class AccessTest : public scan_samples::FolderTest {

@@ -1,4 +1,4 @@
-#include "daemon/api/folder_files.h"
+#include "daemon/api/downloads.h"
 
 #include <gmock/gmock.h>
 #include <sys/stat.h>
@@ -20,7 +20,7 @@ class FolderFiles : public scan_samples::FolderTest {
     fs::create_directories(folder_ / "job/pose1/view00");
     scan_samples::write_text(folder_ / "secret", "secret");
     scan_samples::write_text(job() / "scan.json", "{}");
-    scan_samples::write_text(job() / "pose1/view00/left.png", "picture");
+    scan_samples::write_text(job() / "pose1/view00/left.png", "image");
     fs::create_symlink(folder_ / "secret", job() / "link");
     fs::create_directory_symlink(folder_, job() / "up");
     ASSERT_EQ(::mkfifo((job() / "pipe").c_str(), 0600), 0);
@@ -43,7 +43,7 @@ TEST_F(FolderFiles, AreOpenedBelowTheirFolder) {
   EXPECT_EQ((*file)->size(), 7u);
   std::string text(7, ' ');
   EXPECT_EQ(::read((*file)->fd(), text.data(), text.size()), 7);
-  EXPECT_EQ(text, "picture");
+  EXPECT_EQ(text, "image");
 }
 
 TEST_F(FolderFiles, NothingElseIsOpened) {

@@ -1,4 +1,4 @@
-#include "daemon/api/job_bundle.h"
+#include "daemon/api/downloads.h"
 
 #include "tests/unit/pipeline/storage/scan_samples.h"
 

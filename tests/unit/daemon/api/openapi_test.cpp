@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "daemon/api/router.h"
+#include "daemon/api/route.h"
 
 namespace scanrig {
 namespace {

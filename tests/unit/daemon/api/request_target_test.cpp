@@ -1,4 +1,4 @@
-#include "daemon/api/request_target.h"
+#include "daemon/api/request.h"
 
 #include <gmock/gmock.h>
 

@@ -1,4 +1,4 @@
-#include "daemon/api/router.h"
+#include "daemon/api/route.h"
 
 #include <gmock/gmock.h>
 
@@ -161,12 +161,12 @@ TEST_F(Api, TooLowARoleIsToldWhichIsNeeded) {
 }
 
 TEST_F(Api, HealthNamesEveryProblem) {
-  station.loop.post(event::DevicesChecked{{{"camera", Error{ErrorCode::timeout, "no answer"}}}});
+  station.loop.post(event::DevicesChecked{{{"camera", Error{ErrorCode::timeout, "no reply"}}}});
   nlohmann::json health;
   while ((health = ask("GET", "/api/v1/health").second)["devices"].size() < 2) {
   }
   EXPECT_EQ(health["ok"], false);
-  EXPECT_EQ(health["problems"][0]["message"], "no answer");
+  EXPECT_EQ(health["problems"][0]["message"], "no reply");
   EXPECT_EQ(health["uptime_s"], 5.0);
 }
 

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "daemon/api/router.h"
-#include "daemon/api/service_status.h"
+#include "daemon/api/metrics.h"
+#include "daemon/api/route.h"
 
 namespace scanrig {
 

@@ -1,4 +1,4 @@
-#include "daemon/api/tokens.h"
+#include "daemon/api/access.h"
 
 #include <gmock/gmock.h>
 #include <sys/stat.h>

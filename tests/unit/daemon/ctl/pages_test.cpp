@@ -7,7 +7,6 @@
 #include <cstdio>
 #include <set>
 
-#include "daemon/ctl/command_tree.h"
 #include "daemon/ctl/commands.h"
 #include "tests/unit/pipeline/storage/scan_samples.h"
 

@@ -1,9 +1,15 @@
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <deque>
+#include <functional>
+#include <latch>
+#include <limits>
+#include <memory>
 #include <mutex>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "core/clock.h"
@@ -51,6 +57,40 @@ class Mailbox {
   std::condition_variable changed_;
   std::deque<Message> messages_;
   bool closed_ = false;
+};
+
+/// Starts a thread that is an actor of `clock` for as long as it runs, and already when this returns.
+inline std::thread start_actor(Clock& clock, std::function<void()> run) {
+  auto entered = std::make_shared<std::latch>(1);
+  std::thread thread([&clock, entered, run = std::move(run)] {
+    const Clock::Actor actor(clock);
+    entered->count_down();
+    run();
+  });
+  entered->wait();
+  return thread;
+}
+
+/// Measures how long a thread has been at its present work: for work that cannot be stopped.
+/// Threads: one works, any may read.
+class BusyTimer {
+ public:
+  explicit BusyTimer(const Clock& clock) : clock_(clock) {}
+
+  /// Marks the start of work, or progress in it.
+  void begins() { since_ = clock_.now().time_since_epoch().count(); }
+  void ends() { since_ = kIdle; }
+  /// Zero without work.
+  [[nodiscard]] Clock::Duration lasts() const {
+    const auto since = since_.load();
+    return since == kIdle ? Clock::Duration::zero() : clock_.now().time_since_epoch() - Clock::Duration(since);
+  }
+
+ private:
+  static constexpr auto kIdle = std::numeric_limits<Clock::Duration::rep>::max();
+
+  const Clock& clock_;
+  std::atomic<Clock::Duration::rep> since_ = kIdle;
 };
 
 }  // namespace scanrig

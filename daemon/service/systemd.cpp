@@ -1,13 +1,18 @@
-#include "daemon/service/sleep_inhibitor.h"
+#include "daemon/service/systemd.h"
 
 #include <fcntl.h>
-#include <fmt/format.h>
+#include <sys/socket.h>
 #include <systemd/sd-bus.h>
+#include <systemd/sd-daemon.h>
 #include <unistd.h>
 
+#include <fmt/format.h>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
+#include <ctime>
 #include <memory>
+#include <string_view>
 #include <utility>
 
 namespace scanrig {
@@ -15,6 +20,12 @@ namespace {
 
 using std::chrono::microseconds;
 using SteadyClock = std::chrono::steady_clock;
+
+unsigned long long monotonic_us() {
+  timespec now{};
+  ::clock_gettime(CLOCK_MONOTONIC, &now);
+  return static_cast<unsigned long long>(now.tv_sec) * 1'000'000 + static_cast<unsigned long long>(now.tv_nsec) / 1000;
+}
 
 struct CloseBus {
   void operator()(sd_bus* bus) const { ::sd_bus_close_unref(bus); }
@@ -71,6 +82,61 @@ int inhibit(const SleepInhibitorOptions& options, std::string& detail) {
 }
 
 }  // namespace
+
+ServiceManager::~ServiceManager() {
+  if (ever_ready_) ::sd_notify(0, "STOPPING=1");
+}
+
+void ServiceManager::alive(const std::string& sentence) {
+  const std::lock_guard guard(mutex_);
+  std::string words = "WATCHDOG=1";
+  if (state_ == State::starting) words += "\nREADY=1";
+  if (state_ != State::reloading && (state_ == State::starting || sentence != told_)) {
+    words += "\nSTATUS=" + sentence;
+    told_ = sentence;
+  }
+  if (state_ == State::starting) state_ = State::ready;
+  ever_ready_ = true;
+  ::sd_notify(0, words.c_str());
+}
+
+void ServiceManager::reloading() {
+  const std::lock_guard guard(mutex_);
+  state_ = State::reloading;
+  ::sd_notifyf(0, "RELOADING=1\nMONOTONIC_USEC=%llu\nSTATUS=The configuration is reloaded.", monotonic_us());
+}
+
+void ServiceManager::stays(const std::string& sentence) {
+  const std::lock_guard guard(mutex_);
+  state_ = State::ready;
+  ::sd_notify(0, ("READY=1\nSTATUS=" + sentence).c_str());
+}
+
+void ServiceManager::begins_again() {
+  const std::lock_guard guard(mutex_);
+  state_ = State::starting;
+  ::sd_notify(0, "WATCHDOG=1");
+}
+
+PassedSockets take_passed_sockets() {
+  PassedSockets passed;
+  char** names = nullptr;
+  const int count = ::sd_listen_fds_with_names(1, &names);
+  for (int i = 0; i < count; ++i) {
+    const int fd = SD_LISTEN_FDS_START + i;
+    const bool ours = names && std::string_view(names[i]) == "api";
+    if (ours && !passed.local && ::sd_is_socket(fd, AF_UNIX, SOCK_STREAM, 1) > 0) {
+      passed.local = fd;
+    } else if (ours && !passed.tcp && ::sd_is_socket_inet(fd, AF_UNSPEC, SOCK_STREAM, 1, 0) > 0) {
+      passed.tcp = fd;
+    } else {
+      ::close(fd);
+    }
+  }
+  for (int i = 0; i < count && names; ++i) ::free(names[i]);
+  ::free(names);
+  return passed;
+}
 
 SleepInhibitor::SleepInhibitor(std::function<void(const std::string&)> report, SleepInhibitorOptions options)
     : report_(std::move(report)),

@@ -1,4 +1,4 @@
-#include "daemon/api/peer.h"
+#include "daemon/api/roles.h"
 
 #include <arpa/inet.h>
 #include <grp.h>
@@ -28,6 +28,22 @@ Result<gid_t> group_id(const std::string& name) {
 }
 
 }  // namespace
+
+std::string_view to_string(Role role) {
+  switch (role) {
+    case Role::viewer: return "viewer";
+    case Role::operating: return "operator";
+    case Role::engineer: break;
+  }
+  return "engineer";
+}
+
+std::optional<Role> parse_role(std::string_view name) {
+  for (const Role role : kRoles) {
+    if (name == to_string(role)) return role;
+  }
+  return std::nullopt;
+}
 
 Result<PeerCredentials> peer_credentials(int socket) {
   ucred credentials{};

@@ -2,15 +2,23 @@
 
 #include <sys/types.h>
 
+#include <array>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "core/result.h"
-#include "daemon/api/role.h"
 
 namespace scanrig {
+
+/// Rights of a client: each role may do what those before it may.
+enum class Role { viewer, operating, engineer };
+
+inline constexpr std::array kRoles{Role::viewer, Role::operating, Role::engineer};
+
+std::string_view to_string(Role role);  ///< "viewer", "operator", "engineer"
+std::optional<Role> parse_role(std::string_view name);
 
 /// The process at the other end of a Unix socket, as the kernel recorded it on connection.
 struct PeerCredentials {

@@ -26,4 +26,10 @@ Result<std::shared_ptr<OpenFile>> open_below(const std::filesystem::path& folder
 /// Media type by the file's ending: "model/gltf-binary", "image/png", ...
 std::string_view media_type(std::string_view path);
 
+/// Packs a job into a separate file beside the jobs and sends it; the file's name is gone before the first byte is.
+void send_bundle(const ApiStation& station, const Values& values, Send send);
+
+/// Deletes what a daemon that died while packing has left.
+void remove_old_bundles(const std::filesystem::path& storage);
+
 }  // namespace scanrig

@@ -1,4 +1,4 @@
-#include "daemon/api/folder_files.h"
+#include "daemon/api/downloads.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>
@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <cstring>
 #include <system_error>
@@ -37,6 +38,15 @@ Result<int> open_component(int folder, const std::string& name, bool last) {
   return fail(ErrorCode::not_found, "the job has no such file");
 }
 
+constexpr std::string_view kPrefix = ".bundle-", kEnding = ".tar.gz";
+
+void send_packed(const std::filesystem::path& packed, const Send& send) {
+  const auto file = open_below(packed.parent_path(), packed.filename().string());
+  ::unlink(packed.c_str());
+  if (!file) return send(error_response(file.error()));
+  send({.body = *file, .type = media_type(kEnding)});
+}
+
 }  // namespace
 
 Result<std::vector<FolderFile>> list_files(const fs::path& folder) {
@@ -55,7 +65,7 @@ Result<std::vector<FolderFile>> list_files(const fs::path& folder) {
 
 Result<std::shared_ptr<OpenFile>> open_below(const fs::path& folder, std::string_view path) {
   int at = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (at < 0) return fail(ErrorCode::not_found, "the job's folder is not there any more");
+  if (at < 0) return fail(ErrorCode::not_found, "the job's folder does not exist any more");
   for (bool last = false; !last;) {
     const auto slash = path.find('/');
     last = slash == std::string_view::npos;
@@ -79,6 +89,28 @@ Result<std::shared_ptr<OpenFile>> open_below(const fs::path& folder, std::string
 std::string_view media_type(std::string_view path) {
   const auto found = std::ranges::find_if(kTypes, [&](const auto& type) { return path.ends_with(type.first); });
   return found == kTypes.end() ? "application/octet-stream" : found->second;
+}
+
+void send_bundle(const ApiStation& station, const Values& values, Send send) {
+  static std::atomic<unsigned> number = 0;
+  if (!find_job(station, values)) return send(no_such_job());
+  const auto packed = station.storage / fmt::format("{}{}{}", kPrefix, ++number, kEnding);
+  const event::JobRequested asked{.what = event::JobRequested::What::bundle, .job = *values.text("id"), .path = packed};
+  // The reply comes on the control loop's thread, which must not touch the disk.
+  station.loop.ask(asked,
+                   [send = std::move(send), packed, on_worker = station.on_worker](const Result<std::string>& done) {
+                     if (!done) return send(error_response(done.error()));
+                     on_worker([send, packed] { send_packed(packed, send); });
+                   });
+}
+
+void remove_old_bundles(const std::filesystem::path& storage) {
+  std::error_code error;
+  for (std::filesystem::directory_iterator next(storage, error), end; !error && next != end; next.increment(error)) {
+    std::error_code ignored;
+    if (!next->path().filename().string().starts_with(kPrefix)) continue;
+    std::filesystem::remove_all(next->path(), ignored);  // half packed ones too
+  }
 }
 
 }  // namespace scanrig

@@ -1,12 +1,14 @@
-#include "daemon/ctl/doctor/findings.h"
+#include "daemon/ctl/doctor/examine.h"
+
+#include <unistd.h>
 
 #include <fmt/format.h>
-#include <unistd.h>
 #include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
 
 namespace scanrig::ctl::doctor {
+
 std::string Report::text() const {
   std::string text;
   for (const Section& section : sections_) {
@@ -30,8 +32,8 @@ std::string Report::json() const {
   return all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
-Operator::Operator(bool answers, bool quiet_output)
-    : there_(answers || ::isatty(STDIN_FILENO) == 1), quiet_output_(quiet_output) {}
+Operator::Operator(bool interactive, bool quiet_output)
+    : there_(interactive || ::isatty(STDIN_FILENO) == 1), quiet_output_(quiet_output) {}
 
 void Operator::tell(const std::string& text) const {
   std::FILE* out = quiet_output_ ? stderr : stdout;
@@ -39,7 +41,7 @@ void Operator::tell(const std::string& text) const {
   std::fflush(out);
 }
 
-std::optional<std::string> Operator::ask(const std::string& question) const {
+std::optional<std::string> Operator::prompt(const std::string& question) const {
   if (!there_) return std::nullopt;
   tell(question);
   std::string line;
