@@ -99,6 +99,8 @@ class Checked(unittest.TestCase):
     def test_an_alias_needs_a_mark_on_its_line_and_its_file_in_the_table(self):
         marked = "int least_size;  // old name\n"
         self.assert_clean({"config/keys.h": marked})
+        self.assert_clean({"config/keys.h": "section.accept_old_name(min_size, least_size);\n"})
+        self.assert_clean({"config/keys.h": "int least_size;  // Old names\n"})
         self.assert_found({"config/keys.h": "int least_size;\nint least_mass;  // alias\n"},
                           "config/keys.h:1: least_* -> use min_*")
         _, lines = self.check({"core/a.h": marked})
