@@ -79,8 +79,8 @@ class AxisTurntable : public Turntable {
   Clock& clock_;
   std::unique_ptr<AxisDrive> drive_;
   bool homed_ = false;
-  bool flank_loaded_ = false;  // the last move ended counter-clockwise
-  bool stop_pending_ = false;  // a stop could not be delivered
+  bool backlash_taken_up_ = false;  // the last move ended counter-clockwise
+  bool stop_pending_ = false;       // a stop could not be delivered
 
   std::mutex mutex_;
   std::condition_variable wake_;
