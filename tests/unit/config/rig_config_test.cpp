@@ -159,7 +159,7 @@ TEST_F(RigConfigTest, ARigThatCouldNeverScanIsRefusedWithTheReason) {
                  "[panel] lamp_red: missing: a fault would not be visible at the rig; name the output of the red lamp",
                  panel);
   expect_problem("plain_line = ", "# plain_line = ",
-                 "[projector] plain_line: missing: every view needs an image in even light; name the output that fires "
+                 "[projector] plain_line: missing: every view needs a plain image; name the output that fires "
                  "it",
                  "[projector]\n");
   expect_problem("\"BayerRG8\"", "\"Mono12\"",
@@ -298,7 +298,7 @@ TEST_F(RigConfigTest, AProjectorOnAnIoModuleNeedsThePanelsModuleAndChannelsOfIts
   EXPECT_EQ(rig->projector.io_module.device, "/dev/ttyUSB1");
   EXPECT_EQ(rig->projector.io_module.unit_id, 3);
   expect_problem_in(text, "plain_channel = 9\n", "",
-                    "[projector] plain_channel: missing: every view needs an image in even light; name the output that "
+                    "[projector] plain_channel: missing: every view needs a plain image; name the output that "
                     "fires it",
                     "[projector]\n");
   expect_problem_in(text, "channel = 8", "channel = 0", "[projector] channel: is on the same contact as lamp_red");
