@@ -9,6 +9,8 @@
 #include <string>
 
 #include "drivers/turntable/axis_drive.h"
+#include "drivers/turntable/axis_scale.h"
+#include "drivers/turntable/move_planner.h"
 #include "drivers/turntable/turntable.h"
 
 namespace scanrig {
