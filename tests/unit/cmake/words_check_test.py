@@ -123,6 +123,18 @@ class Checked(unittest.TestCase):
         table = (ROOT / "cmake" / "words.txt").read_text().replace("tests/bench/bench.py ->", "config/keys.h ->")
         self.assertEqual(self.check(files, table)[1][0][:23], "core/a.cpp:1: nobody ->")
 
+    def test_a_word_of_each_kind_is_noticed_by_the_table_of_this_project(self):
+        planted = {"docs/status.md": ("Measure the closure.", "closure"),
+                   "daemon/a.cpp": ('auto a = "ask the daemon";', "the daemon"),
+                   "drivers/a.cpp": ('auto a = "the bus fell silent";', "fell silent"),
+                   "drivers/turntable/a.h": ("bool flank_loaded_ = false;", "flank_loaded"),
+                   "tests/system/hand.py": ("", "hand.py")}
+        files = {name: text + "\n" for name, (text, _) in planted.items()}
+        code, lines = self.check(files, (ROOT / "cmake" / "words.txt").read_text())
+        self.assertEqual(code, 1)
+        for name, (_, term) in planted.items():
+            self.assertTrue(any(line.startswith(f"{name}:1: {term} -> ") for line in lines), f"{name}: {lines}")
+
 
 if __name__ == "__main__":
     unittest.main()
