@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Checks the documents: their citations exist, and they stay short and in the glossary's words.
+"""Checks the documents: their citations exist, and they stay short. Their words are checked by check_words.py.
 
 Usage: check_docs.py ROOT. Prints one line per finding and exits 1 if there is any.
 """
@@ -16,8 +16,6 @@ MAX_LEAF_LINES = 40
 GENERATED = ("docs/measured.md", "docs/reference/states.md")  # by tests/bench/record.py and state_diagram_test.cpp
 CODE = (".h", ".cpp", ".py", ".toml", ".txt", ".service", ".socket", ".rules", ".conf")
 WITHOUT_README = ("tests/unit/", "tests/component/", "tests/system/", "tests/bench/")  # one README for each of these trees
-# docs/reference/glossary.md: words of the column "not", wrong in any sense. A line that names an old name may use them.
-WRONG_WORDS = re.compile(r"\b(closure|closures|spoilt|redone|known zero|whoever|nobody|somebody|see to)\b", re.I)
 
 FENCE = re.compile(r"^\s*```")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
@@ -111,9 +109,6 @@ def check_document(tree, document):
     for number, line in without_fences(lines):
         for target in missing(tree, document, line):
             yield number, f"{target} does not exist"
-        if document not in GENERATED and "old name" not in line and document != "docs/reference/glossary.md":
-            for word in WRONG_WORDS.findall(line):
-                yield number, f'"{word}": use the word of docs/reference/glossary.md'
     if document in GENERATED:
         return
     for number, words in paragraphs(lines):

@@ -89,7 +89,7 @@ void check_projector(Section& s, const RigConfig& rig) {
     s.report("driver", "\"modbus-io\" uses the panel's I/O module: it needs driver = \"modbus-io\" in [panel]");
   }
   if (!rig.projector.plain_line) {
-    s.report(plain_line, "missing: every view needs an image in even light; name the output that fires it");
+    s.report(plain_line, "missing: every view needs a plain image; name the output that fires it");
   }
   if (!s.sound()) return;
   std::map<std::string, Pin> outputs{{line, rig.projector.line}, {plain_line, *rig.projector.plain_line}};

@@ -254,11 +254,11 @@ Result<SensorFrame> AravisSensor::read(ArvBuffer* buffer) const {
   raw.bits = format->bits;
   raw.size = {arv_buffer_get_image_width(buffer), arv_buffer_get_image_height(buffer)};
   raw.bytes = {static_cast<const std::uint8_t*>(bytes), size};
-  auto picture = decode_image(raw);
-  if (picture) {
-    frame.picture = std::move(*picture);
+  auto decoded = decode_image(raw);
+  if (decoded) {
+    frame.decoded = std::move(*decoded);
   } else {
-    frame.damage = picture.error().message;
+    frame.damage = decoded.error().message;
   }
   return frame;
 }

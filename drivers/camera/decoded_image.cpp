@@ -69,17 +69,17 @@ Result<DecodedImage> convert(const RawImage& raw) {
   }
   const cv::Mat seen(raw.size, type, const_cast<std::uint8_t*>(raw.bytes.data()), stride);
   if (const auto code = to_bgr(raw.layout)) {
-    DecodedImage picture{new_image(raw.size, CV_8UC3), PixelFormat::bgr8};
-    cv::cvtColor(raw.bits > 8 ? upper_8_bits(seen, raw.bits) : seen, picture.image, *code);
-    return picture;
+    DecodedImage decoded{new_image(raw.size, CV_8UC3), PixelFormat::bgr8};
+    cv::cvtColor(raw.bits > 8 ? upper_8_bits(seen, raw.bits) : seen, decoded.image, *code);
+    return decoded;
   }
-  DecodedImage picture{raw.bits > 8 ? upper_8_bits(seen, raw.bits) : copy_of(seen), PixelFormat::mono8};
+  DecodedImage decoded{raw.bits > 8 ? upper_8_bits(seen, raw.bits) : copy_of(seen), PixelFormat::mono8};
   if (raw.layout == Layout::bgr) {
-    picture.format = PixelFormat::bgr8;
+    decoded.format = PixelFormat::bgr8;
   } else if (raw.layout == Layout::bayer_rg) {
-    picture.format = PixelFormat::bayer_rggb8;
+    decoded.format = PixelFormat::bayer_rggb8;
   }
-  return picture;
+  return decoded;
 }
 
 }  // namespace

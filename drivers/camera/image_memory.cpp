@@ -14,7 +14,7 @@ class ImageMemory final : public cv::MatAllocator {
  public:
   cv::UMatData* allocate(int dims, const int* sizes, int type, void* data, std::size_t* step, cv::AccessFlag,
                          cv::UMatUsageFlags) const override {
-    if (data) CV_Error(cv::Error::StsNotImplemented, "memory of somebody else");
+    if (data) CV_Error(cv::Error::StsNotImplemented, "memory of another owner");
     std::size_t bytes = CV_ELEM_SIZE(type);
     for (int i = dims - 1; i >= 0; --i) {
       if (step) step[i] = bytes;

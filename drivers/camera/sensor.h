@@ -16,7 +16,7 @@ struct FrameStamp {
 
 struct SensorFrame {
   FrameStamp stamp;
-  DecodedImage picture;
+  DecodedImage decoded;
   std::string damage;          ///< why the frame is incomplete; empty if it is whole
   Clock::TimePoint arrival{};  ///< time when this process received it
 };

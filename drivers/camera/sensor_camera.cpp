@@ -321,11 +321,11 @@ Result<void> SensorCamera::expect_one_moment(const std::vector<SensorFrame>& fra
 
 StereoFrame SensorCamera::hand_out(std::vector<SensorFrame>& frames) {
   StereoFrame pair;
-  const DecodedImage& left = frames.front().picture;
+  const DecodedImage& left = frames.front().decoded;
   pair.format = left.format;
   if (frames.size() == 2) {
     pair.left = left.image;
-    pair.right = frames.back().picture.image;
+    pair.right = frames.back().decoded.image;
   } else {
     const int half = left.image.cols / 2;
     pair.left = copy_of(left.image.colRange(0, half));

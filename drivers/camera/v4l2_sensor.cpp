@@ -236,11 +236,11 @@ Result<SensorFrame> V4l2Sensor::read(const v4l2_buffer& buffer) const {
   raw.size = options_.size;
   raw.stride = format_.bytesperline;
   raw.bytes = {static_cast<const std::uint8_t*>(buffers_[buffer.index].address), buffer.bytesused};
-  auto picture = decode_image(raw);
-  if (picture) {
-    frame.picture = std::move(*picture);
+  auto decoded = decode_image(raw);
+  if (decoded) {
+    frame.decoded = std::move(*decoded);
   } else {
-    frame.damage = picture.error().message;
+    frame.damage = decoded.error().message;
   }
   return frame;
 }

@@ -17,7 +17,7 @@ Result<std::unique_ptr<GpioProjector>> GpioProjector::open(const GpioProjectorOp
 
 Result<void> GpioProjector::fire(Light light, Deadline deadline) {
   gpio::Output* const line = light == Light::pattern ? pattern_.get() : plain_.get();
-  if (!line) return fail(ErrorCode::unsupported, "projector: there is no plain_line for even light");
+  if (!line) return fail(ErrorCode::unsupported, "projector: plain_line is missing: no output fires plain light");
   if (deadline.left(clock_) < pulse_) {
     return fail(ErrorCode::timeout, "projector: a pulse of {} us does not fit before the deadline", pulse_.count());
   }

@@ -13,7 +13,7 @@ ModbusIoProjector::ModbusIoProjector(ModbusIoProjectorOptions options, Clock& cl
 
 Result<void> ModbusIoProjector::fire(Light light, Deadline deadline) {
   const auto coil = light == Light::pattern ? std::optional(options_.pattern_coil) : options_.plain_coil;
-  if (!coil) return fail(ErrorCode::unsupported, "projector: there is no plain_channel for even light");
+  if (!coil) return fail(ErrorCode::unsupported, "projector: plain_channel is missing: no output fires plain light");
   if (deadline.left(clock_) < options_.pulse) {
     return fail(ErrorCode::timeout, "projector: a pulse of {} us does not fit before the deadline",
                 options_.pulse.count());

@@ -5,7 +5,7 @@
 
 #include "core/clock.h"
 #include "core/result.h"
-#include "drivers/turntable/axis_scale.h"
+#include "drivers/turntable/move_planner.h"
 
 namespace scanrig {
 

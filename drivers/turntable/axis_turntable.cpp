@@ -40,7 +40,7 @@ bool AxisTurntable::near(std::int32_t a, std::int32_t b) const {
 }
 
 Result<void> AxisTurntable::home(Deadline deadline) {
-  homed_ = flank_loaded_ = false;
+  homed_ = backlash_taken_up_ = false;
   if (auto found = find_home(deadline); !found) return give_up(found.error());
   if (auto off = drive_->guard_connection(false, deadline); !off) return give_up(off.error());
   homed_ = true;
@@ -110,7 +110,7 @@ Result<Move> AxisTurntable::rotate_to(Degrees target, Deadline deadline) {
   const auto before = ask(deadline);
   if (!before) return give_up(before.error());
   if (auto fit = healthy(*before, deadline); !fit) return give_up(fit.error());
-  const auto plan = planner_.plan(before->position, target, flank_loaded_);
+  const auto plan = planner_.plan(before->position, target, backlash_taken_up_);
   if (!plan) {
     return fail(ErrorCode::out_of_range, "turntable: {} deg cannot be reached within the soft limits", target.value);
   }
@@ -126,7 +126,7 @@ Result<Move> AxisTurntable::turn(Degrees target, const DriveState& before, const
                           : fail(ErrorCode::not_homed, "the drive has lost its home (switched off in between?)");
   }
   if (auto on = drive_->guard_connection(true, deadline); !on) return pass_on(on);
-  flank_loaded_ = false;
+  backlash_taken_up_ = false;
   DriveState state = before;
   if (plan.before) {
     const auto passed = run_to(*plan.before, state, Clock::Duration::zero(), deadline);
@@ -136,7 +136,7 @@ Result<Move> AxisTurntable::turn(Degrees target, const DriveState& before, const
   const auto arrival = run_to(plan.target, state, options_.settle, deadline);
   if (!arrival) return pass_on(arrival);
   if (auto off = drive_->guard_connection(false, deadline); !off) return pass_on(off);
-  flank_loaded_ = true;
+  backlash_taken_up_ = true;
   const Degrees measured = options_.scale.angle(arrival->position);
   return Move{target, target + Degrees{std::remainder((measured - target).value, 360.0)}, arrival->in_position - begun,
               arrival->still - arrival->in_position};
@@ -216,7 +216,7 @@ Result<void> AxisTurntable::watch(std::string_view doing, const Look& look, Dead
     // A blind drive's state is unknown: there must be time left for a stop that gets no reply.
     const auto for_stop = state->blind ? kStopReplyTimeouts * reply_timeout_ : Clock::Duration::zero();
     if (deadline.left(clock_) <= for_stop) {
-      return fail(ErrorCode::timeout, "{}: not there by the deadline, the axis reads {:.3f} deg", doing,
+      return fail(ErrorCode::timeout, "{}: not at the target by the deadline, the axis reads {:.3f} deg", doing,
                   options_.scale.angle(state->position).value);
     }
     pause(again);
@@ -263,7 +263,7 @@ Result<void> AxisTurntable::stop_drive(Deadline deadline) {
 
 /// After any failure: the table is not homed, and a stop is sent to the motor.
 tl::unexpected<Error> AxisTurntable::give_up(const Error& error) {
-  homed_ = flank_loaded_ = false;
+  homed_ = backlash_taken_up_ = false;
   ErrorCode code = error.code;
   if (code == ErrorCode::stopped || code == ErrorCode::timeout) {
     // A stop request aborts waiting requests: that is not a time-out.
@@ -288,7 +288,7 @@ Result<void> AxisTurntable::stop(Deadline deadline) {
   };
   if (auto told = stop_drive(deadline); !told) return failed(told.error());
   stop_pending_ = false;
-  flank_loaded_ = false;
+  backlash_taken_up_ = false;
   auto since = clock_.now();
   for (std::optional<std::int32_t> last; !deadline.expired(clock_); pause(clock_.now() + kPollPeriod)) {
     const auto state = drive_->read_state(deadline);

@@ -9,6 +9,8 @@
 #include <string>
 
 #include "drivers/turntable/axis_drive.h"
+#include "drivers/turntable/axis_scale.h"
+#include "drivers/turntable/move_planner.h"
 #include "drivers/turntable/turntable.h"
 
 namespace scanrig {
@@ -79,8 +81,8 @@ class AxisTurntable : public Turntable {
   Clock& clock_;
   std::unique_ptr<AxisDrive> drive_;
   bool homed_ = false;
-  bool flank_loaded_ = false;  // the last move ended counter-clockwise
-  bool stop_pending_ = false;  // a stop could not be delivered
+  bool backlash_taken_up_ = false;  // the last move ended counter-clockwise
+  bool stop_pending_ = false;       // a stop could not be delivered
 
   std::mutex mutex_;
   std::condition_variable wake_;

@@ -231,8 +231,8 @@ Result<void> decide(const std::vector<Hypothesis>& field, const Scene& scene, co
   }
   if (!others.empty()) {
     return fail(ErrorCode::ambiguous,
-                "pose estimation: the object looks the same in more than one way: {}{}. Stick a mark "
-                "of clay on it, or choose another second pose",
+                "pose estimation: the part is too symmetric, several motions fit: {}{}. Add a mark of clay or "
+                "change pose 2",
                 describe(best), others);
   }
   return {};

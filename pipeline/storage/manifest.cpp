@@ -14,7 +14,7 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr int kVersion = 4;
-constexpr int kCurrentKeysVersion = 4;  ///< older versions use the keys "spoilt" and "closures"
+constexpr int kCurrentKeysVersion = 4;  ///< older versions use old names of two keys
 constexpr std::array kStates = {"queued",    "scanning", "waiting_for_flip", "scanned", "interrupted",
                                 "cancelled", "failed"};
 constexpr std::array kSources = {"stereo", "range"};

@@ -23,7 +23,7 @@ class SimulatedDrive {
   virtual void raise_alarm(std::uint16_t code, bool can_be_reset) = 0;
   void raise_alarm(std::uint16_t code) { raise_alarm(code, true); }
   virtual void power_cycle() = 0;
-  /// Somebody else sends the table this far, slowly, behind the driver's back.
+  /// Another master on the bus moves the table this far, slowly, without the driver's knowledge.
   virtual void send(std::int32_t pulses) = 0;
 
   // Truth.

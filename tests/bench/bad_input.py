@@ -139,7 +139,7 @@ def object_cases(desk):
                                       "property float z\nelement face 0\n"
                                       "property list uchar int vertex_indices\nend_header\n")
     yield "a truth of zero faces", *verdict(desk, BAD_INPUT, "truth.ply", "scanrig", "evaluate", folder)
-    yield "a mesh that is not there", *verdict(desk, BAD_INPUT, "gone.ply", "scanrig-sim", "shoot", "--object",
+    yield "a missing mesh", *verdict(desk, BAD_INPUT, "gone.ply", "scanrig-sim", "shoot", "--object",
                                                desk.home / "gone.ply", "--out", target)
     yield "0 views to shoot", *verdict(desk, USAGE, "views", "scanrig-sim", "shoot", "--views", 0, "--out", target)
     yield "0 views for the daemon", *verdict(desk, USAGE, "views", "scanrigd-sim", "--views", 0, "--socket", target,
@@ -159,12 +159,12 @@ def config_cases(desk, config):
     unknown = desk.file("config/rigs/unknown_key.toml", config.read_text().replace("[turntable]\n", "[turntable]\ncolour = \"red\"\n"))
     yield "a config with an unknown key", *verdict(desk, BAD_INPUT, "unknown_key.toml", "scanrig", "check-config", unknown)
     yield "the daemon with that config", *verdict(desk, BAD_INPUT, "unknown_key.toml", "scanrigd", "--config", unknown)
-    yield "a config that is not there", *verdict(desk, BAD_INPUT, "gone.toml", "scanrig", "check-config", "gone.toml")
+    yield "a missing config", *verdict(desk, BAD_INPUT, "gone.toml", "scanrig", "check-config", "gone.toml")
     target = desk.home / "never"
-    yield "range scans that are not there", *verdict(desk, BAD_INPUT, "gone.conf", "scanrig", "import", "stanford",
+    yield "missing range scans", *verdict(desk, BAD_INPUT, "gone.conf", "scanrig", "import", "stanford",
                                                      "--pose", desk.home / "gone.conf", "--out", target)
     conf = desk.file("scans.conf", "bmesh gone.ply 0 0 0 0 0 0 1\n")
-    yield "a range scan that is not there", *verdict(desk, BAD_INPUT, "gone.ply", "scanrig", "import", "stanford",
+    yield "one missing range scan", *verdict(desk, BAD_INPUT, "gone.ply", "scanrig", "import", "stanford",
                                                      "--pose", conf, "--out", target)
 
 

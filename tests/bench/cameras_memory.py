@@ -28,6 +28,6 @@ def measure(bench):
     bench.line(what + "descriptors", "the same all the time, all given back",
                f"{min(opened)} to {max(opened)}; {ends[0]['before']} before, {ends[0]['after']} after",
                len(opened) == 1 and ends[0]["before"] == ends[0]["after"])
-    rate = (last["frames"] + last["pictures"]) / last["at_s"]
-    bench.line(what + "frames of each camera a second", "10", f"{rate:.1f} ({last['frames']} in scans, {last['pictures']} "
+    rate = (last["frames"] + last["previews"]) / last["at_s"]
+    bench.line(what + "frames of each camera a second", "10", f"{rate:.1f} ({last['frames']} in scans, {last['previews']} "
                f"in previews, {last['failed']} views failed)", rate >= 9.0 and last["failed"] == 0)

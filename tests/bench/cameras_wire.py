@@ -93,7 +93,7 @@ def measure(bench):
         stamps = json.loads((folder / "stamps.json").read_text())
         overheads += overheads_ms(stamps)
         lost = sum(len(view) - 2 for view in views(stamps))
-        bench.line(f"wire, figurine seed {seed}: exposures redone", "reported", f"{lost} of {len(stamps['exposures'])}",
+        bench.line(f"wire, figurine seed {seed}: exposures retaken", "reported", f"{lost} of {len(stamps['exposures'])}",
                    True)
         group_end_to_end.accuracy(bench, "wire, figurine", seed, folder)
     bench.at_most(f"software beside motion, settling, exposure, readout: p95 of {len(overheads)} views", 50,

@@ -27,7 +27,7 @@ def triggers(bench, _scratch):
                seen["wrong"] == 0 and seen["good"] == count)
     happened = lost + late + torn + stale
     named = f"{seen['named']}: {seen['lost']} missing, {seen['torn']} torn, {seen['old']} old, {seen['odd']} other"
-    bench.line(what + "every one named and redone",
+    bench.line(what + "every one named and retaken",
                f"{happened}: {lost + late} missing, {torn} torn, {stale} old", named,
                seen["named"] >= happened)
     bench.at_most("arming and collecting one exposure over the wire, p95", 50, seen["overhead_p95_ms"], "ms")

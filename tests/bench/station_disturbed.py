@@ -70,7 +70,7 @@ def takes_nothing(station, spoil, mend, words):
     ended = station.finish()
     status = station.status()
     told = " ".join([str(ended["error"]), status["cause"], status["next_action"]])
-    if ended["state"] != "interrupted" or words not in told or "See to the disk" not in status["next_action"]:
+    if ended["state"] != "interrupted" or words not in told or "Check the job disk" not in status["next_action"]:
         wrongs.append(f"the job ends {ended['state']}, told: {told}")
     if status["machine"] == "Error":
         wrongs.append(f"a fault is latched: {status['cause']}")

@@ -74,7 +74,7 @@ def rows(rendered):
          ("gige", "one pose of 8 views: LightCrafter over USB/IP, two GigE cameras at its trigger output",
           "whole scan folder", lambda s: scenario.usb_and_gige(s, rendered)),
          ("uart", "table homed and turned: Modbus on the kernel's 8250", "at its angle", scenario.uart),
-         ("vivid", "two vivid devices as a pair: V4L2", "pictures, a pair on disk", scenario.vivid)]]
+         ("vivid", "two vivid devices as a pair: V4L2", "images, a pair on disk", scenario.vivid)]]
 
 
 def live(table, station, acts):

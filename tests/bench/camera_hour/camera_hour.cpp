@@ -76,14 +76,14 @@ class Answers {
 
 struct Done {
   int frames = 0;    ///< of each camera, in scans
-  int pictures = 0;  ///< of each camera, in previews
+  int previews = 0;  ///< of each camera, in previews
   int failed = 0;
 };
 
 void print(double at_s, const Done& done) {
-  fmt::print(R"({{"at_s": {:.1f}, "resident_kib": {}, "descriptors": {}, "frames": {}, "pictures": {}, "failed": {}}})"
+  fmt::print(R"({{"at_s": {:.1f}, "resident_kib": {}, "descriptors": {}, "frames": {}, "previews": {}, "failed": {}}})"
              "\n",
-             at_s, resident_kib(), descriptors(), done.frames, done.pictures, done.failed);
+             at_s, resident_kib(), descriptors(), done.frames, done.previews, done.failed);
   std::fflush(stdout);
 }
 
@@ -115,7 +115,7 @@ int work(seconds time, Done& done) {
       done.frames += 2;
       next += 2 * kFrame;
     } else {
-      if (preview.jpeg(Side::left) && preview.jpeg(Side::right)) ++done.pictures;
+      if (preview.jpeg(Side::left) && preview.jpeg(Side::right)) ++done.previews;
       next += kFrame;
     }
     next = std::max(next, clock.now());

@@ -60,11 +60,11 @@ class CameraTrial {
     const auto begun = clock().now();
     bench_->plug(false);
     // The driver detects the silence itself: there is no event to wait for.
-    if (method == "ready" || method == "arm") clock().sleep_for(kNoticed);
+    if (method == "prepare" || method == "arm") clock().sleep_for(kNoticed);
     if (collects) bench_->fire();
     auto outcome = timed(clock(), collects ? Clock::Duration(kFrameLimit) : kConnectLimit,
                          {ErrorCode::io, ErrorCode::timeout, ErrorCode::not_found}, [&](Deadline by) -> Result<void> {
-                           if (method == "ready") return camera().prepare(by);
+                           if (method == "prepare") return camera().prepare(by);
                            if (method == "arm") return camera().arm(by);
                            return ended(collects ? camera().collect(by) : camera().capture_preview(by));
                          });
@@ -104,9 +104,9 @@ class CameraTrial {
 std::optional<std::string> why_not(const std::string& device, const std::string& method, Fault fault) {
   if (fault == Fault::stalled) return "nothing moves";
   if (fault == Fault::device_error) return "a camera raises no alarm";
-  if (method == "look" && device != "aravis") return "exposes at the edge of its trigger input only";
+  if (method == "capture_preview" && device != "aravis") return "exposes at the edge of its trigger input only";
   if (fault == Fault::unplugged || fault == Fault::back_after_2s || method == "collect") return std::nullopt;
-  return method == "look" ? "frames are spoilt at edges only: see collect" : "brings no frame";
+  return method == "capture_preview" ? "frames are damaged at edges only: see collect" : "brings no frame";
 }
 
 }  // namespace
@@ -115,7 +115,7 @@ std::vector<Cell> camera_cells() {
   static std::mutex gige;  // all GigE cameras of a network share one port
   std::vector<Cell> cells;
   for (const std::string device : {"aravis", "v4l2", "v4l2-side-by-side"}) {
-    for (const std::string method : {"ready", "arm", "collect", "look"}) {
+    for (const std::string method : {"prepare", "arm", "collect", "capture_preview"}) {
       for (const auto& [fault, name] : kFaults) {
         cells.push_back({"SensorCamera", device, method, fault, [device, method, fault] {
                            if (auto reason = why_not(device, method, fault)) return not_applicable(*reason);

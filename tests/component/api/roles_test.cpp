@@ -143,7 +143,7 @@ TEST_F(ApiBench, ARevokedTokenIsVoidSoon) {
   RealClock clock;
   for (const auto end = Deadline::after(clock, std::chrono::seconds(10)); !end.expired(clock);) {
     if (ask(tcp(), status).status == 401) return;
-    clock.sleep_for(std::chrono::milliseconds(200));  // guessing costs much: wait between guesses
+    clock.sleep_for(std::chrono::milliseconds(200));  // the file is read once a second; stay below the request rate
   }
   FAIL() << "still good";
 }

@@ -106,7 +106,7 @@ TEST_P(TurntableCompliance, AnAngleThatIsNoneIsOutOfRange) {
 }
 
 TEST_P(TurntableCompliance, ABlockedTableIsStalled) {
-  if (!bench_->can_block()) GTEST_SKIP() << "nobody is there to block the table";
+  if (!bench_->can_block()) GTEST_SKIP() << "the bench cannot block the table";
   if (!bench_->has_feedback()) GTEST_SKIP() << "the device counts its steps and measures nothing";
   ASSERT_TRUE(home());
   bench_->block(true);
@@ -118,7 +118,7 @@ TEST_P(TurntableCompliance, ABlockedTableIsStalled) {
 }
 
 TEST_P(TurntableCompliance, HomingABlockedTableIsStalled) {
-  if (!bench_->can_block()) GTEST_SKIP() << "nobody is there to block the table";
+  if (!bench_->can_block()) GTEST_SKIP() << "the bench cannot block the table";
   bench_->block(true);
   const auto homed = home();
   bench_->block(false);

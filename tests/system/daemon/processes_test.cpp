@@ -82,7 +82,7 @@ TEST_F(Programs, AJobIsQueuedShownCancelledAndRemovedFromTheCommandLine) {
   EXPECT_THAT(output, HasSubstr(id));
   EXPECT_EQ(scanrig({"bundle", id, "--out", folder_ / "job.tar.gz", "--socket", socket()}), 0) << output;
   EXPECT_GT(fs::file_size(folder_ / "job.tar.gz"), 100u);
-  EXPECT_EQ(scanrig({"delete", id, "--socket", socket()}), 6) << "nobody said yes";
+  EXPECT_EQ(scanrig({"delete", id, "--socket", socket()}), 6) << "without --yes";
   EXPECT_EQ(scanrig({"delete", id, "--yes", "--socket", socket()}), 0) << output;
   EXPECT_EQ(scanrig({"jobs", id, "--socket", socket()}), 3);
   EXPECT_EQ(scanrig({"queue", "--recipe", "no-such", "--socket", socket()}), 3) << output;

@@ -86,7 +86,7 @@ TEST_F(CamerasOnWires, AScanRedoesALostExposureUsesTheFramesOfOneEdgeOnlyAndEnds
   EXPECT_TRUE(std::filesystem::exists(job["model"].get<std::string>()));
 }
 
-TEST_F(CamerasOnWires, PicturesThatAreDarkBlurredOrOfTheOtherSideAreRedone) {
+TEST_F(CamerasOnWires, ImagesThatAreDarkBlurredOrOfTheOtherSideAreRetaken) {
   start();
   spoil("dark", 2);
   begin_scan();
@@ -100,7 +100,7 @@ TEST_F(CamerasOnWires, PicturesThatAreDarkBlurredOrOfTheOtherSideAreRedone) {
   int retakes = 0;
   const auto stored = job()["stored"];
   for (const auto& view : stored) retakes += view["retakes"].get<int>();
-  EXPECT_GE(retakes, 4) << "of two spoilt exposures at least one was with dots";
+  EXPECT_GE(retakes, 4) << "of two bad exposures at least one was with the pattern";
 }
 
 TEST_F(CamerasOnWires, ACameraThatStaysDarkEndsTheJobInItsName) {
@@ -131,22 +131,22 @@ TEST_F(CamerasOnWires, ACameraPulledInAScanInterruptsTheJobAndIsBackWithoutARest
 TEST_F(CamerasOnWires, TheCommandListsTunesGrabsAndPreviews) {
   views_ = 3;  // the minimum
   start_rig({"--cameras", "gige", "--scale", "0.25", "--poses", "1"});
-  const auto pictures = folder_ / "pictures";
+  const auto images = folder_ / "images";
   EXPECT_EQ(Process({SCANRIG_PROGRAM, "camera", "list"}, folder_ / "output").wait(), 0);
   EXPECT_THAT(*read_file(folder_ / "output"), AllOf(HasSubstr("SIM-L"), HasSubstr("SIM-R")));
   EXPECT_EQ(scanrig({"camera", "tune", "--count", "2"}), 0) << output_;
   EXPECT_THAT(output_, HasSubstr("right  brightness"));
-  EXPECT_EQ(scanrig({"camera", "grab", "--light", "pattern", "--out", pictures}), 0) << output_;
-  EXPECT_TRUE(std::filesystem::exists(pictures / "left.png"));
-  EXPECT_THAT(output_, HasSubstr((pictures / "left.png").string() + "\n" + (pictures / "right.png").string() + "\n"));
-  EXPECT_EQ(scanrig({"camera", "grab", "--out", pictures}), static_cast<int>(ExitCode::bad_input)) << "already there";
-  EXPECT_EQ(scanrig({"camera", "preview", "--count", "2", "--out", pictures}), 0) << output_;
-  EXPECT_TRUE(std::filesystem::exists(pictures / "right.jpg"));
-  std::filesystem::remove(pictures / "right.jpg");
+  EXPECT_EQ(scanrig({"camera", "grab", "--light", "pattern", "--out", images}), 0) << output_;
+  EXPECT_TRUE(std::filesystem::exists(images / "left.png"));
+  EXPECT_THAT(output_, HasSubstr((images / "left.png").string() + "\n" + (images / "right.png").string() + "\n"));
+  EXPECT_EQ(scanrig({"camera", "grab", "--out", images}), static_cast<int>(ExitCode::bad_input)) << "already there";
+  EXPECT_EQ(scanrig({"camera", "preview", "--count", "2", "--out", images}), 0) << output_;
+  EXPECT_TRUE(std::filesystem::exists(images / "right.jpg"));
+  std::filesystem::remove(images / "right.jpg");
   start_daemon({SCANRIGD_PROGRAM});
   EXPECT_EQ(scanrig({"camera", "tune", "--count", "1"}), static_cast<int>(ExitCode::refused)) << "the daemon has them";
-  EXPECT_EQ(scanrig({"camera", "preview", "--count", "3", "--out", pictures}), 0) << output_;
-  EXPECT_TRUE(std::filesystem::exists(pictures / "right.jpg"));
+  EXPECT_EQ(scanrig({"camera", "preview", "--count", "3", "--out", images}), 0) << output_;
+  EXPECT_TRUE(std::filesystem::exists(images / "right.jpg"));
 }
 
 TEST_F(CamerasOnWires, TheCommandTellsProgramsInJsonALineAPair) {
@@ -158,10 +158,9 @@ TEST_F(CamerasOnWires, TheCommandTellsProgramsInJsonALineAPair) {
     for (std::string line; std::getline(text, line);) all.push_back(json::parse(line, nullptr, false));
     return all;
   };
-  const auto pictures = folder_ / "pictures";
+  const auto images = folder_ / "images";
   const auto files = [&](const char* ending) {
-    return json{{"left", pictures / (std::string("left") + ending)},
-                {"right", pictures / (std::string("right") + ending)}};
+    return json{{"left", images / (std::string("left") + ending)}, {"right", images / (std::string("right") + ending)}};
   };
   EXPECT_EQ(scanrig({"camera", "tune", "--light", "pattern", "--count", "2", "--json"}), 0) << output_;
   ASSERT_EQ(lines().size(), 2u) << output_;
@@ -174,11 +173,11 @@ TEST_F(CamerasOnWires, TheCommandTellsProgramsInJsonALineAPair) {
       EXPECT_TRUE(pair[side]["advice"].is_string()) << pair;
     }
   }
-  EXPECT_EQ(scanrig({"camera", "grab", "--out", pictures, "--json"}), 0) << output_;
+  EXPECT_EQ(scanrig({"camera", "grab", "--out", images, "--json"}), 0) << output_;
   EXPECT_EQ(lines(), std::vector<json>{files(".png")});
-  EXPECT_EQ(scanrig({"camera", "preview", "--count", "2", "--out", pictures, "--json"}), 0) << output_;
+  EXPECT_EQ(scanrig({"camera", "preview", "--count", "2", "--out", images, "--json"}), 0) << output_;
   EXPECT_EQ(lines(), (std::vector<json>{files(".jpg"), files(".jpg")}));
-  EXPECT_TRUE(std::filesystem::exists(pictures / "right.jpg"));
+  EXPECT_TRUE(std::filesystem::exists(images / "right.jpg"));
 }
 
 }  // namespace

@@ -48,7 +48,7 @@ TEST(ServiceManager, IsToldOfAReloadAndOfReadinessOnlyWhenTheDaemonHasBegunAgain
   ServiceManager manager;
   manager.alive("The rig is ready.");
   manager.reloading();
-  manager.alive("The daemon begins again.");
+  manager.alive("Reloading the configuration.");
   manager.begins_again();
   manager.alive("The table is not homed.");
   const auto heard = systemd.heard();

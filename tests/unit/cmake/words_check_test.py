@@ -99,6 +99,8 @@ class Checked(unittest.TestCase):
     def test_an_alias_needs_a_mark_on_its_line_and_its_file_in_the_table(self):
         marked = "int least_size;  // old name\n"
         self.assert_clean({"config/keys.h": marked})
+        self.assert_clean({"config/keys.h": "section.accept_old_name(min_size, least_size);\n"})
+        self.assert_clean({"config/keys.h": "int least_size;  // Old names\n"})
         self.assert_found({"config/keys.h": "int least_size;\nint least_mass;  // alias\n"},
                           "config/keys.h:1: least_* -> use min_*")
         _, lines = self.check({"core/a.h": marked})
@@ -120,6 +122,18 @@ class Checked(unittest.TestCase):
         files = {"core/a.cpp": "// nobody\n"}
         table = (ROOT / "cmake" / "words.txt").read_text().replace("tests/bench/bench.py ->", "config/keys.h ->")
         self.assertEqual(self.check(files, table)[1][0][:23], "core/a.cpp:1: nobody ->")
+
+    def test_a_word_of_each_kind_is_noticed_by_the_table_of_this_project(self):
+        planted = {"docs/status.md": ("Measure the closure.", "closure"),
+                   "daemon/a.cpp": ('auto a = "ask the daemon";', "the daemon"),
+                   "drivers/a.cpp": ('auto a = "the bus fell silent";', "fell silent"),
+                   "drivers/turntable/a.h": ("bool flank_loaded_ = false;", "flank_loaded"),
+                   "tests/system/hand.py": ("", "hand.py")}
+        files = {name: text + "\n" for name, (text, _) in planted.items()}
+        code, lines = self.check(files, (ROOT / "cmake" / "words.txt").read_text())
+        self.assertEqual(code, 1)
+        for name, (_, term) in planted.items():
+            self.assertTrue(any(line.startswith(f"{name}:1: {term} -> ") for line in lines), f"{name}: {lines}")
 
 
 if __name__ == "__main__":

@@ -63,9 +63,9 @@ TEST_F(RecipeConfigTest, ALineHasSignalsAndLimits) {
 
 TEST_F(RecipeConfigTest, OldNamesAreReadWithAWarning) {
   auto old_names = std::string(line_);
-  for (const auto& [now, before] :
-       {std::pair("flip = \"signal\"", "flip = \"line\""),  // old name
-        std::pair("min_measured_share", "least_measured_share"), std::pair("max_residual_mm", "most_residual_mm")}) {
+  for (const auto& [now, before] : {std::pair("flip = \"signal\"", "flip = \"line\""),        // old name
+                                    std::pair("min_measured_share", "least_measured_share"),  // old name
+                                    std::pair("max_residual_mm", "most_residual_mm")}) {      // old name
     old_names = replaced(old_names, now, before);
   }
   old_names = replaced(with_inputs(), "voxel_mm = 0.25", "voxel_mm = 0.25\nlimit_min = 7") + old_names;

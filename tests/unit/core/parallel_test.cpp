@@ -23,25 +23,25 @@ TEST(Parallel, EveryIndexIsVisitedOnceForAnyNumberOfThreads) {
 
 TEST(Parallel, ThreadsThatHelpALowPriorityThreadTakeItsPriority) {
   constexpr int kThreads = 4;
-  const auto most_urgent_helper = [] {
-    std::atomic<int> least = 100, met = 0;
+  const auto lowest_niceness_of_helpers = [] {
+    std::atomic<int> lowest = 100, met = 0;
     with_threads(kThreads, [&] {
       parallel_for(kThreads, [&](std::size_t) {
         ++met;
         const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(2);
         while (met < kThreads && std::chrono::steady_clock::now() < end) std::this_thread::yield();
-        for (int before = least; niceness() < before && !least.compare_exchange_weak(before, niceness());) {
+        for (int before = lowest; niceness() < before && !lowest.compare_exchange_weak(before, niceness());) {
         }
       });
     });
-    return least.load();
+    return lowest.load();
   };
   const int ordinary = niceness();
-  EXPECT_EQ(most_urgent_helper(), ordinary);
+  EXPECT_EQ(lowest_niceness_of_helpers(), ordinary);
   int background = 0;
   std::thread([&] {
     lower_priority();
-    background = most_urgent_helper();
+    background = lowest_niceness_of_helpers();
   }).join();
   EXPECT_GE(background, std::min(ordinary + 1, 15));
   EXPECT_EQ(niceness(), ordinary);

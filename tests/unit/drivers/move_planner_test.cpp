@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "drivers/turntable/axis_scale.h"
+#include "drivers/turntable/move_planner.h"
 
 namespace scanrig {
 namespace {

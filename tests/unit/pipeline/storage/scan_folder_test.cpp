@@ -111,7 +111,8 @@ TEST_F(ScanFolderTest, AnOlderFolderIsReadAndBecomesANewOneWithItsNextChange) {
   const auto third =
       replaced(replaced(now, "\"version\": 4", "\"version\": 3"), "movement_checks", "closures");  // old name
   const auto second = replaced(replaced(third, "\"version\": 3", "\"version\": 2"), "  \"config_sha256\": [],\n", "");
-  const auto first = replaced(replaced(second, "\"version\": 2", "\"version\": 1"), ",\n      \"closures\": []", "");
+  const auto first =
+      replaced(replaced(second, "\"version\": 2", "\"version\": 1"), ",\n      \"closures\": []", "");  // old name
   for (const auto& old : {first, second, third}) {
     write_text(scan_ / "scan.json", old);
     auto again = ScanFolder::open(scan_);

@@ -1,4 +1,4 @@
-// bench_picture MODEL.ply AZIMUTH_DEG ELEVATION_DEG OUT: a shaded image of a model for the documentation, seen from
+// bench_model_image MODEL.ply AZIMUTH_DEG ELEVATION_DEG OUT: a shaded image of a model for the documentation, seen from
 // afar. Measured surface is grey; surface closed without measurement (`views` 0) is orange.
 
 #include <fmt/format.h>
@@ -47,24 +47,24 @@ cv::Mat3b draw(const Mesh& mesh, const SurfaceIndex& surface, double azimuth, do
   const int rows = static_cast<int>((box.sizes().y() + 2 * kMarginMm) / step);
   const Eigen::Vector3d eye = world_from_eye.col(2);
   const Eigen::Vector3d light = world_from_eye * Eigen::Vector3d(-0.5, 0.7, 0.6).normalized();
-  cv::Mat3b picture(rows, kWidth * kSamples, cv::Vec3b(255, 255, 255));
+  cv::Mat3b image(rows, kWidth * kSamples, cv::Vec3b(255, 255, 255));
   parallel_for(static_cast<std::size_t>(rows), [&](std::size_t row) {
-    for (int col = 0; col < picture.cols; ++col) {
+    for (int col = 0; col < image.cols; ++col) {
       const Eigen::Vector3d start(box.min().x() - kMarginMm + step * col,
                                   box.max().y() + kMarginMm - step * static_cast<double>(row), box.max().z() + 1.0);
       const auto hit = surface.first_hit(world_from_eye * start, -eye);
-      if (hit) picture(static_cast<int>(row), col) = shade(mesh, *hit, eye, light);
+      if (hit) image(static_cast<int>(row), col) = shade(mesh, *hit, eye, light);
     }
   });
-  cv::resize(picture, picture, {}, 1.0 / kSamples, 1.0 / kSamples, cv::INTER_AREA);
-  return picture;
+  cv::resize(image, image, {}, 1.0 / kSamples, 1.0 / kSamples, cv::INTER_AREA);
+  return image;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   if (argc != 5) {
-    fmt::print(stderr, "usage: bench_picture MODEL.ply AZIMUTH_DEG ELEVATION_DEG OUT\n");
+    fmt::print(stderr, "usage: bench_model_image MODEL.ply AZIMUTH_DEG ELEVATION_DEG OUT\n");
     return static_cast<int>(ExitCode::usage);
   }
   const auto mesh = read_ply(argv[1]);
@@ -73,6 +73,6 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "{}\n", surface.error().message);
     return static_cast<int>(exit_code(surface.error().code));
   }
-  const auto picture = draw(*mesh, *surface, to_radians(std::atof(argv[2])), to_radians(std::atof(argv[3])));
-  return cv::imwrite(argv[4], picture, {cv::IMWRITE_JPEG_QUALITY, 88}) ? 0 : 1;
+  const auto image = draw(*mesh, *surface, to_radians(std::atof(argv[2])), to_radians(std::atof(argv[3])));
+  return cv::imwrite(argv[4], image, {cv::IMWRITE_JPEG_QUALITY, 88}) ? 0 : 1;
 }
