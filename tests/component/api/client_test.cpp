@@ -101,7 +101,7 @@ class HangingDaemon : public Client {
     ASSERT_FALSE(answer);
     EXPECT_EQ(answer.error().exit, ExitCode::unreachable);
     EXPECT_THAT(answer.error().message,
-                AllOf(HasSubstr(options.socket.string()), HasSubstr("not answered within 0.2 s"),
+                AllOf(HasSubstr(options.socket.string()), HasSubstr("not responded within 0.2 s"),
                       HasSubstr("systemctl status scanrigd")));
   }
   static constexpr std::chrono::milliseconds kSoon{200};
@@ -123,7 +123,7 @@ TEST_F(HangingDaemon, ThatSendsNoFileIsGivenUpAndLeavesNothing) {
   const auto done = ctl::download(options.socket, kModel, out(), nobody, kSoon);
   ASSERT_FALSE(done);
   EXPECT_EQ(done.error().exit, ExitCode::unreachable);
-  EXPECT_THAT(done.error().message, HasSubstr("not answered within 0.2 s"));
+  EXPECT_THAT(done.error().message, HasSubstr("not responded within 0.2 s"));
   EXPECT_FALSE(left_something());
 }
 

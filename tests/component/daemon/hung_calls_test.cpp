@@ -103,7 +103,8 @@ class HungCalls : public Daemon {
   void by_jog(const std::string& call) {
     get_ready();
     ASSERT_TRUE(ask(event::MaintenanceRequested{.what = What::on}));
-    rig.panel.press(&PanelInputs::reset);  // consents to it
+    rig.panel.press(&PanelInputs::reset);  // consents to it, and homes
+    ASSERT_TRUE(clock_waits_for([this] { return now()->activity == Activity::homing; }));
     ASSERT_TRUE(clock_waits_for([this] { return now()->activity == Activity::none; }));
     gate.close(call);
     const auto jogged = ask(event::MaintenanceRequested{.what = What::jog, .angle = {20}, .speed = {5}});

@@ -17,7 +17,7 @@ class HangingDisk : public Station {
   void expect_interrupted() {
     ASSERT_NE(asked_for<action::CloseJob>(), nullptr);
     EXPECT_EQ(asked_for<action::CloseJob>()->state, JobState::interrupted);
-    EXPECT_THAT(asked_for<action::CloseJob>()->why.message, HasSubstr("/jobs has not answered"));
+    EXPECT_THAT(asked_for<action::CloseJob>()->why.message, HasSubstr("/jobs has not responded"));
     EXPECT_FALSE(state.job);
     EXPECT_FALSE(state.latch) << "it is no fault of the rig";
   }
