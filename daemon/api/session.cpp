@@ -35,9 +35,6 @@ std::optional<ApiResponse> understand(boost::beast::error_code error) {
   return std::nullopt;  // gone, or too slow
 }
 
-namespace net = boost::asio;
-namespace http = boost::beast::http;
-
 constexpr std::size_t kChunk = 64 * 1024;
 
 }  // namespace
@@ -351,7 +348,7 @@ void ApiSession::send_events(EventHub::Batch batch) {
   for (const auto& text : batch_) buffers.push_back(net::buffer(*text));
   writing_events_ = true;
   stream_.expires_after(core_.limits.answer_time);
-  net::async_write(stream_, std::move(buffers), [self = shared_from_this()](Error error, std::size_t) {
+  net::async_write(stream_, buffers, [self = shared_from_this()](Error error, std::size_t) {
     self->writing_events_ = false;
     if (error) return self->hang_up();
     self->events_due();

@@ -45,7 +45,8 @@ Result<void> check_memory(const ReconstructionTask& task, double voxel_mm, std::
 }
 
 ReconstructorFactory pipeline_reconstructor(ReconstructOptions options, std::uintmax_t memory_bytes) {
-  return [=](const ReconstructionTask& task) -> Result<std::unique_ptr<Reconstructor>> {
+  return [options = std::move(options),
+          memory_bytes](const ReconstructionTask& task) -> Result<std::unique_ptr<Reconstructor>> {
     auto changed = options;
     changed.voxel_mm = task.changes.voxel_mm.value_or(options.voxel_mm);
     if (!task.changes.fusion.empty()) changed.fusion = task.changes.fusion;

@@ -111,7 +111,7 @@ class ReconstructionThread {
   Result<event::ModelReady> make_model();
   void end();
   Context context(std::function<void(std::string_view, double)> progress) const {
-    return {current_->stop.get_token(), progress};
+    return {current_->stop.get_token(), std::move(progress)};
   }
   void tell_progress(std::string stage, double fraction);
 

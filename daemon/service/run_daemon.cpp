@@ -283,7 +283,8 @@ StationPorts ports_of(const Shared& shared, Threads& threads, ApiServer& api) {
 
 }  // namespace
 
-Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, Clock& clock, std::stop_token stop) {
+Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, Clock& clock,
+                         const std::stop_token& stop) {
   keep_heaps_small();
   ExitWatchdog ending(options.exit_timeout, options.on_exit_hang);
   auto store = JobStore::open(options.jobs);

@@ -83,6 +83,7 @@ struct DaemonOptions {
 /// requested reload. Fails with `io`, `refused` (another daemon), `invalid_input` before it starts. Fails with
 /// `timeout` without confirmed standstill at the end, or when a device's call hangs for good. Then it calls
 /// `on_exit_hang` at once, and returns only when the device does. The devices outlive the call.
-Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, Clock& clock, std::stop_token stop);
+Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, Clock& clock,
+                         const std::stop_token& stop);
 
 }  // namespace scanrig

@@ -26,7 +26,7 @@ constexpr PanelOutputs kAllOn{true, true, true, true, true, true, true, true};
 }  // namespace
 
 ControlLoop::ControlLoop(Clock& clock, ControlLoopOptions options, JobTable known_jobs)
-    : clock_(clock), options_(options), inbox_(clock), jobs_(std::move(known_jobs)) {
+    : clock_(clock), options_(std::move(options)), inbox_(clock), jobs_(std::move(known_jobs)) {
   for (const auto& [id, job] : jobs_) {
     state_ = next(state_, event::JobUpdated{job}, options_.rules).state;
   }

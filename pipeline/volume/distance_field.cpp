@@ -41,8 +41,8 @@ SurfaceStatistics surface_statistics(const std::vector<std::vector<RangeSampler>
 
 }  // namespace
 
-Field::Field(std::vector<std::vector<RangeSampler>> views_of_pose, std::vector<Transform> model_from_pose, Hull hull,
-             const VolumeOptions& options, double band_mm)
+Field::Field(std::vector<std::vector<RangeSampler>> views_of_pose, const std::vector<Transform>& model_from_pose,
+             Hull hull, const VolumeOptions& options, double band_mm)
     : views_of_pose_(std::move(views_of_pose)),
       hull_(std::move(hull)),
       fusion_(options.fusion),

@@ -36,7 +36,7 @@ struct PointEvidence {
 class Field {
  public:
   /// `views_of_pose`: prepared views, pose after pose.
-  Field(std::vector<std::vector<RangeSampler>> views_of_pose, std::vector<Transform> model_from_pose, Hull hull,
+  Field(std::vector<std::vector<RangeSampler>> views_of_pose, const std::vector<Transform>& model_from_pose, Hull hull,
         const VolumeOptions& options, double band_mm);
 
   /// The views and bounds that matter near one place.
