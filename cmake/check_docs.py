@@ -49,6 +49,12 @@ class Tree:
             return any(pathlib.PurePosixPath(name).match(path) for name in self.files)
         return path in self.files or (self.root / path).is_dir()
 
+    def has_below(self, folder, name):
+        """A file called `name` in `folder` or below it; a document of docs/ may name files from anywhere."""
+        if folder.parts[:1] == ("docs",) or not folder.parts:
+            return any(pathlib.PurePosixPath(known).match(name) for known in self.names)
+        return any(path.match(name) and path.is_relative_to(folder) for path in map(pathlib.PurePosixPath, self.files))
+
     def documents(self):
         return sorted(name for name in self.files if name.endswith(".md"))
 
@@ -100,7 +106,7 @@ def missing(tree, document, line):
             if quoted.split("/")[0] in TOP and not tree.has(quoted) and not tree.has(beside) and not tree.has(quoted + ".h"):
                 yield quoted
         elif quoted.endswith((".h", ".cpp", ".py")) and not quoted.startswith("*"):
-            if not (tree.has((folder / quoted).as_posix()) or ("*" not in quoted and quoted in tree.names)):
+            if not tree.has_below(folder, quoted):
                 yield quoted
 
 

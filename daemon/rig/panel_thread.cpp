@@ -9,7 +9,7 @@ namespace scanrig {
 namespace {
 
 /// Longest wait of a lamp for a quiet panel; part of panel_latency().
-constexpr auto kPoll = std::chrono::milliseconds(20);
+constexpr auto kLampWait = std::chrono::milliseconds(20);
 constexpr auto kShowLimit = std::chrono::milliseconds(500);
 constexpr auto kRetry = std::chrono::seconds(1);  ///< after a panel that did not respond
 
@@ -29,7 +29,7 @@ std::vector<Event> changes(const PanelInputs& before, const PanelInputs& after) 
   return events;
 }
 
-Clock::Duration panel_latency(Clock::Duration read_time) { return PanelDebounce::kDebounce + kPoll + read_time; }
+Clock::Duration panel_latency(Clock::Duration read_time) { return PanelDebounce::kDebounce + kLampWait + read_time; }
 
 PanelThread::PanelThread(Panel& panel, Clock& clock, PanelThreadOptions options, std::function<void(Event)> post_event,
                          std::function<void()> on_estop)
@@ -84,7 +84,7 @@ Result<void> PanelThread::show_wanted() {
 Result<void> PanelThread::read_inputs() {
   // A panel whose first state is unread differs from nothing: compare with a quiet panel.
   const auto inputs = panel_.wait_change(known_.value_or(PanelInputs{}),
-                                         known_ ? Deadline::after(clock_, kPoll) : Deadline{clock_.now()});
+                                         known_ ? Deadline::after(clock_, kLampWait) : Deadline{clock_.now()});
   if (!inputs) return pass_on(inputs);
   if (!inputs->estop_ok && (!known_ || known_->estop_ok)) on_estop_();
   if (!known_) {

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "pipeline/texture/face_labels.h"
+#include "pipeline/texture/chart_cutting.h"
 
 namespace scanrig {
 

@@ -8,7 +8,7 @@
 #include "core/parallel.h"
 #include "pipeline/mesh/solid_properties.h"
 #include "pipeline/texture/atlas.h"
-#include "pipeline/texture/face_labels.h"
+#include "pipeline/texture/chart_cutting.h"
 #include "pipeline/texture/photo_view.h"
 #include "pipeline/texture/point_colour.h"
 #include "pipeline/texture/shading.h"

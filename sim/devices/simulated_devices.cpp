@@ -6,7 +6,7 @@
 namespace scanrig::sim {
 
 Result<void> SimProjector::fire(Light light, Deadline deadline) {
-  Bench& b = bench_;
+  SharedState& b = state_;
   std::unique_lock lock(b.mutex);
   b.dark_requested = false;
   b.edge(light);
@@ -25,21 +25,21 @@ Result<void> SimProjector::turn_off(Deadline) {
 }
 
 void SimProjector::request_off() noexcept {
-  const std::scoped_lock lock(bench_.mutex);
-  bench_.dark_requested = true;
-  bench_.clock.notify_all(bench_.changed);
+  const std::scoped_lock lock(state_.mutex);
+  state_.dark_requested = true;
+  state_.clock.notify_all(state_.changed);
 }
 
 Result<void> SimStereoCamera::arm(Deadline) {
-  const std::scoped_lock lock(bench_.mutex);
-  bench_.in_flight.reset();
-  bench_.triggers = 0;
-  bench_.armed = collectable_ = true;
+  const std::scoped_lock lock(state_.mutex);
+  state_.in_flight.reset();
+  state_.triggers = 0;
+  state_.armed = collectable_ = true;
   return {};
 }
 
 Result<StereoFrame> SimStereoCamera::collect(Deadline deadline) {
-  Bench& b = bench_;
+  SharedState& b = state_;
   std::unique_lock lock(b.mutex);
   if (!collectable_) return fail(ErrorCode::protocol, "camera: nothing to collect: not armed");
   collectable_ = false;
@@ -66,7 +66,7 @@ Result<StereoFrame> SimStereoCamera::capture_preview(Deadline) {
 }
 
 Result<PanelInputs> SimPanel::wait_change(const PanelInputs& known, Deadline deadline) {
-  Bench& b = bench_;
+  SharedState& b = state_;
   std::unique_lock lock(b.mutex);
   for (Button* button : {&b.start, &b.stop, &b.reset}) {
     if (*button == Button::reported) *button = Button::released;
@@ -88,8 +88,8 @@ Result<PanelInputs> SimPanel::wait_change(const PanelInputs& known, Deadline dea
 }
 
 Result<void> SimPanel::show(const PanelOutputs& outputs, Deadline) {
-  const std::scoped_lock lock(bench_.mutex);
-  bench_.lamps = outputs;
+  const std::scoped_lock lock(state_.mutex);
+  state_.lamps = outputs;
   return {};
 }
 

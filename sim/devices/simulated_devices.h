@@ -4,7 +4,7 @@
 #include "drivers/panel/panel.h"
 #include "drivers/projector/projector.h"
 #include "drivers/turntable/turntable.h"
-#include "sim/devices/bench.h"
+#include "sim/devices/shared_state.h"
 
 namespace scanrig::sim {
 
@@ -12,7 +12,7 @@ namespace scanrig::sim {
 /// `device_alarm` (the e-stop has cut the motor's power), `stopped`. A target out of range leaves the table homed.
 class SimTurntable final : public Turntable {
  public:
-  explicit SimTurntable(Bench& bench);
+  explicit SimTurntable(SharedState& state);
   Result<void> home(Deadline deadline) override;
   Result<Move> rotate_to(Degrees target, Deadline deadline) override;
   Result<void> stop(Deadline deadline) override;
@@ -25,7 +25,7 @@ class SimTurntable final : public Turntable {
   Result<void> travel(std::unique_lock<std::mutex>& lock, double target, Deadline deadline, Move& move);
   Result<void> wait_for(std::unique_lock<std::mutex>& lock, Clock::TimePoint moment, Deadline deadline);
 
-  Bench& bench_;
+  SharedState& state_;
   bool homed_ = false;
   double speed_;  // deg/s
 };
@@ -33,38 +33,38 @@ class SimTurntable final : public Turntable {
 /// Fails with `timeout`, and with `io` if request_off() cut the pulse short.
 class SimProjector final : public Projector {
  public:
-  explicit SimProjector(Bench& bench) : bench_(bench) {}
+  explicit SimProjector(SharedState& state) : state_(state) {}
   Result<void> fire(Light light, Deadline deadline) override;
   Result<void> turn_off(Deadline deadline) override;
   void request_off() noexcept override;
 
  private:
-  Bench& bench_;
+  SharedState& state_;
 };
 
 /// collect() fails with `timeout`, and with `protocol` if it was not armed; capture_preview() with `unsupported`:
 /// rendering takes too long.
 class SimStereoCamera final : public StereoCamera {
  public:
-  explicit SimStereoCamera(Bench& bench) : bench_(bench) {}
+  explicit SimStereoCamera(SharedState& state) : state_(state) {}
   Result<void> prepare(Deadline) override { return {}; }
   Result<void> arm(Deadline deadline) override;
   Result<StereoFrame> collect(Deadline deadline) override;
   Result<StereoFrame> capture_preview(Deadline deadline) override;
 
  private:
-  Bench& bench_;
+  SharedState& state_;
   bool collectable_ = false;  // armed since the last collect()
 };
 
 class SimPanel final : public Panel {
  public:
-  explicit SimPanel(Bench& bench) : bench_(bench) {}
+  explicit SimPanel(SharedState& state) : state_(state) {}
   Result<PanelInputs> wait_change(const PanelInputs& known, Deadline deadline) override;
   Result<void> show(const PanelOutputs& outputs, Deadline deadline) override;
 
  private:
-  Bench& bench_;
+  SharedState& state_;
 };
 
 }  // namespace scanrig::sim

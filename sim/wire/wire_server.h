@@ -1,6 +1,5 @@
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <filesystem>
@@ -13,26 +12,9 @@
 #include "core/result.h"
 #include "sim/wire/modbus_frame.h"
 #include "sim/wire/pty.h"
+#include "sim/wire/wire_fault.h"
 
 namespace scanrig::sim::wire {
-
-/// A fault for the next requests.
-struct WireFault {
-  enum class Kind {
-    request_lost,  ///< does not receive the request
-    reply_lost,    ///< obeys, its reply is lost
-    late,          ///< obeys, replies `delay` later; meanwhile it receives nothing else
-    wrong_crc,     ///< obeys, the reply is damaged
-    cut_short,     ///< obeys, half of the reply arrives
-    refuse,        ///< does not obey, replies with `exception`
-    earlier_reply  ///< obeys, repeats its previous reply
-  };
-  Kind kind = Kind::request_lost;
-  int count = -1;                          ///< requests with the fault; negative: all
-  std::optional<std::uint8_t> function{};  ///< only requests of this kind: Modbus function, or first letter
-  std::chrono::milliseconds delay{0};
-  std::uint8_t exception = 4;
-};
 
 /// One frame, as it passed the far end of the wire.
 struct WireFrame {

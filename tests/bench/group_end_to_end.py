@@ -7,7 +7,7 @@ import time
 import bad_input
 import bare_machine
 import dragon
-import rim
+import d415_pair
 import sigkill
 import truth_absent
 
@@ -145,7 +145,7 @@ PARTS = {"models": models,
          "render": render_time,
          "same_model": lambda bench, scratch: each_case(bench, "same model", truth_absent.cases(bench.bin, scratch)),
          "dragon": lambda bench, _: dragon.measure(bench),
-         "rim": lambda bench, _: rim.measure(bench),
+         "rim": lambda bench, _: d415_pair.measure(bench),
          "bad_input": lambda bench, scratch: each_case(bench, "bad input", bad_input.cases(
              bench.bin, scratch, ROOT / "config" / "rigs" / "example.toml")),
          "sigkill": killed_scans,

@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "daemon/ctl/doctor/examine.h"
+#include "daemon/ctl/doctor/examine_rig.h"
 #include "daemon/ctl/doctor/find_devices.h"
 
 namespace scanrig::ctl::doctor {

@@ -7,7 +7,7 @@
 #include <cstdlib>
 #include <initializer_list>
 
-#include "daemon/ctl/doctor/examine.h"
+#include "daemon/ctl/doctor/examine_rig.h"
 #include "daemon/ctl/motion_session.h"
 
 namespace scanrig::ctl::doctor {

@@ -2,7 +2,7 @@
 
 #include <tuple>
 
-#include "daemon/ctl/doctor/examine.h"
+#include "daemon/ctl/doctor/examine_rig.h"
 #include "daemon/rig/open_devices.h"
 
 namespace scanrig::ctl::doctor {

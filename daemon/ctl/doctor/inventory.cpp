@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "core/files.h"
-#include "daemon/ctl/doctor/examine.h"
+#include "daemon/ctl/doctor/examine_rig.h"
 
 namespace scanrig::ctl::doctor {
 namespace {

@@ -1,4 +1,4 @@
-#include "pipeline/texture/face_labels.h"
+#include "pipeline/texture/chart_cutting.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

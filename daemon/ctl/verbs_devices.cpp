@@ -1,7 +1,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
-#include "daemon/ctl/doctor/examine.h"
+#include "daemon/ctl/doctor/examine_rig.h"
 #include "daemon/ctl/motion_session.h"
 #include "daemon/ctl/offline_rig_config.h"
 #include "daemon/ctl/verbs.h"
@@ -172,17 +172,7 @@ ExitCode examine_rig(const DoctorVerb& verb) {
   RealClock clock;
   const doctor::Operator person(verb.answers, verb.json);
   doctor::Report report;
-  doctor::list_what_is_connected(report);
-  const bool drive_answers = doctor::examine_drive(*rig, clock, report);
-  const bool estop_works = doctor::examine_panel(*rig, drive_answers, person, clock, report);
-  const auto may_turn = [&] {
-    return verb.yes_move || person.prompt("Is everyone clear? Turn the table? [y/N]") == "y";
-  };
-  Result<void> moved;
-  if (drive_answers && estop_works && may_turn()) {
-    moved = doctor::examine_motion({*rig, verb.config}, person, clock, report);
-  }
-  doctor::print_missing_snippets(rig->turntable.device(), verb.config, report);
+  const auto moved = doctor::examine_rig({*rig, verb.config}, verb.yes_move, person, clock, report);
   fmt::print("{}", verb.json ? report.json() : report.text());
   if (!moved) return report_error(moved.error());
   const auto found = report.findings().size();

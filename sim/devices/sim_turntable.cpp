@@ -13,7 +13,7 @@ constexpr double kMaxAngleDeg = 3600.0;  // deg either way
 
 }  // namespace
 
-SimTurntable::SimTurntable(Bench& bench) : bench_(bench), speed_(profile().speed_deg_s) {}
+SimTurntable::SimTurntable(SharedState& state) : state_(state), speed_(profile().speed_deg_s) {}
 
 Result<void> SimTurntable::limit_speed(std::optional<DegreesPerSecond> limit) {
   const DegreesPerSecond full{profile().speed_deg_s};
@@ -23,7 +23,7 @@ Result<void> SimTurntable::limit_speed(std::optional<DegreesPerSecond> limit) {
 
 /// Waits until `moment`; any event that ends a move ends the wait.
 Result<void> SimTurntable::wait_for(std::unique_lock<std::mutex>& lock, Clock::TimePoint moment, Deadline deadline) {
-  Bench& b = bench_;
+  SharedState& b = state_;
   const auto disturbed = [&b] { return b.stop_requested || !b.estop_ok || b.stalled; };
   if (b.clock.wait_until(lock, b.changed, std::min(moment, deadline.at), disturbed)) {
     if (std::exchange(b.stop_requested, false)) return fail(ErrorCode::stopped, "turntable: stopped on request");
@@ -43,7 +43,7 @@ Result<void> SimTurntable::wait_for(std::unique_lock<std::mutex>& lock, Clock::T
 }
 
 Result<void> SimTurntable::travel(std::unique_lock<std::mutex>& lock, double target, Deadline deadline, Move& move) {
-  Bench& b = bench_;
+  SharedState& b = state_;
   const auto begin = b.clock.now();
   if (!b.stop_requested && b.estop_ok) {
     b.axis.go(resting_angle(target, b.scene->options().seed), speed_, begin);
@@ -61,7 +61,7 @@ Result<void> SimTurntable::travel(std::unique_lock<std::mutex>& lock, double tar
 }
 
 Result<void> SimTurntable::home(Deadline deadline) {
-  Bench& b = bench_;
+  SharedState& b = state_;
   std::unique_lock lock(b.mutex);
   homed_ = false;
   // A table that still brakes is stopped first.
@@ -75,7 +75,7 @@ Result<void> SimTurntable::home(Deadline deadline) {
 }
 
 Result<Move> SimTurntable::rotate_to(Degrees target, Deadline deadline) {
-  Bench& b = bench_;
+  SharedState& b = state_;
   std::unique_lock lock(b.mutex);
   if (!b.stop_requested && !homed_) return fail(ErrorCode::not_homed, "turntable: not homed; home first");
   if (!(std::abs(target.value) <= kMaxAngleDeg)) {
@@ -88,7 +88,7 @@ Result<Move> SimTurntable::rotate_to(Degrees target, Deadline deadline) {
 }
 
 Result<void> SimTurntable::stop(Deadline deadline) {
-  Bench& b = bench_;
+  SharedState& b = state_;
   std::unique_lock lock(b.mutex);
   b.axis.brake(b.clock.now());
   const auto standstill = b.axis.still();
@@ -99,26 +99,26 @@ Result<void> SimTurntable::stop(Deadline deadline) {
 }
 
 Result<void> SimTurntable::reset_alarm(Deadline) {
-  const std::scoped_lock lock(bench_.mutex);
-  if (!bench_.estop_ok) return fail(ErrorCode::device_alarm, "turntable: the drive has no power: release the e-stop");
+  const std::scoped_lock lock(state_.mutex);
+  if (!state_.estop_ok) return fail(ErrorCode::device_alarm, "turntable: the drive has no power: release the e-stop");
   return {};
 }
 
 Result<TurntableStatus> SimTurntable::status(Deadline) {
-  const std::scoped_lock lock(bench_.mutex);
-  const auto now = bench_.clock.now();
+  const std::scoped_lock lock(state_.mutex);
+  const auto now = state_.clock.now();
   TurntableStatus status;
-  status.motion = now < bench_.axis.still() ? TurntableStatus::Motion::moving : TurntableStatus::Motion::stopped;
+  status.motion = now < state_.axis.still() ? TurntableStatus::Motion::moving : TurntableStatus::Motion::stopped;
   status.homed = homed_;
-  status.angle = Degrees{encoder_reading(bench_.axis.angle(now))};
-  if (!bench_.estop_ok) status.alarm = "no motor power: e-stop";
+  status.angle = Degrees{encoder_reading(state_.axis.angle(now))};
+  if (!state_.estop_ok) status.alarm = "no motor power: e-stop";
   return status;
 }
 
 void SimTurntable::request_stop() noexcept {
-  const std::scoped_lock lock(bench_.mutex);
-  bench_.stop_requested = true;
-  bench_.clock.notify_all(bench_.changed);
+  const std::scoped_lock lock(state_.mutex);
+  state_.stop_requested = true;
+  state_.clock.notify_all(state_.changed);
 }
 
 }  // namespace scanrig::sim

@@ -32,8 +32,8 @@ struct Exposure {
 /// Shared state of the devices: the scene on the table, and the actions of operator and tests. `mutex` guards
 /// everything except `scene`, which belongs to the camera (its const part to all). Code that changes a state that
 /// another thread may wait for calls clock.notify_all(changed).
-struct Bench {
-  Bench(std::unique_ptr<Scene> the_scene, Clock& the_clock) : clock(the_clock), scene(std::move(the_scene)) {}
+struct SharedState {
+  SharedState(std::unique_ptr<Scene> the_scene, Clock& the_clock) : clock(the_clock), scene(std::move(the_scene)) {}
 
   Clock& clock;
   const std::unique_ptr<Scene> scene;

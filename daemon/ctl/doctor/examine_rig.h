@@ -1,72 +1,27 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "config/rig_config.h"
 #include "core/clock.h"
+#include "daemon/ctl/doctor/doctor_report.h"
 
 namespace scanrig::ctl::doctor {
-
-/// A problem in one sentence, and its remedy in another.
-struct Finding {
-  std::string id;  ///< one word for programs: "gear_ratio"
-  std::string problem;
-  std::string remedy;
-};
-
-/// Results of the doctor, section by section, and its findings.
-class Report {
- public:
-  void section(std::string heading) { sections_.push_back({std::move(heading), {}}); }
-  void note(std::string line) { sections_.back().lines.push_back(std::move(line)); }
-  void find(std::string id, std::string problem, std::string remedy) {
-    findings_.push_back({std::move(id), std::move(problem), std::move(remedy)});
-  }
-  [[nodiscard]] const std::vector<Finding>& findings() const { return findings_; }
-
-  [[nodiscard]] std::string text() const;
-  [[nodiscard]] std::string json() const;
-
- private:
-  struct Section {
-    std::string heading;
-    std::vector<std::string> lines;
-  };
-  std::vector<Section> sections_;
-  std::vector<Finding> findings_;
-};
-
-/// The person at the rig, at a terminal or at the other end of standard input.
-class Operator {
- public:
-  /// `interactive`: a person replies on standard input although it is no terminal. Prompts go to standard error with
-  /// `quiet_output`, so that standard output stays JSON.
-  Operator(bool interactive, bool quiet_output);
-
-  [[nodiscard]] bool there() const { return there_; }
-  void tell(const std::string& text) const;
-  /// The line that was entered; nothing without a person there.
-  [[nodiscard]] std::optional<std::string> prompt(const std::string& question) const;
-
- private:
-  bool there_;
-  bool quiet_output_;
-};
-
-/// Checks whether the drive responds at its port as configured, how fast, and reads its registers. Otherwise finds what
-/// responds there instead (`wrong_parity`, `wrong_baud`, `wrong_unit_id`, `swapped_adapter`, `no_answer`, ...).
-/// Returns whether the drive can be used.
-bool examine_drive(const config::RigConfig& rig, Clock& clock, Report& report);
 
 /// The rig to be examined, and the file that a motion's guardian reads again.
 struct Rig {
   const config::RigConfig& config;
   const std::filesystem::path& file;
 };
+
+/// Examines everything that the configuration names, in the order of daemon/ctl/doctor/README.md. Without `may_turn` a
+/// person is prompted before the table turns. Fails with what made examine_motion() fail.
+Result<void> examine_rig(const Rig& rig, bool may_turn, const Operator& person, Clock& clock, Report& report);
+
+/// Checks whether the drive responds at its port as configured, how fast, and reads its registers. Otherwise finds what
+/// responds there instead (`wrong_parity`, `wrong_baud`, `wrong_unit_id`, `swapped_adapter`, `no_answer`, ...).
+/// Returns whether the drive can be used.
+bool examine_drive(const config::RigConfig& rig, Clock& clock, Report& report);
 
 /// Turns the table under the rules of with_motion(). Homes, then a quarter turn for the sign (the operator enters its
 /// direction), then one revolution from home switch to home switch for the gear ratio. Findings: `cannot_turn`,

@@ -1,4 +1,4 @@
-#include "daemon/ctl/doctor/examine.h"
+#include "daemon/ctl/doctor/doctor_report.h"
 
 #include <unistd.h>
 

@@ -1,9 +1,9 @@
-#include "sim/devices/bench.h"
+#include "sim/devices/shared_state.h"
 
 #include "sim/scene/profile.h"
 
 namespace scanrig::sim {
-void Bench::edge(Light light) {
+void SharedState::edge(Light light) {
   ++triggers;
   if (!armed) return;
   armed = false;
