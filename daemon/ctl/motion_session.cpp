@@ -156,8 +156,8 @@ Result<void> MotionSession::check_panel() {
   clock_.wait_until(lock, changed_, clock_.now() + kPanelTimeout, [this] { return inputs_ || cause_; });
   if (cause_) return tl::unexpected(*cause_);
   if (!inputs_) return fail(ErrorCode::timeout, "panel: no reply, e-stop unknown. Check the panel's power and cable");
-  if (auto why = obstacle(*inputs_)) return tl::unexpected(std::move(*why));
-  return {};
+  auto why = obstacle(*inputs_);
+  return why ? Result<void>(tl::unexpect, std::move(*why)) : Result<void>();
 }
 
 /// Lights the lamp, before the first move.

@@ -24,7 +24,7 @@ class HungCalls : public Daemon {
  protected:
   void SetUp() override {
     Daemon::SetUp();
-    auto made = sim::SimRig::create({.image_scale = 0.1}, clock);
+    auto made = sim::SimRig::create({.object = {}, .image_scale = 0.1}, clock);
     ASSERT_TRUE(made) << made.error().message;
     sim = std::move(*made);
     turntable.emplace(sim->turntable(), gate, clock);
@@ -185,7 +185,7 @@ INSTANTIATE_TEST_SUITE_P(AllCalls, EachHungCall,
                                          std::pair("camera", "prepare"), std::pair("camera", "arm"),
                                          std::pair("camera", "collect"), std::pair("camera", "capture_preview"),
                                          std::pair("panel", "wait_change"), std::pair("panel", "show")),
-                         [](const auto& info) { return std::string(info.param.first) + "_" + info.param.second; });
+                         [](const auto& each) { return std::string(each.param.first) + "_" + each.param.second; });
 
 TEST_F(HungCalls, ATableThatTurnsBehindACallThatHangsIsStoppedByAnotherProcess) {
   options.acquisition.move_limit = seconds(2);

@@ -331,9 +331,9 @@ TEST_F(Jobs, AnEndedJobIsBundledExportedAndRemoved) {
   const auto file = folder_ / "bundle.tar.gz";
   EXPECT_EQ(ask(event::JobRequested{.what = What::bundle, .job = id, .path = file}).value_or("no"), file.string());
   EXPECT_GT(fs::file_size(file), 1000u);
-  const auto log = read_file(fs::path(job(id)->folder) / "log.jsonl");
-  ASSERT_TRUE(log) << "the log of the job";
-  EXPECT_THAT(*log, testing::AllOf(testing::HasSubstr("Stored, taken at"), testing::HasSubstr("\"pose\":1")));
+  const auto job_log = read_file(fs::path(job(id)->folder) / "log.jsonl");
+  ASSERT_TRUE(job_log) << "the log of the job";
+  EXPECT_THAT(*job_log, testing::AllOf(testing::HasSubstr("Stored, taken at"), testing::HasSubstr("\"pose\":1")));
   EXPECT_EQ(ask(event::JobRequested{.what = What::bundle, .job = id, .path = file}).error().code, ErrorCode::exists);
   EXPECT_EQ(ask(event::JobRequested{.what = What::bundle, .job = id, .path = "here.tar.gz"}).error().code,
             ErrorCode::invalid_input);

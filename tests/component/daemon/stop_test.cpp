@@ -173,7 +173,9 @@ TEST_P(StopInEveryState, IsObeyed) {
   const auto after = loop->snapshot();
   const bool unreachable = std::string_view(situation.name) == "drive_without_reply";
   EXPECT_EQ(standstill(*after), unreachable ? Standstill::unknown : Standstill::confirmed);
-  if (replied) EXPECT_THAT(*replied, testing::AnyOf("pending", to_string(standstill(*after))));
+  if (replied) {
+    EXPECT_THAT(*replied, testing::AnyOf("pending", to_string(standstill(*after))));
+  }
   {
     const std::lock_guard guard(rig.turntable.mutex);
     EXPECT_FALSE(rig.turntable.moving);

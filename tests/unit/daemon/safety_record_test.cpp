@@ -21,7 +21,9 @@ class SafetyRecordTest : public testing::Test {
     SafetyRecord record(folder_ / "state", [this] { return now_; });
     auto latch = record.begin();
     EXPECT_TRUE(latch) << latch.error().message;
-    if (clean) EXPECT_TRUE(record.end());
+    if (clean) {
+      EXPECT_TRUE(record.end());
+    }
     return latch.value_or(std::nullopt);
   }
   void pass(seconds time) {
