@@ -152,7 +152,7 @@ TEST_F(OtherCameras, AJobOfOthersIsNotGoneOnWith) {
   const auto resumed = ask(event::JobRequested{.what = What::resume, .job = id});
   ASSERT_FALSE(resumed);
   EXPECT_EQ(resumed.error().code, ErrorCode::refused);
-  EXPECT_THAT(resumed.error().message, HasSubstr("was begun with the cameras L1 (left) and R1 (right)"));
+  EXPECT_THAT(resumed.error().message, HasSubstr("was started with the cameras L1 (left) and R1 (right)"));
   EXPECT_EQ(job(id)->state, JobState::interrupted);
 }
 

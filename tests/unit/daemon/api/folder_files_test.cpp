@@ -33,16 +33,16 @@ TEST_F(FolderFiles, AreListedByNameWithoutLinks) {
   ASSERT_TRUE(files) << files.error().message;
   EXPECT_THAT(*files,
               ElementsAre(Field(&FolderFile::path, "pose1/view00/left.png"), Field(&FolderFile::path, "scan.json")));
-  EXPECT_EQ(files->front().bytes, 7u);
+  EXPECT_EQ(files->front().bytes, 5u);
   EXPECT_EQ(list_files(folder_ / "nowhere").error().code, ErrorCode::io);
 }
 
 TEST_F(FolderFiles, AreOpenedBelowTheirFolder) {
   const auto file = open_below(job(), "pose1/view00/left.png");
   ASSERT_TRUE(file) << file.error().message;
-  EXPECT_EQ((*file)->size(), 7u);
-  std::string text(7, ' ');
-  EXPECT_EQ(::read((*file)->fd(), text.data(), text.size()), 7);
+  EXPECT_EQ((*file)->size(), 5u);
+  std::string text(5, ' ');
+  EXPECT_EQ(::read((*file)->fd(), text.data(), text.size()), 5);
   EXPECT_EQ(text, "image");
 }
 
