@@ -21,6 +21,7 @@ import record as record_file
 
 HERE = pathlib.Path(__file__).resolve().parent
 ROOT = HERE.parent.parent
+TEST_BUILD_LIMIT_S = 900
 OLD_NAMES = {"road": "end-to-end"}  # old name, accepted for a release
 
 
@@ -88,6 +89,12 @@ class Bench:
 
     def note(self, text):
         print(f"   {text}", flush=True)
+
+    def test_program(self, name):
+        """A program of the test suite's own build; built if missing."""
+        for command in (["cmake", "--preset", "dev"], ["cmake", "--build", "--preset", "dev", "--target", name]):
+            self.run(command, TEST_BUILD_LIMIT_S, cwd=ROOT)
+        return ROOT / "build" / "dev" / "bin" / name
 
     def run(self, command, timeout, **options):
         """A finished process with its text output; a hang ends as exit code 124."""

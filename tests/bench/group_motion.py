@@ -7,6 +7,7 @@ import motion_latch
 import motion_long
 import motion_matrix
 import motion_safety
+import motion_tools
 
 PARSERS = [fuzz.Parser("grbl", "GRBL"), fuzz.Parser("drive_profile", "profile files"),
            fuzz.Parser("modbus_io", "Modbus I/O", processes=48)]
@@ -23,6 +24,7 @@ PARTS = {"matrix": lambda bench, scratch: motion_matrix.measure(bench, ROOT, scr
          "killed": motion_safety.killed,
          "restarts": motion_safety.restarts,
          "latches": motion_latch.latches,
+         "tools": motion_tools.moments,
          "turns": lambda bench, scratch: motion_long.turns(bench, ROOT, scratch),
          "words": lambda bench, scratch: motion_long.words(bench, ROOT, scratch),
          "doctor": motion_doctor.measure,

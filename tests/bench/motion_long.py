@@ -6,7 +6,7 @@ import tomllib
 
 import motion_rig
 
-TURNS_LIMIT_S, BUILD_LIMIT_S = 3000, 900
+TURNS_LIMIT_S = 3000
 DRIFT_DEG = 0.01
 TOLERANCE_DEG = 0.02  # of the rig's configuration
 WOUND_UP = 2384       # turns from zero, two before the 32-bit counter is full: 10,000 pulses, 90:1
@@ -63,12 +63,8 @@ def alarms(bench, root, scratch):
                    bool(words) and told == len(words))
 
 
-def golden(bench, root):
-    """Program of the test suite's own build; built if missing."""
-    program = root / "build" / "dev" / "bin" / GOLDEN_TESTS
-    for command in (["cmake", "--preset", "dev"], ["cmake", "--build", "--preset", "dev", "--target", GOLDEN_TESTS]):
-        bench.run(command, BUILD_LIMIT_S, cwd=root)
-    done = bench.run([program, "--gtest_filter=*Golden*:*Frame*"], 120)
+def golden(bench):
+    done = bench.run([bench.test_program(GOLDEN_TESTS), "--gtest_filter=*Golden*:*Frame*"], 120)
     ran = re.search(r"\[==========\] (\d+) tests? from .* ran", done.stdout)
     count = int(ran.group(1)) if ran else 0
     bench.line("frames of the manuals byte for byte", "all tests pass",
@@ -96,6 +92,6 @@ def job_tells(bench, scratch):
 
 
 def words(bench, root, scratch):
-    golden(bench, root)
+    golden(bench)
     alarms(bench, root, scratch)
     job_tells(bench, scratch)
