@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
 
 #include "daemon/ctl/client.h"
 #include "sim/devices/sim_rig.h"
@@ -103,9 +104,11 @@ class HungCalls : public Daemon {
   void by_jog(const std::string& call) {
     get_ready();
     ASSERT_TRUE(ask(event::MaintenanceRequested{.what = What::on}));
+    const auto does_nothing = [this] { return now()->activity == Activity::none; };
+    ASSERT_TRUE(clock_waits_for(does_nothing));
     rig.panel.press(&PanelInputs::reset);  // consents to it, and homes
-    ASSERT_TRUE(clock_waits_for([this] { return now()->activity == Activity::homing; }));
-    ASSERT_TRUE(clock_waits_for([this] { return now()->activity == Activity::none; }));
+    ASSERT_TRUE(clock_waits_for(std::not_fn(does_nothing)));
+    ASSERT_TRUE(clock_waits_for(does_nothing));
     gate.close(call);
     const auto jogged = ask(event::MaintenanceRequested{.what = What::jog, .angle = {20}, .speed = {5}});
     ASSERT_TRUE(jogged) << jogged.error().message;
