@@ -99,10 +99,11 @@ endfunction()
 set(SCANRIG_QUICK_TO_COMPILE -O0)
 set(SCANRIG_TESTS_THAT_COMPUTE "/tests/(unit|component)/(core|pipeline|sim|reconstruct|movement)(/|$)")
 
-# scanrig_test(NAME LABEL unit|component|system SOURCES a_test.cpp ... LINK libs [TIMEOUT seconds] [REAL_TIME])
-# REAL_TIME: the test has deadlines of tens of milliseconds on a wire; no other test runs at the same time.
+# scanrig_test(NAME LABEL unit|component|system SOURCES a_test.cpp ... LINK libs [TIMEOUT seconds] [REAL_TIME | WAITS])
+# Both are for tests with deadlines of tens of milliseconds on a wire. REAL_TIME: no other test runs at the same time.
+# WAITS: it computes little; ./dev test runs it after all others, beside one of its kind.
 function(scanrig_test name)
-  cmake_parse_arguments(ARG "REAL_TIME" "LABEL;TIMEOUT" "SOURCES;LINK" ${ARGN})
+  cmake_parse_arguments(ARG "REAL_TIME;WAITS" "LABEL;TIMEOUT" "SOURCES;LINK" ${ARGN})
   if(NOT ARG_TIMEOUT)
     set(ARG_TIMEOUT 120)
   endif()
@@ -120,6 +121,8 @@ function(scanrig_test name)
   scanrig_time_limit(${name} ${ARG_TIMEOUT})
   if(ARG_REAL_TIME)
     set_tests_properties(${name} PROPERTIES RUN_SERIAL ON)
+  elseif(ARG_WAITS)
+    set_property(TEST ${name} APPEND PROPERTY LABELS waits)
   endif()
 endfunction()
 

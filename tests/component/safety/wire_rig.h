@@ -129,7 +129,7 @@ class WireRig {
   /// The folder of the only job.
   [[nodiscard]] std::filesystem::path only_job() const {
     for (const auto& entry : std::filesystem::directory_iterator(folder / "jobs")) {
-      if (entry.is_directory()) return entry.path();
+      if (entry.is_directory() && !entry.path().filename().string().starts_with('.')) return entry.path();
     }
     ADD_FAILURE() << "no job";
     return {};
