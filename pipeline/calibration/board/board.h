@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,6 +31,33 @@ struct Board {
   [[nodiscard]] int corner_count() const { return corner_columns() * corner_rows(); }
   /// Corner `id`, as ordered: 0 is the upper left one, row after row.
   [[nodiscard]] Eigen::Vector3d corner(int id) const;
+  /// Point on the print at `column` and `row`, in squares from the upper left edge of the print.
+  [[nodiscard]] Eigen::Vector2d at(double column, double row) const;
 };
+
+/// Colour of the upper left square. Ours is black; older versions of OpenCV start with white when `rows` is even.
+/// Markers are in the white squares, numbered row after row.
+enum class BoardParity { upper_left_black, upper_left_white };
+
+bool is_white_square(int column, int row, BoardParity parity);
+
+struct MarkerCell {
+  int id = 0;
+  int column = 0;  ///< of its square
+  int row = 0;
+};
+
+/// The square of marker `id` on a board with `columns` squares in a row, however many rows it has.
+MarkerCell marker_cell(int id, int columns, BoardParity parity);
+
+/// Cells of all markers, by id; empty for a plain chessboard.
+std::vector<MarkerCell> marker_cells(const Board& board, BoardParity parity = BoardParity::upper_left_black);
+
+/// Corners of a marker on the print, mm, in OpenCV's order: upper left, upper right, lower right, lower left.
+std::array<Eigen::Vector2d, 4> marker_corners(const Board& board, const MarkerCell& cell);
+
+/// Fails with `invalid_input` for a board that cannot be: fewer than 3 x 3 squares, a marker larger than its square, an
+/// unknown dictionary or one with too few markers.
+Result<void> check_board(const Board& board);
 
 }  // namespace scanrig
