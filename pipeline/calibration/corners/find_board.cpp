@@ -188,8 +188,8 @@ double CornerFinder::saturated_share(const std::array<Eigen::Vector2d, 4>& outli
     return true;
   };
   const auto first = [](double value) { return std::max(0, static_cast<int>(std::max(value, 0.0))); };
-  const int last_x = std::min(image_.width() - 1.0, upper.x());
-  const int last_y = std::min(image_.height() - 1.0, upper.y());
+  const double last_x = std::min(image_.width() - 1.0, upper.x());
+  const double last_y = std::min(image_.height() - 1.0, upper.y());
   int all = 0;
   int saturated = 0;
   for (int y = first(lower.y()); y <= last_y; y += 3) {  // odd: meets every colour of a mosaic

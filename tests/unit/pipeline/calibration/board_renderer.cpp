@@ -13,20 +13,33 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180.0;
 
-cv::Mat1d gaussian(double sigma) { return cv::getGaussianKernel(2 * static_cast<int>(std::ceil(4.0 * sigma)) + 1, sigma, CV_64F); }
+constexpr int kFine = 3;  // cells per pixel and axis: the lens blurs these, then the pixel takes their mean
 
-/// Albedo per pixel, before the lens.
-cv::Mat1d cast_rays(const Print& print, const TestCamera& camera, const Eigen::Isometry3d& camera_from_print,
+cv::Mat1d gaussian(double sigma_px) {
+  const double sigma = sigma_px * kFine;
+  return cv::getGaussianKernel(2 * static_cast<int>(std::ceil(4.0 * sigma)) + 1, sigma, CV_64F);
+}
+
+/// Small and fast, for jitter only.
+struct Jitter {
+  std::uint64_t state;
+  double operator()() {
+    state = state * 6364136223846793005ULL + 1442695040888963407ULL;
+    return static_cast<double>(state >> 11) * 0x1.0p-53;
+  }
+};
+
+/// Albedo before the lens, in cells.
+cv::Mat1f cast_rays(const Print& print, const TestCamera& camera, const Eigen::Isometry3d& camera_from_print,
                     std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  Jitter jitter{seed};
   const Eigen::Isometry3d print_from_camera = camera_from_print.inverse();
   const Eigen::Vector3d eye = print_from_camera.translation();
   const auto hit = [&](const Eigen::Vector2d& pixel) -> Eigen::Vector2d {
     const Eigen::Vector3d direction = print_from_camera.linear() * camera.ray(pixel);
     return (eye - eye.z() / direction.z() * direction).head<2>();
   };
-  cv::Mat1d image(camera.height, camera.width);
+  cv::Mat1f cells(camera.height * kFine, camera.width * kFine);
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       const Eigen::Vector2d centre(x, y);
@@ -34,22 +47,22 @@ cv::Mat1d cast_rays(const Print& print, const TestCamera& camera, const Eigen::I
       const Eigen::Vector2d right = hit(centre + Eigen::Vector2d(0.5, 0.0)) - middle;
       const Eigen::Vector2d down = hit(centre + Eigen::Vector2d(0.0, 0.5)) - middle;
       if (print.distance_to_edge(middle) > right.norm() + down.norm()) {
-        image(y, x) = print.albedo(middle);
+        cells(cv::Rect(x * kFine, y * kFine, kFine, kFine)) = static_cast<float>(print.albedo(middle));
         continue;
       }
-      constexpr int kSide = 10;
-      double sum = 0.0;
-      for (int i = 0; i < kSide; ++i) {
-        for (int j = 0; j < kSide; ++j) {
-          const double u = (i + uniform(random)) / kSide * 2.0 - 1.0;
-          const double v = (j + uniform(random)) / kSide * 2.0 - 1.0;
+      constexpr int kSide = 4;  // samples per cell and axis
+      for (int cell = 0; cell < kFine * kFine; ++cell) {
+        double sum = 0.0;
+        for (int i = 0; i < kSide * kSide; ++i) {
+          const double u = (cell % kFine + (i % kSide + jitter()) / kSide) / kFine * 2.0 - 1.0;
+          const double v = (cell / kFine + (i / kSide + jitter()) / kSide) / kFine * 2.0 - 1.0;
           sum += print.albedo(middle + u * right + v * down);
         }
+        cells(y * kFine + cell / kFine, x * kFine + cell % kFine) = static_cast<float>(sum / (kSide * kSide));
       }
-      image(y, x) = sum / (kSide * kSide);
     }
   }
-  return image;
+  return cells;
 }
 
 }  // namespace
@@ -72,17 +85,22 @@ Eigen::Vector3d TestCamera::ray(const Eigen::Vector2d& pixel) const {
 
 cv::Mat render(const Print& print, const TestCamera& camera, const Eigen::Isometry3d& camera_from_print,
                const Exposure& exposure, const ChannelAlbedo& channel_albedo) {
-  cv::Mat1d light = cast_rays(print, camera, camera_from_print, exposure.seed * 7919 + 13);
-  const cv::Mat1d kernel = gaussian(exposure.kernel_sigma_px);
+  const cv::Mat1f light = cast_rays(print, camera, camera_from_print, exposure.seed * 7919 + 13);
+  const cv::Mat1d kernel = gaussian(exposure.lens_sigma_px);
   const auto channels = exposure.pixel_format == "Mono8" ? 1 : 3;
-  std::vector<cv::Mat1d> blurred(static_cast<std::size_t>(channels));
+  std::vector<cv::Mat1f> blurred(static_cast<std::size_t>(channels));
   for (int c = 0; c < channels; ++c) {
-    cv::Mat1d plane = light.clone();
-    if (channel_albedo) {
-      for (double& value : plane) value = channel_albedo(value, c);
+    cv::Mat1f& plane = blurred[static_cast<std::size_t>(c)];
+    if (c > 0 && !channel_albedo) {
+      plane = blurred[0];
+      continue;
     }
-    cv::sepFilter2D(plane, blurred[static_cast<std::size_t>(c)], CV_64F, kernel, kernel, {-1, -1}, 0.0,
-                    cv::BORDER_REPLICATE);
+    cv::Mat1f cells = light.clone();
+    if (channel_albedo) {
+      for (float& value : cells) value = static_cast<float>(channel_albedo(value, c));
+    }
+    cv::sepFilter2D(cells, cells, CV_32F, kernel, kernel, {-1, -1}, 0.0, cv::BORDER_REPLICATE);
+    cv::resize(cells, plane, {camera.width, camera.height}, 0.0, 0.0, cv::INTER_AREA);
   }
   std::mt19937_64 random(exposure.seed);
   std::normal_distribution<double> normal;
@@ -106,12 +124,7 @@ cv::Mat render(const Print& print, const TestCamera& camera, const Eigen::Isomet
   return image;
 }
 
-double edge_sigma(const Exposure& exposure) {
-  const cv::Mat1d kernel = gaussian(exposure.kernel_sigma_px);
-  double variance = 1.0 / 12.0;
-  for (int i = 0; i < kernel.rows; ++i) variance += kernel(i, 0) * (i - kernel.rows / 2) * (i - kernel.rows / 2);
-  return std::sqrt(variance);
-}
+double edge_sigma(const Exposure& exposure) { return std::hypot(exposure.lens_sigma_px, std::sqrt(1.0 / 12.0)); }
 
 Print make_print(const PrintedBoard& board) {
   std::vector<cv::Mat1b> markers;

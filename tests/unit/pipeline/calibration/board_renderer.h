@@ -33,7 +33,7 @@ struct Exposure {
   std::string pixel_format = "BayerRG8";
   double gains[3] = {0.72, 1.0, 0.83};  ///< of red, green, blue
   double white = 210.0;                 ///< grey levels of albedo 1 in green
-  double kernel_sigma_px = 0.6;         ///< lens
+  double lens_sigma_px = 0.6;         
   double read_noise = 0.8;
   double shot_noise_variance = 0.0263;
   std::uint64_t seed = 1;
@@ -43,12 +43,12 @@ struct Exposure {
 /// Colour of one channel, from 0 to 1, of a print that is not grey.
 using ChannelAlbedo = std::function<double(double albedo, int channel)>;
 
-/// Each pixel's ray is intersected with the plane z = 0 of `camera_from_print`; pixels near an edge are the mean of 100
-/// jittered samples. Then lens blur, mosaic, noise, 8 bits.
+/// Each pixel's ray is intersected with the plane z = 0 of `camera_from_print`; pixels near an edge are made of 9
+/// cells of 16 jittered samples. The lens blurs the cells. Then pixels, mosaic, noise, 8 bits.
 cv::Mat render(const Print& print, const TestCamera& camera, const Eigen::Isometry3d& camera_from_print,
                const Exposure& exposure, const ChannelAlbedo& channel_albedo = {});
 
-/// Sigma of an edge in such an image: the kernel's and the pixel's own.
+/// Sigma of an edge in such an image: the lens's and the pixel's own.
 double edge_sigma(const Exposure& exposure);
 
 /// A ChArUco board, or a plain one with `marker_mm` 0. Upper left square black, or white.
