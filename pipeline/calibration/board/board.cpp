@@ -46,8 +46,8 @@ std::array<Eigen::Vector2d, 4> marker_corners(const Board& board, const MarkerCe
 
 Result<void> check_board(const Board& board) {
   if (board.columns < 3 || board.rows < 3 || board.columns > 200 || board.rows > 200 || !(board.square_mm > 0.0)) {
-    return fail(ErrorCode::invalid_input, "board: {} x {} squares of {} mm; give 3 to 200 columns and rows", board.columns,
-                board.rows, board.square_mm);
+    return fail(ErrorCode::invalid_input, "board: {} x {} squares of {} mm; give 3 to 200 columns and rows",
+                board.columns, board.rows, board.square_mm);
   }
   if (!board.markers) return {};
   if (!(board.markers->size_mm > 0.0) || !(board.markers->size_mm < board.square_mm)) {

@@ -15,10 +15,10 @@ namespace {
 const std::map<std::string, int>& dictionaries() {
   using namespace cv::aruco;
   static const std::map<std::string, int> names = {
-      {"4x4_50", DICT_4X4_50},     {"4x4_100", DICT_4X4_100},   {"4x4_250", DICT_4X4_250}, {"4x4_1000", DICT_4X4_1000},
-      {"5x5_50", DICT_5X5_50},     {"5x5_100", DICT_5X5_100},   {"5x5_250", DICT_5X5_250}, {"5x5_1000", DICT_5X5_1000},
-      {"6x6_50", DICT_6X6_50},     {"6x6_100", DICT_6X6_100},   {"6x6_250", DICT_6X6_250}, {"6x6_1000", DICT_6X6_1000},
-      {"7x7_50", DICT_7X7_50},     {"7x7_100", DICT_7X7_100},   {"7x7_250", DICT_7X7_250}, {"7x7_1000", DICT_7X7_1000},
+      {"4x4_50", DICT_4X4_50}, {"4x4_100", DICT_4X4_100}, {"4x4_250", DICT_4X4_250}, {"4x4_1000", DICT_4X4_1000},
+      {"5x5_50", DICT_5X5_50}, {"5x5_100", DICT_5X5_100}, {"5x5_250", DICT_5X5_250}, {"5x5_1000", DICT_5X5_1000},
+      {"6x6_50", DICT_6X6_50}, {"6x6_100", DICT_6X6_100}, {"6x6_250", DICT_6X6_250}, {"6x6_1000", DICT_6X6_1000},
+      {"7x7_50", DICT_7X7_50}, {"7x7_100", DICT_7X7_100}, {"7x7_250", DICT_7X7_250}, {"7x7_1000", DICT_7X7_1000},
   };
   return names;
 }
@@ -60,8 +60,8 @@ Result<cv::Mat1b> marker_bits(const std::string& dictionary, int id) {
   if (id < 0 || id >= opened.bytesList.rows) {
     return fail(ErrorCode::invalid_input, "board: dictionary {} has no marker {}", dictionary, id);
   }
-  const cv::Mat inner = cv::aruco::Dictionary::getBitsFromByteList(opened.bytesList.rowRange(id, id + 1),
-                                                                   opened.markerSize);
+  const cv::Mat inner =
+      cv::aruco::Dictionary::getBitsFromByteList(opened.bytesList.rowRange(id, id + 1), opened.markerSize);
   cv::Mat1b cells(inner.rows + 2, inner.cols + 2, uchar{0});
   for (int y = 0; y < inner.rows; ++y) {
     for (int x = 0; x < inner.cols; ++x) cells(y + 1, x + 1) = inner.at<uchar>(y, x) != 0 ? 255 : 0;

@@ -72,11 +72,12 @@ Result<Layout> lay_out_page(const Board& board, const PageOptions& page) {
   const double free_width = page.width_mm - 2.0 * page.margin_mm - full_width;
   const double free_height = page.height_mm - 2.0 * page.margin_mm - full_height;
   if (!(free_width >= 0.0) || !(free_height >= 0.0)) {
-    return fail(ErrorCode::invalid_input,
-                "board: {:g} x {:g} mm needs a page of {:g} x {:g} mm, this one is {:g} x {:g} mm; use a larger page or "
-                "smaller squares",
-                layout.width, layout.height, full_width + 2.0 * page.margin_mm, full_height + 2.0 * page.margin_mm,
-                page.width_mm, page.height_mm);
+    return fail(
+        ErrorCode::invalid_input,
+        "board: {:g} x {:g} mm needs a page of {:g} x {:g} mm, this one is {:g} x {:g} mm; use a larger page or "
+        "smaller squares",
+        layout.width, layout.height, full_width + 2.0 * page.margin_mm, full_height + 2.0 * page.margin_mm,
+        page.width_mm, page.height_mm);
   }
   layout.left = page.margin_mm + 0.5 * free_width + kMarkStrip + layout.border;
   layout.bottom = page.margin_mm + 0.5 * free_height + kTextStrip + kMarkStrip + layout.border;
@@ -141,9 +142,10 @@ std::string as_pdf(const PageOptions& page, const std::string& content) {
   const std::string objects[] = {
       "<< /Type /Catalog /Pages 2 0 R /ViewerPreferences << /PrintScaling /None >> >>",
       "<< /Type /Pages /Kids [3 0 R] /Count 1 >>",
-      fmt::format("<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {:.4f} {:.4f}] /Contents 4 0 R /Resources << /Font << /F1 "
-                  "5 0 R >> >> >>",
-                  page.width_mm * kPointsPerMm, page.height_mm * kPointsPerMm),
+      fmt::format(
+          "<< /Type /Page /Parent 2 0 R /MediaBox [0 0 {:.4f} {:.4f}] /Contents 4 0 R /Resources << /Font << /F1 "
+          "5 0 R >> >> >>",
+          page.width_mm * kPointsPerMm, page.height_mm * kPointsPerMm),
       fmt::format("<< /Length {} >>\nstream\n{}endstream", content.size(), content),
       "<< /Type /Font /Subtype /Type1 /BaseFont /Helvetica >>",
   };
@@ -156,7 +158,8 @@ std::string as_pdf(const PageOptions& page, const std::string& content) {
   }
   const std::size_t table_start = file.size();
   return file + table +
-         fmt::format("trailer\n<< /Size {} /Root 1 0 R >>\nstartxref\n{}\n%%EOF\n", std::size(objects) + 1, table_start);
+         fmt::format("trailer\n<< /Size {} /Root 1 0 R >>\nstartxref\n{}\n%%EOF\n", std::size(objects) + 1,
+                     table_start);
 }
 
 }  // namespace
@@ -181,7 +184,8 @@ Result<std::string> print_board(const Board& board, const PageOptions& page) {
   draw_length_marks(*layout, drawing);
   const std::string line = board_check_line(board);
   const double room = page.width_mm - page.margin_mm - layout->left;
-  const double size = std::min(kTextHeight, room / (0.56 * static_cast<double>(line.size())));  // Helvetica's mean width
+  const double size =
+      std::min(kTextHeight, room / (0.56 * static_cast<double>(line.size())));  // Helvetica's mean width
   drawing.text(layout->left, layout->bottom - layout->border - kMarkStrip - kTextStrip + 1.5, size, line);
   return as_pdf(page, drawing.operators());
 }

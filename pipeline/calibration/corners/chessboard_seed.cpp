@@ -63,9 +63,10 @@ Error name_other_grid(const cv::Mat1b& grey, const Board& board) {
                         is_rows ? board.rows + higher : board.columns + wider, is_rows ? "rows" : "columns",
                         is_rows ? board.rows : board.columns)};
   }
-  return {ErrorCode::not_found, fmt::format("board: no chessboard of {} x {} squares seen; put all of it into view, check "
-                                            "light and focus",
-                                            board.columns, board.rows)};
+  return {ErrorCode::not_found,
+          fmt::format("board: no chessboard of {} x {} squares seen; put all of it into view, check "
+                      "light and focus",
+                      board.columns, board.rows)};
 }
 
 }  // namespace

@@ -25,7 +25,8 @@ bool CornerImage::is_saturated(int x, int y) const {
 Result<CornerImage> make_corner_image(const cv::Mat& image, const std::string& pixel_format) {
   const bool is_mosaic = pixel_format == "BayerRG8";
   if (!is_mosaic && pixel_format != "Mono8" && pixel_format != "BGR8") {
-    return fail(ErrorCode::invalid_input, "board: unknown pixel format \"{}\"; use Mono8, BayerRG8 or BGR8", pixel_format);
+    return fail(ErrorCode::invalid_input, "board: unknown pixel format \"{}\"; use Mono8, BayerRG8 or BGR8",
+                pixel_format);
   }
   if (image.empty() || image.type() != (pixel_format == "BGR8" ? CV_8UC3 : CV_8UC1)) {
     return fail(ErrorCode::invalid_input, "board: the image is not {}; check the file", pixel_format);

@@ -19,9 +19,9 @@ struct FitPixel {
 /// An image of a sensor for fits: every value as the sensor measured it, and which colour it is. A mosaic is not
 /// demosaiced; a fit has gain and offset per colour instead.
 struct CornerImage {
-  cv::Mat raw;            ///< 8 bit, 1 channel (grey or mosaic) or 3 (BGR)
-  int colours = 1;        ///< kinds of pixels: 3 in a mosaic (red, green, blue), else 1
-  cv::Mat1b grey;         ///< for finding things; a mosaic lightly blurred, so that its colours have equal weights
+  cv::Mat raw;      ///< 8 bit, 1 channel (grey or mosaic) or 3 (BGR)
+  int colours = 1;  ///< kinds of pixels: 3 in a mosaic (red, green, blue), else 1
+  cv::Mat1b grey;   ///< for finding things; a mosaic lightly blurred, so that its colours have equal weights
 
   [[nodiscard]] int width() const { return raw.cols; }
   [[nodiscard]] int height() const { return raw.rows; }

@@ -20,9 +20,9 @@ Eigen::Matrix<double, 6, 1> quadratic(const Eigen::Vector2d& p) {
 
 /// A pixel's distance from the rim of the disc.
 struct RimDistance {
-  double pixels = 0.0;                 // positive outside
-  double pixels_per_radius = 1.0;      // along the normal
-  Eigen::Vector2d normal{0.0, 0.0};    // outwards, in the image
+  double pixels = 0.0;               // positive outside
+  double pixels_per_radius = 1.0;    // along the normal
+  Eigen::Vector2d normal{0.0, 0.0};  // outwards, in the image
 };
 
 RimDistance rim_distance(const DiscShape& shape, const Eigen::Vector2d& from_centre, double size) {
@@ -123,6 +123,24 @@ Eigen::Matrix2d DiscShape::jacobian(const Eigen::Vector2d& from_centre) const {
   slopes << 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 2.0 * from_centre.x(), 0.0, from_centre.y(), from_centre.x(), 0.0,
       2.0 * from_centre.y();
   return terms_.transpose() * slopes;
+}
+
+double explained_by_disc(std::span<const FitPixel> pixels, int colours, const DiscShape& shape) {
+  FitVector p = FitVector::Zero(kColours + 2 * colours);
+  double explained = -fit_levels(p, pixels, colours, shape);
+  for (int colour = 0; colour < colours; ++colour) {
+    double count = 0.0;
+    double sum = 0.0;
+    double squares = 0.0;
+    for (const FitPixel& pixel : pixels) {
+      if (pixel.colour != colour) continue;
+      count += 1.0;
+      sum += pixel.value;
+      squares += pixel.value * pixel.value;
+    }
+    if (count > 0.0) explained += squares - sum * sum / count;
+  }
+  return explained;
 }
 
 std::optional<Disc> fit_disc(std::span<const FitPixel> pixels, int colours, const DiscShape& shape, double search_px) {

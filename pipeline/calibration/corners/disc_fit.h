@@ -35,6 +35,10 @@ struct Disc {
   double noise = 0.0;               ///< rms of what the fit leaves, as a share of the light
 };
 
+/// Sum of squares that a disc of the predicted size, at the predicted place, explains in `pixels`. Same for any offset
+/// of the light.
+double explained_by_disc(std::span<const FitPixel> pixels, int colours, const DiscShape& shape);
+
 /// Fits the image of a disc: shift, blur, size, gain and offset per colour. `pixels` are relative to `shape.centre()`.
 /// The shift is found within `search_px`. No value: not converged. Threads: any.
 std::optional<Disc> fit_disc(std::span<const FitPixel> pixels, int colours, const DiscShape& shape, double search_px);

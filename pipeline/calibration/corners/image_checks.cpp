@@ -36,31 +36,35 @@ std::vector<ImageCheck> check_board_image(const BoardFinding& finding, const Boa
                                           const ImageLimits& limits) {
   std::vector<ImageCheck> checks;
   if (finding.blur_px > limits.max_blur_px) {
-    checks.push_back({ImageProblem::blurred,
-                      fmt::format("Image blurred ({:.1f} px, at most {:.1f}). Check focus and aperture, and let the table "
-                                  "settle.",
-                                  finding.blur_px, limits.max_blur_px)});
+    checks.push_back(
+        {ImageProblem::blurred,
+         fmt::format("Image blurred ({:.1f} px, at most {:.1f}). Check focus and aperture, and let the table "
+                     "settle.",
+                     finding.blur_px, limits.max_blur_px)});
   }
   if (finding.saturated_share > limits.max_saturated_share) {
-    checks.push_back({ImageProblem::glare,
-                      fmt::format("Glare on {:.0f} % of the board. Shorten the exposure, or turn the board or the lights.",
-                                  std::max(1.0, 100.0 * finding.saturated_share))});
+    checks.push_back(
+        {ImageProblem::glare,
+         fmt::format("Glare on {:.0f} % of the board. Shorten the exposure, or turn the board or the lights.",
+                     std::max(1.0, 100.0 * finding.saturated_share))});
   }
   const std::string edges = edges_crossed(finding, image);
   if (!edges.empty()) {
-    checks.push_back({ImageProblem::cut_off, "Board cut off at the " + edges + " edge of the image. Move it into view."});
+    checks.push_back(
+        {ImageProblem::cut_off, "Board cut off at the " + edges + " edge of the image. Move it into view."});
   }
   if (finding.square_px < limits.min_square_px) {
-    checks.push_back({ImageProblem::too_small,
-                      fmt::format("Board too small or too flat in the image: squares are {:.0f} px, {:.0f} needed. Move or "
-                                  "tilt it.",
-                                  finding.square_px, limits.min_square_px)});
+    checks.push_back(
+        {ImageProblem::too_small,
+         fmt::format("Board too small or too flat in the image: squares are {:.0f} px, {:.0f} needed. Move or "
+                     "tilt it.",
+                     finding.square_px, limits.min_square_px)});
   }
   const double needed = limits.min_corner_share * board.corner_count();
   if (edges.empty() && static_cast<double>(finding.corners.size()) < needed) {
-    checks.push_back({ImageProblem::hidden,
-                      fmt::format("Only {} of {} corners visible. Uncover the board, and check its light.",
-                                  finding.corners.size(), board.corner_count())});
+    checks.push_back(
+        {ImageProblem::hidden, fmt::format("Only {} of {} corners visible. Uncover the board, and check its light.",
+                                           finding.corners.size(), board.corner_count())});
   }
   return checks;
 }

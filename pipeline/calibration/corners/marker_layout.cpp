@@ -96,17 +96,19 @@ Error name_other_board(const std::vector<FoundMarker>& markers, const Board& boa
     other.columns = columns;
     for (const BoardParity parity : parities) {
       if (columns == board.columns || !fits(fit_layout(markers, other, parity), markers.size())) continue;
-      return {ErrorCode::invalid_input, fmt::format("board: {} board columns seen, {} expected; use the configured board "
-                                                    "or correct its size",
-                                                    columns, board.columns)};
+      return {ErrorCode::invalid_input,
+              fmt::format("board: {} board columns seen, {} expected; use the configured board "
+                          "or correct its size",
+                          columns, board.columns)};
     }
   }
   for (const BoardParity parity : parities) {
     const double size = marker_size_seen(markers, board, parity);
     if (size <= 0.0 || std::abs(size - board.markers->size_mm) < 0.05 * board.markers->size_mm) continue;
-    return {ErrorCode::invalid_input, fmt::format("board: markers are {:.1f} mm by the image, {:g} mm expected; use the "
-                                                  "configured board or correct its marker size",
-                                                  size, board.markers->size_mm)};
+    return {ErrorCode::invalid_input,
+            fmt::format("board: markers are {:.1f} mm by the image, {:g} mm expected; use the "
+                        "configured board or correct its marker size",
+                        size, board.markers->size_mm)};
   }
   return {ErrorCode::invalid_input, fmt::format("board: {} markers seen, but not in the places of a {} x {} board; use "
                                                 "the configured board",
@@ -173,7 +175,8 @@ Result<BoardSeed> seed_from_markers(const CornerImage& image, const Board& board
   if (rows <= board.rows) rows = rows_of_smaller_board(image, board, fit);
   if (rows != board.rows) {
     return fail(ErrorCode::invalid_input,
-                "board: {} board rows seen, {} expected; use the configured board or correct its size", rows, board.rows);
+                "board: {} board rows seen, {} expected; use the configured board or correct its size", rows,
+                board.rows);
   }
   const auto map = BoardMap::fit(fit.points);
   if (!map) return fail(ErrorCode::ambiguous, "board: the markers seen are on one line; show more of the board");

@@ -10,8 +10,9 @@
 namespace scanrig {
 namespace {
 
-constexpr double kSurroundingsPx = 5.0;    // around a dot, fitted with it
+constexpr double kSurroundingsPx = 5.0;  // around a dot, fitted with it
 constexpr double kSurroundingsRadii = 2.5;
+constexpr double kMaxReachPx = 200.0;
 
 struct MeasuredDot {
   DotObservation dot;
@@ -31,8 +32,39 @@ bool is_inside(const std::vector<Eigen::Vector2d>& outline, const Eigen::Vector2
   return !outline.empty() && (left || right);
 }
 
-/// Pixels on and around a disc; empty when some are outside the image.
-std::vector<FitPixel> pixels_around(const CornerImage& image, const DiscShape& shape, double reach_px) {
+/// Where a dot is expected, and the pixels on and around it.
+struct Target {
+  DiscShape shape;
+  std::vector<FitPixel> pixels;
+};
+
+/// Predicts the dots of one image.
+class DotPredictor {
+ public:
+  DotPredictor(const CornerImage& image, const Camera& camera, const RimDots& dots)
+      : image_(image), camera_(camera), dots_(dots) {}
+
+  [[nodiscard]] Eigen::Vector2d pixel(double angle_rad) const { return pixel_of(angle_rad, 0.0, {0.0, 0.0}); }
+  /// No value: not all of it is in the image.
+  [[nodiscard]] std::optional<Target> predict(double angle_rad, double outwards_mm) const;
+  /// The likeliest place within `along_mm`.
+  [[nodiscard]] std::optional<Target> search(double angle_rad, double along_mm) const;
+
+ private:
+  [[nodiscard]] Eigen::Vector2d pixel_of(double angle_rad, double outwards_mm, const Eigen::Vector2d& on_disc) const {
+    const double radius_mm = 0.5 * dots_.diameter_mm;
+    const Eigen::Vector3d at_front(radius_mm * on_disc.x(), 0.0,
+                                   dots_.radius_mm + outwards_mm + radius_mm * on_disc.y());
+    return camera_.project(rot_y(angle_rad) * at_front);
+  }
+  [[nodiscard]] std::vector<FitPixel> pixels_around(const DiscShape& shape, double reach_px) const;
+
+  const CornerImage& image_;
+  const Camera& camera_;
+  const RimDots& dots_;
+};
+
+std::vector<FitPixel> DotPredictor::pixels_around(const DiscShape& shape, double reach_px) const {
   std::vector<FitPixel> pixels;
   const Eigen::Vector2d& centre = shape.centre();
   const auto x0 = static_cast<int>(std::floor(centre.x() - reach_px));
@@ -45,11 +77,47 @@ std::vector<FitPixel> pixels_around(const CornerImage& image, const DiscShape& s
       const double radii = shape.on_disc(from).norm();
       const double pixels_out = (radii - 1.0) / shape.jacobian(from).norm() * std::numbers::sqrt2;
       if (radii > kSurroundingsRadii || pixels_out > kSurroundingsPx) continue;
-      if (x < 0 || y < 0 || x >= image.width() || y >= image.height()) return {};
-      pixels.push_back({from, image.value(x, y), image.colour(x, y)});
+      if (x < 0 || y < 0 || x >= image_.width() || y >= image_.height()) return {};
+      pixels.push_back({from, image_.value(x, y), image_.colour(x, y)});
     }
   }
   return pixels;
+}
+
+std::optional<Target> DotPredictor::predict(double angle_rad, double outwards_mm) const {
+  const Eigen::Vector3d place = rot_y(angle_rad) * Eigen::Vector3d(0.0, 0.0, dots_.radius_mm + outwards_mm);
+  if (!((camera_.camera_from_turntable * place).z() > 1.0)) return std::nullopt;
+  const auto shape =
+      DiscShape::predict([&](const Eigen::Vector2d& on_disc) { return pixel_of(angle_rad, outwards_mm, on_disc); });
+  if (!shape || !camera_.projection.contains(shape->centre())) return std::nullopt;
+  const Eigen::Vector2d across =
+      pixel_of(angle_rad, outwards_mm, {1.0, 0.0}) - pixel_of(angle_rad, outwards_mm, {-1.0, 0.0});
+  const Eigen::Vector2d along =
+      pixel_of(angle_rad, outwards_mm, {0.0, 1.0}) - pixel_of(angle_rad, outwards_mm, {0.0, -1.0});
+  const double reach = 0.5 * std::hypot(across.norm(), along.norm()) * kSurroundingsRadii;
+  if (!(reach < kMaxReachPx)) return std::nullopt;
+  Target target{*shape, pixels_around(*shape, reach)};
+  if (target.pixels.empty()) return std::nullopt;
+  return target;
+}
+
+std::optional<Target> DotPredictor::search(double angle_rad, double along_mm) const {
+  const double step_mm = 0.35 * dots_.diameter_mm;
+  const int steps = static_cast<int>(std::ceil(along_mm / step_mm));
+  std::optional<Target> best;
+  double most = -1.0;
+  for (int i = -steps; i <= steps; ++i) {
+    for (const double outwards : {0.0, -step_mm, step_mm}) {
+      if (steps == 0 && outwards != 0.0) continue;
+      auto target = predict(angle_rad + i * step_mm / dots_.radius_mm, outwards);
+      if (!target) continue;
+      const double explained = explained_by_disc(target->pixels, image_.colours, target->shape);
+      if (explained <= most) continue;
+      most = explained;
+      best = std::move(target);
+    }
+  }
+  return best;
 }
 
 /// Leaves out dots that look other than the rest.
@@ -89,36 +157,28 @@ Result<RimDotFinding> find_rim_dots(const cv::Mat& image, const std::string& pix
   }
   const auto prepared = make_corner_image(image, pixel_format);
   if (!prepared) return pass_on(prepared);
+  const DotPredictor predictor(*prepared, camera, dots);
   RimDotFinding found;
   std::vector<MeasuredDot> measured;
   for (int id = 0; id < dots.count; ++id) {
     const double angle = options.angles_rad.empty() ? 2.0 * std::numbers::pi * id / dots.count
                                                     : options.angles_rad[static_cast<std::size_t>(id)];
-    const Transform turned = rot_y(table_angle_rad + angle);
-    const double radius_mm = 0.5 * dots.diameter_mm;
-    const auto pixel_of = [&](const Eigen::Vector2d& on_disc) {
-      return camera.project(turned * Eigen::Vector3d(radius_mm * on_disc.x(), 0.0, dots.radius_mm + radius_mm * on_disc.y()));
+    const double turned = table_angle_rad + angle;
+    const auto is_hidden = [&](const auto& outline) {
+      return is_inside(outline, predictor.pixel(turned), kSurroundingsPx);
     };
-    const auto is_hidden = [&](const auto& outline) { return is_inside(outline, pixel_of({0.0, 0.0}), kSurroundingsPx); };
     if (std::any_of(options.hidden_by.begin(), options.hidden_by.end(), is_hidden)) {
       ++found.hidden;
       continue;
     }
-    const bool is_before = (camera.camera_from_turntable * (turned * Eigen::Vector3d(0.0, 0.0, dots.radius_mm))).z() > 1.0;
-    const auto shape = is_before ? DiscShape::predict(pixel_of) : std::nullopt;
-    const double reach = shape ? 1.5 * (pixel_of({1.0, 0.0}) - pixel_of({-1.0, 0.0})).norm() +
-                                     1.5 * (pixel_of({0.0, 1.0}) - pixel_of({0.0, -1.0})).norm() + kSurroundingsPx
-                               : 0.0;
-    const auto pixels = shape && camera.projection.contains(shape->centre()) && reach < 200.0
-                            ? pixels_around(*prepared, *shape, reach)
-                            : std::vector<FitPixel>{};
-    if (pixels.empty()) {
+    const auto target = predictor.search(turned, options.search_along_mm);
+    if (!target) {
       ++found.outside;
       continue;
     }
-    const auto disc = fit_disc(pixels, prepared->colours, *shape, options.search_px);
+    const auto disc = fit_disc(target->pixels, prepared->colours, target->shape, options.search_px);
     if (disc) {
-      measured.push_back({{id, shape->centre() + disc->shift}, *disc});
+      measured.push_back({{id, target->shape.centre() + disc->shift}, *disc});
     } else {
       ++found.unclear;
     }

@@ -9,7 +9,8 @@
 namespace scanrig {
 namespace {
 
-// Unknowns: place 0 1, angles of both edges 2 3, log of blur 4, slope of the light 5 6, then offset and gain per colour.
+// Unknowns: place 0 1, angles of both edges 2 3, log of blur 4, slope of the light 5 6, then offset and gain per
+// colour.
 constexpr int kColours = 7;
 
 struct Crossing {
@@ -79,8 +80,8 @@ FitSums sums_at(const FitVector& p, std::span<const FitPixel> pixels) {
     const double level = p[k] + p[k + 1] * crossing.value;
     const double scale = light * p[k + 1];
     row.setZero();
-    row.head<2>() = -scale * inverse * (crossing.by_u * edges.normal_0 + crossing.by_v * edges.normal_1) -
-                    level * p.segment<2>(5);
+    row.head<2>() =
+        -scale * inverse * (crossing.by_u * edges.normal_0 + crossing.by_v * edges.normal_1) - level * p.segment<2>(5);
     row[2] = scale * (-crossing.by_u * edges.turn * edges.along_0.dot(from) * inverse -
                       crossing.by_correlation * correlation_by_angle);
     row[3] = scale * (crossing.by_v * edges.turn * edges.along_1.dot(from) * inverse +
@@ -103,9 +104,9 @@ void start_levels(FitVector& p, std::span<const FitPixel> pixels, int colours) {
     for (const FitPixel& pixel : pixels) {
       if (pixel.colour != colour) continue;
       const Eigen::Vector2d from = pixel.place - p.head<2>();
-      const Eigen::Vector2d row(1.0, cross(edges.normal_0.dot(from) / edges.blur, edges.normal_1.dot(from) / edges.blur,
-                                           edges.correlation)
-                                         .value);
+      const Eigen::Vector2d row(
+          1.0,
+          cross(edges.normal_0.dot(from) / edges.blur, edges.normal_1.dot(from) / edges.blur, edges.correlation).value);
       normal += row * row.transpose();
       slope += row * pixel.value;
     }

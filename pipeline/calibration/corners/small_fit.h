@@ -11,7 +11,8 @@ using FitMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::C
 
 /// Sums of a least-squares problem at one place: of squared residuals, J'J and J'r.
 struct FitSums {
-  explicit FitSums(Eigen::Index unknowns) : normal(FitMatrix::Zero(unknowns, unknowns)), slope(FitVector::Zero(unknowns)) {}
+  explicit FitSums(Eigen::Index unknowns)
+      : normal(FitMatrix::Zero(unknowns, unknowns)), slope(FitVector::Zero(unknowns)) {}
 
   void add(double residual, const FitVector& derivatives) {
     cost += residual * residual;

@@ -157,8 +157,8 @@ Print make_print(const PrintedBoard& board) {
     const double y = q.y() - row * board.square_mm - gap;
     if (x < 0.0 || y < 0.0 || x >= board.marker_mm || y >= board.marker_mm) return 0.9;
     const auto& bits = markers[static_cast<std::size_t>(id)];
-    return bits(std::min(static_cast<int>(y / cell), bits.rows - 1), std::min(static_cast<int>(x / cell), bits.cols - 1)) !=
-                   0
+    return bits(std::min(static_cast<int>(y / cell), bits.rows - 1),
+                std::min(static_cast<int>(x / cell), bits.cols - 1)) != 0
                ? 0.9
                : 0.05;
   };
@@ -180,8 +180,8 @@ Print make_print(const PrintedBoard& board) {
 
 Eigen::Vector3d corner_place(const PrintedBoard& board, int id) {
   const int in_row = board.columns - 1;
-  return {(id % in_row + 1 - 0.5 * board.columns) * board.square_mm, (id / in_row + 1 - 0.5 * board.rows) * board.square_mm,
-          0.0};
+  return {(id % in_row + 1 - 0.5 * board.columns) * board.square_mm,
+          (id / in_row + 1 - 0.5 * board.rows) * board.square_mm, 0.0};
 }
 
 Eigen::Isometry3d camera_from_table() {
@@ -203,11 +203,11 @@ Eigen::Isometry3d camera_from_board(const BoardPlace& place) {
   Eigen::Isometry3d table_from_board = Eigen::Isometry3d::Identity();
   Eigen::Matrix3d flat;
   flat << 1, 0, 0, 0, 0, -1, 0, 1, 0;
-  table_from_board.linear() =
-      (Eigen::AngleAxisd(place.azimuth_deg * kDegree, Eigen::Vector3d::UnitY()) *
-       Eigen::AngleAxisd(place.tilt_deg * kDegree, Eigen::Vector3d::UnitX()))
-          .toRotationMatrix() *
-      flat * Eigen::AngleAxisd(place.turn_deg * kDegree, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  table_from_board.linear() = (Eigen::AngleAxisd(place.azimuth_deg * kDegree, Eigen::Vector3d::UnitY()) *
+                               Eigen::AngleAxisd(place.tilt_deg * kDegree, Eigen::Vector3d::UnitX()))
+                                  .toRotationMatrix() *
+                              flat *
+                              Eigen::AngleAxisd(place.turn_deg * kDegree, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   table_from_board.translation() =
       Eigen::AngleAxisd(place.azimuth_deg * kDegree, Eigen::Vector3d::UnitY()) * place.centre;
   return camera_from_table() * table_from_board;

@@ -33,7 +33,7 @@ struct Exposure {
   std::string pixel_format = "BayerRG8";
   double gains[3] = {0.72, 1.0, 0.83};  ///< of red, green, blue
   double white = 210.0;                 ///< grey levels of albedo 1 in green
-  double lens_sigma_px = 0.6;         
+  double lens_sigma_px = 0.6;
   double read_noise = 0.8;
   double shot_noise_variance = 0.0263;
   std::uint64_t seed = 1;
@@ -68,9 +68,9 @@ Eigen::Vector3d corner_place(const PrintedBoard& board, int id);
 
 /// The rig's camera, 22 deg above the table and 640 mm away, and a board in it. Turntable frame: Y up, Z to the camera.
 struct BoardPlace {
-  double tilt_deg = 60.0;     ///< from lying flat, its print towards the camera
-  double azimuth_deg = 0.0;   ///< about the table's axis
-  double turn_deg = 0.0;      ///< in its own plane: 90 is portrait
+  double tilt_deg = 60.0;    ///< from lying flat, its print towards the camera
+  double azimuth_deg = 0.0;  ///< about the table's axis
+  double turn_deg = 0.0;     ///< in its own plane: 90 is portrait
   Eigen::Vector3d centre{0.0, 40.0, 0.0};
 };
 Eigen::Isometry3d camera_from_table();

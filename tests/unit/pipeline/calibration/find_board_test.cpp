@@ -24,12 +24,11 @@ struct CornerErrors {
   double worst_mean = 0.0;
   double blur = 0.0;
 
-  void add(const BoardFinding& found, const PrintedBoard& board, const TestCamera& camera, const Eigen::Isometry3d& pose,
-           const Eigen::Vector2d& mutation = {0.0, 0.0}) {
+  void add(const BoardFinding& found, const PrintedBoard& board, const TestCamera& camera,
+           const Eigen::Isometry3d& pose, const Eigen::Vector2d& mutation = {0.0, 0.0}) {
     Eigen::Vector2d sum(0.0, 0.0);
     for (const CornerObservation& corner : found.corners) {
-      const Eigen::Vector2d error =
-          corner.pixel + mutation - camera.project(pose * corner_place(board, corner.id));
+      const Eigen::Vector2d error = corner.pixel + mutation - camera.project(pose * corner_place(board, corner.id));
       sum += error;
       squares += error.squaredNorm();
       worst = std::max(worst, error.norm());
@@ -54,7 +53,8 @@ struct Shot {
   Exposure exposure;
 };
 
-/// The placements of a calibration: tilts from flat to 75 deg, all azimuths that face the camera, landscape and portrait.
+/// The placements of a calibration: tilts from flat to 75 deg, all azimuths that face the camera, landscape and
+/// portrait.
 std::vector<Shot> realistic_shots(int count, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   const auto between = [&](double a, double b) { return std::uniform_real_distribution<double>(a, b)(random); };
@@ -85,7 +85,8 @@ TEST(FindBoard, MeasuresCornersToAHundredthOfAPixelOverTheViewsOfACalibration) {
     const Eigen::Isometry3d pose = camera_from_board(shot.place);
     const cv::Mat image = render(print, camera, pose, shot.exposure);
     const auto found = find_board(image, "BayerRG8", Board{});
-    ASSERT_TRUE(found) << found.error().message << " tilt " << shot.place.tilt_deg << " azimuth " << shot.place.azimuth_deg;
+    ASSERT_TRUE(found) << found.error().message << " tilt " << shot.place.tilt_deg << " azimuth "
+                       << shot.place.azimuth_deg;
     EXPECT_EQ(found->parity, BoardParity::upper_left_black);
     CornerErrors one;
     one.add(*found, printed, camera, pose);
