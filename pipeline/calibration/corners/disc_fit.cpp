@@ -1,6 +1,8 @@
 #include "pipeline/calibration/corners/disc_fit.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -59,7 +61,26 @@ double fit_levels(FitVector& p, std::span<const FitPixel> pixels, int colours, c
   return cost;
 }
 
-FitSums sums_at(const FitVector& p, std::span<const FitPixel> pixels, const DiscShape& shape) {
+using ColourWeights = std::array<double, 3>;
+
+/// Mean squared residual per colour.
+ColourWeights residuals_of(const FitVector& p, std::span<const FitPixel> pixels, const DiscShape& shape) {
+  ColourWeights squares{};
+  std::array<int, 3> counts{};
+  for (const FitPixel& pixel : pixels) {
+    const auto colour = static_cast<std::size_t>(pixel.colour);
+    const int k = kColours + 2 * pixel.colour;
+    const double level = level_at(rim_distance(shape, pixel.place - p.head<2>(), std::exp(p[3])), std::exp(p[2]));
+    squares[colour] += std::pow(p[k] + p[k + 1] * level - pixel.value, 2);
+    ++counts[colour];
+  }
+  for (std::size_t i = 0; i < 3; ++i) squares[i] /= std::max(counts[i], 1);
+  return squares;
+}
+
+/// `weights`: of a residual of each colour, one over its sigma.
+FitSums sums_at(const FitVector& p, std::span<const FitPixel> pixels, const DiscShape& shape,
+                const ColourWeights& weights) {
   FitSums sums(p.size());
   const double blur = std::exp(p[2]);
   const double size = std::exp(p[3]);
@@ -76,15 +97,16 @@ FitSums sums_at(const FitVector& p, std::span<const FitPixel> pixels, const Disc
     row[3] = -by_sigmas / blur * size * rim.pixels_per_radius;
     row[k] = 1.0;
     row[k + 1] = level;
-    sums.add(p[k] + p[k + 1] * level - pixel.value, row);
+    const double weight = weights[static_cast<std::size_t>(pixel.colour)];
+    row *= weight;
+    sums.add(weight * (p[k] + p[k + 1] * level - pixel.value), row);
   }
   // Blur and size are known to a fifth and a twentieth before; a faint dot cannot tell them from its contrast.
-  const double scale = 4.0;
   FitVector prior = FitVector::Zero(p.size());
-  prior[2] = scale / 0.2;
+  prior[2] = 1.0 / 0.2;
   sums.add(prior[2] * p[2], prior);
   prior.setZero();
-  prior[3] = scale / 0.05;
+  prior[3] = 1.0 / 0.05;
   sums.add(prior[3] * p[3], prior);
   return sums;
 }
@@ -160,7 +182,13 @@ std::optional<Disc> fit_disc(std::span<const FitPixel> pixels, int colours, cons
       }
     }
   }
-  if (!minimise(best, [&](const FitVector& p) { return sums_at(p, pixels, shape); })) return std::nullopt;
+  // Colours differ in noise, the brighter ones have more: each counts by what the fit before leaves of it.
+  ColourWeights weights{};
+  for (int round = 0; round < 2; ++round) {
+    weights = residuals_of(best, pixels, shape);
+    for (double& weight : weights) weight = 1.0 / std::sqrt(std::max(weight, 0.05));
+    if (!minimise(best, [&](const FitVector& p) { return sums_at(p, pixels, shape, weights); })) return std::nullopt;
+  }
   Disc disc;
   disc.shift = best.head<2>();
   disc.blur_px = std::exp(best[2]);

@@ -139,7 +139,7 @@ TEST(PrintBoard, ShowsItsLengthsAndWhatItIs) {
   for (int y = page.image.rows - 1; y > 0; --y) {
     std::vector<int> dark;
     for (int x = 0; x < page.image.cols; ++x) {
-      if (page.image(y, x) < 128) dark.push_back(x);
+      if (page.image(y, x) < 220) dark.push_back(x);
     }
     if (dark.empty()) continue;
     ASSERT_GE(dark.size(), 2u);

@@ -62,7 +62,7 @@ TEST(RealChessboard, EveryPairIsFoundAndGivesThePublishedBaseline) {
       const cv::Mat image = decode_jpeg(read_file(stereo_pairs() / name).value()).value();
       const auto board = find_board(image, "BGR8", bouguets_board());
       ASSERT_TRUE(board) << name << ": " << board.error().message;
-      EXPECT_GE(board->corners.size(), 50u) << name;
+      EXPECT_GE(board->corners.size(), 45u) << name;
       corners += static_cast<int>(board->corners.size());
       found[side] = *board;
     }
@@ -84,7 +84,8 @@ TEST(RealChessboard, EveryPairIsFoundAndGivesThePublishedBaseline) {
                           rotation, baseline, essential, fundamental, cv::CALIB_FIX_INTRINSIC);
   std::cout << corners << " of " << 26 * 54 << " corners; left rms " << left_rms << " px, stereo rms " << rms
             << " px, baseline " << baseline.t() << " mm\n";
-  EXPECT_LT(rms, 0.30);  // cornerSubPix: 0.296
+  EXPECT_GE(corners, 1390);
+  EXPECT_LT(rms, 0.20);  // cornerSubPix: 0.296
   EXPECT_NEAR(baseline.at<double>(0), -99.8, 0.5);
   EXPECT_NEAR(left_matrix.at<double>(0, 0), 535.9, 5.0);
 }

@@ -115,9 +115,9 @@ TEST(RimDots, AreMeasuredFromAnApproximateCamera) {
     errors.add(*found, table);
   }
   errors.print("rim dots");
-  EXPECT_LT(errors.sigma().maxCoeff(), 0.04);
-  EXPECT_LT(errors.sigma().minCoeff(), 0.02);
-  EXPECT_LT(errors.mean().cwiseAbs().maxCoeff(), 0.004);
+  EXPECT_LT(errors.sigma().maxCoeff(), 0.044);  // noise alone: 0.039 x 0.019
+  EXPECT_LT(errors.sigma().minCoeff(), 0.024);
+  EXPECT_LT(errors.mean().cwiseAbs().maxCoeff(), 0.008);  // its own sigma is 0.004
 }
 
 TEST(RimDots, AreFoundWhenThePrintedPlacesAreNotKnownYet) {
@@ -130,13 +130,16 @@ TEST(RimDots, AreFoundWhenThePrintedPlacesAreNotKnownYet) {
   DotErrors errors;
   errors.add(*found, table);
   errors.print("unknown places");
-  EXPECT_GE(errors.count, 39);
-  EXPECT_LT(errors.worst, 0.12);
+  EXPECT_GE(errors.count, 30);  // all that are in the image
+  EXPECT_EQ(found->unclear, 0);
+  EXPECT_LT(errors.worst, 0.16);
 }
 
 TEST(RimDots, LargeOnesHaveNoEccentricity) {
   Table table(0.0);
   table.dots = {12, 80.0, 10.0};
+  table.exposure.read_noise = 0.2;
+  table.exposure.shot_noise_variance = 0.0;
   table.angles.clear();
   for (int i = 0; i < 12; ++i) table.angles.push_back(2.0 * std::numbers::pi * i / 12.0);
   const auto found = find_rim_dots(table.image(), "BayerRG8", table.known_camera(), table.dots, table.table_angle);
@@ -144,7 +147,7 @@ TEST(RimDots, LargeOnesHaveNoEccentricity) {
   DotErrors errors;
   errors.add(*found, table);
   errors.print("10 mm dots");
-  EXPECT_GE(errors.count, 11);
+  EXPECT_EQ(errors.count, 12 - found->outside);
   EXPECT_LT(errors.mean().cwiseAbs().maxCoeff(), 0.006);  // a centroid is off by 0.09
 }
 
@@ -153,7 +156,7 @@ TEST(RimDots, LeavesOutThoseThatAreHidden) {
   cv::Mat image = table.image();
   RimDotOptions options;
   options.angles_rad = table.angles;
-  const std::vector<Eigen::Vector2d> board = {{100.0, 200.0}, {500.0, 200.0}, {500.0, 560.0}, {100.0, 560.0}};
+  const std::vector<Eigen::Vector2d> board = {{60.0, 300.0}, {500.0, 300.0}, {500.0, 760.0}, {60.0, 760.0}};
   options.hidden_by.push_back(board);
   image(cv::Rect(700, 200, 250, 380)) = 128;                      // an object that no outline is given for
   cv::circle(image, {860, 470}, 40, cv::Scalar(30), cv::FILLED);  // with a texture
@@ -165,11 +168,11 @@ TEST(RimDots, LeavesOutThoseThatAreHidden) {
   DotErrors errors;
   errors.add(*found, table);
   errors.print("partly hidden");
-  EXPECT_LT(errors.worst, 0.12);
-  EXPECT_GT(errors.count, 20);
+  EXPECT_LT(errors.worst, 0.16);
+  EXPECT_GT(errors.count, 15);
   for (const DotObservation& dot : found->dots) {
     const bool is_behind_board =
-        dot.pixel.x() > 100.0 && dot.pixel.x() < 500.0 && dot.pixel.y() > 200.0 && dot.pixel.y() < 560.0;
+        dot.pixel.x() > 60.0 && dot.pixel.x() < 500.0 && dot.pixel.y() > 300.0 && dot.pixel.y() < 760.0;
     EXPECT_FALSE(is_behind_board) << dot.id;
   }
 }
