@@ -39,6 +39,11 @@ class CornerFinder {
 
  private:
   Loss fit(int id);
+  [[nodiscard]] int reach_px() const { return static_cast<int>(std::ceil(options_.radius_px)); }
+  [[nodiscard]] std::pair<std::vector<FitPixel>, int> patch(const Eigen::Vector2d& origin,
+                                                            const Eigen::Vector2d& corner,
+                                                            const Eigen::Matrix2d& board_from_pixel,
+                                                            bool is_upper_left_white) const;
   [[nodiscard]] bool is_usable(const Eigen::Vector2d& from_corner, const Eigen::Matrix2d& board_from_pixel,
                                bool is_upper_left_white) const;
   [[nodiscard]] std::vector<BoardPoint> points() const;
@@ -75,6 +80,30 @@ bool CornerFinder::is_usable(const Eigen::Vector2d& from_corner, const Eigen::Ma
   return true;
 }
 
+/// Pixels around `origin` for a corner that is `corner` from there, and how many more of them are saturated.
+std::pair<std::vector<FitPixel>, int> CornerFinder::patch(const Eigen::Vector2d& origin, const Eigen::Vector2d& corner,
+                                                          const Eigen::Matrix2d& board_from_pixel,
+                                                          bool is_upper_left_white) const {
+  std::pair<std::vector<FitPixel>, int> found;
+  const int reach = reach_px();
+  for (int dy = -reach; dy <= reach; ++dy) {
+    for (int dx = -reach; dx <= reach; ++dx) {
+      const Eigen::Vector2d place(dx, dy);
+      const Eigen::Vector2d from_corner = place - corner;
+      if (from_corner.norm() > options_.radius_px || !is_usable(from_corner, board_from_pixel, is_upper_left_white))
+        continue;
+      const int x = static_cast<int>(origin.x()) + dx;
+      const int y = static_cast<int>(origin.y()) + dy;
+      if (image_.is_saturated(x, y)) {
+        ++found.second;
+      } else {
+        found.first.push_back({place, image_.value(x, y), image_.colour(x, y)});
+      }
+    }
+  }
+  return found;
+}
+
 Loss CornerFinder::fit(int id) {
   const Eigen::Vector2d on_board = board_.corner(id).head<2>();
   const Eigen::Matrix2d jacobian = map_.jacobian(on_board);
@@ -88,26 +117,13 @@ Loss CornerFinder::fit(int id) {
   const std::array<Eigen::Vector2d, 2> expected = {jacobian.col(0).normalized(), jacobian.col(1).normalized()};
   saddle.directions = expected;
   if (const auto first = saddles_.begin(); first != saddles_.end()) saddle.blur_px = first->second.blur_px;
-  const int reach = static_cast<int>(std::ceil(options_.radius_px));
+  const int reach = reach_px();
   for (int round = 0; round < 3; ++round) {
     const Eigen::Vector2d origin(std::round(saddle.place.x()), std::round(saddle.place.y()));
     const int x0 = static_cast<int>(origin.x());
     const int y0 = static_cast<int>(origin.y());
     if (x0 < reach || y0 < reach || x0 >= image_.width() - reach || y0 >= image_.height() - reach) return Loss::outside;
-    std::vector<FitPixel> pixels;
-    int saturated = 0;
-    for (int dy = -reach; dy <= reach; ++dy) {
-      for (int dx = -reach; dx <= reach; ++dx) {
-        const Eigen::Vector2d place(dx, dy);
-        const Eigen::Vector2d from_corner = place + origin - saddle.place;
-        if (from_corner.norm() > options_.radius_px || !is_usable(from_corner, board_from_pixel, is_white)) continue;
-        if (image_.is_saturated(x0 + dx, y0 + dy)) {
-          ++saturated;
-        } else {
-          pixels.push_back({place, image_.value(x0 + dx, y0 + dy), image_.colour(x0 + dx, y0 + dy)});
-        }
-      }
-    }
+    const auto [pixels, saturated] = patch(origin, saddle.place - origin, board_from_pixel, is_white);
     const auto all = static_cast<double>(pixels.size()) + saturated;
     if (saturated > options_.max_saturated * all) return Loss::glared;
     if (static_cast<int>(pixels.size()) < kMinPixels) return Loss::not_converged;
