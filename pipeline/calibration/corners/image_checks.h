@@ -11,7 +11,7 @@ namespace scanrig {
 struct ImageLimits {
   double max_blur_px = 1.6;           ///< sigma of the edges
   double max_saturated_share = 0.01;  ///< of the board
-  double min_square_px = 15.0;        ///< shortest side of a square; markers need about as much
+  double min_square_px = 15.0;        ///< shortest side of a square
   double min_corner_share = 0.6;      ///< of the board's corners
 };
 

@@ -54,8 +54,10 @@ cv::Mat1f cast_rays(const Print& print, const TestCamera& camera, const Eigen::I
       for (int cell = 0; cell < kFine * kFine; ++cell) {
         double sum = 0.0;
         for (int i = 0; i < kSide * kSide; ++i) {
-          const double u = (cell % kFine + (i % kSide + jitter()) / kSide) / kFine * 2.0 - 1.0;
-          const double v = (cell / kFine + (i / kSide + jitter()) / kSide) / kFine * 2.0 - 1.0;
+          const int column = cell % kFine * kSide + i % kSide;  // of kFine * kSide in a pixel
+          const int row = cell / kFine * kSide + i / kSide;
+          const double u = (column + jitter()) / (kSide * kFine) * 2.0 - 1.0;
+          const double v = (row + jitter()) / (kSide * kFine) * 2.0 - 1.0;
           sum += print.albedo(middle + u * right + v * down);
         }
         cells(y * kFine + cell / kFine, x * kFine + cell % kFine) = static_cast<float>(sum / (kSide * kSide));
@@ -150,7 +152,8 @@ Print make_print(const PrintedBoard& board) {
     if (beyond.maxCoeff() >= 0.0) return 0.9;
     const int column = std::min(static_cast<int>(q.x() / board.square_mm), board.columns - 1);
     const int row = std::min(static_cast<int>(q.y() / board.square_mm), board.rows - 1);
-    const int id = id_of[static_cast<std::size_t>(row * board.columns + column)];
+    const int id = id_of.at(static_cast<std::size_t>(row) * static_cast<std::size_t>(board.columns) +
+                            static_cast<std::size_t>(column));
     if (id < 0) return 0.05;
     if (markers.empty()) return 0.9;
     const double x = q.x() - column * board.square_mm - gap;
@@ -180,8 +183,9 @@ Print make_print(const PrintedBoard& board) {
 
 Eigen::Vector3d corner_place(const PrintedBoard& board, int id) {
   const int in_row = board.columns - 1;
-  return {(id % in_row + 1 - 0.5 * board.columns) * board.square_mm,
-          (id / in_row + 1 - 0.5 * board.rows) * board.square_mm, 0.0};
+  const int column = id % in_row + 1;
+  const int row = id / in_row + 1;
+  return {(column - 0.5 * board.columns) * board.square_mm, (row - 0.5 * board.rows) * board.square_mm, 0.0};
 }
 
 Eigen::Isometry3d camera_from_table() {
