@@ -185,11 +185,14 @@ TEST(FindBoard, NeverSwapsTheLayoutInAnyOrientationOrParity) {
 }
 
 TEST(FindBoard, MeasuresSmallBoardsBesideTheirMarkers) {
-  const PrintedBoard printed;
+  PrintedBoard printed;
+  printed.marker_mm = 7.5;
+  Board board;
+  board.markers->size_mm = 7.5;
   TestCamera camera;
   camera.width = 640;
   camera.height = 480;
-  camera.f = 1500.0;  // squares of 23 px: the markers are 4.6 px from the edges
+  camera.f = 1500.0;  // squares of 23 px: the markers are 2.9 px from the edges
   camera.cx = 318.6;
   camera.cy = 240.5;
   CornerErrors errors;
@@ -200,7 +203,7 @@ TEST(FindBoard, MeasuresSmallBoardsBesideTheirMarkers) {
     Exposure exposure;
     exposure.seed = 70 + static_cast<std::uint64_t>(i);
     const Eigen::Isometry3d pose = camera_from_board(place);
-    const auto found = find_board(render(make_print(printed), camera, pose, exposure), "BayerRG8", Board{});
+    const auto found = find_board(render(make_print(printed), camera, pose, exposure), "BayerRG8", board);
     ASSERT_TRUE(found) << found.error().message;
     EXPECT_GE(found->corners.size(), 86u);
     errors.add(*found, printed, camera, pose);
