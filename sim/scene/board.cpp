@@ -146,16 +146,20 @@ PrintedBoard::Cover PrintedBoard::cover(double at, double sigma, int squares) co
   return c;
 }
 
-Vector3f PrintedBoard::albedo(const Vector2d& at, const Vector2d& sigma) const {
+PrintedBoard::Print PrintedBoard::print(const Vector2d& at, const Vector2d& sigma) const {
   const Vector2d on_layout = ordered(at);
   const Cover x = cover(on_layout.x() + 0.5 * layout_.columns * layout_.square_mm, std::hypot(sigma.x(), kInkSpread),
                         layout_.columns);
   const Cover y =
       cover(on_layout.y() + 0.5 * layout_.rows * layout_.square_mm, std::hypot(sigma.y(), kInkSpread), layout_.rows);
   double black = 0.0;
+  const bool first = is_black(x.first, y.first);
+  bool even = true;
   for (int j = 0; j < y.count; ++j) {
     for (int i = 0; i < x.count; ++i) {
-      if (is_black(x.first + i, y.first + j)) black += x.share[i] * y.share[j];
+      const bool cell = is_black(x.first + i, y.first + j);
+      if (cell) black += x.share[i] * y.share[j];
+      even = even && cell == first;
     }
   }
   const Vector3f white(0.84F, 0.835F, 0.81F), ink(0.045F, 0.045F, 0.048F);
@@ -163,10 +167,11 @@ Vector3f PrintedBoard::albedo(const Vector2d& at, const Vector2d& sigma) const {
   for (const Spot& spot : dirt_) {
     const double edge = spot.edge + sigma.maxCoeff();
     const double inside = spot.radius + 0.5 * edge - (at - spot.centre).norm();
+    if (inside > -kReach * sigma.maxCoeff()) even = false;
     if (inside <= 0.0) continue;
     colour *= static_cast<float>(1.0 - spot.darkness * std::min(1.0, inside / edge));
   }
-  return colour;
+  return {colour, even};
 }
 
 }  // namespace scanrig::sim

@@ -65,8 +65,12 @@ class PrintedBoard {
   [[nodiscard]] Eigen::Vector3d corner(int id) const;
   /// z of the surface at (x, y).
   [[nodiscard]] double warp(double x, double y) const;
-  /// Linear RGB albedo at `at`, averaged by a Gaussian of `sigma` mm along x and y.
-  [[nodiscard]] Eigen::Vector3f albedo(const Eigen::Vector2d& at, const Eigen::Vector2d& sigma) const;
+  struct Print {
+    Eigen::Vector3f albedo;  ///< linear RGB
+    bool even;               ///< the same all over the averaged area
+  };
+  /// The print at `at`, averaged by a Gaussian of `sigma` mm along x and y.
+  [[nodiscard]] Print print(const Eigen::Vector2d& at, const Eigen::Vector2d& sigma) const;
 
  private:
   /// Cells of the print that an interval covers along one axis, with the share of each.

@@ -58,7 +58,8 @@ class BoardShot {
  public:
   struct Sample {
     Vector3f light = Vector3f::Zero();
-    int surface = -2;  // -2 backdrop, -1 table, else box and face
+    int surface = -2;   // -2 backdrop, -1 table, else box and face
+    bool even = false;  // only from probe(): nothing else within more than the pixel
   };
 
   BoardShot(const BoardScene& scene, const Eye& camera, const RayMap& rays, double angle)
@@ -71,6 +72,19 @@ class BoardShot {
       const Transform box_from_table = box.table_from_box.inverse();
       boxes_.push_back({box_from_table * eye_, box_from_table.linear() * table_from_eye_});
     }
+  }
+
+  /// The middle of a pixel, and whether all of the pixel shows the same.
+  [[nodiscard]] Sample probe(double u, double v) const {
+    constexpr double kWidth = 1.2, kClear = 1.0;  // px, mm
+    Sample s = sample(u, v, kWidth);
+    const Vector3d in_eye = rays_.ray(u, v);
+    const std::size_t seen = s.surface == 0 ? 0 : boxes_.size();
+    for (std::size_t i = 0; i < boxes_.size() && s.even; ++i) {
+      const Vector3d half = scene_.boxes_[i].half.array() + kClear;
+      s.even = i == seen || enter_box(boxes_[i].eye, boxes_[i].from_eye * in_eye, half).distance < 0.0;
+    }
+    return s;
   }
 
   /// `width`: of the sample, in pixels.
@@ -89,14 +103,16 @@ class BoardShot {
     }
     const double to_table = -eye_.y() / way.y();
     const Vector3d on_table = eye_ + to_table * way;
-    if (to_table > 0.0 && std::hypot(on_table.x(), on_table.z()) < profile().table_radius_mm) {
-      return table_sample(on_table, to_table, width);
-    }
+    const double from_axis = std::hypot(on_table.x(), on_table.z());
+    if (to_table > 0.0 && from_axis < profile().table_radius_mm) return table_sample(on_table, to_table, width);
+    const bool even = to_table < 0.0 || from_axis > profile().table_radius_mm + kRimClear;
     const Vector3d eye = turntable_from_table_ * eye_, turned = turntable_from_table_ * way;
-    return {backdrop_.plain_light(eye + backdrop_.distance(eye, turned) * turned), -2};
+    return {backdrop_.plain_light(eye + backdrop_.distance(eye, turned) * turned), -2, even};
   }
 
  private:
+  static constexpr double kRimClear = 2.0;  // mm on the table: more than a pixel, however flat the view
+
   struct InBox {
     Vector3d eye;
     Eigen::Matrix3d from_eye;
@@ -127,7 +143,7 @@ class BoardShot {
     const Vector2d along_u = per_pixel(0, camera_.fx), along_v = per_pixel(1, camera_.fy);
     const double pixels = averaging(distance * in_eye.z(), width);
     const Vector2d sigma = pixels * (along_u.cwiseAbs2() + along_v.cwiseAbs2()).cwiseSqrt();
-    const Vector3f albedo = board.albedo(at.head<2>(), sigma);
+    const PrintedBoard::Print print = board.print(at.head<2>(), sigma);
 
     const Transform& table_from_box = scene_.boxes_[0].table_from_box;
     const Vector3d normal = turntable_from_table_.linear() * -table_from_box.linear().col(2);
@@ -138,7 +154,9 @@ class BoardShot {
     const auto light = [&](int vertex) { return scene_.light_->at_vertex(vertex); };
     const Surroundings around = mixed(light(node), light(node + 1), light(node + kGridX), light(node + kGridX + 1),
                                       x - std::floor(x), y - std::floor(y));
-    Sample s{albedo.cwiseProduct(RoomLight::irradiance(around, normal)), 0};
+    const Vector2d inside(0.5 * layout.width() - std::abs(at.x()), 0.5 * layout.height() - std::abs(at.y()));
+    const bool even = print.even && (inside.array() > 4.0 * sigma.array()).all();
+    Sample s{print.albedo.cwiseProduct(RoomLight::irradiance(around, normal)), 0, even};
     if (board.errors().glare > 0.0) {
       const Vector3d to_eye = -(turntable_from_table_.linear() * (table_from_eye_ * in_eye)).normalized();
       s.light += Vector3f::Constant(static_cast<float>(board.errors().glare) * mirrored(normal, to_eye));
@@ -148,7 +166,7 @@ class BoardShot {
 
   /// Light of the soft boxes from a half-glossy surface.
   static float mirrored(const Vector3d& normal, const Vector3d& to_eye) {
-    constexpr double kGloss = 0.35, kWidth = 0.02;
+    constexpr double kGloss = 1.0, kWidth = 0.01;
     double light = 0.0;
     for (const auto& box : RoomLight::soft_boxes()) {
       const double off = 1.0 - normal.dot((to_eye + box.towards).normalized());
@@ -166,7 +184,7 @@ class BoardShot {
     const auto along = [&](int axis) { return std::clamp(0.5 * at[axis] / box.half[axis] + 0.5, 0.0, 1.0); };
     const Surroundings around = mixed(light(0), light(1), light(2), light(3), along(other), along(third));
     const Vector3d normal = turntable_from_table_.linear() * (in.side * box.table_from_box.linear().col(in.axis));
-    return {box.albedo.cwiseProduct(RoomLight::irradiance(around, normal)), 8 * which + face + 1};
+    return {box.albedo.cwiseProduct(RoomLight::irradiance(around, normal)), 8 * which + face + 1, false};
   }
 
   [[nodiscard]] Sample table_sample(const Vector3d& in_table, double depth, double width) const {
@@ -175,7 +193,9 @@ class BoardShot {
     const auto dot = static_cast<float>(rim_dot_share(in_table, size, scene_.rim_dots_));
     const Vector3f albedo = (1.0F - dot) * rgb(p.table_albedo) + dot * rgb(p.rim_dot_albedo);
     const Surroundings around = scene_.light_->on_table(in_table.x(), in_table.z());
-    return {albedo.cwiseProduct(RoomLight::irradiance(around, Vector3d::UnitY())), -1};
+    const double from_axis = std::hypot(in_table.x(), in_table.z());
+    const bool even = from_axis < p.rim_dot_radius_mm - p.rim_dot_diameter_mm - kRimClear;
+    return {albedo.cwiseProduct(RoomLight::irradiance(around, Vector3d::UnitY())), -1, even};
   }
 
   const BoardScene& scene_;
@@ -192,6 +212,8 @@ class BoardShot {
 namespace {
 
 Vector3f render_pixel(const BoardShot& shot, int x, int y, std::uint64_t bits) {
+  const BoardShot::Sample probe = shot.probe(x, y);
+  if (probe.even) return probe.light;
   const double turn = 0.5 * std::numbers::pi * uniform(bits);
   constexpr double kArm = 0.35355;  // half the diagonal of a half-pixel square
   const double c = kArm * std::cos(turn), s = kArm * std::sin(turn);
@@ -204,7 +226,6 @@ Vector3f render_pixel(const BoardShot& shot, int x, int y, std::uint64_t bits) {
     if (i == 0) surface = sample.surface;
     one_surface = one_surface && sample.surface == surface;
     sum += 0.25F * sample.light;
-    if (i == 1 && one_surface && surface == -2) return 2.0F * sum;  // an even cloth: two opposite halves are enough
   }
   if (one_surface) return sum;
   sum.setZero();

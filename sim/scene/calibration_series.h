@@ -31,13 +31,13 @@ struct SeriesOptions {
   std::uint64_t seed = 1;                          ///< the print, how the board is put down, faults, noise
   double image_scale = 1.0;
   bool noise = true;
-  BoardLayout board;
-  PrintErrors print;
+  BoardLayout board{};
+  PrintErrors print{};
   bool exact_placements = false;  ///< the operator errs in nothing
-  std::vector<int> placements;    ///< numbers of the plan to take; empty: all
+  std::vector<int> placements{};  ///< numbers of the plan to take; empty: all
   int angles = 7;                 ///< per placement, one more of the flat one
   int hand_held = 0;              ///< that many pairs of a board held by hand instead of the plan
-  SeriesFaults faults;
+  SeriesFaults faults{};
 };
 
 /// One pair of images to take, and the truth of it.
@@ -47,11 +47,11 @@ struct SeriesPair {
   int image = 1;      ///< from 1, within the placement
   bool in_a = true;
   bool in_b = true;
-  double reported_deg = 0.0;                       ///< by the table
-  double true_deg = 0.0;                           ///< about the axis; 0 for a hand-held board
-  Transform table_from_board;                      ///< in the frame that turns about the axis
-  RigGeometry rig;                                 ///< cameras at the time
-  double left_blur_px = 0.0, right_blur_px = 0.0;  ///< sigma beside the lens's own
+  double reported_deg = 0.0;                           ///< by the table
+  double true_deg = 0.0;                               ///< about the axis; 0 for a hand-held board
+  Transform table_from_board = Transform::Identity();  ///< in the frame that turns about the axis
+  RigGeometry rig;                                     ///< cameras at the time
+  double left_blur_px = 0.0, right_blur_px = 0.0;      ///< sigma beside the lens's own
 };
 
 /// A calibration series: the plan of placements and angles of one board before one rig.
