@@ -82,7 +82,10 @@ TEST_F(ShootBoard, GivesTheSameBytesForTheSameSeed) {
 TEST_F(ShootBoard, OfARigHasTheCamerasOfItsScans) {
   const fs::path scan = folder_.string() + "_scan";
   ASSERT_TRUE(shoot_board(options_, folder_));
-  const ShootOptions object = {.scene = {.poses = 1, .image_scale = 0.2, .rig = options_.rig}, .views = 1};
+  ShootOptions object;
+  object.views = object.scene.poses = 1;
+  object.scene.image_scale = 0.2;
+  object.scene.rig = options_.rig;
   ASSERT_TRUE(shoot(object, scan));
   const json series = parse(folder_ / "calibration_truth.json"), rig = parse(scan / "rig_truth.json");
   for (const char* part : {"left", "right", "table", "rim_dots"}) EXPECT_EQ(series[part], rig[part]) << part;
