@@ -265,8 +265,9 @@ BoardScene::BoardScene(const PrintedBoard& board, PlacedBoard placed, const RimD
 void BoardScene::add_print(Object& mesh) const {
   const BoardLayout& layout = board_.layout();
   for (int i = 0; i < kGridX * kGridY; ++i) {
-    const double x = (i % kGridX / (kGridX - 1.0) - 0.5) * layout.width();
-    const double y = (i / kGridX / (kGridY - 1.0) - 0.5) * layout.height();
+    const int column = i % kGridX, row = i / kGridX;
+    const double x = (column / (kGridX - 1.0) - 0.5) * layout.width();
+    const double y = (row / (kGridY - 1.0) - 0.5) * layout.height();
     mesh.mesh.vertices.push_back(placed_.table_from_board * Vector3d(x, y, 0.0));
     mesh.normals.push_back(-placed_.table_from_board.linear().col(2));
   }

@@ -42,7 +42,8 @@ LensResidual draw_lens_residual(const Eye& eye, double rms_px, std::uint64_t see
   constexpr int kRows = 2 * kAcross * kDown;
   Eigen::MatrixXd fields(kRows, kUnknowns), model(kRows, kModel);
   for (int node = 0; node < kAcross * kDown; ++node) {
-    const double x = (node % kAcross + 0.5) / kAcross, y = (node / kAcross + 0.5) / kDown;
+    const int column = node % kAcross, row = node / kAcross;
+    const double x = (column + 0.5) / kAcross, y = (row + 0.5) / kDown;
     model.middleRows<2>(2 * node) = model_at(eye, x * eye.width - 0.5, y * eye.height - 0.5);
     for (int i = 0; i < kUnknowns; ++i) {
       fields.col(i).segment<2>(2 * node) = residual_of(Amplitudes::Unit(i)).at(x, y);
