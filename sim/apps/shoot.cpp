@@ -40,7 +40,7 @@ Result<ordered_json> shoot_view(Scene& scene, int pose, const ViewAngle& angle, 
     const StereoImages images = scene.shoot(pose, to_radians(angle.true_deg), pattern, exposure++);
     for (const bool left : {true, false}) {
       const std::string name = fmt::format("{}_{}", left ? "left" : "right", pattern ? "pattern" : "plain");
-      const std::string file = path + "/" + name + ".png";
+      const std::string file = fmt::format("{}/{}.png", path, name);
       const auto hash = save_png(left ? images.left : images.right, folder / file);
       if (!hash) return pass_on(hash);
       files[name] = {{"path", file}, {"sha256", *hash}};

@@ -6,7 +6,7 @@
 
 namespace scanrig::sim {
 
-RayMap::RayMap(const Eye& eye) : across_(eye.width + 2), rays_(static_cast<std::size_t>(across_ * (eye.height + 2))) {
+RayMap::RayMap(const Eye& eye) : across_(eye.width + 2), rays_(static_cast<std::size_t>(across_) * (eye.height + 2)) {
   parallel_for(static_cast<std::size_t>(eye.height + 2), [&](std::size_t row) {
     for (int i = 0; i < across_; ++i)
       rays_[row * across_ + i] = eye.ray(i - 1.0, static_cast<double>(row) - 1.0).head<2>();

@@ -61,7 +61,8 @@ TEST(Board, ShowsOpenCvsMarkersInOrder) {
   // of the four outermost corners.
   std::vector<cv::Point2f> ordered, seen;
   for (const int id : {0, 10, 77, 87}) {
-    ordered.emplace_back(static_cast<float>(id % 11 + 1), static_cast<float>(id / 11 + 1));
+    const int column = id % 11 + 1, row = id / 11 + 1;
+    ordered.emplace_back(static_cast<float>(column), static_cast<float>(row));
     const Vector2d pixel = series->corner_pixel(series->pairs()[0], true, id);
     seen.emplace_back(static_cast<float>(pixel.x()), static_cast<float>(pixel.y()));
   }
