@@ -6,8 +6,10 @@
 
 #include "daemon/runtime/signal_stop.h"
 #include "sim/apps/rig_control.h"
+#include "sim/apps/rig_options.h"
 #include "sim/apps/scanrig_sim_ctl.h"
 #include "sim/apps/shoot.h"
+#include "sim/apps/shoot_board.h"
 #include "sim/apps/wire_rig.h"
 #include "sim/wire/control_socket.h"
 #include "sim/wire/loopback.h"
@@ -21,6 +23,7 @@ using Chosen = std::function<Result<void>()>;
 
 struct ShootVerb {
   sim::ShootOptions options;
+  sim::DrawnRigOptions rig;
   std::string folder;
 };
 
@@ -43,7 +46,27 @@ void add_shoot(CLI::App& app, ShootVerb& verb, Chosen& chosen) {
   shoot->add_option("--poses", options.scene.poses, "Number of poses: how often the object is put down")
       ->capture_default_str();
   shoot->add_option("--views", options.views, "Table angles per pose")->check(CLI::Range(1, 99))->capture_default_str();
-  shoot->callback([&] { chosen = [&] { return sim::shoot(verb.options, verb.folder); }; });
+  verb.rig.add_to(*shoot);
+  shoot->callback([&] {
+    chosen = [&]() -> Result<void> {
+      const auto rig = verb.rig.variation();
+      if (!rig) return pass_on(rig);
+      verb.options.scene.rig = *rig;
+      return sim::shoot(verb.options, verb.folder);
+    };
+  });
+}
+
+void add_shoot_board(CLI::App& app, sim::ShootBoardOptions& verb, Chosen& chosen) {
+  auto* shoot = app.add_subcommand(
+      "shoot-board", "Render a calibration series, with its truth; see docs/reference/calibration-images.md");
+  verb.add_to(*shoot);
+  shoot->callback([&] {
+    chosen = [&]() -> Result<void> {
+      const auto options = verb.chosen();
+      return options ? sim::shoot_board(*options, verb.folder) : pass_on(options);
+    };
+  });
 }
 
 Result<void> serve_rig(const sim::WireRigOptions& options) {
@@ -132,6 +155,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   Chosen chosen;
   ShootVerb shoot_verb;
+  sim::ShootBoardOptions board_verb;
   sim::WireRigOptions rig_options;
   rig_options.toml.drive = "leadshine-rs";
   rig_options.toml.panel = "gpio";
@@ -139,6 +163,7 @@ int main(int argc, char** argv) {
   ControlVerb control_verb;
   std::vector<std::string> command;
   add_shoot(app, shoot_verb, chosen);
+  add_shoot_board(app, board_verb, chosen);
   add_rig(app, rig_options, scene, chosen);
   add_control(app, control_verb, chosen);
   add_own_network(app, command, chosen);

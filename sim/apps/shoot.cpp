@@ -24,26 +24,33 @@ Result<std::string> save_png(const cv::Mat& image, const fs::path& file) {
   return sha256(*bytes);
 }
 
-Result<ordered_json> shoot_view(Scene& scene, int pose, int index, double commanded, double true_deg,
-                                const fs::path& folder, std::uint64_t exposure) {
-  const std::string path = fmt::format("pose{}/view{:02}", pose + 1, index);
+struct ViewAngle {
+  int index;
+  double commanded_deg;
+  double rest_deg;  ///< where the drive's axis rests, as its encoder measures
+  double true_deg;  ///< of the table
+};
+
+Result<ordered_json> shoot_view(Scene& scene, int pose, const ViewAngle& angle, const fs::path& folder,
+                                std::uint64_t exposure) {
+  const std::string path = fmt::format("pose{}/view{:02}", pose + 1, angle.index);
   if (const auto made = create_directories_synced(folder / path); !made) return pass_on(made);
   ordered_json files = ordered_json::object();
   for (const bool pattern : {true, false}) {
-    const StereoImages images = scene.shoot(pose, to_radians(true_deg), pattern, exposure++);
+    const StereoImages images = scene.shoot(pose, to_radians(angle.true_deg), pattern, exposure++);
     for (const bool left : {true, false}) {
       const std::string name = fmt::format("{}_{}", left ? "left" : "right", pattern ? "pattern" : "plain");
-      const std::string file = path + "/" + name + ".png";
+      const std::string file = fmt::format("{}/{}.png", path, name);
       const auto hash = save_png(left ? images.left : images.right, folder / file);
       if (!hash) return pass_on(hash);
       files[name] = {{"path", file}, {"sha256", *hash}};
     }
   }
   const int seconds = 10 * static_cast<int>(exposure / 2);
-  return ordered_json{{"index", index},
-                      {"commanded_deg", commanded},
-                      {"measured_deg", encoder_reading(true_deg)},
-                      {"moving_ms", index == 0 ? 0 : 1500},
+  return ordered_json{{"index", angle.index},
+                      {"commanded_deg", angle.commanded_deg},
+                      {"measured_deg", encoder_reading(angle.rest_deg)},
+                      {"moving_ms", angle.index == 0 ? 0 : 1500},
                       {"settling_ms", static_cast<int>(1e3 * profile().settling_s)},
                       {"taken", fmt::format("2026-11-21T09:{:02}:{:02}Z", seconds / 60 % 60, seconds % 60)},
                       {"pixel_format", "BayerRG8"},
@@ -87,8 +94,9 @@ Result<void> shoot(const ShootOptions& options, const fs::path& folder) {
     truth.push_back({pose, {}});
     for (int index = 0; index < options.views; ++index, exposure += 2) {
       const double commanded = 360.0 * index / options.views;
-      const double true_deg = resting_angle(commanded + 360.0 * pose, options.scene.seed) - 360.0 * pose;
-      const auto view = shoot_view(**scene, pose, index, commanded, true_deg, folder, exposure);
+      const double rest_deg = resting_angle(commanded + 360.0 * pose, options.scene.seed) - 360.0 * pose;
+      const double true_deg = options.scene.rig ? (*scene)->drawn_rig().table.true_deg(rest_deg) : rest_deg;
+      const auto view = shoot_view(**scene, pose, {index, commanded, rest_deg, true_deg}, folder, exposure);
       if (!view) return pass_on(view);
       views.push_back(*view);
       truth.back().angles_deg.push_back(true_deg);

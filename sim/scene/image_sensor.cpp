@@ -10,9 +10,9 @@
 
 namespace scanrig::sim {
 
-cv::Mat through_lens(const cv::Mat& light, double image_scale) {
+cv::Mat through_lens(const cv::Mat& light, double image_scale, double extra_sigma_px) {
   cv::Mat blurred;
-  const double sigma = profile().lens_sigma_px * image_scale;
+  const double sigma = std::hypot(profile().lens_sigma_px, extra_sigma_px) * image_scale;
   cv::GaussianBlur(light, blurred, {}, sigma, sigma, cv::BORDER_REPLICATE);
   cv::Mat filtered(light.rows, light.cols, CV_32F);
   for (int y = 0; y < light.rows; ++y) {
@@ -23,7 +23,7 @@ cv::Mat through_lens(const cv::Mat& light, double image_scale) {
   return filtered;
 }
 
-cv::Mat expose(const cv::Mat& on_sensor, std::uint64_t noise_key) {
+cv::Mat expose(const cv::Mat& on_sensor, std::uint64_t noise_key, double noise_factor) {
   const Profile& p = profile();
   cv::Mat raw(on_sensor.rows, on_sensor.cols, CV_8U);
   const double cx = 0.5 * (raw.cols - 1), cy = 0.5 * (raw.rows - 1);
@@ -36,7 +36,7 @@ cv::Mat expose(const cv::Mat& on_sensor, std::uint64_t noise_key) {
       double grey = 255.0 * in[x] * (1.0 - p.vignetting * off);
       if (noise_key != 0) {
         const double variance = p.read_noise * p.read_noise + p.shot_noise_variance * std::max(0.0, grey);
-        grey += std::sqrt(variance) * normal(mix(noise_key, row, x));
+        grey += noise_factor * std::sqrt(variance) * normal(mix(noise_key, row, x));
       }
       out[x] = static_cast<std::uint8_t>(std::lround(std::clamp(grey, 0.0, 255.0)));
     }

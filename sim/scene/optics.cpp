@@ -1,6 +1,7 @@
 #include "sim/scene/optics.h"
 
 #include <cmath>
+#include <numbers>
 
 #include "core/units.h"
 #include "sim/scene/profile.h"
@@ -18,18 +19,6 @@ Vector2d distort(const std::array<double, 5>& k, const Vector2d& p) {
           y * radial + k[2] * (r2 + 2.0 * y * y) + 2.0 * k[3] * x * y};
 }
 
-/// An eye at `centre` that looks at `target` with its x axis horizontal.
-Transform looking_at(const Vector3d& centre, const Vector3d& target) {
-  const Vector3d forward = (target - centre).normalized();
-  const Vector3d right = forward.cross(Vector3d::UnitY()).normalized();
-  Transform eye_from_turntable = Transform::Identity();
-  eye_from_turntable.linear().row(0) = right;
-  eye_from_turntable.linear().row(1) = forward.cross(right);
-  eye_from_turntable.linear().row(2) = forward;
-  eye_from_turntable.translation() = -(eye_from_turntable.linear() * centre);
-  return eye_from_turntable;
-}
-
 Eye camera(const Profile& p, bool left, double scale) {
   Eye eye;
   eye.serial = left ? "SIM-L" : "SIM-R";
@@ -44,15 +33,44 @@ Eye camera(const Profile& p, bool left, double scale) {
   return eye;
 }
 
+/// cos(i pi x) for i = 0 to 3.
+Eigen::Vector4d cosines(double x) {
+  const double c = std::cos(std::numbers::pi * x);
+  return {1.0, c, 2.0 * c * c - 1.0, c * (4.0 * c * c - 3.0)};
+}
+
 }  // namespace
+
+Vector2d LensResidual::at(double x, double y) const {
+  const Eigen::Vector4d along_x = cosines(x), along_y = cosines(y);
+  return {along_x.dot(du * along_y), along_x.dot(dv * along_y)};
+}
+
+Transform looking_at(const Vector3d& centre, const Vector3d& target) {
+  const Vector3d forward = (target - centre).normalized();
+  const Vector3d right = forward.cross(Vector3d::UnitY()).normalized();
+  Transform eye_from_turntable = Transform::Identity();
+  eye_from_turntable.linear().row(0) = right;
+  eye_from_turntable.linear().row(1) = forward.cross(right);
+  eye_from_turntable.linear().row(2) = forward;
+  eye_from_turntable.translation() = -(eye_from_turntable.linear() * centre);
+  return eye_from_turntable;
+}
 
 Vector2d Eye::project(const Vector3d& point_in_turntable) const {
   const Vector3d q = eye_from_turntable * point_in_turntable;
   const Vector2d d = distort(distortion, {q.x() / q.z(), q.y() / q.z()});
-  return {fx * d.x() + cx, fy * d.y() + cy};
+  const Vector2d pixel(fx * d.x() + cx, fy * d.y() + cy);
+  return residual ? Vector2d(pixel + residual->at((pixel.x() + 0.5) / width, (pixel.y() + 0.5) / height)) : pixel;
 }
 
 Vector3d Eye::ray(double u, double v) const {
+  if (residual) {
+    Vector2d pixel(u, v);  // of Brown's model
+    for (int i = 0; i < 3; ++i)
+      pixel = Vector2d(u, v) - residual->at((pixel.x() + 0.5) / width, (pixel.y() + 0.5) / height);
+    u = pixel.x(), v = pixel.y();
+  }
   const Vector2d target((u - cx) / fx, (v - cy) / fy);
   Vector2d p = target;
   // The distortion is mild (it moves a corner by 0.3 %), so the fixed point gains two or more digits per step.

@@ -7,9 +7,9 @@
 #include <numbers>
 
 #include "core/parallel.h"
-#include "core/units.h"
 #include "sim/scene/profile.h"
 #include "sim/scene/random.h"
+#include "sim/scene/table_top.h"
 
 namespace scanrig::sim {
 namespace {
@@ -45,9 +45,6 @@ class Shot {
     for (const auto& v : vertices) radius_ = std::max(radius_, (v - box.center()).norm());
     middle_ = turntable_from_object_ * box.center();
     const Vector3d aim(0.0, profile().aim_height_mm, 0.0);
-    const double elevation = to_radians(profile().elevation_deg);
-    backdrop_normal_ = Vector3d(0.0, std::sin(elevation), std::cos(elevation));
-    backdrop_point_ = aim - profile().backdrop_distance_mm * backdrop_normal_;
     focus_ = (camera.eye_from_turntable * aim).z();
     lamp_focus_ = (projector.eye_from_turntable * aim).z();
   }
@@ -65,7 +62,7 @@ class Shot {
     if (to_table > 0.0 && std::hypot(on_table.x(), on_table.z()) < profile().table_radius_mm) {
       return table_sample(on_table, to_table, width);
     }
-    const double t = (backdrop_point_ - eye_).dot(backdrop_normal_) / way.dot(backdrop_normal_);
+    const double t = backdrop_.distance(eye_, way);
     return backdrop_sample(eye_ + t * way, t);
   }
 
@@ -143,7 +140,7 @@ class Shot {
     const Profile& p = profile();
     const Vector3d in_table = turntable_from_table_.inverse() * point;
     const double size = footprint(depth, 0.4, width);
-    const float dot = static_cast<float>(rim_dot(in_table, size));
+    const float dot = static_cast<float>(rim_dot_share(in_table, size, placed_.rim_dots));
     const Vector3f albedo = (1.0F - dot) * rgb(p.table_albedo) + dot * rgb(p.rim_dot_albedo);
     Sample s;
     s.surface = Surface::table;
@@ -154,31 +151,11 @@ class Shot {
     return s;
   }
 
-  /// Share of a rim dot under a sample. 40 dots, each a little off its even place so that every angle looks different.
-  [[nodiscard]] static double rim_dot(const Vector3d& in_table, double size) {
-    const Profile& p = profile();
-    constexpr int kDots = 40;
-    const double radius = std::hypot(in_table.x(), in_table.z());
-    if (std::abs(radius - p.rim_dot_radius_mm) > p.rim_dot_diameter_mm) return 0.0;
-    const double step = 2.0 * std::numbers::pi / kDots;
-    const int nearest = static_cast<int>(std::lround(std::atan2(in_table.x(), in_table.z()) / step));
-    const int dot = ((nearest % kDots) + kDots) % kDots;
-    const double angle = step * (nearest + 0.25 * (uniform(mix(p.dot_seed, dot)) - 0.5));
-    const Vector2d centre = p.rim_dot_radius_mm * Vector2d(std::sin(angle), std::cos(angle));
-    const double inside = 0.5 * p.rim_dot_diameter_mm - (Vector2d(in_table.x(), in_table.z()) - centre).norm();
-    return std::clamp(inside / std::max(size, 0.1) + 0.5, 0.0, 1.0);
-  }
-
   [[nodiscard]] Sample backdrop_sample(const Vector3d& point, double depth) const {
     Sample s;
     s.depth = depth;
-    // Cloth lit a little less towards the sides and the floor.
-    const double fall = (point - backdrop_point_).squaredNorm() / (300.0 * 300.0);
-    const Surroundings free{Vector3f::Constant(0.8F), 1.0F};
-    const Vector3f albedo = rgb(profile().backdrop_albedo);
-    s.plain = static_cast<float>(1.0 - 0.25 * fall) *
-              albedo.cwiseProduct(RoomLight::irradiance(free, Vector3d(0.0, 0.5, 0.87)));
-    light_up(s, point, backdrop_normal_, albedo, footprint(depth, 1.0, 1.0));
+    s.plain = backdrop_.plain_light(point);
+    light_up(s, point, backdrop_.normal, rgb(profile().backdrop_albedo), footprint(depth, 1.0, 1.0));
     return s;
   }
 
@@ -189,7 +166,8 @@ class Shot {
   const Eye& projector_;
   const DotPattern& dots_;
   Transform turntable_from_table_, turntable_from_object_, object_from_turntable_;
-  Vector3d eye_, lamp_, middle_, backdrop_normal_, backdrop_point_;
+  Vector3d eye_, lamp_, middle_;
+  const Backdrop backdrop_;
   double radius_ = 0.0, focus_ = 0.0, lamp_focus_ = 0.0;
 };
 

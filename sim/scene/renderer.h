@@ -7,6 +7,7 @@
 #include "sim/scene/optics.h"
 #include "sim/scene/ray_caster.h"
 #include "sim/scene/room_light.h"
+#include "sim/scene/table_top.h"
 
 namespace scanrig::sim {
 
@@ -22,6 +23,7 @@ struct Placed {
   const RayCaster& rays;
   const RoomLight& light;
   Transform table_from_object;
+  const RimDotErrors& rim_dots = kRimDotsAsDesigned;
 };
 
 /// Both exposures of one camera with the table at `angle` (radians). Each pixel is a square of four samples turned by a

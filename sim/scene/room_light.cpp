@@ -116,18 +116,18 @@ Surroundings RoomLight::on_table(double x, double z) const {
   return {Vector3f::Constant(0.9F * open + 0.1F * (1.0F - open)), open};
 }
 
-Vector3f RoomLight::irradiance(const Surroundings& surroundings, const Vector3d& normal) {
-  struct SoftBox {
-    Vector3d towards;
-    double share;
-  };
+const std::array<RoomLight::SoftBox, 3>& RoomLight::soft_boxes() {
   static const std::array<SoftBox, 3> boxes = {{{Vector3d(-0.60, 0.65, 0.65).normalized(), 0.42},
                                                 {Vector3d(0.75, 0.45, 0.55).normalized(), 0.36},
                                                 {Vector3d(0.05, 0.90, -0.45).normalized(), 0.22}}};
+  return boxes;
+}
+
+Vector3f RoomLight::irradiance(const Surroundings& surroundings, const Vector3d& normal) {
   constexpr double kWrap = 0.5;  // a box as wide as its distance lights a little past the edge
   const Profile& p = profile();
   double direct = 0.0;
-  for (const auto& box : boxes) {
+  for (const auto& box : soft_boxes()) {
     direct += box.share * std::max(0.0, (normal.dot(box.towards) + kWrap) / (1.0 + kWrap));
   }
   // A covered place loses the boxes' light faster than the sky's.

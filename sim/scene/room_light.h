@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
@@ -25,6 +26,13 @@ class RoomLight {
   [[nodiscard]] Surroundings at_vertex(int vertex) const { return vertices_[vertex]; }
   /// `x`, `z` in the table's own (turning) frame.
   [[nodiscard]] Surroundings on_table(double x, double z) const;
+
+  /// One of the soft boxes: direction to its middle (turntable frame, unit) and its share of their light.
+  struct SoftBox {
+    Eigen::Vector3d towards;
+    double share;
+  };
+  static const std::array<SoftBox, 3>& soft_boxes();
 
   /// Irradiance of a surface with unit normal `normal` (turntable frame, angle included).
   static Eigen::Vector3f irradiance(const Surroundings& surroundings, const Eigen::Vector3d& normal);

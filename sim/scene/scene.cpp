@@ -27,7 +27,8 @@ Scene::Scene(Object object, std::vector<Transform> placements, const SceneOption
     : options_(options),
       object_(std::move(object)),
       placements_(std::move(placements)),
-      rig_(default_rig(options.image_scale)),
+      rig_(options.rig ? draw_rig(*options.rig, options.image_scale)
+                       : DrawnRig{.geometry = default_rig(options.image_scale)}),
       rays_(object_.mesh),
       dots_(options.image_scale),
       lights_(placements_.size()) {}
@@ -38,25 +39,30 @@ const RoomLight& Scene::light_of(int pose) {
   return *light;
 }
 
+Transform Scene::true_placement(int pose) const {
+  return options_.rig ? Transform(rig_.table.axis_from_top * placements_[pose]) : placements_[pose];
+}
+
 View Scene::look(int pose, double angle) {
   assert(pose >= 0 && pose < static_cast<int>(placements_.size()));
-  const Placed placed{object_, rays_, light_of(pose), placements_[pose]};
+  const Placed placed{object_, rays_, light_of(pose), placements_[pose], rig_.rim_dots};
+  const RigGeometry rig = options_.rig ? against_table_motion(rig_.geometry, rig_.table, angle) : rig_.geometry;
   const auto seen_by = [&](const Eye& eye, int camera) {
     const std::uint64_t sampling = mix(static_cast<std::uint64_t>(pose), std::bit_cast<std::uint64_t>(angle), camera);
-    const Radiance light = render(placed, eye, rig_.projector, dots_, angle, sampling);
+    const Radiance light = render(placed, eye, rig.projector, dots_, angle, sampling);
     const double scale = options_.image_scale;
     return std::pair(through_lens(light.pattern, scale), through_lens(light.plain, scale));
   };
   View view;
-  std::tie(view.left_pattern, view.left_plain) = seen_by(rig_.left, 0);
-  std::tie(view.right_pattern, view.right_plain) = seen_by(rig_.right, 1);
+  std::tie(view.left_pattern, view.left_plain) = seen_by(rig.left, 0);
+  std::tie(view.right_pattern, view.right_plain) = seen_by(rig.right, 1);
   return view;
 }
 
 StereoImages Scene::expose(const View& view, bool pattern, std::uint64_t exposure) const {
   const auto key = [&](int camera) { return options_.noise ? mix(options_.seed, exposure, camera) | 1 : 0; };
-  return {sim::expose(pattern ? view.left_pattern : view.left_plain, key(0)),
-          sim::expose(pattern ? view.right_pattern : view.right_plain, key(1))};
+  return {sim::expose(pattern ? view.left_pattern : view.left_plain, key(0), rig_.noise_factor),
+          sim::expose(pattern ? view.right_pattern : view.right_plain, key(1), rig_.noise_factor)};
 }
 
 StereoImages Scene::shoot(int pose, double angle, bool pattern, std::uint64_t exposure) {

@@ -2,12 +2,14 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/result.h"
 #include "sim/scene/object.h"
 #include "sim/scene/optics.h"
 #include "sim/scene/renderer.h"
+#include "sim/scene/rig_variation.h"
 
 namespace scanrig::sim {
 
@@ -20,6 +22,7 @@ struct SceneOptions {
   bool same_rest_twice = false;  ///< every pose is the first rest, only turned and moved
   bool any_size = false;         ///< put it down although it is larger than the working volume, as an operator can
   bool noise = true;
+  std::optional<RigVariation> rig = std::nullopt;  ///< a drawn rig; nothing: the default rig, without any error
 };
 
 /// Left and right image of one exposure, 8 bit BayerRG8.
@@ -33,7 +36,7 @@ struct View {
   cv::Mat left_pattern, right_pattern, left_plain, right_plain;
 };
 
-/// The object in all its poses under the default rig.
+/// The object in all its poses under the default rig, or a drawn one.
 /// Threads: look() and shoot() one at a time, the rest from any.
 class Scene {
  public:
@@ -42,7 +45,8 @@ class Scene {
   /// For tests: a given object in given placements.
   Scene(Object object, std::vector<Transform> placements, const SceneOptions& options);
 
-  /// The scene with the table at `angle` (radians). Same pose and angle, same bits. Takes about 2 s in full size.
+  /// The scene with the table at the true `angle` (radians). Same pose and angle, same bits. Takes about 2 s in full
+  /// size.
   View look(int pose, double angle);
   /// `exposure` counts exposures; with the seed it names the noise.
   [[nodiscard]] StereoImages expose(const View& view, bool pattern, std::uint64_t exposure) const;
@@ -50,10 +54,13 @@ class Scene {
   StereoImages shoot(int pose, double angle, bool pattern, std::uint64_t exposure);
 
   [[nodiscard]] const Object& object() const { return object_; }
-  [[nodiscard]] const RigGeometry& rig() const { return rig_; }
+  [[nodiscard]] const RigGeometry& rig() const { return rig_.geometry; }
+  [[nodiscard]] const DrawnRig& drawn_rig() const { return rig_; }
   [[nodiscard]] const SceneOptions& options() const { return options_; }
-  /// table_from_object of each pose.
+  /// table_from_object of each pose, on the table top; see true_placement().
   [[nodiscard]] const std::vector<Transform>& placements() const { return placements_; }
+  /// The same with the table top's tilt: in the frame that turns about the axis.
+  [[nodiscard]] Transform true_placement(int pose) const;
 
  private:
   const RoomLight& light_of(int pose);
@@ -61,7 +68,7 @@ class Scene {
   SceneOptions options_;
   Object object_;
   std::vector<Transform> placements_;
-  RigGeometry rig_;
+  DrawnRig rig_;
   RayCaster rays_;
   DotPattern dots_;
   std::vector<std::unique_ptr<RoomLight>> lights_;  // made when a pose is first seen

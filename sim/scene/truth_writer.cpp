@@ -7,29 +7,12 @@
 
 #include "core/files.h"
 #include "sim/scene/profile.h"
+#include "sim/scene/truth_json.h"
 
 namespace scanrig::sim {
 namespace {
 
 using nlohmann::ordered_json;
-
-ordered_json to_json(const Transform& t) {
-  ordered_json rotation = ordered_json::array();
-  for (int i = 0; i < 3; ++i) rotation.push_back({t.linear()(i, 0), t.linear()(i, 1), t.linear()(i, 2)});
-  return {{"rotation", rotation}, {"translation", {t.translation().x(), t.translation().y(), t.translation().z()}}};
-}
-
-ordered_json lens(const Eye& eye) {
-  return {{"width", eye.width}, {"height", eye.height}, {"fx", eye.fx}, {"fy", eye.fy}, {"cx", eye.cx}, {"cy", eye.cy}};
-}
-
-ordered_json camera(const Eye& eye) {
-  ordered_json json = {{"serial", eye.serial}};
-  json.update(lens(eye));
-  json["distortion"] = eye.distortion;
-  json["camera_from_turntable"] = to_json(eye.eye_from_turntable);
-  return json;
-}
 
 std::string ply(const TriangleMesh& mesh, const Transform& placed) {
   std::string text = fmt::format(
@@ -54,9 +37,9 @@ std::string ply(const TriangleMesh& mesh, const Transform& placed) {
 }  // namespace
 
 Result<void> write_calibration(const Scene& scene, const std::filesystem::path& file) {
-  const ordered_json json = {{"format", "scanrig-calibration"},  {"version", 1},
-                             {"date", "2026-11-21T09:00:00Z"},   {"table_radius_mm", profile().table_radius_mm},
-                             {"left", camera(scene.rig().left)}, {"right", camera(scene.rig().right)}};
+  const ordered_json json = {{"format", "scanrig-calibration"},       {"version", 1},
+                             {"date", "2026-11-21T09:00:00Z"},        {"table_radius_mm", profile().table_radius_mm},
+                             {"left", camera_json(scene.rig().left)}, {"right", camera_json(scene.rig().right)}};
   return write_file_atomically(file, json.dump(2) + "\n");
 }
 
@@ -86,30 +69,38 @@ std::vector<PoseTruth> ExposureHistory::latest(const Scene& scene) const {
 
 Result<void> write_truth(const Scene& scene, const std::vector<PoseTruth>& poses, const std::filesystem::path& folder) {
   if (poses.empty()) return fail(ErrorCode::degenerate, "truth: no exposure has been taken yet");
-  const auto table_from_object = [&](std::size_t pose) { return scene.placements()[poses[pose].placement]; };
+  const auto table_from_object = [&](std::size_t pose) { return scene.true_placement(poses[pose].placement); };
   const Transform truth_from_object = table_from_object(0);
-  ordered_json projector = lens(scene.rig().projector);
-  projector["projector_from_turntable"] = to_json(scene.rig().projector.eye_from_turntable);
+  ordered_json projector = lens_json(scene.rig().projector);
+  projector["projector_from_turntable"] = transform_json(scene.rig().projector.eye_from_turntable);
   ordered_json json = {{"format", "scanrig-truth"},
                        {"version", 1},
                        {"profile_sha256", profile_sha256()},
                        {"object", scene.object().name},
                        {"seed", scene.options().seed},
                        {"mesh", "truth.ply"},
-                       {"left", camera(scene.rig().left)},
-                       {"right", camera(scene.rig().right)},
+                       {"left", camera_json(scene.rig().left)},
+                       {"right", camera_json(scene.rig().right)},
                        {"projector", projector},
                        {"table_radius_mm", profile().table_radius_mm},
                        {"poses", ordered_json::array()}};
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const Transform table_from_truth =
         i == 0 ? Transform::Identity() : table_from_object(i) * truth_from_object.inverse();
-    json["poses"].push_back({{"table_from_truth", to_json(table_from_truth)}, {"angles_deg", poses[i].angles_deg}});
+    json["poses"].push_back(
+        {{"table_from_truth", transform_json(table_from_truth)}, {"angles_deg", poses[i].angles_deg}});
   }
-  if (poses.size() > 1) json["pose1_from_pose2"] = to_json(table_from_object(0) * table_from_object(1).inverse());
+  if (poses.size() > 1)
+    json["pose1_from_pose2"] = transform_json(table_from_object(0) * table_from_object(1).inverse());
   if (const auto written = write_file_atomically(folder / "truth.ply", ply(scene.object().mesh, truth_from_object));
       !written) {
     return written;
+  }
+  if (scene.options().rig) {
+    ordered_json rig = {{"format", "scanrig-rig-truth"}, {"version", 1}, {"rig_seed", scene.options().rig->seed}};
+    rig.update(rig_json(scene.drawn_rig()));
+    if (const auto written = write_file_atomically(folder / "rig_truth.json", rig.dump(2) + "\n"); !written)
+      return written;
   }
   return write_file_atomically(folder / "truth.json", json.dump(2) + "\n");
 }

@@ -8,7 +8,8 @@
 
 namespace scanrig::sim {
 
-/// The exact calibration of a scene's cameras, in the format of docs/reference/scan-folder.md. Fails with `io`.
+/// The calibration of a scene's cameras, in the format of docs/reference/scan-folder.md: exact but for a lens residual,
+/// for which the format has no place. Fails with `io`.
 Result<void> write_calibration(const Scene& scene, const std::filesystem::path& file);
 
 /// True table angles of one pose.
@@ -33,8 +34,8 @@ class ExposureHistory {
   std::vector<PoseTruth> poses_ = {{}};  // each time the object was put down
 };
 
-/// truth.json and truth.ply into a scan folder; `poses` in the order they were taken, at least one. Fails with
-/// `degenerate` (none), `io`.
+/// truth.json and truth.ply into a scan folder, of a drawn rig also rig_truth.json; `poses` in the order they were
+/// taken, at least one. Fails with `degenerate` (none), `io`.
 Result<void> write_truth(const Scene& scene, const std::vector<PoseTruth>& poses, const std::filesystem::path& folder);
 
 }  // namespace scanrig::sim

@@ -189,6 +189,23 @@ TEST(Table, IsBlueEverywhereAndBackdropToo) {
   EXPECT_LT(middle[0], 1.2 * middle[1]);
 }
 
+TEST(Profile1, RendersWhatItAlwaysRendered) {
+  // Recorded before rigs could be drawn. A grey level is for other versions of the mathematical library.
+  SceneOptions options;
+  options.image_scale = 0.25;
+  options.noise = false;
+  Scene scene(grey(box({20.0, 20.0, 20.0}), 0.5F), {Transform(Eigen::Translation3d(0.0, 20.0, 0.0))}, options);
+  const auto check = [](const cv::Mat& image, double mean, const std::array<int, 8>& pixels) {
+    EXPECT_NEAR(cv::sum(image)[0] / static_cast<double>(image.total()), mean, 1e-3);
+    for (int i = 0; i < 8; ++i) EXPECT_NEAR(image.at<std::uint8_t>(25 + 27 * i, 30 + 36 * i), pixels[i], 1) << i;
+  };
+  const StereoImages pattern = scene.shoot(0, 0.4, true, 1), plain = scene.shoot(0, 0.4, false, 1);
+  check(pattern.left, 12.6257, {2, 2, 8, 1, 41, 1, 6, 4});
+  check(pattern.right, 12.5531, {8, 1, 10, 2, 52, 1, 3, 3});
+  check(plain.left, 34.9754, {16, 7, 18, 8, 85, 6, 15, 6});
+  check(plain.right, 34.8626, {16, 7, 18, 8, 84, 6, 15, 6});
+}
+
 TEST(Scene, RefusesAnImpossibleResolution) {
   SceneOptions options;
   options.image_scale = 0.0;

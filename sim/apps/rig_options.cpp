@@ -1,0 +1,71 @@
+#include "sim/apps/rig_options.h"
+
+#include <cstdio>
+
+namespace scanrig::sim {
+namespace {
+
+template <class Options, std::size_t N>
+std::string listed(const std::array<NamedValue<Options>, N>& values) {
+  const Options defaults;
+  std::string text;
+  for (const auto& value : values) {
+    text += fmt::format("{}{}={}", text.empty() ? "" : ", ", value.name, defaults.*value.member);
+  }
+  return text;
+}
+
+}  // namespace
+
+void DrawnRigOptions::add_to(CLI::App& app) {
+  app.add_option("--rig-seed", seed, "Draw the rig at random; the same seed is the same rig. 0: the default rig")
+      ->capture_default_str();
+  app.add_option("--rig", changes, "How far it is off, NAME=NUMBER,...; by default " + listed(kRigVariationNames));
+}
+
+Result<std::optional<RigVariation>> DrawnRigOptions::variation() const {
+  if (seed == 0 && !changes.empty()) {
+    return fail(ErrorCode::invalid_input, "--rig changes a drawn rig: give --rig-seed, too");
+  }
+  if (seed == 0) return std::optional<RigVariation>();
+  RigVariation variation;
+  variation.seed = seed;
+  if (const auto set = set_by_name(variation, kRigVariationNames, changes); !set) return pass_on(set, "--rig");
+  return std::optional(variation);
+}
+
+void ShootBoardOptions::add_to(CLI::App& app) {
+  app.add_option("--out", folder, "The folder to make")->required();
+  rig.add_to(app);
+  app.add_option("--seed", series.seed, "The print, how the board is put down, faults and noise")
+      ->capture_default_str();
+  app.add_option("--scale", series.image_scale, "Resolution, as a share of 1280x960")->capture_default_str();
+  app.add_flag("!--no-noise", series.noise, "Leave the sensors' noise out");
+  app.add_option("--board", board, "COLUMNSxROWS squares")->capture_default_str();
+  app.add_option("--square-mm", series.board.square_mm, "Side of a square")->capture_default_str();
+  app.add_option("--marker-mm", series.board.marker_mm, "Side of a marker; 0: a plain chessboard")
+      ->capture_default_str();
+  app.add_option("--print", print, "Errors of the print, NAME=NUMBER,...; by default " + listed(kPrintErrorNames));
+  app.add_option("--faults", faults, "What goes wrong, NAME=NUMBER,...; by default " + listed(kSeriesFaultNames));
+  app.add_option("--placements", series.placements, "Numbers of the plan; by default all seven")->delimiter(',');
+  app.add_option("--angles", series.angles, "Table angles per placement")->capture_default_str();
+  app.add_option("--hand-held", series.hand_held, "That many pairs of a board held by hand instead of the plan");
+  app.add_flag("--exact", series.exact_placements, "Put the board down exactly as planned");
+}
+
+Result<SeriesOptions> ShootBoardOptions::chosen() const {
+  SeriesOptions options = series;
+  int end = 0;
+  if (std::sscanf(board.c_str(), "%dx%d%n", &options.board.columns, &options.board.rows, &end) != 2 ||
+      end != static_cast<int>(board.size())) {
+    return fail(ErrorCode::invalid_input, "--board {}: write COLUMNSxROWS", board);
+  }
+  auto variation = rig.variation();
+  if (!variation) return pass_on(variation);
+  options.rig = *variation;
+  if (const auto set = set_by_name(options.print, kPrintErrorNames, print); !set) return pass_on(set, "--print");
+  if (const auto set = set_by_name(options.faults, kSeriesFaultNames, faults); !set) return pass_on(set, "--faults");
+  return options;
+}
+
+}  // namespace scanrig::sim
