@@ -27,11 +27,11 @@ struct BoardSight {
 
 /// One stereo pair of a board that stands on the table.
 struct BoardPair {
-  std::string name;          ///< for reports: "placement 4 image 3", or a file's
-  int placement = 0;         ///< pairs of one placement share the board's place on the table
-  bool in_a = true;          ///< takes part in calibration A, of A against B
-  bool in_b = true;          ///< likewise B
-  double angle_rad = 0.0;    ///< of the table as reported, counter-clockwise seen from above
+  std::string name;        ///< for reports: "placement 4 image 3", or a file's
+  int placement = 0;       ///< pairs of one placement share the board's place on the table
+  bool in_a = true;        ///< takes part in calibration A, of A against B
+  bool in_b = true;        ///< likewise B
+  double angle_rad = 0.0;  ///< of the table as reported, counter-clockwise seen from above
   BoardSight left;
   BoardSight right;
 };
