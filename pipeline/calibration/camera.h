@@ -2,9 +2,11 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <string>
 
 #include "core/transform.h"
+#include "pipeline/calibration/lens_field.h"
 
 namespace scanrig {
 
@@ -38,15 +40,19 @@ struct Projection {
   }
 };
 
-/// A calibrated sensor. Brown-Conrady distortion as in OpenCV: k1, k2, p1, p2, k3.
+/// A calibrated sensor. Brown-Conrady distortion as in OpenCV: k1, k2, p1, p2, k3; then the lens field, if it has one.
 struct Camera {
   Projection projection;  ///< pinhole
   std::array<double, 5> distortion{};
+  std::optional<LensField> lens_field;
   Transform camera_from_turntable = Transform::Identity();
   std::string serial;
 
   /// Pixel, distortion included, of a point in the turntable frame; it must lie in front of the camera.
   [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& point_in_turntable) const;
+  /// The inverse: the direction in the camera frame, with z = 1, that `pixel` shows. To 1e-9 px for lenses that bend a
+  /// ray by less than a tenth.
+  [[nodiscard]] Eigen::Vector3d ray(const Eigen::Vector2d& pixel) const;
 };
 
 /// The rig's calibration for the reconstruction. It defines the turntable frame: +Y is the axis, y = 0 the table top.

@@ -53,7 +53,7 @@ cv::Mat1b jumps(const cv::Mat1f& depth, double jump) {
 Eigen::Vector2d undistort(const Camera& camera, const Eigen::Vector2d& pixel) {
   const Projection& p = camera.projection;
   const Eigen::Vector2d distorted((pixel.x() - p.cx) / p.fx, (pixel.y() - p.cy) / p.fy);
-  if (camera.distortion == decltype(camera.distortion){}) return distorted;
+  if (camera.distortion == decltype(camera.distortion){} && !camera.lens_field) return distorted;
   Camera plain = camera;
   plain.camera_from_turntable = Transform::Identity();
   Eigen::Vector2d x = distorted;

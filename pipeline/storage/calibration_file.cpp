@@ -1,6 +1,7 @@
 #include "pipeline/storage/calibration_file.h"
 
 #include <algorithm>
+#include <array>
 
 #include "core/files.h"
 
@@ -18,6 +19,26 @@ Projection read_pinhole(JsonObject& object) {
   return projection;
 }
 
+namespace {
+
+LensField read_lens_field(JsonObject object, const Projection& projection) {
+  LensField field;
+  field.width = projection.width;
+  field.height = projection.height;
+  const std::array<std::vector<double>, 2> parts{object.numbers("du"), object.numbers("dv")};
+  for (int axis = 0; axis < 2; ++axis) {
+    if (parts[axis].size() != field.shift.size()) {
+      object.reject(axis == 0 ? "du" : "dv", "must be 42 numbers: 6 rows of 7 shifts in pixels");
+      continue;
+    }
+    for (std::size_t i = 0; i < field.shift.size(); ++i) field.shift[i][axis] = parts[axis][i];
+  }
+  object.close();
+  return field;
+}
+
+}  // namespace
+
 Camera read_camera(JsonObject object) {
   Camera camera;
   camera.serial = object.text("serial");
@@ -27,6 +48,9 @@ Camera read_camera(JsonObject object) {
     std::copy(distortion.begin(), distortion.end(), camera.distortion.begin());
   } else {
     object.reject("distortion", "must be five numbers: k1 k2 p1 p2 k3");
+  }
+  if (object.has("lens_correction")) {
+    camera.lens_field = read_lens_field(object.object("lens_correction"), camera.projection);
   }
   camera.camera_from_turntable = object.transform("camera_from_turntable");
   if (camera.camera_from_turntable.translation().z() <= 0.0) {

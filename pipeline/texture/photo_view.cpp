@@ -45,26 +45,6 @@ cv::Rect window_of(const Mesh& mesh, const Photo& photo) {
 
 }  // namespace
 
-Eigen::Vector3d pixel_ray(const Camera& camera, double u, double v) {
-  const double xd = (u - camera.projection.cx) / camera.projection.fx;
-  const double yd = (v - camera.projection.cy) / camera.projection.fy;
-  const auto& [k1, k2, p1, p2, k3] = camera.distortion;
-  double x = xd;
-  double y = yd;
-  // Fixed point of the distortion; contracts by the distortion's own size, so 1e-12 after a few rounds.
-  for (int round = 0; round < 20; ++round) {
-    const double r2 = x * x + y * y;
-    const double radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-    const double nx = (xd - 2.0 * p1 * x * y - p2 * (r2 + 2.0 * x * x)) / radial;
-    const double ny = (yd - p1 * (r2 + 2.0 * y * y) - 2.0 * p2 * x * y) / radial;
-    const double change = std::abs(nx - x) + std::abs(ny - y);
-    x = nx;
-    y = ny;
-    if (change < 1e-10) break;
-  }
-  return {x, y, 1.0};
-}
-
 PhotoView::PhotoView(const Photo& photo, const Mesh& mesh, const SurfaceIndex& scene, const TextureOptions& options,
                      double typical)
     : photo_(&photo),
@@ -88,7 +68,7 @@ void PhotoView::cast(const SurfaceIndex& scene) {
   parallel_for(static_cast<std::size_t>(window_.height), [&](std::size_t row) {
     const int y = static_cast<int>(row);
     for (int x = 0; x < window_.width; ++x) {
-      const Eigen::Vector3d ray = model_from_camera * pixel_ray(photo_->camera, x + window_.x, y + window_.y);
+      const Eigen::Vector3d ray = model_from_camera * photo_->camera.ray({x + window_.x, y + window_.y});
       if (const auto hit = scene.first_hit(centre_, ray)) depth_(y, x) = static_cast<float>(hit->distance);
     }
   });

@@ -9,9 +9,6 @@
 
 namespace scanrig {
 
-/// Direction of a camera's pixel in the camera frame with z = 1, lens distortion taken out.
-Eigen::Vector3d pixel_ray(const Camera& camera, double u, double v);
-
 /// A point of the surface in one photo.
 struct Sight {
   Eigen::Vector2d pixel;  ///< in the photo, distortion included

@@ -106,7 +106,7 @@ Result<Rendering> MeshRenderer::render(const Camera& camera, const Transform& tu
   Rendering out{cv::Mat3b(size, options.background), cv::Mat1f(size, std::numeric_limits<float>::quiet_NaN()),
                 cv::Mat1b(size, uchar{0})};
   const auto cast = [&](double u, double v) {
-    const Eigen::Vector3d ray = camera_from_model.linear().transpose() * pixel_ray(camera, u, v);
+    const Eigen::Vector3d ray = camera_from_model.linear().transpose() * camera.ray({u, v});
     return std::pair(scene_.first_hit(centre, ray), ray);
   };
   const int n = options.supersample;
