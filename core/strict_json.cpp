@@ -118,6 +118,18 @@ std::string JsonObject::sha256(std::string_view key) {
   return value;
 }
 
+std::vector<std::string> JsonObject::texts(std::string_view key) {
+  std::vector<std::string> values;
+  const json* list = take(key);
+  if (!list) return values;
+  for (const json& item : *list) {
+    if (!list->is_array() || !item.is_string()) break;
+    values.push_back(item.get<std::string>());
+  }
+  if (!list->is_array() || values.size() != list->size()) reject(key, "must be a list of texts");
+  return values;
+}
+
 std::vector<std::string> JsonObject::sha256s(std::string_view key) {
   std::vector<std::string> values;
   const json* list = take(key);
