@@ -10,7 +10,8 @@
 namespace scanrig {
 
 /// Adjusts the unknowns: least squares over all sightings and priors, with Cauchy's loss at 3 sigma. One thread; same
-/// input, same bits. Returns the steps taken. `tolerance`: relative change of chi-square at which it ends. Fails with `degenerate` (no convergence), `stopped`.
+/// input, same bits. Returns the steps taken. `tolerance`: relative change of chi-square at which it ends. Fails with
+/// `degenerate` (no convergence), `stopped`.
 Result<int> adjust(const BundleSetup& setup, Unknowns& unknowns, double tolerance, const Context& context);
 
 /// Columns of one group of unknowns; `count` 0: not solved for.

@@ -10,10 +10,10 @@
 namespace scanrig {
 namespace {
 
-constexpr double kBlurred = 1.6;        ///< times the camera's median blur
-constexpr double kBadImage = 3.0;       ///< times the median residual of all
-constexpr int kMaxRounds = 5;           ///< of leaving images out
-constexpr double kFieldEvidence = 3.0;  ///< chi-square per coefficient
+constexpr double kBlurred = 1.6;                                ///< times the camera's median blur
+constexpr double kBadImage = 3.0;                               ///< times the median residual of all
+constexpr int kMaxRounds = 5;                                   ///< of leaving images out
+constexpr double kFieldEvidence = 3.0;                          ///< chi-square per coefficient
 constexpr double kCoarse = 1e-4, kMiddle = 1e-6, kFine = 1e-9;  ///< tolerance of the bundle
 constexpr double kMadToSigma = 1.4826;
 constexpr std::size_t kMinCorners = 12;

@@ -43,8 +43,8 @@ Eigen::Isometry3d facing(double tilt_deg, bool is_portrait, double in_front, dou
 }  // namespace
 
 SyntheticBoardRig::SyntheticBoardRig(const RigFaults& faults, unsigned seed) : faults_(faults), random_(seed) {
-  const double focal = 16.0 / 0.00375, brown[2][5] = {{-0.080, 0.15, 1.2e-4, -0.9e-4, 0.0},
-                                                      {-0.084, 0.17, -0.8e-4, 1.1e-4, 0.0}};
+  const double focal = 16.0 / 0.00375,
+               brown[2][5] = {{-0.080, 0.15, 1.2e-4, -0.9e-4, 0.0}, {-0.084, 0.17, -0.8e-4, 1.1e-4, 0.0}};
   const double middle[2][2] = {{637.2, 481.1}, {641.9, 478.4}};
   for (int c = 0; c < 2; ++c) {
     focal_[c] = focal + 2.4 * c + normal(8.0);
@@ -56,8 +56,10 @@ SyntheticBoardRig::SyntheticBoardRig(const RigFaults& faults, unsigned seed) : f
     pose_[c] = looking(place, {normal(1.0), 45.0 + normal(1.0), normal(1.0)}, 0.01 * (c == 0 ? 1.0 : -0.7));
   }
   for (int id = 0; id < 88; ++id) {
-    const double x = 10.0 * (id % 11 - 5), y = 10.0 * (static_cast<double>(id / 11) - 3.5);  // NOLINT(bugprone-integer-division)
-    const double bow = faults_.warp_mm * (1.2 * (1.0 - std::cos(0.03 * x)) - 0.8 * std::sin(0.02 * y) * std::sin(0.021 * x));
+    const double x = 10.0 * (id % 11 - 5),
+                 y = 10.0 * (static_cast<double>(id / 11) - 3.5);  // NOLINT(bugprone-integer-division)
+    const double bow =
+        faults_.warp_mm * (1.2 * (1.0 - std::cos(0.03 * x)) - 0.8 * std::sin(0.02 * y) * std::sin(0.021 * x));
     print_.emplace_back(faults_.board_scale * x + normal(faults_.print_mm),
                         faults_.board_scale * y + normal(faults_.print_mm), bow + normal(2.5 * faults_.print_mm));
   }
@@ -79,8 +81,9 @@ Eigen::Vector2d SyntheticBoardRig::through_lens(int camera, const Eigen::Vector3
   if (faults_.lens_px > 0.0) {
     const double* f = phase_[camera];
     const double x = at.x() / kWidth, y = at.y() / kHeight, w = 2.0 * std::numbers::pi;
-    at += 1.41 * faults_.lens_px * Eigen::Vector2d(std::sin(w * 0.9 * x + f[0]) * std::cos(w * 0.7 * y + f[1]) * 1.41,
-                                                   std::sin(w * (0.8 * y + 0.5 * x) + f[2]));
+    at += 1.41 * faults_.lens_px *
+          Eigen::Vector2d(std::sin(w * 0.9 * x + f[0]) * std::cos(w * 0.7 * y + f[1]) * 1.41,
+                          std::sin(w * (0.8 * y + 0.5 * x) + f[2]));
   }
   return at;
 }
@@ -138,7 +141,8 @@ void SyntheticBoardRig::add_placement(CalibrationInput& input, int number, const
     look.wobble.rotate(Eigen::AngleAxisd(normal(tilt), Eigen::Vector3d::UnitX()));
     look.wobble.rotate(Eigen::AngleAxisd(normal(tilt), Eigen::Vector3d::UnitZ()));
     look.has_moved = faults_.moved_px > 0.0 && number > 3;
-    if (number == faults_.slipped_placement && i == angles_deg.size() / 2) place.pretranslate(Eigen::Vector3d(0.08, 0.0, 0.06));
+    if (number == faults_.slipped_placement && i == angles_deg.size() / 2)
+      place.pretranslate(Eigen::Vector3d(0.08, 0.0, 0.06));
     pair.left = see(0, place, look);
     pair.right = see(1, place, look);
     input.pairs.push_back(pair);

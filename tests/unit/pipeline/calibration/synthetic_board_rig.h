@@ -58,8 +58,8 @@ class SyntheticBoardRig {
   };
   [[nodiscard]] Eigen::Vector2d through_lens(int camera, const Eigen::Vector3d& in_camera) const;
   BoardSight see(int camera, const Eigen::Isometry3d& table_from_board, const Look& look);
-  void add_placement(CalibrationInput& input, int number, const Eigen::Isometry3d& facing, double mark_deg,
-                     bool in_a, bool in_b, const std::vector<double>& angles_deg);
+  void add_placement(CalibrationInput& input, int number, const Eigen::Isometry3d& facing, double mark_deg, bool in_a,
+                     bool in_b, const std::vector<double>& angles_deg);
   double normal(double sigma) { return sigma > 0.0 ? sigma * unit_(random_) : 0.0; }
 
   RigFaults faults_;
