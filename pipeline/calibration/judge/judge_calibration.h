@@ -1,0 +1,54 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/context.h"
+#include "core/result.h"
+#include "pipeline/calibration/solve/calibration_input.h"
+#include "pipeline/calibration/solve/solved_calibration.h"
+
+namespace scanrig {
+
+/// a: sigma over the volume to 5 um, b: to 15, c: to 40; else refused: not to be written.
+enum class CalibrationGrade { a, b, c, refused };
+std::string_view to_string(CalibrationGrade grade);  ///< "A", "B", "C", "refused"
+
+/// Calibration A alone against B alone, over the volume, micrometres; scale and base taken off.
+struct CrossValidation {
+  double difference = 0.0;  ///< rms
+  double max = 0.0;
+  double expected = 0.0;  ///< rms, from both covariances
+  [[nodiscard]] double ratio() const { return expected > 0.0 ? difference / expected : 0.0; }
+};
+
+/// Something that moved while the boards were shown. Chi-square: what a motion at this moment explains.
+struct RigChange {
+  enum class Kind { camera, board };
+  Kind kind = Kind::camera;
+  int camera = 0;         ///< kind camera: 0 left, 1 right
+  int placement = 0;      ///< camera: the last one before the motion; board: the one in which it slipped
+  double shift_px = 0.0;  ///< rms in the images after the motion
+  double chi2 = 0.0;
+};
+
+struct CalibrationJudgement {
+  CalibrationGrade grade = CalibrationGrade::refused;
+  double graded_um = 0.0;                           ///< what the grade is by
+  std::optional<CrossValidation> cross_validation;  ///< none: A or B has too few images
+  std::optional<RigChange> change;
+  std::vector<std::string> sentences;  ///< for the operator, most important first
+};
+
+struct JudgedCalibration {
+  SolvedCalibration solved;
+  CalibrationJudgement judgement;
+};
+
+/// Solves the whole, then A alone and B alone, and grades it. One camera and hand-held boards have no volume: their
+/// grade is `refused`, with a sentence. Threads: any, one. Fails as solve_calibration(); a failure of A or B alone is
+/// no failure.
+Result<JudgedCalibration> judge_calibration(const CalibrationInput& input, const Context& context = {});
+
+}  // namespace scanrig

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/calibration/camera.h"
+
+namespace scanrig {
+
+/// Sigma of a triangulated point over the working volume by part, micrometres, rms over the grid. Turntable frame.
+struct VolumeSigma {
+  double axis = 0.0;     ///< place and direction of the table's axis
+  double strain = 0.0;   ///< shape
+  double azimuth = 0.0;  ///< turn about the axis
+  double scale = 0.0;    ///< of all lengths alike; from the measured length
+  double base = 0.0;     ///< height over the table top
+  double volume = 0.0;   ///< axis, strain and azimuth
+  double max = 0.0;      ///< the greatest of the grid, likewise without scale and base
+};
+
+/// How one image fits the solution.
+struct ImageFit {
+  std::string name;  ///< of its pair
+  int placement = 0;
+  int camera = 0;  ///< 0 left, 1 right
+  int corners = 0;
+  bool is_used = false;
+  std::string left_out_because;                       ///< empty when used
+  Eigen::Vector2d mean_px = Eigen::Vector2d::Zero();  ///< pixel minus model
+  double rms_px = 0.0;
+  double median_px = 0.0;  ///< of the residuals' lengths
+  double blur_px = 0.0;    ///< median over the corners
+};
+
+/// Mean residual of all images of one placement and camera; sees what the rms cannot.
+struct PlacementFit {
+  int placement = 0;
+  int camera = 0;
+  Eigen::Vector2d mean_px = Eigen::Vector2d::Zero();
+};
+
+/// How the print departs from the board as ordered.
+struct SolvedBoard {
+  double scale = 1.0;
+  double scale_sigma = 0.0;
+  double aspect = 0.0;
+  double shear = 0.0;
+  std::array<double, 3> warp_mm{};                ///< at the board's edge: of x^2, x y, y^2
+  std::vector<std::array<double, 3>> offsets_mm;  ///< of each corner, board frame
+};
+
+struct SolvedTable {
+  double gear = 1.0;                           ///< turned angle over reported angle; < 0: turns the other way
+  std::vector<double> angle_error_deg;         ///< per pair: turned minus gear times reported
+  std::vector<Eigen::Vector3d> dots;           ///< rim dots at table angle 0, mm
+  std::vector<int> dot_ids;                    ///< as DotObservation::id
+  std::optional<double> axis_from_square_deg;  ///< of the axis from the table top's normal; none: top not seen
+  bool is_height_known = true;                 ///< y = 0 is the table top; else a board's middle
+};
+
+/// A solved calibration and what is known of it. Hand-held form: the turntable frame is the left camera's.
+struct SolvedCalibration {
+  Calibration calibration;  ///< with one camera `right` is empty
+  int cameras = 2;
+  bool has_lens_field = false;
+  double field_evidence = 0.0;  ///< chi-square that the lens field takes off, per coefficient
+  double noise_px = 0.0;        ///< sigma of a corner's coordinate
+  double median_px = 0.0;       ///< median length of the residuals of used images
+  std::vector<ImageFit> images;
+  std::vector<PlacementFit> placements;
+  SolvedBoard board;
+  SolvedTable table;
+  std::optional<VolumeSigma> sigma;  ///< none: one camera, or no table
+  /// Covariance of the cameras' unknowns: per camera fx, fy / fx, cx, cy, k1 k2 p1 p2 k3 (9), pose (turn and shift of
+  /// the table in the camera frame, rad and mm; 6), lens field (du, dv; 84 if it has one).
+  Eigen::MatrixXd camera_covariance;
+  int steps = 0;  ///< of the bundle, all rounds
+};
+
+}  // namespace scanrig
