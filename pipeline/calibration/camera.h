@@ -4,6 +4,7 @@
 #include <array>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/transform.h"
 #include "pipeline/calibration/lens_field.h"
@@ -55,13 +56,26 @@ struct Camera {
   [[nodiscard]] Eigen::Vector3d ray(const Eigen::Vector2d& pixel) const;
 };
 
+/// How sure a calibration is of itself; docs/reference/calibration.md.
+struct CalibrationQuality {
+  std::string grade;       ///< A, B or C
+  double volume_um = 0.0;  ///< sigma of a point in the working volume: axis, shape and azimuth; without scale
+  double scale_um = 0.0;   ///< of all lengths alike, likewise
+  /// Covariance of both cameras' unknowns, left first, 15 each: fx, fy / fx, cx, cy, k1 k2 p1 p2 k3, turn (rad) and
+  /// shift (mm) of the table in the camera frame.
+  Eigen::MatrixXd cameras;
+  std::vector<Eigen::Vector3d> rim_dots;  ///< in the turntable frame at table angle 0; empty: none
+  double rim_dot_diameter_mm = 0.0;
+};
+
 /// The rig's calibration for the reconstruction. It defines the turntable frame: +Y is the axis, y = 0 the table top.
 struct Calibration {
   Camera left;
   Camera right;
   double table_radius_mm = 0.0;
-  std::string date;    ///< ISO 8601
-  std::string sha256;  ///< of the file it was read from
+  std::optional<CalibrationQuality> quality;  ///< none: of unknown origin, as in files of version 1
+  std::string date;                           ///< ISO 8601
+  std::string sha256;                         ///< of the file it was read from
 };
 
 }  // namespace scanrig

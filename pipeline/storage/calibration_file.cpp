@@ -39,6 +39,55 @@ LensField read_lens_field(JsonObject object, const Projection& projection) {
 
 }  // namespace
 
+namespace {
+
+constexpr int kCameraUnknowns = 30;  ///< of both cameras, see CalibrationQuality::cameras
+
+/// The lower triangle of a symmetric matrix, row after row.
+Eigen::MatrixXd read_covariance(JsonObject& object, std::string_view key) {
+  const std::vector<double> values = object.numbers(key);
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(kCameraUnknowns, kCameraUnknowns);
+  if (values.size() != kCameraUnknowns * (kCameraUnknowns + 1) / 2) {
+    object.reject(key, "must be the 465 numbers of a lower triangle, 30 rows");
+    return matrix;
+  }
+  std::size_t next = 0;
+  for (int row = 0; row < kCameraUnknowns; ++row) {
+    for (int column = 0; column <= row; ++column) matrix(row, column) = matrix(column, row) = values[next++];
+    if (!(matrix(row, row) >= 0.0)) object.reject(key, "must have no negative variance");
+  }
+  return matrix;
+}
+
+CalibrationQuality read_quality(JsonObject& root) {
+  CalibrationQuality quality;
+  quality.grade = root.one_of("grade", {"A", "B", "C"});
+  JsonObject covariance = root.object("covariance");
+  quality.volume_um = covariance.number("volume_um", 0.0, 1e6);
+  quality.scale_um = covariance.number("scale_um", 0.0, 1e6);
+  quality.cameras = read_covariance(covariance, "cameras");
+  for (const char* part : {"axis_um", "strain_um", "azimuth_um", "base_um", "max_um"}) covariance.ignore(part);
+  covariance.close();
+  if (root.has("rim_dots")) {
+    JsonObject dots = root.object("rim_dots");
+    quality.rim_dot_diameter_mm = dots.number("diameter_mm", 0.1, 1e3);
+    const std::vector<double> places = dots.numbers("places_mm");
+    if (places.size() % 3 != 0) dots.reject("places_mm", "must be three numbers a dot");
+    for (std::size_t i = 0; i + 2 < places.size(); i += 3) {
+      quality.rim_dots.emplace_back(places[i], places[i + 1], places[i + 2]);
+    }
+    dots.close();
+  }
+  // What people and later calibrations read.
+  for (const char* key : {"noise_px", "images", "cross_validation", "board", "table", "temperature_c", "sources",
+                          "previous", "sentences"}) {
+    root.ignore(key);
+  }
+  return quality;
+}
+
+}  // namespace
+
 Camera read_camera(JsonObject object) {
   Camera camera;
   camera.serial = object.text("serial");
@@ -67,7 +116,7 @@ Result<Calibration> read_calibration(const std::filesystem::path& file) {
 }
 
 Result<Calibration> parse_calibration(std::string_view text, const std::filesystem::path& file) {
-  auto json = JsonFile::parse(text, file, "scanrig-calibration", 1, 1);
+  auto json = JsonFile::parse(text, file, "scanrig-calibration", 2, 1);
   if (!json) return pass_on(json);
   JsonObject& root = json->root();
   Calibration calibration;
@@ -75,7 +124,11 @@ Result<Calibration> parse_calibration(std::string_view text, const std::filesyst
   calibration.table_radius_mm = root.number("table_radius_mm", 1.0, 1e4);
   calibration.left = read_camera(root.object("left"));
   calibration.right = read_camera(root.object("right"));
-  root.ignore("report");
+  if (json->version() >= 2) {
+    calibration.quality = read_quality(root);
+  } else {
+    root.ignore("report");
+  }
   calibration.sha256 = json->sha256();
   if (const auto whole = json->finish(); !whole) return pass_on(whole);
   return calibration;

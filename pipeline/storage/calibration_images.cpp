@@ -41,6 +41,15 @@ Board read_board(JsonObject object, std::vector<BoardLength>& lengths) {
   return board;
 }
 
+RimDots read_rim_dots(JsonObject object) {
+  RimDots dots;
+  dots.count = object.integer("count", 3, 1000);
+  dots.radius_mm = object.number("radius_mm", 1.0, 1e4);
+  dots.diameter_mm = object.number("diameter_mm", 0.1, 1e3);
+  object.close();
+  return dots;
+}
+
 CalibrationPair read_pair(JsonObject& object, const fs::path& folder) {
   CalibrationPair pair;
   pair.placement = object.integer("placement", 1, 1000);
@@ -85,6 +94,7 @@ Result<CalibrationImages> read_list(const fs::path& folder) {
     camera.close();
   }
   if (root.has("board")) images.board = read_board(root.object("board"), images.lengths);
+  if (root.has("rim_dots")) images.rim_dots = read_rim_dots(root.object("rim_dots"));
   for (JsonObject& pair : root.objects("pairs")) images.pairs.push_back(read_pair(pair, folder));
   if (images.pairs.empty()) root.reject("pairs", "must not be empty");
   const auto is_mixed = [&](const CalibrationPair& pair) {

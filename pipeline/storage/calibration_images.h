@@ -9,6 +9,7 @@
 
 #include "core/result.h"
 #include "pipeline/calibration/board/board.h"
+#include "pipeline/calibration/observations.h"
 
 namespace scanrig {
 
@@ -40,6 +41,7 @@ struct CalibrationImages {
   std::array<double, 2> focal_px{};      ///< nominal; 0: not given
   std::optional<double> table_radius_mm{};
   std::optional<Board> board{};
+  std::optional<RimDots> rim_dots{};
   std::vector<BoardLength> lengths{};
   std::vector<CalibrationPair> pairs{};
 

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/calibrate/calibrate_images.h"
+
+namespace scanrig {
+
+/// What the images do not tell of a calibration.
+struct CalibrationOrigin {
+  std::string date;                                            ///< ISO 8601
+  std::optional<double> temperature_c{};                       ///< of the rig
+  std::string previous{};                                      ///< sha256 of the calibration it replaces; empty: none
+  std::vector<std::pair<std::string, std::string>> sources{};  ///< file name and sha256 of each image
+};
+
+/// calibration.json, version 2 (docs/reference/scan-folder.md): the text of the file. Fails with `below_limits` for a
+/// calibration that is refused: the operator's sentences are the message.
+Result<std::string> calibration_json(const CalibrationOutcome& outcome, const CalibrationOrigin& origin);
+
+}  // namespace scanrig
