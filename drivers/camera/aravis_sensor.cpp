@@ -4,6 +4,8 @@
 #include <array>
 #include <thread>
 
+#include "drivers/camera/aravis_strobe.h"
+
 namespace scanrig {
 namespace {
 
@@ -77,20 +79,11 @@ std::optional<std::string> find_by_serial(const std::string& serial) {
   return std::nullopt;
 }
 
-}  // namespace
-
-Result<void> GenicamCall::refused(const std::string& what, GError* error) const {
-  auto code = ErrorCode::io;
-  if (g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_TIMEOUT)) code = ErrorCode::timeout;
-  if (g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_NOT_FOUND)) code = ErrorCode::not_found;
-  if (g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_FEATURE_NOT_FOUND) ||
-      g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_INVALID_PARAMETER) || error->domain == ARV_GC_ERROR) {
-    code = ErrorCode::invalid_input;
-  }
-  const std::string reason = error->message;
-  g_error_free(error);
-  return fail(code, "{}: {}: {}", who_, what, reason);
+Result<void> trigger_by_software(ArvCamera* camera, const GenicamCall& attempt) {
+  return attempt("trigger", [&](GError** error) { arv_camera_execute_command(camera, "TriggerSoftware", error); });
 }
+
+}  // namespace
 
 AravisSensor::AravisSensor(const std::string& side, const AravisSensorOptions& sensor, const AravisOptions& options,
                            Clock& clock)
@@ -206,7 +199,9 @@ Result<void> AravisSensor::let_go(Deadline deadline) {
   }
   std::promise<void> gone;
   giving_up_ = gone.get_future();
-  std::thread([camera = std::move(camera_), stream = std::move(stream_), gone = std::move(gone)]() mutable {
+  std::thread([camera = std::move(camera_), stream = std::move(stream_), pending = std::move(pending_),
+               gone = std::move(gone)]() mutable {
+    if (pending.valid()) pending.wait();
     stream.reset();
     camera.reset();
     gone.set_value();
@@ -273,10 +268,45 @@ Result<void> AravisSensor::listen_to_line(bool line) {
 }
 
 Result<void> AravisSensor::trigger() {
-  auto triggered =
-      attempt_("trigger", [&](GError** error) { arv_camera_execute_command(camera_.get(), "TriggerSoftware", error); });
+  auto triggered = trigger_by_software(camera_.get(), attempt_);
   if (!triggered) mark(lost_);
   return triggered;
+}
+
+/// The library repeats a request without reply for seconds: done on a thread that the caller does not wait for beyond
+/// `deadline`. The thread has the camera to itself until then, and the camera is given up after.
+Result<void> AravisSensor::request(const char* what, Act act, Deadline deadline) {
+  if (!camera_ || *lost_) {
+    return fail(ErrorCode::io, "{}: cannot {}, it is not connected; check power and cable", name(), what);
+  }
+  GRef<ArvCamera> camera(ARV_CAMERA(g_object_ref(camera_.get())));
+  std::packaged_task<Result<void>()> task([camera = std::move(camera), act = std::move(act)]() mutable {
+    auto done = act(camera.get());
+    camera.reset();
+    return done;
+  });
+  auto result = task.get_future();
+  std::thread(std::move(task)).detach();
+  if (result.wait_for(deadline.left(clock_)) != std::future_status::ready) {
+    pending_ = std::move(result);
+    mark(lost_);
+    return fail(ErrorCode::timeout, "{}: no reply in time to {}; check power, cable and network", name(), what);
+  }
+  auto done = result.get();
+  if (!done) mark(lost_);  // a device that does not reply is connected again
+  return done;
+}
+
+Result<void> AravisSensor::select_output(const std::string& output, Deadline deadline) {
+  const auto act = [outputs = options_.strobe_outputs, output, attempt = attempt_](ArvCamera* camera) {
+    return scanrig::select_output(camera, outputs, output, attempt);
+  };
+  return request("switch its outputs", act, deadline);
+}
+
+Result<void> AravisSensor::start_exposure(Deadline deadline) {
+  return request(
+      "expose", [attempt = attempt_](ArvCamera* camera) { return trigger_by_software(camera, attempt); }, deadline);
 }
 
 }  // namespace scanrig
