@@ -103,6 +103,7 @@ Result<bool> AravisSensor::prepare(Deadline deadline) {
   if (camera_ && !*lost_) ask_whether_there();
   if (camera_ && !*lost_) return false;
   if (auto free = let_go(deadline); !free) return pass_on(free);
+  if (auto ended = wait_for_pending(deadline); !ended) return pass_on(ended);
   if (deadline.expired(clock_)) return fail(ErrorCode::timeout, "{}: no time left to connect", name());
   auto connected = connect();
   if (connected) connected = start_stream();
@@ -110,6 +111,21 @@ Result<bool> AravisSensor::prepare(Deadline deadline) {
   mark(lost_);
   std::ignore = let_go({clock_.now()});  // if it would have to wait, the next call does it
   return pass_on(connected);
+}
+
+/// A request that was not waited for would change the camera after it has been set up anew. If the camera has replied
+/// after all, the old connection is closed first: its closing would take the camera away from the new one.
+/// Fails with `timeout`.
+Result<void> AravisSensor::wait_for_pending(Deadline deadline) {
+  if (!pending_.valid()) return {};
+  const auto ends = [&](auto& future) {
+    return !future.valid() || future.wait_for(deadline.left(clock_)) == std::future_status::ready;
+  };
+  if (!ends(pending_) || (pending_.get() && !ends(giving_up_))) {
+    return fail(ErrorCode::timeout, "{}: lost, and its last request has not ended; try again in 10 s", name());
+  }
+  pending_ = {};
+  return {};
 }
 
 /// The library's own heartbeat takes many seconds to detect a lost camera.
@@ -199,9 +215,10 @@ Result<void> AravisSensor::let_go(Deadline deadline) {
   }
   std::promise<void> gone;
   giving_up_ = gone.get_future();
-  std::thread([camera = std::move(camera_), stream = std::move(stream_), pending = std::move(pending_),
+  std::thread([camera = std::move(camera_), stream = std::move(stream_), pending = pending_,
                gone = std::move(gone)]() mutable {
-    if (pending.valid()) pending.wait();
+    // A camera that has replied after all is stopped: an exposure still to come is cancelled.
+    if (pending.valid() && pending.get()) arv_camera_stop_acquisition(camera.get(), nullptr);
     stream.reset();
     camera.reset();
     gone.set_value();
@@ -288,7 +305,7 @@ Result<void> AravisSensor::request(const char* what, Act act, Deadline deadline)
   auto result = task.get_future();
   std::thread(std::move(task)).detach();
   if (result.wait_for(deadline.left(clock_)) != std::future_status::ready) {
-    pending_ = std::move(result);
+    pending_ = result.share();
     mark(lost_);
     return fail(ErrorCode::timeout, "{}: no reply in time to {}; check power, cable and network", name(), what);
   }

@@ -45,6 +45,7 @@ class AravisSensor final : public Sensor, private CameraStrobe {
   Result<void> start_stream();
   void stop_stream();
   Result<void> let_go(Deadline deadline);
+  Result<void> wait_for_pending(Deadline deadline);
   Result<SensorFrame> read(ArvBuffer* buffer) const;
   void ask_whether_there();
 
@@ -54,9 +55,9 @@ class AravisSensor final : public Sensor, private CameraStrobe {
   const GenicamCall attempt_;
   GRef<ArvCamera> camera_;
   GRef<ArvStream> stream_;
-  std::future<Result<void>> pending_;   // a request of the lost connection that was not waited for
-  std::future<void> giving_up_;         // ready when the last lost connection is given up
-  std::optional<std::string> finding_;  // a problem of this machine's settings, see host_finding()
+  std::shared_future<Result<void>> pending_;  // a request of the lost connection that was not waited for
+  std::future<void> giving_up_;               // ready when the last lost connection is given up
+  std::optional<std::string> finding_;        // a problem of this machine's settings, see host_finding()
   std::shared_ptr<std::atomic<bool>> lost_ = std::make_shared<std::atomic<bool>>(false);  // a library's thread sets it
   Clock::TimePoint heard_{};                                                              // of the last reply or frame
   bool in_doubt_ = false;  // an expected frame did not come

@@ -73,6 +73,12 @@ TEST(CameraStrobeSetup, AnOutputTheCameraDoesNotHaveIsNamed) {
   EXPECT_THAT(error.message, HasSubstr("left camera 40012345: its LineSelector has no Line7"));
 }
 
+TEST(CameraStrobeSetup, TheTriggerInputIsTheRightCameras) {
+  const auto error = refused("full", [](auto& options) { options.trigger_source = "Line7"; });
+  EXPECT_EQ(error.code, ErrorCode::invalid_input);
+  EXPECT_THAT(error.message, HasSubstr("right camera 40012346: set TriggerSource to Line7"));
+}
+
 TEST(CameraStrobeSetup, TheRightCameraNeedsNoOutputs) {
   AravisBench bench([](auto&) {}, 400, "FrameStart", "none");
   ASSERT_TRUE(bench.opened()) << bench.opened().error().message;
@@ -157,6 +163,10 @@ TEST_F(CameraStrobeTest, ACameraThatHangsIsNamedByTheDeadline) {
   EXPECT_EQ(fired.error().code, ErrorCode::timeout) << fired.error().message;
   EXPECT_THAT(fired.error().message, HasSubstr("projector: left camera 40012345: no reply in time"));
   EXPECT_LT(took, milliseconds(1500));
+  // The request that was given up still selects the output. Connected again, the cameras warm up without light.
+  const auto end = ample();
+  while (!bench_.camera().prepare(ample()) && !end.expired(bench_.clock())) std::this_thread::yield();
+  EXPECT_EQ(bench_.flashes(), 0u);
   expect_recovery();
 }
 

@@ -51,7 +51,10 @@ class FarCameras {
     return text;
   }
   /// Stops the process, so that no camera replies; lets it run on.
-  void freeze(bool frozen) { ::kill(child_, frozen ? SIGSTOP : SIGCONT); }
+  void freeze(bool frozen) {
+    ::kill(child_, frozen ? SIGSTOP : SIGCONT);
+    if (frozen) ::waitpid(child_, nullptr, WUNTRACED);
+  }
 
   std::string tell(const std::string& words) {
     std::fprintf(in_, "%s\n", words.c_str());
