@@ -60,6 +60,14 @@ ModbusIoProjectorOptions modbus_io_projector_options(const ProjectorConfig& proj
   return options;
 }
 
+CameraStrobeProjectorOptions camera_strobe_options(const RigConfig& rig) {
+  CameraStrobeProjectorOptions options;
+  options.pattern_output = rig.projector.line.line;
+  if (rig.projector.plain_line) options.plain_output = rig.projector.plain_line->line;
+  options.exposure = rig.stereo_camera.aravis.exposure;
+  return options;
+}
+
 GpioPanelOptions gpio_panel_options(const RigConfig& rig) { return panel_options<GpioPanelOptions>(rig, line_spec); }
 
 ModbusIoPanelOptions modbus_io_panel_options(const RigConfig& rig) {

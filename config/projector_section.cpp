@@ -32,6 +32,12 @@ void read_modbus_io(Section& s, std::chrono::microseconds exposure, ProjectorCon
   read_pulse(s, exposure, projector);
 }
 
+/// The outputs by the camera's own names. The camera's exposure is the length of the light.
+void read_camera_strobe(Section& s, ProjectorConfig& projector) {
+  s.text("line", projector.line.line);
+  if (s.has("plain_line")) s.text("plain_line", projector.plain_line.emplace().line);
+}
+
 /// The ranges are the device's, see LightCrafterProjector::create().
 void read_lightcrafter(Section& s, std::chrono::microseconds exposure, ProjectorConfig& projector) {
   using Trigger = dlpc350::LutEntry::Trigger;
@@ -70,17 +76,38 @@ void read_projector(Section& s, std::chrono::microseconds exposure, ProjectorCon
                    {{"gpio", Driver::gpio},
                     {"modbus-io", Driver::modbus_io},
                     {"lightcrafter4500", Driver::lightcrafter4500},
+                    {"camera-strobe", Driver::camera_strobe},
                     {"manual", Driver::manual}});
   if (projector.driver == Driver::gpio) read_gpio(s, exposure, projector);
   if (projector.driver == Driver::modbus_io) read_modbus_io(s, exposure, projector);
   if (projector.driver == Driver::lightcrafter4500) read_lightcrafter(s, exposure, projector);
+  if (projector.driver == Driver::camera_strobe) read_camera_strobe(s, projector);
   s.number("warm_up_s", projector.warm_up, {0, 7200});
 }
+
+namespace {
+
+/// The right camera exposes at the edge that the left camera's output makes.
+void check_strobe_cameras(Section& s, const StereoCameraConfig& camera) {
+  if (camera.driver != StereoCameraConfig::Driver::aravis) {
+    return s.report("driver",
+                    "\"camera-strobe\" needs driver = \"aravis\" in [stereo_camera]: only GigE and USB3 Vision cameras "
+                    "have outputs that follow their exposure");
+  }
+  if (camera.aravis.trigger_source == "Software") {
+    s.report(
+        "driver",
+        "\"camera-strobe\" needs trigger.source in [stereo_camera] to be the right camera's input that the outputs "
+        "are wired to, not \"Software\"");
+  }
+}
+
+}  // namespace
 
 void check_projector(Section& s, const RigConfig& rig) {
   using Driver = ProjectorConfig::Driver;
   const Driver driver = rig.projector.driver;
-  if (driver != Driver::gpio && driver != Driver::modbus_io) return;
+  if (driver == Driver::lightcrafter4500 || driver == Driver::manual) return;
   const bool by_channel = driver == Driver::modbus_io;
   const bool module = rig.panel.driver == PanelConfig::Driver::modbus_io;
   const char* const line = by_channel ? "channel" : "line";
@@ -88,12 +115,14 @@ void check_projector(Section& s, const RigConfig& rig) {
   if (by_channel && !module) {
     s.report("driver", "\"modbus-io\" uses the panel's I/O module: it needs driver = \"modbus-io\" in [panel]");
   }
+  if (driver == Driver::camera_strobe) check_strobe_cameras(s, rig.stereo_camera);
   if (!rig.projector.plain_line) {
     s.report(plain_line, "missing: every view needs a plain image; name the output that fires it");
   }
   if (!s.sound()) return;
+  const bool shares_panel = driver != Driver::camera_strobe && by_channel == module;
   std::map<std::string, Pin> outputs{{line, rig.projector.line}, {plain_line, *rig.projector.plain_line}};
-  report_shared(s, outputs, by_channel == module ? rig.panel.outputs : std::map<std::string, Pin>{});
+  report_shared(s, outputs, shares_panel ? rig.panel.outputs : std::map<std::string, Pin>{});
 }
 
 }  // namespace scanrig::config

@@ -197,6 +197,12 @@ void read_module_of_projector(Section& root, ProjectorConfig& projector) {
   });
 }
 
+/// The left camera makes them outputs when it is connected.
+std::vector<std::string> strobe_outputs(const ProjectorConfig& projector) {
+  if (projector.driver != ProjectorConfig::Driver::camera_strobe || !projector.plain_line) return {};
+  return {projector.line.line, projector.plain_line->line};
+}
+
 void read_rig(Section& root, const std::filesystem::path& base, const std::vector<std::filesystem::path>& drives,
               Cameras cameras, RigConfig& rig) {
   int schema = 0;
@@ -213,6 +219,7 @@ void read_rig(Section& root, const std::filesystem::path& base, const std::vecto
     check_projector(s, rig);
   });
   rig.projector.io_module = rig.panel.io_module;
+  rig.stereo_camera.aravis.strobe_outputs = strobe_outputs(rig.projector);
   root.section("calibration", [&](Section& s) { s.path("file", base, rig.calibration_file); });
   root.section("recipe", [&](Section& s) { read_recipes(s, rig); });
   root.section("storage", [&](Section& s) { read_storage(s, base, rig.storage); });

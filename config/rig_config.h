@@ -62,10 +62,12 @@ struct TurntableConfig {
 };
 
 struct ProjectorConfig {
-  enum class Driver { gpio, modbus_io, lightcrafter4500, manual };
+  enum class Driver { gpio, modbus_io, lightcrafter4500, camera_strobe, manual };
   Driver driver = Driver::gpio;
-  Pin line;                                ///< gpio, modbus_io: fires the pattern and both cameras
-  std::optional<Pin> plain_line;           ///< gpio, modbus_io: fires the cameras and plain light, without the pattern
+  /// gpio, modbus_io: fires the pattern and both cameras. camera_strobe: name of the left camera's output that fires
+  /// the pattern and the right camera.
+  Pin line;
+  std::optional<Pin> plain_line;           ///< as `line`, with plain light and without the pattern
   modbus::ClientOptions io_module;         ///< modbus_io: the panel's
   std::chrono::microseconds pulse{15000};  ///< gpio, modbus_io: at least the exposure
   std::string serial;                      ///< lightcrafter4500: empty: the only one connected

@@ -149,7 +149,7 @@ void ReconstructionThread::handle(const Begin& message) {
 }
 
 Result<void> ReconstructionThread::start(const Begin& message, const ScanFolder& scan) {
-  current_->quarantined = read_attempt_record(message.folder).ended_by_death >= kAttemptsThatQuarantine;
+  current_->quarantined = is_to_be_quarantined(read_attempt_record(message.folder).ended_by_death);
   if (current_->quarantined) return {};
   const auto calibration = scan.load_calibration();
   if (!calibration) return pass_on(calibration);

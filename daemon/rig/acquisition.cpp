@@ -95,9 +95,10 @@ event::DevicesChecked Acquisition::check() {
     return DeviceHealth{name, answer ? std::nullopt : std::optional(answer.error())};
   };
   const auto status = known_motion(devices_.turntable.status(limit()));
-  event::DevicesChecked seen{
-      {health(kTurntable, status), health(kProjector, devices_.projector.turn_off(limit())),
-       health(kCamera, devices_.camera.prepare(Deadline::after(clock_, options_.connect_limit)))}};
+  // Before the projector, which may be fired by a camera.
+  const auto camera = health(kCamera, devices_.camera.prepare(Deadline::after(clock_, options_.connect_limit)));
+  const auto projector = health(kProjector, devices_.projector.turn_off(limit()));
+  event::DevicesChecked seen{{health(kTurntable, status), projector, camera}};
   if (status) seen.drive = event::DriveReport{status->motion == TurntableStatus::Motion::moving, status->alarm};
   return seen;
 }

@@ -59,6 +59,8 @@ struct Held {
 
 Result<void> darken(const Result<config::RigConfig>& config, Clock& clock, Deadline deadline, Held<Projector>& held) {
   if (!config) return pass_on(config);
+  // Its light ended with the last exposure. The camera may still belong to the daemon that died.
+  if (config->projector.driver == config::ProjectorConfig::Driver::camera_strobe) return {};
   held.lines = open_lines(*config, clock);
   auto projector = open_projector(config->projector, *held.lines, clock);
   if (!projector) return pass_on(projector);

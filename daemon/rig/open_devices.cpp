@@ -6,6 +6,7 @@
 #include "drivers/camera/v4l2_stereo_camera.h"
 #include "drivers/panel/gpio_panel.h"
 #include "drivers/panel/modbus_io_panel.h"
+#include "drivers/projector/camera_strobe_projector.h"
 #include "drivers/projector/gpio_projector.h"
 #include "drivers/projector/lightcrafter_projector.h"
 #include "drivers/projector/manual_projector.h"
@@ -34,6 +35,9 @@ Result<std::unique_ptr<Projector>> open_projector(const config::ProjectorConfig&
                                                   Clock& clock) {
   using Driver = config::ProjectorConfig::Driver;
   if (config.driver == Driver::manual) return std::make_unique<ManualProjector>();
+  if (config.driver == Driver::camera_strobe) {
+    return fail(ErrorCode::unsupported, "projector: is fired by a camera; it has no connection of its own");
+  }
   if (config.driver == Driver::modbus_io) {
     return std::make_unique<ModbusIoProjector>(config::modbus_io_projector_options(config), clock);
   }
@@ -53,7 +57,7 @@ Result<std::unique_ptr<Projector>> open_projector(const config::ProjectorConfig&
 namespace {
 
 /// The cameras connect at their first use. Null for simulated ones.
-std::unique_ptr<StereoCamera> make_camera(const config::StereoCameraConfig& config, Clock& clock) {
+std::unique_ptr<SensorCamera> make_camera(const config::StereoCameraConfig& config, Clock& clock) {
   using Driver = config::StereoCameraConfig::Driver;
   switch (config.driver) {
     case Driver::aravis: return aravis_camera(config.aravis, clock);
@@ -62,6 +66,16 @@ std::unique_ptr<StereoCamera> make_camera(const config::StereoCameraConfig& conf
     case Driver::simulated: break;
   }
   return nullptr;
+}
+
+/// `camera` is null for simulated cameras.
+Result<std::unique_ptr<Projector>> make_projector(const config::RigConfig& config, SensorCamera* camera,
+                                                  gpio::Lines& lines, Clock& clock) {
+  CameraStrobe* const strobe = camera ? camera->strobe() : nullptr;
+  if (strobe && config.projector.driver == config::ProjectorConfig::Driver::camera_strobe) {
+    return std::make_unique<CameraStrobeProjector>(config::camera_strobe_options(config), *strobe, clock);
+  }
+  return open_projector(config.projector, lines, clock);
 }
 
 Result<std::unique_ptr<Panel>> wired_panel(const config::RigConfig& config, gpio::Lines& lines, Clock& clock) {
@@ -86,11 +100,12 @@ Result<OpenDevices> open_devices(const config::RigConfig& config, Clock& clock) 
   open.lines = open_lines(config, clock);
   open.turntable = std::move(*turntable);
   gpio::Lines& lines = *open.lines;
-  auto projector = open_projector(config.projector, lines, clock);
+  auto camera = make_camera(config.stereo_camera, clock);
+  auto projector = make_projector(config, camera.get(), lines, clock);
   if (!projector) return pass_on(projector);
   open.projector = std::move(*projector);
   open.panel = open_panel(config, lines, clock);
-  open.camera = make_camera(config.stereo_camera, clock);
+  open.camera = std::move(camera);
   return open;
 }
 

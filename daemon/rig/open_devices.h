@@ -29,6 +29,7 @@ Result<OpenDevices> open_devices(const config::RigConfig& config, Clock& clock);
 /// Single devices, for callers that need no more. `config` and `lines` outlive them. Fail with `out_of_range`.
 std::unique_ptr<gpio::Lines> open_lines(const config::RigConfig& config, Clock& clock);
 Result<std::unique_ptr<Turntable>> open_turntable(const config::TurntableConfig& config, Clock& clock);
+/// Also fails with `unsupported`, for a projector that only a camera fires.
 Result<std::unique_ptr<Projector>> open_projector(const config::ProjectorConfig& config, gpio::Lines& lines,
                                                   Clock& clock);
 std::unique_ptr<Panel> open_panel(const config::RigConfig& config, gpio::Lines& lines, Clock& clock);

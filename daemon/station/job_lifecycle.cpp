@@ -120,7 +120,7 @@ namespace {
 /// Ends a scan that has all its views.
 void set_scanned_state(JobInfo& job, const FolderFacts& facts) {
   if (!facts.has_report) job.model = job.report = "";
-  job.quarantined = !facts.is_running && facts.deaths >= kAttemptsThatQuarantine;
+  job.quarantined = !facts.is_running && is_to_be_quarantined(facts.deaths);
   job.error = job.quarantined ? quarantine_error() : facts.failure;
   if (job.error) {
     job.state = job.error->code == ErrorCode::stopped ? JobState::cancelled : JobState::failed;

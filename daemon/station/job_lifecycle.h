@@ -37,6 +37,8 @@ struct FolderFacts {
 
 /// Quarantine after this many reconstructions in a row that started and never ended: the service died in each.
 constexpr int kAttemptsThatQuarantine = 2;
+/// True after `deaths` reconstructions that ended with their process.
+constexpr bool is_to_be_quarantined(int deaths) { return deaths >= kAttemptsThatQuarantine; }
 /// The error of a quarantined job.
 Error quarantine_error();
 

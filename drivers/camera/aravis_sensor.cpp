@@ -4,6 +4,8 @@
 #include <array>
 #include <thread>
 
+#include "drivers/camera/aravis_strobe.h"
+
 namespace scanrig {
 namespace {
 
@@ -77,20 +79,11 @@ std::optional<std::string> find_by_serial(const std::string& serial) {
   return std::nullopt;
 }
 
-}  // namespace
-
-Result<void> GenicamCall::refused(const std::string& what, GError* error) const {
-  auto code = ErrorCode::io;
-  if (g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_TIMEOUT)) code = ErrorCode::timeout;
-  if (g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_NOT_FOUND)) code = ErrorCode::not_found;
-  if (g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_FEATURE_NOT_FOUND) ||
-      g_error_matches(error, ARV_DEVICE_ERROR, ARV_DEVICE_ERROR_INVALID_PARAMETER) || error->domain == ARV_GC_ERROR) {
-    code = ErrorCode::invalid_input;
-  }
-  const std::string reason = error->message;
-  g_error_free(error);
-  return fail(code, "{}: {}: {}", who_, what, reason);
+Result<void> trigger_by_software(ArvCamera* camera, const GenicamCall& attempt) {
+  return attempt("trigger", [&](GError** error) { arv_camera_execute_command(camera, "TriggerSoftware", error); });
 }
+
+}  // namespace
 
 AravisSensor::AravisSensor(const std::string& side, const AravisSensorOptions& sensor, const AravisOptions& options,
                            Clock& clock)
@@ -110,6 +103,7 @@ Result<bool> AravisSensor::prepare(Deadline deadline) {
   if (camera_ && !*lost_) ask_whether_there();
   if (camera_ && !*lost_) return false;
   if (auto free = let_go(deadline); !free) return pass_on(free);
+  if (auto ended = wait_for_pending(deadline); !ended) return pass_on(ended);
   if (deadline.expired(clock_)) return fail(ErrorCode::timeout, "{}: no time left to connect", name());
   auto connected = connect();
   if (connected) connected = start_stream();
@@ -117,6 +111,21 @@ Result<bool> AravisSensor::prepare(Deadline deadline) {
   mark(lost_);
   std::ignore = let_go({clock_.now()});  // if it would have to wait, the next call does it
   return pass_on(connected);
+}
+
+/// A request that was not waited for would change the camera after it has been set up anew. If the camera has replied
+/// after all, the old connection is closed first: its closing would take the camera away from the new one.
+/// Fails with `timeout`.
+Result<void> AravisSensor::wait_for_pending(Deadline deadline) {
+  if (!pending_.valid()) return {};
+  const auto ends = [&](auto& future) {
+    return !future.valid() || future.wait_for(deadline.left(clock_)) == std::future_status::ready;
+  };
+  if (!ends(pending_) || (pending_.get() && !ends(giving_up_))) {
+    return fail(ErrorCode::timeout, "{}: lost, and its last request has not ended; try again in 10 s", name());
+  }
+  pending_ = {};
+  return {};
 }
 
 /// The library's own heartbeat takes many seconds to detect a lost camera.
@@ -206,7 +215,10 @@ Result<void> AravisSensor::let_go(Deadline deadline) {
   }
   std::promise<void> gone;
   giving_up_ = gone.get_future();
-  std::thread([camera = std::move(camera_), stream = std::move(stream_), gone = std::move(gone)]() mutable {
+  std::thread([camera = std::move(camera_), stream = std::move(stream_), pending = pending_,
+               gone = std::move(gone)]() mutable {
+    // A camera that has replied after all is stopped: an exposure still to come is cancelled.
+    if (pending.valid() && pending.get()) arv_camera_stop_acquisition(camera.get(), nullptr);
     stream.reset();
     camera.reset();
     gone.set_value();
@@ -273,10 +285,45 @@ Result<void> AravisSensor::listen_to_line(bool line) {
 }
 
 Result<void> AravisSensor::trigger() {
-  auto triggered =
-      attempt_("trigger", [&](GError** error) { arv_camera_execute_command(camera_.get(), "TriggerSoftware", error); });
+  auto triggered = trigger_by_software(camera_.get(), attempt_);
   if (!triggered) mark(lost_);
   return triggered;
+}
+
+/// The library repeats a request without reply for seconds: done on a thread that the caller does not wait for beyond
+/// `deadline`. The thread has the camera to itself until then, and the camera is given up after.
+Result<void> AravisSensor::request(const char* what, Act act, Deadline deadline) {
+  if (!camera_ || *lost_) {
+    return fail(ErrorCode::io, "{}: cannot {}, it is not connected; check power and cable", name(), what);
+  }
+  GRef<ArvCamera> camera(ARV_CAMERA(g_object_ref(camera_.get())));
+  std::packaged_task<Result<void>()> task([camera = std::move(camera), act = std::move(act)]() mutable {
+    auto done = act(camera.get());
+    camera.reset();
+    return done;
+  });
+  auto result = task.get_future();
+  std::thread(std::move(task)).detach();
+  if (result.wait_for(deadline.left(clock_)) != std::future_status::ready) {
+    pending_ = result.share();
+    mark(lost_);
+    return fail(ErrorCode::timeout, "{}: no reply in time to {}; check power, cable and network", name(), what);
+  }
+  auto done = result.get();
+  if (!done) mark(lost_);  // a device that does not reply is connected again
+  return done;
+}
+
+Result<void> AravisSensor::select_output(const std::string& output, Deadline deadline) {
+  const auto act = [outputs = options_.strobe_outputs, output, attempt = attempt_](ArvCamera* camera) {
+    return scanrig::select_output(camera, outputs, output, attempt);
+  };
+  return request("switch its outputs", act, deadline);
+}
+
+Result<void> AravisSensor::start_exposure(Deadline deadline) {
+  return request(
+      "expose", [attempt = attempt_](ArvCamera* camera) { return trigger_by_software(camera, attempt); }, deadline);
 }
 
 }  // namespace scanrig

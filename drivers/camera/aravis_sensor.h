@@ -1,40 +1,17 @@
 #pragma once
 
-#include <arv.h>
-
 #include <atomic>
+#include <functional>
 #include <future>
 #include <memory>
 
 #include "drivers/camera/aravis_stereo_camera.h"
+#include "drivers/camera/camera_strobe.h"
+#include "drivers/camera/genicam_call.h"
 
 namespace scanrig {
 
 inline constexpr int kBuffers = 6;  // of each camera's stream
-
-struct Unref {
-  void operator()(gpointer object) const { g_object_unref(object); }
-};
-template <class T>
-using GRef = std::unique_ptr<T, Unref>;
-
-/// A GError as Result; `act` is called with a place for one: attempt("set Gain", [&](GError** e) { ... });
-class GenicamCall {
- public:
-  explicit GenicamCall(std::string who) : who_(std::move(who)) {}
-  template <class Act>
-  Result<void> operator()(const std::string& what, Act act) const {
-    GError* error = nullptr;
-    act(&error);
-    return error ? refused(what, error) : Result<void>{};
-  }
-  [[nodiscard]] const std::string& who() const { return who_; }
-
- private:
-  [[nodiscard]] Result<void> refused(const std::string& what, GError* error) const;
-
-  std::string who_;
-};
 
 /// Trigger, exposure, pixels and transport of one camera [GenICam SFNC 2.7, 5 and 6]. See open_aravis() for errors.
 Result<void> set_up(ArvCamera* camera, const AravisOptions& options, const std::string& address,
@@ -44,7 +21,7 @@ Result<void> set_up(ArvCamera* camera, const AravisOptions& options, const std::
 Result<void> set_trigger_source(ArvCamera* camera, const std::string& source, const GenicamCall& attempt);
 
 /// One GigE Vision or USB3 Vision camera.
-class AravisSensor final : public Sensor {
+class AravisSensor final : public Sensor, private CameraStrobe {
  public:
   AravisSensor(const std::string& side, const AravisSensorOptions& sensor, const AravisOptions& options, Clock& clock);
   ~AravisSensor() override;
@@ -57,12 +34,18 @@ class AravisSensor final : public Sensor {
   [[nodiscard]] bool shares_host_clock() const override { return false; }
   Result<void> listen_to_line(bool line) override;
   Result<void> trigger() override;
+  [[nodiscard]] CameraStrobe* strobe() override { return options_.strobe_outputs.empty() ? nullptr : this; }
 
  private:
+  Result<void> select_output(const std::string& output, Deadline deadline) override;
+  Result<void> start_exposure(Deadline deadline) override;
+  using Act = std::function<Result<void>(ArvCamera*)>;
+  Result<void> request(const char* what, Act act, Deadline deadline);
   Result<void> connect();
   Result<void> start_stream();
   void stop_stream();
   Result<void> let_go(Deadline deadline);
+  Result<void> wait_for_pending(Deadline deadline);
   Result<SensorFrame> read(ArvBuffer* buffer) const;
   void ask_whether_there();
 
@@ -72,8 +55,9 @@ class AravisSensor final : public Sensor {
   const GenicamCall attempt_;
   GRef<ArvCamera> camera_;
   GRef<ArvStream> stream_;
-  std::future<void> giving_up_;         // ready when the last lost connection is given up
-  std::optional<std::string> finding_;  // a problem of this machine's settings, see host_finding()
+  std::shared_future<Result<void>> pending_;  // a request of the lost connection that was not waited for
+  std::future<void> giving_up_;               // ready when the last lost connection is given up
+  std::optional<std::string> finding_;        // a problem of this machine's settings, see host_finding()
   std::shared_ptr<std::atomic<bool>> lost_ = std::make_shared<std::atomic<bool>>(false);  // a library's thread sets it
   Clock::TimePoint heard_{};                                                              // of the last reply or frame
   bool in_doubt_ = false;  // an expected frame did not come

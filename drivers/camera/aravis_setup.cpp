@@ -7,33 +7,14 @@
 #include <fstream>
 
 #include "drivers/camera/aravis_sensor.h"
+#include "drivers/camera/aravis_strobe.h"
 
 namespace scanrig {
 namespace {
 
-/// True if the camera has the feature and it can be used now.
-bool has(ArvCamera* camera, const char* feature) {
-  GError* error = nullptr;
-  const bool there = arv_camera_is_feature_available(camera, feature, &error);
-  g_clear_error(&error);
-  return there && !error;
-}
-
-bool has_entry(ArvCamera* camera, const char* feature, const char* entry) {
-  GError* error = nullptr;
-  const bool there = arv_camera_is_enumeration_entry_available(camera, feature, entry, &error);
-  g_clear_error(&error);
-  return there;
-}
-
-Result<void> set_text(ArvCamera* camera, const char* feature, const std::string& value, const GenicamCall& attempt) {
-  return attempt(fmt::format("set {} to {}", feature, value),
-                 [&](GError** error) { arv_camera_set_string(camera, feature, value.c_str(), error); });
-}
-
 /// Frames come on triggers only, and on one kind of trigger only.
 Result<void> set_up_trigger(ArvCamera* camera, const AravisOptions& options, const GenicamCall& attempt) {
-  if (has(camera, "AcquisitionFrameRateEnable")) {
+  if (has_feature(camera, "AcquisitionFrameRateEnable")) {
     auto off = attempt("set AcquisitionFrameRateEnable", [&](GError** error) {
       arv_camera_set_boolean(camera, "AcquisitionFrameRateEnable", FALSE, error);
     });
@@ -45,21 +26,21 @@ Result<void> set_up_trigger(ArvCamera* camera, const AravisOptions& options, con
   for (const char* candidate : {"FrameStart", "FrameBurstStart", "AcquisitionStart"}) {
     if (!selector && has_entry(camera, "TriggerSelector", candidate)) selector = candidate;
   }
-  if (!selector || !has(camera, "TriggerSoftware")) {
+  if (!selector || !has_feature(camera, "TriggerSoftware")) {
     return fail(ErrorCode::unsupported, "{}: the camera has no {}", attempt.who(),
                 selector ? "TriggerSoftware" : "trigger that starts a frame");
   }
   if (auto set = set_text(camera, "TriggerSelector", selector, attempt); !set) return set;
   if (auto set = set_trigger_source(camera, options.trigger_source, attempt); !set) return set;
   const char* edge = options.falling_edge ? "FallingEdge" : "RisingEdge";
-  if (has(camera, "TriggerActivation") || options.falling_edge) {
+  if (has_feature(camera, "TriggerActivation") || options.falling_edge) {
     if (auto set = set_text(camera, "TriggerActivation", edge, attempt); !set) return set;
   }
   return set_text(camera, "TriggerMode", "On", attempt);
 }
 
 Result<void> set_up_image(ArvCamera* camera, const AravisOptions& options, const GenicamCall& attempt) {
-  if (!has_entry(camera, "PixelFormat", options.pixel_format.c_str())) {
+  if (!has_entry(camera, "PixelFormat", options.pixel_format)) {
     return fail(ErrorCode::unsupported, "{}: the camera has no pixel format {}", attempt.who(), options.pixel_format);
   }
   if (auto set = set_text(camera, "PixelFormat", options.pixel_format, attempt); !set) return set;
@@ -70,7 +51,7 @@ Result<void> set_up_image(ArvCamera* camera, const AravisOptions& options, const
     if (!set) return set;
   }
   for (const char* automatic : {"ExposureAuto", "GainAuto", "BalanceWhiteAuto"}) {
-    if (!has(camera, automatic)) continue;
+    if (!has_feature(camera, automatic)) continue;
     if (auto off = set_text(camera, automatic, "Off", attempt); !off) return off;
   }
   if (options.gain) {
@@ -144,7 +125,7 @@ Result<void> set_up_packets(ArvCamera* camera, const AravisOptions& options, con
 Result<void> set_up_clock(ArvCamera* camera, const AravisOptions& options, const GenicamCall& attempt) {
   if (options.frame_clock != TriggeringOptions::FrameClock::ptp) return {};
   for (const char* feature : {"PtpEnable", "GevIEEE1588"}) {
-    if (!has(camera, feature)) continue;
+    if (!has_feature(camera, feature)) continue;
     return attempt("switch PTP on", [&](GError** error) { arv_camera_set_boolean(camera, feature, TRUE, error); });
   }
   return fail(ErrorCode::unsupported, "{}: the camera has no PTP; use clock = \"interval\"", attempt.who());
@@ -171,15 +152,19 @@ Result<void> set_up(ArvCamera* camera, const AravisOptions& options, const std::
   });
   if (!continuous) return continuous;
   if (auto done = set_up_image(camera, options, attempt); !done) return done;
+  if (auto done = set_up_outputs(camera, options.strobe_outputs, attempt); !done) return done;
   if (auto done = set_up_trigger(camera, options, attempt); !done) return done;
   if (auto done = set_up_packets(camera, options, address, attempt); !done) return done;
   return set_up_clock(camera, options, attempt);
 }
 
 std::unique_ptr<SensorCamera> aravis_camera(const AravisOptions& options, Clock& clock) {
+  AravisOptions left = options, right = options;
+  if (!options.strobe_outputs.empty()) left.trigger_source = "Software";
+  right.strobe_outputs.clear();
   std::vector<std::unique_ptr<Sensor>> sensors;
-  sensors.push_back(std::make_unique<AravisSensor>("left", options.left, options, clock));
-  sensors.push_back(std::make_unique<AravisSensor>("right", options.right, options, clock));
+  sensors.push_back(std::make_unique<AravisSensor>("left", options.left, left, clock));
+  sensors.push_back(std::make_unique<AravisSensor>("right", options.right, right, clock));
   TriggeringOptions triggering;
   triggering.by = options.trigger_source == "Software" ? TriggeringOptions::By::software : TriggeringOptions::By::line;
   triggering.frame_clock = options.frame_clock;

@@ -3,6 +3,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "drivers/camera/sensor_camera.h"
 
@@ -24,6 +25,10 @@ struct AravisOptions {
   AravisSensorOptions right;
   std::string trigger_source = "Line0";  ///< an input of both cameras, or "Software"
   bool falling_edge = false;
+  /// Outputs of the left camera, each wired to a light of the projector and to the right camera's `trigger_source`. The
+  /// left camera is then triggered by software only, see SensorCamera::strobe(). Empty: both cameras have
+  /// `trigger_source`.
+  std::vector<std::string> strobe_outputs;
   std::string pixel_format = "Mono8";  ///< Mono8..16, BayerRG8 and its like, RGB8, BGR8, YUV422_8; not packed ones
   std::chrono::microseconds exposure{12000};
   std::optional<double> gain;    ///< in the camera's own units; empty: unchanged
@@ -40,7 +45,7 @@ std::unique_ptr<SensorCamera> aravis_camera(const AravisOptions& options, Clock&
 
 /// Two cameras, connected and set up. Fails with `not_found` (no such camera), `io`, `timeout`, `invalid_input`
 /// (another serial number, a feature that rejects the value, packets larger than the network passes),
-/// `unsupported` (no trigger, no such pixel format).
+/// `unsupported` (no trigger, no such pixel format, no such output or an output that cannot follow the exposure).
 Result<std::unique_ptr<SensorCamera>> open_aravis(const AravisOptions& options, Clock& clock, Deadline deadline);
 
 enum class CameraBus { gige, usb3 };

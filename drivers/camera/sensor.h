@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "drivers/camera/camera_strobe.h"
 #include "drivers/camera/decoded_image.h"
 
 namespace scanrig {
@@ -46,6 +47,9 @@ class Sensor {
   /// Select whether the line or trigger() exposes. Fail with `io`, `timeout`.
   virtual Result<void> listen_to_line(bool line) = 0;
   virtual Result<void> trigger() = 0;
+
+  /// Its outputs for a projector; null if there are none.
+  [[nodiscard]] virtual CameraStrobe* strobe() { return nullptr; }
 };
 
 }  // namespace scanrig

@@ -56,6 +56,9 @@ class SensorCamera final : public StereoCamera {
   /// Takes a pair by software, one sensor after the other; of freely running sensors the next pair.
   Result<StereoFrame> capture_preview(Deadline deadline) override;
 
+  /// Outputs of the left sensor that fire a projector, between arm() and collect(); null if there are none.
+  [[nodiscard]] CameraStrobe* strobe() { return channels_.front().sensor->strobe(); }
+
   [[nodiscard]] const TriggerCounts& counts() const { return counts_; }
 
  private:

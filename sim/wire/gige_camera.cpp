@@ -25,7 +25,11 @@ constexpr std::array<std::pair<std::string_view, GigeFault>, 9> kFaults{{{"none"
 class Pair final : public GigeCameras {
  public:
   Pair(std::unique_ptr<GigeSensor> left, std::unique_ptr<GigeSensor> right, Clock& clock)
-      : clock_(clock), sensors_{std::move(left), std::move(right)} {}
+      : clock_(clock), sensors_{std::move(left), std::move(right)} {
+    sensors_[0]->on_strobe([this](int output) { return strobe(output); });
+  }
+  /// The left camera's thread uses the right one.
+  ~Pair() override { std::ignore = sensors_[0]->plug(false); }
 
   std::uint64_t edge(bool pattern) override {
     const std::scoped_lock lock(mutex_);
@@ -34,6 +38,27 @@ class Pair final : public GigeCameras {
     if (const GigeFault chance = draw(); chance != GigeFault::none) faults[random_() % 2] = chance;
     for (std::size_t i = 0; i < sensors_.size(); ++i) sensors_[i]->expose(exposure, faults[i]);
     return exposure.number;
+  }
+  /// The left camera has been triggered by software while this output is active. Its own frame can be torn or
+  /// another image, but not lost or late: it is sent already.
+  GigeSensor::Strobe strobe(int output) {
+    const std::scoped_lock lock(mutex_);
+    const GigeFlash flash{output == 1, clock_.now()};
+    flashes_.push_back(flash);
+    const GigeExposure exposure{++edges_, flash.pattern, flash.at};
+    sensors_[1]->expose(exposure, next_injected(1));
+    return {exposure, next_injected(0)};
+  }
+  std::vector<GigeFlash> flashes() const override {
+    const std::scoped_lock lock(mutex_);
+    return flashes_;
+  }
+  bool is_lit() const override {
+    std::unique_lock lock(mutex_);
+    if (flashes_.empty()) return false;
+    const auto [pattern, at] = flashes_.back();
+    lock.unlock();
+    return sensors_[0]->output() == (pattern ? 1 : 2) && clock_.now() < at + sensors_[0]->exposure_time();
   }
   void inject(Side side, GigeFault fault, int count) override {
     const std::scoped_lock lock(mutex_);
@@ -83,6 +108,7 @@ class Pair final : public GigeCameras {
   FaultRates rates_;
   FaultCounts counts_;
   std::mt19937_64 random_{1};
+  std::vector<GigeFlash> flashes_;
   std::array<std::unique_ptr<GigeSensor>, 2> sensors_;
 };
 
@@ -108,6 +134,7 @@ Result<std::unique_ptr<GigeCameras>> GigeCameras::start(const GigeCamerasOptions
     own.frame_after = options.frame_after;
     own.ready = options.ready;
     own.numbered = options.numbered;
+    own.outputs = options.outputs;
     // No two crystals agree.
     own.clock_ahead = side == Side::left ? std::chrono::seconds(4711) : std::chrono::seconds(-123);
     own.clock_drift = side == Side::left ? 30e-6 : -40e-6;

@@ -4,9 +4,11 @@
 #include <memory>
 #include <opencv2/core/mat.hpp>
 #include <string>
+#include <vector>
 
 #include "core/clock.h"
 #include "core/result.h"
+#include "sim/wire/gige_outputs.h"
 
 namespace scanrig::sim::wire {
 
@@ -51,6 +53,13 @@ struct GigeCamerasOptions {
   /// Whether a due frame can be read out; empty: always.
   std::function<bool(const GigeExposure& exposure)> ready;
   bool numbered = true;  ///< write the number of the edge into every frame
+  GigeOutputs outputs = GigeOutputs::full;
+};
+
+/// Light of a projector on the left camera's outputs: Line1 lights the pattern, Line2 plain light.
+struct GigeFlash {
+  bool pattern = false;
+  Clock::TimePoint at;  ///< start of the exposure
 };
 
 /// Share of the frames with each fault, by chance, on one of the two sensors at a time.
@@ -64,11 +73,12 @@ struct FaultCounts {
   std::uint64_t lost = 0, late = 0, torn = 0, stale = 0;
 };
 
-/// Two GigE Vision cameras on the wire, with a line as their trigger input. Stamps are taken from each camera's own
-/// clock: neither starts with the other's or with the host's, and they drift apart. A trigger number may be hidden in
-/// the upper left corner of every frame, see hidden_number(). All such cameras on a host share one control port: run
-/// them in their own network namespace, see loopback.h.
-/// Threads: every function may be called from any thread.
+/// Two GigE Vision cameras on the wire, with a line as their trigger input. The left camera's outputs are wired to that
+/// input of the right one: when the left camera is triggered by software, an active output exposes both. Stamps are
+/// taken from each camera's own clock: neither starts with the other's or with the host's, and they drift apart. A
+/// trigger number may be hidden in the upper left corner of every frame, see hidden_number(). All such cameras on a
+/// host share one control port: run them in their own network namespace, see loopback.h. Threads: every function may be
+/// called from any thread.
 class GigeCameras {
  public:
   /// Fails with `io` (the addresses cannot be used, no temporary file).
@@ -78,6 +88,9 @@ class GigeCameras {
 
   /// The edge of the trigger line. Returns its number; a camera that is not waiting for a trigger counts nothing.
   virtual std::uint64_t edge(bool pattern) = 0;
+  /// Flashes by the left camera's outputs so far; whether one is lit now.
+  [[nodiscard]] virtual std::vector<GigeFlash> flashes() const = 0;
+  [[nodiscard]] virtual bool is_lit() const = 0;
   /// Applies the fault to the frames of the next `count` edges, of one sensor.
   virtual void inject(Side side, GigeFault fault, int count) = 0;
   virtual void happen(const FaultRates& rates) = 0;

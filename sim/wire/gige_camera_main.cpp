@@ -1,11 +1,14 @@
 // scanrig-gige-camera: two GigE Vision cameras in a process of their own, for tests of the camera driver.
 //
-//   scanrig-gige-camera GPIO_SOCKET WIDTH HEIGHT LATE_MS [TRIGGER_SELECTOR]
+//   scanrig-gige-camera GPIO_SOCKET WIDTH HEIGHT LATE_MS [TRIGGER_SELECTOR [OUTPUTS]]
 //
 // Serves the trigger lines DOTS and PLAIN on GPIO_SOCKET (see gpio_socket.h): a rising edge exposes both cameras.
 // Prints "ready" when both are on the wire. Accepts commands, one per line, with the reply "ok" or words:
 //   fault left|right KIND COUNT        rates LOST LATE TORN STALE SEED      counts
 //   plug left|right 0|1                clock left|right MILLISECONDS        edge 0|1
+//   flash N                            the Nth flash by the left camera's outputs, from 0: "pattern 1234" (ns) or
+//   "none" lit                                whether one is lit now: "0" or "1"
+// OUTPUTS: see parse_gige_outputs().
 // Ends at the end of its input. Run it in its own network namespace.
 
 #include <iostream>
@@ -16,6 +19,12 @@
 
 namespace scanrig::sim::wire {
 namespace {
+
+std::string in_words(const std::vector<GigeFlash>& flashes, std::size_t index) {
+  if (index >= flashes.size()) return "none";
+  const auto& [pattern, at] = flashes[index];
+  return fmt::format("{} {}", pattern ? "pattern" : "plain", at.time_since_epoch().count());
+}
 
 std::string obey(GigeCameras& cameras, const std::string& line) {
   std::istringstream words(line);
@@ -63,6 +72,12 @@ std::string obey(GigeCameras& cameras, const std::string& line) {
     words >> pattern;
     return fmt::format("{}", cameras.edge(pattern));
   }
+  if (verb == "flash") {
+    std::size_t index = 0;
+    words >> index;
+    return in_words(cameras.flashes(), index);
+  }
+  if (verb == "lit") return cameras.is_lit() ? "1" : "0";
   return "what?";
 }
 
@@ -90,13 +105,15 @@ int run(const std::string& socket, const GigeCamerasOptions& options) {
 }  // namespace scanrig::sim::wire
 
 int main(int argc, char** argv) {
-  if (argc < 5 || argc > 6) {
-    std::cerr << "usage: scanrig-gige-camera GPIO_SOCKET WIDTH HEIGHT LATE_MS [TRIGGER_SELECTOR]\n";
+  const auto outputs = scanrig::sim::wire::parse_gige_outputs(argc > 6 ? argv[6] : "full");
+  if (argc < 5 || argc > 7 || !outputs) {
+    std::cerr << "usage: scanrig-gige-camera GPIO_SOCKET WIDTH HEIGHT LATE_MS [TRIGGER_SELECTOR [OUTPUTS]]\n";
     return static_cast<int>(scanrig::ExitCode::usage);
   }
   scanrig::sim::wire::GigeCamerasOptions options;
   options.size = {std::atoi(argv[2]), std::atoi(argv[3])};
   options.late_by = std::chrono::milliseconds(std::atoi(argv[4]));
-  if (argc == 6) options.trigger_selector = argv[5];
+  if (argc > 5) options.trigger_selector = argv[5];
+  options.outputs = *outputs;
   return scanrig::sim::wire::run(argv[1], options);
 }

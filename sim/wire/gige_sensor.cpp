@@ -23,9 +23,9 @@ constexpr const char* kPacketDelay =
 <Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>
 )";
 
-/// Aravis' own description, with a packet delay, with Line0 standing for the software trigger, and with `selector` for
-/// FrameStart.
-std::string genicam_description(const std::string& selector) {
+/// Aravis' own description, with a packet delay and outputs, with Line0 standing for the software trigger, and with
+/// `selector` for FrameStart.
+std::string genicam_description(const std::string& selector, GigeOutputs outputs) {
   ArvFakeCamera* sample = arv_fake_camera_new("sample");
   std::size_t size = 0;
   const char* bytes = arv_fake_camera_get_genicam_xml(sample, &size);
@@ -38,7 +38,8 @@ std::string genicam_description(const std::string& selector) {
   if (const auto name = text.find(frame_start); name != std::string::npos) {
     text.replace(name, frame_start.size(), "Name=\"" + selector + "\"");
   }
-  if (const auto end = text.rfind("</RegisterDescription>"); end != std::string::npos) text.insert(end, kPacketDelay);
+  if (const auto end = text.rfind("</RegisterDescription>"); end != std::string::npos)
+    text.insert(end, kPacketDelay + describe_outputs(outputs));
   return text;
 }
 
@@ -89,7 +90,7 @@ Result<std::unique_ptr<GigeSensor>> GigeSensor::start(const GigeSensorOptions& o
   const int descriptor = ::mkstemp(file.data());
   if (descriptor < 0) return fail(ErrorCode::io, "no temporary file {}", file);
   ::close(descriptor);
-  std::ofstream(file) << genicam_description(options.trigger_selector);
+  std::ofstream(file) << genicam_description(options.trigger_selector, options.outputs);
   std::unique_ptr<GigeSensor> sensor(new GigeSensor(options, std::move(source), clock, file));
   if (auto plugged = sensor->plug(true); !plugged) return pass_on(plugged);
   return sensor;
@@ -222,20 +223,12 @@ void GigeSensor::fill(ArvBuffer* buffer, void* self, std::uint32_t, std::uint32_
 /// Called from the camera's thread, once per frame, before its packets are sent. Without an edge it was the host's own
 /// trigger.
 void GigeSensor::fill(ArvBuffer* buffer) {
-  Frame frame;
-  ArvGvFakeCamera* camera = nullptr;
-  {
-    const std::scoped_lock lock(mutex_);
-    if (triggered_) {
-      frame = *std::exchange(triggered_, std::nullopt);
-    } else {
-      constexpr std::uint64_t kBySoftware = 0x80000000;
-      frame = new_frame({kBySoftware + ++by_software_, false, clock_.now()});
-      last_ = frame;
-    }
-    camera = camera_;
-    clock_.notify_all(changed_);
-  }
+  std::unique_lock lock(mutex_);
+  auto triggered = std::exchange(triggered_, std::nullopt);
+  ArvGvFakeCamera* const camera = camera_;
+  clock_.notify_all(changed_);
+  lock.unlock();
+  const Frame frame = triggered ? *triggered : exposed_by_host();
   constexpr double kTornShare = 0.5;
   if (camera) g_object_set(camera, "gvsp-lost-ratio", frame.fault == GigeFault::torn ? kTornShare : 0.0, nullptr);
   arv_buffer_set_frame_id(buffer, frame.id);
@@ -252,6 +245,39 @@ void GigeSensor::fill(ArvBuffer* buffer) {
   for (std::size_t i = 0; i < grey.total(); ++i) {
     for (std::size_t k = 0; k < pixel; ++k) bytes[i * pixel + k] = grey.data[i];
   }
+}
+
+GigeSensor::Frame GigeSensor::exposed_by_host() {
+  const auto active = output();
+  std::unique_lock lock(mutex_);
+  constexpr std::uint64_t kBySoftware = 0x80000000;
+  Strobe strobe{{kBySoftware + ++by_software_, false, clock_.now()}};
+  const auto show = on_strobe_;
+  lock.unlock();
+  if (active && show) strobe = show(*active);  // without the lock: it takes the other camera's
+  lock.lock();
+  Frame frame = new_frame(strobe.exposure);
+  frame.fault = strobe.fault;
+  last_ = frame;
+  last_->fault = GigeFault::none;
+  return frame;
+}
+
+void GigeSensor::on_strobe(std::function<Strobe(int output)> act) {
+  const std::scoped_lock lock(mutex_);
+  on_strobe_ = std::move(act);
+}
+
+std::optional<int> GigeSensor::output() const {
+  const std::scoped_lock lock(mutex_);
+  return core_ ? output_while_exposing(core_) : std::nullopt;
+}
+
+std::chrono::microseconds GigeSensor::exposure_time() const {
+  const std::scoped_lock lock(mutex_);
+  std::uint32_t us = 0;
+  if (core_) arv_fake_camera_read_register(core_, ARV_FAKE_CAMERA_REGISTER_EXPOSURE_TIME_US, &us);
+  return std::chrono::microseconds(us);
 }
 
 void GigeSensor::draw(const Frame& frame, cv::Mat& image) const {

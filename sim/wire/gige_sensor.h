@@ -25,6 +25,7 @@ struct GigeSensorOptions {
   std::chrono::microseconds frame_after{0};
   std::function<bool(const GigeExposure&)> ready;
   bool numbered = true;
+  GigeOutputs outputs = GigeOutputs::full;
 };
 
 /// One of GigeCameras: Aravis' GigE Vision camera on the wire with its own frames, ids and stamps. Line0 has the value
@@ -37,6 +38,17 @@ class GigeSensor {
   void expose(const GigeExposure& exposure, GigeFault fault);
   Result<void> plug(bool in);
   void set_clock(std::chrono::nanoseconds by);
+
+  /// An exposure that an output has shown to the other camera.
+  struct Strobe {
+    GigeExposure exposure;
+    GigeFault fault = GigeFault::none;
+  };
+  /// Called from the camera's thread at each exposure by software during which an output is active, with its number.
+  void on_strobe(std::function<Strobe(int output)> act);
+  /// Number of the output that is active while it exposes; nothing while it is unplugged.
+  [[nodiscard]] std::optional<int> output() const;
+  [[nodiscard]] std::chrono::microseconds exposure_time() const;
 
  private:
   struct Frame {
@@ -52,6 +64,7 @@ class GigeSensor {
   void fill(_ArvBuffer* buffer);
   void draw(const Frame& frame, cv::Mat& image) const;
   void send_frames(const std::stop_token& stop);
+  Frame exposed_by_host();
   [[nodiscard]] Frame new_frame(const GigeExposure& exposure);
   [[nodiscard]] bool streaming() const;
 
@@ -72,6 +85,7 @@ class GigeSensor {
   std::optional<Frame> triggered_;  // the frame of the last register write
   std::optional<Frame> last_;       // the frame before, for `stale`
   std::uint64_t by_software_ = 0;
+  std::function<Strobe(int output)> on_strobe_;
   std::jthread sender_;
 };
 

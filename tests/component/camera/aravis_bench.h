@@ -16,10 +16,12 @@ class AravisBench : public StereoCameraBench {
   using Change = std::function<void(AravisOptions&)>;
 
   explicit AravisBench(
-      const Change& change = [](auto&) {}, int late_ms = 400, const std::string& selector = "FrameStart") {
+      const Change& change = [](auto&) {}, int late_ms = 400, const std::string& selector = "FrameStart",
+      const std::string& outputs = "full") {
     far_ = std::make_unique<FarCameras>(
-        SCANRIG_GIGE_CAMERA, std::vector<std::string>{socket_, std::to_string(size_.width),
-                                                      std::to_string(size_.height), std::to_string(late_ms), selector});
+        SCANRIG_GIGE_CAMERA,
+        std::vector<std::string>{socket_, std::to_string(size_.width), std::to_string(size_.height),
+                                 std::to_string(late_ms), selector, outputs});
     EXPECT_EQ(far_->hear(), "ready");
     options_.left = {"40012345", "127.0.0.1"};
     options_.right = {"40012346", "127.0.0.2"};

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <csignal>
 #include <cstdio>
 #include <string>
 #include <vector>
@@ -35,6 +36,7 @@ class FarCameras {
   FarCameras(const FarCameras&) = delete;
   FarCameras& operator=(const FarCameras&) = delete;
   ~FarCameras() {
+    if (child_ > 0) freeze(false);
     if (in_) std::fclose(in_);
     if (child_ > 0) ::waitpid(child_, nullptr, 0);
     if (out_) std::fclose(out_);
@@ -48,6 +50,12 @@ class FarCameras {
     while (!text.empty() && text.back() == '\n') text.pop_back();
     return text;
   }
+  /// Stops the process, so that no camera replies; lets it run on.
+  void freeze(bool frozen) {
+    ::kill(child_, frozen ? SIGSTOP : SIGCONT);
+    if (frozen) ::waitpid(child_, nullptr, WUNTRACED);
+  }
+
   std::string tell(const std::string& words) {
     std::fprintf(in_, "%s\n", words.c_str());
     std::fflush(in_);

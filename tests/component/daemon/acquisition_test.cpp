@@ -112,6 +112,29 @@ TEST_F(AcquisitionTest, ACameraThatStaysAwayFailsTheViewByItsName) {
   EXPECT_TRUE(acquisition.take_view({"job", 0, 0}, {0.0}));
 }
 
+/// A projector that a camera fires: it can be switched off once the cameras have been prepared.
+class FiredByCamera final : public Projector {
+ public:
+  explicit FiredByCamera(const fakes::TriggerLine& line) : line_(line) {}
+  Result<void> fire(Light, Deadline) override { return {}; }
+  Result<void> turn_off(Deadline) override {
+    if (line_.ready_at == Clock::TimePoint{}) return fail(ErrorCode::io, "projector: left camera: not connected");
+    return {};
+  }
+  void request_off() noexcept override {}
+
+ private:
+  const fakes::TriggerLine& line_;
+};
+
+TEST_F(AcquisitionTest, TheFirstCheckFindsAProjectorThatACameraFires) {
+  clock.sleep_for(std::chrono::seconds(1));
+  FiredByCamera projector(rig.line);
+  auto devices = rig.devices();
+  Acquisition with_strobe({devices.turntable, projector, devices.camera, devices.panel}, clock, {});
+  for (const auto& device : with_strobe.check().devices) EXPECT_FALSE(device.problem) << device.name;
+}
+
 TEST_F(AcquisitionTest, AnInterruptedExposureIsNotRedone) {
   ASSERT_TRUE(acquisition.home());
   rig.line.at_fire = [&] {

@@ -33,6 +33,9 @@ class OpenDevicesTest : public config::RigFile {
     ASSERT_TRUE(opened) << opened.error().message;
     devices_ = std::move(*opened);
   }
+  static constexpr const char* kStrobe =
+      "[projector]\ndriver = \"camera-strobe\"\nline = \"Line1\"\nplain_line = \"Line2\"\nwarm_up_s = 0\n";
+
   Deadline soon() { return Deadline::after(clock_, std::chrono::milliseconds(500)); }
 
   RealClock clock_;
@@ -90,6 +93,30 @@ TEST_F(OpenDevicesTest, AProjectorOnThePanelsModuleIsMadeDarkBesideARedLamp) {
   EXPECT_TRUE(made.panel) << made.panel.error().message;
   EXPECT_TRUE(io.coil(kRed));
   EXPECT_FALSE(io.coil(kDots) || io.coil(kPlain));
+}
+
+TEST_F(OpenDevicesTest, AProjectorOnACameraFailsByNameUntilTheCameraIsConnected) {
+  const auto rig = read(with_section("[projector]", "[stereo_camera]", kStrobe));
+  ASSERT_TRUE(rig) << rig.error().message;
+  const auto opened = open_devices(*rig, clock_);
+  ASSERT_TRUE(opened) << opened.error().message;
+  const auto fired = opened->projector->fire(Light::pattern, Deadline::after(clock_, std::chrono::seconds(5)));
+  ASSERT_FALSE(fired);
+  EXPECT_EQ(fired.error().code, ErrorCode::io);
+  EXPECT_THAT(fired.error().message, HasSubstr("projector: left camera 40012345"));
+  const auto off = opened->projector->turn_off(soon());
+  ASSERT_FALSE(off);
+  EXPECT_THAT(off.error().message, HasSubstr("the light may be on"));
+}
+
+/// The camera ends its light itself, and may still belong to the process that died.
+TEST_F(OpenDevicesTest, AProjectorOnACameraIsSafeWithoutTheCamera) {
+  write(with_section("[projector]", "[stereo_camera]", kStrobe));
+  const auto config = config::read_device_config(config::SafetyDevice::projector, file_, folder_);
+  ASSERT_TRUE(config) << config.error().message;
+  const Result<config::RigConfig> none = fail(ErrorCode::not_found, "not of this test");
+  const auto made = make_safe({none, config, none}, clock_, Deadline::after(clock_, std::chrono::seconds(5)));
+  EXPECT_TRUE(made.projector) << made.projector.error().message;
 }
 
 TEST_F(OpenDevicesTest, SimulatedCamerasAreTheirOwners) {
