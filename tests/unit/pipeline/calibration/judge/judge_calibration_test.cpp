@@ -1,0 +1,118 @@
+#include "pipeline/calibration/judge/judge_calibration.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/pipeline/calibration/synthetic_board_rig.h"
+
+namespace scanrig {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+TEST(JudgeCalibration, ACleanRigIsGradeAWithoutASentence) {
+  SyntheticBoardRig rig({}, 101);
+  const auto judged = judge_calibration(rig.observe());
+  ASSERT_TRUE(judged) << judged.error().message;
+  EXPECT_EQ(to_string(judged->judgement.grade), "A");
+  ASSERT_TRUE(judged->judgement.cross_validation);
+  EXPECT_LT(judged->judgement.cross_validation->ratio(), 1.5);
+  EXPECT_GT(judged->judgement.cross_validation->difference, 0.2);
+  EXPECT_THAT(judged->judgement.sentences, IsEmpty());
+}
+
+TEST(JudgeCalibration, ALensThatBrownDoesNotKnowShowsBetweenAAndB) {
+  RigFaults faults;
+  faults.lens_px = 0.1;
+  SyntheticBoardRig rig(faults, 102);
+  CalibrationInput input = rig.observe();
+  input.lens_field = false;
+  const auto judged = judge_calibration(input);
+  ASSERT_TRUE(judged) << judged.error().message;
+  EXPECT_GT(judged->judgement.cross_validation->ratio(), 2.5);
+  EXPECT_NE(to_string(judged->judgement.grade), "A");
+  EXPECT_THAT(judged->judgement.sentences, Contains(HasSubstr("A and B differ by")));
+}
+
+TEST(JudgeCalibration, ACameraThatMovedHalfWayIsNamed) {
+  RigFaults faults;
+  faults.noise_px = 0.05;
+  faults.moved_px = 0.05;
+  SyntheticBoardRig rig(faults, 103);
+  const auto judged = judge_calibration(rig.observe());
+  ASSERT_TRUE(judged) << judged.error().message;
+  ASSERT_TRUE(judged->judgement.change);
+  EXPECT_EQ(judged->judgement.change->kind, RigChange::Kind::camera);
+  EXPECT_EQ(judged->judgement.change->camera, 1);
+  EXPECT_EQ(judged->judgement.change->placement, 3);
+  EXPECT_THAT(judged->judgement.sentences, Contains(StartsWith("Right camera moved after placement 3 (0.0")));
+  EXPECT_NE(to_string(judged->judgement.grade), "A");
+}
+
+TEST(JudgeCalibration, ABoardThatSlippedIsNamed) {
+  RigFaults faults;
+  faults.slipped_placement = 5;
+  SyntheticBoardRig rig(faults, 104);
+  const auto judged = judge_calibration(rig.observe());
+  ASSERT_TRUE(judged) << judged.error().message;
+  EXPECT_THAT(judged->judgement.sentences, Contains(StartsWith("Board slipped in placement 5")));
+}
+
+TEST(JudgeCalibration, ASecondLengthThatContradictsIsRefused) {
+  RigFaults faults;
+  faults.board_scale = 1.003;
+  SyntheticBoardRig rig(faults, 105);
+  CalibrationInput input = rig.observe();
+  const auto alone = judge_calibration(input);
+  ASSERT_TRUE(alone);
+  EXPECT_EQ(to_string(alone->judgement.grade), "A");  // no image shows it
+  input.second_length = MeasuredLength{200.0, 200.6, 0.02};
+  const auto judged = judge_calibration(input);
+  ASSERT_TRUE(judged);
+  EXPECT_EQ(to_string(judged->judgement.grade), "refused");
+  EXPECT_THAT(judged->judgement.sentences, Contains(StartsWith("Second length differs by 0.30 %")));
+}
+
+TEST(JudgeCalibration, WithoutALengthItIsGradeCAtBest) {
+  SyntheticBoardRig rig({}, 106);
+  CalibrationInput input = rig.observe();
+  input.length.reset();
+  for (auto& corner : input.pairs[10].left.corners) corner.blur_px = 2.0;
+  const auto judged = judge_calibration(input);
+  ASSERT_TRUE(judged);
+  EXPECT_EQ(to_string(judged->judgement.grade), "C");
+  EXPECT_THAT(judged->judgement.sentences, Contains("No measured length: sizes uncertain by 0.3 %."));
+  EXPECT_THAT(judged->judgement.sentences, Contains("Placement 2 image 4 blurred, left out: focus or settling."));
+}
+
+TEST(JudgeCalibration, ATableThatTurnsTheOtherWayByAnotherGearIsRefused) {
+  RigFaults faults;
+  faults.gear = -1.00334;
+  faults.axis_tilt_deg = 0.06;
+  SyntheticBoardRig rig(faults, 107);
+  CalibrationInput input = rig.observe();
+  input.gear_ratio = 90.0;
+  const auto judged = judge_calibration(input);
+  ASSERT_TRUE(judged) << judged.error().message;
+  EXPECT_EQ(to_string(judged->judgement.grade), "refused");
+  EXPECT_THAT(judged->judgement.sentences, Contains(StartsWith("Table turns the other way")));
+  EXPECT_THAT(judged->judgement.sentences, Contains(StartsWith("Gear ratio 89.7")));
+  EXPECT_THAT(judged->judgement.sentences, Contains(StartsWith("Axis and table top 0.06 deg")));
+}
+
+TEST(JudgeCalibration, SwappedCamerasAreNamed) {
+  SyntheticBoardRig rig({}, 108);
+  CalibrationInput input = rig.observe();
+  for (auto& pair : input.pairs) std::swap(pair.left, pair.right);
+  const auto judged = judge_calibration(input);
+  ASSERT_TRUE(judged) << judged.error().message;
+  EXPECT_EQ(to_string(judged->judgement.grade), "refused");
+  ASSERT_FALSE(judged->judgement.sentences.empty());
+  EXPECT_EQ(judged->judgement.sentences.front(), "Left and right cameras swapped: exchange the serials.");
+}
+
+}  // namespace
+}  // namespace scanrig

@@ -1,0 +1,191 @@
+#include "pipeline/calibration/solve/solve_calibration.h"
+
+#include <gtest/gtest.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <cmath>
+#include <ctime>
+
+#include "tests/unit/pipeline/calibration/synthetic_board_rig.h"
+
+namespace scanrig {
+namespace {
+
+RigFaults all_faults() {
+  RigFaults faults;
+  faults.print_mm = 0.008;
+  faults.warp_mm = 0.1;
+  faults.gear_deg = 0.01;
+  faults.runout_mm = 0.002;
+  faults.lens_px = 0.03;
+  return faults;
+}
+
+double seconds_of_this_program() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+
+TEST(SolveCalibration, AllFaultsTogetherCostFewMicrometres) {
+  SyntheticBoardRig rig(all_faults(), 100);
+  const double before = seconds_of_this_program();
+  const auto solved = solve_calibration(rig.observe());
+  const double seconds = seconds_of_this_program() - before;
+  ASSERT_TRUE(solved) << solved.error().message;
+  const auto error = rig.error_of(solved->calibration);
+  EXPECT_LT(error.rms, 4.0);
+  EXPECT_LT(error.max, 11.0);
+  EXPECT_LT(std::abs(error.scale_ppm), 100.0);
+  EXPECT_LT(std::abs(error.height), 40.0);
+  EXPECT_TRUE(solved->has_lens_field);
+  // The corners' print error is 0.05 px: solved for, it is no noise.
+  EXPECT_LT(solved->noise_px, 0.022);
+  RecordProperty("seconds", std::to_string(seconds));
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  EXPECT_LT(seconds, 15.0);
+  EXPECT_LT(usage.ru_maxrss, 1024 * 1024);
+#endif
+}
+
+TEST(SolveCalibration, PredictsItsError) {
+  double actual = 0.0, predicted = 0.0;
+  for (unsigned seed = 1; seed <= 12; ++seed) {
+    SyntheticBoardRig rig(all_faults(), seed);
+    const auto solved = solve_calibration(rig.observe());
+    ASSERT_TRUE(solved) << solved.error().message;
+    const auto error = rig.error_of(solved->calibration);
+    actual += error.rms * error.rms;
+    predicted += solved->sigma->volume * solved->sigma->volume;
+    EXPECT_LT(error.rms, 4.0) << seed;
+  }
+  RecordProperty("ratio", std::to_string(std::sqrt(actual / predicted)));
+  EXPECT_GT(std::sqrt(actual / predicted), 0.8);
+  EXPECT_LT(std::sqrt(actual / predicted), 1.3);
+}
+
+TEST(SolveCalibration, AnIdealRigNeedsNoLensField) {
+  SyntheticBoardRig rig({}, 7);
+  const auto solved = solve_calibration(rig.observe());
+  ASSERT_TRUE(solved) << solved.error().message;
+  EXPECT_FALSE(solved->has_lens_field);
+  EXPECT_LT(rig.error_of(solved->calibration).rms, 1.5);
+  EXPECT_NEAR(solved->noise_px, 0.02, 0.001);
+}
+
+TEST(SolveCalibration, ANominalFocalLengthThreePerCentOffGivesTheSame) {
+  SyntheticBoardRig rig({}, 8);
+  CalibrationInput input = rig.observe();
+  const auto near = solve_calibration(input);
+  input.nominal_focal_px *= 1.03;
+  const auto off = solve_calibration(input);
+  ASSERT_TRUE(near && off);
+  const auto a = rig.error_of(near->calibration), b = rig.error_of(off->calibration);
+  EXPECT_NEAR(a.rms, b.rms, 0.05);
+  EXPECT_NEAR(near->calibration.left.projection.fx, off->calibration.left.projection.fx, 0.05);
+}
+
+TEST(SolveCalibration, SameInputSameBits) {
+  SyntheticBoardRig rig(all_faults(), 9);
+  const CalibrationInput input = rig.observe();
+  const auto a = solve_calibration(input), b = solve_calibration(input);
+  ASSERT_TRUE(a && b);
+  EXPECT_EQ(a->calibration.left.projection.fx, b->calibration.left.projection.fx);
+  EXPECT_EQ(a->calibration.right.camera_from_turntable.matrix(), b->calibration.right.camera_from_turntable.matrix());
+  EXPECT_EQ(a->camera_covariance, b->camera_covariance);
+  EXPECT_EQ(a->sigma->volume, b->sigma->volume);
+}
+
+TEST(SolveCalibration, OutliersAndABadImageDoNotMatter) {
+  RigFaults faults = all_faults();
+  faults.outlier_share = 0.01;
+  SyntheticBoardRig rig(faults, 10);
+  CalibrationInput input = rig.observe();
+  for (auto& corner : input.pairs[11].right.corners) corner.pixel += Eigen::Vector2d(0.4, 0.3);
+  for (auto& corner : input.pairs[24].left.corners) corner.blur_px = 1.9;
+  const auto solved = solve_calibration(input);
+  ASSERT_TRUE(solved) << solved.error().message;
+  EXPECT_LT(rig.error_of(solved->calibration).rms, 4.0);
+  std::vector<std::string> out;
+  for (const ImageFit& image : solved->images) {
+    if (!image.is_used) out.push_back(image.name + (image.camera == 0 ? " left " : " right ") + image.left_out_because);
+  }
+  ASSERT_EQ(out.size(), 2U) << ::testing::PrintToString(out);
+  EXPECT_EQ(out[0].substr(0, 37), "placement 2 image 5 right does not fi");
+  EXPECT_EQ(out[1], "placement 4 image 4 left blurred");
+}
+
+TEST(SolveCalibration, RimDotsShowTheTableTop) {
+  RigFaults faults;
+  faults.has_dots = true;
+  SyntheticBoardRig rig(faults, 11);
+  CalibrationInput input = rig.observe();
+  input.board.thickness_mm = 3.4;  // wrong, and not needed
+  const auto solved = solve_calibration(input);
+  ASSERT_TRUE(solved) << solved.error().message;
+  EXPECT_LT(solved->sigma->base, 6.0);
+  EXPECT_LT(std::abs(rig.error_of(solved->calibration).height), 15.0);
+  EXPECT_GT(solved->table.dots.size(), 20U);
+}
+
+TEST(SolveCalibration, TheMeasuredLengthSetsTheScale) {
+  RigFaults faults;
+  faults.board_scale = 1.003;
+  SyntheticBoardRig rig(faults, 12);
+  CalibrationInput input = rig.observe();
+  input.length = MeasuredLength{100.0, 100.3, 0.01};
+  const auto solved = solve_calibration(input);
+  ASSERT_TRUE(solved);
+  EXPECT_LT(std::abs(rig.error_of(solved->calibration).scale_ppm), 50.0);
+  EXPECT_NEAR(solved->board.scale_sigma, 1e-4, 1e-5);
+  input.length.reset();
+  const auto unknown = solve_calibration(input);
+  ASSERT_TRUE(unknown);
+  EXPECT_NEAR(unknown->board.scale_sigma, 3e-3, 1e-4);
+}
+
+TEST(SolveCalibration, HandHeldBoardsGiveTheStereoPair) {
+  SyntheticBoardRig rig({}, 13);
+  const auto solved = solve_calibration(rig.observe_hand_held(20));
+  ASSERT_TRUE(solved) << solved.error().message;
+  EXPECT_FALSE(solved->sigma.has_value());
+  EXPECT_TRUE(solved->calibration.left.camera_from_turntable.isApprox(Transform::Identity(), 1e-12));
+  const Eigen::Isometry3d found = solved->calibration.right.camera_from_turntable;
+  EXPECT_NEAR(found.inverse().translation().norm(), rig.stereo().inverse().translation().norm(), 0.1);
+  EXPECT_LT(rotation_angle(found.linear().transpose() * rig.stereo().linear()), 1e-3);
+}
+
+TEST(SolveCalibration, RefusesWhatItCannotSolve) {
+  SyntheticBoardRig rig({}, 14);
+  CalibrationInput input = rig.observe();
+  const auto code_of = [](const CalibrationInput& wrong) {
+    const auto solved = solve_calibration(wrong);
+    return solved ? "solved" : std::string(to_string(solved.error().code));
+  };
+  CalibrationInput wrong = input;
+  wrong.nominal_focal_px = 0.0;
+  EXPECT_EQ(code_of(wrong), "invalid_input");
+  wrong = input;
+  wrong.length = MeasuredLength{100.0, 100.0, 0.0};
+  EXPECT_EQ(code_of(wrong), "invalid_input");
+  wrong = input;
+  wrong.pairs[3].left.corners[5].id = 88;
+  EXPECT_EQ(code_of(wrong), "invalid_input");
+  wrong = input;
+  wrong.pairs.resize(1);
+  EXPECT_EQ(code_of(wrong), "degenerate");
+  wrong = input;
+  for (auto& pair : wrong.pairs) pair.angle_rad = 0.0;  // the table does not turn
+  EXPECT_EQ(code_of(wrong), "degenerate");
+}
+
+TEST(SolveCalibration, StopsOnRequest) {
+  SyntheticBoardRig rig({}, 15);
+  std::stop_source source;
+  source.request_stop();
+  const auto solved = solve_calibration(rig.observe(), {source.get_token(), {}});
+  ASSERT_FALSE(solved);
+  EXPECT_EQ(solved.error().code, ErrorCode::stopped);
+}
+
+}  // namespace
+}  // namespace scanrig
