@@ -226,6 +226,48 @@ void add_reconstruct(CLI::App& app, Chosen& chosen) {
   sub->callback([&chosen, verb] { chosen = [verb] { return reconstruct(*verb); }; });
 }
 
+void add_board_options(CLI::App& sub, BoardOptions& board, bool& named) {
+  const auto is_named = [&named](const auto&) { named = true; };
+  sub.add_option("--board", board.squares, "squares of the board")->capture_default_str()->each(is_named);
+  sub.add_option("--square-mm", board.square_mm, "side of a square")->capture_default_str()->each(is_named);
+  sub.add_option("--marker-mm", board.marker_mm, "side of a marker")->capture_default_str()->each(is_named);
+  sub.add_option("--dictionary", board.dictionary, "OpenCV's markers")->capture_default_str()->each(is_named);
+  sub.add_option("--thickness-mm", board.thickness_mm, "of the board")->capture_default_str()->each(is_named);
+  sub.add_flag_callback(
+      "--chessboard", [&board, &named] { board.chessboard = named = true; }, "a board without markers");
+}
+
+void add_calibrate(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<CalibrateVerb>();
+  auto* sub = app.add_subcommand("calibrate", "make calibration.json from images of a calibration board");
+  sub->add_option("DIR", verb->images, "folder of the images")->required();
+  sub->add_option("--out", verb->out, "the file to write; one that is there is kept under another name")
+      ->capture_default_str();
+  add_board_options(*sub, verb->board, verb->has_board);
+  sub->add_flag("--paper", verb->paper, "the board is printed on paper");
+  sub->add_option("--length", verb->length_mm, "first to last corner of a row as measured, mm, and its uncertainty")
+      ->expected(2);
+  sub->add_option("--second-length", verb->second_length_mm, "the same with another instrument, compared only")
+      ->expected(2);
+  sub->add_option("--rim-dots", verb->rim_dots, "dots on the table's rim: COUNTxRADIUSxDIAMETER, mm");
+  sub->add_option("--focal-px", verb->options.focal_px, "focal length, within 10 %")->check(CLI::PositiveNumber);
+  sub->add_option("--pixel-format", verb->options.pixel_format, "of images without a list")
+      ->check(CLI::IsMember({"Mono8", "BayerRG8", "BGR8"}));
+  sub->add_option("--threads", verb->options.threads, "threads; 0: all of the machine's")->check(CLI::Range(0, 1024));
+  sub->add_flag("--json", verb->json, "print JSON");
+  sub->callback([&chosen, verb] { chosen = [verb] { return calibrate(*verb); }; });
+}
+
+void add_board(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<BoardVerb>();
+  const auto ignored = std::make_shared<bool>();
+  auto* sub = app.add_subcommand("board", "print a calibration board as PDF, to scale");
+  sub->add_option("--out", verb->out, "the PDF to write")->required();
+  add_board_options(*sub, verb->board, *ignored);
+  sub->add_option("--page-mm", verb->page_mm, "width and height of the page (default: A4 landscape)")->expected(2);
+  sub->callback([&chosen, verb, ignored] { chosen = [verb] { return board(*verb); }; });
+}
+
 void add_evaluate(CLI::App& app, Chosen& chosen) {
   const auto verb = std::make_shared<EvaluateVerb>();
   auto* sub = app.add_subcommand("evaluate", "compare a model with the truth of a simulated scan");
@@ -290,6 +332,8 @@ void add_offline_commands(CLI::App& app, Chosen& chosen) {
   add_reconstruct(app, chosen);
   add_evaluate(app, chosen);
   add_import(app, chosen);
+  add_calibrate(app, chosen);
+  add_board(app, chosen);
   add_check_config(app, chosen);
   add_token(app, chosen);
 }

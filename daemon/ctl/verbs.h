@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/result.h"
+#include "pipeline/calibrate/calibrate_images.h"
 #include "pipeline/reconstruct/reconstruct.h"
 
 /// The verbs of the scanrig command. Each prints its result on stdout, or one sentence "scanrig: ..." on stderr.
@@ -103,6 +104,36 @@ struct ReconstructVerb {
   bool lines = false;  ///< for programs: "STAGE<tab>FRACTION", and "failed<tab>CODE<tab>MESSAGE" at the end
 };
 ExitCode reconstruct(const ReconstructVerb& verb);
+
+/// A calibration board as it is named at the command line.
+struct BoardOptions {
+  std::string squares = "12x9";
+  double square_mm = 10.0;
+  double marker_mm = 6.0;
+  std::string dictionary = "4x4_100";
+  double thickness_mm = 3.0;
+  bool chessboard = false;  ///< no markers
+};
+
+struct CalibrateVerb {
+  std::filesystem::path images;
+  std::filesystem::path out = "calibration.json";
+  BoardOptions board;
+  bool has_board = false;  ///< else that of the folder's list
+  bool paper = false;
+  std::vector<double> length_mm, second_length_mm;  ///< measured, and its standard uncertainty
+  std::string rim_dots;                             ///< COUNTxRADIUSxDIAMETER
+  CalibrateOptions options;
+  bool json = false;
+};
+ExitCode calibrate(const CalibrateVerb& verb);
+
+struct BoardVerb {
+  std::filesystem::path out;
+  BoardOptions board;
+  std::vector<double> page_mm;
+};
+ExitCode board(const BoardVerb& verb);
 
 struct EvaluateVerb {
   std::filesystem::path scan;

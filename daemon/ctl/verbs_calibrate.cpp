@@ -1,0 +1,185 @@
+#include <fmt/ranges.h>
+#include <unistd.h>
+#include <algorithm>
+#include <charconv>
+#include <chrono>
+#include <nlohmann/json.hpp>
+
+#include "core/files.h"
+#include "core/hash.h"
+#include "daemon/ctl/output.h"
+#include "daemon/ctl/verbs.h"
+#include "daemon/runtime/catch_exceptions.h"
+#include "daemon/runtime/signal_stop.h"
+#include "daemon/station/timestamp.h"
+#include "pipeline/calibrate/calibration_json.h"
+#include "pipeline/calibration/board/print_board.h"
+
+namespace scanrig::ctl {
+namespace {
+
+/// The numbers of "12x9" or "40x84.5x2.4"; empty if there are not `count` of them.
+std::vector<double> numbers_of(const std::string& text, std::size_t count) {
+  std::vector<double> numbers;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find('x', begin), text.size());
+    double value = 0.0;
+    const auto read = std::from_chars(text.data() + begin, text.data() + end, value);
+    if (read.ec != std::errc() || read.ptr != text.data() + end) return {};
+    numbers.push_back(value);
+    begin = end + 1;
+  }
+  return numbers.size() == count ? numbers : std::vector<double>{};
+}
+
+Result<Board> board_of(const BoardOptions& options) {
+  const auto squares = numbers_of(options.squares, 2);
+  if (squares.empty()) {
+    return fail(ErrorCode::invalid_input, "--board {}: must be COLUMNSxROWS in squares, as 12x9", options.squares);
+  }
+  Board board;
+  board.columns = static_cast<int>(squares[0]);
+  board.rows = static_cast<int>(squares[1]);
+  board.square_mm = options.square_mm;
+  board.thickness_mm = options.thickness_mm;
+  board.markers = BoardMarkers{options.marker_mm, options.dictionary};
+  if (options.chessboard) board.markers.reset();
+  if (auto possible = check_board(board); !possible) return pass_on(possible);
+  return board;
+}
+
+/// A measured length of the longest row of corners.
+std::optional<MeasuredLength> row_length(const std::vector<double>& measured, const Board& board) {
+  if (measured.size() != 2) return std::nullopt;
+  return MeasuredLength{(board.corner_columns() - 1) * board.square_mm, measured[0], measured[1]};
+}
+
+Result<CalibrateOptions> options_of(const CalibrateVerb& verb, const CalibrationImages& images) {
+  CalibrateOptions options = verb.options;
+  const auto named = board_of(verb.board);
+  if (!named) return pass_on(named);
+  if (verb.has_board) options.board = *named;
+  const Board board = verb.has_board ? *named : images.board.value_or(*named);
+  if (verb.paper) options.board_kind = BoardKind::paper;
+  options.length = row_length(verb.length_mm, board);
+  options.second_length = row_length(verb.second_length_mm, board);
+  if (!verb.rim_dots.empty()) {
+    const auto dots = numbers_of(verb.rim_dots, 3);
+    if (dots.empty()) {
+      return fail(ErrorCode::invalid_input, "--rim-dots {}: must be COUNTxRADIUSxDIAMETER in mm, as 40x84.5x2.4",
+                  verb.rim_dots);
+    }
+    options.rim_dots = RimDots{static_cast<int>(dots[0]), dots[1], dots[2]};
+  }
+  return options;
+}
+
+std::string hash_of_file(const std::filesystem::path& file) {
+  const auto bytes = read_file(file);
+  return bytes ? sha256(*bytes) : std::string();
+}
+
+CalibrationOrigin origin_of(const CalibrateVerb& verb, const CalibrationImages& images) {
+  CalibrationOrigin origin;
+  origin.date = iso_time(std::chrono::system_clock::now());
+  origin.previous = hash_of_file(verb.out);
+  for (const CalibrationPair& pair : images.pairs) {
+    for (const auto& file : pair.files) origin.sources.emplace_back(file.filename().string(), hash_of_file(file));
+  }
+  return origin;
+}
+
+/// The file that stood there before, under the name of its hash.
+Result<void> keep_previous(const CalibrateVerb& verb, const std::string& hash) {
+  if (hash.empty()) return {};
+  const auto text = read_file(verb.out);
+  if (!text) return pass_on(text);
+  auto kept = verb.out;
+  kept.replace_extension(hash.substr(0, 8) + verb.out.extension().string());
+  return write_file_atomically(kept, *text);
+}
+
+void print_outcome(const CalibrateVerb& verb, const CalibrationOutcome& outcome) {
+  const SolvedCalibration& solved = outcome.judged.solved;
+  const CalibrationJudgement& judgement = outcome.judged.judgement;
+  const auto used = std::ranges::count_if(solved.images, &ImageFit::is_used);
+  if (verb.json) {
+    nlohmann::ordered_json json{{"grade", to_string(judgement.grade)}, {"graded_um", judgement.graded_um},
+                                {"images", solved.images.size()},      {"used", used},
+                                {"noise_px", solved.noise_px},         {"sentences", judgement.sentences}};
+    if (solved.sigma) {
+      json["volume_um"] = solved.sigma->volume;
+      json["scale_um"] = solved.sigma->scale;
+    }
+    if (const auto& ab = judgement.cross_validation) json["a_b_ratio"] = ab->ratio();
+    for (const ImageRemark& remark : outcome.boards.remarks) {
+      json["remarks"].push_back({{"pair", remark.pair},
+                                 {"camera", remark.side == 0 ? "left" : "right"},
+                                 {"message", remark.message},
+                                 {"left_out", remark.is_left_out}});
+    }
+    fmt::print("{}\n", json.dump(2));
+    return;
+  }
+  for (const ImageRemark& remark : outcome.boards.remarks) {
+    fmt::print("  {}, {}: {}{}\n", remark.pair, remark.side == 0 ? "left" : "right", remark.message,
+               remark.is_left_out ? " (left out)" : "");
+  }
+  for (const std::string& sentence : judgement.sentences) fmt::print("  {}\n", sentence);
+  fmt::print("grade {}: ", to_string(judgement.grade));
+  if (solved.sigma) {
+    fmt::print("{:.1f} um in the working volume, lengths to {:.1f} um, ", solved.sigma->volume, solved.sigma->scale);
+  }
+  fmt::print("{} of {} images, corners to {:.3f} px\n", used, solved.images.size(), solved.noise_px);
+}
+
+}  // namespace
+
+ExitCode calibrate(const CalibrateVerb& verb) {
+  const auto images = read_calibration_images(verb.images);
+  if (!images) return report_error(images.error());
+  const auto options = options_of(verb, *images);
+  if (!options) return report_error(options.error());
+
+  const SignalStop stop;
+  std::FILE* told = verb.json ? stderr : stdout;  // bars beside the JSON, not in it
+  StageBars bars(told, ::isatty(::fileno(told)) == 1);
+  const auto outcome = catch_exceptions("the calibration", [&] {
+    return calibrate_images(*images, *options, {stop.token(), [&](std::string_view stage, double fraction) {
+                                                  bars.update(std::string(stage), fraction);
+                                                }});
+  });
+  bars.end(outcome.has_value());
+  if (!outcome) return report_error(outcome.error());
+  print_outcome(verb, *outcome);
+
+  const auto origin = origin_of(verb, *images);
+  const auto text = calibration_json(*outcome, origin);
+  if (!text) return report_error(text.error());
+  if (auto kept = keep_previous(verb, origin.previous); !kept) return report_error(kept.error());
+  if (auto written = write_file_atomically(verb.out, *text); !written) return report_error(written.error());
+  if (!verb.json) fmt::print("{}\n", verb.out.string());
+  return ExitCode::ok;
+}
+
+ExitCode board(const BoardVerb& verb) {
+  const auto wanted = board_of(verb.board);
+  if (!wanted) return report_error(wanted.error());
+  PageOptions page;
+  if (verb.page_mm.size() == 2) {
+    page.width_mm = verb.page_mm[0];
+    page.height_mm = verb.page_mm[1];
+  }
+  std::error_code ignored;
+  if (std::filesystem::exists(verb.out, ignored)) {
+    return report_error({ErrorCode::exists, verb.out.string() + ": already there; name another file with --out"});
+  }
+  const auto pdf = print_board(*wanted, page);
+  if (!pdf) return report_error(pdf.error());
+  if (auto written = write_file_atomically(verb.out, *pdf); !written) return report_error(written.error());
+  fmt::print("{}\nPrint it at 100 %, then measure its length marks: {}\n", verb.out.string(),
+             board_check_line(*wanted));
+  return ExitCode::ok;
+}
+
+}  // namespace scanrig::ctl
