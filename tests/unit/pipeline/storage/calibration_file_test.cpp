@@ -58,6 +58,25 @@ TEST_F(CalibrationFileTest, ValuesNoRigCanHaveAreRefused) {
   expect_refused("[0.1, -0.2, 0.001, 0.002, 0.05]", "[0.1]", "left.distortion");
 }
 
+TEST_F(CalibrationFileTest, ALensFieldIsReadWhereThereIsOne) {
+  std::string du = "0.5", dv = "-0.25";
+  for (int i = 1; i < 42; ++i) {
+    du += ", 0.5";
+    dv += ", -0.25";
+  }
+  const std::string field = "\"lens_correction\": { \"du\": [" + du + "], \"dv\": [" + dv + "] }, \"serial\"";
+  const auto plain = read(calibration_json());
+  const auto calibration = read(replaced(calibration_json(), "\"serial\"", field));
+  ASSERT_TRUE(calibration) << calibration.error().message;
+  ASSERT_TRUE(calibration->left.lens_field);
+  EXPECT_FALSE(plain->left.lens_field);
+  const Eigen::Vector3d point(2.0, 30.0, 4.0);
+  const Eigen::Vector2d shift = calibration->left.project(point) - plain->left.project(point);
+  EXPECT_LT((shift - Eigen::Vector2d(0.5, -0.25)).norm(), 1e-12);
+  expect_refused("\"serial\"", "\"lens_correction\": { \"du\": [1], \"dv\": [" + dv + "] }, \"serial\"",
+                 "left.lens_correction.du");
+}
+
 TEST_F(CalibrationFileTest, KeysAreStrict) {
   expect_refused("\"serial\"", "\"colour\": 1, \"serial\"", "left.colour");
   expect_refused("\"date\"", "\"day\"", "date");
