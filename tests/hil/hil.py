@@ -21,7 +21,7 @@ import station as stations
 from station import Station
 
 MOST_S = 5  # of a scan, until the machine is killed
-COLD_S, CACHED_S = 600, 240
+COLD_S, CACHED_S = 660, 300
 CORES = 2
 
 
@@ -73,6 +73,8 @@ def rows(rendered):
           lambda s: scenario.pose(s, rendered)),
          ("gige", "one pose of 8 views: LightCrafter over USB/IP, two GigE cameras at its trigger output",
           "whole scan folder", lambda s: scenario.usb_and_gige(s, rendered)),
+         ("shipped_example", "config/rigs/example.toml: libgpiod, Modbus on ftdi_sio, two GigE cameras",
+          "two poses of 8 views", lambda s: scenario.shipped_example(s, rendered)),
          ("uart", "table homed and turned: Modbus on the kernel's 8250", "at its angle", scenario.uart),
          ("vivid", "two vivid devices as a pair: V4L2", "images, a pair on disk", scenario.vivid)]]
 
@@ -148,8 +150,8 @@ def run(options, work, table):
 def main():
     parser = argparse.ArgumentParser(prog="./dev hil", description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="+", metavar="ROW",
-                        help="unit, failing, serial, estop, camera, killed, watchdog, pose, gige, uart, vivid; "
-                        "without the kills of the machine")
+                        help="unit, failing, serial, estop, camera, killed, watchdog, pose, gige, shipped_example, "
+                        "uart, vivid; without the kills of the machine")
     parser.add_argument("--cold", action="store_true", help="make the machine's images anew, and render what it sees")
     parser.add_argument("--bin", type=pathlib.Path, required=True, help=argparse.SUPPRESS)
     options = parser.parse_args()

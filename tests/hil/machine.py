@@ -193,9 +193,10 @@ class Machine:
         return output.strip()
 
 
-def make_disk(file, mebibytes=4096):
-    """An empty ext4 disk, sparse, that outlives the machine."""
+def make_disk(file, mebibytes=32 << 10):
+    """An empty ext4 disk, sparse, that outlives the machine; larger than what the shipped example keeps free."""
     file.unlink(missing_ok=True)
     with file.open("wb") as disk:
         os.truncate(disk.fileno(), mebibytes << 20)
-    subprocess.run(["mke2fs", "-q", "-t", "ext4", "-L", "scans", str(file)], check=True)
+    subprocess.run(["mke2fs", "-q", "-t", "ext4", "-T", "largefile", "-J", "size=64", "-L", "scans", str(file)],
+                   check=True)

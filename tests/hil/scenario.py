@@ -101,6 +101,43 @@ def usb_and_gige(station, rendered):
     return pose(station, rendered)
 
 
+def shipped_example(station, rendered):
+    """config/rigs/example.toml: from Reset to the last view of pose 2. The cameras show the images of pose 1 twice."""
+    station.machine.do("echo 'CAMERAS=gige 10.77.0.11 10.77.0.12' >/run/hil/cameras && systemctl restart hil-cameras")
+    station.told = None  # the angle must be sent again
+    end_job(station)
+    station.machine.do(f"cp {CONFIGS}/shipped.toml {CONFIGS}/rig.toml && "
+                       "install -o scanrig -g scanrig /usr/share/hil/images/calibration.json /var/lib/scanrig/ && "
+                       f"scanrig check-config {CONFIGS}/rig.toml && systemctl start {UNITS}", 60)
+    station.wait("the cameras there", lambda: device_is_there(station, "camera"), 30)
+    station.get_ready()
+    begin = time.monotonic()
+    job = station.start()
+    wait_for_views(station, job, VIEWS)
+    station.wait("the flip requested", lambda: station.lamp("FLIP") and station.lamp("LAMP_AMBER"), 30)
+    station.tap("START")
+    wait_for_views(station, job, 2 * VIEWS)
+    took = time.monotonic() - begin
+    expect(not station.lamp("FLIP"), "the lamp that requests the flip is still lit")
+
+    def state_after_scanning():
+        state = station.ask(f"jobs/{job}")["state"]
+        return state if state in ("reconstructing", "done") else None
+
+    state = station.wait("the job beyond scanning", state_after_scanning, 30)
+    scan = station.manifest(job)
+    complete = [(pose["complete"], len(pose["views"])) for pose in scan["poses"]]
+    expect(complete == [(True, VIEWS)] * 2 and scan["state"] == "scanned", f"scan.json: {scan['state']}, {complete}")
+    formats = {view["pixel_format"] for view in station.views(job)}
+    expect(formats == {"BayerRG8"}, f"pixel formats: {formats}")
+    stored = station.image_hashes(job)
+    names = [f"view{view:02}/{image}" for view in range(VIEWS) for image in IMAGES]
+    wrong = [f"pose{pose}/{name}" for pose in (1, 2) for name in names
+             if stored.get(f"pose{pose}/{name}") != rendered[f"pose1/{name}"]]
+    expect(not wrong, f"{len(wrong)} of {2 * len(names)} images are not those that were shown: {', '.join(wrong[:4])}")
+    return f"2 poses, {2 * VIEWS} views, {2 * len(names)} images byte for byte, {took:.0f} s; then {state}"
+
+
 def uart(station):
     """The table homed and turned with the command line, at a serial port of the machine's own."""
     end_job(station)

@@ -44,9 +44,22 @@ def make_tree(build, tree, images):
     for name in ("usb-and-gige.toml", "vivid.toml"):
         other = with_sections(CONFIGS / "rig.toml", CONFIGS / name)
         (configs / name).write_text(other)
+    (configs / "shipped.toml").write_text(shipped_example())
     shutil.copytree(images, tree / "usr" / "share" / "hil" / "images")
     calibration = tree / "usr" / "share" / "hil" / "images" / "calibration.json"  # of the GigE pair, if of any
     calibration.write_text(calibration.read_text().replace("SIM-L", "40012345").replace("SIM-R", "40012346"))
+
+
+def shipped_example():
+    """config/rigs/example.toml as shipped; only the addresses of the two cameras differ."""
+    text = (image.ROOT / "config" / "rigs" / "example.toml").read_text()
+    for side, serial, end in (("left", "40012345", 11), ("right", "40012346", 12)):
+        before, after = (f'\n{side} = {{ serial = "{serial}", address = "{net}.{end}" }}'
+                         for net in ("192.168.10", "10.77.0"))
+        if text.count(before) != 1:
+            raise RuntimeError(f"config/rigs/example.toml does not have once: {before.strip()}")
+        text = text.replace(before, after)
+    return text
 
 
 def with_sections(config, sections):
