@@ -22,9 +22,10 @@ std::string pixel_format_of(const CalibrationImages& images, const CalibrateOpti
   return "Mono8";
 }
 
-std::optional<MeasuredLength> listed_length(const CalibrationImages& images, const Board& board, std::size_t which) {
-  if (which >= images.lengths.size()) return std::nullopt;
-  const BoardLength& length = images.lengths[which];
+/// The first one: others on the same board measure its print, not the instrument.
+std::optional<MeasuredLength> listed_length(const CalibrationImages& images, const Board& board) {
+  if (images.lengths.empty()) return std::nullopt;
+  const BoardLength& length = images.lengths.front();
   return MeasuredLength{(board.corner(length.to) - board.corner(length.from)).norm(), length.mm, length.sigma_mm};
 }
 
@@ -44,8 +45,8 @@ CalibrationInput input_of(const CalibrationImages& images, const CalibrateOption
   const double radius = options.table_radius_mm > 0.0 ? options.table_radius_mm : images.table_radius_mm.value_or(0.0);
   input.table_radius_mm = radius > 0.0 ? radius : kTableRadiusMm;
   input.gear_ratio = options.gear_ratio;
-  input.length = options.length ? options.length : listed_length(images, board, 0);
-  input.second_length = options.second_length ? options.second_length : listed_length(images, board, 1);
+  input.length = options.length ? options.length : listed_length(images, board);
+  input.second_length = options.second_length;
   input.lens_field = options.lens_field;
   return input;
 }

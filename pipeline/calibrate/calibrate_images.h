@@ -13,7 +13,7 @@ namespace scanrig {
 struct CalibrateOptions {
   std::optional<Board> board;  ///< none here and in the list: the station's 12 x 9 board
   BoardKind board_kind = BoardKind::glass;
-  std::optional<MeasuredLength> length;         ///< fixes the scale; none here and in the list: grade C at best
+  std::optional<MeasuredLength> length;  ///< fixes the scale; none here and in the list (its first): grade C at best
   std::optional<MeasuredLength> second_length;  ///< of another instrument, only compared
   std::string pixel_format;                     ///< empty here and in the list: by the image's channels, Mono8 or BGR8
   double focal_px = 0.0;                        ///< nominal; 0 here and in the list: 1.2 times the image's width

@@ -1,0 +1,149 @@
+// A rendered series of a rig drawn at random becomes a calibration; only the test knows the truth.
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "core/files.h"
+#include "pipeline/calibrate/calibration_json.h"
+#include "pipeline/storage/calibration_file.h"
+#include "sim/apps/shoot_board.h"
+#include "tests/own_folder.h"
+
+namespace scanrig {
+namespace {
+
+using testing::HasSubstr;
+
+/// Where the lines of sight of both pixels are nearest to each other.
+Eigen::Vector3d triangulated(const Calibration& calibration, const Eigen::Vector2d& left,
+                             const Eigen::Vector2d& right) {
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const auto& [camera, pixel] : {std::pair(&calibration.left, left), std::pair(&calibration.right, right)}) {
+    const Transform table_from_camera = camera->camera_from_turntable.inverse();
+    const Eigen::Vector3d along = (table_from_camera.linear() * camera->ray(pixel)).normalized();
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - along * along.transpose();
+    normal += across;
+    sum += across * table_from_camera.translation();
+  }
+  return normal.ldlt().solve(sum);
+}
+
+/// Of points of the working volume as the true cameras see them, base (the height's zero) taken off; mm.
+double volume_error_mm(const Calibration& calibration, const sim::RigGeometry& truth) {
+  std::vector<Eigen::Vector3d> errors;
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const double height : {5.0, 60.0, 110.0}) {
+    for (const double radius : {0.0, 30.0, 55.0}) {
+      for (int step = 0; step < 8; ++step) {
+        const Eigen::Vector3d p(radius * std::cos(step * M_PI / 4), height, radius * std::sin(step * M_PI / 4));
+        errors.push_back(triangulated(calibration, truth.left.project(p), truth.right.project(p)) - p);
+        mean += errors.back();
+      }
+    }
+  }
+  mean /= static_cast<double>(errors.size());
+  double squares = 0.0;
+  for (const auto& error : errors) squares += (error - Eigen::Vector3d(0.0, mean.y(), 0.0)).squaredNorm();
+  return std::sqrt(squares / static_cast<double>(errors.size()));
+}
+
+class CalibrateImages : public testing::Test {
+ protected:
+  void SetUp() override { std::filesystem::remove_all(folder_); }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  void shoot(const sim::SeriesOptions& wanted) {
+    const auto shot = sim::shoot_board(wanted, folder_);
+    ASSERT_TRUE(shot) << shot.error().message;
+    auto series = sim::CalibrationSeries::create(wanted);
+    ASSERT_TRUE(series) << series.error().message;
+    truth_ = (*series)->rig().geometry;
+  }
+  /// Half the resolution; three of the plan's placements beside the flat one, with few angles.
+  static sim::SeriesOptions series() {
+    sim::SeriesOptions options;
+    options.rig = sim::RigVariation{.seed = 5};
+    options.image_scale = 0.5;
+    options.placements = {1, 2, 3, 4, 6, 7};
+    options.angles = 4;
+    return options;
+  }
+  Result<CalibrationOutcome> calibrate(const CalibrateOptions& options = {}) {
+    const auto images = read_calibration_images(folder_);
+    if (!images) return pass_on(images);
+    return calibrate_images(*images, options);
+  }
+
+  const std::filesystem::path folder_ = own_folder("calibrate_");
+  sim::RigGeometry truth_;
+};
+
+TEST_F(CalibrateImages, OfADrawnRigMeasuresItsWorkingVolumeAndIsReadBack) {
+  shoot(series());
+  CalibrateOptions options;
+  options.rim_dots = RimDots{40, 84.5, 2.4};
+  const auto outcome = calibrate(options);
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  const auto& judged = outcome->judged;
+  EXPECT_LT(judged.judgement.graded_um, 15.0);
+  EXPECT_LT(volume_error_mm(judged.solved.calibration, truth_), 0.015);
+  EXPECT_GT(judged.solved.table.dots.size(), 20u);
+
+  const auto text = calibration_json(*outcome, {.date = "2026-11-25T03:00:00Z"});
+  ASSERT_TRUE(text) << text.error().message;
+  const auto again = parse_calibration(*text, "calibration.json");
+  ASSERT_TRUE(again) << again.error().message;
+  ASSERT_TRUE(again->quality);
+  EXPECT_EQ(again->quality->volume_um, judged.solved.sigma->volume);
+  EXPECT_EQ(again->quality->cameras.rows(), 30);
+  EXPECT_EQ(again->quality->rim_dots.size(), judged.solved.table.dots.size());
+  const Eigen::Vector3d p(10, 40, -20);
+  EXPECT_EQ(again->left.project(p), judged.solved.calibration.left.project(p));
+}
+
+TEST_F(CalibrateImages, OfSwappedCamerasIsRefusedWithWhatToDo) {
+  auto wanted = series();
+  wanted.rig->swapped = 1.0;
+  wanted.placements = {1, 2, 3, 7};
+  shoot(wanted);
+  const auto outcome = calibrate();
+  ASSERT_TRUE(outcome) << outcome.error().message;
+  const auto text = calibration_json(*outcome, {});
+  ASSERT_FALSE(text);
+  EXPECT_EQ(text.error().code, ErrorCode::below_limits);
+  EXPECT_THAT(text.error().message, HasSubstr("Left and right cameras swapped: exchange the serials."));
+}
+
+TEST_F(CalibrateImages, OfAnotherBoardSaysSo) {
+  auto wanted = series();
+  wanted.placements = {3};
+  wanted.angles = 1;
+  shoot(wanted);
+  Board other;
+  other.columns = 8;
+  other.rows = 7;
+  CalibrateOptions options;
+  options.board = other;
+  const auto outcome = calibrate(options);
+  ASSERT_FALSE(outcome);
+  EXPECT_THAT(outcome.error().message, HasSubstr("no image shows the board"));
+}
+
+TEST_F(CalibrateImages, OfAnImageThatIsGoneLeavesItOutByName) {
+  auto wanted = series();
+  wanted.placements = {1, 2, 3, 7};
+  wanted.angles = 3;
+  shoot(wanted);
+  const auto images = read_calibration_images(folder_);
+  ASSERT_TRUE(images) << images.error().message;
+  std::filesystem::remove(images->pairs[1].files[0]);
+  const auto boards = find_boards(*images, images->pixel_format, Board{});
+  ASSERT_TRUE(boards) << boards.error().message;
+  EXPECT_TRUE(boards->pairs[1].left.corners.empty());
+  const auto remark = std::ranges::find_if(boards->remarks, [](const ImageRemark& r) { return r.is_left_out; });
+  ASSERT_NE(remark, boards->remarks.end());
+  EXPECT_EQ(remark->pair, images->pairs[1].name);
+}
+
+}  // namespace
+}  // namespace scanrig
