@@ -118,6 +118,16 @@ std::string JsonObject::sha256(std::string_view key) {
   return value;
 }
 
+std::vector<std::string> JsonObject::texts(std::string_view key) {
+  std::vector<std::string> values;
+  const json* list = take(key);
+  if (!list) return values;
+  const bool whole = list->is_array() && std::ranges::all_of(*list, [](const json& item) { return item.is_string(); });
+  if (whole) return list->get<std::vector<std::string>>();
+  reject(key, "must be a list of texts");
+  return values;
+}
+
 std::vector<std::string> JsonObject::sha256s(std::string_view key) {
   std::vector<std::string> values;
   const json* list = take(key);

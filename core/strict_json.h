@@ -29,6 +29,7 @@ class JsonObject {
   std::string text(std::string_view key);
   std::string one_of(std::string_view key, std::initializer_list<std::string_view> allowed);
   std::string sha256(std::string_view key);
+  std::vector<std::string> texts(std::string_view key);
   std::vector<std::string> sha256s(std::string_view key);
   /// A path that stays inside the folder of the file.
   std::string inner_path(std::string_view key);

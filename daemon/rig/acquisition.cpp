@@ -45,7 +45,7 @@ Result<void> Acquisition::home() {
   return {};
 }
 
-Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle) {
+Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle, bool plain_only) {
   const unsigned before = interrupts_;
   if (id.job != std::exchange(job_, id.job)) image_checker_.begin();
   // The cameras are prepared before the table has stopped. If they fail, the exposure returns the error.
@@ -54,8 +54,12 @@ Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle) {
   if (!move) return pass_on(move);
 
   TakenView view{.id = id};
-  const auto pattern = expose(Light::pattern, before, view.record.retake_reasons);
-  if (!pattern) return pass_on(pattern);
+  StereoFrame pattern;
+  if (!plain_only) {
+    auto taken = expose(Light::pattern, before, view.record.retake_reasons);
+    if (!taken) return pass_on(taken);
+    pattern = std::move(*taken);
+  }
   const auto plain = expose(Light::plain, before, view.record.retake_reasons);
   if (!plain) return pass_on(plain);
 
@@ -65,8 +69,8 @@ Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle) {
   view.record.moving_ms = milliseconds(move->moving);
   view.record.settling_ms = milliseconds(move->settling);
   view.record.taken = iso_time(std::chrono::system_clock::now());
-  view.record.pixel_format = to_string(pattern->format);
-  view.images = {view.record.pixel_format, pattern->left, pattern->right, plain->left, plain->right};
+  view.record.pixel_format = to_string(plain->format);
+  view.images = {view.record.pixel_format, pattern.left, pattern.right, plain->left, plain->right};
   return view;
 }
 
