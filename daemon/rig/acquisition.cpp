@@ -48,6 +48,7 @@ Result<void> Acquisition::home() {
 Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle, bool plain_only) {
   const unsigned before = interrupts_;
   if (id.job != std::exchange(job_, id.job)) image_checker_.begin();
+  judges_images_ = !plain_only;
   // The cameras are prepared before the table has stopped. If they fail, the exposure returns the error.
   std::ignore = devices_.camera.prepare(Deadline::after(clock_, options_.connect_limit));
   const auto move = turn_to(angle);
@@ -146,7 +147,9 @@ Result<StereoFrame> Acquisition::expose_once(Light light) {
   }
   auto frame = from(kCamera, devices_.camera.collect(Deadline::after(clock_, options_.camera_limit)));
   if (!frame) return frame;
-  if (auto good = from(kCamera, image_checker_.judge(light, *frame)); !good) return pass_on(good);
+  if (judges_images_) {
+    if (auto good = from(kCamera, image_checker_.judge(light, *frame)); !good) return pass_on(good);
+  }
   seen_(*frame);
   return frame;
 }

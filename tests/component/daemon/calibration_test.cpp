@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "daemon/ctl/client.h"
+#include "daemon/ctl/verbs.h"
 #include "tests/component/daemon/calibration_under_test.h"
 
 namespace scanrig {
@@ -14,6 +15,10 @@ using testing::StartsWith;
 
 class CalibrationJob : public CalibratedRig {
  protected:
+  int looks() {
+    const std::lock_guard guard(rig.line.mutex);
+    return rig.line.looks;
+  }
   std::string sentence() { return loop->snapshot()->sentence; }
   /// The e-stop ends the view after `exposures` more; then it is released, and the rig is ready again.
   void estop_after(int exposures) {
@@ -68,6 +73,15 @@ TEST_F(CalibrationJob, TakesTwoImagesAViewAndTurnsEachMarkToTheFront) {
   EXPECT_EQ(scan.manifest().poses[0].views.size(), 7u);
   const std::lock_guard guard(rig.turntable.mutex);
   EXPECT_NEAR(rig.turntable.targets.back(), -120.0, 1e-9);
+}
+
+TEST_F(CalibrationJob, ABadImageIsNamedAndNoFaultOfTheRig) {
+  boot();
+  get_ready();
+  begin();
+  rig.line.dark = 5;  // more than an exposure of a scan is taken again
+  take_placements(0, 0);
+  EXPECT_EQ(rig.line.exposures, 8);
 }
 
 TEST_F(CalibrationJob, OneThatDoesNotGradeReplacesNothing) {
@@ -192,6 +206,31 @@ TEST_F(CalibrationJob, ShowsHowTheBoardStandsWhileItWaits) {
   EXPECT_EQ(left.at("expected").size(), 4u);
   EXPECT_TRUE(seen.at("board").at("off_mm").is_number());
   EXPECT_EQ(rig.line.exposures, 0);
+}
+
+TEST_F(CalibrationJob, TheCommandLineBeginsItFollowsItAndAccepts) {
+  boot();
+  get_ready();
+  testing::internal::CaptureStdout();
+  ExitCode end = ExitCode::internal;
+  std::thread command([&] { end = ctl::calibrate({.socket = options.api.socket}, {.rig = true}); });
+  {
+    const Clock::Busy until_it_is_told(
+        clock);  // each request looks at the board; the second comes after the first line
+    while (looks() < 2) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  }
+  take_placements(0, 6);
+  const auto id = newest()->id;
+  EXPECT_TRUE(wait_state(id, JobState::done));
+  const Clock::Busy replying(clock);
+  command.join();
+  EXPECT_EQ(end, ExitCode::ok);
+  EXPECT_EQ(ctl::calibrate({.socket = options.api.socket}, {.accept = true}), ExitCode::ok);
+  const auto said = testing::internal::GetCapturedStdout();
+  EXPECT_THAT(said, HasSubstr("Put the board at mark 0: landscape"));
+  EXPECT_THAT(said, HasSubstr("Calibration of grade A. Volume 3 um."));
+  EXPECT_THAT(said, HasSubstr("is accepted."));
+  EXPECT_EQ(rig_file(), new_calibration());
 }
 
 TEST_F(CalibrationJob, IsAbortedByTheApi) {
