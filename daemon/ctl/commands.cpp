@@ -48,11 +48,10 @@ void add_station_commands(CLI::App& app, Chosen& chosen) {
   add_maintenance(app, chosen);
   const auto verb = std::make_shared<CalibrateVerb>();
   sub = add_client(app, chosen, "calibrate", "calibrate the rig with a board on its table", verb, calibrate);
-  auto* which = sub->add_option_group("what");
-  which->add_flag("--rig", verb->rig, "begin, or take up the one begun, and follow it to its end");
-  which->add_flag("--accept", verb->accept, "use the calibration that was solved last; the old file is kept");
-  which->add_flag("--abort", verb->abort, "cancel it; an active one is stopped");
-  which->require_option(1);
+  auto* rig = sub->add_flag("--rig", verb->rig, "begin, or take up the one begun, and follow it to its end");
+  auto* accept = sub->add_flag("--accept", verb->accept, "use the calibration solved last; the old file is kept");
+  accept->excludes(rig);
+  sub->add_flag("--abort", verb->abort, "cancel it; an active one is stopped")->excludes(rig)->excludes(accept);
 }
 
 namespace {

@@ -235,6 +235,9 @@ tl::expected<std::string, RequestError> unfinished_calibration(const Connection&
 }  // namespace
 
 ExitCode calibrate(const Connection& connection, const CalibrateVerb& verb) {
+  if (!verb.rig && !verb.accept && !verb.abort) {
+    return report_error(ExitCode::usage, "calibrate needs --rig, --accept or --abort");
+  }
   if (verb.rig) {
     const auto unfinished = unfinished_calibration(connection);
     if (!unfinished) return report_error(unfinished.error());
