@@ -134,6 +134,33 @@ void read_time_of_day(Section& s, std::string_view key, std::chrono::minutes& ti
   time = std::chrono::hours(hour) + std::chrono::minutes(minute);
 }
 
+void read_board(Section& s, Board& board) {
+  BoardMarkers markers;
+  s.number("columns", board.columns, {3, 100});
+  s.number("rows", board.rows, {3, 100});
+  s.number("square_mm", board.square_mm, {1, 200});
+  s.number("marker_mm", markers.size_mm, {0.5, 200});
+  s.text("dictionary", markers.dictionary);
+  s.number("thickness_mm", board.thickness_mm, {0, 100});
+  board.markers = markers;
+  if (const auto can_be = check_board(board); !can_be) s.report("columns", can_be.error().message);
+}
+
+void read_calibration(Section& s, CalibrationConfig& calibration) {
+  if (s.has("board")) s.section("board", [&](Section& board) { read_board(board, calibration.board); });
+  if (s.has("length_mm")) {
+    const double nominal = calibration.board.square_mm * (calibration.board.corner_columns() - 1);
+    s.number("length_mm", calibration.length_mm.emplace(), {0.97 * nominal, 1.03 * nominal});
+    s.number("length_sigma_mm", calibration.length_sigma_mm, {0.0001, 1});
+  } else if (s.has("length_sigma_mm")) {
+    s.report("length_sigma_mm", "needs length_mm");
+  }
+  if (s.has("check_every_h")) s.number("check_every_h", calibration.check_every, {1, 87'600});
+  if (s.has("accept")) {
+    s.choice<bool>("accept", calibration.accepts_by_itself, {{"asked", false}, {"automatic", true}});
+  }
+}
+
 void read_webhook(Section& s, WebhookConfig& webhook) {
   std::string url;
   s.text("url", url);
@@ -220,7 +247,10 @@ void read_rig(Section& root, const std::filesystem::path& base, const std::vecto
   });
   rig.projector.io_module = rig.panel.io_module;
   rig.stereo_camera.aravis.strobe_outputs = strobe_outputs(rig.projector);
-  root.section("calibration", [&](Section& s) { s.path("file", base, rig.calibration_file); });
+  root.section("calibration", [&](Section& s) {
+    s.path("file", base, rig.calibration_file);
+    read_calibration(s, rig.calibration);
+  });
   root.section("recipe", [&](Section& s) { read_recipes(s, rig); });
   root.section("storage", [&](Section& s) { read_storage(s, base, rig.storage); });
   root.section("reconstruction", [&](Section& s) { read_reconstruction(s, rig.reconstruction); });

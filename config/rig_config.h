@@ -14,6 +14,7 @@
 #include "drivers/projector/lightcrafter_projector.h"
 #include "drivers/turntable/grbl_turntable.h"
 #include "drivers/turntable/modbus_turntable.h"
+#include "pipeline/calibration/board/board.h"
 
 namespace scanrig::config {
 
@@ -115,6 +116,15 @@ struct WebhookConfig {
   std::string host, port, path;
 };
 
+/// The calibration board, and how the rig is calibrated.
+struct CalibrationConfig {
+  Board board{};
+  std::optional<double> length_mm;    ///< measured between the first and the last corner of the board's first row
+  double length_sigma_mm = 0.0;       ///< its standard deviation
+  std::chrono::hours check_every{0};  ///< an older calibration is reported; 0: never
+  bool accepts_by_itself = false;     ///< one that grades is used without a person
+};
+
 struct StorageConfig {
   std::filesystem::path root;
   double reserve_gib = 20;
@@ -150,6 +160,7 @@ struct RigConfig {
   StereoCameraConfig stereo_camera;
   PanelConfig panel;
   std::filesystem::path calibration_file;
+  CalibrationConfig calibration;
   std::map<std::string, RecipeConfig> recipes;  ///< always includes `default`
   StorageConfig storage;
   ReconstructionConfig reconstruction;

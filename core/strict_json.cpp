@@ -122,11 +122,9 @@ std::vector<std::string> JsonObject::texts(std::string_view key) {
   std::vector<std::string> values;
   const json* list = take(key);
   if (!list) return values;
-  for (const json& item : *list) {
-    if (!list->is_array() || !item.is_string()) break;
-    values.push_back(item.get<std::string>());
-  }
-  if (!list->is_array() || values.size() != list->size()) reject(key, "must be a list of texts");
+  const bool whole = list->is_array() && std::ranges::all_of(*list, [](const json& item) { return item.is_string(); });
+  if (whole) return list->get<std::vector<std::string>>();
+  reject(key, "must be a list of texts");
   return values;
 }
 

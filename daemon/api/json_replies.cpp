@@ -48,7 +48,9 @@ ordered_json to_json(const JobInfo& job) {
           {"model", job.model},
           {"report", job.report},
           {"config_sha256", job.config_sha256},
-          {"error", to_json(job.error)}};
+          {"error", to_json(job.error)},
+          {"kind", job.recipe.is_calibration() ? "calibration" : "scan"},
+          {"all_views", job.recipe.all_views()}};
 }
 
 namespace {
@@ -76,6 +78,7 @@ ordered_json to_detailed_json(const JobInfo& job) {
                               {"measured_deg", v.measured_deg},
                               {"error_deg", v.measured_deg - v.commanded_deg},
                               {"settling_ms", v.settling_ms}});
+    if (v.problems) json["stored"].back()["problems"] = *v.problems;
     add_retakes(json["stored"].back(), v.retake_reasons);
   }
   json["movement_checks"] = ordered_json::array();

@@ -180,7 +180,9 @@ const char* const kSchemas = R"({
   "outputs": {"type": "object", "additionalProperties": {"type": "boolean"}}}},
 "Job": {"type": "object", "additionalProperties": false,
   "required": ["id", "state", "sentence", "next_action", "recipe", "part", "folder", "poses", "views", "stored", "resumable", "quarantined",
-  "exported", "passed", "model", "report", "config_sha256", "error"], "properties": {
+  "exported", "passed", "model", "report", "config_sha256", "error", "kind", "all_views"], "properties": {
+  "kind": {"type": "string", "enum": ["scan", "calibration"]},
+  "all_views": {"type": "integer", "description": "of all poses"},
   "id": {"type": "string"}, "state": {"type": "string"},
   "sentence": {"type": "string", "description": "what becomes of it, and why"},
   "next_action": {"type": "string", "description": "what the operator should do, if only to wait"},
@@ -190,7 +192,8 @@ const char* const kSchemas = R"({
   "exported": {"type": "boolean"},
   "passed": {"type": "boolean", "nullable": true, "description": "done: within the limits of its recipe"},
   "folder": {"type": "string"},
-  "poses": {"type": "integer"}, "views": {"type": "integer", "description": "a pose"},
+  "poses": {"type": "integer", "description": "of a calibration: placements"},
+  "views": {"type": "integer", "description": "a pose; a flat placement of a calibration has one more"},
   "stored": {"type": "integer", "description": "views that survive a power cut"},
   "model": {"type": "string", "description": "path of the model; empty until it is there"},
   "report": {"type": "string"},
@@ -204,6 +207,7 @@ const char* const kSchemas = R"({
   "description": "redone and spoilt are old names of retakes and retake_reasons", "required": ["pose", "view", "measured_deg", "error_deg", "settling_ms", "retakes", "retake_reasons", "redone", "spoilt"], "properties": {
   "pose": {"type": "integer"}, "view": {"type": "integer"}, "measured_deg": {"type": "number"},
   "error_deg": {"type": "number", "description": "measured less commanded"}, "settling_ms": {"type": "number"},
+  "problems": {"type": "array", "items": {"type": "string"}, "description": "only of a calibration: what is wrong with its images"},
   "retakes": {"type": "integer", "description": "exposures that were lost or unusable and taken again"},
   "redone": {"type": "integer", "deprecated": true, "description": "old name of retakes"},
   "retake_reasons": {"type": "array", "items": {"$ref": "#/components/schemas/Problem"}, "description": "what was wrong with each"},
@@ -226,11 +230,44 @@ const char* const kSchemas = R"({
     "additionalProperties": false, "properties": {
     "path": {"type": "string"}, "bytes": {"type": "integer"}, "type": {"type": "string"}}}}}},
 "Report": {"type": "object", "description": "report.json of the model"},
+"Calibration": {"type": "object", "required": ["job", "reminder", "awaited_placement", "board"], "additionalProperties": false, "properties": {
+  "job": {"allOf": [{"$ref": "#/components/schemas/CalibrationJob"}], "nullable": true},
+  "reminder": {"type": "string", "nullable": true, "description": "that the rig's calibration is old"},
+  "awaited_placement": {"type": "integer", "nullable": true, "description": "of the plan, that the next Start begins"},
+  "board": {"allOf": [{"$ref": "#/components/schemas/BoardOnTable"}], "nullable": true}}},
+"CalibrationJob": {"type": "object", "additionalProperties": false,
+  "required": ["id", "state", "sentence", "next_action", "placements_complete", "plan", "views", "grade", "sentences", "accepted"], "properties": {
+  "id": {"type": "string"}, "state": {"type": "string"}, "sentence": {"type": "string"}, "next_action": {"type": "string"},
+  "placements_complete": {"type": "integer"},
+  "plan": {"type": "array", "items": {"$ref": "#/components/schemas/Placement"}},
+  "views": {"type": "array", "items": {"type": "object", "required": ["placement", "view", "table_deg", "examined", "problems"],
+    "additionalProperties": false, "properties": {
+    "placement": {"type": "integer"}, "view": {"type": "integer"}, "table_deg": {"type": "number"},
+    "examined": {"type": "boolean"}, "problems": {"type": "array", "items": {"type": "string"}}}}},
+  "grade": {"type": "string", "nullable": true, "description": "A, B or C, once it is solved"},
+  "sentences": {"type": "array", "items": {"type": "string"}},
+  "accepted": {"type": "boolean", "description": "it became the rig's"}}},
+"Placement": {"type": "object", "additionalProperties": false,
+  "required": ["number", "sets", "portrait", "tilt_deg", "front_mm", "on_block", "mark_deg", "instruction"], "properties": {
+  "number": {"type": "integer"}, "sets": {"type": "string"}, "portrait": {"type": "boolean"},
+  "tilt_deg": {"type": "number", "description": "from flat"},
+  "front_mm": {"type": "number", "description": "of the centre before the axis; negative: behind"},
+  "on_block": {"type": "boolean"}, "mark_deg": {"type": "number"}, "instruction": {"type": "string"}}},
+"BoardOnTable": {"type": "object", "additionalProperties": false,
+  "required": ["sentence", "accepted", "off_deg", "off_mm", "left", "right"], "properties": {
+  "sentence": {"type": "string"}, "accepted": {"type": "boolean"},
+  "off_deg": {"type": "number", "nullable": true}, "off_mm": {"type": "number", "nullable": true},
+  "left": {"$ref": "#/components/schemas/BoardInImage"}, "right": {"$ref": "#/components/schemas/BoardInImage"}}},
+"BoardInImage": {"type": "object", "required": ["seen", "problem", "outline", "expected"], "additionalProperties": false, "properties": {
+  "seen": {"type": "boolean"}, "problem": {"type": "string", "nullable": true},
+  "outline": {"type": "array", "items": {"type": "array", "items": {"type": "number"}}, "description": "pixels; empty: unknown"},
+  "expected": {"type": "array", "items": {"type": "array", "items": {"type": "number"}}, "description": "as planned, by the present calibration"}}},
 "Health": {"type": "object", "additionalProperties": false,
-  "required": ["ok", "problems", "version", "uptime_s", "devices", "disk", "temperatures", "deadlines_missed", "retakes",
+  "required": ["ok", "problems", "reminders", "version", "uptime_s", "devices", "disk", "temperatures", "deadlines_missed", "retakes",
   "retries", "faults", "connections", "event_streams"], "properties": {
   "ok": {"type": "boolean", "description": "nothing is wrong"},
   "problems": {"type": "array", "items": {"$ref": "#/components/schemas/Problem"}},
+  "reminders": {"type": "array", "items": {"type": "string"}, "description": "what is due, although nothing is wrong"},
   "version": {"type": "string"}, "uptime_s": {"type": "number"},
   "devices": {"type": "array", "items": {"$ref": "#/components/schemas/Device"}},
   "disk": {"type": "object", "required": ["bytes", "free_bytes"], "additionalProperties": false, "properties": {

@@ -14,6 +14,7 @@
 #include "daemon/api/request.h"
 #include "daemon/api/roles.h"
 #include "daemon/station/control_loop.h"
+#include "pipeline/calibration/placement/placement_aid.h"
 
 namespace scanrig {
 
@@ -53,6 +54,7 @@ struct ApiStation {
   std::function<ServiceStatus()> facts;  ///< of the machine and of the API itself; the latest, without waiting
   std::filesystem::path storage{};       ///< absolute; where jobs are kept
   std::function<Result<std::string>(std::string_view side)> preview_jpeg{};  ///< of "left" or "right"
+  std::function<Result<PlacementView>(const AwaitedPlacement&)> look_at_board{};
   std::function<Result<void>()> check_config{};            ///< of the file that the daemon was started with
   std::function<void(ControlLoop::Reply)> reload{};        ///< of it; reads the disk
   std::function<void(std::function<void()>)> on_worker{};  ///< for work that touches the disk
@@ -119,9 +121,10 @@ class Router {
   std::vector<std::vector<std::string_view>> paths_;  // of each route, in segments
 };
 
-std::vector<Route> station_routes();  ///< status, events, buttons, maintenance, inputs and outputs
-std::vector<Route> job_routes();      ///< jobs as they are, their files and models
-std::vector<Route> order_routes();    ///< actions on jobs: queued, cancelled, bundled, deleted, ...
-std::vector<Route> service_routes();  ///< health, metrics, the OpenAPI document
+std::vector<Route> station_routes();      ///< status, events, buttons, maintenance, inputs and outputs
+std::vector<Route> job_routes();          ///< jobs as they are, their files and models
+std::vector<Route> order_routes();        ///< actions on jobs: queued, cancelled, bundled, deleted, ...
+std::vector<Route> calibration_routes();  ///< calibrating the rig, and how its board stands
+std::vector<Route> service_routes();      ///< health, metrics, the OpenAPI document
 
 }  // namespace scanrig

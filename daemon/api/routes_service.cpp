@@ -23,6 +23,11 @@ ordered_json problems_of(const Snapshot& snapshot, const ServiceStatus& facts) {
   return problems;
 }
 
+std::vector<std::string> reminders_of(const Snapshot& snapshot) {
+  if (snapshot.calibration_reminder.empty()) return {};
+  return {snapshot.calibration_reminder};
+}
+
 void health(const ApiStation& station, const Values&, const Send& send) {
   const auto snapshot = station.loop.snapshot();
   const ServiceStatus facts = station.facts();
@@ -34,6 +39,7 @@ void health(const ApiStation& station, const Values&, const Send& send) {
   const auto status = to_json(*snapshot);
   send({.body = to_text({{"ok", problems.empty()},
                          {"problems", std::move(problems)},
+                         {"reminders", reminders_of(*snapshot)},
                          {"version", kVersion},
                          {"uptime_s", facts.uptime_s},
                          {"devices", status["devices"]},

@@ -73,8 +73,9 @@ struct ApiServer::Impl {
   Impl(const ApiOptions& with, const PeerRoles& roles, const Proxy& proxy, int listening, ControlLoop& control)
       : options(with),
         loop(control),
-        core({control, [this] { return latest_facts(); }, with.storage, with.preview_jpeg, with.check_config,
-              with.reload, [this](std::function<void()> work) { net::post(core.workers, std::move(work)); }},
+        core({control, [this] { return latest_facts(); }, with.storage, with.preview_jpeg, with.look_at_board,
+              with.check_config, with.reload,
+              [this](std::function<void()> work) { net::post(core.workers, std::move(work)); }},
              roles, proxy, with, this_life()),
         local(io, Local(), listening) {}
 

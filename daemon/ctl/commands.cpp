@@ -27,6 +27,53 @@ void add_maintenance(CLI::App& app, Chosen& chosen) {
   sub->add_option("--speed", verb->speed_deg_s, "jog: deg/s")->capture_default_str();
 }
 
+void add_board_options(CLI::App& sub, BoardOptions& board, bool& named) {
+  const auto is_named = [&named](const auto&) { named = true; };
+  sub.add_option("--board", board.squares, "squares of the board")->capture_default_str()->each(is_named);
+  sub.add_option("--square-mm", board.square_mm, "side of a square")->capture_default_str()->each(is_named);
+  sub.add_option("--marker-mm", board.marker_mm, "side of a marker")->capture_default_str()->each(is_named);
+  sub.add_option("--dictionary", board.dictionary, "OpenCV's markers")->capture_default_str()->each(is_named);
+  sub.add_option("--thickness-mm", board.thickness_mm, "of the board")->capture_default_str()->each(is_named);
+  sub.add_flag_callback(
+      "--chessboard", [&board, &named] { board.chessboard = named = true; }, "a board without markers");
+}
+
+/// Images of a folder instead of the rig.
+void add_calibrate_folder(CLI::App& sub, CalibrateFolderVerb& verb) {
+  auto* folder = sub.add_option("DIR", verb.images, "make calibration.json of the images in this folder");
+  for (const char* rig : {"--rig", "--accept", "--abort"}) folder->excludes(sub.get_option(rig));
+  sub.add_option("--out", verb.out, "DIR: the file to write; one that is there is kept under another name")
+      ->capture_default_str();
+  add_board_options(sub, verb.board, verb.has_board);
+  sub.add_flag("--paper", verb.paper, "DIR: the board is printed on paper");
+  sub.add_option("--length", verb.length_mm, "DIR: first to last corner of a row as measured, mm, and its uncertainty")
+      ->expected(2);
+  sub.add_option("--second-length", verb.second_length_mm, "DIR: the same with another instrument, compared only")
+      ->expected(2);
+  sub.add_option("--rim-points", verb.rim_dots, "DIR: printed on the table's rim: COUNTxRADIUSxDIAMETER, mm");
+  sub.add_option("--focal-px", verb.options.focal_px, "DIR: focal length, within 10 %")->check(CLI::PositiveNumber);
+  sub.add_option("--pixel-format", verb.options.pixel_format, "DIR: of images without a list")
+      ->check(CLI::IsMember({"Mono8", "BayerRG8", "BGR8"}));
+  sub.add_option("--threads", verb.options.threads, "DIR: threads; 0: all of the machine's")
+      ->check(CLI::Range(0, 1024));
+}
+
+void add_calibrate(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<CalibrateVerb>();
+  const auto folder = std::make_shared<CalibrateFolderVerb>();
+  auto* sub = add_client(app, chosen, "calibrate", "calibrate the rig, or from a folder of images", verb,
+                         [folder](const Connection& connection, const CalibrateVerb& rig) {
+                           if (folder->images.empty()) return calibrate(connection, rig);
+                           folder->json = connection.json;
+                           return calibrate_folder(*folder);
+                         });
+  auto* rig = sub->add_flag("--rig", verb->rig, "begin, or take up the one begun, and follow it to its end");
+  auto* accept = sub->add_flag("--accept", verb->accept, "use the calibration solved last; the old file is kept");
+  accept->excludes(rig);
+  sub->add_flag("--abort", verb->abort, "cancel it; an active one is stopped")->excludes(rig)->excludes(accept);
+  add_calibrate_folder(*sub, *folder);
+}
+
 }  // namespace
 
 void add_station_commands(CLI::App& app, Chosen& chosen) {
@@ -46,6 +93,7 @@ void add_station_commands(CLI::App& app, Chosen& chosen) {
   add_client(app, chosen, "health", "devices, disk, temperatures, deadlines missed, retakes", std::make_shared<int>(),
              [](const Connection& connection, int) { return health(connection); });
   add_maintenance(app, chosen);
+  add_calibrate(app, chosen);
 }
 
 namespace {
@@ -226,38 +274,6 @@ void add_reconstruct(CLI::App& app, Chosen& chosen) {
   sub->callback([&chosen, verb] { chosen = [verb] { return reconstruct(*verb); }; });
 }
 
-void add_board_options(CLI::App& sub, BoardOptions& board, bool& named) {
-  const auto is_named = [&named](const auto&) { named = true; };
-  sub.add_option("--board", board.squares, "squares of the board")->capture_default_str()->each(is_named);
-  sub.add_option("--square-mm", board.square_mm, "side of a square")->capture_default_str()->each(is_named);
-  sub.add_option("--marker-mm", board.marker_mm, "side of a marker")->capture_default_str()->each(is_named);
-  sub.add_option("--dictionary", board.dictionary, "OpenCV's markers")->capture_default_str()->each(is_named);
-  sub.add_option("--thickness-mm", board.thickness_mm, "of the board")->capture_default_str()->each(is_named);
-  sub.add_flag_callback(
-      "--chessboard", [&board, &named] { board.chessboard = named = true; }, "a board without markers");
-}
-
-void add_calibrate(CLI::App& app, Chosen& chosen) {
-  const auto verb = std::make_shared<CalibrateVerb>();
-  auto* sub = app.add_subcommand("calibrate", "make calibration.json from images of a calibration board");
-  sub->add_option("DIR", verb->images, "folder of the images")->required();
-  sub->add_option("--out", verb->out, "the file to write; one that is there is kept under another name")
-      ->capture_default_str();
-  add_board_options(*sub, verb->board, verb->has_board);
-  sub->add_flag("--paper", verb->paper, "the board is printed on paper");
-  sub->add_option("--length", verb->length_mm, "first to last corner of a row as measured, mm, and its uncertainty")
-      ->expected(2);
-  sub->add_option("--second-length", verb->second_length_mm, "the same with another instrument, compared only")
-      ->expected(2);
-  sub->add_option("--rim-dots", verb->rim_dots, "dots on the table's rim: COUNTxRADIUSxDIAMETER, mm");
-  sub->add_option("--focal-px", verb->options.focal_px, "focal length, within 10 %")->check(CLI::PositiveNumber);
-  sub->add_option("--pixel-format", verb->options.pixel_format, "of images without a list")
-      ->check(CLI::IsMember({"Mono8", "BayerRG8", "BGR8"}));
-  sub->add_option("--threads", verb->options.threads, "threads; 0: all of the machine's")->check(CLI::Range(0, 1024));
-  sub->add_flag("--json", verb->json, "print JSON");
-  sub->callback([&chosen, verb] { chosen = [verb] { return calibrate(*verb); }; });
-}
-
 void add_board(CLI::App& app, Chosen& chosen) {
   const auto verb = std::make_shared<BoardVerb>();
   const auto ignored = std::make_shared<bool>();
@@ -332,7 +348,6 @@ void add_offline_commands(CLI::App& app, Chosen& chosen) {
   add_reconstruct(app, chosen);
   add_evaluate(app, chosen);
   add_import(app, chosen);
-  add_calibrate(app, chosen);
   add_board(app, chosen);
   add_check_config(app, chosen);
   add_token(app, chosen);

@@ -104,7 +104,8 @@ void add_retakes(const json& taken, const std::string& name, std::vector<std::st
 
 std::vector<std::string> job_lines(const json& job) {
   const auto stored = job.at("stored").size();
-  const auto all = static_cast<std::size_t>(std::max(1, job.at("poses").get<int>() * job.at("views").get<int>()));
+  const auto all = static_cast<std::size_t>(
+      std::max(1, job.value("all_views", job.at("poses").get<int>() * job.at("views").get<int>())));
   const auto part = text(job, "part");
   std::vector<std::string> lines{
       fmt::format("job {}{}: {}", text(job, "id"), part.empty() ? "" : " of " + part, text(job, "state")),

@@ -87,6 +87,14 @@ struct BundleVerb {
 };
 ExitCode bundle(const Connection& connection, const BundleVerb& verb);
 
+struct CalibrateVerb {
+  bool rig = false;     ///< queue a calibration and follow it
+  bool accept = false;  ///< the one that was solved last becomes the rig's
+  bool abort = false;
+};
+/// With `rig`: queues a calibration, or takes up the one that is queued or active, and follows it to its end.
+ExitCode calibrate(const Connection& connection, const CalibrateVerb& verb);
+
 struct MaintenanceVerb {
   std::string what = "on";  ///< on, off, home, jog, pulse, lamp_test, io
   std::optional<double> to_deg, by_deg;
@@ -115,7 +123,7 @@ struct BoardOptions {
   bool chessboard = false;  ///< no markers
 };
 
-struct CalibrateVerb {
+struct CalibrateFolderVerb {
   std::filesystem::path images;
   std::filesystem::path out = "calibration.json";
   BoardOptions board;
@@ -126,7 +134,7 @@ struct CalibrateVerb {
   CalibrateOptions options;
   bool json = false;
 };
-ExitCode calibrate(const CalibrateVerb& verb);
+ExitCode calibrate_folder(const CalibrateFolderVerb& verb);
 
 struct BoardVerb {
   std::filesystem::path out;

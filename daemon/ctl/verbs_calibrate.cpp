@@ -54,7 +54,7 @@ std::optional<MeasuredLength> row_length(const std::vector<double>& measured, co
   return MeasuredLength{(board.corner_columns() - 1) * board.square_mm, measured[0], measured[1]};
 }
 
-Result<CalibrateOptions> options_of(const CalibrateVerb& verb, const CalibrationImages& images) {
+Result<CalibrateOptions> options_of(const CalibrateFolderVerb& verb, const CalibrationImages& images) {
   CalibrateOptions options = verb.options;
   const auto named = board_of(verb.board);
   if (!named) return pass_on(named);
@@ -66,7 +66,7 @@ Result<CalibrateOptions> options_of(const CalibrateVerb& verb, const Calibration
   if (!verb.rim_dots.empty()) {
     const auto dots = numbers_of(verb.rim_dots, 3);
     if (dots.empty()) {
-      return fail(ErrorCode::invalid_input, "--rim-dots {}: must be COUNTxRADIUSxDIAMETER in mm, as 40x84.5x2.4",
+      return fail(ErrorCode::invalid_input, "--rim-points {}: must be COUNTxRADIUSxDIAMETER in mm, as 40x84.5x2.4",
                   verb.rim_dots);
     }
     options.rim_dots = RimDots{static_cast<int>(dots[0]), dots[1], dots[2]};
@@ -79,7 +79,7 @@ std::string hash_of_file(const std::filesystem::path& file) {
   return bytes ? sha256(*bytes) : std::string();
 }
 
-CalibrationOrigin origin_of(const CalibrateVerb& verb, const CalibrationImages& images) {
+CalibrationOrigin origin_of(const CalibrateFolderVerb& verb, const CalibrationImages& images) {
   CalibrationOrigin origin;
   origin.date = iso_time(std::chrono::system_clock::now());
   origin.previous = hash_of_file(verb.out);
@@ -90,7 +90,7 @@ CalibrationOrigin origin_of(const CalibrateVerb& verb, const CalibrationImages& 
 }
 
 /// The file that stood there before, under the name of its hash.
-Result<void> keep_previous(const CalibrateVerb& verb, const std::string& hash) {
+Result<void> keep_previous(const CalibrateFolderVerb& verb, const std::string& hash) {
   if (hash.empty()) return {};
   const auto text = read_file(verb.out);
   if (!text) return pass_on(text);
@@ -99,7 +99,7 @@ Result<void> keep_previous(const CalibrateVerb& verb, const std::string& hash) {
   return write_file_atomically(kept, *text);
 }
 
-void print_outcome(const CalibrateVerb& verb, const CalibrationOutcome& outcome) {
+void print_outcome(const CalibrateFolderVerb& verb, const CalibrationOutcome& outcome) {
   const SolvedCalibration& solved = outcome.judged.solved;
   const CalibrationJudgement& judgement = outcome.judged.judgement;
   const auto used = std::ranges::count_if(solved.images, &ImageFit::is_used);
@@ -135,7 +135,7 @@ void print_outcome(const CalibrateVerb& verb, const CalibrationOutcome& outcome)
 
 }  // namespace
 
-ExitCode calibrate(const CalibrateVerb& verb) {
+ExitCode calibrate_folder(const CalibrateFolderVerb& verb) {
   const auto images = read_calibration_images(verb.images);
   if (!images) return report_error(images.error());
   const auto options = options_of(verb, *images);

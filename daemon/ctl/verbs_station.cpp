@@ -1,11 +1,13 @@
 #include <unistd.h>
 #include <cstdio>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "daemon/ctl/client.h"
 #include "daemon/ctl/job_view.h"
 #include "daemon/ctl/output.h"
 #include "daemon/ctl/verbs.h"
+#include "daemon/station/states.h"
 
 namespace scanrig::ctl {
 namespace {
@@ -13,6 +15,7 @@ namespace {
 using nlohmann::json;
 
 constexpr auto kPoll = std::chrono::milliseconds(100);
+constexpr auto kLookAtBoard = std::chrono::milliseconds(500);
 constexpr auto kStandstillTimeout = std::chrono::seconds(10);  ///< the service gives the drive less
 
 /// `id` empty: the active job, now or as soon as there is one.
@@ -68,6 +71,7 @@ ExitCode health(const Connection& connection) {
   }
   fmt::print("{}\n", answer->at("ok").get<bool>() ? "nothing is wrong" : "problems:");
   for (const auto& problem : answer->at("problems")) fmt::print("  {}\n", text(problem, "message"));
+  for (const auto& reminder : answer->at("reminders")) fmt::print("{}\n", reminder.get<std::string>());
   const auto& disk = answer->at("disk");
   fmt::print("disk: {} free of {}\n", bytes_text(disk.at("free_bytes")), bytes_text(disk.at("bytes")));
   for (const auto& one : answer->at("temperatures")) {
@@ -127,6 +131,124 @@ ExitCode press(const Connection& connection, const std::string& button) {
   const auto answer = send_request(connection.socket, "POST", "/api/v1/" + button);
   if (!answer) return report_error(answer.error());
   if (connection.json) print(*answer);
+  return ExitCode::ok;
+}
+
+namespace {
+
+/// Lines of a calibration as they become true, and one that is kept up to date while the board is put in place.
+class CalibrationStory {
+ public:
+  CalibrationStory(std::FILE* out, bool terminal) : out_(out), terminal_(terminal) {}
+
+  /// `calibration`: as GET calibration gives it, `status` as GET status.
+  void tell(const json& calibration, const json& status) {
+    const auto& job = calibration.at("job");
+    for (const auto& view : job.at("views")) tell_view(view);
+    const bool waits = calibration.at("awaited_placement").is_number();
+    line(text(status, "sentence") + (waits ? "\n  " + text(status, "next_action") : ""));
+    const auto& board = calibration.at("board");
+    if (waits && board.is_object()) live(text(board, "sentence"));
+  }
+  void end(const json& job) {
+    line(text(job, "sentence") + "\n  " + text(job, "next_action"));
+    clear();
+  }
+
+ private:
+  void tell_view(const json& view) {
+    const auto name =
+        fmt::format("  placement {} view {}", view.at("placement").get<int>(), view.at("view").get<int>());
+    for (const auto& problem : view.at("problems")) {
+      const auto words = fmt::format("{}: {}", name, problem.get<std::string>());
+      if (told_.insert(words).second) print(words);
+    }
+  }
+  void line(const std::string& words) {
+    if (words == last_) return;
+    last_ = words;
+    print(words);
+  }
+  void print(const std::string& words) {
+    clear();
+    fmt::print(out_, "{}\n", words);
+    std::fflush(out_);
+  }
+  void live(const std::string& words) {
+    if (words == live_) return;
+    if (!terminal_) fmt::print(out_, "  {}\n", words);
+    if (terminal_) fmt::print(out_, "\r\033[K  {}", words);
+    live_ = words;
+    std::fflush(out_);
+  }
+  void clear() {
+    if (terminal_ && !live_.empty()) fmt::print(out_, "\r\033[K");
+    live_.clear();
+  }
+
+  std::FILE* out_;
+  const bool terminal_;
+  std::string last_, live_;
+  std::set<std::string> told_;
+};
+
+ExitCode follow_calibration(const Connection& connection, const std::string& id) {
+  RealClock clock;
+  std::FILE* out = connection.json ? stderr : stdout;
+  CalibrationStory story(out, ::isatty(::fileno(out)) == 1);
+  for (;; clock.sleep_for(kLookAtBoard)) {
+    const auto status = send_request(connection.socket, "GET", "/api/v1/status");
+    if (!status) return report_error(status.error());
+    if (const auto why = why_not_started(*status, id)) return report_error(*why);
+    const auto calibration = send_request(connection.socket, "GET", "/api/v1/calibration");
+    if (!calibration) return report_error(calibration.error());
+    const auto& job = calibration->at("job");
+    if (!job.is_object() || text(job, "id") != id)
+      return report_error(ExitCode::refused, "the calibration was deleted");
+    const auto state = parse_job_state(text(job, "state"));
+    if (!state || !is_final(*state)) {
+      story.tell(*calibration, *status);
+      continue;
+    }
+    if (connection.json) print(job);
+    if (*state == JobState::done) {
+      if (!connection.json) story.end(job);
+      return ExitCode::ok;
+    }
+    const auto ended = send_request(connection.socket, "GET", "/api/v1/jobs/" + segment(id));
+    if (!ended) return report_error(ended.error());
+    const auto& why = ended->at("error");
+    const auto code = why.is_object() ? parse_error_code(text(why, "code")) : std::nullopt;
+    return report_error({code.value_or(ErrorCode::internal), text(job, "sentence") + " " + text(job, "next_action")});
+  }
+}
+
+/// The calibration that is queued or active; empty: none is.
+tl::expected<std::string, RequestError> unfinished_calibration(const Connection& connection) {
+  const auto calibration = send_request(connection.socket, "GET", "/api/v1/calibration");
+  if (!calibration) return tl::unexpected(calibration.error());
+  const auto& job = calibration->at("job");
+  const auto state = job.is_object() ? parse_job_state(text(job, "state")) : std::nullopt;
+  return state && !is_final(*state) ? text(job, "id") : std::string();
+}
+
+}  // namespace
+
+ExitCode calibrate(const Connection& connection, const CalibrateVerb& verb) {
+  if (!verb.rig && !verb.accept && !verb.abort) {
+    return report_error(ExitCode::usage, "calibrate needs --rig, --accept, --abort or a folder of images");
+  }
+  if (verb.rig) {
+    const auto unfinished = unfinished_calibration(connection);
+    if (!unfinished) return report_error(unfinished.error());
+    if (!unfinished->empty()) return follow_calibration(connection, *unfinished);
+  }
+  const char* const what = verb.rig ? "begin" : verb.accept ? "accept" : "abort";
+  const auto answer = send_request(connection.socket, "POST", std::string("/api/v1/calibration/") + what);
+  if (!answer) return report_error(answer.error());
+  if (verb.rig) return follow_calibration(connection, text(*answer, "job"));
+  if (connection.json) print(*answer);
+  if (!connection.json) fmt::print("{} is {}.\n", text(*answer, "job"), verb.accept ? "accepted" : "cancelled");
   return ExitCode::ok;
 }
 

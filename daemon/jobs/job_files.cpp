@@ -18,7 +18,7 @@ using nlohmann::ordered_json;
 constexpr const char* kJob = "job.json";
 constexpr const char* kFailure = "failure.json";
 constexpr const char* kAttempt = "attempt.json";
-constexpr int kJobVersion = 2;  ///< 1 had other names for some keys of the recipe
+constexpr int kJobVersion = 3;  ///< 1 had other names for some keys of the recipe, 2 no calibrations
 
 /// Part ids and messages come from outside and need not be UTF-8.
 Result<void> write_json(const fs::path& file, const ordered_json& json) {
@@ -34,7 +34,8 @@ ordered_json to_json(const Recipe& recipe) {
   ordered_json limits = ordered_json::object();
   if (recipe.limits.min_measured_share) limits["min_measured_share"] = *recipe.limits.min_measured_share;
   if (recipe.limits.max_residual_mm) limits["max_residual_mm"] = *recipe.limits.max_residual_mm;
-  return {{"name", recipe.name},
+  return {{"kind", recipe.is_calibration() ? "calibration" : "scan"},
+          {"name", recipe.name},
           {"poses", recipe.poses},
           {"views", recipe.views},
           {"flip_timeout_min", recipe.flip_timeout.count()},
@@ -49,7 +50,10 @@ Recipe read_recipe(JsonObject object, int version) {
   const char* const max_residual = old_names ? "most_residual_mm" : "max_residual_mm";      // old name
   Recipe recipe;
   recipe.name = object.text("name");
-  recipe.poses = object.integer("poses", 1, 2);
+  if (version >= 3 && object.one_of("kind", {"scan", "calibration"}) == "calibration") {
+    recipe.kind = RecipeKind::calibration;
+  }
+  recipe.poses = object.integer("poses", 1, recipe.is_calibration() ? static_cast<int>(calibration_plan().size()) : 2);
   recipe.views = object.integer("views", 1, 360);
   recipe.flip_timeout = std::chrono::minutes(object.integer("flip_timeout_min", 1, 1440));
   recipe.flip_by_signal = object.flag(old_names ? "flip_by_line" : "flip_by_signal");  // old name
@@ -95,7 +99,9 @@ std::optional<double> residual_mm(const nlohmann::json& report) {
 }  // namespace
 
 fs::path model_folder(const fs::path& job_folder) { return job_folder / "model"; }
-fs::path model_file(const fs::path& job_folder) { return model_folder(job_folder) / "model.glb"; }
+fs::path model_file(const fs::path& job_folder, RecipeKind kind) {
+  return model_folder(job_folder) / (kind == RecipeKind::calibration ? "calibration.json" : "model.glb");
+}
 fs::path report_file(const fs::path& job_folder) { return model_folder(job_folder) / "report.json"; }
 
 FolderSize measure_folder(const fs::path& folder) {
@@ -116,6 +122,7 @@ Result<void> write_job_file(const fs::path& job_folder, const JobFile& job) {
                                         {"part", job.part},
                                         {"place", job.place},
                                         {"exported", job.exported},
+                                        {"accepted", job.accepted},
                                         {"recipe", to_json(job.recipe)}});
 }
 
@@ -127,9 +134,17 @@ Result<JobFile> read_job_file(const fs::path& job_folder) {
   job.part = json->root().text("part");
   job.place = json->root().integer("place", -1'000'000'000, 1'000'000'000);
   job.exported = json->root().flag("exported");
+  if (json->version() >= 3) job.accepted = json->root().flag("accepted");
   job.recipe = read_recipe(json->root().object("recipe"), json->version());
   if (const auto whole = json->finish(); !whole) return pass_on(whole);
   return job;
+}
+
+Result<void> set_accepted(const fs::path& job_folder, bool accepted) {
+  auto job = read_job_file(job_folder);
+  if (!job) return pass_on(job);
+  job->accepted = accepted;
+  return write_job_file(job_folder, *job);
 }
 
 Result<void> write_failure(const fs::path& job_folder, const Error& error) {
@@ -166,6 +181,24 @@ Result<void> begin_attempt(const fs::path& job_folder) {
 }
 
 void forget_attempts(const fs::path& job_folder) { std::ignore = remove_file_synced(job_folder / kAttempt); }
+
+std::string calibration_report(const CalibrationOutcome& outcome) {
+  const ordered_json json = {{"format", "scanrig-calibration-report"},
+                             {"version", 1},
+                             {"grade", outcome.grade},
+                             {"sentences", outcome.sentences}};
+  return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+}
+
+std::optional<CalibrationOutcome> read_calibration_report(const fs::path& report) {
+  auto json = JsonFile::read(report, "scanrig-calibration-report", 1);
+  if (!json) return std::nullopt;
+  CalibrationOutcome outcome;
+  outcome.grade = json->root().text("grade");
+  outcome.sentences = json->root().texts("sentences");
+  if (!json->finish()) return std::nullopt;
+  return outcome;
+}
 
 std::optional<Error> limit_violation(const fs::path& report, const Limits& limits) {
   if (limits == Limits{}) return std::nullopt;

@@ -12,9 +12,9 @@ namespace scanrig {
 
 /// The files of a job beside scan.json, docs/reference/scan-folder.md.
 
-/// Paths of a job's model and report.
+/// Paths of a job's model and report. The model of a calibration is its calibration.json.
 std::filesystem::path model_folder(const std::filesystem::path& job_folder);
-std::filesystem::path model_file(const std::filesystem::path& job_folder);
+std::filesystem::path model_file(const std::filesystem::path& job_folder, RecipeKind kind = RecipeKind::scan);
 std::filesystem::path report_file(const std::filesystem::path& job_folder);
 
 struct FolderSize {
@@ -30,11 +30,14 @@ struct JobFile {
   std::string part{};
   std::int64_t place = 0;
   bool exported = false;
+  bool accepted = false;  ///< a calibration that became the rig's
 };
 /// Fails with `io`.
 Result<void> write_job_file(const std::filesystem::path& job_folder, const JobFile& job);
 /// Keys missing in a folder from elsewhere have the default. Fails with `invalid_input`, `unsupported`, `io`.
 Result<JobFile> read_job_file(const std::filesystem::path& job_folder);
+/// Notes whether the job's calibration became the rig's. Fails as both.
+Result<void> set_accepted(const std::filesystem::path& job_folder, bool accepted);
 
 /// Records durably that the job has no model, and why: failure.json. Fails with `io`.
 Result<void> write_failure(const std::filesystem::path& job_folder, const Error& error);
@@ -53,6 +56,10 @@ AttemptRecord read_attempt_record(const std::filesystem::path& job_folder);
 Result<void> begin_attempt(const std::filesystem::path& job_folder);
 /// Durable. If the disk refuses it, the mark counts once too often.
 void forget_attempts(const std::filesystem::path& job_folder);
+
+/// Text of a calibration's report.json, and what it says; nothing where it cannot be read. Neither has `is_accepted`.
+std::string calibration_report(const CalibrationOutcome& outcome);
+std::optional<CalibrationOutcome> read_calibration_report(const std::filesystem::path& report);
 
 /// Why the model of report.json is beyond the limits; nothing when it is within, or without limits. An unreadable
 /// report never passes.

@@ -178,7 +178,7 @@ std::optional<JobInfo> JobIndex::find(const fs::path& job_folder) const {
   JobInfo job;
   if (!from_record(record, job) || job.folder != job_folder) return std::nullopt;
   const auto order = read_job_file(job_folder);
-  if (!order) return std::nullopt;
+  if (!order || order->recipe.is_calibration()) return std::nullopt;  // its report is not in the record
   job.recipe = order->recipe;
   job.part = order->part;
   job.place = order->place;

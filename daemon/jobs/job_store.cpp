@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <cstring>
 #include <system_error>
@@ -27,6 +28,8 @@ constexpr const char* kNew = ".new-";
 constexpr const char* kGone = ".gone-";
 constexpr std::uintmax_t kModelBytes = 128u
                                        << 20;  ///< mesh in all formats, textures, report: the largest seen is 90 MiB
+
+constexpr std::uintmax_t kUnknownPairPixels = 2 * 20'000'000;  ///< of cameras without a calibration: large ones
 
 void take_views(JobInfo& job, const Manifest& manifest) {
   job.config_sha256 = manifest.config_sha256;
@@ -66,8 +69,10 @@ Result<JobInfo> read_folder(const fs::path& folder, const ScanFolder& scan) {
               .part = std::move(order->part),
               .place = order->place,
               .exported = order->exported,
-              .model = model_file(folder),
+              .model = model_file(folder, order->recipe.kind),
               .report = report_file(folder)};
+  if (job.recipe.is_calibration()) job.calibration = read_calibration_report(report_file(folder));
+  if (job.calibration) job.calibration->is_accepted = order->accepted;
   take_views(job, scan.manifest());
   const auto facts = facts_of(job, scan.manifest().state);
   return with_state_of_folder(std::move(job), facts);
@@ -102,6 +107,26 @@ std::optional<std::string> other_cameras(const Calibration& calibration, const C
   const auto named = [](const std::string& serial) { return serial.empty() ? std::string("unnamed") : serial; };
   return fmt::format("the cameras {} (left) and {} (right), but the rig has {} and {}", named(left), named(right),
                      named(rig.left), named(rig.right));
+}
+
+/// Keeps the calibration in `file` under its date. The same one is kept once, however often this is interrupted.
+Result<void> keep_old_calibration(const fs::path& file, const std::string& replacement) {
+  const auto old = read_file(file);
+  if (!old && old.error().code == ErrorCode::not_found) return {};
+  if (!old) return pass_on(old);
+  if (*old == replacement) return {};
+  const auto calibration = parse_calibration(*old, file);
+  std::string date = calibration ? calibration->date : std::string();
+  std::erase_if(date, [](char c) { return std::isalnum(static_cast<unsigned char>(c)) == 0; });
+  if (date.empty()) date = "undated";
+  for (int copy = 1;; ++copy) {
+    const auto kept =
+        file.parent_path() / fmt::format("{}-{}{}{}", file.stem().string(), date,
+                                         copy == 1 ? "" : fmt::format("-{}", copy), file.extension().string());
+    const auto there = read_file(kept);
+    if (there && *there == *old) return {};
+    if (!there) return write_file_atomically(kept, *old);
+  }
 }
 
 }  // namespace
@@ -164,6 +189,7 @@ Result<JobInfo> JobStore::create(const std::string& id, const JobFile& job) cons
   manifest.created = iso_time(std::chrono::system_clock::now());
   manifest.state = "queued";
   manifest.profile = options_.profile;
+  if (job.recipe.is_calibration()) manifest.source = "calibration";
   if (auto made = make(std::move(manifest), job); !made) {
     fs::remove_all(folder(id), ignored);  // renamed, but its name not synced: no client has its id
     return pass_on(made);
@@ -174,7 +200,9 @@ Result<JobInfo> JobStore::create(const std::string& id, const JobFile& job) cons
 Result<void> JobStore::make(Manifest manifest, const JobFile& job) const {
   const auto id = manifest.id;
   const fs::path prepared = options_.root / (kNew + id);
-  auto scan = ScanFolder::create(prepared, std::move(manifest), options_.calibration_file);
+  // A rig that is calibrated for the first time has none.
+  const bool needs_none = job.recipe.is_calibration() && !read_calibration(options_.calibration_file);
+  auto scan = ScanFolder::create(prepared, std::move(manifest), needs_none ? fs::path() : options_.calibration_file);
   auto made = scan ? write_job_file(prepared, job) : Result<void>(pass_on(scan));
   std::error_code ignored;
   fs::copy_file(job_log_file(folder(id)), job_log_file(prepared), ignored);  // from the folder that is replaced
@@ -190,6 +218,31 @@ Result<void> JobStore::check_rig_cameras() const {
   if (!others) return {};
   return fail(ErrorCode::refused, "{} is for {}; calibrate, or install its file", options_.calibration_file.string(),
               *others);
+}
+
+std::string JobStore::calibration_reminder() const {
+  if (options_.check_calibration_every.count() == 0) return {};
+  const auto calibration = read_calibration(options_.calibration_file);
+  const auto taken = calibration ? parse_iso_time(calibration->date) : std::nullopt;
+  if (!taken || std::chrono::system_clock::now() - *taken < options_.check_calibration_every) return {};
+  return fmt::format("The calibration is older than {} h: run scanrig calibrate --rig.",
+                     options_.check_calibration_every.count());
+}
+
+Result<void> JobStore::accept_calibration(const JobInfo& job) const {
+  if (job.state != JobState::done || !job.calibration) {
+    return fail(ErrorCode::refused, "job {} has no calibration to accept", job.id);
+  }
+  const auto text = read_file(job.model);
+  if (!text) return pass_on(text);
+  const auto calibration = parse_calibration(*text, job.model);
+  if (!calibration) return pass_on(calibration);
+  if (const auto others = other_cameras(*calibration, options_.cameras)) {
+    return fail(ErrorCode::refused, "the calibration of job {} is for {}", job.id, *others);
+  }
+  if (auto kept = keep_old_calibration(options_.calibration_file, *text); !kept) return kept;
+  if (auto replaced = write_file_atomically(options_.calibration_file, *text); !replaced) return replaced;
+  return set_accepted(job.folder, true);
 }
 
 Result<void> JobStore::check_job_cameras(const std::string& id) const {
@@ -215,14 +268,15 @@ Result<void> JobStore::renew_calibration(const JobInfo& job) const {
 }
 
 Result<void> JobStore::check_room(const JobInfo& job) const {
+  const bool calibrates = job.recipe.is_calibration();
   const auto calibration = read_calibration(options_.calibration_file);
-  if (!calibration) return pass_on(calibration);
+  if (!calibration && !calibrates) return pass_on(calibration);
   const auto pixels = [](const Camera& camera) {
     return static_cast<std::uintmax_t>(camera.projection.width) * static_cast<std::uintmax_t>(camera.projection.height);
   };
-  const auto views = static_cast<std::uintmax_t>(job.recipe.poses * job.recipe.views) - job.stored.size();
-  const auto view_bytes = 2 * (pixels(calibration->left) + pixels(calibration->right)) *
-                          static_cast<std::uintmax_t>(options_.bytes_per_pixel);
+  const auto views = static_cast<std::uintmax_t>(job.recipe.all_views()) - job.stored.size();
+  const auto pair_pixels = calibration ? pixels(calibration->left) + pixels(calibration->right) : kUnknownPairPixels;
+  const auto view_bytes = (calibrates ? 1 : 2) * pair_pixels * static_cast<std::uintmax_t>(options_.bytes_per_pixel);
   const auto needed = views * view_bytes + kModelBytes;
   std::error_code error;
   const auto space = fs::space(options_.root, error);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -17,13 +18,14 @@ struct CameraSerials {
 };
 
 struct JobStoreOptions {
-  std::filesystem::path root;              ///< one folder per job
-  std::filesystem::path calibration_file;  ///< copied into every job
-  CameraSerials cameras{};                 ///< the rig's
-  std::string profile{};                   ///< of a simulated rig; empty otherwise
-  std::string config_sha256{};             ///< of the configuration that views are taken under; empty: none
-  std::uintmax_t reserve_bytes = 0;        ///< of the disk: a job that would use it does not start
-  int bytes_per_pixel = 1;                 ///< of the sensors
+  std::filesystem::path root;                     ///< one folder per job
+  std::filesystem::path calibration_file;         ///< copied into every job
+  CameraSerials cameras{};                        ///< the rig's
+  std::string profile{};                          ///< of a simulated rig; empty otherwise
+  std::string config_sha256{};                    ///< of the configuration that views are taken under; empty: none
+  std::uintmax_t reserve_bytes = 0;               ///< of the disk: a job that would use it does not start
+  int bytes_per_pixel = 1;                        ///< of the sensors
+  std::chrono::hours check_calibration_every{0};  ///< an older one is reported; 0: never
 };
 
 /// The folders of all jobs. They are the truth: a job is recorded nowhere else.
@@ -52,6 +54,14 @@ class JobStore {
   /// Checks whether the rig's calibration belongs to its cameras. A serial number missing in either is not compared.
   /// Fails with `refused`, naming both, and as read_calibration().
   [[nodiscard]] Result<void> check_rig_cameras() const;
+
+  /// That the rig's calibration is older than it should be, as a sentence; empty: it is not.
+  [[nodiscard]] std::string calibration_reminder() const;
+
+  /// Puts the calibration of a solved job in the place of the rig's, which is kept beside it as calibration-DATE.json.
+  /// A crash leaves the old one or the new one whole. Fails with `refused` (not solved, other cameras), `io`, and as
+  /// read_calibration().
+  [[nodiscard]] Result<void> accept_calibration(const JobInfo& job) const;
 
   /// The same check for the calibration that this job's views are taken with. Fails as read() too.
   [[nodiscard]] Result<void> check_job_cameras(const std::string& id) const;

@@ -32,11 +32,17 @@ Result<void> keep_images(const ScanFolder& scan, int pose, std::size_t number, c
 
 /// Checks that the job has the calibration it is scanned with, and that this belongs to the rig's cameras.
 Result<void> settle_calibration(const JobStore& store, const JobInfo& job) {
+  if (job.recipe.is_calibration()) return {};
   if (!has_views(job)) {
     if (auto same = store.check_rig_cameras(); !same) return same;
     if (auto renewed = store.renew_calibration(job); !renewed) return renewed;
   }
   return store.check_job_cameras(job.id);
+}
+
+/// Limits for view 0 taken again. A rig that is calibrated for the first time has no calibration.
+CompareViewsOptions limits_of(double turned_deg, bool left, const Result<Calibration>& rig) {
+  return rig ? allowing_for(turned_deg, left ? rig->left : rig->right, *rig) : CompareViewsOptions{};
 }
 
 }  // namespace
@@ -109,7 +115,8 @@ void JobThread::handle(const LogLine& line) {
 void JobThread::handle(const action::CheckCalibration& task) {
   const auto same = task.job.empty() ? store_.check_rig_cameras() : store_.check_job_cameras(task.job);
   const bool refused = !same && same.error().code == ErrorCode::refused;
-  post_event_(event::CalibrationChecked{task.job, refused ? std::optional(same.error()) : std::nullopt});
+  post_event_(event::CalibrationChecked{task.job, refused ? std::optional(same.error()) : std::nullopt,
+                                        store_.calibration_reminder()});
 }
 
 void JobThread::handle(const action::CreateJobs& task) {
@@ -145,11 +152,12 @@ Result<JobInfo> JobThread::read_whole(const std::string& id) const {
   if (!job) return job;
   const auto scan = ScanFolder::open(job->folder);
   if (!scan) return pass_on(scan);
-  if (const auto calibration = scan->load_calibration(); !calibration) return pass_on(calibration);
+  const auto calibration = scan->load_calibration();
+  if (!calibration && !job->recipe.is_calibration()) return pass_on(calibration);
   const auto pose = static_cast<std::size_t>(job->complete);
   const auto& poses = scan->manifest().poses;
   if (pose >= poses.size() || poses[pose].views.empty()) return job;
-  if (const auto first = scan->load_images(pose, 0); !first) return pass_on(first);
+  if (const auto first = scan->load_raw(pose, 0); !first) return pass_on(first);
   return job;
 }
 
@@ -167,19 +175,25 @@ void JobThread::set_aside(const std::string& id, const Error& why) {
 Result<void> JobThread::begin(const JobInfo& job) {
   auto scan = ScanFolder::open(job.folder);
   if (!scan) return pass_on(scan);
+  const auto current = static_cast<std::size_t>(job.complete);
+  const auto moved = [](const MovementCheck& check) { return !check.unmoved; };
+  if (job.recipe.is_calibration() && std::ranges::any_of(job.movement_checks, moved)) {
+    if (auto dropped = scan->drop_views(current, "scanning"); !dropped) return dropped;
+    post_event_(event::PlacementDropped{job.id, job.complete, {ErrorCode::moved, "the board slipped"}});
+  }
   if (auto state = scan->set_state("scanning"); !state) return state;
   // The daemon died in a scan without a recorded end. Its views may have been the reason, and are not examined again
   // beside the moving table.
-  later_ = !job.stored.empty() && !read_failure(job.folder) ? std::optional(job.recipe) : std::nullopt;
+  const bool may_be_reason = !job.stored.empty() && !read_failure(job.folder) && !job.recipe.is_calibration();
+  later_ = may_be_reason ? std::optional(job.recipe) : std::nullopt;
   remove_failure(job.folder);
   scan_ = std::move(*scan);
   scan_->taken_under(store_.options().config_sha256);
   broken_ = false;
   if (!later_) reconstruction_.begin(job.id, *scan_, job.recipe);
   const auto& poses = scan_->manifest().poses;
-  const auto pose = static_cast<std::size_t>(job.complete);
-  post_event_(
-      event::JobStarted{job.id, job.complete, pose < poses.size() ? static_cast<int>(poses[pose].views.size()) : 0});
+  const int stored = current < poses.size() ? static_cast<int>(poses[current].views.size()) : 0;
+  post_event_(event::JobStarted{job.id, job.complete, stored});
   return {};
 }
 
@@ -192,7 +206,7 @@ Result<void> JobThread::move(const action::MoveJob& task) {
     return fail(ErrorCode::refused, "job {} is {} and cannot be resumed: order a new one", task.job,
                 to_string(job->state));
   }
-  if (task.resume && has_views(*job)) {
+  if (task.resume && has_views(*job) && !job->recipe.is_calibration()) {
     if (auto same = store_.check_job_cameras(task.job); !same) return same;
   }
   auto order = read_job_file(job->folder);
@@ -222,6 +236,11 @@ Result<void> JobThread::keep(const event::JobRequested& asked) {
   if (asked.what == What::reprocess) return reprocess(std::move(*job), asked);
   auto order = read_job_file(job->folder);
   if (!order) return pass_on(order);
+  if (asked.what == What::accept) {
+    auto accepted = store_.accept_calibration(*job);
+    if (accepted) tell_known(asked.job);
+    return accepted;
+  }
   order->exported = true;
   if (auto written = write_job_file(job->folder, *order); !written) return written;
   tell_known(asked.job);
@@ -261,6 +280,10 @@ Result<void> JobThread::reprocess(JobInfo job, const event::JobRequested& asked)
   job.quarantined = false;
   job.error.reset();
   job.passed.reset();
+  if (job.calibration) {  // one that is solved again is another one
+    if (auto anew = set_accepted(job.folder, false); !anew) return anew;
+    job.calibration.reset();
+  }
   const auto known = std::make_shared<const JobInfo>(std::move(job));
   post_event_(event::JobUpdated{known});  // before any report of the reconstruction
   reconstruction_.rebuild(known->id, known->folder, known->recipe, {asked.voxel_mm, asked.fusion});
@@ -294,19 +317,20 @@ void JobThread::handle(const action::CheckMovement& task) {
 /// Compares the plain images with the first ones, and keeps the result as evidence.
 Result<MovementCheck> JobThread::judge(const TakenView& again) {
   const auto pose = static_cast<std::size_t>(again.id.pose);
-  const auto first = scan_->load_images(pose, 0);
-  if (!first) return pass_on(first);
-  const auto now = to_view_images(again.images, again.record);
-  if (!now) return pass_on(now);
-  const auto calibration = scan_->load_calibration();
-  if (!calibration) return pass_on(calibration);
   const auto& record = scan_->manifest().poses[pose];
+  const auto calibration = scan_->load_calibration();
+  if (!calibration && scan_->manifest().source != "calibration") return pass_on(calibration);
   const double turned = again.record.measured_deg - record.views[0].measured_deg;
-  const auto left =
-      compare_views(first->left_plain, now->left_plain, allowing_for(turned, calibration->left, *calibration));
+  const auto compare = [&](const char* role, bool is_left) -> Result<ViewChange> {
+    const auto first = scan_->load_usable_image(pose, 0, role);
+    if (!first) return pass_on(first);
+    const auto now = to_usable_image(again.images.image(role), again.images.pixel_format);
+    if (!now) return pass_on(now);
+    return compare_views(*first, *now, limits_of(turned, is_left, calibration));
+  };
+  const auto left = compare("left_plain", true);
   if (!left) return pass_on(left);
-  const auto right =
-      compare_views(first->right_plain, now->right_plain, allowing_for(turned, calibration->right, *calibration));
+  const auto right = compare("right_plain", false);
   if (!right) return pass_on(right);
 
   busy_timer_.begins();  // comparing takes time too
@@ -341,6 +365,18 @@ void JobThread::handle(const action::FinishPose& task) {
     later_ ? reconstruction_.rebuild(task.job, scan_->path(), *later_, {}) : reconstruction_.finish(task.job);
     scan_.reset();
   }
+}
+
+void JobThread::handle(const action::CheckPlacement& task) {
+  if (storing()) reconstruction_.check_placement(task.job, task.pose);
+}
+
+void JobThread::handle(const action::DropPlacement& task) {
+  if (!storing()) return;
+  const auto dropped = scan_->drop_views(static_cast<std::size_t>(task.pose), "waiting_for_flip");
+  if (!dropped) return give_up(task.job, dropped.error());
+  reconstruction_.drop_pose(task.job, task.pose);
+  post_event_(event::PlacementDropped{task.job, task.pose, task.why});
 }
 
 void JobThread::handle(const action::ResumeJob& task) {

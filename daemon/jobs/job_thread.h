@@ -25,7 +25,7 @@ class JobThread {
   };
   using Task = std::variant<LogLine, action::CheckCalibration, action::CreateJobs, action::StartJob, action::MoveJob,
                             action::RunJobRequest, action::StoreView, action::CheckMovement, action::FinishPose,
-                            action::ResumeJob, action::CloseJob>;
+                            action::CheckPlacement, action::DropPlacement, action::ResumeJob, action::CloseJob>;
   using ScannedHook = std::function<Result<void>(const std::filesystem::path& job_folder)>;
 
   /// `on_scanned` (may be empty) is called when all views of a job are on disk, before any report.
@@ -54,6 +54,8 @@ class JobThread {
   void handle(const action::StoreView& task);
   void handle(const action::CheckMovement& task);
   void handle(const action::FinishPose& task);
+  void handle(const action::CheckPlacement& task);
+  void handle(const action::DropPlacement& task);
   void handle(const action::ResumeJob& task);
   void handle(const action::CloseJob& task);
 

@@ -12,8 +12,11 @@ class PipelineReconstructor final : public Reconstructor {
   PipelineReconstructor(Reconstruction reconstruction, std::filesystem::path scan)
       : reconstruction_(std::move(reconstruction)), scan_(std::move(scan)) {}
 
-  Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context) override {
-    return reconstruction_.add_view(pose, images, context);
+  Result<void> add_view(std::size_t pose, const RawView& raw, const ViewRecord& record,
+                        const Context& context) override {
+    const auto images = to_view_images(raw, record);
+    if (!images) return pass_on(images);
+    return reconstruction_.add_view(pose, *images, context);
   }
   Result<void> finish_pose(std::size_t pose, const Context& context) override {
     return reconstruction_.finish_pose(pose, context);

@@ -53,7 +53,7 @@ class ProcessReconstructor final : public Reconstructor {
   ProcessReconstructor(ProcessExecutorOptions options, fs::path folder, ReconstructionChanges changes)
       : options_(std::move(options)), folder_(std::move(folder)), changes_(std::move(changes)) {}
 
-  Result<void> add_view(std::size_t, const ViewImages&, const Context&) override { return {}; }
+  Result<void> add_view(std::size_t, const RawView&, const ViewRecord&, const Context&) override { return {}; }
   Result<void> finish_pose(std::size_t, const Context&) override { return {}; }
 
   Result<void> finish(const fs::path& folder, const Context& context) override {

@@ -23,8 +23,9 @@ constexpr const char* kWork = "the reconstruction";
 }  // namespace
 
 ReconstructionThread::ReconstructionThread(Clock& clock, ReconstructorFactory factory,
-                                           std::function<void(Event)> post_event)
+                                           std::function<void(Event)> post_event, CalibratorFactory calibrator)
     : factory_(std::move(factory)),
+      calibrator_(std::move(calibrator)),
       post_event_(std::move(post_event)),
       inbox_(clock),
       thread_(start_actor(clock, [this] { run(); })) {}
@@ -151,20 +152,31 @@ void ReconstructionThread::handle(const Begin& message) {
 Result<void> ReconstructionThread::start(const Begin& message, const ScanFolder& scan) {
   current_->quarantined = is_to_be_quarantined(read_attempt_record(message.folder).ended_by_death);
   if (current_->quarantined) return {};
-  const auto calibration = scan.load_calibration();
-  if (!calibration) return pass_on(calibration);
   if (scan.manifest().state == "scanned") {
     if (auto marked = mark(); !marked) return marked;
   }
   return catch_exceptions(kWork, [&]() -> Result<void> {
-    auto made = factory_({.calibration = *calibration,
-                          .folder = message.folder,
-                          .views = message.recipe.poses * message.recipe.views,
-                          .changes = message.changes});
+    auto made = make_reconstructor(message, scan);
     if (!made) return pass_on(made);
     current_->reconstructor = std::move(*made);
     return {};
   });
+}
+
+Result<std::unique_ptr<Reconstructor>> ReconstructionThread::make_reconstructor(const Begin& message,
+                                                                                const ScanFolder& scan) {
+  const auto& recipe = message.recipe;
+  if (recipe.is_calibration()) {
+    if (!calibrator_) return fail(ErrorCode::unsupported, "this service cannot solve a calibration");
+    const auto report = [this, job = message.job](int pose, int view, std::vector<std::string> problems) {
+      post_event_(event::ImagesChecked{{job, pose, view}, std::move(problems)});
+    };
+    return calibrator_({.min_views = std::min(kMinPlacementViews, recipe.views), .report = report});
+  }
+  const auto calibration = scan.load_calibration();
+  if (!calibration) return pass_on(calibration);
+  return factory_(
+      {.calibration = *calibration, .folder = message.folder, .views = recipe.all_views(), .changes = message.changes});
 }
 
 /// Takes the earlier views of a job that is resumed or reprocessed.
@@ -173,7 +185,7 @@ Result<void> ReconstructionThread::catch_up(const ScanFolder& scan) {
   for (std::size_t pose = 0; pose < poses.size(); ++pose) {
     for (std::size_t view = 0; view < poses[pose].views.size(); ++view) {
       if (current_->stop.stop_requested()) return fail(ErrorCode::stopped, "stopped by request");
-      if (auto added = add(static_cast<int>(pose), scan.load_images(pose, view)); !added) return added;
+      if (auto added = add_stored(scan, pose, view); !added) return added;
     }
     if (!poses[pose].complete) break;
     if (auto closed = close_pose(static_cast<int>(pose)); !closed) return closed;
@@ -183,29 +195,34 @@ Result<void> ReconstructionThread::catch_up(const ScanFolder& scan) {
 
 void ReconstructionThread::handle(const Rebuild& message) { rebuilds_.push_back(message.begin); }
 
-Result<void> ReconstructionThread::add(int pose, const Result<ViewImages>& images) {
-  if (!images) return pass_on(images);
+Result<void> ReconstructionThread::add_stored(const ScanFolder& scan, std::size_t pose, std::size_t view) {
+  const auto raw = scan.load_raw(pose, view);
+  if (!raw) return pass_on(raw);
+  return add(static_cast<int>(pose), *raw, scan.manifest().poses[pose].views[view]);
+}
+
+Result<void> ReconstructionThread::add(int pose, const RawView& raw, const ViewRecord& record) {
   // One stage for all views of the scan: its bar covers the time in which the table turns.
-  const int views = current_->recipe.poses * current_->recipe.views;
+  const int views = current_->recipe.all_views();
+  const char* const stage = current_->recipe.is_calibration() ? "images" : "range";
   const auto progress = [&](std::string_view, double fraction) {
-    tell_progress("range", (current_->views_done + fraction) / views);
+    tell_progress(stage, std::min(1.0, (current_->views_done + fraction) / views));
   };
   auto added = catch_exceptions(kWork, [&] {
-    return current_->reconstructor->add_view(static_cast<std::size_t>(pose), *images, context(progress));
+    return current_->reconstructor->add_view(static_cast<std::size_t>(pose), raw, record, context(progress));
   });
   ++current_->views_done;
-  progress("range", 0.0);
+  progress(stage, 0.0);
   return added;
 }
 
 void ReconstructionThread::handle(const AddView& message) {
   if (message.view) --views_waiting_;
   if (!works_on(message.id.job)) return;
-  if (message.view) return check(add(message.id.pose, to_view_images(message.view->images, message.view->record)));
+  if (message.view) return check(add(message.id.pose, message.view->images, message.view->record));
   const auto scan = ScanFolder::open(current_->folder);
   if (!scan) return check(pass_on(scan));
-  check(add(message.id.pose,
-            scan->load_images(static_cast<std::size_t>(message.id.pose), static_cast<std::size_t>(message.id.view))));
+  check(add_stored(*scan, static_cast<std::size_t>(message.id.pose), static_cast<std::size_t>(message.id.view)));
 }
 
 Result<void> ReconstructionThread::close_pose(int pose) {
@@ -218,6 +235,21 @@ Result<void> ReconstructionThread::close_pose(int pose) {
 
 void ReconstructionThread::handle(const FinishPose& message) {
   if (works_on(message.job)) check(close_pose(message.pose));
+}
+
+/// A placement that no one can examine is not asked for again: its job fails for another reason.
+void ReconstructionThread::handle(const CheckPlacement& message) {
+  Result<void> enough;
+  if (works_on(message.job)) {
+    enough = catch_exceptions(
+        kWork, [&] { return current_->reconstructor->check_pose(static_cast<std::size_t>(message.pose)); });
+  }
+  post_event_(
+      event::PlacementChecked{message.job, message.pose, enough ? std::nullopt : std::optional(enough.error())});
+}
+
+void ReconstructionThread::handle(const DropPose& message) {
+  if (works_on(message.job)) current_->reconstructor->drop_pose(static_cast<std::size_t>(message.pose));
 }
 
 void ReconstructionThread::handle(const Finish& message) {
@@ -264,8 +296,10 @@ Result<event::ModelReady> ReconstructionThread::make_model() {
     const auto made = current_->reconstructor->finish(model_folder(current_->folder), context(progress));
     if (!made) return pass_on(made);
     const auto report = report_file(current_->folder);
-    return event::ModelReady{current_->job, model_file(current_->folder), report,
-                             limit_violation(report, current_->recipe.limits)};
+    const auto& recipe = current_->recipe;
+    return event::ModelReady{current_->job, model_file(current_->folder, recipe.kind), report,
+                             limit_violation(report, recipe.limits),
+                             recipe.is_calibration() ? read_calibration_report(report) : std::nullopt};
   });
 }
 

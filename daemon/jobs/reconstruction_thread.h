@@ -13,6 +13,7 @@
 #include <thread>
 #include <variant>
 
+#include "daemon/jobs/calibrator.h"
 #include "daemon/jobs/reconstructor.h"
 #include "daemon/rig/acquisition.h"
 #include "daemon/runtime/actor.h"
@@ -26,7 +27,8 @@ namespace scanrig {
 /// daemon died in it.
 class ReconstructionThread {
  public:
-  ReconstructionThread(Clock& clock, ReconstructorFactory factory, std::function<void(Event)> post_event);
+  ReconstructionThread(Clock& clock, ReconstructorFactory factory, std::function<void(Event)> post_event,
+                       CalibratorFactory calibrator = {});
   /// As stop(), then joins.
   ~ReconstructionThread();
   ReconstructionThread(const ReconstructionThread&) = delete;
@@ -36,6 +38,9 @@ class ReconstructionThread {
   void begin(std::string job, ScanFolder scan, Recipe recipe);
   void add_view(std::shared_ptr<const TakenView> view);
   void finish_pose(std::string job, int pose) { inbox_.post(FinishPose{std::move(job), pose}); }
+  /// Reports PlacementChecked once the views before it were examined.
+  void check_placement(std::string job, int pose) { inbox_.post(CheckPlacement{std::move(job), pose}); }
+  void drop_pose(std::string job, int pose) { inbox_.post(DropPose{std::move(job), pose}); }
   void finish(std::string job) { inbox_.post(Finish{std::move(job)}); }
   void abandon(std::string job) { inbox_.post(Abandon{std::move(job)}); }
   /// Reconstructs a whole scan, from its folder, when no scan is being followed.
@@ -69,13 +74,21 @@ class ReconstructionThread {
     std::string job;
     int pose;
   };
+  struct CheckPlacement {
+    std::string job;
+    int pose;
+  };
+  struct DropPose {
+    std::string job;
+    int pose;
+  };
   struct Finish {
     std::string job;
   };
   struct Abandon {
     std::string job;
   };
-  using Message = std::variant<Begin, Rebuild, AddView, FinishPose, Finish, Abandon>;
+  using Message = std::variant<Begin, Rebuild, AddView, FinishPose, CheckPlacement, DropPose, Finish, Abandon>;
 
   struct Current {
     std::string job;
@@ -95,6 +108,8 @@ class ReconstructionThread {
   void handle(const Rebuild& message);
   void handle(const AddView& message);
   void handle(const FinishPose& message);
+  void handle(const CheckPlacement& message);
+  void handle(const DropPose& message);
   void handle(const Finish& message);
   void handle(const Abandon& message);
 
@@ -104,8 +119,10 @@ class ReconstructionThread {
   Result<void> mark();
   void unmark();
   Result<void> start(const Begin& message, const ScanFolder& scan);
+  Result<std::unique_ptr<Reconstructor>> make_reconstructor(const Begin& message, const ScanFolder& scan);
   Result<void> catch_up(const ScanFolder& scan);
-  Result<void> add(int pose, const Result<ViewImages>& images);
+  Result<void> add(int pose, const RawView& raw, const ViewRecord& record);
+  Result<void> add_stored(const ScanFolder& scan, std::size_t pose, std::size_t view);
   Result<void> close_pose(int pose);
   void check(const Result<void>& done);
   Result<event::ModelReady> make_model();
@@ -116,6 +133,7 @@ class ReconstructionThread {
   void tell_progress(std::string stage, double fraction);
 
   ReconstructorFactory factory_;
+  CalibratorFactory calibrator_;
   std::function<void(Event)> post_event_;
   Mailbox<Message> inbox_;
   struct Run {

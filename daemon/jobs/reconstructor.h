@@ -19,7 +19,13 @@ namespace scanrig {
 class Reconstructor {
  public:
   virtual ~Reconstructor() = default;
-  virtual Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context) = 0;
+  virtual Result<void> add_view(std::size_t pose, const RawView& raw, const ViewRecord& record,
+                                const Context& context) = 0;
+  /// Whether the views of the pose are enough. Only of a calibration: fails with `below_limits`, then it is taken
+  /// again.
+  virtual Result<void> check_pose(std::size_t) { return {}; }
+  /// Its views are taken again.
+  virtual void drop_pose(std::size_t) {}
   virtual Result<void> finish_pose(std::size_t pose, const Context& context) = 0;
   /// Makes the model and writes its files and report.json together: after a failure there is no `folder`.
   virtual Result<void> finish(const std::filesystem::path& folder, const Context& context) = 0;

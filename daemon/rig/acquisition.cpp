@@ -45,17 +45,22 @@ Result<void> Acquisition::home() {
   return {};
 }
 
-Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle) {
+Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle, bool plain_only) {
   const unsigned before = interrupts_;
   if (id.job != std::exchange(job_, id.job)) image_checker_.begin();
+  judges_images_ = !plain_only;
   // The cameras are prepared before the table has stopped. If they fail, the exposure returns the error.
   std::ignore = devices_.camera.prepare(Deadline::after(clock_, options_.connect_limit));
   const auto move = turn_to(angle);
   if (!move) return pass_on(move);
 
   TakenView view{.id = id};
-  const auto pattern = expose(Light::pattern, before, view.record.retake_reasons);
-  if (!pattern) return pass_on(pattern);
+  StereoFrame pattern;
+  if (!plain_only) {
+    auto taken = expose(Light::pattern, before, view.record.retake_reasons);
+    if (!taken) return pass_on(taken);
+    pattern = std::move(*taken);
+  }
   const auto plain = expose(Light::plain, before, view.record.retake_reasons);
   if (!plain) return pass_on(plain);
 
@@ -65,8 +70,8 @@ Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle) {
   view.record.moving_ms = milliseconds(move->moving);
   view.record.settling_ms = milliseconds(move->settling);
   view.record.taken = iso_time(std::chrono::system_clock::now());
-  view.record.pixel_format = to_string(pattern->format);
-  view.images = {view.record.pixel_format, pattern->left, pattern->right, plain->left, plain->right};
+  view.record.pixel_format = to_string(plain->format);
+  view.images = {view.record.pixel_format, pattern.left, pattern.right, plain->left, plain->right};
   return view;
 }
 
@@ -143,7 +148,9 @@ Result<StereoFrame> Acquisition::expose_once(Light light) {
   }
   auto frame = from(kCamera, devices_.camera.collect(Deadline::after(clock_, options_.camera_limit)));
   if (!frame) return frame;
-  if (auto good = from(kCamera, image_checker_.judge(light, *frame)); !good) return pass_on(good);
+  if (judges_images_) {
+    if (auto good = from(kCamera, image_checker_.judge(light, *frame)); !good) return pass_on(good);
+  }
   seen_(*frame);
   return frame;
 }

@@ -52,7 +52,12 @@ class Acquisition {
   /// (see ImageChecker), or during which camera or projector vanished, and notes the reason.
   /// Unwinds a table wound up by several jobs on the way. Fails as the device that failed; the table has then been
   /// commanded to stop.
-  Result<TakenView> take_view(const ViewId& id, Degrees angle);
+  /// `plain_only`: without the pattern's two images; those of the plain light are not judged, as the board's glare is
+  /// no fault of the rig.
+  Result<TakenView> take_view(const ViewId& id, Degrees angle, bool plain_only = false);
+
+  /// Turns to `angle` as take_view() does. Fails as Turntable::rotate_to.
+  Result<Move> turn_to(Degrees angle);
 
   /// Turns as an engineer requests, no faster than requested, and measures the angle. Fails as Turntable::rotate_to,
   /// and with `unsupported` where the speed cannot be limited.
@@ -89,7 +94,6 @@ class Acquisition {
     if (!answer) failed_ = device;
     return answer;
   }
-  Result<Move> turn_to(Degrees angle);
   /// `before`: what interrupts() was when the view started.
   Result<StereoFrame> expose(Light light, unsigned before, std::vector<Error>& retake_reasons);
   Result<StereoFrame> expose_once(Light light);
@@ -100,6 +104,7 @@ class Acquisition {
   const std::function<void(const StereoFrame&)> seen_;
   std::atomic<unsigned> interrupts_ = 0;
   ImageChecker image_checker_;
+  bool judges_images_ = true;
   std::string job_;  ///< whose images it has seen
   std::string failed_;
   double position_deg_ = 0.0;  ///< where the last move ended, turns counted from home

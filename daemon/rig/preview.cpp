@@ -28,11 +28,7 @@ Result<std::string> encode(const cv::Mat& image, PixelFormat format) {
 Result<std::string> Preview::jpeg(Side side) {
   const bool quiet = quiet_();
   std::unique_lock lock(mutex_);
-  if (quiet) ask_for_more();
-  // Where only the projector's edge exposes, the latest exposure stays.
-  const bool blind = problem_ && (problem_->code != ErrorCode::unsupported || pairs_ == 0);
-  if (quiet && blind) return tl::unexpected(*problem_);
-  if (pairs_ == 0) return fail(ErrorCode::not_found, "preview: the cameras have taken no image yet; try again");
+  if (auto there = look(quiet); !there) return pass_on(there);
   Encoded& encoded = encoded_[static_cast<std::size_t>(side)];
   if (encoded.pair == pairs_) return encoded.bytes;
   const std::uint64_t pair = pairs_;
@@ -43,6 +39,23 @@ Result<std::string> Preview::jpeg(Side side) {
   lock.lock();
   if (bytes) encoded = {pair, *bytes};
   return bytes;
+}
+
+Result<StereoFrame> Preview::latest() {
+  const bool quiet = quiet_();
+  const std::scoped_lock lock(mutex_);
+  if (auto there = look(quiet); !there) return pass_on(there);
+  return latest_;
+}
+
+/// Requests a newer pair, and checks that there is one.
+Result<void> Preview::look(bool quiet) {
+  if (quiet) ask_for_more();
+  // Where only the projector's edge exposes, the latest exposure stays.
+  const bool blind = problem_ && (problem_->code != ErrorCode::unsupported || pairs_ == 0);
+  if (quiet && blind) return tl::unexpected(*problem_);
+  if (pairs_ == 0) return fail(ErrorCode::not_found, "preview: the cameras have taken no image yet; try again");
+  return {};
 }
 
 /// Takes one preview at a time.

@@ -26,6 +26,9 @@ class Preview {
   /// and as the preview failed while the cameras are free.
   Result<std::string> jpeg(Side side);
 
+  /// The same pair as it was taken. Fails as jpeg().
+  Result<StereoFrame> latest();
+
   // For the rig.
 
   /// `look` is called when a pair is wanted; one keep() or failed() replies to it. Null: no more previews.
@@ -35,6 +38,7 @@ class Preview {
 
  private:
   void ask_for_more();
+  Result<void> look(bool quiet);
 
   struct Encoded {
     std::uint64_t pair = 0;

@@ -95,11 +95,16 @@ Event RigThread::perform(const Asked& asked) {
     return event::Homed{};
   }
   if (const auto* view = std::get_if<action::TakeView>(&command)) {
-    auto taken = acquisition_.take_view(view->id, view->angle);
+    auto taken = acquisition_.take_view(view->id, view->angle, view->plain_only);
     if (!taken) return event::RigFailed{taken.error(), acquisition_.failed_device()};
     auto shared = std::make_shared<const TakenView>(std::move(*taken));
     if (view->movement_check) return event::CheckViewTaken{std::move(shared)};
     return event::ViewTaken{std::move(shared)};
+  }
+  if (const auto* turn = std::get_if<action::TurnTo>(&command)) {
+    const auto turned = acquisition_.turn_to(turn->angle);
+    if (!turned) return event::RigFailed{turned.error(), acquisition_.failed_device()};
+    return event::Turned{};
   }
   if (const auto* jog = std::get_if<action::Jog>(&command)) {
     const auto measured = acquisition_.jog(*jog);

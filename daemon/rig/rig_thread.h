@@ -28,6 +28,7 @@ class RigThread {
 
   void home() { post(action::Home{}); }
   void take_view(action::TakeView view) { post(std::move(view)); }
+  void turn_to(action::TurnTo turn) { post(turn); }
   void jog(action::Jog jog) { post(jog); }
   void pulse() { post(action::Pulse{}); }
   void check_devices() { post(action::CheckDevices{}); }
@@ -44,8 +45,8 @@ class RigThread {
 
  private:
   struct Look {};
-  using Command = std::variant<action::Home, action::TakeView, action::Jog, action::Pulse, action::CheckDevices,
-                               action::StopRig, Look>;
+  using Command = std::variant<action::Home, action::TakeView, action::TurnTo, action::Jog, action::Pulse,
+                               action::CheckDevices, action::StopRig, Look>;
 
   struct Asked {
     Command what;

@@ -8,6 +8,7 @@
 #include "daemon/jobs/housekeeping_thread.h"
 #include "daemon/journal/log_entries.h"
 #include "daemon/rig/panel_thread.h"
+#include "daemon/rig/placement_aid.h"
 #include "daemon/rig/rig_thread.h"
 #include "daemon/rig/turntable_thread.h"
 #include "daemon/runtime/overloaded.h"
@@ -146,11 +147,14 @@ bool quiet_now(const std::optional<QuietHours>& hours) {
 }
 
 ControlLoopOptions loop_options(const DaemonOptions& options, const std::optional<Latch>& latch) {
-  const StationRules rules{.recipes = options.recipes,
-                           .remote = options.remote,
-                           .guard = options.guard,
-                           .auto_home = options.auto_home,
-                           .manual_light = options.manual_light};
+  const StationRules rules{
+      .recipes = options.recipes,
+      .remote = options.remote,
+      .guard = options.guard,
+      .auto_home = options.auto_home,
+      .manual_light = options.manual_light,
+      .calibration = options.calibrator.solver ? std::optional(calibration_recipe()) : std::nullopt,
+      .accepts_calibrations = options.accepts_calibrations};
   ControlLoopOptions for_loop{.rules = rules,
                               .warning = options.warning,
                               .hang_limit = options.hang_limit,
@@ -160,13 +164,15 @@ ControlLoopOptions loop_options(const DaemonOptions& options, const std::optiona
   return for_loop;
 }
 
-ApiOptions api_options(const DaemonOptions& options, const JobStore& store, JobLogs& logs, Preview& preview) {
+ApiOptions api_options(const DaemonOptions& options, const JobStore& store, JobLogs& logs, Preview& preview,
+                       PlacementAid& aid) {
   auto for_api = options.api;
   for_api.storage = store.options().root;
   for_api.journal = [&logs](JournalEntry entry) { logs.write(std::move(entry)); };
   for_api.preview_jpeg = [&preview](std::string_view side) {
     return preview.jpeg(side == "left" ? Side::left : Side::right);
   };
+  for_api.look_at_board = [&aid](const AwaitedPlacement& awaited) { return aid.look(awaited); };
   return for_api;
 }
 
@@ -193,7 +199,8 @@ struct Shared {
 struct Threads {
   Threads(const Devices& devices, const Shared& shared)
       : post_event([&loop = shared.loop](Event event) { loop.post(std::move(event)); }),
-        reconstruction(shared.clock, shared.options.reconstructor, post_event),
+        reconstruction(shared.clock, shared.options.reconstructor, post_event,
+                       shared.options.calibrator.solver ? calibrator(shared.options.calibrator) : CalibratorFactory{}),
         housekeeping(
             shared.clock, shared.store, shared.options.retention,
             [&loop = shared.loop] { return loop.snapshot()->jobs; }, post_event, bundle_options(shared.options)),
@@ -240,8 +247,9 @@ void perform(const Action& action, Threads& threads) {
                  [&](const action::Home&) { rig.home(); }, [&](const action::StopRig&) { rig.stop(); },
                  [&](const action::StopTableDirectly&) { rig.stop_directly(); },
                  [&](const action::StopTableOutside&) { threads.outside.begin(); },
-                 [&](const action::TakeView& a) { rig.take_view(a); }, [&](const action::Jog& a) { rig.jog(a); },
-                 [&](const action::Pulse&) { rig.pulse(); }, [&](const action::CheckDevices&) { rig.check_devices(); },
+                 [&](const action::TakeView& a) { rig.take_view(a); }, [&](const action::TurnTo& a) { rig.turn_to(a); },
+                 [&](const action::Jog& a) { rig.jog(a); }, [&](const action::Pulse&) { rig.pulse(); },
+                 [&](const action::CheckDevices&) { rig.check_devices(); },
                  [&](const action::RunJobRequest& a) { keep(a, threads); },
                  [&](const auto& task) { threads.jobs.post(task); }},
       action);
@@ -297,7 +305,8 @@ Result<Ended> run_daemon(const Devices& devices, const DaemonOptions& options, C
   JobLogs logs(options.journal);
   const OnLoop reachable(options, loop);
   Preview preview(clock, [&loop] { return cameras_are_free(*loop.snapshot()); });
-  auto api = ApiServer::start(api_options(options, *store, logs, preview), loop);
+  PlacementAid aid(clock, preview, options.calibrator.board, options.jobs.calibration_file);
+  auto api = ApiServer::start(api_options(options, *store, logs, preview, aid), loop);
   if (!api) return pass_on(api);
   if (auto may = options.takes_devices(); !may) return pass_on(may);
   record.begin_devices();

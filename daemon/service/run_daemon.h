@@ -11,6 +11,7 @@
 #include "core/result.h"
 #include "daemon/api/server.h"
 #include "daemon/jobs/bundle.h"
+#include "daemon/jobs/calibrator.h"
 #include "daemon/jobs/job_store.h"
 #include "daemon/jobs/job_thread.h"
 #include "daemon/jobs/reconstructor.h"
@@ -63,6 +64,8 @@ struct DaemonOptions {
   AcquisitionOptions acquisition;
   Clock::Duration warning = std::chrono::seconds(2);
   ReconstructorFactory reconstructor;
+  CalibratorOptions calibrator{};     ///< without a solver no calibration can begin
+  bool accepts_calibrations = false;  ///< one that grades is used without a person
   JobThread::ScannedHook on_scanned;
   /// Called once nothing else can refuse, such as another daemon, and before a device is used. If it fails, the
   /// daemon fails with its error.

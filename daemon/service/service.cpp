@@ -74,7 +74,10 @@ DaemonOptions options_from(const config::RigConfig& config) {
                   .cameras = cameras_from(config.stereo_camera),
                   .profile = "",
                   .config_sha256 = sha256(config.text),
-                  .reserve_bytes = gib(config.storage.reserve_gib)};
+                  .reserve_bytes = gib(config.storage.reserve_gib),
+                  .check_calibration_every = config.calibration.check_every};
+  options.calibrator.board = config.calibration.board;
+  options.accepts_calibrations = config.calibration.accepts_by_itself;
   options.state_folder = crash_folder(config.storage.root).parent_path();
   options.recipes.clear();
   for (const auto& [name, recipe] : config.recipes) options.recipes[name] = recipe_from(name, recipe);

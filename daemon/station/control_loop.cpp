@@ -21,6 +21,12 @@ std::string concerned_job(const StationState& state, const Step& step) {
   return state.job ? state.job->id : std::string();
 }
 
+std::optional<AwaitedPlacement> awaited(const StationState& state) {
+  const auto placement = awaited_placement(state);
+  if (!placement) return std::nullopt;
+  return AwaitedPlacement{state.job ? state.job->id : state.queue.front()->id, *placement, state.table_deg};
+}
+
 constexpr PanelOutputs kAllOn{true, true, true, true, true, true, true, true};
 
 }  // namespace
@@ -233,6 +239,8 @@ void ControlLoop::publish(const StationPorts& ports) {
       .outputs = shown_,
       .devices = std::move(devices),
       .calibration_problem = calibration ? std::optional(*calibration) : std::nullopt,
+      .calibration_reminder = state_.calibration.reminder,
+      .awaited_placement = awaited(state_),
       .job = state_.job ? state_.job->id : std::string(),
       .not_started = state_.not_started,
       .queue = std::move(queue),

@@ -32,6 +32,8 @@ struct JobOrder {
   std::string recipe = "default";
   std::string part{};  ///< free text, at most 200 bytes
   int repeat = 1;      ///< 1 to 100
+  /// A calibration instead, at the head of the queue; the rest is not used.
+  bool is_calibration = false;
 };
 
 /// Identifies the requester waiting for a reply; 0: no requester.
@@ -80,6 +82,7 @@ struct WarmingUp {
 struct CalibrationChecked {
   std::string job{};
   std::optional<Error> problem{};
+  std::string reminder{};  ///< that it is old, as a sentence; empty: it is not
 };
 /// Reports of the turntable's drive while no motion is requested.
 struct DriveReport {
@@ -109,6 +112,7 @@ struct Jogged {
 };
 struct Pulsed {};
 struct Homed {};
+struct Turned {};  ///< to the next placement's mark
 struct ViewTaken {
   std::shared_ptr<const TakenView> view;
 };
@@ -141,6 +145,7 @@ struct JobRequested {
     reprocess,     ///< the reconstruction again, from the images; `voxel_mm` and `fusion` may change it
     set_exported,  ///< retention may delete it
     bundle,        ///< packed into the file `path`, for support
+    accept,        ///< a calibration that is solved becomes the rig's
   };
   What what;
   std::string job;
@@ -186,6 +191,23 @@ struct MovementChecked {
 struct FlipTimedOut {
   std::string job;
 };
+/// The images of one view of a calibration were examined.
+struct ImagesChecked {
+  ViewId id;
+  std::vector<std::string> problems;  ///< for the operator; empty: both are good
+};
+/// Whether enough views of a placement are good; `problem`: why not.
+struct PlacementChecked {
+  std::string job;
+  int pose;
+  std::optional<Error> problem{};
+};
+/// The views of a placement were dropped: it is taken again.
+struct PlacementDropped {
+  std::string job;
+  int pose;
+  Error why;
+};
 struct ViewStored {
   ViewId id;
   double measured_deg;
@@ -222,6 +244,7 @@ struct ReconstructionFailed {
 struct ModelReady {
   std::string job, model, report;          ///< paths of the files
   std::optional<Error> limit_violation{};  ///< why the model did not pass
+  std::optional<CalibrationOutcome> calibration{};
 };
 /// The daemon is to restart under a new configuration; accepted only while the rig is idle.
 struct ReloadRequested {
@@ -235,6 +258,7 @@ using Event =
                  event::WarningOver, event::EstopWindowOver, event::StopRetryDue, event::CheckDue, event::QuietHours,
                  event::WarmingUp, event::DevicesChecked, event::HungCallChanged, event::CalibrationChecked,
                  event::MaintenanceRequested, event::ConsentTimeout, event::Jogged, event::Pulsed, event::Homed,
+                 event::Turned, event::ImagesChecked, event::PlacementChecked, event::PlacementDropped,
                  event::ViewTaken, event::Stopped, event::RigFailed, event::StopFailed, event::PanelFailed,
                  event::JobsOrdered, event::JobRequested, event::RequestDone, event::JobUpdated, event::JobRemoved,
                  event::JobStarted, event::JobNotStarted, event::JobUnreadable, event::CheckViewTaken,
@@ -273,6 +297,11 @@ struct TakeView {
   ViewId id;
   Degrees angle;
   bool movement_check = false;  ///< view 0 again, for comparison: CheckViewTaken follows instead of ViewTaken
+  bool plain_only = false;      ///< without the pattern, as a calibration is taken
+};
+/// Turns without an exposure, for the next placement. Replied to by Turned or RigFailed.
+struct TurnTo {
+  Degrees angle;
 };
 struct WaitForFlip {
   std::string job;
@@ -305,6 +334,15 @@ struct CheckMovement {
 struct StoreView {
   std::shared_ptr<const TakenView> view;
 };
+struct CheckPlacement {
+  std::string job;
+  int pose;
+};  ///< replied to by PlacementChecked, when all its views were examined
+struct DropPlacement {
+  std::string job;
+  int pose;
+  Error why;
+};  ///< replied to by PlacementDropped
 struct FinishPose {
   std::string job;
   int pose;
@@ -320,11 +358,12 @@ struct CloseJob {
 };
 }  // namespace action
 
-using Action = std::variant<action::Warn, action::WaitForEstop, action::RetryStopLater, action::EndConsentLater,
-                            action::CheckLater, action::CheckDevices, action::CheckCalibration, action::Home,
-                            action::StopRig, action::StopTableDirectly, action::StopTableOutside, action::Jog,
-                            action::Pulse, action::TestLamps, action::TakeView, action::WaitForFlip, action::CreateJobs,
-                            action::StartJob, action::MoveJob, action::RunJobRequest, action::CheckMovement,
-                            action::StoreView, action::FinishPose, action::ResumeJob, action::CloseJob>;
+using Action =
+    std::variant<action::Warn, action::WaitForEstop, action::RetryStopLater, action::EndConsentLater,
+                 action::CheckLater, action::CheckDevices, action::CheckCalibration, action::Home, action::StopRig,
+                 action::StopTableDirectly, action::StopTableOutside, action::Jog, action::Pulse, action::TestLamps,
+                 action::TakeView, action::TurnTo, action::WaitForFlip, action::CheckPlacement, action::DropPlacement,
+                 action::CreateJobs, action::StartJob, action::MoveJob, action::RunJobRequest, action::CheckMovement,
+                 action::StoreView, action::FinishPose, action::ResumeJob, action::CloseJob>;
 
 }  // namespace scanrig

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <optional>
@@ -8,6 +9,7 @@
 
 #include "core/result.h"
 #include "daemon/station/states.h"
+#include "pipeline/calibration/plan.h"
 
 namespace scanrig {
 
@@ -18,17 +20,49 @@ struct Limits {
   bool operator==(const Limits&) const = default;
 };
 
+/// What the views of a job are for. The poses of a calibration are the placements of calibration_plan().
+enum class RecipeKind { scan, calibration };
+
 /// Settings for scanning one kind of object. A job keeps the recipe it was queued with.
 struct Recipe {
   std::string name = "default";
   int poses = 2;
-  int views = 8;                          ///< per pose, at equal angles
+  int views = 8;                          ///< per pose, at equal angles; of a calibration as placement_angles() counts
   std::chrono::minutes flip_timeout{30};  ///< then the job is parked and the rig is free
   bool flip_by_signal = false;            ///< the panel's `flipped` input reports that the object was turned over
   bool start_on_part = false;             ///< the queue continues when `part_present` falls and rises again
   Limits limits{};
+  RecipeKind kind = RecipeKind::scan;
   bool operator==(const Recipe&) const = default;
+
+  [[nodiscard]] bool is_calibration() const { return kind == RecipeKind::calibration; }
+  [[nodiscard]] const Placement& placement(int pose) const {
+    const auto& plan = calibration_plan();
+    return plan[std::min(static_cast<std::size_t>(pose), plan.size() - 1)];
+  }
+  [[nodiscard]] std::vector<double> angles_deg(int pose) const {
+    if (is_calibration()) return placement_angles(placement(pose), views);
+    std::vector<double> angles;
+    for (int view = 0; view < views; ++view) angles.push_back(360.0 * view / views);
+    return angles;
+  }
+  [[nodiscard]] int views_of(int pose) const {
+    return is_calibration() && placement(pose).is_flat() ? views + 1 : views;
+  }
+  [[nodiscard]] int all_views() const {
+    int all = 0;
+    for (int pose = 0; pose < poses; ++pose) all += views_of(pose);
+    return all;
+  }
 };
+
+/// The recipe of every calibration.
+inline Recipe calibration_recipe() {
+  return {.name = "calibration",
+          .poses = static_cast<int>(calibration_plan().size()),
+          .views = kPlacementViews,
+          .kind = RecipeKind::calibration};
+}
 
 struct StoredView {
   int pose = 0;
@@ -37,6 +71,8 @@ struct StoredView {
   std::vector<Error> retake_reasons{};  ///< exposures that were taken again, and why
   double commanded_deg = 0.0;
   double settling_ms = 0.0;  ///< from in-position to stopped
+  /// Of a calibration: what is wrong with its images, for the operator; nothing: not examined yet.
+  std::optional<std::vector<std::string>> problems{};
 };
 
 struct StageShare {
@@ -51,6 +87,14 @@ struct MovementCheck {
   double changed = 0.0;                 ///< share of the visible image that looks different, 0 to 1
   bool unmoved = true;                  ///< object, table and cameras are where they were
   std::vector<Error> retake_reasons{};  ///< exposures that were taken again, and why
+};
+
+/// Result of a calibration.
+struct CalibrationOutcome {
+  std::string grade{};  ///< "A", "B", "C"
+  std::vector<std::string> sentences{};
+  bool is_accepted = false;  ///< the rig's calibration was replaced by it
+  bool operator==(const CalibrationOutcome&) const = default;
 };
 
 /// Data of one job.
@@ -69,8 +113,10 @@ struct JobInfo {
   bool exported = false;             ///< a client has fetched what it needs
   std::optional<bool> passed{};      ///< done: whether the model is within the recipe's limits
   std::vector<StageShare> stages{};  ///< of the reconstruction, in the order of their start
-  std::optional<Error> error{};      ///< why it failed, was interrupted or cancelled; or did not pass
-  std::string model{};               ///< path of the model file, once it exists
+  std::optional<CalibrationOutcome> calibration{};  ///< of a calibration that is solved
+  std::string repeated{};        ///< why the views of the current placement were dropped; empty: they were not
+  std::optional<Error> error{};  ///< why it failed, was interrupted or cancelled; or did not pass
+  std::string model{};           ///< path of the model file, once it exists
   std::string report{};
 };
 

@@ -34,6 +34,27 @@ void set_progress(JobInfo& job, const event::StageProgress& e) {
   }
 }
 
+void set_model_ready(JobInfo& job, const event::ModelReady& e) {
+  std::tie(job.state, job.model, job.report) = std::tuple(JobState::done, e.model, e.report);
+  job.passed = !e.limit_violation;
+  job.error = e.limit_violation;
+  job.calibration = e.calibration;
+}
+
+void set_placement_dropped(JobInfo& job, const event::PlacementDropped& e) {
+  const auto of_pose = [&](const auto& one) { return one.pose == e.pose; };
+  std::erase_if(job.stored, of_pose);
+  std::erase_if(job.movement_checks, of_pose);
+  job.repeated = e.why.message;
+  if (!is_final(job.state)) job.state = JobState::waiting_for_flip;
+}
+
+void set_images_checked(JobInfo& job, const event::ImagesChecked& e) {
+  for (auto& view : job.stored) {
+    if (view.pose == e.id.pose && view.view == e.id.view) view.problems = e.problems;
+  }
+}
+
 void set_pose_stored(JobInfo& job, int pose) {
   const bool last = pose + 1 == job.recipe.poses;
   job.complete = pose + 1;
@@ -69,6 +90,7 @@ std::optional<JobEnd> update(JobTable& table, const Event& event) {
           [&](const event::ViewStored& e) {
             change(e.id.job, [&](JobInfo& job) {
               if (!is_final(job.state)) job.state = JobState::scanning;
+              job.repeated.clear();
               job.stored.push_back(
                   {e.id.pose, e.id.view, e.measured_deg, e.retake_reasons, e.commanded_deg, e.settling_ms});
               job.config_sha256 = e.config_sha256;
@@ -86,12 +108,10 @@ std::optional<JobEnd> update(JobTable& table, const Event& event) {
               if (job.state == JobState::reconstructing) job.state = JobState::failed;
             });
           },
-          [&](const event::ModelReady& e) {
-            change(e.job, [&](JobInfo& job) {
-              std::tie(job.state, job.model, job.report) = std::tuple(JobState::done, e.model, e.report);
-              job.passed = !e.limit_violation;
-              job.error = e.limit_violation;
-            });
+          [&](const event::ModelReady& e) { change(e.job, [&](JobInfo& job) { set_model_ready(job, e); }); },
+          [&](const event::ImagesChecked& e) { change(e.id.job, [&](JobInfo& job) { set_images_checked(job, e); }); },
+          [&](const event::PlacementDropped& e) {
+            change(e.job, [&](JobInfo& job) { set_placement_dropped(job, e); });
           },
           [](const auto&) {},  // concerns the machine only
       },
@@ -105,6 +125,7 @@ std::optional<JobEnd> close(JobTable& table, const action::CloseJob& task) {
 }
 
 bool is_resumable(const JobInfo& job) {
+  if (job.recipe.is_calibration()) return job.state == JobState::interrupted;
   return job.state == JobState::interrupted && std::ranges::all_of(job.movement_checks, &MovementCheck::unmoved);
 }
 
@@ -119,7 +140,10 @@ namespace {
 
 /// Ends a scan that has all its views.
 void set_scanned_state(JobInfo& job, const FolderFacts& facts) {
-  if (!facts.has_report) job.model = job.report = "";
+  if (!facts.has_report) {
+    job.model = job.report = "";
+    job.calibration.reset();
+  }
   job.quarantined = !facts.is_running && is_to_be_quarantined(facts.deaths);
   job.error = job.quarantined ? quarantine_error() : facts.failure;
   if (job.error) {
@@ -141,6 +165,7 @@ JobInfo with_state_of_folder(JobInfo job, const FolderFacts& facts) {
     return job;
   }
   job.model = job.report = "";
+  job.calibration.reset();
   job.state = parse_job_state(facts.manifest_state).value_or(JobState::interrupted);
   if (job.state == JobState::queued) return job;
   if (job.state == JobState::scanning || job.state == JobState::waiting_for_flip) {

@@ -22,7 +22,8 @@ struct JobEnd {
 /// JobUpdated.
 std::optional<JobEnd> update(JobTable& table, const Event& event);
 
-/// Interrupted, and the missing views may still be taken: nothing has moved so far.
+/// Interrupted, and the missing views may still be taken: nothing has moved so far. A calibration takes the placement
+/// in which its board moved again.
 bool is_resumable(const JobInfo& job);
 
 /// Content of the files in a job's folder beside its views.

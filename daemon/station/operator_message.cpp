@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <cctype>
+#include <cmath>
+#include <ranges>
 
 #include "daemon/station/job_lifecycle.h"
 
@@ -75,8 +77,22 @@ std::string fault_sentence(const StationState& state) {
   return "A fault stopped the rig.";
 }
 
+std::string working_on_calibration(const StationState& state) {
+  const auto& job = *state.job;
+  const auto problem = job.image_problem.empty() ? "" : " " + job.image_problem;
+  const int views = job.recipe.views_of(job.pose);
+  if (job.turning) return "The table turns to the mark of the next placement.";
+  if (job.closing)
+    return fmt::format("Placement {} of {}: has the board slipped?{}", job.pose + 1, job.recipe.poses, problem);
+  if (state.activity == Activity::storing)
+    return fmt::format("Placement {}: checking its images.{}", job.pose + 1, problem);
+  return fmt::format("Placement {} of {}: {} of {} views taken, {} stored.{}", job.pose + 1, job.recipe.poses,
+                     job.taken, views, job.stored, problem);
+}
+
 std::string working(const StationState& state) {
   const auto& job = *state.job;
+  if (state.activity != Activity::warning && job.recipe.is_calibration()) return working_on_calibration(state);
   switch (state.activity) {
     case Activity::warning: return "The table is about to move.";
     case Activity::scanning:
@@ -93,6 +109,9 @@ std::string how_to_start(const StationState& state) {
   const auto start = steps_before_motion(state) + "then press Start.";
   if (state.queue.empty()) return "Put a part on the table, " + start;
   const auto& head = *state.queue.front();
+  const auto placement = awaited_placement(state);
+  if (placement) return how_to_place(head.recipe.placement(*placement), state.guard_closed);
+  if (head.recipe.is_calibration()) return "Do not move the board, " + start;
   const bool has_views = !head.stored.empty() && head.stored.back().pose == head.complete;
   const auto name = head.part.empty() ? "job " + head.id : head.part;
   if (has_views) return fmt::format("Do not move the part of {}, {}", name, start);
@@ -124,6 +143,10 @@ OperatorMessage when_ready(const StationState& state, const StationRules& rules)
   const auto queued = state.queue.size();
   auto sentence =
       queued == 0 ? std::string("The rig is ready.") : fmt::format("The rig is ready, {} in the queue.", queued);
+  if (const auto placement = awaited_placement(state)) {
+    sentence = fmt::format("Calibration, placement {} of {}.", *placement + 1, state.queue.front()->recipe.poses);
+  }
+  if (!state.calibration.reminder.empty()) sentence += " " + state.calibration.reminder;
   if (warming_up(state)) sentence += fmt::format(" The projector will be warm in {} s.", state.warm_up_left.count());
   if (const auto* problem = calibration_problem(state)) return {std::move(sentence), see_to_calibration(*problem)};
   return {std::move(sentence),
@@ -142,7 +165,18 @@ std::string how_to_go_on(const StationState& state) {
   return state.guard_closed ? "The scan continues." : "Close the guard: the scan continues.";
 }
 
+OperatorMessage when_waiting_for_board(const StationState& state) {
+  const auto& job = *state.job;
+  const auto action = see_to_absent(state) + how_to_place(job.recipe.placement(next_pose(job)), state.guard_closed);
+  if (job.repeated.empty()) {
+    return {fmt::format("Placement {} of {} is complete.", job.pose + 1, job.recipe.poses), action};
+  }
+  return {fmt::format("Placement {} of {} again: {}.", job.pose + 1, job.recipe.poses, job.repeated), action};
+}
+
 OperatorMessage when_executing(const StationState& state) {
+  const bool calibrates = state.job && state.job->recipe.is_calibration();
+  if (calibrates && state.activity == Activity::waiting_for_flip) return when_waiting_for_board(state);
   if (state.activity == Activity::waiting_for_flip) {
     return {fmt::format("Pose {} of {} is complete.", state.job->pose + 1, state.job->recipe.poses),
             see_to_absent(state) +
@@ -151,8 +185,9 @@ OperatorMessage when_executing(const StationState& state) {
   if (state.activity == Activity::waiting_for_part) {
     return {fmt::format("Waiting for the next part, {} in the queue.", state.queue.size()), what_holds_the_line(state)};
   }
-  if (state.activity == Activity::storing) return {working(state), "Do not move the part."};
-  return {working(state), "Keep clear. Do not move the part."};
+  const char* const what = calibrates ? "board" : "part";
+  if (state.activity == Activity::storing) return {working(state), fmt::format("Do not move the {}.", what)};
+  return {working(state), fmt::format("Keep clear. Do not move the {}.", what)};
 }
 
 }  // namespace
@@ -164,6 +199,17 @@ std::string how_to_flip(const Recipe& recipe, bool guard_closed) {
   }
   return guard_closed ? "Wait: the automation turns the part over."
                       : "Close the guard: the automation turns the part over.";
+}
+
+std::string how_to_place(const Placement& placement, bool guard_closed) {
+  const char* const guard = guard_closed ? "Then" : "Then close the guard and";
+  if (placement.is_flat()) return fmt::format("Lay the board flat, its centre on the axis. {} press Start.", guard);
+  const auto centre = placement.front_mm == 0.0 ? std::string("on the axis")
+                                                : fmt::format("{:.0f} mm {} the axis", std::abs(placement.front_mm),
+                                                              placement.front_mm > 0.0 ? "in front of" : "behind");
+  return fmt::format("Put the board at mark {:.0f}: {}, {:.0f} deg from flat, centre {}{}. {} press Start.",
+                     placement.mark_deg, placement.portrait ? "portrait" : "landscape", placement.tilt_deg, centre,
+                     placement.on_block ? ", on the block" : "", guard);
 }
 
 OperatorMessage describe(const StationState& state, const StationRules& rules) {
@@ -198,6 +244,11 @@ auto views_of_pose(const JobInfo& job) {
 
 OperatorMessage when_queued(const JobInfo& job) {
   const std::string sentence = job.stored.empty() ? "Queued." : "Queued to resume.";
+  if (job.recipe.is_calibration()) {
+    const auto& placement = job.recipe.placement(job.complete);
+    return {"Calibration queued.",
+            views_of_pose(job) > 0 ? "Do not move the board. Press Start." : how_to_place(placement)};
+  }
   if (job.recipe.start_on_part) {
     return {sentence, "When first in the queue, load the part. Start begins the series."};
   }
@@ -226,9 +277,49 @@ OperatorMessage when_interrupted(const JobInfo& job) {
   return {sentence, "Put its part on the table. Resume the job, then press Start."};
 }
 
+/// The last view with a problem, of the current placement.
+std::string image_problem(const JobInfo& job) {
+  for (const auto& view : std::views::reverse(job.stored)) {
+    if (view.pose != job.complete) break;
+    if (view.problems && !view.problems->empty())
+      return fmt::format(" View {}, {}", view.view + 1, view.problems->front());
+  }
+  return "";
+}
+
+OperatorMessage when_solved(const JobInfo& job) {
+  const auto outcome = job.calibration.value_or(CalibrationOutcome{});
+  auto sentence = fmt::format("Calibration of grade {}{}.", outcome.grade, outcome.is_accepted ? " is in use" : "");
+  for (const auto& more : outcome.sentences) sentence += " " + more;
+  return {sentence, outcome.is_accepted ? "Scan." : "Accept it: run scanrig calibrate --accept."};
+}
+
+OperatorMessage describe_calibration(const JobInfo& job) {
+  const int pose = job.complete + 1, all = job.recipe.poses;
+  switch (job.state) {
+    case JobState::scanning:
+      return {fmt::format("Placement {} of {}: {} of {} views stored.{}", pose, all, views_of_pose(job),
+                          job.recipe.views_of(job.complete), image_problem(job)),
+              "Do not move the board."};
+    case JobState::waiting_for_flip:
+      return {job.repeated.empty() ? fmt::format("Placement {} of {} is complete.", job.complete, all)
+                                   : fmt::format("Placement {} of {} again: {}.", pose, all, job.repeated),
+              how_to_place(job.recipe.placement(job.complete))};
+    case JobState::reconstructing: return {"Solving the calibration.", "Wait for the result."};
+    case JobState::done: return when_solved(job);
+    case JobState::interrupted:
+      return {
+          fmt::format("Interrupted: {}.", why(job)),
+          fmt::format("{}Resume the job, then press Start.", views_of_pose(job) > 0 ? "Do not move the board. " : "")};
+    case JobState::cancelled: return {fmt::format("Cancelled: {}.", why(job)), "Calibrate again if needed."};
+    default: return {fmt::format("Failed: {}.", why(job)), "The old calibration stays. Calibrate again."};
+  }
+}
+
 }  // namespace
 
 OperatorMessage describe(const JobInfo& job) {
+  if (job.recipe.is_calibration() && job.state != JobState::queued) return describe_calibration(job);
   switch (job.state) {
     case JobState::queued: return when_queued(job);
     case JobState::scanning:
@@ -253,6 +344,7 @@ PanelOutputs lamps(const StationState& state, const JobTable& jobs, bool blink) 
   PanelOutputs out;
   const bool warning = state.activity == Activity::warning;
   const bool flip = state.activity == Activity::waiting_for_flip;
+  const bool by_automation = flip && !state.job->recipe.is_calibration();
   out.red = state.machine == MachineState::error || state.may_be_moving || state.shutting_down;
   const bool part = state.activity == Activity::waiting_for_part;
   out.amber = (state.machine == MachineState::halted && !out.red) || warning || flip ||
@@ -261,7 +353,7 @@ PanelOutputs lamps(const StationState& state, const JobTable& jobs, bool blink) 
   out.green = state.machine == MachineState::ready || part ||
               (out.busy && !state.maintenance && !warning && !out.red && !out.amber);
   out.start_lamp = state.machine == MachineState::ready || flip || part;
-  out.flip_request = flip;
+  out.flip_request = by_automation;
   const auto last = jobs.find(state.last_started_job);
   if (last != jobs.end() && is_final(last->second->state)) {
     out.pass = last->second->state == JobState::done && last->second->passed.value_or(true);

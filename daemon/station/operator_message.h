@@ -24,6 +24,9 @@ OperatorMessage describe(const JobInfo& job);
 /// Next action when a pose is complete.
 std::string how_to_flip(const Recipe& recipe, bool guard_closed = true);
 
+/// Next action before a placement of the calibration board.
+std::string how_to_place(const Placement& placement, bool guard_closed = true);
+
 /// Meaning of the lamps. Red: fault. Amber: act now, or (with busy) keep your hands away. Green: ready or working.
 /// Amber blinking (`blink` changes every half second): maintenance. Red also when the daemon ends.
 /// The start lamp is on where Start would do something. Pass and fail show how the last started job ended;

@@ -11,10 +11,37 @@ void finish_pose(StepBuilder& m) {
   m.act(action::FinishPose{job.id, job.pose, job.pose + 1 == job.recipe.poses});
 }
 
+/// The next placement's mark faces the cameras, so that they show how the board is put down. It was the Start of this
+/// placement that let the table move.
+void turn_to_mark(StepBuilder& m) {
+  auto& job = *m.s().job;
+  const Degrees angle{facing_deg(job.recipe.placement(next_pose(job)))};
+  job.turning = true;
+  m.s().activity = Activity::scanning;
+  m.s().table_deg = angle.value;
+  m.act(action::TurnTo{angle});
+}
+
+void wait_for_person(StepBuilder& m) {
+  auto& s = m.s();
+  s.activity = Activity::waiting_for_flip;
+  m.act(action::WaitForFlip{s.job->id, s.job->recipe.flip_timeout});
+}
+
+/// The board has slipped, or too few of its images are good: only this placement is taken again.
+void drop_placement(StepBuilder& m, Error why) {
+  const auto& job = *m.s().job;
+  m.s().activity = Activity::storing;
+  m.act(action::DropPlacement{job.id, job.pose, std::move(why)});
+}
+
 /// The views of this pose do not belong together: no model can come of them.
 void moved(StepBuilder& m, const MovementCheck& movement_check) {
   const auto& job = *m.s().job;
-  const bool resuming = job.taken < job.recipe.views;
+  if (job.recipe.is_calibration()) {
+    return drop_placement(m, {ErrorCode::moved, fmt::format("the board slipped in placement {}", job.pose + 1)});
+  }
+  const bool resuming = job.taken < job.recipe.views_of(job.pose);
   const Error why{
       ErrorCode::moved,
       fmt::format("something moved in pose {} ({} px, {:.0f} % of the image changed); scan the part again",
@@ -66,14 +93,19 @@ void job_started(StepBuilder& m, const event::JobStarted& e) {
 void take_next_view(StepBuilder& m) {
   if (m.s().activity != Activity::scanning || !m.s().job->is_started) return;
   auto& job = *m.s().job;
+  const auto take = [&](int view, bool again) {
+    const double angle = job.recipe.angles_deg(job.pose)[static_cast<std::size_t>(view)];
+    m.s().table_deg = angle;
+    m.act(action::TakeView{{job.id, job.pose, view}, {angle}, again, job.recipe.is_calibration()});
+  };
   if (job.closing || job.asked > job.taken || job.taken - job.stored >= kMaxUnstored) return;
   if (job.movement_check_due) {
     job.movement_check_due = false;
     job.closing = true;
-    return m.act(action::TakeView{{job.id, job.pose, 0}, {0.0}, true});
+    return take(0, true);
   }
-  if (job.asked == job.recipe.views) return;
-  m.act(action::TakeView{{job.id, job.pose, job.asked}, {360.0 * job.asked / job.recipe.views}});
+  if (job.asked == job.recipe.views_of(job.pose)) return;
+  take(job.asked, false);
   ++job.asked;
 }
 
@@ -83,7 +115,7 @@ void view_taken(StepBuilder& m, const event::ViewTaken& e) {
   if (job.taken == job.asked) return;
   ++job.taken;
   m.act(action::StoreView{e.view});
-  job.movement_check_due = job.taken == job.recipe.views;
+  job.movement_check_due = job.taken == job.recipe.views_of(job.pose);
   take_next_view(m);
 }
 
@@ -95,7 +127,8 @@ void view_stored(StepBuilder& m, const event::ViewStored& e) {
 
 void check_view_taken(StepBuilder& m, const event::CheckViewTaken& e) {
   if (m.s().activity != Activity::scanning) return;
-  if (m.s().job->taken == m.s().job->recipe.views) m.s().activity = Activity::storing;
+  const auto& job = *m.s().job;
+  if (job.taken == job.recipe.views_of(job.pose)) m.s().activity = Activity::storing;
   m.act(action::CheckMovement{e.view});
 }
 
@@ -104,8 +137,11 @@ void movement_checked(StepBuilder& m, const event::MovementChecked& e) {
   if (!m.is_active(e.job) || !m.s().job->closing || !executing) return;
   m.s().job->closing = false;
   if (!e.movement_check.unmoved) return moved(m, e.movement_check);
-  if (m.s().job->stored == m.s().job->recipe.views) return finish_pose(m);
-  take_next_view(m);
+  const auto& job = *m.s().job;
+  if (job.stored < job.recipe.views_of(job.pose)) return take_next_view(m);
+  if (!job.recipe.is_calibration()) return finish_pose(m);
+  m.s().activity = Activity::storing;
+  m.act(action::CheckPlacement{job.id, job.pose});
 }
 
 void pose_stored(StepBuilder& m, const event::PoseStored& e) {
@@ -117,9 +153,9 @@ void pose_stored(StepBuilder& m, const event::PoseStored& e) {
   } else if (s.job->reconstruction) {
     fail_before_flip(m);
   } else {
-    s.activity = Activity::waiting_for_flip;
-    s.cause = fmt::format("Pose {} is complete.", e.pose + 1);
-    m.act(action::WaitForFlip{e.job, s.job->recipe.flip_timeout});
+    const bool calibrates = s.job->recipe.is_calibration();
+    s.cause = fmt::format("{} {} is complete.", calibrates ? "Placement" : "Pose", e.pose + 1);
+    calibrates ? turn_to_mark(m) : wait_for_person(m);
   }
 }
 
@@ -129,9 +165,40 @@ void model_given_up(StepBuilder& m, const Error& why) {
   if (m.s().activity == Activity::waiting_for_flip) fail_before_flip(m);
 }
 
+void images_checked(StepBuilder& m, const event::ImagesChecked& e) {
+  if (!m.is_active(e.id.job) || e.id.pose != m.s().job->pose || e.problems.empty()) return;
+  m.s().job->image_problem = fmt::format("View {}, {}", e.id.view + 1, e.problems.front());
+}
+
+void placement_checked(StepBuilder& m, const event::PlacementChecked& e) {
+  const auto& s = m.s();
+  if (!m.is_active(e.job) || s.activity != Activity::storing || e.pose != s.job->pose || s.job->closing) return;
+  if (s.job->stored < s.job->recipe.views_of(e.pose)) return;
+  e.problem ? drop_placement(m, *e.problem) : finish_pose(m);
+}
+
+void placement_dropped(StepBuilder& m, const event::PlacementDropped& e) {
+  auto& s = m.s();
+  if (!m.is_active(e.job) || s.activity != Activity::storing || e.pose != s.job->pose) return;
+  s.job->asked = s.job->taken = s.job->stored = 0;
+  s.job->repeated = e.why.message;
+  s.cause = fmt::format("Placement {} is taken again: {}.", e.pose + 1, e.why.message);
+  if (s.job->reconstruction) return fail_before_flip(m);
+  turn_to_mark(m);
+}
+
+void turned(StepBuilder& m) {
+  auto& s = m.s();
+  if (s.activity != Activity::scanning || !s.job || !s.job->turning) return;
+  s.job->turning = false;
+  s.job->reconstruction ? fail_before_flip(m) : wait_for_person(m);
+}
+
 void continue_after_flip(StepBuilder& m, std::string cause) {
   auto& job = *m.s().job;
-  ++job.pose;
+  job.pose = next_pose(job);
+  job.repeated.clear();
+  job.image_problem.clear();
   job.asked = job.taken = job.stored = 0;
   job.turned_over = false;
   m.s().cause = std::move(cause);
@@ -158,11 +225,11 @@ void disk_checked(StepBuilder& m, const event::DiskChecked& e) {
 void flip_timed_out(StepBuilder& m, const event::FlipTimedOut& e) {
   if (!m.is_active(e.job) || m.s().activity != Activity::waiting_for_flip) return;
   const auto limit = m.s().job->recipe.flip_timeout;
+  const char* const not_done = m.s().job->recipe.is_calibration() ? "board not put in place" : "part not turned over";
   count_result(m, e.job, false);
-  m.close_job(
-      JobState::interrupted,
-      {ErrorCode::timeout, fmt::format("parked: part not turned over in {} min; resume the job", limit.count())});
-  release_rig(m, fmt::format("Job {} is parked: the part was not turned over.", e.job));
+  m.close_job(JobState::interrupted,
+              {ErrorCode::timeout, fmt::format("parked: {} in {} min; resume the job", not_done, limit.count())});
+  release_rig(m, fmt::format("Job {} is parked: {} in time.", e.job, not_done));
 }
 
 }  // namespace scanrig

@@ -40,6 +40,14 @@ class EventCounter {
   std::map<std::pair<std::string, std::string>, Clock::TimePoint> running_;  // since when, by job and stage
 };
 
+/// A placement of the calibration board that the next Start begins.
+struct AwaitedPlacement {
+  std::string job;
+  int placement = 0;  ///< from 0
+  std::optional<double> table_deg{};
+  bool operator==(const AwaitedPlacement&) const = default;
+};
+
 /// Whether the table is confirmed to be stopped.
 enum class Standstill {
   confirmed,
@@ -62,9 +70,11 @@ struct Snapshot {
   PanelOutputs outputs{};
   std::vector<DeviceHealth> devices{};         ///< as of the last check
   std::optional<Error> calibration_problem{};  ///< why the calibration refuses the next scan
-  std::string job{};                           ///< the active one; empty: none
-  std::optional<NotStarted> not_started{};     ///< by the last Start; until the next one
-  std::vector<std::string> queue{};            ///< ids of the jobs to come, the next one first
+  std::string calibration_reminder{};          ///< that it is old, as a sentence; empty: it is not
+  std::optional<AwaitedPlacement> awaited_placement{};
+  std::string job{};                        ///< the active one; empty: none
+  std::optional<NotStarted> not_started{};  ///< by the last Start; until the next one
+  std::vector<std::string> queue{};         ///< ids of the jobs to come, the next one first
   JobTable jobs{};
   Counters counters{};
 };

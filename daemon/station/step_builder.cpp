@@ -8,9 +8,23 @@ std::string calibrated_job(const StationState& state) {
   return has_views(head) ? head.id : std::string();
 }
 
+/// A calibration is what mends it.
 const Error* calibration_problem(const StationState& state) {
+  if (!state.queue.empty() && state.queue.front()->recipe.is_calibration()) return nullptr;
   const auto& seen = state.calibration;
   return seen.problem && seen.job == calibrated_job(state) ? &*seen.problem : nullptr;
+}
+
+int next_pose(const ActiveJob& job) { return job.repeated.empty() ? job.pose + 1 : job.pose; }
+
+std::optional<int> awaited_placement(const StationState& state) {
+  if (state.activity == Activity::waiting_for_flip) {
+    return state.job->recipe.is_calibration() ? std::optional(next_pose(*state.job)) : std::nullopt;
+  }
+  if (state.machine != MachineState::ready || state.queue.empty()) return std::nullopt;
+  const auto& head = *state.queue.front();
+  const bool stands = !head.stored.empty() && head.stored.back().pose == head.complete;
+  return head.recipe.is_calibration() && !stands ? std::optional(head.complete) : std::nullopt;
 }
 
 bool StepBuilder::may_move() {
@@ -36,6 +50,7 @@ void StepBuilder::warn() {
 }
 
 void StepBuilder::stop_rig() {
+  if (may_move()) s().table_deg.reset();
   s().activity = Activity::stopping;
   send_stop();
 }

@@ -114,7 +114,12 @@ void store_failed(StepBuilder& m, const event::StoreFailed& e);
 void disk_checked(StepBuilder& m, const event::DiskChecked& e);
 /// Reports that the active job will have no model.
 void model_given_up(StepBuilder& m, const Error& why);
-/// Handles a part that was turned over.
+// scanning.cpp: a calibration, placement by placement
+void images_checked(StepBuilder& m, const event::ImagesChecked& e);
+void placement_checked(StepBuilder& m, const event::PlacementChecked& e);
+void placement_dropped(StepBuilder& m, const event::PlacementDropped& e);
+void turned(StepBuilder& m);
+/// Handles a part that was turned over, or a board that was put in place.
 void continue_after_flip(StepBuilder& m, std::string cause);
 void flip_timed_out(StepBuilder& m, const event::FlipTimedOut& e);
 

@@ -69,6 +69,7 @@ class Transition : public StepBuilder {
   void operator()(const event::Homed&) {
     if (s().activity != Activity::homing) return;
     s().has_no_alarm = true;
+    s().table_deg = 0.0;
     if (s().maintenance) {
       s().maintenance->homed = true;
       moved_in_maintenance(*this);
@@ -79,6 +80,7 @@ class Transition : public StepBuilder {
   void operator()(const event::Jogged& e) {
     if (s().activity != Activity::jogging) return;
     s().maintenance->jog.reset();
+    s().table_deg = e.measured.value;
     moved_in_maintenance(*this);
     enter(MachineState::maintenance, fmt::format("The table is at {:.3f} deg.", e.measured.value));
   }
@@ -194,6 +196,10 @@ class Transition : public StepBuilder {
   void operator()(const event::MovementChecked& e) { movement_checked(*this, e); }
   void operator()(const event::PoseStored& e) { pose_stored(*this, e); }
   void operator()(const event::FlipTimedOut& e) { flip_timed_out(*this, e); }
+  void operator()(const event::ImagesChecked& e) { images_checked(*this, e); }
+  void operator()(const event::PlacementChecked& e) { placement_checked(*this, e); }
+  void operator()(const event::PlacementDropped& e) { placement_dropped(*this, e); }
+  void operator()(const event::Turned&) { turned(*this); }
 
   void operator()(const event::StoreFailed& e) { store_failed(*this, e); }
   void operator()(const event::DiskChecked& e) { disk_checked(*this, e); }
@@ -203,7 +209,11 @@ class Transition : public StepBuilder {
     if (is_active(e.job)) model_given_up(*this, e.error);
   }
 
-  void operator()(const event::ModelReady& e) { count_result(*this, e.job, !e.limit_violation); }
+  void operator()(const event::ModelReady& e) {
+    count_result(*this, e.job, !e.limit_violation);
+    if (!e.calibration || !rules().accepts_calibrations || s().shutting_down) return;
+    act(action::RunJobRequest{{.what = event::JobRequested::What::accept, .job = e.job}});
+  }
 
   /// A reload must not clear a latched fault.
   void operator()(const event::ReloadRequested& e) {
@@ -292,7 +302,10 @@ class Transition : public StepBuilder {
     if (!require_safe() || !require_devices() || !require_disk()) return;
     if (!flipped && !require_calibration()) return;
     s().failures = 0;
-    if (flipped) return continue_after_flip(*this, "The part was turned over.");
+    if (flipped) {
+      return continue_after_flip(
+          *this, s().job->recipe.is_calibration() ? "The board is in place." : "The part was turned over.");
+    }
     start_next_job(*this, new_job_id, "Start was pressed.");
   }
 

@@ -16,10 +16,12 @@ namespace scanrig {
 
 struct StationRules {
   std::map<std::string, Recipe> recipes{{"default", {}}};  ///< "default" is what Start scans when nothing is queued
-  bool remote = false;        ///< the API may start and home while the guard is closed; needs a guard
-  bool guard = false;         ///< there is a guard whose contact is wired
-  bool auto_home = false;     ///< after a restart a closed guard homes the table, without Reset
-  bool manual_light = false;  ///< the projector is switched by hand
+  bool remote = false;                  ///< the API may start and home while the guard is closed; needs a guard
+  bool guard = false;                   ///< there is a guard whose contact is wired
+  bool auto_home = false;               ///< after a restart a closed guard homes the table, without Reset
+  bool manual_light = false;            ///< the projector is switched by hand
+  std::optional<Recipe> calibration{};  ///< how the rig is calibrated; nothing: this service cannot solve one
+  bool accepts_calibrations = false;    ///< a calibration that grades becomes the rig's without a person
 };
 
 constexpr DegreesPerSecond kMaxJogSpeed{10};
@@ -46,6 +48,9 @@ struct ActiveJob {
   bool movement_check_due = false;        ///< view 0 has to be taken again before anything else
   bool closing = false;                   ///< it is being taken or checked
   bool turned_over = false;               ///< the automation has reported it since the flip request
+  bool turning = false;                   ///< to the mark of the placement that comes next
+  std::string repeated{};                 ///< why this placement is to be taken again; empty: the next one is
+  std::string image_problem{};            ///< of the last view with one, in this placement
   std::optional<Error> reconstruction{};  ///< why there will be no model
 };
 
@@ -96,6 +101,7 @@ struct StationState {
   std::optional<NotStarted> not_started{};              ///< by the last Start; until the next one
   std::optional<Error> disk_problem{};                  ///< it does not respond: nothing starts meanwhile
   bool part_gone = false;                               ///< the part of the last job was removed
+  std::optional<double> table_deg{};                    ///< where the last motion ended; nothing: unknown
 };
 
 struct Step {
@@ -108,6 +114,11 @@ struct Step {
 std::string calibrated_job(const StationState& state);
 /// Why the calibration refuses the next scan, as of the last check; null: it does not.
 const Error* calibration_problem(const StationState& state);
+
+/// The pose that the next Start begins or continues with.
+int next_pose(const ActiveJob& job);
+/// The placement, from 0, that the board is to be put at before the next Start; nothing: none is awaited.
+std::optional<int> awaited_placement(const StationState& state);
 
 /// The whole behaviour of the station as a pure function: the next state, and the actions.
 /// Events that come too late for the state they belong to change nothing.

@@ -1,20 +1,11 @@
 #include "pipeline/storage/images.h"
 
-#include <array>
 #include <opencv2/imgproc.hpp>
-#include <utility>
 
 #include "core/units.h"
 
 namespace scanrig {
 namespace {
-
-std::array<std::pair<const char*, const cv::Mat*>, 4> named(const RawView& raw) {
-  return {{{"left_pattern", &raw.left_pattern},
-           {"right_pattern", &raw.right_pattern},
-           {"left_plain", &raw.left_plain},
-           {"right_plain", &raw.right_plain}}};
-}
 
 cv::Mat demosaiced(const cv::Mat& image, const std::string& pixel_format) {
   if (pixel_format != "BayerRG8") return image;
@@ -24,7 +15,7 @@ cv::Mat demosaiced(const cv::Mat& image, const std::string& pixel_format) {
   return bgr;
 }
 
-Result<void> check_image(const char* name, const cv::Mat& image, const std::string& pixel_format) {
+Result<void> check_image(const std::string& name, const cv::Mat& image, const std::string& pixel_format) {
   const bool is_format = pixel_format == "Mono8" || pixel_format == "BayerRG8" || pixel_format == "BGR8";
   if (!is_format) return fail(ErrorCode::invalid_input, "unknown pixel format \"{}\"", pixel_format);
   if (image.empty()) return fail(ErrorCode::invalid_input, "{}: the image is missing", name);
@@ -37,10 +28,19 @@ Result<void> check_image(const char* name, const cv::Mat& image, const std::stri
 
 }  // namespace
 
-Result<void> check_images(const RawView& raw) {
-  for (const auto& [name, image] : named(raw)) {
-    if (const auto checked = check_image(name, *image, raw.pixel_format); !checked) return checked;
+cv::Mat& RawView::image(std::string_view role) {
+  const bool left = role.starts_with("left");
+  if (role.ends_with("pattern")) return left ? left_pattern : right_pattern;
+  return left ? left_plain : right_plain;
+}
+
+const cv::Mat& RawView::image(std::string_view role) const { return const_cast<RawView*>(this)->image(role); }
+
+Result<void> check_images(const RawView& raw, std::string_view source) {
+  for (const auto& role : view_roles(source)) {
+    if (const auto checked = check_image(role, raw.image(role), raw.pixel_format); !checked) return checked;
   }
+  if (source == "calibration") return {};
   if (raw.left_pattern.size() != raw.left_plain.size() || raw.right_pattern.size() != raw.right_plain.size()) {
     return fail(ErrorCode::invalid_input, "the pattern and the plain image of a camera differ in size");
   }

@@ -2,16 +2,21 @@
 
 #include <opencv2/core/mat.hpp>
 #include <string>
+#include <string_view>
 
 #include "core/result.h"
 #include "pipeline/storage/manifest.h"
 
 namespace scanrig {
 
-/// The four images of a view, as delivered by the sensors.
+/// The four images of a view, as delivered by the sensors. A view of a calibration has no pattern images.
 struct RawView {
   std::string pixel_format;
   cv::Mat left_pattern, right_pattern, left_plain, right_plain;
+
+  /// "left_plain" and so on, as view_roles() names them.
+  [[nodiscard]] cv::Mat& image(std::string_view role);
+  [[nodiscard]] const cv::Mat& image(std::string_view role) const;
 };
 
 /// The four images of a view, ready for use: BGR (colour sensors, demosaiced) or grey (mono sensors), 8 bit.
@@ -27,8 +32,8 @@ Result<ViewImages> to_view_images(const RawView& raw, const ViewRecord& record);
 /// One image of a sensor, ready for use: demosaiced where its pixel format needs it. Fails with `invalid_input`.
 Result<cv::Mat> to_usable_image(const cv::Mat& raw, const std::string& pixel_format);
 
-/// Checks that every image is 8 bit and has the format's channels, and that left and right each have one size. Fails
-/// with `invalid_input`.
-Result<void> check_images(const RawView& raw);
+/// Checks that every image of such a source is 8 bit and has the format's channels, and that left and right each have
+/// one size. Fails with `invalid_input`.
+Result<void> check_images(const RawView& raw, std::string_view source = "stereo");
 
 }  // namespace scanrig

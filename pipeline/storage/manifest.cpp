@@ -13,11 +13,11 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr int kVersion = 4;
+constexpr int kVersion = 5;             ///< 4 had no calibrations
 constexpr int kCurrentKeysVersion = 4;  ///< older versions use old names of two keys
 constexpr std::array kStates = {"queued",    "scanning", "waiting_for_flip", "scanned", "interrupted",
                                 "cancelled", "failed"};
-constexpr std::array kSources = {"stereo", "range"};
+constexpr std::array kSources = {"stereo", "calibration", "range"};
 
 /// The path of a view's file is under "path", that of the calibration under "file".
 ordered_json to_json(const FileRecord& file, const char* key = "path") {
@@ -102,7 +102,7 @@ std::vector<Error> read_retake_reasons(JsonObject& object, int version) {
   return reasons;
 }
 
-ViewRecord read_view(JsonObject object, bool stereo, int version) {
+ViewRecord read_view(JsonObject object, const std::string& source, int version) {
   ViewRecord view;
   view.index = object.integer("index", 0, 9999);
   view.commanded_deg = object.number("commanded_deg", -3600, 3600);
@@ -110,16 +110,14 @@ ViewRecord read_view(JsonObject object, bool stereo, int version) {
   view.moving_ms = object.number("moving_ms", 0);
   view.settling_ms = object.number("settling_ms", 0);
   view.taken = object.text("taken");
+  const bool images = source != "range";
   view.pixel_format =
-      stereo ? object.one_of("pixel_format", {"Mono8", "BayerRG8", "BGR8"}) : object.one_of("pixel_format", {""});
+      images ? object.one_of("pixel_format", {"Mono8", "BayerRG8", "BGR8"}) : object.one_of("pixel_format", {""});
   JsonObject files = object.object("files");
-  const std::vector<std::string> roles =
-      stereo ? std::vector<std::string>{"left_pattern", "right_pattern", "left_plain", "right_plain"}
-             : std::vector<std::string>{"range"};
-  for (const std::string& role : roles) view.files[role] = read_file_record(files.object(role));
+  for (const std::string& role : view_roles(source)) view.files[role] = read_file_record(files.object(role));
   files.close();
   view.retake_reasons = read_retake_reasons(object, version);
-  if (!stereo) {
+  if (!images) {
     view.grid = read_grid(object.object("grid"));
     view.camera_from_pose = object.transform("camera_from_pose");
   }
@@ -149,7 +147,7 @@ std::optional<int> first_gap(const PoseRecord& pose) {
   return std::nullopt;
 }
 
-PoseRecord read_pose(JsonObject object, bool stereo, int version) {
+PoseRecord read_pose(JsonObject object, const std::string& source, int version) {
   PoseRecord pose;
   pose.name = object.text("name");
   if (pose.name.empty() || pose.name.front() == '.' || pose.name.find('/') != std::string::npos) {
@@ -157,7 +155,7 @@ PoseRecord read_pose(JsonObject object, bool stereo, int version) {
   }
   pose.complete = object.flag("complete");
   for (JsonObject& view : object.objects("views")) {
-    pose.views.push_back(read_view(view, stereo, version));
+    pose.views.push_back(read_view(view, source, version));
     if (pose.views.size() > 1 && pose.views.back().index <= pose.views[pose.views.size() - 2].index) {
       view.reject("index", "views must be listed by ascending index, each once");
     }
@@ -210,11 +208,17 @@ Result<Manifest> read_manifest(const std::filesystem::path& file) {
   if (root.has("calibration")) manifest.calibration = read_file_record(root.object("calibration"), "file");
   std::set<std::string> names;
   for (JsonObject& pose : root.objects("poses")) {
-    manifest.poses.push_back(read_pose(pose, manifest.source == "stereo", json->version()));
+    manifest.poses.push_back(read_pose(pose, manifest.source, json->version()));
     if (!names.insert(manifest.poses.back().name).second) pose.reject("name", "is already used by another pose");
   }
   if (const auto whole = json->finish(); !whole) return pass_on(whole);
   return manifest;
+}
+
+std::vector<std::string> view_roles(std::string_view source) {
+  if (source == "range") return {"range"};
+  if (source == "calibration") return {"left_plain", "right_plain"};
+  return {"left_pattern", "right_pattern", "left_plain", "right_plain"};
 }
 
 Result<void> check_words(const Manifest& manifest) {

@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/result.h"
@@ -54,7 +55,7 @@ struct Manifest {
   std::string id;
   std::string created;
   std::string state = "scanning";
-  std::string source = "stereo";
+  std::string source = "stereo";  ///< or "calibration", "range"
   std::string profile;
   std::vector<std::string> config_sha256;  ///< one per configuration that its views were taken under, in order of use
   std::optional<FileRecord> calibration;
@@ -65,9 +66,12 @@ struct Manifest {
 std::string to_json(const Manifest& manifest);
 
 /// Reads version 1 too, which has no movement_checks, and version 2, which has no configuration; the written version is
-/// 4. Fails with `not_found`, `io`, `invalid_input` (naming file and key), `unsupported` (version). Sizes of range
+/// 5. Fails with `not_found`, `io`, `invalid_input` (naming file and key), `unsupported` (version). Sizes of range
 /// grids are those of their files and stay 0 here.
 Result<Manifest> read_manifest(const std::filesystem::path& file);
+
+/// The files of a view of this source: "left_plain" and so on.
+std::vector<std::string> view_roles(std::string_view source);
 
 /// Checks that `state` and `source` are words of the format. Fails with `invalid_input`.
 Result<void> check_words(const Manifest& manifest);

@@ -136,15 +136,11 @@ Result<void> ScanFolder::store_view(std::size_t pose, ViewRecord record, std::sp
 
 Result<void> ScanFolder::add_view(std::size_t pose, ViewRecord record, const RawView& images) {
   const std::string who = fmt::format("{}: view {}", path_.string(), record.index);
-  if (manifest_.source != "stereo") return fail(ErrorCode::invalid_input, "{}: not a stereo scan", who);
-  if (auto checked = check_images(images); !checked) return pass_on(checked, who);
+  if (manifest_.source == "range") return fail(ErrorCode::invalid_input, "{}: not a stereo scan", who);
+  if (auto checked = check_images(images, manifest_.source); !checked) return pass_on(checked, who);
   std::vector<NamedImage> encoded;
-  const std::pair<const char*, const cv::Mat*> all[] = {{"left_pattern", &images.left_pattern},
-                                                        {"right_pattern", &images.right_pattern},
-                                                        {"left_plain", &images.left_plain},
-                                                        {"right_plain", &images.right_plain}};
-  for (const auto& [role, image] : all) {
-    auto bytes = encode_png(*image);
+  for (const auto& role : view_roles(manifest_.source)) {
+    auto bytes = encode_png(images.image(role));
     if (!bytes) return pass_on(bytes, who);
     encoded.emplace_back(role, std::move(*bytes));
   }
@@ -166,6 +162,16 @@ Result<void> ScanFolder::complete_pose(std::size_t pose, std::string state) {
   if (pose >= manifest_.poses.size()) return fail(ErrorCode::invalid_input, "{}: no pose {}", path_.string(), pose + 1);
   Manifest changed = manifest_;
   changed.poses[pose].complete = true;
+  changed.state = std::move(state);
+  if (auto words = check_words(changed); !words) return words;
+  return change_manifest(std::move(changed));
+}
+
+Result<void> ScanFolder::drop_views(std::size_t pose, std::string state) {
+  if (pose >= manifest_.poses.size()) return fail(ErrorCode::invalid_input, "{}: no pose {}", path_.string(), pose + 1);
+  Manifest changed = manifest_;
+  changed.poses[pose].views.clear();
+  changed.poses[pose].movement_checks.clear();
   changed.state = std::move(state);
   if (auto words = check_words(changed); !words) return words;
   return change_manifest(std::move(changed));
@@ -200,14 +206,14 @@ Result<cv::Mat> ScanFolder::load_image(const FileRecord& file) const {
   return image;
 }
 
-/// An image of the size that the calibration gives its camera.
+/// An image of the size that the calibration gives its camera. A calibration's images make a new one.
 Result<cv::Mat> ScanFolder::load_sensor_image(const ViewRecord& record, const std::string& role) const {
   const auto found = record.files.find(role);
   if (found == record.files.end())
     return fail(ErrorCode::not_found, "{}: view {} has no image {}", path_.string(), record.index, role);
   const FileRecord& file = found->second;
   auto image = load_image(file);
-  if (!image || !manifest_.calibration) return image;
+  if (!image || !manifest_.calibration || manifest_.source == "calibration") return image;
   const auto calibration = load_calibration();
   if (!calibration) return pass_on(calibration);
   const Projection& p = (role.starts_with("left") ? calibration->left : calibration->right).projection;
@@ -221,19 +227,15 @@ Result<cv::Mat> ScanFolder::load_sensor_image(const ViewRecord& record, const st
 Result<RawView> ScanFolder::load_raw(std::size_t pose, std::size_t view) const {
   const auto record = find_view(pose, view);
   if (!record) return pass_on(record);
-  if (manifest_.source != "stereo") return fail(ErrorCode::invalid_input, "{}: not a stereo scan", path_.string());
+  if (manifest_.source == "range") return fail(ErrorCode::invalid_input, "{}: not a stereo scan", path_.string());
   RawView raw{(*record)->pixel_format, {}, {}, {}, {}};
-  const std::pair<const char*, cv::Mat*> all[] = {{"left_pattern", &raw.left_pattern},
-                                                  {"right_pattern", &raw.right_pattern},
-                                                  {"left_plain", &raw.left_plain},
-                                                  {"right_plain", &raw.right_plain}};
-  for (const auto& [role, image] : all) {
+  for (const auto& role : view_roles(manifest_.source)) {
     auto loaded = load_sensor_image(**record, role);
     if (!loaded) return pass_on(loaded);
-    *image = std::move(*loaded);
+    raw.image(role) = std::move(*loaded);
   }
-  if (const auto checked = check_images(raw); !checked) {
-    return pass_on(checked, (path_ / (*record)->files.at("left_pattern").path).parent_path().string());
+  if (const auto checked = check_images(raw, manifest_.source); !checked) {
+    return pass_on(checked, (path_ / (*record)->files.at("left_plain").path).parent_path().string());
   }
   return raw;
 }
@@ -241,7 +243,7 @@ Result<RawView> ScanFolder::load_raw(std::size_t pose, std::size_t view) const {
 Result<cv::Mat> ScanFolder::load_usable_image(std::size_t pose, std::size_t view, const std::string& role) const {
   const auto record = find_view(pose, view);
   if (!record) return pass_on(record);
-  if (manifest_.source != "stereo") return fail(ErrorCode::invalid_input, "{}: not a stereo scan", path_.string());
+  if (manifest_.source == "range") return fail(ErrorCode::invalid_input, "{}: not a stereo scan", path_.string());
   const auto raw = load_sensor_image(**record, role);
   if (!raw) return pass_on(raw);
   const auto image = to_usable_image(*raw, (*record)->pixel_format);

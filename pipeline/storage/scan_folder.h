@@ -47,6 +47,8 @@ class ScanFolder {
 
   /// Marks the pose complete; `state` is the scan's from then on.
   Result<void> complete_pose(std::size_t pose, std::string state);
+  /// Takes the views and movement checks of an incomplete pose off the manifest; `state` is the scan's from then on.
+  Result<void> drop_views(std::size_t pose, std::string state);
   Result<void> add_movement_check(std::size_t pose, MovementCheckRecord record);
   Result<void> set_state(std::string state);
 

@@ -31,7 +31,7 @@ namespace fs = std::filesystem;
 /// Writes real model files of one triangle.
 class TriangleMaker final : public Reconstructor {
  public:
-  Result<void> add_view(std::size_t, const ViewImages&, const Context&) override { return {}; }
+  Result<void> add_view(std::size_t, const RawView&, const ViewRecord&, const Context&) override { return {}; }
   Result<void> finish_pose(std::size_t, const Context&) override { return {}; }
   Result<void> finish(const fs::path& folder, const Context&) override {
     if (std::getenv("ONE_JOB_CRASH")) {

@@ -22,12 +22,12 @@ struct ReconstructionLog {
 class FakeReconstructor final : public Reconstructor {
  public:
   explicit FakeReconstructor(ReconstructionLog& log) : log_(log) {}
-  Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context) override {
+  Result<void> add_view(std::size_t pose, const RawView& raw, const ViewRecord& record,
+                        const Context& context) override {
     context.report("range", 0.5);
     const std::lock_guard guard(log_.mutex);
-    log_.calls.push_back(fmt::format("view {}/{}", pose, images.index));
-    log_.grey_levels.emplace_back(images.left_pattern.at<unsigned char>(0, 0),
-                                  images.left_plain.at<unsigned char>(0, 0));
+    log_.calls.push_back(fmt::format("view {}/{}", pose, record.index));
+    log_.grey_levels.emplace_back(raw.left_pattern.at<unsigned char>(0, 0), raw.left_plain.at<unsigned char>(0, 0));
     return log_.answer_to_view;
   }
   Result<void> finish_pose(std::size_t pose, const Context& context) override {

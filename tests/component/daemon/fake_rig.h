@@ -124,7 +124,8 @@ struct TriggerLine {
   Clock::TimePoint ready_at{};    ///< time of the last request to prepare the cameras
   Clock::Duration ready_takes{};  ///< time they need for that
   Light last = Light::plain;
-  int scene = 0;  ///< the cameras' scene: another number, another image
+  int scene = 0;    ///< the cameras' scene: another number, another image
+  cv::Mat picture;  ///< the plain image, instead of a grey one; empty: none
 };
 
 class FakeProjector final : public Projector {
@@ -189,7 +190,7 @@ class FakeCamera final : public StereoCamera {
     if (auto answers = there(); !answers) return pass_on(answers);
     ++line_.looks;
     StereoFrame frame;
-    frame.left = frame.right = cv::Mat(48, 64, CV_8UC1, cv::Scalar(30));
+    frame.left = frame.right = line_.picture.empty() ? cv::Mat(48, 64, CV_8UC1, cv::Scalar(30)) : line_.picture;
     return frame;
   }
   Result<StereoFrame> collect(Deadline deadline) override {
@@ -202,8 +203,9 @@ class FakeCamera final : public StereoCamera {
       lost = line_.lose > 0;
       if (lost) --line_.lose;
       const cv::Scalar grey((line_.last == Light::pattern ? 200 : 100) + line_.scene);
-      frame.left = cv::Mat(48, 64, CV_8UC1, grey);
-      frame.right = cv::Mat(48, 64, CV_8UC1, grey);
+      const bool drawn = line_.last == Light::plain && !line_.picture.empty();
+      frame.left = drawn ? line_.picture : cv::Mat(48, 64, CV_8UC1, grey);
+      frame.right = drawn ? line_.picture : cv::Mat(48, 64, CV_8UC1, grey);
       frame.taken = clock_.now();
       frame.left_evidence.brightness = frame.right_evidence.brightness = grey[0] / 255;
       if (line_.dark > 0) {

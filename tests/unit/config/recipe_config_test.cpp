@@ -50,6 +50,31 @@ TEST_F(RecipeConfigTest, ARecipeMayLeaveEverythingButTheScanToTheButton) {
   EXPECT_FALSE(rig->storage.keep_days);
 }
 
+TEST_F(RecipeConfigTest, ACalibrationHasTheStandardBoardUnlessAnotherIsNamed) {
+  const auto standard = read(example_);
+  ASSERT_TRUE(standard) << standard.error().message;
+  EXPECT_EQ(standard->calibration.board.columns, 12);
+  EXPECT_FALSE(standard->calibration.length_mm);
+  EXPECT_FALSE(standard->calibration.accepts_by_itself);
+  const std::string board = R"([calibration]
+board = { columns = 9, rows = 7, square_mm = 8.0, marker_mm = 5.0, dictionary = "4x4_50", thickness_mm = 4.0 }
+length_mm = 56.01
+length_sigma_mm = 0.004
+check_every_h = 168
+accept = "automatic"
+)";
+  const auto rig = read(replaced(example_, "[calibration]\n", board));
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->calibration.board.rows, 7);
+  EXPECT_EQ(rig->calibration.board.markers->size_mm, 5.0);
+  EXPECT_EQ(rig->calibration.length_mm, 56.01);
+  EXPECT_EQ(rig->calibration.check_every, std::chrono::hours(168));
+  EXPECT_TRUE(rig->calibration.accepts_by_itself);
+  expect_problem(replaced(example_, "[calibration]\n", replaced(board, "56.01", "64.0")), "length_mm");
+  expect_problem(replaced(example_, "[calibration]\n", replaced(board, "marker_mm = 5.0", "marker_mm = 9.0")), "board");
+  expect_problem(replaced(example_, "[calibration]\n", "[calibration]\nlength_sigma_mm = 0.1\n"), "needs length_mm");
+}
+
 TEST_F(RecipeConfigTest, ALineHasSignalsAndLimits) {
   const auto rig = read(with_inputs() + line_);
   ASSERT_TRUE(rig) << rig.error().message;

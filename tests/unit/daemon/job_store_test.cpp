@@ -163,6 +163,25 @@ TEST_F(JobStoreTest, AnOrderOfVersion1IsRead) {
   EXPECT_EQ(recipe.limits, (Limits{.min_measured_share = 0.9, .max_residual_mm = 0.05}));
 }
 
+TEST_F(JobStoreTest, AnOldCalibrationIsReportedWhereThatIsAskedFor) {
+  EXPECT_EQ(open().calibration_reminder(), "");
+  options.check_calibration_every = std::chrono::hours(24);
+  auto text = scan_samples::calibration_json();
+  scan_samples::write_text(options.calibration_file, scan_samples::replaced(text, "2026-11-21", "2020-01-01"));
+  EXPECT_THAT(open().calibration_reminder(), HasSubstr("older than 24 h"));
+  scan_samples::write_text(options.calibration_file, scan_samples::replaced(text, "2026-11-21", "2199-01-01"));
+  EXPECT_EQ(open().calibration_reminder(), "");
+}
+
+TEST_F(JobStoreTest, ACalibrationKeepsItsKindAndThatItWasAccepted) {
+  const auto store = open();
+  const JobFile order{.recipe = calibration_recipe(), .accepted = true};
+  ASSERT_TRUE(store.create("job", order));
+  EXPECT_EQ(recovered(store, "job").recipe, calibration_recipe());
+  EXPECT_TRUE(read_job_file(options.root / "job")->accepted);
+  EXPECT_EQ(ScanFolder::open(options.root / "job")->manifest().source, "calibration");
+}
+
 TEST_F(JobStoreTest, AQueuedJobKeepsItsOrderAndItsPlace) {
   const auto store = open();
   const JobFile order{.recipe = {.name = "small", .poses = 1, .views = 5, .limits = {.min_measured_share = 0.9}},

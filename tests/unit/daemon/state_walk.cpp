@@ -45,8 +45,9 @@ std::string key(const Node& node, bool with_jobs) {
   }
   if (s.job) {
     const auto& j = *s.job;
-    key += fmt::format("j{}{}{}{}{}{}{}{}{}{}", j.id, j.is_started, j.pose, j.asked, j.taken, j.stored,
-                       j.movement_check_due, j.closing, j.reconstruction.has_value(), j.recipe.start_on_part);
+    key += fmt::format("j{}{}{}{}{}{}{}{}{}{}{}{}", j.id, j.is_started, j.pose, j.asked, j.taken, j.stored,
+                       j.movement_check_due, j.closing, j.reconstruction.has_value(), j.recipe.start_on_part, j.turning,
+                       j.repeated.empty());
   }
   return key + (s.activity == Activity::waiting_for_part ? std::to_string(s.failures) : "");
 }
@@ -95,12 +96,12 @@ void press_stop(const Node& node, const StationRules& rules, Walk& walk) {
 }
 
 /// The rest of the station replies as in operation: a job that is closed is closed on disk.
-void close_jobs(Node& node, const std::vector<Action>& actions) {
+void close_jobs(Node& node, const std::vector<Action>& actions, RecipeKind kind) {
   for (const auto& action : actions) {
     if (const auto* close = std::get_if<action::CloseJob>(&action)) {
       update(node.jobs, event::JobClosed{close->job, close->state, close->why});
     }
-    if (std::holds_alternative<action::CreateJobs>(action)) node.jobs["job"] = job(JobState::queued);
+    if (std::holds_alternative<action::CreateJobs>(action)) node.jobs["job"] = job(JobState::queued, "job", kind);
   }
 }
 
@@ -139,6 +140,14 @@ bool can_happen(const Node& node, const Event& event) {
           [&](const event::PoseStored& e) {
             return job && !job->closing && e.pose == job->pose && s.activity == Activity::storing;
           },
+          [&](const event::PlacementChecked& e) {
+            return job && !job->closing && e.pose == job->pose && s.activity == Activity::storing;
+          },
+          [&](const event::PlacementDropped& e) {
+            return job && !job->closing && e.pose == job->pose && s.activity == Activity::storing;
+          },
+          [&](const event::ImagesChecked&) { return job != nullptr; },
+          [&](const event::Turned&) { return job && job->turning && s.activity == Activity::scanning; },
           [&](const event::StoreFailed&) { return job != nullptr; },
           [&](const event::DiskChecked&) { return job != nullptr; },
           [&](const event::ReconstructionFailed&) { return job || state == JobState::reconstructing; },
@@ -150,14 +159,14 @@ bool can_happen(const Node& node, const Event& event) {
 
 }  // namespace
 
-std::shared_ptr<const JobInfo> job(JobState state, const char* id) {
+std::shared_ptr<const JobInfo> job(JobState state, const char* id, RecipeKind kind) {
   JobInfo info{.id = id, .state = state};
-  info.recipe = {.poses = 2, .views = 1, .start_on_part = true};
+  info.recipe = {.poses = 2, .views = 1, .start_on_part = kind == RecipeKind::scan, .kind = kind};
   return std::make_shared<const JobInfo>(info);
 }
 
-void walk(const std::vector<Named>& events, bool with_jobs, Walk& walk) {
-  StationRules rules{.recipes = {{"default", {.poses = 2, .views = 1}}}, .guard = true};
+void walk(const std::vector<Named>& events, bool with_jobs, Walk& walk, RecipeKind kind) {
+  StationRules rules{.recipes = {{"default", {.poses = 2, .views = 1, .kind = kind}}}, .guard = true};
   std::deque<Node> open{Node{}};
   std::set<std::string> seen{key(open.front(), with_jobs)};
   while (!open.empty()) {
@@ -171,7 +180,7 @@ void walk(const std::vector<Named>& events, bool with_jobs, Walk& walk) {
       if (step.refused) continue;
       Node after{std::move(step.state), before.jobs};
       update(after.jobs, event);
-      close_jobs(after, step.actions);
+      close_jobs(after, step.actions, kind);
       if (machine_state(before) != machine_state(after)) {
         walk.machine[{machine_state(before), machine_state(after)}].insert(name);
       }

@@ -32,9 +32,10 @@ struct Walk {
 };
 
 /// A job with two poses of one view, as the walk knows it under the identifier "job".
-std::shared_ptr<const JobInfo> job(JobState state, const char* id = "job");
+std::shared_ptr<const JobInfo> job(JobState state, const char* id = "job", RecipeKind kind = RecipeKind::scan);
 
 /// Applies each of `events` in each state that they reach. `with_jobs`: the list of jobs makes a difference too.
-void walk(const std::vector<Named>& events, bool with_jobs, Walk& walk);
+/// `kind`: of every job.
+void walk(const std::vector<Named>& events, bool with_jobs, Walk& walk, RecipeKind kind = RecipeKind::scan);
 
 }  // namespace scanrig::state_walk

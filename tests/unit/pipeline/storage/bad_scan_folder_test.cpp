@@ -43,7 +43,7 @@ TEST_F(BadScanFolderTest, AMissingKeyIsNamedWithItsPath) {
 
 TEST_F(BadScanFolderTest, AFutureVersionIsUnsupported) {
   with_one_view();
-  edit_manifest("\"version\": 4", "\"version\": 5");
+  edit_manifest("\"version\": 5", "\"version\": 6");
   expect_refused(ErrorCode::unsupported, {"scan.json", "version"});
 }
 

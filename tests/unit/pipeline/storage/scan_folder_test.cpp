@@ -108,12 +108,13 @@ TEST_F(ScanFolderTest, ReasonsOfRetakesAreKept) {
 TEST_F(ScanFolderTest, AnOlderFolderIsReadAndBecomesANewOneWithItsNextChange) {
   ScanFolder scan = with_one_view();
   const std::string now = *read_file(scan_ / "scan.json");
+  const auto fourth = replaced(now, "\"version\": 5", "\"version\": 4");
   const auto third =
-      replaced(replaced(now, "\"version\": 4", "\"version\": 3"), "movement_checks", "closures");  // old name
+      replaced(replaced(fourth, "\"version\": 4", "\"version\": 3"), "movement_checks", "closures");  // old name
   const auto second = replaced(replaced(third, "\"version\": 3", "\"version\": 2"), "  \"config_sha256\": [],\n", "");
   const auto first =
       replaced(replaced(second, "\"version\": 2", "\"version\": 1"), ",\n      \"closures\": []", "");  // old name
-  for (const auto& old : {first, second, third}) {
+  for (const auto& old : {first, second, third, fourth}) {
     write_text(scan_ / "scan.json", old);
     auto again = ScanFolder::open(scan_);
     ASSERT_TRUE(again) << again.error().message;
@@ -133,7 +134,7 @@ TEST_F(ScanFolderTest, RetakesAndMovementChecksOfAnOlderFolderAreRead) {
                                           .shift_px = 0.5,
                                           .unmoved = true,
                                           .retake_reasons = {{ErrorCode::protocol, "torn"}}}));
-  edit_manifest("\"version\": 4", "\"version\": 3");
+  edit_manifest("\"version\": 5", "\"version\": 3");
   edit_manifest("movement_checks", "closures");  // old name
   edit_manifest("retake_reasons", "spoilt");     // old name
   edit_manifest("retake_reasons", "spoilt");     // old name
@@ -170,7 +171,7 @@ TEST_F(ScanFolderTest, EachConfigurationOfItsViewsIsKeptOnce) {
 TEST_F(ScanFolderTest, TheDocumentedManifestIsRead) {
   const std::string zeros(64, '0');
   std::string text = R"({
-    "format": "scanrig-scan", "version": 4, "id": "20261121-093000-1", "created": "2026-11-21T09:30:00Z",
+    "format": "scanrig-scan", "version": 5, "id": "20261121-093000-1", "created": "2026-11-21T09:30:00Z",
     "state": "scanning", "source": "stereo", "profile": "", "config_sha256": ["HASH"],
     "calibration": { "file": "calibration.json", "sha256": "HASH" },
     "poses": [
@@ -270,6 +271,38 @@ TEST_F(ScanFolderTest, InconsistentImagesAreNotStored) {
   EXPECT_EQ(scan.add_view(0, record(0), raw).error().code, ErrorCode::invalid_input);
   EXPECT_EQ(scan.add_view(1, record(0), raw_view(0)).error().code, ErrorCode::invalid_input) << "pose 2 before pose 1";
   EXPECT_TRUE(scan.manifest().poses.empty());
+}
+
+TEST_F(ScanFolderTest, ACalibrationHasTwoPlainImagesAViewAndNeedsNoCalibration) {
+  auto scan = ScanFolder::create(scan_, {.id = "20261121-093000-1", .source = "calibration"}, {});
+  ASSERT_TRUE(scan) << scan.error().message;
+  auto plain = raw_view(3);
+  plain.left_pattern = plain.right_pattern = cv::Mat();
+  ASSERT_TRUE(scan->add_view(0, record(0), plain));
+  const auto again = ScanFolder::open(scan_);
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->manifest().poses[0].views[0].files.size(), 2u);
+  const auto raw = again->load_raw(0, 0);
+  ASSERT_TRUE(raw) << raw.error().message;
+  EXPECT_TRUE(same(raw->left_plain, plain.left_plain));
+  EXPECT_TRUE(raw->left_pattern.empty());
+  EXPECT_TRUE(again->load_usable_image(0, 0, "right_plain"));
+  plain.right_plain = cv::Mat();
+  EXPECT_EQ(scan->add_view(0, record(1), plain).error().code, ErrorCode::invalid_input);
+}
+
+TEST_F(ScanFolderTest, DroppedViewsAreTakenAnew) {
+  ScanFolder scan = with_one_view();
+  ASSERT_TRUE(scan.add_movement_check(0, {.after_views = 1, .taken = "2026-11-21T09:31:10Z", .unmoved = false}));
+  ASSERT_TRUE(scan.drop_views(0, "waiting_for_flip"));
+  auto again = ScanFolder::open(scan_);
+  ASSERT_TRUE(again) << again.error().message;
+  EXPECT_EQ(again->manifest().state, "waiting_for_flip");
+  EXPECT_TRUE(again->manifest().poses[0].views.empty());
+  EXPECT_TRUE(again->manifest().poses[0].movement_checks.empty());
+  ASSERT_TRUE(again->add_view(0, record(0), raw_view(5)));
+  EXPECT_TRUE(same(again->load_raw(0, 0)->left_plain, raw_view(5).left_plain));
+  EXPECT_EQ(again->drop_views(1, "scanning").error().code, ErrorCode::invalid_input);
 }
 
 TEST_F(ScanFolderTest, ARangeViewKeepsItsDepthsAndItsGaps) {
