@@ -99,7 +99,7 @@ Result<void> keep_previous(const CalibrateFolderVerb& verb, const std::string& h
   return write_file_atomically(kept, *text);
 }
 
-void print_outcome(const CalibrateFolderVerb& verb, const CalibrationOutcome& outcome) {
+void print_outcome(const CalibrateFolderVerb& verb, const FolderCalibration& outcome) {
   const SolvedCalibration& solved = outcome.judged.solved;
   const CalibrationJudgement& judgement = outcome.judged.judgement;
   const auto used = std::ranges::count_if(solved.images, &ImageFit::is_used);

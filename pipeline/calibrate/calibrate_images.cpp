@@ -53,7 +53,7 @@ CalibrationInput input_of(const CalibrationImages& images, const CalibrateOption
 
 /// Dots of every image, by the cameras as solved without them.
 Result<std::size_t> measure_dots(const CalibrationImages& images, const std::string& format,
-                                 const CalibrationOutcome& first, CalibrationInput& input, const Context& context) {
+                                 const FolderCalibration& first, CalibrationInput& input, const Context& context) {
   const SolvedCalibration& solved = first.judged.solved;
   std::vector<std::size_t> dots(2 * images.pairs.size(), 0);
   context.report("dots", 0.0);
@@ -77,13 +77,13 @@ Result<std::size_t> measure_dots(const CalibrationImages& images, const std::str
   return static_cast<std::size_t>(std::ranges::count_if(dots, [](std::size_t count) { return count > 0; }));
 }
 
-Result<CalibrationOutcome> calibrate(const CalibrationImages& images, const CalibrateOptions& options,
-                                     const Context& context) {
+Result<FolderCalibration> calibrate(const CalibrationImages& images, const CalibrateOptions& options,
+                                    const Context& context) {
   const Board board = options.board ? *options.board : images.board.value_or(Board{});
   const std::string format = pixel_format_of(images, options);
   auto boards = find_boards(images, format, board, context);
   if (!boards) return pass_on(boards);
-  CalibrationOutcome outcome;
+  FolderCalibration outcome;
   outcome.boards = std::move(*boards);
   outcome.input = input_of(images, options, board, outcome.boards);
   auto judged = judge_calibration(outcome.input, context);
@@ -106,9 +106,9 @@ Result<CalibrationOutcome> calibrate(const CalibrationImages& images, const Cali
 
 }  // namespace
 
-Result<CalibrationOutcome> calibrate_images(const CalibrationImages& images, const CalibrateOptions& options,
-                                            const Context& context) {
-  Result<CalibrationOutcome> outcome = fail(ErrorCode::internal, "calibration: not run");
+Result<FolderCalibration> calibrate_images(const CalibrationImages& images, const CalibrateOptions& options,
+                                           const Context& context) {
+  Result<FolderCalibration> outcome = fail(ErrorCode::internal, "calibration: not run");
   with_threads(options.threads, [&] { outcome = calibrate(images, options, context); });
   return outcome;
 }

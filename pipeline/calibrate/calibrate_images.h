@@ -25,7 +25,7 @@ struct CalibrateOptions {
 };
 
 /// A calibration from a folder of images, and what it came from.
-struct CalibrationOutcome {
+struct FolderCalibration {
   CalibrationInput input;
   JudgedCalibration judged;
   FoundBoards boards;
@@ -34,7 +34,7 @@ struct CalibrationOutcome {
 /// Finds the boards, solves, measures the rim dots with that solution, solves again, judges. Reports the stages
 /// "boards", "dots" and those of the solver. Same input, same bits, for any number of threads.
 /// Fails as find_boards() and solve_calibration().
-Result<CalibrationOutcome> calibrate_images(const CalibrationImages& images, const CalibrateOptions& options = {},
-                                            const Context& context = {});
+Result<FolderCalibration> calibrate_images(const CalibrationImages& images, const CalibrateOptions& options = {},
+                                           const Context& context = {});
 
 }  // namespace scanrig

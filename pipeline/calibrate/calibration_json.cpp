@@ -117,7 +117,7 @@ void add_judgement(ordered_json& json, const CalibrationJudgement& judgement) {
 
 }  // namespace
 
-Result<std::string> calibration_json(const CalibrationOutcome& outcome, const CalibrationOrigin& origin) {
+Result<std::string> calibration_json(const FolderCalibration& outcome, const CalibrationOrigin& origin) {
   const SolvedCalibration& solved = outcome.judged.solved;
   const CalibrationJudgement& judgement = outcome.judged.judgement;
   if (judgement.grade == CalibrationGrade::refused || !solved.sigma) {

@@ -18,6 +18,6 @@ struct CalibrationOrigin {
 
 /// calibration.json, version 2 (docs/reference/scan-folder.md): the text of the file. Fails with `below_limits` for a
 /// calibration that is refused: the operator's sentences are the message.
-Result<std::string> calibration_json(const CalibrationOutcome& outcome, const CalibrationOrigin& origin);
+Result<std::string> calibration_json(const FolderCalibration& outcome, const CalibrationOrigin& origin);
 
 }  // namespace scanrig

@@ -68,7 +68,7 @@ class CalibrateImages : public testing::Test {
     options.angles = 4;
     return options;
   }
-  Result<CalibrationOutcome> calibrate(const CalibrateOptions& options = {}) {
+  Result<FolderCalibration> calibrate(const CalibrateOptions& options = {}) {
     const auto images = read_calibration_images(folder_);
     if (!images) return pass_on(images);
     return calibrate_images(*images, options);
