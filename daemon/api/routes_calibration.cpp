@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
-#include <ranges>
 
 #include "daemon/api/json_replies.h"
 #include "daemon/api/route.h"
@@ -18,10 +17,9 @@ constexpr Reply kDone{.description = "done, and durable", .schema = "JobDone"};
 std::shared_ptr<const JobInfo> current_calibration(const Snapshot& snapshot) {
   const auto active = snapshot.jobs.find(snapshot.job);
   if (active != snapshot.jobs.end() && active->second->recipe.is_calibration()) return active->second;
-  for (const auto& [id, job] : std::views::reverse(snapshot.jobs)) {
-    if (job->recipe.is_calibration()) return job;
-  }
-  return nullptr;
+  const auto newest = std::find_if(snapshot.jobs.rbegin(), snapshot.jobs.rend(),
+                                   [](const auto& known) { return known.second->recipe.is_calibration(); });
+  return newest == snapshot.jobs.rend() ? nullptr : newest->second;
 }
 
 ordered_json to_json(const std::vector<Eigen::Vector2d>& outline) {

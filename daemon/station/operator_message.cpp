@@ -279,10 +279,10 @@ OperatorMessage when_interrupted(const JobInfo& job) {
 
 /// The last view with a problem, of the current placement.
 std::string image_problem(const JobInfo& job) {
-  for (const auto& view : std::views::reverse(job.stored)) {
-    if (view.pose != job.complete) break;
-    if (view.problems && !view.problems->empty())
-      return fmt::format(" View {}, {}", view.view + 1, view.problems->front());
+  for (auto view = job.stored.rbegin(); view != job.stored.rend() && view->pose == job.complete; ++view) {
+    if (view->problems && !view->problems->empty()) {
+      return fmt::format(" View {}, {}", view->view + 1, view->problems->front());
+    }
   }
   return "";
 }

@@ -39,7 +39,7 @@ Eigen::Vector2d LensField::at(const Eigen::Vector2d& pixel, Eigen::Matrix2d* slo
   for (int j = 0; j < 4; ++j) {
     Eigen::Vector2d line = Eigen::Vector2d::Zero(), line_slope = Eigen::Vector2d::Zero();
     for (int i = 0; i < 4; ++i) {
-      const Eigen::Vector2d& c = shift[static_cast<std::size_t>(s.first + i + kColumns * j)];
+      const Eigen::Vector2d& c = shift[s.coefficient(i, j)];
       line += s.across[i] * c;
       if (slope) line_slope += s.across_slope[i] * c;
     }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <vector>
 
 namespace scanrig {
@@ -12,6 +13,13 @@ struct LensFieldSupport {
   int first = 0;
   std::array<double, 4> across{}, down{};
   std::array<double, 4> across_slope{}, down_slope{};
+
+  /// Place of the coefficient `column` and `row` (0 to 3) after the first one.
+  [[nodiscard]] std::size_t coefficient(int column, int row) const {
+    constexpr int kColumns = 7;  // LensField::kColumns
+    const int place = first + column + kColumns * row;
+    return static_cast<std::size_t>(place);
+  }
 };
 
 /// What a lens does beyond Brown's five coefficients: a smooth shift of pixels, added to the pixel that Brown's

@@ -72,8 +72,7 @@ class Bundle {
       problem_.AddParameterBlock(pose, 7, manifold_.get());
     }
     for (int k = 0; field && k < 16; ++k) {
-      blocks.push_back(
-          camera.field[static_cast<std::size_t>(support.first + k % 4 + LensField::kColumns * (k / 4))].data());
+      blocks.push_back(camera.field[support.coefficient(k % 4, k / 4)].data());
     }
     problem_.AddParameterBlock(camera.camera_from_table.data(), 7, manifold_.get());
     add(cost, &loss_, blocks);
@@ -273,7 +272,7 @@ std::vector<Eigen::Vector2d> misses(const BundleSetup& setup, const Unknowns& u)
     if (setup.with_field) {
       const LensFieldSupport f = LensField::support(s.pixel, input.width, input.height);
       for (int k = 0; k < 16; ++k) {
-        const auto& c = camera.field[static_cast<std::size_t>(f.first + k % 4 + LensField::kColumns * (k / 4))];
+        const auto& c = camera.field[f.coefficient(k % 4, k / 4)];
         model += f.down[static_cast<std::size_t>(k / 4)] * f.across[static_cast<std::size_t>(k % 4)] *
                  Eigen::Vector2d(c[0], c[1]);
       }
