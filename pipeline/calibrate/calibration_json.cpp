@@ -4,21 +4,14 @@
 
 #include <nlohmann/json.hpp>
 
+#include "pipeline/storage/transform_json.h"
+
 namespace scanrig {
 namespace {
 
 using nlohmann::ordered_json;
 
 constexpr Eigen::Index kWithoutField = 15;  ///< unknowns of a camera in the file
-
-ordered_json to_json(const Transform& transform) {
-  ordered_json rows = ordered_json::array();
-  for (int r = 0; r < 3; ++r) {
-    rows.push_back({transform.linear()(r, 0), transform.linear()(r, 1), transform.linear()(r, 2)});
-  }
-  const Eigen::Vector3d& t = transform.translation();
-  return {{"rotation", rows}, {"translation", {t.x(), t.y(), t.z()}}};
-}
 
 ordered_json to_json(const Camera& camera) {
   const Projection& p = camera.projection;
@@ -38,7 +31,7 @@ ordered_json to_json(const Camera& camera) {
     }
     json["lens_correction"] = {{"du", du}, {"dv", dv}};
   }
-  json["camera_from_turntable"] = to_json(camera.camera_from_turntable);
+  json["camera_from_turntable"] = transform_json(camera.camera_from_turntable);
   return json;
 }
 

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "core/strict_json.h"
+#include "pipeline/storage/transform_json.h"
 
 namespace scanrig {
 namespace {
@@ -22,15 +23,6 @@ constexpr std::array kSources = {"stereo", "calibration", "range"};
 /// The path of a view's file is under "path", that of the calibration under "file".
 ordered_json to_json(const FileRecord& file, const char* key = "path") {
   return {{key, file.path}, {"sha256", file.sha256}};
-}
-
-ordered_json to_json(const Transform& transform) {
-  ordered_json rows = ordered_json::array();
-  for (int r = 0; r < 3; ++r) {
-    rows.push_back({transform.linear()(r, 0), transform.linear()(r, 1), transform.linear()(r, 2)});
-  }
-  const Eigen::Vector3d& t = transform.translation();
-  return {{"rotation", rows}, {"translation", {t.x(), t.y(), t.z()}}};
 }
 
 /// Writes no key without retakes.
@@ -53,7 +45,7 @@ ordered_json to_json(const ViewRecord& view) {
   add_retake_reasons(json, view.retake_reasons);
   if (view.grid) {
     json["grid"] = {{"fx", view.grid->fx}, {"fy", view.grid->fy}, {"cx", view.grid->cx}, {"cy", view.grid->cy}};
-    json["camera_from_pose"] = to_json(view.camera_from_pose);
+    json["camera_from_pose"] = transform_json(view.camera_from_pose);
   }
   return json;
 }
