@@ -49,7 +49,7 @@ TEST_F(ShippedExample, ScansAWholeJobFromResetToTheModel) {
       << read_file(folder_ / "output").value_or("");
   start_daemon({SCANRIGD_PROGRAM});
   ASSERT_TRUE(press_until("reset", [&] { return machine() == "Operational.Ready"; })) << log();
-  ASSERT_TRUE(lamp("lamp_green") && lamp("start_lamp") && !lamp("lamp_red"));
+  ASSERT_TRUE(soon([&] { return lamp("lamp_green") && lamp("start_lamp") && !lamp("lamp_red"); })) << log();
   ASSERT_TRUE(press_until("start", [&] { return machine() == "Operational.SingleExecution"; })) << log();
   ASSERT_TRUE(soon([&] { return lamp("flip_request") && lamp("lamp_amber"); }, std::chrono::seconds(120))) << log();
   ASSERT_EQ(say({{"turn_over", true}})["ok"], true);
