@@ -134,7 +134,7 @@ void read_time_of_day(Section& s, std::string_view key, std::chrono::minutes& ti
   time = std::chrono::hours(hour) + std::chrono::minutes(minute);
 }
 
-void read_board(Section& s, Board& board) {
+void read_board(Section& s, Board& board, BoardKind& kind) {
   BoardMarkers markers;
   s.number("columns", board.columns, {3, 100});
   s.number("rows", board.rows, {3, 100});
@@ -142,12 +142,24 @@ void read_board(Section& s, Board& board) {
   s.number("marker_mm", markers.size_mm, {0.5, 200});
   s.text("dictionary", markers.dictionary);
   s.number("thickness_mm", board.thickness_mm, {0, 100});
+  if (s.has("material"))
+    s.choice<BoardKind>("material", kind, {{"glass", BoardKind::glass}, {"paper", BoardKind::paper}});
   board.markers = markers;
   if (const auto can_be = check_board(board); !can_be) s.report("columns", can_be.error().message);
 }
 
 void read_calibration(Section& s, CalibrationConfig& calibration) {
-  if (s.has("board")) s.section("board", [&](Section& board) { read_board(board, calibration.board); });
+  if (s.has("board"))
+    s.section("board", [&](Section& board) { read_board(board, calibration.board, calibration.board_kind); });
+  if (s.has("table_radius_mm")) s.number("table_radius_mm", calibration.table_radius_mm, {10, 1000});
+  if (s.has("rim_dots")) {
+    s.section("rim_dots", [&](Section& dots) {
+      RimDots& printed = calibration.rim_dots.emplace();
+      dots.number("count", printed.count, {8, 360});
+      dots.number("radius_mm", printed.radius_mm, {10, 1000});
+      dots.number("diameter_mm", printed.diameter_mm, {0.5, 20});
+    });
+  }
   if (s.has("length_mm")) {
     const double nominal = calibration.board.square_mm * (calibration.board.corner_columns() - 1);
     s.number("length_mm", calibration.length_mm.emplace(), {0.97 * nominal, 1.03 * nominal});

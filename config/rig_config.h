@@ -15,6 +15,7 @@
 #include "drivers/turntable/grbl_turntable.h"
 #include "drivers/turntable/modbus_turntable.h"
 #include "pipeline/calibration/board/board.h"
+#include "pipeline/calibration/observations.h"
 
 namespace scanrig::config {
 
@@ -119,6 +120,9 @@ struct WebhookConfig {
 /// The calibration board, and how the rig is calibrated.
 struct CalibrationConfig {
   Board board{};
+  BoardKind board_kind = BoardKind::glass;
+  double table_radius_mm = 90.0;
+  std::optional<RimDots> rim_dots;    ///< printed on the table
   std::optional<double> length_mm;    ///< measured between the first and the last corner of the board's first row
   double length_sigma_mm = 0.0;       ///< its standard deviation
   std::chrono::hours check_every{0};  ///< an older calibration is reported; 0: never

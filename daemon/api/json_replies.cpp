@@ -49,7 +49,7 @@ ordered_json to_json(const JobInfo& job) {
           {"report", job.report},
           {"config_sha256", job.config_sha256},
           {"error", to_json(job.error)},
-          {"kind", job.recipe.is_calibration() ? "calibration" : "scan"},
+          {"kind", to_string(job.recipe.kind)},
           {"all_views", job.recipe.all_views()}};
 }
 

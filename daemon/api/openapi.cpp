@@ -181,7 +181,7 @@ const char* const kSchemas = R"({
 "Job": {"type": "object", "additionalProperties": false,
   "required": ["id", "state", "sentence", "next_action", "recipe", "part", "folder", "poses", "views", "stored", "resumable", "quarantined",
   "exported", "passed", "model", "report", "config_sha256", "error", "kind", "all_views"], "properties": {
-  "kind": {"type": "string", "enum": ["scan", "calibration"]},
+  "kind": {"type": "string", "enum": ["scan", "calibration", "check"]},
   "all_views": {"type": "integer", "description": "of all poses"},
   "id": {"type": "string"}, "state": {"type": "string"},
   "sentence": {"type": "string", "description": "what becomes of it, and why"},

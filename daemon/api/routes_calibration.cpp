@@ -82,6 +82,7 @@ ordered_json job_json(const JobInfo& job) {
           {"placements_complete", job.complete},
           {"plan", std::move(plan)},
           {"views", views_json(job)},
+          {"verdict", outcome && !outcome->verdict.empty() ? ordered_json(outcome->verdict) : ordered_json(nullptr)},
           {"grade", outcome ? ordered_json(outcome->grade) : ordered_json(nullptr)},
           {"sentences", outcome ? outcome->sentences : std::vector<std::string>{}},
           {"accepted", outcome && outcome->is_accepted}};
@@ -105,7 +106,11 @@ ControlLoop::Reply reply_with(Send send) {
 }
 
 void begin(const ApiStation& station, const Values&, Send send) {
-  station.loop.order({.is_calibration = true}, reply_with(std::move(send)));
+  station.loop.order({.kind = RecipeKind::calibration}, reply_with(std::move(send)));
+}
+
+void check(const ApiStation& station, const Values&, Send send) {
+  station.loop.order({.kind = RecipeKind::check}, reply_with(std::move(send)));
 }
 
 ApiResponse no_calibration() { return error_response({ErrorCode::not_found, "there is no calibration"}); }
@@ -155,9 +160,14 @@ std::vector<Route> calibration_routes() {
                     "Queues a calibration before all other jobs. The status says where the board goes; each Start "
                     "takes one placement.",
                     begin, {400, 409, 500}),
+          engineers("/api/v1/calibration/check",
+                    "Queues a check of the rig's calibration before all other jobs: the board in placement 1, six "
+                    "views, one minute.",
+                    check, {400, 409, 500}),
           engineers("/api/v1/calibration/accept",
-                    "The calibration that was solved last becomes the rig's; the old file is kept beside it.", accept,
-                    {404, 409, 500}),
+                    "The calibration that was solved last becomes the rig's, or the poses that a check found; the old "
+                    "file is kept beside it.",
+                    accept, {404, 409, 500}),
           engineers("/api/v1/calibration/abort",
                     "Cancels the current calibration; an active one is stopped first. The rig's calibration stays.",
                     abort, {404, 409, 500})};

@@ -41,7 +41,9 @@ void add_board_options(CLI::App& sub, BoardOptions& board, bool& named) {
 /// Images of a folder instead of the rig.
 void add_calibrate_folder(CLI::App& sub, CalibrateFolderVerb& verb) {
   auto* folder = sub.add_option("DIR", verb.images, "make calibration.json of the images in this folder");
-  for (const char* rig : {"--rig", "--accept", "--abort"}) folder->excludes(sub.get_option(rig));
+  for (const char* rig : {"--rig", "--check", "--accept", "--abort"}) folder->excludes(sub.get_option(rig));
+  sub.add_option("--compare", verb.check, "DIR: does this calibration still hold? Writes --out where the poses changed")
+      ->needs(folder);
   sub.add_option("--out", verb.out, "DIR: the file to write; one that is there is kept under another name")
       ->capture_default_str();
   add_board_options(sub, verb.board, verb.has_board);
@@ -68,9 +70,14 @@ void add_calibrate(CLI::App& app, Chosen& chosen) {
                            return calibrate_folder(*folder);
                          });
   auto* rig = sub->add_flag("--rig", verb->rig, "begin, or take up the one begun, and follow it to its end");
-  auto* accept = sub->add_flag("--accept", verb->accept, "use the calibration solved last; the old file is kept");
-  accept->excludes(rig);
-  sub->add_flag("--abort", verb->abort, "cancel it; an active one is stopped")->excludes(rig)->excludes(accept);
+  auto* check = sub->add_flag("--check", verb->check, "does the calibration still hold? One placement, one minute");
+  check->excludes(rig);
+  auto* accept = sub->add_flag("--accept", verb->accept, "use what was solved last; the old file is kept");
+  accept->excludes(rig)->excludes(check);
+  sub->add_flag("--abort", verb->abort, "cancel it; an active one is stopped")
+      ->excludes(rig)
+      ->excludes(check)
+      ->excludes(accept);
   add_calibrate_folder(*sub, *folder);
 }
 

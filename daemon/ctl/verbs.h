@@ -89,10 +89,11 @@ ExitCode bundle(const Connection& connection, const BundleVerb& verb);
 
 struct CalibrateVerb {
   bool rig = false;     ///< queue a calibration and follow it
+  bool check = false;   ///< likewise a check of the calibration
   bool accept = false;  ///< the one that was solved last becomes the rig's
   bool abort = false;
 };
-/// With `rig`: queues a calibration, or takes up the one that is queued or active, and follows it to its end.
+/// With `rig` or `check`: queues it, or takes up what is queued or active, and follows it to its end.
 ExitCode calibrate(const Connection& connection, const CalibrateVerb& verb);
 
 struct MaintenanceVerb {
@@ -126,6 +127,7 @@ struct BoardOptions {
 struct CalibrateFolderVerb {
   std::filesystem::path images;
   std::filesystem::path out = "calibration.json";
+  std::filesystem::path check;  ///< the calibration that the images are compared with; empty: a new one is solved
   BoardOptions board;
   bool has_board = false;  ///< else that of the folder's list
   bool paper = false;

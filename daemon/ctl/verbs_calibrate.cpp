@@ -7,13 +7,14 @@
 
 #include "core/files.h"
 #include "core/hash.h"
+#include "core/timestamp.h"
 #include "daemon/ctl/output.h"
 #include "daemon/ctl/verbs.h"
 #include "daemon/runtime/catch_exceptions.h"
 #include "daemon/runtime/signal_stop.h"
-#include "daemon/station/timestamp.h"
 #include "pipeline/calibrate/calibration_json.h"
 #include "pipeline/calibration/board/print_board.h"
+#include "pipeline/storage/calibration_file.h"
 
 namespace scanrig::ctl {
 namespace {
@@ -133,6 +134,52 @@ void print_outcome(const CalibrateFolderVerb& verb, const FolderCalibration& out
   fmt::print("{} of {} images, corners to {:.3f} px\n", used, solved.images.size(), solved.noise_px);
 }
 
+void print_check(const CalibrateFolderVerb& verb, const DriftCheck& check) {
+  if (!verb.json) {
+    for (const std::string& sentence : check.sentences) fmt::print("{}\n", sentence);
+    return;
+  }
+  const nlohmann::ordered_json json{{"verdict", to_string(check.verdict)},
+                                    {"difference_um", check.difference_um},
+                                    {"sigma_um", check.sigma_um},
+                                    {"cameras_px", {check.cameras_px.x(), check.cameras_px.y()}},
+                                    {"axis_mm", check.axis_mm},
+                                    {"axis_deg", check.axis_deg},
+                                    {"noise_px", check.noise_px},
+                                    {"sentences", check.sentences}};
+  fmt::print("{}\n", json.dump(2));
+}
+
+/// Does the calibration hold? Only poses that may replace the old ones are written.
+ExitCode check_folder(const CalibrateFolderVerb& verb, const CalibrationImages& images,
+                      const CalibrateOptions& options) {
+  const auto text = read_file(verb.check);
+  if (!text) return report_error(text.error());
+  const auto known = parse_calibration(*text, verb.check);
+  if (!known) return report_error(known.error());
+  const Board board = options.board ? *options.board : images.board.value_or(Board{});
+  const SignalStop stop;
+  const auto check = catch_exceptions("the check", [&]() -> Result<DriftCheck> {
+    const auto boards = find_boards(images, options.pixel_format.empty() ? images.pixel_format : options.pixel_format,
+                                    board, {stop.token(), {}});
+    if (!boards) return pass_on(boards);
+    return check_drift(*known, board, boards->pairs, {stop.token(), {}});
+  });
+  if (!check) return report_error(check.error());
+  print_check(verb, *check);
+  if (check->verdict == DriftVerdict::calibrate) {
+    return report_error({ErrorCode::below_limits, "the calibration does not hold; calibrate the rig"});
+  }
+  if (check->verdict == DriftVerdict::holds) return ExitCode::ok;
+  const auto origin = origin_of(verb, images);
+  const auto moved = moved_calibration_json(*text, *check, origin);
+  if (!moved) return report_error(moved.error());
+  if (auto kept = keep_previous(verb, origin.previous); !kept) return report_error(kept.error());
+  if (auto written = write_file_atomically(verb.out, *moved); !written) return report_error(written.error());
+  if (!verb.json) fmt::print("{}\n", verb.out.string());
+  return ExitCode::ok;
+}
+
 }  // namespace
 
 ExitCode calibrate_folder(const CalibrateFolderVerb& verb) {
@@ -140,6 +187,7 @@ ExitCode calibrate_folder(const CalibrateFolderVerb& verb) {
   if (!images) return report_error(images.error());
   const auto options = options_of(verb, *images);
   if (!options) return report_error(options.error());
+  if (!verb.check.empty()) return check_folder(verb, *images, *options);
 
   const SignalStop stop;
   std::FILE* told = verb.json ? stderr : stdout;  // bars beside the JSON, not in it

@@ -235,18 +235,19 @@ tl::expected<std::string, RequestError> unfinished_calibration(const Connection&
 }  // namespace
 
 ExitCode calibrate(const Connection& connection, const CalibrateVerb& verb) {
-  if (!verb.rig && !verb.accept && !verb.abort) {
-    return report_error(ExitCode::usage, "calibrate needs --rig, --accept, --abort or a folder of images");
+  const bool follows = verb.rig || verb.check;
+  if (!follows && !verb.accept && !verb.abort) {
+    return report_error(ExitCode::usage, "calibrate needs --rig, --check, --accept, --abort or a folder of images");
   }
-  if (verb.rig) {
+  if (follows) {
     const auto unfinished = unfinished_calibration(connection);
     if (!unfinished) return report_error(unfinished.error());
     if (!unfinished->empty()) return follow_calibration(connection, *unfinished);
   }
-  const char* const what = verb.rig ? "begin" : verb.accept ? "accept" : "abort";
+  const char* const what = verb.rig ? "begin" : verb.check ? "check" : verb.accept ? "accept" : "abort";
   const auto answer = send_request(connection.socket, "POST", std::string("/api/v1/calibration/") + what);
   if (!answer) return report_error(answer.error());
-  if (verb.rig) return follow_calibration(connection, text(*answer, "job"));
+  if (follows) return follow_calibration(connection, text(*answer, "job"));
   if (connection.json) print(*answer);
   if (!connection.json) fmt::print("{} is {}.\n", text(*answer, "job"), verb.accept ? "accepted" : "cancelled");
   return ExitCode::ok;

@@ -8,6 +8,7 @@
 
 #include "core/files.h"
 #include "core/strict_json.h"
+#include "core/timestamp.h"
 
 namespace scanrig {
 namespace {
@@ -16,6 +17,7 @@ namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
 constexpr const char* kJob = "job.json";
+constexpr const char* kCheck = "calibration_check.json";
 constexpr const char* kFailure = "failure.json";
 constexpr const char* kAttempt = "attempt.json";
 constexpr int kJobVersion = 3;  ///< 1 had other names for some keys of the recipe, 2 no calibrations
@@ -34,7 +36,7 @@ ordered_json to_json(const Recipe& recipe) {
   ordered_json limits = ordered_json::object();
   if (recipe.limits.min_measured_share) limits["min_measured_share"] = *recipe.limits.min_measured_share;
   if (recipe.limits.max_residual_mm) limits["max_residual_mm"] = *recipe.limits.max_residual_mm;
-  return {{"kind", recipe.is_calibration() ? "calibration" : "scan"},
+  return {{"kind", to_string(recipe.kind)},
           {"name", recipe.name},
           {"poses", recipe.poses},
           {"views", recipe.views},
@@ -50,8 +52,9 @@ Recipe read_recipe(JsonObject object, int version) {
   const char* const max_residual = old_names ? "most_residual_mm" : "max_residual_mm";      // old name
   Recipe recipe;
   recipe.name = object.text("name");
-  if (version >= 3 && object.one_of("kind", {"scan", "calibration"}) == "calibration") {
-    recipe.kind = RecipeKind::calibration;
+  if (version >= 3) {
+    const auto kind = object.one_of("kind", {"scan", "calibration", "check"});
+    recipe.kind = static_cast<RecipeKind>(std::ranges::find(kRecipeKinds, kind) - kRecipeKinds.begin());
   }
   recipe.poses = object.integer("poses", 1, recipe.is_calibration() ? static_cast<int>(calibration_plan().size()) : 2);
   recipe.views = object.integer("views", 1, 360);
@@ -100,7 +103,7 @@ std::optional<double> residual_mm(const nlohmann::json& report) {
 
 fs::path model_folder(const fs::path& job_folder) { return job_folder / "model"; }
 fs::path model_file(const fs::path& job_folder, RecipeKind kind) {
-  return model_folder(job_folder) / (kind == RecipeKind::calibration ? "calibration.json" : "model.glb");
+  return model_folder(job_folder) / (kind == RecipeKind::scan ? "model.glb" : "calibration.json");
 }
 fs::path report_file(const fs::path& job_folder) { return model_folder(job_folder) / "report.json"; }
 
@@ -183,10 +186,11 @@ Result<void> begin_attempt(const fs::path& job_folder) {
 void forget_attempts(const fs::path& job_folder) { std::ignore = remove_file_synced(job_folder / kAttempt); }
 
 std::string calibration_report(const CalibrationOutcome& outcome) {
-  const ordered_json json = {{"format", "scanrig-calibration-report"},
-                             {"version", 1},
-                             {"grade", outcome.grade},
-                             {"sentences", outcome.sentences}};
+  ordered_json json = {{"format", "scanrig-calibration-report"},
+                       {"version", 1},
+                       {"grade", outcome.grade},
+                       {"sentences", outcome.sentences}};
+  if (!outcome.verdict.empty()) json["verdict"] = outcome.verdict;
   return json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n";
 }
 
@@ -196,8 +200,24 @@ std::optional<CalibrationOutcome> read_calibration_report(const fs::path& report
   CalibrationOutcome outcome;
   outcome.grade = json->root().text("grade");
   outcome.sentences = json->root().texts("sentences");
+  if (json->root().has("verdict")) outcome.verdict = json->root().text("verdict");
   if (!json->finish()) return std::nullopt;
   return outcome;
+}
+
+Result<void> note_check(const fs::path& root, const std::string& calibration_sha256) {
+  return write_json(root / kCheck, {{"format", "scanrig-calibration-check"},
+                                    {"version", 1},
+                                    {"calibration_sha256", calibration_sha256},
+                                    {"date", iso_time(std::chrono::system_clock::now())}});
+}
+
+std::string last_check(const fs::path& root, const std::string& calibration_sha256) {
+  auto json = JsonFile::read(root / kCheck, "scanrig-calibration-check", 1);
+  if (!json) return "";
+  const bool is_of_this = json->root().sha256("calibration_sha256") == calibration_sha256;
+  const auto date = json->root().text("date");
+  return json->finish() && is_of_this ? date : "";
 }
 
 std::optional<Error> limit_violation(const fs::path& report, const Limits& limits) {

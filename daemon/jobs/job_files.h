@@ -61,6 +61,11 @@ void forget_attempts(const std::filesystem::path& job_folder);
 std::string calibration_report(const CalibrationOutcome& outcome);
 std::optional<CalibrationOutcome> read_calibration_report(const std::filesystem::path& report);
 
+/// calibration_check.json in the folder of all jobs: a check found that this calibration holds, now. Fails with `io`.
+Result<void> note_check(const std::filesystem::path& root, const std::string& calibration_sha256);
+/// ISO 8601; empty: this calibration was not checked, or the record cannot be read.
+std::string last_check(const std::filesystem::path& root, const std::string& calibration_sha256);
+
 /// Why the model of report.json is beyond the limits; nothing when it is within, or without limits. An unreadable
 /// report never passes.
 std::optional<Error> limit_violation(const std::filesystem::path& report, const Limits& limits);

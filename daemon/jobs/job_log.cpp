@@ -8,8 +8,8 @@
 #include <cstring>
 #include <nlohmann/json.hpp>
 
+#include "core/timestamp.h"
 #include "daemon/jobs/bundle.h"
-#include "daemon/station/timestamp.h"
 
 namespace scanrig {
 namespace {

@@ -13,10 +13,10 @@
 #include <utility>
 
 #include "core/files.h"
+#include "core/timestamp.h"
 #include "daemon/jobs/job_files.h"
 #include "daemon/jobs/job_index.h"
 #include "daemon/jobs/job_log.h"
-#include "daemon/station/timestamp.h"
 
 namespace scanrig {
 namespace {
@@ -213,6 +213,9 @@ Result<void> JobStore::make(Manifest manifest, const JobFile& job) const {
 
 Result<void> JobStore::check_rig_cameras() const {
   const auto calibration = read_calibration(options_.calibration_file);
+  if (!calibration && calibration.error().code == ErrorCode::not_found) {
+    return fail(ErrorCode::refused, "there is none; run scanrig calibrate --rig");
+  }
   if (!calibration) return pass_on(calibration);
   const auto others = other_cameras(*calibration, options_.cameras);
   if (!others) return {};
@@ -223,15 +226,21 @@ Result<void> JobStore::check_rig_cameras() const {
 std::string JobStore::calibration_reminder() const {
   if (options_.check_calibration_every.count() == 0) return {};
   const auto calibration = read_calibration(options_.calibration_file);
-  const auto taken = calibration ? parse_iso_time(calibration->date) : std::nullopt;
+  if (!calibration) return {};
+  // Texts of one form: the later one is the greater one.
+  const auto date = std::max(calibration->date, last_check(options_.root, calibration->sha256));
+  const auto taken = parse_iso_time(date);
   if (!taken || std::chrono::system_clock::now() - *taken < options_.check_calibration_every) return {};
-  return fmt::format("The calibration is older than {} h: run scanrig calibrate --rig.",
+  return fmt::format("The calibration was not checked for {} h: run scanrig calibrate --check.",
                      options_.check_calibration_every.count());
 }
 
 Result<void> JobStore::accept_calibration(const JobInfo& job) const {
   if (job.state != JobState::done || !job.calibration) {
     return fail(ErrorCode::refused, "job {} has no calibration to accept", job.id);
+  }
+  if (job.recipe.is_check() && job.calibration->verdict != "moved") {
+    return fail(ErrorCode::refused, "the check {} offers no new poses", job.id);
   }
   const auto text = read_file(job.model);
   if (!text) return pass_on(text);

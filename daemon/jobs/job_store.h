@@ -52,7 +52,7 @@ class JobStore {
   [[nodiscard]] Result<JobInfo> create(const std::string& id, const JobFile& job) const;
 
   /// Checks whether the rig's calibration belongs to its cameras. A serial number missing in either is not compared.
-  /// Fails with `refused`, naming both, and as read_calibration().
+  /// Fails with `refused`, naming both, or for a missing calibration, and as read_calibration().
   [[nodiscard]] Result<void> check_rig_cameras() const;
 
   /// That the rig's calibration is older than it should be, as a sentence; empty: it is not.

@@ -7,9 +7,9 @@
 
 #include "core/files.h"
 #include "core/image_codec.h"
+#include "core/overloaded.h"
 #include "daemon/runtime/actor.h"
 #include "daemon/runtime/catch_exceptions.h"
-#include "daemon/runtime/overloaded.h"
 #include "daemon/station/job_lifecycle.h"
 #include "pipeline/movement/turned_table.h"
 
@@ -352,7 +352,8 @@ Result<MovementCheck> JobThread::judge(const TakenView& again) {
 Result<void> JobThread::finish_pose(const action::FinishPose& task) {
   const auto pose = static_cast<std::size_t>(task.pose);
   if (auto done = scan_->complete_pose(pose, task.last ? "scanned" : "waiting_for_flip"); !done) return done;
-  return task.last && on_scanned_ ? on_scanned_(scan_->path()) : Result<void>{};
+  const bool is_scanned = task.last && scan_->manifest().source != "calibration";
+  return is_scanned && on_scanned_ ? on_scanned_(scan_->path()) : Result<void>{};
 }
 
 void JobThread::handle(const action::FinishPose& task) {

@@ -5,8 +5,8 @@
 #include <type_traits>
 #include <utility>
 
+#include "core/heap.h"
 #include "core/priority.h"
-#include "daemon/jobs/heap.h"
 #include "daemon/jobs/job_files.h"
 #include "daemon/runtime/actor.h"
 #include "daemon/runtime/catch_exceptions.h"
@@ -171,7 +171,7 @@ Result<std::unique_ptr<Reconstructor>> ReconstructionThread::make_reconstructor(
     const auto report = [this, job = message.job](int pose, int view, std::vector<std::string> problems) {
       post_event_(event::ImagesChecked{{job, pose, view}, std::move(problems)});
     };
-    return calibrator_({.min_views = std::min(kMinPlacementViews, recipe.views), .report = report});
+    return calibrator_({.folder = message.folder, .is_check = recipe.is_check(), .report = report});
   }
   const auto calibration = scan.load_calibration();
   if (!calibration) return pass_on(calibration);

@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-#include "daemon/station/timestamp.h"
+#include "core/timestamp.h"
 
 namespace scanrig {
 namespace {

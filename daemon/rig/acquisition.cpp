@@ -3,7 +3,7 @@
 #include <cmath>
 #include <utility>
 
-#include "daemon/station/timestamp.h"
+#include "core/timestamp.h"
 
 namespace scanrig {
 namespace {

@@ -4,17 +4,17 @@
 #include <ctime>
 #include <mutex>
 
-#include "daemon/jobs/heap.h"
+#include "core/heap.h"
+#include "core/overloaded.h"
+#include "core/timestamp.h"
 #include "daemon/jobs/housekeeping_thread.h"
 #include "daemon/journal/log_entries.h"
 #include "daemon/rig/panel_thread.h"
 #include "daemon/rig/placement_aid.h"
 #include "daemon/rig/rig_thread.h"
 #include "daemon/rig/turntable_thread.h"
-#include "daemon/runtime/overloaded.h"
 #include "daemon/service/exit_watchdog.h"
 #include "daemon/service/safety_record.h"
-#include "daemon/station/timestamp.h"
 #include "daemon/webhook/webhook.h"
 
 namespace scanrig {

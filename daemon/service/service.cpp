@@ -8,6 +8,7 @@
 #include "core/hash.h"
 #include "core/version.h"
 #include "daemon/api/socket_file.h"
+#include "daemon/jobs/calibration_solver.h"
 #include "daemon/jobs/pipeline_reconstructor.h"
 #include "daemon/jobs/process_reconstructor.h"
 #include "daemon/rig/make_safe.h"
@@ -57,6 +58,21 @@ ReconstructorFactory reconstructor_from(const config::ReconstructionConfig& conf
   return pipeline_reconstructor(options, gib(config.memory_gib));
 }
 
+CalibrateOptions calibrate_options_from(const config::RigConfig& rig) {
+  const config::CalibrationConfig& config = rig.calibration;
+  CalibrateOptions options;
+  options.board = config.board;
+  options.board_kind = config.board_kind;
+  if (config.length_mm) {
+    const double nominal = config.board.square_mm * (config.board.corner_columns() - 1);
+    options.length = MeasuredLength{nominal, *config.length_mm, config.length_sigma_mm};
+  }
+  options.rim_dots = config.rim_dots;
+  options.table_radius_mm = config.table_radius_mm;
+  options.gear_ratio = rig.turntable.motion().scale.gear_ratio;
+  return options;
+}
+
 /// True if a sleep of this machine would lose something now.
 bool is_job_active(const Snapshot& snapshot) {
   const bool scans = !snapshot.job.empty() || snapshot.machine == MachineState::single_execution ||
@@ -76,7 +92,9 @@ DaemonOptions options_from(const config::RigConfig& config) {
                   .config_sha256 = sha256(config.text),
                   .reserve_bytes = gib(config.storage.reserve_gib),
                   .check_calibration_every = config.calibration.check_every};
-  options.calibrator.board = config.calibration.board;
+  options.calibrator = {.board = config.calibration.board,
+                        .cameras = options.jobs.cameras,
+                        .solver = calibration_solver(calibrate_options_from(config), config.calibration_file)};
   options.accepts_calibrations = config.calibration.accepts_by_itself;
   options.state_folder = crash_folder(config.storage.root).parent_path();
   options.recipes.clear();

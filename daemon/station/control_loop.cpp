@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "daemon/runtime/overloaded.h"
+#include "core/overloaded.h"
 #include "daemon/station/operator_message.h"
 
 namespace scanrig {

@@ -32,8 +32,8 @@ struct JobOrder {
   std::string recipe = "default";
   std::string part{};  ///< free text, at most 200 bytes
   int repeat = 1;      ///< 1 to 100
-  /// A calibration instead, at the head of the queue; the rest is not used.
-  bool is_calibration = false;
+  /// A calibration, or a check of it: instead, at the head of the queue; the rest is not used.
+  RecipeKind kind = RecipeKind::scan;
 };
 
 /// Identifies the requester waiting for a reply; 0: no requester.

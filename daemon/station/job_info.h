@@ -1,10 +1,12 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/result.h"
@@ -20,8 +22,11 @@ struct Limits {
   bool operator==(const Limits&) const = default;
 };
 
-/// What the views of a job are for. The poses of a calibration are the placements of calibration_plan().
-enum class RecipeKind { scan, calibration };
+/// What the views of a job are for. The poses of a calibration are the placements of calibration_plan(); a check of the
+/// calibration is its first placement alone.
+enum class RecipeKind { scan, calibration, check };
+inline constexpr std::array<std::string_view, 3> kRecipeKinds = {"scan", "calibration", "check"};
+constexpr std::string_view to_string(RecipeKind kind) { return kRecipeKinds[static_cast<std::size_t>(kind)]; }
 
 /// Settings for scanning one kind of object. A job keeps the recipe it was queued with.
 struct Recipe {
@@ -35,7 +40,9 @@ struct Recipe {
   RecipeKind kind = RecipeKind::scan;
   bool operator==(const Recipe&) const = default;
 
-  [[nodiscard]] bool is_calibration() const { return kind == RecipeKind::calibration; }
+  /// Or a check of one: views of the board.
+  [[nodiscard]] bool is_calibration() const { return kind != RecipeKind::scan; }
+  [[nodiscard]] bool is_check() const { return kind == RecipeKind::check; }
   [[nodiscard]] const Placement& placement(int pose) const {
     const auto& plan = calibration_plan();
     return plan[std::min(static_cast<std::size_t>(pose), plan.size() - 1)];
@@ -64,6 +71,11 @@ inline Recipe calibration_recipe() {
           .kind = RecipeKind::calibration};
 }
 
+/// The recipe of every check of a calibration.
+inline Recipe check_recipe() {
+  return {.name = "calibration check", .poses = 1, .views = kCheckViews, .kind = RecipeKind::check};
+}
+
 struct StoredView {
   int pose = 0;
   int view = 0;
@@ -89,9 +101,10 @@ struct MovementCheck {
   std::vector<Error> retake_reasons{};  ///< exposures that were taken again, and why
 };
 
-/// Result of a calibration.
+/// Result of a calibration, or of a check of one.
 struct CalibrationOutcome {
-  std::string grade{};  ///< "A", "B", "C"
+  std::string grade{};    ///< "A", "B", "C"
+  std::string verdict{};  ///< of a check: "holds", "moved" (new poses can be accepted), "calibrate"; else empty
   std::vector<std::string> sentences{};
   bool is_accepted = false;  ///< the rig's calibration was replaced by it
   bool operator==(const CalibrationOutcome&) const = default;

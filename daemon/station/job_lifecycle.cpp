@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <tuple>
 
-#include "daemon/runtime/overloaded.h"
+#include "core/overloaded.h"
 
 namespace scanrig {
 namespace {

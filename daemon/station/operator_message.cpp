@@ -144,7 +144,9 @@ OperatorMessage when_ready(const StationState& state, const StationRules& rules)
   auto sentence =
       queued == 0 ? std::string("The rig is ready.") : fmt::format("The rig is ready, {} in the queue.", queued);
   if (const auto placement = awaited_placement(state)) {
-    sentence = fmt::format("Calibration, placement {} of {}.", *placement + 1, state.queue.front()->recipe.poses);
+    const auto& recipe = state.queue.front()->recipe;
+    sentence = recipe.is_check() ? "Check of the calibration."
+                                 : fmt::format("Calibration, placement {} of {}.", *placement + 1, recipe.poses);
   }
   if (!state.calibration.reminder.empty()) sentence += " " + state.calibration.reminder;
   if (warming_up(state)) sentence += fmt::format(" The projector will be warm in {} s.", state.warm_up_left.count());
@@ -246,7 +248,7 @@ OperatorMessage when_queued(const JobInfo& job) {
   const std::string sentence = job.stored.empty() ? "Queued." : "Queued to resume.";
   if (job.recipe.is_calibration()) {
     const auto& placement = job.recipe.placement(job.complete);
-    return {"Calibration queued.",
+    return {job.recipe.is_check() ? "Check of the calibration queued." : "Calibration queued.",
             views_of_pose(job) > 0 ? "Do not move the board. Press Start." : how_to_place(placement)};
   }
   if (job.recipe.start_on_part) {
@@ -287,8 +289,19 @@ std::string image_problem(const JobInfo& job) {
   return "";
 }
 
+/// What follows from the verdict of a check.
+std::string after_check(const CalibrationOutcome& outcome) {
+  if (outcome.is_accepted || outcome.verdict == "holds") return "Scan.";
+  return outcome.verdict == "moved" ? "Accept the new poses: run scanrig calibrate --accept."
+                                    : "Calibrate the rig: run scanrig calibrate --rig.";
+}
+
 OperatorMessage when_solved(const JobInfo& job) {
   const auto outcome = job.calibration.value_or(CalibrationOutcome{});
+  if (job.recipe.is_check()) {
+    auto found = fmt::format("{}", fmt::join(outcome.sentences, " "));
+    return {found + (outcome.is_accepted ? " They are in use." : ""), after_check(outcome)};
+  }
   auto sentence = fmt::format("Calibration of grade {}{}.", outcome.grade, outcome.is_accepted ? " is in use" : "");
   for (const auto& more : outcome.sentences) sentence += " " + more;
   return {sentence, outcome.is_accepted ? "Scan." : "Accept it: run scanrig calibrate --accept."};
@@ -305,7 +318,9 @@ OperatorMessage describe_calibration(const JobInfo& job) {
       return {job.repeated.empty() ? fmt::format("Placement {} of {} is complete.", job.complete, all)
                                    : fmt::format("Placement {} of {} again: {}.", pose, all, job.repeated),
               how_to_place(job.recipe.placement(job.complete))};
-    case JobState::reconstructing: return {"Solving the calibration.", "Wait for the result."};
+    case JobState::reconstructing:
+      return {job.recipe.is_check() ? "Comparing with the calibration." : "Solving the calibration.",
+              "Wait for the result."};
     case JobState::done: return when_solved(job);
     case JobState::interrupted:
       return {
@@ -344,7 +359,7 @@ PanelOutputs lamps(const StationState& state, const JobTable& jobs, bool blink) 
   PanelOutputs out;
   const bool warning = state.activity == Activity::warning;
   const bool flip = state.activity == Activity::waiting_for_flip;
-  const bool by_automation = flip && !state.job->recipe.is_calibration();
+  const bool calibrates = state.job && state.job->recipe.is_calibration();
   out.red = state.machine == MachineState::error || state.may_be_moving || state.shutting_down;
   const bool part = state.activity == Activity::waiting_for_part;
   out.amber = (state.machine == MachineState::halted && !out.red) || warning || flip ||
@@ -353,7 +368,7 @@ PanelOutputs lamps(const StationState& state, const JobTable& jobs, bool blink) 
   out.green = state.machine == MachineState::ready || part ||
               (out.busy && !state.maintenance && !warning && !out.red && !out.amber);
   out.start_lamp = state.machine == MachineState::ready || flip || part;
-  out.flip_request = by_automation;
+  out.flip_request = flip && !calibrates;
   const auto last = jobs.find(state.last_started_job);
   if (last != jobs.end() && is_final(last->second->state)) {
     out.pass = last->second->state == JobState::done && last->second->passed.value_or(true);

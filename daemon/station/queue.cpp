@@ -40,15 +40,15 @@ void look_at_queue(StepBuilder& m) {
 /// Goes before all other jobs: their scans are to have the new calibration.
 void take_calibration(StepBuilder& m, const event::JobsOrdered& asked) {
   const auto& s = m.s();
-  const auto& recipe = m.rules().calibration;
-  if (!recipe) return m.refuse(ErrorCode::unsupported, "This service cannot solve a calibration.");
+  if (!m.rules().calibration) return m.refuse(ErrorCode::unsupported, "This service cannot solve a calibration.");
+  const auto& recipe = asked.order.kind == RecipeKind::check ? check_recipe() : *m.rules().calibration;
   const auto queued = std::ranges::find_if(s.queue, [](const auto& job) { return job->recipe.is_calibration(); });
   const bool active = s.job && s.job->recipe.is_calibration();
   if (active || queued != s.queue.end()) {
     return m.refuse(ErrorCode::busy, "Calibration {} is {}: finish it, or abort it first.",
                     active ? s.job->id : (*queued)->id, active ? "active" : "queued");
   }
-  m.act(action::CreateJobs{{asked.new_ids.front()}, *recipe, "", first_place(s) - 1, asked.request_id});
+  m.act(action::CreateJobs{{asked.new_ids.front()}, recipe, "", first_place(s) - 1, asked.request_id});
 }
 
 }  // namespace
@@ -56,7 +56,7 @@ void take_calibration(StepBuilder& m, const event::JobsOrdered& asked) {
 void take_order(StepBuilder& m, const event::JobsOrdered& asked) {
   if (m.s().shutting_down) return m.refuse(ErrorCode::refused, "The service is shutting down.");
   if (!m.require_disk()) return;
-  if (asked.order.is_calibration) return take_calibration(m, asked);
+  if (asked.order.kind != RecipeKind::scan) return take_calibration(m, asked);
   const auto recipe = m.rules().recipes.find(asked.order.recipe);
   if (recipe == m.rules().recipes.end()) {
     return m.refuse(ErrorCode::not_found, "There is no recipe \"{}\". Use one of rig.toml.", asked.order.recipe);

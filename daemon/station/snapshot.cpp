@@ -1,6 +1,6 @@
 #include "daemon/station/snapshot.h"
 
-#include "daemon/runtime/overloaded.h"
+#include "core/overloaded.h"
 
 namespace scanrig {
 

@@ -4,11 +4,12 @@
 
 #include "core/parallel.h"
 #include "pipeline/calibration/corners/rim_dots.h"
+#include "pipeline/calibration/solve/focal_length.h"
 
 namespace scanrig {
 namespace {
 
-constexpr double kFocalPerWidth = 1.2;
+constexpr double kFocalPerWidth = 1.2;  ///< where nothing tells it
 constexpr double kTableRadiusMm = 90.0;
 constexpr std::size_t kMinDotImages = 6;  ///< fewer show the rim too seldom to be worth it
 constexpr double kPrintErrorMm = 1.0;     ///< of a dot along the rim, while its place is not known
@@ -40,7 +41,10 @@ CalibrationInput input_of(const CalibrationImages& images, const CalibrateOption
   input.height = boards.height;
   const double listed = (images.focal_px[0] + images.focal_px[1]) / 2.0;
   input.nominal_focal_px = options.focal_px > 0.0 ? options.focal_px : listed;
-  if (!(input.nominal_focal_px > 0.0)) input.nominal_focal_px = kFocalPerWidth * boards.width;
+  if (!(input.nominal_focal_px > 0.0)) {
+    const auto found = find_focal_px(board, boards.pairs, boards.width, boards.height);
+    input.nominal_focal_px = found.value_or(kFocalPerWidth * boards.width);
+  }
   input.serials = images.serials;
   const double radius = options.table_radius_mm > 0.0 ? options.table_radius_mm : images.table_radius_mm.value_or(0.0);
   input.table_radius_mm = radius > 0.0 ? radius : kTableRadiusMm;
@@ -77,14 +81,16 @@ Result<std::size_t> measure_dots(const CalibrationImages& images, const std::str
   return static_cast<std::size_t>(std::ranges::count_if(dots, [](std::size_t count) { return count > 0; }));
 }
 
-Result<FolderCalibration> calibrate(const CalibrationImages& images, const CalibrateOptions& options,
-                                    const Context& context) {
-  const Board board = options.board ? *options.board : images.board.value_or(Board{});
+Board board_of(const CalibrationImages& images, const CalibrateOptions& options) {
+  return options.board ? *options.board : images.board.value_or(Board{});
+}
+
+Result<FolderCalibration> calibrate(const CalibrationImages& images, FoundBoards boards,
+                                    const CalibrateOptions& options, const Context& context) {
+  const Board board = board_of(images, options);
   const std::string format = pixel_format_of(images, options);
-  auto boards = find_boards(images, format, board, context);
-  if (!boards) return pass_on(boards);
   FolderCalibration outcome;
-  outcome.boards = std::move(*boards);
+  outcome.boards = std::move(boards);
   outcome.input = input_of(images, options, board, outcome.boards);
   auto judged = judge_calibration(outcome.input, context);
   if (!judged) return pass_on(judged);
@@ -106,11 +112,21 @@ Result<FolderCalibration> calibrate(const CalibrationImages& images, const Calib
 
 }  // namespace
 
+Result<FolderCalibration> calibrate_boards(const CalibrationImages& images, FoundBoards boards,
+                                           const CalibrateOptions& options, const Context& context) {
+  Result<FolderCalibration> outcome = fail(ErrorCode::internal, "calibration: not run");
+  with_threads(options.threads, [&] { outcome = calibrate(images, std::move(boards), options, context); });
+  return outcome;
+}
+
 Result<FolderCalibration> calibrate_images(const CalibrationImages& images, const CalibrateOptions& options,
                                            const Context& context) {
-  Result<FolderCalibration> outcome = fail(ErrorCode::internal, "calibration: not run");
-  with_threads(options.threads, [&] { outcome = calibrate(images, options, context); });
-  return outcome;
+  Result<FoundBoards> boards = fail(ErrorCode::internal, "calibration: not run");
+  with_threads(options.threads, [&] {
+    boards = find_boards(images, pixel_format_of(images, options), board_of(images, options), context);
+  });
+  if (!boards) return pass_on(boards);
+  return calibrate_boards(images, std::move(*boards), options, context);
 }
 
 }  // namespace scanrig

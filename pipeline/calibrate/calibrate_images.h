@@ -16,7 +16,7 @@ struct CalibrateOptions {
   std::optional<MeasuredLength> length;  ///< fixes the scale; none here and in the list (its first): grade C at best
   std::optional<MeasuredLength> second_length;  ///< of another instrument, only compared
   std::string pixel_format;                     ///< empty here and in the list: by the image's channels, Mono8 or BGR8
-  double focal_px = 0.0;                        ///< nominal; 0 here and in the list: 1.2 times the image's width
+  double focal_px = 0.0;                        ///< nominal; 0 here and in the list: found in the images
   std::optional<RimDots> rim_dots;              ///< none here and in the list: not used
   double table_radius_mm = 0.0;                 ///< 0 here and in the list: 90
   double gear_ratio = 0.0;                      ///< for messages
@@ -31,9 +31,12 @@ struct FolderCalibration {
   FoundBoards boards;
 };
 
-/// Finds the boards, solves, measures the rim dots with that solution, solves again, judges. Reports the stages
-/// "boards", "dots" and those of the solver. Same input, same bits, for any number of threads.
-/// Fails as find_boards() and solve_calibration().
+/// Solves, measures the rim dots with that solution, solves again, judges. Reports the stage
+/// "dots" and those of the solver. Same input, same bits, for any number of threads. Fails as solve_calibration().
+Result<FolderCalibration> calibrate_boards(const CalibrationImages& images, FoundBoards boards,
+                                           const CalibrateOptions& options = {}, const Context& context = {});
+
+/// Finds the boards in the images, then calibrate_boards(). Reports the stage "boards" too. Fails as find_boards() too.
 Result<FolderCalibration> calibrate_images(const CalibrationImages& images, const CalibrateOptions& options = {},
                                            const Context& context = {});
 

@@ -2,6 +2,7 @@
 
 #include <fmt/ranges.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/storage/transform_json.h"
@@ -82,7 +83,14 @@ ordered_json board(const CalibrationInput& input, const SolvedCalibration& solve
   json["second_length"] = to_json(input.second_length);
   json["scale"] = solved.board.scale;
   json["scale_sigma"] = solved.board.scale_sigma;
+  json["aspect"] = solved.board.aspect;
+  json["shear"] = solved.board.shear;
   json["warp_mm"] = solved.board.warp_mm;
+  ordered_json offsets = ordered_json::array();
+  for (const auto& corner : solved.board.offsets_mm) {
+    for (const double value : corner) offsets.push_back(std::round(1e7 * value) / 1e7);
+  }
+  json["offsets_mm"] = std::move(offsets);
   return json;
 }
 
@@ -137,6 +145,30 @@ Result<std::string> calibration_json(const FolderCalibration& outcome, const Cal
   if (origin.temperature_c) json["temperature_c"] = *origin.temperature_c;
   for (const auto& [file, hash] : origin.sources) json["sources"].push_back({{"path", file}, {"sha256", hash}});
   if (!origin.previous.empty()) json["previous"] = origin.previous;
+  return json.dump(1) + "\n";
+}
+
+Result<std::string> moved_calibration_json(std::string_view known, const DriftCheck& check,
+                                           const CalibrationOrigin& origin) {
+  auto json = ordered_json::parse(known, nullptr, false);
+  if (!json.is_object() || !json.contains("covariance")) {
+    return fail(ErrorCode::invalid_input, "calibration: the file to replace is not of version 2; calibrate the rig");
+  }
+  json["date"] = origin.date;
+  for (const auto& [side, camera] : {std::pair("left", &check.calibration.left), {"right", &check.calibration.right}}) {
+    json[side]["camera_from_turntable"] = transform_json(camera->camera_from_turntable);
+  }
+  auto& volume = json["covariance"]["volume_um"];
+  volume = std::hypot(volume.get<double>(), check.sigma_um);
+  json["drift"] = {{"difference_um", check.difference_um},
+                   {"sigma_um", check.sigma_um},
+                   {"cameras_px", {check.cameras_px.x(), check.cameras_px.y()}},
+                   {"axis_mm", check.axis_mm},
+                   {"axis_deg", check.axis_deg}};
+  json["sentences"] = check.sentences;
+  json["sources"] = ordered_json::array();
+  for (const auto& [file, hash] : origin.sources) json["sources"].push_back({{"path", file}, {"sha256", hash}});
+  json["previous"] = origin.previous;
   return json.dump(1) + "\n";
 }
 

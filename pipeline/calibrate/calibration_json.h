@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pipeline/calibrate/calibrate_images.h"
+#include "pipeline/calibration/drift/check_drift.h"
 
 namespace scanrig {
 
@@ -19,5 +20,10 @@ struct CalibrationOrigin {
 /// calibration.json, version 2 (docs/reference/scan-folder.md): the text of the file. Fails with `below_limits` for a
 /// calibration that is refused: the operator's sentences are the message.
 Result<std::string> calibration_json(const FolderCalibration& outcome, const CalibrationOrigin& origin);
+
+/// The text of the calibration `known` (version 2) with the poses that a drift check found; docs as above. Fails with
+/// `invalid_input` (the text).
+Result<std::string> moved_calibration_json(std::string_view known, const DriftCheck& check,
+                                           const CalibrationOrigin& origin);
 
 }  // namespace scanrig

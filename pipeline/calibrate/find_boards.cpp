@@ -21,8 +21,6 @@ struct ImageResult {
   bool is_other_board = false;
 };
 
-bool spoils_corners(ImageProblem problem) { return problem == ImageProblem::blurred || problem == ImageProblem::glare; }
-
 ImageResult look(const CalibrationPair& pair, std::size_t side, const std::string& format, const Board& board) {
   ImageResult result;
   const auto leave_out = [&](const std::string& why) { result.remarks.push_back({pair.name, side, why, true}); };
@@ -41,9 +39,8 @@ ImageResult look(const CalibrationPair& pair, std::size_t side, const std::strin
   result.outline.assign(found->outline.begin(), found->outline.end());
   bool is_usable = true;
   for (const ImageCheck& check : check_board_image(*found, board, result.size)) {
-    const bool spoilt = spoils_corners(check.problem);
-    result.remarks.push_back({pair.name, side, check.message, spoilt});
-    is_usable = is_usable && !spoilt;
+    result.remarks.push_back({pair.name, side, check.message, check.spoils_corners});
+    is_usable = is_usable && !check.spoils_corners;
   }
   if (is_usable) result.corners = std::move(found->corners);
   return result;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/transform.h"
+#include "pipeline/calibration/board_print.h"
 #include "pipeline/calibration/lens_field.h"
 
 namespace scanrig {
@@ -66,6 +67,7 @@ struct CalibrationQuality {
   Eigen::MatrixXd cameras;
   std::vector<Eigen::Vector3d> rim_dots;  ///< in the turntable frame at table angle 0; empty: none
   double rim_dot_diameter_mm = 0.0;
+  std::optional<BoardPrint> board;  ///< of the board it was made with; none: not in its file
 };
 
 /// The rig's calibration for the reconstruction. It defines the turntable frame: +Y is the axis, y = 0 the table top.

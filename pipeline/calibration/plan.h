@@ -23,8 +23,10 @@ constexpr double kBlockHeightMm = 40.0;
 /// How far from its plan a board may stand.
 constexpr double kMaxPlacementErrorDeg = 10.0, kMaxPlacementErrorMm = 15.0;
 
-constexpr int kPlacementViews = 7;     ///< of a placement; a flat one has one more
-constexpr int kMinPlacementViews = 5;  ///< good ones, below which a placement is taken again
+constexpr int kPlacementViews = 7;  ///< of a placement; a flat one has one more
+constexpr int kCheckViews = 6;      ///< of the first placement, for a check of a calibration
+/// Good views, below which a placement is taken again. A flat board, seen at a low angle, is often hard to read.
+constexpr int kMinPlacementViews = 5, kMinFlatViews = 3;
 
 /// The seven placements: together they fill the volume, front and back, low and high.
 const std::vector<Placement>& calibration_plan();

@@ -59,6 +59,34 @@ Eigen::MatrixXd read_covariance(JsonObject& object, std::string_view key) {
   return matrix;
 }
 
+/// None: files of before have no offsets.
+std::optional<BoardPrint> read_board_print(JsonObject object) {
+  for (const char* key :
+       {"columns", "rows", "square_mm", "thickness_mm", "markers", "length", "second_length", "scale_sigma"}) {
+    object.ignore(key);
+  }
+  BoardPrint print;
+  print.scale = object.number("scale", 0.5, 2.0);
+  const std::vector<double> warp = object.numbers("warp_mm");
+  if (warp.size() == print.warp_mm.size()) {
+    std::copy(warp.begin(), warp.end(), print.warp_mm.begin());
+  } else {
+    object.reject("warp_mm", "must be three numbers");
+  }
+  const bool has_offsets = object.has("offsets_mm");
+  if (has_offsets) {
+    print.aspect = object.number("aspect", -0.1, 0.1);
+    print.shear = object.number("shear", -0.1, 0.1);
+    const std::vector<double> offsets = object.numbers("offsets_mm");
+    if (offsets.size() % 3 != 0) object.reject("offsets_mm", "must be three numbers a corner");
+    for (std::size_t i = 0; i + 2 < offsets.size(); i += 3) {
+      print.offsets_mm.push_back({offsets[i], offsets[i + 1], offsets[i + 2]});
+    }
+  }
+  object.close();
+  return has_offsets ? std::optional(std::move(print)) : std::nullopt;
+}
+
 CalibrationQuality read_quality(JsonObject& root) {
   CalibrationQuality quality;
   quality.grade = root.one_of("grade", {"A", "B", "C"});
@@ -78,9 +106,10 @@ CalibrationQuality read_quality(JsonObject& root) {
     }
     dots.close();
   }
+  if (root.has("board")) quality.board = read_board_print(root.object("board"));
   // What people and later calibrations read.
-  for (const char* key : {"noise_px", "images", "cross_validation", "board", "table", "temperature_c", "sources",
-                          "previous", "sentences"}) {
+  for (const char* key : {"noise_px", "images", "cross_validation", "table", "temperature_c", "sources", "previous",
+                          "sentences", "drift"}) {
     root.ignore(key);
   }
   return quality;

@@ -7,6 +7,9 @@
 #include "core/hash.h"
 #include "core/image_codec.h"
 #include "core/strict_json.h"
+#include "core/units.h"
+#include "pipeline/calibration/plan.h"
+#include "pipeline/storage/calibration_file.h"
 
 namespace scanrig {
 namespace {
@@ -14,6 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kList = "calibration_images.json";
+constexpr const char* kScan = "scan.json";
 constexpr std::array kSides = {"left", "right"};
 constexpr std::array kEndings = {".png", ".jpg", ".jpeg"};
 
@@ -150,10 +154,56 @@ Result<CalibrationImages> read_names(const fs::path& folder) {
   return images;
 }
 
+Result<CalibrationImages> read_job(const fs::path& folder) {
+  const auto manifest = read_manifest(folder / kScan);
+  if (!manifest) return pass_on(manifest);
+  if (manifest->source != "calibration") {
+    return fail(ErrorCode::invalid_input, "{}: is not a calibration; name the folder of a calibration job",
+                (folder / kScan).string());
+  }
+  if (manifest->poses.size() > calibration_plan().size()) {
+    return fail(ErrorCode::invalid_input, "{}: has {} placements, a calibration at most {}", (folder / kScan).string(),
+                manifest->poses.size(), calibration_plan().size());
+  }
+  CalibrationImages images;
+  images.folder = folder;
+  for (std::size_t pose = 0; pose < manifest->poses.size(); ++pose) {
+    for (const ViewRecord& view : manifest->poses[pose].views) {
+      images.pixel_format = view.pixel_format;
+      images.pairs.push_back(calibration_pair(folder, pose, view));
+    }
+  }
+  if (images.pairs.empty()) return fail(ErrorCode::not_found, "{}: has no views yet", (folder / kScan).string());
+  // The calibration that the rig had then is of the same cameras; the rig's first one is solved without.
+  if (!manifest->calibration) return images;
+  if (const auto had = read_calibration(folder / manifest->calibration->path)) {
+    images.serials = {had->left.serial, had->right.serial};
+    images.table_radius_mm = had->table_radius_mm;
+  }
+  return images;
+}
+
 }  // namespace
 
+CalibrationPair calibration_pair(const fs::path& folder, std::size_t pose, const ViewRecord& view) {
+  const Placement& placement = calibration_plan().at(pose);
+  CalibrationPair pair{.name = fmt::format("placement {} image {}", placement.number, view.index + 1),
+                       .placement = placement.number,
+                       .in_a = placement.in_a,
+                       .in_b = placement.in_b,
+                       .table_deg = view.measured_deg};
+  for (std::size_t side = 0; side < kSides.size(); ++side) {
+    const auto file = view.files.find(fmt::format("{}_plain", kSides[side]));
+    if (file == view.files.end()) continue;
+    pair.files[side] = folder / file->second.path;
+    pair.sha256[side] = file->second.sha256;
+  }
+  return pair;
+}
+
 Result<CalibrationImages> read_calibration_images(const fs::path& folder) {
-  return fs::exists(folder / kList) ? read_list(folder) : read_names(folder);
+  if (fs::exists(folder / kList)) return read_list(folder);
+  return fs::exists(folder / kScan) ? read_job(folder) : read_names(folder);
 }
 
 Result<cv::Mat> load_calibration_image(const CalibrationPair& pair, std::size_t side) {

@@ -10,6 +10,7 @@
 #include "core/result.h"
 #include "pipeline/calibration/board/board.h"
 #include "pipeline/calibration/observations.h"
+#include "pipeline/storage/manifest.h"
 
 namespace scanrig {
 
@@ -49,9 +50,14 @@ struct CalibrationImages {
   [[nodiscard]] bool is_on_table() const { return !pairs.empty() && pairs.front().table_deg.has_value(); }
 };
 
-/// The pairs of a folder: those of its calibration_images.json, else all NAME_left.* with their NAME_right.* (PNG or
-/// JPEG), by name. Fails with `not_found` (no folder, no pairs, a file without its partner), `io`, `invalid_input` (the
-/// list, naming file and key), `unsupported` (version).
+/// The pair that a view of a calibration job is: `pose` is its placement's place in the plan. `folder`: the job's.
+/// Files are empty until the view is stored.
+CalibrationPair calibration_pair(const std::filesystem::path& folder, std::size_t pose, const ViewRecord& view);
+
+/// The pairs of a folder: those of its calibration_images.json, of a calibration job (scan.json), else all NAME_left.*
+/// with their NAME_right.* (PNG or JPEG), by name. Fails with `not_found` (no folder, no pairs, a file without its
+/// partner), `io`, `invalid_input` (the list, naming file and key; the folder of another scan), `unsupported`
+/// (version).
 Result<CalibrationImages> read_calibration_images(const std::filesystem::path& folder);
 
 /// One image of a pair as the sensor delivered it; `side` 0 is left. Fails with `not_found`, `io`, `invalid_input` (not

@@ -5,10 +5,12 @@
 #include "config/rig_config.h"
 #include "core/files.h"
 #include "core/virtual_clock.h"
+#include "daemon/jobs/calibration_solver.h"
 #include "daemon/jobs/pipeline_reconstructor.h"
 #include "daemon/rig/make_safe.h"
 #include "daemon/rig/open_devices.h"
 #include "daemon/service/service.h"
+#include "sim/apps/rig_options.h"
 #include "sim/apps/simulated_operator.h"
 #include "sim/apps/troubled_camera.h"
 #include "sim/apps/wire_camera.h"
@@ -21,6 +23,7 @@ using namespace scanrig;
 
 struct SimOptions {
   sim::SimRigOptions rig;
+  sim::DrawnRigOptions drawn_rig;
   std::filesystem::path socket = "out/api.sock";
   std::filesystem::path jobs = "out/jobs";
   int views = 8;
@@ -46,6 +49,7 @@ void add_options(CLI::App& app, SimOptions& o) {
       ->capture_default_str()
       ->check(CLI::Range(1.0, 1000.0));
   app.add_option("--seed", o.rig.seed, "placements, sensor noise, table errors")->capture_default_str();
+  o.drawn_rig.add_to(app);
   app.add_option("--views", o.views, "views per pose")->capture_default_str()->check(CLI::Range(1, 360));
   app.add_option("--scale", o.rig.image_scale, "of the images: 0.25 gives 320x240")
       ->capture_default_str()
@@ -71,8 +75,29 @@ void add_options(CLI::App& app, SimOptions& o) {
 /// A simulated image takes as long as its rendering: that is no camera that hangs.
 constexpr auto kRenderingMargin = std::chrono::minutes(2);
 
+/// What rig.toml says of board and table in a real rig.
+CalibratorOptions calibrator_of(const sim::SimRig& rig, const JobStoreOptions& jobs) {
+  CalibrateOptions options;
+  const auto [length_mm, sigma_mm] = rig.measured_board_length();
+  options.length = MeasuredLength{(Board{}.corner_columns() - 1) * Board{}.square_mm, length_mm, sigma_mm};
+  const auto& profile = sim::profile();
+  constexpr int kRimDots = 40;
+  options.rim_dots = RimDots{kRimDots, profile.rim_dot_radius_mm, profile.rim_dot_diameter_mm};
+  options.table_radius_mm = profile.table_radius_mm;
+  return {.cameras = jobs.cameras, .solver = calibration_solver(options, jobs.calibration_file)};
+}
+
+/// A drawn rig has no calibration until it is calibrated; that of the default rig is known.
+Result<void> write_calibration(const SimOptions& o, const sim::SimRig& rig, const std::filesystem::path& file) {
+  if (o.rig.rig) return {};
+  return rig.write_calibration(file);
+}
+
 /// Checks that the rig can take the object before anything is written.
-Result<void> run(const SimOptions& o, const SignalStop& stop) {
+Result<void> run(SimOptions o, const SignalStop& stop) {
+  auto drawn = o.drawn_rig.variation();
+  if (!drawn) return pass_on(drawn);
+  o.rig.rig = *drawn;
   std::unique_ptr<Clock> clock;
   if (o.clock == "virtual") {
     clock = std::make_unique<VirtualClock>();
@@ -85,7 +110,7 @@ Result<void> run(const SimOptions& o, const SignalStop& stop) {
 
   if (auto made = create_directories_synced(o.jobs); !made) return made;
   const auto calibration = o.jobs / "calibration.json";
-  if (auto written = r.write_calibration(calibration); !written) return written;
+  if (auto written = write_calibration(o, r, calibration); !written) return written;
 
   ReconstructOptions reconstruct;
   reconstruct.voxel_mm = o.voxel_mm;
@@ -96,6 +121,7 @@ Result<void> run(const SimOptions& o, const SignalStop& stop) {
                   .calibration_file = calibration,
                   .cameras = {cameras[0], cameras[1]},
                   .profile = r.profile_sha256()};
+  options.calibrator = calibrator_of(r, options.jobs);
   options.recipes["default"] = {.poses = o.rig.poses, .views = o.views};
   options.api.socket = o.socket;
   options.remote = options.guard = true;  // a simulated table cannot hurt a person
@@ -106,6 +132,10 @@ Result<void> run(const SimOptions& o, const SignalStop& stop) {
   using Role = sim::Operator::Role;
   if (o.operator_at_rig != "none")
     operator_thread.emplace(r, *clock, o.operator_at_rig == "auto" ? Role::alone : Role::helper);
+  options.published = [&operator_thread](const std::shared_ptr<const Snapshot>& snapshot) {
+    const auto& awaited = snapshot->awaited_placement;
+    if (operator_thread) operator_thread->read_screen(awaited ? awaited->placement + 1 : 0);
+  };
   sim::TroubledCamera camera(r, o.trouble, o.rig.seed);
   Journal journal(standard_sink());
   options.journal = [&journal](JournalEntry entry) { journal.write(std::move(entry)); };

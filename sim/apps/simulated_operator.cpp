@@ -18,8 +18,11 @@ void Operator::run(const std::stop_token& stop) {
 }
 
 void Operator::look(const PanelOutputs& lamps) {
-  if (lamps.flip_request && !flip_was_requested_) {
-    rig_.turn_over();
+  const int placement = awaited_placement_;
+  const bool is_asked = lamps.flip_request || (placement != 0 && lamps.start_lamp);
+  if (is_asked && !was_asked_) {
+    rig_.put_board(placement);
+    if (placement == 0) rig_.turn_over();
     rig_.press_start();
   } else if (role_ == Role::alone && lamps.start_lamp && !lamps.flip_request && !has_started_) {
     has_started_ = true;
@@ -27,7 +30,8 @@ void Operator::look(const PanelOutputs& lamps) {
   } else if ((lamps.amber || lamps.red) && !lamps.busy && !lamps.start_lamp) {
     reset();
   }
-  flip_was_requested_ = lamps.flip_request;
+  if (lamps.start_lamp && !is_asked) rig_.put_board(0);
+  was_asked_ = is_asked;
 }
 
 void Operator::reset() {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <thread>
 
 #include "core/clock.h"
@@ -7,14 +8,18 @@
 
 namespace scanrig::sim {
 
-/// Simulated operator who watches only the lamps: turns the object over and presses Start each time the flip lamp
-/// lights. Alone the operator also presses Reset once and Start once. As a helper the operator starts no job, but fixes
-/// any fault of the rig and presses Reset whenever it is requested.
+/// Simulated operator who watches the lamps: turns the object over and presses Start each time the flip lamp lights. In
+/// a calibration the operator reads where the board goes, and puts it there instead. Alone the operator also presses
+/// Reset once and Start once. As a helper the operator starts no job, but fixes any fault of the rig and presses Reset
+/// whenever it is requested.
 class Operator {
  public:
   enum class Role { alone, helper };
   Operator(SimRig& rig, Clock& clock, Role role)
       : rig_(rig), clock_(clock), role_(role), thread_([this](const std::stop_token& stop) { run(stop); }) {}
+
+  /// What the screen says: placement that awaits the board, from 1; 0: none. Threads: any.
+  void read_screen(int awaited_placement) { awaited_placement_ = awaited_placement; }
 
  private:
   void run(const std::stop_token& stop);
@@ -26,7 +31,8 @@ class Operator {
   Role role_;
   bool has_reset_ = false;
   bool has_started_ = false;
-  bool flip_was_requested_ = false;
+  bool was_asked_ = false;
+  std::atomic<int> awaited_placement_ = 0;
   std::jthread thread_;  ///< last: joined before the other members are destroyed
 };
 

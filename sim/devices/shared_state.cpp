@@ -11,15 +11,22 @@ void SharedState::edge(Light light) {
       std::chrono::duration_cast<Clock::Duration>(std::chrono::duration<double>(profile().exposure_s));
   constexpr auto kTransfer = std::chrono::milliseconds(25);
   const auto now = clock.now();
-  const double angle = axis.angle(now + exposure_time / 2);
-  history.exposed(angle);
+  const double reported = axis.angle(now + exposure_time / 2);
+  const double angle = scene->options().rig ? scene->drawn_rig().table.true_deg(reported) : reported;
+  if (board_placement == 0) history.exposed(angle);
   ++exposures;
   if (frames_to_lose > 0) {
     --frames_to_lose;
     return;
   }
-  in_flight = Exposure{
-      history.placement(), angle, light == Light::pattern, exposures, triggers, now, now + exposure_time + kTransfer};
+  in_flight = Exposure{.placement = history.placement(),
+                       .board = board_placement,
+                       .angle_deg = angle,
+                       .pattern = light == Light::pattern,
+                       .number = exposures,
+                       .trigger = triggers,
+                       .taken = now,
+                       .arrival = now + exposure_time + kTransfer};
   clock.notify_all(changed);
 }
 

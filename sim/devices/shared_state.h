@@ -10,6 +10,7 @@
 #include "drivers/panel/panel.h"
 #include "drivers/projector/projector.h"
 #include "sim/devices/table_motion.h"
+#include "sim/scene/board_on_table.h"
 #include "sim/scene/scene.h"
 #include "sim/scene/truth_writer.h"
 
@@ -21,6 +22,7 @@ enum class Button { released, pressed, reported };
 /// State seen by the cameras at an edge; becomes images when they are collected.
 struct Exposure {
   int placement = 0;
+  int board = 0;  ///< number of the board's placement; 0: the object is on the table
   double angle_deg = 0.0;
   bool pattern = false;
   std::uint64_t number = 0;
@@ -30,13 +32,15 @@ struct Exposure {
 };
 
 /// Shared state of the devices: the scene on the table, and the actions of operator and tests. `mutex` guards
-/// everything except `scene`, which belongs to the camera (its const part to all). Code that changes a state that
-/// another thread may wait for calls clock.notify_all(changed).
+/// everything except `scene` and `board`, which belong to the camera (its const part to all). Code that changes a state
+/// that another thread may wait for calls clock.notify_all(changed).
 struct SharedState {
-  SharedState(std::unique_ptr<Scene> the_scene, Clock& the_clock) : clock(the_clock), scene(std::move(the_scene)) {}
+  SharedState(std::unique_ptr<Scene> the_scene, Clock& the_clock)
+      : clock(the_clock), scene(std::move(the_scene)), board(*scene) {}
 
   Clock& clock;
   const std::unique_ptr<Scene> scene;
+  BoardOnTable board;
   std::mutex mutex;
   std::condition_variable changed;
 
@@ -60,7 +64,9 @@ struct SharedState {
   bool estop_ok = true;
   PanelOutputs lamps;
 
+  // On the table.
   ExposureHistory history;
+  int board_placement = 0;  ///< number in the plan; 0: the object is on the table
 
   /// The trigger edge, at the beginning of an exposure. Call with `mutex` held.
   void edge(Light light);

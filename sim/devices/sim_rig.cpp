@@ -27,6 +27,11 @@ class Rig final : public SimRig {
     state_.history.turned_over(*state_.scene);
   }
 
+  void put_board(int number) override {
+    const std::scoped_lock lock(state_.mutex);
+    state_.board_placement = number;
+  }
+
   PanelOutputs lamps() const override {
     const std::scoped_lock lock(state_.mutex);
     return state_.lamps;
@@ -46,6 +51,9 @@ class Rig final : public SimRig {
   }
 
   std::string profile_sha256() const override { return sim::profile_sha256(); }
+  std::array<double, 2> measured_board_length() const override {
+    return {state_.board.measured_length_mm(), BoardOnTable::kLengthSigmaMm};
+  }
   std::array<std::string, 2> camera_serials() const override {
     return {state_.scene->rig().left.serial, state_.scene->rig().right.serial};
   }
@@ -74,7 +82,8 @@ Result<std::unique_ptr<SimRig>> SimRig::create(const SimRigOptions& options, Clo
                               .poses = options.poses,
                               .image_scale = options.image_scale,
                               .same_rest_twice = options.same_rest_twice,
-                              .noise = options.noise});
+                              .noise = options.noise,
+                              .rig = options.rig});
   if (!scene) return pass_on(scene, "simulated rig");
   return std::make_unique<Rig>(std::move(*scene), clock);
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "core/clock.h"
@@ -12,6 +13,7 @@
 #include "drivers/panel/panel.h"
 #include "drivers/projector/projector.h"
 #include "drivers/turntable/turntable.h"
+#include "sim/scene/rig_variation.h"
 
 namespace scanrig::sim {
 
@@ -24,9 +26,10 @@ struct SimRigOptions {
   double image_scale = 1.0;      ///< 0.25 gives 320x240 with the same field of view, for fast tests
   bool same_rest_twice = false;  ///< the operator does not turn the object over
   bool noise = true;
+  std::optional<RigVariation> rig = std::nullopt;  ///< a drawn rig; nothing: the default rig, without any error
 };
 
-/// The default rig in this process: turntable, projector, cameras and panel over one rendered scene.
+/// The default rig, or a drawn one, in this process: turntable, projector, cameras and panel over one rendered scene.
 /// Threads: each device as its interface says; the operator's functions may be called from any thread.
 class SimRig {
  public:
@@ -46,18 +49,22 @@ class SimRig {
   virtual void press_reset() = 0;
   virtual void set_estop(bool ok) = 0;
   virtual void turn_over() = 0;  ///< puts the object on its next rest
+  /// The calibration board as placement `number` (from 1) of the plan, in the object's place; 0 takes it off again.
+  virtual void put_board(int number) = 0;
   virtual PanelOutputs lamps() const = 0;
 
   // Faults, for tests.
   virtual void stall_turntable(bool stalled) = 0;
   virtual void lose_frames(int count) = 0;  ///< the next `count` frame pairs never arrive
 
-  /// The calibration of docs/reference/scan-folder.md, exact.
+  /// The calibration of docs/reference/scan-folder.md, exact but for a drawn rig's lens residual.
   virtual Result<void> write_calibration(const std::filesystem::path& file) const = 0;
   /// truth.json and truth.ply, into a scan folder, for the latest `poses` times the object was put down and exposed; a
   /// retaken view replaces the one before. Fails with `degenerate` (nothing exposed yet), `io`.
   virtual Result<void> write_truth(const std::filesystem::path& folder) const = 0;
   virtual std::string profile_sha256() const = 0;
+  /// Of the board's first row of corners: what a person measures, mm, and its standard deviation.
+  virtual std::array<double, 2> measured_board_length() const = 0;
   virtual std::array<std::string, 2> camera_serials() const = 0;  ///< left, right
 };
 

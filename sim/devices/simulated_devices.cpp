@@ -57,7 +57,11 @@ Result<StereoFrame> SimStereoCamera::collect(Deadline deadline) {
   const Exposure e = *b.in_flight;
   b.in_flight.reset();
   lock.unlock();
-  const StereoImages images = b.scene->shoot(e.placement, to_radians(e.angle_deg), e.pattern, e.number);
+  if (e.board != 0 && e.board != board_) b.board.put(e.board);
+  board_ = e.board;
+  const double angle = to_radians(e.angle_deg);
+  const StereoImages images =
+      e.board != 0 ? b.board.shoot(angle, e.number) : b.scene->shoot(e.placement, angle, e.pattern, e.number);
   return StereoFrame{images.left, images.right, PixelFormat::bayer_rggb8, e.trigger, e.taken};
 }
 

@@ -55,6 +55,7 @@ class SimStereoCamera final : public StereoCamera {
  private:
   SharedState& state_;
   bool collectable_ = false;  // armed since the last collect()
+  int board_ = 0;             // the board's placement at the last one
 };
 
 class SimPanel final : public Panel {

@@ -10,6 +10,9 @@
 
 namespace scanrig {
 
+/// What a board is made of: how far it may depart from its nominal print.
+enum class BoardKind { glass, paper };
+
 /// The marker part of a ChArUco board.
 struct BoardMarkers {
   double size_mm = 6.0;

@@ -40,18 +40,25 @@ std::vector<ImageCheck> check_board_image(const BoardFinding& finding, const Boa
         {ImageProblem::blurred,
          fmt::format("Image blurred ({:.1f} px, at most {:.1f}). Check focus and aperture, and let the table "
                      "settle.",
-                     finding.blur_px, limits.max_blur_px)});
+                     finding.blur_px, limits.max_blur_px),
+         true});
   }
   if (finding.saturated_share > limits.max_saturated_share) {
     checks.push_back(
         {ImageProblem::glare,
          fmt::format("Glare on {:.0f} % of the board. Shorten the exposure, or turn the board or the lights.",
-                     std::max(1.0, 100.0 * finding.saturated_share))});
+                     std::max(1.0, 100.0 * finding.saturated_share)),
+         true});
   }
+  const double needed = limits.min_corner_share * board.corner_count();
+  const bool are_enough = static_cast<double>(finding.corners.size()) >= needed;
   const std::string edges = edges_crossed(finding, image);
   if (!edges.empty()) {
     checks.push_back(
-        {ImageProblem::cut_off, "Board cut off at the " + edges + " edge of the image. Move it into view."});
+        {ImageProblem::cut_off,
+         fmt::format("Board cut off at the {} edge of the image, {} of {} corners visible{}", edges,
+                     finding.corners.size(), board.corner_count(), are_enough ? ": enough." : ". Move it into view."),
+         false, are_enough});
   }
   if (finding.square_px < limits.min_square_px) {
     checks.push_back(
@@ -60,8 +67,7 @@ std::vector<ImageCheck> check_board_image(const BoardFinding& finding, const Boa
                      "tilt it.",
                      finding.square_px, limits.min_square_px)});
   }
-  const double needed = limits.min_corner_share * board.corner_count();
-  if (edges.empty() && static_cast<double>(finding.corners.size()) < needed) {
+  if (edges.empty() && !are_enough) {
     checks.push_back(
         {ImageProblem::hidden, fmt::format("Only {} of {} corners visible. Uncover the board, and check its light.",
                                            finding.corners.size(), board.corner_count())});

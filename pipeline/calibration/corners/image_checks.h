@@ -19,7 +19,9 @@ enum class ImageProblem { blurred, glare, cut_off, too_small, hidden };
 
 struct ImageCheck {
   ImageProblem problem = ImageProblem::blurred;
-  std::string message;  ///< for the operator: one sentence, what happened and what to do
+  std::string message;          ///< for the operator: one sentence, what happened and what to do
+  bool spoils_corners = false;  ///< they are not where the board's are
+  bool is_minor = false;        ///< said, but the image is good
 };
 
 /// What is wrong with an image of a calibration board; empty: nothing. Threads: any.

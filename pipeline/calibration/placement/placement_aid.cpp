@@ -28,8 +28,9 @@ Sighting look(const cv::Mat& image, const std::string& pixel_format, const Board
   if (!found) return {{.problem = found.error().message}};
   Sighting sighting{{.is_seen = true}, found->corners};
   sighting.image.outline.assign(found->outline.begin(), found->outline.end());
-  const auto problems = check_board_image(*found, board, image.size());
-  if (!problems.empty()) sighting.image.problem = problems.front().message;
+  for (const ImageCheck& check : check_board_image(*found, board, image.size())) {
+    if (sighting.image.problem.empty() && !check.is_minor) sighting.image.problem = check.message;
+  }
   return sighting;
 }
 

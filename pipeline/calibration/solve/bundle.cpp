@@ -42,6 +42,7 @@ class Bundle {
       }
       problem_.SetParameterBlockConstant(u_.cameras[0].camera_from_table.data());
     }
+    if (setup.holds_lens_and_board) hold_lens_and_board();
   }
 
   ceres::Problem& problem() { return problem_; }
@@ -76,6 +77,18 @@ class Bundle {
     }
     problem_.AddParameterBlock(camera.camera_from_table.data(), 7, manifold_.get());
     add(cost, &loss_, blocks);
+  }
+
+  void hold_lens_and_board() {
+    const auto hold = [this](auto& block) {
+      if (problem_.HasParameterBlock(block.data())) problem_.SetParameterBlockConstant(block.data());
+    };
+    for (CameraUnknowns& camera : u_.cameras) {
+      hold(camera.lens);
+      for (auto& shift : camera.field) hold(shift);
+    }
+    hold(u_.shape);
+    for (auto& corner : u_.offsets) hold(corner);
   }
 
   void add_camera_priors() {

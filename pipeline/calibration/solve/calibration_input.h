@@ -25,9 +25,6 @@ struct CalibrationPriors {
   double thickness_mm = 0.02;                                   ///< of the board
 };
 
-/// What a board is made of: how far it may depart from its nominal print.
-enum class BoardKind { glass, paper };
-
 /// A distance on the board: as ordered, and as measured with a certified instrument.
 struct MeasuredLength {
   double nominal_mm = 0.0;

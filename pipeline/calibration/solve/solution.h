@@ -26,6 +26,10 @@ Result<CalibrationSolution> solve_whole(const CalibrationInput& input, const Con
 Result<CalibrationSolution> solve_part(const CalibrationSolution& whole, const std::vector<bool>& pairs,
                                        const Context& context);
 
+/// Sigma of a coordinate of corners and dots from the median residual, freedom of the poses counted; sets it in
+/// `setup`.
+void measure_noise(BundleSetup& setup, const Unknowns& unknowns);
+
 /// How the images fit, by image and by placement; fills SolvedCalibration::images, placements and median_px.
 void describe_images(const CalibrationInput& input, const CalibrationSolution& solution,
                      const std::vector<std::array<std::string, 2>>& reasons, SolvedCalibration& out);

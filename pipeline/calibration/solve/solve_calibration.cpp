@@ -108,27 +108,8 @@ class CalibrationSolver {
     const auto steps = adjust(setup(), made_.start.unknowns, tolerance, context_);
     if (!steps) return pass_on(steps);
     steps_ += *steps;
-    measure_noise();
+    measure_noise(setup(), made_.start.unknowns);
     return {};
-  }
-
-  /// Sigma of a coordinate from the median residual, freedom of the poses counted.
-  void measure_noise() {
-    std::vector<double> corners, dots;
-    const auto residuals = misses(setup(), made_.start.unknowns);
-    for (std::size_t i = 0; i < residuals.size(); ++i) {
-      auto& into = setup().sightings[i].is_dot ? dots : corners;
-      into.push_back(std::abs(residuals[i].x()));
-      into.push_back(std::abs(residuals[i].y()));
-    }
-    const auto sigma = [](const std::vector<double>& values, double unknowns) {
-      const auto count = static_cast<double>(values.size());
-      return std::max(1e-4, kMadToSigma * quantile(values, 0.5) * std::sqrt(count / std::max(1.0, count - unknowns)));
-    };
-    const auto& u = made_.start.unknowns;
-    const double poses = 6.0 * static_cast<double>(u.placements.size() + u.motions.size()) + 30.0;
-    setup().sigma_px = sigma(corners, std::min(poses, 0.5 * static_cast<double>(corners.size())));
-    if (!dots.empty()) setup().dot_sigma_px = sigma(dots, 2.0 * static_cast<double>(u.dots.size()));
   }
 
   /// Marks the worse image of each pair that does not fit.
@@ -195,6 +176,23 @@ class CalibrationSolver {
 };
 
 }  // namespace
+
+void measure_noise(BundleSetup& setup, const Unknowns& u) {
+  std::vector<double> corners, dots;
+  const auto residuals = misses(setup, u);
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    auto& into = setup.sightings[i].is_dot ? dots : corners;
+    into.push_back(std::abs(residuals[i].x()));
+    into.push_back(std::abs(residuals[i].y()));
+  }
+  const auto sigma = [](const std::vector<double>& values, double unknowns) {
+    const auto count = static_cast<double>(values.size());
+    return std::max(1e-4, kMadToSigma * quantile(values, 0.5) * std::sqrt(count / std::max(1.0, count - unknowns)));
+  };
+  const double poses = 6.0 * static_cast<double>(u.placements.size() + u.motions.size()) + 30.0;
+  setup.sigma_px = sigma(corners, std::min(poses, 0.5 * static_cast<double>(corners.size())));
+  if (!dots.empty()) setup.dot_sigma_px = sigma(dots, 2.0 * static_cast<double>(u.dots.size()));
+}
 
 Result<CalibrationSolution> solve_whole(const CalibrationInput& input, const Context& context) {
   if (auto fine = check_input(input); !fine) return pass_on(fine);

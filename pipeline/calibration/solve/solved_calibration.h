@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/calibration/board_print.h"
 #include "pipeline/calibration/camera.h"
 
 namespace scanrig {
@@ -42,14 +43,9 @@ struct PlacementFit {
   Eigen::Vector2d mean_px = Eigen::Vector2d::Zero();
 };
 
-/// How the print departs from the board as ordered.
-struct SolvedBoard {
-  double scale = 1.0;
+/// The print, and how well its scale is known.
+struct SolvedBoard : BoardPrint {
   double scale_sigma = 0.0;
-  double aspect = 0.0;
-  double shear = 0.0;
-  std::array<double, 3> warp_mm{};                ///< at the board's edge: of x^2, x y, y^2
-  std::vector<std::array<double, 3>> offsets_mm;  ///< of each corner, board frame
 };
 
 struct SolvedTable {

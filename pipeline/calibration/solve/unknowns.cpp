@@ -29,6 +29,12 @@ Eigen::Vector2d corner_share(const Board& board, int id) {
           place.y() / (0.5 * (board.corner_rows() - 1) * board.square_mm)};
 }
 
+LensBlock lens_block(const Camera& camera) {
+  const Projection& p = camera.projection;
+  const auto& d = camera.distortion;
+  return {p.fx, p.fy / p.fx, p.cx, p.cy, d[0], d[1], d[2], d[3], d[4]};
+}
+
 Camera make_camera(const CalibrationInput& input, const Unknowns& unknowns, int camera, bool with_field) {
   const CameraUnknowns& from = unknowns.cameras[static_cast<std::size_t>(camera)];
   Camera made;

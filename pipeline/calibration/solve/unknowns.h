@@ -61,6 +61,7 @@ struct BundleSetup {
   double sigma_px = 0.3;             ///< of a corner, each coordinate
   double dot_sigma_px = 0.05;
   bool with_field = false;
+  bool holds_lens_and_board = false;  ///< lenses, fields and print stay as they are
 };
 
 /// Nominal place of a corner in the board frame, mm.
@@ -68,6 +69,8 @@ Eigen::Vector2d ordered_corner(const Board& board, int id);
 /// The same over half of the board's extent: -1..1 in both directions.
 Eigen::Vector2d corner_share(const Board& board, int id);
 
+/// The lens of a camera as unknowns.
+LensBlock lens_block(const Camera& camera);
 /// The camera that the unknowns describe.
 Camera make_camera(const CalibrationInput& input, const Unknowns& unknowns, int camera, bool with_field);
 

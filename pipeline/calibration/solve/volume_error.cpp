@@ -13,12 +13,6 @@ namespace {
 using TwoPixels = Eigen::Matrix<double, 4, 3>;
 constexpr double kMicrometres = 1e3;
 
-LensBlock lens_of(const Camera& camera) {
-  const Projection& p = camera.projection;
-  const auto& d = camera.distortion;
-  return {p.fx, p.fy / p.fx, p.cx, p.cy, d[0], d[1], d[2], d[3], d[4]};
-}
-
 /// The least-squares inverse of the derivative of both pixels by the point.
 Eigen::Matrix<double, 3, 4> inverse_of(const TwoPixels& by_point) {
   return (by_point.transpose() * by_point).inverse() * by_point.transpose();
@@ -89,7 +83,7 @@ Eigen::Vector3d triangulate(const Calibration& calibration, const Eigen::Vector2
     for (int c = 0; c < 2; ++c) {
       const Camera& camera = c == 0 ? calibration.left : calibration.right;
       Eigen::Matrix<double, 2, 3> by;
-      lens_pixel(lens_of(camera).data(), camera.camera_from_turntable * point, nullptr, &by);
+      lens_pixel(lens_block(camera).data(), camera.camera_from_turntable * point, nullptr, &by);
       by_point.middleRows<2>(2 * c) = by * camera.camera_from_turntable.linear();
       miss.segment<2>(2 * c) = (c == 0 ? left : right) - camera.project(point);
     }

@@ -3,8 +3,11 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/hash.h"
 #include "daemon/ctl/client.h"
 #include "daemon/ctl/verbs.h"
+#include "daemon/jobs/job_files.h"
+#include "daemon/station/operator_message.h"
 #include "tests/component/daemon/calibration_under_test.h"
 
 namespace scanrig {
@@ -45,11 +48,23 @@ TEST_F(CalibrationJob, EndsWithAFileThatAPersonAccepts) {
   EXPECT_EQ(rig.line.exposures, 0) << "it waits for the board";
   take_placements(0, 6);
   ASSERT_TRUE(wait_state(id, JobState::done));
-  EXPECT_EQ(views_.pairs.size(), 50u);
-  EXPECT_EQ(views_.width, 320);
-  EXPECT_EQ(views_.pairs.front().left.corners.size(), 24u);
-  EXPECT_NEAR(views_.pairs.front().angle_rad, -56.0 * M_PI / 180, 1e-3);
-  EXPECT_TRUE(views_.pairs.front().in_a && !views_.pairs.front().in_b);
+  const auto& boards = views_.boards;
+  EXPECT_EQ(boards.pairs.size(), 50u);
+  EXPECT_EQ(boards.width, 320);
+  EXPECT_EQ(boards.pairs.front().left.corners.size(), 24u);
+  EXPECT_NEAR(boards.pairs.front().angle_rad, -56.0 * M_PI / 180, 1e-3);
+  EXPECT_TRUE(boards.pairs.front().in_a && !boards.pairs.front().in_b);
+  EXPECT_EQ(boards.outlines.front()[1].size(), 4u);
+  EXPECT_EQ(views_.images.serials[1], "40012346");
+  ASSERT_EQ(views_.images.pairs.size(), 50u);
+  const auto image = load_calibration_image(views_.images.pairs.back(), 1);
+  ASSERT_TRUE(image) << image.error().message;
+  EXPECT_EQ(image->cols, 320);
+  const auto as_folder = read_calibration_images(only_job().path());
+  ASSERT_TRUE(as_folder) << as_folder.error().message;
+  EXPECT_EQ(as_folder->pairs.size(), 50u);
+  EXPECT_EQ(as_folder->pairs.back().files, views_.images.pairs.back().files);
+  EXPECT_EQ(as_folder->pairs.back().name, boards.pairs.back().name);
   EXPECT_EQ(rig_file(), old) << "not accepted yet";
   EXPECT_EQ(job(id)->calibration->grade, "A");
 
@@ -60,6 +75,40 @@ TEST_F(CalibrationJob, EndsWithAFileThatAPersonAccepts) {
   shut_down();
   boot();
   EXPECT_TRUE(job(id)->calibration->is_accepted) << "after a restart too";
+}
+
+TEST_F(CalibrationJob, ACheckTakesOnePlacementAndOffersTheNewPoses) {
+  answer_ = {.grade = "B", .verdict = "moved", .sentences = {"Moved by 18 um."}, .file = new_calibration()};
+  const auto old = rig_file();
+  boot();
+  get_ready();
+  const auto id = begin(RecipeKind::check);
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_state(id, JobState::done));
+  EXPECT_TRUE(views_.is_check);
+  EXPECT_EQ(views_.boards.pairs.size(), 6u);
+  EXPECT_EQ(rig_file(), old);
+  EXPECT_EQ(describe(*job(id)).sentence, "Moved by 18 um.");
+  EXPECT_THAT(describe(*job(id)).next_action, HasSubstr("scanrig calibrate --accept"));
+  shut_down();
+  boot();
+  EXPECT_EQ(job(id)->calibration->verdict, "moved") << "after a restart too";
+  EXPECT_TRUE(job(id)->recipe.is_check());
+  ASSERT_TRUE(ask(event::JobRequested{.what = What::accept, .job = id}));
+  EXPECT_EQ(rig_file(), new_calibration());
+}
+
+TEST_F(CalibrationJob, ACheckThatHoldsReplacesNothingAndIsRemembered) {
+  answer_ = {.grade = "B", .verdict = "holds", .sentences = {"The calibration holds."}, .file = rig_file()};
+  boot();
+  get_ready();
+  const auto id = begin(RecipeKind::check);
+  rig.panel.press(&PanelInputs::start);
+  ASSERT_TRUE(wait_state(id, JobState::done));
+  EXPECT_FALSE(ask(event::JobRequested{.what = What::accept, .job = id}));
+  const auto rig = read_calibration(options.jobs.calibration_file);
+  EXPECT_NE(last_check(options.jobs.root, rig->sha256), "");
+  EXPECT_EQ(last_check(options.jobs.root, sha256(std::string_view("another"))), "");
 }
 
 TEST_F(CalibrationJob, TakesTwoImagesAViewAndTurnsEachMarkToTheFront) {
@@ -160,7 +209,7 @@ TEST_F(CalibrationJob, ContinuesInThePlacementInWhichTheEstopEndedIt) {
   const auto before = only_job().manifest().poses[1].views[0].taken;
   take_placements(1, 6);
   ASSERT_TRUE(wait_state(id, JobState::done));
-  EXPECT_EQ(views_.pairs.size(), 50u);
+  EXPECT_EQ(views_.boards.pairs.size(), 50u);
   EXPECT_EQ(only_job().manifest().poses[1].views[0].taken, before);
   EXPECT_EQ(only_job().manifest().poses[1].movement_checks.size(), 2u);
 }
@@ -185,7 +234,7 @@ TEST_F(CalibrationJob, ContinuesAfterAPowerCutWithWhatWasStored) {
   ASSERT_TRUE(ask(event::JobRequested{.what = What::resume, .job = id}));
   take_placements(2, 6);
   ASSERT_TRUE(wait_state(id, JobState::done));
-  EXPECT_EQ(views_.pairs.size(), 50u);
+  EXPECT_EQ(views_.boards.pairs.size(), 50u);
 }
 
 TEST_F(CalibrationJob, ShowsHowTheBoardStandsWhileItWaits) {

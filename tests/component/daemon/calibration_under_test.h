@@ -16,9 +16,10 @@ class CalibratedRig : public Daemon {
   void SetUp() override {
     Daemon::SetUp();
     options.calibrator.board = {.columns = 7, .rows = 5, .square_mm = 10.0, .markers = std::nullopt};
-    options.calibrator.solver = [this](const CalibrationViews& views, const Context&) {
+    options.calibrator.cameras = {"40012345", "40012346"};
+    options.calibrator.solver = [this](CalibrationViews views, const Context&) {
       const std::lock_guard guard(mutex_);
-      views_ = views;
+      views_ = std::move(views);
       return answer_;
     };
     answer_.grade = "A";
@@ -47,8 +48,8 @@ class CalibratedRig : public Daemon {
     const std::lock_guard guard(rig.line.mutex);
     rig.line.picture = std::move(picture);
   }
-  std::string begin() {
-    auto id = ask(JobOrder{.is_calibration = true});
+  std::string begin(RecipeKind kind = RecipeKind::calibration) {
+    auto id = ask(JobOrder{.kind = kind});
     EXPECT_TRUE(id) << id.error().message;
     EXPECT_TRUE(clock_waits_for([this] { return loop->snapshot()->awaited_placement.has_value(); }));
     return id.value_or("");

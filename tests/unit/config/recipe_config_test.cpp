@@ -54,10 +54,13 @@ TEST_F(RecipeConfigTest, ACalibrationHasTheStandardBoardUnlessAnotherIsNamed) {
   const auto standard = read(example_);
   ASSERT_TRUE(standard) << standard.error().message;
   EXPECT_EQ(standard->calibration.board.columns, 12);
+  EXPECT_FALSE(standard->calibration.rim_dots);
   EXPECT_FALSE(standard->calibration.length_mm);
   EXPECT_FALSE(standard->calibration.accepts_by_itself);
   const std::string board = R"([calibration]
-board = { columns = 9, rows = 7, square_mm = 8.0, marker_mm = 5.0, dictionary = "4x4_50", thickness_mm = 4.0 }
+board = { columns = 9, rows = 7, square_mm = 8.0, marker_mm = 5.0, dictionary = "4x4_50", thickness_mm = 4.0, material = "paper" }
+table_radius_mm = 110
+rim_dots = { count = 36, radius_mm = 104.5, diameter_mm = 2.4 }
 length_mm = 56.01
 length_sigma_mm = 0.004
 check_every_h = 168
@@ -67,6 +70,9 @@ accept = "automatic"
   ASSERT_TRUE(rig) << rig.error().message;
   EXPECT_EQ(rig->calibration.board.rows, 7);
   EXPECT_EQ(rig->calibration.board.markers->size_mm, 5.0);
+  EXPECT_EQ(rig->calibration.board_kind, BoardKind::paper);
+  EXPECT_EQ(rig->calibration.table_radius_mm, 110.0);
+  EXPECT_EQ(rig->calibration.rim_dots->count, 36);
   EXPECT_EQ(rig->calibration.length_mm, 56.01);
   EXPECT_EQ(rig->calibration.check_every, std::chrono::hours(168));
   EXPECT_TRUE(rig->calibration.accepts_by_itself);

@@ -13,7 +13,9 @@ using testing::StartsWith;
 class Calibrating : public Station {
  protected:
   Calibrating() { rules.calibration = calibration_recipe(); }
-  void order() { tell(event::JobsOrdered{.order = {.is_calibration = true}, .new_ids = {"job"}, .request_id = 1}); }
+  void order() {
+    tell(event::JobsOrdered{.order = {.kind = RecipeKind::calibration}, .new_ids = {"job"}, .request_id = 1});
+  }
   /// A ready rig with a calibration at the head of its queue.
   void queue_calibration() {
     get_ready();

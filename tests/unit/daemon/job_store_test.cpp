@@ -168,7 +168,9 @@ TEST_F(JobStoreTest, AnOldCalibrationIsReportedWhereThatIsAskedFor) {
   options.check_calibration_every = std::chrono::hours(24);
   auto text = scan_samples::calibration_json();
   scan_samples::write_text(options.calibration_file, scan_samples::replaced(text, "2026-11-21", "2020-01-01"));
-  EXPECT_THAT(open().calibration_reminder(), HasSubstr("older than 24 h"));
+  EXPECT_THAT(open().calibration_reminder(), HasSubstr("not checked for 24 h"));
+  ASSERT_TRUE(note_check(options.root, read_calibration(options.calibration_file)->sha256));
+  EXPECT_EQ(open().calibration_reminder(), "") << "a check that held is as good as a new one";
   scan_samples::write_text(options.calibration_file, scan_samples::replaced(text, "2026-11-21", "2199-01-01"));
   EXPECT_EQ(open().calibration_reminder(), "");
 }
@@ -296,6 +298,8 @@ TEST_F(JobStoreTest, ComparesTheSerialNumbersThatAreKnown) {
                            std::regex_replace(scan_samples::calibration_json(), std::regex("A1"), ""));
   options.cameras = {"B2", "B3"};
   EXPECT_TRUE(open().check_rig_cameras()) << "a calibration that does not say whose it is";
+  std::filesystem::remove(options.calibration_file);
+  EXPECT_EQ(open().check_rig_cameras().error().code, ErrorCode::refused);
 }
 
 TEST_F(JobStoreTest, AJobWithoutViewsIsGivenTheCalibrationAsItIsNow) {

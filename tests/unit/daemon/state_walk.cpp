@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <deque>
 
-#include "daemon/runtime/overloaded.h"
+#include "core/overloaded.h"
 #include "daemon/station/transition.h"
 
 namespace scanrig::state_walk {

@@ -52,6 +52,10 @@ TEST(ImageChecks, NamesABoardThatIsCutOff) {
   Situation situation;
   situation.place.centre = {75.0, 40.0, 0.0};
   expect_only(situation, ImageProblem::cut_off, "Board cut off at the right edge");
+  EXPECT_TRUE(situation.checks()[0].is_minor) << "most of it is visible";
+  situation.place.centre = {120.0, 40.0, 0.0};
+  expect_only(situation, ImageProblem::cut_off, "corners visible. Move it into view.");
+  EXPECT_FALSE(situation.checks()[0].is_minor);
   situation.place.centre = {-60.0, 100.0, 0.0};
   expect_only(situation, ImageProblem::cut_off, "Board cut off at the left and upper edge");
 }

@@ -93,6 +93,39 @@ TEST_F(CalibrationImagesTest, WithoutAListNamesMakeThePairs) {
   EXPECT_EQ(images->pairs[1].files[1], folder_ / "b_right.png");
 }
 
+TEST_F(CalibrationImagesTest, AJobOfTheStationIsAFolderOfImages) {
+  Manifest manifest{.id = "20261125-090000-1", .created = "2026-11-25T09:00:00Z", .source = "calibration"};
+  PoseRecord third{.name = "pose3", .complete = false, .views = {}};
+  for (int index = 0; index < 2; ++index) {
+    ViewRecord view{.index = index, .commanded_deg = 30.0 * index, .measured_deg = 30.0 * index + 0.004};
+    view.taken = "2026-11-25T09:00:05Z";
+    view.pixel_format = "BayerRG8";
+    for (const char* side : {"left", "right"}) {
+      view.files[fmt::format("{}_plain", side)] = {fmt::format("pose3/view0{}/{}_plain.png", index, side),
+                                                   sha256(std::string_view(side))};
+    }
+    third.views.push_back(view);
+  }
+  manifest.poses = {
+      {.name = "pose1", .complete = false, .views = {}}, {.name = "pose2", .complete = false, .views = {}}, third};
+  write_text(folder_ / "scan.json", to_json(manifest));
+  const auto images = read_calibration_images(folder_);
+  ASSERT_TRUE(images) << images.error().message;
+  EXPECT_EQ(images->pixel_format, "BayerRG8");
+  ASSERT_EQ(images->pairs.size(), 2u);
+  EXPECT_EQ(images->pairs[1].name, "placement 3 image 2");
+  EXPECT_EQ(images->pairs[1].table_deg, 30.004);
+  EXPECT_EQ(images->pairs[1].files[0], folder_ / "pose3/view01/left_plain.png");
+
+  manifest.poses.assign(8, third);
+  write_text(folder_ / "scan.json", to_json(manifest));
+  EXPECT_EQ(read_calibration_images(folder_).error().code, ErrorCode::invalid_input);
+  manifest.source = "stereo";
+  manifest.poses.clear();
+  write_text(folder_ / "scan.json", to_json(manifest));
+  EXPECT_THAT(read_calibration_images(folder_).error().message, HasSubstr("is not a calibration"));
+}
+
 TEST_F(CalibrationImagesTest, AFileWithoutItsPartnerIsNamed) {
   write_text(folder_ / "b_right.png", "");
   EXPECT_THAT(read_calibration_images(folder_).error().message, HasSubstr("b_right.png: has no partner b_left"));

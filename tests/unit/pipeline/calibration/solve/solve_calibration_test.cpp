@@ -7,6 +7,7 @@
 #include <cmath>
 #include <ctime>
 
+#include "pipeline/calibration/solve/focal_length.h"
 #include "tests/unit/pipeline/calibration/synthetic_board_rig.h"
 
 namespace scanrig {
@@ -45,6 +46,15 @@ TEST(SolveCalibration, AllFaultsTogetherCostFewMicrometres) {
   EXPECT_LT(seconds, 15.0);
   EXPECT_LT(usage.ru_maxrss, 1024 * 1024);
 #endif
+}
+
+TEST(SolveCalibration, NeedsNoFocalLengthFromAnyone) {
+  SyntheticBoardRig rig(all_faults(), 3);
+  const auto input = rig.observe();
+  const auto found = find_focal_px(input.board, input.pairs, input.width, input.height);
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(*found / rig.focal(0), 1.0, 0.03);
+  EXPECT_FALSE(find_focal_px(input.board, {}, input.width, input.height));
 }
 
 TEST(SolveCalibration, PredictsItsError) {

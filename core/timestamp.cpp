@@ -1,4 +1,4 @@
-#include "daemon/station/timestamp.h"
+#include "core/timestamp.h"
 
 #include <fmt/chrono.h>
 

@@ -1,4 +1,4 @@
-#include "daemon/jobs/heap.h"
+#include "core/heap.h"
 
 #include <malloc.h>
 
