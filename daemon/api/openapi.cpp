@@ -236,7 +236,7 @@ const char* const kSchemas = R"({
   "awaited_placement": {"type": "integer", "nullable": true, "description": "of the plan, that the next Start begins"},
   "board": {"allOf": [{"$ref": "#/components/schemas/BoardOnTable"}], "nullable": true}}},
 "CalibrationJob": {"type": "object", "additionalProperties": false,
-  "required": ["id", "state", "sentence", "next_action", "placements_complete", "plan", "views", "grade", "sentences", "accepted"], "properties": {
+  "required": ["id", "state", "sentence", "next_action", "placements_complete", "plan", "views", "verdict", "grade", "sentences", "accepted"], "properties": {
   "id": {"type": "string"}, "state": {"type": "string"}, "sentence": {"type": "string"}, "next_action": {"type": "string"},
   "placements_complete": {"type": "integer"},
   "plan": {"type": "array", "items": {"$ref": "#/components/schemas/Placement"}},
@@ -244,6 +244,7 @@ const char* const kSchemas = R"({
     "additionalProperties": false, "properties": {
     "placement": {"type": "integer"}, "view": {"type": "integer"}, "table_deg": {"type": "number"},
     "examined": {"type": "boolean"}, "problems": {"type": "array", "items": {"type": "string"}}}}},
+  "verdict": {"type": "string", "enum": ["holds", "moved", "calibrate"], "nullable": true, "description": "of a check, once it is done; moved: its new poses can be accepted"},
   "grade": {"type": "string", "nullable": true, "description": "A, B or C, once it is solved"},
   "sentences": {"type": "array", "items": {"type": "string"}},
   "accepted": {"type": "boolean", "description": "it became the rig's"}}},
