@@ -14,6 +14,7 @@ constexpr double kGradeA = 5.0, kGradeB = 15.0, kGradeC = 40.0;  ///< micrometre
 constexpr double kMaxRatio = 1.5;
 constexpr double kDifferenceToError = 3.0;  ///< A - B is a quarter to all of the error
 constexpr double kMicrometres = 1e3;
+constexpr double kMaxLinearPx = 2.0;  ///< a larger motion is beyond a linear test
 
 /// A alone and B alone over the volume, against their covariances.
 CrossValidation compare(const CalibrationInput& input, const CalibrationSolution& a, const CalibrationSolution& b) {
@@ -57,15 +58,37 @@ CalibrationGrade grade_of(double sigma) {
   return sigma <= kGradeC ? CalibrationGrade::c : CalibrationGrade::refused;
 }
 
+/// What points of the volume are off when a camera moved by so much after its images: micrometres.
+double effect_of(const RigChange& change, const Calibration& calibration) {
+  if (change.kind == RigChange::Kind::board) return 0.0;
+  Calibration moved = calibration;
+  const double turn = change.share * change.shift_px / calibration.right.projection.fx;
+  moved.right.camera_from_turntable =
+      small_motion({0.0, turn, 0.0}, Eigen::Vector3d::Zero()) * calibration.right.camera_from_turntable;
+  const auto grid = volume_grid(calibration);
+  return kMicrometres *
+         rms_per_point(VolumeParts(grid).without_scale_and_base(volume_difference(calibration, moved, grid)));
+}
+
 void grade(const CalibrationInput& input, const SolvedCalibration& solved, CalibrationJudgement& out) {
   if (!solved.sigma) return;
   out.graded_um = solved.sigma->volume;
   const auto& ab = out.cross_validation;
   if (ab && ab->ratio() > kMaxRatio) out.graded_um = std::max(out.graded_um, kDifferenceToError * ab->difference);
+  if (out.change) out.graded_um = std::max(out.graded_um, effect_of(*out.change, solved.calibration));
   out.grade = grade_of(out.graded_um);
   // Without a length, or without A against B, nothing proves it: C at best.
   if (!input.length || !ab) out.grade = std::max(out.grade, CalibrationGrade::c);
   if (is_to_be_refused(input, solved, out)) out.grade = CalibrationGrade::refused;
+}
+
+std::optional<RigChange> find_any_change(const CalibrationInput& input, const CalibrationSolution& whole) {
+  if (whole.before_leaving_out) {
+    const auto change = find_change(input, *whole.before_leaving_out);
+    if (change && change->shift_px < kMaxLinearPx) return change;
+    if (const auto motion = find_large_motion(whole.solved)) return motion;
+  }
+  return find_change(input, whole);
 }
 
 }  // namespace
@@ -90,7 +113,8 @@ Result<JudgedCalibration> judge_calibration(const CalibrationInput& input, const
     if (!ab) return pass_on(ab);
     judged.judgement.cross_validation = *ab;
   }
-  judged.judgement.change = find_change(input, *whole);
+  judged.judgement.change = find_any_change(input, *whole);
+  judged.judgement.does_not_fit = whole->does_not_fit;
   grade(input, whole->solved, judged.judgement);
   judged.judgement.sentences = calibration_sentences(input, whole->solved, judged.judgement);
   judged.solved = std::move(whole->solved);

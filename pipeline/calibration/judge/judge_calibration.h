@@ -23,13 +23,16 @@ struct CrossValidation {
   [[nodiscard]] double ratio() const { return expected > 0.0 ? difference / expected : 0.0; }
 };
 
-/// Something that moved while the boards were shown. Chi-square: what a motion at this moment explains.
+/// Something that changed while the boards were shown. Chi-square: what this change explains.
 struct RigChange {
-  enum class Kind { camera, board };
+  /// camera: turned between two placements; focus: likewise, its focal length; drift: it turned all the time; board:
+  /// slipped within a placement.
+  enum class Kind { camera, focus, drift, board };
   Kind kind = Kind::camera;
-  int camera = 0;         ///< kind camera: 0 left, 1 right
-  int placement = 0;      ///< camera: the last one before the motion; board: the one in which it slipped
-  double shift_px = 0.0;  ///< rms in the images after the motion
+  int camera = 0;         ///< but of a board: 0 left, 1 right
+  int placement = 0;      ///< camera, focus: the last one before the change; board: the one in which it slipped
+  double shift_px = 0.0;  ///< rms in the images after the change; drift: from the first image to the last
+  double share = 1.0;     ///< of the camera's images from before the change
   double chi2 = 0.0;
 };
 
@@ -38,6 +41,7 @@ struct CalibrationJudgement {
   double graded_um = 0.0;                           ///< what the grade is by
   std::optional<CrossValidation> cross_validation;  ///< none: A or B has too few images
   std::optional<RigChange> change;
+  bool does_not_fit = false;           ///< more than a third of the images do not fit
   std::vector<std::string> sentences;  ///< for the operator, most important first
 };
 

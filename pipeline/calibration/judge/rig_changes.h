@@ -7,8 +7,12 @@
 
 namespace scanrig {
 
-/// The motion of a camera between two placements, or of a board within one, that explains most of what the solution
-/// leaves over: a score test against all unknowns. None: nothing over 0.01 px with a chi-square over 40.
+/// The change of a camera, or the slip of a board, that explains most of what the solution leaves over: a score test
+/// against all unknowns. None: nothing over 0.01 px with a chi-square over 40.
 std::optional<RigChange> find_change(const CalibrationInput& input, const CalibrationSolution& solution);
+
+/// The same for motions of several pixels, which no linear test finds: all images of a camera up to a placement, or
+/// after it, were left out because they do not fit.
+std::optional<RigChange> find_large_motion(const SolvedCalibration& solved);
 
 }  // namespace scanrig

@@ -56,6 +56,12 @@ void add_changes(const CalibrationJudgement& judgement, std::vector<std::string>
   const RigChange& change = *judgement.change;
   if (change.kind == RigChange::Kind::board) {
     out.push_back(fmt::format("Board slipped in placement {}: fix it, show this placement again.", change.placement));
+  } else if (change.kind == RigChange::Kind::focus) {
+    out.push_back(fmt::format("Focus of the {} camera changed after placement {}: lock its rings, calibrate again.",
+                              change.camera == 0 ? "left" : "right", change.placement));
+  } else if (change.kind == RigChange::Kind::drift) {
+    out.push_back(fmt::format("{} camera drifted by {:.2f} px: let the rig warm up for 30 minutes, calibrate again.",
+                              side(change.camera), change.shift_px));
   } else {
     out.push_back(fmt::format("{} camera moved after placement {} ({:.2f} px): clamp it, calibrate again.",
                               side(change.camera), change.placement, change.shift_px));
@@ -90,8 +96,10 @@ void add_lengths(const CalibrationInput& input, const SolvedCalibration& solved,
 
 bool is_to_be_refused(const CalibrationInput& input, const SolvedCalibration& solved,
                       const CalibrationJudgement& judgement) {
-  const bool moved = judgement.change && judgement.change->shift_px > kMaxMove;
-  return are_swapped(solved) || std::abs(solved.table.gear - 1.0) > kMaxGearError || moved ||
+  const auto& change = judgement.change;
+  const bool is_focus = change && change->kind == RigChange::Kind::focus;
+  const bool moved = change && (change->shift_px > kMaxMove || is_focus);
+  return judgement.does_not_fit || are_swapped(solved) || std::abs(solved.table.gear - 1.0) > kMaxGearError || moved ||
          contradiction(input, solved).has_value();
 }
 
@@ -101,6 +109,9 @@ std::vector<std::string> calibration_sentences(const CalibrationInput& input, co
   if (are_swapped(solved)) out.emplace_back("Left and right cameras swapped: exchange the serials.");
   add_table(input, solved, out);
   add_changes(judgement, out);
+  if (judgement.does_not_fit) {
+    out.emplace_back("More than a third of the images do not fit: check board layout and table angles.");
+  }
   const auto& ab = judgement.cross_validation;
   if (ab && ab->ratio() > 1.5) {
     out.push_back(fmt::format("A and B differ by {:.0f} um, {:.0f} expected: lens model or board.", ab->difference,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "core/context.h"
@@ -17,6 +18,10 @@ struct CalibrationSolution {
   Linearised linear;
   NormalMatrix normal;
   SolvedCalibration solved;
+  /// The solution before images were left out, when many do not fit: what changed in the rig is seen there. Has start,
+  /// linear and normal only.
+  std::shared_ptr<const CalibrationSolution> before_leaving_out{};
+  bool does_not_fit = false;  ///< more than a third of the images do not fit: none of these was left out
 };
 
 /// Fails as solve_calibration().

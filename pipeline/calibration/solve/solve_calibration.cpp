@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <set>
+#include <utility>
 
 #include "core/statistics.h"
 #include "pipeline/calibration/solve/solution.h"
@@ -10,10 +12,11 @@
 namespace scanrig {
 namespace {
 
-constexpr double kBlurred = 1.6;                                ///< times the camera's median blur
-constexpr double kBadImage = 3.0;                               ///< times the median residual of all
-constexpr int kMaxRounds = 5;                                   ///< of leaving images out
-constexpr double kFieldEvidence = 3.0;                          ///< chi-square per coefficient
+constexpr double kBlurred = 1.6;        ///< times the camera's median blur
+constexpr double kBadImage = 3.0;       ///< times the median residual of all
+constexpr int kMaxRounds = 5;           ///< of leaving images out
+constexpr int kFew = 3;                 ///< images that do not fit by themselves; more have a reason in common
+constexpr double kFieldEvidence = 3.0;  ///< chi-square per coefficient
 constexpr double kCoarse = 1e-4, kMiddle = 1e-6, kFine = 1e-9;  ///< tolerance of the bundle
 constexpr double kMadToSigma = 1.4826;
 constexpr std::size_t kMinCorners = 12;
@@ -133,16 +136,43 @@ class CalibrationSolver {
     return marked;
   }
 
+  /// Keeps the solution as it is now, for the search for what changed.
+  Result<void> keep_whole() {
+    auto whole = std::make_shared<CalibrationSolution>();
+    whole->used = made_.used;
+    whole->start = made_.start;
+    auto linear = linearise(whole->start.setup, whole->start.unknowns);
+    if (!linear) return pass_on(linear);
+    auto normal = NormalMatrix::factorise(*linear);
+    if (!normal) return pass_on(normal);
+    whole->linear = std::move(*linear);
+    whole->normal = std::move(*normal);
+    made_.before_leaving_out = std::move(whole);
+    return {};
+  }
+
   Result<void> leave_out() {
     if (auto again = run(0.3, kCoarse); !again) return again;
+    const auto all = made_.start;
+    const UsedImages used = made_.used;
+    const auto reasons = reasons_;
     int left_out = 0;
     for (int round = 0; round < kMaxRounds; ++round) {
       const int marked = mark_bad_images();
       if (marked == 0) break;
       left_out += marked;
+      if (left_out > kFew && !made_.before_leaving_out) {
+        const auto now = std::exchange(made_.start, all);
+        auto kept = keep_whole();
+        made_.start = now;
+        if (!kept) return kept;
+      }
       if (3 * left_out > input_.cameras * static_cast<int>(input_.pairs.size())) {
-        return fail(ErrorCode::degenerate,
-                    "calibration: more than a third of the images do not fit; check board layout and table angles");
+        made_.does_not_fit = true;
+        made_.start = all;
+        made_.used = used;
+        reasons_ = reasons;
+        return {};
       }
       setup().sightings = collect_sightings(input_, made_.used, made_.start.dot_ids);
       if (auto again = run(0.5, kCoarse); !again) return again;
@@ -225,6 +255,10 @@ Result<CalibrationSolution> solve_part(const CalibrationSolution& whole, const s
 Result<SolvedCalibration> solve_calibration(const CalibrationInput& input, const Context& context) {
   auto solution = solve_whole(input, context);
   if (!solution) return pass_on(solution);
+  if (solution->does_not_fit) {
+    return fail(ErrorCode::degenerate,
+                "calibration: more than a third of the images do not fit; check board layout and table angles");
+  }
   return std::move(solution->solved);
 }
 

@@ -98,6 +98,12 @@ BoardSight SyntheticBoardRig::see(int camera, const Eigen::Isometry3d& table_fro
     const double turn = faults_.moved_px / focal_[1];
     pose = Eigen::Isometry3d(Eigen::AngleAxisd(turn, Eigen::Vector3d(0.8, 0.6, 0.0))) * pose;
   }
+  if (camera == 1) {
+    const double turn = look.progress * faults_.drift_px / focal_[1];
+    pose = Eigen::Isometry3d(Eigen::AngleAxisd(turn, Eigen::Vector3d(0.6, 0.8, 0.0))) * pose;
+  }
+  const double focal_before = focal_[camera];
+  if (look.has_moved && camera == 1) focal_[1] *= 1.0 + faults_.focus;
   const Eigen::Isometry3d camera_from_board = pose * table_from_board;
   BoardSight sight;
   const Eigen::Vector3d towards = -camera_from_board.translation().normalized();
@@ -119,6 +125,7 @@ BoardSight SyntheticBoardRig::see(int camera, const Eigen::Isometry3d& table_fro
     if (is_behind || at.x() < 8.0 || at.y() < 8.0 || at.x() > kWidth - 9.0 || at.y() > kHeight - 9.0) continue;
     sight.dots.push_back({id, at});
   }
+  focal_[camera] = focal_before;
   return sight;
 }
 
@@ -140,7 +147,8 @@ void SyntheticBoardRig::add_placement(CalibrationInput& input, int number, const
     const double tilt = 0.001 * kDegree * faults_.runout_mm / 0.003;
     look.wobble.rotate(Eigen::AngleAxisd(normal(tilt), Eigen::Vector3d::UnitX()));
     look.wobble.rotate(Eigen::AngleAxisd(normal(tilt), Eigen::Vector3d::UnitZ()));
-    look.has_moved = faults_.moved_px > 0.0 && number > 3;
+    look.has_moved = number > 3;
+    look.progress = (number - 1 + static_cast<double>(i) / static_cast<double>(angles_deg.size())) / 7.0;
     if (number == faults_.slipped_placement && i == angles_deg.size() / 2)
       place.pretranslate(Eigen::Vector3d(0.08, 0.0, 0.06));
     pair.left = see(0, place, look);

@@ -19,6 +19,8 @@ struct RigFaults {
   double lens_px = 0.0;        ///< rms of a smooth residual that Brown's coefficients do not have
   double board_scale = 1.0;    ///< of the real board over its certificate
   double moved_px = 0.0;       ///< turn of the right camera after half of the placements
+  double focus = 0.0;          ///< share by which the right camera's focal length grows, likewise
+  double drift_px = 0.0;       ///< turn of the right camera from the first image to the last
   int slipped_placement = -1;  ///< its board moves by 0.1 mm half-way
   double outlier_share = 0.0;  ///< corners that are 2 px off
   double axis_tilt_deg = 0.0;  ///< of the table top
@@ -53,6 +55,7 @@ class SyntheticBoardRig {
  private:
   struct Look {
     bool has_moved = false;
+    double progress = 0.0;  ///< of all placements, 0 to 1
     double angle = 0.0;
     Eigen::Isometry3d wobble = Eigen::Isometry3d::Identity();
   };

@@ -52,6 +52,47 @@ TEST(JudgeCalibration, ACameraThatMovedHalfWayIsNamed) {
   EXPECT_NE(to_string(judged->judgement.grade), "A");
 }
 
+TEST(JudgeCalibration, AHeavyKnockIsNamedThoughItsImagesAreLeftOut) {
+  for (const double px : {0.3, 1.0, 4.0}) {
+    RigFaults faults;
+    faults.moved_px = px;
+    SyntheticBoardRig rig(faults, 109);
+    const auto judged = judge_calibration(rig.observe());
+    ASSERT_TRUE(judged) << judged.error().message;
+    ASSERT_TRUE(judged->judgement.change) << px;
+    EXPECT_EQ(judged->judgement.change->kind, RigChange::Kind::camera) << px;
+    EXPECT_THAT(judged->judgement.sentences, Contains(StartsWith("Right camera moved after placement 3"))) << px;
+    EXPECT_GT(judged->judgement.graded_um, 40.0) << px;
+    EXPECT_EQ(to_string(judged->judgement.grade), "refused") << px;
+  }
+}
+
+TEST(JudgeCalibration, AFocusThatChangedIsToldFromAKnock) {
+  for (const double focus : {0.0005, 0.003}) {
+    RigFaults faults;
+    faults.focus = focus;
+    SyntheticBoardRig rig(faults, 110);
+    const auto judged = judge_calibration(rig.observe());
+    ASSERT_TRUE(judged) << judged.error().message;
+    EXPECT_THAT(judged->judgement.sentences,
+                Contains(StartsWith("Focus of the right camera changed after placement 3")))
+        << focus;
+    EXPECT_EQ(to_string(judged->judgement.grade), "refused");
+  }
+}
+
+TEST(JudgeCalibration, AColdRigIsToldFromAKnock) {
+  for (const double px : {0.1, 0.5}) {
+    RigFaults faults;
+    faults.drift_px = px;
+    SyntheticBoardRig rig(faults, 111);
+    const auto judged = judge_calibration(rig.observe());
+    ASSERT_TRUE(judged) << judged.error().message;
+    EXPECT_THAT(judged->judgement.sentences, Contains(StartsWith("Right camera drifted by 0."))) << px;
+    EXPECT_NE(to_string(judged->judgement.grade), "A") << px;
+  }
+}
+
 TEST(JudgeCalibration, ABoardThatSlippedIsNamed) {
   RigFaults faults;
   faults.slipped_placement = 5;
