@@ -41,9 +41,9 @@ ImageResult look(const CalibrationPair& pair, std::size_t side, const std::strin
   result.outline.assign(found->outline.begin(), found->outline.end());
   bool is_usable = true;
   for (const ImageCheck& check : check_board_image(*found, board, result.size)) {
-    const bool spoilt = spoils_corners(check.problem);
-    result.remarks.push_back({pair.name, side, check.message, spoilt});
-    is_usable = is_usable && !spoilt;
+    const bool spoils = spoils_corners(check.problem);
+    result.remarks.push_back({pair.name, side, spoils ? check.message : check.remark, spoils});
+    is_usable = is_usable && !spoils;
   }
   if (is_usable) result.corners = std::move(found->corners);
   return result;

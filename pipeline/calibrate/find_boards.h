@@ -12,11 +12,11 @@
 
 namespace scanrig {
 
-/// What is to be said of one image: one sentence.
+/// What is remarkable of one image.
 struct ImageRemark {
   std::string pair;      ///< its name
   std::size_t side = 0;  ///< 0 left
-  std::string message;
+  std::string message;  ///< of one that is left out: a sentence with what to do; else what is seen, in a few words
   bool is_left_out = false;
 };
 
