@@ -32,7 +32,7 @@ struct FolderCalibration {
 };
 
 /// Finds the boards, solves, measures the rim dots with that solution, solves again, judges. Reports the stages
-/// "boards", "dots" and those of the solver. Same input, same bits, for any number of threads.
+/// "boards", "rim dots" and those of the solver. Same input, same bits, for any number of threads.
 /// Fails as find_boards() and solve_calibration().
 Result<FolderCalibration> calibrate_images(const CalibrationImages& images, const CalibrateOptions& options = {},
                                            const Context& context = {});
