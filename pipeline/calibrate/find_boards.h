@@ -16,7 +16,7 @@ namespace scanrig {
 struct ImageRemark {
   std::string pair;      ///< its name
   std::size_t side = 0;  ///< 0 left
-  std::string message;  ///< of one that is left out: a sentence with what to do; else what is seen, in a few words
+  std::string message;   ///< of one that is left out: a sentence with what to do; else what is seen, in a few words
   bool is_left_out = false;
 };
 

@@ -35,9 +35,9 @@ std::vector<double> intrinsics_of(const OpenCvLens& lens, std::size_t coefficien
 /// First lines of a file: what it is, what is lost.
 std::string comment_of(const Calibration& calibration, const CalibrationExport& exported, std::size_t side) {
   const Camera& camera = camera_of(calibration, side);
-  std::string out = fmt::format("# {} camera{}{}, calibrated {}; lengths in mm\n", side_name(side),
-                                camera.serial.empty() ? "" : " ", camera.serial,
-                                calibration.date.empty() ? "at an unknown date" : calibration.date);
+  std::string out =
+      fmt::format("# {} camera{}{}, calibrated {}; lengths in mm\n", side_name(side), camera.serial.empty() ? "" : " ",
+                  camera.serial, calibration.date.empty() ? "at an unknown date" : calibration.date);
   const std::string lost = what_is_lost(exported, side);
   return lost.empty() ? out : out + "# " + lost + "\n";
 }
@@ -143,7 +143,8 @@ std::string colmap_cameras(const Calibration& calibration, const CalibrationExpo
   return text;
 }
 
-std::string colmap_images(const Calibration& calibration, const Manifest& manifest, std::size_t pose, ColmapNames names) {
+std::string colmap_images(const Calibration& calibration, const Manifest& manifest, std::size_t pose,
+                          ColmapNames names) {
   const std::vector<ViewRecord>& views = manifest.poses[pose].views;
   std::string text =
       "# Image list with two lines of data per image:\n#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n"
@@ -160,8 +161,8 @@ std::string colmap_images(const Calibration& calibration, const Manifest& manife
       const std::string name = names == ColmapNames::of_copy
                                    ? colmap_image_name(pose, view, side)
                                    : view.files.at(side == 0 ? "left_plain" : "right_plain").path;
-      text += fmt::format("{} {} {} {}\n\n", ++id,
-                          list_of({q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()}, " "), side + 1, name);
+      text += fmt::format("{} {} {} {}\n\n", ++id, list_of({q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()}, " "),
+                          side + 1, name);
     }
   }
   return text;

@@ -7,10 +7,10 @@
 namespace scanrig {
 namespace {
 
-constexpr int kAcross = 41, kDown = 31;     ///< points over the image
-constexpr double kWorthIt = 0.98;           ///< of the rms: what more coefficients must reach
-constexpr std::size_t kIntrinsics = 4;      ///< fx fy cx cy
-constexpr double kSmallPx = 0.01;           ///< residual that a coefficient of the size of its scale costs
+constexpr int kAcross = 41, kDown = 31;  ///< points over the image
+constexpr double kWorthIt = 0.98;        ///< of the rms: what more coefficients must reach
+constexpr std::size_t kIntrinsics = 4;   ///< fx fy cx cy
+constexpr double kSmallPx = 0.01;        ///< residual that a coefficient of the size of its scale costs
 constexpr int kMaxRounds = 60;
 // How large a coefficient gets without being odd; one that hardly acts stays near its start.
 constexpr std::array<double, 14> kScale{0.3, 2.0, 2e-3, 2e-3, 2.0, 0.3, 2.0, 2.0, 2e-3, 2e-3, 2e-3, 2e-3, 5e-3, 5e-3};
@@ -124,9 +124,9 @@ LensFit measured(const std::vector<Ray>& rays, const OpenCvLens& lens) {
 /// Plane of the image tilted against the lens by `tau_x` and `tau_y`, rad, as in OpenCV.
 Eigen::Vector2d tilted(const Eigen::Vector2d& p, double tau_x, double tau_y) {
   if (tau_x == 0.0 && tau_y == 0.0) return p;
-  const Eigen::Matrix3d turn = (Eigen::AngleAxisd(-tau_y, Eigen::Vector3d::UnitY()) *
-                                Eigen::AngleAxisd(-tau_x, Eigen::Vector3d::UnitX()))
-                                   .toRotationMatrix();
+  const Eigen::Matrix3d turn =
+      (Eigen::AngleAxisd(-tau_y, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(-tau_x, Eigen::Vector3d::UnitX()))
+          .toRotationMatrix();
   Eigen::Matrix3d onto = Eigen::Matrix3d::Identity();
   onto(0, 0) = onto(1, 1) = turn(2, 2);
   onto(0, 2) = -turn(0, 2);
@@ -139,8 +139,7 @@ Eigen::Vector2d tilted(const Eigen::Vector2d& p, double tau_x, double tau_y) {
 Eigen::Vector2d OpenCvLens::project(const Eigen::Vector3d& point) const {
   const auto& [k1, k2, p1, p2, k3, k4, k5, k6, s1, s2, s3, s4, tau_x, tau_y] = distortion;
   const double x = point.x() / point.z(), y = point.y() / point.z(), r2 = x * x + y * y;
-  const double radial =
-      (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)));
+  const double radial = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)));
   const Eigen::Vector2d bent(x * radial + 2.0 * p1 * x * y + p2 * (r2 + 2.0 * x * x) + r2 * (s1 + r2 * s2),
                              y * radial + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y + r2 * (s3 + r2 * s4));
   const Eigen::Vector2d on_sensor = tilted(bent, tau_x, tau_y);

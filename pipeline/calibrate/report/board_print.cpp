@@ -44,9 +44,10 @@ std::string print_errors(const Board& board, const SolvedBoard& solved) {
   drawing.dots(corners, "c0");
   drawing.arrows(arrows, "");
   const double key_um = round_down(kMicrometres * board.square_mm / exaggeration);
-  return figure(drawing.svg() + arrow_key(window, key_um / kMicrometres, exaggeration, fmt::format("{:.4g} um", key_um)),
-                fmt::format("errors of the print in its plane, drawn {:.6g} times too long; {} um at most", exaggeration,
-                            number(kMicrometres * largest, 1)));
+  return figure(
+      drawing.svg() + arrow_key(window, key_um / kMicrometres, exaggeration, fmt::format("{:.4g} um", key_um)),
+      fmt::format("errors of the print in its plane, drawn {:.6g} times too long; {} um at most", exaggeration,
+                  number(kMicrometres * largest, 1)));
 }
 
 std::string flatness(const Board& board, const SolvedBoard& solved) {
@@ -76,8 +77,7 @@ std::string lengths_of(const CalibrationInput& input) {
     return fmt::format("{} mm measured, sigma {} mm, {} mm ordered", number(length->measured_mm, 4),
                        number(length->sigma_mm, 4), number(length->nominal_mm, 3));
   };
-  return table({"length", "is"},
-               {{"fixes the scale", words(input.length)}, {"compared", words(input.second_length)}});
+  return table({"length", "is"}, {{"fixes the scale", words(input.length)}, {"compared", words(input.second_length)}});
 }
 
 }  // namespace
@@ -90,19 +90,19 @@ std::string board_section(const FolderCalibration& outcome) {
     plane.push_back(std::hypot(offset[0], offset[1]));
     across.push_back(offset[2]);
   }
-  std::string out = paragraph(fmt::format("{} x {} squares of {} mm, as solved against the board as ordered, seen by who "
-                                          "reads its print.",
-                                          board.columns, board.rows, number(board.square_mm, 3)));
-  out += table(
-      {"what", "is"},
-      {{"scale", fmt::format("{} ppm from the order, sigma {} ppm", number(kPpm * (solved.scale - 1.0), 0),
-                             number(kPpm * solved.scale_sigma, 0))},
-       {"aspect", fmt::format("{} ppm", number(kPpm * solved.aspect, 0))},
-       {"shear", fmt::format("{} ppm", number(kPpm * solved.shear, 0))},
-       {"warp at the edge", fmt::format("{}, {}, {} mm, of x x, x y, y y", number(solved.warp_mm[0], 3),
-                                        number(solved.warp_mm[1], 3), number(solved.warp_mm[2], 3))},
-       {"print, in the plane", fmt::format("{} um rms", number(kMicrometres * root_mean_square(plane), 1))},
-       {"print, across it", fmt::format("{} um rms", number(kMicrometres * root_mean_square(across), 1))}});
+  std::string out =
+      paragraph(fmt::format("{} x {} squares of {} mm, as solved against the board as ordered, seen by who "
+                            "reads its print.",
+                            board.columns, board.rows, number(board.square_mm, 3)));
+  out += table({"what", "is"},
+               {{"scale", fmt::format("{} ppm from the order, sigma {} ppm", number(kPpm * (solved.scale - 1.0), 0),
+                                      number(kPpm * solved.scale_sigma, 0))},
+                {"aspect", fmt::format("{} ppm", number(kPpm * solved.aspect, 0))},
+                {"shear", fmt::format("{} ppm", number(kPpm * solved.shear, 0))},
+                {"warp at the edge", fmt::format("{}, {}, {} mm, of x x, x y, y y", number(solved.warp_mm[0], 3),
+                                                 number(solved.warp_mm[1], 3), number(solved.warp_mm[2], 3))},
+                {"print, in the plane", fmt::format("{} um rms", number(kMicrometres * root_mean_square(plane), 1))},
+                {"print, across it", fmt::format("{} um rms", number(kMicrometres * root_mean_square(across), 1))}});
   out += lengths_of(outcome.input);
   if (solved.offsets_mm.size() == static_cast<std::size_t>(board.corner_count())) {
     out += row_of(print_errors(board, solved) + flatness(board, solved));

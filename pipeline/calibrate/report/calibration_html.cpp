@@ -86,7 +86,8 @@ std::string figures_of(const FolderCalibration& outcome) {
     rows.push_back({"scale", number(solved.sigma->scale, 2) + " um", "of all lengths alike; from the measured length"});
   }
   if (const auto& ab = judgement.cross_validation) {
-    rows.push_back({"A against B", number(ab->ratio(), 2), "difference over what is expected; above 1.5 it lowers the grade"});
+    rows.push_back(
+        {"A against B", number(ab->ratio(), 2), "difference over what is expected; above 1.5 it lowers the grade"});
   }
   return report::table({"what", "is", "means"}, rows);
 }

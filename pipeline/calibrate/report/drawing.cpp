@@ -96,7 +96,8 @@ void Drawing::dots(const std::vector<Eigen::Vector2d>& points, std::string_view 
 void Drawing::arrows(const std::vector<Arrow>& arrows, std::string_view style) {
   if (arrows.empty()) return;
   std::string d;
-  for (const Arrow& arrow : arrows) d += arrow_path(on_page(arrow.at), on_page(arrow.at + arrow.by) - on_page(arrow.at));
+  for (const Arrow& arrow : arrows)
+    d += arrow_path(on_page(arrow.at), on_page(arrow.at + arrow.by) - on_page(arrow.at));
   content_ += fmt::format("<path class=\"arrows {}\" d=\"{}\"/>\n", style, d);
 }
 

@@ -14,9 +14,9 @@ namespace scanrig::report {
 namespace {
 
 constexpr double kTilePx = 150.0;
-constexpr double kTypical = 0.95;        ///< share of the residuals that stay below the arrow's usual length
-constexpr double kTypicalShare = 0.07;   ///< that length, of the image's width
-constexpr double kKeyShare = 0.25;       ///< length of the arrow that explains the scale, of the image's width
+constexpr double kTypical = 0.95;       ///< share of the residuals that stay below the arrow's usual length
+constexpr double kTypicalShare = 0.07;  ///< that length, of the image's width
+constexpr double kKeyShare = 0.25;      ///< length of the arrow that explains the scale, of the image's width
 
 std::string remark_of(const FoundBoards& boards, const ImageFit& image) {
   for (const ImageRemark& remark : boards.remarks) {

@@ -36,8 +36,8 @@ std::string error_curve(const FolderCalibration& outcome) {
     largest = std::max(largest, std::abs(error));
   }
   const double reach = 1.2 * largest, tick = round_down(largest);
-  Drawing drawing({.left = -45.0, .right = 370.0, .top = reach, .bottom = -1.25 * reach, .width_px = 720.0,
-                   .height_px = 240.0});
+  Drawing drawing(
+      {.left = -45.0, .right = 370.0, .top = reach, .bottom = -1.25 * reach, .width_px = 720.0, .height_px = 240.0});
   for (int angle = 0; angle <= 360; angle += 60) {
     drawing.line({angle * 1.0, -reach}, {angle * 1.0, reach}, "faint");
     drawing.text({angle * 1.0, -1.2 * reach}, fmt::format("{}", angle));
@@ -47,9 +47,10 @@ std::string error_curve(const FolderCalibration& outcome) {
     drawing.text({-4.0, at - 0.04 * reach}, number(at, 4), "end");
   }
   for (const auto& [placement, of_placement] : points) drawing.dots(of_placement, "big " + placement_style(placement));
-  return figure(drawing.svg(),
-                "error of the table angle, degrees, over the reported angle, degrees; turned minus gear times reported; "
-                "one colour per placement");
+  return figure(
+      drawing.svg(),
+      "error of the table angle, degrees, over the reported angle, degrees; turned minus gear times reported; "
+      "one colour per placement");
 }
 
 /// A rim dot against its place as ordered, the print's start and size fitted.
@@ -100,9 +101,10 @@ std::string dot_drawing(const DotErrors& errors, double largest) {
   drawing.dots(places, "c0");
   drawing.arrows(arrows, "strong");
   const double key_um = round_down(kMicrometres * 0.15 * errors.radius_mm / exaggeration);
-  return figure(drawing.svg() + arrow_key(window, key_um / kMicrometres, exaggeration, fmt::format("{:.4g} um", key_um)),
-                fmt::format("from above, the cameras below: errors of the dots' print, drawn {:.6g} times too long",
-                            exaggeration));
+  return figure(
+      drawing.svg() + arrow_key(window, key_um / kMicrometres, exaggeration, fmt::format("{:.4g} um", key_um)),
+      fmt::format("from above, the cameras below: errors of the dots' print, drawn {:.6g} times too long",
+                  exaggeration));
 }
 
 std::string rim_dots(const FolderCalibration& outcome) {
@@ -125,14 +127,14 @@ std::string rim_dots(const FolderCalibration& outcome) {
       images += sight->dots.empty() ? 0 : 1;
     }
   }
-  out += table({"what", "is"},
-               {{"dots", fmt::format("{} of {}, measured {} times in {} images", solved.dots.size(),
-                                     input.rim_dots.count, sightings, images)},
-                {"radius", fmt::format("{} mm, {} ordered", number(errors.radius_mm, 4),
-                                       number(input.rim_dots.radius_mm, 3))},
-                {"first dot", fmt::format("{} deg from the front at table angle 0", number(errors.start_deg, 4))},
-                {"print", fmt::format("{} um rms in the plane", number(kMicrometres * root_mean_square(away), 1))},
-                {"height", fmt::format("{} um rms", number(kMicrometres * root_mean_square(height), 1))}});
+  out += table(
+      {"what", "is"},
+      {{"dots", fmt::format("{} of {}, measured {} times in {} images", solved.dots.size(), input.rim_dots.count,
+                            sightings, images)},
+       {"radius", fmt::format("{} mm, {} ordered", number(errors.radius_mm, 4), number(input.rim_dots.radius_mm, 3))},
+       {"first dot", fmt::format("{} deg from the front at table angle 0", number(errors.start_deg, 4))},
+       {"print", fmt::format("{} um rms in the plane", number(kMicrometres * root_mean_square(away), 1))},
+       {"height", fmt::format("{} um rms", number(kMicrometres * root_mean_square(height), 1))}});
   return out + dot_drawing(errors, largest);
 }
 
@@ -148,7 +150,8 @@ std::string turntable_section(const FolderCalibration& outcome) {
   std::vector<Row> rows{{"gear", fmt::format("{:.6f} turned over reported angle", solved.gear)},
                         {"angle error", fmt::format("{} deg rms", number(root_mean_square(errors), 5))}};
   if (solved.axis_from_square_deg) {
-    rows.push_back({"axis", fmt::format("{} deg from square to the table top", number(*solved.axis_from_square_deg, 4))});
+    rows.push_back(
+        {"axis", fmt::format("{} deg from square to the table top", number(*solved.axis_from_square_deg, 4))});
   }
   rows.push_back({"table top", solved.is_height_known ? "seen: y = 0" : "not seen; y = 0 is a board's middle"});
   return section("Turntable", table({"what", "is"}, rows) + error_curve(outcome) + rim_dots(outcome));

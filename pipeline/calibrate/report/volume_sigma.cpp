@@ -45,7 +45,11 @@ std::string map_of(const SigmaMap& map, double full_scale, std::string_view capt
   std::ranges::sort(radii);
   radii.erase(std::unique(radii.begin(), radii.end()), radii.end());
   const auto rows = static_cast<double>(map.values.size()), columns = static_cast<double>(radii.size());
-  Drawing drawing({.left = -1.2, .right = columns, .top = -0.9, .bottom = rows, .width_px = 330.0,
+  Drawing drawing({.left = -1.2,
+                   .right = columns,
+                   .top = -0.9,
+                   .bottom = rows,
+                   .width_px = 330.0,
                    .height_px = 26.0 * (rows + 0.9)});
   for (std::size_t i = 0; i < radii.size(); ++i) {
     drawing.text({static_cast<double>(i) + 0.5, -0.25}, fmt::format("r {:.0f}", static_cast<double>(radii[i]) / 10.0));
@@ -111,9 +115,9 @@ std::string sigma_section(const FolderCalibration& outcome) {
                 {"scale", number(s.scale, 2), "all lengths alike; no image shows it, only a measured length"},
                 {"base", number(s.base, 2), "height over the table top"}});
   const std::array<std::pair<const char*, Part>, 4> together{{{"volume", &PointSigma::volume},
-                                                               {"axis", &PointSigma::axis},
-                                                               {"strain", &PointSigma::strain},
-                                                               {"azimuth", &PointSigma::azimuth}}};
+                                                              {"axis", &PointSigma::axis},
+                                                              {"strain", &PointSigma::strain},
+                                                              {"azimuth", &PointSigma::azimuth}}};
   const std::array<std::pair<const char*, Part>, 2> apart{{{"scale", &PointSigma::scale}, {"base", &PointSigma::base}}};
   const auto maps = [&](const auto& parts) {
     double full_scale = 1e-9;

@@ -52,9 +52,8 @@ std::vector<ImageCheck> check_board_image(const BoardFinding& finding, const Boa
   }
   const std::string edges = edges_crossed(finding, image);
   if (!edges.empty()) {
-    checks.push_back(
-        {ImageProblem::cut_off, "Board cut off at the " + edges + " edge of the image. Move it into view.",
-         "board partly outside the image, at the " + edges + " edge"});
+    checks.push_back({ImageProblem::cut_off, "Board cut off at the " + edges + " edge of the image. Move it into view.",
+                      "board partly outside the image, at the " + edges + " edge"});
   }
   if (finding.square_px < limits.min_square_px) {
     checks.push_back(
@@ -66,9 +65,9 @@ std::vector<ImageCheck> check_board_image(const BoardFinding& finding, const Boa
   }
   const double needed = limits.min_corner_share * board.corner_count();
   if (edges.empty() && static_cast<double>(finding.corners.size()) < needed) {
-    checks.push_back(
-        {ImageProblem::hidden, fmt::format("Only {} of {} corners visible. Uncover the board, and check its light.",
-                                           finding.corners.size(), board.corner_count()),
+    checks.push_back({ImageProblem::hidden,
+                      fmt::format("Only {} of {} corners visible. Uncover the board, and check its light.",
+                                  finding.corners.size(), board.corner_count()),
                       fmt::format("{} of {} corners visible", finding.corners.size(), board.corner_count())});
   }
   return checks;

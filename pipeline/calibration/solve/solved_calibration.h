@@ -44,8 +44,8 @@ struct ImageFit {
   std::string left_out_because;                       ///< empty when used
   Eigen::Vector2d mean_px = Eigen::Vector2d::Zero();  ///< pixel minus model
   double rms_px = 0.0;
-  double median_px = 0.0;  ///< of the residuals' lengths
-  double blur_px = 0.0;    ///< median over the corners
+  double median_px = 0.0;                 ///< of the residuals' lengths
+  double blur_px = 0.0;                   ///< median over the corners
   std::vector<CornerResidual> residuals;  ///< of each corner, ascending id; also of an image that is left out
 };
 

@@ -315,7 +315,8 @@ TEST(ExportColmap, ProjectsThePartOfEveryViewAsTheCameras) {
     std::size_t camera_id = 0;
     std::string name;
     in >> id >> qw >> qx >> qy >> qz >> tx >> ty >> tz >> camera_id >> name;
-    EXPECT_EQ(name, std::string("pose1/view0") + (i < 2 ? "0" : "1") + (i % 2 == 0 ? "/left" : "/right") + "_plain.png");
+    EXPECT_EQ(name,
+              std::string("pose1/view0") + (i < 2 ? "0" : "1") + (i % 2 == 0 ? "/left" : "/right") + "_plain.png");
     ASSERT_EQ(camera_id, i % 2 + 1);
     const ColmapCamera colmap = colmap_camera(cameras[camera_id - 1]);
     EXPECT_EQ(colmap.model, "FULL_OPENCV");
@@ -350,12 +351,12 @@ TEST(ExportColmap, OfALensFieldIsAsNearAsItStates) {
   ASSERT_TRUE(made);
   const std::string text = text_of(*made, "pose1/cameras.txt");
   const ColmapCamera colmap = colmap_camera(lines_of(text)[0]);
-  expect_as_stated(distance(calibration.left,
-                            [&](const Vector3d& p) {
-                              return Vector2d(colmap.project(calibration.left.camera_from_turntable * p) -
-                                              Vector2d(0.5, 0.5));
-                            }),
-                   stated(text, "left"));
+  expect_as_stated(
+      distance(calibration.left,
+               [&](const Vector3d& p) {
+                 return Vector2d(colmap.project(calibration.left.camera_from_turntable * p) - Vector2d(0.5, 0.5));
+               }),
+      stated(text, "left"));
   EXPECT_NE(text_of(*made, "pose1/images.txt").find(" 2 pose1/view01_right.png\n"), std::string::npos);
 }
 

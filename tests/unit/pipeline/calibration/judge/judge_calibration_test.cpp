@@ -24,7 +24,8 @@ TEST(JudgeCalibration, ACleanRigIsGradeAWithoutASentence) {
   double sum = 0.0;
   const auto& shifts = judged->judgement.cross_validation->shifts;
   for (const PointShift& shift : shifts) sum += shift.shift_um.squaredNorm();
-  EXPECT_NEAR(std::sqrt(sum / static_cast<double>(shifts.size())), judged->judgement.cross_validation->difference, 1e-9);
+  EXPECT_NEAR(std::sqrt(sum / static_cast<double>(shifts.size())), judged->judgement.cross_validation->difference,
+              1e-9);
   EXPECT_THAT(judged->judgement.sentences, IsEmpty());
 }
 
