@@ -151,8 +151,11 @@ void print_outcome(const CalibrateFolderVerb& verb, const FolderCalibration& out
     return;
   }
   for (const ImageRemark& remark : outcome.boards.remarks) {
-    fmt::print("  {}, {}: {}{}\n", remark.pair, remark.side == 0 ? "left" : "right", remark.message,
-               remark.is_left_out ? " (left out)" : "");
+    if (!remark.is_left_out) continue;
+    fmt::print("  {}, {}: {} (left out)\n", remark.pair, remark.side == 0 ? "left" : "right", remark.message);
+  }
+  for (const auto& [message, remarks] : remarks_on_used_images(outcome.boards)) {
+    fmt::print("  {} {}, used: {}\n", remarks.size(), remarks.size() == 1 ? "image" : "images", message);
   }
   for (const std::string& sentence : judgement.sentences) fmt::print("  {}\n", sentence);
   fmt::print("grade {}: ", to_string(judgement.grade));

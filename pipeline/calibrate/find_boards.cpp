@@ -80,6 +80,14 @@ Result<cv::Size> common_size(const CalibrationImages& images, const std::vector<
 
 }  // namespace
 
+std::map<std::string, std::vector<ImageRemark>> remarks_on_used_images(const FoundBoards& boards) {
+  std::map<std::string, std::vector<ImageRemark>> found;
+  for (const ImageRemark& remark : boards.remarks) {
+    if (!remark.is_left_out) found[remark.message].push_back(remark);
+  }
+  return found;
+}
+
 Result<FoundBoards> find_boards(const CalibrationImages& images, const std::string& pixel_format, const Board& board,
                                 const Context& context) {
   auto results = look_at_all(images, pixel_format, board, context);

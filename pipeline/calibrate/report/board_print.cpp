@@ -63,7 +63,7 @@ std::string flatness(const Board& board, const SolvedBoard& solved) {
     const double height = heights[static_cast<std::size_t>(id)] - mean, share = height / largest;
     drawing.box(at - half, at + half, "cell", signed_shade(share));
     drawing.text(at + Eigen::Vector2d(0.0, 1.2), number(kMicrometres * height, 0),
-                 std::abs(share) > 0.6 ? "middle light" : "middle");
+                 std::abs(share) > 0.75 ? "middle light" : "middle");
   }
   return figure(drawing.svg(),
                 fmt::format("height of the corners over their mean, um: warp and print together, {} at most; positive: "

@@ -26,11 +26,11 @@ p,li{max-width:820px}
 table{border-collapse:collapse;margin:8px 0 14px}
 th,td{padding:3px 10px;border-bottom:1px solid #e3e6e9;text-align:left;font-variant-numeric:tabular-nums}
 th{color:#57606a;font-weight:600}
-.row{display:flex;flex-wrap:wrap;gap:14px;align-items:flex-end}
+.row{display:flex;flex-wrap:wrap;gap:14px;align-items:flex-start}
 figure{margin:6px 0}
 figcaption{font-size:13px;color:#57606a;max-width:520px}
 figure.tile{margin:0}
-figure.tile figcaption{font-size:11px;line-height:1.25;max-width:160px}
+figure.tile figcaption{font-size:11px;line-height:1.25;width:150px}
 svg{display:block;font:11px system-ui,sans-serif}
 svg .line{fill:none;stroke:#8a939b;stroke-width:1}
 svg .faint{stroke:#d5d9dd}

@@ -17,6 +17,7 @@ constexpr double kTilePx = 150.0;
 constexpr double kTypical = 0.95;       ///< share of the residuals that stay below the arrow's usual length
 constexpr double kTypicalShare = 0.07;  ///< that length, of the image's width
 constexpr double kKeyShare = 0.25;      ///< length of the arrow that explains the scale, of the image's width
+constexpr double kMeanPx = 0.005;       ///< shown in full at least: smaller means look small
 
 std::string remark_of(const FoundBoards& boards, const ImageFit& image) {
   for (const ImageRemark& remark : boards.remarks) {
@@ -38,9 +39,9 @@ std::string tile(const CalibrationInput& input, std::size_t pair, const ImageFit
   std::vector<Arrow> arrows;
   for (const CornerResidual& r : image.residuals) arrows.push_back({r.pixel, exaggeration * r.miss});
   drawing.arrows(arrows, image.is_used ? "" : "lost");
-  std::string words = fmt::format("{}, {} deg", side_name(static_cast<std::size_t>(image.camera)),
+  std::string words = fmt::format("{} {} deg", side_name(static_cast<std::size_t>(image.camera)),
                                   number(to_degrees(input.pairs[pair].angle_rad), 1));
-  if (!image.residuals.empty()) words += fmt::format(": rms {} px", number(image.rms_px, 3));
+  if (!image.residuals.empty()) words += fmt::format(", {} px", number(image.rms_px, 3));
   if (!image.is_used) words += ", left out";
   return figure(drawing.svg(), words, "tile");
 }
@@ -68,7 +69,7 @@ std::string all_images(const FolderCalibration& outcome) {
   std::string out = heading("Residuals of each image");
   out += paragraph(fmt::format(
       "Each arrow is measured pixel minus model, drawn {:.6g} times too long. Noise points anywhere; arrows that point "
-      "alike in one area are something that the model does not have.",
+      "alike in one area are something that the model does not have. Below each image: table angle and rms.",
       exaggeration));
   out += arrow_key(tile_of(input), key, exaggeration, fmt::format("{:.4g} px", key));
   std::map<int, std::vector<std::size_t>> by_placement;
@@ -86,13 +87,13 @@ std::string all_images(const FolderCalibration& outcome) {
 
 /// Each camera's mean residuals as arrows from one point.
 std::string mean_drawings(const SolvedCalibration& solved, double largest) {
-  const double reach = std::max(1.3 * largest, 1e-6);
+  const double reach = std::max(1.3 * largest, kMeanPx);
   std::string figures;
   for (std::size_t c = 0; c < static_cast<std::size_t>(solved.cameras); ++c) {
     Drawing drawing({.left = -reach, .right = reach, .top = -reach, .bottom = reach, .width_px = 260.0});
     drawing.line({-reach, 0.0}, {reach, 0.0}, "faint");
     drawing.line({0.0, -reach}, {0.0, reach}, "faint");
-    const double ring = round_down(largest);
+    const double ring = round_down(0.7 * reach);
     drawing.circle({0.0, 0.0}, ring, "faint");
     drawing.text({0.0, -ring * 1.03}, fmt::format("{:.3g} px", ring), "start");
     for (const PlacementFit& fit : solved.placements) {
@@ -128,18 +129,24 @@ std::string means(const SolvedCalibration& solved) {
 
 std::string left_out_section(const FolderCalibration& outcome) {
   std::vector<Row> lost, remarked;
+  constexpr std::size_t kMaxNamed = 3;
   for (const ImageFit& image : outcome.judged.solved.images) {
     if (image.is_used) continue;
     lost.push_back({image.name, side_name(static_cast<std::size_t>(image.camera)), fmt::format("{}", image.corners),
                     remark_of(outcome.boards, image)});
   }
-  for (const ImageRemark& remark : outcome.boards.remarks) {
-    if (!remark.is_left_out) remarked.push_back({remark.pair, side_name(remark.side), remark.message});
+  for (const auto& [message, remarks] : remarks_on_used_images(outcome.boards)) {
+    std::string names;
+    for (std::size_t i = 0; i < std::min(kMaxNamed, remarks.size()); ++i) {
+      names += fmt::format("{}{}, {}", i == 0 ? "" : "; ", remarks[i].pair, side_name(remarks[i].side));
+    }
+    if (remarks.size() > kMaxNamed) names += fmt::format("; and {} more", remarks.size() - kMaxNamed);
+    remarked.push_back({message, fmt::format("{}", remarks.size()), names});
   }
   std::string out = lost.empty() ? paragraph("Every image is used.")
                                  : table({"image", "camera", "corners", "left out because"}, lost);
   if (!remarked.empty()) {
-    out += heading("Remarks on images that are used") + table({"image", "camera", "remark"}, remarked);
+    out += heading("Remarks on images that are used") + table({"remark", "images", "which"}, remarked);
   }
   return section("What was left out", out);
 }

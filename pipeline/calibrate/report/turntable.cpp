@@ -27,24 +27,32 @@ bool is_used(const SolvedCalibration& solved, std::size_t pair) {
 std::string error_curve(const FolderCalibration& outcome) {
   const SolvedCalibration& solved = outcome.judged.solved;
   std::map<int, std::vector<Eigen::Vector2d>> points;
-  double largest = 1e-6;
+  double largest = 1e-6, first = 0.0, last = 0.0;
   for (std::size_t k = 0; k < outcome.input.pairs.size(); ++k) {
     if (!is_used(solved, k)) continue;
-    const double turned = to_degrees(outcome.input.pairs[k].angle_rad);
-    const double error = solved.table.angle_error_deg[k];
-    points[outcome.input.pairs[k].placement].emplace_back(turned - 360.0 * std::floor(turned / 360.0), error);
+    const double reported = to_degrees(outcome.input.pairs[k].angle_rad), error = solved.table.angle_error_deg[k];
+    points[outcome.input.pairs[k].placement].emplace_back(reported, error);
     largest = std::max(largest, std::abs(error));
+    first = std::min(first, reported);
+    last = std::max(last, reported);
   }
-  const double reach = 1.2 * largest, tick = round_down(largest);
-  Drawing drawing(
-      {.left = -45.0, .right = 370.0, .top = reach, .bottom = -1.25 * reach, .width_px = 720.0, .height_px = 240.0});
-  for (int angle = 0; angle <= 360; angle += 60) {
-    drawing.line({angle * 1.0, -reach}, {angle * 1.0, reach}, "faint");
-    drawing.text({angle * 1.0, -1.2 * reach}, fmt::format("{}", angle));
+  const double step = last - first > 720.0 ? 180.0 : 60.0;
+  first = step * std::floor(first / step);
+  last = step * std::max(std::ceil(last / step), first / step + 1.0);
+  const double reach = 1.2 * largest, tick = round_down(largest), margin = 0.12 * (last - first);
+  Drawing drawing({.left = first - margin,
+                   .right = last + 0.2 * margin,
+                   .top = reach,
+                   .bottom = -1.25 * reach,
+                   .width_px = 720.0,
+                   .height_px = 240.0});
+  for (double angle = first; angle <= last; angle += step) {
+    drawing.line({angle, -reach}, {angle, reach}, "faint");
+    drawing.text({angle, -1.2 * reach}, number(angle, 0));
   }
   for (const double at : {-tick, 0.0, tick}) {
-    drawing.line({0.0, at}, {360.0, at}, at == 0.0 ? "" : "faint");
-    drawing.text({-4.0, at - 0.04 * reach}, number(at, 4), "end");
+    drawing.line({first, at}, {last, at}, at == 0.0 ? "" : "faint");
+    drawing.text({first - 0.01 * (last - first), at - 0.04 * reach}, number(at, 4), "end");
   }
   for (const auto& [placement, of_placement] : points) drawing.dots(of_placement, "big " + placement_style(placement));
   return figure(
@@ -103,7 +111,7 @@ std::string dot_drawing(const DotErrors& errors, double largest) {
   const double key_um = round_down(kMicrometres * 0.15 * errors.radius_mm / exaggeration);
   return figure(
       drawing.svg() + arrow_key(window, key_um / kMicrometres, exaggeration, fmt::format("{:.4g} um", key_um)),
-      fmt::format("from above, the cameras below: errors of the dots' print, drawn {:.6g} times too long",
+      fmt::format("from above, the cameras below: dots against equal steps on a circle, drawn {:.6g} times too long",
                   exaggeration));
 }
 
@@ -133,7 +141,8 @@ std::string rim_dots(const FolderCalibration& outcome) {
                             sightings, images)},
        {"radius", fmt::format("{} mm, {} ordered", number(errors.radius_mm, 4), number(input.rim_dots.radius_mm, 3))},
        {"first dot", fmt::format("{} deg from the front at table angle 0", number(errors.start_deg, 4))},
-       {"print", fmt::format("{} um rms in the plane", number(kMicrometres * root_mean_square(away), 1))},
+       {"print",
+        fmt::format("{} um rms in the plane, from equal steps", number(kMicrometres * root_mean_square(away), 1))},
        {"height", fmt::format("{} um rms", number(kMicrometres * root_mean_square(height), 1))}});
   return out + dot_drawing(errors, largest);
 }

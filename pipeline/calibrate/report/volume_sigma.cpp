@@ -131,7 +131,8 @@ std::string sigma_section(const FolderCalibration& outcome) {
   out += heading("By height y and radius r");
   out += paragraph("Heights and radii in mm. The first four maps have one scale of shades, the last two another.");
   out += row_of(maps(together) + maps(apart));
-  out += heading("Around the axis") + around(solved.sigma_at);
+  out += heading("Around the axis") + paragraph("Points that a camera does not see are missing.") +
+         around(solved.sigma_at);
   return section("Sigma at the object", out);
 }
 

@@ -125,7 +125,10 @@ TEST_F(CalibrateImages, ByTheCommandLeaveAReportAlsoWhenRefused) {
   const auto out = folder_ / "calibration.json", report = folder_ / "calibration.html";
   ASSERT_TRUE(write_file_atomically(out, std::string_view("the one before")));
   ASSERT_TRUE(write_file_atomically(report, std::string_view("its report")));
-  EXPECT_EQ(ctl::calibrate_folder({.images = folder_, .out = out}), ExitCode::below_limits);
+  ctl::CalibrateFolderVerb verb;
+  verb.images = folder_;
+  verb.out = out;
+  EXPECT_EQ(ctl::calibrate_folder(verb), ExitCode::below_limits);
   EXPECT_EQ(read_file(out).value_or(""), "the one before");
   const std::string page = read_file(report).value_or("");
   EXPECT_THAT(page, HasSubstr("<li>Left and right cameras swapped: exchange the serials.</li>"));
@@ -135,10 +138,12 @@ TEST_F(CalibrateImages, ByTheCommandLeaveAReportAlsoWhenRefused) {
 
   // Again, under another name; then without one.
   std::filesystem::remove(report);
-  const auto other = folder_ / "why.html";
-  EXPECT_EQ(ctl::calibrate_folder({.images = folder_, .out = out, .report = other}), ExitCode::below_limits);
-  EXPECT_TRUE(std::filesystem::exists(other));
-  EXPECT_EQ(ctl::calibrate_folder({.images = folder_, .out = out, .with_report = false}), ExitCode::below_limits);
+  verb.report = folder_ / "why.html";
+  EXPECT_EQ(ctl::calibrate_folder(verb), ExitCode::below_limits);
+  EXPECT_TRUE(std::filesystem::exists(verb.report));
+  verb.report.clear();
+  verb.with_report = false;
+  EXPECT_EQ(ctl::calibrate_folder(verb), ExitCode::below_limits);
   EXPECT_FALSE(std::filesystem::exists(report));
   EXPECT_EQ(read_file(kept).value_or(""), "its report");
 }

@@ -140,7 +140,7 @@ TEST(CalibrationHtml, EscapesNamesAndNamesWhatWasLeftOut) {
   EXPECT_THAT(page, Not(HasSubstr("<script")));
   EXPECT_THAT(page, HasSubstr("<td>&lt;script&gt;x&amp;y&quot;&lt;/script&gt;</td><td>right</td>"));
   EXPECT_THAT(page, HasSubstr("Image blurred &lt;3."));
-  EXPECT_THAT(page, HasSubstr("<td>pair &lt;2&gt;</td><td>left</td><td>a remark</td>"));
+  EXPECT_THAT(page, HasSubstr("<td>a remark</td><td>1</td><td>pair &lt;2&gt;, left</td>"));
 }
 
 TEST(CalibrationHtml, OfBoardsHeldByHandAndOfOneCameraHasNoVolume) {
