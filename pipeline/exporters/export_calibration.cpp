@@ -32,12 +32,17 @@ std::vector<double> intrinsics_of(const OpenCvLens& lens, std::size_t coefficien
   return values;
 }
 
+/// Without what would end a comment.
+std::string one_line(std::string text) {
+  std::erase_if(text, [](char c) { return static_cast<unsigned char>(c) < 0x20; });
+  return text;
+}
+
 /// First lines of a file: what it is, what is lost.
 std::string comment_of(const Calibration& calibration, const CalibrationExport& exported, std::size_t side) {
-  const Camera& camera = camera_of(calibration, side);
-  std::string out =
-      fmt::format("# {} camera{}{}, calibrated {}; lengths in mm\n", side_name(side), camera.serial.empty() ? "" : " ",
-                  camera.serial, calibration.date.empty() ? "at an unknown date" : calibration.date);
+  const std::string serial = one_line(camera_of(calibration, side).serial), date = one_line(calibration.date);
+  std::string out = fmt::format("# {} camera{}{}, calibrated {}; lengths in mm\n", side_name(side),
+                                serial.empty() ? "" : " ", serial, date.empty() ? "at an unknown date" : date);
   const std::string lost = what_is_lost(exported, side);
   return lost.empty() ? out : out + "# " + lost + "\n";
 }

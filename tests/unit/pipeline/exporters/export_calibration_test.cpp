@@ -158,6 +158,12 @@ TEST(ExportMrcal, ProjectsAsTheCamera) {
   }
 }
 
+TEST(ExportMrcal, KeepsOddNamesInTheComment) {
+  Calibration calibration = calibration_with(false);
+  calibration.left.serial = "L\n'lensmodel': 'X'\n";
+  EXPECT_EQ(MrcalModel(export_mrcal(calibration).files[0].text).lensmodel, "LENSMODEL_OPENCV5");
+}
+
 TEST(ExportMrcal, OfALensFieldIsAsNearAsItStates) {
   const Calibration calibration = calibration_with(true);
   const auto made = export_mrcal(calibration);
