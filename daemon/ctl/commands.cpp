@@ -52,7 +52,10 @@ void add_calibrate_folder(CLI::App& sub, CalibrateFolderVerb& verb) {
       ->expected(2);
   sub.add_option("--second-length", verb.second_length_mm, "DIR: the same with another instrument, compared only")
       ->expected(2);
-  sub.add_option("--rim-points", verb.rim_dots, "DIR: printed on the table's rim: COUNTxRADIUSxDIAMETER, mm");
+  sub.add_option("--report", verb.report, "DIR: the report to write (default: beside --out, as .html)");
+  sub.add_flag("!--no-report", verb.with_report, "DIR: write no report")->excludes(sub.get_option("--report"));
+  sub.add_option("--rim-dots", verb.rim_dots, "DIR: printed on the table's rim: COUNTxRADIUSxDIAMETER, mm");
+  sub.add_option("--rim-points", verb.rim_dots)->group("");  // old name
   sub.add_option("--focal-px", verb.options.focal_px, "DIR: focal length, within 10 %")->check(CLI::PositiveNumber);
   sub.add_option("--pixel-format", verb.options.pixel_format, "DIR: of images without a list")
       ->check(CLI::IsMember({"Mono8", "BayerRG8", "BGR8"}));
@@ -314,6 +317,28 @@ void add_import(CLI::App& app, Chosen& chosen) {
   stanford->callback([&chosen, verb] { chosen = [verb] { return import_stanford(*verb); }; });
 }
 
+void add_convert(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<ConvertVerb>();
+  auto* sub = app.add_subcommand("convert", "write a calibration, or the views of a scan, for other programs");
+  sub->require_subcommand(1);
+  const auto add = [&](const char* name, const char* description, const char* from, const char* out) {
+    auto* action = sub->add_subcommand(name, description);
+    action->add_option("FROM", verb->from, from)->required();
+    action->add_option("--out", verb->out, out)->required();
+    action->add_flag("--json", verb->json, "print JSON");
+    action->callback([&chosen, verb, name] {
+      verb->what = name;
+      chosen = [verb] { return convert(*verb); };
+    });
+    return action;
+  };
+  constexpr const char* kCalibration = "calibration.json, or a folder that has one";
+  add("mrcal", "left.cameramodel and right.cameramodel", kCalibration, "the folder to make");
+  add("opencv", "a YAML file for cv::FileStorage", kCalibration, "the file to write");
+  add("colmap", "cameras and images as a text model, one per pose", "a scan folder", "the folder to make")
+      ->add_flag("--images", verb->images, "copy the plain images, too, ready for use: demosaiced");
+}
+
 void add_check_config(CLI::App& app, Chosen& chosen) {
   const auto verb = std::make_shared<CheckConfigVerb>();
   auto* sub = app.add_subcommand("check-config", "read a rig.toml and tell everything that is wrong with it");
@@ -355,6 +380,7 @@ void add_offline_commands(CLI::App& app, Chosen& chosen) {
   add_reconstruct(app, chosen);
   add_evaluate(app, chosen);
   add_import(app, chosen);
+  add_convert(app, chosen);
   add_board(app, chosen);
   add_check_config(app, chosen);
   add_token(app, chosen);

@@ -133,6 +133,8 @@ struct CalibrateFolderVerb {
   bool paper = false;
   std::vector<double> length_mm, second_length_mm;  ///< measured, and its standard uncertainty
   std::string rim_dots;                             ///< COUNTxRADIUSxDIAMETER
+  std::filesystem::path report;                     ///< empty: beside `out`, as .html
+  bool with_report = true;
   CalibrateOptions options;
   bool json = false;
 };
@@ -144,6 +146,15 @@ struct BoardVerb {
   std::vector<double> page_mm;
 };
 ExitCode board(const BoardVerb& verb);
+
+struct ConvertVerb {
+  std::string what;            ///< "mrcal", "opencv", "colmap"
+  std::filesystem::path from;  ///< a calibration.json, or a folder with one; colmap: a scan folder
+  std::filesystem::path out;
+  bool images = false;  ///< colmap: copies of the images, demosaiced, too
+  bool json = false;
+};
+ExitCode convert(const ConvertVerb& verb);
 
 struct EvaluateVerb {
   std::filesystem::path scan;

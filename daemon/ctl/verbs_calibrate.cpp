@@ -13,6 +13,7 @@
 #include "daemon/runtime/catch_exceptions.h"
 #include "daemon/runtime/signal_stop.h"
 #include "pipeline/calibrate/calibration_json.h"
+#include "pipeline/calibrate/report/calibration_html.h"
 #include "pipeline/calibration/board/print_board.h"
 #include "pipeline/storage/calibration_file.h"
 
@@ -67,7 +68,7 @@ Result<CalibrateOptions> options_of(const CalibrateFolderVerb& verb, const Calib
   if (!verb.rim_dots.empty()) {
     const auto dots = numbers_of(verb.rim_dots, 3);
     if (dots.empty()) {
-      return fail(ErrorCode::invalid_input, "--rim-points {}: must be COUNTxRADIUSxDIAMETER in mm, as 40x84.5x2.4",
+      return fail(ErrorCode::invalid_input, "--rim-dots {}: must be COUNTxRADIUSxDIAMETER in mm, as 40x84.5x2.4",
                   verb.rim_dots);
     }
     options.rim_dots = RimDots{static_cast<int>(dots[0]), dots[1], dots[2]};
@@ -90,14 +91,41 @@ CalibrationOrigin origin_of(const CalibrateFolderVerb& verb, const CalibrationIm
   return origin;
 }
 
+std::filesystem::path report_of(const CalibrateFolderVerb& verb) {
+  if (!verb.with_report) return {};
+  if (!verb.report.empty()) return verb.report;
+  auto beside = verb.out;
+  return beside.replace_extension(".html");
+}
+
+/// `file` with a part of its calibration's hash in its name.
+std::filesystem::path kept_name(std::filesystem::path file, const std::string& hash) {
+  const std::string extension = file.extension().string();
+  return file.replace_extension(hash.substr(0, 8) + extension);
+}
+
 /// The file that stood there before, under the name of its hash.
 Result<void> keep_previous(const CalibrateFolderVerb& verb, const std::string& hash) {
   if (hash.empty()) return {};
   const auto text = read_file(verb.out);
   if (!text) return pass_on(text);
-  auto kept = verb.out;
-  kept.replace_extension(hash.substr(0, 8) + verb.out.extension().string());
-  return write_file_atomically(kept, *text);
+  return write_file_atomically(kept_name(verb.out, hash), *text);
+}
+
+/// Writes the report. One that stood there belongs to the previous calibration and is kept by the name of that; the
+/// first is, for later ones are of attempts that were refused.
+Result<void> write_report(const CalibrateFolderVerb& verb, const FolderCalibration& outcome,
+                          const CalibrationOrigin& origin) {
+  const auto file = report_of(verb);
+  if (file.empty()) return {};
+  if (const auto old = read_file(file); old && !origin.previous.empty()) {
+    const auto kept = kept_name(file, origin.previous);
+    std::error_code ignored;
+    if (!std::filesystem::exists(kept, ignored)) {
+      if (auto written = write_file_atomically(kept, *old); !written) return written;
+    }
+  }
+  return write_file_atomically(file, calibration_html(outcome, origin));
 }
 
 void print_outcome(const CalibrateFolderVerb& verb, const FolderCalibration& outcome) {
@@ -112,6 +140,7 @@ void print_outcome(const CalibrateFolderVerb& verb, const FolderCalibration& out
       json["volume_um"] = solved.sigma->volume;
       json["scale_um"] = solved.sigma->scale;
     }
+    if (verb.with_report) json["report"] = report_of(verb);
     if (const auto& ab = judgement.cross_validation) json["a_b_ratio"] = ab->ratio();
     for (const ImageRemark& remark : outcome.boards.remarks) {
       json["remarks"].push_back({{"pair", remark.pair},
@@ -123,8 +152,11 @@ void print_outcome(const CalibrateFolderVerb& verb, const FolderCalibration& out
     return;
   }
   for (const ImageRemark& remark : outcome.boards.remarks) {
-    fmt::print("  {}, {}: {}{}\n", remark.pair, remark.side == 0 ? "left" : "right", remark.message,
-               remark.is_left_out ? " (left out)" : "");
+    if (!remark.is_left_out) continue;
+    fmt::print("  {}, {}: {} (left out)\n", remark.pair, remark.side == 0 ? "left" : "right", remark.message);
+  }
+  for (const auto& [message, remarks] : remarks_on_used_images(outcome.boards)) {
+    fmt::print("  {} {}, used: {}\n", remarks.size(), remarks.size() == 1 ? "image" : "images", message);
   }
   for (const std::string& sentence : judgement.sentences) fmt::print("  {}\n", sentence);
   fmt::print("grade {}: ", to_string(judgement.grade));
@@ -202,6 +234,8 @@ ExitCode calibrate_folder(const CalibrateFolderVerb& verb) {
   print_outcome(verb, *outcome);
 
   const auto origin = origin_of(verb, *images);
+  if (auto written = write_report(verb, *outcome, origin); !written) return report_error(written.error());
+  if (!verb.json && verb.with_report) fmt::print("{}\n", report_of(verb).string());
   const auto text = calibration_json(*outcome, origin);
   if (!text) return report_error(text.error());
   if (auto kept = keep_previous(verb, origin.previous); !kept) return report_error(kept.error());

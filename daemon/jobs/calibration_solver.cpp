@@ -6,6 +6,7 @@
 #include "core/hash.h"
 #include "core/timestamp.h"
 #include "pipeline/calibrate/calibration_json.h"
+#include "pipeline/calibrate/report/calibration_html.h"
 #include "pipeline/storage/calibration_file.h"
 
 namespace scanrig {
@@ -55,9 +56,12 @@ CalibrationSolver calibration_solver(CalibrateOptions options, std::filesystem::
     const auto outcome = calibrate_boards(views.images, std::move(views.boards), options, context);
     if (!outcome) return pass_on(outcome);
     const CalibrationJudgement& judgement = outcome->judged.judgement;
-    CalibrationResult result{.grade = std::string(to_string(judgement.grade)), .sentences = judgement.sentences};
+    const CalibrationOrigin origin = origin_of(views.images, previous);
+    CalibrationResult result{.grade = std::string(to_string(judgement.grade)),
+                             .sentences = judgement.sentences,
+                             .html = calibration_html(*outcome, origin)};
     if (judgement.grade == CalibrationGrade::refused) return result;
-    auto text = calibration_json(*outcome, origin_of(views.images, previous));
+    auto text = calibration_json(*outcome, origin);
     if (!text) return pass_on(text);
     result.file = std::move(*text);
     return result;

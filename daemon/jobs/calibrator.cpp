@@ -59,6 +59,9 @@ class Calibrator final : public Reconstructor {
     if (!views) return pass_on(views);
     const auto solved = options_.solver(std::move(*views), context);
     if (!solved) return pass_on(solved);
+    if (!solved->html.empty()) {
+      if (auto told = write_file_atomically(task_.folder / "calibration.html", solved->html); !told) return told;
+    }
     if (solved->grade == "refused") {
       return fail(ErrorCode::below_limits, "the calibration does not grade: {}", fmt::join(solved->sentences, " "));
     }

@@ -26,6 +26,7 @@ struct CalibrationResult {
   std::string grade = "refused";         ///< "A", "B", "C", or "refused": it must not be used
   std::string verdict{};                 ///< of a check, as CalibrationOutcome::verdict
   std::vector<std::string> sentences{};  ///< for the person who accepts it, or why it is refused
+  std::string html{};                    ///< a report on it, also of one that is refused; of a check: empty
   std::string file{};                    ///< text of its calibration.json; of a check that holds: as it was
 };
 
@@ -47,8 +48,8 @@ struct CalibrationTask {
 using CalibratorFactory = std::function<std::unique_ptr<Reconstructor>(const CalibrationTask&)>;
 
 /// Makes calibrations instead of models: add_view() finds the board in both images. finish() solves, and writes
-/// calibration.json and report.json; it fails with `below_limits` where the grade is "refused". A check that holds is
-/// noted for the reminder.
+/// calibration.json and report.json; it fails with `below_limits` where the grade is "refused". The
+/// report is calibration.html in the job's folder. A check that holds is noted for the reminder.
 CalibratorFactory calibrator(CalibratorOptions options);
 
 }  // namespace scanrig

@@ -60,7 +60,7 @@ Result<std::size_t> measure_dots(const CalibrationImages& images, const std::str
                                  const FolderCalibration& first, CalibrationInput& input, const Context& context) {
   const SolvedCalibration& solved = first.judged.solved;
   std::vector<std::size_t> dots(2 * images.pairs.size(), 0);
-  context.report("dots", 0.0);
+  context.report("rim dots", 0.0);
   if (context.stopped()) return fail(ErrorCode::stopped, "calibration: stopped on request");
   parallel_for(dots.size(), [&](std::size_t i) {
     const CalibrationPair& pair = images.pairs[i / 2];
@@ -77,7 +77,7 @@ Result<std::size_t> measure_dots(const CalibrationImages& images, const std::str
     dots[i] = found->dots.size();
     (i % 2 == 0 ? input.pairs[i / 2].left : input.pairs[i / 2].right).dots = std::move(found->dots);
   });
-  context.report("dots", 1.0);
+  context.report("rim dots", 1.0);
   return static_cast<std::size_t>(std::ranges::count_if(dots, [](std::size_t count) { return count > 0; }));
 }
 

@@ -32,7 +32,7 @@ struct FolderCalibration {
 };
 
 /// Solves, measures the rim dots with that solution, solves again, judges. Reports the stage
-/// "dots" and those of the solver. Same input, same bits, for any number of threads. Fails as solve_calibration().
+/// "rim dots" and those of the solver. Same input, same bits, for any number of threads. Fails as solve_calibration().
 Result<FolderCalibration> calibrate_boards(const CalibrationImages& images, FoundBoards boards,
                                            const CalibrateOptions& options = {}, const Context& context = {});
 

@@ -39,7 +39,8 @@ ImageResult look(const CalibrationPair& pair, std::size_t side, const std::strin
   result.outline.assign(found->outline.begin(), found->outline.end());
   bool is_usable = true;
   for (const ImageCheck& check : check_board_image(*found, board, result.size)) {
-    result.remarks.push_back({pair.name, side, check.message, check.spoils_corners});
+    const std::string& what = check.spoils_corners ? check.message : check.remark;
+    result.remarks.push_back({pair.name, side, what, check.spoils_corners});
     is_usable = is_usable && !check.spoils_corners;
   }
   if (is_usable) result.corners = std::move(found->corners);
@@ -76,6 +77,14 @@ Result<cv::Size> common_size(const CalibrationImages& images, const std::vector<
 }
 
 }  // namespace
+
+std::map<std::string, std::vector<ImageRemark>> remarks_on_used_images(const FoundBoards& boards) {
+  std::map<std::string, std::vector<ImageRemark>> found;
+  for (const ImageRemark& remark : boards.remarks) {
+    if (!remark.is_left_out) found[remark.message].push_back(remark);
+  }
+  return found;
+}
 
 Result<FoundBoards> find_boards(const CalibrationImages& images, const std::string& pixel_format, const Board& board,
                                 const Context& context) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -12,11 +13,11 @@
 
 namespace scanrig {
 
-/// What is to be said of one image: one sentence.
+/// What is remarkable of one image.
 struct ImageRemark {
   std::string pair;      ///< its name
   std::size_t side = 0;  ///< 0 left
-  std::string message;
+  std::string message;   ///< of one that is left out: a sentence with what to do; else what is seen, in a few words
   bool is_left_out = false;
 };
 
@@ -29,6 +30,9 @@ struct FoundBoards {
   int height = 0;
   std::vector<ImageRemark> remarks;
 };
+
+/// The remarks on images that are used, by what they say.
+std::map<std::string, std::vector<ImageRemark>> remarks_on_used_images(const FoundBoards& boards);
 
 /// Finds `board` in every image of the folder, on all threads. An image that cannot be read, shows no board, or is
 /// blurred or glared is left out with a remark. Reports the stage "boards".

@@ -15,11 +15,7 @@ struct LensFieldSupport {
   std::array<double, 4> across_slope{}, down_slope{};
 
   /// Place of the coefficient `column` and `row` (0 to 3) after the first one.
-  [[nodiscard]] std::size_t coefficient(int column, int row) const {
-    constexpr int kColumns = 7;  // LensField::kColumns
-    const int place = first + column + kColumns * row;
-    return static_cast<std::size_t>(place);
-  }
+  [[nodiscard]] std::size_t coefficient(int column, int row) const;
 };
 
 /// What a lens does beyond Brown's five coefficients: a smooth shift of pixels, added to the pixel that Brown's
@@ -41,5 +37,9 @@ struct LensField {
   [[nodiscard]] Eigen::Vector2d source_of(const Eigen::Vector2d& pixel) const;
   static LensFieldSupport support(const Eigen::Vector2d& pixel, int width, int height);
 };
+
+inline std::size_t LensFieldSupport::coefficient(int column, int row) const {
+  return static_cast<std::size_t>(first + column + LensField::kColumns * row);
+}
 
 }  // namespace scanrig

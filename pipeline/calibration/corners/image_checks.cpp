@@ -41,14 +41,14 @@ std::vector<ImageCheck> check_board_image(const BoardFinding& finding, const Boa
          fmt::format("Image blurred ({:.1f} px, at most {:.1f}). Check focus and aperture, and let the table "
                      "settle.",
                      finding.blur_px, limits.max_blur_px),
-         true});
+         fmt::format("blurred, {:.1f} px", finding.blur_px), true});
   }
   if (finding.saturated_share > limits.max_saturated_share) {
     checks.push_back(
         {ImageProblem::glare,
          fmt::format("Glare on {:.0f} % of the board. Shorten the exposure, or turn the board or the lights.",
                      std::max(1.0, 100.0 * finding.saturated_share)),
-         true});
+         fmt::format("glare on {:.0f} % of the board", std::max(1.0, 100.0 * finding.saturated_share)), true});
   }
   const double needed = limits.min_corner_share * board.corner_count();
   const bool are_enough = static_cast<double>(finding.corners.size()) >= needed;
@@ -58,19 +58,21 @@ std::vector<ImageCheck> check_board_image(const BoardFinding& finding, const Boa
         {ImageProblem::cut_off,
          fmt::format("Board cut off at the {} edge of the image, {} of {} corners visible{}", edges,
                      finding.corners.size(), board.corner_count(), are_enough ? ": enough." : ". Move it into view."),
-         false, are_enough});
+         "board partly outside the image, at the " + edges + " edge", false, are_enough});
   }
   if (finding.square_px < limits.min_square_px) {
     checks.push_back(
         {ImageProblem::too_small,
          fmt::format("Board too small or too flat in the image: squares are {:.0f} px, {:.0f} needed. Move or "
                      "tilt it.",
-                     finding.square_px, limits.min_square_px)});
+                     finding.square_px, limits.min_square_px),
+         fmt::format("board small or flat in the image, squares of {:.0f} px", finding.square_px)});
   }
   if (edges.empty() && !are_enough) {
-    checks.push_back(
-        {ImageProblem::hidden, fmt::format("Only {} of {} corners visible. Uncover the board, and check its light.",
-                                           finding.corners.size(), board.corner_count())});
+    checks.push_back({ImageProblem::hidden,
+                      fmt::format("Only {} of {} corners visible. Uncover the board, and check its light.",
+                                  finding.corners.size(), board.corner_count()),
+                      fmt::format("{} of {} corners visible", finding.corners.size(), board.corner_count())});
   }
   return checks;
 }

@@ -20,6 +20,7 @@ enum class ImageProblem { blurred, glare, cut_off, too_small, hidden };
 struct ImageCheck {
   ImageProblem problem = ImageProblem::blurred;
   std::string message;          ///< for the operator: one sentence, what happened and what to do
+  std::string remark;           ///< for a report on an image that is used all the same: what happened
   bool spoils_corners = false;  ///< they are not where the board's are
   bool is_minor = false;        ///< said, but the image is good
 };

@@ -25,6 +25,9 @@ CrossValidation compare(const CalibrationInput& input, const CalibrationSolution
   CrossValidation found;
   found.difference = kMicrometres * rms_per_point(field);
   found.max = kMicrometres * max_per_point(field);
+  for (std::size_t i = 0; i < grid.size(); ++i) {
+    found.shifts.push_back({grid[i], kMicrometres * field.segment<3>(3 * static_cast<Eigen::Index>(i))});
+  }
   double variance = 0.0;
   for (const CalibrationSolution* part : {&a, &b}) {
     const Eigen::MatrixXd response = volume_response(input, part->start.unknowns, part->linear, grid);

@@ -15,11 +15,18 @@ namespace scanrig {
 enum class CalibrationGrade { a, b, c, refused };
 std::string_view to_string(CalibrationGrade grade);  ///< "A", "B", "C", "refused"
 
+/// What B alone makes of a point that A alone sees, micrometres.
+struct PointShift {
+  Eigen::Vector3d point;  ///< turntable frame, mm
+  Eigen::Vector3d shift_um;
+};
+
 /// Calibration A alone against B alone, over the volume, micrometres; scale and base taken off.
 struct CrossValidation {
   double difference = 0.0;  ///< rms
   double max = 0.0;
   double expected = 0.0;  ///< rms, from both covariances
+  std::vector<PointShift> shifts;
   [[nodiscard]] double ratio() const { return expected > 0.0 ? difference / expected : 0.0; }
 };
 

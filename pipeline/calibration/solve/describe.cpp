@@ -66,6 +66,41 @@ void describe_table(const CalibrationInput& input, const CalibrationSolution& so
   table.is_height_known = solution.start.is_height_known;
 }
 
+Eigen::Vector2d mean_of(const std::vector<CornerResidual>& residuals) {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (const CornerResidual& residual : residuals) sum += residual.miss;
+  return sum / std::max<double>(1.0, static_cast<double>(residuals.size()));
+}
+
+/// The figures of one image.
+ImageFit fit_of(const BoardSight& sight, std::vector<CornerResidual> residuals) {
+  ImageFit fit;
+  fit.corners = static_cast<int>(residuals.size());
+  fit.mean_px = mean_of(residuals);
+  std::vector<double> sizes, blur;
+  for (const CornerResidual& residual : residuals) sizes.push_back(residual.miss.norm());
+  for (const CornerObservation& corner : sight.corners) blur.push_back(corner.blur_px);
+  if (!sizes.empty()) {
+    fit.rms_px = root_mean_square(sizes);
+    fit.median_px = quantile(sizes, 0.5);
+    fit.blur_px = quantile(blur, 0.5);
+  }
+  fit.residuals = std::move(residuals);
+  return fit;
+}
+
+/// Where the board of each pair stood when its images were taken.
+std::vector<Transform> turned_boards(const CalibrationInput& input, const StartingPoint& solved) {
+  std::vector<Transform> boards;
+  for (std::size_t k = 0; k < input.pairs.size(); ++k) {
+    const auto& m = solved.unknowns.motions[k];
+    const auto placement = static_cast<std::size_t>(solved.setup.placement_of_pair[k]);
+    const Transform motion = small_motion({m[1], 0.0, m[2]}, {m[3], m[4], m[5]}) * rot_y(m[0]);
+    boards.push_back(motion * to_transform(solved.unknowns.placements[placement]));
+  }
+  return boards;
+}
+
 }  // namespace
 
 void describe_images(const CalibrationInput& input, const CalibrationSolution& solution,
@@ -76,46 +111,30 @@ void describe_images(const CalibrationInput& input, const CalibrationSolution& s
   BundleSetup setup = solution.start.setup;
   setup.sightings = collect_sightings(input, all, {});
   const auto residuals = misses(setup, solution.start.unknowns);
-  std::vector<std::vector<Eigen::Vector2d>> by_image(input.pairs.size() * count);
-  std::map<std::pair<int, int>, std::vector<Eigen::Vector2d>> by_placement;
+  std::vector<std::vector<CornerResidual>> by_image(input.pairs.size() * count);
+  std::map<std::pair<int, int>, std::vector<CornerResidual>> by_placement;
   std::vector<double> lengths;
   for (std::size_t i = 0; i < residuals.size(); ++i) {
-    const auto pair = static_cast<std::size_t>(setup.sightings[i].pair);
-    const auto camera = static_cast<std::size_t>(setup.sightings[i].camera);
-    by_image[pair * count + camera].push_back(residuals[i]);
+    const Sighting& sighting = setup.sightings[i];
+    const auto pair = static_cast<std::size_t>(sighting.pair);
+    const auto camera = static_cast<std::size_t>(sighting.camera);
+    const CornerResidual residual{sighting.point, sighting.pixel, residuals[i]};
+    by_image[pair * count + camera].push_back(residual);
     if (!solution.used[pair][camera]) continue;
-    by_placement[{input.pairs[pair].placement, setup.sightings[i].camera}].push_back(residuals[i]);
+    by_placement[{input.pairs[pair].placement, sighting.camera}].push_back(residual);
     lengths.push_back(residuals[i].norm());
   }
   out.median_px = quantile(lengths, 0.5);
-  const auto mean_of = [](const std::vector<Eigen::Vector2d>& values) {
-    Eigen::Vector2d sum = Eigen::Vector2d::Zero();
-    for (const auto& value : values) sum += value;
-    return Eigen::Vector2d(sum / std::max<double>(1.0, static_cast<double>(values.size())));
-  };
   out.images.clear();
   for (std::size_t k = 0; k < input.pairs.size(); ++k) {
     for (std::size_t c = 0; c < count; ++c) {
-      const auto& values = by_image[k * count + c];
-      ImageFit fit;
+      ImageFit fit = fit_of(c == 0 ? input.pairs[k].left : input.pairs[k].right, std::move(by_image[k * count + c]));
       fit.name = input.pairs[k].name;
       fit.placement = input.pairs[k].placement;
       fit.camera = static_cast<int>(c);
-      fit.corners = static_cast<int>(values.size());
       fit.is_used = solution.used[k][c];
       if (!fit.is_used) fit.left_out_because = reasons[k][c];
-      fit.mean_px = mean_of(values);
-      std::vector<double> sizes, blur;
-      for (const auto& value : values) sizes.push_back(value.norm());
-      for (const auto& corner : (c == 0 ? input.pairs[k].left : input.pairs[k].right).corners) {
-        blur.push_back(corner.blur_px);
-      }
-      if (!sizes.empty()) {
-        fit.rms_px = root_mean_square(sizes);
-        fit.median_px = quantile(sizes, 0.5);
-        fit.blur_px = quantile(blur, 0.5);
-      }
-      out.images.push_back(fit);
+      out.images.push_back(std::move(fit));
     }
   }
   out.placements.clear();
@@ -141,6 +160,7 @@ Result<void> describe_solution(const CalibrationInput& input, CalibrationSolutio
   out.calibration.table_radius_mm = input.table_radius_mm;
   out.calibration.date = input.date;
   describe_board(u, solution, out.board);
+  out.turntable_from_board = turned_boards(input, solution.start);
   const std::vector<int> columns = camera_columns(solution.linear, input.cameras);
   Eigen::MatrixXd units = Eigen::MatrixXd::Zero(solution.linear.columns, static_cast<Eigen::Index>(columns.size()));
   for (std::size_t i = 0; i < columns.size(); ++i) units(columns[i], static_cast<Eigen::Index>(i)) = 1.0;
@@ -152,7 +172,10 @@ Result<void> describe_solution(const CalibrationInput& input, CalibrationSolutio
   if (input.cameras < 2) return {};
   const std::vector<Eigen::Vector3d> grid = volume_grid(out.calibration);
   const Eigen::MatrixXd response = volume_response(input, u, solution.linear, grid);
-  out.sigma = VolumeParts(grid).sigma(solution.normal.half_solve(response));
+  const VolumeParts parts(grid);
+  const Eigen::MatrixXd spread = solution.normal.half_solve(response);
+  out.sigma = parts.sigma(spread);
+  out.sigma_at = parts.sigma_at(spread);
   return {};
 }
 

@@ -22,6 +22,19 @@ struct VolumeSigma {
   double max = 0.0;      ///< the greatest of the grid, likewise without scale and base
 };
 
+/// The same at one point of the volume.
+struct PointSigma {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< mm
+  double axis = 0.0, strain = 0.0, azimuth = 0.0, scale = 0.0, base = 0.0, volume = 0.0;
+};
+
+/// What the solution leaves of one corner of one image.
+struct CornerResidual {
+  int id = 0;             ///< as in Board::corner()
+  Eigen::Vector2d pixel;  ///< as measured
+  Eigen::Vector2d miss;   ///< pixel minus model
+};
+
 /// How one image fits the solution.
 struct ImageFit {
   std::string name;  ///< of its pair
@@ -32,8 +45,9 @@ struct ImageFit {
   std::string left_out_because;                       ///< empty when used
   Eigen::Vector2d mean_px = Eigen::Vector2d::Zero();  ///< pixel minus model
   double rms_px = 0.0;
-  double median_px = 0.0;  ///< of the residuals' lengths
-  double blur_px = 0.0;    ///< median over the corners
+  double median_px = 0.0;                 ///< of the residuals' lengths
+  double blur_px = 0.0;                   ///< median over the corners
+  std::vector<CornerResidual> residuals;  ///< of each corner, ascending id; also of an image that is left out
 };
 
 /// Mean residual of all images of one placement and camera; sees what the rms cannot.
@@ -67,9 +81,11 @@ struct SolvedCalibration {
   double median_px = 0.0;       ///< median length of the residuals of used images
   std::vector<ImageFit> images;
   std::vector<PlacementFit> placements;
+  std::vector<Transform> turntable_from_board;  ///< per pair, as the table had turned it then
   SolvedBoard board;
   SolvedTable table;
   std::optional<VolumeSigma> sigma;  ///< none: one camera, or no table
+  std::vector<PointSigma> sigma_at;  ///< of each point of the grid that `sigma` is over
   /// Covariance of the cameras' unknowns: per camera fx, fy / fx, cx, cy, k1 k2 p1 p2 k3 (9), pose (turn and shift of
   /// the table in the camera frame, rad and mm; 6), lens field (du, dv; 84 if it has one).
   Eigen::MatrixXd camera_covariance;

@@ -115,33 +115,59 @@ Eigen::MatrixXd volume_response(const CalibrationInput& input, const Unknowns& u
 }
 
 VolumeParts::VolumeParts(const std::vector<Eigen::Vector3d>& grid)
-    : modes_(3 * static_cast<Eigen::Index>(grid.size()), 7) {
+    : grid_(grid), modes_(3 * static_cast<Eigen::Index>(grid.size()), 7) {
   for (std::size_t i = 0; i < grid.size(); ++i) {
     modes_.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = modes_at(grid[i]).transpose();
   }
   fitted_ = (modes_.transpose() * modes_).ldlt().solve(modes_.transpose());
 }
 
-VolumeSigma VolumeParts::sigma(const Eigen::MatrixXd& half) const {
+VolumeParts::Split VolumeParts::split(const Eigen::MatrixXd& half) const {
   const Eigen::MatrixXd fits = half * fitted_.transpose();  // one column per mode
-  const auto rms = [](const Eigen::MatrixXd& part) {
-    return kMicrometres * std::sqrt(part.squaredNorm() / (static_cast<double>(part.cols()) / 3.0));
-  };
   const auto part = [&](int first, int count) -> Eigen::MatrixXd {
     return fits.middleCols(first, count) * modes_.middleCols(first, count).transpose();
   };
-  VolumeSigma sigma;
-  sigma.axis = rms(part(0, 4));
-  sigma.azimuth = rms(part(4, 1));
-  sigma.scale = rms(part(5, 1));
-  sigma.base = rms(part(6, 1));
-  sigma.strain = rms(half - part(0, 7));
-  const Eigen::MatrixXd rest = half - part(5, 2);
-  sigma.volume = rms(rest);
-  for (Eigen::Index i = 0; i + 2 < rest.cols(); i += 3) {
-    sigma.max = std::max(sigma.max, kMicrometres * rest.middleCols<3>(i).norm());
+  return {.axis = part(0, 4),
+          .azimuth = part(4, 1),
+          .scale = part(5, 1),
+          .base = part(6, 1),
+          .strain = half - part(0, 7),
+          .volume = half - part(5, 2)};
+}
+
+VolumeSigma VolumeParts::sigma(const Eigen::MatrixXd& half) const {
+  const auto rms = [](const Eigen::MatrixXd& part) {
+    return kMicrometres * std::sqrt(part.squaredNorm() / (static_cast<double>(part.cols()) / 3.0));
+  };
+  const Split parts = split(half);
+  VolumeSigma sigma{.axis = rms(parts.axis),
+                    .strain = rms(parts.strain),
+                    .azimuth = rms(parts.azimuth),
+                    .scale = rms(parts.scale),
+                    .base = rms(parts.base),
+                    .volume = rms(parts.volume)};
+  for (Eigen::Index i = 0; i + 2 < parts.volume.cols(); i += 3) {
+    sigma.max = std::max(sigma.max, kMicrometres * parts.volume.middleCols<3>(i).norm());
   }
   return sigma;
+}
+
+std::vector<PointSigma> VolumeParts::sigma_at(const Eigen::MatrixXd& half) const {
+  const Split parts = split(half);
+  std::vector<PointSigma> found;
+  for (std::size_t i = 0; i < grid_.size(); ++i) {
+    const auto norm = [&](const Eigen::MatrixXd& part) {
+      return kMicrometres * part.middleCols<3>(3 * static_cast<Eigen::Index>(i)).norm();
+    };
+    found.push_back({.point = grid_[i],
+                     .axis = norm(parts.axis),
+                     .strain = norm(parts.strain),
+                     .azimuth = norm(parts.azimuth),
+                     .scale = norm(parts.scale),
+                     .base = norm(parts.base),
+                     .volume = norm(parts.volume)});
+  }
+  return found;
 }
 
 Eigen::VectorXd VolumeParts::coefficients(const Eigen::VectorXd& field) const { return fitted_ * field; }

@@ -26,11 +26,20 @@ class VolumeParts {
   explicit VolumeParts(const std::vector<Eigen::Vector3d>& grid);
   /// Rms and greatest sigma of the parts of fields whose covariance is half' half (three columns per point).
   [[nodiscard]] VolumeSigma sigma(const Eigen::MatrixXd& half) const;
+  /// The same at each point, in the grid's order.
+  [[nodiscard]] std::vector<PointSigma> sigma_at(const Eigen::MatrixXd& half) const;
   /// A field without its scale and base; three values per point.
   [[nodiscard]] Eigen::VectorXd without_scale_and_base(const Eigen::VectorXd& field) const;
   [[nodiscard]] Eigen::VectorXd coefficients(const Eigen::VectorXd& field) const;
 
  private:
+  /// A field's parts, each as long as the field.
+  struct Split {
+    Eigen::MatrixXd axis, azimuth, scale, base, strain, volume;
+  };
+  [[nodiscard]] Split split(const Eigen::MatrixXd& half) const;
+
+  std::vector<Eigen::Vector3d> grid_;
   Eigen::MatrixXd modes_;   ///< columns: shift x, z, tilt x, z; turn about y; scale; shift y
   Eigen::MatrixXd fitted_;  ///< their least-squares coefficients from a field
 };

@@ -4,6 +4,8 @@
 #include <cmath>
 
 #include "core/files.h"
+#include "core/hash.h"
+#include "daemon/ctl/verbs.h"
 #include "pipeline/calibrate/calibration_json.h"
 #include "pipeline/storage/calibration_file.h"
 #include "sim/apps/shoot_board.h"
@@ -114,6 +116,38 @@ TEST_F(CalibrateImages, OfSwappedCamerasIsRefusedWithWhatToDo) {
   EXPECT_THAT(text.error().message, HasSubstr("Left and right cameras swapped: exchange the serials."));
 }
 
+TEST_F(CalibrateImages, ByTheCommandLeaveAReportAlsoWhenRefused) {
+  auto wanted = series();
+  wanted.rig->swapped = 1.0;
+  wanted.placements = {1, 2, 3, 7};
+  wanted.angles = 3;
+  shoot(wanted);
+  const auto out = folder_ / "calibration.json", report = folder_ / "calibration.html";
+  ASSERT_TRUE(write_file_atomically(out, std::string_view("the one before")));
+  ASSERT_TRUE(write_file_atomically(report, std::string_view("its report")));
+  ctl::CalibrateFolderVerb verb;
+  verb.images = folder_;
+  verb.out = out;
+  EXPECT_EQ(ctl::calibrate_folder(verb), ExitCode::below_limits);
+  EXPECT_EQ(read_file(out).value_or(""), "the one before");
+  const std::string page = read_file(report).value_or("");
+  EXPECT_THAT(page, HasSubstr("<li>Left and right cameras swapped: exchange the serials.</li>"));
+  const std::string hash = sha256(std::string_view("the one before")).substr(0, 8);
+  const auto kept = folder_ / ("calibration." + hash + ".html");
+  EXPECT_EQ(read_file(kept).value_or(""), "its report");
+
+  // Again, under another name; then without one.
+  std::filesystem::remove(report);
+  verb.report = folder_ / "why.html";
+  EXPECT_EQ(ctl::calibrate_folder(verb), ExitCode::below_limits);
+  EXPECT_TRUE(std::filesystem::exists(verb.report));
+  verb.report.clear();
+  verb.with_report = false;
+  EXPECT_EQ(ctl::calibrate_folder(verb), ExitCode::below_limits);
+  EXPECT_FALSE(std::filesystem::exists(report));
+  EXPECT_EQ(read_file(kept).value_or(""), "its report");
+}
+
 TEST_F(CalibrateImages, OfAnotherBoardSaysSo) {
   auto wanted = series();
   wanted.placements = {3};
@@ -143,6 +177,11 @@ TEST_F(CalibrateImages, OfAnImageThatIsGoneLeavesItOutByName) {
   const auto remark = std::ranges::find_if(boards->remarks, [](const ImageRemark& r) { return r.is_left_out; });
   ASSERT_NE(remark, boards->remarks.end());
   EXPECT_EQ(remark->pair, images->pairs[1].name);
+  // What is used all the same has a remark, not an instruction.
+  for (const ImageRemark& other : boards->remarks) {
+    if (other.is_left_out) continue;
+    EXPECT_THAT(other.message, testing::Not(HasSubstr(". "))) << other.pair;
+  }
 }
 
 }  // namespace

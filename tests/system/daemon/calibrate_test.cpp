@@ -32,6 +32,9 @@ TEST_F(CalibrateRig, FromNothingToAScan) {
   ASSERT_EQ(scanrig({"calibrate", "--rig", "--socket", socket()}), 0) << output;
   EXPECT_THAT(output, HasSubstr("Calibration of grade "));
   EXPECT_FALSE(fs::exists(calibration())) << "not accepted yet";
+  const auto job = ask_until("jobs", [](const json& all) { return all["jobs"][0]["state"] == "done"; });
+  const auto report = read_file(folder_ / "jobs" / job["jobs"][0]["id"].get<std::string>() / "calibration.html");
+  EXPECT_THAT(report.value_or(""), HasSubstr("</html>"));
   ASSERT_EQ(scanrig({"calibrate", "--accept", "--socket", socket()}), 0) << output;
   const auto solved = read_calibration(calibration());
   ASSERT_TRUE(solved) << solved.error().message;

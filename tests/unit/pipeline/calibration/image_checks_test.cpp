@@ -32,6 +32,8 @@ void expect_only(const Situation& situation, ImageProblem problem, const std::st
   EXPECT_EQ(checks[0].problem, problem);
   EXPECT_NE(checks[0].message.find(words), std::string::npos) << checks[0].message;
   EXPECT_LE(checks[0].message.size(), 120u);
+  EXPECT_FALSE(checks[0].remark.empty());
+  EXPECT_EQ(checks[0].remark.find(". "), std::string::npos) << "a remark has no instruction: " << checks[0].remark;
 }
 
 TEST(ImageChecks, AGoodImageHasNoProblem) { EXPECT_TRUE(Situation{}.checks().empty()); }

@@ -21,6 +21,11 @@ TEST(JudgeCalibration, ACleanRigIsGradeAWithoutASentence) {
   ASSERT_TRUE(judged->judgement.cross_validation);
   EXPECT_LT(judged->judgement.cross_validation->ratio(), 1.5);
   EXPECT_GT(judged->judgement.cross_validation->difference, 0.2);
+  double sum = 0.0;
+  const auto& shifts = judged->judgement.cross_validation->shifts;
+  for (const PointShift& shift : shifts) sum += shift.shift_um.squaredNorm();
+  EXPECT_NEAR(std::sqrt(sum / static_cast<double>(shifts.size())), judged->judgement.cross_validation->difference,
+              1e-9);
   EXPECT_THAT(judged->judgement.sentences, IsEmpty());
 }
 

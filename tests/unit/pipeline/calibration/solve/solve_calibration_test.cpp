@@ -57,6 +57,62 @@ TEST(SolveCalibration, NeedsNoFocalLengthFromAnyone) {
   EXPECT_FALSE(find_focal_px(input.board, {}, input.width, input.height));
 }
 
+/// A corner of the print as solved, board frame.
+Eigen::Vector3d printed(const Board& order, const SolvedBoard& board, int id) {
+  const Eigen::Vector3d at = order.corner(id), edge = order.corner(order.corner_count() - 1);
+  const double x = at.x(), y = at.y(), u = x / edge.x(), v = y / edge.y();
+  const auto& offset = board.offsets_mm[static_cast<std::size_t>(id)];
+  return {board.scale * (x + 0.5 * (board.aspect * x + board.shear * y)) + offset[0],
+          board.scale * (y + 0.5 * (board.shear * x - board.aspect * y)) + offset[1],
+          board.warp_mm[0] * u * u + board.warp_mm[1] * u * v + board.warp_mm[2] * v * v + offset[2]};
+}
+
+TEST(SolveCalibration, KeepsEachResidualAndWhereEachBoardStood) {
+  SyntheticBoardRig rig(all_faults(), 115);
+  CalibrationInput input = rig.observe(3);
+  input.pairs[1].left.corners[5].pixel.x() += 4.0;
+  const auto solved = solve_calibration(input);
+  ASSERT_TRUE(solved) << solved.error().message;
+  ASSERT_EQ(solved->turntable_from_board.size(), input.pairs.size());
+  for (std::size_t k = 0; k < input.pairs.size(); ++k) {
+    for (std::size_t c = 0; c < 2; ++c) {
+      const ImageFit& image = solved->images[2 * k + c];
+      const auto& corners = (c == 0 ? input.pairs[k].left : input.pairs[k].right).corners;
+      const Camera& camera = c == 0 ? solved->calibration.left : solved->calibration.right;
+      ASSERT_EQ(image.residuals.size(), corners.size());
+      for (std::size_t i = 0; i < corners.size(); ++i) {
+        const CornerResidual& r = image.residuals[i];
+        ASSERT_EQ(r.id, corners[i].id);
+        ASSERT_EQ(r.pixel, corners[i].pixel);
+        const Eigen::Vector3d point = solved->turntable_from_board[k] * printed(input.board, solved->board, r.id);
+        // The solver has the lens field at the measured pixel, the camera at the modelled one.
+        ASSERT_LT((r.pixel - camera.project(point) - r.miss).norm(), 0.01) << k << " " << c << " " << r.id;
+      }
+    }
+  }
+  EXPECT_NEAR(solved->images[2].residuals[5].miss.x(), 4.0, 0.2);
+}
+
+TEST(SolveCalibration, SigmaOfTheVolumeIsTheRmsOverItsPoints) {
+  SyntheticBoardRig rig({}, 116);
+  const auto solved = solve_calibration(rig.observe(3));
+  ASSERT_TRUE(solved) << solved.error().message;
+  ASSERT_GT(solved->sigma_at.size(), 100u);
+  double volume = 0.0, axis = 0.0, base = 0.0, greatest = 0.0;
+  for (const PointSigma& p : solved->sigma_at) {
+    volume += p.volume * p.volume;
+    axis += p.axis * p.axis;
+    base += p.base * p.base;
+    greatest = std::max(greatest, p.volume);
+    EXPECT_LE(std::hypot(p.point.x(), p.point.z()), 55.0 + 1e-9);
+  }
+  const auto count = static_cast<double>(solved->sigma_at.size());
+  EXPECT_NEAR(std::sqrt(volume / count), solved->sigma->volume, 1e-9);
+  EXPECT_NEAR(std::sqrt(axis / count), solved->sigma->axis, 1e-9);
+  EXPECT_NEAR(std::sqrt(base / count), solved->sigma->base, 1e-9);
+  EXPECT_NEAR(greatest, solved->sigma->max, 1e-9);
+}
+
 TEST(SolveCalibration, PredictsItsError) {
   double actual = 0.0, predicted = 0.0;
   for (unsigned seed = 1; seed <= 12; ++seed) {
