@@ -16,7 +16,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-enum Purpose : std::uint8_t { print = 40, place, knock, focus, blurred, slip, sampling, exposure };
+enum Purpose : std::uint8_t { print = 40, place, knock, focus, blurred, slip, sampling, exposure, cold, cut_off };
 
 bool can_be_made(const BoardLayout& b) {
   const bool markers = b.marker_mm > 0.0;
@@ -114,18 +114,36 @@ void CalibrationSeries::plan_hand_held() {
 }
 
 void CalibrationSeries::add_faults() {
+  change_cameras();
+  const SeriesFaults& f = options_.faults;
+  const auto bits = [&](int n) { return mix(options_.seed, blurred, n); };
+  for (int i = 0; i < static_cast<int>(f.blurred); ++i) {
+    SeriesPair& pair = pairs_[bits(2 * i) % pairs_.size()];
+    (bits(2 * i + 1) % 2 == 0 ? pair.left_blur_px : pair.right_blur_px) = 2.5;
+  }
+  move_boards();
+}
+
+void CalibrationSeries::change_cameras() {
   const SeriesFaults& f = options_.faults;
   const auto bits = [&](int purpose, int n) { return mix(options_.seed, purpose, n); };
   const auto eye_of = [](SeriesPair& pair, bool left) -> Eye& { return left ? pair.rig.left : pair.rig.right; };
+  const auto turn = [&](Eye& eye, double px, double way) {
+    const double angle = px * options_.image_scale / eye.fx;
+    eye.eye_from_turntable =
+        small_motion(angle * Vector3d(std::sin(way), std::cos(way), 0.0), Vector3d::Zero()) * eye.eye_from_turntable;
+  };
   const int knocked_after = placement_before(pairs_, bits(knock, 0)),
             focused_after = placement_before(pairs_, bits(focus, 0));
-  const double way = 2.0 * M_PI * uniform(bits(knock, 1));
-  for (auto& pair : pairs_) {
+  const double knocked_way = 2.0 * M_PI * uniform(bits(knock, 1)), cold_way = 2.0 * M_PI * uniform(bits(cold, 1));
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    SeriesPair& pair = pairs_[i];
     if (f.knock_px != 0.0 && pair.placement > knocked_after) {
-      Eye& eye = eye_of(pair, bits(knock, 2) % 2 == 0);
-      const double turn = f.knock_px * options_.image_scale / eye.fx;
-      eye.eye_from_turntable =
-          small_motion(turn * Vector3d(std::sin(way), std::cos(way), 0.0), Vector3d::Zero()) * eye.eye_from_turntable;
+      turn(eye_of(pair, bits(knock, 2) % 2 == 0), f.knock_px, knocked_way);
+    }
+    if (f.cold_px != 0.0) {
+      const double progress = static_cast<double>(i) / static_cast<double>(pairs_.size() - 1);
+      turn(eye_of(pair, bits(cold, 2) % 2 == 0), progress * f.cold_px, cold_way);
     }
     if (f.focus != 0.0 && pair.placement > focused_after) {
       const bool left = bits(focus, 1) % 2 == 0;
@@ -134,18 +152,24 @@ void CalibrationSeries::add_faults() {
       (left ? pair.left_blur_px : pair.right_blur_px) = 0.6;
     }
   }
-  for (int i = 0; i < static_cast<int>(f.blurred); ++i) {
-    SeriesPair& pair = pairs_[bits(blurred, 2 * i) % pairs_.size()];
-    (bits(blurred, 2 * i + 1) % 2 == 0 ? pair.left_blur_px : pair.right_blur_px) = 2.5;
-  }
-  if (f.slip_mm == 0.0) return;
-  const int slipped = pairs_[bits(slip, 0) % pairs_.size()].placement;
-  const double direction = 2.0 * M_PI * uniform(bits(slip, 1));
-  const Transform slid(Eigen::Translation3d(f.slip_mm * std::sin(direction), 0.0, f.slip_mm * std::cos(direction)));
-  for (std::size_t i = 0; i < pairs_.size(); ++i) {
-    if (pairs_[i].placement != slipped || pairs_[i].image <= (options_.angles + 1) / 2) continue;
-    placed_[i].table_from_board = slid * placed_[i].table_from_board;
+}
+
+void CalibrationSeries::move_boards() {
+  const SeriesFaults& f = options_.faults;
+  const auto move = [&](std::size_t i, const Vector3d& shift) {
+    placed_[i].table_from_board = Transform(Eigen::Translation3d(shift)) * placed_[i].table_from_board;
     pairs_[i].table_from_board = rig_.table.axis_from_top * placed_[i].table_from_board;
+  };
+  const auto one_of = [&](int purpose) { return pairs_[mix(options_.seed, purpose, 0) % pairs_.size()].placement; };
+  const int slipped = one_of(slip), aside = one_of(cut_off);
+  const double direction = 2.0 * M_PI * uniform(mix(options_.seed, slip, 1));
+  for (std::size_t i = 0; i < pairs_.size(); ++i) {
+    if (f.slip_mm != 0.0 && pairs_[i].placement == slipped && pairs_[i].image > (options_.angles + 1) / 2) {
+      move(i, f.slip_mm * Vector3d(std::sin(direction), 0.0, std::cos(direction)));
+    }
+    if (f.cut_off_mm != 0.0 && pairs_[i].placement == aside) {
+      move(i, f.cut_off_mm * placed_[i].table_from_board.linear().col(0));
+    }
   }
 }
 

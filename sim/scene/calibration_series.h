@@ -15,15 +15,19 @@ namespace scanrig::sim {
 struct SeriesFaults {
   double knock_px = 0.0;  ///< one camera is turned so that its image shifts that much, after placement 2 to 5
   double focus = 0.0;  ///< one camera's focus is changed after placement 2 to 5: share by which its focal length grows
-  double blurred = 0.0;  ///< number of images out of focus by 2.5 px
-  double slip_mm = 0.0;  ///< the board of one placement slides that far half-way through it
+  double blurred = 0.0;     ///< number of images out of focus by 2.5 px
+  double slip_mm = 0.0;     ///< the board of one placement slides that far half-way through it
+  double cold_px = 0.0;     ///< one camera turns all the time, so that its image shifts that much in the end
+  double cut_off_mm = 0.0;  ///< the board of one placement is put that far to the side
 };
 
-inline constexpr std::array<NamedValue<SeriesFaults>, 4> kSeriesFaultNames = {{
+inline constexpr std::array<NamedValue<SeriesFaults>, 6> kSeriesFaultNames = {{
     {"knock", &SeriesFaults::knock_px},
     {"focus", &SeriesFaults::focus},
     {"blurred", &SeriesFaults::blurred},
     {"slip", &SeriesFaults::slip_mm},
+    {"cold", &SeriesFaults::cold_px},
+    {"cut-off", &SeriesFaults::cut_off_mm},
 }};
 
 struct SeriesOptions {
@@ -79,6 +83,8 @@ class CalibrationSeries {
   void plan_placements();
   void plan_hand_held();
   void add_faults();
+  void change_cameras();
+  void move_boards();
 
   SeriesOptions options_;
   DrawnRig rig_;

@@ -1,54 +1,19 @@
 // A rendered series of a rig drawn at random becomes a calibration; only the test knows the truth.
 #include <gmock/gmock.h>
 
-#include <cmath>
-
 #include "core/files.h"
 #include "core/hash.h"
 #include "daemon/ctl/verbs.h"
 #include "pipeline/calibrate/calibration_json.h"
 #include "pipeline/storage/calibration_file.h"
 #include "sim/apps/shoot_board.h"
+#include "tests/calibration_error.h"
 #include "tests/own_folder.h"
 
 namespace scanrig {
 namespace {
 
 using testing::HasSubstr;
-
-/// Where the lines of sight of both pixels are nearest to each other.
-Eigen::Vector3d triangulated(const Calibration& calibration, const Eigen::Vector2d& left,
-                             const Eigen::Vector2d& right) {
-  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const auto& [camera, pixel] : {std::pair(&calibration.left, left), std::pair(&calibration.right, right)}) {
-    const Transform table_from_camera = camera->camera_from_turntable.inverse();
-    const Eigen::Vector3d along = (table_from_camera.linear() * camera->ray(pixel)).normalized();
-    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - along * along.transpose();
-    normal += across;
-    sum += across * table_from_camera.translation();
-  }
-  return normal.ldlt().solve(sum);
-}
-
-/// Of points of the working volume as the true cameras see them, base (the height's zero) taken off; mm.
-double volume_error_mm(const Calibration& calibration, const sim::RigGeometry& truth) {
-  std::vector<Eigen::Vector3d> errors;
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const double height : {5.0, 60.0, 110.0}) {
-    for (const double radius : {0.0, 30.0, 55.0}) {
-      for (int step = 0; step < 8; ++step) {
-        const Eigen::Vector3d p(radius * std::cos(step * M_PI / 4), height, radius * std::sin(step * M_PI / 4));
-        errors.push_back(triangulated(calibration, truth.left.project(p), truth.right.project(p)) - p);
-        mean += errors.back();
-      }
-    }
-  }
-  mean /= static_cast<double>(errors.size());
-  double squares = 0.0;
-  for (const auto& error : errors) squares += (error - Eigen::Vector3d(0.0, mean.y(), 0.0)).squaredNorm();
-  return std::sqrt(squares / static_cast<double>(errors.size()));
-}
 
 class CalibrateImages : public testing::Test {
  protected:
@@ -88,7 +53,7 @@ TEST_F(CalibrateImages, OfADrawnRigMeasuresItsWorkingVolumeAndIsReadBack) {
   ASSERT_TRUE(outcome) << outcome.error().message;
   const auto& judged = outcome->judged;
   EXPECT_LT(judged.judgement.graded_um, 15.0);
-  EXPECT_LT(volume_error_mm(judged.solved.calibration, truth_), 0.015);
+  EXPECT_LT(calibration_error(judged.solved.calibration, truth_).rms_um, 15.0);
   EXPECT_GT(judged.solved.table.dots.size(), 20u);
 
   const auto text = calibration_json(*outcome, {.date = "2026-11-25T03:00:00Z"});
