@@ -5,6 +5,7 @@
 
 #include "core/transform.h"
 #include "pipeline/calibration/camera.h"
+#include "pipeline/range/row_offsets.h"
 #include "pipeline/silhouette/silhouette.h"
 
 namespace scanrig {
@@ -18,6 +19,7 @@ struct RangeImage {
   cv::Mat3f normal;  ///< unit, camera frame, towards the camera (z < 0); NaN where depth is
   /// 255 where a NaN pixel shows background (free space all along its ray); empty: background unknown.
   cv::Mat1b background;
+  RowOffsets row_offsets = {};  ///< of the stereo pair; empty for imported range scans
 };
 
 /// One table angle of one pose, for registration and volume.

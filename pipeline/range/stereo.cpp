@@ -57,6 +57,7 @@ RangeImage to_range(const RectifiedPair& pair, const DenseDisparity& disparity) 
                    cv::Mat1f(size, kNaN),
                    cv::Mat1f(size, kNaN),
                    cv::Mat3f(size, cv::Vec3f(kNaN, kNaN, kNaN)),
+                   {},
                    {}};
   const double strength = p.fx * pair.baseline_mm;
   parallel_for(static_cast<std::size_t>(size.height), [&](std::size_t row) {
@@ -101,6 +102,7 @@ Result<RangeImage> match_rectified(const RectifiedPair& pair, const StereoOption
   if (cv::countNonZero(range.depth == range.depth) == 0) {
     return fail(ErrorCode::degenerate, "range: no stereo matches; check the projector and the calibration");
   }
+  range.row_offsets = find_row_offsets(pair, disparity->value, disparity->sigma);
   context.report("range", 1.0);
   return range;
 }
