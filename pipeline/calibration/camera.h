@@ -67,6 +67,7 @@ struct CalibrationQuality {
   Eigen::MatrixXd cameras;
   std::vector<Eigen::Vector3d> rim_dots;  ///< in the turntable frame at table angle 0; empty: none
   double rim_dot_diameter_mm = 0.0;
+  double gear = 1.0;                ///< turned angle over reported angle of the table
   std::optional<BoardPrint> board;  ///< of the board it was made with; none: not in its file
 };
 

@@ -106,10 +106,16 @@ CalibrationQuality read_quality(JsonObject& root) {
     }
     dots.close();
   }
+  if (root.has("table")) {
+    JsonObject table = root.object("table");
+    quality.gear = table.number("gear", -10.0, 10.0);
+    for (const char* key : {"angle_error_deg", "axis_from_square_deg"}) table.ignore(key);
+    table.close();
+  }
   if (root.has("board")) quality.board = read_board_print(root.object("board"));
   // What people and later calibrations read.
-  for (const char* key : {"noise_px", "images", "cross_validation", "table", "temperature_c", "sources", "previous",
-                          "sentences", "drift"}) {
+  for (const char* key :
+       {"noise_px", "images", "cross_validation", "temperature_c", "sources", "previous", "sentences", "drift"}) {
     root.ignore(key);
   }
   return quality;
