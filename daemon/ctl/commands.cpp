@@ -279,6 +279,9 @@ void add_reconstruct(CLI::App& app, Chosen& chosen) {
       ->check(CLI::IsMember({"evidence", "paper"}));
   sub->add_option("--rests", verb->options.rests, "how rests are found")->check(CLI::IsMember({"hull", "egi"}));
   sub->add_flag("!--no-texture", verb->options.texture, "shape only");
+  sub->add_option("--watch", verb->options.watch,
+                  "what to do when the rig has moved since its calibration: refine (or refuse), report, off")
+      ->check(CLI::IsMember({"refine", "report", "off"}));
   auto* json = sub->add_flag("--json", verb->json, "print JSON");
   sub->add_flag("--lines", verb->lines, "tell the progress in lines for a program")->excludes(json);
   sub->callback([&chosen, verb] { chosen = [verb] { return reconstruct(*verb); }; });

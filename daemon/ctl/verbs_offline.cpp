@@ -23,6 +23,10 @@ Result<void> make_model(const ScanFolder& scan, const ReconstructVerb& verb, con
                         const std::filesystem::path& out) {
   const auto model = scanrig::reconstruct(scan, verb.options, context);
   if (!model) return pass_on(model);
+  for (const auto& pose : model->report->at("poses")) {
+    if (!pose["watch"].is_object() || verb.lines) continue;
+    for (const auto& sentence : pose["watch"]["sentences"]) fmt::print(stderr, "{}\n", sentence.get<std::string>());
+  }
   return write_model(*model, out);
 }
 

@@ -52,8 +52,7 @@ float value_at(const cv::Mat1f& coefficients, float u, float v) {
   float value = 0.0F;
   for (int j = 0; j < 4; ++j) {
     const float* c = coefficients[row + j - 1] + column - 1;
-    value +=
-        down.w[j] * (across.w[0] * c[0] + across.w[1] * c[1] + across.w[2] * c[2] + across.w[3] * c[3]);
+    value += down.w[j] * (across.w[0] * c[0] + across.w[1] * c[1] + across.w[2] * c[2] + across.w[3] * c[3]);
   }
   return value;
 }
@@ -101,8 +100,8 @@ std::optional<std::pair<double, double>> row_shift(const cv::Mat1f& right, const
     Eigen::Vector4d sum = Eigen::Vector4d::Zero();
     double all = 0.0;
     for (const Pixel& p : pixels) {
-      const double value = double(value_at(right, p.u + static_cast<float>(along),
-                                           static_cast<float>(p.v) + static_cast<float>(across)));
+      const double value = double(
+          value_at(right, p.u + static_cast<float>(along), static_cast<float>(p.v) + static_cast<float>(across)));
       sum += row_of(p) * value;
       all += value * value;
     }
@@ -154,7 +153,8 @@ Terms terms_at(double u, double v, cv::Size image) {
 
 /// The field by iterated weights (Cauchy's at two sigma of what it leaves); `scale` becomes the ratio of the scatter to
 /// the samples' own sigmas, `covariance` the field's.
-Terms fit_field(const std::vector<Sample>& samples, cv::Size image, double& scale, Eigen::Matrix<double, 6, 6>& normal) {
+Terms fit_field(const std::vector<Sample>& samples, cv::Size image, double& scale,
+                Eigen::Matrix<double, 6, 6>& normal) {
   // The bend is known before to be below half a pixel: a small object cannot measure it.
   const Terms prior = (Terms() << 1e-4, 1.0, 1.0, 4.0, 4.0, 4.0).finished();
   Terms field = Terms::Zero();

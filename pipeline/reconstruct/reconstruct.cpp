@@ -11,6 +11,7 @@
 #include "pipeline/range/rectification.h"
 #include "pipeline/range/view_builder.h"
 #include "pipeline/reconstruct/report.h"
+#include "pipeline/reconstruct/rig_watch.h"
 #include "pipeline/reconstruct/stage_log.h"
 #include "pipeline/reconstruct/voxel_size.h"
 #include "pipeline/registration/refine_pose.h"
@@ -33,7 +34,8 @@ struct PlainPair {
 
 struct PoseState {
   std::vector<View> views;
-  std::vector<PlainPair> plain;  ///< one per view; empty for range scans and grey sensors
+  std::vector<PlainPair> plain;   ///< one per view; empty for range scans and grey sensors
+  std::optional<RigWatch> watch;  ///< none: range scans, or switched off
   RegistrationReport registration;
   Surface partial;
   bool finished = false;
@@ -68,6 +70,8 @@ struct Reconstruction::State {
 
   Result<PoseState*> open_pose(std::size_t pose);
   Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context);
+  Result<void> watch_view(PoseState& pose, const ViewImages& images);
+  Result<void> judge_rig(PoseState& pose, const Context& context);
   Result<void> finish_pose(std::size_t pose, const Context& context);
   Result<Transform> find_pose(Report& report, const Context& context);
   Result<Surface> surface(const Transform& pose1_from_pose2, const Context& context);
@@ -98,10 +102,31 @@ Result<void> Reconstruction::State::add_view(std::size_t pose, const ViewImages&
   auto view = make_view(*rectification, stereo, images.angle_rad, images.index, {}, context);
   if (!view) return pass_on(view, fmt::format("pose {} view {}", pose + 1, images.index));
   (*open)->views.push_back(std::move(*view));
+  if (auto done = watch_view(**open, images); !done) return done;
   if (images.left_plain.channels() == 3) {
     (*open)->plain.push_back({images.left_plain, images.right_plain});
   }
   return {};
+}
+
+Result<void> Reconstruction::State::watch_view(PoseState& pose, const ViewImages& images) {
+  const auto mode = watch_mode_of(options.watch);
+  if (!mode) return pass_on(mode);
+  if (*mode == WatchMode::off) return {};
+  const StageLog::Timer timer(log, "watch");
+  if (!pose.watch) pose.watch.emplace(*calibration, *rectification);
+  pose.watch->add(images, pose.views.back());
+  return {};
+}
+
+/// The views are matched already. Cameras that moved by less than refuse them leave the matches as they are, so the
+/// lines of sight are intersected anew.
+Result<void> Reconstruction::State::judge_rig(PoseState& pose, const Context& context) {
+  if (!pose.watch) return {};
+  const StageLog::Timer timer(log, "watch");
+  context.report("watch", 0.0);
+  const auto mode = watch_mode_of(options.watch);
+  return mode ? pose.watch->judge(pose.views, *mode) : Result<void>(pass_on(mode));
 }
 
 Result<void> Reconstruction::State::finish_pose(std::size_t pose, const Context& context) {
@@ -109,13 +134,15 @@ Result<void> Reconstruction::State::finish_pose(std::size_t pose, const Context&
   if (!open) return pass_on(open);
   PoseState& state = **open;
   if (state.views.empty()) return fail(ErrorCode::invalid_input, "pose {} has no views", pose + 1);
+  if (auto done = judge_rig(state, context); !done) return pass_on(done, fmt::format("pose {}", pose + 1));
   {
     const StageLog::Timer timer(log, "registration");
     context.report("registration", 0.0);
-    const auto registration = calibration ? RegistrationOptions{} : RegistrationOptions::imported();
+    const auto registration = calibration ? registration_options(*calibration) : RegistrationOptions::imported();
     auto report = register_views(state.views, registration, context);
     if (!report) return pass_on(report, fmt::format("pose {}", pose + 1));
     state.registration = std::move(*report);
+    if (state.watch) state.watch->add_overlap(state.registration);
   }
   const StageLog::Timer timer(log, "partial model");
   const PosedViews posed{.views = state.views};
@@ -159,11 +186,13 @@ std::vector<Photo> Reconstruction::State::photos(const Transform& pose1_from_pos
     const Transform pose_from_model = p == 0 ? Transform::Identity() : pose1_from_pose2.inverse();
     for (std::size_t v = 0; v < poses[p].plain.size(); ++v) {
       // The registration of the view's range image holds for its photographs too.
-      const Transform turntable_from_pose =
-          rectification->left_from_turntable.inverse() * poses[p].views[v].range.camera_from_pose;
+      const Transform left_from_turntable =
+          poses[p].watch ? poses[p].watch->left_from_turntable() : rectification->left_from_turntable;
+      const Transform turntable_from_pose = left_from_turntable.inverse() * poses[p].views[v].range.camera_from_pose;
       const Transform turntable_from_model = turntable_from_pose * pose_from_model;
-      photos.push_back({calibration->left, turntable_from_model, poses[p].plain[v].left});
-      photos.push_back({calibration->right, turntable_from_model, poses[p].plain[v].right});
+      const Calibration& cameras = poses[p].watch ? poses[p].watch->calibration() : *calibration;
+      photos.push_back({cameras.left, turntable_from_model, poses[p].plain[v].left});
+      photos.push_back({cameras.right, turntable_from_model, poses[p].plain[v].right});
     }
   }
   return photos;
@@ -176,7 +205,9 @@ Result<Model> Reconstruction::State::finish(const ScanIdentity& identity, const 
   }
   if (options.voxel_mm == 0.0) options.voxel_mm = voxel_for(poses.front().views.front().range);
   Report report(options, identity, calibration);
-  for (const PoseState& pose : poses) report.add_pose(pose.views, pose.registration, pose.partial.report);
+  for (const PoseState& pose : poses) {
+    report.add_pose(pose.views, pose.registration, pose.partial.report, pose.watch ? &*pose.watch : nullptr);
+  }
   const auto pose1_from_pose2 = find_pose(report, context);
   if (!pose1_from_pose2) return pass_on(pose1_from_pose2, "pose 2 in pose 1");
   auto integrated = surface(*pose1_from_pose2, context);

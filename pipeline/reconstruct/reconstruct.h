@@ -23,6 +23,9 @@ struct ReconstructOptions {
   std::string fusion = "evidence";  ///< `evidence`, or `paper` for the class table as published
   std::string rests = "hull";       ///< `hull`, or `egi` for the paper's tessellated sphere
   bool texture = true;
+  /// `refine`: the rig is compared with its calibration, which is refined where it has moved and refused where it has
+  /// moved too far; `report`: compared alone; `off`. Only for calibrations of known quality.
+  std::string watch = "refine";
   double partial_voxel_mm = 0.8;  ///< minimum for partial models: they only serve the search for the pose
 };
 
@@ -60,7 +63,8 @@ class Reconstruction {
   /// An imported range image, placed in its pose.
   Result<void> add_range_view(std::size_t pose, int index, double angle_rad, RangeImage range, const Context& context);
 
-  /// Registers the pose's views and makes its partial model. Fails with `degenerate`, `no_overlap`, `stopped`.
+  /// Watches the rig, registers the pose's views and makes its partial model. Fails with `below_limits` (the rig is no
+  /// longer as calibrated), `invalid_input` (options), `degenerate`, `no_overlap`, `stopped`.
   Result<void> finish_pose(std::size_t pose, const Context& context);
 
   /// Pose 2 into pose 1, integration, texture; with one pose, its own complete model. Every pose must be finished

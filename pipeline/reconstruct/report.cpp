@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 
+#include "core/units.h"
 #include "core/version.h"
 #include "pipeline/mesh/solid_properties.h"
 #include "pipeline/mesh/topology.h"
@@ -40,6 +41,36 @@ json view_json(const View& view, const ViewFit& fit) {
           {"residual_median_mm", number(fit.median_after_mm)},
           {"residual_rms_mm", number(fit.rms_after_mm)},
           {"overlap", number(fit.overlap)}};
+}
+
+json watch_json(const RigWatch& rig) {
+  const Watch& watch = rig.result();
+  json parts = json::array();
+  for (const WatchedPart& part : watch.parts) {
+    parts.push_back({{"part", to_string(part.part)},
+                     {"verdict", to_string(part.verdict)},
+                     {"px", number(part.px)},
+                     {"volume_um", number(part.volume_um)},
+                     {"expected_px", number(part.expected_px)}});
+  }
+  json result = {{"verdict", to_string(watch.verdict)},
+                 {"parts", parts},
+                 {"sentences", watch.sentences},
+                 {"dots", watch.dots},
+                 {"rows", watch.rows},
+                 {"rows_rms_px", number(watch.rows_rms_px)},
+                 {"table_zero_deg", number(watch.table_zero_deg)},
+                 {"refined", json()}};
+  if (rig.is_refined()) {
+    json angles = json::array();
+    for (const double angle : watch.refined_angles_rad) angles.push_back(to_degrees(angle));
+    const auto camera = [](const Camera& c) {
+      return json{{"camera_from_turntable", transform_json(c.camera_from_turntable)}};
+    };
+    result["refined"] = {
+        {"left", camera(rig.calibration().left)}, {"right", camera(rig.calibration().right)}, {"angles_deg", angles}};
+  }
+  return result;
 }
 
 json volume_json(const VolumeReport& volume) {
@@ -131,18 +162,15 @@ Report::Report(const ReconstructOptions& options, const ScanIdentity& identity,
   report["profile_sha256"] = identity.profile;
   report["config_sha256"] = identity.config_sha256;
   report["calibration_sha256"] = calibration ? calibration->sha256 : "";
-  report["options"] = {{"voxel_mm", options.voxel_mm},
-                       {"fusion", options.fusion},
-                       {"rests", options.rests},
-                       {"texture", options.texture},
-                       {"threads", options.threads}};
+  report["options"] = {{"voxel_mm", options.voxel_mm}, {"fusion", options.fusion}, {"rests", options.rests},
+                       {"texture", options.texture},   {"watch", options.watch},   {"threads", options.threads}};
   report["poses"] = json::array();
 }
 
 Report::~Report() = default;
 
-void Report::add_pose(std::span<const View> views, const RegistrationReport& registration,
-                      const VolumeReport& partial) {
+void Report::add_pose(std::span<const View> views, const RegistrationReport& registration, const VolumeReport& partial,
+                      const RigWatch* watch) {
   json per_view = json::array();
   for (std::size_t v = 0; v < views.size(); ++v) per_view.push_back(view_json(views[v], registration.views[v]));
   (*json_)["poses"].push_back({{"views", per_view},
@@ -151,6 +179,7 @@ void Report::add_pose(std::span<const View> views, const RegistrationReport& reg
                                {"axis_tilt_correction_deg", registration.axis_tilt_deg},
                                {"axis_shift_correction_mm", registration.axis_shift_mm},
                                {"angle_observable", registration.angle_observable},
+                               {"watch", watch ? watch_json(*watch) : json()},
                                {"partial_model", volume_json(partial)}});
 }
 

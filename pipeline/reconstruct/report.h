@@ -7,6 +7,7 @@
 
 #include "pipeline/pose/estimate_pose.h"
 #include "pipeline/reconstruct/reconstruct.h"
+#include "pipeline/reconstruct/rig_watch.h"
 #include "pipeline/reconstruct/stage_log.h"
 #include "pipeline/registration/refine_pose.h"
 #include "pipeline/registration/register_views.h"
@@ -22,7 +23,9 @@ class Report {
          const std::optional<Calibration>& calibration);
   ~Report();
 
-  void add_pose(std::span<const View> views, const RegistrationReport& registration, const VolumeReport& partial);
+  /// `watch`: none without one.
+  void add_pose(std::span<const View> views, const RegistrationReport& registration, const VolumeReport& partial,
+                const RigWatch* watch);
   void add_estimate(const PoseEstimate& estimate);
   void add_refinement(const RefinedPose& refined);
   void add_surface(const Mesh& mesh, const VolumeReport& volume);

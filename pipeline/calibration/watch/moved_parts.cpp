@@ -6,7 +6,7 @@
 namespace scanrig {
 namespace {
 
-constexpr int kParts = 3;       // left camera, right camera, table
+constexpr int kParts = 3;        // left camera, right camera, table
 constexpr double kStill = 0.03;  // drift of a part that has not moved, as a share of its drift
 
 /// Priors of a hypothesis: bit i of `parts`: part i moved.
@@ -53,8 +53,7 @@ MovedParts find_moved_parts(const RigFit& fit, const RigPriors& priors) {
   for (int c = 0; c < 2; ++c) parts.camera[c] = part(best.camera[c]);
   parts.table = part(best.table());
   parts.pair = part(best.camera[0] + best.camera[1]);
-  parts.table_change =
-      best.table_variance.asDiagonal() * best.pose_by_table.transpose() * by_right * fit.right;
+  parts.table_change = best.table_variance.asDiagonal() * best.pose_by_table.transpose() * by_right * fit.right;
   return parts;
 }
 

@@ -11,11 +11,11 @@ namespace scanrig {
 namespace {
 
 constexpr int kRounds = 6;
-constexpr double kAngleSigmaDeg = 0.01;     // of each view, beside the common offset
-constexpr double kOffsetSigmaDeg = 1.0;     // of the table's zero
-constexpr double kCommonDotPx = 0.006;      // of all dots of an image: light, wobble; more dots do not average it
-constexpr double kCommonRowPx = 0.003;      // the same of a view's rows
-constexpr double kFirstDotPx = 0.5;         // of a dot while nothing is known
+constexpr double kAngleSigmaDeg = 0.01;  // of each view, beside the common offset
+constexpr double kOffsetSigmaDeg = 1.0;  // of the table's zero
+constexpr double kCommonDotPx = 0.006;   // of all dots of an image: light, wobble; more dots do not average it
+constexpr double kCommonRowPx = 0.003;   // the same of a view's rows
+constexpr double kFirstDotPx = 0.5;      // of a dot while nothing is known
 constexpr double kMinDotPx = 0.01;
 
 /// Unknowns: 12 of the poses, the common angle, then one angle per view.
@@ -92,8 +92,7 @@ void Fitter::add_rows(std::size_t view, const Calibration& now, std::vector<Equa
     for (int c = 0; c < 2; ++c) {
       const Camera& was = c == 0 ? input_.calibration.left : input_.calibration.right;
       const Camera& is = c == 0 ? now.left : now.right;
-      const Eigen::Matrix3d rectify =
-          input_.rectified_from_turntable * was.camera_from_turntable.linear().transpose();
+      const Eigen::Matrix3d rectify = input_.rectified_from_turntable * was.camera_from_turntable.linear().transpose();
       const Eigen::Vector3d seen = rectify * (is.camera_from_turntable * row.point);
       const double sign = c == 0 ? -1.0 : 1.0;
       e.miss -= sign * input_.rectified_focal_px * seen.y() / seen.z();
@@ -170,9 +169,9 @@ void Fitter::step() {
   right.head<12>() -= information_ * change_;
   // Radians and millimetres differ by orders of magnitude.
   const Eigen::VectorXd unit = normal.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::VectorXd delta =
-      unit.asDiagonal() *
-      Eigen::MatrixXd(unit.asDiagonal() * normal * unit.asDiagonal()).ldlt().solve(Eigen::VectorXd(unit.asDiagonal() * right));
+  const Eigen::VectorXd delta = unit.asDiagonal() * Eigen::MatrixXd(unit.asDiagonal() * normal * unit.asDiagonal())
+                                                        .ldlt()
+                                                        .solve(Eigen::VectorXd(unit.asDiagonal() * right));
   change_ += delta.head<12>();
   offset_ += delta[kOffset];
   for (std::size_t view = 0; view < angles_.size(); ++view) {

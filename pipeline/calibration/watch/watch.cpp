@@ -28,8 +28,11 @@ WatchVerdict judge(const WatchedPart& part, const WatchOptions& options) {
 WatchedPart camera_part(int camera, const MovedParts& moved, const RigEffects& effects) {
   const PartMotion& motion = moved.camera[camera];
   const auto [px, expected] = size_of(effects.image_px2[camera], motion);
-  return {camera == 0 ? RigPart::left_camera : RigPart::right_camera, {}, px,
-          kMicrometres * size_of(effects.volume_mm2, motion).first, expected};
+  return {camera == 0 ? RigPart::left_camera : RigPart::right_camera,
+          {},
+          px,
+          kMicrometres * size_of(effects.volume_mm2, motion).first,
+          expected};
 }
 
 WatchedPart depth_part(RigPart part, const PartMotion& motion, const RigEffects& effects) {
@@ -39,8 +42,8 @@ WatchedPart depth_part(RigPart part, const PartMotion& motion, const RigEffects&
 
 WatchedPart angle_part(double rms_rad, double sigma_rad, const RigEffects& effects) {
   const double mm = rms_rad * kMeanRadiusMm;
-  return {RigPart::angles, {}, mm / effects.mm_per_px, kMicrometres * mm,
-          sigma_rad * kMeanRadiusMm / effects.mm_per_px};
+  return {
+      RigPart::angles, {}, mm / effects.mm_per_px, kMicrometres * mm, sigma_rad * kMeanRadiusMm / effects.mm_per_px};
 }
 
 bool are_dots_seen(const WatchInput& input, const WatchOptions& options) {

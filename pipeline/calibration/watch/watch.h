@@ -33,8 +33,8 @@ std::string_view to_string(RigPart part);
 struct WatchedPart {
   RigPart part = RigPart::left_camera;
   WatchVerdict verdict = WatchVerdict::not_available;
-  double px = 0.0;           ///< mean shift of the image; of pair, axis, angles: the disparity that does as much to depth
-  double volume_um = 0.0;    ///< rms shift of points of the working volume
+  double px = 0.0;         ///< mean shift of the image; of pair, axis, angles: the disparity that does as much to depth
+  double volume_um = 0.0;  ///< rms shift of points of the working volume
   double expected_px = 0.0;  ///< one sigma without a departure: noise of this scan and the calibration's covariance
 };
 

@@ -31,5 +31,10 @@ TEST(ReconstructOptions, VoxelsAreThoseTheDaemonMayAskItsChildFor) {
   }
 }
 
+TEST(ReconstructOptions, TheWatchIsOneOfThree) {
+  for (const char* mode : {"refine", "report", "off"}) EXPECT_TRUE(takes(fmt::format("--watch {}", mode))) << mode;
+  EXPECT_FALSE(takes("--watch sometimes"));
+}
+
 }  // namespace
 }  // namespace scanrig::ctl

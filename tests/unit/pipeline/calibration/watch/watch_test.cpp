@@ -22,9 +22,7 @@ constexpr unsigned kSeeds = 10;
 
 RigChange right_columns(double px) { return {.right_turn = {0, px * kPixel, 0}}; }
 RigChange right_rows(double px) { return {.right_turn = {-px * kPixel, 0, 0}}; }
-RigChange axis_off() {
-  return {.table_shift = Eigen::Vector3d(0.03, 0, 0.04), .table_tilt = {to_radians(0.02), 0, 0}};
-}
+RigChange axis_off() { return {.table_shift = Eigen::Vector3d(0.03, 0, 0.04), .table_tilt = {to_radians(0.02), 0, 0}}; }
 
 /// Rms over seeds of the volume error before and after the refinement, micrometres.
 std::pair<double, double> before_and_after(const RigChange& change) {

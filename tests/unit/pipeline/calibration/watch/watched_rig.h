@@ -9,7 +9,7 @@ namespace scanrig::test {
 
 /// What has happened to a rig since its calibration.
 struct RigChange {
-  Eigen::Vector3d left_turn = Eigen::Vector3d::Zero();   ///< about the camera's own centre and axes, rad
+  Eigen::Vector3d left_turn = Eigen::Vector3d::Zero();  ///< about the camera's own centre and axes, rad
   Eigen::Vector3d right_turn = Eigen::Vector3d::Zero();
   Eigen::Vector3d table_shift = Eigen::Vector3d::Zero();  ///< turntable frame, mm
   Eigen::Vector3d table_tilt = Eigen::Vector3d::Zero();   ///< rad
@@ -17,8 +17,8 @@ struct RigChange {
   double table_zero_deg = 0.0;
 };
 
-/// The default rig (4267 px, 640 mm, 22 deg above, baseline 160 mm) with 40 rim dots, calibrated at sigma 3 um, as a scan
-/// of eight views shows it past an object of 86 mm. Pixels come from the true cameras.
+/// The default rig (4267 px, 640 mm, 22 deg above, baseline 160 mm) with 40 rim dots, calibrated at sigma 3 um, as a
+/// scan of eight views shows it past an object of 86 mm. Pixels come from the true cameras.
 class WatchedRig {
  public:
   explicit WatchedRig(const RigChange& change, unsigned seed = 1);
