@@ -39,7 +39,8 @@ struct LensField {
 };
 
 inline std::size_t LensFieldSupport::coefficient(int column, int row) const {
-  return static_cast<std::size_t>(first + column + LensField::kColumns * row);
+  const int place = first + column + LensField::kColumns * row;
+  return static_cast<std::size_t>(place);
 }
 
 }  // namespace scanrig
