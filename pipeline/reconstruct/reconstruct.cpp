@@ -99,7 +99,8 @@ Result<void> Reconstruction::State::add_view(std::size_t pose, const ViewImages&
     rectification = std::move(*made);
   }
   const StereoImages stereo{images.left_pattern, images.right_pattern, images.left_plain, images.right_plain};
-  auto view = make_view(*rectification, stereo, images.angle_rad, images.index, {}, context);
+  const double gear = calibration->quality ? calibration->quality->gear : 1.0;
+  auto view = make_view(*rectification, stereo, gear * images.angle_rad, images.index, {}, context);
   if (!view) return pass_on(view, fmt::format("pose {} view {}", pose + 1, images.index));
   (*open)->views.push_back(std::move(*view));
   if (auto done = watch_view(**open, images); !done) return done;
