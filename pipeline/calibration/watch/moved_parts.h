@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include "pipeline/calibration/watch/rig_fit.h"
 #include "pipeline/calibration/watch/rig_priors.h"
 
@@ -13,7 +15,7 @@ struct PartMotion {
 
 /// What a rig's departure from its calibration is made of.
 struct MovedParts {
-  PartMotion camera[2];
+  std::array<PartMotion, 2> camera;
   PartMotion table;                                ///< and its axis, against both cameras
   PartMotion pair;                                 ///< both cameras' together
   TableChange table_change = TableChange::Zero();  ///< as RigPriors::table_variance

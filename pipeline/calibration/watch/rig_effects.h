@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <vector>
 
 #include "pipeline/calibration/camera.h"
@@ -26,9 +27,9 @@ std::vector<Eigen::Vector3d> working_points(const Calibration& calibration);
 
 /// What changes of the poses do, as quadratic forms: x' form x is a mean square over the working volume.
 struct RigEffects {
-  PoseMatrix image_px2[2];  ///< of the image of each camera
-  PoseMatrix volume_mm2;    ///< of triangulated points; their mean height left out, which bends nothing
-  double mm_per_px = 0.0;   ///< rms shift of a point for one pixel of disparity
+  std::array<PoseMatrix, 2> image_px2;  ///< of the image of each camera
+  PoseMatrix volume_mm2;                ///< of triangulated points; their mean height left out, which bends nothing
+  double mm_per_px = 0.0;               ///< rms shift of a point for one pixel of disparity
 };
 RigEffects rig_effects(const Calibration& calibration);
 

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include "pipeline/calibration/watch/rig_effects.h"
 
 namespace scanrig {
@@ -21,7 +23,7 @@ using TableChange = Eigen::Matrix<double, 5, 1>;  ///< shift x y z (mm), tilt ab
 
 /// Covariances of the changes of both poses, by cause.
 struct RigPriors {
-  PoseMatrix camera[2];                        ///< each camera's own motion
+  std::array<PoseMatrix, 2> camera;            ///< each camera's own motion
   Eigen::Matrix<double, 12, 5> pose_by_table;  ///< what a motion of the table is, seen from both cameras
   TableChange table_variance;
   PoseMatrix calibration;  ///< of the calibration, lenses held; without height, azimuth and scale, which dots share
