@@ -194,7 +194,8 @@ std::vector<RowOffset> mean_cells(const std::vector<Sample>& samples, const RowO
     if (std::abs(double(s.offset) - offsets.at(u, v, image)) > 3.0 * sigma) continue;
     const int column = static_cast<int>(u) * options.cells / image.width;
     const int row = static_cast<int>(v) * options.cells / image.height;
-    Sum& sum = sums[static_cast<std::size_t>(row * options.cells + column)];
+    const int cell = row * options.cells + column;
+    Sum& sum = sums[static_cast<std::size_t>(cell)];
     const double weight = 1.0 / (sigma * sigma);
     sum.weight += weight;
     sum.u += weight * u;

@@ -22,7 +22,7 @@ double BoardOnTable::measured_length_mm() const {
 }
 
 void BoardOnTable::put(int number) {
-  const PlannedPlacement& planned = calibration_plan().at(static_cast<std::size_t>(number - 1));
+  const PlannedPlacement& planned = calibration_plan().at(static_cast<std::size_t>(number) - 1);
   const double facing = -to_radians(scene_.drawn_rig().table.true_deg(-planned.mark_deg));
   placed_.emplace(board_, put_down(planned, board_.layout(), facing, false, mix(scene_.options().seed, place)),
                   scene_.drawn_rig().rim_dots);

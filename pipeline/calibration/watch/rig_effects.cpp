@@ -40,7 +40,7 @@ Camera with_lens(const Camera& camera, int unknown, double change) {
     case 1: p.fy += change * p.fx; break;
     case 2: p.cx += change; break;
     case 3: p.cy += change; break;
-    default: other.distortion[static_cast<std::size_t>(unknown - 4)] += change;
+    default: other.distortion.at(static_cast<std::size_t>(unknown) - 4) += change;
   }
   return other;
 }
