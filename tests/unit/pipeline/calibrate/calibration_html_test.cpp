@@ -85,7 +85,7 @@ TEST(CalibrationHtml, NeedsNoOtherFileAndNoScript) {
 }
 
 TEST(CalibrationHtml, HasTheSameBytesForTheSameInput) {
-  const FolderCalibration again = outcome_with_all();
+  const auto again = FolderCalibration(outcome_with_all());
   EXPECT_EQ(calibration_html(outcome_with_all(), kOrigin), calibration_html(again, kOrigin));
 }
 

@@ -101,8 +101,8 @@ struct MrcalModel {
       const auto begin = code.find('[', at);
       return numbers(code.substr(begin, code.find(']', begin) - begin));
     };
-    const auto name = code.find("'", code.find("'lensmodel':") + 12) + 1;
-    lensmodel = code.substr(name, code.find("'", name) - name);
+    const auto name = code.find('\'', code.find("'lensmodel':") + 12) + 1;
+    lensmodel = code.substr(name, code.find('\'', name) - name);
     intrinsics = list("intrinsics");
     extrinsics = list("extrinsics");
     imagersize = list("imagersize");
