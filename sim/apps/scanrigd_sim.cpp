@@ -134,7 +134,9 @@ Result<void> run(SimOptions o, const SignalStop& stop) {
     operator_thread.emplace(r, *clock, o.operator_at_rig == "auto" ? Role::alone : Role::helper);
   options.published = [&operator_thread](const std::shared_ptr<const Snapshot>& snapshot) {
     const auto& awaited = snapshot->awaited_placement;
-    if (operator_thread) operator_thread->read_screen(awaited ? awaited->placement + 1 : 0);
+    const auto job = snapshot->jobs.find(snapshot->job);
+    const bool calibrates = awaited || (job != snapshot->jobs.end() && job->second->recipe.is_calibration());
+    if (operator_thread) operator_thread->read_screen(awaited ? awaited->placement + 1 : 0, calibrates);
   };
   sim::TroubledCamera camera(r, o.trouble, o.rig.seed);
   Journal journal(standard_sink());

@@ -30,7 +30,7 @@ void Operator::look(const PanelOutputs& lamps) {
   } else if ((lamps.amber || lamps.red) && !lamps.busy && !lamps.start_lamp) {
     reset();
   }
-  if (lamps.start_lamp && !is_asked) rig_.put_board(0);
+  if (lamps.start_lamp && !is_asked && !calibrates_) rig_.put_board(0);
   was_asked_ = is_asked;
 }
 

@@ -18,8 +18,12 @@ class Operator {
   Operator(SimRig& rig, Clock& clock, Role role)
       : rig_(rig), clock_(clock), role_(role), thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
-  /// What the screen says: placement that awaits the board, from 1; 0: none. Threads: any.
-  void read_screen(int awaited_placement) { awaited_placement_ = awaited_placement; }
+  /// What the screen says: placement that awaits the board, from 1, 0: none; whether a calibration is under way, for
+  /// which the board stays. Threads: any.
+  void read_screen(int awaited_placement, bool calibrates) {
+    calibrates_ = calibrates;
+    awaited_placement_ = awaited_placement;
+  }
 
  private:
   void run(const std::stop_token& stop);
@@ -33,6 +37,7 @@ class Operator {
   bool has_started_ = false;
   bool was_asked_ = false;
   std::atomic<int> awaited_placement_ = 0;
+  std::atomic<bool> calibrates_ = false;
   std::jthread thread_;  ///< last: joined before the other members are destroyed
 };
 
