@@ -46,7 +46,8 @@ TEST(LensField, CoefficientsOnALineGiveALine) {
   field.width = 1281;
   field.height = 961;
   for (int i = 0; i < LensField::kCount; ++i) {
-    field.shift[static_cast<std::size_t>(i)] = {0.1 * (i % LensField::kColumns), 0.2 * (i / LensField::kColumns)};
+    const int column = i % LensField::kColumns, row = i / LensField::kColumns;
+    field.shift[static_cast<std::size_t>(i)] = {0.1 * column, 0.2 * row};
   }
   // Knots are 320 px apart; the first coefficient lies one knot before the image.
   EXPECT_LT((field.at({480.0, 160.0}) - Eigen::Vector2d(0.1 * 2.5, 0.2 * 1.5)).norm(), 1e-12);
