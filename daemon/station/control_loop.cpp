@@ -85,8 +85,9 @@ void ControlLoop::handle(Message message, const StationPorts& ports) {
   counter_.see(message.event, clock_.now());
   if (const auto ended = update(jobs_, message.event)) counter_.see(*ended);
   for (const auto& action : step.actions) carry_out(action, ports);
+  // The rig is being stopped by now. Neither the lamp nor anything else reports a latch before it is stored.
+  if (latch_changed) ports.store_latch(state_.latch);
   show(ports);
-  if (latch_changed) ports.store_latch(state_.latch);  // the rig is being stopped; nothing is reported before this
   publish(ports);
   const auto* pressed = std::get_if<event::Pressed>(&message.event);
   if (step.refused && pressed && pressed->origin == Origin::panel) ports.refused_at_panel(*pressed, *step.refused);

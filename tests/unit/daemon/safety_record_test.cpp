@@ -62,6 +62,18 @@ TEST_F(SafetyRecordTest, ADamagedRecordIsALatch) {
   }
 }
 
+TEST_F(SafetyRecordTest, AnUnfinishedWriteIsALatch) {
+  run(true);
+  std::ofstream(folder_ / "state" / "latch.json.tmp4711") << "{";
+  const auto latch = run(true);
+  ASSERT_TRUE(latch);
+  EXPECT_EQ(run(true), latch);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "state" / "latch.json.tmp4711"));
+  SafetyRecord record(folder_ / "state");
+  ASSERT_TRUE(record.store_latch(std::nullopt));
+  EXPECT_EQ(run(true), std::nullopt);
+}
+
 TEST_F(SafetyRecordTest, ThreeUnexpectedEndsWithinFiveMinutesAreALatch) {
   for (int start = 0; start < 3; ++start) {
     EXPECT_EQ(run(false), std::nullopt) << start;
