@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <chrono>
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "core/files.h"
@@ -20,14 +21,16 @@
 namespace scanrig::ctl {
 namespace {
 
-/// The numbers of "12x9" or "40x84.5x2.4"; empty if there are not `count` of them.
+constexpr double kMaxNumber = 1e6;
+
+/// The numbers of "12x9" or "40x84.5x2.4"; empty if there are not `count` of them, each of a size that can be.
 std::vector<double> numbers_of(const std::string& text, std::size_t count) {
   std::vector<double> numbers;
   for (std::size_t begin = 0; begin <= text.size();) {
     const std::size_t end = std::min(text.find('x', begin), text.size());
     double value = 0.0;
     const auto read = std::from_chars(text.data() + begin, text.data() + end, value);
-    if (read.ec != std::errc() || read.ptr != text.data() + end) return {};
+    if (read.ec != std::errc() || read.ptr != text.data() + end || !(std::abs(value) < kMaxNumber)) return {};
     numbers.push_back(value);
     begin = end + 1;
   }

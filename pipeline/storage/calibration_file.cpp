@@ -1,7 +1,9 @@
 #include "pipeline/storage/calibration_file.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include "core/files.h"
 
@@ -41,7 +43,17 @@ LensField read_lens_field(JsonObject object, const Projection& projection) {
 
 namespace {
 
+constexpr double kRounding = 1e-6;
 constexpr int kCameraUnknowns = 30;  ///< of both cameras, see CalibrationQuality::cameras
+
+/// Of correlations, for its rows differ by orders of magnitude; rounding may make a smallest eigenvalue of 0 negative.
+bool is_covariance(const Eigen::MatrixXd& matrix) {
+  const Eigen::VectorXd scale =
+      matrix.diagonal().unaryExpr([](double variance) { return variance > 0.0 ? 1.0 / std::sqrt(variance) : 0.0; });
+  const Eigen::MatrixXd correlation = scale.asDiagonal() * matrix * scale.asDiagonal();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(correlation, Eigen::EigenvaluesOnly);
+  return eigen.info() == Eigen::Success && eigen.eigenvalues().minCoeff() > -kRounding;
+}
 
 /// The lower triangle of a symmetric matrix, row after row.
 Eigen::MatrixXd read_covariance(JsonObject& object, std::string_view key) {
@@ -56,6 +68,7 @@ Eigen::MatrixXd read_covariance(JsonObject& object, std::string_view key) {
     for (int column = 0; column <= row; ++column) matrix(row, column) = matrix(column, row) = values[next++];
     if (!(matrix(row, row) >= 0.0)) object.reject(key, "must have no negative variance");
   }
+  if (!is_covariance(matrix)) object.reject(key, "must be a covariance: no combination has a negative variance");
   return matrix;
 }
 

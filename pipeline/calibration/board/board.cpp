@@ -44,10 +44,16 @@ std::array<Eigen::Vector2d, 4> marker_corners(const Board& board, const MarkerCe
           middle + Eigen::Vector2d(half, half), middle + Eigen::Vector2d(-half, half)};
 }
 
+constexpr double kMaxSquareMm = 1000.0;
+
 Result<void> check_board(const Board& board) {
-  if (board.columns < 3 || board.rows < 3 || board.columns > 200 || board.rows > 200 || !(board.square_mm > 0.0)) {
-    return fail(ErrorCode::invalid_input, "board: {} x {} squares of {} mm; give 3 to 200 columns and rows",
-                board.columns, board.rows, board.square_mm);
+  if (board.columns < 3 || board.rows < 3 || board.columns > 200 || board.rows > 200) {
+    return fail(ErrorCode::invalid_input, "board: {} x {} squares; give 3 to 200 columns and rows", board.columns,
+                board.rows);
+  }
+  if (!(board.square_mm > 0.0) || board.square_mm > kMaxSquareMm) {
+    return fail(ErrorCode::invalid_input, "board: squares of {} mm; give more than 0 and at most {}", board.square_mm,
+                kMaxSquareMm);
   }
   if (!board.markers) return {};
   if (!(board.markers->size_mm > 0.0) || !(board.markers->size_mm < board.square_mm)) {

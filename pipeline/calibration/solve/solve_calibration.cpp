@@ -1,6 +1,7 @@
 #include "pipeline/calibration/solve/solve_calibration.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <set>
@@ -23,8 +24,10 @@ constexpr std::size_t kMinCorners = 12;
 
 Result<void> check_length(const std::optional<MeasuredLength>& length) {
   if (!length) return {};
-  if (length->nominal_mm > 0.0 && length->measured_mm > 0.0 && length->sigma_mm > 0.0) return {};
-  return fail(ErrorCode::invalid_input, "calibration: a measured length needs nominal value, value and uncertainty");
+  const std::array<double, 3> values = {length->nominal_mm, length->measured_mm, length->sigma_mm};
+  if (std::ranges::all_of(values, [](double mm) { return std::isfinite(mm) && mm > 0.0; })) return {};
+  return fail(ErrorCode::invalid_input,
+              "calibration: a measured length and its uncertainty must be finite and over 0 mm");
 }
 
 Result<void> check_sight(const CalibrationInput& input, const BoardPair& pair, const BoardSight& sight) {

@@ -1,6 +1,8 @@
 // A rendered series of a rig drawn at random becomes a calibration; only the test knows the truth.
 #include <gmock/gmock.h>
 
+#include <nlohmann/json.hpp>
+
 #include "core/files.h"
 #include "core/hash.h"
 #include "daemon/ctl/verbs.h"
@@ -66,6 +68,12 @@ TEST_F(CalibrateImages, OfADrawnRigMeasuresItsWorkingVolumeAndIsReadBack) {
   EXPECT_EQ(again->quality->rim_dots.size(), judged.solved.table.dots.size());
   const Eigen::Vector3d p(10, 40, -20);
   EXPECT_EQ(again->left.project(p), judged.solved.calibration.left.project(p));
+
+  auto damaged = nlohmann::json::parse(*text);
+  damaged["covariance"]["cameras"][1] = 1e9;  // larger than the variances of its row and column
+  const auto refused = parse_calibration(damaged.dump(), "calibration.json");
+  ASSERT_FALSE(refused);
+  EXPECT_THAT(refused.error().message, HasSubstr("covariance.cameras: must be a covariance"));
 }
 
 TEST_F(CalibrateImages, OfSwappedCamerasIsRefusedWithWhatToDo) {
