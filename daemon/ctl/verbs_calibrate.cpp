@@ -185,6 +185,19 @@ void print_check(const CalibrateFolderVerb& verb, const DriftCheck& check) {
   fmt::print("{}\n", json.dump(2));
 }
 
+/// Images without serials are taken as they are.
+Result<void> check_cameras(const Calibration& known, const CalibrationImages& images) {
+  for (std::size_t side = 0; side < images.serials.size(); ++side) {
+    const std::string& serial = side == 0 ? known.left.serial : known.right.serial;
+    if (images.serials[side].empty() || serial.empty() || images.serials[side] == serial) continue;
+    return fail(
+        ErrorCode::invalid_input,
+        "{}: the {} camera of the images is {}, that of the calibration {}; name the calibration of these cameras",
+        images.folder.string(), side == 0 ? "left" : "right", images.serials[side], serial);
+  }
+  return {};
+}
+
 /// Does the calibration hold? Only poses that may replace the old ones are written.
 ExitCode check_folder(const CalibrateFolderVerb& verb, const CalibrationImages& images,
                       const CalibrateOptions& options) {
@@ -192,6 +205,7 @@ ExitCode check_folder(const CalibrateFolderVerb& verb, const CalibrationImages& 
   if (!text) return report_error(text.error());
   const auto known = parse_calibration(*text, verb.check);
   if (!known) return report_error(known.error());
+  if (auto same = check_cameras(*known, images); !same) return report_error(same.error());
   const Board board = options.board ? *options.board : images.board.value_or(Board{});
   const SignalStop stop;
   const auto check = catch_exceptions("the check", [&]() -> Result<DriftCheck> {

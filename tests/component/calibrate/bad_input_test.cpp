@@ -12,6 +12,7 @@
 #include "core/files.h"
 #include "daemon/ctl/verbs.h"
 #include "sim/apps/shoot_board.h"
+#include "tests/unit/pipeline/storage/sample_files.h"
 
 namespace scanrig {
 namespace {
@@ -153,6 +154,8 @@ TEST_F(BadCalibrationInput, ACheckAgainstAFileThatIsNoCalibrationOfThisRig) {
     ASSERT_TRUE(write_file_atomically(known, text));
     EXPECT_THAT(refused(ExitCode::bad_input), HasSubstr("known.json")) << text;
   }
+  ASSERT_TRUE(write_file_atomically(known, scan_samples::calibration_json()));
+  EXPECT_THAT(refused(ExitCode::bad_input), HasSubstr("name the calibration of these cameras"));
 }
 
 }  // namespace
