@@ -47,6 +47,7 @@ ordered_json to_json(const JobInfo& job) {
           {"passed", job.passed ? ordered_json(*job.passed) : ordered_json(nullptr)},
           {"model", job.model},
           {"report", job.report},
+          {"remarks", job.remarks},
           {"config_sha256", job.config_sha256},
           {"error", to_json(job.error)},
           {"kind", to_string(job.recipe.kind)},

@@ -180,7 +180,7 @@ const char* const kSchemas = R"({
   "outputs": {"type": "object", "additionalProperties": {"type": "boolean"}}}},
 "Job": {"type": "object", "additionalProperties": false,
   "required": ["id", "state", "sentence", "next_action", "recipe", "part", "folder", "poses", "views", "stored", "resumable", "quarantined",
-  "exported", "passed", "model", "report", "config_sha256", "error", "kind", "all_views"], "properties": {
+  "exported", "passed", "model", "report", "remarks", "config_sha256", "error", "kind", "all_views"], "properties": {
   "kind": {"type": "string", "enum": ["scan", "calibration", "check"]},
   "all_views": {"type": "integer", "description": "of all poses"},
   "id": {"type": "string"}, "state": {"type": "string"},
@@ -197,6 +197,7 @@ const char* const kSchemas = R"({
   "stored": {"type": "integer", "description": "views that survive a power cut"},
   "model": {"type": "string", "description": "path of the model; empty until it is there"},
   "report": {"type": "string"},
+  "remarks": {"type": "array", "items": {"type": "string"}, "description": "done: that the rig has moved since its calibration"},
   "config_sha256": {"type": "array", "items": {"type": "string"},
     "description": "SHA-256 of each rig.toml that its views were taken under; of a rig without one none"},
   "error": {"$ref": "#/components/schemas/MaybeProblem"}}},

@@ -98,7 +98,7 @@ class Calibrator final : public Reconstructor {
     return all;
   }
 
-  /// Finds the board and adds what there is to say of the image; true: it is good.
+  /// Finds the board and adds what makes the image a bad one; true: it is good. The report has the minor remarks.
   bool examine(const char* side, const cv::Mat& image, const std::string& pixel_format, BoardSight& sight,
                std::vector<Eigen::Vector2d>& outline, std::vector<std::string>& problems) const {
     auto found = find_board(image, pixel_format, options_.board);
@@ -107,7 +107,9 @@ class Calibrator final : public Reconstructor {
       return false;
     }
     const auto checks = check_board_image(*found, options_.board, image.size());
-    for (const auto& check : checks) problems.push_back(fmt::format("{}: {}", side, check.message));
+    for (const auto& check : checks) {
+      if (!check.is_minor) problems.push_back(fmt::format("{}: {}", side, check.message));
+    }
     outline.assign(found->outline.begin(), found->outline.end());
     sight.corners = std::move(found->corners);
     return std::ranges::all_of(checks, &ImageCheck::is_minor);

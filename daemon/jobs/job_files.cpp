@@ -220,6 +220,19 @@ std::string last_check(const fs::path& root, const std::string& calibration_sha2
   return json->finish() && is_of_this ? date : "";
 }
 
+std::vector<std::string> read_rig_remarks(const fs::path& report) {
+  const auto text = read_file(report);
+  const auto json = text ? nlohmann::json::parse(*text, nullptr, false) : nlohmann::json();
+  std::vector<std::string> remarks;
+  for (const auto& pose : json.is_object() ? member(json, "poses") : nlohmann::json::array()) {
+    for (const auto& sentence : member(member(pose, "watch"), "sentences")) {
+      if (!sentence.is_string() || std::ranges::count(remarks, sentence.get<std::string>()) > 0) continue;
+      remarks.push_back(sentence);
+    }
+  }
+  return remarks;
+}
+
 std::optional<Error> limit_violation(const fs::path& report, const Limits& limits) {
   if (limits == Limits{}) return std::nullopt;
   const auto text = read_file(report);

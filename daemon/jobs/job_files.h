@@ -66,6 +66,9 @@ Result<void> note_check(const std::filesystem::path& root, const std::string& ca
 /// ISO 8601; empty: this calibration was not checked, or the record cannot be read.
 std::string last_check(const std::filesystem::path& root, const std::string& calibration_sha256);
 
+/// What the watch of report.json says of the rig, each sentence once; none where it cannot be read.
+std::vector<std::string> read_rig_remarks(const std::filesystem::path& report);
+
 /// Why the model of report.json is beyond the limits; nothing when it is within, or without limits. An unreadable
 /// report never passes.
 std::optional<Error> limit_violation(const std::filesystem::path& report, const Limits& limits);

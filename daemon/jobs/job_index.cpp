@@ -15,7 +15,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kLayout = 6;  ///< increase with every change below
+constexpr int kLayout = 7;  ///< increase with every change below
 
 json to_json(const std::optional<Error>& error) {
   if (!error) return nullptr;
@@ -65,6 +65,7 @@ void read(const json& j, JobInfo& job) {
   job.error = error_from(j.at("error"));
   job.model = j.at("model");
   job.report = j.at("report");
+  job.remarks = j.at("remarks").get<std::vector<std::string>>();
   job.config_sha256 = j.at("config_sha256").get<std::vector<std::string>>();
   for (const auto& v : j.at("stored")) {
     job.stored.push_back({v.at(0), v.at(1), v.at(2), errors_from(v.at(3)), v.at(4), v.at(5)});
@@ -122,6 +123,7 @@ std::string to_record(const JobInfo& job) {
                   {"error", to_json(job.error)},
                   {"model", job.model},
                   {"report", job.report},
+                  {"remarks", job.remarks},
                   {"config_sha256", job.config_sha256},
                   {"stored", views_of(job)},
                   {"movement_checks", movement_checks_of(job)}};

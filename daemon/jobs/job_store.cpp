@@ -71,7 +71,10 @@ Result<JobInfo> read_folder(const fs::path& folder, const ScanFolder& scan) {
               .exported = order->exported,
               .model = model_file(folder, order->recipe.kind),
               .report = report_file(folder)};
-  if (job.recipe.is_calibration()) job.calibration = read_calibration_report(report_file(folder));
+  if (job.recipe.is_calibration())
+    job.calibration = read_calibration_report(report_file(folder));
+  else
+    job.remarks = read_rig_remarks(report_file(folder));
   if (job.calibration) job.calibration->is_accepted = order->accepted;
   take_views(job, scan.manifest());
   const auto facts = facts_of(job, scan.manifest().state);

@@ -299,7 +299,8 @@ Result<event::ModelReady> ReconstructionThread::make_model() {
     const auto& recipe = current_->recipe;
     return event::ModelReady{current_->job, model_file(current_->folder, recipe.kind), report,
                              limit_violation(report, recipe.limits),
-                             recipe.is_calibration() ? read_calibration_report(report) : std::nullopt};
+                             recipe.is_calibration() ? read_calibration_report(report) : std::nullopt,
+                             recipe.is_calibration() ? std::vector<std::string>() : read_rig_remarks(report)};
   });
 }
 

@@ -245,6 +245,7 @@ struct ModelReady {
   std::string job, model, report;          ///< paths of the files
   std::optional<Error> limit_violation{};  ///< why the model did not pass
   std::optional<CalibrationOutcome> calibration{};
+  std::vector<std::string> remarks{};
 };
 /// The daemon is to restart under a new configuration; accepted only while the rig is idle.
 struct ReloadRequested {

@@ -39,6 +39,7 @@ void set_model_ready(JobInfo& job, const event::ModelReady& e) {
   job.passed = !e.limit_violation;
   job.error = e.limit_violation;
   job.calibration = e.calibration;
+  job.remarks = e.remarks;
 }
 
 void set_placement_dropped(JobInfo& job, const event::PlacementDropped& e) {
@@ -143,6 +144,7 @@ void set_scanned_state(JobInfo& job, const FolderFacts& facts) {
   if (!facts.has_report) {
     job.model = job.report = "";
     job.calibration.reset();
+    job.remarks.clear();
   }
   job.quarantined = !facts.is_running && is_to_be_quarantined(facts.deaths);
   job.error = job.quarantined ? quarantine_error() : facts.failure;

@@ -345,7 +345,10 @@ OperatorMessage describe(const JobInfo& job) {
       return {fmt::format("Pose {} of {} is complete.", job.complete, job.recipe.poses), how_to_flip(job.recipe)};
     case JobState::reconstructing: return {making_model(job), "Wait for the model."};
     case JobState::done:
-      if (job.passed.value_or(true)) return {"The model is ready.", "Check the model."};
+      if (job.passed.value_or(true)) {
+        return {fmt::format("The model is ready.{}{}", job.remarks.empty() ? "" : " ", fmt::join(job.remarks, " ")),
+                "Check the model."};
+      }
       return {fmt::format("Model outside the recipe's limits: {}.", why(job)),
               fmt::format("Check the model. Scan the part again or change the limits of recipe {}.", job.recipe.name)};
     case JobState::failed: return when_failed(job);

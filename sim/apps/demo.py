@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 
+import demo_calibration
 from control_client import ControlClient
 
 START_LIMIT_S = 60
@@ -18,6 +19,7 @@ RENDER_LIMIT_S = 900
 VOXEL_MM = 0.25
 INSIDE = "SCANRIG_DEMO_NETWORK"  # set inside the network namespace
 JOB_LIMIT_S = 3600
+SMALLEST_SCALE = 0.5  # smaller images do not show a board's markers
 
 
 def arguments():
@@ -31,6 +33,8 @@ def arguments():
     parser.add_argument("--same-rest", action="store_true", help="the operator does not turn the object over")
     parser.add_argument("--scale", type=float, default=1.0, help="of the images: 0.25 gives 320x240")
     parser.add_argument("--no-noise", action="store_true", help="sensors without noise")
+    parser.add_argument("--calibration", choices=("own", "true"), default="own",
+                        help="own: the rig calibrates itself once; true: the rig knows its exact geometry")
     parser.add_argument("--wire", action="store_true",
                         help="the shipped daemon over wires: Modbus drive, GPIO lines, two GigE cameras")
     parser.add_argument("--bin", type=pathlib.Path, required=True, help=argparse.SUPPRESS)
@@ -70,9 +74,13 @@ class SimulatedStation:
         self.socket = folder / "api.sock"
         self.processes = []
 
-    def start(self, options, log):
+    def start(self, options, log, calibration=None, extra=()):
         """Returns the process that is the daemon."""
-        command = [options.bin / "scanrigd-sim", "--socket", self.socket, "--jobs", self.jobs, *scene(options)]
+        if calibration:
+            self.jobs.mkdir(parents=True)
+            shutil.copy(calibration, self.jobs)
+            extra = ["--own-calibration", *extra]
+        command = [options.bin / "scanrigd-sim", "--socket", self.socket, "--jobs", self.jobs, *scene(options), *extra]
         self.processes.append(run(command, log))
         return self.processes[0]
 
@@ -89,7 +97,7 @@ class WireStation:
         self.socket = self.rig / "api.sock"
         self.processes = []  # in the order in which they must end
 
-    def start(self, options, log):
+    def start(self, options, log, calibration=None):
         """Returns the process that is the daemon; the rig where it ended instead of becoming ready."""
         print("Rendering the views of the cameras", flush=True)
         rig = run([options.bin / "scanrig-sim", "rig", "--dir", self.rig, "--cameras", "gige", "--voxel-mm", VOXEL_MM,
@@ -97,6 +105,8 @@ class WireStation:
         self.processes.append(rig)
         if not said_ready(rig):
             return rig
+        if calibration:
+            shutil.copy(calibration, self.rig)
         daemon = run([options.bin / "scanrigd", "--config", self.rig / "rig.toml"], log)
         self.processes.insert(0, daemon)
         self.control = ControlClient(self.rig / "control.sock")
@@ -134,6 +144,32 @@ def wait_for_socket(daemon, socket):
     return False
 
 
+class UncalibratedRig(SimulatedStation):
+    """The same rig before it was calibrated; nobody waits for its table."""
+
+    def __init__(self, folder, options, log):
+        super().__init__(folder)
+        daemon = self.start(options, log, extra=["--own-calibration", "--operator", "helper", "--clock", "virtual"])
+        if not wait_for_ready(options, daemon, self.socket):
+            self.stop()
+            raise RuntimeError("the rig to calibrate did not become ready")
+
+    def stop(self):
+        stop(self)
+
+
+def wait_for_ready(options, daemon, socket):
+    if not wait_for_socket(daemon, socket):
+        return False
+    limit = time.monotonic() + START_LIMIT_S
+    while time.monotonic() < limit:
+        status = subprocess.run([options.bin / "scanrig", "status", "--socket", socket], capture_output=True, text=True)
+        if "Operational.Ready" in status.stdout:
+            return True
+        time.sleep(0.2)
+    return False
+
+
 def stop(station):
     for process in station.processes:
         if process.poll() is None:
@@ -142,6 +178,17 @@ def stop(station):
                 process.wait(timeout=20)
             except subprocess.TimeoutExpired:
                 process.kill()
+
+
+def calibration_of(options, log):
+    """The file that the rig has made, or None: it knows the truth."""
+    if options.calibration == "true":
+        return None
+    if options.scale < SMALLEST_SCALE:
+        print(f"Images of {options.scale:g} times the size do not show a board's markers: the true calibration is used")
+        return None
+    kept = demo_calibration.own_calibration(options, lambda folder: UncalibratedRig(folder, options, log), log)
+    return kept / demo_calibration.CALIBRATION
 
 
 def job_folder(jobs):
@@ -153,6 +200,20 @@ def link_results(job, folder):
     """The job's files directly under `folder`, while they stay in the job folder."""
     for entry in job.iterdir():
         (folder / entry.name).symlink_to(os.path.relpath(entry, folder))
+
+
+def print_accuracies(options, job, folder):
+    """What the calibration costs: the same images with the rig's own and with the true one."""
+    true = folder / "true_calibration"
+    demo_calibration.with_true_calibration(job, true)
+    subprocess.run([options.bin / "scanrig", "reconstruct", true, "--no-texture", "--voxel-mm", str(VOXEL_MM)],
+                   stdout=subprocess.DEVNULL, check=True)
+    evaluated = subprocess.run([options.bin / "scanrig", "evaluate", true, "--json"], capture_output=True, text=True)
+    print("Accuracy on the measured surface")
+    for name, text in (("own calibration", (folder / "scores.json").read_text()),
+                       ("true calibration", evaluated.stdout)):
+        measured = json.loads(text)["measured"]
+        print(f"  {name:<18} median {measured['median_mm']:.4f} mm, p95 {measured['p95_mm']:.4f} mm")
 
 
 def scores_of(options, folder):
@@ -185,7 +246,8 @@ def main():
     log = open(folder / "demo.log", "w")
     station = (WireStation if options.wire else SimulatedStation)(folder)
     try:
-        daemon = station.start(options, log)
+        calibration = calibration_of(options, log)
+        daemon = station.start(options, log, calibration)
         if not wait_for_socket(daemon, station.socket):
             stop(station)
             print((folder / "demo.log").read_text(), end="", file=sys.stderr)
@@ -203,12 +265,16 @@ def main():
             stop(station)
         link_results(job, folder)
         scored = scores_of(options, folder)
+        if calibration and scored == 0:
+            print_accuracies(options, job, folder)
         print(f"Model   {folder}/model/model.glb\nReport  {folder}/model/report.json")
         print(f"Wall time {time.monotonic() - start:.1f} s")
         if options.keep:
             print(f"The daemon keeps running (process {daemon.pid}); its state: "
                   f"scanrig status --socket {station.socket}")
         return scored
+    except RuntimeError as failed:
+        return report_error(failed, 1)
     finally:
         if not options.keep:
             stop(station)

@@ -32,6 +32,7 @@ struct SimOptions {
   std::string clock = "real";
   std::string operator_at_rig = "auto";
   double trouble = 0.0;
+  bool own_calibration = false;
   std::filesystem::path config;  ///< a rig of real drivers on simulated wires
   bool make_safe = false, beside_daemon = false;
 };
@@ -50,6 +51,8 @@ void add_options(CLI::App& app, SimOptions& o) {
       ->check(CLI::Range(1.0, 1000.0));
   app.add_option("--seed", o.rig.seed, "placements, sensor noise, table errors")->capture_default_str();
   o.drawn_rig.add_to(app);
+  app.add_flag("--own-calibration", o.own_calibration,
+               "the rig knows only the calibration that it made: calibration.json beside the jobs, if it is there");
   app.add_option("--views", o.views, "views per pose")->capture_default_str()->check(CLI::Range(1, 360));
   app.add_option("--scale", o.rig.image_scale, "of the images: 0.25 gives 320x240")
       ->capture_default_str()
@@ -87,9 +90,9 @@ CalibratorOptions calibrator_of(const sim::SimRig& rig, const JobStoreOptions& j
   return {.cameras = jobs.cameras, .solver = calibration_solver(options, jobs.calibration_file)};
 }
 
-/// A drawn rig has no calibration until it is calibrated; that of the default rig is known.
+/// A drawn rig has no calibration until it is calibrated; that of the default rig is known, unless it shall not be.
 Result<void> write_calibration(const SimOptions& o, const sim::SimRig& rig, const std::filesystem::path& file) {
-  if (o.rig.rig) return {};
+  if (o.rig.rig || o.own_calibration) return {};
   return rig.write_calibration(file);
 }
 
@@ -126,6 +129,7 @@ Result<void> run(SimOptions o, const SignalStop& stop) {
   options.api.socket = o.socket;
   options.remote = options.guard = true;  // a simulated table cannot hurt a person
   options.reconstructor = pipeline_reconstructor(reconstruct);
+  options.hang_margin = kRenderingMargin;
   options.on_scanned = [&r](const std::filesystem::path& folder) { return r.write_truth(folder); };
 
   std::optional<sim::Operator> operator_thread;

@@ -96,6 +96,7 @@ Result<void> write_truth(const Scene& scene, const std::vector<PoseTruth>& poses
       !written) {
     return written;
   }
+  if (auto written = write_calibration(scene, folder / "truth_calibration.json"); !written) return written;
   if (scene.options().rig) {
     ordered_json rig = {{"format", "scanrig-rig-truth"}, {"version", 1}, {"rig_seed", scene.options().rig->seed}};
     rig.update(rig_json(scene.drawn_rig()));

@@ -34,8 +34,8 @@ class ExposureHistory {
   std::vector<PoseTruth> poses_ = {{}};  // each time the object was put down
 };
 
-/// truth.json and truth.ply into a scan folder, of a drawn rig also rig_truth.json; `poses` in the order they were
-/// taken, at least one. Fails with `degenerate` (none), `io`.
+/// truth.json, truth.ply and truth_calibration.json into a scan folder, of a drawn rig also rig_truth.json; `poses` in
+/// the order they were taken, at least one. Fails with `degenerate` (none), `io`.
 Result<void> write_truth(const Scene& scene, const std::vector<PoseTruth>& poses, const std::filesystem::path& folder);
 
 }  // namespace scanrig::sim

@@ -48,6 +48,9 @@ TEST(JobWords, AModelBeyondTheLimitsSaysWhatMayBeDone) {
   auto j = job(JobState::done);
   j.passed = true;
   EXPECT_EQ(describe(j).sentence, "The model is ready.");
+  j.remarks = {"Left camera moved by 0.06 px: clamp it, calibrate again."};
+  EXPECT_EQ(describe(j).sentence, "The model is ready. Left camera moved by 0.06 px: clamp it, calibrate again.");
+  j.remarks.clear();
   j.passed = false;
   j.error = Error{ErrorCode::below_limits, "0.8 of it is measured, 0.9 are asked for"};
   EXPECT_EQ(describe(j).sentence, "Model outside the recipe's limits: 0.8 of it is measured, 0.9 are asked for.");

@@ -130,6 +130,19 @@ TEST_F(JobStoreTest, AScannedJobWithAReportIsDone) {
   EXPECT_EQ(job.model, model_file(folder).string());
 }
 
+TEST_F(JobStoreTest, AModelTellsWhatTheWatchSaidOfTheRig) {
+  const auto store = open();
+  const auto folder = make_job(store, "job", "scanned");
+  fs::create_directories(model_folder(folder));
+  scan_samples::write_text(report_file(folder), R"({"poses": [{"watch": null}, {"watch": {"sentences": ["A moved."]}},
+                                                    {"watch": {"sentences": ["A moved.", 7, "B moved."]}}]})");
+  EXPECT_THAT(recovered(store, "job").remarks, testing::ElementsAre("A moved.", "B moved."));
+  for (const char* const strange : {"", "[]", "{}", R"({"poses": 3})"}) {
+    scan_samples::write_text(report_file(folder), strange);
+    EXPECT_THAT(recovered(store, "job").remarks, testing::IsEmpty()) << strange;
+  }
+}
+
 TEST_F(JobStoreTest, AScannedJobWithoutAModelIsToBeReconstructed) {
   const auto store = open();
   make_job(store, "job", "scanned");
