@@ -21,7 +21,7 @@ def own_calibration(options, start_rig, log):
     if (kept / CALIBRATION).is_file():
         print(f"Calibration  {kept}/{CALIBRATION}, made by this rig before", flush=True)
         return kept
-    print("The rig calibrates itself: a simulated operator puts the board in seven places (once, two minutes)", flush=True)
+    print("The rig calibrates itself: a simulated operator puts the board in seven places (once, about two minutes)", flush=True)
     working = KEPT / "working"
     shutil.rmtree(working, ignore_errors=True)
     working.mkdir(parents=True)

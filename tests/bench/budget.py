@@ -10,7 +10,7 @@ MINUTES = {
                 "security": 4, "soak": 9},
     "motion": {"matrix": 6, "estop": 10, "killed": 3, "restarts": 5, "latches": 3, "tools": 4,
                "turns": 5, "words": 5, "doctor": 4},
-    "calibration": {"rigs": 8, "faults": 9, "models": 16, "drift": 5},
+    "calibration": {"rigs": 12, "faults": 8, "models": 8, "watch": 9, "drift": 6},
     "cameras": {"triggers": 4, "matrix": 3, "wire": 12, "hil": 8, "memory": 12},
     "end-to-end": {"models": 14, "render": 1, "same_model": 4, "dragon": 8, "rim": 1, "bad_input": 4, "sigkill": 4},
 }
