@@ -145,7 +145,7 @@ def wait_for_socket(daemon, socket):
 
 
 class UncalibratedRig(SimulatedStation):
-    """The same rig before it was calibrated; nobody waits for its table."""
+    """The same rig before it was calibrated, on a clock that need not be waited for."""
 
     def __init__(self, folder, options, log):
         super().__init__(folder)

@@ -17,7 +17,7 @@ MINUTES = {
 LONG = {
     "station": {"fuzz", "asan", "tsan"},
     "motion": {"fuzz"},
-    "calibration": set(),
+    "calibration": {"debian13"},
     "cameras": {"debian13", "fuzz"},
     "end-to-end": {"bare_machine"},
 }

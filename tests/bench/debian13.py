@@ -28,8 +28,8 @@ def machine():
     return root
 
 
-def command(verb):
-    """Command line that runs `./dev VERB...` on this tree inside; its build/ and out/ are separate."""
+def shell(line):
+    """Command line that runs a shell line in this tree inside; its build/ and out/ are separate."""
     binds = [(ROOT, "scanrig")]
     for folder in ("build", "out"):
         (KEPT / folder).mkdir(parents=True, exist_ok=True)
@@ -38,8 +38,12 @@ def command(verb):
     data = pathlib.Path(os.environ.get("SCANRIG_SHARED_DATA", ROOT.parent / "shared" / "data"))
     if data.is_dir():
         binds.append((data, "shared/data"))
-    line = f"cd /scanrig && SCANRIG_SHARED_DATA=/shared/data ./dev {shlex.join(verb)}"
-    return bare_machine.entrance(machine(), line, binds)
+    return bare_machine.entrance(machine(), f"cd /scanrig && export SCANRIG_SHARED_DATA=/shared/data; {line}", binds)
+
+
+def command(verb):
+    """The same for `./dev VERB...`."""
+    return shell(f"./dev {shlex.join(verb)}")
 
 
 def main():

@@ -4,6 +4,7 @@ import math
 import shutil
 import time
 
+import calibration_debian13
 import calibration_faults
 import calibration_series
 import calibration_watch
@@ -100,4 +101,5 @@ PARTS = {"rigs": rigs,
          "faults": calibration_faults.measure,
          "models": models,
          "watch": calibration_watch.measure,
-         "drift": drift}
+         "drift": drift,
+         "debian13": calibration_debian13.measure}
