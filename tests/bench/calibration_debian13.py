@@ -27,7 +27,7 @@ def measure(bench, scratch):
                  "--no-report", *calibration_series.RIM_DOTS]
     targets = " ".join(("scanrig", *CORNER_TESTS))
     tests = " && ".join(f"build/release/bin/{test}" for test in CORNER_TESTS)
-    done = bench.run(debian13.shell(f"./dev deps test && cmake --preset release -DSCANRIG_BENCH=OFF && "
+    done = bench.run(debian13.shell(f"./dev deps test && cmake --preset release -DSCANRIG_TESTS=ON -DSCANRIG_BENCH=ON && "
                                     f"cmake --build --preset release --target {targets} && {' '.join(calibrate)}; "
                                     f"calibrated=$?; {tests} && exit $calibrated"), BUILD_S)
     bench.line("corners and boards with the OpenCV of Debian 13: their tests", "all pass",

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <opencv2/core/mat.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,10 @@ struct CornerImage {
   [[nodiscard]] double value(int x, int y) const;
   [[nodiscard]] bool is_saturated(int x, int y) const;
 };
+
+/// Sigma in pixels of the blur of an image's steepest edges, as if they were steps over its whole contrast; nothing
+/// where the contrast is too low to tell.
+std::optional<double> steepest_edge_px(const cv::Mat1b& grey);
 
 /// `pixel_format` as in manifests: "Mono8", "BayerRG8" (red at 0, 0), "BGR8". Shares the memory of `image`. Fails with
 /// `invalid_input` for an image that is not of that format.

@@ -11,6 +11,7 @@ namespace {
 
 constexpr int kMinMarkers = 4;
 constexpr double kMinAgreeing = 0.8;  // share of the markers seen
+constexpr double kBlurred = 1.25;     // px, of an image whose markers are not read
 constexpr int kMaxColumns = 30;       // tried when the configured number does not fit
 
 /// Markers under the assumption of one layout.
@@ -159,6 +160,12 @@ Result<BoardSeed> seed_from_markers(const CornerImage& image, const Board& board
   const auto markers = detect_markers(image.grey, board.markers->dictionary);
   if (!markers) return pass_on(markers);
   if (static_cast<int>(markers->size()) < kMinMarkers) {
+    if (const auto edge = steepest_edge_px(image.grey); edge && *edge > kBlurred) {
+      return fail(ErrorCode::not_found,
+                  "board: image blurred ({:.1f} px), markers cannot be read; check focus and "
+                  "aperture, and let the table settle",
+                  *edge);
+    }
     return fail(ErrorCode::not_found,
                 "board: {} markers of {} seen, {} needed; put the board into view, check light and focus",
                 markers->size(), board.markers->dictionary, kMinMarkers);

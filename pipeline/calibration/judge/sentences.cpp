@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "pipeline/calibration/solve/unknowns.h"
 
@@ -14,6 +16,8 @@ constexpr double kSaidGearError = 1e-4;  ///< 0.02 degrees over half a turn
 constexpr double kMaxTilt = 0.03;        ///< degrees of the axis from the table top's normal
 constexpr double kMaxMove = 0.5;         ///< px
 constexpr double kSigmas = 2.0;
+constexpr double kSureUm = 5.0;  ///< of the volume: grade A
+constexpr double kFilled = 0.5;  ///< of an image's cells
 
 bool are_swapped(const SolvedCalibration& solved) {
   if (solved.cameras < 2) return false;
@@ -92,6 +96,31 @@ void add_lengths(const CalibrationInput& input, const SolvedCalibration& solved,
   }
 }
 
+/// Share of the cells of an image, 8 x 6, in which the images used have corners.
+double image_coverage(const CalibrationInput& input, const SolvedCalibration& solved, int camera) {
+  constexpr int kColumns = 8, kRows = 6;
+  std::set<std::pair<int, int>> cells;
+  for (const ImageFit& image : solved.images) {
+    if (!image.is_used || image.camera != camera) continue;
+    for (const CornerResidual& r : image.residuals) {
+      cells.emplace(static_cast<int>(r.pixel.x() / input.width * kColumns),
+                    static_cast<int>(r.pixel.y() / input.height * kRows));
+    }
+  }
+  return static_cast<double>(cells.size()) / (kColumns * kRows);
+}
+
+/// What is missing where the boards show too little of the volume.
+void add_coverage(const CalibrationInput& input, const SolvedCalibration& solved, std::vector<std::string>& out) {
+  if (!solved.sigma || solved.sigma->volume <= kSureUm) return;
+  const double left = image_coverage(input, solved, 0), right = image_coverage(input, solved, 1);
+  const char* const what = std::min(left, right) < kFilled ? "Use a larger board, or put it nearer to the image's edges"
+                                                           : "Take more placements, and check focus and light";
+  out.push_back(
+      fmt::format("Points known to {:.0f} um; corners in {:.0f} % of the left image, {:.0f} % of the right. {}.",
+                  solved.sigma->volume, 100.0 * left, 100.0 * right, what));
+}
+
 }  // namespace
 
 bool is_to_be_refused(const CalibrationInput& input, const SolvedCalibration& solved,
@@ -119,6 +148,7 @@ std::vector<std::string> calibration_sentences(const CalibrationInput& input, co
   }
   if (solved.sigma && !ab) out.emplace_back("A and B not compared: show boards for both. Grade C at best.");
   if (!solved.sigma) out.emplace_back("No volume to grade: needs two cameras and the table.");
+  add_coverage(input, solved, out);
   add_lengths(input, solved, out);
   add_images(solved, out);
   return out;

@@ -303,6 +303,17 @@ TEST(FindBoard, FailsWithAReasonWhereNoBoardIs) {
   EXPECT_EQ(find_board(grey, "Mono8", unknown).error().code, ErrorCode::invalid_input);
 }
 
+TEST(FindBoard, NamesBlurThatHidesTheMarkers) {
+  Exposure soft;
+  soft.lens_sigma_px = 6.0;
+  const PrintedBoard printed;
+  const auto found =
+      find_board(render(make_print(printed), TestCamera{}, camera_from_board({}), soft), "BayerRG8", Board{});
+  ASSERT_FALSE(found);
+  EXPECT_EQ(found.error().code, ErrorCode::not_found);
+  EXPECT_NE(found.error().message.find("image blurred ("), std::string::npos) << found.error().message;
+}
+
 TEST(FindBoard, RefusesTooFewMarkersToPlaceTheBoard) {
   const PrintedBoard printed;
   const TestCamera camera;

@@ -8,6 +8,7 @@
 namespace scanrig {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -27,6 +28,26 @@ TEST(JudgeCalibration, ACleanRigIsGradeAWithoutASentence) {
   EXPECT_NEAR(std::sqrt(sum / static_cast<double>(shifts.size())), judged->judgement.cross_validation->difference,
               1e-9);
   EXPECT_THAT(judged->judgement.sentences, IsEmpty());
+}
+
+TEST(JudgeCalibration, ABoardThatHardlyFillsTheImageIsNamedWithWhatIsMissing) {
+  RigFaults faults;
+  faults.noise_px = 0.1;
+  SyntheticBoardRig rig(faults, 110);
+  CalibrationInput input = rig.observe(3);
+  for (BoardPair& pair : input.pairs) {  // a smaller board: its inner corners
+    for (BoardSight* sight : {&pair.left, &pair.right}) {
+      std::erase_if(sight->corners, [&](const CornerObservation& corner) {
+        const int column = corner.id % input.board.corner_columns(), row = corner.id / input.board.corner_columns();
+        return column < 3 || column > 7 || row < 2 || row > 5;
+      });
+    }
+  }
+  const auto judged = judge_calibration(input);
+  ASSERT_TRUE(judged) << judged.error().message;
+  EXPECT_NE(to_string(judged->judgement.grade), "A");
+  EXPECT_THAT(judged->judgement.sentences,
+              Contains(AllOf(StartsWith("Points known to "), HasSubstr("Use a larger board"))));
 }
 
 TEST(JudgeCalibration, ALensThatBrownDoesNotKnowShowsBetweenAAndB) {
