@@ -62,6 +62,17 @@ ordered_json to_json(const std::vector<Error>& errors) {
   return list;
 }
 
+ordered_json action_json(const std::optional<Error>& refused) {
+  return {{"ok", !refused}, {"why", refused ? ordered_json(refused->message) : ordered_json(nullptr)}};
+}
+
+ordered_json actions_json(const Offers& offers) {
+  auto start = action_json(offers.start);
+  start["does"] = offers.start_offer.starts_with("continue") ? "continue" : "begin";
+  start["offer"] = offers.start_offer;
+  return {{"start", std::move(start)}, {"stop", action_json({})}, {"reset", action_json(offers.reset)}};
+}
+
 /// Number and reasons of the retakes.
 void add_retakes(ordered_json& json, const std::vector<Error>& reasons) {
   json["retakes"] = json["redone"] = reasons.size();           // redone: old name
@@ -103,6 +114,9 @@ ordered_json to_json(const Snapshot& snapshot) {
           {"cause", snapshot.cause},
           {"sentence", snapshot.sentence},
           {"next_action", snapshot.next_action},
+          {"tone", to_string(snapshot.headline.tone)},
+          {"word", snapshot.headline.word},
+          {"actions", actions_json(snapshot.offers)},
           {"devices", devices_json(snapshot.devices)},
           {"job", snapshot.job.empty() ? ordered_json(nullptr) : ordered_json(snapshot.job)},
           {"not_started", not_started_json(snapshot.not_started)},

@@ -154,7 +154,7 @@ const char* const kSchemas = R"({
 "Standstill": {"type": "string", "enum": ["confirmed", "pending", "moving", "unknown"],
   "description": "pending: stop was sent and is not confirmed yet; unknown: the table may be moving"},
 "Status": {"type": "object", "additionalProperties": false,
-  "required": ["revision", "machine", "activity", "may_be_moving", "standstill", "cause", "sentence", "next_action", "devices", "job",
+  "required": ["revision", "machine", "activity", "may_be_moving", "standstill", "cause", "sentence", "next_action", "tone", "word", "actions", "devices", "job",
   "not_started", "queue", "not_begun"],
   "properties": {
   "revision": {"type": "integer"},
@@ -165,11 +165,21 @@ const char* const kSchemas = R"({
   "cause": {"type": "string", "description": "why the machine is in this state"},
   "sentence": {"type": "string", "description": "what is going on"},
   "next_action": {"type": "string", "description": "what the operator should do, if only to wait"},
+  "tone": {"type": "string", "enum": ["idle", "ready", "working", "act", "fault"], "description": "how urgent it is to a person"},
+  "word": {"type": "string", "description": "the state in a word, to be read from afar; of a scan the view: 5/8"},
+  "actions": {"type": "object", "additionalProperties": false, "required": ["start", "stop", "reset"],
+    "description": "what would be obeyed now from here; a role may forbid it besides", "properties": {
+    "start": {"allOf": [{"$ref": "#/components/schemas/Action"}]},
+    "stop": {"$ref": "#/components/schemas/Action"}, "reset": {"$ref": "#/components/schemas/Action"}}},
   "devices": {"type": "array", "items": {"$ref": "#/components/schemas/Device"}},
   "job": {"type": "string", "nullable": true, "description": "the active job"},
   "not_started": {"allOf": [{"$ref": "#/components/schemas/NotStarted"}], "nullable": true},
   "not_begun": {"allOf": [{"$ref": "#/components/schemas/NotStarted"}], "nullable": true, "deprecated": true, "description": "old name of not_started"},
   "queue": {"type": "array", "items": {"type": "string"}, "description": "jobs to come, the next one first"}}},
+"Action": {"type": "object", "additionalProperties": false, "required": ["ok", "why"], "properties": {
+  "ok": {"type": "boolean"}, "why": {"type": "string", "nullable": true, "description": "why it would be refused"},
+  "does": {"type": "string", "enum": ["begin", "continue"], "description": "only of start"},
+  "offer": {"type": "string", "description": "only of start: what it means now, for POST start"}}},
 "NotStarted": {"type": "object", "required": ["job", "why"], "additionalProperties": false,
   "description": "the job that the last Start did not begin; null: it began one", "properties": {
   "job": {"type": "string"}, "why": {"$ref": "#/components/schemas/Problem"}}},

@@ -31,6 +31,23 @@ Route press(std::string_view path, Button button, Role role, std::string_view de
           }};
 }
 
+Route start_route() {
+  constexpr double kOffer = 300.0;
+  auto route = press("/api/v1/start", Button::start, Role::operating, "Starts a scan, or continues it after the flip.");
+  route.in_body = {{.name = "offer",
+                    .description =
+                        "`actions.start.offer` of the status that was seen: where Start means something else "
+                        "by now, it is refused. Repeated, it counts once",
+                    .min = 1.0,
+                    .max = kOffer}};
+  route.handle = [](const ApiStation& station, const Values& values, Send send) {
+    station.loop.press(
+        Button::start, Origin::remote, [send = std::move(send)](const Result<std::string>& job) { send(pressed(job)); },
+        values.text("offer").value_or(""));
+  };
+  return route;
+}
+
 /// The snapshot of the stop, or a later one.
 ApiResponse stopped(const Result<std::string>& job, const Snapshot& snapshot) {
   if (!job) return error_response(job.error());
@@ -145,7 +162,7 @@ std::vector<Route> station_routes() {
            "and the present status when that is too long ago. A comment every 10 s is the heartbeat.",
        .reply = {.description = "events without end", .type = "text/event-stream"},
        .handle = [](const ApiStation&, const Values&, const Send& send) { send({.body = EventStream{}}); }},
-      press("/api/v1/start", Button::start, Role::operating, "Starts a scan, or continues it after the flip."),
+      start_route(),
       stop_route(),
       press("/api/v1/reset", Button::reset, Role::operating, "Clears a fault and homes the table."),
       maintenance("/api/v1/maintenance/on", What::on, "Maintenance mode begins: no jobs."),

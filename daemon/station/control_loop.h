@@ -59,8 +59,9 @@ class ControlLoop {
 
   void post(Event event) { inbox_.post({std::move(event), {}}); }
   /// The control loop's thread calls `reply` soon; it must not wait. After a shutdown it may never be called.
-  void press(Button button, Origin origin, Reply reply) {
-    inbox_.post({event::Pressed{button, origin, {}}, std::move(reply)});
+  /// `offer`: as in event::Pressed.
+  void press(Button button, Origin origin, Reply reply, std::string offer = {}) {
+    inbox_.post({event::Pressed{button, origin, {}, std::move(offer)}, std::move(reply)});
   }
   /// The same for an engineer's requests.
   void ask(event::MaintenanceRequested what, Reply reply) { inbox_.post({what, std::move(reply)}); }

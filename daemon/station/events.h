@@ -61,6 +61,7 @@ struct Pressed {
   Button button;
   Origin origin;
   std::string new_job_id;
+  std::string offer{};  ///< start_offer() that the requester has seen; empty: none is to be compared
 };
 struct EstopChanged {
   bool ok;

@@ -129,8 +129,9 @@ struct JobInfo {
   std::optional<CalibrationOutcome> calibration{};  ///< of a calibration that is solved
   std::string repeated{};        ///< why the views of the current placement were dropped; empty: they were not
   std::optional<Error> error{};  ///< why it failed, was interrupted or cancelled; or did not pass
-  std::vector<std::string> remarks{};  ///< done: what the scan shows of the rig, as sentences (pipeline/calibration/watch)
-  std::string model{};           ///< path of the model file, once it exists
+  std::vector<std::string>
+      remarks{};        ///< done: what the scan shows of the rig, as sentences (pipeline/calibration/watch)
+  std::string model{};  ///< path of the model file, once it exists
   std::string report{};
 };
 

@@ -4,6 +4,7 @@
 
 #include "daemon/station/job_info.h"
 #include "daemon/station/job_lifecycle.h"
+#include "daemon/station/snapshot.h"
 #include "daemon/station/transition.h"
 #include "drivers/panel/panel.h"
 
@@ -20,6 +21,12 @@ OperatorMessage describe(const StationState& state, const StationRules& rules);
 
 /// One job: its state, the reason for it, and what to do about it.
 OperatorMessage describe(const JobInfo& job);
+
+/// The rig's state as it is read from afar.
+Headline headline(const StationState& state);
+
+/// What may be pressed remotely now.
+Offers offers(const StationState& state, const StationRules& rules);
 
 /// Next action when a pose is complete.
 std::string how_to_flip(const Recipe& recipe, bool guard_closed = true);

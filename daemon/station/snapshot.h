@@ -48,6 +48,20 @@ struct AwaitedPlacement {
   bool operator==(const AwaitedPlacement&) const = default;
 };
 
+/// How urgent the rig's state is to a person, and one word for it.
+enum class Tone { idle, ready, working, act, fault };
+std::string_view to_string(Tone tone);
+struct Headline {
+  Tone tone = Tone::idle;
+  std::string word = "WAIT";  ///< "READY"; "5/8": the view that is being taken
+};
+
+/// Whether Start and Reset would be obeyed, pressed remotely now. Stop always is.
+struct Offers {
+  std::optional<Error> start{}, reset{};  ///< why it would be refused
+  std::string start_offer{};              ///< start_offer() in transition.h
+};
+
 /// Whether the table is confirmed to be stopped.
 enum class Standstill {
   confirmed,
@@ -64,6 +78,8 @@ struct Snapshot {
   std::string cause{};
   std::string sentence{};
   std::string next_action{};
+  Headline headline{};
+  Offers offers{};
   bool may_be_moving = false;  ///< the last stop was not confirmed
   std::string fault_device{};  ///< in Error: the failed device; empty: none, as of an e-stop
   PanelInputs inputs{};

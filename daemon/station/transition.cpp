@@ -30,6 +30,9 @@ class Transition : public StepBuilder {
     switch (e.button) {
       case Button::start:
         if (remote && !remote_may_move("start")) return;
+        if (!e.offer.empty() && e.offer != start_offer(s())) {
+          return refuse(ErrorCode::refused, "Start means something else by now: look again, then press Start.");
+        }
         return start(e.new_job_id);
       case Button::stop: return;  // above
       case Button::reset:
@@ -352,6 +355,12 @@ class Transition : public StepBuilder {
 };
 
 }  // namespace
+
+std::string start_offer(const StationState& state) {
+  if (state.job) return fmt::format("continue-{}-{}", state.job->id, state.job->pose);
+  if (state.queue.empty()) return fmt::format("begin-new-{}", state.last_started_job);
+  return fmt::format("begin-{}-{}", state.queue.front()->id, state.queue.front()->complete);
+}
 
 Step next(const StationState& state, const Event& event, const StationRules& rules) {
   Transition transition(state, rules);

@@ -120,6 +120,9 @@ int next_pose(const ActiveJob& job);
 /// The placement, from 0, that the board is to be put at before the next Start; nothing: none is awaited.
 std::optional<int> awaited_placement(const StationState& state);
 
+/// What Start means now: another text when it means something else. A Start that carries an offer counts once.
+std::string start_offer(const StationState& state);
+
 /// The whole behaviour of the station as a pure function: the next state, and the actions.
 /// Events that come too late for the state they belong to change nothing.
 Step next(const StationState& state, const Event& event, const StationRules& rules);

@@ -19,6 +19,8 @@ def moments(bench, scratch):
         ok = int(longest_ms) < STANDSTILL_MS and int(count) >= wanted and done.returncode == 0
         bench.line(f"{tool}, ended by {way}", f"standstill < {STANDSTILL_MS} ms at {wanted} moments",
                    f"longest {longest_ms} ms, {count} moments, {moving} while moving", ok)
+    for failure in re.findall(r": Failure\n(.{1,600})", done.stdout, re.DOTALL)[:8]:
+        bench.note(" ".join(failure.split()))
     bench.line("tools that move leave no table turning", "all tests pass",
                f"{len(seen)} tools and ways, {'all pass' if done.returncode == 0 else 'some FAIL'}",
                done.returncode == 0 and bool(seen))
