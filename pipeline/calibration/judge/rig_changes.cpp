@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <optional>
 #include <utility>
 
 #include "core/statistics.h"
@@ -14,6 +15,7 @@ namespace {
 constexpr double kMinChi2 = 40.0;
 constexpr double kMinShiftPx = 0.01;
 constexpr double kAgreement = 0.9;   ///< of a camera's images with a motion between two placements
+constexpr double kApart = 1e-3;      ///< share of a direction that no other unknowns explain
 constexpr double kFocusShare = 0.3;  ///< of the chi-square that only the focal length explains
 
 /// Further unknowns: combinations of the solution's columns, in some of its sightings only.
@@ -21,6 +23,7 @@ struct ExtraUnknowns {
   Columns columns;
   Eigen::MatrixXd combine;                        ///< columns by further unknowns
   std::function<double(const Sighting&)> weight;  ///< 0: not in this sighting
+  std::function<bool(const Sighting&)> explains;  ///< sightings whose misfit is all that it may explain; none: any
 };
 
 struct Gain {
@@ -28,6 +31,8 @@ struct Gain {
   double shift_px = 0.0;
 };
 
+/// What further unknowns explain of what a solution leaves over. The test is linear: directions of which the other
+/// unknowns leave next to nothing do not count, nor does a slip that explains more than its placement leaves over.
 class ScoreTest {
  public:
   explicit ScoreTest(const CalibrationSolution& solution)
@@ -37,8 +42,11 @@ class ScoreTest {
     const Eigen::Index q = extra.combine.cols();
     Eigen::MatrixXd cross = Eigen::MatrixXd::Zero(linear_.columns, q), own = Eigen::MatrixXd::Zero(q, q);
     Eigen::VectorXd slope = Eigen::VectorXd::Zero(q);
-    double rows = 0.0;
+    double rows = 0.0, misfit = 0.0;
     for (std::size_t i = 0; i < setup_.sightings.size(); ++i) {
+      if (!extra.explains || extra.explains(setup_.sightings[i])) {
+        misfit += std::pow(linear_.residual[2 * i], 2) + std::pow(linear_.residual[2 * i + 1], 2);
+      }
       const double weight = extra.weight(setup_.sightings[i]);
       if (weight == 0.0) continue;
       for (std::size_t row = 2 * i; row < 2 * i + 2; ++row) {
@@ -55,9 +63,16 @@ class ScoreTest {
     if (rows == 0.0) return {};
     const Eigen::MatrixXd half = normal_.half_solve(cross);
     const Eigen::MatrixXd left = own - half.transpose() * half;
-    const Eigen::LDLT<Eigen::MatrixXd> solver(left);
-    if (!(left.diagonal().array() > 1e-6 * own.diagonal().array()).all()) return {};  // not seen apart
-    const Eigen::VectorXd step = solver.solve(slope);
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> apart(left, own);
+    if (apart.info() != Eigen::Success) return {};
+    Eigen::VectorXd step = Eigen::VectorXd::Zero(q);
+    for (Eigen::Index i = 0; i < q; ++i) {
+      const double share = apart.eigenvalues()[i];
+      if (share < kApart) continue;
+      const auto direction = apart.eigenvectors().col(i);
+      step += direction * (direction.dot(slope) / share);
+    }
+    if (extra.explains && slope.dot(step) > misfit) return {};
     return {slope.dot(step), setup_.sigma_px * std::sqrt(2.0 * step.dot(own * step) / rows)};
   }
 
@@ -91,7 +106,7 @@ ExtraUnknowns camera_turn(const CalibrationSolution& solution, int camera, bool 
   const auto c = static_cast<std::size_t>(camera);
   const Transform pose = to_transform(solution.start.unknowns.cameras[c].camera_from_table);
   const Columns columns = lens_and_pose(solution.linear, c);
-  ExtraUnknowns extra{columns, Eigen::MatrixXd::Zero(columns.count, focus ? 3 : 2), std::move(weight)};
+  ExtraUnknowns extra{columns, Eigen::MatrixXd::Zero(columns.count, focus ? 3 : 2), std::move(weight), {}};
   for (int axis = 0; axis < 2; ++axis) {
     const Eigen::Vector3d turn = Eigen::Vector3d::Unit(axis);
     extra.combine.col(axis).segment<6>(solution.linear.pose[c].first - columns.first) << turn,
@@ -119,10 +134,13 @@ std::function<double(const Sighting&)> gradually(int camera, std::size_t pairs) 
 ExtraUnknowns board_slip(const CalibrationSolution& solution, int placement, int from_pair) {
   const std::vector<int>& placements = solution.start.setup.placement_of_pair;
   ExtraUnknowns extra{
-      solution.linear.placements[static_cast<std::size_t>(placement)], Eigen::MatrixXd::Identity(6, 6), {}};
+      solution.linear.placements[static_cast<std::size_t>(placement)], Eigen::MatrixXd::Identity(6, 6), {}, {}};
   extra.weight = [placement, from_pair, &placements](const Sighting& s) {
     const bool applies = !s.is_dot && s.pair >= from_pair && placements[static_cast<std::size_t>(s.pair)] == placement;
     return applies ? 1.0 : 0.0;
+  };
+  extra.explains = [placement, &placements](const Sighting& s) {
+    return !s.is_dot && placements[static_cast<std::size_t>(s.pair)] == placement;
   };
   return extra;
 }

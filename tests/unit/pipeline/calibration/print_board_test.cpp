@@ -10,6 +10,7 @@
 #include "pipeline/calibration/corners/find_board.h"
 #if CV_VERSION_MAJOR > 4 || CV_VERSION_MINOR >= 7
 #include <opencv2/objdetect/aruco_board.hpp>
+#include <opencv2/objdetect/aruco_dictionary.hpp>
 #else
 #include <opencv2/aruco/charuco.hpp>
 #endif
