@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <optional>
 #include <utility>
 
 #include "core/statistics.h"
@@ -14,16 +13,15 @@ namespace {
 
 constexpr double kMinChi2 = 40.0;
 constexpr double kMinShiftPx = 0.01;
-constexpr double kAgreement = 0.9;   ///< of a camera's images with a motion between two placements
-constexpr double kApart = 1e-3;      ///< share of a direction that no other unknowns explain
-constexpr double kFocusShare = 0.3;  ///< of the chi-square that only the focal length explains
+constexpr double kAgreement = 0.9;      ///< of a camera's images with a motion between two placements
+constexpr double kSlipAdvantage = 8.0;  ///< a slip's six unknowns take up much of any other change
+constexpr double kFocusShare = 0.3;     ///< of the chi-square that only the focal length explains
 
 /// Further unknowns: combinations of the solution's columns, in some of its sightings only.
 struct ExtraUnknowns {
   Columns columns;
   Eigen::MatrixXd combine;                        ///< columns by further unknowns
   std::function<double(const Sighting&)> weight;  ///< 0: not in this sighting
-  std::function<bool(const Sighting&)> explains;  ///< sightings whose misfit is all that it may explain; none: any
 };
 
 struct Gain {
@@ -31,8 +29,6 @@ struct Gain {
   double shift_px = 0.0;
 };
 
-/// What further unknowns explain of what a solution leaves over. The test is linear: directions of which the other
-/// unknowns leave next to nothing do not count, nor does a slip that explains more than its placement leaves over.
 class ScoreTest {
  public:
   explicit ScoreTest(const CalibrationSolution& solution)
@@ -42,11 +38,8 @@ class ScoreTest {
     const Eigen::Index q = extra.combine.cols();
     Eigen::MatrixXd cross = Eigen::MatrixXd::Zero(linear_.columns, q), own = Eigen::MatrixXd::Zero(q, q);
     Eigen::VectorXd slope = Eigen::VectorXd::Zero(q);
-    double rows = 0.0, misfit = 0.0;
+    double rows = 0.0;
     for (std::size_t i = 0; i < setup_.sightings.size(); ++i) {
-      if (!extra.explains || extra.explains(setup_.sightings[i])) {
-        misfit += std::pow(linear_.residual[2 * i], 2) + std::pow(linear_.residual[2 * i + 1], 2);
-      }
       const double weight = extra.weight(setup_.sightings[i]);
       if (weight == 0.0) continue;
       for (std::size_t row = 2 * i; row < 2 * i + 2; ++row) {
@@ -63,16 +56,9 @@ class ScoreTest {
     if (rows == 0.0) return {};
     const Eigen::MatrixXd half = normal_.half_solve(cross);
     const Eigen::MatrixXd left = own - half.transpose() * half;
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> apart(left, own);
-    if (apart.info() != Eigen::Success) return {};
-    Eigen::VectorXd step = Eigen::VectorXd::Zero(q);
-    for (Eigen::Index i = 0; i < q; ++i) {
-      const double share = apart.eigenvalues()[i];
-      if (share < kApart) continue;
-      const auto direction = apart.eigenvectors().col(i);
-      step += direction * (direction.dot(slope) / share);
-    }
-    if (extra.explains && slope.dot(step) > misfit) return {};
+    const Eigen::LDLT<Eigen::MatrixXd> solver(left);
+    if (!(left.diagonal().array() > 1e-6 * own.diagonal().array()).all()) return {};  // not seen apart
+    const Eigen::VectorXd step = solver.solve(slope);
     return {slope.dot(step), setup_.sigma_px * std::sqrt(2.0 * step.dot(own * step) / rows)};
   }
 
@@ -106,7 +92,7 @@ ExtraUnknowns camera_turn(const CalibrationSolution& solution, int camera, bool 
   const auto c = static_cast<std::size_t>(camera);
   const Transform pose = to_transform(solution.start.unknowns.cameras[c].camera_from_table);
   const Columns columns = lens_and_pose(solution.linear, c);
-  ExtraUnknowns extra{columns, Eigen::MatrixXd::Zero(columns.count, focus ? 3 : 2), std::move(weight), {}};
+  ExtraUnknowns extra{columns, Eigen::MatrixXd::Zero(columns.count, focus ? 3 : 2), std::move(weight)};
   for (int axis = 0; axis < 2; ++axis) {
     const Eigen::Vector3d turn = Eigen::Vector3d::Unit(axis);
     extra.combine.col(axis).segment<6>(solution.linear.pose[c].first - columns.first) << turn,
@@ -134,13 +120,10 @@ std::function<double(const Sighting&)> gradually(int camera, std::size_t pairs) 
 ExtraUnknowns board_slip(const CalibrationSolution& solution, int placement, int from_pair) {
   const std::vector<int>& placements = solution.start.setup.placement_of_pair;
   ExtraUnknowns extra{
-      solution.linear.placements[static_cast<std::size_t>(placement)], Eigen::MatrixXd::Identity(6, 6), {}, {}};
+      solution.linear.placements[static_cast<std::size_t>(placement)], Eigen::MatrixXd::Identity(6, 6), {}};
   extra.weight = [placement, from_pair, &placements](const Sighting& s) {
     const bool applies = !s.is_dot && s.pair >= from_pair && placements[static_cast<std::size_t>(s.pair)] == placement;
     return applies ? 1.0 : 0.0;
-  };
-  extra.explains = [placement, &placements](const Sighting& s) {
-    return !s.is_dot && placements[static_cast<std::size_t>(s.pair)] == placement;
   };
   return extra;
 }
@@ -164,7 +147,8 @@ class ChangeSearch {
       const auto gain = test_.of(camera_turn(solution_, camera, false, gradually(camera, placements.size())));
       consider(gain, {.kind = RigChange::Kind::drift, .camera = camera, .share = 0.5});
     }
-    return best_;
+    const bool is_slip = slip_ && (!camera_ || slip_->chi2 > kSlipAdvantage * camera_->chi2);
+    return is_slip ? slip_ : camera_;
   }
 
  private:
@@ -199,13 +183,14 @@ class ChangeSearch {
   void consider(const Gain& gain, RigChange change) {
     change.chi2 = gain.chi2;
     change.shift_px = gain.shift_px;
-    if (gain.chi2 > kMinChi2 && gain.shift_px > kMinShiftPx && (!best_ || gain.chi2 > best_->chi2)) best_ = change;
+    auto& best = change.kind == RigChange::Kind::board ? slip_ : camera_;
+    if (gain.chi2 > kMinChi2 && gain.shift_px > kMinShiftPx && (!best || gain.chi2 > best->chi2)) best = change;
   }
 
   const CalibrationInput& input_;
   const CalibrationSolution& solution_;
   const ScoreTest test_;
-  std::optional<RigChange> best_;
+  std::optional<RigChange> slip_, camera_;  ///< the best of each
 };
 
 }  // namespace
