@@ -297,7 +297,9 @@ Result<event::ModelReady> ReconstructionThread::make_model() {
     if (!made) return pass_on(made);
     const auto report = report_file(current_->folder);
     const auto& recipe = current_->recipe;
-    return event::ModelReady{current_->job, model_file(current_->folder, recipe.kind), report,
+    return event::ModelReady{current_->job,
+                             model_file(current_->folder, recipe.kind),
+                             report,
                              limit_violation(report, recipe.limits),
                              recipe.is_calibration() ? read_calibration_report(report) : std::nullopt,
                              recipe.is_calibration() ? std::vector<std::string>() : read_rig_remarks(report)};
