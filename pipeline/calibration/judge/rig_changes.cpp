@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <map>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "core/statistics.h"
 
@@ -13,9 +16,9 @@ namespace {
 
 constexpr double kMinChi2 = 40.0;
 constexpr double kMinShiftPx = 0.01;
-constexpr double kAgreement = 0.9;      ///< of a camera's images with a motion between two placements
-constexpr double kSlipAdvantage = 8.0;  ///< a slip's six unknowns take up much of any other change
-constexpr double kFocusShare = 0.3;     ///< of the chi-square that only the focal length explains
+constexpr double kAgreement = 0.9;   ///< of a camera's images with a motion between two placements
+constexpr double kUneven = 2.0;      ///< misfit of the worst placement over that of the middle one
+constexpr double kFocusShare = 0.3;  ///< of the chi-square that only the focal length explains
 
 /// Further unknowns: combinations of the solution's columns, in some of its sightings only.
 struct ExtraUnknowns {
@@ -147,11 +150,32 @@ class ChangeSearch {
       const auto gain = test_.of(camera_turn(solution_, camera, false, gradually(camera, placements.size())));
       consider(gain, {.kind = RigChange::Kind::drift, .camera = camera, .share = 0.5});
     }
-    const bool is_slip = slip_ && (!camera_ || slip_->chi2 > kSlipAdvantage * camera_->chi2);
+    const bool is_slip = slip_ && (!camera_ || (slip_->chi2 > camera_->chi2 && !others_fit_badly(slip_->placement)));
     return is_slip ? slip_ : camera_;
   }
 
  private:
+  /// A slip leaves the other placements as they were; what a camera does shows in several of them.
+  [[nodiscard]] bool others_fit_badly(int slipped) const {
+    struct Misfit {
+      double chi2 = 0.0, rows = 0.0;
+    };
+    std::map<int, Misfit> of;
+    const BundleSetup& setup = solution_.start.setup;
+    for (std::size_t i = 0; i < setup.sightings.size(); ++i) {
+      const Sighting& s = setup.sightings[i];
+      if (s.is_dot) continue;
+      Misfit& misfit = of[input_.pairs[static_cast<std::size_t>(s.pair)].placement];
+      misfit.chi2 += std::pow(solution_.linear.residual[2 * i], 2) + std::pow(solution_.linear.residual[2 * i + 1], 2);
+      misfit.rows += 2.0;
+    }
+    std::vector<double> others;
+    for (const auto& [placement, misfit] : of) {
+      if (placement != slipped) others.push_back(misfit.chi2 / misfit.rows);
+    }
+    return others.size() > 2 && std::ranges::max(others) > kUneven * quantile(others, 0.5);
+  }
+
   [[nodiscard]] bool is_solved_for(int camera) const {
     const auto c = static_cast<std::size_t>(camera);
     return solution_.linear.pose[c].count == 6 && solution_.linear.lens[c].count == 9;
