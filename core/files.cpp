@@ -14,6 +14,8 @@
 namespace scanrig {
 namespace {
 
+constexpr const char* kTemporary = ".tmp";  // between a file's name and the number of its process
+
 class Descriptor {
  public:
   explicit Descriptor(int fd) : fd_(fd) {}
@@ -70,9 +72,19 @@ Result<std::string> read_file(const std::filesystem::path& path) {
   return std::move(text).str();
 }
 
+std::vector<std::filesystem::path> unfinished_writes(const std::filesystem::path& path) {
+  const std::string begins = path.filename().string() + kTemporary;
+  std::vector<std::filesystem::path> found;
+  std::error_code ignored;
+  for (const auto& entry : std::filesystem::directory_iterator(path.parent_path(), ignored)) {
+    if (entry.path().filename().string().starts_with(begins)) found.push_back(entry.path());
+  }
+  return found;
+}
+
 Result<void> write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes) {
   std::filesystem::path temporary = path;
-  temporary += fmt::format(".tmp{}", ::getpid());
+  temporary += fmt::format("{}{}", kTemporary, ::getpid());
   auto written = write_all(temporary, bytes);
   if (written) written = sync_file(temporary);
   if (written && ::rename(temporary.c_str(), path.c_str()) != 0) {

@@ -18,6 +18,9 @@ Result<std::string> read_file(const std::filesystem::path& path);
 Result<void> write_file_atomically(const std::filesystem::path& path, std::span<const std::byte> bytes);
 Result<void> write_file_atomically(const std::filesystem::path& path, std::string_view text);
 
+/// What write_file_atomically() left of `path` where its process ended before it did.
+std::vector<std::filesystem::path> unfinished_writes(const std::filesystem::path& path);
+
 struct FileContent {
   std::string name;  ///< within the folder
   std::span<const std::byte> bytes;

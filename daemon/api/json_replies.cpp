@@ -66,11 +66,11 @@ ordered_json action_json(const std::optional<Error>& refused) {
   return {{"ok", !refused}, {"why", refused ? ordered_json(refused->message) : ordered_json(nullptr)}};
 }
 
-ordered_json actions_json(const Offers& offers) {
-  auto start = action_json(offers.start);
-  start["does"] = offers.start_offer.starts_with("continue") ? "continue" : "begin";
-  start["offer"] = offers.start_offer;
-  return {{"start", std::move(start)}, {"stop", action_json({})}, {"reset", action_json(offers.reset)}};
+ordered_json actions_json(const RemoteActions& actions) {
+  auto start = action_json(actions.start_refused);
+  start["does"] = actions.start_offer.starts_with("continue") ? "continue" : "begin";
+  start["offer"] = actions.start_offer;
+  return {{"start", std::move(start)}, {"stop", action_json({})}, {"reset", action_json(actions.reset_refused)}};
 }
 
 /// Number and reasons of the retakes.
@@ -116,7 +116,7 @@ ordered_json to_json(const Snapshot& snapshot) {
           {"next_action", snapshot.next_action},
           {"tone", to_string(snapshot.headline.tone)},
           {"word", snapshot.headline.word},
-          {"actions", actions_json(snapshot.offers)},
+          {"actions", actions_json(snapshot.actions)},
           {"devices", devices_json(snapshot.devices)},
           {"job", snapshot.job.empty() ? ordered_json(nullptr) : ordered_json(snapshot.job)},
           {"not_started", not_started_json(snapshot.not_started)},

@@ -185,17 +185,13 @@ void print_check(const CalibrateFolderVerb& verb, const DriftCheck& check) {
   fmt::print("{}\n", json.dump(2));
 }
 
-/// Images without serials are taken as they are.
 Result<void> check_cameras(const Calibration& known, const CalibrationImages& images) {
-  for (std::size_t side = 0; side < images.serials.size(); ++side) {
-    const std::string& serial = side == 0 ? known.left.serial : known.right.serial;
-    if (images.serials[side].empty() || serial.empty() || images.serials[side] == serial) continue;
-    return fail(
-        ErrorCode::invalid_input,
-        "{}: the {} camera of the images is {}, that of the calibration {}; name the calibration of these cameras",
-        images.folder.string(), side == 0 ? "left" : "right", images.serials[side], serial);
-  }
-  return {};
+  if (is_of_cameras(known, images.serials[0], images.serials[1])) return {};
+  return fail(
+      ErrorCode::invalid_input,
+      "{}: its images are of the cameras {} and {}, the calibration of {} and {}; name the calibration of these "
+      "cameras",
+      images.folder.string(), images.serials[0], images.serials[1], known.left.serial, known.right.serial);
 }
 
 /// Does the calibration hold? Only poses that may replace the old ones are written.

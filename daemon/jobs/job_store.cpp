@@ -71,10 +71,11 @@ Result<JobInfo> read_folder(const fs::path& folder, const ScanFolder& scan) {
               .exported = order->exported,
               .model = model_file(folder, order->recipe.kind),
               .report = report_file(folder)};
-  if (job.recipe.is_calibration())
+  if (job.recipe.is_calibration()) {
     job.calibration = read_calibration_report(report_file(folder));
-  else
+  } else {
     job.remarks = read_rig_remarks(report_file(folder));
+  }
   if (job.calibration) job.calibration->is_accepted = order->accepted;
   take_views(job, scan.manifest());
   const auto facts = facts_of(job, scan.manifest().state);
@@ -102,11 +103,8 @@ double gib(std::uintmax_t bytes) { return static_cast<double>(bytes) / (1u << 30
 
 /// Both pairs as text where the calibration is not of the rig's cameras. A missing serial number is not compared.
 std::optional<std::string> other_cameras(const Calibration& calibration, const CameraSerials& rig) {
-  const auto other = [](const std::string& own, const std::string& rigs) {
-    return !own.empty() && !rigs.empty() && own != rigs;
-  };
+  if (is_of_cameras(calibration, rig.left, rig.right)) return {};
   const auto &left = calibration.left.serial, &right = calibration.right.serial;
-  if (!other(left, rig.left) && !other(right, rig.right)) return {};
   const auto named = [](const std::string& serial) { return serial.empty() ? std::string("unnamed") : serial; };
   return fmt::format("the cameras {} (left) and {} (right), but the rig has {} and {}", named(left), named(right),
                      named(rig.left), named(rig.right));

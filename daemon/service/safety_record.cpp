@@ -23,16 +23,6 @@ Result<void> write_json(const std::filesystem::path& file, const ordered_json& j
   return write_file_atomically(file, json.dump(2, ' ', false, ordered_json::error_handler_t::replace) + "\n");
 }
 
-/// What a process leaves of `file` that ends before its atomic write does: a disk that hangs prolongs that.
-std::vector<std::filesystem::path> unfinished_writes(const std::filesystem::path& file) {
-  std::vector<std::filesystem::path> found;
-  std::error_code ignored;
-  for (const auto& entry : std::filesystem::directory_iterator(file.parent_path(), ignored)) {
-    if (entry.path().filename().string().starts_with(file.filename().string() + ".tmp")) found.push_back(entry.path());
-  }
-  return found;
-}
-
 std::chrono::seconds read_clock(clockid_t clock) {
   timespec now{};
   ::clock_gettime(clock, &now);
@@ -81,7 +71,9 @@ Result<std::optional<Latch>> SafetyRecord::begin() {
     if (latch->cause.find(sentence) == std::string::npos) latch->cause += " " + sentence;
   }
   if (auto stored = store_latch(latch); !stored) return pass_on(stored);
-  for (const auto& rest : unfinished_writes(folder_ / kLatchFile)) std::filesystem::remove(rest);
+  for (const auto& rest : unfinished_writes(folder_ / kLatchFile)) {
+    if (auto removed = remove_file_synced(rest); !removed) return pass_on(removed);
+  }
   if (auto noted = write_run(true, *ends); !noted) return pass_on(noted);
   return latch;
 }
@@ -99,7 +91,7 @@ std::optional<Latch> SafetyRecord::read_latch() const {
   const auto file = folder_ / kLatchFile;
   auto json = JsonFile::read(file, "scanrig-latch", kVersion);
   if (!json && json.error().code == ErrorCode::not_found) {
-    if (!unfinished_writes(file).empty()) return Latch{"The service ended while it stored a fault."};
+    if (!unfinished_writes(file).empty()) return Latch{"The service ended while it was storing a fault."};
     return std::nullopt;
   }
   if (!json) return Latch{json.error().message + "."};

@@ -235,7 +235,7 @@ void ControlLoop::publish(const StationPorts& ports) {
       .sentence = std::move(words.sentence),
       .next_action = std::move(words.next_action),
       .headline = headline(state_),
-      .offers = offers(state_, options_.rules),
+      .actions = remote_actions(state_, options_.rules),
       .may_be_moving = state_.may_be_moving,
       .fault_device = state_.machine == MachineState::error ? state_.fault_device : std::string(),
       .inputs = state_.inputs,

@@ -55,11 +55,13 @@ Headline headline(const StationState& state) {
   return state.job ? of_scan(state) : Headline{Tone::working, "WAIT"};
 }
 
-Offers offers(const StationState& state, const StationRules& rules) {
+RemoteActions remote_actions(const StationState& state, const StationRules& rules) {
   const auto refusal = [&](Button button) {
     return next(state, event::Pressed{button, Origin::remote, {}}, rules).refused;
   };
-  return {.start = refusal(Button::start), .reset = refusal(Button::reset), .start_offer = start_offer(state)};
+  return {.start_refused = refusal(Button::start),
+          .reset_refused = refusal(Button::reset),
+          .start_offer = start_offer(state)};
 }
 
 PanelOutputs lamps(const StationState& state, const JobTable& jobs, bool blink) {

@@ -127,11 +127,10 @@ struct JobInfo {
   std::optional<bool> passed{};      ///< done: whether the model is within the recipe's limits
   std::vector<StageShare> stages{};  ///< of the reconstruction, in the order of their start
   std::optional<CalibrationOutcome> calibration{};  ///< of a calibration that is solved
-  std::string repeated{};        ///< why the views of the current placement were dropped; empty: they were not
-  std::optional<Error> error{};  ///< why it failed, was interrupted or cancelled; or did not pass
-  std::vector<std::string>
-      remarks{};        ///< done: what the scan shows of the rig, as sentences (pipeline/calibration/watch)
-  std::string model{};  ///< path of the model file, once it exists
+  std::string repeated{};              ///< why the views of the current placement were dropped; empty: they were not
+  std::optional<Error> error{};        ///< why it failed, was interrupted or cancelled; or did not pass
+  std::vector<std::string> remarks{};  ///< done: sentences on the rig, as its watch found it
+  std::string model{};                 ///< path of the model file, once it exists
   std::string report{};
 };
 

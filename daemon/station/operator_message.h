@@ -26,7 +26,7 @@ OperatorMessage describe(const JobInfo& job);
 Headline headline(const StationState& state);
 
 /// What may be pressed remotely now.
-Offers offers(const StationState& state, const StationRules& rules);
+RemoteActions remote_actions(const StationState& state, const StationRules& rules);
 
 /// Next action when a pose is complete.
 std::string how_to_flip(const Recipe& recipe, bool guard_closed = true);

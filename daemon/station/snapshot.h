@@ -57,9 +57,9 @@ struct Headline {
 };
 
 /// Whether Start and Reset would be obeyed, pressed remotely now. Stop always is.
-struct Offers {
-  std::optional<Error> start{}, reset{};  ///< why it would be refused
-  std::string start_offer{};              ///< start_offer() in transition.h
+struct RemoteActions {
+  std::optional<Error> start_refused{}, reset_refused{};  ///< why; nothing: it would be obeyed
+  std::string start_offer{};                              ///< start_offer() in transition.h
 };
 
 /// Whether the table is confirmed to be stopped.
@@ -79,7 +79,7 @@ struct Snapshot {
   std::string sentence{};
   std::string next_action{};
   Headline headline{};
-  Offers offers{};
+  RemoteActions actions{};
   bool may_be_moving = false;  ///< the last stop was not confirmed
   std::string fault_device{};  ///< in Error: the failed device; empty: none, as of an e-stop
   PanelInputs inputs{};

@@ -31,7 +31,8 @@ class Transition : public StepBuilder {
       case Button::start:
         if (remote && !remote_may_move("start")) return;
         if (!e.offer.empty() && e.offer != start_offer(s())) {
-          return refuse(ErrorCode::refused, "Start means something else by now: look again, then press Start.");
+          return refuse(ErrorCode::refused,
+                        "The rig has changed since: check what it asks for, then press Start again.");
         }
         return start(e.new_job_id);
       case Button::stop: return;  // above

@@ -60,4 +60,11 @@ Eigen::Vector3d Camera::ray(const Eigen::Vector2d& pixel) const {
   return newton_step(distortion, {x, y}, {xd, yd}).homogeneous();
 }
 
+bool is_of_cameras(const Calibration& calibration, const std::string& left, const std::string& right) {
+  const auto may_be = [](const std::string& own, const std::string& other) {
+    return own.empty() || other.empty() || own == other;
+  };
+  return may_be(calibration.left.serial, left) && may_be(calibration.right.serial, right);
+}
+
 }  // namespace scanrig

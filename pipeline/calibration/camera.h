@@ -81,4 +81,7 @@ struct Calibration {
   std::string sha256;                         ///< of the file it was read from
 };
 
+/// Whether it belongs to cameras with these serial numbers. One that is empty on either side is not compared.
+bool is_of_cameras(const Calibration& calibration, const std::string& left, const std::string& right);
+
 }  // namespace scanrig

@@ -90,7 +90,7 @@ CalibratorOptions calibrator_of(const sim::SimRig& rig, const JobStoreOptions& j
   return {.cameras = jobs.cameras, .solver = calibration_solver(options, jobs.calibration_file)};
 }
 
-/// A drawn rig has no calibration until it is calibrated; that of the default rig is known, unless it shall not be.
+/// The exact one, of the default rig. A drawn rig, and one with --own-calibration, has to be calibrated first.
 Result<void> write_calibration(const SimOptions& o, const sim::SimRig& rig, const std::filesystem::path& file) {
   if (o.rig.rig || o.own_calibration) return {};
   return rig.write_calibration(file);

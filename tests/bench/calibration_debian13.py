@@ -17,7 +17,7 @@ def measure(bench, scratch):
         bench.line(WHAT, f"<= {LIMIT_UM} um", reason, None)
         return
     folder = scratch / "boards"
-    calibration_series.shoot(bench, folder, 1, ["--rig", "noise=1", "--scale", "0.5"])
+    calibration_series.shoot(bench, folder, 1, [*calibration_series.NOISE, "--scale", "0.5"])
     calibration_series.calibrate(bench, folder, calibration_series.RIM_DOTS).check_returncode()
     shared = debian13.KEPT / "out" / "boards"  # out/boards inside
     shutil.rmtree(shared, ignore_errors=True)

@@ -6,6 +6,7 @@ import subprocess
 import time
 
 LIMIT_S = 600
+NOISE = ["--rig", "noise=1"]
 RIM_DOTS = ["--rim-dots", "40x84.5x2.4"]
 
 

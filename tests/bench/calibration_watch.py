@@ -6,7 +6,6 @@ import shutil
 
 import calibration_series
 
-NOISE = ["--rig", "noise=1"]
 SMALL = ["--scale", "0.5"]  # of the scans that show nothing but that nothing moved
 SCANS_PER_RIG = 10
 
@@ -67,7 +66,7 @@ def reconstruct(bench, scan, model, mode):
 
 def shoot_and_calibrate(bench, scratch, seed, scale):
     boards = scratch / "boards"
-    calibration_series.shoot(bench, boards, seed, [*NOISE, *scale])
+    calibration_series.shoot(bench, boards, seed, [*calibration_series.NOISE, *scale])
     calibration_series.calibrate(bench, boards, calibration_series.RIM_DOTS).check_returncode()
     return boards / "calibration.json"
 
@@ -75,7 +74,7 @@ def shoot_and_calibrate(bench, scratch, seed, scale):
 def scan_with(bench, scratch, seed, object_seed, calibration, options):
     scan = scratch / "scan"
     shutil.rmtree(scan, ignore_errors=True)
-    bench.run([bench.bin / "scanrig-sim", "shoot", "--out", scan, "--rig-seed", seed, "--seed", object_seed, *NOISE,
+    bench.run([bench.bin / "scanrig-sim", "shoot", "--out", scan, "--rig-seed", seed, "--seed", object_seed, *calibration_series.NOISE,
                *options], 1200, check=True)
     calibration_series.replace_calibration(scan, calibration)
     return scan

@@ -10,7 +10,6 @@ import calibration_series
 import calibration_watch
 
 RIGS = 8
-NOISE = ["--rig", "noise=1"]
 OBJECTS = {"figurine": None, "spot": "spot/spot_triangulated.obj", "igea": "igea_tri.ply"}  # of the data's meshes
 
 
@@ -19,7 +18,7 @@ def rigs(bench, scratch):
     squares = predicted = good = graded = count = 0
     for seed in bench.in_time(range(1, 1 + bench.pick(full=RIGS, sampled=RIGS, quick=1))):
         folder = scratch / f"rig{seed}"
-        calibration_series.shoot(bench, folder, seed, NOISE)
+        calibration_series.shoot(bench, folder, seed, calibration_series.NOISE)
         done = calibration_series.calibrate(bench, folder, calibration_series.RIM_DOTS)
         count += 1
         if done.returncode != 0:
@@ -58,7 +57,7 @@ def compare_model(bench, scratch, name, seed, calibration):
     scan, own = scratch / "scan", scratch / "own"
     for folder in (scan, own):
         shutil.rmtree(folder, ignore_errors=True)
-    bench.run([bench.bin / "scanrig-sim", "shoot", "--out", scan, "--rig-seed", seed, "--seed", seed, *NOISE, *options],
+    bench.run([bench.bin / "scanrig-sim", "shoot", "--out", scan, "--rig-seed", seed, "--seed", seed, *calibration_series.NOISE, *options],
               1200, check=True)
     shutil.copytree(scan, own)
     calibration_series.replace_calibration(own, calibration)
@@ -72,7 +71,7 @@ def compare_model(bench, scratch, name, seed, calibration):
 def models(bench, scratch):
     boards = scratch / "boards"
     for seed in range(1, 1 + bench.pick(full=2, sampled=1, quick=1)):
-        calibration_series.shoot(bench, boards, seed, NOISE)
+        calibration_series.shoot(bench, boards, seed, calibration_series.NOISE)
         calibration_series.calibrate(bench, boards, calibration_series.RIM_DOTS).check_returncode()
         for name in list(OBJECTS)[:bench.pick(full=3, sampled=2, quick=1)]:
             compare_model(bench, scratch, name, seed, boards / "calibration.json")

@@ -28,9 +28,10 @@ def objects(bench):
         yield name, ["--object", meshes / file] if meshes else None
 
 
-def demo(bench, folder, options):
+def demo(bench, folder, options, calibration="true"):
+    """`calibration`: the bars on models are those of matching and fusion, so the rig knows the truth."""
     shutil.rmtree(folder, ignore_errors=True)
-    command = ["python3", DEMO, "--bin", bench.bin, "--out", folder, *options]
+    command = ["python3", DEMO, "--bin", bench.bin, "--out", folder, "--calibration", calibration, *options]
     began = time.monotonic()
     done = bench.run(command, 3600)
     return done, time.monotonic() - began
@@ -89,8 +90,9 @@ def models(bench, _scratch):
                 bench.line(f"{name} seed {seed}", "a model within the limits", "not measured: no data", None)
                 continue
             folder = bench.out / f"{name}_{seed}"
-            done, seconds = demo(bench, folder, [*options, "--seed", seed])
-            if name == "figurine" and seed == 1:
+            is_plain = name == "figurine" and seed == 1  # as a person calls it
+            done, seconds = demo(bench, folder, [*options, "--seed", seed], "own" if is_plain else "true")
+            if is_plain:
                 demo_itself(bench, folder, done, seconds)
             if not (folder / "scores.json").is_file():
                 bench.line(f"{name} seed {seed}", "a model within the limits", f"none: {done.stderr.strip()}", False)

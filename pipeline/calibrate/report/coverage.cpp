@@ -8,11 +8,10 @@
 #include "pipeline/calibrate/report/html.h"
 #include "pipeline/calibrate/report/sections.h"
 #include "pipeline/calibrate/report/volume_views.h"
+#include "pipeline/calibration/judge/sentences.h"
 
 namespace scanrig::report {
 namespace {
-
-constexpr int kColumns = 8, kRows = 6;  ///< cells of an image in which corners are counted
 
 /// Points by the placement they come from.
 using ByPlacement = std::map<int, std::vector<Eigen::Vector2d>>;
@@ -21,21 +20,21 @@ std::string image_coverage(const FolderCalibration& outcome, std::size_t camera)
   const double width = outcome.input.width, height = outcome.input.height;
   const Window window{.left = -0.5, .right = width - 0.5, .top = -0.5, .bottom = height - 0.5, .width_px = 500.0};
   ByPlacement points;
-  std::set<std::pair<int, int>> cells;
   for (const ImageFit& image : outcome.judged.solved.images) {
     if (!image.is_used || image.camera != static_cast<int>(camera)) continue;
-    for (const CornerResidual& r : image.residuals) {
-      points[image.placement].push_back(r.pixel);
-      cells.emplace(static_cast<int>(r.pixel.x() / width * kColumns), static_cast<int>(r.pixel.y() / height * kRows));
-    }
+    for (const CornerResidual& r : image.residuals) points[image.placement].push_back(r.pixel);
   }
   Drawing drawing(window);
   drawing.box({window.left, window.top}, {window.right, window.bottom}, "frame");
-  for (int i = 1; i < kColumns; ++i) drawing.line({i * width / kColumns, 0.0}, {i * width / kColumns, height}, "faint");
-  for (int j = 1; j < kRows; ++j) drawing.line({0.0, j * height / kRows}, {width, j * height / kRows}, "faint");
+  for (int i = 1; i < kCoverageColumns; ++i)
+    drawing.line({i * width / kCoverageColumns, 0.0}, {i * width / kCoverageColumns, height}, "faint");
+  for (int j = 1; j < kCoverageRows; ++j)
+    drawing.line({0.0, j * height / kCoverageRows}, {width, j * height / kCoverageRows}, "faint");
   for (const auto& [placement, of_placement] : points) drawing.dots(of_placement, placement_style(placement));
-  return figure(drawing.svg(), fmt::format("{} camera: {} of {} cells of the image have corners", side_name(camera),
-                                           cells.size(), kColumns * kRows));
+  return figure(drawing.svg(),
+                fmt::format("{} camera: {} of {} cells of the image have corners", side_name(camera),
+                            covered_cells(outcome.input, outcome.judged.solved, static_cast<int>(camera)),
+                            kCoverageColumns * kCoverageRows));
 }
 
 /// Corners that both cameras see in the images used, in the turntable frame.

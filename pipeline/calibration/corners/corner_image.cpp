@@ -1,32 +1,21 @@
 #include "pipeline/calibration/corners/corner_image.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <numeric>
 #include <opencv2/imgproc.hpp>
+#include <utility>
+#include <vector>
+
+#include "core/statistics.h"
 
 namespace scanrig {
 namespace {
 
-constexpr int kSaturated = 254;    // grey levels
-constexpr int kMinContrast = 50;   // likewise
-constexpr double kDarkest = 0.02;  // shares of the pixels
+constexpr int kSaturated = 254;        // grey levels
+constexpr double kMinContrast = 50.0;  // likewise
+constexpr double kDarkest = 0.02;      // shares of the pixels
 constexpr double kBrightest = 0.98;
 constexpr double kSteepest = 0.9995;
-
-using Histogram = std::array<std::size_t, 512>;
-
-/// The value below which a share of the counts lies.
-int quantile(const Histogram& counts, double share) {
-  const auto all = static_cast<double>(std::accumulate(counts.begin(), counts.end(), std::size_t{0}));
-  double below = 0.0;
-  for (std::size_t value = 0; value < counts.size(); ++value) {
-    below += static_cast<double>(counts[value]);
-    if (below > share * all) return static_cast<int>(value);
-  }
-  return static_cast<int>(counts.size()) - 1;
-}
 
 }  // namespace
 
@@ -43,17 +32,17 @@ bool CornerImage::is_saturated(int x, int y) const {
 }
 
 std::optional<double> steepest_edge_px(const cv::Mat1b& grey) {
-  Histogram values{}, steps{};
+  std::vector<double> values, steps;
   for (int y = 1; y + 1 < grey.rows; ++y) {
     for (int x = 1; x + 1 < grey.cols; ++x) {
-      ++values[grey(y, x)];
-      const int across = grey(y, x + 1) - grey(y, x - 1), down = grey(y + 1, x) - grey(y - 1, x);
-      ++steps[static_cast<std::size_t>(std::hypot(across, down))];
+      values.push_back(grey(y, x));
+      steps.push_back(std::hypot(grey(y, x + 1) - grey(y, x - 1), grey(y + 1, x) - grey(y - 1, x)));
     }
   }
+  if (values.empty()) return std::nullopt;
   const double contrast = quantile(values, kBrightest) - quantile(values, kDarkest);
   if (contrast < kMinContrast) return std::nullopt;
-  const double slope = 0.5 * std::max(1, quantile(steps, kSteepest));
+  const double slope = 0.5 * std::max(1.0, quantile(std::move(steps), kSteepest));
   return contrast / (slope * std::sqrt(2.0 * M_PI));
 }
 

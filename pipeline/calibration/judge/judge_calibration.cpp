@@ -10,7 +10,6 @@
 namespace scanrig {
 namespace {
 
-constexpr double kGradeA = 5.0, kGradeB = 15.0, kGradeC = 40.0;  ///< micrometres
 constexpr double kMaxRatio = 1.5;
 constexpr double kDifferenceToError = 3.0;  ///< A - B is a quarter to all of the error
 constexpr double kMicrometres = 1e3;
@@ -56,9 +55,9 @@ Result<std::optional<CrossValidation>> cross_validate(const CalibrationInput& in
 }
 
 CalibrationGrade grade_of(double sigma) {
-  if (sigma <= kGradeA) return CalibrationGrade::a;
-  if (sigma <= kGradeB) return CalibrationGrade::b;
-  return sigma <= kGradeC ? CalibrationGrade::c : CalibrationGrade::refused;
+  if (sigma <= kGradeAUm) return CalibrationGrade::a;
+  if (sigma <= kGradeBUm) return CalibrationGrade::b;
+  return sigma <= kGradeCUm ? CalibrationGrade::c : CalibrationGrade::refused;
 }
 
 /// What points of the volume are off when a camera moved by so much after its images: micrometres.

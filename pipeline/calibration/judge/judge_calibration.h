@@ -11,7 +11,9 @@
 
 namespace scanrig {
 
-/// a: sigma over the volume to 5 um, b: to 15, c: to 40; else refused: not to be written.
+inline constexpr double kGradeAUm = 5.0, kGradeBUm = 15.0, kGradeCUm = 40.0;
+
+/// By sigma over the volume, to these limits; else refused: not to be written.
 enum class CalibrationGrade { a, b, c, refused };
 std::string_view to_string(CalibrationGrade grade);  ///< "A", "B", "C", "refused"
 

@@ -16,7 +16,6 @@ constexpr double kSaidGearError = 1e-4;  ///< 0.02 degrees over half a turn
 constexpr double kMaxTilt = 0.03;        ///< degrees of the axis from the table top's normal
 constexpr double kMaxMove = 0.5;         ///< px
 constexpr double kSigmas = 2.0;
-constexpr double kSureUm = 5.0;  ///< of the volume: grade A
 constexpr double kFilled = 0.5;  ///< of an image's cells
 
 bool are_swapped(const SolvedCalibration& solved) {
@@ -96,32 +95,31 @@ void add_lengths(const CalibrationInput& input, const SolvedCalibration& solved,
   }
 }
 
-/// Share of the cells of an image, 8 x 6, in which the images used have corners.
-double image_coverage(const CalibrationInput& input, const SolvedCalibration& solved, int camera) {
-  constexpr int kColumns = 8, kRows = 6;
+/// What is missing where the boards show too little of the volume.
+void add_coverage(const CalibrationInput& input, const SolvedCalibration& solved, std::vector<std::string>& out) {
+  if (!solved.sigma || solved.sigma->volume <= kGradeAUm) return;
+  const int cells = std::min(covered_cells(input, solved, 0), covered_cells(input, solved, 1));
+  const double share = static_cast<double>(cells) / (kCoverageColumns * kCoverageRows);
+  out.push_back(fmt::format("Points uncertain by {:.0f} um: ", solved.sigma->volume) +
+                (share < kFilled ? fmt::format("boards filled only {:.0f} % of an image. Use a larger one, or show it "
+                                               "nearer to the edges.",
+                                               100.0 * share)
+                                 : std::string("take more placements, and check focus and light.")));
+}
+
+}  // namespace
+
+int covered_cells(const CalibrationInput& input, const SolvedCalibration& solved, int camera) {
   std::set<std::pair<int, int>> cells;
   for (const ImageFit& image : solved.images) {
     if (!image.is_used || image.camera != camera) continue;
     for (const CornerResidual& r : image.residuals) {
-      cells.emplace(static_cast<int>(r.pixel.x() / input.width * kColumns),
-                    static_cast<int>(r.pixel.y() / input.height * kRows));
+      cells.emplace(static_cast<int>(r.pixel.x() / input.width * kCoverageColumns),
+                    static_cast<int>(r.pixel.y() / input.height * kCoverageRows));
     }
   }
-  return static_cast<double>(cells.size()) / (kColumns * kRows);
+  return static_cast<int>(cells.size());
 }
-
-/// What is missing where the boards show too little of the volume.
-void add_coverage(const CalibrationInput& input, const SolvedCalibration& solved, std::vector<std::string>& out) {
-  if (!solved.sigma || solved.sigma->volume <= kSureUm) return;
-  const double left = image_coverage(input, solved, 0), right = image_coverage(input, solved, 1);
-  const char* const what = std::min(left, right) < kFilled ? "Use a larger board, or put it nearer to the image's edges"
-                                                           : "Take more placements, and check focus and light";
-  out.push_back(
-      fmt::format("Points known to {:.0f} um; corners in {:.0f} % of the left image, {:.0f} % of the right. {}.",
-                  solved.sigma->volume, 100.0 * left, 100.0 * right, what));
-}
-
-}  // namespace
 
 bool is_to_be_refused(const CalibrationInput& input, const SolvedCalibration& solved,
                       const CalibrationJudgement& judgement) {

@@ -12,6 +12,10 @@ namespace scanrig {
 bool is_to_be_refused(const CalibrationInput& input, const SolvedCalibration& solved,
                       const CalibrationJudgement& judgement);
 
+/// An image's cells that have corners of the images used, of kCoverageColumns x kCoverageRows.
+inline constexpr int kCoverageColumns = 8, kCoverageRows = 6;
+int covered_cells(const CalibrationInput& input, const SolvedCalibration& solved, int camera);
+
 /// What the operator is told, most important first.
 std::vector<std::string> calibration_sentences(const CalibrationInput& input, const SolvedCalibration& solved,
                                                const CalibrationJudgement& judgement);

@@ -2,8 +2,8 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <string>
-#include <thread>
 #include <vector>
 
 namespace scanrig {
@@ -36,17 +36,13 @@ std::vector<std::string> order_after(const Event& event) {
                            .new_job_id = [] { return std::string("job"); },
                            .published =
                                [&](const auto& snapshot) {
-                                 if (snapshot->machine == MachineState::error) note("published");
+                                 if (snapshot->machine != MachineState::error) return;
+                                 note("published");
+                                 loop.post(event::Shutdown{});
                                }};
   loop.post(event::PanelFound{true, true});
   loop.post(event);
-  std::thread ending([&] {
-    for (int i = 0; i < 500 && loop.snapshot()->machine != MachineState::error; ++i)
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    loop.post(event::Shutdown{});
-  });
   EXPECT_TRUE(loop.run(ports));
-  ending.join();
   return order;
 }
 

@@ -13,7 +13,7 @@ class HeadlineTest : public Station {
     const auto [tone, word] = headline(state);
     return std::string(to_string(tone)) + " " + word;
   }
-  [[nodiscard]] std::string offer() const { return offers(state, rules).start_offer; }
+  [[nodiscard]] std::string offer() const { return remote_actions(state, rules).start_offer; }
   void start(const std::string& seen) { tell(event::Pressed{Button::start, Origin::remote, "job", seen}); }
 };
 
@@ -57,15 +57,15 @@ TEST_F(HeadlineTest, WhatIsWrongComesFirst) {
   EXPECT_EQ(shown(), "fault KEEP CLEAR");
 }
 
-TEST_F(HeadlineTest, OffersAreWhatWouldBeObeyed) {
+TEST_F(HeadlineTest, ActionsAreWhatWouldBeObeyed) {
   start_up();
-  EXPECT_TRUE(offers(state, rules).start) << "not homed";
-  EXPECT_FALSE(offers(state, rules).reset);
+  EXPECT_TRUE(remote_actions(state, rules).start_refused) << "not homed";
+  EXPECT_FALSE(remote_actions(state, rules).reset_refused);
   get_ready();
-  EXPECT_FALSE(offers(state, rules).start);
+  EXPECT_FALSE(remote_actions(state, rules).start_refused);
   rules.remote = false;
-  ASSERT_TRUE(offers(state, rules).start);
-  EXPECT_NE(offers(state, rules).start->message.find("use the panel"), std::string::npos);
+  ASSERT_TRUE(remote_actions(state, rules).start_refused);
+  EXPECT_NE(remote_actions(state, rules).start_refused->message.find("use the panel"), std::string::npos);
 }
 
 TEST_F(HeadlineTest, AStartThatMeansSomethingElseByNowIsRefused) {
@@ -84,7 +84,7 @@ TEST_F(HeadlineTest, AStartThatMeansSomethingElseByNowIsRefused) {
   EXPECT_EQ(go_on, "continue-job-0");
   start(begin);
   ASSERT_TRUE(refused);
-  EXPECT_NE(refused->message.find("means something else"), std::string::npos);
+  EXPECT_NE(refused->message.find("The rig has changed since"), std::string::npos);
   EXPECT_EQ(state.activity, Activity::waiting_for_flip);
   start(go_on);
   EXPECT_FALSE(refused);

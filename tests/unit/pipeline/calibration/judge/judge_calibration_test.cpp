@@ -47,7 +47,7 @@ TEST(JudgeCalibration, ABoardThatHardlyFillsTheImageIsNamedWithWhatIsMissing) {
   ASSERT_TRUE(judged) << judged.error().message;
   EXPECT_NE(to_string(judged->judgement.grade), "A");
   EXPECT_THAT(judged->judgement.sentences,
-              Contains(AllOf(StartsWith("Points known to "), HasSubstr("Use a larger board"))));
+              Contains(AllOf(StartsWith("Points uncertain by "), HasSubstr("Use a larger one"))));
 }
 
 TEST(JudgeCalibration, ALensThatBrownDoesNotKnowShowsBetweenAAndB) {
