@@ -55,6 +55,7 @@ class WatchedTurntable final : public Turntable {
     return turntable_.limit_speed(limit);
   }
   void request_stop() noexcept override { turntable_.request_stop(); }
+  void drop_stop_request() noexcept override { turntable_.drop_stop_request(); }
 
   [[nodiscard]] std::optional<HungCall> hung() const { return watch_.hung(); }
 

@@ -119,6 +119,8 @@ Event RigThread::perform(const Asked& asked) {
   if (std::holds_alternative<action::CheckDevices>(command)) return acquisition_.check();
   const auto stopped = acquisition_.stop();
   if (!stopped.table) return event::StopFailed{stopped.table.error()};
+  // Work from before this stop is refused above: what the turntable gets from now on is a person's new decision.
+  devices_.turntable.drop_stop_request();
   return event::Stopped{stopped.light ? std::nullopt : std::optional(stopped.light.error())};
 }
 

@@ -30,9 +30,10 @@ class TurntableThread final : public Turntable {
   Result<void> limit_speed(std::optional<DegreesPerSecond> limit) override;
   /// Ends what runs, and commands the drive to stop even when nothing does.
   void request_stop() noexcept override;
-  /// The same from any thread, with evidence: the turntable's own thread calls `done` with what stop() returned by
-  /// `limit`. It does not call `done` where the turntable itself hangs.
+  /// A request_stop() from any thread, with evidence: the turntable's own thread calls `done` with what stop() returned
+  /// by `limit`. It does not call `done` where the turntable itself hangs.
   void stop_directly(Clock::Duration limit, std::function<void(const Result<void>&)> done);
+  void drop_stop_request() noexcept override { turntable_.drop_stop_request(); }
 
  private:
   template <class Answer>

@@ -346,4 +346,9 @@ void AxisTurntable::request_stop() noexcept {
   clock_.notify_all(wake_);
 }
 
+void AxisTurntable::drop_stop_request() noexcept {
+  const std::scoped_lock lock(mutex_);
+  stop_requested_ = false;
+}
+
 }  // namespace scanrig

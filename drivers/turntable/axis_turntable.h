@@ -40,6 +40,7 @@ class AxisTurntable : public Turntable {
   Result<TurntableStatus> status(Deadline deadline) override;
   Result<void> limit_speed(std::optional<DegreesPerSecond> limit) override;
   void request_stop() noexcept override;
+  void drop_stop_request() noexcept override;
 
  protected:
   /// `reply_timeout`: the longest reply time of the drive. `counter`: the range that it can count.

@@ -60,6 +60,10 @@ class Turntable {
   /// Ends one call with `stopped`, and stops the motor: the running home() or rotate_to(), or if none is running, the
   /// next one, before it moves anything. With that the request is delivered: the home() after it is a new decision.
   virtual void request_stop() noexcept = 0;
+
+  /// Lets a requested stop that found nothing running end no later call: it was delivered by stop(), and whatever is
+  /// called from now on was asked for after it. For the owner.
+  virtual void drop_stop_request() noexcept = 0;
 };
 
 }  // namespace scanrig

@@ -121,4 +121,9 @@ void SimTurntable::request_stop() noexcept {
   state_.clock.notify_all(state_.changed);
 }
 
+void SimTurntable::drop_stop_request() noexcept {
+  const std::scoped_lock lock(state_.mutex);
+  state_.stop_requested = false;
+}
+
 }  // namespace scanrig::sim

@@ -20,6 +20,7 @@ class SimTurntable final : public Turntable {
   Result<TurntableStatus> status(Deadline deadline) override;
   Result<void> limit_speed(std::optional<DegreesPerSecond> limit) override;
   void request_stop() noexcept override;
+  void drop_stop_request() noexcept override;
 
  private:
   Result<void> travel(std::unique_lock<std::mutex>& lock, double target, Deadline deadline, Move& move);

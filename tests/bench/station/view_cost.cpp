@@ -70,6 +70,7 @@ class TimedTurntable final : public Turntable {
   Result<void> reset_alarm(Deadline deadline) override { return table_.reset_alarm(deadline); }
   Result<TurntableStatus> status(Deadline deadline) override { return table_.status(deadline); }
   void request_stop() noexcept override { table_.request_stop(); }
+  void drop_stop_request() noexcept override { table_.drop_stop_request(); }
 
  private:
   Turntable& table_;

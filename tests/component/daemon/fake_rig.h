@@ -61,6 +61,10 @@ class FakeTurntable final : public Turntable {
     }
     clock_.notify_all(changed_);
   }
+  void drop_stop_request() noexcept override {
+    const std::lock_guard guard(mutex);
+    stop_requested_ = false;
+  }
 
   std::mutex mutex;  ///< guards all that follows
   bool moving = false;

@@ -102,6 +102,7 @@ class HangingTurntable final : public Turntable {
   void request_stop() noexcept override {
     if (!gate_.hangs("turntable.rotate_to")) turntable_.request_stop();
   }
+  void drop_stop_request() noexcept override { turntable_.drop_stop_request(); }
 
  private:
   struct Ended {

@@ -186,6 +186,27 @@ TEST_P(StopInEveryState, IsObeyed) {
   }
 }
 
+class StopAtRest : public Daemon {};
+
+TEST_F(StopAtRest, LeavesTheNextStartAlone) {
+  boot();
+  get_ready();
+  for (int i = 0; i < 2; ++i) {
+    const int before = [&] {
+      const std::lock_guard guard(rig.turntable.mutex);
+      return rig.turntable.stops;
+    }();
+    rig.panel.press(&PanelInputs::stop);
+    ASSERT_TRUE(clock_waits_for([&] {
+      const std::lock_guard guard(rig.turntable.mutex);
+      return rig.turntable.stops > before && loop->snapshot()->activity == Activity::none;
+    }));
+  }
+  EXPECT_EQ(loop->snapshot()->machine, MachineState::ready) << "home is kept";
+  rig.panel.press(&PanelInputs::start);
+  EXPECT_TRUE(wait_flip());
+}
+
 std::string name_of(const testing::TestParamInfo<std::tuple<Situation, By>>& info) {
   static constexpr const char* kBy[] = {"panel", "api", "command_line"};
   const auto& [situation, by] = info.param;

@@ -171,6 +171,16 @@ TEST_P(TurntableCompliance, AStopRequestedAtRestEndsTheNextHomeAndNoMore) {
   expect_home_is_needed_and_helps();
 }
 
+TEST_P(TurntableCompliance, AStopThatWasDeliveredAtRestEndsNoLaterMoveAndKeepsHome) {
+  ASSERT_TRUE(home());
+  ASSERT_TRUE(rotate_to(0));
+  bench_->turntable().request_stop();
+  ASSERT_TRUE(bench_->turntable().stop(ample()));
+  bench_->turntable().drop_stop_request();
+  const auto moved = rotate_to(30);
+  EXPECT_TRUE(moved) << moved.error().message;
+}
+
 TEST_P(TurntableCompliance, StopReturnsOnceTheTableStands) {
   ASSERT_TRUE(home());
   const auto stopped = bench_->turntable().stop(ample());
