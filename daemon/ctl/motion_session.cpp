@@ -232,13 +232,14 @@ Result<void> MotionSession::confirm_standstill() {
 
 Result<void> MotionSession::end(Result<void> result) {
   auto stopped = confirm_standstill();
+  if (const std::lock_guard lock(mutex_); result && cause_) result = tl::unexpected(*cause_);
   if (panel_thread_) panel_thread_->show({.red = has_moved_ && !result});
   close();
   if (stopped && !is_handed_over_) guardian_.dismiss();
   if (!stopped) {
     return result ? stopped : fail(stopped.error().code, "{}; {}", result.error().message, stopped.error().message);
   }
-  return result && cause_ ? tl::unexpected(*cause_) : result;
+  return result;
 }
 
 /// Closes panel, table and threads; the lamps stay as shown last.
