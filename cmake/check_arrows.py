@@ -13,13 +13,14 @@ DRIVER_INTERFACES = {
     "drivers/camera/stereo_camera.h",
     "drivers/panel/panel.h",
 }
-FOLDERS = ("core", "drivers", "pipeline", "config", "daemon", "sim", "tests")
+FOLDERS = ("core", "drivers", "pipeline", "config", "web", "daemon", "sim", "tests")
 ALLOWED = {
     "core": {"core"},
     "drivers": {"drivers", "core"},
     "pipeline": {"pipeline", "core"},
     "config": {"config", "drivers", "pipeline", "core"},
-    "daemon": {"daemon", "config", "drivers", "pipeline", "core"},
+    "web": {"web", "core"},
+    "daemon": {"daemon", "web", "config", "drivers", "pipeline", "core"},
     "sim": {"sim", "core"},  # and the driver interfaces, see DRIVER_INTERFACES
     "sim/apps": {"sim", "daemon", "config", "drivers", "core"},
     "tests": set(FOLDERS),

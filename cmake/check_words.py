@@ -13,7 +13,7 @@ CODE, COMMENT, STRING = "code", "comment", "string"
 CPP, MARKDOWN = {".h", ".cpp"}, {".md"}
 HASH = {".toml", ".cmake", ".txt", ".in", ".service", ".socket", ".rules", ".yml", ""}
 SUFFIXES = CPP | MARKDOWN | HASH | {".py"}
-LEFT_OUT = {"build", "out"}  # folders of ROOT; names that start with a dot are left out, too
+LEFT_OUT = {"build", "out", "node_modules"}  # folders anywhere; names that start with a dot are left out, too
 TEST_FOLDERS = ("tests/unit/", "tests/component/", "tests/system/", "tests/bench/", "tests/fuzz/")
 MARK = re.compile(r"\b(old names?|alias(es)?)\b|\baccept_old_name\(", re.IGNORECASE)
 KINDS = {"text": {COMMENT, STRING}, "strings": {STRING}, "sentences": {STRING}, "names": {CODE}, "files": set()}
@@ -150,7 +150,7 @@ def files(root, skipped):
     for path in sorted(root.rglob("*")):
         name = path.relative_to(root).as_posix()
         hidden = any(part.startswith(".") for part in name.split("/"))
-        if path.suffix not in SUFFIXES or hidden or name.split("/")[0] in LEFT_OUT or not path.is_file():
+        if path.suffix not in SUFFIXES or hidden or LEFT_OUT & set(name.split("/")) or not path.is_file():
             continue
         if not any(within(name, one) for one in skipped):
             yield name, path

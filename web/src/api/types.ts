@@ -1,0 +1,161 @@
+// Shapes of the API's replies, as far as the page reads them: /api/v1/openapi.json describes all of them.
+
+export type Tone = "idle" | "ready" | "working" | "act" | "fault";
+export type Role = "viewer" | "operator" | "engineer";
+
+export interface Problem {
+  code: string;
+  message: string;
+}
+
+export interface Action {
+  ok: boolean;
+  why: string | null;
+}
+
+export interface StartAction extends Action {
+  does: "begin" | "continue";
+  offer: string;
+}
+
+export interface Device {
+  name: string;
+  ok: boolean;
+  problem: Problem | null;
+}
+
+export interface Status {
+  machine: string;
+  activity: string;
+  may_be_moving: boolean;
+  standstill: "confirmed" | "pending" | "moving" | "unknown";
+  cause: string;
+  sentence: string;
+  next_action: string;
+  tone: Tone;
+  word: string;
+  actions: { start: StartAction; stop: Action; reset: Action };
+  devices: Device[];
+  job: string | null;
+  not_started: { job: string; why: Problem } | null;
+  queue: string[];
+}
+
+export type JobState =
+  | "queued"
+  | "scanning"
+  | "waiting_for_flip"
+  | "reconstructing"
+  | "done"
+  | "failed"
+  | "interrupted"
+  | "cancelled";
+
+export interface StoredView {
+  pose: number;
+  view: number;
+  retakes: number;
+}
+
+export interface Job {
+  id: string;
+  state: JobState;
+  kind: "scan" | "calibration" | "check";
+  sentence: string;
+  next_action: string;
+  recipe: string;
+  part: string;
+  poses: number;
+  views: number;
+  all_views: number;
+  stored: StoredView[];
+  resumable: boolean;
+  quarantined: boolean;
+  exported: boolean;
+  passed: boolean | null;
+  model: string;
+  report: string;
+  remarks: string[];
+  error: Problem | null;
+  stages: { name: string; fraction: number }[];
+}
+
+export interface Health {
+  ok: boolean;
+  problems: Problem[];
+  reminders: string[];
+  version: string;
+  uptime_s: number;
+  devices: Device[];
+  disk: { bytes: number; free_bytes: number };
+  temperatures: { sensor: string; celsius: number }[];
+  deadlines_missed: number;
+  retakes: number;
+  faults: number;
+  connections: number;
+  event_streams: number;
+}
+
+export interface Login {
+  role: Role;
+  name: string | null;
+  cookie: boolean;
+}
+
+export interface Snapshot {
+  life: string;
+  seq: number;
+  time: string;
+  build: string;
+  status: Status;
+  jobs: Job[];
+  health: Health;
+  login: Login;
+  insecure: boolean;
+}
+
+export interface Io {
+  inputs: Record<string, boolean>;
+  outputs: Record<string, boolean>;
+}
+
+export interface Placement {
+  number: number;
+  instruction: string;
+}
+
+export interface BoardInImage {
+  seen: boolean;
+  problem: string | null;
+  outline: [number, number][];
+  expected: [number, number][];
+}
+
+export interface CalibrationState {
+  job: {
+    id: string;
+    state: JobState;
+    sentence: string;
+    next_action: string;
+    placements_complete: number;
+    plan: Placement[];
+    verdict: "holds" | "moved" | "calibrate" | null;
+    grade: string | null;
+    sentences: string[];
+    accepted: boolean;
+  } | null;
+  reminder: string | null;
+  awaited_placement: number | null;
+  board: {
+    sentence: string;
+    accepted: boolean;
+    off_deg: number | null;
+    off_mm: number | null;
+    left: BoardInImage;
+    right: BoardInImage;
+  } | null;
+}
+
+export interface FileList {
+  files: { path: string; bytes: number; type: string }[];
+}

@@ -1,0 +1,30 @@
+// The word that is read from two metres, the daemon's sentence and next action, and STOP.
+import { activeJob, insecure, isOld, silentFor_s, status } from "../api/store.ts";
+import { words } from "../words.ts";
+import { Ring } from "./Ring.tsx";
+import { Stop } from "./Stop.tsx";
+
+export function Head() {
+  const now = status.value;
+  const job = activeJob.value;
+  return (
+    <header class={`head tone tone-${now?.tone ?? "idle"}`}>
+      {isOld.value && (
+        <p class="banner" role="alert">
+          {now ? words.lost(silentFor_s.value) : words.waiting}
+        </p>
+      )}
+      {insecure.value && <p class="banner">{words.insecure}</p>}
+      <h1 class="word">
+        <span class={`shape shape-${now?.tone ?? "idle"}`} aria-hidden="true" />
+        {now?.word ?? ""}
+        {job && <Ring job={job} />}
+      </h1>
+      <div class="saying" aria-live="polite">
+        <p class="sentence">{now?.sentence ?? ""}</p>
+        <p class="next">{now?.next_action ?? ""}</p>
+      </div>
+      <Stop />
+    </header>
+  );
+}

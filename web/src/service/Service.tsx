@@ -1,0 +1,172 @@
+import { useSignal } from "@preact/signals";
+import { useEffect } from "preact/hooks";
+import { order, read } from "../api/client.ts";
+import { connect, health, login, status } from "../api/store.ts";
+import type { Health, Io } from "../api/types.ts";
+import { may, Order } from "../parts/Order.tsx";
+import { bytes, words } from "../words.ts";
+import { qrSvg } from "./qr.ts";
+
+const PERIOD_MS = 1000;
+const HEALTH_PERIOD_MS = 5000;
+
+function usePolled<T>(path: string, period_ms: number, first: T | null = null) {
+  const value = useSignal<T | null>(first);
+  useEffect(() => {
+    const ask = () =>
+      read<T>(path, AbortSignal.timeout(5000)).then(
+        (got) => {
+          value.value = got;
+        },
+        () => {},
+      );
+    ask();
+    const timer = setInterval(ask, period_ms);
+    return () => clearInterval(timer);
+  }, [path]);
+  return value;
+}
+
+function HealthCard() {
+  const now = usePolled<Health>("/health", HEALTH_PERIOD_MS, health.value).value;
+  if (!now) return null;
+  return (
+    <section class="card">
+      <h2>{words.health}</h2>
+      {now.problems.length === 0 && <p>{words.allWell}</p>}
+      {now.problems.map((problem) => (
+        <p key={problem.message} class="wrong">
+          {problem.message}
+        </p>
+      ))}
+      {now.reminders.map((reminder) => (
+        <p key={reminder}>{reminder}</p>
+      ))}
+      <p class="dim">
+        {words.disk(bytes(now.disk.free_bytes), bytes(now.disk.bytes))} ·{" "}
+        {words.uptime((now.uptime_s / 3600).toFixed(1))} · {words.version} {now.version}
+      </p>
+      {now.temperatures.map((one) => (
+        <p key={one.sensor} class="dim">
+          {one.sensor} {one.celsius.toFixed(0)} °C
+        </p>
+      ))}
+    </section>
+  );
+}
+
+const JOGS = [-90, -10, 10, 90];
+
+function TableCard() {
+  const active = status.value?.machine.includes("Maintenance") ?? false;
+  const maintenance = (what: string, body = {}) => order(`/maintenance/${what}`, body);
+  return (
+    <section class="card">
+      <h2>{words.table}</h2>
+      {!may("engineer") && <p class="dim">{words.needs("engineer")}</p>}
+      <div class="row">
+        <Order needs="engineer" send={() => maintenance(active ? "off" : "on")}>
+          {active ? words.maintenanceOff : words.maintenanceOn}
+        </Order>
+        {active && (
+          <>
+            <Order needs="engineer" send={() => maintenance("home")}>
+              {words.home}
+            </Order>
+            {JOGS.map((by) => (
+              <Order key={by} needs="engineer" send={() => maintenance("jog", { by_deg: by })}>
+                {words.jog(by)}
+              </Order>
+            ))}
+            <Order needs="engineer" send={() => maintenance("pulse")}>
+              {words.flash}
+            </Order>
+            <Order needs="engineer" send={() => maintenance("lamp_test")}>
+              {words.lampTest}
+            </Order>
+          </>
+        )}
+      </div>
+    </section>
+  );
+}
+
+function Contacts({ title, values }: { title: string; values: Record<string, boolean> }) {
+  return (
+    <div>
+      <h3>{title}</h3>
+      <dl class="facts">
+        {Object.entries(values).map(([name, on]) => (
+          <>
+            <dt>{name}</dt>
+            <dd>{on ? `● ${words.on}` : `○ ${words.off}`}</dd>
+          </>
+        ))}
+      </dl>
+    </div>
+  );
+}
+
+function IoCard() {
+  const io = usePolled<Io>("/io", PERIOD_MS).value;
+  if (!io) return null;
+  return (
+    <section class="card">
+      <Contacts title={words.inputs} values={io.inputs} />
+      <Contacts title={words.outputs} values={io.outputs} />
+    </section>
+  );
+}
+
+function AccessCard() {
+  const code = useSignal("");
+  const picture = useSignal("");
+  const who = login.value;
+  const offer = async () => {
+    const made = await order<{ code: string; valid_s: number }>("/login/code");
+    code.value = made.code;
+    picture.value = await qrSvg(`${location.origin}/#code=${made.code}`);
+    setTimeout(() => {
+      code.value = "";
+      picture.value = "";
+    }, made.valid_s * 1000);
+  };
+  return (
+    <section class="card">
+      <h2>{words.access}</h2>
+      <p>{who && words.you(who.role, who.name)}</p>
+      <div class="row">
+        <Order needs="viewer" send={offer}>
+          {words.offerCode}
+        </Order>
+        {who?.cookie && (
+          <Order needs="viewer" send={() => order("/login", {}, "DELETE").then(connect)}>
+            {words.logOut}
+          </Order>
+        )}
+      </div>
+      {code.value && (
+        <div class="row">
+          {picture.value && <img class="qr" src={picture.value} alt={code.value} />}
+          <div>
+            <p class="code">{code.value}</p>
+            <p class="dim">{words.codeValid(120)}</p>
+          </div>
+        </div>
+      )}
+    </section>
+  );
+}
+
+export function Service() {
+  return (
+    <main class="columns">
+      <div class="stack">
+        <HealthCard />
+        <TableCard />
+        <AccessCard />
+      </div>
+      <IoCard />
+    </main>
+  );
+}

@@ -1,0 +1,132 @@
+// Every word of the page's own. Sentences about the rig, and what to do next, are the daemon's.
+import type { Job, Role } from "./api/types.ts";
+
+export const words = {
+  screens: { station: "Station", jobs: "Jobs", model: "Model", calibrate: "Calibrate", service: "Service" },
+  stop: "STOP",
+  stopping: "STOP SENT",
+  notDelivered: "NOT DELIVERED. Use the red button.",
+  notTheEstop: "This is not the emergency stop.",
+  start: "START",
+  carryOn: "CONTINUE",
+  reset: "Reset",
+  lost: (seconds: number) => `Connection lost. Last known state ${seconds} s ago.`,
+  waiting: "Waiting for the rig.",
+  insecure: "This connection is not encrypted: others on the network can read tokens.",
+  nextJob: "Next job",
+  noJob: "No job is queued: Start takes the default recipe.",
+  left: "Left camera",
+  right: "Right camera",
+  noPicture: "No picture",
+  frozen: "old picture",
+  progress: (stored: number, all: number) => `${stored} of ${all} views stored`,
+  devices: "Devices",
+  queue: "Queue",
+  filters: { all: "All", queue: "Queue", trouble: "Trouble" },
+  noJobs: "No jobs.",
+  more: "Show more",
+  part: "Part",
+  recipe: "Recipe",
+  orderScan: "Queue a scan",
+  hold: (what: string) => `${what}: hold`,
+  cancel: "Cancel",
+  remove: "Delete",
+  resume: "Resume",
+  first: "Do next",
+  exported: "Mark as exported",
+  reprocess: "Reprocess",
+  showModel: "Show model",
+  download: "Download",
+  files: "Files",
+  chooseJob: "Choose a finished job.",
+  loading: "Loading the model.",
+  noModel: "This job has no model.",
+  colourings: { texture: "Texture", shade: "Shade" },
+  section: "Section",
+  ruler: "Ruler",
+  rulerHint: "Tap two points of the surface.",
+  distance: (mm: number) => `${mm.toFixed(2)} mm on the reduced mesh; the report has the uncertainty`,
+  facts: "Facts",
+  passed: "within the limits",
+  below: "outside the limits",
+  loginTitle: "Log in",
+  loginHint: "A token of scanrig token add, or the code that scanrig open shows.",
+  token: "Token or code",
+  logIn: "Log in",
+  logOut: "Log out",
+  access: "Access",
+  you: (role: Role, name: string | null) => (name ? `${name}, ${role}` : role),
+  offerCode: "Show a code for another device",
+  codeValid: (seconds: number) => `Valid for ${seconds / 60} minutes, once.`,
+  health: "Health",
+  allWell: "Nothing is wrong.",
+  table: "Table",
+  inputs: "Inputs",
+  outputs: "Outputs",
+  maintenanceOn: "Begin maintenance",
+  maintenanceOff: "End maintenance",
+  home: "Home",
+  jog: (deg: number) => `${deg > 0 ? "+" : ""}${deg}°`,
+  flash: "Flash",
+  lampTest: "Lamp test",
+  on: "on",
+  off: "off",
+  disk: (free: string, all: string) => `${free} free of ${all}`,
+  uptime: (hours: string) => `${hours} h up`,
+  version: "Version",
+  calibrationBegin: "Calibrate",
+  calibrationCheck: "Check",
+  calibrationAccept: "Accept",
+  calibrationAbort: "Abort",
+  placement: (number: number, all: number) => `Placement ${number} of ${all}`,
+  grade: (grade: string) => `Grade ${grade}`,
+  accepted: "In use.",
+  boardOff: (deg: number | null, mm: number | null) =>
+    deg === null || mm === null ? "" : `${deg.toFixed(1)}° and ${mm.toFixed(0)} mm off`,
+  needs: (role: Role) => `needs the role ${role}`,
+  verdicts: { holds: "It holds.", moved: "Something has moved.", calibrate: "A calibration is due." },
+} as const;
+
+export interface Badge {
+  word: string;
+  tone: "idle" | "ready" | "working" | "act" | "fault";
+}
+
+/** One badge a job, from its state alone. */
+export function badge(job: Pick<Job, "state" | "passed" | "stages" | "stored" | "all_views">): Badge {
+  switch (job.state) {
+    case "queued":
+      return { word: "QUEUED", tone: "idle" };
+    case "scanning":
+      return { word: `SCANNING ${job.stored.length}/${job.all_views}`, tone: "working" };
+    case "waiting_for_flip":
+      return { word: "FLIP", tone: "act" };
+    case "reconstructing": {
+      const stage = job.stages.at(-1);
+      return { word: stage ? `MODEL ${stage.name} ${Math.round(stage.fraction * 100)} %` : "MODEL", tone: "working" };
+    }
+    case "done":
+      return job.passed === false ? { word: "BELOW LIMITS", tone: "act" } : { word: "DONE", tone: "ready" };
+    case "failed":
+      return { word: "FAILED", tone: "fault" };
+    case "interrupted":
+      return { word: "INTERRUPTED", tone: "act" };
+    case "cancelled":
+      return { word: "CANCELLED", tone: "idle" };
+    default: {
+      const never: never = job.state;
+      return never;
+    }
+  }
+}
+
+export function bytes(count: number): string {
+  const units = ["B", "kB", "MB", "GB", "TB"];
+  let value = count;
+  let unit = 0;
+  while (value >= 1000 && unit < units.length - 1) {
+    value /= 1000;
+    unit++;
+  }
+  return `${value >= 100 || unit === 0 ? value.toFixed(0) : value.toFixed(1)} ${units[unit]}`;
+}
