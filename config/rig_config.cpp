@@ -198,6 +198,14 @@ void read_reconstruction(Section& s, ReconstructionConfig& reconstruction) {
   if (s.has("timeout_min")) s.number("timeout_min", reconstruction.timeout, {1, 1440});
 }
 
+bool is_loopback(std::string_view address) { return address.starts_with("127.") || address == "::1"; }
+
+bool is_origin(std::string_view text) {
+  const auto name = text.find("://");
+  return (text.starts_with("https://") || text.starts_with("http://")) && name + 3 < text.size() &&
+         text.find('/', name + 3) == std::string_view::npos;
+}
+
 void read_api(Section& s, const std::filesystem::path& base, ApiConfig& api) {
   s.path("socket", base, api.socket);
   if (s.has("tokens")) s.path("tokens", base, api.tokens);
@@ -212,6 +220,16 @@ void read_api(Section& s, const std::filesystem::path& base, ApiConfig& api) {
   if (s.has("proxy")) {
     s.text("proxy", api.proxy);
     if (!api.http_port && !api.proxy.starts_with("unix:")) s.report("proxy", "needs http_port, or \"unix:USER\"");
+  }
+  if (s.has("http_origin")) {
+    s.text("http_origin", api.http_origin);
+    if (!is_origin(api.http_origin)) s.report("http_origin", "is like https://rig.example, without a path");
+  }
+  if (s.has("insecure_http")) s.flag("insecure_http", api.insecure_http);
+  if (!is_loopback(api.http_address) && api.proxy.empty() && !api.insecure_http) {
+    s.report(
+        "http_address",
+        "other machines would send tokens in the clear: name the proxy that speaks TLS, or say insecure_http = true");
   }
   if (s.has("viewer_group")) s.text("viewer_group", api.viewer_group.emplace());
   if (s.has("operator_group")) s.text("operator_group", api.operator_group.emplace());

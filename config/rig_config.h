@@ -149,6 +149,8 @@ struct ApiConfig {
   std::optional<int> http_port;  ///< TCP; every request over it needs a token
   std::string http_address = "127.0.0.1";
   std::filesystem::path tokens;  ///< the file of tokens; empty: no tokens
+  std::string http_origin;       ///< "https://rig.example": how browsers reach the proxy in front; empty: directly
+  bool insecure_http = false;    ///< other machines may connect without TLS
   std::string proxy;             ///< address of the reverse proxy in front, or "unix:USER"; empty: no proxy
   /// Groups of local users by what they may do over the socket. Without groups, the daemon's own group may operate.
   std::optional<std::string> viewer_group, operator_group, engineer_group;

@@ -1,21 +1,14 @@
 #include "daemon/api/access.h"
 
-#include <fcntl.h>
 #include <openssl/crypto.h>
-#include <openssl/rand.h>
 #include <strings.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <array>
-#include <cerrno>
-#include <cstring>
 #include <nlohmann/json.hpp>
-#include <span>
 
 #include "core/files.h"
 #include "core/hash.h"
+#include "core/secrets.h"
 
 namespace scanrig {
 namespace {
@@ -26,20 +19,6 @@ using nlohmann::ordered_json;
 constexpr std::size_t kMaxTokens = 256;
 constexpr std::string_view kHexadecimal = "0123456789abcdef";
 
-Result<std::string> random_hexadecimal(std::size_t bytes) {
-  std::string raw(bytes, '\0');
-  if (RAND_bytes(reinterpret_cast<unsigned char*>(raw.data()), static_cast<int>(bytes)) != 1) {
-    return fail(ErrorCode::io, "the system gives no random numbers");
-  }
-  std::string text;
-  for (const char c : raw) {
-    const auto byte = static_cast<unsigned char>(c);
-    text += {kHexadecimal[byte >> 4], kHexadecimal[byte & 15]};
-  }
-  OPENSSL_cleanse(raw.data(), raw.size());
-  return text;
-}
-
 bool is_hexadecimal(const std::string& text, std::size_t digits) {
   return text.size() == digits && text.find_first_not_of(kHexadecimal) == std::string::npos;
 }
@@ -49,33 +28,6 @@ bool is_name(const std::string& name) {
     return std::isalnum(static_cast<unsigned char>(c)) || c == '.' || c == '_' || c == '-';
   };
   return !name.empty() && name.size() <= 32 && std::ranges::all_of(name, allowed);
-}
-
-/// A reader of the file could try to guess tokens; a writer would be an engineer.
-Result<void> check_private(const fs::path& path) {
-  struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) {
-    return fail(ErrorCode::io, "{}: cannot be looked at: {}", path.string(), std::strerror(errno));
-  }
-  if ((status.st_mode & 077) != 0) {
-    return fail(ErrorCode::refused, "{}: mode {:04o} lets others at the tokens: chmod 600 it", path.string(),
-                status.st_mode & 07777);
-  }
-  if (status.st_uid != ::geteuid() && status.st_uid != 0) {
-    return fail(ErrorCode::refused, "{}: belongs to another user: chown it", path.string());
-  }
-  return {};
-}
-
-/// The daemon reads a file that root has written in the daemon's folder.
-Result<void> give_to_owner_of_folder(const fs::path& path) {
-  struct stat folder {};
-  const fs::path parent = path.has_parent_path() ? path.parent_path() : fs::path(".");
-  if (::stat(parent.c_str(), &folder) != 0 || ::chown(path.c_str(), folder.st_uid, folder.st_gid) != 0) {
-    return fail(ErrorCode::io, "{}: cannot be given to the owner of its folder: {}", path.string(),
-                std::strerror(errno));
-  }
-  return {};
 }
 
 std::optional<TokenRecord> parse_record(const ordered_json& json) {
@@ -117,13 +69,18 @@ Result<TokenFile> TokenFile::read(const fs::path& path) {
   return file;
 }
 
-std::optional<Role> TokenFile::role_of(std::string_view token) const {
-  std::optional<Role> role;
+const TokenRecord* TokenFile::find(std::string_view token) const {
+  const TokenRecord* found = nullptr;
   for (const auto& record : records_) {
     const std::string hash = sha256(record.salt + std::string(token));
-    if (CRYPTO_memcmp(hash.data(), record.sha256.data(), hash.size()) == 0) role = record.role;
+    if (CRYPTO_memcmp(hash.data(), record.sha256.data(), hash.size()) == 0) found = &record;
   }
-  return role;
+  return found;
+}
+
+std::optional<Role> TokenFile::role_of(std::string_view token) const {
+  const auto* record = find(token);
+  return record == nullptr ? std::nullopt : std::optional(record->role);
 }
 
 Result<std::string> TokenFile::add(const std::string& name, Role role, std::string created) {
@@ -158,13 +115,13 @@ Result<void> TokenFile::write(const fs::path& path) const {
                               {"salt", r.salt},
                               {"sha256", r.sha256}});
   }
-  const auto before = ::umask(077);
-  auto written = write_file_atomically(path, json.dump(2) + "\n");
-  ::umask(before);
-  return written && ::geteuid() == 0 ? give_to_owner_of_folder(path) : written;
+  return write_private_file(path, json.dump(2) + "\n");
 }
 
-Access::Access(PeerRoles peers, std::filesystem::path tokens) : peers_(peers), path_(std::move(tokens)) { refresh(); }
+Access::Access(PeerRoles peers, fs::path tokens, fs::path logins)
+    : peers_(peers), logins_(std::move(logins)), path_(std::move(tokens)) {
+  refresh();
+}
 
 void Access::refresh() {
   auto known = std::make_shared<Known>();
@@ -182,14 +139,56 @@ void Access::refresh() {
 
 std::optional<Error> Access::problem() const { return known()->problem; }
 
-std::optional<Role> Access::role_of(std::optional<Role> peer, std::string_view authorization) const {
+Identity Access::identify(std::optional<Role> peer, std::string_view authorization, std::string_view cookie, Time now) {
   constexpr std::string_view kScheme = "Bearer ";
-  if (authorization.empty()) return peer;
+  if (authorization.empty()) {
+    const auto login = logins_.find(cookie, now);
+    const auto valid = login ? still_valid(*login) : std::nullopt;
+    if (valid) return {.role = valid->role, .token = valid->token, .cookie = std::string(cookie)};
+    return {.role = peer};
+  }
   if (authorization.size() < kScheme.size() ||
       ::strncasecmp(authorization.data(), kScheme.data(), kScheme.size()) != 0) {
-    return std::nullopt;
+    return {};
   }
-  return known()->tokens.role_of(authorization.substr(kScheme.size()));
+  const auto all = known();
+  const auto* record = all->tokens.find(authorization.substr(kScheme.size()));
+  return record == nullptr ? Identity{} : Identity{.role = record->role, .token = record->name};
+}
+
+/// A login ends with its token, and never may more than it.
+std::optional<LoginSource> Access::still_valid(LoginSource source) const {
+  if (source.token.empty()) return source;
+  const auto all = known();
+  const auto record = std::ranges::find(all->tokens.records(), source.token, &TokenRecord::name);
+  if (record == all->tokens.records().end() || record->sha256 != source.proof) return std::nullopt;
+  source.role = std::min(source.role, record->role);
+  return source;
+}
+
+Result<std::optional<std::string>> Access::log_in_by_token(std::string_view token, Time now) {
+  const auto all = known();
+  const auto* record = all->tokens.find(token);
+  if (record == nullptr) return std::nullopt;
+  return logins_.begin({.token = record->name, .proof = record->sha256, .role = record->role}, now);
+}
+
+Result<std::optional<std::string>> Access::log_in_by_code(std::string_view code, Time now) {
+  const auto source = logins_.take_code(code, now);
+  if (!source || !still_valid(*source)) return std::nullopt;
+  return logins_.begin(*source, now);
+}
+
+Result<std::string> Access::offer_code(const Identity& who, Role role, bool kiosk, Time now) {
+  if (!who.role || role > *who.role) {
+    return fail(ErrorCode::refused, "a code gives at most your own role{}",
+                who.role ? fmt::format(", {}", to_string(*who.role)) : "");
+  }
+  LoginSource source{.token = who.token, .role = role, .kiosk = kiosk};
+  const auto all = known();
+  const auto record = std::ranges::find(all->tokens.records(), who.token, &TokenRecord::name);
+  if (record != all->tokens.records().end()) source.proof = record->sha256;
+  return logins_.offer_code(source, now);
 }
 
 std::shared_ptr<const Access::Known> Access::known() const {

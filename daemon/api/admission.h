@@ -23,6 +23,7 @@ struct ApiLimits {
   double requests_a_second = 1000.0;    ///< per peer, on average
   double requests_at_once = 1000.0;     ///< per peer, after a pause
   double price_of_a_bad_token = 100.0;  ///< in requests: 10 guesses a second
+  double price_of_an_order = 50.0;      ///< from a browser, in requests: 20 a second
   std::uint32_t header_bytes = 8 * 1024;
   std::uint64_t body_bytes = 64 * 1024;
   // Absolute: a client that sends or reads a byte now and then gains nothing.
@@ -31,6 +32,7 @@ struct ApiLimits {
   std::chrono::milliseconds answer_time{10000};  ///< for the station to decide, and for a reply to be taken
   double slowest_bytes_a_second = 64 * 1024.0;   ///< of a download
   std::chrono::milliseconds heartbeat{10000};    ///< of an event stream
+  std::chrono::milliseconds beat{500};           ///< of one with beats
 };
 
 /// Seats for connections and a rate for requests, by peer. Threads: any.
@@ -86,6 +88,9 @@ class Admission : public std::enable_shared_from_this<Admission> {
 
   /// Counts a request. False: too many since the last pause. Hanging up gains no new ones.
   bool may_request(const std::string& account, Clock::time_point now) { return take(account, 1.0, now); }
+  bool may_order(const std::string& account, Clock::time_point now) {
+    return take(account, limits_.price_of_an_order, now);
+  }
   void charge_bad_token(const std::string& account, Clock::time_point now) {
     take(account, limits_.price_of_a_bad_token, now);
   }

@@ -53,7 +53,18 @@ std::string EventHub::text_of(std::uint64_t number, std::string_view name, const
   return fmt::format("id: {}-{}\nevent: {}\ndata: {}\n\n", life_, number, name, data);
 }
 
-EventHub::Batch EventHub::present(bool lost) const {
+EventHub::Present EventHub::present() const {
+  const std::lock_guard guard(mutex_);
+  return {life_, last_, seen_};
+}
+
+EventHub::Text EventHub::beat(const std::string& time) const {
+  const std::lock_guard guard(mutex_);
+  return std::make_shared<const std::string>(
+      fmt::format("event: beat\ndata: {}\n\n", to_line({{"time", time}, {"seq", last_}})));
+}
+
+EventHub::Batch EventHub::present_status(bool lost) const {
   Batch batch{.last = last_};
   const auto add_text = [&](std::string_view name, const std::string& data) {
     batch.texts.push_back(std::make_shared<const std::string>(text_of(last_, name, data)));
@@ -64,20 +75,20 @@ EventHub::Batch EventHub::present(bool lost) const {
 }
 
 EventHub::Batch EventHub::since(std::uint64_t last) const {
-  if (last > last_ || last_ - last > events_.size()) return present(true);
+  if (last > last_ || last_ - last > events_.size()) return present_status(true);
   const auto missed = static_cast<std::ptrdiff_t>(last_ - last);
   return {.last = last_, .texts = {events_.end() - missed, events_.end()}};
 }
 
 EventHub::Batch EventHub::join(std::string_view last_event_id) const {
   const std::lock_guard guard(mutex_);
-  if (last_event_id.empty()) return present(false);
+  if (last_event_id.empty()) return present_status(false);
   const auto dash = last_event_id.rfind('-');
   std::uint64_t number = 0;
-  if (dash == std::string_view::npos || last_event_id.substr(0, dash) != life_) return present(true);
+  if (dash == std::string_view::npos || last_event_id.substr(0, dash) != life_) return present_status(true);
   const auto* end = last_event_id.data() + last_event_id.size();
   const auto read = std::from_chars(last_event_id.data() + dash + 1, end, number);
-  if (read.ec != std::errc() || read.ptr != end) return present(true);
+  if (read.ec != std::errc() || read.ptr != end) return present_status(true);
   return since(number);
 }
 

@@ -23,6 +23,14 @@ class EventHub {
   /// Notifies all subscribers when something that clients can read has changed.
   void see(std::shared_ptr<const Snapshot> snapshot);
 
+  /// What the newest event has led to.
+  struct Present {
+    std::string life;
+    std::uint64_t last = 0;
+    std::shared_ptr<const Snapshot> snapshot{};  ///< null before the first
+  };
+  [[nodiscard]] Present present() const;
+
   using Text = std::shared_ptr<const std::string>;  ///< of server-sent events, ready to be sent
   struct Batch {
     std::uint64_t last = 0;  ///< number of the newest event
@@ -31,6 +39,8 @@ class EventHub {
   /// For a new client: what it missed since `last_event_id`. Without one, or when that is not kept any more
   /// (then after an event `lost`), the present status.
   [[nodiscard]] Batch join(std::string_view last_event_id) const;
+  /// Without a number: it is not kept. `time` as iso_time() writes it.
+  [[nodiscard]] Text beat(const std::string& time) const;
   /// Events after `last`; as join() when that is not kept any more.
   [[nodiscard]] Batch after(std::uint64_t last) const;
 
@@ -42,7 +52,7 @@ class EventHub {
  private:
   void add(std::string_view name, const std::string& data);
   [[nodiscard]] std::string text_of(std::uint64_t number, std::string_view name, const std::string& data) const;
-  [[nodiscard]] Batch present(bool lost) const;
+  [[nodiscard]] Batch present_status(bool lost) const;
   [[nodiscard]] Batch since(std::uint64_t last) const;
 
   const std::string life_;

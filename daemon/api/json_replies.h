@@ -8,13 +8,16 @@
 
 namespace scanrig {
 
+struct ApiStation;
+
 /// The API's replies as JSON, in the shapes of openapi.cpp.
 nlohmann::ordered_json to_json(const Error& error);
 nlohmann::ordered_json to_json(const std::optional<Error>& error);
-nlohmann::ordered_json to_json(const Snapshot& snapshot);     ///< Status
-nlohmann::ordered_json to_json(const JobInfo& job);           ///< Job
-nlohmann::ordered_json to_detailed_json(const JobInfo& job);  ///< JobDetail
-nlohmann::ordered_json io_table(const Snapshot& snapshot);    ///< Io
+nlohmann::ordered_json to_json(const Snapshot& snapshot);       ///< Status
+nlohmann::ordered_json to_json(const JobInfo& job);             ///< Job
+nlohmann::ordered_json to_detailed_json(const JobInfo& job);    ///< JobDetail
+nlohmann::ordered_json io_table(const Snapshot& snapshot);      ///< Io
+nlohmann::ordered_json health_json(const ApiStation& station);  ///< Health
 
 /// Paths come from the file system and need not be UTF-8: invalid bytes are replaced.
 std::string to_text(const nlohmann::ordered_json& json);

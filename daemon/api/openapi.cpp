@@ -59,6 +59,7 @@ std::string_view words_of(unsigned status) {
     case 404: return "no such thing";
     case 409: return "a rule, or the state of the rig, is against it now";
     case 413: return "the body is too large";
+    case 421: return "the header Host holds no name of this rig";
     case 429: return "too many requests";
     case 431: return "the header is too large";
     case 503: return "too many connections, or the service is too busy to reply in time";
@@ -73,7 +74,7 @@ ordered_json replies_of(const Route& route) {
   const auto schema = route.reply.schema.empty() ? ordered_json{{"type", "string"}, {"format", "binary"}}
                                                  : reference(route.reply.schema);
   good["content"][std::string(route.reply.type)]["schema"] = schema;
-  std::set<unsigned> errors{400, 401, 403, 413, 429, 431, 503};
+  std::set<unsigned> errors{400, 401, 403, 413, 421, 429, 431, 503};
   errors.insert(route.errors.begin(), route.errors.end());
   if (!route.in_path.empty()) errors.insert(404);
   for (const unsigned status : errors) {
@@ -128,6 +129,7 @@ std::string openapi_document(const std::vector<Route>& routes) {
     add_parameters(route.in_path, "path", parameters);
     add_parameters(route.in_query, "query", parameters);
     if (!parameters.empty()) operation["parameters"] = std::move(parameters);
+    if (route.open) operation["security"] = ordered_json::array();
     if (!route.in_body.empty()) operation["requestBody"] = body_of(route.in_body);
     operation["responses"] = replies_of(route);
     paths[std::string(route.path)][lower(to_string(route.method))] = std::move(operation);
@@ -289,6 +291,22 @@ const char* const kSchemas = R"({
   "deadlines_missed": {"type": "integer"}, "retakes": {"type": "integer"},
   "retries": {"type": "integer", "deprecated": true, "description": "old name of retakes"}, "faults": {"type": "integer"},
   "connections": {"type": "integer"}, "event_streams": {"type": "integer"}}},
+"Login": {"type": "object", "required": ["role", "name", "cookie"], "additionalProperties": false, "properties": {
+  "role": {"type": "string", "enum": ["viewer", "operator", "engineer"]},
+  "name": {"type": "string", "nullable": true, "description": "of the token; null: a user of this machine, or a code from one"},
+  "cookie": {"type": "boolean", "description": "known by the cookie of a login"}}},
+"LoginCode": {"type": "object", "required": ["code", "valid_s", "address"], "additionalProperties": false, "properties": {
+  "code": {"type": "string"}, "valid_s": {"type": "integer"},
+  "address": {"type": "string", "nullable": true, "description": "of the page; null: it is not served, [api] http_port is not set"}}},
+"Page": {"type": "object", "required": ["life", "seq", "time", "build", "status", "jobs", "health", "login", "insecure"], "additionalProperties": false, "properties": {
+  "life": {"type": "string", "description": "of this run of the service"},
+  "seq": {"type": "integer", "description": "the newest event that is in it"},
+  "time": {"type": "string"}, "build": {"type": "string", "description": "of the page: another one, and a page loads itself again"},
+  "status": {"$ref": "#/components/schemas/Status"},
+  "jobs": {"type": "array", "items": {"$ref": "#/components/schemas/JobDetail"}},
+  "health": {"$ref": "#/components/schemas/Health"},
+  "login": {"$ref": "#/components/schemas/Login"},
+  "insecure": {"type": "boolean", "description": "other machines may send tokens in the clear: insecure_http"}}},
 "ConfigCheck": {"type": "object", "required": ["ok", "problems"], "additionalProperties": false, "properties": {
   "ok": {"type": "boolean"}, "problems": {"type": "array", "items": {"type": "string"}}}},
 "OpenApi": {"type": "object", "required": ["openapi", "paths"]}

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/result.h"
+#include "daemon/api/roles.h"
 
 namespace scanrig {
 
@@ -48,7 +49,11 @@ class Values {
   [[nodiscard]] bool flag(std::string_view name) const { return get<bool>(name).value_or(false); }
   /// The user of this machine or the address that sent the request, as the log names it.
   [[nodiscard]] const std::string& requester() const { return requester_; }
-  void set_requester(std::string requester) { requester_ = std::move(requester); }
+  [[nodiscard]] const Identity& identity() const { return identity_; }
+  void set_requester(std::string requester, Identity identity) {
+    requester_ = std::move(requester);
+    identity_ = std::move(identity);
+  }
 
  private:
   template <class T>
@@ -59,6 +64,7 @@ class Values {
   }
   std::map<std::string, Value, std::less<>> values_;
   std::string requester_;
+  Identity identity_;
 };
 
 /// Reads the text of a parameter as `field` describes it. Fails with `invalid_input`, naming the field.

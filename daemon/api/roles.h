@@ -29,6 +29,13 @@ struct PeerCredentials {
 /// Fails with `io`.
 Result<PeerCredentials> peer_credentials(int socket);
 
+/// Who sends a request.
+struct Identity {
+  std::optional<Role> role{};  ///< nothing: not known
+  std::string token{};         ///< name of the token; empty: the kernel's record of the peer, or a code given to it
+  std::string cookie{};        ///< by which it was recognised; empty: not by one
+};
+
 /// Groups that give a local user each role. Root and the daemon's own user are engineers.
 struct PeerRoles {
   std::optional<gid_t> viewer, operating, engineer;

@@ -13,7 +13,7 @@ namespace {
 
 std::vector<std::string_view> split(std::string_view path) {
   std::vector<std::string_view> segments;
-  while (!path.empty()) {
+  while (path.size() > 1) {
     path.remove_prefix(1);
     const auto slash = path.find('/');
     segments.push_back(path.substr(0, slash));
@@ -107,7 +107,8 @@ ApiResponse error_response(unsigned status, const Error& error) {
 
 std::vector<Route> all_routes() {
   std::vector<Route> all;
-  for (auto part : {station_routes(), job_routes(), order_routes(), calibration_routes(), service_routes()}) {
+  for (auto part :
+       {station_routes(), job_routes(), order_routes(), calibration_routes(), service_routes(), page_routes()}) {
     std::ranges::move(part, std::back_inserter(all));
   }
   return all;
@@ -122,9 +123,11 @@ tl::expected<Router::Match, ApiResponse> Router::find(std::string_view method, s
   const auto no = [](unsigned status, ErrorCode code, std::string why) {
     return tl::unexpected(error_response(status, Error{code, std::move(why)}));
   };
-  if (!role) return no(401, ErrorCode::refused, "not authenticated: send a token or join an API group");
+  const auto not_authenticated = [&] {
+    return no(401, ErrorCode::refused, "not authenticated: send a token or join an API group");
+  };
   const auto parsed = parse_target(target);
-  if (!parsed) return tl::unexpected(error_response(parsed.error()));
+  if (!parsed) return role ? tl::unexpected(error_response(parsed.error())) : not_authenticated();
   std::optional<std::size_t> found;
   bool path_known = false;
   for (std::size_t i = 0; i < routes_.size(); ++i) {
@@ -132,10 +135,11 @@ tl::expected<Router::Match, ApiResponse> Router::find(std::string_view method, s
     path_known = true;
     if (to_string(routes_[i].method) == method && (!found || more_exact(paths_[i], paths_[*found]))) found = i;
   }
+  if (!role && !(found && routes_[*found].open)) return not_authenticated();
   if (!path_known) return no(404, ErrorCode::not_found, "the API has nothing of that name; see /api/v1/openapi.json");
   if (!found) return no(405, ErrorCode::unsupported, fmt::format("this path does not take {}", method));
   const auto& route = routes_[*found];
-  if (*role < route.role) {
+  if (!route.open && *role < route.role) {
     return no(403, ErrorCode::refused,
               fmt::format("this needs the role {}; yours is {}", to_string(route.role), to_string(*role)));
   }

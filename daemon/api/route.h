@@ -36,17 +36,24 @@ class OpenFile {
   std::uint64_t size_;
 };
 
-/// The events from then on, for as long as the client stays.
-struct EventStream {};
+/// The events after one of them, for as long as the client stays.
+struct EventStream {
+  std::string after{};  ///< "LIFE-SEQ"; empty: as the header Last-Event-ID says
+  bool beats = false;   ///< an event `beat` every half second, for scripts: comments reach none
+};
 
 struct ApiResponse {
   unsigned status = 200;
   std::variant<std::string, std::shared_ptr<OpenFile>, EventStream> body{};
   std::string_view type = "application/json";
   std::string why{};  ///< of an error: its message
+  /// Headers beside those that every reply has, or instead of them.
+  std::vector<std::pair<std::string_view, std::string>> headers{};
 };
 
 struct ServiceStatus;
+class Access;
+class EventHub;
 
 /// Dependencies of the routes. All of it may be used from any thread.
 struct ApiStation {
@@ -58,6 +65,11 @@ struct ApiStation {
   std::function<Result<void>()> check_config{};            ///< of the file that the daemon was started with
   std::function<void(ControlLoop::Reply)> reload{};        ///< of it; reads the disk
   std::function<void(std::function<void()>)> on_worker{};  ///< for work that touches the disk
+  EventHub* hub = nullptr;                                 ///< never null where a server runs
+  Access* access = nullptr;                                ///< likewise
+  std::function<std::string()> page_address{};             ///< "http://127.0.0.1:8080"; empty: it is not served
+  bool tls = false;                                        ///< browsers reach it by https, through a proxy
+  bool insecure = false;                                   ///< other machines may connect without TLS
 };
 
 using Send = std::function<void(ApiResponse)>;
@@ -80,6 +92,7 @@ struct Route {
   std::vector<unsigned> errors{};        ///< beside those of every route
   bool slow = false;                     ///< touches the disk: done by a worker, not by an I/O thread
   bool reserved = false;                 ///< served where no seat is free
+  bool open = false;                     ///< to anybody: the page itself, and the way in
   std::chrono::seconds reply_timeout{};  ///< for the reply; 0: as in the limits
   /// Calls `send` once, from this thread or, soon, from the control loop's.
   std::function<void(const ApiStation&, const Values&, Send)> handle;
@@ -108,7 +121,7 @@ class Router {
     const Route* route = nullptr;
     Values values{};
   };
-  /// The match, or the error reply: 400, 401 (`role` is nothing), 403, 404, 405.
+  /// The match, or the error reply: 400, 401 (`role` is nothing and the route is not open), 403, 404, 405.
   [[nodiscard]] tl::expected<Match, ApiResponse> find(std::string_view method, std::string_view target,
                                                       std::optional<Role> role) const;
   /// Reads the body and runs the route; `send` as in Route. 400 for a body that does not fit.
@@ -126,5 +139,6 @@ std::vector<Route> job_routes();          ///< jobs as they are, their files and
 std::vector<Route> order_routes();        ///< actions on jobs: queued, cancelled, bundled, deleted, ...
 std::vector<Route> calibration_routes();  ///< calibrating the rig, and how its board stands
 std::vector<Route> service_routes();      ///< health, metrics, the OpenAPI document
+std::vector<Route> page_routes();         ///< the web page, what it starts from, logging in and out
 
 }  // namespace scanrig

@@ -28,7 +28,9 @@ std::vector<std::string> reminders_of(const Snapshot& snapshot) {
   return {snapshot.calibration_reminder};
 }
 
-void health(const ApiStation& station, const Values&, const Send& send) {
+}  // namespace
+
+ordered_json health_json(const ApiStation& station) {
   const auto snapshot = station.loop.snapshot();
   const ServiceStatus facts = station.facts();
   auto problems = problems_of(*snapshot, facts);
@@ -37,21 +39,23 @@ void health(const ApiStation& station, const Values&, const Send& send) {
     temperatures.push_back({{"sensor", one.sensor}, {"celsius", one.celsius}});
   }
   const auto status = to_json(*snapshot);
-  send({.body = to_text({{"ok", problems.empty()},
-                         {"problems", std::move(problems)},
-                         {"reminders", reminders_of(*snapshot)},
-                         {"version", kVersion},
-                         {"uptime_s", facts.uptime_s},
-                         {"devices", status["devices"]},
-                         {"disk", {{"bytes", facts.disk_bytes}, {"free_bytes", facts.disk_free_bytes}}},
-                         {"temperatures", std::move(temperatures)},
-                         {"deadlines_missed", snapshot->counters.deadlines_missed},
-                         {"retakes", snapshot->counters.retakes},
-                         {"retries", snapshot->counters.retakes},  // old name
-                         {"faults", snapshot->counters.faults},
-                         {"connections", facts.connections},
-                         {"event_streams", facts.event_streams}})});
+  return {{"ok", problems.empty()},
+          {"problems", std::move(problems)},
+          {"reminders", reminders_of(*snapshot)},
+          {"version", kVersion},
+          {"uptime_s", facts.uptime_s},
+          {"devices", status["devices"]},
+          {"disk", {{"bytes", facts.disk_bytes}, {"free_bytes", facts.disk_free_bytes}}},
+          {"temperatures", std::move(temperatures)},
+          {"deadlines_missed", snapshot->counters.deadlines_missed},
+          {"retakes", snapshot->counters.retakes},
+          {"retries", snapshot->counters.retakes},  // old name
+          {"faults", snapshot->counters.faults},
+          {"connections", facts.connections},
+          {"event_streams", facts.event_streams}};
 }
+
+namespace {
 
 void metrics(const ApiStation& station, const Values&, const Send& send) {
   send({.body = metrics_text(*station.loop.snapshot(), station.facts()), .type = "text/plain; version=0.0.4"});
@@ -60,6 +64,7 @@ void metrics(const ApiStation& station, const Values&, const Send& send) {
 /// A camera that does not respond now may do so later.
 void preview(const ApiStation& station, const Values& values, const Send& send) {
   auto jpeg = station.preview_jpeg(*values.text("side"));
+  if (!jpeg && values.flag("or_nothing")) return send({.status = 204, .type = "image/jpeg"});
   send(jpeg ? ApiResponse{.body = std::move(*jpeg), .type = "image/jpeg"} : error_response(503, jpeg.error()));
 }
 
@@ -91,12 +96,16 @@ std::vector<Route> service_routes() {
            .role = Role::viewer,
            .description = "Devices, disk, temperatures, deadlines missed, retakes.",
            .reply = {.description = "`ok` is false when something is wrong", .schema = "Health"},
-           .handle = health},
+           .handle = [](const ApiStation& station, const Values&,
+                        const Send& send) { send({.body = to_text(health_json(station))}); }},
           {.method = Method::get,
            .path = "/api/v1/preview/{side}",
            .role = Role::viewer,
            .description = "The latest image of a camera. Requests a newer one while the rig is idle.",
            .in_path = {{.name = "side", .description = "of the rig", .required = true, .words = {"left", "right"}}},
+           .in_query = {{.name = "or_nothing",
+                         .type = RequestField::Type::flag,
+                         .description = "204 instead of an error where there is no image: a page repeats it anyway"}},
            .reply = {.description = "an image", .type = "image/jpeg"},
            .slow = true,
            .handle = preview},

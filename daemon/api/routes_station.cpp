@@ -159,9 +159,16 @@ std::vector<Route> station_routes() {
        .description =
            "Server-sent events: `status` and `job` as they change, each with the shapes of Status and JobDetail, and "
            "`job_deleted` with {\"id\"}. A client that comes back with Last-Event-ID gets what it missed, or `lost` "
-           "and the present status when that is too long ago. A comment every 10 s is the heartbeat.",
+           "and the present status when that is too long ago. A comment every 10 s is the heartbeat. With `after`, the "
+           "`life` and `seq` of a snapshot, what came after it, and an event `beat` {\"time\", \"seq\"} every half "
+           "second.",
+       .in_query = {{.name = "after", .description = "LIFE-SEQ", .min = 1, .max = 64}},
        .reply = {.description = "events without end", .type = "text/event-stream"},
-       .handle = [](const ApiStation&, const Values&, const Send& send) { send({.body = EventStream{}}); }},
+       .handle =
+           [](const ApiStation&, const Values& values, const Send& send) {
+             const auto after = values.text("after");
+             send({.body = EventStream{.after = after.value_or(""), .beats = after.has_value()}});
+           }},
       start_route(),
       stop_route(),
       press("/api/v1/reset", Button::reset, Role::operating, "Clears a fault and homes the table."),

@@ -75,9 +75,21 @@ struct ApiServer::Impl {
         loop(control),
         core({control, [this] { return latest_facts(); }, with.storage, with.preview_jpeg, with.look_at_board,
               with.check_config, with.reload,
-              [this](std::function<void()> work) { net::post(core.workers, std::move(work)); }},
+              [this](std::function<void()> work) { net::post(core.workers, std::move(work)); }, &core.hub, &core.access,
+              [this] { return page_address(); }, with.http_origin.starts_with("https://"), with.insecure_http},
              roles, proxy, with, this_life()),
         local(io, Local(), listening) {}
+
+  /// As a browser on this machine reaches it.
+  [[nodiscard]] std::string page_address() const {
+    if (!options.http_origin.empty()) return options.http_origin;
+    if (!tcp) return {};
+    const auto here = tcp->local_endpoint();
+    if (here.address().is_unspecified()) return fmt::format("http://localhost:{}", here.port());
+    const auto name = here.address().to_string();
+    return here.address().is_v6() ? fmt::format("http://[{}]:{}", name, here.port())
+                                  : fmt::format("http://{}:{}", name, here.port());
+  }
 
   void run() {
     core.hub.see(loop.snapshot());

@@ -22,6 +22,9 @@ struct ApiOptions {
   std::optional<int> http_port{};  ///< TCP, where every request needs a token; 0: any free port
   std::string http_address = "127.0.0.1";
   std::filesystem::path tokens{};  ///< the file of tokens
+  std::filesystem::path logins{};  ///< where logged-in browsers are remembered; empty: until the process ends
+  std::string http_origin{};       ///< "https://rig.example": how browsers reach it through the proxy; empty: directly
+  bool insecure_http = false;      ///< other machines may connect without TLS; the page says so
   std::string proxy{};             ///< the reverse proxy in front, as find_proxy() reads it; empty: none
   /// Listening sockets of the caller, used instead of an own one and left open and in place at the end.
   std::optional<int> passed_socket{}, passed_tcp{};

@@ -1,10 +1,7 @@
 #include "daemon/api/session.h"
 
-#include <unistd.h>
-
 #include <boost/asio/post.hpp>
 #include <boost/asio/write.hpp>
-#include <sstream>
 
 namespace scanrig {
 namespace {
@@ -34,8 +31,6 @@ std::optional<ApiResponse> understand(boost::beast::error_code error) {
   }
   return std::nullopt;  // gone, or too slow
 }
-
-constexpr std::size_t kChunk = 64 * 1024;
 
 }  // namespace
 
@@ -104,21 +99,23 @@ void ApiSession::on_header(Error error) {
   }
   ++core_.requests;
   last_ = !parser_->get().keep_alive();
-  const auto as = role();
   requester_ = requester();
-  auto found = core_.router.find(plain(parser_->get().method_string()), plain(parser_->get().target()), as);
-  const bool may = may_request(found ? found->route : nullptr, as.has_value());
+  identity_ = identify();
+  if (auto stranger = refuse_stranger()) return refuse(std::move(*stranger), true);
+  auto found = core_.router.find(plain(parser_->get().method_string()), plain(parser_->get().target()), identity_.role);
+  const bool may = may_request(found ? found->route : nullptr, identity_.role.has_value());
   if (!may) return refuse(error_response(429, kTooOften), false);
-  if (!as) return refuse(std::move(found.error()), true);
-  if (!take_seat(found && found->route->reserved)) return refuse(error_response(503, kTooMany), true);
+  if (!found && !identity_.role) return refuse(std::move(found.error()), true);
+  // The page itself, and logging in, are served from a waiting place.
+  if (identity_.role && !take_seat(found && found->route->reserved)) return refuse(error_response(503, kTooMany), true);
   if (!found) {
-    const auto order = found.error().status == kForbidden ? order_of(*as) : std::nullopt;
+    const auto order = found.error().status == kForbidden ? order_of() : std::nullopt;
     if (order) tell_refused(*order, found.error().why);
     return refuse(std::move(found.error()), false);
   }
   match_ = std::move(*found);
-  match_->values.set_requester(seat_->peer());
-  order_ = order_of(*as);
+  match_->values.set_requester(seat_->peer(), identity_);
+  order_ = order_of();
   const auto job = order_ ? find_job(core_.station, match_->values) : nullptr;
   if (job) order_->job = job->id;
   if (parser_->is_done()) return call();
@@ -127,11 +124,30 @@ void ApiSession::on_header(Error error) {
                    [self = shared_from_this()](Error failed, std::size_t) { self->on_body(failed); });
 }
 
+/// Requests that another site's page may have caused: under a name that is not ours, or orders that a browser sends
+/// with our cookie by itself. What comes over the Unix socket of this machine is no browser's.
+std::optional<ApiResponse> ApiSession::refuse_stranger() const {
+  const auto host = header(http::field::host), origin = header(http::field::origin);
+  const bool may_be_browser = peer_.door == Admission::Door::tcp || peer_.is_proxy;
+  if (may_be_browser && !core_.origins.is_own_host(host)) {
+    return error_response(421,
+                          {ErrorCode::refused, "not a name of the rig: use its address, or set [api] http_origin"});
+  }
+  if (plain(parser_->get().method_string()) == to_string(Method::get)) return std::nullopt;
+  const bool by_cookie = !identity_.cookie.empty();
+  const bool is_ours = core_.origins.is_own_origin(origin, host) && (!by_cookie || parser_->get()["X-Scanrig"] == "1");
+  if (is_ours || (!by_cookie && (origin.empty() || !may_be_browser))) return std::nullopt;
+  return error_response(403, {ErrorCode::refused, "this order did not come from the rig's own page"});
+}
+
 /// Stop and status have a separate allowance: neither bad tokens nor other requests use it up.
 bool ApiSession::may_request(const Route* route, bool authenticated) {
   const auto now = Admission::Clock::now();
   if (route && route->reserved) return core_.admission->may_request(fmt::format("{} {}", route->path, requester_), now);
   if (!authenticated && !header(http::field::authorization).empty()) core_.admission->charge_bad_token(requester_, now);
+  if (!identity_.cookie.empty() && route && route->method != Method::get) {
+    return core_.admission->may_order(requester_, now);
+  }
   return core_.admission->may_request(requester_, now);
 }
 
@@ -165,12 +181,13 @@ void ApiSession::call() {
   }
 }
 
-std::optional<ApiSession::JobOrder> ApiSession::order_of(Role as) const {
+std::optional<ApiSession::JobOrder> ApiSession::order_of() const {
   const auto method = plain(parser_->get().method_string());
-  if (method == to_string(Method::get)) return std::nullopt;
+  if (method == to_string(Method::get) || !identity_.role) return std::nullopt;
   const auto target = plain(parser_->get().target());
   return JobOrder{fmt::format("{} {}, requested by {} ({})", method,
-                              target.substr(0, target.find('?')).substr(0, kMaxPathLength), requester_, to_string(as))};
+                              target.substr(0, target.find('?')).substr(0, kMaxPathLength), requester_,
+                              to_string(*identity_.role))};
 }
 
 void ApiSession::tell_refused(const JobOrder& order, const std::string& why) const {
@@ -209,28 +226,30 @@ void ApiSession::answer(ApiResponse response) {
   waiting_ = false;
   timer_.cancel();
   if (order_ && response.status >= kFirstError) tell_refused(*order_, response.why);
-  if (const auto* file = std::get_if<std::shared_ptr<OpenFile>>(&response.body)) {
-    begin_file(*file, response.type);
+  if (std::holds_alternative<std::shared_ptr<OpenFile>>(response.body)) {
+    begin_file(response);
   } else if (std::holds_alternative<EventStream>(response.body)) {
-    begin_events();
+    begin_events(response);
   } else {
     write_text(std::move(response));
   }
 }
 
 /// Headers common to all replies. Content of a job's folder is shown, never run.
-void ApiSession::set_head(unsigned status, std::string_view type) {
-  response_ = {static_cast<http::status>(status), 11};
+void ApiSession::set_head(const ApiResponse& response) {
+  const auto& type = response.type;
+  response_ = {static_cast<http::status>(response.status), 11};
   response_.set(http::field::content_type, {type.data(), type.size()});
   response_.set(http::field::cache_control, "no-store");
   response_.set("X-Content-Type-Options", "nosniff");
   response_.set("Content-Security-Policy", "default-src 'none'; img-src data:; style-src 'unsafe-inline'; sandbox");
-  if (status == 401) response_.set(http::field::www_authenticate, "Bearer");
+  if (response.status == 401) response_.set(http::field::www_authenticate, "Bearer");
+  for (const auto& [name, value] : response.headers) response_.set({name.data(), name.size()}, value);
   response_.keep_alive(!last_);
 }
 
 void ApiSession::write_text(ApiResponse response) {
-  set_head(response.status, response.type);
+  set_head(response);
   response_.body() = std::move(std::get<std::string>(response.body));
   response_.prepare_payload();
   stream_.expires_after(core_.limits.answer_time);
@@ -265,8 +284,10 @@ void ApiSession::drain_more() {
 
 std::string_view ApiSession::header(http::field name) const { return plain(parser_->get()[name]); }
 
-std::optional<Role> ApiSession::role() const {
-  return core_.access.role_of(peer_.role, header(http::field::authorization));
+Identity ApiSession::identify() const {
+  const auto cookie = cookie_value(header(http::field::cookie), login_cookie(core_.station.tls));
+  return core_.access.identify(peer_.role, header(http::field::authorization), cookie,
+                               std::chrono::system_clock::now());
 }
 
 /// Several lines of one header form one list.
@@ -275,98 +296,6 @@ std::string ApiSession::requester() const {
   const auto lines = parser_->get().equal_range("X-Forwarded-For");
   if (lines.first == lines.second) return peer_.name;
   return forwarded_address(plain(std::prev(lines.second)->value())).value_or(peer_.name);
-}
-
-// Files and events, which a session sends piece by piece.
-
-std::string ApiSession::head_text() const {
-  std::ostringstream text;
-  text << response_.base();
-  return text.str();
-}
-
-/// One limit for the whole file, long enough for the slowest client that is served.
-void ApiSession::begin_file(std::shared_ptr<OpenFile> file, std::string_view type) {
-  file_ = std::move(file);
-  sent_ = 0;
-  set_head(200, type);
-  response_.content_length(file_->size());
-  chunk_ = head_text();
-  const std::chrono::duration<double> download(static_cast<double>(file_->size()) /
-                                               core_.limits.slowest_bytes_a_second);
-  stream_.expires_after(core_.limits.answer_time + std::chrono::ceil<std::chrono::milliseconds>(download));
-  write_chunk();
-}
-
-void ApiSession::write_chunk() {
-  net::async_write(stream_, net::buffer(chunk_), [self = shared_from_this()](Error error, std::size_t) {
-    if (error) return self->hang_up();
-    if (self->sent_ < self->file_->size()) return self->read_chunk();
-    self->file_.reset();
-    self->on_written({});
-  });
-}
-
-/// Runs on a worker: a slow disk delays only this connection.
-void ApiSession::read_chunk() {
-  net::post(core_.workers, [self = shared_from_this()] {
-    self->chunk_.resize(std::min<std::uint64_t>(kChunk, self->file_->size() - self->sent_));
-    const auto got =
-        ::pread(self->file_->fd(), self->chunk_.data(), self->chunk_.size(), static_cast<off_t>(self->sent_));
-    net::post(self->stream_.get_executor(), [self, got] {
-      if (got <= 0) return self->hang_up();  // the file became shorter: better no reply than a wrong one
-      self->chunk_.resize(static_cast<std::size_t>(got));
-      self->sent_ += static_cast<std::uint64_t>(got);
-      self->write_chunk();
-    });
-  });
-}
-
-void ApiSession::begin_events() {
-  last_ = true;
-  subscription_ = core_.hub.subscribe([weak = weak_from_this(), strand = stream_.get_executor()] {
-    net::post(strand, [weak] {
-      if (const auto self = weak.lock()) self->events_due();
-    });
-  });
-  set_head(200, "text/event-stream");
-  const auto last_event_id = parser_->get().find("Last-Event-ID");
-  auto batch = core_.hub.join(last_event_id == parser_->get().end() ? "" : std::string(last_event_id->value()));
-  batch.texts.insert(batch.texts.begin(), std::make_shared<const std::string>(head_text()));
-  send_events(std::move(batch));
-}
-
-void ApiSession::events_due() {
-  if (!writing_events_) send_events(core_.hub.after(last_event_));
-}
-
-void ApiSession::send_events(EventHub::Batch batch) {
-  last_event_ = batch.last;
-  batch_ = std::move(batch.texts);
-  if (batch_.empty()) return wait_for_events();
-  std::vector<net::const_buffer> buffers;
-  for (const auto& text : batch_) buffers.push_back(net::buffer(*text));
-  writing_events_ = true;
-  stream_.expires_after(core_.limits.answer_time);
-  net::async_write(stream_, buffers, [self = shared_from_this()](Error error, std::size_t) {
-    self->writing_events_ = false;
-    if (error) return self->hang_up();
-    self->events_due();
-  });
-}
-
-void ApiSession::wait_for_events() {
-  timer_.expires_after(core_.limits.heartbeat);
-  timer_.async_wait([self = shared_from_this()](Error error) {
-    if (!error) self->beat();
-  });
-}
-
-/// Sends a heartbeat; a client without the right to listen any more is cut off then.
-void ApiSession::beat() {
-  if (writing_events_) return;
-  if (!role()) return hang_up();
-  send_events({last_event_, {std::make_shared<const std::string>(":\n\n")}});
 }
 
 }  // namespace scanrig

@@ -13,6 +13,7 @@
 #include "daemon/api/access.h"
 #include "daemon/api/admission.h"
 #include "daemon/api/event_hub.h"
+#include "daemon/api/origins.h"
 #include "daemon/api/route.h"
 #include "daemon/api/server.h"
 
@@ -22,8 +23,9 @@ namespace scanrig {
 struct ServerCore {
   ServerCore(ApiStation what, PeerRoles peers, Proxy in_front, const ApiOptions& options, std::string life)
       : station(std::move(what)),
-        access(peers, options.tokens),
+        access(peers, options.tokens, options.logins),
         proxy(std::move(in_front)),
+        origins(options.http_origin),
         limits(options.limits),
         journal(options.journal),
         admission(std::make_shared<Admission>(options.limits)),
@@ -33,6 +35,7 @@ struct ServerCore {
   const ApiStation station;
   Access access;
   const Proxy proxy;
+  const OwnOrigins origins;
   const ApiLimits limits;
   const std::function<void(JournalEntry)> journal;
   const std::shared_ptr<Admission> admission;
@@ -83,12 +86,13 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
   void refuse(ApiResponse response, bool must_close);
   void on_body(Error error);
   void call();
-  [[nodiscard]] std::optional<JobOrder> order_of(Role as) const;
+  [[nodiscard]] std::optional<ApiResponse> refuse_stranger() const;
+  [[nodiscard]] std::optional<JobOrder> order_of() const;
   void tell_refused(const JobOrder& order, const std::string& why) const;
   void await_answer(std::chrono::milliseconds reply_timeout);
   [[nodiscard]] Send sender();
   void answer(ApiResponse response);
-  void set_head(unsigned status, std::string_view type);
+  void set_head(const ApiResponse& response);
   [[nodiscard]] std::string head_text() const;
   void write_text(ApiResponse response);
   void on_written(Error error);
@@ -96,14 +100,14 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
   void drain();
   void drain_more();
   [[nodiscard]] std::string_view header(boost::beast::http::field name) const;
-  [[nodiscard]] std::optional<Role> role() const;
+  [[nodiscard]] Identity identify() const;
   [[nodiscard]] std::string requester() const;
 
-  void begin_file(std::shared_ptr<OpenFile> file, std::string_view type);
+  void begin_file(const ApiResponse& response);
   void read_chunk();
   void write_chunk();
 
-  void begin_events();
+  void begin_events(const ApiResponse& response);
   void events_due();
   void send_events(EventHub::Batch batch);
   void wait_for_events();
@@ -117,6 +121,7 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
   Place place_ = Place::waiting;
   std::uint64_t seat_number_ = 0;  ///< number of seats this connection has had
   std::string requester_;          ///< sender of this request
+  Identity identity_;              ///< likewise
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::string_body>> parser_;
   std::optional<Router::Match> match_;
@@ -132,6 +137,7 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
 
   std::optional<std::uint64_t> subscription_;
   std::uint64_t last_event_ = 0;
+  bool beats_ = false;
   std::vector<EventHub::Text> batch_;
   bool writing_events_ = false;
 };

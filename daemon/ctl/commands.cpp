@@ -97,6 +97,14 @@ void add_station_commands(CLI::App& app, Chosen& chosen) {
   const auto halt = std::make_shared<StopVerb>();
   add_client(app, chosen, "stop", "stop the table, in every state, and wait until it has stopped", halt, stop)
       ->add_flag("!--no-wait", halt->wait, "do not wait for standstill");
+  const auto page = std::make_shared<OpenVerb>();
+  auto* open =
+      add_client(app, chosen, "open", "the page's address, with a code that logs a browser in", page, open_page);
+  open->add_option("--role", page->role, "that the browser gets, at most one's own")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"viewer", "operator", "engineer"}));
+  open->add_flag("--kiosk", page->kiosk, "show it on this screen, over all of it; the login does not end by itself");
+  open->add_option("--browser", page->browser, "kiosk: the program")->capture_default_str();
   add_button(app, chosen, "reset", "clear a fault and home the table");
   add_button(app, chosen, "reload",
              "restart the service with the configuration file as it is now, while the rig is idle");

@@ -43,6 +43,14 @@ struct StopVerb {
 /// Stops, then reports the table's standstill: `ok` (standstill confirmed) or `standstill_unknown`.
 ExitCode stop(const Connection& connection, const StopVerb& verb);
 
+struct OpenVerb {
+  std::string role = "operator";
+  bool kiosk = false;
+  std::string browser = "chromium";
+};
+/// Prints the page's address with a code that logs in once; for a kiosk becomes a browser with it.
+ExitCode open_page(const Connection& connection, const OpenVerb& verb);
+
 struct StartVerb {
   bool follow = false;
 };

@@ -1,8 +1,10 @@
 #include <unistd.h>
 #include <cstdio>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "core/secrets.h"
 #include "daemon/ctl/client.h"
 #include "daemon/ctl/job_view.h"
 #include "daemon/ctl/output.h"
@@ -92,6 +94,49 @@ ExitCode start(const Connection& connection, const StartVerb& verb) {
     print(*answer);
   } else {
     fmt::print("{}\n", id);
+  }
+  return ExitCode::ok;
+}
+
+namespace {
+
+/// A page that leads to `target`: a command line is everybody's to read, this file is not.
+Result<std::filesystem::path> write_redirect(const std::string& target) {
+  const char* runtime = std::getenv("XDG_RUNTIME_DIR");
+  const std::filesystem::path folder = runtime != nullptr ? runtime : "/tmp";
+  auto file = folder / fmt::format("scanrig-open-{}.html", ::getpid());
+  auto written = write_private_file(
+      file,
+      fmt::format("<!doctype html><meta http-equiv=\"refresh\" content=\"0;url={}\"><title>scanrig</title>\n", target));
+  return written ? Result<std::filesystem::path>(std::move(file)) : pass_on(written);
+}
+
+/// Returns only where there is no such browser.
+ExitCode become_kiosk(const std::string& browser, const std::string& target) {
+  const auto file = write_redirect(target);
+  if (!file) return report_error(exit_code(file.error().code), file.error().message);
+  const auto address = "file://" + file->string();
+  ::execlp(browser.c_str(), browser.c_str(), "--kiosk", "--no-first-run", address.c_str(), nullptr);
+  return report_error(exit_code(ErrorCode::not_found),
+                      fmt::format("cannot start {}: install it, or name another --browser", browser));
+}
+
+}  // namespace
+
+ExitCode open_page(const Connection& connection, const OpenVerb& verb) {
+  const auto answer = send_request(connection.socket, "POST", "/api/v1/login/code",
+                                   json{{"role", verb.role}, {"kiosk", verb.kiosk}}.dump());
+  if (!answer) return report_error(answer.error());
+  const auto address = text(*answer, "address");
+  if (address.empty()) {
+    return report_error(exit_code(ErrorCode::refused), "the page is not served: set http_port in [api] of rig.toml");
+  }
+  const auto target = fmt::format("{}/#code={}", address, text(*answer, "code"));
+  if (verb.kiosk) return become_kiosk(verb.browser, target);
+  if (connection.json) {
+    print(*answer);
+  } else {
+    fmt::print("{}\nvalid once, for {} minutes, as {}\n", target, answer->at("valid_s").get<int>() / 60, verb.role);
   }
   return ExitCode::ok;
 }

@@ -111,6 +111,9 @@ DaemonOptions options_from(const config::RigConfig& config) {
                  .http_port = config.api.http_port,
                  .http_address = config.api.http_address,
                  .tokens = config.api.tokens,
+                 .logins = config.api.tokens.empty() ? "" : config.api.tokens.parent_path() / "logins.json",
+                 .http_origin = config.api.http_origin,
+                 .insecure_http = config.api.insecure_http,
                  .proxy = config.api.proxy};
   if (config.webhook) options.webhook = HttpAddress{config.webhook->host, config.webhook->port, config.webhook->path};
   options.remote = config.safety.remote_start;

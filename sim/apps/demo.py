@@ -19,6 +19,7 @@ RENDER_LIMIT_S = 900
 VOXEL_MM = 0.25
 INSIDE = "SCANRIG_DEMO_NETWORK"  # set inside the network namespace
 JOB_LIMIT_S = 3600
+PAGE_PORT = 8080
 SMALLEST_SCALE = 0.5  # smaller images do not show a board's markers
 
 
@@ -30,6 +31,8 @@ def arguments():
     parser.add_argument("--views", type=int, default=8, help="views a pose")
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/demo"), help="folder for the scan")
     parser.add_argument("--keep", action="store_true", help="leave the daemon running")
+    parser.add_argument("--page", action="store_true",
+                        help="show the web page meanwhile; the daemon keeps running afterwards, as with --keep")
     parser.add_argument("--same-rest", action="store_true", help="the operator does not turn the object over")
     parser.add_argument("--scale", type=float, default=1.0, help="of the images: 0.25 gives 320x240")
     parser.add_argument("--no-noise", action="store_true", help="sensors without noise")
@@ -38,7 +41,11 @@ def arguments():
     parser.add_argument("--wire", action="store_true",
                         help="the shipped daemon over wires: Modbus drive, GPIO lines, two GigE cameras")
     parser.add_argument("--bin", type=pathlib.Path, required=True, help=argparse.SUPPRESS)
-    return parser.parse_args()
+    options = parser.parse_args()
+    if options.page and options.wire:
+        parser.error("--page shows the simulated rig without wires: leave --wire out")
+    options.keep = options.keep or options.page
+    return options
 
 
 def report_error(sentence, code):
@@ -80,6 +87,8 @@ class SimulatedStation:
             self.jobs.mkdir(parents=True)
             shutil.copy(calibration, self.jobs)
             extra = ["--own-calibration", *extra]
+        if options.page:
+            extra = ["--http-port", PAGE_PORT, *extra]
         command = [options.bin / "scanrigd-sim", "--socket", self.socket, "--jobs", self.jobs, *scene(options), *extra]
         self.processes.append(run(command, log))
         return self.processes[0]
@@ -252,6 +261,9 @@ def main():
             stop(station)
             print((folder / "demo.log").read_text(), end="", file=sys.stderr)
             return daemon.returncode or 1
+        if options.page:
+            print("Open in a browser", flush=True)
+            subprocess.run([options.bin / "scanrig", "open", "--role", "engineer", "--socket", station.socket])
         try:
             followed = subprocess.run([options.bin / "scanrig", "status", "--follow", "--socket", station.socket],
                                       timeout=JOB_LIMIT_S).returncode
@@ -272,6 +284,8 @@ def main():
         if options.keep:
             print(f"The daemon keeps running (process {daemon.pid}); its state: "
                   f"scanrig status --socket {station.socket}")
+            if options.page:
+                print(f"Log another browser in: {options.bin}/scanrig open --socket {station.socket}")
         return scored
     except RuntimeError as failed:
         return report_error(failed, 1)

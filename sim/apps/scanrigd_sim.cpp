@@ -25,6 +25,7 @@ struct SimOptions {
   sim::SimRigOptions rig;
   sim::DrawnRigOptions drawn_rig;
   std::filesystem::path socket = "out/api.sock";
+  std::optional<int> http_port{};
   std::filesystem::path jobs = "out/jobs";
   int views = 8;
   double voxel_mm = 0.25;
@@ -44,6 +45,8 @@ void add_options(CLI::App& app, SimOptions& o) {
   app.add_flag("--make-safe", o.make_safe, "as scanrigd --make-safe")->needs(config);
   app.add_flag("--beside-daemon", o.beside_daemon, "likewise")->needs(config);
   app.add_option("--socket", o.socket, "socket of the API")->capture_default_str();
+  app.add_option("--http-port", o.http_port, "serve page and API at 127.0.0.1, too; scanrig open logs in")
+      ->check(CLI::Range(1024, 65535));
   app.add_option("--jobs", o.jobs, "folder of the jobs; calibration.json beside them")->capture_default_str();
   app.add_option("--object", o.rig.object, "mesh to scan (OBJ, PLY, GLB); default: the built-in figurine");
   app.add_option("--height-mm", o.rig.height_mm, "height the object is scaled to")
@@ -127,6 +130,8 @@ Result<void> run(SimOptions o, const SignalStop& stop) {
   options.calibrator = calibrator_of(r, options.jobs);
   options.recipes["default"] = {.poses = o.rig.poses, .views = o.views};
   options.api.socket = o.socket;
+  options.api.http_port = o.http_port;
+  options.api.logins = o.socket.parent_path() / "logins.json";
   options.remote = options.guard = true;  // a simulated table cannot hurt a person
   options.reconstructor = pipeline_reconstructor(reconstruct);
   options.hang_margin = kRenderingMargin;

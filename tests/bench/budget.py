@@ -8,7 +8,7 @@ CORES = 2
 MINUTES = {
     "station": {"startup": 2, "movement": 6, "kill": 5, "disturbed": 4, "stages": 4, "view_cost": 4, "load": 7,
                 "security": 4, "soak": 9},
-    "motion": {"matrix": 6, "estop": 10, "killed": 3, "restarts": 5, "latches": 3, "tools": 4,
+    "motion": {"matrix": 5, "estop": 10, "killed": 3, "restarts": 5, "latches": 4, "tools": 4,
                "turns": 5, "words": 5, "doctor": 4},
     "calibration": {"rigs": 12, "faults": 8, "models": 8, "watch": 9, "drift": 6},
     "cameras": {"triggers": 4, "matrix": 3, "wire": 12, "hil": 8, "memory": 12},

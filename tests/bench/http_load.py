@@ -30,7 +30,7 @@ class Load:
         return await asyncio.open_unix_connection(self.o.socket)
 
     def request(self, target):
-        return (f"GET {target} HTTP/1.1\r\nHost: rig\r\nAuthorization: Bearer {self.o.token}\r\n\r\n").encode()
+        return (f"GET {target} HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bearer {self.o.token}\r\n\r\n").encode()
 
     async def ask(self, reader, writer, target):
         writer.write(self.request(target))

@@ -138,7 +138,7 @@ class Rig:
             with socket.socket(socket.AF_UNIX) as peer:
                 peer.settimeout(5)
                 peer.connect(str(self.api))
-                peer.sendall(f"GET /api/v1/{target} HTTP/1.1\r\nHost: rig\r\nConnection: close\r\n\r\n".encode())
+                peer.sendall(f"GET /api/v1/{target} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n".encode())
                 parts = []
                 while part := peer.recv(65536):
                     parts.append(part)

@@ -134,7 +134,7 @@ class ApiBench : public scan_samples::FolderTest {
   }
   static std::string request(const std::string& method, const std::string& target, const std::string& token = "",
                              const std::string& body = "", const std::string& more = "") {
-    return method + " " + target + " HTTP/1.1\r\nHost: rig\r\n" +
+    return method + " " + target + " HTTP/1.1\r\nHost: localhost\r\n" +
            (token.empty() ? "" : "Authorization: Bearer " + token + "\r\n") + more +
            (body.empty() ? "" : "Content-Length: " + std::to_string(body.size()) + "\r\n") + "\r\n" + body;
   }

@@ -8,7 +8,7 @@ using api_bench::Wire;
 using std::chrono::milliseconds;
 using testing::HasSubstr;
 
-const std::string kStatus = "GET /api/v1/status HTTP/1.1\r\nHost: rig\r\n\r\n";
+const std::string kStatus = "GET /api/v1/status HTTP/1.1\r\nHost: localhost\r\n\r\n";
 
 class Limits : public ApiBench {
  protected:
@@ -29,7 +29,7 @@ TEST_F(Limits, OneConnectionServesManyRequests) {
 TEST_F(Limits, PipelinedRequestsAreAnsweredInOrder) {
   serve();
   auto wire = local();
-  ASSERT_TRUE(wire.say(kStatus + "GET /api/v1/nothing HTTP/1.1\r\nHost: rig\r\n\r\n" + kStatus));
+  ASSERT_TRUE(wire.say(kStatus + "GET /api/v1/nothing HTTP/1.1\r\nHost: localhost\r\n\r\n" + kStatus));
   EXPECT_EQ(wire.answer().status, 200);
   EXPECT_EQ(wire.answer().status, 404);
   EXPECT_EQ(wire.answer().status, 200);
@@ -50,7 +50,7 @@ TEST_F(Limits, ABodyMustBeThereInTimeToo) {
   options.limits.body_time = milliseconds(200);
   serve();
   auto wire = local();
-  ASSERT_TRUE(wire.say("POST /api/v1/stop HTTP/1.1\r\nHost: rig\r\nContent-Length: 100\r\n\r\n{"));
+  ASSERT_TRUE(wire.say("POST /api/v1/stop HTTP/1.1\r\nHost: localhost\r\nContent-Length: 100\r\n\r\n{"));
   const auto begun = std::chrono::steady_clock::now();
   EXPECT_TRUE(wire.ended());
   EXPECT_LT(seconds_since(begun), 2.0);
@@ -62,10 +62,11 @@ TEST_F(Limits, WhoDoesNotReadItsAnswerIsCutOff) {
   serve();
   scan_samples::write_text(folder_ / "jobs/old/model/model.glb", std::string(20'000'000, 'x'));
   auto wire = local();
-  ASSERT_TRUE(wire.say("GET /api/v1/jobs/old/model HTTP/1.1\r\nHost: rig\r\n\r\n"));
+  ASSERT_TRUE(wire.say("GET /api/v1/jobs/old/model HTTP/1.1\r\nHost: localhost\r\n\r\n"));
   RealClock clock;
   const auto connections = [&] {
-    const auto health = ask(local(), "GET /api/v1/health HTTP/1.1\r\nHost: rig\r\nConnection: close\r\n\r\n").json();
+    const auto health =
+        ask(local(), "GET /api/v1/health HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n").json();
     return health.is_object() ? health.value("connections", 0) : 0;
   };
   for (const auto end = Deadline::after(clock, std::chrono::seconds(5)); !end.expired(clock);
@@ -107,7 +108,7 @@ TEST_F(Limits, AControlLoopThatDoesNotAnswerIsGivenUp) {
   serve();
   station->end();
   auto wire = local();
-  ASSERT_TRUE(wire.say("POST /api/v1/stop HTTP/1.1\r\nHost: rig\r\n\r\n"));
+  ASSERT_TRUE(wire.say("POST /api/v1/stop HTTP/1.1\r\nHost: localhost\r\n\r\n"));
   const auto answer = wire.answer();
   EXPECT_EQ(answer.status, 503);
   EXPECT_EQ(answer.json()["error"]["code"], "timeout");

@@ -29,7 +29,7 @@ class SeatsOfTheApi : public ApiBench {
     std::vector<Wire> wires;
     for (int i = 0; i < count; ++i) {
       wires.push_back(tcp(1 + static_cast<std::uint32_t>(i % 4)));
-      if (i % 3 == 1) wires.back().say("POST /api/v1/stop HTTP/1.1\r\nHost: rig\r\nAuthorization: Bear");
+      if (i % 3 == 1) wires.back().say("POST /api/v1/stop HTTP/1.1\r\nHost: localhost\r\nAuthorization: Bear");
       if (i % 3 == 2) wires.back().say("G");
     }
     return wires;

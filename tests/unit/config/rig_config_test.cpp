@@ -183,6 +183,24 @@ TEST_F(RigConfigTest, TcpNeedsTokensAndIsOnThisMachineUnlessToldOtherwise) {
   EXPECT_FALSE(rig->api.engineer_group);
 }
 
+TEST_F(RigConfigTest, OtherMachinesReachItThroughTlsUnlessSaidOtherwise) {
+  const std::string socket = "socket = \"/run/scanrig/api.sock\"\n";
+  const std::string open = socket + "tokens = \"tokens.json\"\nhttp_port = 8080\nhttp_address = \"0.0.0.0\"\n";
+  auto rig = read(replaced(example_, socket, open));
+  ASSERT_FALSE(rig);
+  EXPECT_THAT(rig.error().message, HasSubstr("[api] http_address: other machines would send tokens in the clear"));
+  EXPECT_TRUE(read(replaced(example_, socket, open + "insecure_http = true\n"))->api.insecure_http);
+  EXPECT_TRUE(read(replaced(example_, socket, open + "proxy = \"192.0.2.7\"\n")));
+  rig = read(replaced(example_, socket, open + "proxy = \"192.0.2.7\"\nhttp_origin = \"https://rig.example\"\n"));
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->api.http_origin, "https://rig.example");
+  for (const auto* bad : {"rig.example", "https://", "https://rig.example/page"}) {
+    rig = read(replaced(example_, socket, open + "proxy = \"192.0.2.7\"\nhttp_origin = \"" + bad + "\"\n"));
+    ASSERT_FALSE(rig) << bad;
+    EXPECT_THAT(rig.error().message, HasSubstr("http_origin: is like https://rig.example"));
+  }
+}
+
 TEST_F(RigConfigTest, AProfileThatIsNotThereOrWrongIsToldAtItsKey) {
   const std::string missing = replaced(example_, "\"leadshine-rs\"", "\"none-such\"");
   auto rig = read(missing);

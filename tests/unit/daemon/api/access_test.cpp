@@ -70,20 +70,23 @@ TEST(PeerCredentials, AGroupIsFoundByItsName) {
 class AccessTest : public scan_samples::FolderTest {
  protected:
   std::filesystem::path path() const { return folder_ / "tokens.json"; }
+  static std::optional<Role> role_of(Access& access, std::optional<Role> peer, const std::string& authorization) {
+    return access.identify(peer, authorization, "", std::chrono::system_clock::now()).role;
+  }
 };
 
 TEST_F(AccessTest, ATokenThatIsShownDecidesAndNotThePeer) {
   TokenFile tokens;
   const auto token = *tokens.add("tablet", Role::operating, "now");
   ASSERT_TRUE(tokens.write(path()));
-  const Access access({}, path());
-  EXPECT_EQ(access.role_of(std::nullopt, ""), std::nullopt);
-  EXPECT_EQ(access.role_of(Role::viewer, ""), Role::viewer);
-  EXPECT_EQ(access.role_of(std::nullopt, "Bearer " + token), Role::operating);
-  EXPECT_EQ(access.role_of(std::nullopt, "bearer " + token), Role::operating);
-  EXPECT_EQ(access.role_of(Role::engineer, "Bearer wrong"), std::nullopt);
-  EXPECT_EQ(access.role_of(Role::engineer, "Basic " + token), std::nullopt);
-  EXPECT_EQ(access.role_of(Role::engineer, "Bearer"), std::nullopt);
+  Access access({}, path());
+  EXPECT_EQ(role_of(access, std::nullopt, ""), std::nullopt);
+  EXPECT_EQ(role_of(access, Role::viewer, ""), Role::viewer);
+  EXPECT_EQ(role_of(access, std::nullopt, "Bearer " + token), Role::operating);
+  EXPECT_EQ(role_of(access, std::nullopt, "bearer " + token), Role::operating);
+  EXPECT_EQ(role_of(access, Role::engineer, "Bearer wrong"), std::nullopt);
+  EXPECT_EQ(role_of(access, Role::engineer, "Basic " + token), std::nullopt);
+  EXPECT_EQ(role_of(access, Role::engineer, "Bearer"), std::nullopt);
 }
 
 TEST_F(AccessTest, TokensThatBecomeUnreadableAreVoidAndThatIsSaid) {
@@ -94,12 +97,43 @@ TEST_F(AccessTest, TokensThatBecomeUnreadableAreVoidAndThatIsSaid) {
   EXPECT_FALSE(access.problem());
   ::chmod(path().c_str(), 0644);
   access.refresh();
-  EXPECT_FALSE(access.role_of(std::nullopt, token));
+  EXPECT_FALSE(role_of(access, std::nullopt, token));
   ASSERT_TRUE(access.problem());
   EXPECT_EQ(access.problem()->code, ErrorCode::refused);
   ::chmod(path().c_str(), 0600);
   access.refresh();
-  EXPECT_EQ(access.role_of(std::nullopt, token), Role::operating);
+  EXPECT_EQ(role_of(access, std::nullopt, token), Role::operating);
+}
+
+TEST_F(AccessTest, ALoginIsVoidWithItsTokenAndNeverMayMoreThanIt) {
+  const auto now = std::chrono::system_clock::now();
+  TokenFile tokens;
+  const auto token = *tokens.add("tablet", Role::engineer, "now");
+  ASSERT_TRUE(tokens.write(path()));
+  Access access({}, path(), folder_ / "logins.json");
+  EXPECT_FALSE(*access.log_in_by_token("scanrig_wrong", now));
+  const auto cookie = **access.log_in_by_token(token, now);
+  const auto who = access.identify(std::nullopt, "", cookie, now);
+  EXPECT_EQ(who.role, Role::engineer);
+  EXPECT_EQ(who.token, "tablet");
+  EXPECT_EQ(who.cookie, cookie);
+
+  ASSERT_TRUE(tokens.revoke("tablet"));
+  ASSERT_TRUE(tokens.add("tablet", Role::engineer, "later")) << "another one of the same name";
+  ASSERT_TRUE(tokens.write(path()));
+  access.refresh();
+  EXPECT_FALSE(access.identify(std::nullopt, "", cookie, now).role);
+}
+
+TEST_F(AccessTest, ACodeGivesAtMostTheRoleOfWhoAskedForIt) {
+  const auto now = std::chrono::system_clock::now();
+  Access access({}, path());
+  const Identity operating{.role = Role::operating};
+  EXPECT_EQ(access.offer_code(operating, Role::engineer, false, now).error().code, ErrorCode::refused);
+  const auto code = *access.offer_code(operating, Role::viewer, false, now);
+  const auto cookie = **access.log_in_by_code(code, now);
+  EXPECT_EQ(access.identify(std::nullopt, "", cookie, now).role, Role::viewer);
+  EXPECT_FALSE(*access.log_in_by_code(code, now)) << "it counts once";
 }
 
 }  // namespace

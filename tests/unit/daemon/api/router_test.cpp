@@ -115,7 +115,8 @@ TEST_F(Api, TheInputsAndOutputsOfThePanelAreATable) {
 }
 
 TEST_F(Api, WhatIsNotThereIsNotFound) {
-  for (const auto* target : {"/api/v1/jobs/nothing", "/", "/api/v1/nothing", "/api/v1/status/x", "/api/v1"}) {
+  for (const auto* target :
+       {"/api/v1/jobs/nothing", "/nothing", "/assets/nothing.js", "/api/v1/nothing", "/api/v1/status/x", "/api/v1"}) {
     const auto [status, json] = ask("GET", target);
     EXPECT_EQ(status, 404u) << target;
     EXPECT_EQ(json["error"]["code"], "not_found");

@@ -1,0 +1,154 @@
+#include "daemon/api/logins.h"
+#include "tests/component/api/api_bench.h"
+#include "web/embedded_files.h"
+
+namespace scanrig {
+namespace {
+
+using api_bench::Answer;
+using api_bench::ApiBench;
+using testing::AllOf;
+using testing::ContainsRegex;
+using testing::HasSubstr;
+using testing::Not;
+
+/// A browser: sends its cookie, and from the rig's own page the right Origin and X-Scanrig.
+class PageTest : public ApiBench {
+ protected:
+  static constexpr auto kOwn = "Origin: http://localhost\r\nX-Scanrig: 1\r\n";
+
+  void SetUp() override {
+    ApiBench::SetUp();
+    options.logins = folder_ / "logins.json";
+  }
+  Answer browse(const std::string& method, const std::string& target, const std::string& more = "",
+                const std::string& body = "") {
+    return ask(tcp(), request(method, target, "", body, more));
+  }
+  Answer log_in(const std::string& body) { return browse("POST", "/api/v1/login", kOwn, body); }
+  /// The header line that sends the cookie of a login with the token of `role`.
+  std::string cookie_of(Role role) {
+    const auto answer = log_in(R"({"token":")" + tokens[role] + "\"}");
+    EXPECT_EQ(answer.status, 200) << answer.body;
+    const auto begin = answer.head.find("Set-Cookie: ") + 12;
+    return "Cookie: " + answer.head.substr(begin, answer.head.find(';', begin) - begin) + "\r\n";
+  }
+};
+
+TEST_F(PageTest, ThePageIsOpenToAnybodyAndRunsNothingButItself) {
+  serve();
+  const auto page = browse("GET", "/");
+  if (web::embedded_build().empty()) {
+    EXPECT_EQ(page.status, 404);
+    return;
+  }
+  EXPECT_EQ(page.status, 200);
+  EXPECT_THAT(page.head, AllOf(HasSubstr("Content-Encoding: gzip"), HasSubstr("script-src 'self'"),
+                               HasSubstr("frame-ancestors 'none'"), HasSubstr("Cache-Control: no-cache")));
+  for (const auto* path : {"/assets/none.js", "/assets/..%2F..%2Fsecret", "/assets/%2e%2e%2fsecret", "/assets/a%2fb"}) {
+    EXPECT_THAT(browse("GET", path).status, testing::AnyOf(400, 401, 404)) << path;
+  }
+}
+
+TEST_F(PageTest, ASnapshotAndTheEventsAfterItAreOneStory) {
+  serve();
+  const auto cookie = cookie_of(Role::viewer);
+  const auto page = browse("GET", "/api/v1/snapshot", cookie).json();
+  EXPECT_EQ(page["status"]["machine"], "Preoperational");
+  EXPECT_EQ(page["jobs"][0]["id"], "old");
+  EXPECT_EQ(page["login"]["role"], "viewer");
+  EXPECT_EQ(page["login"]["name"], "viewer");
+  EXPECT_FALSE(page["insecure"]);
+  auto wire = tcp();
+  const auto after = page["life"].get<std::string>() + "-" + std::to_string(page["seq"].get<int>());
+  EXPECT_TRUE(wire.say(request("GET", "/api/v1/events?after=" + after, "", "", cookie)));
+  EXPECT_THAT(wire.hear("\r\n\r\n"), HasSubstr("200 OK"));
+  EXPECT_THAT(wire.hear("\n\n"), AllOf(HasSubstr("event: beat\n"), HasSubstr("\"seq\":"), Not(HasSubstr("id:"))));
+  station->loop.post(event::StageProgress{"old", "volume", 0.9});
+  EXPECT_THAT(wire.hear("\n\n") + wire.hear("\n\n"), HasSubstr("event: job\n"));
+}
+
+TEST_F(PageTest, ACookieIsForThisSiteAndNoScript) {
+  serve();
+  const auto answer = log_in(R"({"token":")" + tokens[Role::operating] + "\"}");
+  EXPECT_THAT(answer.head, ContainsRegex("Set-Cookie: scanrig=[0-9a-f]{64}; Path=/; HttpOnly; SameSite=Strict"));
+  EXPECT_EQ(answer.json()["role"], "operator");
+}
+
+TEST_F(PageTest, BehindTlsTheCookieIsForThisHostAlone) {
+  options.http_origin = "https://rig.example";
+  serve();
+  EXPECT_THAT(log_in(R"({"token":")" + tokens[Role::viewer] + "\"}").head,
+              AllOf(HasSubstr("Set-Cookie: __Host-scanrig="), HasSubstr("; Secure")));
+}
+
+TEST_F(PageTest, AnOrderByCookieNeedsTheRigsOwnPage) {
+  serve();
+  const auto cookie = cookie_of(Role::operating);
+  for (const auto* foreign : {"", "X-Scanrig: 1\r\n", "Origin: http://localhost\r\n",
+                              "Origin: http://evil.example\r\nX-Scanrig: 1\r\n", "Origin: null\r\nX-Scanrig: 1\r\n"}) {
+    EXPECT_EQ(browse("POST", "/api/v1/start", cookie + foreign).status, 403) << foreign;
+    EXPECT_EQ(browse("POST", "/api/v1/stop", cookie + foreign).status, 403) << foreign;
+  }
+  EXPECT_EQ(browse("POST", "/api/v1/stop", cookie + kOwn).status, 200);
+  EXPECT_EQ(browse("POST", "/api/v1/start", cookie + kOwn).status, 409) << "obeyed or refused by the station";
+  EXPECT_EQ(browse("GET", "/api/v1/status", cookie).status, 200);
+}
+
+TEST_F(PageTest, AnotherSitesFormLogsNobodyIn) {
+  serve();
+  const auto body = R"({"token":")" + tokens[Role::viewer] + "\"}";
+  EXPECT_EQ(browse("POST", "/api/v1/login", "Origin: http://evil.example\r\n", body).status, 403);
+}
+
+TEST_F(PageTest, ARequestUnderAForeignNameIsNotServed) {
+  serve();
+  auto wire = tcp();
+  EXPECT_TRUE(wire.say("GET / HTTP/1.1\r\nHost: evil.example\r\n\r\n"));
+  const auto answer = wire.answer();
+  EXPECT_EQ(answer.status, 421);
+  EXPECT_THAT(answer.json()["error"]["message"].get<std::string>(), HasSubstr("not a name of the rig"));
+}
+
+TEST_F(PageTest, TheRoleOfACookieIsThatOfItsTokenAndEndsWithIt) {
+  serve();
+  const auto viewer = cookie_of(Role::viewer), engineer = cookie_of(Role::engineer);
+  EXPECT_EQ(browse("POST", "/api/v1/start", viewer + kOwn).status, 403);
+  EXPECT_NE(browse("POST", "/api/v1/maintenance/off", engineer + kOwn).status, 403);
+  EXPECT_EQ(browse("DELETE", "/api/v1/login", viewer + kOwn).status, 200);
+  EXPECT_EQ(browse("GET", "/api/v1/status", viewer).status, 401);
+  EXPECT_EQ(browse("GET", "/api/v1/status", engineer).status, 200);
+  auto file = *TokenFile::read(options.tokens);
+  ASSERT_TRUE(file.revoke("engineer"));
+  ASSERT_TRUE(file.write(options.tokens));
+  int status = 200;
+  for (int i = 0; i < 50 && status == 200; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    status = browse("GET", "/api/v1/status", engineer).status;
+  }
+  EXPECT_EQ(status, 401);
+}
+
+TEST_F(PageTest, ACodeOfTheSocketLogsABrowserInOnce) {
+  serve();
+  const auto offered = ask(local(), request("POST", "/api/v1/login/code", "", R"({"role":"operator","kiosk":true})"));
+  ASSERT_EQ(offered.status, 200) << offered.body;
+  const auto body = R"({"code":")" + offered.json()["code"].get<std::string>() + "\"}";
+  const auto first = log_in(body);
+  EXPECT_EQ(first.status, 200);
+  EXPECT_EQ(first.json()["role"], "operator");
+  EXPECT_EQ(log_in(body).status, 401);
+}
+
+TEST_F(PageTest, GuessesAreLimited) {
+  serve();
+  std::map<int, int> seen;
+  for (int i = 0; i < 1000; ++i) ++seen[log_in(R"({"code":"AAAAAAAA"})").status];
+  EXPECT_EQ(seen[401], 10);
+  EXPECT_EQ(seen[429], 990);
+  EXPECT_EQ(ask(tcp(), request("POST", "/api/v1/stop", tokens[Role::viewer])).status, 200)
+      << "Stop has its own allowance";
+}
+
+}  // namespace
+}  // namespace scanrig
