@@ -239,6 +239,10 @@ std::vector<Cell> turntable_cells(const std::filesystem::path& scratch, const st
                          }});
       }
     }
+    for (const auto& [fault, name] : kFaults) {
+      cells.push_back(
+          {kind.driver, kind.device, "drop_stop_request", fault, [] { return not_applicable("sends nothing"); }});
+    }
   }
   return cells;
 }
