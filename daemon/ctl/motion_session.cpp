@@ -102,7 +102,7 @@ class MotionSession final : public Motion {
   std::unique_ptr<Turntable> table_;
   bool has_warned_ = false;
   bool has_moved_ = false;
-  bool is_handed_over_ = false;  // to the guardian
+  std::optional<Error> handed_over_;  // to the guardian: why the standstill was not seen from here
 };
 
 /// Reads the inputs first; one that was pressed all along is an obstacle.
@@ -226,16 +226,17 @@ Result<void> MotionSession::confirm_standstill() {
   if (stopped) return stopped;
   fmt::print(stderr, "scanrig: {}. Keep clear: stop is sent again until the drive responds\n", stopped.error().message);
   close();  // the guardian needs the devices
-  is_handed_over_ = true;
+  handed_over_ = stopped.error();
   return guardian_.take_over();
 }
 
 Result<void> MotionSession::end(Result<void> result) {
   auto stopped = confirm_standstill();
+  if (result && handed_over_) result = tl::unexpected(*handed_over_);  // what it tried last cannot be believed
   if (const std::lock_guard lock(mutex_); result && cause_) result = tl::unexpected(*cause_);
   if (panel_thread_) panel_thread_->show({.red = has_moved_ && !result});
   close();
-  if (stopped && !is_handed_over_) guardian_.dismiss();
+  if (stopped && !handed_over_) guardian_.dismiss();
   if (!stopped) {
     return result ? stopped : fail(stopped.error().code, "{}; {}", result.error().message, stopped.error().message);
   }
