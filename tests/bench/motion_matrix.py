@@ -7,7 +7,8 @@ WORKERS = 8  # the cells mostly wait
 INTERFACES = {"Turntable": "drivers/turntable/turntable.h", "Projector": "drivers/projector/projector.h",
               "Panel": "drivers/panel/panel.h", "StereoCamera": "drivers/camera/stereo_camera.h"}
 SHARED = {"AxisTurntable": "Turntable", "SensorCamera": "StereoCamera"}  # common base of several drivers
-CAMERAS = ("StereoCamera", "LightCrafterProjector")  # interfaces and drivers whose rows are the cameras group's
+# Interfaces and drivers whose rows are the cameras group's.
+CAMERAS = ("StereoCamera", "LightCrafterProjector", "CameraStrobeProjector")
 
 
 def methods(root, interface):

@@ -14,6 +14,7 @@ namespace {
 
 constexpr double kEdgeReach = 2.5;  // pixels from an edge that its blur reaches
 constexpr int kMinPixels = 30;
+constexpr int kRounds = 3;  // the markers place the first; what they add to a corner's place is gone after the last
 
 enum class Loss { none, outside, glared, occluded, not_converged };
 
@@ -25,10 +26,11 @@ class CornerFinder {
     losses_.assign(static_cast<std::size_t>(board.corner_count()), Loss::not_converged);
   }
 
-  void fit_missing() {
-    for (int id = 0; id < board_.corner_count(); ++id) {
-      if (!saddles_.contains(id)) losses_[static_cast<std::size_t>(id)] = fit(id);
-    }
+  /// Every corner, from the map of the corners fitted before, else from the seed's.
+  void fit_all() {
+    if (!saddles_.empty()) start_blur_px_ = median_of([](const Saddle& s) { return s.blur_px; });
+    saddles_.clear();
+    for (int id = 0; id < board_.corner_count(); ++id) losses_[static_cast<std::size_t>(id)] = fit(id);
   }
   void improve_map() {
     if (auto map = BoardMap::fit(points()); map && saddles_.size() >= 12) map_ = *map;
@@ -59,6 +61,7 @@ class CornerFinder {
   const CornerOptions& options_;
   BoardMap map_;
   BoardParity parity_;
+  double start_blur_px_ = Saddle{}.blur_px;
   std::map<int, Saddle> saddles_;  // by corner, ascending
   std::vector<Loss> losses_;
 };
@@ -116,7 +119,7 @@ Loss CornerFinder::fit(int id) {
   saddle.place = seed;
   const std::array<Eigen::Vector2d, 2> expected = {jacobian.col(0).normalized(), jacobian.col(1).normalized()};
   saddle.directions = expected;
-  if (const auto first = saddles_.begin(); first != saddles_.end()) saddle.blur_px = first->second.blur_px;
+  saddle.blur_px = start_blur_px_;
   const int reach = reach_px();
   for (int round = 0; round < 3; ++round) {
     const Eigen::Vector2d origin(std::round(saddle.place.x()), std::round(saddle.place.y()));
@@ -256,13 +259,12 @@ Result<BoardFinding> find_board(const cv::Mat& image, const std::string& pixel_f
   const auto seed = board.markers ? seed_from_markers(*prepared, board) : seed_from_chessboard(*prepared, board);
   if (!seed) return pass_on(seed);
   CornerFinder finder(*prepared, board, *seed, options);
-  finder.fit_missing();
-  finder.drop_poor_fits();
-  finder.improve_map();
-  finder.fit_missing();
-  finder.drop_poor_fits();
-  finder.drop_misfits();
-  finder.improve_map();
+  for (int round = 0; round < kRounds; ++round) {
+    finder.fit_all();
+    finder.drop_poor_fits();
+    if (round > 0) finder.drop_misfits();
+    finder.improve_map();
+  }
   BoardFinding found = finder.finding();
   if (static_cast<int>(found.corners.size()) < options.min_corners) {
     return fail(ErrorCode::not_found,

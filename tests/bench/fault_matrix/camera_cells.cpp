@@ -2,7 +2,7 @@
 #include <mutex>
 
 #include "tests/bench/fault_matrix/cells.h"
-#include "tests/component/camera/aravis_bench.h"
+#include "tests/component/camera/strobe_bench.h"
 #include "tests/component/camera/v4l2_bench.h"
 
 namespace scanrig::bench {
@@ -101,6 +101,53 @@ class CameraTrial {
   std::unique_ptr<StereoCameraBench> bench_;
 };
 
+/// The light that a GigE camera switches: its wire is that camera's control channel.
+class StrobeTrial {
+ public:
+  Outcome run(const std::string& method, Fault fault) {
+    if (auto good = expose(); !good) return {.told = good.error().message, .wrongs = {"could not begin"}};
+    const auto begun = bench_.clock().now();
+    disturb(fault, true);
+    auto outcome = timed(bench_.clock(), kLimit, {ErrorCode::io, ErrorCode::timeout}, [&](Deadline by) {
+      return method == "fire" ? bench_.projector().fire(Light::pattern, by) : bench_.projector().turn_off(by);
+    });
+    if (fault == Fault::back_after_2s) bench_.clock().sleep_until(begun + kAbsence);
+    disturb(fault, false);
+    const bool lights_again = soon(bench_.clock(), kRecovery, [&] { return expose().has_value(); });
+    outcome.expect(lights_again, "no good exposure afterwards");
+    outcome.expect(!bench_.is_lit(), "the light is on");
+    return outcome;
+  }
+
+ private:
+  static constexpr milliseconds kLimit{1500};
+  static constexpr seconds kRecovery{20};
+
+  void disturb(Fault fault, bool begins) {
+    if (fault == Fault::silent) {
+      bench_.far().freeze(begins);
+    } else {
+      bench_.tell(begins ? "plug left 0" : "plug left 1");
+    }
+  }
+  Result<void> expose() {
+    const auto ample = Deadline::after(bench_.clock(), seconds(10));
+    if (auto armed = bench_.camera().arm(ample); !armed) return armed;
+    if (auto fired = bench_.projector().fire(Light::pattern, ample); !fired) return fired;
+    if (const auto frame = bench_.camera().collect(ample); !frame) return pass_on(frame);
+    return {};
+  }
+
+  StrobeBench bench_;
+};
+
+std::optional<std::string> why_the_light_cannot(const std::string& method, Fault fault) {
+  if (fault == Fault::stalled) return "nothing moves";
+  if (method == "request_off") return "sends nothing";
+  if (fault == Fault::silent || fault == Fault::unplugged || fault == Fault::back_after_2s) return std::nullopt;
+  return "the camera's control channel repeats and checks by itself";
+}
+
 std::optional<std::string> why_not(const std::string& device, const std::string& method, Fault fault) {
   if (fault == Fault::stalled) return "nothing moves";
   if (fault == Fault::device_error) return "a camera raises no alarm";
@@ -117,13 +164,22 @@ std::vector<Cell> camera_cells() {
   for (const std::string device : {"aravis", "v4l2", "v4l2-side-by-side"}) {
     for (const std::string method : {"prepare", "arm", "collect", "capture_preview"}) {
       for (const auto& [fault, name] : kFaults) {
-        cells.push_back({"SensorCamera", device, method, fault, [device, method, fault] {
+        cells.push_back({"SensorCamera", device, method, fault, [device, method, fault = fault] {
                            if (auto reason = why_not(device, method, fault)) return not_applicable(*reason);
                            std::unique_lock lock(gige, std::defer_lock);
                            if (device == "aravis") lock.lock();
                            return CameraTrial(device).run(method, fault);
                          }});
       }
+    }
+  }
+  for (const std::string method : {"fire", "turn_off", "request_off"}) {
+    for (const auto& [fault, name] : kFaults) {
+      cells.push_back({"CameraStrobeProjector", "", method, fault, [method, fault = fault] {
+                         if (auto reason = why_the_light_cannot(method, fault)) return not_applicable(*reason);
+                         const std::scoped_lock lock(gige);
+                         return StrobeTrial().run(method, fault);
+                       }});
     }
   }
   return cells;

@@ -90,7 +90,7 @@ std::vector<Cell> lightcrafter_cells() {
   std::vector<Cell> cells;
   for (const std::string method : {"fire", "dark", "request_off"}) {
     for (const auto& [fault, name] : kFaults) {
-      cells.push_back({"LightCrafterProjector", "", method, fault, [method, fault] {
+      cells.push_back({"LightCrafterProjector", "", method, fault, [method, fault = fault] {
                          if (auto reason = why_not(fault)) return not_applicable(*reason);
                          return LightCrafterTrial().run(method, fault);
                        }});

@@ -174,17 +174,18 @@ std::vector<Cell> panel_cells(const std::filesystem::path& scratch) {
   for (const bool gpio : {true, false}) {
     for (const std::string method : {"wait_change", "show"}) {
       for (const auto& [fault, name] : kFaults) {
-        cells.push_back({gpio ? "GpioPanel" : "ModbusIoPanel", "", method, fault, [scratch, gpio, method, fault] {
-                           if (auto reason = why_not(gpio, fault)) return not_applicable(*reason);
-                           RealClock clock;
-                           std::unique_ptr<PanelEnd> end;
-                           if (gpio) {
-                             end = std::make_unique<GpioEnd>(scratch, clock);
-                           } else {
-                             end = std::make_unique<ModuleEnd>(scratch, clock);
-                           }
-                           return trial(*end, clock, method, fault);
-                         }});
+        cells.push_back(
+            {gpio ? "GpioPanel" : "ModbusIoPanel", "", method, fault, [scratch, gpio, method, fault = fault] {
+               if (auto reason = why_not(gpio, fault)) return not_applicable(*reason);
+               RealClock clock;
+               std::unique_ptr<PanelEnd> end;
+               if (gpio) {
+                 end = std::make_unique<GpioEnd>(scratch, clock);
+               } else {
+                 end = std::make_unique<ModuleEnd>(scratch, clock);
+               }
+               return trial(*end, clock, method, fault);
+             }});
       }
     }
   }

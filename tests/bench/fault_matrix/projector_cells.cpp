@@ -178,11 +178,11 @@ std::vector<Cell> projector_cells(const std::filesystem::path& scratch) {
   std::vector<Cell> cells;
   for (const std::string method : {"fire", "turn_off", "request_off"}) {
     for (const auto& [fault, name] : kFaults) {
-      cells.push_back({"GpioProjector", "", method, fault, [scratch, method, fault] {
+      cells.push_back({"GpioProjector", "", method, fault, [scratch, method, fault = fault] {
                          if (auto reason = why_not(fault)) return not_applicable(*reason);
                          return Trial(scratch).run(method, fault);
                        }});
-      cells.push_back({"ModbusIoProjector", "", method, fault, [scratch, method, fault] {
+      cells.push_back({"ModbusIoProjector", "", method, fault, [scratch, method, fault = fault] {
                          if (fault == Fault::stalled) return not_applicable("nothing moves");
                          return ModuleTrial(scratch).run(method, fault);
                        }});

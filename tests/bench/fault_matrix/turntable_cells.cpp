@@ -233,7 +233,7 @@ std::vector<Cell> turntable_cells(const std::filesystem::path& scratch, const st
   for (const TurntableKind& kind : shipped_turntables(scratch, profiles)) {
     for (const auto& [method, unused] : methods()) {
       for (const auto& [fault, name] : kFaults) {
-        cells.push_back({kind.driver, kind.device, method, fault, [kind, method, fault] {
+        cells.push_back({kind.driver, kind.device, method, fault, [kind, method = method, fault = fault] {
                            if (auto reason = why_not(kind, method, fault)) return not_applicable(*reason);
                            return Trial(kind, method, fault).run();
                          }});

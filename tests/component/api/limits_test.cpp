@@ -4,9 +4,7 @@ namespace scanrig {
 namespace {
 
 using api_bench::ApiBench;
-using api_bench::Wire;
 using std::chrono::milliseconds;
-using testing::HasSubstr;
 
 const std::string kStatus = "GET /api/v1/status HTTP/1.1\r\nHost: localhost\r\n\r\n";
 
@@ -60,7 +58,9 @@ TEST_F(Limits, WhoDoesNotReadItsAnswerIsCutOff) {
   options.limits.answer_time = milliseconds(200);
   options.limits.slowest_bytes_a_second = 1e9;
   serve();
-  scan_samples::write_text(folder_ / "jobs/old/model/model.glb", std::string(20'000'000, 'x'));
+  std::string model;
+  model.resize(20'000'000, 'x');
+  scan_samples::write_text(folder_ / "jobs/old/model/model.glb", model);
   auto wire = local();
   ASSERT_TRUE(wire.say("GET /api/v1/jobs/old/model HTTP/1.1\r\nHost: localhost\r\n\r\n"));
   RealClock clock;

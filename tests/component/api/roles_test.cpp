@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include "tests/component/api/api_bench.h"
 #include "tests/unit/daemon/api/json_schema.h"
 
@@ -38,7 +40,7 @@ class Document : public ApiBench {
   void each_operation(const Check& check) {
     for (const auto& [path, methods] : document["paths"].items()) {
       for (const auto& [method, operation] : methods.items()) {
-        SCOPED_TRACE(method + " " + path);
+        SCOPED_TRACE(fmt::format("{} {}", method, path));
         check(upper(method), path, operation);
       }
     }

@@ -9,7 +9,6 @@
 namespace scanrig {
 namespace {
 
-using api_bench::Answer;
 using api_bench::ApiBench;
 using api_bench::Wire;
 using std::chrono::milliseconds;

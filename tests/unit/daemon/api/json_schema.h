@@ -1,5 +1,6 @@
 #pragma once
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
@@ -47,7 +48,7 @@ inline testing::AssertionResult fits(const json& value, const json& schema, cons
   const auto properties = schema.value("properties", json::object());
   const auto rest = schema.value("additionalProperties", json(true));
   for (const auto& [key, member] : value.items()) {
-    const auto path = where + "." + key;
+    const auto path = fmt::format("{}.{}", where, key);
     if (!properties.contains(key) && rest == false) return no("has an unknown key " + key);
     if (!properties.contains(key) && !rest.is_object()) continue;
     if (auto one = fits(member, properties.contains(key) ? properties[key] : rest, document, path); !one) return one;
