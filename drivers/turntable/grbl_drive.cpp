@@ -17,9 +17,9 @@ constexpr milliseconds kListen{20};
 /// GRBL's settings [gnea/grbl wiki: Configuration].
 constexpr int kReports = 10, kInches = 13, kHomingOn = 22, kSteps = 100, kAcceleration = 120;
 constexpr double kAccelerationSlack = 1.001;  ///< settings are reported with three decimals
-/// Alarms after which GRBL needs the operator: a limit switch, a move beyond its limits, the probe.
-bool wants_reset(int alarm) { return alarm == 1 || alarm == 2 || alarm == 4 || alarm == 5 || alarm > 10; }
-bool switch_not_found(int alarm) { return alarm == 8 || alarm == 9 || alarm == 10; }
+
+/// Bit 0 of a setting: where GRBL has 0 or 1, grblHAL has a mask.
+bool is_on(double setting) { return std::isfinite(setting) && (std::lround(setting) & 1) != 0; }
 
 }  // namespace
 
@@ -69,8 +69,8 @@ Result<DriveState> GrblDrive::read_state(Deadline deadline) {
   seen_ = *position;
   if (link_.restarted() || last_ == State::alarm || last_ == State::sleep) homed_ = false;
   DriveState state;
-  state.fault = (last_ == State::alarm && wants_reset(link_.alarm())) || last_ == State::door ||
-                last_ == State::check || last_ == State::sleep;
+  state.fault = (last_ == State::alarm && alarm().wants_reset) || last_ == State::door || last_ == State::check ||
+                last_ == State::sleep || last_ == State::tool;
   state.enabled = true;
   state.running = last_ == State::run || last_ == State::jog || last_ == State::home || report->underway;
   state.in_position = last_ == State::idle;
@@ -103,11 +103,14 @@ Result<DriveState> GrblDrive::watch_homing(Deadline deadline) {
     }
     case Kind::error:
       homing_ = false;
-      return fail(ErrorCode::protocol, "the controller refused to home: {}", grbl::error_words(number));
-    case Kind::alarm:
+      return fail(ErrorCode::protocol, "the controller refused to home: {}",
+                  grbl::error_words(number, link_.firmware()));
+    case Kind::alarm: {
       homing_ = false;
-      return fail(switch_not_found(number) ? ErrorCode::stalled : ErrorCode::device_alarm, "the controller reports {}",
-                  grbl::alarm_words(number));
+      const auto alarm = grbl::alarm_of(number, link_.firmware());
+      return fail(alarm.switch_not_found ? ErrorCode::stalled : ErrorCode::device_alarm, "the controller reports {}",
+                  alarm.words);
+    }
     case Kind::banner:
       homing_ = false;
       return fail(ErrorCode::device_alarm, "the controller restarted while homing (power, reset button)");
@@ -120,10 +123,13 @@ Result<std::string> GrblDrive::read_alarm(Deadline) {
     case State::door: return "the safety door is open";
     case State::check: return "the controller only checks what it is told: leave the check mode ($C)";
     case State::sleep: return "the controller sleeps: reset it";
-    case State::alarm: return wants_reset(link_.alarm()) ? grbl::alarm_words(link_.alarm()) : std::string();
+    case State::tool: return "the controller waits for a tool: reset it";
+    case State::alarm: return alarm().wants_reset ? alarm().words : std::string();
     default: return std::string();
   }
 }
+
+grbl::Alarm GrblDrive::alarm() const { return grbl::alarm_of(link_.alarm(), link_.firmware()); }
 
 /// Never sends "$X": that would allow moves although the position is lost.
 Result<void> GrblDrive::reset_alarm(Deadline deadline) {
@@ -140,21 +146,26 @@ Result<void> GrblDrive::check(Deadline deadline) {
   }
   const auto settings = link_.settings(deadline);
   if (!settings) return pass_on(settings);
+  if (auto named = link_.identify(deadline); !named) return named;
+  const bool has_file = link_.firmware() == grbl::Firmware::fluidnc;  // its settings are not set by number
   const auto value = [&](int number) {
     const auto found = settings->find(number);
     return found == settings->end() ? std::nan("") : found->second;
   };
-  if (home_mode_ != "here" && !(value(kHomingOn) > 0)) {
-    return fail(ErrorCode::protocol, "the controller has homing switched off: set $22=1, or home mode \"here\"");
+  if (home_mode_ != "here" && !is_on(value(kHomingOn))) {
+    const std::string remedy = has_file ? "give the axis a homing cycle in its file" : "set $22=1";
+    return fail(ErrorCode::protocol, "the controller has homing switched off: {}, or home mode \"here\"", remedy);
   }
-  if ((static_cast<int>(value(kReports)) & 1) == 0 || value(kInches) > 0) {
+  if (!is_on(value(kReports)) || value(kInches) > 0) {
     return fail(ErrorCode::protocol, "the controller must report machine positions in mm: set $10=1 and $13=0");
   }
   const double most = acceleration_.value * scale_.gear_ratio;
   if (!(value(kAcceleration + index()) <= most * kAccelerationSlack)) {
+    const std::string remedy = has_file ? fmt::format("acceleration_mm_per_sec2: {:.3f} in its file", most)
+                                        : fmt::format("${}={:.3f}", kAcceleration + index(), most);
     return fail(ErrorCode::protocol,
-                "the controller accelerates with {} deg/s2 at the table, configured are {}: set ${}={:.3f}",
-                value(kAcceleration + index()) / scale_.gear_ratio, acceleration_.value, kAcceleration + index(), most);
+                "the controller accelerates with {} deg/s2 at the table, configured are {}: set {}",
+                value(kAcceleration + index()) / scale_.gear_ratio, acceleration_.value, remedy);
   }
   if (!(value(kSteps + index()) > 0)) {
     return fail(ErrorCode::protocol, "the controller has no axis {}: ${} is missing", axis_, kSteps + index());

@@ -58,6 +58,7 @@ class GrblDrive final : public AxisDrive {
   /// Position of the machine in pulses.
   Result<double> position_in(const grbl::Report& report) const;
   Result<void> leave_hold(Deadline deadline);
+  [[nodiscard]] grbl::Alarm alarm() const;
   [[nodiscard]] int index() const;
 
   grbl::Link link_;

@@ -46,6 +46,7 @@ Result<std::optional<Line>> Link::next_line(Clock::Duration wait) {
       Line line = parse_line(text);
       if (line.kind == Kind::alarm) alarm_ = line.number;
       if (line.kind == Kind::banner) restarted_ = true;
+      if (line.firmware) firmware_ = *line.firmware;
       return line;
     }
     const auto left = until - clock_.now();
@@ -132,8 +133,9 @@ Result<void> Link::command(std::string_view line, Deadline deadline) {
     case Kind::error:
       ++statistics_.refused;
       return fail(ErrorCode::protocol, "{}: the controller refused \"{}\": {}", options_.device, line,
-                  error_words(end->number));
-    case Kind::alarm: return fail(ErrorCode::device_alarm, "the controller reports {}", alarm_words(end->number));
+                  error_words(end->number, firmware_));
+    case Kind::alarm:
+      return fail(ErrorCode::device_alarm, "the controller reports {}", alarm_of(end->number, firmware_).words);
     case Kind::banner:
       return fail(ErrorCode::not_homed, "the controller restarted (power, reset button): its zero is gone");
     default: return {};
@@ -164,6 +166,14 @@ Result<void> Link::probe(Deadline deadline) {
   const auto refused = answer(
       "#", [](const Line& l) { return l.kind == Kind::error; }, deadline);
   if (!refused) return pass_on(refused);
+  return {};
+}
+
+Result<void> Link::identify(Deadline deadline) {
+  if (auto sent = send("$I\n", deadline); !sent) return sent;
+  const auto end = answer(
+      "$I", [](const Line& l) { return l.kind == Kind::ok || l.kind == Kind::error; }, deadline);
+  if (!end) return pass_on(end);
   return {};
 }
 

@@ -34,11 +34,12 @@ struct LinkStatistics {
   std::uint64_t openings = 0;
 };
 
-/// A GRBL 1.1 controller at the other end of a serial line. Waits in real time, never longer than `reply_timeout` or
-/// the deadline; never retries. The port is opened by the first request and again after it was lost. After a missed
-/// reply the next request is held back until the line has been silent for twice `reply_timeout`. Every request fails
-/// with `timeout`, `protocol` (not understood, or refused: error:N with its text), `io`. The controller reports alarms
-/// and restarts when they happen; they are kept until read. Threads: one owner; set_fail_fast() from any thread.
+/// A controller with GRBL 1.1, grblHAL or FluidNC at the other end of a serial line. Waits in real time, never longer
+/// than `reply_timeout` or the deadline; never retries. The port is opened by the first request and again after it was
+/// lost. After a missed reply the next request is held back until the line has been silent for twice `reply_timeout`.
+/// Every request fails with `timeout`, `protocol` (not understood, or refused: error:N with its text), `io`. The
+/// controller reports alarms and restarts when they happen; they are kept until read. Threads: one owner;
+/// set_fail_fast() from any thread.
 class Link {
  public:
   Link(LinkOptions options, Clock& clock) : options_(std::move(options)), clock_(clock) {}
@@ -55,6 +56,10 @@ class Link {
   /// Sends a line that no state of the controller carries out, for its reply. So a late or repeated reply is not taken
   /// for a report again and again. The rest of a line with a lost byte is discarded with it.
   Result<void> probe(Deadline deadline);
+  /// Sends "$I", for firmware(). A controller that does not answer it is taken for GRBL.
+  Result<void> identify(Deadline deadline);
+  /// As the controller last named it.
+  [[nodiscard]] Firmware firmware() const { return firmware_; }
   /// Sends "$$".
   Result<std::map<int, double>> settings(Deadline deadline);
   /// Sends a byte that takes effect at once and has no reply: '!', whatever is on the line. Fails with `io`, `timeout`.
@@ -88,6 +93,7 @@ class Link {
   std::optional<serial::Port> port_;
   std::string heard_;  // start of a line that has not ended
   int alarm_ = 0;
+  Firmware firmware_ = Firmware::grbl;
   bool restarted_ = false;
   bool reply_missed_ = false;
   std::atomic<bool> fail_fast_ = false;

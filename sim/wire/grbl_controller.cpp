@@ -10,8 +10,6 @@
 namespace scanrig::sim::wire {
 namespace {
 
-constexpr const char* kGreeting = "\r\nGrbl 1.1h ['$' for help]\r\n";
-constexpr const char* kLocked = "[MSG:'$H'|'$X' to unlock]\r\n";
 constexpr const char* kOk = "ok\r\n";
 constexpr float kPullOff = 1.0F;       ///< $27, units: distance of home from the machine's zero
 constexpr double kHomingTravel = 1.5;  ///< of the axis' travel, one table turn; then homing is given up
@@ -59,10 +57,50 @@ AxisMotion GrblController::motion(double deg_s) const {
   return {std::min(deg_s, settings_.max_deg_s) * steps_per_deg, rate, rate};
 }
 
+std::string GrblController::greeting() const {
+  switch (settings_.firmware) {
+    case GrblFirmware::grblhal: return "\r\nGrblHAL 1.1f ['$' or '$HELP' for help]\r\n";
+    case GrblFirmware::fluidnc: return "\r\nGrbl 3.7 [FluidNC v3.7.8 (wifi) '$' for help]\r\n";
+    case GrblFirmware::grbl: break;
+  }
+  return "\r\nGrbl 1.1h ['$' for help]\r\n";
+}
+
+std::string GrblController::lock() const {
+  switch (settings_.firmware) {
+    case GrblFirmware::grblhal: return "ALARM:11\r\n[MSG:Homing cycle required]\r\n";
+    case GrblFirmware::fluidnc: return "[MSG:INFO: '$H'|'$X' to unlock]\r\n" + alarm(14);
+    case GrblFirmware::grbl: break;
+  }
+  return "[MSG:'$H'|'$X' to unlock]\r\n";
+}
+
+std::string GrblController::alarm(int number) const {
+  const bool says_more = settings_.firmware == GrblFirmware::fluidnc;
+  return fmt::format("{}ALARM:{}\r\n", says_more ? "[MSG:INFO: ALARM: see the number]\r\n" : "", number);
+}
+
+std::string GrblController::build_info() const {
+  switch (settings_.firmware) {
+    case GrblFirmware::grblhal:
+      return "[VER:1.1f.20240812:]\r\n[OPT:VNMSL,35,1024,4,0]\r\n[NEWOPT:ENUMS,RT-,ES]\r\n[FIRMWARE:grblHAL]\r\n"
+             "[DRIVER:RP2040]\r\nok\r\n";
+    case GrblFirmware::fluidnc:
+      return "[VER:3.7 FluidNC v3.7.8:]\r\n[OPT:PHS]\r\n[MSG:INFO: Machine: turntable]\r\nok\r\n";
+    case GrblFirmware::grbl: break;
+  }
+  return "[VER:1.1h.20190830:]\r\n[OPT:V,15,128]\r\nok\r\n";
+}
+
 std::string GrblController::report() const {
   static const std::map<State, const char*> names{
       {State::idle, "Idle"}, {State::run, "Run"}, {State::alarm, "Alarm"}, {State::home, "Home"}};
   const std::string name = state_ == State::hold ? (axis_.running() ? "Hold:1" : "Hold:0") : names.at(state_);
+  if (settings_.firmware == GrblFirmware::grblhal) {
+    // Four axes, and the reason of an alarm.
+    return fmt::format("<{}{}|MPos:{:.3f},0.000,0.000,0.000|Bf:35,1024|FS:0,0|Pn:>\r\n", name,
+                       state_ == State::alarm ? ":11" : "", position());
+  }
   return fmt::format("<{}|MPos:{:.3f},0.000,0.000|FS:0,0>\r\n", name, position());
 }
 
@@ -70,8 +108,8 @@ std::string GrblController::realtime(char byte) {
   const std::scoped_lock lock(mutex_);
   refresh();
   switch (byte) {
-    // While homing, GRBL accepts nothing but a reset.
-    case '?': return state_ == State::home ? std::string() : report();
+    // While homing, GRBL accepts nothing but a reset; the others report.
+    case '?': return state_ == State::home && settings_.firmware == GrblFirmware::grbl ? std::string() : report();
     case '!':
       if (state_ == State::run) axis_.slow_down();
       if (state_ == State::run || state_ == State::idle) state_ = State::hold;
@@ -82,7 +120,7 @@ std::string GrblController::realtime(char byte) {
     case 0x18: {
       const bool moved = axis_.running();
       if (moved) {
-        output_ += fmt::format("ALARM:{}\r\n", state_ == State::home ? 6 : 3);
+        output_ += alarm(state_ == State::home ? 6 : 3);
         state_ = State::alarm;
       }
       if (state_ != State::alarm) state_ = State::idle;
@@ -97,12 +135,12 @@ std::string GrblController::realtime(char byte) {
 void GrblController::restart() const {
   axis_.quick_stop();
   lines_.clear();
-  output_ += kGreeting;
-  if (state_ == State::alarm) output_ += kLocked;
+  output_ += greeting();
+  if (state_ == State::alarm) output_ += lock();
   critical_ = false;
   if (stays_ != 0) {
     critical_ = true;
-    output_ += fmt::format("ALARM:{}\r\n", stays_);
+    output_ += alarm(stays_);
   }
 }
 
@@ -129,7 +167,7 @@ void GrblController::follow() const {
     } else if (clock_.now() >= give_up_homing_) {
       axis_.quick_stop();
       state_ = State::alarm;
-      output_ += "ALARM:9\r\n";
+      output_ += alarm(9);
     }
   }
   advance();
@@ -157,7 +195,7 @@ void GrblController::carry_out(const std::string& text) const {
   } else if (text == "$$") {
     output_ += list_settings();
   } else if (text == "$I") {
-    output_ += "[VER:1.1h.20190830:]\r\n[OPT:V,15,128]\r\nok\r\n";
+    output_ += build_info();
   } else if (text.front() == '$') {
     output_ += error(3);
   } else {
@@ -167,10 +205,21 @@ void GrblController::carry_out(const std::string& text) const {
 
 std::string GrblController::list_settings() const {
   const double units_per_deg = gear_ratio_;
-  return fmt::format(
-      "$0=10\r\n$10=1\r\n$13=0\r\n$20=0\r\n$22={}\r\n$27={:.3f}\r\n$100={:.3f}\r\n$110={:.3f}\r\n$120={:.3f}\r\nok\r\n",
-      settings_.homing ? 1 : 0, kPullOff, steps_per_unit_, settings_.max_deg_s * units_per_deg * 60.0,
-      settings_.acceleration_deg_s2 * units_per_deg);
+  const auto axis =
+      fmt::format("$100={:.3f}\r\n$110={:.3f}\r\n$120={:.3f}\r\n", steps_per_unit_,
+                  settings_.max_deg_s * units_per_deg * 60.0, settings_.acceleration_deg_s2 * units_per_deg);
+  const int homing = settings_.homing ? 1 : 0;
+  switch (settings_.firmware) {
+    case GrblFirmware::grblhal:  // masks, and texts among the numbers
+      return fmt::format(
+          "$0=10.0\r\n$10=511\r\n$13=0\r\n$20=0\r\n$22={}\r\n$27={:.3f}\r\n{}$302=192.168.5.1\r\n$341=0\r\nok\r\n",
+          settings_.homing ? 5 : 4, kPullOff, axis);
+    case GrblFirmware::fluidnc:  // few: the others are in its file
+      return fmt::format("$10=1\r\n$20=0\r\n$21=0\r\n$22={}\r\n$23=0\r\n$30=0\r\n$32=0\r\n{}$130=1000.000\r\nok\r\n",
+                         homing, axis);
+    case GrblFirmware::grbl: break;
+  }
+  return fmt::format("$0=10\r\n$10=1\r\n$13=0\r\n$20=0\r\n$22={}\r\n$27={:.3f}\r\n{}ok\r\n", homing, kPullOff, axis);
 }
 
 void GrblController::start_homing() const {
@@ -216,7 +265,7 @@ void GrblController::raise_alarm(std::uint16_t code, bool can_be_reset) {
   state_ = State::alarm;
   critical_ = code == 1 || code == 2;
   stays_ = can_be_reset ? 0 : code;
-  output_ += fmt::format("ALARM:{}\r\n", code);
+  output_ += alarm(code);
 }
 
 void GrblController::power_cycle() {

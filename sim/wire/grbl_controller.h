@@ -8,17 +8,21 @@
 
 namespace scanrig::sim::wire {
 
+/// What runs on the controller.
+enum class GrblFirmware { grbl, grblhal, fluidnc };
+
 /// Settings of the controller's first axis; at the table.
 struct GrblSettings {
+  GrblFirmware firmware = GrblFirmware::grbl;
   double homing_deg_s = 60;
   double acceleration_deg_s2 = 90;
   double max_deg_s = 3600;
   bool homing = true;  ///< $22: locked until homed
 };
 
-/// A GRBL 1.1 controller whose X axis turns the table; its unit is a degree of the motor. It keeps positions as GRBL
-/// does: counted steps, 32-bit floating point, three decimals. There is no feedback.
-/// Threads: every function may be called from any thread.
+/// A controller with GRBL 1.1, grblHAL or FluidNC whose X axis turns the table; its unit is a degree of the motor. It
+/// keeps positions as GRBL does: counted steps, 32-bit floating point, three decimals. There is no feedback. Threads:
+/// every function may be called from any thread.
 class GrblController final : public SimulatedDrive {
  public:
   GrblController(const AxisOptions& axis, const GrblSettings& settings, Clock& clock);
@@ -46,6 +50,10 @@ class GrblController final : public SimulatedDrive {
   void start_homing() const;
   [[nodiscard]] std::string report() const;
   [[nodiscard]] std::string list_settings() const;
+  [[nodiscard]] std::string build_info() const;
+  [[nodiscard]] std::string greeting() const;
+  [[nodiscard]] std::string lock() const;  ///< what it says when it starts locked
+  [[nodiscard]] std::string alarm(int number) const;
   [[nodiscard]] float position() const;  ///< of the machine, units
   [[nodiscard]] AxisMotion motion(double deg_s) const;
   void restart() const;

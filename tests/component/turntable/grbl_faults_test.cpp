@@ -112,6 +112,33 @@ TEST_F(GrblFaults, AnAlarmIsToldInWordsAndHoldsUntilItIsReset) {
   expect_home_is_needed_and_helps();
 }
 
+TEST_F(GrblFaults, AnAlarmIsWhatTheFirmwareMeansByIt) {
+  start_at_zero([](auto& options, auto& settings) {
+    slow(options, settings);
+    settings.firmware = sim::wire::GrblFirmware::grblhal;
+  });
+  expect_alarm_until_reset(10, "its emergency stop input is open");
+  expect_home_is_needed_and_helps();
+}
+
+TEST_F(GrblFaults, FluidNcIsSetUpInItsFile) {
+  const auto fluidnc = [](auto& settings) { settings.firmware = sim::wire::GrblFirmware::fluidnc; };
+  start([&](auto&, auto& settings) {
+    fluidnc(settings);
+    settings.homing = false;
+  });
+  auto homed = home();
+  ASSERT_FALSE(homed);
+  EXPECT_THAT(homed.error().message, HasSubstr("give the axis a homing cycle in its file"));
+  start([&](auto&, auto& settings) {
+    fluidnc(settings);
+    settings.acceleration_deg_s2 = 30000;
+  });
+  homed = home();
+  ASSERT_FALSE(homed);
+  EXPECT_THAT(homed.error().message, HasSubstr("set acceleration_mm_per_sec2: 180000.000 in its file"));
+}
+
 TEST_F(GrblFaults, AnAlarmThatStaysIsSaid) {
   start_at_zero();
   bench_->drive().raise_alarm(1, false);
