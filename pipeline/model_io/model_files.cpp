@@ -23,6 +23,9 @@ Result<ModelFiles> write_into(const fs::path& folder, const TexturedMesh& model,
   const auto glb = encode_glb(model);
   if (!glb) return pass_on(glb);
   write("model.glb", *glb);
+  const auto view = encode_view_glb(model);
+  if (!view) return pass_on(view);
+  write("view.glb", *view);
   write("model.ply", encode_ply(model.mesh));
   write("model.stl", encode_stl(model.mesh));
   if (!model.atlas.empty()) {

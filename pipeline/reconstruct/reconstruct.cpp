@@ -7,9 +7,11 @@
 #include <vector>
 
 #include "core/parallel.h"
+#include "pipeline/mesh/solid_properties.h"
 #include "pipeline/pose/estimate_pose.h"
 #include "pipeline/range/rectification.h"
 #include "pipeline/range/view_builder.h"
+#include "pipeline/reconstruct/live_mesh.h"
 #include "pipeline/reconstruct/report.h"
 #include "pipeline/reconstruct/rig_watch.h"
 #include "pipeline/reconstruct/stage_log.h"
@@ -76,6 +78,7 @@ struct Reconstruction::State {
   Result<Transform> find_pose(Report& report, const Context& context);
   Result<Surface> surface(const Transform& pose1_from_pose2, const Context& context);
   [[nodiscard]] std::vector<Photo> photos(const Transform& pose1_from_pose2) const;
+  [[nodiscard]] std::vector<LivePhoto> live_photos(const PoseState& pose) const;
   Result<void> add_texture(TexturedMesh& model, const Transform& pose1_from_pose2, Report& report,
                            const Context& context);
   Result<Model> finish(const ScanIdentity& identity, const Context& context);
@@ -199,6 +202,16 @@ std::vector<Photo> Reconstruction::State::photos(const Transform& pose1_from_pos
   return photos;
 }
 
+std::vector<LivePhoto> Reconstruction::State::live_photos(const PoseState& pose) const {
+  const Transform turntable_from_left = rectification->left_from_turntable.inverse();
+  std::vector<LivePhoto> photos;
+  for (std::size_t v = 0; v < pose.views.size(); ++v) {
+    photos.push_back({turntable_from_left * pose.views[v].range.camera_from_pose,
+                      v < pose.plain.size() ? pose.plain[v].left : cv::Mat3b()});
+  }
+  return photos;
+}
+
 Result<Model> Reconstruction::State::finish(const ScanIdentity& identity, const Context& context) {
   if (poses.empty()) return fail(ErrorCode::invalid_input, "the scan has no views");
   for (std::size_t p = 0; p < poses.size(); ++p) {
@@ -267,6 +280,21 @@ Result<void> Reconstruction::finish_pose(std::size_t pose, const Context& contex
   Result<void> done;
   with_threads(state_->options.threads, [&] { done = state_->finish_pose(pose, context); });
   return done;
+}
+
+Mesh Reconstruction::live_view(std::size_t pose) const {
+  if (!state_->rectification || pose >= state_->poses.size() || state_->poses[pose].views.empty()) return {};
+  const PoseState& state = state_->poses[pose];
+  return live_mesh_of_view(state.views.back(), state_->calibration->left, state_->live_photos(state).back());
+}
+
+Mesh Reconstruction::live_pose(std::size_t pose) const {
+  if (!state_->rectification || pose >= state_->poses.size() || !state_->poses[pose].finished) return {};
+  const PoseState& state = state_->poses[pose];
+  Mesh mesh = state.partial.mesh;
+  if (mesh.normals.size() != mesh.vertices.size()) mesh.normals = vertex_normals(mesh);
+  colour_by_views(mesh, state.views, state_->calibration->left, state_->live_photos(state));
+  return mesh;
 }
 
 Result<Model> Reconstruction::finish(const ScanIdentity& identity, const Context& context) {

@@ -67,6 +67,11 @@ class Reconstruction {
   /// longer as calibrated), `invalid_input` (options), `degenerate`, `no_overlap`, `stopped`.
   Result<void> finish_pose(std::size_t pose, const Context& context);
 
+  /// The view that was added last, and a finished pose, as coarse coloured meshes to be shown; live_mesh.h. Empty
+  /// without such a view, and of imported range images.
+  [[nodiscard]] Mesh live_view(std::size_t pose) const;
+  [[nodiscard]] Mesh live_pose(std::size_t pose) const;
+
   /// Pose 2 into pose 1, integration, texture; with one pose, its own complete model. Every pose must be finished
   /// before.
   /// Fails with `same_rest`, `ambiguous`, `no_overlap`, `degenerate`, `stopped`.

@@ -74,12 +74,12 @@ Eigen::MatrixXd read_covariance(JsonObject& object, std::string_view key) {
 
 /// None: files of before have no offsets.
 std::optional<BoardPrint> read_board_print(JsonObject object) {
-  for (const char* key :
-       {"columns", "rows", "square_mm", "thickness_mm", "markers", "length", "second_length", "scale_sigma"}) {
+  for (const char* key : {"columns", "rows", "square_mm", "thickness_mm", "markers", "length", "second_length"}) {
     object.ignore(key);
   }
   BoardPrint print;
   print.scale = object.number("scale", 0.5, 2.0);
+  if (object.has("scale_sigma")) print.scale_sigma = object.number("scale_sigma", 0.0, 1.0);
   const std::vector<double> warp = object.numbers("warp_mm");
   if (warp.size() == print.warp_mm.size()) {
     std::copy(warp.begin(), warp.end(), print.warp_mm.begin());

@@ -58,8 +58,8 @@ class ModelFilesTest : public ::testing::Test {
 TEST_F(ModelFilesTest, aModelIsWrittenInEveryFormatAndNothingElseIsLeft) {
   const auto files = write_model_files(tetrahedron(), "{}", room_ / "model");
   ASSERT_TRUE(files) << files.error().message;
-  const std::set<std::string> wanted = {"model.glb", "model.ply", "model.stl",  "model.obj",
-                                        "model.mtl", "model.png", "report.json"};
+  const std::set<std::string> wanted = {"model.glb", "view.glb",  "model.ply", "model.stl",
+                                        "model.obj", "model.mtl", "model.png", "report.json"};
   EXPECT_EQ(names_in(room_ / "model"), wanted);
   EXPECT_EQ(std::set<std::string>(files->names.begin(), files->names.end()), wanted);
   EXPECT_EQ(names_in(room_), std::set<std::string>{"model"});
@@ -79,7 +79,7 @@ TEST_F(ModelFilesTest, aModelWithoutATextureHasNoObj) {
   model.atlas.release();
   model.corner_uv.clear();
   ASSERT_TRUE(write_model_files(model, "", room_ / "model"));
-  EXPECT_EQ(names_in(room_ / "model"), (std::set<std::string>{"model.glb", "model.ply", "model.stl"}));
+  EXPECT_EQ(names_in(room_ / "model"), (std::set<std::string>{"model.glb", "view.glb", "model.ply", "model.stl"}));
 }
 
 TEST_F(ModelFilesTest, theOldModelStaysWhenWritingFails) {
@@ -97,17 +97,39 @@ TEST_F(ModelFilesTest, aModelWithoutFacesIsNotWritten) {
   EXPECT_TRUE(names_in(room_).empty());
 }
 
-TEST_F(ModelFilesTest, theGlbOpensElsewhereInMetresWithItsTexture) {
-  const auto bytes = encode_glb(tetrahedron());
-  ASSERT_TRUE(bytes);
+tinygltf::Model opened(const Result<std::string>& bytes) {
   tinygltf::Model gltf;
-  tinygltf::TinyGLTF loader;
+  if (!bytes) {
+    ADD_FAILURE() << bytes.error().message;
+    return gltf;
+  }
   std::string error, warning;
-  ASSERT_TRUE(loader.LoadBinaryFromMemory(&gltf, &error, &warning,
-                                          reinterpret_cast<const unsigned char*>(bytes->data()),
-                                          static_cast<unsigned>(bytes->size())))
+  EXPECT_TRUE(tinygltf::TinyGLTF().LoadBinaryFromMemory(&gltf, &error, &warning,
+                                                        reinterpret_cast<const unsigned char*>(bytes->data()),
+                                                        static_cast<unsigned>(bytes->size())))
       << error;
   EXPECT_EQ(warning, "");
+  return gltf;
+}
+
+/// The values of one attribute of the only primitive, `per_vertex` of them each.
+template <class T>
+std::vector<T> attribute(const tinygltf::Model& gltf, const std::string& name, std::size_t per_vertex) {
+  const auto& accessor = gltf.accessors.at(gltf.meshes.at(0).primitives.at(0).attributes.at(name));
+  const auto& view = gltf.bufferViews.at(accessor.bufferView);
+  const std::size_t stride = view.byteStride == 0 ? per_vertex * sizeof(T) : view.byteStride;
+  std::vector<T> values(per_vertex * accessor.count);
+  for (std::size_t i = 0; i < accessor.count; ++i) {
+    std::memcpy(&values[per_vertex * i],
+                gltf.buffers.at(0).data.data() + view.byteOffset + accessor.byteOffset + stride * i,
+                per_vertex * sizeof(T));
+  }
+  return values;
+}
+
+TEST_F(ModelFilesTest, theGlbOpensElsewhereInMetresWithItsTexture) {
+  const auto gltf = opened(encode_glb(tetrahedron()));
+  ASSERT_FALSE(gltf.meshes.empty());
   EXPECT_EQ(gltf.asset.generator, "scanrig");
   const auto& primitive = gltf.meshes.at(0).primitives.at(0);
   const auto& positions = gltf.accessors.at(primitive.attributes.at("POSITION"));
@@ -121,10 +143,7 @@ TEST_F(ModelFilesTest, theGlbOpensElsewhereInMetresWithItsTexture) {
   ASSERT_EQ(material.baseColorTexture.index, 0);
 
   // The colour under the middle of face 0's coordinates is that of its quarter.
-  const auto& uv = gltf.accessors.at(primitive.attributes.at("TEXCOORD_0"));
-  const auto& view = gltf.bufferViews.at(uv.bufferView);
-  std::array<float, 2> first{};
-  std::memcpy(first.data(), gltf.buffers.at(0).data.data() + view.byteOffset, sizeof first);
+  const auto first = attribute<float>(gltf, "TEXCOORD_0", 2);
   EXPECT_NEAR(first[0], 0.1, 1e-6);
   EXPECT_NEAR(first[1], 0.1, 1e-6);
   const auto& image = gltf.images.at(0);
@@ -133,6 +152,78 @@ TEST_F(ModelFilesTest, theGlbOpensElsewhereInMetresWithItsTexture) {
                          static_cast<std::size_t>(image.component);
   EXPECT_NEAR(image.image[at], 220, 4) << "red, first in RGB";
   EXPECT_NEAR(image.image[at + 2], 0, 4);
+}
+
+TEST_F(ModelFilesTest, theGlbForABrowserKeepsPlacesViewsAndSigma) {
+  const TexturedMesh model = tetrahedron();
+  const auto gltf = opened(encode_view_glb(model));
+  ASSERT_FALSE(gltf.meshes.empty());
+  EXPECT_THAT(gltf.extensionsRequired, testing::ElementsAre("KHR_mesh_quantization"));
+  const auto& node = gltf.nodes.at(0);
+  const auto steps = attribute<std::uint16_t>(gltf, "POSITION", 3);
+  const auto views = attribute<std::uint8_t>(gltf, "_VIEWS", 1);
+  const auto sigma = attribute<std::uint16_t>(gltf, "_SIGMA", 1);
+  const auto uv = attribute<std::uint16_t>(gltf, "TEXCOORD_0", 2);
+  ASSERT_EQ(views.size(), 12u);
+  std::set<std::size_t> seen;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    Eigen::Vector3f place;
+    for (std::size_t k = 0; k < 3; ++k)
+      place[static_cast<int>(k)] =
+          static_cast<float>(1000.0 * (node.translation[k] + node.scale[k] * steps[3 * i + k]));
+    const auto vertex =
+        std::ranges::find_if(model.mesh.vertices, [&](const auto& v) { return (v - place).norm() < 1e-3F; });
+    ASSERT_NE(vertex, model.mesh.vertices.end()) << place.transpose();
+    const auto v = static_cast<std::size_t>(vertex - model.mesh.vertices.begin());
+    seen.insert(v);
+    EXPECT_EQ(views[i], model.mesh.views[v]);
+    EXPECT_EQ(sigma[i], std::isnan(model.mesh.sigma[v]) ? 65535 : std::lround(1e5F * model.mesh.sigma[v]));
+  }
+  EXPECT_EQ(seen.size(), 4u);
+  EXPECT_NEAR(uv[0] / 65535.0, model.corner_uv[0][0].x(), 1e-4);
+}
+
+/// A square of 60 mm in 2 n^2 faces, on one chart.
+TexturedMesh sheet(std::uint32_t n) {
+  TexturedMesh model;
+  for (std::uint32_t i = 0; i <= n; ++i) {
+    for (std::uint32_t j = 0; j <= n; ++j) {
+      model.mesh.vertices.emplace_back(60.0F * static_cast<float>(i) / static_cast<float>(n),
+                                       60.0F * static_cast<float>(j) / static_cast<float>(n), 0.0F);
+    }
+  }
+  const auto at = [&](std::uint32_t i, std::uint32_t j) { return i * (n + 1) + j; };
+  for (std::uint32_t i = 0; i < n; ++i) {
+    for (std::uint32_t j = 0; j < n; ++j) {
+      model.mesh.faces.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+      model.mesh.faces.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+    }
+  }
+  for (const auto& face : model.mesh.faces) {
+    std::array<Eigen::Vector2f, 3> uv;
+    for (std::size_t k = 0; k < 3; ++k) uv[k] = model.mesh.vertices[face[k]].head<2>() / 60.0F;
+    model.corner_uv.push_back(uv);
+  }
+  model.atlas = cv::Mat3b(128, 128, cv::Vec3b(10, 200, 30));
+  return model;
+}
+
+TEST_F(ModelFilesTest, theGlbForABrowserHasFewerFacesAndASmallerTexture) {
+  const auto gltf = opened(encode_view_glb(sheet(40), {.max_faces = 500, .texture_px = 64}));
+  ASSERT_FALSE(gltf.meshes.empty());
+  const auto& indices = gltf.accessors.at(gltf.meshes.at(0).primitives.at(0).indices);
+  EXPECT_LE(indices.count, 1500u);
+  EXPECT_GE(indices.count, 6u);
+  EXPECT_EQ(gltf.images.at(0).width, 64);
+  const auto& positions = gltf.accessors.at(gltf.meshes.at(0).primitives.at(0).attributes.at("POSITION"));
+  EXPECT_LT(positions.count, 1681u) << "vertices that no face uses are left out";
+  EXPECT_EQ(positions.maxValues.at(0), 65535.0);
+}
+
+TEST_F(ModelFilesTest, aGlbForABrowserWantsFaces) {
+  const auto bytes = encode_view_glb({});
+  ASSERT_FALSE(bytes);
+  EXPECT_EQ(bytes.error().code, ErrorCode::degenerate);
 }
 
 TEST_F(ModelFilesTest, thePlyKeepsEveryVertexWithItsMeasurements) {
