@@ -102,6 +102,7 @@ ordered_json to_detailed_json(const JobInfo& job) {
   json["closures"] = json["movement_checks"];  // old name
   json["stages"] = ordered_json::array();
   for (const auto& stage : job.stages) json["stages"].push_back({{"name", stage.name}, {"fraction", stage.fraction}});
+  json["live"] = job.live;
   return json;
 }
 

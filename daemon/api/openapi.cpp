@@ -1,4 +1,4 @@
-#include "daemon/api/openapi.h"
+#include "daemon/api/route.h"
 
 #include <cctype>
 #include <nlohmann/json.hpp>
@@ -242,6 +242,14 @@ const char* const kSchemas = R"({
   "files": {"type": "array", "items": {"type": "object", "required": ["path", "bytes", "type"],
     "additionalProperties": false, "properties": {
     "path": {"type": "string"}, "bytes": {"type": "integer"}, "type": {"type": "string"}}}}}},
+"Length": {"type": "object", "required": ["mm", "expanded_uncertainty_mm", "from", "to"], "additionalProperties": false, "properties": {
+  "mm": {"type": "number"},
+  "expanded_uncertainty_mm": {"type": "number", "nullable": true, "description": "k = 2; null: an end is not measured, or the calibration does not say"},
+  "from": {"$ref": "#/components/schemas/RulerEnd"}, "to": {"$ref": "#/components/schemas/RulerEnd"}}},
+"RulerEnd": {"type": "object", "required": ["point", "measured", "sigma_mm"], "additionalProperties": false, "properties": {
+  "point": {"type": "array", "items": {"type": "number"}, "description": "mm, on the surface"},
+  "measured": {"type": "boolean", "description": "false: closed there by silhouettes or the table"},
+  "sigma_mm": {"type": "number", "nullable": true}}},
 "Report": {"type": "object", "description": "report.json of the model"},
 "Calibration": {"type": "object", "required": ["job", "reminder", "awaited_placement", "board"], "additionalProperties": false, "properties": {
   "job": {"allOf": [{"$ref": "#/components/schemas/CalibrationJob"}], "nullable": true},
@@ -313,11 +321,12 @@ const char* const kSchemas = R"({
 })";
 
 const char* const kJobDetail = R"({
-"description": "closures is the old name of movement_checks", "required": ["movement_checks", "closures", "stages"],
+"description": "closures is the old name of movement_checks", "required": ["movement_checks", "closures", "stages", "live"],
 "properties": {
   "stored": {"type": "array", "description": null, "items": {"$ref": "#/components/schemas/StoredView"}},
   "movement_checks": {"type": "array", "items": {"$ref": "#/components/schemas/MovementCheck"}},
   "closures": {"type": "array", "items": {"$ref": "#/components/schemas/MovementCheck"}, "deprecated": true, "description": "old name of movement_checks"},
-  "stages": {"type": "array", "items": {"$ref": "#/components/schemas/Stage"}}}})";
+  "stages": {"type": "array", "items": {"$ref": "#/components/schemas/Stage"}},
+  "live": {"type": "array", "items": {"type": "string"}, "description": "what the scan shows so far: files live/NAME.glb of the job, which never change"}}})";
 
 }  // namespace scanrig

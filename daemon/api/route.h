@@ -141,4 +141,12 @@ std::vector<Route> calibration_routes();  ///< calibrating the rig, and how its 
 std::vector<Route> service_routes();      ///< health, metrics, the OpenAPI document
 std::vector<Route> page_routes();         ///< the web page, what it starts from, logging in and out
 
+/// The OpenAPI 3.0 document of these routes, as JSON.
+std::string openapi_document(const std::vector<Route>& routes);
+
+/// The shapes of the API's replies: a JSON object of OpenAPI 3.0 schemas by name.
+extern const char* const kSchemas;
+/// Additions that make the schema Job into JobDetail: a JSON merge patch (RFC 7396), but its `required` is added.
+extern const char* const kJobDetail;
+
 }  // namespace scanrig

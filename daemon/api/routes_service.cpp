@@ -4,7 +4,6 @@
 #include "core/version.h"
 #include "daemon/api/json_replies.h"
 #include "daemon/api/metrics.h"
-#include "daemon/api/openapi.h"
 #include "daemon/api/route.h"
 
 namespace scanrig {

@@ -6,12 +6,12 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "core/catch_exceptions.h"
 #include "core/files.h"
 #include "core/hash.h"
 #include "core/timestamp.h"
 #include "daemon/ctl/output.h"
 #include "daemon/ctl/verbs.h"
-#include "daemon/runtime/catch_exceptions.h"
 #include "daemon/runtime/signal_stop.h"
 #include "pipeline/calibrate/calibration_json.h"
 #include "pipeline/calibrate/report/calibration_html.h"

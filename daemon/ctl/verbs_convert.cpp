@@ -1,11 +1,11 @@
 #include <nlohmann/json.hpp>
 #include <span>
 
+#include "core/catch_exceptions.h"
 #include "core/files.h"
 #include "core/image_codec.h"
 #include "daemon/ctl/output.h"
 #include "daemon/ctl/verbs.h"
-#include "daemon/runtime/catch_exceptions.h"
 #include "pipeline/exporters/export_calibration.h"
 #include "pipeline/storage/scan_folder.h"
 

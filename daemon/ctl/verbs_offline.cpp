@@ -7,11 +7,11 @@
 #include <system_error>
 
 #include "config/rig_config.h"
+#include "core/catch_exceptions.h"
 #include "core/timestamp.h"
 #include "daemon/api/access.h"
 #include "daemon/ctl/output.h"
 #include "daemon/ctl/verbs.h"
-#include "daemon/runtime/catch_exceptions.h"
 #include "daemon/runtime/signal_stop.h"
 #include "pipeline/evaluate/evaluate.h"
 #include "pipeline/importers/import_stanford.h"

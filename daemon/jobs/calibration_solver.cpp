@@ -1,4 +1,4 @@
-#include "daemon/jobs/calibration_solver.h"
+#include "daemon/jobs/executors.h"
 
 #include <utility>
 

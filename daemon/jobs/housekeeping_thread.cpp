@@ -9,9 +9,9 @@
 #include <tuple>
 #include <utility>
 
+#include "core/catch_exceptions.h"
 #include "daemon/jobs/bundle.h"
 #include "daemon/runtime/actor.h"
-#include "daemon/runtime/catch_exceptions.h"
 
 namespace scanrig {
 namespace {

@@ -18,6 +18,7 @@ using nlohmann::ordered_json;
 
 constexpr const char* kJob = "job.json";
 constexpr const char* kCheck = "calibration_check.json";
+constexpr const char* kLive = "live";
 constexpr const char* kFailure = "failure.json";
 constexpr const char* kAttempt = "attempt.json";
 constexpr int kJobVersion = 3;  ///< 1 had other names for some keys of the recipe, 2 no calibrations
@@ -105,6 +106,18 @@ fs::path model_folder(const fs::path& job_folder) { return job_folder / "model";
 fs::path model_file(const fs::path& job_folder, RecipeKind kind) {
   return model_folder(job_folder) / (kind == RecipeKind::scan ? "model.glb" : "calibration.json");
 }
+Result<void> write_live_mesh(const fs::path& job_folder, const std::string& name, std::string_view glb) {
+  const auto folder = job_folder / kLive;
+  std::error_code error;
+  fs::create_directory(folder, error);  // nothing needs it after a power cut; what fails, fails again below
+  return write_file_atomically(folder / (name + ".glb"), glb);
+}
+
+void remove_live_meshes(const fs::path& job_folder) {
+  std::error_code ignored;  // removed with the job
+  fs::remove_all(job_folder / kLive, ignored);
+}
+
 fs::path report_file(const fs::path& job_folder) { return model_folder(job_folder) / "report.json"; }
 
 FolderSize measure_folder(const fs::path& folder) {

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
 
 #include "core/result.h"
+#include "daemon/journal/journal.h"
 #include "daemon/station/job_info.h"
 
 namespace scanrig {
@@ -16,6 +18,10 @@ namespace scanrig {
 std::filesystem::path model_folder(const std::filesystem::path& job_folder);
 std::filesystem::path model_file(const std::filesystem::path& job_folder, RecipeKind kind = RecipeKind::scan);
 std::filesystem::path report_file(const std::filesystem::path& job_folder);
+
+/// live/NAME.glb: what the scan shows so far, while it is made. Fails with `io`.
+Result<void> write_live_mesh(const std::filesystem::path& job_folder, const std::string& name, std::string_view glb);
+void remove_live_meshes(const std::filesystem::path& job_folder);
 
 struct FolderSize {
   std::uintmax_t bytes = 0;
@@ -72,5 +78,15 @@ std::vector<std::string> read_rig_remarks(const std::filesystem::path& report);
 /// Why the model of report.json is beyond the limits; nothing when it is within, or without limits. An unreadable
 /// report never passes.
 std::optional<Error> limit_violation(const std::filesystem::path& report, const Limits& limits);
+
+/// log.jsonl of a job's folder: the job's entries of the log, one object per line, docs/reference/journal.md.
+std::filesystem::path job_log_file(const std::filesystem::path& job_folder);
+
+constexpr std::uintmax_t kMaxJobLogBytes = 4u << 20;
+
+/// Appends an entry, without secrets. Not synced: after a power cut the last lines may be missing or torn. A log of
+/// kMaxJobLogBytes gets a last line about its limit, then nothing more. Fails with `io`, `not_found` (no such folder).
+Result<void> append_job_log(const std::filesystem::path& job_folder, const JournalEntry& entry,
+                            std::chrono::system_clock::time_point when);
 
 }  // namespace scanrig

@@ -1,5 +1,3 @@
-#include "daemon/jobs/job_log.h"
-
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -10,6 +8,7 @@
 
 #include "core/timestamp.h"
 #include "daemon/jobs/bundle.h"
+#include "daemon/jobs/job_files.h"
 
 namespace scanrig {
 namespace {

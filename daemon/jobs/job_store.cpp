@@ -16,7 +16,6 @@
 #include "core/timestamp.h"
 #include "daemon/jobs/job_files.h"
 #include "daemon/jobs/job_index.h"
-#include "daemon/jobs/job_log.h"
 
 namespace scanrig {
 namespace {

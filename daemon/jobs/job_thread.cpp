@@ -5,11 +5,11 @@
 #include <tuple>
 #include <utility>
 
+#include "core/catch_exceptions.h"
 #include "core/files.h"
 #include "core/image_codec.h"
 #include "core/overloaded.h"
 #include "daemon/runtime/actor.h"
-#include "daemon/runtime/catch_exceptions.h"
 #include "daemon/station/job_lifecycle.h"
 #include "pipeline/movement/turned_table.h"
 

@@ -6,7 +6,7 @@
 #include <thread>
 #include <variant>
 
-#include "daemon/jobs/job_log.h"
+#include "daemon/jobs/job_files.h"
 #include "daemon/jobs/job_store.h"
 #include "daemon/jobs/reconstruction_thread.h"
 #include "daemon/runtime/actor.h"

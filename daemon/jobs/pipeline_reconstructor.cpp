@@ -1,7 +1,8 @@
-#include "daemon/jobs/pipeline_reconstructor.h"
+#include "daemon/jobs/executors.h"
 
 #include <utility>
 
+#include "pipeline/model_io/model_files.h"
 #include "pipeline/reconstruct/memory.h"
 
 namespace scanrig {
@@ -21,6 +22,8 @@ class PipelineReconstructor final : public Reconstructor {
   Result<void> finish_pose(std::size_t pose, const Context& context) override {
     return reconstruction_.finish_pose(pose, context);
   }
+  std::string live_view(std::size_t pose) override { return encoded(reconstruction_.live_view(pose)); }
+  std::string live_pose(std::size_t pose) override { return encoded(reconstruction_.live_pose(pose)); }
   Result<void> finish(const std::filesystem::path& folder, const Context& context) override {
     const auto scan = ScanFolder::open(scan_);  // now that it is complete
     if (!scan) return pass_on(scan);
@@ -30,6 +33,11 @@ class PipelineReconstructor final : public Reconstructor {
   }
 
  private:
+  static std::string encoded(Mesh mesh) {
+    constexpr std::size_t kFaces = 20'000;  // 300 kB
+    return encode_view_glb({.mesh = std::move(mesh)}, {.max_faces = kFaces}).value_or(std::string());
+  }
+
   Reconstruction reconstruction_;
   std::filesystem::path scan_;
 };

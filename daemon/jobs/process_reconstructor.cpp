@@ -1,4 +1,4 @@
-#include "daemon/jobs/process_reconstructor.h"
+#include "daemon/jobs/executors.h"
 
 #include <charconv>
 #include <cstring>

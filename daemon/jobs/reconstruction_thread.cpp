@@ -5,11 +5,11 @@
 #include <type_traits>
 #include <utility>
 
+#include "core/catch_exceptions.h"
 #include "core/heap.h"
 #include "core/priority.h"
 #include "daemon/jobs/job_files.h"
 #include "daemon/runtime/actor.h"
-#include "daemon/runtime/catch_exceptions.h"
 #include "daemon/station/job_lifecycle.h"
 
 namespace scanrig {
@@ -213,6 +213,11 @@ Result<void> ReconstructionThread::add(int pose, const RawView& raw, const ViewR
   });
   ++current_->views_done;
   progress(stage, 0.0);
+  if (added) {
+    const bool is_first = record.index == 0;
+    show(fmt::format("pose{}_view{:02}", pose + 1, record.index),
+         current_->reconstructor->live_view(static_cast<std::size_t>(pose)), is_first);
+  }
   return added;
 }
 
@@ -229,8 +234,25 @@ Result<void> ReconstructionThread::close_pose(int pose) {
   const auto progress = [&](std::string_view stage, double fraction) {
     tell_progress(fmt::format("{} pose {}", stage, pose + 1), fraction);
   };
-  return catch_exceptions(
+  auto closed = catch_exceptions(
       kWork, [&] { return current_->reconstructor->finish_pose(static_cast<std::size_t>(pose), context(progress)); });
+  if (closed) {
+    show(fmt::format("pose{}", pose + 1), current_->reconstructor->live_pose(static_cast<std::size_t>(pose)), true);
+  }
+  return closed;
+}
+
+/// A mesh that cannot be written is not shown; the job does not need it. `replaces`: instead of those before.
+void ReconstructionThread::show(std::string name, const std::string& glb, bool replaces) {
+  if (glb.empty() || !write_live_mesh(current_->folder, name, glb)) return;
+  if (replaces) current_->live.clear();
+  current_->live.push_back(std::move(name));
+  post_event_(event::LiveMeshes{current_->job, current_->live});
+}
+
+void ReconstructionThread::hide() {
+  remove_live_meshes(current_->folder);
+  if (!current_->live.empty()) post_event_(event::LiveMeshes{current_->job, {}});
 }
 
 void ReconstructionThread::handle(const FinishPose& message) {
@@ -281,6 +303,7 @@ void ReconstructionThread::handle(const Abandon& message) {
 }
 
 void ReconstructionThread::end() {
+  hide();
   unmark();
   std::ignore = dismiss(current_->stop);
   current_.reset();

@@ -98,6 +98,7 @@ class ReconstructionThread {
     std::unique_ptr<Reconstructor> reconstructor{};
     bool quarantined = false;  ///< the scan continues without a model
     int views_done = 0;
+    std::vector<std::string> live{};  ///< names of the meshes that are shown
     std::optional<Error> error{};
   };
 
@@ -124,6 +125,8 @@ class ReconstructionThread {
   Result<void> add(int pose, const RawView& raw, const ViewRecord& record);
   Result<void> add_stored(const ScanFolder& scan, std::size_t pose, std::size_t view);
   Result<void> close_pose(int pose);
+  void show(std::string name, const std::string& glb, bool replaces);
+  void hide();
   void check(const Result<void>& done);
   Result<event::ModelReady> make_model();
   void end();

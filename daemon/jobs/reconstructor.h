@@ -27,6 +27,10 @@ class Reconstructor {
   /// Its views are taken again.
   virtual void drop_pose(std::size_t) {}
   virtual Result<void> finish_pose(std::size_t pose, const Context& context) = 0;
+  /// GLB files to be shown while the scan grows: the view that was added last, the pose that was finished last. Empty:
+  /// this one shows nothing.
+  virtual std::string live_view(std::size_t) { return {}; }
+  virtual std::string live_pose(std::size_t) { return {}; }
   /// Makes the model and writes its files and report.json together: after a failure there is no `folder`.
   virtual Result<void> finish(const std::filesystem::path& folder, const Context& context) = 0;
 };

@@ -237,6 +237,11 @@ struct StageProgress {
   std::string job, stage;
   double fraction;
 };
+/// Meshes of what the scan shows so far, all of them: names of files in the job's folder live/.
+struct LiveMeshes {
+  std::string job;
+  std::vector<std::string> names;
+};
 struct ReconstructionFailed {
   std::string job;
   Error error;
@@ -265,8 +270,8 @@ using Event =
                  event::JobsOrdered, event::JobRequested, event::RequestDone, event::JobUpdated, event::JobRemoved,
                  event::JobStarted, event::JobNotStarted, event::JobUnreadable, event::CheckViewTaken,
                  event::MovementChecked, event::FlipTimedOut, event::ViewStored, event::PoseStored, event::JobClosed,
-                 event::StoreFailed, event::DiskChecked, event::StageProgress, event::ReconstructionFailed,
-                 event::ModelReady, event::ReloadRequested, event::Shutdown>;
+                 event::StoreFailed, event::DiskChecked, event::StageProgress, event::LiveMeshes,
+                 event::ReconstructionFailed, event::ModelReady, event::ReloadRequested, event::Shutdown>;
 
 /// Actions that the station requests. None of them waits.
 namespace action {

@@ -127,6 +127,7 @@ struct JobInfo {
   std::optional<bool> passed{};      ///< done: whether the model is within the recipe's limits
   std::vector<StageShare> stages{};  ///< of the reconstruction, in the order of their start
   std::optional<CalibrationOutcome> calibration{};  ///< of a calibration that is solved
+  std::vector<std::string> live{};                  ///< meshes of what its scan shows so far, event::LiveMeshes
   std::string repeated{};              ///< why the views of the current placement were dropped; empty: they were not
   std::optional<Error> error{};        ///< why it failed, was interrupted or cancelled; or did not pass
   std::vector<std::string> remarks{};  ///< done: sentences on the rig, as its watch found it

@@ -102,6 +102,7 @@ std::optional<JobEnd> update(JobTable& table, const Event& event) {
             change(e.job, [&](JobInfo& job) { std::tie(job.state, job.error) = std::tuple(e.state, e.why); });
           },
           [&](const event::StageProgress& e) { change(e.job, [&](JobInfo& job) { set_progress(job, e); }); },
+          [&](const event::LiveMeshes& e) { change(e.job, [&](JobInfo& job) { job.live = e.names; }); },
           [&](const event::ReconstructionFailed& e) {
             change(e.job, [&](JobInfo& job) {
               job.error = e.error;

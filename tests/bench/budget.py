@@ -12,11 +12,13 @@ MINUTES = {
                "turns": 5, "words": 5, "doctor": 4},
     "calibration": {"rigs": 12, "faults": 8, "models": 8, "watch": 9, "drift": 6},
     "cameras": {"triggers": 4, "matrix": 3, "wire": 12, "hil": 8, "memory": 12},
+    "page": {"scenes": 5, "bars": 9, "bundle": 1},
     "end-to-end": {"models": 14, "render": 1, "same_model": 4, "dragon": 8, "rim": 1, "bad_input": 4, "sigkill": 4},
 }
 LONG = {
     "station": {"fuzz", "asan", "tsan"},
     "motion": {"fuzz"},
+    "page": set(),
     "calibration": {"debian13"},
     "cameras": {"debian13", "fuzz"},
     "end-to-end": {"bare_machine"},

@@ -2,157 +2,32 @@
 // Usage: node scenarios.mjs BIN [NAME...]. Exit code 77: there is no Chromium here.
 import assert from "node:assert/strict";
 import { existsSync } from "node:fs";
-import { Browser, Station, findings, overflows, press, sleep, until, word } from "./browser.mjs";
+import { Browser, Station } from "./browser.mjs";
+import { scenarios as ofRig } from "./scenes_rig.mjs";
+import { scenarios as ofTrust } from "./scenes_trust.mjs";
 
-const RIG = ["--scale", "0.5", "--operator", "none", "--views", "3", "--voxel-mm", "1"];
-const WIDTHS = [320, 390, 700, 1280, 1920];
+const RIG = ["--scale", "0.5", "--views", "3", "--voxel-mm", "1"];
+const ALONE = ["--operator", "none"];
+const scenarios = { ...ofRig, ...ofTrust };
 
-async function see(page, wanted, limit_ms = 20_000) {
-  let seen = "";
-  await until(`the page says ${wanted}`, async () => (seen = await word(page)) === wanted, limit_ms).catch((error) => {
-    throw new Error(`${error.message}; it says ${seen}`);
-  });
-}
-
-/** The page agrees with the daemon, is legible to a screen reader, and fits. */
-async function check(page, station) {
-  const status = station.status();
-  assert.equal(await page.locator(".sentence").innerText(), status.sentence);
-  assert.equal(await page.locator(".next").innerText(), status.next_action);
-  assert.deepEqual(await findings(page), []);
-  assert.deepEqual(await overflows(page), []);
-}
-
-async function open(browser, station, options) {
-  const page = await browser.page(options);
-  await page.goto(station.address(options?.role));
-  await until("the page has a word", async () => (await page.locator("h1.word").count()) && (await word(page)));
-  return page;
-}
-
-async function ready(page) {
-  await press(page, "Reset");
-  await see(page, "READY", 40_000);
-}
-
-const scenarios = {
-  /** From Reset to the end of the scan by touch and keys; the ring shows what is stored. */
-  async job({ browser, station }) {
-    const page = await open(browser, station, { touch: true });
-    await check(page, station);
-    await ready(page);
-    await check(page, station);
-    await page.getByRole("button", { name: "START", exact: true }).tap();
-    await see(page, "FLIP", 60_000);
-    const stored = await page.locator(".head .ring-stored").count();
-    assert.equal(stored, 3, "views of the first pose");
-    await check(page, station);
-    await until("it may be pressed", () => page.getByRole("button", { name: "CONTINUE", exact: true }).isEnabled());
-    await page.getByRole("button", { name: "CONTINUE", exact: true }).focus();
-    await page.keyboard.press("Enter");
-    await until("the scan is over", () => ["reconstructing", "done", "failed"].includes(jobOf(station).state), 60_000);
-    await page.keyboard.press("2");
-    await until("the list of jobs", async () => (await page.locator("main .badge").count()) === 1);
-    await check(page, station);
-  },
-
-  /** The daemon's sentence, whatever stops the rig: here Stop in motion. */
-  async stop({ browser, station }) {
-    const page = await open(browser, station, {});
-    await ready(page);
-    await press(page, "START");
-    await until("the table moves", () => station.status().activity !== "none" && station.status().standstill === "moving");
-    await page.keyboard.press("x");
-    await until("the daemon has stopped", () => jobOf(station).state === "interrupted");
-    await until("the page has the sentence", async () => (await page.locator(".sentence").innerText()) === station.status().sentence);
-    await check(page, station);
-    await page.keyboard.press("2");
-    await until("it can be resumed", () => page.getByRole("button", { name: "Resume" }).isVisible());
-  },
-
-  /** A daemon that is killed, and one that hangs: grey with the age, STOP not delivered, then the truth again. */
-  async lost({ browser, station }) {
-    const page = await open(browser, station, { expected: /Failed to load resource|ERR_/ });
-    await ready(page);
-    station.process.kill("SIGSTOP");
-    await until("the page is grey", () => page.locator(".old").count(), 3000);
-    await until("it says so", async () => /Connection lost\. Last known state \d+ s ago\./.test(await page.locator(".banner").innerText()));
-    await page.locator("button.stop").dispatchEvent("pointerdown");
-    await until("STOP is not delivered", async () => (await page.locator(".stop-place").innerText()).includes("NOT DELIVERED"), 4000);
-    station.process.kill("SIGCONT");
-    await until("it is back", async () => (await page.locator(".old").count()) === 0, 6000);
-    await press(page, "START");
-    await until("views are stored", () => jobOf(station)?.stored.length > 0, 40_000);
-    await station.end("SIGKILL");
-    await until("the page is grey", () => page.locator(".old").count(), 3000);
+async function play(name, bin, browser) {
+  const began = performance.now();
+  const station = new Station(bin, [...RIG, ...(scenarios[name].rig ?? ALONE)]);
+  const pages = [];
+  const counted = { page: async (options) => pages[pages.push(await browser.page(options)) - 1] };
+  try {
     await station.start();
-    await until("it shows the new daemon's state", async () => (await word(page)) === station.status().word && !(await page.locator(".old").count()), 15_000);
-    await check(page, station);
-    await page.keyboard.press("2");
-    await until("it can be resumed", () => page.getByRole("button", { name: "Resume" }).isVisible());
-  },
-
-  /** Two pages press Continue, one of them late: it counts once, and the late one is told. */
-  async twice({ browser, station }) {
-    const page = await open(browser, station, {});
-    await ready(page);
-    const order = (offer) =>
-      page.evaluate(
-        (body) => fetch("/api/v1/start", { method: "POST", headers: { "X-Scanrig": "1" }, body }).then((reply) => reply.status),
-        JSON.stringify({ offer }),
-      );
-    const { offer } = station.status().actions.start;
-    const seen = await Promise.all([order(offer), order(offer)]);
-    assert.ok(seen.includes(200) && !seen.some((status) => status !== 200 && status !== 409), `${seen}`);
-    await see(page, "FLIP", 60_000);
-    page.wrong.length = 0; // a refusal is a failed request
-    assert.equal(await order(offer), 409, "the first Start, late");
-    await sleep(1000);
-    assert.equal(station.status().word, "FLIP", "nothing moved");
-    page.wrong.length = 0;
-  },
-
-  /** A viewer has no Start, is refused when it forces one, and stops the rig all the same. */
-  async viewer({ browser, station }) {
-    const page = await open(browser, station, { role: "viewer", expected: /403/ });
-    assert.equal(await page.getByRole("button", { name: "START" }).count(), 0);
-    const forced = await page.evaluate(() =>
-      fetch("/api/v1/start", { method: "POST", headers: { "X-Scanrig": "1" } }).then((reply) => reply.status));
-    assert.equal(forced, 403);
-    const engineer = await open(browser, station, {});
-    await ready(engineer);
-    await press(engineer, "START");
-    await until("the rig is busy", () => station.status().job);
-    await page.locator("button.stop").dispatchEvent("pointerdown");
-    await until("STOP was sent", async () => (await page.locator(".stop-place").innerText()).includes("STOP SENT"));
-    await until("the job is interrupted", () => jobOf(station).state === "interrupted");
-    await check(page, station);
-  },
-
-  /** Every screen in both themes and from 320 to 1920 px: nothing sticks out, nothing is illegible. */
-  async layout({ browser, station }) {
-    for (const theme of ["dark", "light"]) {
-      const page = await open(browser, station, { theme });
-      for (const width of WIDTHS) {
-        await page.setViewportSize({ width, height: 900 });
-        for (const key of ["1", "2", "3", "4", "5"]) {
-          await page.keyboard.press(key);
-          await sleep(150);
-          assert.deepEqual(await overflows(page), [], `${theme}, ${width} px, screen ${key}`);
-          const box = await page.locator("button.stop").boundingBox();
-          assert.ok(box.width >= 64 && box.height >= 64 && box.x >= 0 && box.x + box.width <= width, "STOP is there whole");
-          if (width === 390 || width === 1280) assert.deepEqual(await findings(page), [], `${theme}, ${width} px, screen ${key}`);
-        }
-      }
-      assert.deepEqual(page.wrong, []);
-    }
-  },
-};
-
-/** The newest job, in detail; nothing before there is one. */
-function jobOf(station) {
-  const [job] = JSON.parse(station.scanrig("jobs", "--json").stdout).jobs;
-  return job && JSON.parse(station.scanrig("jobs", job.id, "--json").stdout);
+    await scenarios[name]({ browser: counted, station });
+    for (const page of pages) assert.deepEqual(page.wrong, [], "errors of the page");
+    console.log(`ok   ${name}, ${((performance.now() - began) / 1000).toFixed(1)} s`);
+    return true;
+  } catch (error) {
+    console.log(`FAIL ${name}: ${error.stack}\n${station.log.slice(-1500)}`);
+    return false;
+  } finally {
+    for (const page of pages) await page.context().close();
+    await station.remove();
+  }
 }
 
 async function main() {
@@ -164,24 +39,7 @@ async function main() {
   const browser = new Browser();
   await browser.start();
   let failed = 0;
-  for (const name of names.length ? names : Object.keys(scenarios)) {
-    const began = performance.now();
-    const station = new Station(bin, RIG);
-    const pages = [];
-    const counted = { page: async (options) => pages[pages.push(await browser.page(options)) - 1] };
-    try {
-      await station.start();
-      await scenarios[name]({ browser: counted, station });
-      for (const page of pages) assert.deepEqual(page.wrong, [], "errors of the page");
-      console.log(`ok   ${name}, ${((performance.now() - began) / 1000).toFixed(1)} s`);
-    } catch (error) {
-      failed++;
-      console.log(`FAIL ${name}: ${error.stack}\n${station.log.slice(-1500)}`);
-    } finally {
-      for (const page of pages) await page.context().close();
-      await station.remove();
-    }
-  }
+  for (const name of names.length ? names : Object.keys(scenarios)) failed += (await play(name, bin, browser)) ? 0 : 1;
   await browser.end();
   return failed ? 1 : 0;
 }

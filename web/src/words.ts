@@ -1,5 +1,5 @@
 // Every word of the page's own. Sentences about the rig, and what to do next, are the daemon's.
-import type { Job, Role } from "./api/types.ts";
+import type { Job, Length, Role } from "./api/types.ts";
 
 export const words = {
   screens: { station: "Station", jobs: "Jobs", model: "Model", calibrate: "Calibrate", service: "Service" },
@@ -20,6 +20,8 @@ export const words = {
   noPicture: "No picture",
   frozen: "old picture",
   progress: (stored: number, all: number) => `${stored} of ${all} views stored`,
+  live: "Measured so far",
+  flipPicture: "Turn the object over, to stand on another side.",
   devices: "Devices",
   queue: "Queue",
   filters: { all: "All", queue: "Queue", trouble: "Trouble" },
@@ -41,11 +43,23 @@ export const words = {
   chooseJob: "Choose a finished job.",
   loading: "Loading the model.",
   noModel: "This job has no model.",
-  colourings: { texture: "Texture", shade: "Shade" },
+  colourings: { texture: "Texture", shade: "Shade", measured: "Measured", sigma: "Sigma" },
+  legends: {
+    texture: "",
+    shade: "",
+    measured: "Striped: closed by silhouettes or the table, not measured.",
+    sigma: "Standard deviation along the normal, 0 to 0.1 mm. Striped: not measured.",
+  },
   section: "Section",
   ruler: "Ruler",
   rulerHint: "Tap two points of the surface.",
-  distance: (mm: number) => `${mm.toFixed(2)} mm on the reduced mesh; the report has the uncertainty`,
+  measuring: "Measuring.",
+  length: (one: Length) =>
+    one.expanded_uncertainty_mm === null
+      ? `${one.mm.toFixed(2)} mm, ${
+          one.from.measured && one.to.measured ? "uncertainty not known: see the calibration" : "an end is not measured"
+        }`
+      : `${one.mm.toFixed(3)} mm ± ${one.expanded_uncertainty_mm.toFixed(3)} mm (k = 2)`,
   facts: "Facts",
   passed: "within the limits",
   below: "outside the limits",

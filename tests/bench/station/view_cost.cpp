@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "daemon/jobs/pipeline_reconstructor.h"
+#include "daemon/jobs/executors.h"
 #include "daemon/service/run_daemon.h"
 #include "sim/devices/sim_rig.h"
 

@@ -4,7 +4,7 @@
 #include <atomic>
 #include <new>
 
-#include "daemon/jobs/process_reconstructor.h"
+#include "daemon/jobs/executors.h"
 #include "tests/component/daemon/daemon_under_test.h"
 
 namespace scanrig {

@@ -36,6 +36,8 @@ class FakeReconstructor final : public Reconstructor {
     log_.calls.push_back(fmt::format("pose {}", pose));
     return {};
   }
+  std::string live_view(std::size_t) override { return "view so far"; }
+  std::string live_pose(std::size_t) override { return "pose so far"; }
   Result<void> finish(const std::filesystem::path& folder, const Context& context) override {
     context.report("texture", 1.0);
     log_.at_finish();

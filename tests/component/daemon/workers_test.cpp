@@ -138,5 +138,31 @@ TEST_F(Workers, ReconstructionOutlivesWhatIsThrownBesideIt) {
   EXPECT_TRUE(wait_for<event::ModelReady>());
 }
 
+TEST_F(Workers, WhatAScanShowsSoFarIsListedAndGoneWithItsEnd) {
+  make_job("job", "scanned", JobState::reconstructing);
+  const auto live = store->folder("job") / "live";
+  fakes::ReconstructionLog log;
+  std::string shown;
+  log.at_finish = [&] { shown = read_file(live / "pose1.glb").value_or("nothing"); };
+  {
+    ReconstructionThread reconstruction(
+        clock, [&](const ReconstructionTask&) { return std::make_unique<fakes::FakeReconstructor>(log); },
+        [&](Event event) { tell(std::move(event)); });
+    reconstruction.rebuild("job", store->folder("job"), {.poses = 1, .views = 2}, {});
+    std::unique_lock lock(mutex);
+    changed.wait_for(lock, std::chrono::minutes(1), [&] {
+      return std::ranges::any_of(events, [](const Event& e) { return std::holds_alternative<event::ModelReady>(e); });
+    });
+  }
+  std::vector<std::vector<std::string>> lists;
+  for (const auto& event : events) {
+    if (const auto* meshes = std::get_if<event::LiveMeshes>(&event)) lists.push_back(meshes->names);
+  }
+  EXPECT_THAT(lists, ElementsAre(ElementsAre("pose1_view00"), ElementsAre("pose1_view00", "pose1_view01"),
+                                 ElementsAre("pose1"), testing::IsEmpty()));
+  EXPECT_EQ(shown, "pose so far");
+  EXPECT_FALSE(fs::exists(live));
+}
+
 }  // namespace
 }  // namespace scanrig

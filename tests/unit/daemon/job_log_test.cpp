@@ -1,4 +1,4 @@
-#include "daemon/jobs/job_log.h"
+#include "daemon/jobs/job_files.h"
 
 #include <gmock/gmock.h>
 

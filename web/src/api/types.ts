@@ -78,6 +78,7 @@ export interface Job {
   remarks: string[];
   error: Problem | null;
   stages: { name: string; fraction: number }[];
+  live: string[]; // meshes of what the scan shows so far
 }
 
 export interface Health {
@@ -158,4 +159,17 @@ export interface CalibrationState {
 
 export interface FileList {
   files: { path: string; bytes: number; type: string }[];
+}
+
+export interface RulerEnd {
+  point: [number, number, number];
+  measured: boolean;
+  sigma_mm: number | null;
+}
+
+export interface Length {
+  mm: number;
+  expanded_uncertainty_mm: number | null;
+  from: RulerEnd;
+  to: RulerEnd;
 }

@@ -5,12 +5,13 @@ import { order, read } from "../api/client.ts";
 import { status } from "../api/store.ts";
 import type { BoardInImage, CalibrationState } from "../api/types.ts";
 import { Order } from "../parts/Order.tsx";
-import { Picture } from "../station/Picture.tsx";
+import { Picture, type Size } from "../station/Picture.tsx";
 import { words } from "../words.ts";
 
 const PERIOD_MS = 1000;
+const SIDES = ["left", "right"] as const;
 
-function Outline({ board, size }: { board: BoardInImage | undefined; size: [number, number] }) {
+function Outline({ board, size }: { board: BoardInImage | undefined; size: Size }) {
   if (!board) return null;
   const points = (corners: [number, number][]) => corners.map((one) => one.join(",")).join(" ");
   return (
@@ -101,16 +102,12 @@ export function Calibrate() {
     };
   }, []);
   const now = state.value;
-  const size: [number, number] = [1280, 960];
   return (
     <main class="columns">
       <div class="pictures">
-        <Picture side="left">
-          <Outline board={now?.board?.left} size={size} />
-        </Picture>
-        <Picture side="right">
-          <Outline board={now?.board?.right} size={size} />
-        </Picture>
+        {SIDES.map((side) => (
+          <Picture key={side} side={side} over={(size) => <Outline board={now?.board?.[side]} size={size} />} />
+        ))}
       </div>
       <div class="stack">
         {problem.value && <p class="wrong">{problem.value}</p>}

@@ -8,7 +8,7 @@ export function Head() {
   const now = status.value;
   const job = activeJob.value;
   return (
-    <header class={`head tone tone-${now?.tone ?? "idle"}`}>
+    <header class={`head tone-${now?.tone ?? "idle"}`}>
       {isOld.value && (
         <p class="banner" role="alert">
           {now ? words.lost(silentFor_s.value) : words.waiting}
@@ -16,8 +16,10 @@ export function Head() {
       )}
       {insecure.value && <p class="banner">{words.insecure}</p>}
       <h1 class="word">
-        <span class={`shape shape-${now?.tone ?? "idle"}`} aria-hidden="true" />
-        {now?.word ?? ""}
+        <span class="tile">
+          <span class={`shape shape-${now?.tone ?? "idle"}`} aria-hidden="true" />
+          {now?.word ?? ""}
+        </span>
         {job && <Ring job={job} />}
       </h1>
       <div class="saying" aria-live="polite">

@@ -8,8 +8,16 @@ import { words } from "../words.ts";
 const PERIOD_MS = 500;
 const OLD_MS = 2000;
 
-export function Picture({ side, children }: { side: "left" | "right"; children?: ComponentChildren }) {
+export type Size = [number, number]; // pixels
+
+interface Props {
+  side: "left" | "right";
+  over?: (image: Size) => ComponentChildren; // drawn over the image, in its pixels
+}
+
+export function Picture({ side, over }: Props) {
   const shown = useSignal("");
+  const size = useSignal<Size>([4, 3]);
   const old = useSignal(false);
   useEffect(() => {
     let ended = false;
@@ -29,6 +37,7 @@ export function Picture({ side, children }: { side: "left" | "right"; children?:
           await image.decode();
           if (shown.value) URL.revokeObjectURL(shown.value);
           shown.value = url;
+          size.value = [image.naturalWidth, image.naturalHeight];
           taken = performance.now();
         }
       } catch {
@@ -48,7 +57,7 @@ export function Picture({ side, children }: { side: "left" | "right"; children?:
   return (
     <figure class={`picture ${old.value ? "picture-old" : ""}`}>
       {shown.value ? <img src={shown.value} alt={name} /> : <span>{words.noPicture}</span>}
-      {children}
+      {shown.value && over?.(size.value)}
       <figcaption>
         {name}
         {shown.value && old.value ? `, ${words.frozen}` : ""}

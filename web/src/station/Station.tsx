@@ -3,6 +3,7 @@ import { activeJob, jobs, status } from "../api/store.ts";
 import { JobLine } from "../jobs/JobLine.tsx";
 import { Order } from "../parts/Order.tsx";
 import { words } from "../words.ts";
+import { Live } from "./Live.tsx";
 import { Picture } from "./Picture.tsx";
 
 function Buttons() {
@@ -11,9 +12,11 @@ function Buttons() {
   const { start, reset } = now.actions;
   return (
     <>
-      <Order needs="operator" class="start" action={start} send={() => order("/start", { offer: start.offer })}>
-        {start.does === "continue" ? words.carryOn : words.start}
-      </Order>
+      <div class="start-place">
+        <Order needs="operator" class="start" action={start} send={() => order("/start", { offer: start.offer })}>
+          {start.does === "continue" ? words.carryOn : words.start}
+        </Order>
+      </div>
       {now.tone !== "ready" && now.tone !== "working" && (
         <Order needs="operator" class="big" action={reset} send={() => order("/reset")}>
           {words.reset}
@@ -50,6 +53,7 @@ export function Station() {
           <Picture side="left" />
           <Picture side="right" />
         </div>
+        {active && active.live.length > 0 && <Live job={active} />}
         {active && <JobLine job={active} />}
       </div>
       <div class="stack">

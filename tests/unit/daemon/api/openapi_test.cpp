@@ -1,4 +1,3 @@
-#include "daemon/api/openapi.h"
 
 #include <gmock/gmock.h>
 
