@@ -69,8 +69,8 @@ Result<std::shared_ptr<const ModelRuler::Model>> ModelRuler::open(const fs::path
   return last_ = std::move(model);
 }
 
-Result<MeasuredLength> ModelRuler::measure(const fs::path& job_folder, const Eigen::Vector3d& from,
-                                           const Eigen::Vector3d& to) {
+Result<ModelLength> ModelRuler::measure(const fs::path& job_folder, const Eigen::Vector3d& from,
+                                        const Eigen::Vector3d& to) {
   const std::scoped_lock lock(mutex_);
   const auto opened = open(job_folder);
   if (!opened) return pass_on(opened);
@@ -84,7 +84,7 @@ Result<MeasuredLength> ModelRuler::measure(const fs::path& job_folder, const Eig
     }
     ends[i] = surface_point(model.mesh, nearest);
   }
-  MeasuredLength length;
+  ModelLength length;
   length.from = ends[0].end;
   length.to = ends[1].end;
   const Eigen::Vector3d line = length.to.point - length.from.point;

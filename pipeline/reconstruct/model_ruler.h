@@ -17,7 +17,7 @@ struct RulerEnd {
   double sigma_mm = 0.0;                            ///< along the surface's normal; NaN where it is not measured
 };
 
-struct MeasuredLength {
+struct ModelLength {
   double mm = 0.0;
   RulerEnd from, to;
   /// U for k = 2, after GUM: sigma of both ends along the line, the calibration's sigma of a point at both ends, and
@@ -33,8 +33,8 @@ class ModelRuler {
 
   /// `job_folder` has model/model.ply and calibration.json; both points in mm in the model's frame. Fails with
   /// `not_found` (no model), `invalid_input` (a point that is not at the surface), `io`.
-  Result<MeasuredLength> measure(const std::filesystem::path& job_folder, const Eigen::Vector3d& from,
-                                 const Eigen::Vector3d& to);
+  Result<ModelLength> measure(const std::filesystem::path& job_folder, const Eigen::Vector3d& from,
+                              const Eigen::Vector3d& to);
 
  private:
   struct Model;

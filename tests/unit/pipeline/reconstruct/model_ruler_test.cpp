@@ -52,10 +52,10 @@ class ModelRulerTest : public scan_samples::FolderTest {
                      {"shear", 0.0}, {"offsets_mm", {0, 0, 0}}};
     scan_samples::write_text(folder_ / "calibration.json", json.dump());
   }
-  MeasuredLength measured(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  ModelLength measured(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
     const auto length = ruler_.measure(folder_, from, to);
     EXPECT_TRUE(length) << length.error().message;
-    return length.value_or(MeasuredLength{});
+    return length.value_or(ModelLength{});
   }
 
   ModelRuler ruler_;
