@@ -11,7 +11,7 @@ await rm(out, { recursive: true, force: true });
 await mkdir(join(out, "assets"), { recursive: true });
 
 const result = await build({
-  entryPoints: { main: "src/main.tsx" },
+  entryPoints: { main: "src/main.tsx", "live-worker": "src/view3d/live_worker.ts" },
   outdir: join(out, "assets"),
   entryNames: "[name]-[hash]",
   chunkNames: "[name]-[hash]",
@@ -34,11 +34,13 @@ await writeFile(join(out, "assets", iconName), icon);
 const files = Object.entries(result.metafile.outputs);
 const entry = files.find(([, made]) => made.entryPoint === "src/main.tsx");
 const script = basename(entry[0]);
+const worker = basename(files.find(([, made]) => made.entryPoint === "src/view3d/live_worker.ts")[0]);
 const style = basename(entry[1].cssBundle);
 // What the first screen needs besides is fetched at once, not one after the other.
 const first = entry[1].imports.filter((one) => one.kind === "import-statement").map((one) => basename(one.path));
 const html = (await readFile("src/index.html", "utf8"))
   .replace("<!-- icon -->", `<link rel="icon" href="/assets/${iconName}" type="image/svg+xml">`)
+  .replace("<!-- worker -->", `<meta name="live-worker" content="/assets/${worker}">`)
   .replace("<!-- style -->", `<link rel="stylesheet" href="/assets/${style}">`)
   .replace(
     "<!-- script -->",

@@ -51,7 +51,7 @@ TEST(GrblProtocolTest, WhatIsNotUnderstoodToTheLastCharacterIsNoise) {
                            "<Idle|MPos:nan>",
                            "<Idle|MPos:>",
                            "<Idle|MPos:1|MPos:2>",
-                           "<Idle:1|MPos:0.000>",
+                           "<Idle:x|MPos:0.000>",
                            "<Hold:x|MPos:0.000>",
                            "<Moving|MPos:0.000>",
                            "<Idle|MPos:0.0\x9a>",

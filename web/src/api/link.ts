@@ -1,6 +1,6 @@
 // The state of the connection, apart from sockets and clocks: what was heard when, and what follows from it.
 
-export const SILENCE_MS = 1000; // without an event for so long, what the page shows is old
+export const SILENCE_MS = 900; // without an event for so long, what the page shows is old
 export const DEAF_MS = 400; // a tap on what has just appeared is no decision
 const RETRY_MS = [250, 500, 1000, 2000];
 

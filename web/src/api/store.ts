@@ -22,7 +22,7 @@ export const activeJob = computed(() => {
 });
 export const newestFirst = computed(() => [...jobs.value.values()].sort((a, b) => (a.id < b.id ? 1 : -1)));
 
-const TICK_MS = 100;
+const TICK_MS = 50;
 const HIDDEN_MS = 10_000; // a hidden page asks so often, over no stream
 const OPEN_LIMIT_MS = 5000;
 

@@ -53,7 +53,7 @@ export function Station() {
           <Picture side="left" />
           <Picture side="right" />
         </div>
-        {active && active.live.length > 0 && <Live job={active} />}
+        {active && active.live.length > 0 && <Live key={active.id} job={active} />}
         {active && <JobLine job={active} />}
       </div>
       <div class="stack">

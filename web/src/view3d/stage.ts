@@ -1,4 +1,4 @@
-// A scene on a canvas with its light and a camera that turns around it; drawn only when something has changed.
+// A scene on a canvas with its light and camera, in a page or in a worker; drawn only when something has changed.
 import {
   AmbientLight,
   type Box3,
@@ -9,21 +9,27 @@ import {
   Vector3,
   WebGLRenderer,
 } from "three";
-import { OrbitControls } from "three/addons/controls/OrbitControls.js";
+
+export interface Size {
+  width: number; // CSS pixels
+  height: number;
+  ratio: number;
+}
 
 export interface Stage {
   scene: Scene;
   camera: PerspectiveCamera;
+  /** Soon, once, whatever the number of calls. */
   draw(): void;
-  /** Puts the camera so that the box is seen whole. */
-  frame(box: Box3): void;
+  /** Puts the camera so that the box is seen whole; returns its centre. */
+  frame(box: Box3): Vector3;
   close(): void;
 }
 
 const DISTANCE = 1.7; // in diagonals of the box
 const FROM = new Vector3(0.4, 0.35, 1).normalize();
 
-export function openStage(canvas: HTMLCanvasElement): Stage {
+export function openStage(canvas: HTMLCanvasElement | OffscreenCanvas, sizeOf: () => Size): Stage {
   const renderer = new WebGLRenderer({ canvas, antialias: true });
   renderer.localClippingEnabled = true;
   renderer.setClearColor(new Color("#12171c"));
@@ -33,7 +39,6 @@ export function openStage(canvas: HTMLCanvasElement): Stage {
   light.position.set(1, 2, 3);
   camera.add(light);
   scene.add(camera, new AmbientLight("#ffffff", 1));
-  const controls = new OrbitControls(camera, canvas);
   let due = false;
   let closed = false;
   const draw = () => {
@@ -42,17 +47,14 @@ export function openStage(canvas: HTMLCanvasElement): Stage {
     requestAnimationFrame(() => {
       due = false;
       if (closed) return;
-      const { clientWidth: width, clientHeight: height } = canvas;
-      renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+      const { width, height, ratio } = sizeOf();
+      renderer.setPixelRatio(Math.min(ratio, 2));
       renderer.setSize(width, height, false);
       camera.aspect = width / Math.max(height, 1);
       camera.updateProjectionMatrix();
       renderer.render(scene, camera);
     });
   };
-  controls.addEventListener("change", draw);
-  const resized = new ResizeObserver(draw);
-  resized.observe(canvas);
   return {
     scene,
     camera,
@@ -63,14 +65,12 @@ export function openStage(canvas: HTMLCanvasElement): Stage {
       camera.near = size / 100;
       camera.far = size * 20;
       camera.position.copy(centre).addScaledVector(FROM, size * DISTANCE);
-      controls.target.copy(centre);
-      controls.update();
+      camera.lookAt(centre);
       draw();
+      return centre;
     },
     close() {
       closed = true;
-      resized.disconnect();
-      controls.dispose();
       renderer.dispose();
     },
   };

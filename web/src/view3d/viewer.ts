@@ -1,5 +1,6 @@
 // The model in three.js, drawn only when something has changed.
 import { Box3, BufferGeometry, Line, LineBasicMaterial, Mesh, Plane, Raycaster, Vector2, Vector3 } from "three";
+import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { COLOURINGS, type Colouring, looksOf } from "./colourings.ts";
 import { openStage, type Stage } from "./stage.ts";
@@ -65,8 +66,17 @@ export async function openViewer(
 ): Promise<Viewer> {
   const { scene: loaded } = await new GLTFLoader().loadAsync(url);
   const box = new Box3().setFromObject(loaded);
-  const at = openStage(canvas);
-  at.frame(box);
+  const at = openStage(canvas, () => ({
+    width: canvas.clientWidth,
+    height: canvas.clientHeight,
+    ratio: devicePixelRatio,
+  }));
+  const controls = new OrbitControls(at.camera, canvas);
+  controls.target.copy(at.frame(box));
+  controls.addEventListener("change", at.draw);
+  controls.update();
+  const resized = new ResizeObserver(at.draw);
+  resized.observe(canvas);
   const plane = new Plane(new Vector3(0, -1, 0), box.max.y);
   const meshes: Mesh[] = [];
   loaded.traverse((one) => {
@@ -108,6 +118,8 @@ export async function openViewer(
     close() {
       canvas.removeEventListener("pointerdown", onDown);
       canvas.removeEventListener("pointerup", onUp);
+      resized.disconnect();
+      controls.dispose();
       at.close();
     },
   };
