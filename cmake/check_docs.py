@@ -8,7 +8,7 @@ import re
 import subprocess
 import sys
 
-TOP = ("cmake", "config", "core", "daemon", "docs", "drivers", "pipeline", "sim", "systemd", "tests", "web")
+TOP = ("cmake", "config", "core", "daemon", "debian", "docs", "drivers", "pipeline", "sim", "systemd", "tests", "web")
 MAX_PARAGRAPH_WORDS = 120
 MAX_DOC_LINES = 150
 MAX_LINES = {"README.md": 60, "docs/roadmap.md": 40, "docs/status.md": 60, "docs/develop/README.md": 80,

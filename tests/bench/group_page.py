@@ -5,6 +5,8 @@ import json
 import pathlib
 import time
 
+import page_package
+
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 BROWSER = ROOT / "tests" / "browser"
 SCENE_S, BARS_S = 420, 900
@@ -65,4 +67,4 @@ def bundle(bench, scratch):
         bench.at_most(f"bundle of the page, gzip: {name}", limit, sum(size[path] for path in shares[name]), "kB", digits=0)
 
 
-PARTS = {"scenes": scenes, "bars": bars, "bundle": bundle}
+PARTS = {"scenes": scenes, "bars": bars, "bundle": bundle, "package": page_package.measure}

@@ -102,7 +102,6 @@ function toPixels(heard, painted) {
   const lags = said.slice(1).flatMap(({ data, at }, i, all) => {
     const until = all[i + 1]?.at ?? Infinity;
     const seen = painted.find((one) => one.sentence === data.sentence && one.at >= at - 50 && one.at < until + 250);
-
     if (!seen) return until - at < 250 ? [] : [Infinity];
     return [Math.max(0, seen.at - at)];
   });
