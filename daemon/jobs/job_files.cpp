@@ -1,6 +1,7 @@
 #include "daemon/jobs/job_files.h"
 
 #include <algorithm>
+#include <fstream>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <system_error>
@@ -106,11 +107,19 @@ fs::path model_folder(const fs::path& job_folder) { return job_folder / "model";
 fs::path model_file(const fs::path& job_folder, RecipeKind kind) {
   return model_folder(job_folder) / (kind == RecipeKind::scan ? "model.glb" : "calibration.json");
 }
+/// Not synced: nothing needs it after a power cut. A client that reads it by its name reads the whole.
 Result<void> write_live_mesh(const fs::path& job_folder, const std::string& name, std::string_view glb) {
-  const auto folder = job_folder / kLive;
+  const auto file = job_folder / kLive / (name + ".glb");
+  const auto half = job_folder / kLive / (name + ".tmp");
   std::error_code error;
-  fs::create_directory(folder, error);  // nothing needs it after a power cut; what fails, fails again below
-  return write_file_atomically(folder / (name + ".glb"), glb);
+  fs::create_directory(file.parent_path(), error);
+  std::ofstream out(half, std::ios::binary);
+  out << glb;
+  out.close();
+  if (out.good()) fs::rename(half, file, error);
+  if (out.good() && !error) return {};
+  remove_file(half);
+  return fail(ErrorCode::io, "cannot write {}", file.string());
 }
 
 void remove_live_meshes(const fs::path& job_folder) {

@@ -33,14 +33,14 @@ try {
   await shoot("ready");
   await press(pages.desk, "START");
   await until("views are stored", () => jobOf(station)?.stored.length >= 2, 60_000);
-  await until("they are shown", () => pages.desk.locator(".live").count(), 30_000);
+  await until("they are shown", () => pages.desk.locator(".live").count(), 150_000);
   await shoot("scanning");
-  await see(pages.desk, "FLIP", 90_000);
+  await see(pages.desk, "FLIP", 200_000);
   await sleep(3000);
   await shoot("flip");
   await until("it may be pressed", () => pages.desk.getByRole("button", { name: "CONTINUE", exact: true }).isEnabled());
   await press(pages.desk, "CONTINUE");
-  await until("the model is made", () => jobOf(station).state === "done", 300_000);
+  await until("the model is made", () => jobOf(station).state === "done", 900_000);
   await show("2");
   await shoot("jobs");
   for (const page of Object.values(pages)) {

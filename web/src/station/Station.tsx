@@ -49,11 +49,11 @@ export function Station() {
   return (
     <main class="columns">
       <div class="stack">
+        {active && active.live.length > 0 && <Live key={active.id} job={active} />}
         <div class="pictures">
           <Picture side="left" />
           <Picture side="right" />
         </div>
-        {active && active.live.length > 0 && <Live key={active.id} job={active} />}
         {active && <JobLine job={active} />}
       </div>
       <div class="stack">
