@@ -212,8 +212,10 @@ def serial_unplugged(station):
     station.wait("no port", lambda: station.machine.call("test -e /dev/scanrig/turntable")[0] != 0, 10)
     station.plug_serial(True)
     station.wait("the turntable back", lambda: device_is_there(station, "turntable"), 30)
+    latency = station.machine.do("cat /sys/bus/usb-serial/devices/ttyUSB*/latency_timer")
+    expect(latency == "1", f"the adapter's latency is {latency} ms")
     recovers(station)
-    return f"job {state}: {sentence}"
+    return f"job {state}: {sentence}; latency {latency} ms"
 
 
 def device_is_there(station, name):

@@ -56,6 +56,14 @@ std::vector<gid_t> own_groups() {
   return groups;
 }
 
+/// Milliseconds for which an FTDI adapter keeps what it has received.
+void check_latency(const std::string& port, Report& report) {
+  const auto timer = attribute(fs::path("/sys/bus/usb-serial/devices") / port / "latency_timer");
+  if (timer.empty() || timer == "1") return;
+  report.find("serial_latency", fmt::format("The adapter at /dev/{} passes bytes on after {} ms.", port, timer),
+              "Install the package's rules for devices (60-scanrig.rules), then plug the adapter in again.");
+}
+
 void list_serial(Report& report) {
   report.section("Serial adapters");
   std::vector<fs::path> named = entries("/dev/serial/by-id"), seen;
@@ -70,6 +78,7 @@ void list_serial(Report& report) {
       seen.push_back(port);
     }
   }
+  for (const fs::path& port : seen) check_latency(port.filename().string(), report);
   if (seen.empty()) report.note("none");
 }
 
