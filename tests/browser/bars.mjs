@@ -161,10 +161,18 @@ async function heap(browser, station) {
   await page.context().close();
 }
 
+/** Until the table is seen to stand, Reset is refused. */
+async function resetUntilReady(station) {
+  if (station.status().word === "READY") return true;
+  await ask(station, { method: "POST", path: "/api/v1/reset", local: true });
+  return false;
+}
+
 /** Seconds from Start to the flip, with a page that reads everything and without. */
 async function acquisition(browser, station) {
   const times = { alone: [], watched: [] };
   for (let i = 0; i < 2 * PAIRS; i++) {
+    await until("ready", () => resetUntilReady(station), 60_000);
     const kind = i % 2 ? "watched" : "alone";
     const client = kind === "watched" ? watcher(station) : null;
     const begun = performance.now();
@@ -172,8 +180,7 @@ async function acquisition(browser, station) {
     await until("the flip", () => station.status().word === "FLIP", 120_000);
     times[kind].push(performance.now() - begun);
     client?.close();
-    await ask(station, { method: "POST", path: `/api/v1/jobs/${station.status().job}/cancel`, local: true });
-    await until("ready", () => station.status().word === "READY", 60_000);
+    await ask(station, { method: "POST", path: "/api/v1/stop", local: true });
   }
   const median = (values) => share(values, 0.5);
   tell("acquisition with a client that takes images and patches", 2, 100 * (median(times.watched) / median(times.alone) - 1), "%", 1);
@@ -207,10 +214,6 @@ await browser.start();
 for (const name of names.length ? names : Object.keys(parts)) {
   const station = new Station(bin, RIG);
   await station.start();
-  if (name === "acquisition") {
-    await ask(station, { method: "POST", path: "/api/v1/reset", local: true });
-    await until("ready", () => station.status().word === "READY", 60_000);
-  }
   try {
     await parts[name](browser, station);
   } catch (error) {
