@@ -89,7 +89,7 @@ check_page() {
   begun=$(date +%s%N)
   ${command%--operator*} $quick --clock virtual >/tmp/sim.log 2>&1 &
   sim_pid=$!
-  wait_for curl -sf -o /tmp/page.html http://127.0.0.1:8081/
+  wait_for curl -sf --compressed -o /tmp/page.html http://127.0.0.1:8081/
   found=$?
   took=$((($(date +%s%N) - begun) / 1000000))
   row "first page from 127.0.0.1" $found "$(wc -c </tmp/page.html) bytes, $took ms after the start"
