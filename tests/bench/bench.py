@@ -72,6 +72,7 @@ class Bench:
 
     def line(self, what, asked, measured, ok):
         """`ok` is True, False or None (not measured; `measured` gives the reason)."""
+        measured = " ".join(measured.replace(f"{ROOT}/", "").split())  # an error's text: one line, no place of this machine
         self.lines.append({"group": self.group, "what": what, "asked": asked, "measured": measured, "ok": ok})
         print(f"{what} | {asked} | {measured} | {'-' if ok is None else 'ok' if ok else 'NO'}", flush=True)
 
