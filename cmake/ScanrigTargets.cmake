@@ -35,6 +35,10 @@ if(SCANRIG_PRECOMPILE AND SCANRIG_CCACHE)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${SCANRIG_CCACHE})
 endif()
 
+# Sources of one library are compiled several at a time: half of the work. So names without a linkage differ in a library.
+option(SCANRIG_UNITY "Compile the sources of a library together" ON)
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 12)
+
 # scanrig_precompiled(NAME HEADERS ... LINK libs [OPTIONS ...]): the target whose precompiled header others use, with
 # the same options.
 function(scanrig_precompiled name)
@@ -70,6 +74,7 @@ function(scanrig_library name)
     target_include_directories(scanrig_${name} PUBLIC ${CMAKE_SOURCE_DIR})
     target_link_libraries(scanrig_${name} PUBLIC ${ARG_LINK} PRIVATE ${ARG_PRIVATE} scanrig_warnings)
     scanrig_use_precompiled_for(scanrig_${name} ${ARG_LINK} ${ARG_PRIVATE})
+    set_target_properties(scanrig_${name} PROPERTIES UNITY_BUILD ${SCANRIG_UNITY})
   else()
     add_library(scanrig_${name} INTERFACE)
     target_include_directories(scanrig_${name} INTERFACE ${CMAKE_SOURCE_DIR})

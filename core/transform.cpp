@@ -26,4 +26,10 @@ Transform small_motion(const Eigen::Vector3d& rotation_vector, const Eigen::Vect
   return transform;
 }
 
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d m;
+  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
+  return m;
+}
+
 }  // namespace scanrig

@@ -16,4 +16,7 @@ double rotation_angle(const Eigen::Matrix3d& rotation);
 /// Rigid motion of a small rotation vector (radians) and a translation: exp(rotation), then the translation added.
 Transform small_motion(const Eigen::Vector3d& rotation_vector, const Eigen::Vector3d& translation);
 
+/// The matrix whose product with w is v x w.
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v);
+
 }  // namespace scanrig

@@ -23,6 +23,8 @@ struct DegreesPerSecond2 {
   auto operator<=>(const DegreesPerSecond2&) const = default;
 };
 
+inline constexpr double kMicrometresPerMm = 1e3;
+
 constexpr double to_radians(double degrees) { return degrees * std::numbers::pi / 180.0; }
 constexpr double to_radians(Degrees angle) { return to_radians(angle.value); }
 constexpr double to_degrees(double radians) { return radians * 180.0 / std::numbers::pi; }

@@ -56,8 +56,6 @@ tl::unexpected<Error> bad(std::string_view problem) {
   return fail(ErrorCode::invalid_input, "the request's target {}", problem);
 }
 
-using nlohmann::json;
-
 constexpr int kDeepest = 8;  ///< of a body; no route takes nested values
 
 tl::unexpected<Error> bad(const RequestField& field, std::string_view problem) {
@@ -93,7 +91,7 @@ Result<Values::Value> parse_number(const RequestField& field, const std::string&
 constexpr std::string_view kNoNumber = "is not a number", kNoInteger = "is not a whole number",
                            kNoFlag = "is not true or false", kNoText = "is not a text";
 
-Result<Values::Value> value_of(const RequestField& field, const json& value) {
+Result<Values::Value> value_of(const RequestField& field, const nlohmann::json& value) {
   switch (field.type) {
     case RequestField::Type::text:
       return value.is_string() ? check_text(field, value.get<std::string>()) : bad(field, kNoText);
@@ -112,19 +110,19 @@ Result<Values::Value> value_of(const RequestField& field, const json& value) {
 }
 
 /// nlohmann's parser keeps the last of two equal keys; here that is reported as an error, as is too deep a nesting.
-json parse_strictly(std::string_view body) {
+nlohmann::json parse_strictly(std::string_view body) {
   std::vector<std::set<std::string>> keys;
   bool sound = true;
-  const auto watch = [&](int depth, json::parse_event_t event, json& parsed) {
-    using Seen = json::parse_event_t;
+  const auto watch = [&](int depth, nlohmann::json::parse_event_t event, nlohmann::json& parsed) {
+    using Seen = nlohmann::json::parse_event_t;
     sound = sound && depth <= kDeepest;
     if (event == Seen::object_start) keys.emplace_back();
     if (event == Seen::object_end && !keys.empty()) keys.pop_back();
     if (event == Seen::key && !keys.empty()) sound = keys.back().insert(parsed.get<std::string>()).second && sound;
     return sound;
   };
-  auto parsed_body = json::parse(body.begin(), body.end(), watch, false);
-  return sound ? parsed_body : json(json::value_t::discarded);
+  auto parsed_body = nlohmann::json::parse(body.begin(), body.end(), watch, false);
+  return sound ? parsed_body : nlohmann::json(nlohmann::json::value_t::discarded);
 }
 
 }  // namespace
@@ -173,7 +171,7 @@ Result<Values::Value> parse_value(const RequestField& field, const std::string& 
 
 Result<void> read_body(std::string_view body, const std::vector<RequestField>& fields, Values& values) {
   const auto blank = body.find_first_not_of(" \t\r\n") == std::string_view::npos;
-  const auto object = blank ? json::object() : parse_strictly(body);
+  const auto object = blank ? nlohmann::json::object() : parse_strictly(body);
   if (!object.is_object()) {
     return fail(ErrorCode::invalid_input, "the body is not a JSON object with every key once");
   }

@@ -81,6 +81,9 @@ struct Reply {
   std::string_view type = "application/json";
 };
 
+inline const RequestField kJobId{.name = "id", .description = "the job", .required = true, .min = 1, .max = 128};
+inline constexpr Reply kJobDone{.description = "done, and durable", .schema = "JobDone"};
+
 /// One operation of the API. Dispatch, checks and the OpenAPI document all read only this.
 struct Route {
   Method method;

@@ -11,8 +11,6 @@ namespace {
 using nlohmann::ordered_json;
 using What = event::JobRequested::What;
 
-constexpr Reply kDone{.description = "done, and durable", .schema = "JobDone"};
-
 /// The calibration that is active, else the newest.
 std::shared_ptr<const JobInfo> current_calibration(const Snapshot& snapshot) {
   const auto active = snapshot.jobs.find(snapshot.job);
@@ -140,7 +138,7 @@ Route engineers(std::string_view path, std::string_view description,
           .path = path,
           .role = Role::engineer,
           .description = description,
-          .reply = kDone,
+          .reply = kJobDone,
           .errors = std::move(errors),
           .handle = handle};
 }

@@ -10,7 +10,6 @@ namespace {
 
 using nlohmann::ordered_json;
 
-const RequestField kId{.name = "id", .description = "the job", .required = true, .min = 1, .max = 128};
 const RequestField kFile{.name = "file",
                          .description = "path within the job's folder, its slashes written %2F",
                          .required = true,
@@ -90,7 +89,7 @@ Route measure_route() {
       .description =
           "The distance of two points of a job's model, with U (k = 2). Both in mm in the model's frame, "
           "within 2 mm of its surface.",
-      .in_path = {kId},
+      .in_path = {kJobId},
       .reply = {.description = "the points on the surface and their distance", .schema = "Length"},
       .errors = {500},
       .slow = true,
@@ -135,14 +134,14 @@ std::vector<Route> job_routes() {
        .path = "/api/v1/jobs/{id}",
        .role = Role::viewer,
        .description = "One job with its views and stages.",
-       .in_path = {kId},
+       .in_path = {kJobId},
        .reply = {.description = "the job", .schema = "JobDetail"},
        .handle = show},
       {.method = Method::get,
        .path = "/api/v1/jobs/{id}/files",
        .role = Role::viewer,
        .description = "The files in a job's folder: images, manifest, model, report.",
-       .in_path = {kId},
+       .in_path = {kJobId},
        .reply = {.description = "as they are now", .schema = "FileList"},
        .errors = {500},
        .slow = true,
@@ -151,7 +150,7 @@ std::vector<Route> job_routes() {
        .path = "/api/v1/jobs/{id}/files/{file}",
        .role = Role::viewer,
        .description = "One file of a job, such as pose1%2Fview00%2Fleft_pattern.png.",
-       .in_path = {kId, kFile},
+       .in_path = {kJobId, kFile},
        .reply = {.description = "the file, with the media type of its ending", .type = "application/octet-stream"},
        .errors = {500},
        .slow = true,
@@ -161,7 +160,7 @@ std::vector<Route> job_routes() {
        .path = "/api/v1/jobs/{id}/model",
        .role = Role::viewer,
        .description = "The textured model of a job.",
-       .in_path = {kId},
+       .in_path = {kJobId},
        .reply = {.description = "glTF 2.0, binary", .type = "model/gltf-binary"},
        .errors = {500},
        .slow = true,
@@ -171,7 +170,7 @@ std::vector<Route> job_routes() {
        .path = "/api/v1/jobs/{id}/report",
        .role = Role::viewer,
        .description = "The report of a job's reconstruction.",
-       .in_path = {kId},
+       .in_path = {kJobId},
        .reply = {.description = "report.json as it was written", .schema = "Report"},
        .errors = {500},
        .slow = true,

@@ -11,9 +11,6 @@ namespace {
 using What = event::JobRequested::What;
 using Type = RequestField::Type;
 
-const RequestField kId{.name = "id", .description = "the job", .required = true, .min = 1, .max = 128};
-constexpr Reply kDone{.description = "done, and durable", .schema = "JobDone"};
-
 ControlLoop::Reply reply_with(std::string job, Send send) {
   return [job = std::move(job), send = std::move(send)](const Result<std::string>& done) {
     if (!done) return send(error_response(done.error()));
@@ -43,9 +40,9 @@ Route job_route(Method method, std::string_view path, Role role, What what, std:
           .path = path,
           .role = role,
           .description = description,
-          .in_path = {kId},
+          .in_path = {kJobId},
           .in_body = std::move(body),
-          .reply = kDone,
+          .reply = kJobDone,
           .errors = {409, 500},
           .handle = [what](const ApiStation& station, const Values& values, Send send) {
             ask(station, values, what, std::move(send));
@@ -66,7 +63,7 @@ Route order_route() {
             .description = "so many jobs; 1 without it",
             .min = 1,
             .max = 100}},
-      .reply = kDone,
+      .reply = kJobDone,
       .errors = {404, 409, 500},
       .handle = order};
 }
@@ -78,7 +75,7 @@ Route bundle_route() {
       .role = Role::operating,
       .description =
           "The whole folder of a job that has ended, as one archive to send to support. The job counts as exported.",
-      .in_path = {kId},
+      .in_path = {kJobId},
       .reply = {.description = "a compressed tar archive", .type = "application/gzip"},
       .errors = {409, 500},
       .reply_timeout = std::chrono::seconds(180),

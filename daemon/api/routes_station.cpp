@@ -7,11 +7,11 @@ namespace scanrig {
 namespace {
 
 using nlohmann::ordered_json;
-using What = event::MaintenanceRequested::What;
+using Task = event::MaintenanceRequested::What;
 
 constexpr Reply kPressed{.description = "obeyed", .schema = "Pressed"};
 constexpr Reply kStopped{.description = "stop was sent", .schema = "Stopped"};
-constexpr Reply kDone{.description = "obeyed; the status reports its progress", .schema = "Nothing"};
+constexpr Reply kObeyed{.description = "obeyed; the status reports its progress", .schema = "Nothing"};
 
 ApiResponse pressed(const Result<std::string>& job) {
   if (!job) return error_response(job.error());
@@ -79,15 +79,15 @@ void ask(const ApiStation& station, const event::MaintenanceRequested& asked, Se
   });
 }
 
-Route maintenance(std::string_view path, What what, std::string_view description) {
+Route maintenance(std::string_view path, Task task, std::string_view description) {
   return {.method = Method::post,
           .path = path,
           .role = Role::engineer,
           .description = description,
-          .reply = kDone,
+          .reply = kObeyed,
           .errors = {409},
-          .handle = [what](const ApiStation& station, const Values& values, Send send) {
-            ask(station, {.what = what, .speed = kMaxJogSpeed, .requester = values.requester()}, std::move(send));
+          .handle = [task](const ApiStation& station, const Values& values, Send send) {
+            ask(station, {.what = task, .speed = kMaxJogSpeed, .requester = values.requester()}, std::move(send));
           }};
 }
 
@@ -97,7 +97,7 @@ void jog(const ApiStation& station, const Values& values, Send send) {
     return send(error_response({ErrorCode::invalid_input, "a jog takes to_deg or by_deg, one of them"}));
   }
   ask(station,
-      {.what = What::jog,
+      {.what = Task::jog,
        .angle = {to ? *to : *by},
        .relative = by.has_value(),
        .speed = {values.number("speed_deg_s").value_or(kMaxJogSpeed.value)},
@@ -126,7 +126,7 @@ Route jog_route() {
                        .description = "how fast; without it as fast as maintenance may",
                        .min = 0.0,
                        .max = 360.0}},
-          .reply = kDone,
+          .reply = kObeyed,
           .errors = {409},
           .handle = jog};
 }
@@ -172,12 +172,12 @@ std::vector<Route> station_routes() {
       start_route(),
       stop_route(),
       press("/api/v1/reset", Button::reset, Role::operating, "Clears a fault and homes the table."),
-      maintenance("/api/v1/maintenance/on", What::on, "Maintenance mode begins: no jobs."),
-      maintenance("/api/v1/maintenance/off", What::off, "Maintenance mode ends."),
-      maintenance("/api/v1/maintenance/home", What::home, "Homes the table while maintenance is on."),
+      maintenance("/api/v1/maintenance/on", Task::on, "Maintenance mode begins: no jobs."),
+      maintenance("/api/v1/maintenance/off", Task::off, "Maintenance mode ends."),
+      maintenance("/api/v1/maintenance/home", Task::home, "Homes the table while maintenance is on."),
       jog_route(),
-      maintenance("/api/v1/maintenance/pulse", What::pulse, "One flash of the projector."),
-      maintenance("/api/v1/maintenance/lamp_test", What::lamp_test, "All lamps on for three seconds."),
+      maintenance("/api/v1/maintenance/pulse", Task::pulse, "One flash of the projector."),
+      maintenance("/api/v1/maintenance/lamp_test", Task::lamp_test, "All lamps on for three seconds."),
   };
 }
 

@@ -16,8 +16,6 @@ constexpr unsigned kFirstError = 400, kForbidden = 403;
 constexpr std::size_t kMaxPathLength = 200;  ///< in the log
 constexpr auto kDrainTime = std::chrono::seconds(1);
 
-std::string_view plain(boost::beast::string_view text) { return {text.data(), text.size()}; }
-
 std::optional<ApiResponse> understand(boost::beast::error_code error) {
   if (error == http::error::header_limit) {
     return error_response(431, {ErrorCode::invalid_input, "the request's header is too large"});

@@ -19,6 +19,8 @@
 
 namespace scanrig {
 
+inline std::string_view plain(boost::beast::string_view text) { return {text.data(), text.size()}; }
+
 /// State shared by all connections. Outlives them.
 struct ServerCore {
   ServerCore(ApiStation what, PeerRoles peers, Proxy in_front, const ApiOptions& options, std::string life)

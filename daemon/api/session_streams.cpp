@@ -12,8 +12,6 @@ namespace {
 
 namespace net = boost::asio;
 
-std::string_view plain(boost::beast::string_view text) { return {text.data(), text.size()}; }
-
 constexpr std::size_t kChunk = 64 * 1024;
 
 }  // namespace

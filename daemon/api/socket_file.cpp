@@ -37,7 +37,7 @@ tl::unexpected<Error> fail_errno(const char* doing, const fs::path& path, int fd
 
 int open_socket() { return ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0); }
 
-const sockaddr* plain(const sockaddr_un& address) { return reinterpret_cast<const sockaddr*>(&address); }
+const sockaddr* as_sockaddr(const sockaddr_un& address) { return reinterpret_cast<const sockaddr*>(&address); }
 
 Result<void> check_free(const fs::path& path) {
   std::error_code error;
@@ -64,7 +64,7 @@ Result<int> connect_to_socket(const fs::path& path, std::chrono::microseconds li
   const auto whole = std::chrono::floor<std::chrono::seconds>(limit);
   const timeval reply_timeout{.tv_sec = whole.count(), .tv_usec = (limit - whole).count()};
   ::setsockopt(fd, SOL_SOCKET, SO_SNDTIMEO, &reply_timeout, sizeof reply_timeout);
-  if (::connect(fd, plain(*address), sizeof *address) == 0) return fd;
+  if (::connect(fd, as_sockaddr(*address), sizeof *address) == 0) return fd;
   const int why = errno;
   if (why != ENOENT && why != ECONNREFUSED && why != EAGAIN) return fail_errno("connect to", path, fd);
   ::close(fd);
@@ -105,7 +105,7 @@ Result<int> listen_on_socket(const fs::path& path, mode_t mode) {
   ::unlink(temporary.c_str());
   const int fd = open_socket();
   if (fd < 0) return fail_errno("make", path, fd);
-  if (::bind(fd, plain(*address), sizeof *address) != 0) return fail_errno("bind", path, fd);
+  if (::bind(fd, as_sockaddr(*address), sizeof *address) != 0) return fail_errno("bind", path, fd);
   if (::chmod(temporary.c_str(), mode) != 0 || ::listen(fd, SOMAXCONN) != 0 ||
       ::rename(temporary.c_str(), path.c_str()) != 0) {
     auto error = fail_errno("open", path, fd);

@@ -77,11 +77,11 @@ void print_made(const ConvertVerb& verb, const CalibrationExport& made) {
     fmt::print("{}\n", verb.out.string());
     return;
   }
-  nlohmann::ordered_json json{{"out", verb.out}, {"lens_model", made.lens_model}};
+  nlohmann::ordered_json reply{{"out", verb.out}, {"lens_model", made.lens_model}};
   for (std::size_t side = 0; side < 2; ++side) {
-    json[side == 0 ? "left" : "right"] = {{"rms_px", made.lenses[side].rms_px}, {"max_px", made.lenses[side].max_px}};
+    reply[side == 0 ? "left" : "right"] = {{"rms_px", made.lenses[side].rms_px}, {"max_px", made.lenses[side].max_px}};
   }
-  fmt::print("{}\n", json.dump());
+  fmt::print("{}\n", reply.dump());
 }
 
 }  // namespace

@@ -27,8 +27,8 @@ std::string_view word(TurntableStatus::Motion motion) {
   return "unknown: it may be moving";
 }
 
-ExitCode tell(const TurntableStatus& status, bool json) {
-  if (json) {
+ExitCode tell(const TurntableStatus& status, bool as_json) {
+  if (as_json) {
     nlohmann::ordered_json all{{"motion", word(status.motion)}, {"homed", status.homed}, {"alarm", status.alarm}};
     all["angle_deg"] = status.angle ? nlohmann::ordered_json(status.angle->value) : nullptr;
     fmt::print("{}\n", all.dump());
@@ -79,7 +79,7 @@ ExitCode move(const TurntableVerb& verb, const config::RigConfig& rig, Clock& cl
 }
 
 /// Registers of the drive, whether or not this program homed it.
-ExitCode read_registers(const config::RigConfig& rig, Clock& clock, bool json) {
+ExitCode read_registers(const config::RigConfig& rig, Clock& clock, bool as_json) {
   const auto& options = rig.turntable.modbus;
   ModbusDrive drive(options.line, options.profile, clock);
   const auto state = drive.read_state(Deadline::after(clock, kAskLimit));
@@ -87,7 +87,7 @@ ExitCode read_registers(const config::RigConfig& rig, Clock& clock, bool json) {
   const auto alarm = drive.read_alarm(Deadline::after(clock, kAskLimit));
   if (!alarm) return report_error(of_device(alarm.error().in("turntable")));
   const double angle = options.scale.angle(state->position).value;
-  if (json) {
+  if (as_json) {
     const nlohmann::ordered_json all{{"pulses", state->position}, {"angle_deg", angle},
                                      {"running", state->running}, {"in_position", state->in_position},
                                      {"enabled", state->enabled}, {"homed", state->homed},

@@ -118,7 +118,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr auto kGlance = std::chrono::milliseconds(250);
+constexpr auto kRedrawPeriod = std::chrono::milliseconds(250);
 constexpr auto kGlancePatience = std::chrono::seconds(3);  ///< a hanging daemon must show soon
 
 tl::expected<json, RequestError> glance(const Connection& connection, const std::string& target) {
@@ -202,7 +202,7 @@ ExitCode watch(const Connection& connection) {
   std::optional<Screen> screen;
   std::string told;
   bool ever = false;
-  for (; !stop.token().stop_requested(); clock.sleep_for(kGlance)) {
+  for (; !stop.token().stop_requested(); clock.sleep_for(kRedrawPeriod)) {
     const auto lines = look(connection);
     if (!lines && (!ever || connection.json)) return report_error(lines.error());
     ever = true;

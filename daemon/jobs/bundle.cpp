@@ -34,7 +34,7 @@ std::string masked(std::string_view text, std::string_view prefix, const End& en
 namespace fs = std::filesystem;
 
 constexpr const char* kTar = "/bin/tar";
-constexpr auto kLimit = std::chrono::minutes(30);
+constexpr auto kPackingLimit = std::chrono::minutes(30);
 constexpr std::size_t kMaxCrashFiles = 20;
 constexpr std::uintmax_t kMaxTextBytes = 1u << 20;
 constexpr std::uintmax_t kHeaderBytes = 4096;  ///< per file, of tar; poorly compressed files grow by less
@@ -125,7 +125,7 @@ Result<void> pack(const fs::path& job_folder, const fs::path& beside, const fs::
   const auto job = job_folder.filename().string();
   ChildCommand command{.words = {kTar, "--create", "--gzip", "--file", packed.string(), "--directory",
                                  job_folder.parent_path().string(), job},
-                       .limit = kLimit};
+                       .limit = kPackingLimit};
   std::error_code ignored;
   if (fs::exists(beside / job, ignored)) {
     for (const auto& word : {std::string("--directory"), beside.string(), job}) command.words.push_back(word);

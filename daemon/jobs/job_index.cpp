@@ -13,49 +13,47 @@
 namespace scanrig {
 namespace {
 
-using nlohmann::json;
-
 constexpr int kLayout = 7;  ///< increase with every change below
 
-json to_json(const std::optional<Error>& error) {
+nlohmann::json to_json(const std::optional<Error>& error) {
   if (!error) return nullptr;
   return {to_string(error->code), error->message};
 }
 
-json to_json(const std::vector<Error>& errors) {
-  json list = json::array();
+nlohmann::json to_json(const std::vector<Error>& errors) {
+  nlohmann::json list = nlohmann::json::array();
   for (const auto& error : errors) list.push_back(to_json(std::optional(error)));
   return list;
 }
 
-std::optional<Error> error_from(const json& j) {
+std::optional<Error> error_from(const nlohmann::json& j) {
   if (j.is_null()) return std::nullopt;
   return Error{parse_error_code(j.at(0).get<std::string>()).value_or(ErrorCode::internal), j.at(1)};
 }
 
-std::vector<Error> errors_from(const json& list) {
+std::vector<Error> errors_from(const nlohmann::json& list) {
   std::vector<Error> errors;
   for (const auto& error : list) errors.push_back(error_from(error).value());
   return errors;
 }
 
-json views_of(const JobInfo& job) {
-  json views = json::array();
+nlohmann::json views_of(const JobInfo& job) {
+  nlohmann::json views = nlohmann::json::array();
   for (const auto& v : job.stored) {
     views.push_back({v.pose, v.view, v.measured_deg, to_json(v.retake_reasons), v.commanded_deg, v.settling_ms});
   }
   return views;
 }
 
-json movement_checks_of(const JobInfo& job) {
-  json movement_checks = json::array();
+nlohmann::json movement_checks_of(const JobInfo& job) {
+  nlohmann::json movement_checks = nlohmann::json::array();
   for (const auto& c : job.movement_checks) {
     movement_checks.push_back({c.pose, c.shift_px, c.changed, c.unmoved, to_json(c.retake_reasons)});
   }
   return movement_checks;
 }
 
-void read(const json& j, JobInfo& job) {
+void read(const nlohmann::json& j, JobInfo& job) {
   job.id = j.at("id");
   job.folder = j.at("folder");
   job.state = parse_job_state(j.at("state").get<std::string>()).value();
@@ -113,26 +111,26 @@ std::string stamp(const fs::path& folder, const std::string& record) {
 }  // namespace
 
 std::string to_record(const JobInfo& job) {
-  const json j = {{"layout", kLayout},
-                  {"id", job.id},
-                  {"folder", job.folder},
-                  {"state", to_string(job.state)},
-                  {"complete", job.complete},
-                  {"quarantined", job.quarantined},
-                  {"passed", job.passed ? json(*job.passed) : json()},
-                  {"error", to_json(job.error)},
-                  {"model", job.model},
-                  {"report", job.report},
-                  {"remarks", job.remarks},
-                  {"config_sha256", job.config_sha256},
-                  {"stored", views_of(job)},
-                  {"movement_checks", movement_checks_of(job)}};
-  return j.dump(-1, ' ', false, json::error_handler_t::replace);
+  const nlohmann::json j = {{"layout", kLayout},
+                            {"id", job.id},
+                            {"folder", job.folder},
+                            {"state", to_string(job.state)},
+                            {"complete", job.complete},
+                            {"quarantined", job.quarantined},
+                            {"passed", job.passed ? nlohmann::json(*job.passed) : nlohmann::json()},
+                            {"error", to_json(job.error)},
+                            {"model", job.model},
+                            {"report", job.report},
+                            {"remarks", job.remarks},
+                            {"config_sha256", job.config_sha256},
+                            {"stored", views_of(job)},
+                            {"movement_checks", movement_checks_of(job)}};
+  return j.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
 bool from_record(const std::string& text, JobInfo& job) {
   try {
-    const auto j = json::parse(text);
+    const auto j = nlohmann::json::parse(text);
     if (j.at("layout") != kLayout) return false;
     read(j, job);
     return true;

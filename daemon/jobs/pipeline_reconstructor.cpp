@@ -35,7 +35,8 @@ class PipelineReconstructor final : public Reconstructor {
  private:
   static std::string encoded(Mesh mesh) {
     constexpr std::size_t kFaces = 20'000;  // 300 kB
-    return encode_view_glb({.mesh = std::move(mesh)}, {.max_faces = kFaces}).value_or(std::string());
+    return encode_view_glb({.mesh = std::move(mesh), .corner_uv = {}, .atlas = {}}, {.max_faces = kFaces})
+        .value_or(std::string());
   }
 
   Reconstruction reconstruction_;

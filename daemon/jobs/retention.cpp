@@ -15,7 +15,7 @@ namespace scanrig {
 namespace {
 
 constexpr const char* kTimedatectl = "/usr/bin/timedatectl";
-constexpr auto kLimit = std::chrono::seconds(5);
+constexpr auto kDeletingLimit = std::chrono::seconds(5);
 
 /// The kernel's estimate of the error starts at 16 s, and returns there when the clock is set by hand. It is kept
 /// smaller by timesyncd, chrony and ntpd alike [ntp_synced() of systemd-timedated]. STA_UNSYNC is no
@@ -31,7 +31,7 @@ std::optional<bool> kernel_synchronized() {
 bool timedated_synchronized(const std::stop_token& stop) {
   bool synchronized = false;
   const auto ended = run_child({.words = {kTimedatectl, "show", "--property=NTPSynchronized", "--value"},
-                                .limit = kLimit,
+                                .limit = kDeletingLimit,
                                 .on_line = [&](std::string_view line) { synchronized = line == "yes"; }},
                                stop);
   return ended && ended->code == 0 && synchronized;
@@ -49,13 +49,12 @@ class KernelTime final : public SystemTime {
   }
 };
 
-using nlohmann::json;
 using std::chrono::seconds;
 
 constexpr const char* kFormat = "scanrig-retention";
 
 /// Some 270 years, in seconds: sums stay far from overflow, in nanoseconds too. Throws for all others.
-std::int64_t bounded(const json& number) {
+std::int64_t bounded(const nlohmann::json& number) {
   constexpr std::int64_t kMax = std::int64_t{1} << 33;
   if (!number.is_number_integer()) throw std::out_of_range("not an integer");
   const auto value = number.get<std::int64_t>();
@@ -71,7 +70,7 @@ RetentionLedger RetentionLedger::read(const std::filesystem::path& file) {
   const auto text = read_file(file);
   if (!text) return {};
   try {
-    const auto j = json::parse(*text);
+    const auto j = nlohmann::json::parse(*text);
     if (j.at("format") != kFormat || j.at("version") != 1) return {};
     RetentionLedger ledger;
     ledger.count_ = seconds(bounded(j.at("count_s")));
@@ -92,21 +91,21 @@ RetentionLedger RetentionLedger::read(const std::filesystem::path& file) {
 }
 
 Result<void> RetentionLedger::write(const std::filesystem::path& file) const {
-  json jobs = json::object();
+  nlohmann::json jobs = nlohmann::json::object();
   for (const auto& [id, entry] : jobs_) {
     jobs[id] = {{"mark", entry.mark}, {"since_s", entry.since.count()}, {"number", entry.number}};
   }
   const auto last = last_.value_or(TimeReading{});
   const auto wall = std::chrono::floor<seconds>(last.wall).time_since_epoch().count();
-  const json j = {{"format", kFormat},
-                  {"version", 1},
-                  {"count_s", count_.count()},
-                  {"last_number", last_number_},
-                  {"wall_s", std::max<std::int64_t>(wall, 0)},
-                  {"synchronized", last.is_synchronized},
-                  {"running_s", last.running.count()},
-                  {"jobs", std::move(jobs)}};
-  return write_file_atomically(file, j.dump(1, ' ', false, json::error_handler_t::replace) + "\n");
+  const nlohmann::json j = {{"format", kFormat},
+                            {"version", 1},
+                            {"count_s", count_.count()},
+                            {"last_number", last_number_},
+                            {"wall_s", std::max<std::int64_t>(wall, 0)},
+                            {"synchronized", last.is_synchronized},
+                            {"running_s", last.running.count()},
+                            {"jobs", std::move(jobs)}};
+  return write_file_atomically(file, j.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
 /// Since an earlier start of the machine more time has passed than its present run: the difference is never too large.

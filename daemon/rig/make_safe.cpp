@@ -27,7 +27,7 @@ namespace {
 using config::SafetyDevice;
 
 constexpr auto kLimit = std::chrono::milliseconds(900);
-constexpr auto kAgain = std::chrono::milliseconds(20);
+constexpr auto kPeriod = std::chrono::milliseconds(20);
 
 std::span<const std::byte> bytes_of(const std::string& text) { return std::as_bytes(std::span(text)); }
 
@@ -38,8 +38,8 @@ template <class Try>
 Result<void> until(Clock& clock, Deadline deadline, const Try& attempt) {
   for (;;) {
     auto done = attempt();
-    if (done || deadline.left(clock) <= kAgain) return done;
-    clock.sleep_for(kAgain);
+    if (done || deadline.left(clock) <= kPeriod) return done;
+    clock.sleep_for(kPeriod);
   }
 }
 
@@ -106,7 +106,7 @@ std::optional<int> wait_for_end(pid_t child, Clock& clock, Deadline deadline) {
       ::waitpid(child, &status, 0);
       return std::nullopt;
     }
-    clock.sleep_for(kAgain);
+    clock.sleep_for(kPeriod);
   }
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }

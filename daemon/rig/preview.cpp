@@ -8,8 +8,8 @@
 namespace scanrig {
 namespace {
 
-constexpr auto kAgain = std::chrono::seconds(2);  ///< after cameras that did not respond
-constexpr int kQuality = 80;                      ///< JPEG quality, per cent
+constexpr auto kBeforeRetry = std::chrono::seconds(2);  ///< after cameras that did not respond
+constexpr int kQuality = 80;                            ///< JPEG quality, per cent
 
 Result<std::string> encode(const cv::Mat& image, PixelFormat format) {
   try {
@@ -82,7 +82,7 @@ void Preview::failed(const Error& error) {
   const std::scoped_lock lock(mutex_);
   problem_ = error;
   asked_ = false;
-  not_before_ = clock_.now() + kAgain;
+  not_before_ = clock_.now() + kBeforeRetry;
 }
 
 }  // namespace scanrig

@@ -6,7 +6,7 @@
 namespace scanrig {
 namespace {
 
-using What = event::MaintenanceRequested::What;
+using Task = event::MaintenanceRequested::What;
 
 constexpr std::chrono::minutes kConsentTimeout{10};  ///< without a motion
 
@@ -67,18 +67,18 @@ void pulse(StepBuilder& m) {
 
 void ask_maintenance(StepBuilder& m, const event::MaintenanceRequested& asked) {
   if (m.s().shutting_down) return m.refuse(ErrorCode::refused, "The service is shutting down.");
-  if (asked.what == What::on) return begin(m, asked.requester);
+  if (asked.what == Task::on) return begin(m, asked.requester);
   if (!m.s().maintenance) return m.refuse(ErrorCode::refused, "Maintenance mode is off. Switch it on first.");
   if (m.s().activity != Activity::none) {
     return m.refuse(ErrorCode::busy, "The rig is busy ({}): wait or press Stop.", to_string(m.s().activity));
   }
   switch (asked.what) {
-    case What::on: break;  // above
-    case What::off: return end(m);
-    case What::home: return reset_in_maintenance(m, Origin::remote);
-    case What::jog: return jog(m, asked);
-    case What::pulse: return pulse(m);
-    case What::lamp_test: return m.act(action::TestLamps{});
+    case Task::on: break;  // above
+    case Task::off: return end(m);
+    case Task::home: return reset_in_maintenance(m, Origin::remote);
+    case Task::jog: return jog(m, asked);
+    case Task::pulse: return pulse(m);
+    case Task::lamp_test: return m.act(action::TestLamps{});
   }
 }
 

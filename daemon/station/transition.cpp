@@ -5,6 +5,10 @@
 namespace scanrig {
 namespace {
 
+event::RigFailed alarm_failure(const std::string& alarm) {
+  return {{ErrorCode::device_alarm, fmt::format("The drive reports an alarm: {}", alarm)}, "turntable"};
+}
+
 class Transition : public StepBuilder {
  public:
   using StepBuilder::StepBuilder;
@@ -272,9 +276,7 @@ class Transition : public StepBuilder {
       return;
     }
     const bool is_new = std::exchange(s().has_no_alarm, drive.alarm.empty()) && !drive.alarm.empty();
-    if (!is_new || s().latch) return;
-    fault_unclassified(
-        {{ErrorCode::device_alarm, fmt::format("The drive reports an alarm: {}", drive.alarm)}, "turntable"});
+    if (is_new && !s().latch) fault_unclassified(alarm_failure(drive.alarm));
   }
 
   void stopped() {

@@ -12,6 +12,7 @@
 namespace scanrig {
 
 // Numbers of the glTF 2.0 specification.
+inline constexpr double kMetresPerMm = 0.001;
 inline constexpr int kGltfByte = 5120;
 inline constexpr int kGltfUbyte = 5121;
 inline constexpr int kGltfUshort = 5123;

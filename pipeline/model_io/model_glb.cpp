@@ -8,7 +8,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr float kMetresPerMm = 0.001F;
 constexpr int kJpegQuality = 95;
 
 json add_geometry(const TexturedMesh& model, bool textured, GlbDocument& document) {
@@ -19,7 +18,7 @@ json add_geometry(const TexturedMesh& model, bool textured, GlbDocument& documen
   Eigen::Vector3f low = Eigen::Vector3f::Constant(std::numeric_limits<float>::infinity());
   Eigen::Vector3f high = -low;
   for (const auto v : corners.vertex) {
-    positions.emplace_back(kMetresPerMm * model.mesh.vertices[v]);
+    positions.emplace_back(static_cast<float>(kMetresPerMm) * model.mesh.vertices[v]);
     directions.push_back(normals[v]);
     low = low.cwiseMin(positions.back());
     high = high.cwiseMax(positions.back());

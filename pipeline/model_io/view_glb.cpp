@@ -14,12 +14,11 @@ namespace {
 
 using nlohmann::json;
 
-constexpr int kJpegQuality = 85;
+constexpr int kViewJpegQuality = 85;
 constexpr float kMaxError = 0.01F;  // of the object's size; the number of faces ends it earlier
 constexpr float kSteps = 65535.0F;  // of a position along the longest side of the box
 constexpr std::uint16_t kSigmaUnknown = 65535;
 constexpr float kSigmaPerMm = 1e5F;
-constexpr double kMetresPerMm = 0.001;
 
 /// One vertex as the file keeps it: KHR_mesh_quantization, each attribute on a multiple of 4 bytes.
 struct ViewVertex {
@@ -162,7 +161,7 @@ Result<std::string> encode_view_glb(const TexturedMesh& model, const ViewModelOp
     cv::Mat3b atlas = model.atlas;
     if (atlas.cols > options.texture_px)
       cv::resize(atlas, atlas, {options.texture_px, options.texture_px}, 0, 0, cv::INTER_AREA);
-    if (auto added = document.add_texture(atlas, kJpegQuality); !added) return pass_on(added);
+    if (auto added = document.add_texture(atlas, kViewJpegQuality); !added) return pass_on(added);
   }
   return document.file();
 }

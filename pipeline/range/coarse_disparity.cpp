@@ -5,10 +5,10 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "pipeline/range/range_image.h"
+
 namespace scanrig {
 namespace {
-
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 
 /// Local contrast normalised to one level, 8 bit: shading and albedo are removed, the pattern stays.
 cv::Mat1b flattened(const cv::Mat1f& image) {
@@ -40,7 +40,7 @@ cv::Mat1f match(const cv::Mat1b& here, const cv::Mat1b& there, int min_disparity
   const short unknown = static_cast<short>((min_disparity - 1) * 16);
   for (int y = 0; y < fixed.rows; ++y) {
     for (int x = 0; x < fixed.cols; ++x) {
-      disparity(y, x) = fixed(y, x) <= unknown ? kNaN : static_cast<float>(fixed(y, x)) / 16.0f;
+      disparity(y, x) = fixed(y, x) <= unknown ? kUnmeasured : static_cast<float>(fixed(y, x)) / 16.0f;
     }
   }
   return disparity;
@@ -65,7 +65,7 @@ CoarseDisparity coarse_disparity(const cv::Mat1f& left, const cv::Mat1f& right, 
   cv::flip(a, a_mirrored, 1);
   cv::flip(b, b_mirrored, 1);
   const cv::Range columns(margin, margin + left.cols);
-  CoarseDisparity out{cv::Mat1f(left.size(), kNaN), cv::Mat1f(right.size(), kNaN)};
+  CoarseDisparity out{cv::Mat1f(left.size(), kUnmeasured), cv::Mat1f(right.size(), kUnmeasured)};
   match(a, b, min_disparity, count).colRange(columns).copyTo(out.left.rowRange(rows));
   flipped(match(b_mirrored, a_mirrored, min_disparity, count)).colRange(columns).copyTo(out.right.rowRange(rows));
   return out;

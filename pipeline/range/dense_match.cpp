@@ -16,8 +16,6 @@
 namespace scanrig {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-
 cv::Mat1f smoothed(const cv::Mat1f& image, double smoothing_px) {
   cv::Mat1f out;
   cv::GaussianBlur(image, out, {7, 7}, smoothing_px, smoothing_px, cv::BORDER_REPLICATE);
@@ -187,7 +185,7 @@ bool points_back(const DisparityPatch& patch, int u, int v, const Nodes& there, 
 /// Disparities that the other image's disparities confirm; surface seen by one camera only is removed. `towards`: -1
 /// left to right.
 cv::Mat1f confirmed(const cv::Mat1f& here, const cv::Mat1f& there, float towards, float tolerance_px) {
-  cv::Mat1f out(here.size(), kNaN);
+  cv::Mat1f out(here.size(), kUnmeasured);
   for (int v = 0; v < here.rows; ++v) {
     for (int u = 0; u < here.cols; ++u) {
       const float d = here(v, u);
@@ -218,7 +216,8 @@ Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDi
   const Nodes nodes = forward.match_nodes(options.left_node_stride_px, context);
   context.report("range", 0.6);
 
-  DenseDisparity out{cv::Mat1f(size, kNaN), cv::Mat1f(size, kNaN), cv::Mat2f(size, cv::Vec2f(kNaN, kNaN))};
+  DenseDisparity out{cv::Mat1f(size, kUnmeasured), cv::Mat1f(size, kUnmeasured),
+                     cv::Mat2f(size, cv::Vec2f(kUnmeasured, kUnmeasured))};
   parallel_for(static_cast<std::size_t>(size.height), [&](std::size_t row) {
     if (context.stopped()) return;
     const int v = static_cast<int>(row);
@@ -293,8 +292,8 @@ void remove_outliers(DenseDisparity& disparity, const StereoOptions& options) {
   for (int v = 0; v < size.height; ++v) {
     for (int u = 0; u < size.width; ++u) {
       if (kept(v, u) != 0) continue;
-      disparity.value(v, u) = disparity.sigma(v, u) = kNaN;
-      disparity.slope(v, u) = {kNaN, kNaN};
+      disparity.value(v, u) = disparity.sigma(v, u) = kUnmeasured;
+      disparity.slope(v, u) = {kUnmeasured, kUnmeasured};
     }
   }
 }

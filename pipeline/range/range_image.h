@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
@@ -9,6 +10,8 @@
 #include "pipeline/silhouette/silhouette.h"
 
 namespace scanrig {
+
+inline constexpr float kUnmeasured = std::numeric_limits<float>::quiet_NaN();
 
 /// The surface measured from one view, on a regular grid. All matrices have the projection's size.
 struct RangeImage {

@@ -12,8 +12,6 @@
 namespace scanrig {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-
 Result<void> check(const RectifiedPair& pair) {
   const Projection& p = pair.left_projection;
   if (pair.left.empty() || pair.left.size() != pair.right.size() || pair.left.size() != cv::Size(p.width, p.height)) {
@@ -54,9 +52,9 @@ RangeImage to_range(const RectifiedPair& pair, const DenseDisparity& disparity) 
   const cv::Size size(p.width, p.height);
   RangeImage range{p,
                    Transform::Identity(),
-                   cv::Mat1f(size, kNaN),
-                   cv::Mat1f(size, kNaN),
-                   cv::Mat3f(size, cv::Vec3f(kNaN, kNaN, kNaN)),
+                   cv::Mat1f(size, kUnmeasured),
+                   cv::Mat1f(size, kUnmeasured),
+                   cv::Mat3f(size, cv::Vec3f(kUnmeasured, kUnmeasured, kUnmeasured)),
                    {},
                    {}};
   const double strength = p.fx * pair.baseline_mm;

@@ -7,8 +7,6 @@
 namespace scanrig {
 namespace {
 
-constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
-
 Result<Silhouette> silhouette_of(const cv::Mat& plain, const RectifyingMap& map, const Projection& projection,
                                  const Transform& camera_from_pose, const BlueScreenOptions& options) {
   const auto image = rectified(map, plain);
@@ -29,8 +27,8 @@ cv::Mat1b inside(const Silhouette& silhouette, double mixed_px) {
 }
 
 void clear_pixel(RangeImage& range, int u, int v) {
-  range.depth(v, u) = range.sigma(v, u) = kNaN;
-  range.normal(v, u) = {kNaN, kNaN, kNaN};
+  range.depth(v, u) = range.sigma(v, u) = kUnmeasured;
+  range.normal(v, u) = {kUnmeasured, kUnmeasured, kUnmeasured};
 }
 
 /// Without silhouettes: what is not above the table is not the object.

@@ -14,13 +14,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct SurfacePoint {
+struct PickedPoint {
   RulerEnd end;
   Eigen::Vector3d normal;
 };
 
-SurfacePoint surface_point(const Mesh& mesh, const SurfaceIndex::Nearest& nearest) {
-  SurfacePoint found;
+PickedPoint picked_point(const Mesh& mesh, const SurfaceIndex::Nearest& nearest) {
+  PickedPoint found;
   found.end.point = nearest.point;
   const auto& face = mesh.faces[nearest.face];
   const Eigen::Vector3d a = mesh.vertices[face[0]].cast<double>();
@@ -75,14 +75,14 @@ Result<ModelLength> ModelRuler::measure(const fs::path& job_folder, const Eigen:
   const auto opened = open(job_folder);
   if (!opened) return pass_on(opened);
   const Model& model = **opened;
-  std::array<SurfacePoint, 2> ends;
+  std::array<PickedPoint, 2> ends;
   for (std::size_t i = 0; i < 2; ++i) {
     const auto nearest = model.index.nearest(i == 0 ? from : to, kReachMm);
     if (!std::isfinite(nearest.distance)) {
       return fail(ErrorCode::invalid_input, "ruler: the {} point is farther than {:g} mm from the model",
                   i == 0 ? "first" : "second", kReachMm);
     }
-    ends[i] = surface_point(model.mesh, nearest);
+    ends[i] = picked_point(model.mesh, nearest);
   }
   ModelLength length;
   length.from = ends[0].end;
@@ -92,7 +92,7 @@ Result<ModelLength> ModelRuler::measure(const fs::path& job_folder, const Eigen:
   const bool is_known = length.from.is_measured && length.to.is_measured && model.point_sigma_mm && model.scale_sigma;
   if (!is_known) return length;
   double variance = std::pow(*model.scale_sigma * length.mm, 2);
-  for (const SurfacePoint& one : ends) {
+  for (const PickedPoint& one : ends) {
     // Along a line of no length every direction counts.
     const double share = length.mm > 0.0 ? std::abs(one.normal.dot(line)) / length.mm : 1.0;
     variance += std::pow(one.end.sigma_mm * share, 2) + std::pow(*model.point_sigma_mm, 2);

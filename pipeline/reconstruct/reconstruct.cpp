@@ -30,19 +30,6 @@ double voxel_for(const RangeImage& range) {
   return pinhole ? kDefaultVoxelMm : std::max(kDefaultVoxelMm, range.projection.mm_per_pixel(0.0));
 }
 
-struct PlainPair {
-  cv::Mat3b left, right;
-};
-
-struct PoseState {
-  std::vector<View> views;
-  std::vector<PlainPair> plain;   ///< one per view; empty for range scans and grey sensors
-  std::optional<RigWatch> watch;  ///< none: range scans, or switched off
-  RegistrationReport registration;
-  Surface partial;
-  bool finished = false;
-};
-
 Result<VolumeOptions::Fusion> fusion_of(const std::string& name) {
   if (name == "evidence") return VolumeOptions::Fusion::evidence;
   if (name == "paper") return VolumeOptions::Fusion::paper;
@@ -64,6 +51,19 @@ Result<PoseOptions> pose_options_of(const std::string& rests) {
 }  // namespace
 
 struct Reconstruction::State {
+  struct PlainPair {
+    cv::Mat3b left, right;
+  };
+
+  struct PoseState {
+    std::vector<View> views;
+    std::vector<PlainPair> plain;   ///< one per view; empty for range scans and grey sensors
+    std::optional<RigWatch> watch;  ///< none: range scans, or switched off
+    RegistrationReport registration;
+    Surface partial;
+    bool finished = false;
+  };
+
   ReconstructOptions options;
   std::optional<Calibration> calibration;
   std::optional<Rectification> rectification;
@@ -84,7 +84,7 @@ struct Reconstruction::State {
   Result<Model> finish(const ScanIdentity& identity, const Context& context);
 };
 
-Result<PoseState*> Reconstruction::State::open_pose(std::size_t pose) {
+Result<Reconstruction::State::PoseState*> Reconstruction::State::open_pose(std::size_t pose) {
   if (pose > 1) return fail(ErrorCode::invalid_input, "a scan has one or two poses, not {}", pose + 1);
   if (pose > poses.size()) return fail(ErrorCode::invalid_input, "pose {} has no views before pose {}", pose, pose + 1);
   if (pose == poses.size()) poses.emplace_back();
@@ -284,13 +284,13 @@ Result<void> Reconstruction::finish_pose(std::size_t pose, const Context& contex
 
 Mesh Reconstruction::live_view(std::size_t pose) const {
   if (!state_->rectification || pose >= state_->poses.size() || state_->poses[pose].views.empty()) return {};
-  const PoseState& state = state_->poses[pose];
+  const State::PoseState& state = state_->poses[pose];
   return live_mesh_of_view(state.views.back(), state_->calibration->left, state_->live_photos(state).back());
 }
 
 Mesh Reconstruction::live_pose(std::size_t pose) const {
   if (!state_->rectification || pose >= state_->poses.size() || !state_->poses[pose].finished) return {};
-  const PoseState& state = state_->poses[pose];
+  const State::PoseState& state = state_->poses[pose];
   Mesh mesh = state.partial.mesh;
   if (mesh.normals.size() != mesh.vertices.size()) mesh.normals = vertex_normals(mesh);
   colour_by_views(mesh, state.views, state_->calibration->left, state_->live_photos(state));

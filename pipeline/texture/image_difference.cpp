@@ -11,7 +11,7 @@ namespace scanrig {
 namespace {
 
 constexpr double kNoise = 2.0;  // grey levels
-constexpr int kRounds = 30;
+constexpr int kAlignmentRounds = 30;
 constexpr double kSettled = 1e-3;  // px
 
 /// A piece of the rendering with the matrices for placing it by least squares.
@@ -43,7 +43,7 @@ class Patch {
     // Copies: phaseCorrelate of OpenCV 4.6 multiplies its inputs by the window in place.
     const cv::Point2d start = cv::phaseCorrelate(grey_.clone(), there.clone(), window_);
     cv::Point2d shift = start;
-    for (int round = 0; round < kRounds; ++round) {
+    for (int round = 0; round < kAlignmentRounds; ++round) {
       cv::getRectSubPix(photo, grey_.size(), centre + cv::Point2f(shift), there);
       cv::subtract(there, cv::mean(there), there);
       cv::subtract(grey_, there, there);

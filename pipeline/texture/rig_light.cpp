@@ -10,7 +10,7 @@ namespace scanrig {
 namespace {
 
 constexpr double kMetre = 1000.0;
-constexpr int kRounds = 8;
+constexpr int kLightRounds = 8;
 /// Pull towards uniform light, as a share of the data's own weight: decides only what the data leave open.
 constexpr double kRidge = 1e-3;
 /// Relative residual at which an observation (a highlight, a cast shadow) has half its weight.
@@ -82,7 +82,7 @@ RigLight fit_rig_light(std::span<const std::vector<LightSample>> spots) {
   RigLight light;
   parallel_for(light.bgr.size(), [&](std::size_t channel) {
     RigLight::Terms& coefficients = light.bgr[channel];
-    for (int round = 0; round < kRounds; ++round) {
+    for (int round = 0; round < kLightRounds; ++round) {
       Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
       Eigen::VectorXd right = Eigen::VectorXd::Zero(n);
       double weight = 0.0;

@@ -16,7 +16,7 @@ const std::array<Eigen::Vector3i, 6> kFaces = {
 }  // namespace
 
 BlockGrid::BlockGrid(const Eigen::AlignedBox3f& box, float voxel_mm) : voxel_(voxel_mm) {
-  const float block_mm = voxel_mm * kSide;
+  const float block_mm = voxel_mm * kBlockSide;
   // The lattice goes through the model's origin: the same voxels whatever the box.
   const Eigen::Vector3f low = (box.min() / block_mm).array().floor() - 1.0F;
   const Eigen::Vector3f high = (box.max() / block_mm).array().floor() + 2.0F;
@@ -42,7 +42,7 @@ void BlockGrid::classify_blocks(const Field& field) {
     Eigen::Vector3i b(0, 0, static_cast<int>(z));
     for (b.y() = 0; b.y() < size_.y(); ++b.y()) {
       for (b.x() = 0; b.x() < size_.x(); ++b.x()) {
-        if (field.at(position(kSide * b), everywhere).distance < 0.0F) slot_[linear(b)] = kInside;
+        if (field.at(position(kBlockSide * b), everywhere).distance < 0.0F) slot_[linear(b)] = kInside;
       }
     }
   });
@@ -51,7 +51,7 @@ void BlockGrid::classify_blocks(const Field& field) {
 std::vector<Eigen::Vector3i> BlockGrid::seed_blocks(const std::vector<Eigen::Vector3f>& seeds) const {
   std::vector<bool> is_seed(slot_.size());
   for (const auto& point : seeds) {
-    const Eigen::Vector3i b = ((point - origin_) / (voxel_ * kSide)).array().floor().cast<int>();
+    const Eigen::Vector3i b = ((point - origin_) / (voxel_ * kBlockSide)).array().floor().cast<int>();
     if (contains(b)) is_seed[linear(b)] = true;
   }
   std::vector<Eigen::Vector3i> result;
@@ -71,12 +71,12 @@ std::vector<Eigen::Vector3i> BlockGrid::seed_blocks(const std::vector<Eigen::Vec
 }
 
 void BlockGrid::evaluate(const Field& field, Block& block) const {
-  const Eigen::Vector3i first = kSide * block.index;
-  const Eigen::Vector3f half = Eigen::Vector3f::Constant(0.5F * voxel_ * (kSide - 1));
+  const Eigen::Vector3i first = kBlockSide * block.index;
+  const Eigen::Vector3f half = Eigen::Vector3f::Constant(0.5F * voxel_ * (kBlockSide - 1));
   const Field::Neighbourhood neighbourhood = field.near(position(first) + half, half.norm());
-  for (int z = 0; z < kSide; ++z) {
-    for (int y = 0; y < kSide; ++y) {
-      for (int x = 0; x < kSide; ++x) {
+  for (int z = 0; z < kBlockSide; ++z) {
+    for (int y = 0; y < kBlockSide; ++y) {
+      for (int x = 0; x < kBlockSide; ++x) {
         const FieldValue value = field.at(position(first + Eigen::Vector3i(x, y, z)), neighbourhood);
         block.distance[Block::node(x, y, z)] = value.distance;
         block.support[Block::node(x, y, z)] = value.support;
@@ -94,10 +94,10 @@ std::vector<Eigen::Vector3i> BlockGrid::open_neighbours(const Block& block) cons
     const bool inside = slot_[linear(other)] == kInside;
     const int axis = face.x() != 0 ? 0 : face.y() != 0 ? 1 : 2;
     Eigen::Vector3i n;
-    n[axis] = face[axis] > 0 ? kSide - 1 : 0;
+    n[axis] = face[axis] > 0 ? kBlockSide - 1 : 0;
     bool open = false;
-    for (int i = 0; i < kSide && !open; ++i) {
-      for (int j = 0; j < kSide && !open; ++j) {
+    for (int i = 0; i < kBlockSide && !open; ++i) {
+      for (int j = 0; j < kBlockSide && !open; ++j) {
         n[(axis + 1) % 3] = i;
         n[(axis + 2) % 3] = j;
         open = (block.distance[Block::node(n.x(), n.y(), n.z())] < 0.0F) != inside;
@@ -157,12 +157,14 @@ BlockGrid::Block& BlockGrid::store(const Eigen::Vector3i& block, float band_mm) 
 }
 
 void BlockGrid::set(const Eigen::Vector3i& node, float distance, float band_mm) {
-  const auto block_of = [](const Eigen::Vector3i& n) { return n.unaryExpr([](int c) { return c / kSide; }).eval(); };
+  const auto block_of = [](const Eigen::Vector3i& n) {
+    return n.unaryExpr([](int c) { return c / kBlockSide; }).eval();
+  };
   for (const auto& face : kFaces) {
     const Eigen::Vector3i other = block_of(node + face);
     if (contains(other)) store(other, band_mm);
   }
-  const Eigen::Vector3i local = node - kSide * block_of(node);
+  const Eigen::Vector3i local = node - kBlockSide * block_of(node);
   store(block_of(node), band_mm).distance[Block::node(local.x(), local.y(), local.z())] = distance;
 }
 

@@ -12,17 +12,18 @@
 
 namespace scanrig {
 
+inline constexpr int kBlockSide = 8;
+
 /// Blocks of 8 x 8 x 8 nodes, stored only where the surface passes; every other block is all inside or all outside.
 class BlockGrid {
  public:
-  static constexpr int kSide = 8;
-  static constexpr int kNodes = kSide * kSide * kSide;
+  static constexpr int kNodes = kBlockSide * kBlockSide * kBlockSide;
 
   struct Block {
-    Eigen::Vector3i index;  ///< of the block; its first node is kSide times that
+    Eigen::Vector3i index;  ///< of the block; its first node is kBlockSide times that
     std::array<float, kNodes> distance;
     std::array<Support, kNodes> support;
-    [[nodiscard]] static int node(int x, int y, int z) { return (z * kSide + y) * kSide + x; }
+    [[nodiscard]] static int node(int x, int y, int z) { return (z * kBlockSide + y) * kBlockSide + x; }
   };
 
   /// Covers `box` with room around it.

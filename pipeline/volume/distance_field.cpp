@@ -8,8 +8,6 @@
 namespace scanrig {
 namespace {
 
-constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
 /// Full weight near the surface, none at the edge of the band: the two faces of a wall as thin as the band do not pull
 /// at each other, and there is no jump where the band ends.
 float taper(float distance, float band) { return std::clamp(1.5F * (1.0F - std::abs(distance) / band), 0.0F, 1.0F); }

@@ -130,7 +130,7 @@ void count_classes(const Field& field, const BlockGrid& grid, VolumeReport& repo
   parallel_for(counts.size(), [&](std::size_t i) {
     for (int corner = 0; corner < 8; ++corner) {
       const Eigen::Vector3i node = 4 * Eigen::Vector3i(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
-      const Eigen::Vector3f point = grid.position(BlockGrid::kSide * grid.blocks()[i].index + node);
+      const Eigen::Vector3f point = grid.position(kBlockSide * grid.blocks()[i].index + node);
       std::array<PoseDistance, 2> pose;
       for (std::size_t p = 0; p < field.poses(); ++p) {
         pose[p] = field.pose_distance(point, p);

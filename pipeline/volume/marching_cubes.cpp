@@ -8,8 +8,7 @@
 namespace scanrig {
 namespace {
 
-constexpr int kSide = BlockGrid::kSide;
-constexpr int kCorners = kSide + 1;  // nodes along a block's cells, the next block's first included
+constexpr int kCorners = kBlockSide + 1;  // nodes along a block's cells, the next block's first included
 
 /// The edge between two corners that differ in one coordinate.
 int edge_between(int a, int b) {
@@ -129,11 +128,12 @@ struct Octet {
     }
   }
   static int which(const Eigen::Vector3i& n) {
-    return (n.x() == kSide ? 1 : 0) | (n.y() == kSide ? 2 : 0) | (n.z() == kSide ? 4 : 0);
+    return (n.x() == kBlockSide ? 1 : 0) | (n.y() == kBlockSide ? 2 : 0) | (n.z() == kBlockSide ? 4 : 0);
   }
   [[nodiscard]] float distance(const Eigen::Vector3i& n) const {
     const int i = which(n);
-    return block[i] == nullptr ? constant[i] : block[i]->distance[node(n.unaryExpr([](int c) { return c % kSide; }))];
+    return block[i] == nullptr ? constant[i]
+                               : block[i]->distance[node(n.unaryExpr([](int c) { return c % kBlockSide; }))];
   }
 };
 
@@ -146,7 +146,7 @@ struct BlockVertices {
 BlockVertices cut_edges(const BlockGrid& grid, const BlockGrid::Block& block) {
   const Octet octet(grid, block.index);
   BlockVertices result;
-  for_each_node(kSide, [&](const Eigen::Vector3i& n) {
+  for_each_node(kBlockSide, [&](const Eigen::Vector3i& n) {
     const float here = octet.distance(n);
     for (int axis = 0; axis < 3; ++axis) {
       const Eigen::Vector3i step = Eigen::Vector3i::Unit(axis);
@@ -156,7 +156,7 @@ BlockVertices cut_edges(const BlockGrid& grid, const BlockGrid::Block& block) {
       result.of_edge[3 * node(n) + axis] = static_cast<std::uint32_t>(result.positions.size());
       // A hair's breadth from the nodes, so that no triangle shrinks to nothing.
       const float t = std::clamp(here / (here - there), 0.01F, 0.99F);
-      result.positions.push_back(grid.position(kSide * block.index + n) + grid.voxel() * t * step.cast<float>());
+      result.positions.push_back(grid.position(kBlockSide * block.index + n) + grid.voxel() * t * step.cast<float>());
     }
   });
   return result;
@@ -178,10 +178,10 @@ std::vector<Mesh::Face> cell_faces(const Numbering& numbering, const Eigen::Vect
     const Eigen::Vector3i n = cell + Eigen::Vector3i(start & 1, start >> 1 & 1, start >> 2 & 1);
     const auto* owner = octet.block[Octet::which(n)];
     const auto slot = static_cast<std::size_t>(owner - numbering.grid.blocks().data());
-    const int local = node(n.unaryExpr([](int c) { return c % kSide; }));
+    const int local = node(n.unaryExpr([](int c) { return c % kBlockSide; }));
     return numbering.first[slot] + numbering.vertices[slot].of_edge[3 * local + edge / 4];
   };
-  for_each_node(kSide, [&](const Eigen::Vector3i& cell) {
+  for_each_node(kBlockSide, [&](const Eigen::Vector3i& cell) {
     unsigned inside = 0;
     for (unsigned c = 0; c < 8; ++c) {
       const Eigen::Vector3i n = cell + Eigen::Vector3i(c & 1, c >> 1 & 1, c >> 2 & 1);

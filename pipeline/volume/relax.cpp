@@ -6,8 +6,7 @@ namespace scanrig {
 namespace {
 
 using Block = BlockGrid::Block;
-constexpr int kSide = BlockGrid::kSide;
-constexpr int kPadded = kSide + 2;
+constexpr int kPadded = kBlockSide + 2;
 
 /// A block's distances with one layer of its six neighbours around.
 struct Padded {
@@ -17,9 +16,9 @@ struct Padded {
   static int at(int x, int y, int z) { return ((z + 1) * kPadded + y + 1) * kPadded + x + 1; }
 
   Padded(const BlockGrid& grid, const Block& block, float band) {
-    for (int z = 0; z < kSide; ++z) {
-      for (int y = 0; y < kSide; ++y) {
-        for (int x = 0; x < kSide; ++x) distance[at(x, y, z)] = block.distance[Block::node(x, y, z)];
+    for (int z = 0; z < kBlockSide; ++z) {
+      for (int y = 0; y < kBlockSide; ++y) {
+        for (int x = 0; x < kBlockSide; ++x) distance[at(x, y, z)] = block.distance[Block::node(x, y, z)];
       }
     }
     for (int face = 0; face < 6; ++face) {
@@ -29,10 +28,10 @@ struct Padded {
       open[face] = other != nullptr;
       const float constant = grid.all_inside(index) ? -band : band;
       Eigen::Vector3i here, there;
-      here[axis] = side == 0 ? -1 : kSide;
-      there[axis] = side == 0 ? kSide - 1 : 0;
-      for (int i = 0; i < kSide; ++i) {
-        for (int j = 0; j < kSide; ++j) {
+      here[axis] = side == 0 ? -1 : kBlockSide;
+      there[axis] = side == 0 ? kBlockSide - 1 : 0;
+      for (int i = 0; i < kBlockSide; ++i) {
+        for (int j = 0; j < kBlockSide; ++j) {
           here[(axis + 1) % 3] = there[(axis + 1) % 3] = i;
           here[(axis + 2) % 3] = there[(axis + 2) % 3] = j;
           distance[at(here.x(), here.y(), here.z())] =
@@ -44,17 +43,17 @@ struct Padded {
 
   /// A node beside a missing block keeps its sign: the surface may not leave the stored blocks.
   [[nodiscard]] bool touches_unstored(int x, int y, int z) const {
-    return (x == 0 && !open[0]) || (x == kSide - 1 && !open[1]) || (y == 0 && !open[2]) ||
-           (y == kSide - 1 && !open[3]) || (z == 0 && !open[4]) || (z == kSide - 1 && !open[5]);
+    return (x == 0 && !open[0]) || (x == kBlockSide - 1 && !open[1]) || (y == 0 && !open[2]) ||
+           (y == kBlockSide - 1 && !open[3]) || (z == 0 && !open[4]) || (z == kBlockSide - 1 && !open[5]);
   }
 };
 
 std::array<float, BlockGrid::kNodes> relaxed(const BlockGrid& grid, const Block& block, float band) {
   const Padded padded(grid, block, band);
   std::array<float, BlockGrid::kNodes> result = block.distance;
-  for (int z = 0; z < kSide; ++z) {
-    for (int y = 0; y < kSide; ++y) {
-      for (int x = 0; x < kSide; ++x) {
+  for (int z = 0; z < kBlockSide; ++z) {
+    for (int y = 0; y < kBlockSide; ++y) {
+      for (int x = 0; x < kBlockSide; ++x) {
         const int node = Block::node(x, y, z);
         if (block.support[node] == Support::measured || padded.touches_unstored(x, y, z)) continue;
         const auto& d = padded.distance;

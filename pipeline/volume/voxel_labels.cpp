@@ -9,8 +9,6 @@
 namespace scanrig {
 namespace {
 
-constexpr int kSide = BlockGrid::kSide;
-
 /// The 26 neighbours of a voxel; which of them touch each other by faces (6) or by faces and edges (18).
 struct Neighbourhood {
   std::array<Eigen::Vector3i, 26> offset;
@@ -73,8 +71,8 @@ VoxelLabels::VoxelLabels(const BlockGrid& grid, float doubt_reach_mm) {
     low = low.cwiseMin(block.index);
     high = high.cwiseMax(block.index);
   }
-  first_ = kSide * low - Eigen::Vector3i::Ones();
-  size_ = kSide * (high - low + Eigen::Vector3i::Ones()) + Eigen::Vector3i::Constant(2);
+  first_ = kBlockSide * low - Eigen::Vector3i::Ones();
+  size_ = kBlockSide * (high - low + Eigen::Vector3i::Ones()) + Eigen::Vector3i::Constant(2);
   flags_.assign(static_cast<std::size_t>(size_.x()) * size_.y() * size_.z(), 0);
   const Eigen::Vector3i blocks = high - low + Eigen::Vector3i::Ones();
   parallel_for(static_cast<std::size_t>(blocks.z()), [&](std::size_t layer) {
@@ -83,9 +81,10 @@ VoxelLabels::VoxelLabels(const BlockGrid& grid, float doubt_reach_mm) {
       for (b.x() = 0; b.x() < blocks.x(); ++b.x()) {
         const auto* block = grid.find(low + b);
         if (block == nullptr && !grid.all_inside(low + b)) continue;
-        const Eigen::Vector3i corner = kSide * b + Eigen::Vector3i::Ones();
+        const Eigen::Vector3i corner = kBlockSide * b + Eigen::Vector3i::Ones();
         for (int n = 0; n < BlockGrid::kNodes; ++n) {
-          const Eigen::Vector3i p = corner + Eigen::Vector3i(n % kSide, n / kSide % kSide, n / (kSide * kSide));
+          const Eigen::Vector3i p =
+              corner + Eigen::Vector3i(n % kBlockSide, n / kBlockSide % kBlockSide, n / (kBlockSide * kBlockSide));
           if (block == nullptr || block->distance[n] < 0.0F) flags_[step(p.x(), p.y(), p.z())] = kInside;
         }
       }
@@ -111,8 +110,8 @@ void VoxelLabels::mark_doubtful(const BlockGrid& grid, float doubt_reach_mm) {
                                                step(0, -1, 0), step(0, 0, 1),  step(0, 0, -1)};
   const auto is_measured = [&](std::size_t i) {
     const Eigen::Vector3i n = node(i);
-    const auto* block = grid.find(n.unaryExpr([](int c) { return c / kSide; }));
-    const Eigen::Vector3i local = n.unaryExpr([](int c) { return c % kSide; });
+    const auto* block = grid.find(n.unaryExpr([](int c) { return c / kBlockSide; }));
+    const Eigen::Vector3i local = n.unaryExpr([](int c) { return c % kBlockSide; });
     return block != nullptr &&
            block->support[BlockGrid::Block::node(local.x(), local.y(), local.z())] == Support::measured;
   };
@@ -120,7 +119,8 @@ void VoxelLabels::mark_doubtful(const BlockGrid& grid, float doubt_reach_mm) {
   for (const auto& block : grid.blocks()) {
     for (int n = 0; n < BlockGrid::kNodes; ++n) {
       const Eigen::Vector3i p =
-          kSide * block.index - first_ + Eigen::Vector3i(n % kSide, n / kSide % kSide, n / (kSide * kSide));
+          kBlockSide * block.index - first_ +
+          Eigen::Vector3i(n % kBlockSide, n / kBlockSide % kBlockSide, n / (kBlockSide * kBlockSide));
       const auto i = static_cast<std::size_t>(step(p.x(), p.y(), p.z()));
       bool surface = false, measured = false;  // both ends of a cut edge must be
       for (const auto face : faces) {

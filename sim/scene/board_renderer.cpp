@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "sim/scene/profile.h"
 #include "sim/scene/random.h"
+#include "sim/scene/surface_colour.h"
 
 namespace scanrig::sim {
 
@@ -19,8 +20,6 @@ namespace {
 
 constexpr int kGridX = 13, kGridY = 10;  // nodes of the light over the print
 constexpr double kBoxSigma = 0.288675;   // of a box one wide
-
-Vector3f rgb(const double* c) { return Eigen::Map<const Vector3d>(c).cast<float>(); }
 
 /// Where a ray enters a box. `distance` in lengths of the ray's direction.
 struct Entry {

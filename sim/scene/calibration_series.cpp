@@ -16,7 +16,18 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-enum Purpose : std::uint8_t { print = 40, place, knock, focus, blurred, slip, sampling, exposure, cold, cut_off };
+enum class SeriesRandom : std::uint8_t {
+  print = 40,
+  place,
+  knock,
+  focus,
+  blurred,
+  slip,
+  sampling,
+  exposure,
+  cold,
+  cut_off
+};
 
 bool can_be_made(const BoardLayout& b) {
   const bool markers = b.marker_mm > 0.0;
@@ -66,7 +77,7 @@ Result<std::unique_ptr<CalibrationSeries>> CalibrationSeries::create(const Serie
 CalibrationSeries::CalibrationSeries(const SeriesOptions& o)
     : options_(o),
       rig_(o.rig ? draw_rig(*o.rig, o.image_scale) : DrawnRig{.geometry = default_rig(o.image_scale)}),
-      board_(o.board, o.print, mix(o.seed, print)) {
+      board_(o.board, o.print, mix(o.seed, SeriesRandom::print)) {
   if (o.hand_held > 0) {
     plan_hand_held();
   } else {
@@ -81,7 +92,7 @@ void CalibrationSeries::plan_placements() {
     if (!chosen.empty() && std::ranges::find(chosen, planned.number) == chosen.end()) continue;
     const double facing = -to_radians(rig_.table.true_deg(-planned.mark_deg));
     const PlacedBoard placed =
-        put_down(planned, options_.board, facing, options_.exact_placements, mix(options_.seed, place));
+        put_down(planned, options_.board, facing, options_.exact_placements, mix(options_.seed, SeriesRandom::place));
     int image = 0;
     for (const double angle : planned_angles(planned, options_.angles)) {
       SeriesPair pair;
@@ -90,7 +101,7 @@ void CalibrationSeries::plan_placements() {
       pair.name = fmt::format("placement{}_{:02}", planned.number, image);
       pair.in_a = planned.in_a;
       pair.in_b = planned.in_b;
-      const double rest = resting_angle(angle, mix(options_.seed, place));
+      const double rest = resting_angle(angle, mix(options_.seed, SeriesRandom::place));
       pair.reported_deg = encoder_reading(rest);
       pair.true_deg = rig_.table.true_deg(rest);
       pair.table_from_board = rig_.table.axis_from_top * placed.table_from_board;
@@ -106,7 +117,7 @@ void CalibrationSeries::plan_hand_held() {
     SeriesPair pair;
     pair.placement = number;
     pair.name = fmt::format("hand{:03}", number);
-    placed_.push_back(held_by_hand(mix(options_.seed, place), number));
+    placed_.push_back(held_by_hand(mix(options_.seed, SeriesRandom::place), number));
     pair.table_from_board = rig_.table.axis_from_top * placed_.back().table_from_board;
     pair.rig = rig_.geometry;
     pairs_.push_back(pair);
@@ -116,7 +127,7 @@ void CalibrationSeries::plan_hand_held() {
 void CalibrationSeries::add_faults() {
   change_cameras();
   const SeriesFaults& f = options_.faults;
-  const auto bits = [&](int n) { return mix(options_.seed, blurred, n); };
+  const auto bits = [&](int n) { return mix(options_.seed, SeriesRandom::blurred, n); };
   for (int i = 0; i < static_cast<int>(f.blurred); ++i) {
     SeriesPair& pair = pairs_[bits(2 * i) % pairs_.size()];
     (bits(2 * i + 1) % 2 == 0 ? pair.left_blur_px : pair.right_blur_px) = 2.5;
@@ -126,27 +137,28 @@ void CalibrationSeries::add_faults() {
 
 void CalibrationSeries::change_cameras() {
   const SeriesFaults& f = options_.faults;
-  const auto bits = [&](int purpose, int n) { return mix(options_.seed, purpose, n); };
+  const auto bits = [&](SeriesRandom purpose, int n) { return mix(options_.seed, purpose, n); };
   const auto eye_of = [](SeriesPair& pair, bool left) -> Eye& { return left ? pair.rig.left : pair.rig.right; };
   const auto turn = [&](Eye& eye, double px, double way) {
     const double angle = px * options_.image_scale / eye.fx;
     eye.eye_from_turntable =
         small_motion(angle * Vector3d(std::sin(way), std::cos(way), 0.0), Vector3d::Zero()) * eye.eye_from_turntable;
   };
-  const int knocked_after = placement_before(pairs_, bits(knock, 0)),
-            focused_after = placement_before(pairs_, bits(focus, 0));
-  const double knocked_way = 2.0 * M_PI * uniform(bits(knock, 1)), cold_way = 2.0 * M_PI * uniform(bits(cold, 1));
+  const int knocked_after = placement_before(pairs_, bits(SeriesRandom::knock, 0)),
+            focused_after = placement_before(pairs_, bits(SeriesRandom::focus, 0));
+  const double knocked_way = 2.0 * M_PI * uniform(bits(SeriesRandom::knock, 1)),
+               cold_way = 2.0 * M_PI * uniform(bits(SeriesRandom::cold, 1));
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     SeriesPair& pair = pairs_[i];
     if (f.knock_px != 0.0 && pair.placement > knocked_after) {
-      turn(eye_of(pair, bits(knock, 2) % 2 == 0), f.knock_px, knocked_way);
+      turn(eye_of(pair, bits(SeriesRandom::knock, 2) % 2 == 0), f.knock_px, knocked_way);
     }
     if (f.cold_px != 0.0) {
       const double progress = static_cast<double>(i) / static_cast<double>(pairs_.size() - 1);
-      turn(eye_of(pair, bits(cold, 2) % 2 == 0), progress * f.cold_px, cold_way);
+      turn(eye_of(pair, bits(SeriesRandom::cold, 2) % 2 == 0), progress * f.cold_px, cold_way);
     }
     if (f.focus != 0.0 && pair.placement > focused_after) {
-      const bool left = bits(focus, 1) % 2 == 0;
+      const bool left = bits(SeriesRandom::focus, 1) % 2 == 0;
       eye_of(pair, left).fx *= 1.0 + f.focus;
       eye_of(pair, left).fy *= 1.0 + f.focus;
       (left ? pair.left_blur_px : pair.right_blur_px) = 0.6;
@@ -160,9 +172,11 @@ void CalibrationSeries::move_boards() {
     placed_[i].table_from_board = Transform(Eigen::Translation3d(shift)) * placed_[i].table_from_board;
     pairs_[i].table_from_board = rig_.table.axis_from_top * placed_[i].table_from_board;
   };
-  const auto one_of = [&](int purpose) { return pairs_[mix(options_.seed, purpose, 0) % pairs_.size()].placement; };
-  const int slipped = one_of(slip), aside = one_of(cut_off);
-  const double direction = 2.0 * M_PI * uniform(mix(options_.seed, slip, 1));
+  const auto one_of = [&](SeriesRandom purpose) {
+    return pairs_[mix(options_.seed, purpose, 0) % pairs_.size()].placement;
+  };
+  const int slipped = one_of(SeriesRandom::slip), aside = one_of(SeriesRandom::cut_off);
+  const double direction = 2.0 * M_PI * uniform(mix(options_.seed, SeriesRandom::slip, 1));
   for (std::size_t i = 0; i < pairs_.size(); ++i) {
     if (f.slip_mm != 0.0 && pairs_[i].placement == slipped && pairs_[i].image > (options_.angles + 1) / 2) {
       move(i, f.slip_mm * Vector3d(std::sin(direction), 0.0, std::cos(direction)));
@@ -193,8 +207,9 @@ StereoImages CalibrationSeries::shoot(std::size_t index) {
   const auto image = [&](const Eye& eye, int camera, double blur) {
     auto& rays = rays_[camera];
     if (!rays || rays->fx != eye.fx) rays = std::make_unique<Rays>(Rays{eye.fx, RayMap(eye)});
-    const cv::Mat light = scene_->render(eye, rays->map, angle, mix(options_.seed, sampling, index, camera));
-    const std::uint64_t key = options_.noise ? mix(options_.seed, exposure, index, camera) | 1 : 0;
+    const cv::Mat light =
+        scene_->render(eye, rays->map, angle, mix(options_.seed, SeriesRandom::sampling, index, camera));
+    const std::uint64_t key = options_.noise ? mix(options_.seed, SeriesRandom::exposure, index, camera) | 1 : 0;
     return expose(through_lens(light, options_.image_scale, blur), key, rig_.noise_factor);
   };
   return {image(seen.left, 0, pair.left_blur_px), image(seen.right, 1, pair.right_blur_px)};

@@ -9,6 +9,7 @@
 #include "core/parallel.h"
 #include "sim/scene/profile.h"
 #include "sim/scene/random.h"
+#include "sim/scene/surface_colour.h"
 #include "sim/scene/table_top.h"
 
 namespace scanrig::sim {
@@ -27,8 +28,6 @@ struct Sample {
   bool lit = true;     // by the projector
   double depth = 0.0;  // mm along the camera's axis
 };
-
-Vector3f rgb(const double* c) { return Eigen::Map<const Vector3d>(c).cast<float>(); }
 
 class Shot {
  public:

@@ -8,6 +8,7 @@
 
 #include "core/parallel.h"
 #include "sim/scene/profile.h"
+#include "sim/scene/surface_colour.h"
 
 namespace scanrig::sim {
 namespace {
@@ -20,9 +21,7 @@ constexpr int kTableRays = 300;   // a shadow on an even table shows every step
 constexpr double kReach = 200.0;  // mm; no part of the object is farther
 constexpr int kGrid = 73;         // nodes across the table
 constexpr int kMiddle = kGrid / 2;
-constexpr double kStep = 2.5;  // mm between them
-
-Vector3f rgb(const double* c) { return Eigen::Map<const Vector3d>(c).cast<float>(); }
+constexpr double kGridStep = 2.5;  // mm between them
 
 /// Directions over the hemisphere around +Z, spread evenly under the cosine law.
 std::vector<Vector3d> hemisphere(int count) {
@@ -100,15 +99,15 @@ RoomLight::RoomLight(const Object& object, const RayCaster& rays, const Transfor
   parallel_for(kGrid, [&](std::size_t row) {
     const int j = static_cast<int>(row);
     for (int i = 0; i < kGrid; ++i) {
-      const Vector3d at(kStep * (i - kMiddle), 0.0, kStep * (j - kMiddle));
+      const Vector3d at(kGridStep * (i - kMiddle), 0.0, kGridStep * (j - kMiddle));
       table_.at<float>(j, i) = gather(rays, object_from_table, over_table, at, Vector3d::UnitY()).openness;
     }
   });
 }
 
 Surroundings RoomLight::on_table(double x, double z) const {
-  const double u = std::clamp(x / kStep + kMiddle, 0.0, kGrid - 1.001);
-  const double v = std::clamp(z / kStep + kMiddle, 0.0, kGrid - 1.001);
+  const double u = std::clamp(x / kGridStep + kMiddle, 0.0, kGrid - 1.001);
+  const double v = std::clamp(z / kGridStep + kMiddle, 0.0, kGrid - 1.001);
   const int i = static_cast<int>(u), j = static_cast<int>(v);
   const auto fu = static_cast<float>(u - i), fv = static_cast<float>(v - j);
   const float open = (1.0F - fv) * ((1.0F - fu) * table_.at<float>(j, i) + fu * table_.at<float>(j, i + 1)) +

@@ -8,6 +8,9 @@
 
 namespace scanrig::sim {
 
+/// Linear RGB as the profile writes it.
+inline Eigen::Vector3f rgb(const double* c) { return Eigen::Map<const Eigen::Vector3d>(c).cast<float>(); }
+
 /// A point of the object's surface to be coloured.
 struct SurfacePoint {
   Eigen::Vector3d position;  ///< in the object's own frame, mm

@@ -16,13 +16,13 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using Eigen::Vector3f;
 
-constexpr double kStep = 2.0 * std::numbers::pi / kRimDots;
+constexpr double kDotStep = 2.0 * std::numbers::pi / kRimDots;
 
 /// `place` counts the dots; a whole turn more or less is the same dot.
 Vector2d centre_at(int place) {
   const Profile& p = profile();
   const int dot = ((place % kRimDots) + kRimDots) % kRimDots;
-  const double angle = kStep * (place + 0.25 * (uniform(mix(p.dot_seed, dot)) - 0.5));
+  const double angle = kDotStep * (place + 0.25 * (uniform(mix(p.dot_seed, dot)) - 0.5));
   return p.rim_dot_radius_mm * Vector2d(std::sin(angle), std::cos(angle));
 }
 
@@ -34,7 +34,7 @@ double rim_dot_share(const Vector3d& in_table, double size, const RimDotErrors& 
   const Profile& p = profile();
   const double radius = std::hypot(in_table.x(), in_table.z());
   if (std::abs(radius - p.rim_dot_radius_mm) > p.rim_dot_diameter_mm) return 0.0;
-  const int nearest = static_cast<int>(std::lround(std::atan2(in_table.x(), in_table.z()) / kStep));
+  const int nearest = static_cast<int>(std::lround(std::atan2(in_table.x(), in_table.z()) / kDotStep));
   const int dot = ((nearest % kRimDots) + kRimDots) % kRimDots;
   const Vector2d centre = centre_at(nearest) + errors[dot];
   const double inside = 0.5 * p.rim_dot_diameter_mm - (Vector2d(in_table.x(), in_table.z()) - centre).norm();

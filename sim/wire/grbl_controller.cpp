@@ -13,7 +13,7 @@ namespace {
 constexpr const char* kOk = "ok\r\n";
 constexpr float kPullOff = 1.0F;       ///< $27, units: distance of home from the machine's zero
 constexpr double kHomingTravel = 1.5;  ///< of the axis' travel, one table turn; then homing is given up
-constexpr std::size_t kMaxLineLength = 80;
+constexpr std::size_t kMaxGrblLine = 80;
 constexpr double kJogDegS = 90;
 
 std::string error(int number) { return fmt::format("error:{}\r\n", number); }
@@ -185,7 +185,7 @@ void GrblController::advance() const {
 void GrblController::carry_out(const std::string& text) const {
   if (text.empty()) {
     output_ += kOk;
-  } else if (text.size() > kMaxLineLength) {
+  } else if (text.size() > kMaxGrblLine) {
     output_ += error(11);
   } else if (text == "$H") {
     settings_.homing ? start_homing() : static_cast<void>(output_ += error(5));

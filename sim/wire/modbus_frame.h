@@ -9,6 +9,9 @@ namespace scanrig::sim::wire {
 
 using Bytes = std::vector<std::uint8_t>;
 
+/// Exception codes [Modbus application protocol V1.1b3, section 7].
+inline constexpr std::uint8_t kIllegalFunction = 1, kIllegalAddress = 2, kIllegalValue = 3;
+
 /// CRC-16/MODBUS: polynomial 0xA001 reflected, start 0xFFFF [Modbus over serial line V1.02, appendix B].
 std::uint16_t modbus_crc(std::span<const std::uint8_t> bytes);
 /// The bytes with their checksum, low byte first.

@@ -5,8 +5,6 @@
 namespace scanrig::sim::wire {
 namespace {
 
-constexpr std::uint8_t kIllegalFunction = 1;
-constexpr std::uint8_t kIllegalAddress = 2;
 constexpr std::uint8_t kReadCoils = 1;
 
 }  // namespace

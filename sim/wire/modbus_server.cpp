@@ -8,8 +8,7 @@ namespace {
 using std::chrono::milliseconds;
 
 constexpr milliseconds kFrameTimeout{20};  ///< a frame that pauses this long in the middle is dropped
-constexpr std::uint8_t kIllegalFunction = 1;
-constexpr std::uint8_t kWrongCrc = 8;  ///< Leadshine's reply to a damaged request
+constexpr std::uint8_t kWrongCrc = 8;      ///< Leadshine's reply to a damaged request
 constexpr std::size_t kMaxRegisters = 125;
 constexpr std::size_t kMaxBits = 2000;
 

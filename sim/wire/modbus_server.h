@@ -24,9 +24,11 @@ class RegisterDevice {
   virtual std::uint8_t write(std::uint16_t address, std::span<const std::uint16_t> values) = 0;
   /// The same for bits: `function` 1 reads coils, 2 discrete inputs. Without them: illegal function.
   virtual std::uint8_t read_bits(std::uint8_t /*function*/, std::uint16_t /*address*/, std::vector<bool>& /*bits*/) {
-    return 1;
+    return kIllegalFunction;
   }
-  virtual std::uint8_t write_coils(std::uint16_t /*address*/, const std::vector<bool>& /*bits*/) { return 1; }
+  virtual std::uint8_t write_coils(std::uint16_t /*address*/, const std::vector<bool>& /*bits*/) {
+    return kIllegalFunction;
+  }
 };
 
 /// A Modbus RTU device on a pseudo-terminal.

@@ -7,7 +7,6 @@
 namespace scanrig::sim::wire {
 namespace {
 
-constexpr std::uint8_t kIllegalAddress = 2, kIllegalValue = 3;
 constexpr std::uint16_t kDirectData = 0x0058, kType = 0x005A, kPosition = 0x005C, kSpeed = 0x005E,
                         kAcceleration = 0x0060, kDeceleration = 0x0062, kCurrent = 0x0064, kTrigger = 0x0066,
                         kInput = 0x007D, kStatus = 0x007F, kAlarm = 0x0080, kCommandPosition = 0x00C6,

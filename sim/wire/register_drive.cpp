@@ -1,11 +1,7 @@
 #include "sim/wire/register_drive.h"
 
 namespace scanrig::sim::wire {
-namespace {
-
-constexpr std::uint8_t kIllegalAddress = 2;
-
-}  // namespace
+namespace {}  // namespace
 
 std::uint8_t RegisterDrive::read(std::uint16_t address, std::span<std::uint16_t> values) {
   const std::scoped_lock lock(mutex_);

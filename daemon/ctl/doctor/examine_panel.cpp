@@ -11,15 +11,15 @@ namespace {
 using std::chrono::seconds;
 
 constexpr seconds kPressLimit{15};
-constexpr seconds kAskLimit{1};
-constexpr std::chrono::milliseconds kGlance{100};
+constexpr seconds kPanelLimit{1};
+constexpr std::chrono::milliseconds kPanelGlance{100};
 constexpr std::chrono::milliseconds kPowerGone{500};  ///< after the e-stop, until the drive must be off
 
 /// Waits until the e-stop's input is `ok`; returns whether it came.
 Result<bool> wait_for_estop(Panel& panel, bool ok, Clock& clock) {
   PanelInputs known;
   for (const auto by = Deadline::after(clock, kPressLimit); !by.expired(clock);) {
-    const auto now = panel.wait_change(known, Deadline::after(clock, kGlance));
+    const auto now = panel.wait_change(known, Deadline::after(clock, kPanelGlance));
     if (!now) return pass_on(now);
     if (now->estop_ok == ok) return true;
     known = *now;
@@ -34,7 +34,7 @@ bool drive_still_enabled(const config::RigConfig& rig, Clock& clock) {
   clock.sleep_for(kPowerGone);
   const auto& options = rig.turntable.modbus;
   ModbusDrive drive(options.line, options.profile, clock);
-  const auto state = drive.read_state(Deadline::after(clock, kAskLimit));
+  const auto state = drive.read_state(Deadline::after(clock, kPanelLimit));
   return state && state->enabled && !state->fault;
 }
 
@@ -80,7 +80,7 @@ bool examine_panel(const config::RigConfig& rig, bool drive_answers, const Opera
     report.find("panel", open.error().message + ".", "Correct the configuration.");
     return false;
   }
-  const auto now = open->panel->wait_change({}, Deadline::after(clock, kAskLimit));
+  const auto now = open->panel->wait_change({}, Deadline::after(clock, kPanelLimit));
   if (!now) {
     const auto& line = rig.safety.estop.line;
     const bool estop = !line.empty() && now.error().message.find(line) != std::string::npos;

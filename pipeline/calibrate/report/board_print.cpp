@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/statistics.h"
+#include "core/units.h"
 #include "pipeline/calibrate/report/drawing.h"
 #include "pipeline/calibrate/report/html.h"
 #include "pipeline/calibrate/report/sections.h"
@@ -11,7 +12,7 @@
 namespace scanrig::report {
 namespace {
 
-constexpr double kPpm = 1e6, kMicrometres = 1e3;
+constexpr double kPpm = 1e6;
 
 /// Height of a corner over the board's plane, mm: warp and its own offset. Positive: away from the reader.
 double height_of(const Board& board, const SolvedBoard& solved, int id) {
@@ -43,11 +44,11 @@ std::string print_errors(const Board& board, const SolvedBoard& solved) {
   drawing.box({window.left, window.top}, {window.right, window.bottom}, "frame");
   drawing.dots(corners, "c0");
   drawing.arrows(arrows, "");
-  const double key_um = round_down(kMicrometres * board.square_mm / exaggeration);
+  const double key_um = round_down(kMicrometresPerMm * board.square_mm / exaggeration);
   return figure(
-      drawing.svg() + arrow_key(window, key_um / kMicrometres, exaggeration, fmt::format("{:.4g} um", key_um)),
+      drawing.svg() + arrow_key(window, key_um / kMicrometresPerMm, exaggeration, fmt::format("{:.4g} um", key_um)),
       fmt::format("errors of the print in its plane, drawn {:.6g} times too long; {} um at most", exaggeration,
-                  number(kMicrometres * largest, 1)));
+                  number(kMicrometresPerMm * largest, 1)));
 }
 
 std::string flatness(const Board& board, const SolvedBoard& solved) {
@@ -62,13 +63,13 @@ std::string flatness(const Board& board, const SolvedBoard& solved) {
     const Eigen::Vector2d at = board.corner(id).head<2>();
     const double height = heights[static_cast<std::size_t>(id)] - mean, share = height / largest;
     drawing.box(at - half, at + half, "cell", signed_shade(share));
-    drawing.text(at + Eigen::Vector2d(0.0, 1.2), number(kMicrometres * height, 0),
+    drawing.text(at + Eigen::Vector2d(0.0, 1.2), number(kMicrometresPerMm * height, 0),
                  std::abs(share) > 0.75 ? "middle light" : "middle");
   }
   return figure(drawing.svg(),
                 fmt::format("height of the corners over their mean, um: warp and print together, {} at most; positive: "
                             "away from who reads the print",
-                            number(kMicrometres * largest, 0)));
+                            number(kMicrometresPerMm * largest, 0)));
 }
 
 std::string lengths_of(const CalibrationInput& input) {
@@ -94,15 +95,16 @@ std::string board_section(const FolderCalibration& outcome) {
       paragraph(fmt::format("{} x {} squares of {} mm, as solved against the board as ordered, seen by who "
                             "reads its print.",
                             board.columns, board.rows, number(board.square_mm, 3)));
-  out += table({"what", "is"},
-               {{"scale", fmt::format("{} ppm from the order, sigma {} ppm", number(kPpm * (solved.scale - 1.0), 0),
-                                      number(kPpm * solved.scale_sigma, 0))},
-                {"aspect", fmt::format("{} ppm", number(kPpm * solved.aspect, 0))},
-                {"shear", fmt::format("{} ppm", number(kPpm * solved.shear, 0))},
-                {"warp at the edge", fmt::format("{}, {}, {} mm, of x x, x y, y y", number(solved.warp_mm[0], 3),
-                                                 number(solved.warp_mm[1], 3), number(solved.warp_mm[2], 3))},
-                {"print, in the plane", fmt::format("{} um rms", number(kMicrometres * root_mean_square(plane), 1))},
-                {"print, across it", fmt::format("{} um rms", number(kMicrometres * root_mean_square(across), 1))}});
+  out +=
+      table({"what", "is"},
+            {{"scale", fmt::format("{} ppm from the order, sigma {} ppm", number(kPpm * (solved.scale - 1.0), 0),
+                                   number(kPpm * solved.scale_sigma, 0))},
+             {"aspect", fmt::format("{} ppm", number(kPpm * solved.aspect, 0))},
+             {"shear", fmt::format("{} ppm", number(kPpm * solved.shear, 0))},
+             {"warp at the edge", fmt::format("{}, {}, {} mm, of x x, x y, y y", number(solved.warp_mm[0], 3),
+                                              number(solved.warp_mm[1], 3), number(solved.warp_mm[2], 3))},
+             {"print, in the plane", fmt::format("{} um rms", number(kMicrometresPerMm * root_mean_square(plane), 1))},
+             {"print, across it", fmt::format("{} um rms", number(kMicrometresPerMm * root_mean_square(across), 1))}});
   out += lengths_of(outcome.input);
   if (solved.offsets_mm.size() == static_cast<std::size_t>(board.corner_count())) {
     out += row_of(print_errors(board, solved) + flatness(board, solved));

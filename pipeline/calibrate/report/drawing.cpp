@@ -25,7 +25,7 @@ std::string pair_of(const Eigen::Vector2d& at) { return px(at.x()) + " " + px(at
 
 /// The line and, where it is long enough to be seen, the head.
 std::string arrow_path(const Eigen::Vector2d& from, const Eigen::Vector2d& by) {
-  std::string path = "M" + pair_of(from) + "l" + pair_of(by);
+  std::string path = fmt::format("M{}l{}", pair_of(from), pair_of(by));
   const double head = std::min(kHeadPx, 0.4 * by.norm());
   if (head < kMinHeadPx) return path;
   const Eigen::Vector2d back = -by.normalized() * head, aside(-0.5 * back.y(), 0.5 * back.x());
@@ -61,7 +61,7 @@ void Drawing::line(const Eigen::Vector2d& from, const Eigen::Vector2d& to, std::
 void Drawing::path(const std::vector<Eigen::Vector2d>& points, std::string_view style) {
   if (points.empty()) return;
   std::string d = "M";
-  for (std::size_t i = 0; i < points.size(); ++i) d += (i == 0 ? "" : "L") + pair_of(on_page(points[i]));
+  for (std::size_t i = 0; i < points.size(); ++i) d.append(i == 0 ? "" : "L").append(pair_of(on_page(points[i])));
   content_ += fmt::format("<path class=\"line {}\" d=\"{}\"/>\n", style, d);
 }
 
@@ -89,7 +89,7 @@ void Drawing::disc(const Eigen::Vector2d& centre, double radius_px, std::string_
 void Drawing::dots(const std::vector<Eigen::Vector2d>& points, std::string_view style) {
   if (points.empty()) return;
   std::string d;
-  for (const Eigen::Vector2d& point : points) d += "M" + pair_of(on_page(point)) + "h0";
+  for (const Eigen::Vector2d& point : points) d.append("M").append(pair_of(on_page(point))).append("h0");
   content_ += fmt::format("<path class=\"dots {}\" d=\"{}\"/>\n", style, d);
 }
 

@@ -13,8 +13,6 @@
 namespace scanrig::report {
 namespace {
 
-constexpr double kMicrometres = 1e3;
-
 /// One of the pair's images is used: its table angle is measured.
 bool is_used(const SolvedCalibration& solved, std::size_t pair) {
   const auto cameras = static_cast<std::size_t>(solved.cameras);
@@ -108,9 +106,9 @@ std::string dot_drawing(const DotErrors& errors, double largest) {
   }
   drawing.dots(places, "c0");
   drawing.arrows(arrows, "strong");
-  const double key_um = round_down(kMicrometres * 0.15 * errors.radius_mm / exaggeration);
+  const double key_um = round_down(kMicrometresPerMm * 0.15 * errors.radius_mm / exaggeration);
   return figure(
-      drawing.svg() + arrow_key(window, key_um / kMicrometres, exaggeration, fmt::format("{:.4g} um", key_um)),
+      drawing.svg() + arrow_key(window, key_um / kMicrometresPerMm, exaggeration, fmt::format("{:.4g} um", key_um)),
       fmt::format("from above, the cameras below: dots against equal steps on a circle, drawn {:.6g} times too long",
                   exaggeration));
 }
@@ -142,8 +140,8 @@ std::string rim_dots(const FolderCalibration& outcome) {
        {"radius", fmt::format("{} mm, {} ordered", number(errors.radius_mm, 4), number(input.rim_dots.radius_mm, 3))},
        {"first dot", fmt::format("{} deg from the front at table angle 0", number(errors.start_deg, 4))},
        {"print",
-        fmt::format("{} um rms in the plane, from equal steps", number(kMicrometres * root_mean_square(away), 1))},
-       {"height", fmt::format("{} um rms", number(kMicrometres * root_mean_square(height), 1))}});
+        fmt::format("{} um rms in the plane, from equal steps", number(kMicrometresPerMm * root_mean_square(away), 1))},
+       {"height", fmt::format("{} um rms", number(kMicrometresPerMm * root_mean_square(height), 1))}});
   return out + dot_drawing(errors, largest);
 }
 

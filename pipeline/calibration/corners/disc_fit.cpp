@@ -12,7 +12,7 @@ namespace scanrig {
 namespace {
 
 // Unknowns: shift 0 1, log of blur 2, log of size 3, then offset and gain per colour.
-constexpr int kColours = 4;
+constexpr int kFirstDiscColour = 4;
 
 Eigen::Matrix<double, 6, 1> quadratic(const Eigen::Vector2d& p) {
   Eigen::Matrix<double, 6, 1> terms;
@@ -55,7 +55,7 @@ double fit_levels(FitVector& p, std::span<const FitPixel> pixels, int colours, c
       squares += pixel.value * pixel.value;
     }
     const Eigen::Vector2d levels = normal.ldlt().solve(slope);
-    p.segment<2>(kColours + 2 * colour) = levels;
+    p.segment<2>(kFirstDiscColour + 2 * colour) = levels;
     cost += squares - levels.dot(slope);
   }
   return cost;
@@ -69,7 +69,7 @@ ColourWeights residuals_of(const FitVector& p, std::span<const FitPixel> pixels,
   std::array<int, 3> counts{};
   for (const FitPixel& pixel : pixels) {
     const auto colour = static_cast<std::size_t>(pixel.colour);
-    const int k = kColours + 2 * pixel.colour;
+    const int k = kFirstDiscColour + 2 * pixel.colour;
     const double level = level_at(rim_distance(shape, pixel.place - p.head<2>(), std::exp(p[3])), std::exp(p[2]));
     squares[colour] += std::pow(p[k] + p[k + 1] * level - pixel.value, 2);
     ++counts[colour];
@@ -87,7 +87,7 @@ FitSums sums_at(const FitVector& p, std::span<const FitPixel> pixels, const Disc
   FitVector row(p.size());
   for (const FitPixel& pixel : pixels) {
     const RimDistance rim = rim_distance(shape, pixel.place - p.head<2>(), size);
-    const int k = kColours + 2 * pixel.colour;
+    const int k = kFirstDiscColour + 2 * pixel.colour;
     const double level = level_at(rim, blur);
     const double in_sigmas = rim.pixels / blur;
     const double by_sigmas = -p[k + 1] * std::sqrt(2.0 / std::numbers::pi) * std::exp(-0.5 * in_sigmas * in_sigmas);
@@ -148,7 +148,7 @@ Eigen::Matrix2d DiscShape::jacobian(const Eigen::Vector2d& from_centre) const {
 }
 
 double explained_by_disc(std::span<const FitPixel> pixels, int colours, const DiscShape& shape) {
-  FitVector p = FitVector::Zero(kColours + 2 * colours);
+  FitVector p = FitVector::Zero(kFirstDiscColour + 2 * colours);
   double explained = -fit_levels(p, pixels, colours, shape);
   for (int colour = 0; colour < colours; ++colour) {
     double count = 0.0;
@@ -166,7 +166,7 @@ double explained_by_disc(std::span<const FitPixel> pixels, int colours, const Di
 }
 
 std::optional<Disc> fit_disc(std::span<const FitPixel> pixels, int colours, const DiscShape& shape, double search_px) {
-  const int unknowns = kColours + 2 * colours;
+  const int unknowns = kFirstDiscColour + 2 * colours;
   if (static_cast<int>(pixels.size()) < 3 * unknowns) return std::nullopt;
   FitVector best = FitVector::Zero(unknowns);
   double best_cost = fit_levels(best, pixels, colours, shape);
@@ -196,7 +196,7 @@ std::optional<Disc> fit_disc(std::span<const FitPixel> pixels, int colours, cons
   double light = 0.0;
   double squares = 0.0;
   for (const FitPixel& pixel : pixels) {
-    const int k = kColours + 2 * pixel.colour;
+    const int k = kFirstDiscColour + 2 * pixel.colour;
     const double level = level_at(rim_distance(shape, pixel.place - disc.shift, disc.size), disc.blur_px);
     light += best[k];
     disc.contrast += best[k + 1];

@@ -11,7 +11,7 @@ namespace {
 
 // Unknowns: place 0 1, angles of both edges 2 3, log of blur 4, slope of the light 5 6, then offset and gain per
 // colour.
-constexpr int kColours = 7;
+constexpr int kFirstSaddleColour = 7;
 
 struct Crossing {
   double value = 0.0;  // -1 .. 1
@@ -75,7 +75,7 @@ FitSums sums_at(const FitVector& p, std::span<const FitPixel> pixels) {
     const double u = edges.normal_0.dot(from) * inverse;
     const double v = edges.normal_1.dot(from) * inverse;
     const Crossing crossing = cross(u, v, edges.correlation);
-    const int k = kColours + 2 * pixel.colour;
+    const int k = kFirstSaddleColour + 2 * pixel.colour;
     const double light = 1.0 + p.segment<2>(5).dot(from);
     const double level = p[k] + p[k + 1] * crossing.value;
     const double scale = light * p[k + 1];
@@ -110,14 +110,14 @@ void start_levels(FitVector& p, std::span<const FitPixel> pixels, int colours) {
       normal += row * row.transpose();
       slope += row * pixel.value;
     }
-    p.segment<2>(kColours + 2 * colour) = normal.ldlt().solve(slope);
+    p.segment<2>(kFirstSaddleColour + 2 * colour) = normal.ldlt().solve(slope);
   }
 }
 
 }  // namespace
 
 std::optional<Saddle> fit_saddle(std::span<const FitPixel> pixels, int colours, const Saddle& start) {
-  const int unknowns = kColours + 2 * colours;
+  const int unknowns = kFirstSaddleColour + 2 * colours;
   if (static_cast<int>(pixels.size()) < 2 * unknowns) return std::nullopt;
   FitVector p = FitVector::Zero(unknowns);
   p.head<2>() = start.place;
@@ -130,7 +130,7 @@ std::optional<Saddle> fit_saddle(std::span<const FitPixel> pixels, int colours, 
   saddle.place = p.head<2>();
   for (int i = 0; i < 2; ++i) saddle.directions[i] = {std::cos(p[2 + i]), std::sin(p[2 + i])};
   saddle.blur_px = std::exp(p[4]);
-  for (const FitPixel& pixel : pixels) saddle.contrast += p[kColours + 2 * pixel.colour + 1];
+  for (const FitPixel& pixel : pixels) saddle.contrast += p[kFirstSaddleColour + 2 * pixel.colour + 1];
   saddle.contrast /= static_cast<double>(pixels.size());
   saddle.noise = std::sqrt(sums.cost / static_cast<double>(static_cast<int>(pixels.size()) - unknowns));
   if (!std::isfinite(saddle.noise)) return std::nullopt;

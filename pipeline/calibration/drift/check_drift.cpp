@@ -18,7 +18,6 @@ constexpr std::size_t kMinCorners = 12;
 constexpr double kMaxNoisePx = 0.2;             ///< above it the board or a camera moved during the check
 constexpr double kMiddleMm = 57.0;              ///< height of the volume's middle
 constexpr double kCoarse = 1e-4, kFine = 1e-9;  ///< tolerances of the bundle
-constexpr double kMicrometres = 1e3;
 
 CalibrationInput input_of(const Calibration& known, const Board& board, const std::vector<BoardPair>& pairs) {
   CalibrationInput input;
@@ -152,8 +151,8 @@ Result<DriftCheck> check_drift(const Calibration& known, const Board& board, con
   check.calibration = with_poses(known, start->unknowns);
   const auto grid = volume_grid(known);
   const VolumeParts parts(grid);
-  check.difference_um =
-      kMicrometres * rms_per_point(parts.without_scale_and_base(volume_difference(known, check.calibration, grid)));
+  check.difference_um = kMicrometresPerMm *
+                        rms_per_point(parts.without_scale_and_base(volume_difference(known, check.calibration, grid)));
   const auto linear = linearise(start->setup, start->unknowns);
   if (!linear) return pass_on(linear);
   const auto normal = NormalMatrix::factorise(*linear);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/units.h"
 #include "pipeline/calibration/judge/rig_changes.h"
 #include "pipeline/calibration/judge/sentences.h"
 #include "pipeline/calibration/solve/volume_error.h"
@@ -12,8 +13,7 @@ namespace {
 
 constexpr double kMaxRatio = 1.5;
 constexpr double kDifferenceToError = 3.0;  ///< A - B is a quarter to all of the error
-constexpr double kMicrometres = 1e3;
-constexpr double kMaxLinearPx = 2.0;  ///< a larger motion is beyond a linear test
+constexpr double kMaxLinearPx = 2.0;        ///< a larger motion is beyond a linear test
 
 /// A alone and B alone over the volume, against their covariances.
 CrossValidation compare(const CalibrationInput& input, const CalibrationSolution& a, const CalibrationSolution& b) {
@@ -22,10 +22,10 @@ CrossValidation compare(const CalibrationInput& input, const CalibrationSolution
   const VolumeParts parts(grid);
   const Eigen::VectorXd field = parts.without_scale_and_base(volume_difference(from, to, grid));
   CrossValidation found;
-  found.difference = kMicrometres * rms_per_point(field);
-  found.max = kMicrometres * max_per_point(field);
+  found.difference = kMicrometresPerMm * rms_per_point(field);
+  found.max = kMicrometresPerMm * max_per_point(field);
   for (std::size_t i = 0; i < grid.size(); ++i) {
-    found.shifts.push_back({grid[i], kMicrometres * field.segment<3>(3 * static_cast<Eigen::Index>(i))});
+    found.shifts.push_back({grid[i], kMicrometresPerMm * field.segment<3>(3 * static_cast<Eigen::Index>(i))});
   }
   double variance = 0.0;
   for (const CalibrationSolution* part : {&a, &b}) {
@@ -68,7 +68,7 @@ double effect_of(const RigChange& change, const Calibration& calibration) {
   moved.right.camera_from_turntable =
       small_motion({0.0, turn, 0.0}, Eigen::Vector3d::Zero()) * calibration.right.camera_from_turntable;
   const auto grid = volume_grid(calibration);
-  return kMicrometres *
+  return kMicrometresPerMm *
          rms_per_point(VolumeParts(grid).without_scale_and_base(volume_difference(calibration, moved, grid)));
 }
 

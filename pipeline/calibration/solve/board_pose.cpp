@@ -6,10 +6,8 @@
 
 namespace scanrig {
 
-constexpr std::size_t kMinCorners = 12;
-
 std::optional<Transform> board_pose(const Board& board, const BoardSight& sight, const Projection& lens) {
-  if (sight.corners.size() < kMinCorners) return std::nullopt;
+  if (sight.corners.size() < kMinCornersOfBoard) return std::nullopt;
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> pixels;
   for (const CornerObservation& corner : sight.corners) {

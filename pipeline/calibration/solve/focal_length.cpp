@@ -8,13 +8,12 @@
 namespace scanrig {
 namespace {
 
-constexpr std::size_t kMinCorners = 12;
 constexpr int kMinBoards = 2;
 constexpr double kMinPerspective = 1e-3;  ///< of all boards together; below it noise decides
 
 /// Board to pixels from the image's middle, over `width`. The board over its half extent, so that all weigh alike.
 std::optional<cv::Matx33d> homography(const Board& board, const BoardSight& sight, int width, int height) {
-  if (sight.corners.size() < kMinCorners) return std::nullopt;
+  if (sight.corners.size() < kMinCornersOfBoard) return std::nullopt;
   std::vector<cv::Point2d> places, pixels;
   const Eigen::Vector2d middle(0.5 * (width - 1), 0.5 * (height - 1));
   const double extent = 0.5 * (board.corner_columns() - 1) * board.square_mm;

@@ -20,7 +20,6 @@ constexpr int kFew = 3;                 ///< images that do not fit by themselve
 constexpr double kFieldEvidence = 3.0;  ///< chi-square per coefficient
 constexpr double kCoarse = 1e-4, kMiddle = 1e-6, kFine = 1e-9;  ///< tolerance of the bundle
 constexpr double kMadToSigma = 1.4826;
-constexpr std::size_t kMinCorners = 12;
 
 Result<void> check_length(const std::optional<MeasuredLength>& length) {
   if (!length) return {};
@@ -97,7 +96,7 @@ class CalibrationSolver {
       for (std::size_t k = 0; k < input_.pairs.size(); ++k) {
         const BoardSight& sight = sight_of(input_.pairs[k], c);
         const bool dots_only = sight.corners.empty() && !sight.dots.empty();
-        if (sight.corners.size() < kMinCorners && !dots_only) {
+        if (sight.corners.size() < kMinCornersOfBoard && !dots_only) {
           reasons_[k][c] = "too few corners";
         } else if (limit > 0.0 && blurs[k] > limit) {
           reasons_[k][c] = "blurred";

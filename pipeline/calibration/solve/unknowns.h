@@ -10,6 +10,8 @@
 
 namespace scanrig {
 
+inline constexpr std::size_t kMinCornersOfBoard = 12;  ///< found in one image, or it does not count
+
 /// A rigid motion as unknowns: quaternion w x y z, then the translation in mm.
 using PoseBlock = std::array<double, 7>;
 

@@ -5,13 +5,13 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/units.h"
 #include "pipeline/calibration/solve/sighting_model.h"
 
 namespace scanrig {
 namespace {
 
 using TwoPixels = Eigen::Matrix<double, 4, 3>;
-constexpr double kMicrometres = 1e3;
 
 /// The least-squares inverse of the derivative of both pixels by the point.
 Eigen::Matrix<double, 3, 4> inverse_of(const TwoPixels& by_point) {
@@ -137,7 +137,7 @@ VolumeParts::Split VolumeParts::split(const Eigen::MatrixXd& half) const {
 
 VolumeSigma VolumeParts::sigma(const Eigen::MatrixXd& half) const {
   const auto rms = [](const Eigen::MatrixXd& part) {
-    return kMicrometres * std::sqrt(part.squaredNorm() / (static_cast<double>(part.cols()) / 3.0));
+    return kMicrometresPerMm * std::sqrt(part.squaredNorm() / (static_cast<double>(part.cols()) / 3.0));
   };
   const Split parts = split(half);
   VolumeSigma sigma{.axis = rms(parts.axis),
@@ -147,7 +147,7 @@ VolumeSigma VolumeParts::sigma(const Eigen::MatrixXd& half) const {
                     .base = rms(parts.base),
                     .volume = rms(parts.volume)};
   for (Eigen::Index i = 0; i + 2 < parts.volume.cols(); i += 3) {
-    sigma.max = std::max(sigma.max, kMicrometres * parts.volume.middleCols<3>(i).norm());
+    sigma.max = std::max(sigma.max, kMicrometresPerMm * parts.volume.middleCols<3>(i).norm());
   }
   return sigma;
 }
@@ -157,7 +157,7 @@ std::vector<PointSigma> VolumeParts::sigma_at(const Eigen::MatrixXd& half) const
   std::vector<PointSigma> found;
   for (std::size_t i = 0; i < grid_.size(); ++i) {
     const auto norm = [&](const Eigen::MatrixXd& part) {
-      return kMicrometres * part.middleCols<3>(3 * static_cast<Eigen::Index>(i)).norm();
+      return kMicrometresPerMm * part.middleCols<3>(3 * static_cast<Eigen::Index>(i)).norm();
     };
     found.push_back({.point = grid_[i],
                      .axis = norm(parts.axis),

@@ -16,12 +16,6 @@ constexpr int kLensUnknowns = 9, kCameraUnknowns = 15;
 
 using Response = Eigen::Matrix<double, 3, 2 * kCameraUnknowns>;
 
-Eigen::Matrix3d cross(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
-
 void move(Camera& camera, const Eigen::Matrix<double, 6, 1>& change) {
   Transform& pose = camera.camera_from_turntable;
   pose.linear() = small_motion(change.head<3>(), Eigen::Vector3d::Zero()).linear() * pose.linear();
@@ -96,7 +90,7 @@ PixelByPose pixel_by_pose(const Camera& camera, const Eigen::Vector3d& point) {
   const Eigen::Matrix3d rotation = camera.camera_from_turntable.linear();
   const Eigen::Matrix<double, 2, 3> by_camera_point = pixel_by_point(camera, point) * rotation.transpose();
   PixelByPose by;
-  by << -by_camera_point * cross(rotation * point), by_camera_point;
+  by << -by_camera_point * cross_matrix(rotation * point), by_camera_point;
   return by;
 }
 

@@ -10,16 +10,10 @@ namespace {
 
 constexpr int kLens = 9, kCamera = 15;
 
-Eigen::Matrix3d cross(const Eigen::Vector3d& v) {
-  Eigen::Matrix3d m;
-  m << 0.0, -v.z(), v.y(), v.z(), 0.0, -v.x(), -v.y(), v.x(), 0.0;
-  return m;
-}
-
 /// A camera turns about its own centre; PoseChange turns about the table's origin.
 Eigen::Matrix<double, 6, 6> own_motion(const Camera& camera, const RigDrift& drift) {
   Eigen::Matrix<double, 6, 6> by = Eigen::Matrix<double, 6, 6>::Identity();
-  by.bottomLeftCorner<3, 3>() = -cross(camera.camera_from_turntable.translation());
+  by.bottomLeftCorner<3, 3>() = -cross_matrix(camera.camera_from_turntable.translation());
   Eigen::Matrix<double, 6, 1> sigma;
   sigma << drift.rows_px / camera.projection.fy, drift.columns_px / camera.projection.fx, drift.roll_rad,
       drift.camera_mm, drift.camera_mm, drift.camera_mm;

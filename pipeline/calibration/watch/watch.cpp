@@ -12,7 +12,6 @@ namespace {
 
 constexpr double kMeanRadiusMm = 37.0;  // rms over a volume of 55 mm
 constexpr double kMeanHeightMm = 57.0;
-constexpr double kMicrometres = 1e3;
 constexpr double kRowsExpectedPx = 0.003;
 
 /// Root of a mean square of `motion`, and of what its covariance alone would give.
@@ -31,19 +30,22 @@ WatchedPart camera_part(int camera, const MovedParts& moved, const RigEffects& e
   return {camera == 0 ? RigPart::left_camera : RigPart::right_camera,
           {},
           px,
-          kMicrometres * size_of(effects.volume_mm2, motion).first,
+          kMicrometresPerMm * size_of(effects.volume_mm2, motion).first,
           expected};
 }
 
 WatchedPart depth_part(RigPart part, const PartMotion& motion, const RigEffects& effects) {
   const auto [mm, expected] = size_of(effects.volume_mm2, motion);
-  return {part, {}, mm / effects.mm_per_px, kMicrometres * mm, expected / effects.mm_per_px};
+  return {part, {}, mm / effects.mm_per_px, kMicrometresPerMm * mm, expected / effects.mm_per_px};
 }
 
 WatchedPart angle_part(double rms_rad, double sigma_rad, const RigEffects& effects) {
   const double mm = rms_rad * kMeanRadiusMm;
-  return {
-      RigPart::angles, {}, mm / effects.mm_per_px, kMicrometres * mm, sigma_rad * kMeanRadiusMm / effects.mm_per_px};
+  return {RigPart::angles,
+          {},
+          mm / effects.mm_per_px,
+          kMicrometresPerMm * mm,
+          sigma_rad * kMeanRadiusMm / effects.mm_per_px};
 }
 
 bool are_dots_seen(const WatchInput& input, const WatchOptions& options) {
@@ -131,7 +133,7 @@ void add_overlap(Watch& watch, const Calibration& calibration, double axis_tilt_
   const double mm = std::hypot(axis_shift_mm, to_radians(axis_tilt_deg) * kMeanHeightMm);
   const AxisSigma sigma = axis_sigma(calibration, *calibration.quality);
   const double mm_per_px = rig_effects(calibration).mm_per_px;
-  WatchedPart part{RigPart::overlap, WatchVerdict::holds, mm / mm_per_px, kMicrometres * mm,
+  WatchedPart part{RigPart::overlap, WatchVerdict::holds, mm / mm_per_px, kMicrometresPerMm * mm,
                    std::hypot(sigma.shift_mm, to_radians(sigma.tilt_deg) * kMeanHeightMm) / mm_per_px};
   if (part.px > options.overlap_px && part.px > options.min_sigmas * part.expected_px) {
     part.verdict = WatchVerdict::moved;
