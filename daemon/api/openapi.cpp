@@ -315,6 +315,15 @@ const char* const kSchemas = R"({
   "health": {"$ref": "#/components/schemas/Health"},
   "login": {"$ref": "#/components/schemas/Login"},
   "insecure": {"type": "boolean", "description": "other machines may send tokens in the clear: insecure_http"}}},
+"Log": {"type": "object", "required": ["lines"], "additionalProperties": false, "properties": {"lines": {"type": "array",
+  "items": {"type": "object", "required": ["number", "time", "priority", "job", "device", "message"], "additionalProperties": false, "properties": {
+    "number": {"type": "integer", "description": "in the order written"}, "time": {"type": "string"},
+    "priority": {"type": "string", "enum": ["error", "warning", "notice", "info"]},
+    "job": {"type": "string", "description": "empty: of no job"}, "device": {"type": "string", "description": "empty: of no device"},
+    "message": {"type": "string"}}}}}},
+"Recipes": {"type": "object", "required": ["recipes"], "additionalProperties": false, "properties": {"recipes": {"type": "array",
+  "items": {"type": "object", "required": ["name", "poses", "views"], "additionalProperties": false, "properties": {
+    "name": {"type": "string"}, "poses": {"type": "integer"}, "views": {"type": "integer", "description": "of each pose"}}}}}},
 "ConfigCheck": {"type": "object", "required": ["ok", "problems"], "additionalProperties": false, "properties": {
   "ok": {"type": "boolean"}, "problems": {"type": "array", "items": {"type": "string"}}}},
 "OpenApi": {"type": "object", "required": ["openapi", "paths"]}

@@ -13,6 +13,7 @@
 #include "core/result.h"
 #include "daemon/api/request.h"
 #include "daemon/api/roles.h"
+#include "daemon/journal/journal.h"
 #include "daemon/station/control_loop.h"
 #include "pipeline/calibration/placement/placement_aid.h"
 
@@ -60,7 +61,7 @@ struct ApiStation {
   ControlLoop& loop;
   std::function<ServiceStatus()> facts;  ///< of the machine and of the API itself; the latest, without waiting
   std::filesystem::path storage{};       ///< absolute; where jobs are kept
-  std::function<Result<std::string>(std::string_view side)> preview_jpeg{};  ///< of "left" or "right"
+  std::function<Result<std::string>(std::string_view side, bool is_middle)> preview_jpeg{};  ///< of "left" or "right"
   std::function<Result<PlacementView>(const AwaitedPlacement&)> look_at_board{};
   std::function<Result<void>()> check_config{};            ///< of the file that the daemon was started with
   std::function<void(ControlLoop::Reply)> reload{};        ///< of it; reads the disk
@@ -70,6 +71,7 @@ struct ApiStation {
   std::function<std::string()> page_address{};             ///< "http://127.0.0.1:8080"; empty: it is not served
   bool tls = false;                                        ///< browsers reach it by https, through a proxy
   bool insecure = false;                                   ///< other machines may connect without TLS
+  const RecentLog* log = nullptr;                          ///< null: there is none
 };
 
 using Send = std::function<void(ApiResponse)>;

@@ -68,6 +68,21 @@ Route order_route() {
       .handle = order};
 }
 
+Route recipes_route() {
+  return {.method = Method::get,
+          .path = "/api/v1/recipes",
+          .role = Role::viewer,
+          .description = "The recipes of the configuration; Start scans `default` when nothing is queued.",
+          .reply = {.description = "by name", .schema = "Recipes"},
+          .handle = [](const ApiStation& station, const Values&, const Send& send) {
+            auto recipes = nlohmann::ordered_json::array();
+            for (const auto& [name, recipe] : station.loop.rules().recipes) {
+              recipes.push_back({{"name", name}, {"poses", recipe.poses}, {"views", recipe.views}});
+            }
+            send({.body = to_text({{"recipes", std::move(recipes)}})});
+          }};
+}
+
 Route bundle_route() {
   return {
       .method = Method::get,
@@ -86,6 +101,7 @@ Route bundle_route() {
 
 std::vector<Route> order_routes() {
   return {
+      recipes_route(),
       order_route(),
       job_route(Method::post, "/api/v1/jobs/{id}/cancel", Role::operating, What::cancel,
                 "Ends a job that is queued, interrupted or being reconstructed."),

@@ -1,6 +1,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "core/timestamp.h"
 #include "core/version.h"
 #include "daemon/api/json_replies.h"
 #include "daemon/api/metrics.h"
@@ -62,9 +63,23 @@ void metrics(const ApiStation& station, const Values&, const Send& send) {
 
 /// A camera that does not respond now may do so later.
 void preview(const ApiStation& station, const Values& values, const Send& send) {
-  auto jpeg = station.preview_jpeg(*values.text("side"));
+  auto jpeg = station.preview_jpeg(*values.text("side"), values.flag("middle"));
   if (!jpeg && values.flag("or_nothing")) return send({.status = 204, .type = "image/jpeg"});
   send(jpeg ? ApiResponse{.body = std::move(*jpeg), .type = "image/jpeg"} : error_response(503, jpeg.error()));
+}
+
+void log_lines(const ApiStation& station, const Values& values, const Send& send) {
+  ordered_json lines = ordered_json::array();
+  const auto after = static_cast<std::uint64_t>(values.integer("after").value_or(0));
+  for (const auto& line : station.log ? station.log->after(after) : std::vector<RecentLog::Line>()) {
+    lines.push_back({{"number", line.number},
+                     {"time", iso_time(line.time)},
+                     {"priority", to_string(line.entry.priority)},
+                     {"job", line.entry.job},
+                     {"device", line.entry.device},
+                     {"message", line.entry.message}});
+  }
+  send({.body = to_text({{"lines", std::move(lines)}})});
 }
 
 void check_config(const ApiStation& station, const Values&, const Send& send) {
@@ -104,10 +119,24 @@ std::vector<Route> service_routes() {
            .in_path = {{.name = "side", .description = "of the rig", .required = true, .words = {"left", "right"}}},
            .in_query = {{.name = "or_nothing",
                          .type = RequestField::Type::flag,
-                         .description = "204 instead of an error where there is no image: a page repeats it anyway"}},
+                         .description = "204 instead of an error where there is no image: a page repeats it anyway"},
+                        {.name = "middle",
+                         .type = RequestField::Type::flag,
+                         .description = "its middle 512 pixels in full resolution, to focus by"}},
            .reply = {.description = "an image", .type = "image/jpeg"},
            .slow = true,
            .handle = preview},
+          {.method = Method::get,
+           .path = "/api/v1/log",
+           .role = Role::engineer,
+           .description = "The newest 500 lines of the service's log since its start, oldest first.",
+           .in_query = {{.name = "after",
+                         .type = RequestField::Type::integer,
+                         .description = "only lines with a higher number",
+                         .min = 0,
+                         .max = 1e15}},
+           .reply = {.description = "lines with their numbers", .schema = "Log"},
+           .handle = log_lines},
           {.method = Method::post,
            .path = "/api/v1/config/check",
            .role = Role::engineer,

@@ -73,11 +73,12 @@ struct ApiServer::Impl {
   Impl(const ApiOptions& with, const PeerRoles& roles, const Proxy& proxy, int listening, ControlLoop& control)
       : options(with),
         loop(control),
-        core({control, [this] { return latest_facts(); }, with.storage, with.preview_jpeg, with.look_at_board,
-              with.check_config, with.reload,
-              [this](std::function<void()> work) { net::post(core.workers, std::move(work)); }, &core.hub, &core.access,
-              [this] { return page_address(); }, with.http_origin.starts_with("https://"), with.insecure_http},
-             roles, proxy, with, this_life()),
+        core(
+            {control, [this] { return latest_facts(); }, with.storage, with.preview_jpeg, with.look_at_board,
+             with.check_config, with.reload,
+             [this](std::function<void()> work) { net::post(core.workers, std::move(work)); }, &core.hub, &core.access,
+             [this] { return page_address(); }, with.http_origin.starts_with("https://"), with.insecure_http, with.log},
+            roles, proxy, with, this_life()),
         local(io, Local(), listening) {}
 
   /// As a browser on this machine reaches it.

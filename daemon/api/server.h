@@ -28,17 +28,21 @@ struct ApiOptions {
   std::string proxy{};             ///< the reverse proxy in front, as find_proxy() reads it; empty: none
   /// Listening sockets of the caller, used instead of an own one and left open and in place at the end.
   std::optional<int> passed_socket{}, passed_tcp{};
-  std::filesystem::path storage{};                                                         ///< whose disk is watched
-  std::function<Result<std::string>(std::string_view side)> preview_jpeg = no_preview;     ///< from any thread
+  std::filesystem::path storage{};  ///< whose disk is watched
+  /// `is_middle`: its middle in full resolution. From any thread.
+  std::function<Result<std::string>(std::string_view side, bool is_middle)> preview_jpeg = no_preview;
   std::function<Result<PlacementView>(const AwaitedPlacement&)> look_at_board = no_board;  ///< likewise
   std::function<Result<void>()> check_config = no_config;  ///< of the file that the daemon was started with; likewise
   /// Reads that file again and restarts with it if the rig is idle; the reply as for orders to the ControlLoop.
   std::function<void(ControlLoop::Reply)> reload = no_reload;  ///< may take long; from any thread
   ApiLimits limits{};
+  const RecentLog* log = nullptr;                                  ///< for the page; null: there is none
   std::function<void(JournalEntry)> journal = [](const auto&) {};  ///< orders refused; from any thread, must not wait
 
-  static Result<std::string> no_preview(std::string_view) { return fail(ErrorCode::not_found, "there are no cameras"); }
-  static Result<PlacementView> no_board(const AwaitedPlacement&) { return pass_on(no_preview({})); }
+  static Result<std::string> no_preview(std::string_view, bool) {
+    return fail(ErrorCode::not_found, "there are no cameras");
+  }
+  static Result<PlacementView> no_board(const AwaitedPlacement&) { return pass_on(no_preview({}, false)); }
   static Result<void> no_config() {
     return fail(ErrorCode::refused, "the service was started without a configuration file");
   }

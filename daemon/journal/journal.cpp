@@ -23,16 +23,6 @@
 namespace scanrig {
 namespace {
 
-const char* name_of(Priority priority) {
-  switch (priority) {
-    case Priority::error: return "error";
-    case Priority::warning: return "warning";
-    case Priority::notice: return "notice";
-    case Priority::info: return "info";
-  }
-  return "";
-}
-
 bool stderr_is_the_journal() {
   const char* stream = std::getenv("JOURNAL_STREAM");
   struct stat file {};
@@ -52,6 +42,29 @@ void print_line(const JournalEntry& entry) {
 }
 
 }  // namespace
+
+std::string_view to_string(Priority priority) {
+  switch (priority) {
+    case Priority::error: return "error";
+    case Priority::warning: return "warning";
+    case Priority::notice: return "notice";
+    case Priority::info: return "info";
+  }
+  return "";
+}
+
+void RecentLog::write(const JournalEntry& entry) {
+  const std::scoped_lock lock(mutex_);
+  lines_.push_back({++written_, std::chrono::system_clock::now(), entry});
+  if (lines_.size() > kLines) lines_.pop_front();
+}
+
+std::vector<RecentLog::Line> RecentLog::after(std::uint64_t number) const {
+  const std::scoped_lock lock(mutex_);
+  if (number > written_) number = 0;
+  const auto first = std::ranges::find_if(lines_, [&](const Line& line) { return line.number > number; });
+  return {first, lines_.end()};
+}
 
 /// Outlives the Journal where a sink stalls. It waits on the real clock: the log takes no part in the rig's time.
 struct Journal::Shared {
@@ -126,7 +139,7 @@ std::string text_line(const JournalEntry& entry, std::chrono::system_clock::time
   if (entry.pose) about += fmt::format(" pose {}", *entry.pose);
   if (entry.view) about += fmt::format(" view {}", *entry.view);
   if (!entry.device.empty()) about += " " + entry.device;
-  return fmt::format("{} {}{}: {}", iso_time(now), name_of(entry.priority), about, entry.message);
+  return fmt::format("{} {}{}: {}", iso_time(now), to_string(entry.priority), about, entry.message);
 }
 
 Journal::Sink standard_sink() { return stderr_is_the_journal() ? send_to_journal : print_line; }

@@ -2,10 +2,14 @@
 
 #include <chrono>
 #include <cstddef>
+#include <cstdint>
+#include <deque>
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace scanrig {
@@ -45,6 +49,30 @@ class Journal {
   struct Shared;
   std::shared_ptr<Shared> shared_;
 };
+
+/// The newest lines of the log, for people who look at the page.
+/// Threads: every function may be called from any.
+class RecentLog {
+ public:
+  struct Line {
+    std::uint64_t number = 0;  ///< from 1, in the order written
+    std::chrono::system_clock::time_point time;
+    JournalEntry entry;
+  };
+
+  void write(const JournalEntry& entry);
+  /// Those after that number, oldest first; all of them where no line has that number yet, as after a restart.
+  [[nodiscard]] std::vector<Line> after(std::uint64_t number) const;
+
+  static constexpr std::size_t kLines = 500;
+
+ private:
+  mutable std::mutex mutex_;
+  std::deque<Line> lines_;
+  std::uint64_t written_ = 0;
+};
+
+std::string_view to_string(Priority priority);  ///< "error"
 
 /// Under systemd, where stderr is the journal's own stream [systemd.exec(5), JOURNAL_STREAM]: entries with their
 /// fields. Otherwise lines of text on stderr.

@@ -9,13 +9,21 @@ namespace scanrig {
 namespace {
 
 constexpr auto kBeforeRetry = std::chrono::seconds(2);  ///< after cameras that did not respond
-constexpr int kQuality = 80;                            ///< JPEG quality, per cent
+constexpr int kQuality = 80, kFocusQuality = 95;        ///< of the JPEG, per cent
+constexpr int kFocusPx = 512;
 
-Result<std::string> encode(const cv::Mat& image, PixelFormat format) {
+/// Begins at an even pixel: the colours of a sensor repeat every two.
+cv::Mat middle_of(const cv::Mat& image) {
+  const auto even = [](int pixels) { return pixels / 2 * 2; };
+  const int width = std::min(kFocusPx, image.cols), height = std::min(kFocusPx, image.rows);
+  return image({even((image.cols - width) / 2), even((image.rows - height) / 2), width, height});
+}
+
+Result<std::string> encode(const cv::Mat& image, PixelFormat format, int quality) {
   try {
     cv::Mat colour = image;
     if (format == PixelFormat::bayer_rggb8) cv::cvtColor(image, colour, cv::COLOR_BayerRGGB2BGR);
-    const auto bytes = encode_jpeg(colour, kQuality);
+    const auto bytes = encode_jpeg(colour, quality);
     if (!bytes) return pass_on(bytes, "preview");
     return std::string(as_text(*bytes));
   } catch (const cv::Exception& error) {
@@ -25,19 +33,20 @@ Result<std::string> encode(const cv::Mat& image, PixelFormat format) {
 
 }  // namespace
 
-Result<std::string> Preview::jpeg(Side side) {
+Result<std::string> Preview::jpeg(Side side, Extent extent) {
   const bool quiet = quiet_();
   std::unique_lock lock(mutex_);
   if (auto there = look(quiet); !there) return pass_on(there);
   Encoded& encoded = encoded_[static_cast<std::size_t>(side)];
-  if (encoded.pair == pairs_) return encoded.bytes;
+  const bool is_whole = extent == Extent::whole;
+  if (is_whole && encoded.pair == pairs_) return encoded.bytes;
   const std::uint64_t pair = pairs_;
   const cv::Mat image = side == Side::left ? latest_.left : latest_.right;
   const PixelFormat format = latest_.format;
   lock.unlock();
-  auto bytes = encode(image, format);
+  auto bytes = is_whole ? encode(image, format, kQuality) : encode(middle_of(image), format, kFocusQuality);
   lock.lock();
-  if (bytes) encoded = {pair, *bytes};
+  if (bytes && is_whole) encoded = {pair, *bytes};
   return bytes;
 }
 

@@ -13,6 +13,8 @@
 namespace scanrig {
 
 enum class Side { left, right };
+/// All of an image, or its middle in full resolution, to focus by: 512 pixels, less where the image is smaller.
+enum class Extent { whole, middle };
 
 /// Camera images for people: the pair of the latest exposure, or of a preview. A preview is taken on request, when
 /// nothing else has to be done. It never disturbs a scan.
@@ -24,7 +26,7 @@ class Preview {
 
   /// The latest image of one side as a JPEG; requests a newer pair. Fails with `not_found` (no pair yet: try again),
   /// and as the preview failed while the cameras are free.
-  Result<std::string> jpeg(Side side);
+  Result<std::string> jpeg(Side side, Extent extent = Extent::whole);
 
   /// The same pair as it was taken. Fails as jpeg().
   Result<StereoFrame> latest();

@@ -53,7 +53,7 @@ class OnLoop {
   const DaemonOptions& options_;
 };
 
-/// Entries of the log also go to the log of their job, while its thread runs.
+/// Entries of the log also go to the log of their job, while its thread runs, and to the page.
 class JobLogs {
  public:
   explicit JobLogs(const std::function<void(JournalEntry)>& journal) : journal_(journal) {}
@@ -62,8 +62,10 @@ class JobLogs {
       const std::lock_guard guard(mutex_);
       if (jobs_ && !entry.job.empty()) jobs_->log(entry);
     }
+    recent_.write(entry);
     journal_(std::move(entry));
   }
+  [[nodiscard]] const RecentLog& recent() const { return recent_; }
   void attach(JobThread* jobs) {
     const std::lock_guard guard(mutex_);
     jobs_ = jobs;
@@ -73,6 +75,7 @@ class JobLogs {
   const std::function<void(JournalEntry)>& journal_;
   std::mutex mutex_;
   JobThread* jobs_ = nullptr;
+  RecentLog recent_;
 };
 
 class Attached {
@@ -169,8 +172,9 @@ ApiOptions api_options(const DaemonOptions& options, const JobStore& store, JobL
   auto for_api = options.api;
   for_api.storage = store.options().root;
   for_api.journal = [&logs](JournalEntry entry) { logs.write(std::move(entry)); };
-  for_api.preview_jpeg = [&preview](std::string_view side) {
-    return preview.jpeg(side == "left" ? Side::left : Side::right);
+  for_api.log = &logs.recent();
+  for_api.preview_jpeg = [&preview](std::string_view side, bool is_middle) {
+    return preview.jpeg(side == "left" ? Side::left : Side::right, is_middle ? Extent::middle : Extent::whole);
   };
   for_api.look_at_board = [&aid](const AwaitedPlacement& awaited) { return aid.look(awaited); };
   return for_api;

@@ -74,6 +74,7 @@ class ControlLoop {
   /// Ends the loop if the rig is idle. Fails with `busy`, `refused`.
   void ask(event::ReloadRequested what, Reply reply) { inbox_.post({std::move(what), std::move(reply)}); }
   [[nodiscard]] std::shared_ptr<const Snapshot> snapshot() const { return published_.get(); }
+  [[nodiscard]] const StationRules& rules() const { return options_.rules; }  ///< from any thread; they never change
 
   /// Runs until a Shutdown or a reload is done. Fails with `timeout` when standstill was not confirmed: a new
   /// configuration might address another drive. Fails likewise once a device's call hangs for good: only another

@@ -50,6 +50,36 @@ TEST_F(PageTest, ThePageIsOpenToAnybodyAndRunsNothingButItself) {
   }
 }
 
+TEST_F(PageTest, AnEngineerReadsTheNewestLinesOfTheLog) {
+  RecentLog log;
+  options.log = &log;
+  serve();
+  for (int i = 1; i <= 3; ++i) {
+    log.write({.priority = Priority::warning, .message = fmt::format("line {}", i), .job = "old", .device = "panel"});
+  }
+  EXPECT_EQ(browse("GET", "/api/v1/log", cookie_of(Role::operating)).status, 403);
+  const auto cookie = cookie_of(Role::engineer);
+  const auto all = browse("GET", "/api/v1/log", cookie).json()["lines"];
+  ASSERT_EQ(all.size(), 3U);
+  EXPECT_EQ(all[0]["message"], "line 1");
+  EXPECT_EQ(all[0]["priority"], "warning");
+  EXPECT_EQ(all[0]["job"], "old");
+  EXPECT_EQ(all[0]["device"], "panel");
+  EXPECT_EQ(browse("GET", "/api/v1/log?after=2", cookie).json()["lines"][0]["message"], "line 3");
+  EXPECT_EQ(browse("GET", "/api/v1/log?after=3", cookie).json()["lines"].size(), 0U);
+  EXPECT_EQ(browse("GET", "/api/v1/log?after=900", cookie).json()["lines"].size(), 3U) << "a number of an earlier run";
+  for (std::size_t i = 0; i < RecentLog::kLines; ++i) log.write({.message = "more"});
+  EXPECT_EQ(browse("GET", "/api/v1/log", cookie).json()["lines"][0]["message"], "more") << "the oldest go";
+}
+
+TEST_F(PageTest, RecipesAreListedWithTheirViews) {
+  serve();
+  const auto recipes = browse("GET", "/api/v1/recipes", cookie_of(Role::viewer)).json()["recipes"];
+  ASSERT_GE(recipes.size(), 1U);
+  EXPECT_EQ(recipes[0]["name"], "default");
+  EXPECT_GT(recipes[0]["views"], 0);
+}
+
 TEST_F(PageTest, ASnapshotAndTheEventsAfterItAreOneStory) {
   serve();
   const auto cookie = cookie_of(Role::viewer);

@@ -73,6 +73,29 @@ TEST_F(PreviewTest, CamerasThatDoNotAnswerAreTold) {
   EXPECT_NEAR(grey(Side::left), 60, 2);
 }
 
+TEST_F(PreviewTest, TheMiddleIsShownInFullResolutionAndKeepsTheColoursOfTheSensor) {
+  StereoFrame frame;
+  frame.format = PixelFormat::bayer_rggb8;
+  frame.left = cv::Mat(961, 1283, CV_8UC1, cv::Scalar(20));
+  for (int v = 0; v < frame.left.rows; v += 2) {
+    for (int u = 0; u < frame.left.cols; u += 2) frame.left.at<std::uint8_t>(v, u) = 220;  // red
+  }
+  frame.right = frame.left(cv::Rect(0, 0, 300, 200)).clone();
+  preview_.keep(frame);
+  const auto middle = [&](Side side) {
+    const auto jpeg = preview_.jpeg(side, Extent::middle).value_or("");
+    return cv::imdecode(std::vector<char>(jpeg.begin(), jpeg.end()), cv::IMREAD_COLOR);
+  };
+  const cv::Mat left = middle(Side::left);
+  EXPECT_EQ(left.size(), cv::Size(512, 512));
+  const auto colour = left.at<cv::Vec3b>(256, 256);
+  EXPECT_GT(colour[2], 180) << "red";
+  EXPECT_LT(colour[0], 60) << "no blue";
+  EXPECT_EQ(middle(Side::right).size(), cv::Size(300, 200)) << "a small image is shown whole";
+  const auto whole = preview_.jpeg(Side::left).value_or("");
+  EXPECT_EQ(cv::imdecode(std::vector<char>(whole.begin(), whole.end()), cv::IMREAD_COLOR).cols, 1283);
+}
+
 TEST_F(PreviewTest, WhereOnlyAnEdgeExposesTheLatestExposureStays) {
   preview_.failed({ErrorCode::unsupported, "left camera: edges only"});
   expect_error(ErrorCode::unsupported);

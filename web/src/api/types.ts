@@ -1,4 +1,5 @@
-// Shapes of the API's replies, as far as the page reads them: /api/v1/openapi.json describes all of them.
+// Shapes of the API's replies, as far as the page reads them: /api/v1/openapi.json describes all of them, and a test
+// holds these against it.
 
 export type Tone = "idle" | "ready" | "working" | "act" | "fault";
 export type Role = "viewer" | "operator" | "engineer";
@@ -155,6 +156,21 @@ export interface CalibrationState {
     left: BoardInImage;
     right: BoardInImage;
   } | null;
+}
+
+export interface Recipe {
+  name: string;
+  poses: number;
+  views: number; // of each pose
+}
+
+export interface LogLine {
+  number: number;
+  time: string;
+  priority: "error" | "warning" | "notice" | "info";
+  job: string;
+  device: string;
+  message: string;
 }
 
 export interface FileList {

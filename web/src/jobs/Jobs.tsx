@@ -1,7 +1,8 @@
 import { useSignal } from "@preact/signals";
-import { order } from "../api/client.ts";
+import { useEffect } from "preact/hooks";
+import { order, read } from "../api/client.ts";
 import { newestFirst, status } from "../api/store.ts";
-import type { Job } from "../api/types.ts";
+import type { Job, Recipe } from "../api/types.ts";
 import { Order } from "../parts/Order.tsx";
 import { go } from "../screens.ts";
 import { words } from "../words.ts";
@@ -56,8 +57,18 @@ function Orders({ job }: { job: Job }) {
 
 function NewJob() {
   const part = useSignal("");
+  const recipe = useSignal("default");
+  const recipes = useSignal<Recipe[]>([]);
+  useEffect(() => {
+    read<{ recipes: Recipe[] }>("/recipes").then(
+      (got) => {
+        recipes.value = got.recipes;
+      },
+      () => {},
+    );
+  }, []);
   const send = async () => {
-    await order("/jobs", { part: part.value });
+    await order("/jobs", { part: part.value, recipe: recipe.value });
     part.value = "";
   };
   return (
@@ -72,6 +83,23 @@ function NewJob() {
           }}
         />
       </label>
+      {recipes.value.length > 1 && (
+        <label>
+          {words.recipe}
+          <select
+            value={recipe.value}
+            onChange={(event) => {
+              recipe.value = event.currentTarget.value;
+            }}
+          >
+            {recipes.value.map((one) => (
+              <option key={one.name} value={one.name}>
+                {words.recipeOf(one.name, one.poses, one.views)}
+              </option>
+            ))}
+          </select>
+        </label>
+      )}
       <Order needs="operator" class="big" send={send}>
         {words.orderScan}
       </Order>

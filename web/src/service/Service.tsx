@@ -5,6 +5,8 @@ import { connect, health, login, status } from "../api/store.ts";
 import type { Health, Io } from "../api/types.ts";
 import { may, Order } from "../parts/Order.tsx";
 import { bytes, words } from "../words.ts";
+import { FocusCard } from "./Focus.tsx";
+import { LogCard } from "./Log.tsx";
 import { qrSvg } from "./qr.ts";
 
 const PERIOD_MS = 1000;
@@ -164,9 +166,13 @@ export function Service() {
       <div class="stack">
         <HealthCard />
         <TableCard />
+        <FocusCard />
+        <LogCard />
+      </div>
+      <div class="stack">
+        <IoCard />
         <AccessCard />
       </div>
-      <IoCard />
     </main>
   );
 }

@@ -1,8 +1,21 @@
 // The model in three.js, drawn only when something has changed.
-import { Box3, BufferGeometry, Line, LineBasicMaterial, Mesh, Plane, Raycaster, Vector2, Vector3 } from "three";
+import {
+  Box3,
+  BufferAttribute,
+  BufferGeometry,
+  Line,
+  LineBasicMaterial,
+  LineSegments,
+  Mesh,
+  Plane,
+  Raycaster,
+  Vector2,
+  Vector3,
+} from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import { COLOURINGS, type Colouring, looksOf } from "./colourings.ts";
+import { cutAt, type Surface } from "./outline.ts";
 import { openStage, type Stage } from "./stage.ts";
 
 /** In mm, the model's frame. */
@@ -58,6 +71,50 @@ class Ruler {
   }
 }
 
+/** The mesh as the plane of the section sees it. */
+function surfaceOf(mesh: Mesh): Surface {
+  mesh.updateWorldMatrix(true, false);
+  const position = mesh.geometry.getAttribute("position");
+  const points = new Float32Array(3 * position.count);
+  const point = new Vector3();
+  for (let i = 0; i < position.count; i++) {
+    point
+      .fromBufferAttribute(position, i)
+      .applyMatrix4(mesh.matrixWorld)
+      .toArray(points, 3 * i);
+  }
+  return { points, corners: mesh.geometry.index?.array ?? Uint32Array.from({ length: position.count }, (_, i) => i) };
+}
+
+/** The line where a section's plane cuts the surface. */
+class Outline {
+  private readonly line = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color: "#f2b134" }));
+  private surfaces: Surface[] | null = null;
+
+  constructor(
+    at: Stage,
+    private readonly meshes: Mesh[],
+  ) {
+    this.line.visible = false;
+    at.scene.add(this.line);
+  }
+
+  show(height: number | null) {
+    this.line.visible = height !== null;
+    if (height === null) return;
+    this.surfaces ??= this.meshes.map(surfaceOf);
+    const cuts = this.surfaces.map((surface) => cutAt(surface, height));
+    const all = new Float32Array(cuts.reduce((sum, cut) => sum + cut.length, 0));
+    let from = 0;
+    for (const cut of cuts) {
+      all.set(cut, from);
+      from += cut.length;
+    }
+    this.line.geometry.dispose();
+    this.line.geometry = new BufferGeometry().setAttribute("position", new BufferAttribute(all, 3));
+  }
+}
+
 /** `measured` gets two points of the surface, or null after the first of them. */
 export async function openViewer(
   canvas: HTMLCanvasElement,
@@ -87,6 +144,7 @@ export async function openViewer(
   }
   const looks = meshes.map((mesh) => looksOf(mesh, plane));
   at.scene.add(loaded);
+  const outline = new Outline(at, meshes);
   const ruler = new Ruler(at, meshes, measured);
   const colour = (how: Colouring) => {
     for (const look of looks) look[how]?.();
@@ -108,7 +166,9 @@ export async function openViewer(
     colourings: COLOURINGS.filter((how) => looks.every((look) => look[how])),
     colour,
     cut(share) {
-      plane.constant = box.max.y - share * (box.max.y - box.min.y) + (share === 0 ? 1 : 0);
+      const height = box.max.y - share * (box.max.y - box.min.y);
+      plane.constant = height + (share === 0 ? 1 : 0);
+      outline.show(share === 0 ? null : height);
       at.draw();
     },
     measure(on) {

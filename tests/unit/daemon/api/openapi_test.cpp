@@ -9,12 +9,10 @@
 namespace scanrig {
 namespace {
 
-using nlohmann::json;
-
 class OpenApi : public testing::Test {
  protected:
   const std::vector<Route> routes = all_routes();
-  const json document = json::parse(openapi_document(routes));
+  const nlohmann::json document = nlohmann::json::parse(openapi_document(routes));
 };
 
 TEST_F(OpenApi, HasEveryRouteWithItsRole) {
@@ -54,7 +52,7 @@ TEST_F(OpenApi, EveryReferenceLeadsSomewhere) {
   for (auto at = text.find("\"$ref\":\"#"); at != std::string::npos; at = text.find("\"$ref\":\"#", at + 1)) {
     const auto begin = at + 9;
     const auto target = text.substr(begin, text.find('"', begin) - begin);
-    EXPECT_TRUE(document.contains(json::json_pointer(target))) << target;
+    EXPECT_TRUE(document.contains(nlohmann::json::json_pointer(target))) << target;
   }
 }
 

@@ -1,0 +1,45 @@
+import assert from "node:assert/strict";
+import { test } from "node:test";
+import { exposureOf, sharpnessOf } from "../src/service/sharpness.ts";
+import { cutAt } from "../src/view3d/outline.ts";
+
+/** A picture of vertical stripes, their edges `soft` pixels wide. */
+function stripes(soft: number, light = 1) {
+  const [width, height] = [64, 16];
+  const data = new Uint8ClampedArray(4 * width * height);
+  for (let i = 0; i < width * height; i++) {
+    const phase = (i % width) % 16;
+    const edge = Math.min(Math.max((Math.abs(phase - 8) - 4) / soft + 0.5, 0), 1);
+    data.fill(Math.round(light * (40 + 180 * edge)), 4 * i, 4 * i + 3);
+  }
+  return { width, height, data };
+}
+
+test("a picture in focus is sharper, and brightness alone is not sharpness", () => {
+  const [sharp, soft] = [sharpnessOf(stripes(1)), sharpnessOf(stripes(5))];
+  assert.ok(sharp > 2 * soft, `${sharp} and ${soft}`);
+  assert.ok(Math.abs(sharpnessOf(stripes(1, 0.5)) / sharp - 1) < 0.05);
+  assert.equal(sharpnessOf({ width: 4, height: 4, data: new Uint8ClampedArray(64) }), 0);
+});
+
+test("shares of dark and overexposed pixels", () => {
+  const data = new Uint8ClampedArray(4 * 4).fill(128);
+  data.fill(255, 0, 4);
+  data.fill(3, 4, 8);
+  assert.deepEqual(exposureOf({ width: 2, height: 2, data }), { dark: 0.25, bright: 0.25 });
+});
+
+test("a plane cuts a tetrahedron in a triangle, and misses it above", () => {
+  const points = Float32Array.from([0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 1, 0]);
+  const surface = { points, corners: [0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3] };
+  const cut = cutAt(surface, 0.5);
+  assert.equal(cut.length, 3 * 6, "three segments");
+  for (let i = 1; i < cut.length; i += 3) assert.equal(cut[i], 0.5);
+  const ends = new Map<string, number>();
+  for (let i = 0; i < cut.length; i += 3) {
+    const end = `${cut[i]?.toFixed(4)} ${cut[i + 2]?.toFixed(4)}`;
+    ends.set(end, (ends.get(end) ?? 0) + 1);
+  }
+  assert.deepEqual([...ends.values()], [2, 2, 2], "closed");
+  assert.equal(cutAt(surface, 2).length, 0);
+});
