@@ -72,8 +72,8 @@ void add_options(CLI::App& app, SimOptions& o) {
       ->capture_default_str()
       ->check(CLI::IsMember({"auto", "helper", "none"}));
   app.add_option("--trouble", o.trouble,
-                 "share of the exposures before which a frame is lost, the camera stops sending, the table is blocked "
-                 "or the e-stop is pressed")
+                 "share of the exposures before which a frame is lost, the camera stops sending, the table is blocked, "
+                 "the guard is opened or the e-stop is pressed")
       ->check(CLI::Range(0.0, 1.0));
 }
 

@@ -39,6 +39,7 @@ void Operator::reset() {
   rig_.lose_frames(0);
   rig_.stall_turntable(false);
   rig_.set_estop(true);
+  rig_.set_guard(true);
   rig_.press_reset();
 }
 

@@ -62,6 +62,7 @@ struct SharedState {
   Button stop = Button::released;
   Button reset = Button::released;
   bool estop_ok = true;
+  bool guard_closed = true;
   PanelOutputs lamps;
 
   // On the table.

@@ -19,6 +19,7 @@ class Rig final : public SimRig {
   void press_stop() override { set(state_.stop, Button::pressed); }
   void press_reset() override { set(state_.reset, Button::pressed); }
   void set_estop(bool ok) override { set(state_.estop_ok, ok); }
+  void set_guard(bool closed) override { set(state_.guard_closed, closed); }
   void stall_turntable(bool stalled) override { set(state_.stalled, stalled); }
   void lose_frames(int count) override { set(state_.frames_to_lose, count); }
 

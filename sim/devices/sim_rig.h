@@ -48,6 +48,7 @@ class SimRig {
   virtual void press_stop() = 0;
   virtual void press_reset() = 0;
   virtual void set_estop(bool ok) = 0;
+  virtual void set_guard(bool closed) = 0;
   virtual void turn_over() = 0;  ///< puts the object on its next rest
   /// The calibration board as placement `number` (from 1) of the plan, in the object's place; 0 takes it off again.
   virtual void put_board(int number) = 0;

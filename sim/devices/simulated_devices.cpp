@@ -81,6 +81,7 @@ Result<PanelInputs> SimPanel::wait_change(const PanelInputs& known, Deadline dea
     now.stop = b.stop != Button::released;
     now.reset = b.reset != Button::released;
     now.estop_ok = b.estop_ok;
+    now.guard_closed = b.guard_closed;
     return now;
   };
   b.clock.wait_until(lock, b.changed, deadline.at, [&] { return inputs() != known; });

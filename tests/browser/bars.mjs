@@ -83,9 +83,9 @@ async function job(browser, station) {
   await see(page, "FLIP", 120_000);
   await until("it may be pressed", () => page.getByRole("button", { name: "CONTINUE", exact: true }).isEnabled());
   await press(page, "CONTINUE");
-  await until("the model is in the making", () => jobOf(station).state === "reconstructing", 120_000);
+  await until("the model is in the making", () => jobOf(station)?.state === "reconstructing", 120_000);
   answers.push(...(await pressed(page)));
-  await until("the job has ended", () => ["done", "failed"].includes(jobOf(station).state), 400_000);
+  await until("the job has ended", () => ["done", "failed"].includes(jobOf(station)?.state), 400_000);
   await sleep(500);
   events.close();
   const { painted, tasks } = await page.evaluate(() => ({ painted, tasks }));

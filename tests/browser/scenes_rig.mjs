@@ -20,7 +20,7 @@ export const scenarios = {
     await until("it may be pressed", () => page.getByRole("button", { name: "CONTINUE", exact: true }).isEnabled());
     await page.getByRole("button", { name: "CONTINUE", exact: true }).focus();
     await page.keyboard.press("Enter");
-    await until("the scan is over", () => ["reconstructing", "done", "failed"].includes(jobOf(station).state), 60_000);
+    await until("the scan is over", () => ["reconstructing", "done", "failed"].includes(jobOf(station)?.state), 60_000);
     await page.keyboard.press("2");
     await until("the list of jobs", async () => (await page.locator("main .badge").count()) === 1);
     await check(page, station);
@@ -33,7 +33,7 @@ export const scenarios = {
     await press(page, "START");
     await until("the table moves", () => station.status().activity !== "none" && station.status().standstill === "moving");
     await page.keyboard.press("x");
-    await until("the daemon has stopped", () => jobOf(station).state === "interrupted");
+    await until("the daemon has stopped", () => jobOf(station)?.state === "interrupted");
     await until("the page has the sentence", async () => (await page.locator(".sentence").innerText()) === station.status().sentence);
     await check(page, station);
     await page.keyboard.press("2");
@@ -95,7 +95,7 @@ export const scenarios = {
     await until("the rig is busy", () => station.status().job);
     await page.locator("button.stop").dispatchEvent("pointerdown");
     await until("STOP was sent", async () => (await page.locator(".stop-place").innerText()).includes("STOP SENT"));
-    await until("the job is interrupted", () => jobOf(station).state === "interrupted");
+    await until("the job is interrupted", () => jobOf(station)?.state === "interrupted");
     await check(page, station);
   },
 

@@ -40,7 +40,7 @@ try {
   await shoot("flip");
   await until("it may be pressed", () => pages.desk.getByRole("button", { name: "CONTINUE", exact: true }).isEnabled());
   await press(pages.desk, "CONTINUE");
-  await until("the model is made", () => jobOf(station).state === "done", 900_000);
+  await until("the model is made", () => jobOf(station)?.state === "done", 900_000);
   await show("2");
   await shoot("jobs");
   for (const page of Object.values(pages)) {

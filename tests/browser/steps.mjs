@@ -31,10 +31,14 @@ export async function ready(page) {
   await see(page, "READY", 40_000);
 }
 
-/** The newest job, in detail; nothing before there is one. */
+/** The newest job, in detail; nothing before there is one, or when the daemon is too busy to answer. */
 export function jobOf(station) {
-  const [job] = JSON.parse(station.scanrig("jobs", "--json").stdout).jobs;
-  return job && JSON.parse(station.scanrig("jobs", job.id, "--json").stdout);
+  const told = (...words) => {
+    const { status, stdout } = station.scanrig("jobs", ...words, "--json");
+    return status === 0 ? JSON.parse(stdout) : undefined;
+  };
+  const newest = told()?.jobs[0];
+  return newest && told(newest.id);
 }
 
 /** One request as any client can send it: status and headers, and how many milliseconds the reply took. */
