@@ -35,9 +35,9 @@ if(SCANRIG_PRECOMPILE AND SCANRIG_CCACHE)
   set(CMAKE_CXX_COMPILER_LAUNCHER ${CMAKE_COMMAND} -E env CCACHE_SLOPPINESS=pch_defines,time_macros ${SCANRIG_CCACHE})
 endif()
 
-# Sources of one library are compiled several at a time: half of the work. So names without a linkage differ in a library.
-option(SCANRIG_UNITY "Compile the sources of a library together" ON)
-set(CMAKE_UNITY_BUILD_BATCH_SIZE 12)
+# Sources of one library or test are compiled together: half of the work. So their names without a linkage differ.
+option(SCANRIG_UNITY "Compile the sources of a library or test together" ON)
+set(CMAKE_UNITY_BUILD_BATCH_SIZE 24)
 
 # scanrig_precompiled(NAME HEADERS ... LINK libs [OPTIONS ...]): the target whose precompiled header others use, with
 # the same options.
@@ -56,10 +56,10 @@ function(scanrig_use_precompiled target name)
   endif()
 endfunction()
 
-# Targets whose libraries read or write JSON have the JSON header precompiled, too.
+# Targets that read or write JSON or command lines have those headers precompiled, too.
 function(scanrig_use_precompiled_for target)
-  if("nlohmann_json::nlohmann_json" IN_LIST ARGN)
-    scanrig_use_precompiled(${target} scanrig_precompiled_json_headers)
+  if("nlohmann_json::nlohmann_json" IN_LIST ARGN OR "CLI11::CLI11" IN_LIST ARGN)
+    scanrig_use_precompiled(${target} scanrig_precompiled_text_headers)
   else()
     scanrig_use_precompiled(${target} scanrig_precompiled_headers)
   endif()
@@ -120,6 +120,7 @@ function(scanrig_test name)
     target_compile_options(${name} PRIVATE ${SCANRIG_QUICK_TO_COMPILE})
     scanrig_use_precompiled(${name} scanrig_precompiled_test_headers)
   endif()
+  set_target_properties(${name} PROPERTIES UNITY_BUILD ${SCANRIG_UNITY})
   target_compile_definitions(${name} PRIVATE SCANRIG_SOURCE_DIR="${CMAKE_SOURCE_DIR}")
   add_test(NAME ${name} COMMAND ${name})
   set_tests_properties(${name} PROPERTIES LABELS ${ARG_LABEL})

@@ -141,7 +141,7 @@ class SocketLines final : public Lines {
     auto connection = Connection::open(socket_);
     if (!connection) return pass_on(connection);
     std::string words = "inputs";
-    for (const auto& line : lines) words += " " + line.contact();
+    for (const auto& line : lines) words.append(" ").append(line.contact());
     if (auto sent = connection->send(words); !sent) return pass_on(sent);
     const auto answer = connection->receive(kAnswerTime);
     if (!answer) return pass_on(answer);

@@ -24,8 +24,8 @@ int mesh_fuzz(Parse parse, const std::uint8_t* data, std::size_t size) {
       if (vertex >= mesh->vertices.size()) std::abort();
     }
   }
-  for (const auto size : {mesh->normals.size(), mesh->views.size(), mesh->sigma.size(), mesh->colour.size()}) {
-    if (size != 0 && size != mesh->vertices.size()) std::abort();
+  for (const auto count : {mesh->normals.size(), mesh->views.size(), mesh->sigma.size(), mesh->colour.size()}) {
+    if (count != 0 && count != mesh->vertices.size()) std::abort();
   }
   return 0;
 }

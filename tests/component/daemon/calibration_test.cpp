@@ -106,8 +106,8 @@ TEST_F(CalibrationJob, ACheckThatHoldsReplacesNothingAndIsRemembered) {
   rig.panel.press(&PanelInputs::start);
   ASSERT_TRUE(wait_state(id, JobState::done));
   EXPECT_FALSE(ask(event::JobRequested{.what = What::accept, .job = id}));
-  const auto rig = read_calibration(options.jobs.calibration_file);
-  EXPECT_NE(last_check(options.jobs.root, rig->sha256), "");
+  const auto known = read_calibration(options.jobs.calibration_file);
+  EXPECT_NE(last_check(options.jobs.root, known->sha256), "");
   EXPECT_EQ(last_check(options.jobs.root, sha256(std::string_view("another"))), "");
 }
 

@@ -18,7 +18,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 using testing::HasSubstr;
 using testing::StartsWith;
-using What = event::MaintenanceRequested::What;
+using Task = event::MaintenanceRequested::What;
 
 /// The fake rig with the simulator's turntable, which reports its true state; each call can be made to hang.
 class HungCalls : public Daemon {
@@ -103,14 +103,14 @@ class HungCalls : public Daemon {
   }
   void by_jog(const std::string& call) {
     get_ready();
-    ASSERT_TRUE(ask(event::MaintenanceRequested{.what = What::on}));
+    ASSERT_TRUE(ask(event::MaintenanceRequested{.what = Task::on}));
     const auto does_nothing = [this] { return now()->activity == Activity::none; };
     ASSERT_TRUE(clock_waits_for(does_nothing));
     rig.panel.press(&PanelInputs::reset);  // consents to it, and homes
     ASSERT_TRUE(clock_waits_for(std::not_fn(does_nothing)));
     ASSERT_TRUE(clock_waits_for(does_nothing));
     gate.close(call);
-    const auto jogged = ask(event::MaintenanceRequested{.what = What::jog, .angle = {20}, .speed = {5}});
+    const auto jogged = ask(event::MaintenanceRequested{.what = Task::jog, .angle = {20}, .speed = {5}});
     ASSERT_TRUE(jogged) << jogged.error().message;
   }
 

@@ -11,7 +11,7 @@ namespace scanrig {
 namespace {
 
 using std::chrono::milliseconds;
-using What = event::MaintenanceRequested::What;
+using Task = event::MaintenanceRequested::What;
 
 constexpr milliseconds kWithin{100};
 
@@ -45,10 +45,10 @@ class StopInEveryState : public Daemon, public testing::WithParamInterface<std::
   }
   void reach_maintenance() {
     get_ready();
-    ASSERT_TRUE(ask(event::MaintenanceRequested{.what = What::on}));
+    ASSERT_TRUE(ask(event::MaintenanceRequested{.what = Task::on}));
   }
   void jog() {
-    ASSERT_TRUE(ask(event::MaintenanceRequested{.what = What::jog, .angle = {90}, .speed = {5}}));
+    ASSERT_TRUE(ask(event::MaintenanceRequested{.what = Task::jog, .angle = {90}, .speed = {5}}));
     wait_for(MachineState::maintenance, Activity::warning);
   }
   void begin_scan() {

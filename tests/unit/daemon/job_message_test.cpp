@@ -5,7 +5,7 @@
 namespace scanrig {
 namespace {
 
-JobInfo job(JobState state) {
+JobInfo job_in(JobState state) {
   JobInfo job;
   job.state = state;
   job.recipe.views = 4;
@@ -14,13 +14,13 @@ JobInfo job(JobState state) {
 
 TEST(JobWords, EveryStateSaysWhatBecomesOfTheJobAndWhatToDo) {
   for (int state = 0; state <= static_cast<int>(JobState::cancelled); ++state) {
-    EXPECT_FALSE(describe(job(static_cast<JobState>(state))).sentence.empty()) << state;
-    EXPECT_FALSE(describe(job(static_cast<JobState>(state))).next_action.empty()) << state;
+    EXPECT_FALSE(describe(job_in(static_cast<JobState>(state))).sentence.empty()) << state;
+    EXPECT_FALSE(describe(job_in(static_cast<JobState>(state))).next_action.empty()) << state;
   }
 }
 
 TEST(JobWords, AScanTellsHowFarItsPoseIs) {
-  auto j = job(JobState::scanning);
+  auto j = job_in(JobState::scanning);
   j.complete = 1;
   for (int view = 0; view < 4; ++view) j.stored.push_back({.pose = 0, .view = view});
   j.stored.push_back({.pose = 1, .view = 0});
@@ -29,7 +29,7 @@ TEST(JobWords, AScanTellsHowFarItsPoseIs) {
 }
 
 TEST(JobWords, TheFlipIsAskedForAsTheStationAsks) {
-  auto j = job(JobState::waiting_for_flip);
+  auto j = job_in(JobState::waiting_for_flip);
   j.complete = 1;
   EXPECT_EQ(describe(j).sentence, "Pose 1 of 2 is complete.");
   EXPECT_EQ(describe(j).next_action, "Turn the part over so that its underside faces the cameras, then press Start.");
@@ -38,14 +38,14 @@ TEST(JobWords, TheFlipIsAskedForAsTheStationAsks) {
 }
 
 TEST(JobWords, AModelInTheMakingTellsItsStage) {
-  auto j = job(JobState::reconstructing);
+  auto j = job_in(JobState::reconstructing);
   EXPECT_EQ(describe(j).sentence, "Reconstructing.");
   j.stages = {{"range", 1.0}, {"volume", 0.25}};
   EXPECT_EQ(describe(j).sentence, "Reconstructing: volume, 25 %.");
 }
 
 TEST(JobWords, AModelBeyondTheLimitsSaysWhatMayBeDone) {
-  auto j = job(JobState::done);
+  auto j = job_in(JobState::done);
   j.passed = true;
   EXPECT_EQ(describe(j).sentence, "The model is ready.");
   j.remarks = {"Left camera moved by 0.06 px: clamp it, calibrate again."};
@@ -58,7 +58,7 @@ TEST(JobWords, AModelBeyondTheLimitsSaysWhatMayBeDone) {
 }
 
 TEST(JobWords, AFailureSaysWhetherItsImagesAreOfUse) {
-  auto j = job(JobState::failed);
+  auto j = job_in(JobState::failed);
   j.complete = 2;
   j.error = Error{ErrorCode::no_overlap, "the poses do not fit"};
   EXPECT_EQ(describe(j).sentence, "Failed: the poses do not fit.");
@@ -70,7 +70,7 @@ TEST(JobWords, AFailureSaysWhetherItsImagesAreOfUse) {
 }
 
 TEST(JobWords, AnInterruptedJobSaysWhereItsObjectBelongs) {
-  auto j = job(JobState::interrupted);
+  auto j = job_in(JobState::interrupted);
   j.error = Error{ErrorCode::stopped, "the e-stop was pressed"};
   EXPECT_EQ(describe(j).sentence, "Interrupted: the e-stop was pressed.");
   j.movement_checks = {{.unmoved = false}};

@@ -9,11 +9,11 @@ namespace scanrig {
 namespace {
 
 using testing::HasSubstr;
-using What = event::MaintenanceRequested::What;
+using Task = event::MaintenanceRequested::What;
 
 class MaintenanceMode : public Safety {
  protected:
-  void ask(What what, double angle = 0.0, double speed = 5.0) {
+  void ask(Task what, double angle = 0.0, double speed = 5.0) {
     tell(event::MaintenanceRequested{what, {angle}, true, {speed}, requester});
   }
   /// Homed by Reset at the panel: consent to jog.
@@ -23,7 +23,7 @@ class MaintenanceMode : public Safety {
     tell(event::Homed{});
   }
   void jog_and_arrive() {
-    ask(What::jog, 5);
+    ask(Task::jog, 5);
     EXPECT_FALSE(refused);
     tell(event::WarningOver{});
     tell(event::Jogged{{5}});
@@ -34,7 +34,7 @@ class MaintenanceMode : public Safety {
 
 TEST_F(MaintenanceMode, MaintenanceRefusesJobsAndBlinksAmber) {
   get_ready();
-  ask(What::on);
+  ask(Task::on);
   EXPECT_EQ(state.machine, MachineState::maintenance);
   EXPECT_EQ(to_string(state.machine), "Halted.Maintenance");
   press(Button::start);
@@ -45,19 +45,19 @@ TEST_F(MaintenanceMode, MaintenanceRefusesJobsAndBlinksAmber) {
 
 TEST_F(MaintenanceMode, MaintenanceBeginsOnlyWhenIdle) {
   begin_scan();
-  ask(What::on);
+  ask(Task::on);
   EXPECT_TRUE(refused);
-  ask(What::pulse);
+  ask(Task::pulse);
   expect_refused("off");
 }
 
 TEST_F(MaintenanceMode, AJogNeedsHomeAndSomebodyAtThePanelOrAGuard) {
   start_up();
-  ask(What::on);
-  ask(What::jog, 5);
+  ask(Task::on);
+  ask(Task::jog, 5);
   expect_refused("panel");
   rules.guard = true;
-  ask(What::jog, 5);
+  ask(Task::jog, 5);
   expect_refused("not homed");
   rules.guard = false;
   press(Button::reset);
@@ -66,7 +66,7 @@ TEST_F(MaintenanceMode, AJogNeedsHomeAndSomebodyAtThePanelOrAGuard) {
   EXPECT_NE(asked_for<action::Home>(), nullptr);
   tell(event::Homed{});
   EXPECT_EQ(state.machine, MachineState::maintenance);
-  ask(What::jog, 5);
+  ask(Task::jog, 5);
   EXPECT_FALSE(refused);
   EXPECT_EQ(asked_for<action::Jog>(), nullptr) << "first the warning";
   tell(event::WarningOver{});
@@ -80,25 +80,25 @@ TEST_F(MaintenanceMode, AJogNeedsHomeAndSomebodyAtThePanelOrAGuard) {
 TEST_F(MaintenanceMode, AJogWithAnOpenGuardOrTooFastIsRefused) {
   rules.guard = true;
   get_ready();
-  ask(What::on);
-  ask(What::jog, 5, 10.1);
+  ask(Task::on);
+  ask(Task::jog, 5, 10.1);
   expect_refused("at most 10");
-  ask(What::jog, 5, 0);
+  ask(Task::jog, 5, 0);
   expect_refused("at most 10");
-  ask(What::jog, std::nan(""));
+  ask(Task::jog, std::nan(""));
   expect_refused("angle");
   tell(event::GuardChanged{false});
-  ask(What::jog, 5);
+  ask(Task::jog, 5);
   expect_refused("guard is open");
 }
 
 TEST_F(MaintenanceMode, RemoteHomingInMaintenanceFollowsTheSameRule) {
   start_up();
-  ask(What::on);
-  ask(What::home);
+  ask(Task::on);
+  ask(Task::home);
   expect_refused("disabled");
   allow_remote();
-  ask(What::home);
+  ask(Task::home);
   EXPECT_FALSE(refused);
   EXPECT_NE(asked_for<action::Warn>(), nullptr);
 }
@@ -106,11 +106,11 @@ TEST_F(MaintenanceMode, RemoteHomingInMaintenanceFollowsTheSameRule) {
 TEST_F(MaintenanceMode, WhoMovedSomethingInMaintenanceMustResetAfterwards) {
   rules.guard = true;
   get_ready();
-  ask(What::on);
-  ask(What::jog, 5);
+  ask(Task::on);
+  ask(Task::jog, 5);
   tell(event::WarningOver{});
   tell(event::Jogged{{5}});
-  ask(What::off);
+  ask(Task::off);
   EXPECT_EQ(state.machine, MachineState::halted);
   press(Button::start);
   EXPECT_TRUE(refused);
@@ -118,25 +118,25 @@ TEST_F(MaintenanceMode, WhoMovedSomethingInMaintenanceMustResetAfterwards) {
 
 TEST_F(MaintenanceMode, WhoMovedNothingIsReadyAgain) {
   get_ready();
-  ask(What::on);
-  ask(What::pulse);
+  ask(Task::on);
+  ask(Task::pulse);
   EXPECT_NE(asked_for<action::Pulse>(), nullptr);
   tell(event::Pulsed{});
-  ask(What::lamp_test);
+  ask(Task::lamp_test);
   EXPECT_NE(asked_for<action::TestLamps>(), nullptr);
-  ask(What::off);
+  ask(Task::off);
   EXPECT_EQ(state.machine, MachineState::ready);
 }
 
 TEST_F(MaintenanceMode, MaintenanceDoesNotClearAFault) {
   begin_scan();
   fault_and_stand();
-  ask(What::on);
+  ask(Task::on);
   ASSERT_EQ(state.machine, MachineState::maintenance);
   allow_remote();
-  ask(What::home);
+  ask(Task::home);
   expect_refused("Reset at the panel");
-  ask(What::off);
+  ask(Task::off);
   EXPECT_EQ(state.machine, MachineState::error);
 }
 
@@ -145,8 +145,8 @@ TEST_F(MaintenanceMode, StopEstopAndGuardEndAJog) {
   const auto jogging = [&] {
     state = {};
     get_ready();
-    ask(What::on);
-    ask(What::jog, 90);
+    ask(Task::on);
+    ask(Task::jog, 90);
     tell(event::WarningOver{});
   };
   jogging();
@@ -155,7 +155,7 @@ TEST_F(MaintenanceMode, StopEstopAndGuardEndAJog) {
   tell(event::RigFailed{{ErrorCode::stopped, "stopped"}});
   tell(event::Stopped{});
   EXPECT_EQ(state.machine, MachineState::maintenance);
-  ask(What::jog, 5);
+  ask(Task::jog, 5);
   expect_refused("not homed");
   jogging();
   tell(event::EstopChanged{false});
@@ -170,17 +170,17 @@ TEST_F(MaintenanceMode, StopEstopAndGuardEndAJog) {
 
 TEST_F(MaintenanceMode, APulseNeedsTheEstopTheGuardAndAPanelThatCanBeRead) {
   get_ready();
-  ask(What::on);
+  ask(Task::on);
   tell(event::GuardChanged{false});
-  ask(What::pulse);
+  ask(Task::pulse);
   expect_refused("guard is open");
   tell(event::GuardChanged{true});
   state.estop_ok = false;
-  ask(What::pulse);
+  ask(Task::pulse);
   expect_refused("e-stop is pressed");
   state.estop_ok = true;
   state.panel_known = false;
-  ask(What::pulse);
+  ask(Task::pulse);
   expect_refused("check the panel");
 }
 
@@ -188,8 +188,8 @@ TEST_F(MaintenanceMode, StopEstopGuardAndPanelEndAPulse) {
   const auto pulsing = [&] {
     state = {};
     get_ready();
-    ask(What::on);
-    ask(What::pulse);
+    ask(Task::on);
+    ask(Task::pulse);
     ASSERT_EQ(state.activity, Activity::pulsing);
   };
   const Event faults[] = {event::EstopChanged{false}, event::GuardChanged{false}, event::PanelFailed{kNoReply}};
@@ -209,7 +209,7 @@ TEST_F(MaintenanceMode, StopEstopGuardAndPanelEndAPulse) {
 
 TEST_F(MaintenanceMode, ConsentEndsTenMinutesAfterTheLastMotion) {
   start_up();
-  ask(What::on);
+  ask(Task::on);
   press(Button::reset);
   ASSERT_NE(asked_for<action::EndConsentLater>(), nullptr);
   EXPECT_EQ(asked_for<action::EndConsentLater>()->after, std::chrono::minutes(10));
@@ -219,13 +219,13 @@ TEST_F(MaintenanceMode, ConsentEndsTenMinutesAfterTheLastMotion) {
   jog_and_arrive();
   EXPECT_NE(asked_for<action::EndConsentLater>(), nullptr);
 
-  ask(What::jog, 5);
+  ask(Task::jog, 5);
   tell(event::ConsentTimeout{});
   EXPECT_NE(asked_for<action::EndConsentLater>(), nullptr) << "not in the middle of a motion";
   tell(event::WarningOver{});
   tell(event::Jogged{{5}});
   tell(event::ConsentTimeout{});
-  ask(What::jog, 5);
+  ask(Task::jog, 5);
   expect_refused("at the panel");
   consent();
   jog_and_arrive();
@@ -235,7 +235,7 @@ TEST_F(MaintenanceMode, ATimeoutOfConsentThatHasEndedOtherwiseChangesNothing) {
   start_up();
   tell(event::ConsentTimeout{});
   EXPECT_EQ(state.machine, MachineState::halted);
-  ask(What::on);
+  ask(Task::on);
   tell(event::ConsentTimeout{});
   EXPECT_EQ(state.machine, MachineState::maintenance);
   EXPECT_TRUE(actions.empty());
@@ -244,28 +244,28 @@ TEST_F(MaintenanceMode, ATimeoutOfConsentThatHasEndedOtherwiseChangesNothing) {
 TEST_F(MaintenanceMode, AnOpenedGuardEndsTheLeaveToJogUntilResetAtThePanel) {
   rules.guard = true;
   get_ready();
-  ask(What::on);
+  ask(Task::on);
   jog_and_arrive();
   tell(event::GuardChanged{false});
   tell(event::GuardChanged{true});
-  ask(What::jog, 5);
+  ask(Task::jog, 5);
   expect_refused("at the panel");
   EXPECT_THAT(describe(state, rules).next_action, HasSubstr("Reset at the panel"));
   consent();
   jog_and_arrive();
   tell(event::GuardChanged{false});
   tell(event::GuardChanged{true});
-  ask(What::jog, 5);
+  ask(Task::jog, 5);
   expect_refused("at the panel");
 }
 
 TEST_F(MaintenanceMode, ConsentIsForTheRequesterThatSwitchedMaintenanceOn) {
   start_up();
-  ask(What::on);
+  ask(Task::on);
   consent();
   jog_and_arrive();
   requester = "192.0.2.7";
-  ask(What::jog, 5);
+  ask(Task::jog, 5);
   expect_refused("who switched maintenance on");
   requester = "user 1000";
   jog_and_arrive();
@@ -273,19 +273,19 @@ TEST_F(MaintenanceMode, ConsentIsForTheRequesterThatSwitchedMaintenanceOn) {
 
 TEST_F(MaintenanceMode, ConsentEndsWithMaintenance) {
   start_up();
-  ask(What::on);
+  ask(Task::on);
   consent();
-  ask(What::off);
+  ask(Task::off);
   requester = "192.0.2.7";
-  ask(What::on);
-  ask(What::jog, 5);
+  ask(Task::on);
+  ask(Task::jog, 5);
   expect_refused("at the panel");
 }
 
 TEST_F(MaintenanceMode, BehindAGuardThatStayedClosedAnyEngineerMayJog) {
   rules.guard = true;
   get_ready();
-  ask(What::on);
+  ask(Task::on);
   requester = "192.0.2.7";
   jog_and_arrive();
 }

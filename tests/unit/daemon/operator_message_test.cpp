@@ -7,7 +7,7 @@
 namespace scanrig {
 namespace {
 
-using What = event::MaintenanceRequested::What;
+using Task = event::MaintenanceRequested::What;
 
 class StationWords : public Station {
  protected:
@@ -69,7 +69,7 @@ TEST_F(StationWords, ALineSaysWhatItWaitsFor) {
 
 TEST_F(StationWords, MaintenanceSaysHowToMoveAndHowToGoOn) {
   start_up();
-  tell(event::MaintenanceRequested{.what = What::on});
+  tell(event::MaintenanceRequested{.what = Task::on});
   EXPECT_EQ(next_action(), "Press Reset at the panel to home the table, or switch maintenance off.");
   tell(event::GuardChanged{false});
   EXPECT_EQ(next_action(),
@@ -85,7 +85,7 @@ TEST_F(StationWords, MaintenanceSaysHowToMoveAndHowToGoOn) {
 TEST_F(StationWords, WithoutAGuardMaintenanceAsksForSomebodyAtThePanel) {
   rules.guard = false;
   get_ready();
-  tell(event::MaintenanceRequested{.what = What::on});
+  tell(event::MaintenanceRequested{.what = Task::on});
   EXPECT_EQ(next_action(), "Press Reset at the panel to home the table, or switch maintenance off.");
 }
 

@@ -98,13 +98,13 @@ std::vector<Named> of_placements() {
 
 /// All requests of an engineer.
 std::vector<Named> of_maintenance() {
-  using What = event::MaintenanceRequested::What;
+  using Task = event::MaintenanceRequested::What;
   return {
-      {"maintenance on", event::MaintenanceRequested{.what = What::on}},
-      {"maintenance off", event::MaintenanceRequested{.what = What::off}},
-      {"jog", event::MaintenanceRequested{.what = What::jog, .speed = {5}}},
+      {"maintenance on", event::MaintenanceRequested{.what = Task::on}},
+      {"maintenance off", event::MaintenanceRequested{.what = Task::off}},
+      {"jog", event::MaintenanceRequested{.what = Task::jog, .speed = {5}}},
       {"jogged", event::Jogged{}},
-      {"pulse", event::MaintenanceRequested{.what = What::pulse}},
+      {"pulse", event::MaintenanceRequested{.what = Task::pulse}},
       {"pulsed", event::Pulsed{}},
       {"consent ended", event::ConsentTimeout{}},
   };

@@ -21,7 +21,7 @@ class Aid : public ::testing::Test {
     camera.projection = {
         .width = lens_.width, .height = lens_.height, .fx = lens_.f, .fy = lens_.f, .cx = lens_.cx, .cy = lens_.cy};
     camera.camera_from_turntable = testing::camera_from_table();
-    rig_ = {.left = camera, .right = camera};
+    rig_.left = rig_.right = camera;
   }
   cv::Mat shoot(const BoardPlace& place) const {
     return testing::render(testing::make_print({}), lens_, testing::camera_from_board(place), {});

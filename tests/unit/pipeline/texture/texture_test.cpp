@@ -19,8 +19,7 @@ namespace scanrig {
 namespace {
 
 using namespace testing;
-constexpr double kPi = std::numbers::pi;
-constexpr double kElevation = 22.0 * kPi / 180.0;
+constexpr double kElevation = 22.0 * std::numbers::pi / 180.0;
 constexpr double kScale = 0.5;  // of the rig's resolution: 0.3 mm a pixel
 
 double lamp_at_the_left(const Eigen::Vector3d& normal) {

@@ -22,7 +22,7 @@ using Eigen::Vector3d;
 
 constexpr PrintErrors kPerfect = {.corner_mm = 0, .scale_sigma = 0, .aspect = 0, .shear = 0, .warp_mm = 0, .dirt = 0};
 
-std::unique_ptr<CalibrationSeries> made(const SeriesOptions& options) {
+std::unique_ptr<CalibrationSeries> series_of(const SeriesOptions& options) {
   return CalibrationSeries::create(options).value();
 }
 
@@ -54,7 +54,7 @@ Found find_markers(const cv::Mat& raw) {
 
 TEST(Board, ShowsOpenCvsMarkersInOrder) {
   const auto series =
-      made({.noise = false, .print = kPerfect, .exact_placements = true, .placements = {3}, .angles = 1});
+      series_of({.noise = false, .print = kPerfect, .exact_placements = true, .placements = {3}, .angles = 1});
   const Found found = find_markers(series->shoot(0).left);
   ASSERT_EQ(found.ids.size(), 54U);
   // By counting: white squares row after row, the first row begins with a black one. Pixels by OpenCV's own homography
@@ -79,7 +79,7 @@ TEST(Board, ShowsOpenCvsMarkersInOrder) {
 TEST(Board, WithoutMarkersIsAChessboardForOpenCv) {
   BoardLayout layout;
   layout.columns = 9, layout.rows = 6, layout.square_mm = 12.0, layout.marker_mm = 0.0;
-  const auto series = made(
+  const auto series = series_of(
       {.noise = false, .board = layout, .print = kPerfect, .exact_placements = true, .placements = {3}, .angles = 1});
   cv::Mat grey;
   cv::cvtColor(series->shoot(0).right, grey, cv::COLOR_BayerBG2GRAY);
@@ -157,11 +157,12 @@ Deviation deviation(CalibrationSeries& series, std::size_t index, bool left) {
 
 TEST(Board, HasItsCornersWhereTheTruthProjectsThem) {
   // Everything at once: print errors, warp, lens residual, runout, tilted table top.
-  const auto series = made({.rig = RigVariation{.seed = 5, .residual_px = 0.2, .runout_mm = 0.05, .top_tilt_deg = 0.2},
-                            .noise = false,
-                            .print = {.dirt = 0},
-                            .placements = {1, 3, 4},
-                            .angles = 3});
+  const auto series =
+      series_of({.rig = RigVariation{.seed = 5, .residual_px = 0.2, .runout_mm = 0.05, .top_tilt_deg = 0.2},
+                 .noise = false,
+                 .print = {.dirt = 0},
+                 .placements = {1, 3, 4},
+                 .angles = 3});
   for (const std::size_t index : {1U, 3U, 6U}) {
     for (const bool left : {true, false}) {
       const Deviation d = deviation(*series, index, left);
@@ -201,7 +202,7 @@ TEST(Board, IsPrintedWithTheErrorsAsked) {
 TEST(Board, ShowsDirtAndGlare) {
   const auto seen = [](const PrintErrors& print) {
     return smooth_grey(
-        made({.image_scale = 0.5, .noise = false, .print = print, .exact_placements = true, .placements = {1}})
+        series_of({.image_scale = 0.5, .noise = false, .print = print, .exact_placements = true, .placements = {1}})
             ->shoot(2)
             .left,
         0.7);
@@ -217,12 +218,12 @@ TEST(Board, ShowsDirtAndGlare) {
 }
 
 TEST(Board, HasRealAlbedosAndLeavesTheTableBlue) {
-  const auto series = made({.image_scale = 0.5,
-                            .noise = false,
-                            .print = kPerfect,
-                            .exact_placements = true,
-                            .placements = {7},
-                            .angles = 1});
+  const auto series = series_of({.image_scale = 0.5,
+                                 .noise = false,
+                                 .print = kPerfect,
+                                 .exact_placements = true,
+                                 .placements = {7},
+                                 .angles = 1});
   cv::Mat colour;
   cv::cvtColor(series->shoot(0).left, colour, cv::COLOR_BayerBG2BGR);
   // A black square beside the middle, a white margin, the table before the board.
