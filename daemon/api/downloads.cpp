@@ -8,6 +8,7 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <system_error>
 
@@ -83,7 +84,33 @@ Result<std::shared_ptr<OpenFile>> open_below(const fs::path& folder, std::string
     ::close(at);
     return fail(ErrorCode::not_found, "the job has no such file");
   }
-  return std::make_shared<OpenFile>(at, static_cast<std::uint64_t>(status.st_size));
+  const auto& written = status.st_mtim;
+  auto tag = fmt::format("\"{:x}-{:x}-{:x}.{:x}\"", status.st_ino, status.st_size, written.tv_sec, written.tv_nsec);
+  return std::make_shared<OpenFile>(at, static_cast<std::uint64_t>(status.st_size), std::move(tag));
+}
+
+std::optional<FilePart> part_of_file(std::string_view range, std::uint64_t size) {
+  const FilePart whole{0, size};
+  constexpr std::string_view kUnit = "bytes=";
+  if (!range.starts_with(kUnit)) return whole;
+  range.remove_prefix(kUnit.size());
+  const auto dash = range.find('-');
+  if (dash == std::string_view::npos) return whole;
+  const auto number = [](std::string_view text) -> std::optional<std::uint64_t> {
+    std::uint64_t value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    return error == std::errc() && end == text.data() + text.size() ? std::optional(value) : std::nullopt;
+  };
+  const auto from = number(range.substr(0, dash)), to = number(range.substr(dash + 1));
+  if (!from && dash > 0) return whole;
+  if (!to && dash + 1 < range.size()) return whole;
+  if (!from) {
+    if (!to) return whole;
+    return *to == 0 ? std::nullopt : std::optional(FilePart{size - std::min(*to, size), size});
+  }
+  if (to && *to < *from) return whole;
+  if (*from >= size) return std::nullopt;
+  return FilePart{*from, to && *to < size ? *to + 1 : size};
 }
 
 std::string_view media_type(std::string_view path) {

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -22,6 +23,16 @@ Result<std::vector<FolderFile>> list_files(const std::filesystem::path& folder);
 
 /// Opens a file below `folder`, component by component, following no link. Fails with `not_found`, `io`.
 Result<std::shared_ptr<OpenFile>> open_below(const std::filesystem::path& folder, std::string_view path);
+
+/// Bytes of a file, `end` not included.
+struct FilePart {
+  std::uint64_t begin = 0, end = 0;
+  bool operator==(const FilePart&) const = default;
+};
+
+/// The part that the header Range names [RFC 9110, 14.2]: all of it without one, and for several ranges or what is
+/// no range of bytes. Nothing: it begins behind the file's end.
+std::optional<FilePart> part_of_file(std::string_view range, std::uint64_t size);
 
 /// Media type by the file's ending: "model/gltf-binary", "image/png", ...
 std::string_view media_type(std::string_view path);

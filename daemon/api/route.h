@@ -25,16 +25,19 @@ std::string_view to_string(Method method);  ///< "GET", "POST", "DELETE"
 /// A file to be sent: already open, so that the checked file is the one sent.
 class OpenFile {
  public:
-  OpenFile(int fd, std::uint64_t size) : fd_(fd), size_(size) {}
+  /// `tag`: another one for other content, as of the header ETag.
+  OpenFile(int fd, std::uint64_t size, std::string tag) : fd_(fd), size_(size), tag_(std::move(tag)) {}
   ~OpenFile();
   OpenFile(const OpenFile&) = delete;
   OpenFile& operator=(const OpenFile&) = delete;
   [[nodiscard]] int fd() const { return fd_; }
   [[nodiscard]] std::uint64_t size() const { return size_; }
+  [[nodiscard]] const std::string& tag() const { return tag_; }
 
  private:
   int fd_;
   std::uint64_t size_;
+  std::string tag_;
 };
 
 /// The events after one of them, for as long as the client stays.

@@ -25,6 +25,7 @@ ApiResponse file_response(const web::EmbeddedFile& file, std::string cache) {
   return {.body = std::string(file.gzip),
           .type = file.type,
           .headers = {{"Content-Encoding", "gzip"},
+                      {"ETag", fmt::format("\"{}\"", web::embedded_build())},
                       {"Cache-Control", std::move(cache)},
                       {"Content-Security-Policy", std::string(kJustThisPage)},
                       {"Referrer-Policy", "no-referrer"}}};

@@ -12,7 +12,7 @@ namespace http = boost::beast::http;
 const scanrig::Error kTooMany{ErrorCode::busy, "there are too many connections: try again later"};
 const scanrig::Error kTooOften{ErrorCode::busy, "too many requests: wait a moment"};
 const scanrig::Error kNoAnswer{ErrorCode::timeout, "the rig did not respond in time: see scanrig status"};
-constexpr unsigned kFirstError = 400, kForbidden = 403;
+constexpr unsigned kOk = 200, kNotModified = 304, kFirstError = 400, kForbidden = 403;
 constexpr std::size_t kMaxPathLength = 200;  ///< in the log
 constexpr auto kDrainTime = std::chrono::seconds(1);
 
@@ -97,10 +97,11 @@ void ApiSession::on_header(Error error) {
   }
   ++core_.requests;
   last_ = !parser_->get().keep_alive();
+  is_head_ = parser_->get().method() == http::verb::head;
   requester_ = requester();
   identity_ = identify();
   if (auto stranger = refuse_stranger()) return refuse(std::move(*stranger), true);
-  auto found = core_.router.find(plain(parser_->get().method_string()), plain(parser_->get().target()), identity_.role);
+  auto found = core_.router.find(method(), plain(parser_->get().target()), identity_.role);
   const bool may = may_request(found ? found->route : nullptr, identity_.role.has_value());
   if (!may) return refuse(error_response(429, kTooOften), false);
   if (!found && !identity_.role) return refuse(std::move(found.error()), true);
@@ -131,7 +132,7 @@ std::optional<ApiResponse> ApiSession::refuse_stranger() const {
     return error_response(421,
                           {ErrorCode::refused, "not a name of the rig: use its address, or set [api] http_origin"});
   }
-  if (plain(parser_->get().method_string()) == to_string(Method::get)) return std::nullopt;
+  if (method() == to_string(Method::get)) return std::nullopt;
   const bool by_cookie = !identity_.cookie.empty();
   const bool is_ours = core_.origins.is_own_origin(origin, host) && (!by_cookie || parser_->get()["X-Scanrig"] == "1");
   if (is_ours || (!by_cookie && (origin.empty() || !may_be_browser))) return std::nullopt;
@@ -180,10 +181,10 @@ void ApiSession::call() {
 }
 
 std::optional<ApiSession::JobOrder> ApiSession::order_of() const {
-  const auto method = plain(parser_->get().method_string());
-  if (method == to_string(Method::get) || !identity_.role) return std::nullopt;
+  const auto how = method();
+  if (how == to_string(Method::get) || !identity_.role) return std::nullopt;
   const auto target = plain(parser_->get().target());
-  return JobOrder{fmt::format("{} {}, requested by {} ({})", method,
+  return JobOrder{fmt::format("{} {}, requested by {} ({})", how,
                               target.substr(0, target.find('?')).substr(0, kMaxPathLength), requester_,
                               to_string(*identity_.role))};
 }
@@ -224,8 +225,14 @@ void ApiSession::answer(ApiResponse response) {
   waiting_ = false;
   timer_.cancel();
   if (order_ && response.status >= kFirstError) tell_refused(*order_, response.why);
+  if (is_known(response)) {
+    response.status = kNotModified;
+    response.body = std::string();
+  } else if (is_head_ && std::holds_alternative<EventStream>(response.body)) {
+    response = {.type = "text/event-stream"};
+  }
   if (std::holds_alternative<std::shared_ptr<OpenFile>>(response.body)) {
-    begin_file(response);
+    begin_file(std::move(response));
   } else if (std::holds_alternative<EventStream>(response.body)) {
     begin_events(response);
   } else {
@@ -250,6 +257,7 @@ void ApiSession::write_text(ApiResponse response) {
   set_head(response);
   response_.body() = std::move(std::get<std::string>(response.body));
   response_.prepare_payload();
+  if (is_head_) response_.body().clear();  // its length stays in the head
   stream_.expires_after(core_.limits.answer_time);
   http::async_write(stream_, response_,
                     [self = shared_from_this()](Error error, std::size_t) { self->on_written(error); });
@@ -278,6 +286,20 @@ void ApiSession::drain_more() {
     if (error) return self->hang_up();
     self->drain_more();
   });
+}
+
+/// HEAD is routed as GET.
+std::string_view ApiSession::method() const {
+  return is_head_ ? to_string(Method::get) : plain(parser_->get().method_string());
+}
+
+/// The client has this content already: its ETag is in If-None-Match.
+bool ApiSession::is_known(const ApiResponse& response) const {
+  const auto known = header(http::field::if_none_match);
+  if (known.empty() || response.status != kOk) return false;
+  if (const auto* file = std::get_if<std::shared_ptr<OpenFile>>(&response.body)) return known == (*file)->tag();
+  return std::ranges::any_of(response.headers,
+                             [&](const auto& one) { return one.first == "ETag" && one.second == known; });
 }
 
 std::string_view ApiSession::header(http::field name) const { return plain(parser_->get()[name]); }

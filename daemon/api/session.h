@@ -101,11 +101,13 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
   void hang_up();
   void drain();
   void drain_more();
+  [[nodiscard]] std::string_view method() const;
   [[nodiscard]] std::string_view header(boost::beast::http::field name) const;
   [[nodiscard]] Identity identify() const;
   [[nodiscard]] std::string requester() const;
 
-  void begin_file(const ApiResponse& response);
+  [[nodiscard]] bool is_known(const ApiResponse& response) const;
+  void begin_file(ApiResponse response);
   void read_chunk();
   void write_chunk();
 
@@ -128,6 +130,7 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
   std::optional<boost::beast::http::request_parser<boost::beast::http::string_body>> parser_;
   std::optional<Router::Match> match_;
   std::optional<JobOrder> order_;    ///< the order in progress; nothing for requests that only read
+  bool is_head_ = false;             ///< HEAD: as GET, without the body
   bool waiting_ = false;             ///< for a reply to the request
   bool last_ = false;                ///< no request can follow
   std::shared_ptr<int> on_its_way_;  ///< while a reply is being written
@@ -135,7 +138,7 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
   std::string chunk_;  ///< head or part of a file, or what is left of a drained request
 
   std::shared_ptr<OpenFile> file_;
-  std::uint64_t sent_ = 0;
+  std::uint64_t sent_ = 0, end_ = 0;  ///< of the file: what comes next, and where the wanted part ends
 
   std::optional<std::uint64_t> subscription_;
   std::uint64_t last_event_ = 0;

@@ -5,14 +5,17 @@
 #include <sstream>
 
 #include "core/timestamp.h"
+#include "daemon/api/downloads.h"
 #include "daemon/api/session.h"
 
 namespace scanrig {
 namespace {
 
+namespace http = boost::beast::http;
 namespace net = boost::asio;
 
 constexpr std::size_t kChunk = 64 * 1024;
+constexpr unsigned kPartial = 206, kNotSatisfiable = 416;
 
 }  // namespace
 
@@ -24,15 +27,31 @@ std::string ApiSession::head_text() const {
   return text.str();
 }
 
-/// One limit for the whole file, long enough for the slowest client that is served.
-void ApiSession::begin_file(const ApiResponse& response) {
+/// One limit for the whole part, long enough for the slowest client that is served.
+void ApiSession::begin_file(ApiResponse response) {
   file_ = std::get<std::shared_ptr<OpenFile>>(response.body);
-  sent_ = 0;
+  const auto if_range = header(http::field::if_range);
+  const bool is_same = if_range.empty() || if_range == file_->tag();
+  const auto part = part_of_file(is_same ? header(http::field::range) : "", file_->size());
+  if (!part) {
+    auto refused = error_response(kNotSatisfiable, {ErrorCode::out_of_range, "the file ends before this part of it"});
+    refused.headers.emplace_back("Content-Range", fmt::format("bytes */{}", file_->size()));
+    file_.reset();
+    return write_text(std::move(refused));
+  }
+  if (*part != FilePart{0, file_->size()}) {
+    response.status = kPartial;
+    response.headers.emplace_back("Content-Range",
+                                  fmt::format("bytes {}-{}/{}", part->begin, part->end - 1, file_->size()));
+  }
+  response.headers.emplace_back("ETag", file_->tag());
+  response.headers.emplace_back("Accept-Ranges", "bytes");
   set_head(response);
-  response_.content_length(file_->size());
+  response_.content_length(part->end - part->begin);
+  end_ = part->end;
+  sent_ = is_head_ ? end_ : part->begin;
   chunk_ = head_text();
-  const std::chrono::duration<double> download(static_cast<double>(file_->size()) /
-                                               core_.limits.slowest_bytes_a_second);
+  const std::chrono::duration<double> download(static_cast<double>(end_ - sent_) / core_.limits.slowest_bytes_a_second);
   stream_.expires_after(core_.limits.answer_time + std::chrono::ceil<std::chrono::milliseconds>(download));
   write_chunk();
 }
@@ -40,7 +59,7 @@ void ApiSession::begin_file(const ApiResponse& response) {
 void ApiSession::write_chunk() {
   net::async_write(stream_, net::buffer(chunk_), [self = shared_from_this()](Error error, std::size_t) {
     if (error) return self->hang_up();
-    if (self->sent_ < self->file_->size()) return self->read_chunk();
+    if (self->sent_ < self->end_) return self->read_chunk();
     self->file_.reset();
     self->on_written({});
   });
@@ -49,7 +68,7 @@ void ApiSession::write_chunk() {
 /// Runs on a worker: a slow disk delays only this connection.
 void ApiSession::read_chunk() {
   net::post(core_.workers, [self = shared_from_this()] {
-    self->chunk_.resize(std::min<std::uint64_t>(kChunk, self->file_->size() - self->sent_));
+    self->chunk_.resize(std::min<std::uint64_t>(kChunk, self->end_ - self->sent_));
     const auto got =
         ::pread(self->file_->fd(), self->chunk_.data(), self->chunk_.size(), static_cast<off_t>(self->sent_));
     net::post(self->stream_.get_executor(), [self, got] {

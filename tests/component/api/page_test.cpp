@@ -45,9 +45,48 @@ TEST_F(PageTest, ThePageIsOpenToAnybodyAndRunsNothingButItself) {
   EXPECT_EQ(page.status, 200);
   EXPECT_THAT(page.head, AllOf(HasSubstr("Content-Encoding: gzip"), HasSubstr("script-src 'self'"),
                                HasSubstr("frame-ancestors 'none'"), HasSubstr("Cache-Control: no-cache")));
+  const auto tag = "If-None-Match: \"" + std::string(web::embedded_build()) + "\"\r\n";
+  EXPECT_EQ(browse("GET", "/", tag).status, 304) << "not sent again";
   for (const auto* path : {"/assets/none.js", "/assets/..%2F..%2Fsecret", "/assets/%2e%2e%2fsecret", "/assets/a%2fb"}) {
     EXPECT_THAT(browse("GET", path).status, testing::AnyOf(400, 401, 404)) << path;
   }
+}
+
+TEST_F(PageTest, AFileIsSentInPartsAndNotAgainWhenItIsKnown) {
+  serve();
+  const auto cookie = cookie_of(Role::viewer);
+  const std::string model = "/api/v1/jobs/old/model";
+  const auto whole = browse("GET", model, cookie);
+  ASSERT_EQ(whole.status, 200);
+  ASSERT_EQ(whole.body.size(), 300'004U);
+  const auto tag_at = whole.head.find("ETag: ") + 6;
+  const auto tag = whole.head.substr(tag_at, whole.head.find('\r', tag_at) - tag_at);
+  const auto part = browse("GET", model, cookie + "Range: bytes=0-5\r\n");
+  EXPECT_EQ(part.status, 206);
+  EXPECT_EQ(part.body, "glTFxx");
+  EXPECT_THAT(part.head, HasSubstr("Content-Range: bytes 0-5/300004"));
+  EXPECT_EQ(browse("GET", model, cookie + "Range: bytes=300000-\r\nIf-Range: " + tag + "\r\n").body, "xxxx");
+  EXPECT_EQ(browse("GET", model, cookie + "Range: bytes=0-5\r\nIf-Range: \"another\"\r\n").status, 200);
+  const auto behind = browse("GET", model, cookie + "Range: bytes=300004-\r\n");
+  EXPECT_EQ(behind.status, 416);
+  EXPECT_THAT(behind.head, HasSubstr("Content-Range: bytes */300004"));
+  EXPECT_EQ(browse("GET", model, cookie + "If-None-Match: " + tag + "\r\n").status, 304);
+  EXPECT_EQ(browse("GET", model, cookie + "If-None-Match: \"another\"\r\n").status, 200);
+}
+
+TEST_F(PageTest, HeadIsAnsweredAsGetWithoutABody) {
+  serve();
+  const auto cookie = cookie_of(Role::viewer);
+  auto wire = tcp();
+  for (const auto* path : {"/api/v1/jobs/old/model", "/api/v1/status", "/api/v1/nothing"}) {
+    ASSERT_TRUE(wire.say(request("HEAD", path, "", "", cookie)));
+    const auto head = wire.hear("\r\n\r\n");
+    EXPECT_THAT(head, HasSubstr(path == std::string("/api/v1/nothing") ? " 404 " : " 200 "));
+    EXPECT_THAT(head, Not(HasSubstr("Content-Length: 0\r\n")));
+    ASSERT_TRUE(wire.say(request("GET", "/api/v1/login", "", "", cookie)));
+    EXPECT_EQ(wire.answer().json()["role"], "viewer") << "no byte of a body is left over after " << path;
+  }
+  EXPECT_THAT(browse("HEAD", "/api/v1/events", cookie).head, HasSubstr("text/event-stream"));
 }
 
 TEST_F(PageTest, AnEngineerReadsTheNewestLinesOfTheLog) {

@@ -56,6 +56,34 @@ TEST_F(FolderFiles, NothingElseIsOpened) {
   EXPECT_EQ(open_below(folder_ / "gone", "a").error().code, ErrorCode::not_found);
 }
 
+TEST(FilePart, IsTheRangeThatWasAskedForOrTheWhole) {
+  const FilePart whole{0, 1000};
+  EXPECT_EQ(part_of_file("", 1000), whole);
+  EXPECT_EQ(part_of_file("bytes=0-99", 1000), (FilePart{0, 100}));
+  EXPECT_EQ(part_of_file("bytes=999-999", 1000), (FilePart{999, 1000}));
+  EXPECT_EQ(part_of_file("bytes=900-", 1000), (FilePart{900, 1000}));
+  EXPECT_EQ(part_of_file("bytes=900-5000", 1000), (FilePart{900, 1000}));
+  EXPECT_EQ(part_of_file("bytes=-100", 1000), (FilePart{900, 1000}));
+  EXPECT_EQ(part_of_file("bytes=-5000", 1000), whole);
+  EXPECT_EQ(part_of_file("bytes=0-18446744073709551615", 1000), whole) << "no overflow";
+  for (const auto* odd : {"bytes=", "bytes=-", "bytes=a-b", "bytes=5-1", "bytes=0-1,5-6", "lines=0-1", "bytes=0x1-2",
+                          "bytes=+1-2", "bytes=99999999999999999999-"}) {
+    EXPECT_EQ(part_of_file(odd, 1000), whole) << odd;
+  }
+  for (const auto* behind : {"bytes=1000-", "bytes=2000-3000", "bytes=-0"}) {
+    EXPECT_EQ(part_of_file(behind, 1000), std::nullopt) << behind;
+  }
+  EXPECT_EQ(part_of_file("bytes=0-", 0), std::nullopt);
+}
+
+TEST_F(FolderFiles, HaveATagThatChangesWithTheirContent) {
+  const auto tag = [&] { return (*open_below(job(), "scan.json"))->tag(); };
+  const auto before = tag();
+  EXPECT_EQ(tag(), before);
+  scan_samples::write_text(job() / "scan.json", "{ }");
+  EXPECT_NE(tag(), before);
+}
+
 TEST_F(FolderFiles, HaveTheMediaTypeOfTheirEnding) {
   EXPECT_EQ(media_type("model/model.glb"), "model/gltf-binary");
   EXPECT_EQ(media_type("left.png"), "image/png");
