@@ -168,8 +168,8 @@ Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions
     const auto room = Eigen::Vector3f::Constant(static_cast<float>(options.hull_room_mm));
     box = {box.min() - room, box.max() + room};
   }
-  const Field field(std::move(prepared.views_of_pose), std::move(prepared.model_from_pose),
-                    make_hull(poses, options, box), options, report.band_mm);
+  const Field field(std::move(prepared.views_of_pose), prepared.model_from_pose, make_hull(poses, options, box),
+                    options, report.band_mm);
   context.report("volume", 0.2);
   BlockGrid grid(box, static_cast<float>(options.voxel_mm));
   if (auto ok = grid.fill(field, prepared.seeds, context); !ok) return pass_on(ok);
