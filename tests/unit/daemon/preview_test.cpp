@@ -114,7 +114,7 @@ TEST_F(PreviewTest, AMosaicIsShownInColour) {
   const auto jpeg = preview_.jpeg(Side::left);
   ASSERT_TRUE(jpeg);
   const cv::Mat image = cv::imdecode(std::vector<char>(jpeg->begin(), jpeg->end()), cv::IMREAD_COLOR);
-  const auto bgr = image.at<cv::Vec3b>(24, 32);
+  const auto& bgr = image.at<cv::Vec3b>(24, 32);
   EXPECT_GT(bgr[2], 150) << "red";
   EXPECT_LT(bgr[0], 60);
 }
