@@ -98,7 +98,7 @@ def moved_rigs(bench, scratch):
         sentences, after = reconstruct(bench, scan, scratch / "model", "refine")
         bench.line(f"watch, {name}", "named", " ".join(dict.fromkeys(sentences)),
                    any(word in sentence for sentence in sentences))
-        bench.line(f"the same, median of the model: not refined, refined; untouched {untouched:.4f} mm",
+        bench.line(f"watch, {name}, median of the model: not refined, refined; untouched {untouched:.4f} mm",
                    f"refined within {left_um} um of the untouched, and nearer than not refined where that is farther off",
                    f"{before:.4f}, {after:.4f} mm" if after else "refused", after is not None and
                    abs(after - untouched) <= left_um / 1000 and
