@@ -92,7 +92,7 @@ export const words = {
   focusBegin: "Show",
   focusEnd: "Hide",
   sharpness: "Sharpness",
-  sharpnessOf: (share: number) => `${Math.round(100 * share)} % of the sharpest`,
+  sharpnessOf: (share: number) => `${Math.round(100 * share)} % of the sharpest so far`,
   exposure: (dark: number, bright: number) =>
     `· ${(100 * dark).toFixed(0)} % dark, ${(100 * bright).toFixed(1)} % overexposed`,
   log: "Log",

@@ -1,7 +1,6 @@
 // The middle of both images in full resolution, how sharp it is, and the sharpest so far: to turn a lens by.
 import { useSignal } from "@preact/signals";
-import { useEffect } from "preact/hooks";
-import { API } from "../api/client.ts";
+import { usePreview } from "../parts/preview.ts";
 import { words } from "../words.ts";
 import { type Exposure, exposureOf, sharpnessOf } from "./sharpness.ts";
 
@@ -23,36 +22,16 @@ async function pixelsOf(blob: Blob): Promise<ImageData> {
 }
 
 function Eye({ side }: { side: "left" | "right" }) {
-  const shown = useSignal("");
   const seen = useSignal<Seen | null>(null);
-  useEffect(() => {
-    let ended = false;
-    let timer: ReturnType<typeof setTimeout>;
-    const next = async () => {
-      const response = await fetch(`${API}/preview/${side}?or_nothing=true&middle=true`, { cache: "no-store" }).catch(
-        () => null,
-      );
-      if (response?.status === 200) {
-        const blob = await response.blob();
-        const pixels = await pixelsOf(blob);
-        const sharpness = sharpnessOf(pixels);
-        if (shown.value) URL.revokeObjectURL(shown.value);
-        shown.value = URL.createObjectURL(blob);
-        seen.value = { sharpness, best: Math.max(sharpness, seen.value?.best ?? 0), exposure: exposureOf(pixels) };
-      }
-      if (!ended) timer = setTimeout(next, PERIOD_MS);
-    };
-    next();
-    return () => {
-      ended = true;
-      clearTimeout(timer);
-      if (shown.value) URL.revokeObjectURL(shown.value);
-    };
-  }, [side]);
+  const { url, old } = usePreview(`${side}?or_nothing=true&middle=true`, PERIOD_MS, async (image) => {
+    const pixels = await pixelsOf(image);
+    const sharpness = sharpnessOf(pixels);
+    seen.value = { sharpness, best: Math.max(sharpness, seen.value?.best ?? 0), exposure: exposureOf(pixels) };
+  });
   const now = seen.value;
   return (
-    <figure class="picture focus">
-      {shown.value ? <img src={shown.value} alt={words[side]} /> : <span>{words.noPicture}</span>}
+    <figure class={`picture focus ${old.value ? "picture-old" : ""}`}>
+      {url.value ? <img src={url.value} alt={words[side]} /> : <span>{words.noPicture}</span>}
       <figcaption>
         {words[side]}
         {now && (
