@@ -101,6 +101,7 @@ struct Route {
   bool slow = false;                     ///< touches the disk: done by a worker, not by an I/O thread
   bool reserved = false;                 ///< served where no seat is free
   bool open = false;                     ///< to anybody: the page itself, and the way in
+  bool once = false;                     ///< what it sends is made for this request: no HEAD, no part, no ETag
   std::chrono::seconds reply_timeout{};  ///< for the reply; 0: as in the limits
   /// Calls `send` once, from this thread or, soon, from the control loop's.
   std::function<void(const ApiStation&, const Values&, Send)> handle;

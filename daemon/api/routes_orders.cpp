@@ -93,6 +93,7 @@ Route bundle_route() {
       .in_path = {kJobId},
       .reply = {.description = "a compressed tar archive", .type = "application/gzip"},
       .errors = {409, 500},
+      .once = true,
       .reply_timeout = std::chrono::seconds(180),
       .handle = send_bundle};
 }

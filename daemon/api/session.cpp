@@ -11,6 +11,7 @@ namespace http = boost::beast::http;
 
 const scanrig::Error kTooMany{ErrorCode::busy, "there are too many connections: try again later"};
 const scanrig::Error kTooOften{ErrorCode::busy, "too many requests: wait a moment"};
+const scanrig::Error kNoHead{ErrorCode::unsupported, "this is made when it is downloaded: use GET"};
 const scanrig::Error kNoAnswer{ErrorCode::timeout, "the rig did not respond in time: see scanrig status"};
 constexpr unsigned kOk = 200, kNotModified = 304, kFirstError = 400, kForbidden = 403;
 constexpr std::size_t kMaxPathLength = 200;  ///< in the log
@@ -112,6 +113,8 @@ void ApiSession::on_header(Error error) {
     if (order) tell_refused(*order, found.error().why);
     return refuse(std::move(found.error()), false);
   }
+  once_ = found->route->once;
+  if (is_head_ && once_) return refuse(error_response(405, kNoHead), false);
   match_ = std::move(*found);
   match_->values.set_requester(seat_->peer(), identity_);
   order_ = order_of();
@@ -296,7 +299,7 @@ std::string_view ApiSession::method() const {
 /// The client has this content already: its ETag is in If-None-Match.
 bool ApiSession::is_known(const ApiResponse& response) const {
   const auto known = header(http::field::if_none_match);
-  if (known.empty() || response.status != kOk) return false;
+  if (known.empty() || response.status != kOk || once_) return false;
   if (const auto* file = std::get_if<std::shared_ptr<OpenFile>>(&response.body)) return known == (*file)->tag();
   return std::ranges::any_of(response.headers,
                              [&](const auto& one) { return one.first == "ETag" && one.second == known; });

@@ -131,6 +131,7 @@ class ApiSession : public std::enable_shared_from_this<ApiSession> {
   std::optional<Router::Match> match_;
   std::optional<JobOrder> order_;    ///< the order in progress; nothing for requests that only read
   bool is_head_ = false;             ///< HEAD: as GET, without the body
+  bool once_ = false;                ///< as of the route
   bool waiting_ = false;             ///< for a reply to the request
   bool last_ = false;                ///< no request can follow
   std::shared_ptr<int> on_its_way_;  ///< while a reply is being written

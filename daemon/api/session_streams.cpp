@@ -31,8 +31,8 @@ std::string ApiSession::head_text() const {
 void ApiSession::begin_file(ApiResponse response) {
   file_ = std::get<std::shared_ptr<OpenFile>>(response.body);
   const auto if_range = header(http::field::if_range);
-  const bool is_same = if_range.empty() || if_range == file_->tag();
-  const auto part = part_of_file(is_same ? header(http::field::range) : "", file_->size());
+  const bool may_be_part = !once_ && (if_range.empty() || if_range == file_->tag());
+  const auto part = part_of_file(may_be_part ? header(http::field::range) : "", file_->size());
   if (!part) {
     auto refused = error_response(kNotSatisfiable, {ErrorCode::out_of_range, "the file ends before this part of it"});
     refused.headers.emplace_back("Content-Range", fmt::format("bytes */{}", file_->size()));
@@ -44,8 +44,10 @@ void ApiSession::begin_file(ApiResponse response) {
     response.headers.emplace_back("Content-Range",
                                   fmt::format("bytes {}-{}/{}", part->begin, part->end - 1, file_->size()));
   }
-  response.headers.emplace_back("ETag", file_->tag());
-  response.headers.emplace_back("Accept-Ranges", "bytes");
+  if (!once_) {
+    response.headers.emplace_back("ETag", file_->tag());
+    response.headers.emplace_back("Accept-Ranges", "bytes");
+  }
   set_head(response);
   response_.content_length(part->end - part->begin);
   end_ = part->end;

@@ -136,22 +136,22 @@ void print_outcome(const CalibrateFolderVerb& verb, const FolderCalibration& out
   const CalibrationJudgement& judgement = outcome.judged.judgement;
   const auto used = std::ranges::count_if(solved.images, &ImageFit::is_used);
   if (verb.json) {
-    nlohmann::ordered_json reply{{"grade", to_string(judgement.grade)}, {"graded_um", judgement.graded_um},
-                                 {"images", solved.images.size()},      {"used", used},
-                                 {"noise_px", solved.noise_px},         {"sentences", judgement.sentences}};
+    nlohmann::ordered_json all{{"grade", to_string(judgement.grade)}, {"graded_um", judgement.graded_um},
+                               {"images", solved.images.size()},      {"used", used},
+                               {"noise_px", solved.noise_px},         {"sentences", judgement.sentences}};
     if (solved.sigma) {
-      reply["volume_um"] = solved.sigma->volume;
-      reply["scale_um"] = solved.sigma->scale;
+      all["volume_um"] = solved.sigma->volume;
+      all["scale_um"] = solved.sigma->scale;
     }
-    if (verb.with_report) reply["report"] = report_of(verb);
-    if (const auto& ab = judgement.cross_validation) reply["a_b_ratio"] = ab->ratio();
+    if (verb.with_report) all["report"] = report_of(verb);
+    if (const auto& ab = judgement.cross_validation) all["a_b_ratio"] = ab->ratio();
     for (const ImageRemark& remark : outcome.boards.remarks) {
-      reply["remarks"].push_back({{"pair", remark.pair},
-                                  {"camera", remark.side == 0 ? "left" : "right"},
-                                  {"message", remark.message},
-                                  {"left_out", remark.is_left_out}});
+      all["remarks"].push_back({{"pair", remark.pair},
+                                {"camera", remark.side == 0 ? "left" : "right"},
+                                {"message", remark.message},
+                                {"left_out", remark.is_left_out}});
     }
-    fmt::print("{}\n", reply.dump(2));
+    fmt::print("{}\n", all.dump(2));
     return;
   }
   for (const ImageRemark& remark : outcome.boards.remarks) {
@@ -174,15 +174,15 @@ void print_check(const CalibrateFolderVerb& verb, const DriftCheck& check) {
     for (const std::string& sentence : check.sentences) fmt::print("{}\n", sentence);
     return;
   }
-  const nlohmann::ordered_json reply{{"verdict", to_string(check.verdict)},
-                                     {"difference_um", check.difference_um},
-                                     {"sigma_um", check.sigma_um},
-                                     {"cameras_px", {check.cameras_px.x(), check.cameras_px.y()}},
-                                     {"axis_mm", check.axis_mm},
-                                     {"axis_deg", check.axis_deg},
-                                     {"noise_px", check.noise_px},
-                                     {"sentences", check.sentences}};
-  fmt::print("{}\n", reply.dump(2));
+  const nlohmann::ordered_json all{{"verdict", to_string(check.verdict)},
+                                   {"difference_um", check.difference_um},
+                                   {"sigma_um", check.sigma_um},
+                                   {"cameras_px", {check.cameras_px.x(), check.cameras_px.y()}},
+                                   {"axis_mm", check.axis_mm},
+                                   {"axis_deg", check.axis_deg},
+                                   {"noise_px", check.noise_px},
+                                   {"sentences", check.sentences}};
+  fmt::print("{}\n", all.dump(2));
 }
 
 Result<void> check_cameras(const Calibration& known, const CalibrationImages& images) {

@@ -77,11 +77,11 @@ void print_made(const ConvertVerb& verb, const CalibrationExport& made) {
     fmt::print("{}\n", verb.out.string());
     return;
   }
-  nlohmann::ordered_json reply{{"out", verb.out}, {"lens_model", made.lens_model}};
+  nlohmann::ordered_json all{{"out", verb.out}, {"lens_model", made.lens_model}};
   for (std::size_t side = 0; side < 2; ++side) {
-    reply[side == 0 ? "left" : "right"] = {{"rms_px", made.lenses[side].rms_px}, {"max_px", made.lenses[side].max_px}};
+    all[side == 0 ? "left" : "right"] = {{"rms_px", made.lenses[side].rms_px}, {"max_px", made.lenses[side].max_px}};
   }
-  fmt::print("{}\n", reply.dump());
+  fmt::print("{}\n", all.dump());
 }
 
 }  // namespace

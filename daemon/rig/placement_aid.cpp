@@ -5,7 +5,7 @@
 namespace scanrig {
 namespace {
 
-constexpr auto kBetweenPlacements = std::chrono::milliseconds(500);
+constexpr auto kBetweenLooks = std::chrono::milliseconds(500);
 
 }  // namespace
 
@@ -20,7 +20,7 @@ Result<PlacementView> PlacementAid::look(const AwaitedPlacement& awaited) {
                             plan.at(static_cast<std::size_t>(awaited.placement)), calibration ? &*calibration : nullptr,
                             awaited.table_deg);
   seen_for_ = awaited;
-  not_before_ = clock_.now() + kBetweenPlacements;
+  not_before_ = clock_.now() + kBetweenLooks;
   return *seen_;
 }
 

@@ -7,9 +7,8 @@
 namespace scanrig::sim {
 
 /// The rig's camera with faults. Before a `share` of its exposures one fault occurs: one pair of frames is lost, all
-/// further frames are lost, the table is blocked, the guard is
-/// opened, or the e-stop is pressed. Kind and time follow from `seed`. Each
-/// fault except the first stays until an operator fixes it.
+/// further frames are lost, the table is blocked, the guard is opened, or the e-stop is pressed. Kind and time follow
+/// from `seed`. Each fault except the first stays until an operator fixes it.
 class TroubledCamera final : public StereoCamera {
  public:
   TroubledCamera(SimRig& rig, double share, std::uint64_t seed) : rig_(rig), share_(share), seed_(seed) {}

@@ -86,6 +86,8 @@ TEST_F(PageTest, HeadIsAnsweredAsGetWithoutABody) {
     ASSERT_TRUE(wire.say(request("GET", "/api/v1/login", "", "", cookie)));
     EXPECT_EQ(wire.answer().json()["role"], "viewer") << "no byte of a body is left over after " << path;
   }
+  ASSERT_TRUE(wire.say(request("HEAD", "/api/v1/jobs/old/bundle", tokens[Role::operating])));
+  EXPECT_THAT(wire.hear("\r\n\r\n"), HasSubstr(" 405 ")) << "packing marks the job as exported";
   EXPECT_THAT(browse("HEAD", "/api/v1/events", cookie).head, HasSubstr("text/event-stream"));
 }
 
