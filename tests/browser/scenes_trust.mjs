@@ -6,8 +6,8 @@ import { Station, press, sleep, until, word } from "./browser.mjs";
 import { ask, check, jobOf, open, ready, see } from "./steps.mjs";
 
 const STOP_MS = 100;
-/** With --trouble 1: what happens first. */
-const SEED_OF_FAULT = { estop: 10, guard: 14, cameras: 9, table: 16 };
+/** Seeds of --trouble 1 under which nothing else happens first, nor while the exposure is repeated. */
+const SEED_OF_FAULT = { estop: 10, guard: 14, cameras: 609, table: 20 };
 const REASON_OF_FAULT = { estop: /e-stop/i, guard: /guard/i, cameras: /camera/i, table: /table/i };
 
 /** Until the page is busy with a scan. */
@@ -45,9 +45,9 @@ export const scenarios = {
           const page = await open(browser, troubled, {});
           await ready(page);
           await press(page, "START");
-          await until(`the rig is stopped by ${what}`, () => REASON_OF_FAULT[what].test(troubled.status().sentence), 60_000);
+          await until(`the rig is stopped by ${what}`, () => REASON_OF_FAULT[what].test(troubled.status().cause), 60_000);
           await until("it stands", () => troubled.status().activity === "none");
-          await until("the page says it", async () => (await page.locator(".sentence").innerText()) === troubled.status().sentence);
+          await until("the page says why", async () => (await page.locator(".cause").innerText()) === troubled.status().cause);
           await check(page, troubled);
           await page.context().close();
         } finally {
