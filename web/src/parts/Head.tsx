@@ -1,12 +1,12 @@
 // The word that is read from two metres, the daemon's sentence and next action, and STOP.
 import { activeJob, insecure, isOld, silentFor_s, status } from "../api/store.ts";
-import type { Tone } from "../api/types.ts";
+import type { Status } from "../api/types.ts";
 import { words } from "../words.ts";
 import { Ring } from "./Ring.tsx";
 import { Stop } from "./Stop.tsx";
 
-/** A person has to act: then the cause is told, too. */
-const WITH_CAUSE: Tone[] = ["act", "fault"];
+/** Where the rig waits for Reset the sentence does not say what stopped it. */
+const saysCause = (now: Status) => now.tone === "fault" || now.machine === "Halted";
 
 export function Head() {
   const now = status.value;
@@ -28,7 +28,7 @@ export function Head() {
       </h1>
       <div class="saying" aria-live="polite">
         <p class="sentence">{now?.sentence ?? ""}</p>
-        {now && WITH_CAUSE.includes(now.tone) && <p class="cause">{now.cause}</p>}
+        {now && saysCause(now) && <p class="cause">{now.cause}</p>}
         <p class="next">{now?.next_action ?? ""}</p>
       </div>
       <Stop />

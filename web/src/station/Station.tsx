@@ -17,7 +17,7 @@ function Buttons() {
           {start.does === "continue" ? words.carryOn : words.start}
         </Order>
       </div>
-      {now.tone !== "ready" && now.tone !== "working" && (
+      {(reset.ok || !start.ok) && now.tone !== "working" && (
         <Order needs="operator" class="big" action={reset} send={() => order("/reset")}>
           {words.reset}
         </Order>
