@@ -340,8 +340,11 @@ class Transition : public StepBuilder {
 
   void reset(Origin origin) {
     if (s().machine != MachineState::halted && s().machine != MachineState::error) {
-      return refuse(s().machine == MachineState::ready ? ErrorCode::refused : ErrorCode::busy,
-                    "Nothing to reset: the rig is {}.", to_string(s().machine));
+      const bool is_ready = s().machine == MachineState::ready;
+      return refuse(is_ready ? ErrorCode::refused : ErrorCode::busy, "Nothing to reset: the rig is {}.",
+                    is_ready                                      ? "ready"
+                    : s().machine == MachineState::preoperational ? "starting"
+                                                                  : "working");
     }
     if (s().may_be_moving) {
       return refuse(ErrorCode::busy, "The table may be moving: check the drive's power and cable.");

@@ -88,7 +88,7 @@ class SimulatedStation:
             shutil.copy(calibration, self.jobs)
             extra = ["--own-calibration", *extra]
         if options.page:
-            extra = ["--http-port", PAGE_PORT, *extra]
+            extra = ["--http-port", PAGE_PORT, "--background-cameras", *extra]
         command = [options.bin / "scanrigd-sim", "--socket", self.socket, "--jobs", self.jobs, *scene(options), *extra]
         self.processes.append(run(command, log))
         return self.processes[0]

@@ -9,6 +9,7 @@
 #include "daemon/rig/make_safe.h"
 #include "daemon/rig/open_devices.h"
 #include "daemon/service/service.h"
+#include "sim/apps/background_camera.h"
 #include "sim/apps/rig_options.h"
 #include "sim/apps/simulated_operator.h"
 #include "sim/apps/troubled_camera.h"
@@ -33,6 +34,7 @@ struct SimOptions {
   std::string operator_at_rig = "auto";
   double trouble = 0.0;
   bool own_calibration = false;
+  bool background_cameras = false;
   std::filesystem::path config;  ///< a rig of real drivers on simulated wires
   bool make_safe = false, beside_daemon = false;
 };
@@ -66,6 +68,9 @@ void add_options(CLI::App& app, SimOptions& o) {
   app.add_option("--clock", o.clock, "real, or virtual: no waiting for the rig")
       ->capture_default_str()
       ->check(CLI::IsMember({"real", "virtual"}));
+  app.add_flag("--background-cameras", o.background_cameras,
+               "images are rendered with low priority, for a page on the same machine: real cameras take no time of "
+               "its processor");
   app.add_option("--operator", o.operator_at_rig,
                  "auto: an operator scans one object; helper: an operator turns objects over, fixes faults and presses "
                  "Reset, the API does the rest; none: the API does all")
@@ -147,9 +152,11 @@ Result<void> run(SimOptions o, const SignalStop& stop) {
     if (operator_thread) operator_thread->read_screen(awaited ? awaited->placement + 1 : 0, calibrates);
   };
   sim::TroubledCamera camera(r, o.trouble, o.rig.seed);
+  sim::BackgroundCamera background(camera);
+  StereoCamera& used = o.background_cameras ? static_cast<StereoCamera&>(background) : camera;
   Journal journal(standard_sink());
   options.journal = [&journal](JournalEntry entry) { journal.write(std::move(entry)); };
-  const auto ended = run_daemon({r.turntable(), r.projector(), camera, r.panel()}, options, *clock, stop.token());
+  const auto ended = run_daemon({r.turntable(), r.projector(), used, r.panel()}, options, *clock, stop.token());
   return ended ? Result<void>() : pass_on(ended);
 }
 

@@ -58,7 +58,15 @@ Result<StereoFrame> WireCamera::collect(Deadline deadline) {
 }
 
 Result<StereoFrame> WireCamera::capture_preview(Deadline) {
-  return fail(ErrorCode::unsupported, "camera: this simulated camera exposes at the projector's edge only");
+  armed_ = false;
+  exposed_.reset();
+  const auto table = truth_.get();
+  if (!table) return pass_on(table);
+  std::unique_lock lock(mutex_);
+  const int placement = history_.placement();
+  lock.unlock();
+  const auto images = scene_->shoot(placement, to_radians(table->angle_deg), false, Scene::kFirstPreview + previews_++);
+  return StereoFrame{images.left, images.right, PixelFormat::bayer_rggb8, 1, clock_.now()};
 }
 
 void WireCamera::turned_over() {

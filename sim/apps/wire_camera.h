@@ -27,7 +27,7 @@ class WireCamera final : public StereoCamera {
   Result<void> prepare(Deadline deadline) override;
   Result<void> arm(Deadline deadline) override;
   Result<StereoFrame> collect(Deadline deadline) override;
-  /// Fails with `unsupported`: rendering takes too long.
+  /// Exposed under the plain light.
   Result<StereoFrame> capture_preview(Deadline deadline) override;
 
   /// The trigger line: an exposure starts, and lasts as long as `fire` does.
@@ -48,7 +48,7 @@ class WireCamera final : public StereoCamera {
   const std::unique_ptr<Scene> scene_;
   TruthSocket truth_;
   Clock& clock_;
-  std::uint64_t exposures_ = 0;
+  std::uint64_t exposures_ = 0, previews_ = 0;
   bool armed_ = false;
   std::optional<Result<Exposure>> exposed_;
 

@@ -3,6 +3,12 @@
 #include "sim/scene/profile.h"
 
 namespace scanrig::sim {
+
+double SharedState::true_angle_deg(Clock::TimePoint at) const {
+  const double reported = axis.angle(at);
+  return scene->options().rig ? scene->drawn_rig().table.true_deg(reported) : reported;
+}
+
 void SharedState::edge(Light light) {
   ++triggers;
   if (!armed) return;
@@ -11,8 +17,7 @@ void SharedState::edge(Light light) {
       std::chrono::duration_cast<Clock::Duration>(std::chrono::duration<double>(profile().exposure_s));
   constexpr auto kTransfer = std::chrono::milliseconds(25);
   const auto now = clock.now();
-  const double reported = axis.angle(now + exposure_time / 2);
-  const double angle = scene->options().rig ? scene->drawn_rig().table.true_deg(reported) : reported;
+  const double angle = true_angle_deg(now + exposure_time / 2);
   if (board_placement == 0) history.exposed(angle);
   ++exposures;
   if (frames_to_lose > 0) {

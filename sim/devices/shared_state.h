@@ -69,6 +69,8 @@ struct SharedState {
   ExposureHistory history;
   int board_placement = 0;  ///< number in the plan; 0: the object is on the table
 
+  /// Of the table. Call with `mutex` held.
+  [[nodiscard]] double true_angle_deg(Clock::TimePoint at) const;
   /// The trigger edge, at the beginning of an exposure. Call with `mutex` held.
   void edge(Light light);
 };

@@ -57,6 +57,11 @@ Result<StereoFrame> SimStereoCamera::collect(Deadline deadline) {
   const Exposure e = *b.in_flight;
   b.in_flight.reset();
   lock.unlock();
+  return render(e);
+}
+
+StereoFrame SimStereoCamera::render(const Exposure& e) {
+  SharedState& b = state_;
   if (e.board != 0 && e.board != board_) b.board.put(e.board);
   board_ = e.board;
   const double angle = to_radians(e.angle_deg);
@@ -66,7 +71,21 @@ Result<StereoFrame> SimStereoCamera::collect(Deadline deadline) {
 }
 
 Result<StereoFrame> SimStereoCamera::capture_preview(Deadline) {
-  return fail(ErrorCode::unsupported, "camera: this simulated camera exposes at the projector's edge only");
+  SharedState& b = state_;
+  std::unique_lock lock(b.mutex);
+  b.armed = collectable_ = false;
+  b.in_flight.reset();
+  const auto now = b.clock.now();
+  const Exposure seen{.placement = b.history.placement(),
+                      .board = b.board_placement,
+                      .angle_deg = b.true_angle_deg(now),
+                      .pattern = false,
+                      .number = Scene::kFirstPreview + previews_++,
+                      .trigger = b.triggers,
+                      .taken = now,
+                      .arrival = now};
+  lock.unlock();
+  return render(seen);
 }
 
 Result<PanelInputs> SimPanel::wait_change(const PanelInputs& known, Deadline deadline) {

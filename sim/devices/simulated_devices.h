@@ -43,8 +43,7 @@ class SimProjector final : public Projector {
   SharedState& state_;
 };
 
-/// collect() fails with `timeout`, and with `protocol` if it was not armed; capture_preview() with `unsupported`:
-/// rendering takes too long.
+/// collect() fails with `timeout`, and with `protocol` if it was not armed. A preview is exposed under the plain light.
 class SimStereoCamera final : public StereoCamera {
  public:
   explicit SimStereoCamera(SharedState& state) : state_(state) {}
@@ -54,9 +53,12 @@ class SimStereoCamera final : public StereoCamera {
   Result<StereoFrame> capture_preview(Deadline deadline) override;
 
  private:
+  StereoFrame render(const Exposure& exposure);
+
   SharedState& state_;
   bool collectable_ = false;  // armed since the last collect()
   int board_ = 0;             // the board's placement at the last one
+  std::uint64_t previews_ = 0;
 };
 
 class SimPanel final : public Panel {

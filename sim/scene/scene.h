@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
@@ -40,6 +41,8 @@ struct View {
 /// Threads: look() and shoot() one at a time, the rest from any.
 class Scene {
  public:
+  static constexpr std::uint64_t kFirstPreview = std::uint64_t{1} << 32;
+
   /// Fails as load_object and draw_placements, and with `out_of_range` (image_scale outside 0.1 to 1, poses below 1).
   static Result<std::unique_ptr<Scene>> create(const SceneOptions& options);
   /// For tests: a given object in given placements.
@@ -48,7 +51,7 @@ class Scene {
   /// The scene with the table at the true `angle` (radians). Same pose and angle, same bits. Takes about 2 s in full
   /// size.
   View look(int pose, double angle);
-  /// `exposure` counts exposures; with the seed it names the noise.
+  /// `exposure` counts exposures, previews from kFirstPreview; with the seed it names the noise.
   [[nodiscard]] StereoImages expose(const View& view, bool pattern, std::uint64_t exposure) const;
   /// Both; the second light of the same pose and angle costs next to nothing.
   StereoImages shoot(int pose, double angle, bool pattern, std::uint64_t exposure);

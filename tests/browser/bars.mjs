@@ -212,7 +212,7 @@ const parts = { firstSentence, job, loss, heap, acquisition };
 const browser = new Browser();
 await browser.start();
 for (const name of names.length ? names : Object.keys(parts)) {
-  const station = new Station(bin, RIG);
+  const station = new Station(bin, name === "job" ? [...RIG, "--background-cameras"] : RIG);
   await station.start();
   try {
     await parts[name](browser, station);

@@ -4,7 +4,7 @@ import { join } from "node:path";
 import { Browser, Station, press, sleep, until } from "./browser.mjs";
 import { jobOf, open, ready, see } from "./steps.mjs";
 
-const RIG = ["--operator", "none", "--scale", "0.5", "--views", "4", "--voxel-mm", "0.5", "--seed", "1"];
+const RIG = ["--operator", "none", "--scale", "0.5", "--views", "4", "--voxel-mm", "0.5", "--seed", "1", "--background-cameras"];
 const SIZES = { desk: { width: 1280, height: 800 }, phone: { width: 390, height: 844, touch: true } };
 const [bin, folder] = process.argv.slice(2);
 

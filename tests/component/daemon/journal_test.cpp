@@ -179,8 +179,9 @@ TEST_F(LoggedDaemon, TellsAPressAtThePanelThatIsRefused) {
   const auto id = job_folders().at(0).filename().string();
   EXPECT_THAT(lines, Contains(AllOf(says("Pressed at the panel, start is refused: The rig is Halted"),
                                     has(Priority::notice), Field(&JournalEntry::device, "panel"))));
-  EXPECT_THAT(lines, Contains(AllOf(says("Pressed at the panel, reset is refused: Nothing to reset"),
-                                    Field(&JournalEntry::job, id))));
+  EXPECT_THAT(lines,
+              Contains(AllOf(says("Pressed at the panel, reset is refused: Nothing to reset: the rig is working."),
+                             Field(&JournalEntry::job, id))));
 }
 
 TEST_F(LoggedDaemon, TellsADeviceThatIsLostAndBackByItsName) {
