@@ -40,7 +40,7 @@ class Door:
                 time.sleep(PAUSE_S)
 
     def once(self, method, target, token, body, more):
-        text = f"{method} {target} HTTP/1.1\r\nHost: rig\r\nConnection: close\r\n{more}"
+        text = f"{method} {target} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n{more}"
         if token:
             text += f"Authorization: Bearer {token}\r\n"
         if body:
