@@ -23,7 +23,9 @@ class PipelineReconstructor final : public Reconstructor {
     return reconstruction_.finish_pose(pose, context);
   }
   std::string live_view(std::size_t pose) override { return encoded(reconstruction_.live_view(pose)); }
-  std::string live_pose(std::size_t pose) override { return encoded(reconstruction_.live_pose(pose)); }
+  std::string live_pose(std::size_t pose) override {
+    return encoded(reconstruction_.live_pose(pose), reconstruction_.other_rest(pose));
+  }
   Result<void> finish(const std::filesystem::path& folder, const Context& context) override {
     const auto scan = ScanFolder::open(scan_);  // now that it is complete
     if (!scan) return pass_on(scan);
@@ -33,9 +35,10 @@ class PipelineReconstructor final : public Reconstructor {
   }
 
  private:
-  static std::string encoded(Mesh mesh) {
+  static std::string encoded(Mesh mesh, const std::optional<Eigen::Quaterniond>& other_rest = std::nullopt) {
     constexpr std::size_t kFaces = 20'000;  // 300 kB
-    return encode_view_glb({.mesh = std::move(mesh), .corner_uv = {}, .atlas = {}}, {.max_faces = kFaces})
+    return encode_view_glb({.mesh = std::move(mesh), .corner_uv = {}, .atlas = {}},
+                           {.max_faces = kFaces, .other_rest = other_rest})
         .value_or(std::string());
   }
 

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,6 +31,8 @@ Result<std::string> encode_glb(const TexturedMesh& model);
 struct ViewModelOptions {
   std::size_t max_faces = 130'000;
   int texture_px = 2048;  ///< longest side
+  /// Turns the model into another rest; `other_rest` in the node's extras, as x, y, z, w.
+  std::optional<Eigen::Quaterniond> other_rest{};
 };
 /// The model for a browser: fewer faces (meshoptimizer's), a smaller texture or the vertices' colours,
 /// KHR_mesh_quantization; at most some 4 MB. Per vertex `_VIEWS`, and `_SIGMA` in units of 0.01 um, 65535 where it is

@@ -157,6 +157,10 @@ Result<std::string> encode_view_glb(const TexturedMesh& model, const ViewModelOp
   GlbDocument document;
   document.gltf["extensionsUsed"] = document.gltf["extensionsRequired"] = {"KHR_mesh_quantization"};
   document.gltf["meshes"] = {{{"primitives", {add_geometry(model, textured, options.max_faces, document)}}}};
+  if (options.other_rest) {
+    const Eigen::Quaterniond& q = *options.other_rest;
+    document.gltf["nodes"][0]["extras"]["other_rest"] = {q.x(), q.y(), q.z(), q.w()};
+  }
   if (textured) {
     cv::Mat3b atlas = model.atlas;
     if (atlas.cols > options.texture_px)

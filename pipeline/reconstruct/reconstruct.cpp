@@ -297,6 +297,11 @@ Mesh Reconstruction::live_pose(std::size_t pose) const {
   return mesh;
 }
 
+std::optional<Eigen::Quaterniond> Reconstruction::other_rest(std::size_t pose) const {
+  if (pose >= state_->poses.size() || !state_->poses[pose].finished) return std::nullopt;
+  return turn_to_other_rest(state_->poses[pose].partial.mesh);
+}
+
 Result<Model> Reconstruction::finish(const ScanIdentity& identity, const Context& context) {
   Result<Model> model;
   with_threads(state_->options.threads, [&] { model = state_->finish(identity, context); });

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -71,6 +72,8 @@ class Reconstruction {
   /// without such a view, and of imported range images.
   [[nodiscard]] Mesh live_view(std::size_t pose) const;
   [[nodiscard]] Mesh live_pose(std::size_t pose) const;
+  /// Where a finished pose can be turned over to; turn_to_other_rest().
+  [[nodiscard]] std::optional<Eigen::Quaterniond> other_rest(std::size_t pose) const;
 
   /// Pose 2 into pose 1, integration, texture; with one pose, its own complete model. Every pose must be finished
   /// before.

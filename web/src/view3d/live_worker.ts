@@ -1,5 +1,5 @@
 // Draws what a scan shows so far, beside the page's own thread: loading and drawing never delay a button.
-import { Box3, Group, Mesh, MeshBasicMaterial, type Object3D, Vector3 } from "three";
+import { Box3, Group, Mesh, MeshBasicMaterial, type Object3D, Quaternion, Vector3 } from "three";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import type { ToPage, ToWorker } from "./live.ts";
 import { openStage, type Size } from "./stage.ts";
@@ -7,6 +7,8 @@ import { openStage, type Size } from "./stage.ts";
 const TURN_MS = 2500;
 const HOLD_MS = 1500;
 const TURN_PER_PX = 0.01;
+const UP = new Vector3(0, 1, 0);
+const RIGHT = new Vector3(1, 0, 0);
 
 function dispose(object: Object3D) {
   object.traverse((one) => {
@@ -27,12 +29,14 @@ function openLive(canvas: OffscreenCanvas, size: Size, tell: (shown: string[]) =
   const loaded = new Map<string, Object3D | null>(); // null: on its way
   let urls = new Map<string, string>(); // of what is to be shown, by name
   let isTurning = false;
+  const asItLies = new Quaternion();
+  const turnedOver = new Quaternion(1, 0, 0, 0); // half a turn, until a mesh says how it can lie
 
   const arrange = () => {
     turned.position.set(0, 0, 0);
     content.position.set(0, 0, 0);
-    const rotation = turned.rotation.x;
-    turned.rotation.x = 0;
+    const rotation = turned.quaternion.clone();
+    turned.quaternion.copy(asItLies);
     turned.updateMatrixWorld(true);
     const box = new Box3().setFromObject(content);
     if (!box.isEmpty()) {
@@ -41,7 +45,7 @@ function openLive(canvas: OffscreenCanvas, size: Size, tell: (shown: string[]) =
       content.position.copy(centre).negate();
       at.frame(box);
     }
-    turned.rotation.x = rotation;
+    turned.quaternion.copy(rotation);
     at.draw();
     tell([...loaded].flatMap(([name, mesh]) => (mesh ? [name] : [])));
   };
@@ -57,6 +61,8 @@ function openLive(canvas: OffscreenCanvas, size: Size, tell: (shown: string[]) =
     const { scene } = await loader.loadAsync(urls.get(name) ?? "");
     if (!urls.has(name)) return dispose(scene);
     scene.traverse((one) => {
+      const { other_rest } = one.userData as { other_rest?: [number, number, number, number] };
+      if (other_rest) turnedOver.set(...other_rest);
       if (one instanceof Mesh) one.material = new MeshBasicMaterial({ vertexColors: true, side: 2 });
     });
     loaded.set(name, scene);
@@ -68,7 +74,7 @@ function openLive(canvas: OffscreenCanvas, size: Size, tell: (shown: string[]) =
   const turn = (begun: number) => {
     if (!isTurning) return;
     const share = ((performance.now() - begun) % (TURN_MS + HOLD_MS)) / TURN_MS;
-    turned.rotation.x = Math.PI * (1 - Math.cos(Math.PI * Math.min(share, 1))) * 0.5;
+    turned.quaternion.slerpQuaternions(asItLies, turnedOver, (1 - Math.cos(Math.PI * Math.min(share, 1))) * 0.5);
     at.draw();
     requestAnimationFrame(() => turn(begun));
   };
@@ -88,13 +94,13 @@ function openLive(canvas: OffscreenCanvas, size: Size, tell: (shown: string[]) =
         return at.draw();
       case "turn over":
         isTurning = message.again;
-        turned.rotation.x = message.on ? Math.PI : 0;
+        turned.quaternion.copy(message.on ? turnedOver : asItLies);
         at.draw();
         if (isTurning) turn(performance.now());
         return;
       case "drag":
-        turned.rotation.y += TURN_PER_PX * message.x;
-        if (!isTurning) turned.rotation.x += TURN_PER_PX * message.y;
+        turned.rotateOnWorldAxis(UP, TURN_PER_PX * message.x);
+        if (!isTurning) turned.rotateOnWorldAxis(RIGHT, TURN_PER_PX * message.y);
         return at.draw();
       case "open":
         return;

@@ -4,6 +4,7 @@
 
 #include <cstring>
 #include <fstream>
+#include <numbers>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <set>
@@ -152,6 +153,17 @@ TEST_F(ModelFilesTest, theGlbOpensElsewhereInMetresWithItsTexture) {
                          static_cast<std::size_t>(image.component);
   EXPECT_NEAR(image.image[at], 220, 4) << "red, first in RGB";
   EXPECT_NEAR(image.image[at + 2], 0, 4);
+}
+
+TEST_F(ModelFilesTest, theGlbForABrowserNamesTheOtherRest) {
+  const Eigen::Quaterniond quarter(Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ()));
+  const auto gltf = opened(encode_view_glb(tetrahedron(), {.other_rest = quarter}));
+  ASSERT_FALSE(gltf.nodes.empty());
+  const auto& rest = gltf.nodes[0].extras.Get("other_rest");
+  ASSERT_EQ(rest.ArrayLen(), 4u);
+  EXPECT_NEAR(rest.Get(2).GetNumberAsDouble(), std::sqrt(0.5), 1e-9);
+  EXPECT_NEAR(rest.Get(3).GetNumberAsDouble(), std::sqrt(0.5), 1e-9);
+  EXPECT_FALSE(opened(encode_view_glb(tetrahedron())).nodes.at(0).extras.Has("other_rest"));
 }
 
 TEST_F(ModelFilesTest, theGlbForABrowserKeepsPlacesViewsAndSigma) {
