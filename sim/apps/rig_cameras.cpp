@@ -45,6 +45,7 @@ Result<std::unique_ptr<RigCameras>> RigCameras::start(const RigCamerasOptions& o
   cameras.frame_after = std::chrono::round<std::chrono::microseconds>(exposure_time() + kReadout);
   cameras.late_by = std::chrono::milliseconds(1000);
   cameras.numbered = false;
+  cameras.max_exposure = options.max_exposure;
   cameras.ready = [&rig = *rig](const wire::GigeExposure& exposure) { return rig.ready(exposure); };
   const auto source = [&rig = *rig](wire::Side side, const wire::GigeExposure& exposure, cv::Mat& image) {
     rig.read_out(side, exposure, image);
@@ -111,10 +112,43 @@ void RigCameras::develop(const std::stop_token& stop) {
   }
 }
 
+void RigCameras::set_lights(const RigLights& lights) {
+  const std::scoped_lock lock(mutex_);
+  lights_ = lights;
+  lights_set_ = clock_.now();
+}
+
 StereoImages RigCameras::image(const RigExposure& exposure) {
   if (!exposure.lit) return {};
   const auto view = views_.get(exposure.place);
-  return view ? scene_->expose(*view, exposure.pattern, exposure.number) : StereoImages{};
+  return view ? expose(*view, exposure) : StereoImages{};
+}
+
+StereoImages RigCameras::expose(const View& view, const RigExposure& exposure) const {
+  std::unique_lock lock(mutex_);
+  const RigLights lights = lights_;
+  const std::chrono::duration<double> since = exposure.at - lights_set_;
+  lock.unlock();
+  if (lights == RigLights()) return scene_->expose(view, exposure.pattern, exposure.number);
+  const double strength = 1.0 + lights.change_per_s * since.count();
+  LightLevels levels{.plain = lights.room, .is_slide_in = lights.is_slide_in};
+  if (exposure.pattern) {
+    levels.pattern = strength * lights.pattern;
+  } else {
+    levels.plain += strength * lights.plain;
+  }
+  return scene_->expose(view, levels, exposure.number);
+}
+
+/// An exposure without an edge: in the room's light alone.
+StereoImages RigCameras::image_by_software(std::uint64_t number) {
+  std::unique_lock lock(mutex_);
+  const double room = lights_.room;
+  const int placement = history_.placement();
+  lock.unlock();
+  if (room <= 0.0) return {};
+  const auto view = views_.get({placement, truth_().angle_deg});
+  return view ? scene_->expose(*view, {.plain = room}, number) : StereoImages{};
 }
 
 bool RigCameras::ready(const wire::GigeExposure& exposure) const {
@@ -123,10 +157,12 @@ bool RigCameras::ready(const wire::GigeExposure& exposure) const {
 }
 
 void RigCameras::read_out(wire::Side side, const wire::GigeExposure& exposure, cv::Mat& image) {
+  const bool by_software = exposure.number >= wire::kFirstBySoftware;
+  const StereoImages without_edge = by_software ? image_by_software(exposure.number) : StereoImages{};
   const std::scoped_lock lock(mutex_);
   const auto found = images_.find(exposure.number);
-  const bool left = side == wire::Side::left;
-  const cv::Mat rendered = found == images_.end() ? cv::Mat() : left ? found->second.left : found->second.right;
+  const StereoImages& pair = found == images_.end() ? without_edge : found->second;
+  const cv::Mat rendered = side == wire::Side::left ? pair.left : pair.right;
   if (rendered.empty()) {
     image.setTo(0);
   } else {

@@ -20,8 +20,20 @@ struct RigTruth;
 
 struct RigCamerasOptions {
   SceneOptions scene;
-  std::vector<Place> expected;  ///< rendered before it is requested
-  bool numbered = false;        ///< write the number of the edge into every frame, see faint_number()
+  std::vector<Place> expected;                ///< rendered before it is requested
+  bool numbered = false;                      ///< write the number of the edge into every frame, see faint_number()
+  std::chrono::microseconds max_exposure{0};  ///< see GigeCamerasOptions
+};
+
+/// State of the lights, as shares of a sound rig's.
+struct RigLights {
+  double pattern = 1.0;       ///< of the pattern's lamp, while its line is active
+  double plain = 1.0;         ///< of the plain light, likewise
+  double room = 0.0;          ///< plain light that is always on
+  bool is_slide_in = true;    ///< see LightLevels
+  double change_per_s = 0.0;  ///< of both lamps, as a share
+
+  bool operator==(const RigLights&) const = default;
 };
 
 /// One edge of the light, and its exposure.
@@ -40,8 +52,8 @@ std::uint32_t faint_number(const cv::Mat& frame);
 
 /// Two GigE cameras that look at the rendered scene: every edge of the light exposes both. A frame shows the object and
 /// the table angle in the middle of the exposure. It is sent 37 ms after the edge, or once rendered; an unexpected view
-/// takes as long as its rendering. An exposure whose light went out early is dark, and so is one by software.
-/// Threads: every function may be called from any thread, edge() and light_out() from one at a time.
+/// takes as long as its rendering. An exposure whose light went out early is dark, and so is one by software, but for
+/// the room's light. Threads: every function may be called from any thread, edge() and light_out() from one at a time.
 class RigCameras {
  public:
   static constexpr const char* kLeftAddress = "127.0.0.1";
@@ -55,6 +67,7 @@ class RigCameras {
   void edge(bool pattern);
   void light_out();
   void turned_over();
+  void set_lights(const RigLights& lights);
   /// Waits until all expected views are rendered; false when `stop` came first.
   bool wait_until_ready(const std::stop_token& stop) { return views_.wait_until_ready(stop); }
 
@@ -69,6 +82,8 @@ class RigCameras {
              Clock& clock);
   void develop(const std::stop_token& stop);
   StereoImages image(const RigExposure& exposure);
+  StereoImages image_by_software(std::uint64_t number);
+  [[nodiscard]] StereoImages expose(const View& view, const RigExposure& exposure) const;
   bool ready(const wire::GigeExposure& exposure) const;
   void read_out(wire::Side side, const wire::GigeExposure& exposure, cv::Mat& image);
 
@@ -80,6 +95,8 @@ class RigCameras {
   mutable std::mutex mutex_;
   std::condition_variable_any exposed_;
   ExposureHistory history_;
+  RigLights lights_;
+  Clock::TimePoint lights_set_{};
   std::vector<RigExposure> exposures_;            // by number, from 1
   std::size_t developed_ = 0;                     // of them
   std::map<std::uint64_t, StereoImages> images_;  // the last few, by number

@@ -188,6 +188,20 @@ std::optional<Result<void>> RigControl::set_camera(const std::string& knob, cons
   return Result<void>();
 }
 
+/// The lights as the cameras see them; nothing for any other name.
+std::optional<Result<void>> RigControl::set_light(const std::string& knob, const json& value) {
+  if (knob != "light") return std::nullopt;
+  const auto cameras = this->cameras();
+  if (!cameras) return pass_on(cameras);
+  const RigLights sound;
+  (*cameras)->set_lights({.pattern = value.value("pattern", sound.pattern),
+                          .plain = value.value("plain", sound.plain),
+                          .room = value.value("room", sound.room),
+                          .is_slide_in = value.value("slide", sound.is_slide_in),
+                          .change_per_s = value.value("change_per_s", sound.change_per_s)});
+  return Result<void>();
+}
+
 /// Knobs of the panel and of the wiring; nothing for any other name.
 std::optional<Result<void>> RigControl::set_panel(const std::string& knob, const json& value, const json& all) {
   auto* module = rig_.panel().module_port();
@@ -239,6 +253,7 @@ Result<void> RigControl::set(const std::string& knob, const json& value, const j
   if (auto done = set_panel(knob, value, all)) return *done;
   if (auto done = set_port(knob, value, all)) return *done;
   if (auto done = set_camera(knob, value, all)) return *done;
+  if (auto done = set_light(knob, value)) return *done;
   auto& drive = rig_.drive();
   const std::map<std::string, std::function<void()>> knobs{
       {"blocked", [&] { drive.block(value.get<bool>()); }},

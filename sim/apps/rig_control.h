@@ -26,6 +26,7 @@ class RigControl {
   std::optional<Result<void>> set_panel(const std::string& knob, const nlohmann::json& value,
                                         const nlohmann::json& all);
   std::optional<Result<void>> set_port(const std::string& knob, const nlohmann::json& value, const nlohmann::json& all);
+  std::optional<Result<void>> set_light(const std::string& knob, const nlohmann::json& value);
   Result<void> set(const std::string& knob, const nlohmann::json& value, const nlohmann::json& all);
 
   WireRig& rig_;

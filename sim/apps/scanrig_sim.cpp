@@ -111,6 +111,9 @@ void add_rig(CLI::App& app, sim::WireRigOptions& o, sim::SceneOptions& scene, Ch
       ->check(CLI::IsMember({"simulated", "gige"}));
   rig->add_flag("--number-frames", o.numbered_frames,
                 "gige: note the number of the edge in every frame's first pixels");
+  rig->add_option("--max-exposure-us", o.max_exposure_us, "gige: the cameras expose no longer than this; 0: any")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1000000));
   add_scene(*rig, scene);
   rig->callback([&] {
     o.axis.gear_ratio = o.toml.gear_ratio;

@@ -71,7 +71,11 @@ Result<void> WireRig::start_cameras(const WireRigOptions& o, Clock& clock) {
   auto expected = places_of_job(o);
   expected.push_back({0, truth().angle_deg});  // for cameras tested before homing
   auto cameras = RigCameras::start(
-      {.scene = *o.scene, .expected = expected, .numbered = o.numbered_frames}, [this] { return truth(); }, clock);
+      {.scene = *o.scene,
+       .expected = expected,
+       .numbered = o.numbered_frames,
+       .max_exposure = std::chrono::microseconds(o.max_exposure_us)},
+      [this] { return truth(); }, clock);
   if (!cameras) return pass_on(cameras);
   cameras_ = std::move(*cameras);
   panel_->on_light([&cameras = *cameras_](bool pattern, bool on) { on ? cameras.edge(pattern) : cameras.light_out(); });

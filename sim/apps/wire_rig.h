@@ -29,6 +29,7 @@ struct WireRigOptions {
   std::optional<std::int32_t> preload_counter;
   std::optional<SceneOptions> scene;  ///< scene of two GigE cameras; nothing: no cameras
   bool numbered_frames = false;       ///< see RigCamerasOptions
+  int max_exposure_us = 0;            ///< of the cameras; 0: any
 };
 
 /// True state of the mechanics.

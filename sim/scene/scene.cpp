@@ -2,6 +2,7 @@
 
 #include <bit>
 #include <cassert>
+#include <opencv2/core.hpp>
 #include <tuple>
 
 #include "sim/scene/image_sensor.h"
@@ -63,6 +64,15 @@ StereoImages Scene::expose(const View& view, bool pattern, std::uint64_t exposur
   const auto key = [&](int camera) { return options_.noise ? mix(options_.seed, exposure, camera) | 1 : 0; };
   return {sim::expose(pattern ? view.left_pattern : view.left_plain, key(0), rig_.noise_factor),
           sim::expose(pattern ? view.right_pattern : view.right_plain, key(1), rig_.noise_factor)};
+}
+
+StereoImages Scene::expose(const View& view, const LightLevels& lights, std::uint64_t exposure) const {
+  const double dots = lights.is_slide_in ? lights.pattern : 0.0;
+  const double even = lights.plain + (lights.is_slide_in ? 0.0 : lights.pattern);
+  View mixed;
+  cv::addWeighted(view.left_pattern, dots, view.left_plain, even, 0.0, mixed.left_pattern);
+  cv::addWeighted(view.right_pattern, dots, view.right_plain, even, 0.0, mixed.right_pattern);
+  return expose(mixed, true, exposure);
 }
 
 StereoImages Scene::shoot(int pose, double angle, bool pattern, std::uint64_t exposure) {

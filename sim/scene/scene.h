@@ -37,6 +37,13 @@ struct View {
   cv::Mat left_pattern, right_pattern, left_plain, right_plain;
 };
 
+/// Mixture of lights in an exposure, as shares of those of a sound rig.
+struct LightLevels {
+  double pattern = 0.0;
+  double plain = 0.0;
+  bool is_slide_in = true;  ///< without the slide the pattern's lamp gives plain light
+};
+
 /// The object in all its poses under the default rig, or a drawn one.
 /// Threads: look() and shoot() one at a time, the rest from any.
 class Scene {
@@ -53,6 +60,8 @@ class Scene {
   View look(int pose, double angle);
   /// `exposure` counts exposures, previews from kFirstPreview; with the seed it names the noise.
   [[nodiscard]] StereoImages expose(const View& view, bool pattern, std::uint64_t exposure) const;
+  /// The same in any mixture of lights.
+  [[nodiscard]] StereoImages expose(const View& view, const LightLevels& lights, std::uint64_t exposure) const;
   /// Both; the second light of the same pose and angle costs next to nothing.
   StereoImages shoot(int pose, double angle, bool pattern, std::uint64_t exposure);
 

@@ -135,6 +135,7 @@ Result<std::unique_ptr<GigeCameras>> GigeCameras::start(const GigeCamerasOptions
     own.ready = options.ready;
     own.numbered = options.numbered;
     own.outputs = options.outputs;
+    own.max_exposure = options.max_exposure;
     // No two crystals agree.
     own.clock_ahead = side == Side::left ? std::chrono::seconds(4711) : std::chrono::seconds(-123);
     own.clock_drift = side == Side::left ? 30e-6 : -40e-6;

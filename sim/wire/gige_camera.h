@@ -21,6 +21,9 @@ struct GigeExposure {
   Clock::TimePoint at;
 };
 
+/// Exposures by software without an active output are numbered from here.
+inline constexpr std::uint64_t kFirstBySoftware = 0x80000000;
+
 /// Writes a sensor's view into `image` (8 bit, one channel, of the configured size), just before it is sent. Called
 /// from the cameras' threads.
 using FrameSource = std::function<void(Side side, const GigeExposure& exposure, cv::Mat& image)>;
@@ -54,6 +57,8 @@ struct GigeCamerasOptions {
   std::function<bool(const GigeExposure& exposure)> ready;
   bool numbered = true;  ///< write the number of the edge into every frame
   GigeOutputs outputs = GigeOutputs::full;
+  /// Longest exposure that the cameras take, whatever is requested; 0: any.
+  std::chrono::microseconds max_exposure{0};
 };
 
 /// Light of a projector on the left camera's outputs: Line1 lights the pattern, Line2 plain light.

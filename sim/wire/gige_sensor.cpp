@@ -23,9 +23,20 @@ constexpr const char* kPacketDelay =
 <Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></IntReg>
 )";
 
+/// Makes the camera take at most `longest`, without an error for a longer request.
+void limit_exposure(std::string& description, std::chrono::microseconds longest) {
+  const std::string formula = "<FormulaTo>FROM</FormulaTo>";
+  const auto converter = description.find("Name=\"ExposureTimeAbsConverter\"");
+  const auto at = description.find(formula, converter);
+  if (longest.count() == 0 || converter == std::string::npos || at == std::string::npos) return;
+  const std::string us = std::to_string(longest.count());
+  description.replace(at, formula.size(), "<FormulaTo>(FROM &gt; " + us + ") ? " + us + " : FROM</FormulaTo>");
+}
+
 /// Aravis' own description, with a packet delay and outputs, with Line0 standing for the software trigger, and with
 /// `selector` for FrameStart.
-std::string genicam_description(const std::string& selector, GigeOutputs outputs) {
+std::string genicam_description(const GigeSensorOptions& options) {
+  const std::string& selector = options.trigger_selector;
   ArvFakeCamera* sample = arv_fake_camera_new("sample");
   std::size_t size = 0;
   const char* bytes = arv_fake_camera_get_genicam_xml(sample, &size);
@@ -39,7 +50,8 @@ std::string genicam_description(const std::string& selector, GigeOutputs outputs
     text.replace(name, frame_start.size(), "Name=\"" + selector + "\"");
   }
   if (const auto end = text.rfind("</RegisterDescription>"); end != std::string::npos)
-    text.insert(end, kPacketDelay + describe_outputs(outputs));
+    text.insert(end, kPacketDelay + describe_outputs(options.outputs));
+  limit_exposure(text, options.max_exposure);
   return text;
 }
 
@@ -90,7 +102,7 @@ Result<std::unique_ptr<GigeSensor>> GigeSensor::start(const GigeSensorOptions& o
   const int descriptor = ::mkstemp(file.data());
   if (descriptor < 0) return fail(ErrorCode::io, "no temporary file {}", file);
   ::close(descriptor);
-  std::ofstream(file) << genicam_description(options.trigger_selector, options.outputs);
+  std::ofstream(file) << genicam_description(options);
   std::unique_ptr<GigeSensor> sensor(new GigeSensor(options, std::move(source), clock, file));
   if (auto plugged = sensor->plug(true); !plugged) return pass_on(plugged);
   return sensor;
@@ -250,8 +262,7 @@ void GigeSensor::fill(ArvBuffer* buffer) {
 GigeSensor::Frame GigeSensor::exposed_by_host() {
   const auto active = output();
   std::unique_lock lock(mutex_);
-  constexpr std::uint64_t kBySoftware = 0x80000000;
-  Strobe strobe{{kBySoftware + ++by_software_, false, clock_.now()}};
+  Strobe strobe{{kFirstBySoftware + ++by_software_, false, clock_.now()}};
   const auto show = on_strobe_;
   lock.unlock();
   if (active && show) strobe = show(*active);  // without the lock: it takes the other camera's

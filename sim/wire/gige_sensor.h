@@ -26,6 +26,7 @@ struct GigeSensorOptions {
   std::function<bool(const GigeExposure&)> ready;
   bool numbered = true;
   GigeOutputs outputs = GigeOutputs::full;
+  std::chrono::microseconds max_exposure{0};
 };
 
 /// One of GigeCameras: Aravis' GigE Vision camera on the wire with its own frames, ids and stamps. Line0 has the value

@@ -180,6 +180,41 @@ TEST_F(RigCamerasTest, AnUnpluggedCameraIsLostAndComesBack) {
   EXPECT_TRUE(back) << back.error().message;
 }
 
+TEST_F(RigCamerasTest, TheLightsAreAsStrongAsTheyAreSet) {
+  const auto mean = [](const cv::Mat& image) { return cv::mean(image)[0]; };
+  const auto pattern = expose(Light::pattern), plain = expose(Light::plain);
+  ASSERT_TRUE(pattern && plain);
+  EXPECT_EQ(cv::countNonZero(camera_->capture_preview(within(seconds(2))).value().left), 0);
+
+  send({{"set", {{"light", {{"pattern", 0}, {"plain", 0.5}, {"room", 0.25}}}}}});
+  const auto room = camera_->capture_preview(within(seconds(2))), without = expose(Light::pattern),
+             half = expose(Light::plain);
+  ASSERT_TRUE(room && without && half);
+  EXPECT_NEAR(mean(room->left), 0.25 * mean(plain->left), 0.02 * mean(plain->left));
+  EXPECT_NEAR(mean(without->right), 0.25 * mean(plain->right), 0.02 * mean(plain->right));
+  EXPECT_NEAR(mean(half->left), 0.75 * mean(plain->left), 0.02 * mean(plain->left));
+
+  send({{"set", {{"light", {{"slide", false}}}}}});
+  const auto even = expose(Light::pattern);
+  ASSERT_TRUE(even);
+  EXPECT_NEAR(mean(even->left), mean(plain->left), 0.02 * mean(plain->left));
+  send({{"set", {{"light", json::object()}}}});
+  EXPECT_NEAR(mean(expose(Light::pattern).value().left), mean(pattern->left), 0.1);
+}
+
+TEST_F(RigCamerasTest, ACameraMayExposeShorterThanRequested) {
+  WireRigOptions options;
+  options.toml = {.folder = folder_, .drive = "leadshine-rs", .panel = "gpio", .cameras = "gige"};
+  options.scene = scene_;
+  options.max_exposure_us = 8000;
+  close();
+  rig_ = WireRig::start(options, clock_).value();
+  const auto refused = open_aravis(config_.stereo_camera.aravis, clock_, within(seconds(10)));
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::invalid_input);
+  EXPECT_THAT(refused.error().message, HasSubstr("asked for an exposure of 12000 us it takes 8000"));
+}
+
 TEST_F(RigCamerasTest, AnInvalidRequestIsNamed) {
   EXPECT_THAT(send({{"set", {{"camera_fault", "lost"}}}})["error"], HasSubstr("left or right"));
   EXPECT_THAT(send({{"set", {{"camera_fault", "tired"}, {"camera", "left"}}}})["error"], HasSubstr("no camera fault"));
