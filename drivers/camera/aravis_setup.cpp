@@ -1,13 +1,9 @@
-#include <arpa/inet.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
 #include <cmath>
 #include <fstream>
 
 #include "drivers/camera/aravis_sensor.h"
 #include "drivers/camera/aravis_strobe.h"
+#include "drivers/camera/network_card.h"
 
 namespace scanrig {
 namespace {
@@ -72,23 +68,6 @@ Result<void> set_up_image(ArvCamera* camera, const AravisOptions& options, const
                 options.exposure.count(), got);
   }
   return {};
-}
-
-/// Largest datagram on the way to `address`, bytes with headers; 0 if unknown.
-int path_mtu(const std::string& address) {
-  sockaddr_in peer{};
-  peer.sin_family = AF_INET;
-  peer.sin_port = htons(3956);
-  if (::inet_pton(AF_INET, address.c_str(), &peer.sin_addr) != 1) return 0;
-  const int probe = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  int mtu = 0;
-  socklen_t size = sizeof mtu;
-  if (::connect(probe, reinterpret_cast<const sockaddr*>(&peer), sizeof peer) != 0 ||
-      ::getsockopt(probe, IPPROTO_IP, IP_MTU, &mtu, &size) != 0) {
-    mtu = 0;
-  }
-  ::close(probe);
-  return mtu;
 }
 
 Result<void> set_up_packets(ArvCamera* camera, const AravisOptions& options, const std::string& address,

@@ -80,6 +80,24 @@ ImageQuality measure(const cv::Mat& image, PixelFormat format) {
           blur_px(plane_of(image, format))};
 }
 
+double texture(const cv::Mat& image, PixelFormat format) {
+  if (image.empty()) return 0.0;
+  const Plane plane = plane_of(image, format);
+  double sum = 0.0, count = 0.0;
+  for (int y = 1; y + 1 < plane.rows(); y += kEveryRow) {
+    std::int64_t row_sum = 0;
+    for (int x = 1; x + 1 < plane.cols(); ++x) {
+      const std::int64_t bend =
+          bend_at(plane.row(y - 1), plane.row(y), plane.row(y + 1), x * plane.pitch(), plane.pitch());
+      row_sum += bend * bend;
+    }
+    sum += static_cast<double>(row_sum);
+    count += plane.cols() - 2;
+  }
+  constexpr double kOfIndependentPixels = 20.0;  // variance of 4 a - b - c - d - e
+  return count > 0.0 ? std::sqrt(sum / count / kOfIndependentPixels) / 255.0 : 0.0;
+}
+
 double left_right_correlation(const cv::Mat& left, const cv::Mat& right, PixelFormat format) {
   if (left.empty() || left.size() != right.size() || left.type() != right.type()) {
     return std::numeric_limits<double>::quiet_NaN();

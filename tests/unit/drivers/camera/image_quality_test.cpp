@@ -85,5 +85,24 @@ TEST(ImageQuality, AnImageWithoutTextureHasNoBlur) {
   EXPECT_TRUE(std::isnan(measure({}, PixelFormat::mono8).brightness));
 }
 
+TEST(Texture, OfIndependentPixelsIsTheirStandardDeviation) {
+  cv::Mat noise(240, 320, CV_8U);
+  cv::RNG(3).fill(noise, cv::RNG::NORMAL, 128.0, 10.0);
+  EXPECT_NEAR(texture(noise, PixelFormat::mono8), 10.0 / 255.0, 0.002);
+  EXPECT_NEAR(texture(noise / 2, PixelFormat::mono8), 5.0 / 255.0, 0.002);
+}
+
+TEST(Texture, LeavesShadingAndTheMosaicOut) {
+  cv::Mat mosaic(240, 320, CV_8U);
+  for (int y = 0; y < mosaic.rows; ++y) {
+    for (int x = 0; x < mosaic.cols; ++x) {
+      mosaic.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>((x / 4 + y / 4) / (1 + (x & 1)));
+    }
+  }
+  EXPECT_LT(texture(mosaic, PixelFormat::bayer_rggb8), 0.002);
+  EXPECT_GT(texture(mosaic, PixelFormat::mono8), 0.02);
+  EXPECT_EQ(texture({}, PixelFormat::mono8), 0.0);
+}
+
 }  // namespace
 }  // namespace scanrig
