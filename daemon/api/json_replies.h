@@ -3,12 +3,16 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "daemon/station/snapshot.h"
 
 namespace scanrig {
 
 struct ApiStation;
+
+/// In the folder of all jobs: the last report of `scanrig doctor --json`.
+inline constexpr std::string_view kDoctorFile = "doctor.json";
 
 /// The API's replies as JSON, in the shapes of openapi.cpp.
 nlohmann::ordered_json to_json(const Error& error);

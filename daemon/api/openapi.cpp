@@ -299,6 +299,12 @@ const char* const kSchemas = R"({
   "deadlines_missed": {"type": "integer"}, "retakes": {"type": "integer"},
   "retries": {"type": "integer", "deprecated": true, "description": "old name of retakes"}, "faults": {"type": "integer"},
   "connections": {"type": "integer"}, "event_streams": {"type": "integer"}}},
+"Doctor": {"type": "object", "required": ["time", "findings"], "additionalProperties": false, "properties": {
+  "time": {"type": "string", "nullable": true},
+  "findings": {"type": "array", "items": {"$ref": "#/components/schemas/Finding"}}}},
+"Finding": {"type": "object", "required": ["id", "problem", "remedy"], "additionalProperties": false, "properties": {
+  "id": {"type": "string", "description": "one word for programs, see the doctor's README"},
+  "problem": {"type": "string"}, "remedy": {"type": "string"}}},
 "Login": {"type": "object", "required": ["role", "name", "cookie"], "additionalProperties": false, "properties": {
   "role": {"type": "string", "enum": ["viewer", "operator", "engineer"]},
   "name": {"type": "string", "nullable": true, "description": "of the token; null: a user of this machine, or a code from one"},

@@ -1,6 +1,8 @@
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "core/files.h"
 #include "core/timestamp.h"
 #include "core/version.h"
 #include "daemon/api/json_replies.h"
@@ -57,6 +59,37 @@ ordered_json health_json(const ApiStation& station) {
 
 namespace {
 
+/// An object whose fields of these names are all texts.
+bool has_texts(const ordered_json& object, std::initializer_list<const char*> names) {
+  return object.is_object() && std::ranges::all_of(names, [&](const char* name) {
+           return object.contains(name) && object[name].is_string();
+         });
+}
+
+/// Array of objects of which only the texts of these names are kept; those without are left out.
+ordered_json texts_of(const ordered_json& report, const char* list, std::initializer_list<const char*> names) {
+  ordered_json kept = ordered_json::array();
+  if (!report.contains(list) || !report[list].is_array()) return kept;
+  for (const auto& object : report[list]) {
+    if (!has_texts(object, names)) continue;
+    ordered_json one;
+    for (const char* name : names) one[name] = object[name];
+    kept.push_back(std::move(one));
+  }
+  return kept;
+}
+
+/// The doctor works while the service is stopped, and leaves its report in a file.
+void doctor(const ApiStation& station, const Values&, const Send& send) {
+  const auto text = read_file(station.storage / kDoctorFile);
+  const auto report = ordered_json::parse(text ? *text : std::string(), nullptr, false);
+  if (!has_texts(report, {"time"})) {
+    return send({.body = to_text({{"time", nullptr}, {"findings", ordered_json::array()}})});
+  }
+  send({.body = to_text(
+            {{"time", report["time"]}, {"findings", texts_of(report, "findings", {"id", "problem", "remedy"})}})});
+}
+
 void metrics(const ApiStation& station, const Values&, const Send& send) {
   send({.body = metrics_text(*station.loop.snapshot(), station.facts()), .type = "text/plain; version=0.0.4"});
 }
@@ -112,6 +145,13 @@ std::vector<Route> service_routes() {
            .reply = {.description = "`ok` is false when something is wrong", .schema = "Health"},
            .handle = [](const ApiStation& station, const Values&,
                         const Send& send) { send({.body = to_text(health_json(station))}); }},
+          {.method = Method::get,
+           .path = "/api/v1/doctor",
+           .role = Role::viewer,
+           .description = "What `scanrig doctor` found when it last examined the rig.",
+           .reply = {.description = "`time` is null where it never did", .schema = "Doctor"},
+           .slow = true,
+           .handle = doctor},
           {.method = Method::get,
            .path = "/api/v1/preview/{side}",
            .role = Role::viewer,

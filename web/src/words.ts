@@ -75,6 +75,16 @@ export const words = {
   codeValid: (seconds: number) => `Valid for ${seconds / 60} minutes, once.`,
   health: "Health",
   allWell: "Nothing is wrong.",
+  ago: (minutes: number) => {
+    if (minutes < 1) return "just now";
+    if (minutes < 120) return `${minutes} min ago`;
+    return minutes < 48 * 60 ? `${Math.floor(minutes / 60)} h ago` : `${Math.floor(minutes / (24 * 60))} days ago`;
+  },
+  doctor: "Doctor",
+  doctorNever: "The rig was not examined yet.",
+  doctorHow: "To examine the rig, stop the service and run scanrig doctor.",
+  doctorWell: (age: string) => `Examined ${age}: nothing was wrong.`,
+  doctorFound: (age: string, count: number) => `Examined ${age}: ${count === 1 ? "1 finding" : `${count} findings`}.`,
   table: "Table",
   inputs: "Inputs",
   outputs: "Outputs",
@@ -143,6 +153,11 @@ export function badge(job: Pick<Job, "state" | "passed" | "stages" | "stored" | 
       return never;
     }
   }
+}
+
+/** Whole minutes from a time of the daemon until now; 0 where the clocks disagree. */
+export function minutesSince(time: string, now_ms = Date.now()) {
+  return Math.max(0, Math.floor((now_ms - Date.parse(time)) / 60000));
 }
 
 export function bytes(count: number): string {

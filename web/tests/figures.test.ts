@@ -2,6 +2,7 @@ import assert from "node:assert/strict";
 import { test } from "node:test";
 import { exposureOf, sharpnessOf } from "../src/service/sharpness.ts";
 import { cutAt } from "../src/view3d/outline.ts";
+import { minutesSince, words } from "../src/words.ts";
 
 /** A picture of vertical stripes, their edges `soft` pixels wide. */
 function stripes(soft: number, light = 1) {
@@ -42,4 +43,15 @@ test("a plane cuts a tetrahedron in a triangle, and misses it above", () => {
   }
   assert.deepEqual([...ends.values()], [2, 2, 2], "closed");
   assert.equal(cutAt(surface, 2).length, 0);
+});
+
+test("the age of a report", () => {
+  const at = (later_s: number) =>
+    words.ago(minutesSince("2026-11-26T06:00:00Z", Date.UTC(2026, 10, 26, 6, 0, later_s)));
+  assert.equal(at(-3600), "just now");
+  assert.equal(at(59), "just now");
+  assert.equal(at(60), "1 min ago");
+  assert.equal(at(2 * 3600), "2 h ago");
+  assert.equal(at(47 * 3600), "47 h ago");
+  assert.equal(at(72 * 3600), "3 days ago");
 });

@@ -1,3 +1,5 @@
+#include "core/files.h"
+#include "daemon/api/json_replies.h"
 #include "daemon/api/logins.h"
 #include "tests/component/api/api_bench.h"
 #include "web/embedded_files.h"
@@ -111,6 +113,25 @@ TEST_F(PageTest, AnEngineerReadsTheNewestLinesOfTheLog) {
   EXPECT_EQ(browse("GET", "/api/v1/log?after=900", cookie).json()["lines"].size(), 3U) << "a number of an earlier run";
   for (std::size_t i = 0; i < RecentLog::kLines; ++i) log.write({.message = "more"});
   EXPECT_EQ(browse("GET", "/api/v1/log", cookie).json()["lines"][0]["message"], "more") << "the oldest go";
+}
+
+TEST_F(PageTest, TheDoctorsLastReportIsShownAndADamagedOneIsNone) {
+  serve();
+  const auto cookie = cookie_of(Role::viewer);
+  const auto told = [&] { return browse("GET", "/api/v1/doctor", cookie).json(); };
+  const nlohmann::json none{{"time", nullptr}, {"findings", nlohmann::json::array()}};
+  EXPECT_EQ(told(), none);
+  const auto file = folder_ / kDoctorFile;
+  const nlohmann::json finding{{"id", "no_light"}, {"problem", "It is dark."}, {"remedy", "Check the lamp."}};
+  const nlohmann::json report{
+      {"time", "2026-11-26T07:00:00Z"}, {"sections", {"any"}}, {"findings", {finding, "no finding", {{"id", 5}}}}};
+  ASSERT_TRUE(write_file_atomically(file, report.dump()));
+  EXPECT_EQ(told()["time"], "2026-11-26T07:00:00Z");
+  EXPECT_EQ(told()["findings"], nlohmann::json::array({finding}));
+  for (const char* damaged : {"", "{", "[]", "{\"time\": 5}", "\xff"}) {
+    ASSERT_TRUE(write_file_atomically(file, std::string_view(damaged)));
+    EXPECT_EQ(told(), none) << damaged;
+  }
 }
 
 TEST_F(PageTest, RecipesAreListedWithTheirViews) {

@@ -98,6 +98,17 @@ export interface Health {
   event_streams: number;
 }
 
+export interface Finding {
+  id: string;
+  problem: string;
+  remedy: string;
+}
+
+export interface Doctor {
+  time: string | null;
+  findings: Finding[];
+}
+
 export interface Login {
   role: Role;
   name: string | null;

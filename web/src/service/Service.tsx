@@ -2,15 +2,16 @@ import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { order, read } from "../api/client.ts";
 import { connect, health, login, status } from "../api/store.ts";
-import type { Health, Io } from "../api/types.ts";
+import type { Doctor, Health, Io } from "../api/types.ts";
 import { may, Order } from "../parts/Order.tsx";
-import { bytes, words } from "../words.ts";
+import { bytes, minutesSince, words } from "../words.ts";
 import { FocusCard } from "./Focus.tsx";
 import { LogCard } from "./Log.tsx";
 import { qrSvg } from "./qr.ts";
 
 const PERIOD_MS = 1000;
 const HEALTH_PERIOD_MS = 5000;
+const DOCTOR_PERIOD_MS = 60000;
 
 function usePolled<T>(path: string, period_ms: number, first: T | null = null) {
   const value = useSignal<T | null>(first);
@@ -53,6 +54,30 @@ function HealthCard() {
           {one.sensor} {one.celsius.toFixed(0)} °C
         </p>
       ))}
+    </section>
+  );
+}
+
+/// What `scanrig doctor` found while the service was stopped.
+function DoctorCard() {
+  const report = usePolled<Doctor>("/doctor", DOCTOR_PERIOD_MS).value;
+  if (!report) return null;
+  const { time, findings } = report;
+  const age = time === null ? "" : words.ago(minutesSince(time));
+  return (
+    <section class="card">
+      <h2>{words.doctor}</h2>
+      {time === null && <p>{words.doctorNever}</p>}
+      {time !== null && (
+        <p>{findings.length === 0 ? words.doctorWell(age) : words.doctorFound(age, findings.length)}</p>
+      )}
+      {findings.map((one) => (
+        <div key={one.id + one.problem}>
+          <p class="wrong">{one.problem}</p>
+          <p>{one.remedy}</p>
+        </div>
+      ))}
+      <p class="dim">{words.doctorHow}</p>
     </section>
   );
 }
@@ -165,6 +190,7 @@ export function Service() {
     <main class="columns">
       <div class="stack">
         <HealthCard />
+        <DoctorCard />
         <TableCard />
         <FocusCard />
         <LogCard />
