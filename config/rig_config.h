@@ -5,6 +5,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/result.h"
@@ -84,6 +85,13 @@ struct StereoCameraConfig {
   V4l2Options v4l2;             ///< with `right` for v4l2, without for v4l2-side-by-side
   std::filesystem::path truth;  ///< simulated: the control socket that returns the position of the table
   std::chrono::microseconds exposure{12000};
+
+  /// Serial numbers of the left and the right camera; empty for simulated ones: their owner has them.
+  [[nodiscard]] std::pair<std::string, std::string> serials() const {
+    if (driver == Driver::aravis) return {aravis.left.serial, aravis.right.serial};
+    if (driver == Driver::simulated) return {};
+    return {v4l2.left.serial, v4l2.right.value_or(v4l2.left).serial};
+  }
 };
 
 struct PanelConfig {

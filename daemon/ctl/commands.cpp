@@ -213,8 +213,9 @@ void add_doctor(CLI::App& app, Chosen& chosen) {
   sub->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
   sub->add_flag("--allow-motion", verb->yes_move, "the table may turn: everyone is clear");
   sub->add_flag("--interactive", verb->answers, "replies come on standard input although it is no terminal");
-  sub->add_flag("--yes-move", verb->yes_move)->group("");  // old name
-  sub->add_flag("--answers", verb->answers)->group("");    // old name
+  sub->add_option("--machine-root", verb->machine_root)->group("");  // tests only
+  sub->add_flag("--yes-move", verb->yes_move)->group("");            // old name
+  sub->add_flag("--answers", verb->answers)->group("");              // old name
   sub->add_flag("--json", verb->json, "print JSON");
   sub->callback([&chosen, verb] { chosen = [verb] { return examine_rig(*verb); }; });
 }

@@ -232,6 +232,7 @@ struct DoctorVerb {
   bool yes_move = false;  ///< the table may be turned
   bool answers = false;   ///< a person at the rig replies on standard input although it is no terminal
   bool json = false;
+  std::filesystem::path machine_root;  ///< tests only: /proc and /sys are read below it
 };
 /// `device` when there is a finding.
 ExitCode examine_rig(const DoctorVerb& verb);

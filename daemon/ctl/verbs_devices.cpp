@@ -1,6 +1,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "core/files.h"
+#include "daemon/api/json_replies.h"
 #include "daemon/ctl/doctor/examine_rig.h"
 #include "daemon/ctl/motion_session.h"
 #include "daemon/ctl/offline_rig_config.h"
@@ -172,8 +174,11 @@ ExitCode examine_rig(const DoctorVerb& verb) {
   RealClock clock;
   const doctor::Operator person(verb.answers, verb.json);
   doctor::Report report;
-  const auto moved = doctor::examine_rig({*rig, verb.config}, verb.yes_move, person, clock, report);
-  fmt::print("{}", verb.json ? report.json() : report.text());
+  const auto moved = doctor::examine_rig({*rig, verb.config, verb.machine_root}, verb.yes_move, person, clock, report);
+  const std::string as_json = report.json();
+  fmt::print("{}", verb.json ? as_json : report.text());
+  // A job folder that is missing, or not to be written to, has its finding.
+  std::ignore = write_file_atomically(rig->storage.root / kDoctorFile, as_json);
   if (!moved) return report_error(moved.error());
   const auto found = report.findings().size();
   if (found == 0) return ExitCode::ok;

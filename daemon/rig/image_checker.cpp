@@ -11,11 +11,8 @@ namespace {
 // Rendered scans of twelve objects. Images with pattern have 0.044 to 0.064 of full scale. Blur is 1.1 to 1.3 px, 2.2
 // to 2.6 px when blurred over 9x9 pixels, left_right_correlation at most 0.02. Images of one object differ by
 // a tenth.
-constexpr double kDark = 0.02;        ///< of full scale: five grey values of 255
 constexpr double kDarker = 0.4;       ///< of the images before
-constexpr double kSaturated = 0.1;    ///< share of the pixels
 constexpr double kMoreBlurred = 1.6;  ///< times the blur of the images before
-constexpr double kOnePicture = 0.25;  ///< left_right_correlation
 
 /// NaN where nothing was measured.
 double middle(const std::vector<double>& ascending) {
@@ -33,7 +30,7 @@ const char* name_of(Light light) { return light == Light::pattern ? "pattern" : 
 Result<void> ImageChecker::judge(Light light, const StereoFrame& frame) {
   if (auto left = judge(light, "left", frame.left_evidence); !left) return left;
   if (auto right = judge(light, "right", frame.right_evidence); !right) return right;
-  if (light == Light::pattern && frame.left_right_correlation > kOnePicture) {
+  if (light == Light::pattern && frame.left_right_correlation > kOneImage) {
     return fail(ErrorCode::protocol,
                 "camera: left and right show the same image (left_right_correlation {:.2f}); check the cables and "
                 "serial numbers",
@@ -49,13 +46,13 @@ Result<void> ImageChecker::judge(Light light, const char* side, const ImageQuali
   const Seen& seen = found == seen_.end() ? Seen{} : found->second;
   const double usual = middle(seen.brightness), sharp = middle(seen.blur_px);
   // Comparisons with NaN are false.
-  if (evidence.brightness < kDark || evidence.brightness < kDarker * usual) {
+  if (evidence.brightness < kDarkImage || evidence.brightness < kDarker * usual) {
     return fail(ErrorCode::protocol,
                 "{} camera: the {} image is dark ({:.3f} of full scale{}); check light, lens and exposure_us", side,
                 name_of(light), evidence.brightness,
                 std::isnan(usual) ? "" : fmt::format(", {:.3f} in the views before", usual));
   }
-  if (evidence.saturated > kSaturated) {
+  if (evidence.saturated > kOverexposed) {
     return fail(ErrorCode::protocol,
                 "{} camera: the {} image is overexposed ({:.0f} % at full scale); lower exposure_us or gain", side,
                 name_of(light), 100.0 * evidence.saturated);

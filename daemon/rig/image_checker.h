@@ -11,6 +11,11 @@
 
 namespace scanrig {
 
+// Limits that hold for any rig; image_checker.cpp tells where they come from.
+inline constexpr double kDarkImage = 0.02;   ///< brightness below which an image is dark: five grey values of 255
+inline constexpr double kOverexposed = 0.1;  ///< saturated share of the pixels above which it is overexposed
+inline constexpr double kOneImage = 0.25;    ///< left_right_correlation above which both sides show one image
+
 /// Checks whether a pair can be what was exposed, by the values its driver measured. Compares them with limits that
 /// hold for any rig, and with earlier pairs of the same job. Values that were not measured are not judged.
 class ImageChecker {

@@ -6,6 +6,7 @@
 #include "config/rig_config.h"
 #include "core/clock.h"
 #include "daemon/rig/devices.h"
+#include "drivers/camera/sensor_camera.h"
 #include "drivers/gpio/lines.h"
 
 namespace scanrig {
@@ -16,7 +17,7 @@ struct OpenDevices {
   std::unique_ptr<gpio::Lines> lines;
   std::unique_ptr<Turntable> turntable;
   std::unique_ptr<Projector> projector;
-  std::unique_ptr<StereoCamera> camera;  ///< null for simulated ones: their owner has them
+  std::unique_ptr<SensorCamera> camera;  ///< null for simulated ones: their owner has them
   std::unique_ptr<Panel> panel;
 
   [[nodiscard]] Devices devices() const { return {*turntable, *projector, *camera, *panel}; }

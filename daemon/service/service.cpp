@@ -20,15 +20,8 @@ std::uintmax_t gib(double count) { return static_cast<std::uintmax_t>(count * (1
 
 /// V4L2 devices named by their path have no identity; two sensors in one device have one number.
 CameraSerials cameras_from(const config::StereoCameraConfig& config) {
-  using Driver = config::StereoCameraConfig::Driver;
-  switch (config.driver) {
-    case Driver::aravis: return {config.aravis.left.serial, config.aravis.right.serial};
-    case Driver::v4l2:
-    case Driver::v4l2_side_by_side:
-      return {config.v4l2.left.serial, config.v4l2.right.value_or(config.v4l2.left).serial};
-    case Driver::simulated: break;  // their owner has the numbers
-  }
-  return {};
+  const auto [left, right] = config.serials();
+  return {left, right};
 }
 
 Recipe recipe_from(const std::string& name, const config::RecipeConfig& config) {

@@ -1,11 +1,12 @@
-#include "daemon/ctl/doctor/doctor_report.h"
-
 #include <unistd.h>
 
 #include <fmt/format.h>
 #include <cstdio>
 #include <iostream>
 #include <nlohmann/json.hpp>
+
+#include "core/timestamp.h"
+#include "daemon/ctl/doctor/examine_rig.h"
 
 namespace scanrig::ctl::doctor {
 
@@ -28,7 +29,8 @@ std::string Report::json() const {
   for (const Finding& finding : findings_) {
     findings.push_back({{"id", finding.id}, {"problem", finding.problem}, {"remedy", finding.remedy}});
   }
-  const nlohmann::ordered_json all{{"sections", sections}, {"findings", findings}};
+  const nlohmann::ordered_json all{
+      {"time", iso_time(std::chrono::system_clock::now())}, {"sections", sections}, {"findings", findings}};
   return all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 

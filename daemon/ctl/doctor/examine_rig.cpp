@@ -15,6 +15,7 @@
 
 #include "core/files.h"
 #include "daemon/ctl/doctor/examine_rig.h"
+#include "daemon/runtime/signal_stop.h"
 
 namespace scanrig::ctl::doctor {
 namespace {
@@ -216,11 +217,36 @@ void print_missing_snippets(const fs::path& device, const fs::path& config, Repo
   }
 }
 
+namespace {
+
+/// Cameras, light and calibration. Fails with `stopped`, the light being off.
+Result<void> examine_sight(const Rig& rig, Clock& clock, Report& report) {
+  const SignalStop signal;
+  auto images = examine_cameras(rig, signal.token(), clock, report);
+  if (!images) return pass_on(images);
+  if (rig.config.stereo_camera.driver == config::StereoCameraConfig::Driver::simulated) return {};
+  bool may_match = false;
+  if (!images->pattern.left.empty()) {
+    report.section("Light");
+    if (rig.config.projector.driver == config::ProjectorConfig::Driver::manual) {
+      report.note("switched by hand: judged in pattern light only");
+      images->off = images->plain = {};
+    }
+    may_match = judge_images(*images, report);
+  }
+  examine_calibration(rig, *images, may_match, report);
+  return {};
+}
+
+}  // namespace
+
 Result<void> examine_rig(const Rig& rig, bool may_turn, const Operator& person, Clock& clock, Report& report) {
   list_what_is_connected(report);
   const bool drive_answers = examine_drive(rig.config, clock, report);
   const bool estop_works = examine_panel(rig.config, drive_answers, person, clock, report);
   const auto permitted = [&] { return may_turn || person.prompt("Is everyone clear? Turn the table? [y/N]") == "y"; };
+  if (auto seen = examine_sight(rig, clock, report); !seen) return seen;
+  examine_machine(rig, clock, report);
   Result<void> moved;
   if (drive_answers && estop_works && permitted()) moved = examine_motion(rig, person, clock, report);
   print_missing_snippets(rig.config.turntable.device(), rig.file, report);
