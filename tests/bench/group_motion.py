@@ -3,6 +3,7 @@ import pathlib
 
 import fuzz
 import motion_doctor
+import motion_doctor_sight
 import motion_latch
 import motion_long
 import motion_matrix
@@ -19,6 +20,11 @@ def estop(bench, scratch):
     motion_safety.estop_reconstruction(bench, scratch)
 
 
+def doctor(bench, scratch):
+    motion_doctor.measure(bench, scratch)
+    motion_doctor_sight.measure(bench, scratch)
+
+
 PARTS = {"matrix": lambda bench, scratch: motion_matrix.measure(bench, ROOT, scratch),
          "estop": estop,
          "killed": motion_safety.killed,
@@ -27,7 +33,7 @@ PARTS = {"matrix": lambda bench, scratch: motion_matrix.measure(bench, ROOT, scr
          "tools": motion_tools.moments,
          "turns": lambda bench, scratch: motion_long.turns(bench, ROOT, scratch),
          "words": lambda bench, scratch: motion_long.words(bench, ROOT, scratch),
-         "doctor": motion_doctor.measure,
+         "doctor": doctor,
          "fuzz": lambda bench, scratch: fuzz.measure(bench, ROOT, scratch, PARSERS)}
 BESIDE = ("turns",)
 ALONE = ("fuzz",)  # dozens of processes: not beside measurements in milliseconds
