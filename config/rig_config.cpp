@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "config/camera_section.h"
+#include "config/drive_profile_file.h"
 #include "config/pin.h"
 #include "config/projector_section.h"
 #include "config/section.h"
@@ -316,6 +317,23 @@ Result<RigConfig> read_rig_config(const std::filesystem::path& file, const std::
   if (!read) return pass_on(read);
   rig.warnings = *read;
   return rig;
+}
+
+Result<std::map<std::string, DriveProfile>> read_drive_profiles(const std::filesystem::path& file) {
+  for (const auto& folder : usual_drives(file)) {
+    std::map<std::string, DriveProfile> profiles;
+    std::error_code error;
+    for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
+         entry.increment(error)) {
+      if (entry->path().extension() != ".toml") continue;
+      auto profile = read_drive_profile(entry->path());
+      if (!profile) return pass_on(profile);
+      profiles.emplace(entry->path().stem().string(), *std::move(profile));
+    }
+    if (!profiles.empty()) return profiles;
+  }
+  return fail(ErrorCode::not_found,
+              "there are no drive profiles in drives/ beside {}, nor in /usr/share/scanrig/drives", file.string());
 }
 
 Result<RigConfig> read_device_config(SafetyDevice device, const std::filesystem::path& file,

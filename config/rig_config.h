@@ -193,6 +193,10 @@ enum class Cameras { real, or_simulated };
 Result<RigConfig> read_rig_config(const std::filesystem::path& file, const std::filesystem::path& drives = {},
                                   Cameras cameras = Cameras::real);
 
+/// The drive profiles that a rig.toml at `file` can name, by their names: those of the first of the folders above that
+/// is there. Fails as read_drive_profile(), and with `not_found`.
+Result<std::map<std::string, DriveProfile>> read_drive_profiles(const std::filesystem::path& file);
+
 /// Devices that make-safe switches off when no program controls the rig.
 enum class SafetyDevice { turntable, projector, panel };
 

@@ -18,6 +18,9 @@ void add_offline_commands(CLI::App& app, Chosen& chosen);  ///< reconstruct, eva
 void add_rig_commands(CLI::App& app, Chosen& chosen);      ///< at the rig, while no daemon runs
 void add_pages_command(CLI::App& app, Chosen& chosen);     ///< hidden: writes completion and manual pages
 
+/// The board at the command line; `is_named` becomes true with any of its options.
+void add_board_options(CLI::App& sub, BoardOptions& board, bool& is_named);
+
 /// A verb that sends requests to the daemon: `run` gets its connection. `Verb` holds its options.
 template <class Verb, class Run>
 CLI::App* add_client(CLI::App& app, Chosen& chosen, const char* name, const char* description,

@@ -11,10 +11,10 @@
 #include <thread>
 #include <utility>
 
+#include "core/signal_stop.h"
 #include "daemon/ctl/motion_guardian.h"
 #include "daemon/rig/open_devices.h"
 #include "daemon/rig/panel_thread.h"
-#include "daemon/runtime/signal_stop.h"
 
 namespace scanrig::ctl {
 namespace {

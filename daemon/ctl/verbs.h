@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "config/setup/setup_options.h"
 #include "core/result.h"
 #include "pipeline/calibrate/calibrate_images.h"
 #include "pipeline/reconstruct/reconstruct.h"
@@ -226,6 +227,13 @@ struct CameraVerb {
 };
 /// `preview` uses a running daemon; the others need the cameras for themselves.
 ExitCode camera(const CameraVerb& verb);
+
+struct SetupVerb {
+  config::setup::SetupOptions options;
+  bool answers = false;  ///< replies come on standard input
+};
+/// Finds what is connected, prompts for the rest, writes a rig.toml and lets the doctor examine the rig.
+ExitCode set_up(const SetupVerb& verb);
 
 struct DoctorVerb {
   std::filesystem::path config = "/etc/scanrig/rig.toml";

@@ -4,12 +4,12 @@
 
 #include "core/files.h"
 #include "core/image_codec.h"
+#include "core/signal_stop.h"
 #include "daemon/ctl/client.h"
 #include "daemon/ctl/offline_rig_config.h"
 #include "daemon/ctl/verbs.h"
 #include "daemon/rig/open_devices.h"
 #include "daemon/rig/preview.h"
-#include "daemon/runtime/signal_stop.h"
 #include "drivers/camera/camera_list.h"
 
 namespace scanrig::ctl {

@@ -1,14 +1,15 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "config/setup/setup.h"
 #include "core/files.h"
+#include "core/signal_stop.h"
 #include "daemon/api/json_replies.h"
 #include "daemon/ctl/doctor/examine_rig.h"
 #include "daemon/ctl/motion_session.h"
 #include "daemon/ctl/offline_rig_config.h"
 #include "daemon/ctl/verbs.h"
 #include "daemon/rig/open_devices.h"
-#include "daemon/runtime/signal_stop.h"
 
 namespace scanrig::ctl {
 namespace {
@@ -168,22 +169,105 @@ ExitCode watch_panel(const PanelVerb& verb) {
   return ExitCode::ok;
 }
 
+namespace {
+
+/// Examines the rig, prints the report, and keeps it for the page. Fails as doctor::examine_rig().
+Result<void> consult(const doctor::Rig& rig, bool may_turn, bool as_json, const doctor::Operator& person, Clock& clock,
+                     doctor::Report& report) {
+  const auto moved = doctor::examine_rig(rig, may_turn, person, clock, report);
+  const std::string written = report.json();
+  fmt::print("{}", as_json ? written : report.text());
+  // A job folder that is missing, or not to be written to, has its finding.
+  std::ignore = write_file_atomically(rig.config.storage.root / kDoctorFile, written);
+  return moved;
+}
+
+}  // namespace
+
 ExitCode examine_rig(const DoctorVerb& verb) {
   const auto rig = offline_rig_config(verb.config);
   if (!rig) return report_error(rig.error());
   RealClock clock;
   const doctor::Operator person(verb.answers, verb.json);
   doctor::Report report;
-  const auto moved = doctor::examine_rig({*rig, verb.config, verb.machine_root}, verb.yes_move, person, clock, report);
-  const std::string as_json = report.json();
-  fmt::print("{}", verb.json ? as_json : report.text());
-  // A job folder that is missing, or not to be written to, has its finding.
-  std::ignore = write_file_atomically(rig->storage.root / kDoctorFile, as_json);
+  const auto moved = consult({*rig, verb.config, verb.machine_root}, verb.yes_move, verb.json, person, clock, report);
   if (!moved) return report_error(moved.error());
   const auto found = report.findings().size();
   if (found == 0) return ExitCode::ok;
   return report_error(ExitCode::device,
                       fmt::format("{}: {} finding(s); with each stands what to do", verb.config.string(), found));
+}
+
+namespace {
+
+constexpr const char* kNext =
+    "Next: systemctl start scanrigd, press Reset at the panel, and scanrig open --role engineer for the page.\n"
+    "There set focus and exposure, then calibrate.";
+
+/// The conversation of setup, with the person whom the doctor talks to.
+class OperatorDialogue final : public config::setup::Dialogue {
+ public:
+  explicit OperatorDialogue(const doctor::Operator& person) : person_(person) {}
+  void tell(const std::string& text) const override { person_.tell(text); }
+  [[nodiscard]] Result<std::string> prompt(const std::string& question) const override {
+    auto reply = person_.prompt(question);
+    if (!reply) return fail(ErrorCode::refused, "setup: the replies have ended; nothing was written");
+    while (!reply->empty() && reply->back() <= ' ') reply->pop_back();
+    return *std::move(reply);
+  }
+
+ private:
+  const doctor::Operator& person_;
+};
+
+/// What is left to do of the doctor's findings: a reversed direction is corrected in the file, and the calibration
+/// comes next. Fails as consult() and save().
+Result<std::size_t> examine(config::setup::Setup& setup, const doctor::Rig& rig, const doctor::Operator& person,
+                            Clock& clock) {
+  doctor::Report report;
+  if (auto moved = consult(rig, false, false, person, clock, report); !moved) return pass_on(moved);
+  std::size_t left = report.findings().size();
+  for (const auto& finding : report.findings()) {
+    if (finding.id == "no_calibration") --left;
+    if (finding.id != "reversed_sign") continue;
+    setup.reverse_sign();
+    if (auto saved = setup.save(); !saved) return pass_on(saved);
+    fmt::print("The direction of positive pulses is corrected in {}.\n", rig.file.string());
+    --left;
+  }
+  return left;
+}
+
+}  // namespace
+
+ExitCode set_up(const SetupVerb& verb) {
+  const auto& file = verb.options.out;
+  std::error_code error;
+  if (std::filesystem::exists(file, error)) {
+    return report_error(
+        ExitCode::refused,
+        fmt::format("setup: {} is there already; move it away, or name another file with --out", file.string()));
+  }
+  const doctor::Operator person(verb.answers, false);
+  if (!person.there()) {
+    return report_error(ExitCode::refused,
+                        "setup: no person is there to reply; run it at a terminal, or with --interactive");
+  }
+  RealClock clock;
+  const OperatorDialogue dialogue(person);
+  config::setup::Setup setup(verb.options, dialogue, clock);
+  const auto rig = setup.run();
+  if (!rig) return report_error(of_device(rig.error()));
+  fmt::print("{} is written. The doctor examines the rig.\n", file.string());
+  const auto left = examine(setup, {*rig, file}, person, clock);
+  if (!left) return report_error(left.error());
+  if (*left > 0) {
+    return report_error(
+        ExitCode::device,
+        fmt::format("{} is written; {} finding(s) of the doctor remain, with what to do", file.string(), *left));
+  }
+  fmt::print("{}\n", kNext);
+  return ExitCode::ok;
 }
 
 }  // namespace scanrig::ctl

@@ -8,11 +8,11 @@
 
 #include "config/rig_config.h"
 #include "core/catch_exceptions.h"
+#include "core/signal_stop.h"
 #include "core/timestamp.h"
 #include "daemon/api/access.h"
 #include "daemon/ctl/output.h"
 #include "daemon/ctl/verbs.h"
-#include "daemon/runtime/signal_stop.h"
 #include "pipeline/evaluate/evaluate.h"
 #include "pipeline/importers/import_stanford.h"
 

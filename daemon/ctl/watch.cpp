@@ -8,10 +8,10 @@
 #include <string_view>
 
 #include "core/clock.h"
+#include "core/signal_stop.h"
 #include "daemon/ctl/job_view.h"
 #include "daemon/ctl/output.h"
 #include "daemon/ctl/verbs.h"
-#include "daemon/runtime/signal_stop.h"
 
 namespace scanrig::ctl {
 namespace {

@@ -7,8 +7,8 @@
 #include <string>
 
 #include "config/rig_config.h"
+#include "core/signal_stop.h"
 #include "daemon/journal/journal.h"
-#include "daemon/runtime/signal_stop.h"
 #include "daemon/service/run_daemon.h"
 #include "daemon/service/systemd.h"
 

@@ -4,7 +4,7 @@
 #include <functional>
 #include <mutex>
 
-#include "daemon/runtime/signal_stop.h"
+#include "core/signal_stop.h"
 #include "sim/apps/rig_control.h"
 #include "sim/apps/rig_options.h"
 #include "sim/apps/scanrig_sim_ctl.h"

@@ -1,118 +1,31 @@
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <poll.h>
-#include <termios.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <optional>
 #include <vector>
 
 #include "daemon/ctl/doctor/examine_rig.h"
-#include "drivers/modbus/client.h"
+#include "drivers/discovery/serial_devices.h"
 
 namespace scanrig::ctl::doctor {
 namespace {
 
-using modbus::Parity;
 using std::chrono::milliseconds;
 
 constexpr int kReads = 50;
 constexpr std::chrono::seconds kAskLimit{2};
 
-constexpr milliseconds kReplyTimeout{40};  ///< longer than any requested frame takes at 9600 baud
-constexpr milliseconds kGrblPatience{300};
-
-/// A Modbus device that responds, and the settings it needs.
-struct ModbusAnswer {
-  modbus::ClientOptions line;
-  bool knows_register = false;  ///< it has the requested register
-};
-
-std::vector<modbus::ClientOptions> ways_to_ask(const modbus::ClientOptions& configured, int max_unit) {
-  std::vector<modbus::ClientOptions> ways;
-  const auto add = [&](int baud, Parity parity, int unit) {
-    auto way = configured;
-    way.baud = baud;
-    way.parity = parity;
-    way.unit_id = unit;
-    way.reply_timeout = std::max(configured.reply_timeout, kReplyTimeout);
-    ways.push_back(way);
-  };
-  const std::array parities{Parity::none, Parity::even, Parity::odd};
-  add(configured.baud, configured.parity, configured.unit_id);
-  for (const Parity parity : parities) add(configured.baud, parity, configured.unit_id);
-  for (int unit = 1; unit <= max_unit; ++unit) add(configured.baud, configured.parity, unit);
-  for (const int baud : {9600, 19200, 38400, 57600, 115200}) {
-    for (const Parity parity : parities) {
-      if (baud != configured.baud) add(baud, parity, configured.unit_id);
-    }
-  }
-  return ways;
-}
-
-std::string_view word(Parity parity) {
-  switch (parity) {
-    case Parity::none: return "none";
-    case Parity::even: return "even";
-    case Parity::odd: return "odd";
-  }
-  return "none";
-}
-
-/// Requests the state of a GRBL controller on `device` (one harmless character at 115200 8N1); its reply, or nothing.
-std::optional<std::string> grbl_answer(const std::string& device, Clock& clock) {
-  const int port = ::open(device.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-  if (port < 0) return std::nullopt;
-  termios settings{};
-  ::cfmakeraw(&settings);
-  settings.c_cflag |= CLOCAL | CREAD;
-  ::cfsetspeed(&settings, B115200);
-  ::tcsetattr(port, TCSANOW, &settings);
-  ::tcflush(port, TCIOFLUSH);
-  std::string said;
-  if (::write(port, "?", 1) == 1) {
-    for (const auto by = Deadline::after(clock, kGrblPatience); !by.expired(clock);) {
-      pollfd watched{port, POLLIN, 0};
-      const auto left = std::chrono::ceil<milliseconds>(by.left(clock));
-      std::array<char, 256> bytes;
-      if (::poll(&watched, 1, static_cast<int>(left.count())) <= 0) break;
-      const ssize_t count = ::read(port, bytes.data(), bytes.size());
-      if (count <= 0) break;
-      said.append(bytes.data(), static_cast<std::size_t>(count));
-    }
-  }
-  ::close(port);
-  // A status report "<Idle|MPos:...>", or the banner of a controller that opening the port has reset.
-  if (said.find('<') == std::string::npos && said.find("Grbl") == std::string::npos) return std::nullopt;
-  while (!said.empty() && said.back() <= ' ') said.pop_back();
-  return said;
-}
-
-/// Looks for a Modbus device on the port of `configured`: with its settings, then with other parities, speeds and unit
-/// ids up to `max_unit`, by reading `address`. The first that responds, even with a refusal; about 6 s without any.
-std::optional<ModbusAnswer> find_modbus(const modbus::ClientOptions& configured, std::uint16_t address, int max_unit,
-                                        Clock& clock) {
-  for (const auto& way : ways_to_ask(configured, max_unit)) {
-    modbus::Client line(way, clock);
-    const auto read = line.read(address, 1, Deadline::after(clock, 5 * way.reply_timeout));
-    if (read) return ModbusAnswer{way, true};
-    if (line.statistics().refused > 0) return ModbusAnswer{way, false};
-  }
-  return std::nullopt;
-}
-
 /// No device understood the configured settings: find out which device is there.
 void find_out_who_is_there(const ModbusTurntableOptions& options, Clock& clock, Report& report) {
   const auto& line = options.line;
-  if (const auto grbl = grbl_answer(line.device, clock)) {
+  if (const auto grbl = discovery::grbl_answer(line.device, clock)) {
     return report.find(
         "swapped_adapter",
         fmt::format("At {} a GRBL controller responds ({}), not a {} drive.", line.device, *grbl, options.profile.name),
         "Is the right adapter named in [turntable]? If this is the turntable, set driver = \"grbl\".");
   }
-  const auto found = find_modbus(line, options.profile.status.address, options.profile.max_unit_id, clock);
+  const auto found =
+      discovery::find_modbus(line, {.address = options.profile.status.address}, options.profile.max_unit_id, clock);
   if (!found) {
     return report.find("no_answer",
                        fmt::format("Nothing responds at {}: no Modbus device with any parity, speed or unit id, and no "
@@ -121,7 +34,7 @@ void find_out_who_is_there(const ModbusTurntableOptions& options, Clock& clock, 
                        "Check the drive's power, A and B of the RS-485 line, its termination, and that this is the "
                        "right adapter.");
   }
-  if (!found->knows_register) {
+  if (!found->has_trait) {
     return report.find(
         "swapped_adapter",
         fmt::format("At {} unit {} responds, but it has no register 0x{:04X}: it is not a {} drive.", line.device,
@@ -135,17 +48,17 @@ void find_out_who_is_there(const ModbusTurntableOptions& options, Clock& clock, 
                        fmt::format("Set unit_id = {} in [turntable].", found->line.unit_id));
   }
   if (found->line.baud != line.baud) {
-    return report.find(
-        "wrong_baud",
-        fmt::format("The drive at {} responds at {} baud with parity {}, the configuration says {}.", line.device,
-                    found->line.baud, word(found->line.parity), line.baud),
-        fmt::format("Set baud = {} and parity = \"{}\" in [turntable].", found->line.baud, word(found->line.parity)));
+    return report.find("wrong_baud",
+                       fmt::format("The drive at {} responds at {} baud with parity {}, the configuration says {}.",
+                                   line.device, found->line.baud, discovery::word(found->line.parity), line.baud),
+                       fmt::format("Set baud = {} and parity = \"{}\" in [turntable].", found->line.baud,
+                                   discovery::word(found->line.parity)));
   }
   if (found->line.parity != line.parity) {
     return report.find("wrong_parity",
                        fmt::format("The drive at {} responds with parity {}, the configuration says {}.", line.device,
-                                   word(found->line.parity), word(line.parity)),
-                       fmt::format("Set parity = \"{}\" in [turntable].", word(found->line.parity)));
+                                   discovery::word(found->line.parity), discovery::word(line.parity)),
+                       fmt::format("Set parity = \"{}\" in [turntable].", discovery::word(found->line.parity)));
   }
   report.find("unreliable_line",
               fmt::format("The drive at {} responds to some requests only as configured.", line.device),

@@ -15,7 +15,7 @@
 
 #include "core/files.h"
 #include "daemon/ctl/doctor/examine_rig.h"
-#include "daemon/runtime/signal_stop.h"
+#include "core/signal_stop.h"
 
 namespace scanrig::ctl::doctor {
 namespace {

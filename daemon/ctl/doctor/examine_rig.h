@@ -65,7 +65,7 @@ class Operator {
 struct Rig {
   const config::RigConfig& config;
   const std::filesystem::path& file;
-  std::filesystem::path machine_root;  ///< /proc and /sys are read below it; empty: those of this machine
+  std::filesystem::path machine_root{};  ///< /proc and /sys are read below it; empty: those of this machine
 };
 
 /// The last images of a trial in each light, and how bright each side was. `off`: by software, the projector dark.

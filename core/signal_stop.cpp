@@ -1,4 +1,4 @@
-#include "daemon/runtime/signal_stop.h"
+#include "core/signal_stop.h"
 
 #include <poll.h>
 #include <sys/eventfd.h>

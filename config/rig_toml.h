@@ -1,0 +1,14 @@
+#pragma once
+
+#include <string>
+
+#include "config/rig_config.h"
+
+namespace scanrig::config {
+
+/// The text of a rig.toml that read_rig_config() reads as `rig`: the chosen drivers with every key they need, a comment
+/// where a person may want to change one. Paths are written as they are; `rig.turntable.profile_file` names the drive
+/// profile. Left out, so at their defaults: quiet hours, webhook, board, limits of the recipes, packets, regions.
+std::string rig_toml(const RigConfig& rig);
+
+}  // namespace scanrig::config

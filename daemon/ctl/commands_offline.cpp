@@ -1,0 +1,136 @@
+// Verbs that read and write files only.
+#include <CLI/CLI.hpp>
+#include <memory>
+
+#include "daemon/ctl/commands.h"
+#include "daemon/ctl/verbs.h"
+#include "pipeline/reconstruct/voxel_size.h"
+
+namespace scanrig::ctl {
+
+namespace {
+
+void add_reconstruct(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<ReconstructVerb>();
+  auto* sub = app.add_subcommand("reconstruct", "make the model of a scan folder");
+  sub->add_option("DIR", verb->scan, "the scan folder")->required();
+  sub->add_option("--out", verb->out, "new folder for the model (default: DIR/model)");
+  sub->add_option("--threads", verb->options.threads, "threads; 0: all of the machine's")->check(CLI::Range(0, 1024));
+  sub->add_option("--voxel-mm", verb->options.voxel_mm,
+                  "size of a voxel (default: 0.25, or what suits imported range images)")
+      ->check(CLI::Range(kMinVoxelMm, kMaxVoxelMm));
+  sub->add_option("--fusion", verb->options.fusion, "how poses are integrated")
+      ->check(CLI::IsMember({"evidence", "paper"}));
+  sub->add_option("--rests", verb->options.rests, "how rests are found")->check(CLI::IsMember({"hull", "egi"}));
+  sub->add_flag("!--no-texture", verb->options.texture, "shape only");
+  sub->add_option("--watch", verb->options.watch,
+                  "what to do when the rig has moved since its calibration: refine (or refuse), report, off")
+      ->check(CLI::IsMember({"refine", "report", "off"}));
+  auto* json = sub->add_flag("--json", verb->json, "print JSON");
+  sub->add_flag("--lines", verb->lines, "tell the progress in lines for a program")->excludes(json);
+  sub->callback([&chosen, verb] { chosen = [verb] { return reconstruct(*verb); }; });
+}
+
+void add_board(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<BoardVerb>();
+  const auto ignored = std::make_shared<bool>();
+  auto* sub = app.add_subcommand("board", "print a calibration board as PDF, to scale");
+  sub->add_option("--out", verb->out, "the PDF to write")->required();
+  add_board_options(*sub, verb->board, *ignored);
+  sub->add_option("--page-mm", verb->page_mm, "width and height of the page (default: A4 landscape)")->expected(2);
+  sub->callback([&chosen, verb, ignored] { chosen = [verb] { return board(*verb); }; });
+}
+
+void add_evaluate(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<EvaluateVerb>();
+  auto* sub = app.add_subcommand("evaluate", "compare a model with the truth of a simulated scan");
+  sub->add_option("DIR", verb->scan, "the scan folder, with truth.json")->required();
+  sub->add_option("--model", verb->model, "the model's folder (default: DIR/model)");
+  sub->add_flag("--json", verb->json, "print JSON");
+  sub->callback([&chosen, verb] { chosen = [verb] { return evaluate(*verb); }; });
+}
+
+void add_import(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<ImportVerb>();
+  auto* sub = app.add_subcommand("import", "make a scan folder from other people's data");
+  sub->require_subcommand(1);
+  auto* stanford = sub->add_subcommand("stanford", "range scans of the Stanford repository");
+  stanford->add_option("--pose", verb->conf, "the .conf file of a pose; once or twice")
+      ->required()
+      ->expected(1)
+      ->take_all();
+  stanford->add_option("--out", verb->out, "the scan folder to make")->required();
+  stanford->add_flag("--json", verb->json, "print JSON");
+  stanford->callback([&chosen, verb] { chosen = [verb] { return import_stanford(*verb); }; });
+}
+
+void add_convert(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<ConvertVerb>();
+  auto* sub = app.add_subcommand("convert", "write a calibration, or the views of a scan, for other programs");
+  sub->require_subcommand(1);
+  const auto add = [&](const char* name, const char* description, const char* from, const char* out) {
+    auto* action = sub->add_subcommand(name, description);
+    action->add_option("FROM", verb->from, from)->required();
+    action->add_option("--out", verb->out, out)->required();
+    action->add_flag("--json", verb->json, "print JSON");
+    action->callback([&chosen, verb, name] {
+      verb->what = name;
+      chosen = [verb] { return convert(*verb); };
+    });
+    return action;
+  };
+  constexpr const char* kCalibration = "calibration.json, or a folder that has one";
+  add("mrcal", "left.cameramodel and right.cameramodel", kCalibration, "the folder to make");
+  add("opencv", "a YAML file for cv::FileStorage", kCalibration, "the file to write");
+  add("colmap", "cameras and images as a text model, one per pose", "a scan folder", "the folder to make")
+      ->add_flag("--images", verb->images, "copy the plain images, too, ready for use: demosaiced");
+}
+
+void add_check_config(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<CheckConfigVerb>();
+  auto* sub = app.add_subcommand("check-config", "read a rig.toml and tell everything that is wrong with it");
+  sub->add_option("FILE", verb->file, "the configuration")->capture_default_str();
+  sub->add_flag("--json", verb->json, "print JSON");
+  sub->add_option("--drives", verb->drives, "folder of the drive profiles");
+  sub->callback([&chosen, verb] { chosen = [verb] { return check_config(*verb); }; });
+}
+
+void add_token(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<TokenVerb>();
+  auto* sub = app.add_subcommand("token", "who may use the API over TCP");
+  sub->require_subcommand(1);
+  const auto add = [&](const char* name, const char* description) {
+    auto* action = sub->add_subcommand(name, description);
+    action->add_option("--file", verb->file, "the file of tokens (default: the one that the configuration names)");
+    action->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
+    action->add_flag("--json", verb->json, "print JSON");
+    action->callback([&chosen, verb, name] {
+      verb->what = name;
+      chosen = [verb] { return token(*verb); };
+    });
+    return action;
+  };
+  auto* make = add("add", "make a token and print it, once");
+  make->add_option("NAME", verb->name, "of who or what gets it")->required();
+  make->add_option("--role", verb->role, "what it may do")
+      ->check(CLI::IsMember({"viewer", "operator", "engineer"}))
+      ->capture_default_str();
+  add("list", "names, roles and dates; never the tokens");
+  add("revoke", "make a token void; the service refuses it within a second")
+      ->add_option("NAME", verb->name, "of the token")
+      ->required();
+}
+
+}  // namespace
+
+void add_offline_commands(CLI::App& app, Chosen& chosen) {
+  add_reconstruct(app, chosen);
+  add_evaluate(app, chosen);
+  add_import(app, chosen);
+  add_convert(app, chosen);
+  add_board(app, chosen);
+  add_check_config(app, chosen);
+  add_token(app, chosen);
+}
+
+}  // namespace scanrig::ctl
