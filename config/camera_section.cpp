@@ -73,6 +73,7 @@ void read_aravis(Section& s, AravisOptions& options) {
   }
   s.number("exposure_us", options.exposure, kExposureUs);
   if (s.has("gain")) s.number("gain", options.gain.emplace(), {-100, 10'000});
+  if (s.has("black_level")) s.number("black_level", options.black_level.emplace(), {-100, 10'000});
   if (s.has("region")) s.section("region", [&](Section& r) { read_region(r, options.region.emplace()); });
   if (s.has("packet")) {
     s.section("packet", [&](Section& packet) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <thread>
 
+#include "drivers/camera/aravis_setup.h"
 #include "drivers/camera/aravis_strobe.h"
 
 namespace scanrig {
@@ -105,7 +106,7 @@ Result<bool> AravisSensor::prepare(Deadline deadline) {
   if (auto free = let_go(deadline); !free) return pass_on(free);
   if (auto ended = wait_for_pending(deadline); !ended) return pass_on(ended);
   if (deadline.expired(clock_)) return fail(ErrorCode::timeout, "{}: no time left to connect", name());
-  auto connected = connect();
+  auto connected = connect(deadline);
   if (connected) connected = start_stream();
   if (connected) return true;
   mark(lost_);
@@ -142,7 +143,7 @@ void AravisSensor::ask_whether_there() {
   if (!asked) mark(lost_);
 }
 
-Result<void> AravisSensor::connect() {
+Result<void> AravisSensor::connect(Deadline deadline) {
   std::string device = sensor_.address;
   if (device.empty()) {
     const auto found = find_by_serial(sensor_.serial);
@@ -172,7 +173,7 @@ Result<void> AravisSensor::connect() {
                 "{}: the camera at {} has the serial number {}; correct the address or the serial", name(), device,
                 serial);
   }
-  return set_up(camera_.get(), options_, sensor_.address, attempt_);
+  return set_up(camera_.get(), options_, sensor_.address, clock_, deadline, attempt_);
 }
 
 Result<void> AravisSensor::start_stream() {
@@ -195,7 +196,11 @@ Result<void> AravisSensor::start_stream() {
   }
   finding_ = host_finding(ARV_IS_GV_STREAM(stream_.get()) ? CameraBus::gige : CameraBus::usb3, payload);
   for (int i = 0; i < kBuffers; ++i) arv_stream_push_buffer(stream_.get(), arv_buffer_new_allocate(payload));
-  listens_to_line_ = options_.trigger_source != "Software";
+  listens_to_line_ = false;
+  return start_acquisition();
+}
+
+Result<void> AravisSensor::start_acquisition() {
   heard_ = clock_.now();
   return attempt_("start the acquisition", [&](GError** error) { arv_camera_start_acquisition(camera_.get(), error); });
 }
@@ -275,13 +280,28 @@ Result<SensorFrame> AravisSensor::read(ArvBuffer* buffer) const {
   return frame;
 }
 
-Result<void> AravisSensor::listen_to_line(bool line) {
+Result<bool> AravisSensor::listen_to_line(bool line) {
   const bool wanted = line && options_.trigger_source != "Software";
-  if (wanted == listens_to_line_) return {};
-  auto set = set_trigger_source(camera_.get(), wanted ? options_.trigger_source : "Software", attempt_);
-  if (set) listens_to_line_ = wanted;
-  if (!set) mark(lost_);  // a device that does not reply is connected again
-  return set;
+  if (wanted == listens_to_line_) return false;
+  if (auto switched = switch_source(wanted ? options_.trigger_source : "Software"); !switched) {
+    mark(lost_);  // a device that does not reply is connected again
+    return pass_on(switched);
+  }
+  listens_to_line_ = wanted;
+  return true;
+}
+
+/// The camera does not acquire meanwhile: many reject another source then. Frames that were on their way are dropped.
+Result<void> AravisSensor::switch_source(const std::string& source) {
+  auto stopped =
+      attempt_("stop the acquisition", [&](GError** error) { arv_camera_stop_acquisition(camera_.get(), error); });
+  if (!stopped) return stopped;
+  // Ids may restart, and the library's thread would take the first of them for old ones.
+  arv_stream_stop_thread(stream_.get(), FALSE);
+  while (ArvBuffer* buffer = arv_stream_try_pop_buffer(stream_.get())) arv_stream_push_buffer(stream_.get(), buffer);
+  arv_stream_start_thread(stream_.get());
+  if (auto set = set_trigger_source(camera_.get(), source, attempt_); !set) return set;
+  return start_acquisition();
 }
 
 Result<void> AravisSensor::trigger() {

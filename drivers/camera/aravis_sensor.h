@@ -13,13 +13,6 @@ namespace scanrig {
 
 inline constexpr int kBuffers = 6;  // of each camera's stream
 
-/// Trigger, exposure, pixels and transport of one camera [GenICam SFNC 2.7, 5 and 6]. See open_aravis() for errors.
-Result<void> set_up(ArvCamera* camera, const AravisOptions& options, const std::string& address,
-                    const GenicamCall& attempt);
-
-/// True if `line` (or else the software trigger) starts an exposure.
-Result<void> set_trigger_source(ArvCamera* camera, const std::string& source, const GenicamCall& attempt);
-
 /// One GigE Vision or USB3 Vision camera.
 class AravisSensor final : public Sensor, private CameraStrobe {
  public:
@@ -32,7 +25,7 @@ class AravisSensor final : public Sensor, private CameraStrobe {
   [[nodiscard]] bool can_trigger() const override { return true; }
   [[nodiscard]] std::uint64_t id_ring() const override;
   [[nodiscard]] bool shares_host_clock() const override { return false; }
-  Result<void> listen_to_line(bool line) override;
+  Result<bool> listen_to_line(bool line) override;
   Result<void> trigger() override;
   [[nodiscard]] CameraStrobe* strobe() override { return options_.strobe_outputs.empty() ? nullptr : this; }
 
@@ -41,9 +34,11 @@ class AravisSensor final : public Sensor, private CameraStrobe {
   Result<void> start_exposure(Deadline deadline) override;
   using Act = std::function<Result<void>(ArvCamera*)>;
   Result<void> request(const char* what, Act act, Deadline deadline);
-  Result<void> connect();
+  Result<void> connect(Deadline deadline);
   Result<void> start_stream();
+  Result<void> start_acquisition();
   void stop_stream();
+  Result<void> switch_source(const std::string& source);
   Result<void> let_go(Deadline deadline);
   Result<void> wait_for_pending(Deadline deadline);
   Result<SensorFrame> read(ArvBuffer* buffer) const;

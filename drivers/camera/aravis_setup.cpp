@@ -1,4 +1,5 @@
-#include <cmath>
+#include "drivers/camera/aravis_setup.h"
+
 #include <fstream>
 
 #include "drivers/camera/aravis_sensor.h"
@@ -8,16 +9,31 @@
 namespace scanrig {
 namespace {
 
-/// Frames come on triggers only, and on one kind of trigger only.
-Result<void> set_up_trigger(ArvCamera* camera, const AravisOptions& options, const GenicamCall& attempt) {
-  if (has_feature(camera, "AcquisitionFrameRateEnable")) {
-    auto off = attempt("set AcquisitionFrameRateEnable", [&](GError** error) {
-      arv_camera_set_boolean(camera, "AcquisitionFrameRateEnable", FALSE, error);
-    });
-    if (!off) return off;
+/// Starts from what the maker has tested. Returns whether it could. A camera whose clock follows PTP keeps its
+/// settings: loading others would switch PTP off, and it needs longer to follow again than a call may wait.
+Result<bool> load_standard(ArvCamera* camera, const AravisOptions& options, const GenicamCall& attempt) {
+  const bool keeps_clock = options.frame_clock == TriggeringOptions::FrameClock::ptp && has_ptp_on(camera);
+  if (keeps_clock || !has_feature(camera, "UserSetLoad") || !has_entry(camera, "UserSetSelector", "Default")) {
+    return false;
   }
-  auto cleared = attempt("switch the triggers off", [&](GError** error) { arv_camera_clear_triggers(camera, error); });
-  if (!cleared) return cleared;
+  if (auto set = set_text(camera, "UserSetSelector", "Default", attempt); !set) return pass_on(set);
+  if (auto loaded = execute(camera, "UserSetLoad", attempt); !loaded) return pass_on(loaded);
+  return true;
+}
+
+Result<void> switch_triggers_off(ArvCamera* camera, const GenicamCall& attempt) {
+  for (const std::string& trigger : entries_of(camera, "TriggerSelector")) {
+    if (auto set = set_text(camera, "TriggerSelector", trigger, attempt); !set) return set;
+    if (auto off = set_entry_if_present(camera, "TriggerMode", "Off", attempt); !off) return off;
+  }
+  return {};
+}
+
+/// Frames come on triggers only, and on one kind of trigger only. The camera is left waiting for its software trigger,
+/// with which the count of frames begins.
+Result<void> set_up_trigger(ArvCamera* camera, const AravisOptions& options, const GenicamCall& attempt) {
+  if (auto off = set_flag_if_present(camera, "AcquisitionFrameRateEnable", false, attempt); !off) return off;
+  if (auto off = switch_triggers_off(camera, attempt); !off) return off;
   const char* selector = nullptr;
   for (const char* candidate : {"FrameStart", "FrameBurstStart", "AcquisitionStart"}) {
     if (!selector && has_entry(camera, "TriggerSelector", candidate)) selector = candidate;
@@ -32,42 +48,12 @@ Result<void> set_up_trigger(ArvCamera* camera, const AravisOptions& options, con
   if (has_feature(camera, "TriggerActivation") || options.falling_edge) {
     if (auto set = set_text(camera, "TriggerActivation", edge, attempt); !set) return set;
   }
-  return set_text(camera, "TriggerMode", "On", attempt);
-}
-
-Result<void> set_up_image(ArvCamera* camera, const AravisOptions& options, const GenicamCall& attempt) {
-  if (!has_entry(camera, "PixelFormat", options.pixel_format)) {
-    return fail(ErrorCode::unsupported, "{}: the camera has no pixel format {}", attempt.who(), options.pixel_format);
-  }
-  if (auto set = set_text(camera, "PixelFormat", options.pixel_format, attempt); !set) return set;
-  if (options.region) {
-    const Region& r = *options.region;
-    auto set = attempt(fmt::format("read out {}x{} at ({}, {})", r.width, r.height, r.x, r.y),
-                       [&](GError** error) { arv_camera_set_region(camera, r.x, r.y, r.width, r.height, error); });
-    if (!set) return set;
-  }
-  for (const char* automatic : {"ExposureAuto", "GainAuto", "BalanceWhiteAuto"}) {
-    if (!has_feature(camera, automatic)) continue;
-    if (auto off = set_text(camera, automatic, "Off", attempt); !off) return off;
-  }
-  if (options.gain) {
-    auto set = attempt(fmt::format("set the gain to {}", *options.gain),
-                       [&](GError** error) { arv_camera_set_gain(camera, *options.gain, error); });
-    if (!set) return set;
-  }
-  const auto wanted = static_cast<double>(options.exposure.count());
-  double got = 0.0;
-  auto set = attempt(fmt::format("set the exposure to {} us", options.exposure.count()), [&](GError** error) {
-    arv_camera_set_exposure_time(camera, wanted, error);
-    if (!*error) got = arv_camera_get_exposure_time(camera, error);
-  });
-  if (!set) return set;
-  constexpr double kCoarse = 0.05;  // cameras round to lines of the sensor
-  if (std::abs(got - wanted) > kCoarse * wanted) {
-    return fail(ErrorCode::invalid_input, "{}: asked for an exposure of {} us it takes {:.0f} us", attempt.who(),
-                options.exposure.count(), got);
-  }
-  return {};
+  constexpr double kDelayUs = 0.0, kCoarseUs = 10.0;
+  if (auto set = set_number_if_present(camera, "TriggerDelay", kDelayUs, kCoarseUs, attempt); !set) return set;
+  // Pattern and plain light follow each other faster than some sensors are read out.
+  if (auto set = set_entry_if_present(camera, "TriggerOverlap", "ReadOut", attempt); !set) return set;
+  if (auto set = set_text(camera, "TriggerMode", "On", attempt); !set) return set;
+  return set_trigger_source(camera, "Software", attempt);
 }
 
 Result<void> set_up_packets(ArvCamera* camera, const AravisOptions& options, const std::string& address,
@@ -95,19 +81,18 @@ Result<void> set_up_packets(ArvCamera* camera, const AravisOptions& options, con
                   options.packet_bytes, got);
     }
   }
-  if (options.packet_delay.count() == 0) return {};
-  return attempt("set the packet delay", [&](GError** error) {
-    arv_camera_gv_set_packet_delay(camera, std::chrono::nanoseconds(options.packet_delay).count(), error);
+  gint64 got = 0;
+  const auto wanted = std::chrono::nanoseconds(options.packet_delay).count();
+  auto set = attempt("set the packet delay", [&](GError** error) {
+    got = arv_camera_gv_get_packet_delay(camera, error);
+    if (*error || got == wanted) return;
+    arv_camera_gv_set_packet_delay(camera, wanted, error);
+    if (!*error) got = arv_camera_gv_get_packet_delay(camera, error);
   });
-}
-
-Result<void> set_up_clock(ArvCamera* camera, const AravisOptions& options, const GenicamCall& attempt) {
-  if (options.frame_clock != TriggeringOptions::FrameClock::ptp) return {};
-  for (const char* feature : {"PtpEnable", "GevIEEE1588"}) {
-    if (!has_feature(camera, feature)) continue;
-    return attempt("switch PTP on", [&](GError** error) { arv_camera_set_boolean(camera, feature, TRUE, error); });
-  }
-  return fail(ErrorCode::unsupported, "{}: the camera has no PTP; use clock = \"interval\"", attempt.who());
+  constexpr gint64 kCoarseNs = 1000;  // cameras count in ticks of their own
+  if (!set || std::abs(got - wanted) <= std::max(kCoarseNs, wanted / 20)) return set;
+  return fail(ErrorCode::invalid_input, "{}: asked for a packet delay of {} us it has {} us; choose one that it offers",
+              attempt.who(), options.packet_delay.count(), got / 1000);
 }
 
 /// First number in a kernel file; nothing if there is none.
@@ -124,17 +109,18 @@ Result<void> set_trigger_source(ArvCamera* camera, const std::string& source, co
   return set_text(camera, "TriggerSource", source, attempt);
 }
 
-Result<void> set_up(ArvCamera* camera, const AravisOptions& options, const std::string& address,
-                    const GenicamCall& attempt) {
-  auto continuous = attempt("set AcquisitionMode", [&](GError** error) {
-    arv_camera_set_acquisition_mode(camera, ARV_ACQUISITION_MODE_CONTINUOUS, error);
-  });
-  if (!continuous) return continuous;
-  if (auto done = set_up_image(camera, options, attempt); !done) return done;
+Result<void> set_up(ArvCamera* camera, const AravisOptions& options, const std::string& address, Clock& clock,
+                    Deadline deadline, const GenicamCall& attempt) {
+  // Another program may have left it acquiring, with most features locked. An idle camera may reject this.
+  std::ignore = execute(camera, "AcquisitionStop", attempt);
+  const auto is_standard = load_standard(camera, options, attempt);
+  if (!is_standard) return pass_on(is_standard);
+  if (auto set = set_text(camera, "AcquisitionMode", "Continuous", attempt); !set) return set;
+  if (auto done = set_up_image(camera, options, *is_standard, attempt); !done) return done;
   if (auto done = set_up_outputs(camera, options.strobe_outputs, attempt); !done) return done;
   if (auto done = set_up_trigger(camera, options, attempt); !done) return done;
   if (auto done = set_up_packets(camera, options, address, attempt); !done) return done;
-  return set_up_clock(camera, options, attempt);
+  return set_up_clock(camera, options, clock, deadline, attempt);
 }
 
 std::unique_ptr<SensorCamera> aravis_camera(const AravisOptions& options, Clock& clock) {

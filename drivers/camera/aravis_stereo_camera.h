@@ -31,7 +31,8 @@ struct AravisOptions {
   std::vector<std::string> strobe_outputs;
   std::string pixel_format = "Mono8";  ///< Mono8..16, BayerRG8 and its like, RGB8, BGR8, YUV422_8; not packed ones
   std::chrono::microseconds exposure{12000};
-  std::optional<double> gain;    ///< in the camera's own units; empty: unchanged
+  /// In the camera's own units; empty: of its user set Default, or the lowest where it has none.
+  std::optional<double> gain, black_level;
   std::optional<Region> region;  ///< empty: the whole sensor
   int packet_bytes = 0;          ///< GigE: with IP and UDP headers, at most the MTU; 0: as large as passes
   std::chrono::microseconds packet_delay{0};

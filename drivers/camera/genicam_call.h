@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "core/result.h"
 
@@ -40,7 +41,27 @@ bool has_feature(ArvCamera* camera, const char* feature);
 /// True if the enumeration has the entry and it can be chosen now.
 bool has_entry(ArvCamera* camera, const char* feature, const std::string& entry);
 
-/// Sets an enumeration or a text. Fails as GenicamCall.
+/// Names of the entries that can be chosen now; empty if the camera has no such enumeration.
+std::vector<std::string> entries_of(ArvCamera* camera, const char* feature);
+
+/// Reads an enumeration or a text. Fails as GenicamCall.
+Result<std::string> read_text(ArvCamera* camera, const char* feature, const GenicamCall& attempt);
+
+/// Make a feature have a value: it is read, written if it differs, and read back. A feature that the camera lacks is
+/// left alone by those that end in _if_present. Fail as GenicamCall, with `invalid_input` also when the camera keeps
+/// another value.
 Result<void> set_text(ArvCamera* camera, const char* feature, const std::string& value, const GenicamCall& attempt);
+Result<void> set_whole(ArvCamera* camera, const char* feature, std::int64_t value, const GenicamCall& attempt);
+Result<void> set_entry_if_present(ArvCamera* camera, const char* feature, const std::string& entry,
+                                  const GenicamCall& attempt);
+Result<void> set_flag_if_present(ArvCamera* camera, const char* feature, bool value, const GenicamCall& attempt);
+Result<void> set_whole_if_present(ArvCamera* camera, const char* feature, std::int64_t value,
+                                  const GenicamCall& attempt);
+/// Sets the nearest value that the camera offers; `tolerance`: of the value read back, for cameras that round.
+Result<void> set_number_if_present(ArvCamera* camera, const char* feature, double value, double tolerance,
+                                   const GenicamCall& attempt);
+
+/// Executes a command. Fails as GenicamCall.
+Result<void> execute(ArvCamera* camera, const char* command, const GenicamCall& attempt);
 
 }  // namespace scanrig

@@ -44,8 +44,10 @@ class Sensor {
   /// True if stamps are of the host's steady clock.
   [[nodiscard]] virtual bool shares_host_clock() const = 0;
 
-  /// Select whether the line or trigger() exposes. Fail with `io`, `timeout`.
-  virtual Result<void> listen_to_line(bool line) = 0;
+  /// Selects whether the line or trigger() exposes. True if the acquisition was interrupted for it: frames still in
+  /// flight are dropped, and ids may restart. Fails with `io`, `timeout`, `invalid_input`.
+  virtual Result<bool> listen_to_line(bool line) = 0;
+  /// Starts one exposure. Fails with `io`, `timeout`.
   virtual Result<void> trigger() = 0;
 
   /// Its outputs for a projector; null if there are none.

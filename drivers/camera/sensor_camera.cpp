@@ -98,7 +98,7 @@ Result<void> SensorCamera::warm_up(Channel& channel, Deadline deadline) {
   if (options_.by == TriggeringOptions::By::free_run) return {};
   const bool can_trigger = channel.sensor->can_trigger();
   if (can_trigger) {
-    if (auto deaf = channel.sensor->listen_to_line(false); !deaf) return deaf;
+    if (auto deaf = select_source(channel, false); !deaf) return deaf;
   }
   // Long enough for the clocks to distinguish earlier exposures from later ones.
   const auto gap = can_trigger ? channel.ledger.uncertainty().value_or(options_.frame_timeout / 2)
@@ -130,7 +130,14 @@ Result<void> SensorCamera::warm_up(Channel& channel, Deadline deadline) {
 /// Returns to the projector's edge, after exposures by software.
 Result<void> SensorCamera::listen(Channel& channel) {
   if (!channel.sensor->can_trigger()) return {};
-  return channel.sensor->listen_to_line(options_.by == TriggeringOptions::By::line);
+  return select_source(channel, options_.by == TriggeringOptions::By::line);
+}
+
+Result<void> SensorCamera::select_source(Channel& channel, bool line) {
+  const auto interrupted = channel.sensor->listen_to_line(line);
+  if (!interrupted) return pass_on(interrupted);
+  if (*interrupted) channel.ledger.forget_id();
+  return {};
 }
 
 /// Makes one exposure by software. Returns nothing if its frame was torn or did not come; the next one may succeed.
@@ -205,7 +212,7 @@ Result<SensorFrame> SensorCamera::expose_by_software(Channel& channel, Deadline 
   if (!channel.ledger.knows_clock()) {
     if (auto warm = warm_up(channel, deadline); !warm) return pass_on(warm);
   }
-  if (auto deaf = channel.sensor->listen_to_line(false); !deaf) return pass_on(deaf);
+  if (auto deaf = select_source(channel, false); !deaf) return pass_on(deaf);
   for (int i = 0; i < kWarmUpTries; ++i) {
     auto frame = expose_once(channel, deadline);
     if (!frame) return pass_on(frame);

@@ -77,6 +77,7 @@ class SensorCamera final : public StereoCamera {
   Result<void> connect(Channel& channel, Deadline deadline);
   Result<void> get_in_step(Deadline deadline);
   Result<void> listen(Channel& channel);
+  Result<void> select_source(Channel& channel, bool line);
   void forget(Channel& channel);
   Result<void> throw_away(Channel& channel, Clock::TimePoint until);
   Result<void> warm_up(Channel& channel, Deadline deadline);

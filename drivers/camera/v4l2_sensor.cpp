@@ -245,7 +245,7 @@ Result<SensorFrame> V4l2Sensor::read(const v4l2_buffer& buffer) const {
   return frame;
 }
 
-Result<void> V4l2Sensor::listen_to_line(bool) {
+Result<bool> V4l2Sensor::listen_to_line(bool) {
   return fail(ErrorCode::unsupported, "{}: V4L2 has no trigger to choose", name_);
 }
 

@@ -22,7 +22,7 @@ class V4l2Sensor final : public Sensor {
   [[nodiscard]] bool can_trigger() const override { return false; }
   [[nodiscard]] std::uint64_t id_ring() const override { return std::uint64_t{1} << 32; }
   [[nodiscard]] bool shares_host_clock() const override { return true; }
-  Result<void> listen_to_line(bool) override;
+  Result<bool> listen_to_line(bool) override;
   Result<void> trigger() override;
 
  private:

@@ -45,7 +45,11 @@ Result<std::unique_ptr<RigCameras>> RigCameras::start(const RigCamerasOptions& o
   cameras.frame_after = std::chrono::round<std::chrono::microseconds>(exposure_time() + kReadout);
   cameras.late_by = std::chrono::milliseconds(1000);
   cameras.numbered = false;
-  cameras.max_exposure = options.max_exposure;
+  cameras.is_strobe_wired = false;
+  cameras.nominal_exposure = std::chrono::round<std::chrono::microseconds>(exposure_time());
+  cameras.model.state = options.state;
+  cameras.model.has_user_sets = !options.state || *options.state % 2 == 0;
+  cameras.model.max_exposure_us = options.max_exposure_us;
   cameras.ready = [&rig = *rig](const wire::GigeExposure& exposure) { return rig.ready(exposure); };
   const auto source = [&rig = *rig](wire::Side side, const wire::GigeExposure& exposure, cv::Mat& image) {
     rig.read_out(side, exposure, image);

@@ -20,9 +20,11 @@ struct RigTruth;
 
 struct RigCamerasOptions {
   SceneOptions scene;
-  std::vector<Place> expected;                ///< rendered before it is requested
-  bool numbered = false;                      ///< write the number of the edge into every frame, see faint_number()
-  std::chrono::microseconds max_exposure{0};  ///< see GigeCamerasOptions
+  std::vector<Place> expected;  ///< rendered before it is requested
+  bool numbered = false;        ///< write the number of the edge into every frame, see faint_number()
+  int max_exposure_us = 0;      ///< see GigeModel
+  /// Seed of the registers of both cameras at power-on, half of which have no user sets; empty: a sound state.
+  std::optional<std::uint64_t> state{};
 };
 
 /// State of the lights, as shares of a sound rig's.

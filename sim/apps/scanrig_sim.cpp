@@ -114,6 +114,8 @@ void add_rig(CLI::App& app, sim::WireRigOptions& o, sim::SceneOptions& scene, Ch
   rig->add_option("--max-exposure-us", o.max_exposure_us, "gige: the cameras expose no longer than this; 0: any")
       ->capture_default_str()
       ->check(CLI::Range(0, 1000000));
+  rig->add_option("--camera-state", o.camera_state,
+                  "gige: seed of a state in which another program left the cameras; without it a sound one");
   add_scene(*rig, scene);
   rig->callback([&] {
     o.axis.gear_ratio = o.toml.gear_ratio;

@@ -74,7 +74,8 @@ Result<void> WireRig::start_cameras(const WireRigOptions& o, Clock& clock) {
       {.scene = *o.scene,
        .expected = expected,
        .numbered = o.numbered_frames,
-       .max_exposure = std::chrono::microseconds(o.max_exposure_us)},
+       .max_exposure_us = o.max_exposure_us,
+       .state = o.camera_state},
       [this] { return truth(); }, clock);
   if (!cameras) return pass_on(cameras);
   cameras_ = std::move(*cameras);

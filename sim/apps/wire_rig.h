@@ -28,8 +28,9 @@ struct WireRigOptions {
   bool positive_ccw = true;  ///< direction of the table for positive pulses, seen from above
   std::optional<std::int32_t> preload_counter;
   std::optional<SceneOptions> scene;  ///< scene of two GigE cameras; nothing: no cameras
-  bool numbered_frames = false;       ///< see RigCamerasOptions
+  bool numbered_frames = false;       ///< see RigCamerasOptions, as the next
   int max_exposure_us = 0;            ///< of the cameras; 0: any
+  std::optional<std::uint64_t> camera_state;
 };
 
 /// True state of the mechanics.

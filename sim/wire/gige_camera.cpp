@@ -22,11 +22,13 @@ constexpr std::array<std::pair<std::string_view, GigeFault>, 9> kFaults{{{"none"
                                                                          {"blurred", GigeFault::blurred},
                                                                          {"swapped", GigeFault::swapped}}};
 
+constexpr std::uint64_t kRightState = 1'000'000;  // seed of the right camera's registers beside the left one's
+
 class Pair final : public GigeCameras {
  public:
-  Pair(std::unique_ptr<GigeSensor> left, std::unique_ptr<GigeSensor> right, Clock& clock)
+  Pair(std::unique_ptr<GigeSensor> left, std::unique_ptr<GigeSensor> right, bool is_strobe_wired, Clock& clock)
       : clock_(clock), sensors_{std::move(left), std::move(right)} {
-    sensors_[0]->on_strobe([this](int output) { return strobe(output); });
+    if (is_strobe_wired) sensors_[0]->on_strobe([this](int output) { return strobe(output); });
   }
   /// The left camera's thread uses the right one.
   ~Pair() override { std::ignore = sensors_[0]->plug(false); }
@@ -76,6 +78,9 @@ class Pair final : public GigeCameras {
   }
   Result<void> plug(Side side, bool in) override { return sensors_[index(side)]->plug(in); }
   void set_clock(Side side, std::chrono::nanoseconds by) override { sensors_[index(side)]->set_clock(by); }
+  std::string value(Side side, const std::string& feature) const override {
+    return sensors_[index(side)]->value(feature);
+  }
 
  private:
   static std::size_t index(Side side) { return side == Side::left ? 0 : 1; }
@@ -128,14 +133,14 @@ Result<std::unique_ptr<GigeCameras>> GigeCameras::start(const GigeCamerasOptions
     own.side = side;
     own.address = side == Side::left ? options.left_address : options.right_address;
     own.serial = side == Side::left ? options.left_serial : options.right_serial;
-    own.size = options.size;
+    own.model = options.model;
+    own.model.sensor = options.size;
+    if (own.model.state && side == Side::right) *own.model.state += kRightState;
+    own.nominal_exposure = options.nominal_exposure;
     own.late_by = options.late_by;
-    own.trigger_selector = options.trigger_selector;
     own.frame_after = options.frame_after;
     own.ready = options.ready;
     own.numbered = options.numbered;
-    own.outputs = options.outputs;
-    own.max_exposure = options.max_exposure;
     // No two crystals agree.
     own.clock_ahead = side == Side::left ? std::chrono::seconds(4711) : std::chrono::seconds(-123);
     own.clock_drift = side == Side::left ? 30e-6 : -40e-6;
@@ -145,7 +150,7 @@ Result<std::unique_ptr<GigeCameras>> GigeCameras::start(const GigeCamerasOptions
   if (!left) return pass_on(left);
   auto right = sensor(Side::right);
   if (!right) return pass_on(right);
-  return std::make_unique<Pair>(std::move(*left), std::move(*right), clock);
+  return std::make_unique<Pair>(std::move(*left), std::move(*right), options.is_strobe_wired, clock);
 }
 
 void draw_test_image(Side side, const GigeExposure& exposure, cv::Mat& image) {

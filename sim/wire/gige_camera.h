@@ -8,7 +8,7 @@
 
 #include "core/clock.h"
 #include "core/result.h"
-#include "sim/wire/gige_outputs.h"
+#include "sim/wire/gige_model.h"
 
 namespace scanrig::sim::wire {
 
@@ -51,14 +51,14 @@ struct GigeCamerasOptions {
   std::string right_serial = "40012346";
   cv::Size size{160, 120};
   std::chrono::milliseconds late_by{150};
-  std::string trigger_selector = "FrameStart";  ///< name of the trigger that starts a frame
-  std::chrono::microseconds frame_after{0};     ///< from the edge to the frame: exposure and readout
+  bool is_strobe_wired = true;  ///< the left camera's outputs go to the projector and to the right camera
+  GigeModel model;              ///< of both; its sensor is `size`
+  /// Exposure for which the source's images are right; others are darker or brighter. 0: exposure has no effect.
+  std::chrono::microseconds nominal_exposure{0};
+  std::chrono::microseconds frame_after{0};  ///< from the edge to the frame: exposure and readout
   /// Whether a due frame can be read out; empty: always.
   std::function<bool(const GigeExposure& exposure)> ready;
   bool numbered = true;  ///< write the number of the edge into every frame
-  GigeOutputs outputs = GigeOutputs::full;
-  /// Longest exposure that the cameras take, whatever is requested; 0: any.
-  std::chrono::microseconds max_exposure{0};
 };
 
 /// Light of a projector on the left camera's outputs: Line1 lights the pattern, Line2 plain light.
@@ -104,6 +104,8 @@ class GigeCameras {
   virtual Result<void> plug(Side side, bool in) = 0;
   /// Sets a camera's clock forward (or back).
   virtual void set_clock(Side side, std::chrono::nanoseconds by) = 0;
+  /// Value of a camera's feature, as in its registers. For tests only.
+  [[nodiscard]] virtual std::string value(Side side, const std::string& feature) const = 0;
 };
 
 /// Grey texture that changes with every exposure; bright with the pattern, dim without.

@@ -1,14 +1,16 @@
 // scanrig-gige-camera: two GigE Vision cameras in a process of their own, for tests of the camera driver.
 //
-//   scanrig-gige-camera GPIO_SOCKET WIDTH HEIGHT LATE_MS [TRIGGER_SELECTOR [OUTPUTS]]
+//   scanrig-gige-camera GPIO_SOCKET WIDTH HEIGHT LATE_MS [TRIGGER_SELECTOR [OUTPUTS [PROPERTY...]]]
 //
 // Serves the trigger lines DOTS and PLAIN on GPIO_SOCKET (see gpio_socket.h): a rising edge exposes both cameras.
 // Prints "ready" when both are on the wire. Accepts commands, one per line, with the reply "ok" or words:
 //   fault left|right KIND COUNT        rates LOST LATE TORN STALE SEED      counts
 //   plug left|right 0|1                clock left|right MILLISECONDS        edge 0|1
+//   value left|right FEATURE           of its registers
 //   flash N                            the Nth flash by the left camera's outputs, from 0: "pattern 1234" (ns) or
 //   "none" lit                                whether one is lit now: "0" or "1"
-// OUTPUTS: see parse_gige_outputs().
+// OUTPUTS: see parse_gige_outputs(). PROPERTY: see change_gige_model(), or exposure-us=N, the exposure for which the
+// images are right.
 // Ends at the end of its input. Run it in its own network namespace.
 
 #include <iostream>
@@ -67,6 +69,11 @@ std::string obey(GigeCameras& cameras, const std::string& line) {
     cameras.set_clock(side, std::chrono::milliseconds(by));
     return "ok";
   }
+  if (verb == "value") {
+    const Side side = read_side();
+    words >> kind;
+    return cameras.value(side, kind);
+  }
   if (verb == "edge") {
     bool pattern = false;
     words >> pattern;
@@ -79,6 +86,13 @@ std::string obey(GigeCameras& cameras, const std::string& line) {
   }
   if (verb == "lit") return cameras.is_lit() ? "1" : "0";
   return "what?";
+}
+
+Result<void> change(GigeCamerasOptions& options, const std::string& property) {
+  constexpr std::string_view kExposure = "exposure-us=";
+  if (!property.starts_with(kExposure)) return change_gige_model(options.model, property);
+  options.nominal_exposure = std::chrono::microseconds(std::atol(property.c_str() + kExposure.size()));
+  return {};
 }
 
 int run(const std::string& socket, const GigeCamerasOptions& options) {
@@ -106,14 +120,18 @@ int run(const std::string& socket, const GigeCamerasOptions& options) {
 
 int main(int argc, char** argv) {
   const auto outputs = scanrig::sim::wire::parse_gige_outputs(argc > 6 ? argv[6] : "full");
-  if (argc < 5 || argc > 7 || !outputs) {
-    std::cerr << "usage: scanrig-gige-camera GPIO_SOCKET WIDTH HEIGHT LATE_MS [TRIGGER_SELECTOR [OUTPUTS]]\n";
+  scanrig::sim::wire::GigeCamerasOptions options;
+  scanrig::Result<void> changed;
+  for (int i = 7; i < argc && changed; ++i) changed = scanrig::sim::wire::change(options, argv[i]);
+  if (argc < 5 || !outputs || !changed) {
+    if (!changed) std::cerr << changed.error().message << '\n';
+    std::cerr
+        << "usage: scanrig-gige-camera GPIO_SOCKET WIDTH HEIGHT LATE_MS [TRIGGER_SELECTOR [OUTPUTS [PROPERTY...]]]\n";
     return static_cast<int>(scanrig::ExitCode::usage);
   }
-  scanrig::sim::wire::GigeCamerasOptions options;
   options.size = {std::atoi(argv[2]), std::atoi(argv[3])};
   options.late_by = std::chrono::milliseconds(std::atoi(argv[4]));
-  if (argc > 5) options.trigger_selector = argv[5];
-  options.outputs = *outputs;
+  if (argc > 5) options.model.frame_trigger = argv[5];
+  options.model.outputs = *outputs;
   return scanrig::sim::wire::run(argv[1], options);
 }

@@ -1,10 +1,7 @@
 #pragma once
 
 #include <optional>
-#include <string>
 #include <string_view>
-
-struct _ArvFakeCamera;  // NOLINT: name of Aravis
 
 namespace scanrig::sim::wire {
 
@@ -18,11 +15,5 @@ enum class GigeOutputs {
 
 /// By the name of the enumerator, with dashes; nothing for other names.
 std::optional<GigeOutputs> parse_gige_outputs(std::string_view word);
-
-/// Nodes of a GenICam description. Line0 is an input.
-std::string describe_outputs(GigeOutputs outputs);
-
-/// Number of the output that is active while the camera exposes, by its registers.
-std::optional<int> output_while_exposing(_ArvFakeCamera* camera);
 
 }  // namespace scanrig::sim::wire

@@ -1,36 +1,30 @@
 #pragma once
 
-#include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <mutex>
 #include <thread>
 
 #include "sim/wire/gige_camera.h"
-
-struct _ArvBuffer;        // NOLINT: names of Aravis
-struct _ArvFakeCamera;    // NOLINT
-struct _ArvGvFakeCamera;  // NOLINT
+#include "sim/wire/gige_wire.h"
 
 namespace scanrig::sim::wire {
 
 struct GigeSensorOptions {
   Side side = Side::left;
   std::string address, serial;
-  cv::Size size;
+  GigeModel model;
+  std::chrono::microseconds nominal_exposure{0};
   std::chrono::milliseconds late_by{0};
-  std::string trigger_selector;
   std::chrono::nanoseconds clock_ahead{0};
   double clock_drift = 0.0;
   std::chrono::microseconds frame_after{0};
   std::function<bool(const GigeExposure&)> ready;
   bool numbered = true;
-  GigeOutputs outputs = GigeOutputs::full;
-  std::chrono::microseconds max_exposure{0};
 };
 
-/// One of GigeCameras: Aravis' GigE Vision camera on the wire with its own frames, ids and stamps. Line0 has the value
-/// of Software in its GenICam description, and an edge writes the software trigger's register from within.
+/// One of GigeCameras: a GigE Vision camera on the wire with its own frames, ids and stamps. Ids restart with every
+/// acquisition.
 class GigeSensor {
  public:
   static Result<std::unique_ptr<GigeSensor>> start(const GigeSensorOptions& options, FrameSource source, Clock& clock);
@@ -50,6 +44,8 @@ class GigeSensor {
   /// Number of the output that is active while it exposes; nothing while it is unplugged.
   [[nodiscard]] std::optional<int> output() const;
   [[nodiscard]] std::chrono::microseconds exposure_time() const;
+  /// Value of a feature as text, for tests.
+  [[nodiscard]] std::string value(const std::string& feature) const;
 
  private:
   struct Frame {
@@ -58,33 +54,38 @@ class GigeSensor {
     GigeExposure exposure;
     GigeFault fault = GigeFault::none;
     Clock::TimePoint due;
+    bool is_by_edge = false;  // its image has to be ready
   };
 
-  GigeSensor(const GigeSensorOptions& options, FrameSource source, Clock& clock, std::string description);
-  static void fill(_ArvBuffer* buffer, void* self, std::uint32_t exposure_us, std::uint32_t gain, std::uint32_t format);
-  void fill(_ArvBuffer* buffer);
+  GigeSensor(const GigeSensorOptions& options, FrameSource source, Clock& clock);
+  GvcpStatus write(std::uint32_t address, std::uint32_t value);
+  void expose_by_software();
+  void stop_acquiring();
   void draw(const Frame& frame, cv::Mat& image) const;
+  void send(const Frame& frame, const std::stop_token& stop);
   void send_frames(const std::stop_token& stop);
-  Frame exposed_by_host();
-  [[nodiscard]] Frame new_frame(const GigeExposure& exposure);
+  void run_freely();
   [[nodiscard]] bool streaming() const;
+  [[nodiscard]] bool waits_for(const std::string& source) const;
+  [[nodiscard]] bool runs_freely() const;
+  [[nodiscard]] std::size_t frame_trigger() const;
+  [[nodiscard]] std::optional<int> active_output() const;
+  [[nodiscard]] Frame new_frame(const GigeExposure& exposure);
 
   const GigeSensorOptions options_;
   const FrameSource source_;
   Clock& clock_;
-  const std::string description_;  // file of the GenICam description
   const Clock::TimePoint started_;
-  const int nudge_socket_;
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;
-  _ArvGvFakeCamera* camera_ = nullptr;
-  _ArvFakeCamera* core_ = nullptr;  // belongs to camera_
-  std::uint16_t last_id_ = 65000;   // the ids wrap soon
+  GigeRegisters registers_;
+  std::shared_ptr<GigeWire> wire_;  // nothing while it is unplugged
+  std::uint16_t last_id_ = 0;
   std::chrono::nanoseconds set_by_{0};
   std::deque<Frame> queue_;
-  std::optional<Frame> triggered_;  // the frame of the last register write
-  std::optional<Frame> last_;       // the frame before, for `stale`
+  std::optional<Frame> last_;  // the frame before, for `stale`
+  Clock::TimePoint busy_until_{}, next_free_{};
   std::uint64_t by_software_ = 0;
   std::function<Strobe(int output)> on_strobe_;
   std::jthread sender_;

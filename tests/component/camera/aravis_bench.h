@@ -17,11 +17,12 @@ class AravisBench : public StereoCameraBench {
 
   explicit AravisBench(
       const Change& change = [](auto&) {}, int late_ms = 400, const std::string& selector = "FrameStart",
-      const std::string& outputs = "full") {
-    far_ = std::make_unique<FarCameras>(
-        SCANRIG_GIGE_CAMERA,
-        std::vector<std::string>{socket_, std::to_string(size_.width), std::to_string(size_.height),
-                                 std::to_string(late_ms), selector, outputs});
+      const std::string& outputs = "full", const std::vector<std::string>& properties = {},
+      Clock::Duration limit = std::chrono::seconds(10)) {
+    std::vector<std::string> words{
+        socket_, std::to_string(size_.width), std::to_string(size_.height), std::to_string(late_ms), selector, outputs};
+    words.insert(words.end(), properties.begin(), properties.end());
+    far_ = std::make_unique<FarCameras>(SCANRIG_GIGE_CAMERA, words);
     EXPECT_EQ(far_->hear(), "ready");
     options_.left = {"40012345", "127.0.0.1"};
     options_.right = {"40012346", "127.0.0.2"};
@@ -33,7 +34,15 @@ class AravisBench : public StereoCameraBench {
     auto line = lines_->output({"DOTS", false});
     EXPECT_TRUE(line) << line.error().message;
     line_ = std::move(*line);
-    opened_ = open_aravis(options_, clock_, Deadline::after(clock_, std::chrono::seconds(10)));
+    open(limit);
+  }
+
+  /// Connects, and returns how long it took.
+  Clock::Duration open(Clock::Duration limit = std::chrono::seconds(10)) {
+    opened_ = fail(ErrorCode::io, "not open");  // the camera's control is given back
+    const auto begun = clock_.now();
+    opened_ = open_aravis(options_, clock_, Deadline::after(clock_, limit));
+    return clock_.now() - begun;
   }
 
   [[nodiscard]] const Result<std::unique_ptr<SensorCamera>>& opened() const { return opened_; }

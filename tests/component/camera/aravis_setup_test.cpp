@@ -128,7 +128,7 @@ TEST(AravisSetup, ACameraThatCallsItsTriggerFrameBurstStartIsTriggeredByThat) {
 }
 
 TEST(AravisSetup, ACameraThatCallsItsTriggerAcquisitionStartOnlyIsTriggeredByThat) {
-  AravisBench bench([](auto&) {}, 400, "LineStart");
+  AravisBench bench([](auto&) {}, 400, "AcquisitionStart");
   EXPECT_TRUE(bench.opened()) << bench.opened().error().message;
 }
 

@@ -50,7 +50,7 @@ class CamerasOnWires : public RigOnWires {
 };
 
 TEST_F(CamerasOnWires, AScanRedoesALostExposureUsesTheFramesOfOneEdgeOnlyAndEndsInTheModel) {
-  start_rig({"--cameras", "gige", "--scale", "0.25", "--number-frames"});
+  start_rig({"--cameras", "gige", "--scale", "0.25", "--number-frames", "--camera-state", "7"});
   start_daemon({SCANRIGD_PROGRAM});
   ASSERT_TRUE(press_until("reset", [&] { return machine() == "Operational.Ready"; })) << log();
   ASSERT_EQ(say({{"set", {{"camera_fault", "lost"}, {"camera", "right"}}}})["ok"], true);

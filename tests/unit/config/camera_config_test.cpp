@@ -42,7 +42,7 @@ class EyesConfigTest : public RigFile {
 };
 
 TEST_F(EyesConfigTest, AravisCamerasTakeTheirOptions) {
-  std::string text = replaced(example_, "# gain = 6.0", "gain = 6");
+  std::string text = replaced(example_, "# gain = 6.0", "black_level = 4\ngain = 6");
   text = replaced(text, "# region = { x = 0, y = 0, width = 1280", "region = { x = 8, y = 4, width = 640");
   text = replaced(text, "# idle_refresh_s = 10", "idle_refresh_s = 60");
   text = replaced(text, "\"Line0\", edge = \"rising\"", "\"Line0\", edge = \"falling\"");
@@ -58,6 +58,7 @@ TEST_F(EyesConfigTest, AravisCamerasTakeTheirOptions) {
   EXPECT_EQ(options.exposure, microseconds(12000));
   EXPECT_EQ(rig->stereo_camera.exposure, microseconds(12000));
   EXPECT_EQ(options.gain, 6.0);
+  EXPECT_EQ(options.black_level, 4.0);
   ASSERT_TRUE(options.region);
   EXPECT_EQ(options.region->x, 8);
   EXPECT_EQ(options.region->y, 4);
@@ -113,6 +114,8 @@ TEST_F(EyesConfigTest, OneV4l2DeviceMayDeliverBothImages) {
 TEST_F(EyesConfigTest, WhatACameraCannotDoIsToldWithLineAndRange) {
   expect_problem("exposure_us = 12000", "exposure_us = 5",
                  "[stereo_camera] exposure_us: 5 is not between 10 and 1000000");
+  expect_problem("# gain = 6.0", "black_level = -101",
+                 "[stereo_camera] black_level: -101 is not between -100 and 10000");
   expect_problem("# gain = 6.0", "gain = 20000", "[stereo_camera] gain: 20000 is not between -100 and 10000");
   expect_problem("# region = { x = 0, y = 0, width = 1280", "region = { x = 0, y = 0, width = 8",
                  "[stereo_camera] region.width: 8 is not between 16 and 65535");
