@@ -5,12 +5,14 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 
 namespace scanrig {
 namespace {
 
-constexpr std::uint32_t kBuffers = 4;
+constexpr std::uint32_t kVideoBuffers = 4;
+constexpr std::chrono::microseconds kExposureUnit{100};  // of V4L2_CID_EXPOSURE_ABSOLUTE
 
 struct Fourcc {
   std::uint32_t code;
@@ -120,8 +122,9 @@ Result<void> V4l2Sensor::set_format() {
   format.fmt.pix.field = V4L2_FIELD_NONE;
   const v4l2_pix_format wanted = format.fmt.pix;
   if (auto set = call(VIDIOC_S_FMT, &format, "set the image format"); !set) return set;
+  // The driver may reply with other values, or keep others.
+  if (auto read = call(VIDIOC_G_FMT, &format, "read the image format"); !read) return read;
   format_ = format.fmt.pix;
-  // The driver may reply with other values.
   if (format_.pixelformat != code || format_.width != wanted.width || format_.height != wanted.height) {
     return fail(ErrorCode::unsupported, "{}: asked for {} of {}x{} it delivers {}x{} or another format", name_,
                 options_.pixel_format, wanted.width, wanted.height, format_.width, format_.height);
@@ -129,38 +132,68 @@ Result<void> V4l2Sensor::set_format() {
   return {};
 }
 
-Result<void> V4l2Sensor::set_controls() {
-  constexpr int kExposureUnit = 100;  // us
-  const auto exposure = static_cast<int>(std::max<long>(1, options_.exposure.count() / kExposureUnit));
-  if (auto set = set_control(V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL, false); !set) return set;
-  if (auto set = set_control(V4L2_CID_EXPOSURE_ABSOLUTE, exposure, false); !set) return set;
-  if (auto set = set_control(V4L2_CID_AUTOGAIN, 0, false); !set) return set;
-  if (auto set = set_control(V4L2_CID_FOCUS_AUTO, 0, false); !set) return set;
-  if (options_.gain) {
-    if (auto set = set_control(V4L2_CID_GAIN, *options_.gain, true); !set) return set;
+/// Controls in the order in which they are set: a value that an automatic has cannot be set.
+std::vector<V4l2Sensor::Wanted> V4l2Sensor::wanted_controls() const {
+  const auto exposure = static_cast<int>(std::max<long>(1, options_.exposure.count() / kExposureUnit.count()));
+  const int coarse = std::max(1, exposure / 20);  // devices round to lines of the sensor
+  std::vector<Wanted> all{{V4L2_CID_EXPOSURE_AUTO, V4L2_EXPOSURE_MANUAL, "manual exposure"},
+                          {V4L2_CID_EXPOSURE_AUTO_PRIORITY, 0, "a constant frame rate"},
+                          {V4L2_CID_AUTOGAIN, 0, "a constant gain"},
+                          {V4L2_CID_AUTO_WHITE_BALANCE, 0, "a constant white balance"},
+                          {V4L2_CID_FOCUS_AUTO, 0, "a fixed focus"},
+                          {V4L2_CID_EXPOSURE_ABSOLUTE, exposure, "an exposure in units of 100 us", coarse}};
+  if (options_.gain) all.push_back({V4L2_CID_GAIN, *options_.gain, "a gain", 0, true});
+  for (const auto& [id, value] : options_.controls) all.push_back({id, value, "", 0, true});
+  for (Wanted& wanted : all) {
+    if (wanted.what.empty()) wanted.what = fmt::format("control 0x{:08X}", wanted.id);
   }
-  for (const auto& [id, value] : options_.controls) {
-    if (auto set = set_control(id, value, true); !set) return set;
+  return all;
+}
+
+/// They are read back when all are set: a maker's trigger mode may change an exposure.
+Result<void> V4l2Sensor::set_controls() {
+  std::vector<Wanted> readable;
+  for (const Wanted& wanted : wanted_controls()) {
+    const auto may_read = set_control(wanted);
+    if (!may_read) return pass_on(may_read);
+    if (*may_read) readable.push_back(wanted);
+  }
+  for (const Wanted& wanted : readable) {
+    if (auto kept = check_control(wanted); !kept) return kept;
   }
   return {};
 }
 
-Result<void> V4l2Sensor::set_control(std::uint32_t id, int value, bool must_exist) {
+/// Returns whether the control can be read.
+Result<bool> V4l2Sensor::set_control(const Wanted& wanted) {
   v4l2_queryctrl asked{};
-  asked.id = id;
+  asked.id = wanted.id;
   if (calls_.control(descriptor_, VIDIOC_QUERYCTRL, &asked) < 0) {
-    if (errno != EINVAL) return failed(fmt::format("ask for control 0x{:08X}", id), errno);
-    if (!must_exist) return {};
-    return fail(ErrorCode::invalid_input, "{}: there is no control 0x{:08X}", name_, id);
+    if (errno != EINVAL) return failed(fmt::format("ask for control 0x{:08X}", wanted.id), errno);
+    if (!wanted.must_exist) return false;
+    return fail(ErrorCode::invalid_input, "{}: there is no control 0x{:08X}", name_, wanted.id);
   }
-  v4l2_control control{id, value};
-  const std::string what = fmt::format("set control 0x{:08X} to {}", id, value);
-  return call(VIDIOC_S_CTRL, &control, what.c_str());
+  v4l2_control control{wanted.id, wanted.value};
+  const std::string what = fmt::format("set control 0x{:08X} to {}", wanted.id, wanted.value);
+  const bool is_fixed = (asked.flags & V4L2_CTRL_FLAG_READ_ONLY) != 0;  // read back, it may have the value
+  if (!is_fixed) {
+    if (auto set = call(VIDIOC_S_CTRL, &control, what.c_str()); !set) return pass_on(set);
+  }
+  return (asked.flags & V4L2_CTRL_FLAG_WRITE_ONLY) == 0 && asked.type != V4L2_CTRL_TYPE_BUTTON;
+}
+
+Result<void> V4l2Sensor::check_control(const Wanted& wanted) {
+  v4l2_control control{wanted.id, 0};
+  const std::string what = fmt::format("read control 0x{:08X}", wanted.id);
+  if (auto read = call(VIDIOC_G_CTRL, &control, what.c_str()); !read) return read;
+  if (std::abs(control.value - wanted.value) <= wanted.tolerance) return {};
+  return fail(ErrorCode::invalid_input, "{}: asked for {} ({}) it has {}; choose a value that v4l2-ctl -L shows", name_,
+              wanted.what, wanted.value, control.value);
 }
 
 Result<void> V4l2Sensor::start() {
   v4l2_requestbuffers request{};
-  request.count = kBuffers;
+  request.count = kVideoBuffers;
   request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   request.memory = V4L2_MEMORY_MMAP;
   if (auto asked = call(VIDIOC_REQBUFS, &request, "ask for buffers"); !asked) return asked;

@@ -26,6 +26,13 @@ class V4l2Sensor final : public Sensor {
   Result<void> trigger() override;
 
  private:
+  struct Wanted {
+    std::uint32_t id;
+    int value;
+    std::string what;
+    int tolerance = 0;
+    bool must_exist = false;
+  };
   struct Buffer {
     void* address;
     std::size_t length;
@@ -35,7 +42,9 @@ class V4l2Sensor final : public Sensor {
   Result<void> connect();
   Result<void> set_format();
   Result<void> set_controls();
-  Result<void> set_control(std::uint32_t id, int value, bool must_exist);
+  [[nodiscard]] std::vector<Wanted> wanted_controls() const;
+  Result<bool> set_control(const Wanted& wanted);
+  Result<void> check_control(const Wanted& wanted);
   Result<void> start();
   void disconnect();
   Result<void> call(unsigned long request, void* argument, const char* what);

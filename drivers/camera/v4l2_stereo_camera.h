@@ -34,7 +34,8 @@ struct V4l2Options {
 std::unique_ptr<SensorCamera> v4l2_camera(const V4l2Options& options, VideoCalls& calls, Clock& clock);
 
 /// Devices, opened and started. Fails with `not_found`, `io` (in use, access refused), `unsupported` (no capture
-/// device, no such pixel format or size, time stamps that are not monotonic), `invalid_input` (a control's value).
+/// device, no such pixel format or size, time stamps that are not monotonic), `invalid_input` (a control's value that
+/// the device rejects, or keeps another instead of: all are read back).
 Result<std::unique_ptr<SensorCamera>> open_v4l2(const V4l2Options& options, VideoCalls& calls, Clock& clock,
                                                 Deadline deadline);
 

@@ -81,8 +81,14 @@ int ScriptedVideo::control(int descriptor, unsigned long request, void* argument
       device->length = pix.sizeimage;
       return 0;
     }
-    case VIDIOC_QUERYCTRL: return known.contains(static_cast<v4l2_queryctrl*>(argument)->id) ? 0 : refuse(EINVAL);
+    case VIDIOC_G_FMT:
+      if (keeps_other_size) static_cast<v4l2_format*>(argument)->fmt.pix.width = 1234;
+      return 0;
+    case VIDIOC_QUERYCTRL:
+      static_cast<v4l2_queryctrl*>(argument)->flags = flags[static_cast<v4l2_queryctrl*>(argument)->id];
+      return known.contains(static_cast<v4l2_queryctrl*>(argument)->id) ? 0 : refuse(EINVAL);
     case VIDIOC_S_CTRL: return set_control(*static_cast<v4l2_control*>(argument));
+    case VIDIOC_G_CTRL: return read_control(*static_cast<v4l2_control*>(argument));
     case VIDIOC_REQBUFS:
       device->buffers.assign(static_cast<v4l2_requestbuffers*>(argument)->count,
                              std::vector<std::uint8_t>(device->length));
@@ -106,7 +112,17 @@ int ScriptedVideo::control(int descriptor, unsigned long request, void* argument
 int ScriptedVideo::set_control(const v4l2_control& control) {
   if (!known.contains(control.id)) return refuse(EINVAL);
   if (limit.contains(control.id) && control.value > limit[control.id]) return refuse(ERANGE);
-  known[control.id] = control.value;
+  if ((flags[control.id] & V4L2_CTRL_FLAG_READ_ONLY) != 0) return refuse(EACCES);
+  const int each = step.contains(control.id) ? step[control.id] : 1;
+  known[control.id] = control.value / each * each;
+  if (side_effects.contains(control.id)) known[side_effects[control.id].first] = side_effects[control.id].second;
+  return 0;
+}
+
+int ScriptedVideo::read_control(v4l2_control& control) {
+  if (!known.contains(control.id)) return refuse(EINVAL);
+  if ((flags[control.id] & V4L2_CTRL_FLAG_WRITE_ONLY) != 0) return refuse(EACCES);
+  control.value = known[control.id];
   return 0;
 }
 

@@ -33,9 +33,13 @@ class ScriptedVideo final : public VideoCalls {
 
   std::uint32_t capabilities = V4L2_CAP_VIDEO_CAPTURE | V4L2_CAP_STREAMING;
   std::uint32_t stamps = V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC | V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
-  bool other_size = false;             ///< replies to S_FMT with another size
-  std::map<std::uint32_t, int> known;  ///< controls and their values
-  std::map<std::uint32_t, int> limit;  ///< largest value of a control
+  bool other_size = false;                       ///< replies to S_FMT with another size
+  std::map<std::uint32_t, int> known;            ///< controls and their values
+  std::map<std::uint32_t, int> limit;            ///< largest value of a control
+  std::map<std::uint32_t, int> step;             ///< of a control: values are rounded down to a multiple
+  std::map<std::uint32_t, std::uint32_t> flags;  ///< of a control
+  std::map<std::uint32_t, std::pair<std::uint32_t, int>> side_effects;  ///< a control that changes another one
+  bool keeps_other_size = false;                                        ///< confirms S_FMT, and keeps another size
 
   void add(const std::string& device) { devices_[device]; }
   void deliver(const std::string& device, Frame frame);
@@ -64,6 +68,7 @@ class ScriptedVideo final : public VideoCalls {
   [[nodiscard]] bool due(const Device& device) const;
   int take(Device& device, v4l2_buffer& buffer);
   int set_control(const v4l2_control& control);
+  int read_control(v4l2_control& control);
 
   Clock& clock_;
   mutable std::mutex mutex_;

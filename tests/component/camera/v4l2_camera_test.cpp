@@ -75,6 +75,72 @@ TEST(V4l2Camera, ExposureIsManualAndFocusFixed) {
   EXPECT_EQ(bench.video().known[V4L2_CID_FOCUS_AUTO], 0);
 }
 
+TEST(V4l2Camera, WhiteBalanceAndGainAreNotLeftToTheDevice) {
+  V4l2Bench bench(false, [](auto& options, auto& video) {
+    video.known = {{V4L2_CID_AUTO_WHITE_BALANCE, 1}, {V4L2_CID_AUTOGAIN, 1}, {V4L2_CID_GAIN, 3}};
+    options.gain = 7;
+  });
+  ASSERT_TRUE(bench.opened()) << bench.opened().error().message;
+  EXPECT_EQ(bench.video().known[V4L2_CID_AUTO_WHITE_BALANCE], 0);
+  EXPECT_EQ(bench.video().known[V4L2_CID_AUTOGAIN], 0);
+  EXPECT_EQ(bench.video().known[V4L2_CID_GAIN], 7);
+}
+
+TEST(V4l2Camera, AnExposureThatIsRoundedFarIsNamed) {
+  const auto rounded = [](int step) {
+    return [step](auto&, auto& video) {
+      video.known[V4L2_CID_EXPOSURE_ABSOLUTE] = 156;
+      video.step[V4L2_CID_EXPOSURE_ABSOLUTE] = step;
+    };
+  };
+  const V4l2Bench close(false, rounded(19));  // of 20 units
+  EXPECT_TRUE(close.opened()) << close.opened().error().message;
+  const auto error = refused(rounded(16));
+  EXPECT_EQ(error.code, ErrorCode::invalid_input);
+  EXPECT_THAT(error.message, HasSubstr("/dev/left: asked for an exposure in units of 100 us (20) it has 16"));
+}
+
+TEST(V4l2Camera, AnExposureThatATriggerModeChangesIsNamed) {
+  const auto error = refused([](auto& options, auto& video) {
+    video.known = {{V4L2_CID_EXPOSURE_ABSOLUTE, 156}, {0x0199e201, 0}};
+    video.side_effects[0x0199e201] = {V4L2_CID_EXPOSURE_ABSOLUTE, 500};
+    options.controls[0x0199e201] = 1;
+  });
+  EXPECT_EQ(error.code, ErrorCode::invalid_input);
+  EXPECT_THAT(error.message, HasSubstr("it has 500"));
+}
+
+TEST(V4l2Camera, AGainOrAnAutomaticThatTheDeviceKeepsIsNamed) {
+  const auto gain = refused([](auto& options, auto& video) {
+    video.known[V4L2_CID_GAIN] = 0;
+    video.step[V4L2_CID_GAIN] = 8;
+    options.gain = 12;
+  });
+  EXPECT_THAT(gain.message, HasSubstr("asked for a gain (12) it has 8"));
+  const auto automatic = refused([](auto&, auto& video) {
+    video.known[V4L2_CID_AUTO_WHITE_BALANCE] = 1;
+    video.flags[V4L2_CID_AUTO_WHITE_BALANCE] = V4L2_CTRL_FLAG_READ_ONLY;
+  });
+  EXPECT_EQ(automatic.code, ErrorCode::invalid_input);
+  EXPECT_THAT(automatic.message, HasSubstr("asked for a constant white balance (0) it has 1"));
+}
+
+TEST(V4l2Camera, AControlThatCannotBeReadIsWrittenOnly) {
+  V4l2Bench bench(false, [](auto& options, auto& video) {
+    video.known[0x0199e201] = 0;
+    video.flags[0x0199e201] = V4L2_CTRL_FLAG_WRITE_ONLY;
+    options.controls[0x0199e201] = 1;
+  });
+  ASSERT_TRUE(bench.opened()) << bench.opened().error().message;
+  EXPECT_EQ(bench.video().known[0x0199e201], 1);
+}
+
+TEST(V4l2Camera, ASizeThatIsConfirmedAndNotKeptIsUnsupported) {
+  const auto error = refused([](auto&, auto& video) { video.keeps_other_size = true; });
+  EXPECT_EQ(error.code, ErrorCode::unsupported);
+  EXPECT_THAT(error.message, HasSubstr("1234"));
+}
+
 TEST(V4l2Camera, WallClockStampsAreUnsupported) {
   V4l2Bench bench(false, [](auto&, auto& video) { video.stamps = V4L2_BUF_FLAG_TIMESTAMP_UNKNOWN; });
   ASSERT_TRUE(bench.opened());
