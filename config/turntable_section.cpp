@@ -138,6 +138,13 @@ void read_modbus_line(Section& s, modbus::ClientOptions& line) {
   s.choice<Parity>("parity", line.parity, {{"none", Parity::none}, {"even", Parity::even}, {"odd", Parity::odd}});
   s.number("unit_id", line.unit_id, {1, 247});
   s.number("reply_timeout_ms", line.reply_timeout, {10, 2000});
+  if (!s.has("rs485")) return;
+  s.section("rs485", [&](Section& direction) {
+    auto& rs485 = line.rs485.emplace();
+    direction.choice<bool>("rts", rs485.high_while_sending, {{"high", true}, {"low", false}});
+    if (direction.has("before_ms")) direction.number("before_ms", rs485.before, {0, 100});
+    if (direction.has("after_ms")) direction.number("after_ms", rs485.after, {0, 100});
+  });
 }
 
 void read_turntable(Section& s, const std::vector<std::filesystem::path>& drive_folders, TurntableConfig& turntable) {

@@ -178,6 +178,16 @@ Result<void> Client::open() {
   if (!options_.is_shared && ::flock(modbus_get_socket(context_.get()), LOCK_EX | LOCK_NB) != 0) {
     return give_up(errno == EWOULDBLOCK ? "another program is using it" : std::strerror(errno));
   }
+  // libmodbus has a mode of its own, but it sets neither level nor delays, and its set_rts switches RTS from the
+  // program, too late for a device that replies at once.
+  if (options_.rs485) {
+    if (auto used = serial::use_rs485(modbus_get_socket(context_.get()), *options_.rs485); !used) {
+      context_.reset();
+      ++statistics_.io_errors;
+      return pass_on(used, "open " + options_.device);
+    }
+  }
+  finding_ = serial::request_low_latency(modbus_get_socket(context_.get()), options_.device);
   ++statistics_.openings;
   reply_missed_ = true;  // earlier data of the device are not for this request
   return {};
@@ -209,8 +219,8 @@ Result<void> Client::failed(int error, const std::string& request) {
   }
   if (error == ETIMEDOUT) {
     ++statistics_.timeouts;
-    return fail(ErrorCode::timeout, "{}: no complete reply within {} ms; check power, wiring, baud and unit id",
-                request, options_.reply_timeout.count());
+    return fail(ErrorCode::timeout, "{}: no complete reply within {} ms; check power, wiring, baud and unit id{}",
+                request, options_.reply_timeout.count(), finding_ ? "; " + *finding_ : "");
   }
   if (refused(error)) {
     ++statistics_.refused;

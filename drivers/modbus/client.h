@@ -5,12 +5,14 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "core/clock.h"
 #include "core/result.h"
+#include "drivers/serial/line_options.h"
 
 struct _modbus;  // libmodbus' context NOLINT(bugprone-reserved-identifier): the library's own name
 
@@ -24,6 +26,7 @@ struct ClientOptions {
   Parity parity = Parity::none;  ///< one stop bit with even and odd, and with none
   int unit_id = 1;
   std::chrono::milliseconds reply_timeout{60};  ///< from request sent to whole reply received
+  std::optional<serial::Rs485> rs485{};         ///< empty: the port switches the direction by itself
   bool is_shared = false;                       ///< the port is used although another, hanging program has it
 };
 
@@ -43,7 +46,7 @@ struct ClientStatistics {
 /// After a missed reply the next request is held back until the line has been silent for twice `reply_timeout`. So a
 /// late reply is discarded and not taken for the next one. Every request fails with `timeout` (no whole
 /// reply), `protocol` (corrupt, or refused by the device: a Modbus exception), `io` (the port is absent, gone, or used
-/// by another program). Threads: one owner.
+/// by another program), `unsupported` (the port cannot do what `rs485` says). Threads: one owner.
 class Client {
  public:
   Client(ClientOptions options, Clock& clock);
@@ -97,6 +100,7 @@ class Client {
   std::atomic<bool> fail_fast_ = false;
   Clock::TimePoint last_byte_;
   ClientStatistics statistics_;
+  std::optional<std::string> finding_;  // a problem of the adapter, see request_low_latency()
 };
 
 }  // namespace scanrig::modbus

@@ -47,15 +47,19 @@ Result<Port> Port::open(const std::string& device, int baud, Lock lock) {
   if (descriptor < 0) return fail(ErrorCode::io, "open {}: {}", device, std::strerror(errno));
   Port port(descriptor, device);
   if (auto ready = set_up(descriptor, baud, lock); !ready) return pass_on(ready, "open " + device);
+  port.finding_ = request_low_latency(descriptor, device);
   return port;
 }
 
 Port::Port(Port&& other) noexcept
-    : descriptor_(std::exchange(other.descriptor_, -1)), device_(std::move(other.device_)) {}
+    : descriptor_(std::exchange(other.descriptor_, -1)),
+      device_(std::move(other.device_)),
+      finding_(std::move(other.finding_)) {}
 
 Port& Port::operator=(Port&& other) noexcept {
   std::swap(descriptor_, other.descriptor_);
   std::swap(device_, other.device_);
+  std::swap(finding_, other.finding_);
   return *this;
 }
 

@@ -1,10 +1,12 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include "core/clock.h"
 #include "core/result.h"
+#include "drivers/serial/line_options.h"
 
 namespace scanrig::serial {
 
@@ -25,6 +27,9 @@ class Port {
   /// Reads bytes as soon as any arrive within `wait`; empty when none do. Fails with `io`.
   Result<std::string> read(Clock::Duration wait);
 
+  /// A setting of the adapter that makes replies late, see request_low_latency(); nothing: none.
+  [[nodiscard]] const std::optional<std::string>& finding() const { return finding_; }
+
  private:
   Port(int descriptor, std::string device) : descriptor_(descriptor), device_(std::move(device)) {}
   /// True if `events` happen within `wait`. Fails with `io`.
@@ -32,6 +37,7 @@ class Port {
 
   int descriptor_ = -1;
   std::string device_;
+  std::optional<std::string> finding_;
 };
 
 }  // namespace scanrig::serial

@@ -105,8 +105,9 @@ Result<Line> Link::answer(std::string_view to, const std::function<bool(const Li
     if (!line) return pass_on(line);
     if (!*line) {
       ++statistics_.timeouts;
-      return fail(ErrorCode::timeout, "{}: no complete reply to \"{}\" within {} ms; check power, wiring and baud",
-                  options_.device, to, options_.reply_timeout.count());
+      const auto& finding = port_->finding();
+      return fail(ErrorCode::timeout, "{}: no complete reply to \"{}\" within {} ms; check power, wiring and baud{}",
+                  options_.device, to, options_.reply_timeout.count(), finding ? "; " + *finding : "");
     }
     if (wanted(**line)) {
       reply_missed_ = false;

@@ -61,6 +61,26 @@ TEST_F(RigConfigTest, IsNamedByTheTextItWasReadFrom) {
   EXPECT_EQ(sha256(rig->text), sha256(shipped("rigs/example.toml")));
 }
 
+TEST_F(RigConfigTest, TheDirectionOfRs485IsAKeyOfEachBus) {
+  EXPECT_FALSE(read(example_)->turntable.modbus.line.rs485) << "most adapters switch it by themselves";
+  const auto rig = read(replaced(example_, "unit_id = 1", "unit_id = 1\nrs485 = { rts = \"low\", after_ms = 2 }"));
+  ASSERT_TRUE(rig) << rig.error().message;
+  const auto& rs485 = rig->turntable.modbus.line.rs485;
+  ASSERT_TRUE(rs485);
+  EXPECT_FALSE(rs485->high_while_sending);
+  EXPECT_EQ(rs485->before, std::chrono::milliseconds(0));
+  EXPECT_EQ(rs485->after, std::chrono::milliseconds(2));
+  for (const auto& [key, problem] :
+       {std::pair("rs485 = { rts = \"on\" }", "[turntable] rs485.rts: \"on\" is not one of high, low"),
+        std::pair("rs485 = { rts = \"high\", before_ms = 101 }",
+                  "[turntable] rs485.before_ms: 101 is not between 0 and 100"),
+        std::pair("rs485 = true", "[turntable] rs485: must be a table")}) {
+    const auto wrong = read(replaced(example_, "unit_id = 1", std::string("unit_id = 1\n") + key));
+    ASSERT_FALSE(wrong) << key;
+    EXPECT_THAT(wrong.error().message, HasSubstr(problem));
+  }
+}
+
 TEST_F(RigConfigTest, AGrblTurntableHasItsOwnKeys) {
   std::string text = replaced(example_, "driver = \"modbus\"", "driver = \"grbl\"\naxis = \"A\"");
   for (const char* line :

@@ -42,7 +42,7 @@ TEST_F(RigProblems, UnknownKeysAndSectionsAreProblems) {
   expect_problem(
       "settle_ms = 200", "settle_ms = 200\nsettle = 1",
       "[turntable] settle: unknown key; known here: acceleration_deg_s2, backlash_deg, baud, device, driver, "
-      "gear_ratio, home, parity, positive, profile, pulses_per_motor_rev, reply_timeout_ms, settle_ms, "
+      "gear_ratio, home, parity, positive, profile, pulses_per_motor_rev, reply_timeout_ms, rs485, settle_ms, "
       "soft_limits, speed_deg_s, tolerance_deg, unit_id",
       "settle = 1");
   expect_problem("offset_deg = 0.0", "offset_deg = 0.0, speed = 3",

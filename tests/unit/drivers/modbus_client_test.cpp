@@ -60,6 +60,16 @@ TEST_F(LineTest, ALateAnswerIsNotTakenForTheNextOne) {
   EXPECT_EQ(line.statistics().corrupt, 0u);
 }
 
+TEST_F(LineTest, APortThatCannotSwitchTheDirectionIsNamedAtTheFirstRequest) {
+  options_.rs485.emplace();
+  modbus::Client line(options_, clock_);
+  const auto read = line.read(1, 1, soon());
+  ASSERT_FALSE(read);
+  EXPECT_EQ(read.error().code, ErrorCode::unsupported);
+  EXPECT_THAT(read.error().message, HasSubstr("open " + link_));
+  EXPECT_THAT(read.error().message, HasSubstr("does not switch the direction of RS-485"));
+}
+
 TEST_F(LineTest, AnAnswerLaterThanTheQuietLineIsRefusedByItsLength) {
   modbus::Client line(options_, clock_);
   expect_read(line, 1);
