@@ -179,12 +179,8 @@ void add_turntable(CLI::App& app, Chosen& chosen) {
   auto* sub = app.add_subcommand("turntable", "move or query the turntable itself, while no service runs");
   sub->require_subcommand(1);
   const auto add = [&](const char* name, const char* description) {
-    auto* action = sub->add_subcommand(name, description);
+    auto* action = add_action(*sub, chosen, name, description, verb, &turntable);
     action->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
-    action->callback([&chosen, verb, name] {
-      verb->what = name;
-      chosen = [verb] { return turntable(*verb); };
-    });
     return action;
   };
   auto* home = add("home", "find home");
@@ -206,6 +202,18 @@ void add_panel(CLI::App& app, Chosen& chosen) {
   watch->add_option("--seconds", verb->seconds, "how long; 0: until interrupted")->check(CLI::Range(0, 86400));
   watch->add_flag("--json", verb->json, "print JSON, a line a change");
   watch->callback([&chosen, verb] { chosen = [verb] { return watch_panel(*verb); }; });
+}
+
+void add_projector(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<ProjectorVerb>();
+  auto* sub = app.add_subcommand("projector", "a LightCrafter's firmware, while no service runs");
+  const CLI::IsMember known({"info", "load"});
+  sub->add_option("WHAT", verb->what, "info, or load: write FILE into its flash")->required()->check(known);
+  sub->add_option("FILE", verb->file, "load: firmware with the pattern's images, made with TI's control software");
+  sub->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
+  sub->add_flag("--yes", verb->yes, "load: without a question");
+  sub->add_flag("--json", verb->json, "print JSON");
+  sub->callback([&chosen, verb] { chosen = [verb] { return projector(*verb); }; });
 }
 
 void add_doctor(CLI::App& app, Chosen& chosen) {
@@ -241,11 +249,7 @@ void add_camera(CLI::App& app, Chosen& chosen) {
   auto* sub = app.add_subcommand("camera", "the cameras themselves");
   sub->require_subcommand(1);
   const auto add = [&](const char* name, const char* description) {
-    auto* action = sub->add_subcommand(name, description);
-    action->callback([&chosen, verb, name] {
-      verb->what = name;
-      chosen = [verb] { return camera(*verb); };
-    });
+    auto* action = add_action(*sub, chosen, name, description, verb, &camera);
     return action;
   };
   add("list", "every camera on network, USB and V4L2, with its serial number")
@@ -285,6 +289,7 @@ void add_rig_commands(CLI::App& app, Chosen& chosen) {
   add_turntable(app, chosen);
   add_panel(app, chosen);
   add_setup(app, chosen);
+  add_projector(app, chosen);
   add_doctor(app, chosen);
   add_camera(app, chosen);
   add_guardian(app, chosen);

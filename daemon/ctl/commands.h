@@ -36,4 +36,16 @@ CLI::App* add_client(CLI::App& app, Chosen& chosen, const char* name, const char
   return sub;
 }
 
+/// One of a verb's actions: `run` gets the verb with the action's name as `what`.
+template <class Verb>
+CLI::App* add_action(CLI::App& sub, Chosen& chosen, const char* name, const char* description,
+                     std::shared_ptr<Verb> verb, ExitCode (*run)(const Verb&)) {
+  auto* action = sub.add_subcommand(name, description);
+  action->callback([&chosen, verb, name, run] {
+    verb->what = name;
+    chosen = [verb, run] { return run(*verb); };
+  });
+  return action;
+}
+
 }  // namespace scanrig::ctl

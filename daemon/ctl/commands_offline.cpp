@@ -69,14 +69,10 @@ void add_convert(CLI::App& app, Chosen& chosen) {
   auto* sub = app.add_subcommand("convert", "write a calibration, or the views of a scan, for other programs");
   sub->require_subcommand(1);
   const auto add = [&](const char* name, const char* description, const char* from, const char* out) {
-    auto* action = sub->add_subcommand(name, description);
+    auto* action = add_action(*sub, chosen, name, description, verb, &convert);
     action->add_option("FROM", verb->from, from)->required();
     action->add_option("--out", verb->out, out)->required();
     action->add_flag("--json", verb->json, "print JSON");
-    action->callback([&chosen, verb, name] {
-      verb->what = name;
-      chosen = [verb] { return convert(*verb); };
-    });
     return action;
   };
   constexpr const char* kCalibration = "calibration.json, or a folder that has one";
@@ -100,14 +96,10 @@ void add_token(CLI::App& app, Chosen& chosen) {
   auto* sub = app.add_subcommand("token", "who may use the API over TCP");
   sub->require_subcommand(1);
   const auto add = [&](const char* name, const char* description) {
-    auto* action = sub->add_subcommand(name, description);
+    auto* action = add_action(*sub, chosen, name, description, verb, &token);
     action->add_option("--file", verb->file, "the file of tokens (default: the one that the configuration names)");
     action->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
     action->add_flag("--json", verb->json, "print JSON");
-    action->callback([&chosen, verb, name] {
-      verb->what = name;
-      chosen = [verb] { return token(*verb); };
-    });
     return action;
   };
   auto* make = add("add", "make a token and print it, once");

@@ -215,6 +215,16 @@ struct PanelVerb {
 };
 ExitCode watch_panel(const PanelVerb& verb);
 
+struct ProjectorVerb {
+  std::string what;  ///< "info", "load"
+  std::filesystem::path config = "/etc/scanrig/rig.toml";
+  std::filesystem::path file;  ///< load: the firmware
+  bool yes = false;
+  bool json = false;
+};
+/// Of a LightCrafter 4500 only.
+ExitCode projector(const ProjectorVerb& verb);
+
 struct CameraVerb {
   std::string what;  ///< "list", "tune", "grab", "preview"
   std::filesystem::path config = "/etc/scanrig/rig.toml";

@@ -1,3 +1,4 @@
+#include <cmath>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -10,6 +11,7 @@
 #include "daemon/ctl/offline_rig_config.h"
 #include "daemon/ctl/verbs.h"
 #include "daemon/rig/open_devices.h"
+#include "drivers/projector/lightcrafter_flash.h"
 
 namespace scanrig::ctl {
 namespace {
@@ -167,6 +169,63 @@ ExitCode watch_panel(const PanelVerb& verb) {
     known = *now;
   }
   return ExitCode::ok;
+}
+
+namespace {
+
+constexpr std::chrono::minutes kLoadLimit{15};
+
+ExitCode print_version(const dlpc350::Version& version, bool as_json) {
+  const std::string text = to_string(version);
+  if (as_json) {
+    fmt::print("{}\n", nlohmann::ordered_json{{"model", "LightCrafter 4500"}, {"firmware", text}}.dump());
+  } else {
+    fmt::print("LightCrafter 4500, firmware {}\n", text);
+  }
+  return ExitCode::ok;
+}
+
+/// A line per tenth, on standard error.
+void print_progress(std::string_view step, double share) {
+  static std::string last;
+  std::string line = fmt::format("{} {:.0f} %", step, std::floor(share * 10) * 10);
+  if (line == last) return;
+  fmt::print(stderr, "{}\n", line);
+  last = std::move(line);
+}
+
+ExitCode load_projector(const ProjectorVerb& verb, const dlpc350::OpenTransport& open, Clock& clock) {
+  if (verb.file.empty()) return report_error(ExitCode::usage, "projector load: name the firmware's FILE");
+  const auto text = read_file(verb.file);
+  if (!text) return report_error(text.error());
+  const std::vector<std::uint8_t> file(text->begin(), text->end());
+  const auto version = dlpc350::check_firmware_file(file);
+  if (!version) return report_error(version.error().in(verb.file.string()));
+  if (!agreed("The projector's firmware is replaced: keep its power and cable. Go on?", verb.yes)) {
+    return report_error(ExitCode::refused, "nothing was written: reply y, or give --yes where there is no terminal");
+  }
+  const auto loaded = dlpc350::load_firmware(file, open, &print_progress, clock, Deadline::after(clock, kLoadLimit));
+  return loaded ? print_version(*loaded, verb.json) : report_error(of_device(loaded.error()));
+}
+
+}  // namespace
+
+ExitCode projector(const ProjectorVerb& verb) {
+  const auto rig = offline_rig_config(verb.config);
+  if (!rig) return report_error(rig.error());
+  if (rig->projector.driver != config::ProjectorConfig::Driver::lightcrafter4500) {
+    return report_error(ExitCode::refused, "projector: it has no firmware, only a LightCrafter 4500 has");
+  }
+  RealClock clock;
+  const auto open = dlpc350::usb_transport(rig->projector.serial, clock);
+  if (verb.what == "load") return load_projector(verb, open, clock);
+  dlpc350::Link link(open, rig->projector.lightcrafter.reply_timeout, clock);
+  if (auto opened = link.open(); !opened) return report_error(of_device(opened.error().in("projector")));
+  const auto version = dlpc350::read_version(link, Deadline::after(clock, kAskLimit));
+  if (!version) return report_error(of_device(version.error().in("projector")));
+  if (*version) return print_version(**version, verb.json);
+  return report_error(ExitCode::device,
+                      "projector: the LightCrafter has no whole firmware; write it with scanrig projector load");
 }
 
 namespace {

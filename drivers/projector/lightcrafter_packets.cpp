@@ -26,10 +26,11 @@ std::string in_words(std::uint8_t status, std::span<const Bit> bits) {
 
 }  // namespace
 
-std::vector<Report> encode(Command command, bool read, std::uint8_t sequence, std::span<const std::uint8_t> data) {
+std::vector<Report> encode(Command command, Kind kind, std::uint8_t sequence, std::span<const std::uint8_t> data) {
   const auto code = static_cast<std::uint16_t>(command);
   const std::size_t length = 2 + data.size();
-  std::vector<std::uint8_t> bytes{static_cast<std::uint8_t>(kWantsReply | (read ? kRead : 0)),
+  const std::uint8_t flags = kind == Kind::read ? kRead | kWantsReply : kind == Kind::write ? kWantsReply : 0;
+  std::vector<std::uint8_t> bytes{flags,
                                   sequence,
                                   static_cast<std::uint8_t>(length),
                                   static_cast<std::uint8_t>(length >> 8),
@@ -49,7 +50,8 @@ Result<bool> ReplyReader::add(const Report& report) {
       earlier_ = true;
       return fail(ErrorCode::protocol, "the reply is to request {}, not to {}", report[1], sequence_);
     }
-    if (report[0] & kRefused) return fail(ErrorCode::protocol, "the device refuses the command");
+    refused_ = (report[0] & kRefused) != 0;
+    if (refused_) return fail(ErrorCode::protocol, "the device refuses the command");
     const std::size_t length = report[2] | static_cast<std::size_t>(report[3]) << 8;
     if (length > kLargestPayload) return fail(ErrorCode::protocol, "a reply of {} bytes cannot be", length);
     length_ = length;

@@ -40,10 +40,22 @@ enum class Command : std::uint16_t {
   led_enable = 0x1A07,
   led_current = 0x0B01,
   power = 0x0200,
+  version = 0x0205,
+  enter_programming = 0x3001,
+  // Of the bootloader only.
+  flash_query = 0x0015,
+  flash_data = 0x0025,
+  flash_sum = 0x0026,
+  flash_erase = 0x0028,
+  flash_address = 0x0029,
+  flash_size = 0x002C,
+  flash_type = 0x002F,
+  leave_programming = 0x0030,
 };
 
-/// A write (with a reply requested), or a read when `read`.
-std::vector<Report> encode(Command command, bool read, std::uint8_t sequence, std::span<const std::uint8_t> data);
+/// `write`: confirmed by a reply; `send`: a write that is not.
+enum class Kind { read, write, send };
+std::vector<Report> encode(Command command, Kind kind, std::uint8_t sequence, std::span<const std::uint8_t> data);
 
 /// Puts a reply together, report by report.
 class ReplyReader {
@@ -54,11 +66,13 @@ class ReplyReader {
   Result<bool> add(const Report& report);
   /// True if the last error was a reply to an earlier request, after which the right one may still come.
   [[nodiscard]] bool was_earlier() const { return earlier_; }
+  /// True if the device has refused the command.
+  [[nodiscard]] bool was_refused() const { return refused_; }
   [[nodiscard]] const std::vector<std::uint8_t>& payload() const { return payload_; }
 
  private:
   std::uint8_t sequence_;
-  bool earlier_ = false;
+  bool earlier_ = false, refused_ = false;
   std::optional<std::size_t> length_;
   std::vector<std::uint8_t> payload_;
 };

@@ -83,15 +83,31 @@ void LightCrafterProjector::request_off() noexcept {
 }
 
 Result<void> LightCrafterProjector::connect(Deadline deadline) {
-  if (transport_) return {};
-  auto opened = open_();
-  if (!opened) return pass_on(opened, "projector");
-  transport_ = std::move(*opened);
+  if (link_.is_open()) return {};
+  if (auto opened = link_.open(); !opened) return pass_on(opened, "projector");
   set_up_ = false;
+  if (auto known = check_firmware(deadline); !known) {
+    link_.close();
+    return known;
+  }
   if (auto awake = write(Command::power, {0}, deadline); !awake) return awake;
   if (auto healthy = expect_healthy(deadline); !healthy) return healthy;
   if (auto stopped = stop(deadline); !stopped) return stopped;  // ends what the device showed when it was lost
   return write(Command::display_mode, {1}, deadline);
+}
+
+Result<void> LightCrafterProjector::check_firmware(Deadline deadline) {
+  const auto version = dlpc350::read_version(link_, deadline);
+  if (!version) return pass_on(version, "projector");
+  if (!*version) {
+    return fail(ErrorCode::unsupported,
+                "projector: the LightCrafter has no whole firmware; write it with scanrig projector load");
+  }
+  description_ = "LightCrafter 4500, firmware " + to_string(**version);
+  if (**version >= dlpc350::kOldestFirmware) return {};
+  return fail(ErrorCode::unsupported,
+              "projector: the LightCrafter's firmware {} is older than {}; update it with scanrig projector load",
+              to_string(**version), to_string(dlpc350::kOldestFirmware));
 }
 
 /// Sends all settings that do not depend on the light, once per connection. Order matters; the device takes settings
@@ -222,45 +238,15 @@ Result<void> LightCrafterProjector::write_all(const std::vector<std::pair<Comman
 }
 
 Result<void> LightCrafterProjector::write(Command command, const Bytes& data, Deadline deadline) {
-  const auto reply = talk(command, false, data, deadline);
-  if (!reply) return pass_on(reply);
+  auto written = link_.write(command, data, deadline);
+  if (!written) return pass_on(written, "projector");
   return {};
 }
 
 Result<std::uint8_t> LightCrafterProjector::read_byte(Command command, Deadline deadline) {
-  const auto reply = talk(command, true, {}, deadline);
-  if (!reply) return pass_on(reply);
-  if (reply->empty()) {
-    return fail(ErrorCode::protocol, "projector: command {:04X}: an empty reply", static_cast<std::uint16_t>(command));
-  }
+  const auto reply = link_.read(command, {}, 1, deadline);
+  if (!reply) return pass_on(reply, "projector");
   return reply->front();
-}
-
-/// A device that is lost or sends nonsense is connected and set up again by the next call.
-Result<LightCrafterProjector::Bytes> LightCrafterProjector::talk(Command command, bool read, const Bytes& data,
-                                                                 Deadline deadline) {
-  if (!transport_) return fail(ErrorCode::io, "projector: the LightCrafter is not connected");
-  auto reply = exchange(command, read, data, deadline.at_most(clock_, options_.reply_timeout));
-  if (reply) return reply;
-  transport_.reset();
-  return pass_on(reply, fmt::format("projector: command {:04X}", static_cast<std::uint16_t>(command)));
-}
-
-Result<LightCrafterProjector::Bytes> LightCrafterProjector::exchange(Command command, bool read, const Bytes& data,
-                                                                     Deadline deadline) {
-  const std::uint8_t sequence = ++sequence_;
-  for (const auto& report : dlpc350::encode(command, read, sequence, data)) {
-    if (auto sent = transport_->send(report, deadline); !sent) return pass_on(sent);
-  }
-  dlpc350::ReplyReader reader(sequence);
-  for (;;) {
-    const auto report = transport_->receive(deadline);
-    if (!report) return pass_on(report);
-    const auto whole = reader.add(*report);
-    if (!whole && reader.was_earlier() && !deadline.expired(clock_)) continue;  // reply to a request given up before
-    if (!whole) return pass_on(whole);
-    if (*whole) return reader.payload();
-  }
 }
 
 }  // namespace scanrig

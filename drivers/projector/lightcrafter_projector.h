@@ -3,7 +3,7 @@
 #include <condition_variable>
 #include <mutex>
 
-#include "drivers/projector/lightcrafter_transport.h"
+#include "drivers/projector/lightcrafter_link.h"
 #include "drivers/projector/projector.h"
 
 namespace scanrig {
@@ -23,7 +23,8 @@ struct LightCrafterOptions {
 };
 
 /// A TI DLP LightCrafter 4500 that shows the pattern from its flash, or all white, once per fire(); TRIG_OUT_1 is the
-/// cameras' trigger. Connected by the first use, and again after a loss. request_off() ends a running exposure, and
+/// cameras' trigger. Connected by the first use, and again after a loss. Firmware that is too old or missing is
+/// `unsupported`. request_off() ends a running exposure, and
 /// fire() then fails with `io`. Faults that the device reports are `device_alarm` with their text. Options that it
 /// rejects are `invalid_input`.
 class LightCrafterProjector final : public Projector {
@@ -35,14 +36,17 @@ class LightCrafterProjector final : public Projector {
   Result<void> fire(Light light, Deadline deadline) override;
   Result<void> turn_off(Deadline deadline) override;
   void request_off() noexcept override;
+  /// "LightCrafter 4500, firmware 4.1.0", since the first connection.
+  [[nodiscard]] std::string description() const override { return description_; }
 
  private:
-  using Bytes = std::vector<std::uint8_t>;
+  using Bytes = dlpc350::Bytes;
 
   LightCrafterProjector(const LightCrafterOptions& options, dlpc350::OpenTransport open, Clock& clock)
-      : options_(options), open_(std::move(open)), clock_(clock) {}
+      : options_(options), clock_(clock), link_(std::move(open), options.reply_timeout, clock) {}
 
   Result<void> connect(Deadline deadline);
+  Result<void> check_firmware(Deadline deadline);
   Result<void> set_up(Deadline deadline);
   Result<void> load(Light light, Deadline deadline);
   Result<void> send_table(std::uint8_t mailbox, const Bytes& data, Deadline deadline);
@@ -55,14 +59,11 @@ class LightCrafterProjector final : public Projector {
   Result<void> write_all(const std::vector<std::pair<dlpc350::Command, Bytes>>& steps, Deadline deadline);
   Result<void> write(dlpc350::Command command, const Bytes& data, Deadline deadline);
   Result<std::uint8_t> read_byte(dlpc350::Command command, Deadline deadline);
-  Result<Bytes> talk(dlpc350::Command command, bool read, const Bytes& data, Deadline deadline);
-  Result<Bytes> exchange(dlpc350::Command command, bool read, const Bytes& data, Deadline deadline);
 
   const LightCrafterOptions options_;
-  const dlpc350::OpenTransport open_;
   Clock& clock_;
-  std::unique_ptr<dlpc350::Transport> transport_;  // null while the device is lost
-  std::uint8_t sequence_ = 0;
+  dlpc350::Link link_;
+  std::string description_;
   bool set_up_ = false;          // since the last connection
   std::optional<Light> loaded_;  // content of the device's table
 

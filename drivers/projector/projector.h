@@ -1,5 +1,7 @@
 #pragma once
 
+#include <string>
+
 #include "core/clock.h"
 #include "core/result.h"
 
@@ -25,6 +27,9 @@ class Projector {
   virtual Result<void> turn_off(Deadline deadline) = 0;
 
   virtual void request_off() noexcept = 0;
+
+  /// What the device reports of itself, such as its firmware; empty before the first connection, or if it reports none.
+  [[nodiscard]] virtual std::string description() const { return {}; }
 };
 
 }  // namespace scanrig

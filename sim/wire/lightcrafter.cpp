@@ -28,7 +28,7 @@ void LightCrafter::receive(const Report& report) {
     message_.resize(announced);
     const std::size_t before = flashes_.size();
     act();
-    message_.clear();
+    message_.clear();  // also of the one that restarted it
     if (flashes_.size() > before) flash = flashes_.back();
     listener = listener_;
   }
@@ -90,9 +90,21 @@ void LightCrafter::set_hardware_status(std::uint8_t status) {
 
 void LightCrafter::power_cycle() {
   const std::scoped_lock lock(mutex_);
+  restart();
+}
+
+int LightCrafter::enumeration() const {
+  const std::scoped_lock lock(mutex_);
+  return enumeration_;
+}
+
+/// Without a whole application the bootloader stays.
+void LightCrafter::restart() {
   state_ = {};
   message_.clear();
   outgoing_.clear();
+  is_programming_ = !flash_.version();
+  ++enumeration_;
 }
 
 void LightCrafter::act() {
@@ -102,18 +114,26 @@ void LightCrafter::act() {
   if (fault == Fault::refuse || message_.size() < 6) return reply(0x20, sequence, {});
   const auto command = static_cast<std::uint16_t>(message_[4] + 256 * message_[5]);
   const bool is_read = flags & 0x80;
+  const Bytes sent(message_.begin() + 6, message_.end());
+  const bool wants_reply = flags & 0x40;
   Bytes data;
   bool done = true;
+  if (command == 0x3001 && !is_programming_ && !is_read) {
+    restart();
+    is_programming_ = true;
+    return;
+  }
+  if (command == 0x0030 && is_programming_ && !is_read) return restart();
   if (is_read) {
-    data = read(command);
+    data = is_programming_ ? flash_.read(command, sent) : read(command);
     done = !data.empty();
   } else {
-    done = write(command, Bytes(message_.begin() + 6, message_.end()));
+    done = is_programming_ ? flash_.write(command, sent) : write(command, sent);
   }
   if (fault == Fault::silent) return;
   if (fault == Fault::earlier_reply) reply(0, static_cast<std::uint8_t>(sequence - 1), {0});
   if (fault == Fault::endless_reply) data.resize(5000);
-  if (flags & 0x40) reply(done ? 0 : 0x20, sequence, data);
+  if (wants_reply) reply(done ? 0 : 0x20, sequence, data);
 }
 
 bool LightCrafter::write(std::uint16_t command, const Bytes& data) {
@@ -194,6 +214,11 @@ void LightCrafter::check_settings() {
 
 Bytes LightCrafter::read(std::uint16_t command) {
   switch (command) {
+    case 0x0205: {
+      Bytes versions(16);
+      for (std::size_t i = 0; i < 4; ++i) versions[i] = static_cast<std::uint8_t>(*flash_.version() >> (8 * i));
+      return versions;
+    }
     case 0x1A0A: return {state_.hardware};
     case 0x1A0B: return {0x01};
     case 0x1A0C: return {static_cast<std::uint8_t>(state_.started ? 0x02 : 0x00)};

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/clock.h"
+#include "sim/wire/lightcrafter_flash.h"
 
 namespace scanrig::sim::wire {
 
@@ -30,7 +31,7 @@ class LightCrafter {
   };
   enum class Fault { none, silent, refuse, earlier_reply, endless_reply };
 
-  explicit LightCrafter(Clock& clock) : clock_(clock) {}
+  explicit LightCrafter(Clock& clock) : clock_(clock), flash_(clock) {}
 
   void receive(const Report& report);
   /// The next report to send; nothing if there is none yet.
@@ -46,6 +47,11 @@ class LightCrafter {
   void inject(Fault fault, int replies);
   void set_hardware_status(std::uint8_t status);  ///< 0x01: no fault
   void power_cycle();
+
+  /// The firmware is written, checked or damaged here; call with no request under way.
+  [[nodiscard]] LightCrafterFlash& flash() { return flash_; }
+  /// Counts how often it has come up on USB: an older connection is gone.
+  [[nodiscard]] int enumeration() const;
 
  private:
   struct State {
@@ -65,6 +71,7 @@ class LightCrafter {
   };
 
   void act();
+  void restart();
   bool write(std::uint16_t command, const std::vector<std::uint8_t>& data);
   bool write_setting(std::uint16_t command, const std::vector<std::uint8_t>& data);
   std::vector<std::uint8_t> read(std::uint16_t command);
@@ -76,6 +83,9 @@ class LightCrafter {
   Clock& clock_;
   mutable std::mutex mutex_;
   State state_;
+  LightCrafterFlash flash_;
+  bool is_programming_ = false;  // its bootloader runs
+  int enumeration_ = 0;
   std::vector<std::uint8_t> message_;  // of the reports received so far
   std::deque<Report> outgoing_;
   std::vector<Report> received_;

@@ -14,8 +14,9 @@
 #include <vector>
 
 #include "core/files.h"
-#include "daemon/ctl/doctor/examine_rig.h"
 #include "core/signal_stop.h"
+#include "daemon/ctl/doctor/examine_rig.h"
+#include "drivers/projector/lightcrafter_link.h"
 
 namespace scanrig::ctl::doctor {
 namespace {
@@ -238,10 +239,34 @@ Result<void> examine_sight(const Rig& rig, Clock& clock, Report& report) {
   return {};
 }
 
+/// A LightCrafter reports its firmware; other projectors report nothing.
+void examine_projector(const config::RigConfig& config, Clock& clock, Report& report) {
+  if (config.projector.driver != config::ProjectorConfig::Driver::lightcrafter4500) return;
+  report.section("Projector");
+  dlpc350::Link link(dlpc350::usb_transport(config.projector.serial, clock),
+                     config.projector.lightcrafter.reply_timeout, clock);
+  const auto version = [&]() -> Result<std::optional<dlpc350::Version>> {
+    if (auto opened = link.open(); !opened) return pass_on(opened);
+    return dlpc350::read_version(link, Deadline::after(clock, std::chrono::seconds(5)));
+  }();
+  if (!version) {
+    report.find("projector_silent", fmt::format("The projector does not respond: {}.", version.error().message),
+                "Check its power and its USB cable.");
+  } else if (!*version || **version < dlpc350::kOldestFirmware) {
+    report.find("projector_firmware",
+                *version ? fmt::format("The projector's firmware {} is too old.", to_string(**version))
+                         : "The projector has no whole firmware.",
+                "Write it with scanrig projector load.");
+  } else {
+    report.note(fmt::format("LightCrafter 4500, firmware {}", to_string(**version)));
+  }
+}
+
 }  // namespace
 
 Result<void> examine_rig(const Rig& rig, bool may_turn, const Operator& person, Clock& clock, Report& report) {
   list_what_is_connected(report);
+  examine_projector(rig.config, clock, report);
   const bool drive_answers = examine_drive(rig.config, clock, report);
   const bool estop_works = examine_panel(rig.config, drive_answers, person, clock, report);
   const auto permitted = [&] { return may_turn || person.prompt("Is everyone clear? Turn the table? [y/N]") == "y"; };

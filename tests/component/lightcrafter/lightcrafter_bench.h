@@ -12,16 +12,16 @@ namespace scanrig {
 class SimulatedUsb final : public dlpc350::Transport {
  public:
   SimulatedUsb(sim::wire::LightCrafter& device, const std::atomic<bool>& plugged, Clock& clock)
-      : device_(device), plugged_(plugged), clock_(clock) {}
+      : device_(device), plugged_(plugged), clock_(clock), enumeration_(device.enumeration()) {}
 
   Result<void> send(const dlpc350::Report& report, Deadline) override {
-    if (!plugged_) return gone();
+    if (is_gone()) return gone();
     device_.receive(report);
     return {};
   }
   Result<dlpc350::Report> receive(Deadline deadline) override {
     for (;;) {
-      if (!plugged_) return pass_on(Result<void>(gone()));
+      if (is_gone()) return pass_on(Result<void>(gone()));
       if (const auto report = device_.next_report()) return *report;
       if (deadline.expired(clock_)) return fail(ErrorCode::timeout, "no reply");
       clock_.sleep_for(std::chrono::milliseconds(1));
@@ -29,11 +29,13 @@ class SimulatedUsb final : public dlpc350::Transport {
   }
 
  private:
+  [[nodiscard]] bool is_gone() const { return !plugged_ || device_.enumeration() != enumeration_; }
   static tl::unexpected<Error> gone() { return fail(ErrorCode::io, "No such device (it may have been disconnected)"); }
 
   sim::wire::LightCrafter& device_;
   const std::atomic<bool>& plugged_;
   Clock& clock_;
+  const int enumeration_;
 };
 
 class LightCrafterBench : public ProjectorBench {
@@ -47,15 +49,18 @@ class LightCrafterBench : public ProjectorBench {
     options.exposure = std::chrono::milliseconds(12);
     options.reply_timeout = std::chrono::milliseconds(100);
     change(options);
-    const auto open = [this]() -> Result<std::unique_ptr<dlpc350::Transport>> {
-      if (!plugged_) return fail(ErrorCode::not_found, "LightCrafter: no LightCrafter 4500 on USB");
-      return std::make_unique<SimulatedUsb>(device_, plugged_, clock_);
-    };
-    auto created = LightCrafterProjector::create(options, open, clock_);
+    auto created = LightCrafterProjector::create(options, transport(), clock_);
     EXPECT_TRUE(created) << created.error().message;
     if (created) projector_ = std::move(*created);
   }
 
+  /// Opens a connection to the device, as often as it is called.
+  dlpc350::OpenTransport transport() {
+    return [this]() -> Result<std::unique_ptr<dlpc350::Transport>> {
+      if (!plugged_) return fail(ErrorCode::not_found, "LightCrafter: no LightCrafter 4500 on USB");
+      return std::make_unique<SimulatedUsb>(device_, plugged_, clock_);
+    };
+  }
   LightCrafterProjector& projector() override { return *projector_; }
   Clock& clock() override { return clock_; }
   sim::wire::LightCrafter& device() { return device_; }

@@ -100,7 +100,7 @@ TEST_F(LightCrafterTest, ARefusedCommandIsAProtocolErrorThatNamesIt) {
   const auto fired = fire();
   ASSERT_FALSE(fired);
   EXPECT_EQ(fired.error().code, ErrorCode::protocol);
-  EXPECT_THAT(fired.error().message, HasSubstr("0200"));
+  EXPECT_THAT(fired.error().message, HasSubstr("0205"));
   expect_fires();
 }
 

@@ -25,14 +25,14 @@ Report reply(std::uint8_t flags, std::uint8_t sequence, std::uint16_t length, st
 // The frame that starts a sequence, 00 40 ss 03 00 24 1A 02, without the report number in front [DLPU010, 1.2.2].
 TEST(LightCrafterPackets, StartOfASequence) {
   const std::uint8_t start = 2;
-  const auto reports = encode(Command::start_stop, false, 0x5C, {&start, 1});
+  const auto reports = encode(Command::start_stop, Kind::write, 0x5C, {&start, 1});
   ASSERT_EQ(reports.size(), 1u);
   EXPECT_THAT(head(reports, 7), ElementsAre(0x40, 0x5C, 0x03, 0x00, 0x24, 0x1A, 0x02));
   EXPECT_TRUE(std::all_of(reports[0].begin() + 7, reports[0].end(), [](auto byte) { return byte == 0; }));
 }
 
 TEST(LightCrafterPackets, ReadOfTheMainStatus) {
-  const auto reports = encode(Command::main_status, true, 1, {});
+  const auto reports = encode(Command::main_status, Kind::read, 1, {});
   EXPECT_THAT(head(reports, 6), ElementsAre(0xC0, 0x01, 0x02, 0x00, 0x0C, 0x1A));
 }
 
@@ -40,8 +40,8 @@ TEST(LightCrafterPackets, ReadOfTheMainStatus) {
 TEST(LightCrafterPackets, LongWritesGoOnWithoutAHeader) {
   std::vector<std::uint8_t> data(58 + 64 + 1);
   for (std::size_t i = 0; i < data.size(); ++i) data[i] = static_cast<std::uint8_t>(i + 1);
-  EXPECT_EQ(encode(Command::mailbox_data, false, 0, std::span(data).first(58)).size(), 1u);
-  const auto reports = encode(Command::mailbox_data, false, 0, data);
+  EXPECT_EQ(encode(Command::mailbox_data, Kind::write, 0, std::span(data).first(58)).size(), 1u);
+  const auto reports = encode(Command::mailbox_data, Kind::write, 0, data);
   ASSERT_EQ(reports.size(), 3u);
   EXPECT_EQ(reports[0][2], 125);
   EXPECT_EQ(reports[0][63], 58);
