@@ -201,10 +201,6 @@ void TrialImages::keep(Light light, StereoFrame frame) {
 Result<TrialImages> examine_cameras(const Rig& rig, const std::stop_token& stop, Clock& clock, Report& report) {
   report.section("Cameras");
   const auto& camera = rig.config.stereo_camera;
-  if (camera.driver == config::StereoCameraConfig::Driver::simulated) {
-    report.note("simulated by scanrigd-sim: not examined");
-    return TrialImages{};
-  }
   if (camera.driver == config::StereoCameraConfig::Driver::aravis) {
     examine_links(camera.aravis, rig.machine_root, report);
   } else {

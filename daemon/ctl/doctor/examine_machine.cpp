@@ -185,6 +185,7 @@ void examine_calibration(const Rig& rig, const TrialImages& images, bool may_mat
   report.section("Calibration");
   const auto calibration = read_calibration(rig.config.calibration_file);
   if (!calibration) {
+    report.note("without one, whether left and right are exchanged cannot be judged");
     return report.find("no_calibration", calibration.error().message + ".",
                        "Calibrate: scanrig calibrate --rig, see docs/guide/calibrate.md.");
   }

@@ -222,10 +222,14 @@ namespace {
 
 /// Cameras, light and calibration. Fails with `stopped`, the light being off.
 Result<void> examine_sight(const Rig& rig, Clock& clock, Report& report) {
+  if (rig.config.stereo_camera.driver == config::StereoCameraConfig::Driver::simulated) {
+    report.section("Cameras");
+    report.note("simulated by scanrigd-sim: not examined");
+    return {};
+  }
   const SignalStop signal;
   auto images = examine_cameras(rig, signal.token(), clock, report);
   if (!images) return pass_on(images);
-  if (rig.config.stereo_camera.driver == config::StereoCameraConfig::Driver::simulated) return {};
   bool may_match = false;
   if (!images->pattern.left.empty()) {
     report.section("Light");
@@ -236,6 +240,7 @@ Result<void> examine_sight(const Rig& rig, Clock& clock, Report& report) {
     may_match = judge_images(*images, report);
   }
   examine_calibration(rig, *images, may_match, report);
+  if (signal.token().stop_requested()) return fail(ErrorCode::stopped, "stopped on request");
   return {};
 }
 

@@ -98,10 +98,10 @@ Result<void> examine_motion(const Rig& rig, const Operator& person, Clock& clock
 bool examine_panel(const config::RigConfig& rig, bool drive_answers, const Operator& person, Clock& clock,
                    Report& report);
 
-/// Connects and sets up the cameras, exposes both by the projector every 0.4 s for 20 s and counts pairs, lost frames
-/// and torn ones. The light is off at every end. Findings: `slow_link`, `camera_missing`, `camera_settings`,
-/// `no_trigger`, `frames_lost`, `packets_lost`, `receive_buffer`, `projector`. Returns the images taken. Fails with
-/// `stopped`.
+/// Connects and sets up the cameras, which are not simulated ones, exposes both by the projector every 0.4 s for 20 s
+/// and counts pairs, lost frames and torn ones. The light is off at every end. Findings: `slow_link`, `camera_missing`,
+/// `camera_settings`, `no_trigger`, `frames_lost`, `packets_lost`, `receive_buffer`, `projector`. Returns the images
+/// taken. Fails with `stopped`.
 Result<TrialImages> examine_cameras(const Rig& rig, const std::stop_token& stop, Clock& clock, Report& report);
 
 /// Judges the light and the lenses by a trial's images. Findings: `light_stays_on`, `room_light`, `no_light`,
