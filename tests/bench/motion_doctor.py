@@ -86,6 +86,8 @@ def cases():
                 if folder.stat().st_mode & 0o005 != 0o005:
                     raise PermissionError(f"{folder} cannot be entered by another user")
             os.chmod(rig.folder / "gpio.sock", 0o666)
+            (rig.folder / "jobs").mkdir()
+            (rig.folder / "jobs").chmod(0o777)
 
         yield "missing group", "missing_group", strict, {"as_user": 65534, "present": False}, ()
     else:
