@@ -61,7 +61,7 @@ def camera_fault(kind, *sides, count=ALWAYS):
     return plant
 
 
-def networks_are_one():
+def is_in_machine_network():
     """Whether this process is in the machine's network. In a namespace of an ordinary user, the first process is hidden."""
     try:
         return os.readlink("/proc/self/ns/net") == os.readlink("/proc/1/ns/net")
@@ -72,7 +72,7 @@ def networks_are_one():
 def set_mtu(size):
     """Of the loopback, which carries the cameras' packets."""
     SIOCSIFMTU = 0x8922
-    if os.geteuid() == 0 and networks_are_one():
+    if os.geteuid() == 0 and is_in_machine_network():
         raise RuntimeError("run it by scanrig-sim own-network: this is the network of the machine")
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as control:
         fcntl.ioctl(control, SIOCSIFMTU, struct.pack("16si12x", b"lo", size))

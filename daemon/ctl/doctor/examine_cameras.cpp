@@ -52,12 +52,13 @@ std::optional<int> usb_speed(const std::string& serial, const fs::path& root) {
   return std::nullopt;
 }
 
-/// `needs_usb3`: a USB3 Vision camera; a webcam may be slower.
-void examine_usb(const std::string& serial, const char* side, bool needs_usb3, const fs::path& root, Report& report) {
+/// `is_usb3_needed`: a USB3 Vision camera; a webcam may be slower.
+void examine_usb(const std::string& serial, const char* side, bool is_usb3_needed, const fs::path& root,
+                 Report& report) {
   const auto speed = usb_speed(serial, root);
   if (!speed) return;
   report.note(fmt::format("{} camera {}: USB at {} Mbit/s", side, serial, *speed));
-  if (!needs_usb3 || *speed >= kUsb3) return;
+  if (!is_usb3_needed || *speed >= kUsb3) return;
   report.find("slow_link", fmt::format("The {} camera {} is connected by USB at {} Mbit/s.", side, serial, *speed),
               "Plug it into a USB 3 port of its own, with the cable that came with it and no hub.");
 }
@@ -74,8 +75,8 @@ void examine_links(const AravisOptions& options, const fs::path& root, Report& r
 }
 
 void report_connecting(const Error& error, Report& report) {
-  const bool differs = error.code == ErrorCode::invalid_input || error.code == ErrorCode::unsupported;
-  if (differs) {
+  const bool is_different = error.code == ErrorCode::invalid_input || error.code == ErrorCode::unsupported;
+  if (is_different) {
     return report.find("camera_settings", cause_of(error) + ".", "Correct the key of [stereo_camera] that this is of.");
   }
   report.find("camera_missing", cause_of(error) + ".",
@@ -221,7 +222,7 @@ Result<TrialImages> examine_cameras(const Rig& rig, const std::stop_token& stop,
   if (auto ran = trial.run(); !ran) return pass_on(ran);
   trial.judge(report);
   auto images = trial.take_images();
-  images.are_connected = true;
+  images.has_cameras = true;
   examine_buffers(camera, images.pattern, rig.machine_root, report);
   return images;
 }

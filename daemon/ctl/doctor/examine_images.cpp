@@ -39,8 +39,8 @@ Levels added(const Levels& lit, const Levels& off) {
   return {lit[0] - without(off[0]), lit[1] - without(off[1])};
 }
 
-bool are_dark(const Levels& levels) { return levels[0] < kDarkImage && levels[1] < kDarkImage; }
-bool are_measured(const Levels& levels) { return !std::isnan(levels[0]) && !std::isnan(levels[1]); }
+bool is_dark(const Levels& levels) { return levels[0] < kDarkImage && levels[1] < kDarkImage; }
+bool is_measured(const Levels& levels) { return !std::isnan(levels[0]) && !std::isnan(levels[1]); }
 
 void note_levels(const TrialImages& images, Report& report) {
   for (const auto& [what, frame] :
@@ -55,8 +55,8 @@ void note_levels(const TrialImages& images, Report& report) {
 /// The light while it is off. Returns whether the other lights can be judged.
 bool judge_off(const Levels& off, const Levels& plain, Report& report) {
   const double level = std::max(off[0], off[1]);
-  if (!are_measured(off) || level < kDarkImage) return true;
-  if (are_measured(plain) && level > kStaysOn * std::max(plain[0], plain[1])) {
+  if (!is_measured(off) || level < kDarkImage) return true;
+  if (is_measured(plain) && level > kStaysOn * std::max(plain[0], plain[1])) {
     report.find("light_stays_on",
                 fmt::format("With the light switched off the images have {} of full scale, in plain light {}.",
                             per_cent(level), per_cent(std::max(plain[0], plain[1]))),
@@ -64,7 +64,7 @@ bool judge_off(const Levels& off, const Levels& plain, Report& report) {
                 "switched has driver = \"manual\".");
     return false;
   }
-  if (!are_measured(plain) || level < kRoom * std::max(plain[0], plain[1])) return true;
+  if (!is_measured(plain) || level < kRoom * std::max(plain[0], plain[1])) return true;
   report.find("room_light",
               fmt::format("With the light switched off the images still have {} of full scale.", per_cent(level)),
               "Keep daylight and room light away: close the hood, or lower exposure_us and use a brighter lamp.");
@@ -73,19 +73,21 @@ bool judge_off(const Levels& off, const Levels& plain, Report& report) {
 
 /// Whether each light arrives at each camera. Returns whether it does.
 bool judge_lit(const Levels& pattern, const Levels& plain, Report& report) {
-  if (are_dark(pattern) && (!are_measured(plain) || are_dark(plain))) {
+  if (is_dark(pattern) && (!is_measured(plain) || is_dark(plain))) {
     report.find("no_light", "The cameras are triggered, but neither sees any light.",
                 "Check the lamp's power, its fuse and the wire from the line to the lamp.");
     return false;
   }
   for (std::size_t i = 0; i < kSides.size(); ++i) {
-    if (!(pattern[i] < kDarkImage) || plain[i] >= kDarkImage) continue;
+    const auto is_alone = [&](const Levels& levels) { return levels[i] < kDarkImage && levels[1 - i] >= kDarkImage; };
+    if (!is_alone(pattern) && !is_alone(plain)) continue;
     report.find("dark_camera", fmt::format("The {} camera sees no light, the {} one does.", kSides[i], kSides[1 - i]),
-                "Take its lens cap off, open its aperture, check its exposure and trigger delay.");
+                "Take its lens cap off, open its aperture, check its trigger delay and that the light reaches what it "
+                "sees.");
     return false;
   }
-  if (are_dark(pattern) || are_dark(plain)) {
-    const bool is_pattern = are_dark(pattern);
+  if (is_dark(pattern) || is_dark(plain)) {
+    const bool is_pattern = is_dark(pattern);
     report.find(is_pattern ? "no_pattern" : "no_plain_light",
                 fmt::format("The cameras see no light in {} exposures.", is_pattern ? "pattern" : "plain"),
                 fmt::format("Check that lamp and its line: {} in [projector].", is_pattern ? "line" : "plain_line"));
@@ -111,7 +113,7 @@ bool judge_saturation(const TrialImages& images, Report& report) {
 
 /// Fine texture of the pattern's own light against that of plain light. Returns whether there is a pattern.
 bool judge_pattern(const TrialImages& images, const Levels& pattern, const Levels& plain, Report& report) {
-  if (!are_measured(plain)) return true;
+  if (!is_measured(plain)) return true;
   const auto ratio = [&](const cv::Mat& lit, const cv::Mat& even, std::size_t i) {
     return texture(lit, images.pattern.format) / pattern[i] / (texture(even, images.plain.format) / plain[i]);
   };

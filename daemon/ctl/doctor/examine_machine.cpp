@@ -189,7 +189,7 @@ void examine_calibration(const Rig& rig, const TrialImages& images, bool may_mat
     return report.find("no_calibration", calibration.error().message + ".",
                        "Calibrate: scanrig calibrate --rig, see docs/guide/calibrate.md.");
   }
-  const bool is_of_rig = images.are_connected && check_cameras(*calibration, rig.config, report);
+  const bool is_of_rig = images.has_cameras && check_cameras(*calibration, rig.config, report);
   check_age(*calibration, rig.config, report);
   if (!is_of_rig) return;
   if (!may_match) return report.note("not compared with images: there are none to match");

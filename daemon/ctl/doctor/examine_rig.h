@@ -70,7 +70,7 @@ struct Rig {
 
 /// The last images of a trial in each light, and how bright each side was. `off`: by software, the projector dark.
 struct TrialImages {
-  bool are_connected = false;       ///< both cameras, with the serial numbers that the configuration names
+  bool has_cameras = false;         ///< both cameras, with the serial numbers that the configuration names
   StereoFrame off, pattern, plain;  ///< empty images: none was taken
   /// Brightness left and right of every image in pattern light [0] and in plain light [1], in order.
   std::array<std::pair<std::vector<double>, std::vector<double>>, 2> brightness;

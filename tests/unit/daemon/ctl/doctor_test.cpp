@@ -96,6 +96,8 @@ TEST_F(DoctorLight, ThatOneCameraDoesNotSeeIsFoundByItsName) {
   set(Light::pattern, frame(image(24, 10, 3), image(1, 0.4, 4)));
   set(Light::plain, frame(image(90, 2, 5), image(1, 0.4, 6)));
   EXPECT_THAT(found(), ElementsAre("dark_camera"));
+  set(Light::plain, frame(image(90, 2, 5), image(90, 2, 6)));
+  EXPECT_THAT(found(), ElementsAre("dark_camera")) << "the pattern reaches only the left one";
 }
 
 TEST_F(DoctorLight, OfOneLampThatIsMissingIsFound) {
