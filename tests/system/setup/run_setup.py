@@ -17,7 +17,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "sim" / "apps"))
 from control_client import ControlClient  # noqa: E402
 
-SETUP_S, JOB_S = 150, 120
+SETUP_S, JOB_S = 300, 240
 GEAR = 90.0
 SCANNED = ("reconstructing", "done")
 LAMPS = {"lamp_red": "red lamp", "lamp_amber": "amber lamp", "lamp_green": "green lamp",
