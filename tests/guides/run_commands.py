@@ -32,6 +32,8 @@ PARSED = {
     "scanrig reconstruct": "needs a whole scan: tests/system/daemon/exit_codes_test.cpp",
     "scanrig convert": "likewise",
     "scanrig doctor --allow-motion": "turns the table for 15 s: ./dev bench motion",
+    "scanrig setup": "needs a person at the rig: tests/system/setup",
+    "scanrig projector": "needs a LightCrafter: tests/component/lightcrafter",
     "scanrig token add NAME": "as the step with a name",
     "scanrig reprocess ID": "needs a whole scan",
     "scanrig export ID": "needs a model",
