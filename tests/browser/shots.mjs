@@ -4,31 +4,40 @@ import { join } from "node:path";
 import { Browser, Station, press, sleep, until } from "./browser.mjs";
 import { jobOf, open, ready, see } from "./steps.mjs";
 
-const RIG = ["--operator", "none", "--scale", "0.5", "--views", "4", "--voxel-mm", "0.5", "--seed", "1", "--background-cameras"];
+const RIG = ["--scale", "0.5", "--views", "4", "--voxel-mm", "0.5", "--seed", "1", "--background-cameras"];
 const SIZES = { desk: { width: 1280, height: 800 }, phone: { width: 390, height: 844, touch: true } };
 const [bin, folder] = process.argv.slice(2);
 
 mkdirSync(folder, { recursive: true });
 const browser = new Browser();
 await browser.start();
-const station = new Station(bin, RIG);
-await station.start();
-const pages = {};
-for (const [name, size] of Object.entries(SIZES)) pages[name] = await open(browser, station, size);
 
-/** Every size of what is shown now. */
-async function shoot(what) {
-  await sleep(700);
-  for (const [name, page] of Object.entries(pages)) {
-    await page.evaluate(() => scrollTo(0, 0));
-    await page.screenshot({ path: join(folder, `web-${what}-${name}.png`) });
+/** Lets `act` take pictures of a station with this operator: (station, pages by size, shoot, show). */
+async function at(operator, act) {
+  const station = new Station(bin, [...RIG, "--operator", operator]);
+  await station.start();
+  const pages = {};
+  const shoot = async (what) => {
+    await sleep(700);
+    for (const [name, page] of Object.entries(pages)) {
+      await page.evaluate(() => scrollTo(0, 0));
+      await page.screenshot({ path: join(folder, `web-${what}-${name}.png`) });
+    }
+  };
+  const show = async (key) => {
+    for (const page of Object.values(pages)) await page.keyboard.press(key);
+  };
+  try {
+    for (const [name, size] of Object.entries(SIZES)) pages[name] = await open(browser, station, size);
+    await act(station, pages, shoot, show);
+  } finally {
+    for (const page of Object.values(pages)) await page.context().close();
+    await station.remove();
   }
 }
-async function show(key) {
-  for (const page of Object.values(pages)) await page.keyboard.press(key);
-}
 
-try {
+/** Nobody turns the part over: the flip waits. */
+async function scan(station, pages, shoot) {
   await ready(pages.desk);
   await shoot("ready");
   await press(pages.desk, "START");
@@ -38,9 +47,14 @@ try {
   await see(pages.desk, "FLIP", 200_000);
   await sleep(3000);
   await shoot("flip");
-  await until("it may be pressed", () => pages.desk.getByRole("button", { name: "CONTINUE", exact: true }).isEnabled());
-  await press(pages.desk, "CONTINUE");
-  await until("the model is made", () => jobOf(station)?.state === "done", 900_000);
+}
+
+/** The operator turns the part over and continues. */
+async function model(station, pages, shoot, show) {
+  await see(pages.desk, "READY", 60_000);
+  await press(pages.desk, "START");
+  const ended = () => ["done", "failed"].find((state) => state === jobOf(station)?.state);
+  if ((await until("the job ends", ended, 300_000)) === "failed") throw new Error("the job failed: nothing to show");
   await show("2");
   await shoot("jobs");
   for (const page of Object.values(pages)) {
@@ -59,7 +73,11 @@ try {
   await sleep(3000);
   await shoot("lost");
   station.process.kill("SIGCONT");
+}
+
+try {
+  await at("none", scan);
+  await at("helper", model);
 } finally {
   await browser.end();
-  await station.remove();
 }

@@ -12,8 +12,8 @@ namespace scanrig::testing {
 inline Mesh mesh_of(const Solid& solid, const Eigen::Vector3d& low, const Eigen::Vector3d& high, double cell_mm) {
   const Eigen::Vector3i count = ((high - low) / cell_mm).array().ceil().cast<int>() + 1;
   const auto corner = [&](int id) {
-    const Eigen::Vector3d at(id % count.x() + 0.013, (id / count.x()) % count.y() + 0.017,
-                             id / (count.x() * count.y()) + 0.011);
+    const int row = id / count.x(), layer = row / count.y();
+    const Eigen::Vector3d at(id % count.x() + 0.013, row % count.y() + 0.017, layer + 0.011);
     return Eigen::Vector3d(low + cell_mm * at);  // off the round numbers where the solids have their faces
   };
   std::vector<double> value(static_cast<std::size_t>(count.prod()));

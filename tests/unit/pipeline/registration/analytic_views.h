@@ -16,23 +16,23 @@ namespace scanrig::testing {
 
 using Solid = std::function<double(const Eigen::Vector3d&)>;
 
-inline Solid ball(Eigen::Vector3d centre, double radius) {
+inline Solid ball(const Eigen::Vector3d& centre, double radius) {
   return [=](const Eigen::Vector3d& p) { return (p - centre).norm() - radius; };
 }
-inline Solid block(Eigen::Vector3d low, Eigen::Vector3d high) {
+inline Solid block(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
   return [=](const Eigen::Vector3d& p) {
     const Eigen::Vector3d q = (p - 0.5 * (low + high)).cwiseAbs() - 0.5 * (high - low);
     return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0);
   };
 }
-inline Solid upright_cylinder(Eigen::Vector3d foot, double radius, double height) {
+inline Solid upright_cylinder(const Eigen::Vector3d& foot, double radius, double height) {
   return [=](const Eigen::Vector3d& p) {
     const Eigen::Vector3d q = p - foot;
     const Eigen::Vector2d d(std::hypot(q.x(), q.z()) - radius, std::abs(q.y() - 0.5 * height) - 0.5 * height);
     return d.cwiseMax(0.0).norm() + std::min(d.maxCoeff(), 0.0);
   };
 }
-inline Solid together(std::vector<Solid> parts) {
+inline Solid together(const std::vector<Solid>& parts) {
   return [=](const Eigen::Vector3d& p) {
     double nearest = std::numeric_limits<double>::infinity();
     for (const Solid& part : parts) nearest = std::min(nearest, part(p));
@@ -40,7 +40,7 @@ inline Solid together(std::vector<Solid> parts) {
   };
 }
 /// `solid` carried by `target_from_solid`.
-inline Solid moved(Solid solid, const Transform& target_from_solid) {
+inline Solid moved(const Solid& solid, const Transform& target_from_solid) {
   const Transform back = target_from_solid.inverse();
   return [=](const Eigen::Vector3d& p) { return solid(back * p); };
 }
