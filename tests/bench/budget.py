@@ -11,7 +11,7 @@ MINUTES = {
     "motion": {"matrix": 5, "estop": 10, "killed": 3, "restarts": 5, "latches": 4, "tools": 4,
                "turns": 5, "words": 5, "doctor": 4},
     "calibration": {"rigs": 12, "faults": 8, "models": 8, "watch": 9, "drift": 6},
-    "cameras": {"triggers": 4, "states": 1, "matrix": 3, "wire": 12, "hil": 8, "memory": 12},
+    "cameras": {"triggers": 4, "matrix": 3, "wire": 12, "hil": 8, "memory": 12},
     "page": {"scenes": 5, "bars": 9, "bundle": 1},
     "end-to-end": {"models": 14, "render": 1, "same_model": 4, "dragon": 8, "rim": 1, "bad_input": 4, "sigkill": 4},
 }

@@ -33,25 +33,11 @@ def triggers(bench, _scratch):
     bench.at_most("arming and collecting one exposure over the wire, p95", 50, seen["overhead_p95_ms"], "ms")
 
 
-def states(bench, _scratch):
-    """Each state is a test of its own: two cameras connected from it, three exposures of both lights against a sound
-    start's."""
-    wanted, tests = 40, "Seeds/AravisUnknownState.GivesTheImagesOfASoundStart"
-    what = "cameras in 40 unknown states, half without user sets: exposures, regions and formats of a sound start"
-    done = bench.run([bench.bin / "aravis_states_test", f"--gtest_filter={tests}/*"], 60)
-    if done.returncode == 77:
-        bench.line(what, f"{wanted} of {wanted}", "not measured: no network of its own", None)
-        return
-    good = done.stdout.count(f"[       OK ] {tests}/")
-    bench.line(what, f"{wanted} of {wanted}", f"{good} of {wanted}", good == wanted and done.returncode == 0)
-
-
 def fuzzed(bench, scratch):
     fuzz.measure(bench, ROOT, scratch, [fuzz.Parser("dlpc350", "LightCrafter 4500 replies", processes=bench.cores)])
 
 
 PARTS = {"triggers": triggers,
-         "states": states,
          "matrix": lambda bench, scratch: motion_matrix.measure(bench, ROOT, scratch, cameras=True),
          "wire": lambda bench, _: cameras_wire.measure(bench),
          "hil": lambda bench, _: virtual_machine.measure(bench),
