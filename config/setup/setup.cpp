@@ -56,7 +56,7 @@ Result<void> Setup::find_serial_devices() {
   auto ports = options_.ports;
   for (auto& port : discovery::serial_ports()) ports.push_back(std::move(port));
   for (const auto& port : ports) {
-    dialogue_.tell(fmt::format("Asking what is at {}.", port));
+    dialogue_.tell(fmt::format("Checking what is connected to {}.", port));
     auto device = discovery::find_serial_device(port, profiles_, clock_);
     if (!device) {
       dialogue_.tell("  Nothing responds there.");
@@ -174,7 +174,6 @@ Result<void> Setup::find_projector() {
   }
   if (is_on_usb) {
     projector.driver = Driver::lightcrafter4500;
-    projector.lightcrafter.led_current = {100, 100, 100};
     dialogue_.tell("The projector is the LightCrafter 4500 on USB.");
     return {};
   }
@@ -212,11 +211,11 @@ Result<void> Setup::find_cameras() {
   std::vector<std::string> names;
   for (const auto& camera : found)
     names.push_back(fmt::format("{} {} at {}", camera.name, camera.serial, camera.where));
-  const auto left = dialogue_.choose("Which is the left camera, as the cameras look?", names);
+  const auto left = dialogue_.choose("Which camera is on the left, seen from behind both cameras?", names);
   if (!left) return pass_on(left);
   auto others = names;
   others.erase(others.begin() + static_cast<std::ptrdiff_t>(*left));
-  const auto other = dialogue_.choose("Which is the right camera?", others);
+  const auto other = dialogue_.choose("Which camera is on the right?", others);
   if (!other) return pass_on(other);
   const std::size_t right = *other < *left ? *other : *other + 1;
   auto& options = rig_.stereo_camera.aravis;
@@ -225,17 +224,18 @@ Result<void> Setup::find_cameras() {
   };
   options.left = use(found[*left]);
   options.right = use(found[right]);
-  const auto offers = aravis_offers(options.left.serial);
-  if (!offers) return pass_on(offers, "setup");
-  options.pixel_format = first_of(
-      offers->pixel_formats, {"BayerRG8", "BayerGR8", "BayerGB8", "BayerBG8", "RGB8", "BGR8", "YUV422_8"}, "Bayer");
+  const auto capabilities = aravis_capabilities(options.left.serial);
+  if (!capabilities) return pass_on(capabilities, "setup");
+  options.pixel_format =
+      first_of(capabilities->pixel_formats,
+               {"BayerRG8", "BayerGR8", "BayerGB8", "BayerBG8", "RGB8", "BGR8", "YUV422_8"}, "Bayer");
   if (options.pixel_format.empty()) {
     return fail(ErrorCode::unsupported,
-                "setup: camera {} has no colour format ({}); the object is told from its blue screen by colour",
-                options.left.serial, fmt::join(offers->pixel_formats, ", "));
+                "setup: camera {} has no colour format ({}); colour separates the object from the blue screen",
+                options.left.serial, fmt::join(capabilities->pixel_formats, ", "));
   }
   const bool stays_on = rig_.projector.driver == ProjectorConfig::Driver::manual;
-  options.trigger_source = stays_on ? "Software" : first_of(offers->trigger_sources, {"Line0", "Line1"}, "Line");
+  options.trigger_source = stays_on ? "Software" : first_of(capabilities->trigger_sources, {"Line0", "Line1"}, "Line");
   if (options.trigger_source.empty()) {
     return fail(ErrorCode::unsupported, "setup: camera {} has no trigger input", options.left.serial);
   }

@@ -22,7 +22,7 @@ std::vector<FoundCamera> find_aravis_cameras() {
   return found;
 }
 
-Result<CameraOffers> aravis_offers(const std::string& serial) {
+Result<CameraCapabilities> aravis_capabilities(const std::string& serial) {
   arv_update_device_list();
   const char* id = nullptr;
   for (unsigned i = 0; i < arv_get_n_devices(); ++i) {
@@ -32,16 +32,16 @@ Result<CameraOffers> aravis_offers(const std::string& serial) {
     return fail(ErrorCode::not_found, "no camera {} on the network or USB; check power, cable and network", serial);
   GError* problem = nullptr;
   const std::unique_ptr<ArvCamera, decltype(&g_object_unref)> camera(arv_camera_new(id, &problem), &g_object_unref);
-  CameraOffers offers;
+  CameraCapabilities capabilities;
   const auto list = [&](auto read, std::vector<std::string>& names) {
     guint count = 0;
     const char** const all = problem ? nullptr : read(camera.get(), &count, &problem);
     for (guint i = 0; all && i < count; ++i) names.emplace_back(all[i]);
     g_free(all);
   };
-  list(arv_camera_dup_available_pixel_formats_as_strings, offers.pixel_formats);
-  list(arv_camera_dup_available_trigger_sources, offers.trigger_sources);
-  if (!problem) return offers;
+  list(arv_camera_dup_available_pixel_formats_as_strings, capabilities.pixel_formats);
+  list(arv_camera_dup_available_trigger_sources, capabilities.trigger_sources);
+  if (!problem) return capabilities;
   const std::string why = text(problem->message);
   g_clear_error(&problem);
   return fail(ErrorCode::io, "camera {} cannot be read: {}; stop the program that uses it", serial, why);

@@ -21,13 +21,13 @@ struct FoundCamera {
 std::vector<FoundCamera> find_aravis_cameras();
 
 /// Settings that a camera can take, by their SFNC names.
-struct CameraOffers {
+struct CameraCapabilities {
   std::vector<std::string> pixel_formats;
   std::vector<std::string> trigger_sources;
 };
 
 /// Of a GigE or USB3 Vision camera, which is connected for that. Fails with `not_found`, `io` (in use, or gone).
-Result<CameraOffers> aravis_offers(const std::string& serial);
+Result<CameraCapabilities> aravis_capabilities(const std::string& serial);
 
 /// Every capture device among `nodes`/video*; serial numbers from udev's `nodes`/v4l/by-id.
 std::vector<FoundCamera> find_v4l2_cameras(VideoCalls& calls, const std::filesystem::path& nodes = "/dev");

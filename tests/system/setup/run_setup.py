@@ -30,7 +30,7 @@ KINDS = {
                               "panel": "modbus-io", "driver": "grbl"},
 }
 # Nothing else may be asked: it could be found out.
-QUESTIONS = ("How many turns", "Which is the left camera", "Is everyone clear", "which way", "Put a mark", "By how many degrees")
+QUESTIONS = ("How many turns", "Which camera is on the left", "Is everyone clear", "which way", "Put a mark", "By how many degrees")
 QUESTIONS_OF_MODULE = ("Where are buttons", "then press Enter", "Is there a button", "Is there a guard", "May all of them",
                        "What does it switch")
 
@@ -92,7 +92,7 @@ class Person:
         self.answer(self.asked, f"{(angle - self.marked_deg + 180) % 360 - 180:.0f}")
 
     def choose(self):
-        if self.asked.startswith("Which is the left") and len(self.offered) == 2:
+        if self.asked.startswith("Which camera is on the left") and len(self.offered) == 2:
             self.answer(self.asked, str(1 + next(i for i, name in enumerate(self.offered) if "SIM-L" in name)))
         elif self.asked.startswith("Where are buttons") and len(self.offered) == 2:
             self.answer(self.asked, "2")
