@@ -7,10 +7,10 @@
 #include "core/parallel.h"
 #include "core/statistics.h"
 #include "core/units.h"
-#include "pipeline/evaluate/alignment.h"
 #include "pipeline/evaluate/ideal_carve.h"
 #include "pipeline/evaluate/self_intersection.h"
 #include "pipeline/evaluate/texture_figures.h"
+#include "pipeline/mesh/alignment.h"
 #include "pipeline/mesh/topology.h"
 
 namespace scanrig {

@@ -5,11 +5,11 @@
 
 #include "core/context.h"
 #include "core/result.h"
-#include "pipeline/evaluate/alignment.h"
 #include "pipeline/evaluate/scores.h"
 #include "pipeline/evaluate/texture_figures.h"
 #include "pipeline/evaluate/true_view.h"
 #include "pipeline/evaluate/truth_file.h"
+#include "pipeline/mesh/alignment.h"
 #include "pipeline/mesh/mesh.h"
 #include "pipeline/storage/scan_folder.h"
 

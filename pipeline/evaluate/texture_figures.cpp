@@ -7,7 +7,7 @@
 #include "core/parallel.h"
 #include "core/statistics.h"
 #include "core/units.h"
-#include "pipeline/evaluate/surface_samples.h"
+#include "pipeline/mesh/surface_samples.h"
 #include "pipeline/texture/render.h"
 
 namespace scanrig {

@@ -3,9 +3,9 @@
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
-#include "pipeline/evaluate/surface_samples.h"
 #include "pipeline/evaluate/truth_file.h"
 #include "pipeline/mesh/surface_index.h"
+#include "pipeline/mesh/surface_samples.h"
 
 namespace scanrig {
 

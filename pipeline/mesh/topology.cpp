@@ -143,6 +143,26 @@ Mesh kept_faces(const Mesh& mesh, const std::vector<bool>& keep) {
   return result;
 }
 
+Mesh joined_vertices(const Mesh& mesh) {
+  const auto before = [](const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
+    return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+  };
+  std::vector<std::uint32_t> order(mesh.vertices.size()), place(mesh.vertices.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::ranges::sort(order, [&](auto a, auto b) { return before(mesh.vertices[a], mesh.vertices[b]); });
+  Mesh joined;
+  for (const auto v : order) {
+    if (joined.vertices.empty() || joined.vertices.back() != mesh.vertices[v])
+      joined.vertices.push_back(mesh.vertices[v]);
+    place[v] = static_cast<std::uint32_t>(joined.vertices.size() - 1);
+  }
+  for (const auto& [a, b, c] : mesh.faces) {
+    const Mesh::Face face{place[a], place[b], place[c]};
+    if (!is_degenerate(face)) joined.faces.push_back(face);
+  }
+  return joined;
+}
+
 Mesh largest_component(const Mesh& mesh) {
   const Components parts = components(mesh);
   if (parts.count <= 1) return mesh;

@@ -37,6 +37,10 @@ Components components(const Mesh& mesh);
 /// The faces of `keep` (one flag per face) with the vertices they use, in their old order, attributes included.
 Mesh kept_faces(const Mesh& mesh, const std::vector<bool>& keep);
 
+/// The surface with one vertex where several lie on the same place, as in files that repeat them for each triangle;
+/// faces that become lines are gone, and so are attributes.
+Mesh joined_vertices(const Mesh& mesh);
+
 /// The component that encloses the largest volume, without shells of cavities and loose pieces. An empty mesh stays
 /// empty.
 Mesh largest_component(const Mesh& mesh);

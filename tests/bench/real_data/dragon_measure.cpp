@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "core/units.h"
-#include "pipeline/evaluate/surface_samples.h"
 #include "pipeline/importers/grid_resampling.h"
 #include "pipeline/importers/stanford_files.h"
 #include "pipeline/mesh/surface_index.h"
+#include "pipeline/mesh/surface_samples.h"
 #include "pipeline/model_io/mesh_reader.h"
 
 namespace scanrig::bench {

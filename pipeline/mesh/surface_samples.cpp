@@ -1,4 +1,4 @@
-#include "pipeline/evaluate/surface_samples.h"
+#include "pipeline/mesh/surface_samples.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -3,8 +3,8 @@
 #include <vector>
 
 #include "core/transform.h"
-#include "pipeline/evaluate/surface_samples.h"
 #include "pipeline/mesh/surface_index.h"
+#include "pipeline/mesh/surface_samples.h"
 
 namespace scanrig {
 
@@ -14,9 +14,9 @@ struct AlignmentOptions {
   double keep = 0.9;                ///< share of the pairs that is used, the closest ones
 };
 
-/// The rigid motion that aligns the samples best with the surface, from where they are: point-to-plane, the worst 10 %
-/// of the pairs left out. Only for figures printed beside the judged ones, which are in the absolute frame.
-Transform align(const std::vector<SurfaceSample>& samples, const Mesh& truth, const SurfaceIndex& surface,
+/// The rigid motion that aligns the samples best with the surface of `target`, from where they are: point-to-plane, the
+/// worst 10 % of the pairs left out. `surface` is the index of all its faces.
+Transform align(const std::vector<SurfaceSample>& samples, const Mesh& target, const SurfaceIndex& surface,
                 const AlignmentOptions& options);
 
 }  // namespace scanrig
