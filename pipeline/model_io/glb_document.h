@@ -15,6 +15,7 @@ namespace scanrig {
 inline constexpr double kMetresPerMm = 0.001;
 inline constexpr int kGltfByte = 5120;
 inline constexpr int kGltfUbyte = 5121;
+inline constexpr int kGltfShort = 5122;
 inline constexpr int kGltfUshort = 5123;
 inline constexpr int kGltfUint = 5125;
 inline constexpr int kGltfFloat = 5126;

@@ -1,5 +1,7 @@
 #include "pipeline/model_io/mesh_reader.h"
 
+#include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "core/files.h"
@@ -52,9 +54,17 @@ Result<Mesh> read_obj(const std::filesystem::path& path) {
 }
 
 Result<Mesh> read_mesh(const std::filesystem::path& path) {
-  if (path.extension() == ".ply") return read_ply(path);
-  if (path.extension() == ".obj") return read_obj(path);
-  return fail(ErrorCode::invalid_input, "{}: neither .ply nor .obj", path.string());
+  std::string kind = path.extension().string();
+  std::ranges::transform(kind, kind.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const auto parse = kind == ".ply"   ? &parse_ply
+                     : kind == ".obj" ? &parse_obj
+                     : kind == ".stl" ? &parse_stl
+                     : kind == ".glb" ? &parse_glb
+                                      : nullptr;
+  if (parse == nullptr) return fail(ErrorCode::invalid_input, "{}: neither .stl, .ply, .obj nor .glb", path.string());
+  const auto bytes = read_file(path);
+  if (!bytes) return pass_on(bytes);
+  return parse(*bytes, path.string());
 }
 
 }  // namespace scanrig

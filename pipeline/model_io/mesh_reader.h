@@ -17,11 +17,16 @@ namespace scanrig {
 Result<Mesh> read_ply(const std::filesystem::path& path);
 /// Wavefront OBJ: vertices and faces only.
 Result<Mesh> read_obj(const std::filesystem::path& path);
-/// One of these, by the file name's extension.
+/// PLY, OBJ, STL or GLB, by the file name's extension.
 Result<Mesh> read_mesh(const std::filesystem::path& path);
 
 /// The same from bytes; `name` is for messages.
 Result<Mesh> parse_ply(std::string_view bytes, std::string_view name);
 Result<Mesh> parse_obj(std::string_view text, std::string_view name);
+/// STL, binary or text: each triangle has three vertices of its own.
+Result<Mesh> parse_stl(std::string_view bytes, std::string_view name);
+/// glTF 2.0 binary, not compressed: all meshes of its scene, in mm (a file is in metres), vertices in the file's order;
+/// normals and `_VIEWS` if all parts have them.
+Result<Mesh> parse_glb(std::string_view bytes, std::string_view name);
 
 }  // namespace scanrig

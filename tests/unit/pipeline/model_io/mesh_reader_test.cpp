@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstdlib>
 #include <cstring>
 #include <random>
@@ -134,6 +137,133 @@ TEST(MeshReaderTest, aMissingFileOrOneOfAnotherKindIsNamed) {
   EXPECT_EQ(read_obj("/nonexistent/a.obj").error().code, ErrorCode::not_found);
   EXPECT_EQ(read_mesh("/nonexistent/a.step").error().code, ErrorCode::invalid_input);
   EXPECT_EQ(read_ply("/").error().code, ErrorCode::io);
+}
+
+/// A tetrahedron.
+Mesh four_faces() {
+  Mesh mesh;
+  mesh.vertices = {{0, 0, 0}, {10, 0, 0}, {0, 20, 0}, {0, 0, 30}};
+  mesh.faces = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
+  return mesh;
+}
+
+TEST(MeshReaderTest, aBinaryStlIsReadWhateverItsHeadSays) {
+  std::string file = encode_stl(four_faces());
+  file.replace(0, 5, "solid");
+  const auto mesh = parse_stl(file, "a.stl");
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  EXPECT_EQ(mesh->vertices.size(), 12u);
+  EXPECT_EQ(mesh->vertices[11], Eigen::Vector3f(0, 0, 30));
+  EXPECT_EQ(mesh->faces[3], (Mesh::Face{9, 10, 11}));
+  for (std::size_t size = 0; size < file.size(); ++size) {
+    EXPECT_FALSE(parse_stl(std::string_view(file).substr(0, size), "a.stl")) << size;
+  }
+  const float bad = std::nanf("");
+  std::memcpy(file.data() + 84 + 12, &bad, 4);
+  EXPECT_THAT(parse_stl(file, "a.stl").error().message, HasSubstr("triangle 1"));
+}
+
+TEST(MeshReaderTest, aTextStlIsReadAndAnUnusableOneRefusedByLine) {
+  const std::string good =
+      "solid a b\n facet normal 0 0 1\n  outer loop\n   vertex 0 0 0\n   vertex 1e1 0 0\r\n   vertex 0 2.5 0\n"
+      "  endloop\n endfacet\nendsolid a b\n";
+  const auto mesh = parse_stl(good, "a.stl");
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  EXPECT_EQ(mesh->vertices, (std::vector<Eigen::Vector3f>{{0, 0, 0}, {10, 0, 0}, {0, 2.5F, 0}}));
+  EXPECT_EQ(mesh->faces, (std::vector<Mesh::Face>{{0, 1, 2}}));
+  const auto message = [](const std::string& text) { return parse_stl(text, "a.stl").error().message; };
+  EXPECT_THAT(message(with(good, "vertex 0 0 0\n", "")), HasSubstr("a.stl, line 6: a triangle has 2 corners"));
+  EXPECT_THAT(message(with(good, "2.5", "x")), HasSubstr("a.stl, line 6: a vertex that is not a number"));
+  EXPECT_THAT(message(good.substr(0, good.find("  endloop"))), HasSubstr("within a triangle"));
+  EXPECT_THAT(message("solid empty\nendsolid\n"), HasSubstr("no faces"));
+  EXPECT_THAT(message("not a mesh"), HasSubstr("not an STL file"));
+}
+
+TEST(MeshReaderTest, bothOfOurGlbFilesAreReadInMm) {
+  Mesh mesh = four_faces();
+  mesh.views = {0, 3, 1, 200};
+  const TexturedMesh model{.mesh = mesh, .corner_uv = {}, .atlas = {}};
+  for (const auto& file : {*encode_glb(model), *encode_view_glb(model)}) {
+    const auto read = parse_glb(file, "a.glb");
+    ASSERT_TRUE(read) << read.error().message;
+    ASSERT_EQ(read->faces.size(), 4u);
+    ASSERT_EQ(read->normals.size(), 4u);
+    for (std::size_t v = 0; v < 4; ++v) {
+      EXPECT_NEAR(read->normals[v].norm(), 1.0F, 1e-5F);
+      const auto same = std::ranges::find_if(mesh.vertices,
+                                             [&](const auto& one) { return (one - read->vertices[v]).norm() < 1e-3F; });
+      ASSERT_NE(same, mesh.vertices.end()) << read->vertices[v].transpose();
+      if (!read->views.empty()) {
+        EXPECT_EQ(read->views[v], mesh.views[static_cast<std::size_t>(same - mesh.vertices.begin())]);
+      }
+    }
+  }
+  EXPECT_EQ(parse_glb(*encode_view_glb(model), "a.glb")->views.size(), 4u);
+}
+
+/// A GLB file of one chunk of JSON and one of bytes.
+std::string glb(const std::string& json, const std::string& binary) {
+  std::string file;
+  const auto put = [&](std::uint32_t value) { file.append(reinterpret_cast<const char*>(&value), 4); };
+  put(0x46546C67);
+  put(2);
+  put(static_cast<std::uint32_t>(28 + json.size() + binary.size()));
+  put(static_cast<std::uint32_t>(json.size()));
+  put(0x4E4F534A);
+  file += json;
+  put(static_cast<std::uint32_t>(binary.size()));
+  put(0x004E4942);
+  return file + binary;
+}
+
+const std::string kTriangleGlb = R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],)"
+                                 R"("nodes":[{"children":[1,1],"translation":[1,0,0]},{"mesh":0,"scale":[-2,1,1]}],)"
+                                 R"("meshes":[{"primitives":[{"attributes":{"POSITION":0}}]}],)"
+                                 R"("accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],)"
+                                 R"("bufferViews":[{"buffer":0,"byteLength":36}],"buffers":[{"byteLength":36}]})";
+
+std::string triangle_bytes() {
+  const std::array<float, 9> corners{0, 0, 0, 0.001F, 0, 0, 0, 0.002F, 0};
+  return {reinterpret_cast<const char*>(corners.data()), sizeof corners};
+}
+
+TEST(MeshReaderTest, aForeignGlbWithNodesIsReadAndAMirrorTurnsItsFaces) {
+  const auto mesh = parse_glb(glb(kTriangleGlb, triangle_bytes()), "a.glb");
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  ASSERT_EQ(mesh->vertices.size(), 6u) << "the mesh is there twice";
+  EXPECT_TRUE(mesh->vertices[1].isApprox(Eigen::Vector3f(998, 0, 0)));
+  EXPECT_TRUE(mesh->vertices[5].isApprox(Eigen::Vector3f(1000, 2, 0)));
+  EXPECT_EQ(mesh->faces[1], (Mesh::Face{3, 5, 4}));
+  EXPECT_TRUE(mesh->normals.empty());
+}
+
+TEST(MeshReaderTest, anUnusableGlbIsRefused) {
+  const auto message = [](const std::string& json, const std::string& binary = triangle_bytes()) {
+    const auto mesh = parse_glb(glb(json, binary), "a.glb");
+    EXPECT_FALSE(mesh) << json;
+    return mesh ? "" : mesh.error().message;
+  };
+  EXPECT_THAT(message(kTriangleGlb, triangle_bytes().substr(4)), HasSubstr("behind its end"));
+  EXPECT_THAT(message(with(kTriangleGlb, "\"count\":3", "\"count\":4")), HasSubstr("behind its end"));
+  EXPECT_THAT(message(with(kTriangleGlb, "\"count\":3", "\"count\":-1")), HasSubstr("behind its end"));
+  EXPECT_THAT(message(with(kTriangleGlb, "[1,1]", "[0]")), HasSubstr("without end"));
+  EXPECT_THAT(message(with(kTriangleGlb, "5126", "5127")), HasSubstr("glTF does not know"));
+  EXPECT_THAT(message(with(kTriangleGlb, "\"scene\":0", "\"extensionsRequired\":[\"KHR_draco_mesh_compression\"]")),
+              HasSubstr("without compression"));
+  EXPECT_THAT(message(with(kTriangleGlb, "\"POSITION\":0", "\"POSITION\":7")), HasSubstr("damaged"));
+  EXPECT_THAT(message("{"), HasSubstr("damaged"));
+  EXPECT_THAT(message("[]"), HasSubstr("no description"));
+  EXPECT_THAT(parse_glb("glTF", "a.glb").error().message, HasSubstr("not a GLB file"));
+  const std::string good = glb(kTriangleGlb, triangle_bytes());
+  for (std::size_t size = 0; size < good.size(); ++size) {
+    EXPECT_FALSE(parse_glb(std::string_view(good).substr(0, size), "a.glb")) << size;
+  }
+  std::mt19937 random(3);
+  for (int round = 0; round < 20000; ++round) {
+    std::string bad = good;
+    for (int k = 0; k < 3; ++k) bad[random() % bad.size()] = static_cast<char>(random());
+    (void)parse_glb(bad, "a.glb");
+  }
 }
 
 TEST(MeshReaderTest, publishedMeshesAreRead) {
