@@ -250,6 +250,19 @@ const char* const kSchemas = R"({
   "point": {"type": "array", "items": {"type": "number"}, "description": "mm, on the surface"},
   "measured": {"type": "boolean", "description": "false: closed there by silhouettes or the table"},
   "sigma_mm": {"type": "number", "nullable": true}}},
+"Deviation": {"type": "object", "additionalProperties": false, "required": ["reference", "model_file", "values_file", "vertices",
+  "confirmed", "fits_otherwise", "known_share", "mean_mm", "rms_mm", "p95_mm", "min_mm", "max_mm"], "properties": {
+  "reference": {"type": "string"},
+  "model_file": {"type": "string", "description": "of the job: the glTF file whose vertices are compared"},
+  "values_file": {"type": "string", "description": "of the job: a number per vertex, 16 bit, little-endian, signed, um; positive: outside the reference; -32768: not known"},
+  "vertices": {"type": "integer"},
+  "confirmed": {"type": "number", "description": "share of the measured surface that lies at the reference"},
+  "fits_otherwise": {"type": "boolean", "description": "another way to lay it fits as well: the part is symmetric"},
+  "known_share": {"type": "number"}, "mean_mm": {"type": "number"}, "rms_mm": {"type": "number"},
+  "p95_mm": {"type": "number", "description": "of the absolute values"}, "min_mm": {"type": "number"}, "max_mm": {"type": "number"}}},
+"References": {"type": "object", "required": ["references"], "additionalProperties": false, "properties": {
+  "references": {"type": "array", "items": {"type": "object", "required": ["name", "bytes"], "additionalProperties": false, "properties": {
+    "name": {"type": "string"}, "bytes": {"type": "integer"}}}}}},
 "Report": {"type": "object", "description": "report.json of the model"},
 "Calibration": {"type": "object", "required": ["job", "reminder", "awaited_placement", "board"], "additionalProperties": false, "properties": {
   "job": {"allOf": [{"$ref": "#/components/schemas/CalibrationJob"}], "nullable": true},

@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -69,12 +70,14 @@ struct ApiStation {
   std::function<Result<void>()> check_config{};            ///< of the file that the daemon was started with
   std::function<void(ControlLoop::Reply)> reload{};        ///< of it; reads the disk
   std::function<void(std::function<void()>)> on_worker{};  ///< for work that touches the disk
-  EventHub* hub = nullptr;                                 ///< never null where a server runs
-  Access* access = nullptr;                                ///< likewise
-  std::function<std::string()> page_address{};             ///< "http://127.0.0.1:8080"; empty: it is not served
-  bool tls = false;                                        ///< browsers reach it by https, through a proxy
-  bool insecure = false;                                   ///< other machines may connect without TLS
-  const RecentLog* log = nullptr;                          ///< null: there is none
+  /// For work of seconds: one after the other, at low priority; the token when the server ends.
+  std::function<void(std::function<void(const std::stop_token&)>)> on_background{};
+  EventHub* hub = nullptr;                      ///< never null where a server runs
+  Access* access = nullptr;                     ///< likewise
+  std::function<std::string()> page_address{};  ///< "http://127.0.0.1:8080"; empty: it is not served
+  bool tls = false;                             ///< browsers reach it by https, through a proxy
+  bool insecure = false;                        ///< other machines may connect without TLS
+  const RecentLog* log = nullptr;               ///< null: there is none
 };
 
 using Send = std::function<void(ApiResponse)>;
@@ -145,6 +148,7 @@ class Router {
 
 std::vector<Route> station_routes();      ///< status, events, buttons, maintenance, inputs and outputs
 std::vector<Route> job_routes();          ///< jobs as they are, their files and models
+std::vector<Route> model_routes();        ///< lengths on a model, its deviation from a reference
 std::vector<Route> order_routes();        ///< actions on jobs: queued, cancelled, bundled, deleted, ...
 std::vector<Route> calibration_routes();  ///< calibrating the rig, and how its board stands
 std::vector<Route> service_routes();      ///< health, metrics, the OpenAPI document

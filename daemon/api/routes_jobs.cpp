@@ -3,7 +3,6 @@
 #include "daemon/api/downloads.h"
 #include "daemon/api/json_replies.h"
 #include "daemon/api/route.h"
-#include "pipeline/reconstruct/model_ruler.h"
 
 namespace scanrig {
 namespace {
@@ -57,53 +56,6 @@ void send_file(const ApiStation& station, const Values& values, const std::strin
   const auto file = open_below(job->folder, path);
   if (!file) return send(error_response(file.error()));
   send({.body = *file, .type = media_type(path)});
-}
-
-ordered_json to_json(const RulerEnd& end) {
-  return {{"point", {end.point.x(), end.point.y(), end.point.z()}},
-          {"measured", end.is_measured},
-          {"sigma_mm", end.is_measured ? ordered_json(end.sigma_mm) : ordered_json(nullptr)}};
-}
-
-void measure(ModelRuler& ruler, const ApiStation& station, const Values& values, const Send& send) {
-  const auto job = find_job(station, values);
-  if (!job) return send(no_such_job());
-  const auto point = [&](const char* x, const char* y, const char* z) {
-    return Eigen::Vector3d(*values.number(x), *values.number(y), *values.number(z));
-  };
-  const auto length = ruler.measure(job->folder, point("from_x", "from_y", "from_z"), point("to_x", "to_y", "to_z"));
-  if (!length) return send(error_response(length.error()));
-  const auto& uncertainty = length->expanded_uncertainty_mm;
-  send({.body = to_text({{"mm", length->mm},
-                         {"expanded_uncertainty_mm", uncertainty ? ordered_json(*uncertainty) : ordered_json(nullptr)},
-                         {"from", to_json(length->from)},
-                         {"to", to_json(length->to)}})});
-}
-
-Route measure_route() {
-  constexpr double kFarMm = 1e5;
-  Route route{
-      .method = Method::post,
-      .path = "/api/v1/jobs/{id}/measure",
-      .role = Role::viewer,
-      .description =
-          "The distance of two points of a job's model, with U (k = 2). Both in mm in the model's frame, "
-          "within 2 mm of its surface.",
-      .in_path = {kJobId},
-      .reply = {.description = "the points on the surface and their distance", .schema = "Length"},
-      .errors = {500},
-      .slow = true,
-      .handle = [ruler = std::make_shared<ModelRuler>()](const ApiStation& station, const Values& values,
-                                                         const Send& send) { measure(*ruler, station, values, send); }};
-  for (const char* name : {"from_x", "from_y", "from_z", "to_x", "to_y", "to_z"}) {
-    route.in_body.push_back({.name = name,
-                             .type = RequestField::Type::number,
-                             .description = "mm",
-                             .required = true,
-                             .min = -kFarMm,
-                             .max = kFarMm});
-  }
-  return route;
 }
 
 Route list_route() {
@@ -176,7 +128,6 @@ std::vector<Route> job_routes() {
        .slow = true,
        .handle = [](const ApiStation& station, const Values& values,
                     const Send& send) { send_file(station, values, "model/report.json", send); }},
-      measure_route(),
   };
 }
 

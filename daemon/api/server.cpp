@@ -13,6 +13,8 @@
 #include <thread>
 #include <vector>
 
+#include "core/parallel.h"
+#include "core/priority.h"
 #include "daemon/api/downloads.h"
 #include "daemon/api/metrics.h"
 #include "daemon/api/session.h"
@@ -76,10 +78,18 @@ struct ApiServer::Impl {
         core(
             {control, [this] { return latest_facts(); }, with.storage, with.preview_jpeg, with.look_at_board,
              with.check_config, with.reload,
-             [this](std::function<void()> work) { net::post(core.workers, std::move(work)); }, &core.hub, &core.access,
+             [this](std::function<void()> work) { net::post(core.workers, std::move(work)); },
+             [this](auto work) { run_in_background(std::move(work)); }, &core.hub, &core.access,
              [this] { return page_address(); }, with.http_origin.starts_with("https://"), with.insecure_http, with.log},
             roles, proxy, with, this_life()),
         local(io, Local(), listening) {}
+
+  void run_in_background(std::function<void(const std::stop_token&)> work) {
+    net::post(core.background, [this, work = std::move(work)] {
+      lower_priority();
+      with_threads(0, [&] { work(core.ends.get_token()); });
+    });
+  }
 
   /// As a browser on this machine reaches it.
   [[nodiscard]] std::string page_address() const {
@@ -242,6 +252,8 @@ ApiServer::~ApiServer() {
   impl_->io.stop();
   for (auto& thread : impl_->threads) thread.join();
   impl_->core.workers.join();
+  impl_->core.ends.request_stop();
+  impl_->core.background.join();
   remove_own_socket(impl_->options);
 }
 

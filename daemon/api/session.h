@@ -45,6 +45,8 @@ struct ServerCore {
   std::atomic<std::uint64_t> requests = 0, refused = 0;
   const std::shared_ptr<int> answers = std::make_shared<int>();  ///< one more owner for every reply on its way out
   boost::asio::thread_pool workers{2};                           ///< for work that touches the disk
+  boost::asio::thread_pool background{1};                        ///< for work of seconds, at low priority
+  std::stop_source ends;                                         ///< of the work in the background
 };
 
 /// Origin of a connection.

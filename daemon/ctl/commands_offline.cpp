@@ -113,6 +113,24 @@ void add_token(CLI::App& app, Chosen& chosen) {
       ->required();
 }
 
+void add_reference(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<ReferenceVerb>();
+  auto* sub = app.add_subcommand("reference", "meshes, such as a design's, that models are compared with");
+  sub->require_subcommand(1);
+  const auto add = [&](const char* name, const char* description) {
+    auto* action = add_action(*sub, chosen, name, description, verb, &reference);
+    action->add_option("--jobs", verb->jobs, "folder of all jobs (default: the one that the configuration names)");
+    action->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
+    action->add_flag("--json", verb->json, "print JSON");
+    return action;
+  };
+  auto* make = add("add", "keep a mesh; one of the same name is replaced");
+  make->add_option("FILE", verb->file, "STL, PLY or OBJ in mm, or GLB")->required();
+  make->add_option("--name", verb->name, "on the page (default: as the file)");
+  add("list", "names and sizes");
+  add("remove", "delete one; what was compared with it stays")->add_option("NAME", verb->name, "of it")->required();
+}
+
 }  // namespace
 
 void add_offline_commands(CLI::App& app, Chosen& chosen) {
@@ -122,6 +140,7 @@ void add_offline_commands(CLI::App& app, Chosen& chosen) {
   add_convert(app, chosen);
   add_board(app, chosen);
   add_check_config(app, chosen);
+  add_reference(app, chosen);
   add_token(app, chosen);
 }
 

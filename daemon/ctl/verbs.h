@@ -196,6 +196,17 @@ struct TokenVerb {
 };
 ExitCode token(const TokenVerb& verb);
 
+struct ReferenceVerb {
+  std::string what;  ///< "add", "list", "remove"
+  std::string name;  ///< empty: add: as the file
+  std::filesystem::path file;
+  std::filesystem::path jobs;  ///< empty: the folder that `config` names
+  std::filesystem::path config = "/etc/scanrig/rig.toml";
+  bool json = false;
+};
+/// The meshes that models can be compared with.
+ExitCode reference(const ReferenceVerb& verb);
+
 // Verbs at the rig, on the devices themselves, while no daemon runs.
 
 struct TurntableVerb {

@@ -13,6 +13,7 @@
 #include "daemon/api/access.h"
 #include "daemon/ctl/output.h"
 #include "daemon/ctl/verbs.h"
+#include "pipeline/deviation/references.h"
 #include "pipeline/evaluate/evaluate.h"
 #include "pipeline/importers/import_stanford.h"
 
@@ -182,6 +183,47 @@ ExitCode token(const TokenVerb& verb) {
     done = revoke(verb, std::move(*tokens), *file);
   } else {
     list(verb, *tokens);
+  }
+  return done ? ExitCode::ok : report_error(done.error());
+}
+
+namespace {
+
+Result<std::filesystem::path> jobs_folder_of(const ReferenceVerb& verb) {
+  if (!verb.jobs.empty()) return verb.jobs;
+  const auto config = config::read_rig_config(verb.config, {}, config::Cameras::or_simulated);
+  if (!config) return pass_on(config);
+  return config->storage.root;
+}
+
+Result<void> print_references(const std::filesystem::path& jobs, bool json) {
+  const auto found = list_references(jobs);
+  if (!found) return pass_on(found);
+  auto all = ordered_json::array();
+  for (const auto& one : *found) {
+    if (!json) fmt::print("{:<40}  {:>10} bytes\n", one.name, one.bytes);
+    all.push_back({{"name", one.name}, {"bytes", one.bytes}});
+  }
+  if (json) fmt::print("{}\n", ordered_json{{"references", all}}.dump(2));
+  return {};
+}
+
+}  // namespace
+
+ExitCode reference(const ReferenceVerb& verb) {
+  const auto jobs = jobs_folder_of(verb);
+  if (!jobs) return report_error(jobs.error());
+  const auto name = verb.name.empty() ? verb.file.stem().string() : verb.name;
+  Result<void> done;
+  if (verb.what == "add") {
+    done = add_reference(*jobs, name, verb.file);
+    if (done && verb.json) fmt::print("{}\n", ordered_json{{"name", name}}.dump());
+    if (done && !verb.json) fmt::print("{}\n", name);
+  } else if (verb.what == "remove") {
+    done = remove_reference(*jobs, name);
+    if (done && verb.json) fmt::print("{}\n", ordered_json{{"removed", name}}.dump());
+  } else {
+    done = print_references(*jobs, verb.json);
   }
   return done ? ExitCode::ok : report_error(done.error());
 }

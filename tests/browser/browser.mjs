@@ -50,8 +50,12 @@ export class Station {
     for (const from of [this.process.stdout, this.process.stderr]) from.on("data", (text) => (this.log += text));
     await until("the daemon answers", () => this.status() !== null, READY_MS);
   }
+  /** A verb that needs no daemon. */
+  command(...words) {
+    return spawnSync(join(this.bin, "scanrig"), words, { encoding: "utf8" });
+  }
   scanrig(...words) {
-    return spawnSync(join(this.bin, "scanrig"), [...words, "--socket", this.socket], { encoding: "utf8" });
+    return this.command(...words, "--socket", this.socket);
   }
   status() {
     const told = this.scanrig("status", "--json");

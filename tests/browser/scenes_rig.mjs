@@ -1,7 +1,25 @@
 // What a person does at the page while the rig works.
 import assert from "node:assert/strict";
+import { readFileSync, writeFileSync } from "node:fs";
+import { join } from "node:path";
 import { findings, overflows, press, sleep, until, word } from "./browser.mjs";
 import { check, jobOf, open, ready, see } from "./steps.mjs";
+
+const STL_HEAD = 84; // bytes before the triangles
+const STL_TRIANGLE = 50;
+const MODEL_LIMIT_MS = 240_000;
+
+/** A binary STL file, each corner elsewhere: what a design's mesh in its own frame is. */
+function movedStl(bytes, move) {
+  const moved = Buffer.from(bytes);
+  for (let at = STL_HEAD; at + STL_TRIANGLE <= moved.length; at += STL_TRIANGLE) {
+    for (let corner = at + 12; corner < at + 48; corner += 12) {
+      const to = move([0, 4, 8].map((k) => bytes.readFloatLE(corner + k)));
+      for (const k of [0, 1, 2]) moved.writeFloatLE(to[k], corner + 4 * k);
+    }
+  }
+  return moved;
+}
 
 const WIDTHS = [320, 390, 700, 1280, 1920];
 
@@ -98,6 +116,43 @@ export const scenarios = {
     await until("the job is interrupted", () => jobOf(station)?.state === "interrupted");
     await check(page, station);
   },
+
+  /** A model against two references: its own surface, turned, and one squeezed flat, which is refused. */
+  deviation: Object.assign(
+    async ({ browser, station }) => {
+      const page = await open(browser, station, { expected: /409/ });
+      await see(page, "READY", 60_000);
+      await press(page, "START");
+      const ended = () => ["done", "failed"].find((state) => state === jobOf(station)?.state);
+      assert.equal(await until("the job ends", ended, MODEL_LIMIT_MS), "done");
+      const { id } = jobOf(station);
+      const jobs = join(station.folder, "jobs");
+      const own = readFileSync(join(jobs, id, "model", "model.stl"));
+      const references = { turned: ([x, y, z]) => [z + 300, x - 20, y], flat: ([x, y, z]) => [x, 0.2 * y, z] };
+      for (const [name, move] of Object.entries(references)) {
+        const file = join(station.folder, `${name}.stl`);
+        writeFileSync(file, movedStl(own, move));
+        const added = station.command("reference", "add", file, "--jobs", jobs);
+        assert.equal(added.status, 0, added.stderr);
+      }
+      await page.evaluate((job) => (location.hash = `model/${job}`), id);
+      const choice = page.getByLabel("Compare with");
+      await until("references are offered", () => choice.count(), 30_000);
+      await choice.selectOption("turned");
+      const look = page.getByRole("button", { name: "Deviation" });
+      await until("the model is coloured", () => look.count(), 60_000);
+      assert.equal(await look.getAttribute("aria-pressed"), "true");
+      const told = await page.getByText(/^Best fit:/).innerText();
+      const within = Number(/95 % within ([\d.]+) mm/.exec(told)?.[1]);
+      assert.ok(within < 0.05, `its own surface: ${told}`);
+      await check(page, station);
+      await choice.selectOption("flat");
+      await until("it is refused", () => page.getByText(/the reference does not fit/).count(), 60_000);
+      assert.equal(await look.count(), 0, "no colouring by what does not fit");
+      await check(page, station);
+    },
+    { rig: ["--operator", "helper", "--clock", "virtual"] },
+  ),
 
   /** Every screen in both themes and from 320 to 1920 px: nothing sticks out, nothing is illegible. */
   async layout({ browser, station }) {

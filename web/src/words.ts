@@ -1,5 +1,5 @@
 // Every word of the page's own. Sentences about the rig, and what to do next, are the daemon's.
-import type { Job, Length, Role } from "./api/types.ts";
+import type { Deviation, Job, Length, Role } from "./api/types.ts";
 
 export const words = {
   screens: { station: "Station", jobs: "Jobs", model: "Model", calibrate: "Calibrate", service: "Service" },
@@ -44,13 +44,24 @@ export const words = {
   chooseJob: "Choose a finished job.",
   loading: "Loading the model.",
   noModel: "This job has no model.",
-  colourings: { texture: "Texture", shade: "Shade", measured: "Measured", sigma: "Sigma" },
+  colourings: { texture: "Texture", shade: "Shade", measured: "Measured", sigma: "Sigma", deviation: "Deviation" },
   legends: {
     texture: "",
     shade: "",
     measured: "Striped: closed by silhouettes or the table, not measured.",
     sigma: "Standard deviation along the normal, 0 to 0.1 mm. Striped: not measured.",
+    deviation: "Blue: inside the reference. Orange: outside. Striped: beyond the scale. Grey: not known.",
   },
+  reference: "Compare with",
+  noReference: "nothing",
+  comparing: "Comparing. This takes some seconds.",
+  otherFile: "The deviations are of another model file: load the page again.",
+  deviationTop: "Scale",
+  mm: (value: number) => `${value} mm`,
+  deviationFigures: (one: Deviation) =>
+    `Best fit: ${signed(one.mean_mm)} mm on average, 95 % within ${one.p95_mm.toFixed(3)} mm, from ${signed(one.min_mm)} to ${signed(one.max_mm)} mm; ${Math.round(100 * one.known_share)} % of the vertices known.${
+      one.fits_otherwise ? " The part is symmetric: the reference fits in other ways too." : ""
+    }`,
   section: "Section",
   ruler: "Ruler",
   rulerHint: "Tap two points of the surface.",
@@ -121,6 +132,8 @@ export const words = {
   needs: (role: Role) => `needs the role ${role}`,
   verdicts: { holds: "It holds.", moved: "Something has moved.", calibrate: "A calibration is due." },
 } as const;
+
+const signed = (mm: number) => `${mm > 0 ? "+" : ""}${mm.toFixed(3)}`;
 
 export interface Badge {
   word: string;

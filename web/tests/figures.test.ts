@@ -1,6 +1,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
+import { topFor } from "../src/model/scale.ts";
 import { exposureOf, sharpnessOf } from "../src/service/sharpness.ts";
+import { deviationColour, isOutside } from "../src/view3d/colourings.ts";
 import { cutAt } from "../src/view3d/outline.ts";
 import { minutesSince, words } from "../src/words.ts";
 
@@ -54,4 +56,21 @@ test("the age of a report", () => {
   assert.equal(at(2 * 3600), "2 h ago");
   assert.equal(at(47 * 3600), "47 h ago");
   assert.equal(at(72 * 3600), "3 days ago");
+});
+
+test("a deviation is blue inside, white on the reference, orange outside, grey where it is not known", () => {
+  const [inside, on, outside, unknown] = [-200, 0, 200, -32768].map((um) => deviationColour(um, 200));
+  assert.ok(inside && on && outside && unknown);
+  assert.ok(inside.b > 2 * inside.r && outside.r > 2 * outside.b);
+  assert.ok(on.r > 0.8 && Math.abs(on.r - on.b) < 0.01);
+  assert.ok(unknown.r < 0.3 && Math.abs(unknown.r - unknown.b) < 0.1);
+  assert.deepEqual(deviationColour(5000, 200), outside);
+  assert.deepEqual(
+    [-201, -200, 200, 201, -32768].map((um) => isOutside(um, 200)),
+    [true, false, false, true, false],
+  );
+});
+
+test("the scale holds 95 % of the vertices", () => {
+  assert.deepEqual([0.01, 0.05, 0.051, 0.9, 80].map(topFor), [0.05, 0.05, 0.1, 1, 5]);
 });

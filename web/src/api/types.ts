@@ -200,3 +200,23 @@ export interface Length {
   from: RulerEnd;
   to: RulerEnd;
 }
+
+export interface Reference {
+  name: string;
+  bytes: number;
+}
+
+export interface Deviation {
+  reference: string;
+  model_file: string;
+  values_file: string;
+  vertices: number;
+  confirmed: number;
+  fits_otherwise: boolean;
+  known_share: number;
+  mean_mm: number;
+  rms_mm: number;
+  p95_mm: number; // of the absolute values
+  min_mm: number;
+  max_mm: number;
+}

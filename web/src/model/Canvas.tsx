@@ -6,8 +6,9 @@ import type { Length } from "../api/types.ts";
 import type { Colouring } from "../view3d/colourings.ts";
 import type { Point, Viewer } from "../view3d/viewer.ts";
 import { words } from "../words.ts";
+import { Compare } from "./Compare.tsx";
 
-const KEYS: Record<string, Colouring> = { t: "texture", g: "shade", m: "measured", e: "sigma" };
+const KEYS: Record<string, Colouring> = { t: "texture", g: "shade", m: "measured", e: "sigma", d: "deviation" };
 
 function askLength(job: string, [from, to]: [Point, Point]): Promise<Length> {
   return order<Length>(`/jobs/${encodeURIComponent(job)}/measure`, {
@@ -42,6 +43,12 @@ export function Canvas({ job, file }: { job: string; file: string }) {
     measuring.value = on;
     distance.value = on ? words.rulerHint : "";
     viewer.current?.measure(on);
+  };
+  const onCompared = (shown: boolean) => {
+    const own = viewer.current?.colourings ?? [];
+    colourings.value = shown ? [...own, "deviation"] : own;
+    if (shown) colouring.value = "deviation";
+    else if (colouring.value === "deviation") colour("texture");
   };
   const onEnds = async (ends: [Point, Point] | null) => {
     distance.value = ends ? words.measuring : words.rulerHint;
@@ -111,6 +118,7 @@ export function Canvas({ job, file }: { job: string; file: string }) {
           {words.legends[colouring.value]}
         </p>
       )}
+      {!state.value && <Compare key={file} job={job} file={file} viewer={viewer} onShown={onCompared} />}
       {distance.value && (
         <p role="status" class="sentence">
           {distance.value}

@@ -14,7 +14,7 @@ import {
 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 import { GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
-import { COLOURINGS, type Colouring, looksOf } from "./colourings.ts";
+import { COLOURINGS, type Colouring, deviationLook, looksOf } from "./colourings.ts";
 import { cutAt, type Surface } from "./outline.ts";
 import { openStage, type Stage } from "./stage.ts";
 
@@ -24,6 +24,8 @@ export type Point = [number, number, number];
 export interface Viewer {
   colourings: Colouring[]; // that the file has data for
   colour(how: Colouring): void;
+  /** Colours by deviation, one value per vertex, from -top to top. False: these are of another model. */
+  compare(um: Int16Array, top_um: number): boolean;
   /** Cuts away this share of the height, from the top. */
   cut(share: number): void;
   measure(on: boolean): void;
@@ -165,6 +167,14 @@ export async function openViewer(
   return {
     colourings: COLOURINGS.filter((how) => looks.every((look) => look[how])),
     colour,
+    compare(um, top_um) {
+      const [mesh, look] = [meshes[0], looks[0]];
+      if (!mesh || !look || meshes.length > 1 || mesh.geometry.getAttribute("position").count !== um.length)
+        return false;
+      look.deviation = deviationLook(mesh, plane, um, top_um);
+      colour("deviation");
+      return true;
+    },
     cut(share) {
       const height = box.max.y - share * (box.max.y - box.min.y);
       plane.constant = height + (share === 0 ? 1 : 0);

@@ -32,9 +32,13 @@ std::map<std::string, std::vector<PageField>> interfaces() {
 }
 
 /// Schema by interface, where the names differ.
-const std::map<std::string, std::string> kOtherName{{"Job", "JobDetail"},      {"Snapshot", "Page"},
-                                                    {"StartAction", "Action"}, {"CalibrationState", "Calibration"},
-                                                    {"LogLine", "Log/lines"},  {"Recipe", "Recipes/recipes"}};
+const std::map<std::string, std::string> kOtherName{{"Job", "JobDetail"},
+                                                    {"Snapshot", "Page"},
+                                                    {"StartAction", "Action"},
+                                                    {"CalibrationState", "Calibration"},
+                                                    {"LogLine", "Log/lines"},
+                                                    {"Recipe", "Recipes/recipes"},
+                                                    {"Reference", "References/references"}};
 
 class PageTypes : public testing::Test {
  protected:
