@@ -6,6 +6,7 @@
 
 #include "pipeline/mesh/solid_properties.h"
 #include "pipeline/pose/stable_rests.h"
+#include "pipeline/texture/shading.h"
 
 namespace scanrig {
 namespace {
@@ -17,11 +18,22 @@ constexpr double kMaxStep = 4.0;    // edge of a triangle over the grid's spacin
 constexpr double kSameDepth = 1.5;  // mm between a vertex and what a view sees there
 constexpr double kFootSeen = 0.5;   // cosine: the old foot is turned up by 60 deg at least
 
-Rgb colour_at(const Camera& left, const LivePhoto& photo, const Eigen::Vector3d& point_in_pose) {
-  if (photo.image.empty()) return kGrey;
+constexpr std::size_t kGainSamples = 2000;
+
+/// What the photograph shows of a point, linear; nothing outside of it.
+std::optional<Eigen::Vector3f> light_at(const Camera& left, const LivePhoto& photo,
+                                        const Eigen::Vector3d& point_in_pose) {
+  if (photo.image.empty()) return std::nullopt;
   const Eigen::Vector2d pixel = left.project(photo.turntable_from_pose * point_in_pose);
-  if (!pixel.allFinite() || !left.projection.contains(pixel)) return kGrey;
+  if (!pixel.allFinite() || !left.projection.contains(pixel)) return std::nullopt;
   const cv::Vec3b bgr = photo.image(static_cast<int>(std::lround(pixel.y())), static_cast<int>(std::lround(pixel.x())));
+  return Eigen::Vector3f(bgr[0], bgr[1], bgr[2]) / 255.0F;
+}
+
+Rgb colour_at(const Camera& left, const LivePhoto& photo, const Eigen::Vector3d& point_in_pose) {
+  const auto light = light_at(left, photo, point_in_pose);
+  if (!light) return kGrey;
+  const cv::Vec3b bgr = to_srgb(static_cast<float>(photo.gain) * *light);
   return {bgr[2], bgr[1], bgr[0]};
 }
 
@@ -45,6 +57,21 @@ void add_face(Mesh& mesh, const Mesh::Face& face, float max_edge_mm) {
 }
 
 }  // namespace
+
+double live_gain(const View& view, const Camera& left, const LivePhoto& photo) {
+  const RangeImage& range = view.range;
+  const int step = grid_step(range.depth, kGainSamples);
+  const Transform pose_from_camera = range.camera_from_pose.inverse();
+  std::vector<float> brightness;
+  for (int v = 0; v < range.depth.rows; v += step) {
+    for (int u = 0; u < range.depth.cols; u += step) {
+      if (!std::isfinite(range.depth(v, u))) continue;
+      const auto light = light_at(left, photo, pose_from_camera * range.projection.unproject(u, v, range.depth(v, u)));
+      if (light) brightness.push_back(light->maxCoeff());
+    }
+  }
+  return white_gain(std::move(brightness));
+}
 
 Mesh live_mesh_of_view(const View& view, const Camera& left, const LivePhoto& photo, std::size_t max_vertices) {
   const RangeImage& range = view.range;

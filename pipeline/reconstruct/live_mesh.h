@@ -17,8 +17,13 @@ namespace scanrig {
 /// The photograph of a view.
 struct LivePhoto {
   Transform turntable_from_pose = Transform::Identity();  ///< at the view's table angle
-  cv::Mat3b image;                                        ///< BGR, the left camera's; empty: grey
+  cv::Mat3b image;                                        ///< BGR, linear, the left camera's; empty: grey
+  double gain = 1.0;                                      ///< of its values; the same for all views of a pose
 };
+
+/// The gain that shows the surface about as bright as the finished texture; that one takes the lamps' directions out
+/// too, which one view does not tell.
+double live_gain(const View& view, const Camera& left, const LivePhoto& photo);
 
 /// One view's range image on a grid of at most `max_vertices`; neighbours across a step are not joined.
 Mesh live_mesh_of_view(const View& view, const Camera& left, const LivePhoto& photo, std::size_t max_vertices = 4000);

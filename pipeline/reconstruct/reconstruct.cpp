@@ -209,6 +209,8 @@ std::vector<LivePhoto> Reconstruction::State::live_photos(const PoseState& pose)
     photos.push_back({turntable_from_left * pose.views[v].range.camera_from_pose,
                       v < pose.plain.size() ? pose.plain[v].left : cv::Mat3b()});
   }
+  if (!photos.empty()) photos.front().gain = live_gain(pose.views.front(), calibration->left, photos.front());
+  for (LivePhoto& photo : photos) photo.gain = photos.front().gain;
   return photos;
 }
 

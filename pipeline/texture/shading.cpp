@@ -28,4 +28,12 @@ Eigen::Vector3f from_srgb(const cv::Vec3b& encoded) {
   return {table[encoded[0]], table[encoded[1]], table[encoded[2]]};
 }
 
+double white_gain(std::vector<float> brightness, const WhiteOptions& options) {
+  if (brightness.empty()) return 1.0;
+  const auto white =
+      brightness.begin() + static_cast<std::ptrdiff_t>(options.share * static_cast<double>(brightness.size() - 1));
+  std::nth_element(brightness.begin(), white, brightness.end());
+  return std::min(options.max_gain, options.white / std::max(1e-3, static_cast<double>(*white)));
+}
+
 }  // namespace scanrig

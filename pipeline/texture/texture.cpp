@@ -64,10 +64,7 @@ double gain_for(const std::vector<PointColour>& colours, const TextureOptions& o
   for (const auto& c : colours) {
     if (c.weight > 0.0F) brightest.push_back(c.bgr.maxCoeff());
   }
-  const auto white =
-      brightest.begin() + static_cast<std::ptrdiff_t>(options.white_share * static_cast<double>(brightest.size() - 1));
-  std::nth_element(brightest.begin(), white, brightest.end());
-  return std::min(options.max_gain, options.white / std::max(1e-3, static_cast<double>(*white)));
+  return white_gain(std::move(brightest), options.white);
 }
 
 /// Colour of texels without a face: harmless where a viewer's coarser levels reach beyond the padding.

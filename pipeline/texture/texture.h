@@ -11,6 +11,7 @@
 #include "pipeline/calibration/camera.h"
 #include "pipeline/mesh/mesh.h"
 #include "pipeline/texture/rig_light.h"
+#include "pipeline/texture/shading.h"
 
 namespace scanrig {
 
@@ -55,9 +56,7 @@ struct TextureOptions {
   /// Weight of the surrounding colour against the photos' (about 1 for a good view): significant only where they see
   /// next to nothing, and makes the passage to unseen surface continuous.
   float fill_weight = 1e-4F;
-  double white_share = 0.99;  ///< the brightest paint: this share of the vertices lies below it ...
-  double white = 0.8;         ///< ... is brought to this linear value ...
-  double max_gain = 3.0;      ///< ... unless that takes more gain than this: a dark object stays dark
+  WhiteOptions white{};
   ChartOptions charts{};
   BlendOptions blending{};
 };

@@ -31,6 +31,9 @@ Camera left_camera() {
   return left;
 }
 
+// 200 and 150 of 255, linear, as sRGB [IEC 61966-2-1].
+constexpr std::array<std::uint8_t, 3> kShownRed{229, 0, 0}, kShownGreen{0, 202, 0};
+
 /// Red in the left half, green in the right, as BGR.
 LivePhoto two_colours() {
   LivePhoto photo;
@@ -61,13 +64,26 @@ TEST(LiveMesh, AViewIsInItsPosesFrameAndHasThePhotographsColours) {
     EXPECT_NEAR(mesh.vertices[v].z(), is_near ? -100.0F : 40.0F, 1e-3F) << "600 mm before the camera's frame";
     if (is_near) {
       has_red = true;
-      EXPECT_EQ(mesh.colour[v], (std::array<std::uint8_t, 3>{200, 0, 0}));
+      EXPECT_EQ(mesh.colour[v], kShownRed);
     } else {
       has_green = true;
-      EXPECT_EQ(mesh.colour[v], (std::array<std::uint8_t, 3>{0, 150, 0}));
+      EXPECT_EQ(mesh.colour[v], kShownGreen);
     }
   }
   EXPECT_TRUE(has_red && has_green);
+}
+
+TEST(LiveMesh, ADarkPhotographIsShownAsBrightAsTheFinishedTexture) {
+  LivePhoto photo = two_colours();
+  EXPECT_NEAR(live_gain(wall_with_step(), left_camera(), photo), 0.8 / (200.0 / 255.0), 1e-3);
+  photo.image = photo.image * 0.5;
+  photo.gain = live_gain(wall_with_step(), left_camera(), photo);
+  EXPECT_NEAR(photo.gain, 0.8 / (100.0 / 255.0), 1e-3);
+  const Mesh mesh = live_mesh_of_view(wall_with_step(), left_camera(), photo);
+  EXPECT_EQ(mesh.colour.back()[1], 203) << "75 of 255 with this gain is 153";
+  photo.image = photo.image * 0.1;
+  EXPECT_DOUBLE_EQ(live_gain(wall_with_step(), left_camera(), photo), 3.0) << "a dark object stays dark";
+  EXPECT_DOUBLE_EQ(live_gain(wall_with_step(), left_camera(), {}), 1.0);
 }
 
 TEST(LiveMesh, WithoutAPhotographItIsGrey) {
@@ -80,8 +96,8 @@ TEST(LiveMesh, AVertexHasTheColourOfTheViewThatSeesIt) {
   mesh.vertices = {{-50, 0, -100}, {50, 0, 40}, {-50, 0, 0}, {-50, 0, -100}};
   mesh.normals = {{0, 0, -1}, {0, 0, -1}, {0, 0, -1}, {0, 0, 1}};
   colour_by_views(mesh, {wall_with_step()}, left_camera(), {two_colours()});
-  EXPECT_EQ(mesh.colour[0], (std::array<std::uint8_t, 3>{200, 0, 0}));
-  EXPECT_EQ(mesh.colour[1], (std::array<std::uint8_t, 3>{0, 150, 0}));
+  EXPECT_EQ(mesh.colour[0], kShownRed);
+  EXPECT_EQ(mesh.colour[1], kShownGreen);
   EXPECT_EQ(mesh.colour[2], (std::array<std::uint8_t, 3>{150, 150, 150})) << "behind what the view sees";
   EXPECT_EQ(mesh.colour[3], (std::array<std::uint8_t, 3>{150, 150, 150})) << "turned away";
 }
