@@ -6,6 +6,7 @@ import os
 import pathlib
 import shutil
 import signal
+import socket
 import subprocess
 import sys
 import threading
@@ -32,7 +33,7 @@ def arguments():
     parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/demo"), help="folder for the scan")
     parser.add_argument("--keep", action="store_true", help="leave the daemon running")
     parser.add_argument("--page", action="store_true",
-                        help="show the web page meanwhile; the daemon keeps running afterwards, as with --keep")
+                        help="show the web page; the daemon keeps running afterwards, until Ctrl-C")
     parser.add_argument("--same-rest", action="store_true", help="the operator does not turn the object over")
     parser.add_argument("--scale", type=float, default=1.0, help="of the images: 0.25 gives 320x240")
     parser.add_argument("--no-noise", action="store_true", help="sensors without noise")
@@ -44,7 +45,7 @@ def arguments():
     options = parser.parse_args()
     if options.page and options.wire:
         parser.error("--page shows the simulated rig without wires: leave --wire out")
-    options.keep = options.keep or options.page
+    options.keep = options.keep and not options.page  # Ctrl-C ends the page
     return options
 
 
@@ -61,6 +62,19 @@ def make_room(folder):
         shutil.rmtree(folder)
     folder.mkdir(parents=True, exist_ok=True)
     return None
+
+
+def free_port(wanted):
+    """That one, or another where a program has it."""
+    for port in (wanted, 0):
+        with socket.socket() as one:
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            try:
+                one.bind(("127.0.0.1", port))
+            except OSError:
+                continue
+            return one.getsockname()[1]
+    return wanted
 
 
 def scene(options):
@@ -88,7 +102,7 @@ class SimulatedStation:
             shutil.copy(calibration, self.jobs)
             extra = ["--own-calibration", *extra]
         if options.page:
-            extra = ["--http-port", PAGE_PORT, "--background-cameras", *extra]
+            extra = ["--http-port", free_port(PAGE_PORT), "--background-cameras", *extra]
         command = [options.bin / "scanrigd-sim", "--socket", self.socket, "--jobs", self.jobs, *scene(options), *extra]
         self.processes.append(run(command, log))
         return self.processes[0]
@@ -144,10 +158,10 @@ def said_ready(rig):
     return bool(line)
 
 
-def wait_for_socket(daemon, socket):
+def wait_for_socket(daemon, path):
     limit = time.monotonic() + START_LIMIT_S
     while time.monotonic() < limit and daemon.poll() is None:
-        if socket.exists():
+        if path.exists():
             return True
         time.sleep(0.05)
     return False
@@ -167,12 +181,12 @@ class UncalibratedRig(SimulatedStation):
         stop(self)
 
 
-def wait_for_ready(options, daemon, socket):
-    if not wait_for_socket(daemon, socket):
+def wait_for_ready(options, daemon, path):
+    if not wait_for_socket(daemon, path):
         return False
     limit = time.monotonic() + START_LIMIT_S
     while time.monotonic() < limit:
-        status = subprocess.run([options.bin / "scanrig", "status", "--socket", socket], capture_output=True, text=True)
+        status = subprocess.run([options.bin / "scanrig", "status", "--socket", path], capture_output=True, text=True)
         if "Operational.Ready" in status.stdout:
             return True
         time.sleep(0.2)
@@ -273,7 +287,7 @@ def main():
             return followed
         job = job_folder(station.jobs)
         station.finish(job)
-        if not options.keep:
+        if not options.keep and not options.page:
             stop(station)
         link_results(job, folder)
         scored = scores_of(options, folder)
@@ -281,14 +295,18 @@ def main():
             print_accuracies(options, job, folder)
         print(f"Model   {folder}/model/model.glb\nReport  {folder}/model/report.json")
         print(f"Wall time {time.monotonic() - start:.1f} s")
-        if options.keep:
+        if options.page:
+            print(f"Log another browser in: {options.bin}/scanrig open --socket {station.socket}\n"
+                  "The rig and its page keep running: Ctrl-C ends them.", flush=True)
+            daemon.wait()
+        elif options.keep:
             print(f"The daemon keeps running (process {daemon.pid}); its state: "
                   f"scanrig status --socket {station.socket}")
-            if options.page:
-                print(f"Log another browser in: {options.bin}/scanrig open --socket {station.socket}")
         return scored
     except RuntimeError as failed:
         return report_error(failed, 1)
+    except KeyboardInterrupt:
+        return 130
     finally:
         if not options.keep:
             stop(station)
