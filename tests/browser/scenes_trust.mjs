@@ -86,6 +86,7 @@ export const scenarios = {
     ]) {
       assert.equal((await order(headers)).status, 403, JSON.stringify(headers));
     }
+    await expectStopIn(station, STOP_MS, "after orders of other sites");
     assert.equal((await ask(station, { path: "/", headers: { Host: "evil.example" } })).status, 421);
     for (const path of ["/assets/../secret", "/assets/%2e%2e/secret", "/assets/..%2fsecret", "/assets//etc/passwd"]) {
       const told = await ask(station, { path });
@@ -102,6 +103,7 @@ export const scenarios = {
     await sleep(1000);
     const framed = page.frames().find((frame) => frame !== page.mainFrame());
     assert.equal(await framed.locator("h1.word").count().catch(() => 0), 0, "the page is in another site's frame");
+    await expectStopIn(station, STOP_MS, "beside a frame in another site");
     site.close();
     site.closeAllConnections();
   },
