@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/timestamp.h"
 #include "daemon/station/job_lifecycle.h"
 #include "daemon/station/operator_message.h"
 
@@ -21,6 +22,11 @@ ordered_json devices_json(const std::vector<DeviceHealth>& devices) {
 
 ordered_json not_started_json(const std::optional<NotStarted>& job) {
   return job ? ordered_json{{"job", job->job}, {"why", to_json(job->why)}} : ordered_json(nullptr);
+}
+
+ordered_json last_order_json(const std::optional<LastOrder>& order) {
+  if (!order) return nullptr;
+  return {{"what", order->what}, {"who", order->who}, {"when", iso_time(order->when)}};
 }
 
 }  // namespace
@@ -122,7 +128,8 @@ ordered_json to_json(const Snapshot& snapshot) {
           {"job", snapshot.job.empty() ? ordered_json(nullptr) : ordered_json(snapshot.job)},
           {"not_started", not_started_json(snapshot.not_started)},
           {"not_begun", not_started_json(snapshot.not_started)},  // old name
-          {"queue", snapshot.queue}};
+          {"queue", snapshot.queue},
+          {"last_order", last_order_json(snapshot.last_order)}};
 }
 
 ordered_json io_table(const Snapshot& snapshot) {

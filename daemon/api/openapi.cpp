@@ -157,7 +157,7 @@ const char* const kSchemas = R"({
   "description": "pending: stop was sent and is not confirmed yet; unknown: the table may be moving"},
 "Status": {"type": "object", "additionalProperties": false,
   "required": ["revision", "machine", "activity", "may_be_moving", "standstill", "cause", "sentence", "next_action", "tone", "word", "actions", "devices", "job",
-  "not_started", "queue", "not_begun"],
+  "not_started", "queue", "not_begun", "last_order"],
   "properties": {
   "revision": {"type": "integer"},
   "machine": {"type": "string", "description": "in the words of OPC 40100-1, such as Operational.Ready"},
@@ -177,7 +177,13 @@ const char* const kSchemas = R"({
   "job": {"type": "string", "nullable": true, "description": "the active job"},
   "not_started": {"allOf": [{"$ref": "#/components/schemas/NotStarted"}], "nullable": true},
   "not_begun": {"allOf": [{"$ref": "#/components/schemas/NotStarted"}], "nullable": true, "deprecated": true, "description": "old name of not_started"},
-  "queue": {"type": "array", "items": {"type": "string"}, "description": "jobs to come, the next one first"}}},
+  "queue": {"type": "array", "items": {"type": "string"}, "description": "jobs to come, the next one first"},
+  "last_order": {"allOf": [{"$ref": "#/components/schemas/LastOrder"}], "nullable": true}}},
+"LastOrder": {"type": "object", "required": ["what", "who", "when"], "additionalProperties": false,
+  "description": "to the rig, that was obeyed since the service started", "properties": {
+  "what": {"type": "string", "description": "start, stop, reset, or what of maintenance"},
+  "who": {"type": "string", "description": "panel, the name of a token, a user of this machine, or an address"},
+  "when": {"type": "string"}}},
 "Action": {"type": "object", "additionalProperties": false, "required": ["ok", "why"], "properties": {
   "ok": {"type": "boolean"}, "why": {"type": "string", "nullable": true, "description": "why it would be refused"},
   "does": {"type": "string", "enum": ["begin", "continue"], "description": "only of start"},

@@ -50,6 +50,8 @@ class Values {
   /// The user of this machine or the address that sent the request, as the log names it.
   [[nodiscard]] const std::string& requester() const { return requester_; }
   [[nodiscard]] const Identity& identity() const { return identity_; }
+  /// The same for others to read: the name of the token where there is one.
+  [[nodiscard]] const std::string& sender() const { return identity_.token.empty() ? requester_ : identity_.token; }
   void set_requester(std::string requester, Identity identity) {
     requester_ = std::move(requester);
     identity_ = std::move(identity);

@@ -120,7 +120,7 @@ void accept(const ApiStation& station, const Values&, Send send) {
 }
 
 /// An active one is stopped first, as by Stop: then it is interrupted, and can be cancelled.
-void abort(const ApiStation& station, const Values&, Send send) {
+void abort(const ApiStation& station, const Values& values, Send send) {
   const auto snapshot = station.loop.snapshot();
   const auto job = current_calibration(*snapshot);
   if (!job) return send(no_calibration());
@@ -129,7 +129,7 @@ void abort(const ApiStation& station, const Values&, Send send) {
     loop.ask(event::JobRequested{.what = What::cancel, .job = id}, reply_with(send));
   };
   if (snapshot->job != job->id) return cancel(std::string());
-  station.loop.press(Button::stop, Origin::remote, cancel);
+  station.loop.press(Button::stop, Origin::remote, cancel, {}, values.sender());
 }
 
 Route engineers(std::string_view path, std::string_view description,

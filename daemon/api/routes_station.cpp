@@ -25,9 +25,10 @@ Route press(std::string_view path, Button button, Role role, std::string_view de
           .description = description,
           .reply = kPressed,
           .errors = {409},
-          .handle = [button](const ApiStation& station, const Values&, Send send) {
-            station.loop.press(button, Origin::remote,
-                               [send = std::move(send)](const Result<std::string>& job) { send(pressed(job)); });
+          .handle = [button](const ApiStation& station, const Values& values, Send send) {
+            station.loop.press(
+                button, Origin::remote,
+                [send = std::move(send)](const Result<std::string>& job) { send(pressed(job)); }, {}, values.sender());
           }};
 }
 
@@ -43,7 +44,7 @@ Route start_route() {
   route.handle = [](const ApiStation& station, const Values& values, Send send) {
     station.loop.press(
         Button::start, Origin::remote, [send = std::move(send)](const Result<std::string>& job) { send(pressed(job)); },
-        values.text("offer").value_or(""));
+        values.text("offer").value_or(""), values.sender());
   };
   return route;
 }
@@ -65,11 +66,13 @@ Route stop_route() {
               "interrupted and stays resumable. Any role may. `standstill` of the status follows.",
           .reply = kStopped,
           .reserved = true,
-          .handle = [](const ApiStation& station, const Values&, Send send) {
-            station.loop.press(Button::stop, Origin::remote,
-                               [&loop = station.loop, send = std::move(send)](const Result<std::string>& job) {
-                                 send(stopped(job, *loop.snapshot()));
-                               });
+          .handle = [](const ApiStation& station, const Values& values, Send send) {
+            station.loop.press(
+                Button::stop, Origin::remote,
+                [&loop = station.loop, send = std::move(send)](const Result<std::string>& job) {
+                  send(stopped(job, *loop.snapshot()));
+                },
+                {}, values.sender());
           }};
 }
 

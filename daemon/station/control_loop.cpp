@@ -27,6 +27,31 @@ std::optional<AwaitedPlacement> awaited(const StationState& state) {
   return AwaitedPlacement{state.job ? state.job->id : state.queue.front()->id, *placement, state.table_deg};
 }
 
+std::string_view name_of(event::MaintenanceRequested::What what) {
+  using What = event::MaintenanceRequested::What;
+  switch (what) {
+    case What::on: return "maintenance on";
+    case What::off: return "maintenance off";
+    case What::home: return "home";
+    case What::jog: return "jog";
+    case What::pulse: return "flash";
+    case What::lamp_test: break;
+  }
+  return "lamp test";
+}
+
+/// The order to the rig that this event is.
+std::optional<LastOrder> order_in(const Event& event) {
+  const auto now = std::chrono::system_clock::now();
+  if (const auto* pressed = std::get_if<event::Pressed>(&event)) {
+    const auto* what = pressed->button == Button::start ? "start" : pressed->button == Button::stop ? "stop" : "reset";
+    return LastOrder{what, pressed->origin == Origin::panel ? "panel" : pressed->requester, now};
+  }
+  const auto* asked = std::get_if<event::MaintenanceRequested>(&event);
+  if (asked == nullptr) return std::nullopt;
+  return LastOrder{std::string(name_of(asked->what)), asked->requester, now};
+}
+
 constexpr PanelOutputs kAllOn{true, true, true, true, true, true, true, true};
 
 }  // namespace
@@ -83,6 +108,7 @@ void ControlLoop::handle(Message message, const StationPorts& ports) {
   const bool latch_changed = step.state.latch != state_.latch;
   state_ = std::move(step.state);
   counter_.see(message.event, clock_.now());
+  if (auto order = step.refused ? std::nullopt : order_in(message.event)) last_order_ = std::move(order);
   if (const auto ended = update(jobs_, message.event)) counter_.see(*ended);
   for (const auto& action : step.actions) carry_out(action, ports);
   // The rig is being stopped by now. Neither the lamp nor anything else reports a latch before it is stored.
@@ -244,6 +270,7 @@ void ControlLoop::publish(const StationPorts& ports) {
       .calibration_problem = calibration ? std::optional(*calibration) : std::nullopt,
       .calibration_reminder = state_.calibration.reminder,
       .awaited_placement = awaited(state_),
+      .last_order = last_order_,
       .job = state_.job ? state_.job->id : std::string(),
       .not_started = state_.not_started,
       .queue = std::move(queue),

@@ -59,9 +59,9 @@ class ControlLoop {
 
   void post(Event event) { inbox_.post({std::move(event), {}}); }
   /// The control loop's thread calls `reply` soon; it must not wait. After a shutdown it may never be called.
-  /// `offer`: as in event::Pressed.
-  void press(Button button, Origin origin, Reply reply, std::string offer = {}) {
-    inbox_.post({event::Pressed{button, origin, {}, std::move(offer)}, std::move(reply)});
+  /// `offer`, `requester`: as in event::Pressed.
+  void press(Button button, Origin origin, Reply reply, std::string offer = {}, std::string requester = {}) {
+    inbox_.post({event::Pressed{button, origin, {}, std::move(offer), std::move(requester)}, std::move(reply)});
   }
   /// The same for an engineer's requests.
   void ask(event::MaintenanceRequested what, Reply reply) { inbox_.post({what, std::move(reply)}); }
@@ -119,6 +119,7 @@ class ControlLoop {
     Event event;
   };
   std::map<std::size_t, Later> later_;  // by the kind of event: one of a kind, the newest counts
+  std::optional<LastOrder> last_order_;
   PanelOutputs shown_;
   bool blink_ = false;
   Clock::TimePoint next_blink_ = Clock::TimePoint::max();

@@ -61,7 +61,8 @@ struct Pressed {
   Button button;
   Origin origin;
   std::string new_job_id;
-  std::string offer{};  ///< start_offer() that the requester has seen; empty: none is to be compared
+  std::string offer{};      ///< start_offer() that the requester has seen; empty: none is to be compared
+  std::string requester{};  ///< who sent the request, for others to read; empty: unknown
 };
 struct EstopChanged {
   bool ok;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -62,6 +63,13 @@ struct RemoteActions {
   std::string start_offer{};                              ///< start_offer() in transition.h
 };
 
+/// The last order to the rig that was obeyed, so that others who look at it see why its state has changed.
+struct LastOrder {
+  std::string what{};  ///< "start", "stop", "reset", "maintenance on", "home", "jog", ...
+  std::string who{};   ///< "panel", the name of a token, a user of this machine, or an address
+  std::chrono::system_clock::time_point when{};
+};
+
 /// Whether the table is confirmed to be stopped.
 enum class Standstill {
   confirmed,
@@ -88,6 +96,7 @@ struct Snapshot {
   std::optional<Error> calibration_problem{};  ///< why the calibration refuses the next scan
   std::string calibration_reminder{};          ///< that it is old, as a sentence; empty: it is not
   std::optional<AwaitedPlacement> awaited_placement{};
+  std::optional<LastOrder> last_order{};    ///< nothing since the service started
   std::string job{};                        ///< the active one; empty: none
   std::optional<NotStarted> not_started{};  ///< by the last Start; until the next one
   std::vector<std::string> queue{};         ///< ids of the jobs to come, the next one first

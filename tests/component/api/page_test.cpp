@@ -134,6 +134,27 @@ TEST_F(PageTest, TheDoctorsLastReportIsShownAndADamagedOneIsNone) {
   }
 }
 
+TEST_F(PageTest, TheLastOrderThatWasObeyedIsNamedToEverybody) {
+  serve();
+  const auto cookie = cookie_of(Role::viewer);
+  const auto last = [&] { return browse("GET", "/api/v1/status", cookie).json()["last_order"]; };
+  EXPECT_EQ(last(), nullptr);
+  EXPECT_EQ(browse("POST", "/api/v1/stop", cookie + kOwn).status, 200);
+  EXPECT_EQ(last()["what"], "stop");
+  EXPECT_EQ(last()["who"], "viewer") << "the name of the token";
+  const auto when = last()["when"];
+  EXPECT_EQ(browse("POST", "/api/v1/start", cookie_of(Role::operating) + kOwn, "{}").status, 409);
+  EXPECT_EQ(last()["what"], "stop") << "what is refused is no order";
+  EXPECT_EQ(ask(local(), request("POST", "/api/v1/stop")).status, 200);
+  EXPECT_EQ(last()["who"], fmt::format("user {}", ::getuid()));
+  EXPECT_GE(last()["when"], when);
+  station->loop.post(event::Pressed{Button::stop, Origin::panel, {}});
+  const auto shown = [&] { return browse("GET", "/api/v1/snapshot", cookie).json()["status"]["last_order"]["who"]; };
+  for (int i = 0; i < 100 && shown() != "panel"; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  EXPECT_EQ(shown(), "panel");
+  EXPECT_EQ(last()["who"], "panel");
+}
+
 TEST_F(PageTest, RecipesAreListedWithTheirViews) {
   serve();
   const auto recipes = browse("GET", "/api/v1/recipes", cookie_of(Role::viewer)).json()["recipes"];
