@@ -81,8 +81,8 @@ async function job(browser, station) {
   await until("a view is stored", () => jobOf(station)?.stored.length > 0, 60_000);
   const answers = await pressed(page);
   await see(page, "FLIP", 120_000);
-  await until("it may be pressed", () => page.getByRole("button", { name: "CONTINUE", exact: true }).isEnabled());
-  await press(page, "CONTINUE");
+  await until("it may be pressed", () => page.getByRole("button", { name: "START", exact: true }).isEnabled());
+  await press(page, "START");
   await until("the model is in the making", () => jobOf(station)?.state === "reconstructing", 120_000);
   answers.push(...(await pressed(page)));
   await until("the job has ended", () => ["done", "failed"].includes(jobOf(station)?.state), 400_000);

@@ -32,11 +32,12 @@ export const scenarios = {
     await check(page, station);
     await page.getByRole("button", { name: "START", exact: true }).tap();
     await see(page, "FLIP", 60_000);
+    assert.ok((await page.locator(".next").innerText()).includes("press Start"), "the button has the sentence's word");
     const stored = await page.locator(".head .ring-stored").count();
     assert.equal(stored, 3, "views of the first pose");
     await check(page, station);
-    await until("it may be pressed", () => page.getByRole("button", { name: "CONTINUE", exact: true }).isEnabled());
-    await page.getByRole("button", { name: "CONTINUE", exact: true }).focus();
+    await until("it may be pressed", () => page.getByRole("button", { name: "START", exact: true }).isEnabled());
+    await page.getByRole("button", { name: "START", exact: true }).focus();
     await page.keyboard.press("Enter");
     await until("the scan is over", () => ["reconstructing", "done", "failed"].includes(jobOf(station)?.state), 60_000);
     await page.keyboard.press("2");
@@ -114,6 +115,7 @@ export const scenarios = {
     await page.locator("button.stop").dispatchEvent("pointerdown");
     await until("STOP was sent", async () => (await page.locator(".stop-place").innerText()).includes("STOP SENT"));
     await until("the job is interrupted", () => jobOf(station)?.state === "interrupted");
+    await until("the other page says what was ordered", () => engineer.getByText(/^Last order: stop, by 127\.0\.0\.1, [\d:]+\.$/).count());
     await check(page, station);
   },
 

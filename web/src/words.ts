@@ -1,5 +1,5 @@
 // Every word of the page's own. Sentences about the rig, and what to do next, are the daemon's.
-import type { Deviation, Job, Length, Role } from "./api/types.ts";
+import type { Deviation, Job, LastOrder, Length, Role } from "./api/types.ts";
 
 export const words = {
   screens: { station: "Station", jobs: "Jobs", model: "Model", calibrate: "Calibrate", service: "Service" },
@@ -8,11 +8,12 @@ export const words = {
   notDelivered: "NOT DELIVERED. Use the red button.",
   notTheEstop: "This is not the emergency stop.",
   start: "START",
-  carryOn: "CONTINUE",
   reset: "Reset",
   lost: (seconds: number) => `Connection lost. Last known state ${seconds} s ago.`,
   waiting: "Waiting for the rig.",
   insecure: "This connection is not encrypted: others on the network can read tokens.",
+  lastOrder: ({ what, who, when }: LastOrder) => `Last order: ${what}, by ${who}, ${clock(when)}.`,
+  startDoes: { begin: "Begins the next scan.", continue: "Continues the scan." },
   nextJob: "Next job",
   noJob: "No job is queued: Start takes the default recipe.",
   left: "Left camera",
@@ -96,6 +97,12 @@ export const words = {
   doctorHow: "To examine the rig, stop the service and run scanrig doctor.",
   doctorWell: (age: string) => `Examined ${age}: nothing was wrong.`,
   doctorFound: (age: string, count: number) => `Examined ${age}: ${count === 1 ? "1 finding" : `${count} findings`}.`,
+  config: "Configuration",
+  configHow:
+    "For other devices: stop the service, run sudo scanrig setup --out NEW.toml at the rig, compare, put it in the place of rig.toml.",
+  configCheck: "Check the file",
+  configWell: "The file is valid.",
+  configReload: "Restart with the file",
   table: "Table",
   inputs: "Inputs",
   outputs: "Outputs",
@@ -133,6 +140,7 @@ export const words = {
   verdicts: { holds: "It holds.", moved: "Something has moved.", calibrate: "A calibration is due." },
 } as const;
 
+const clock = (time: string) => new Date(time).toLocaleTimeString("en-GB");
 const signed = (mm: number) => `${mm > 0 ? "+" : ""}${mm.toFixed(3)}`;
 
 export interface Badge {

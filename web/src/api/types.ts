@@ -25,6 +25,12 @@ export interface Device {
   problem: Problem | null;
 }
 
+export interface LastOrder {
+  what: string;
+  who: string;
+  when: string;
+}
+
 export interface Status {
   machine: string;
   activity: string;
@@ -40,6 +46,7 @@ export interface Status {
   job: string | null;
   not_started: { job: string; why: Problem } | null;
   queue: string[];
+  last_order: LastOrder | null;
 }
 
 export type JobState =
@@ -199,6 +206,11 @@ export interface Length {
   expanded_uncertainty_mm: number | null;
   from: RulerEnd;
   to: RulerEnd;
+}
+
+export interface ConfigCheck {
+  ok: boolean;
+  problems: string[]; // a sentence each
 }
 
 export interface Reference {

@@ -40,7 +40,7 @@ function Orders({ state }: { state: CalibrationState }) {
       )}
       {running && start && (
         <Order needs="operator" class="big" action={start} send={() => order("/start", { offer: start.offer })}>
-          {start.does === "continue" ? words.carryOn : words.start}
+          {words.start}
         </Order>
       )}
       {running && (

@@ -30,6 +30,7 @@ export function Head() {
         <p class="sentence">{now?.sentence ?? ""}</p>
         {now && saysCause(now) && <p class="cause">{now.cause}</p>}
         <p class="next">{now?.next_action ?? ""}</p>
+        {now?.last_order && <p class="last-order dim">{words.lastOrder(now.last_order)}</p>}
       </div>
       <Stop />
     </header>

@@ -2,7 +2,7 @@ import { useSignal } from "@preact/signals";
 import { useEffect } from "preact/hooks";
 import { order, read } from "../api/client.ts";
 import { connect, health, login, status } from "../api/store.ts";
-import type { Doctor, Health, Io } from "../api/types.ts";
+import type { ConfigCheck, Doctor, Health, Io } from "../api/types.ts";
 import { may, Order } from "../parts/Order.tsx";
 import { bytes, minutesSince, words } from "../words.ts";
 import { FocusCard } from "./Focus.tsx";
@@ -185,6 +185,35 @@ function AccessCard() {
   );
 }
 
+/// rig.toml as scanrig setup or a person has left it: setup itself needs the devices, which the service holds.
+function ConfigCard() {
+  const told = useSignal<string[]>([]);
+  if (!may("engineer")) return null;
+  const check = async () => {
+    const { problems } = await order<ConfigCheck>("/config/check");
+    told.value = problems.length === 0 ? [words.configWell] : problems;
+  };
+  return (
+    <section class="card">
+      <h2>{words.config}</h2>
+      <p class="dim">{words.configHow}</p>
+      <div class="row">
+        <Order needs="engineer" send={check}>
+          {words.configCheck}
+        </Order>
+        <Order needs="engineer" hold send={() => order("/reload")}>
+          {words.hold(words.configReload)}
+        </Order>
+      </div>
+      {told.value.map((sentence) => (
+        <p key={sentence} role="status">
+          {sentence}
+        </p>
+      ))}
+    </section>
+  );
+}
+
 export function Service() {
   return (
     <main class="columns">
@@ -198,6 +227,7 @@ export function Service() {
       <div class="stack">
         <IoCard />
         <AccessCard />
+        <ConfigCard />
       </div>
     </main>
   );

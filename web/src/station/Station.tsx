@@ -1,7 +1,7 @@
 import { order } from "../api/client.ts";
 import { activeJob, jobs, status } from "../api/store.ts";
 import { JobLine } from "../jobs/JobLine.tsx";
-import { Order } from "../parts/Order.tsx";
+import { may, Order } from "../parts/Order.tsx";
 import { words } from "../words.ts";
 import { Live } from "./Live.tsx";
 import { Picture } from "./Picture.tsx";
@@ -14,9 +14,10 @@ function Buttons() {
     <>
       <div class="start-place">
         <Order needs="operator" class="start" action={start} send={() => order("/start", { offer: start.offer })}>
-          {start.does === "continue" ? words.carryOn : words.start}
+          {words.start}
         </Order>
       </div>
+      {start.ok && may("operator") && <p class="dim">{words.startDoes[start.does]}</p>}
       {(reset.ok || !start.ok) && now.tone !== "working" && (
         <Order needs="operator" class="big" action={reset} send={() => order("/reset")}>
           {words.reset}
