@@ -12,8 +12,8 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr std::chrono::seconds kComparing{120};
-constexpr int kMaxComparisons = 4;  // that wait or run
+constexpr std::chrono::seconds kComparing{300};  // the processor may be busy with scans
+constexpr int kMaxComparisons = 4;               // that wait or run
 
 ordered_json to_json(const RulerEnd& end) {
   return {{"point", {end.point.x(), end.point.y(), end.point.z()}},

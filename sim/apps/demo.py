@@ -255,8 +255,14 @@ def scores_of(options, folder):
     return 0
 
 
+def end_as_by_ctrl_c(*_):
+    raise KeyboardInterrupt
+
+
 def main():
     options = arguments()
+    for end in (signal.SIGTERM, signal.SIGHUP):  # a terminal that is closed leaves no daemon behind
+        signal.signal(end, end_as_by_ctrl_c)
     if options.wire and INSIDE not in os.environ:
         in_own_network(options)
     start = time.monotonic()

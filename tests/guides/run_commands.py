@@ -53,6 +53,12 @@ NOT_RUN = {
 }
 
 
+def facets(side):
+    """Two triangles of a text STL file."""
+    a, b, c, d = ("vertex {} {} {}\n".format(*CUBE[int(number) - 1]) for number in side.split())
+    return "".join(f"facet normal 0 0 0\nouter loop\n{corners}endloop\nendfacet\n" for corners in (a + b + c, a + c + d))
+
+
 class Step:
     """A command of a guide with its exit code. `more` is added to it here; `endless` is interrupted after its first output;
     `setup` steps are in no guide."""
@@ -71,6 +77,9 @@ WITH_SERVICE = (
     Step("scanrig token add tablet --role operator", more=CONFIG),
     Step("scanrig token list", more=CONFIG),
     Step("scanrig token revoke tablet", more=CONFIG),
+    Step("scanrig reference add bracket.stl", more=CONFIG),
+    Step("scanrig reference list", more=CONFIG),
+    Step("scanrig reference remove bracket", more=CONFIG),
     Step("scanrig maintenance on"),
     Step("scanrig maintenance home"),
     Step("scanrig maintenance jog --to 90 --speed 10"),
@@ -147,6 +156,7 @@ class Bench:
         """The service at its wires, with the recipe of the guide."""
         (self.folder / "cube.obj").write_text("".join(f"v {x} {y} {z}\n" for x, y, z in CUBE) +
                                               "".join(f"f {side}\n" for side in SIDES))
+        (self.folder / "bracket.stl").write_text("solid bracket\n" + "".join(map(facets, SIDES)) + "endsolid\n")
         self.start("scanrig-sim", "rig", "--dir", str(self.folder), "--start-deg", "10", "--scale", "0.1", "--no-noise",
                    "--speed-deg-s", "180", "--acceleration-deg-s2", "720", "--object", str(self.folder / "cube.obj"))
         file = self.folder / "rig.toml"

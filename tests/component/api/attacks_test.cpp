@@ -134,12 +134,16 @@ TEST_F(AttacksOnThePage, AThousandWrongLoginsAreRefused) {
 }
 
 TEST_F(AttacksOnThePage, OversizedCookiesAreRefused) {
-  const auto attack = [](int i) {
-    return request("GET", "/api/v1/status", "", "",
-                   "Cookie: scanrig=" + std::string(i % 2 == 0 ? 7000 : 20'000, 'a') + "\r\n");
+  const auto cookie_of_size = [](std::size_t size) {
+    return [size](int) {
+      return request("GET", "/api/v1/status", "", "", "Cookie: scanrig=" + std::string(size, 'a') + "\r\n");
+    };
   };
+  expect_only(under(cookie_of_size(7000)), {401, 429});
   // A peer that sends what is too long may be cut off before its reply is read.
-  expect_only(under(attack), {401, 429, 431, 0});
+  const auto seen = under(cookie_of_size(20'000));
+  expect_only(seen, {431, 0});
+  EXPECT_TRUE(seen.contains(431));
 }
 
 TEST_F(AttacksOnThePage, NoRequestSplitsAReply) {
