@@ -26,15 +26,18 @@ struct Answer {
 /// A client that sends exactly the given bytes. Reading gives up after 5 s.
 class Wire {
  public:
-  explicit Wire(int fd) : fd_(fd) {
-    const timeval reply_timeout{.tv_sec = 5, .tv_usec = 0};
-    ::setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &reply_timeout, sizeof reply_timeout);
-  }
+  explicit Wire(int fd) : fd_(fd) { wait_at_most(std::chrono::seconds(5)); }
   ~Wire() {
     if (fd_ >= 0) ::close(fd_);
   }
   Wire(Wire&& other) noexcept : fd_(std::exchange(other.fd_, -1)), read_(std::move(other.read_)) {}
   Wire& operator=(Wire&&) = delete;
+
+  /// Of each reading, instead of 5 s.
+  void wait_at_most(std::chrono::seconds reply_timeout) const {
+    const timeval limit{.tv_sec = reply_timeout.count(), .tv_usec = 0};
+    ::setsockopt(fd_, SOL_SOCKET, SO_RCVTIMEO, &limit, sizeof limit);
+  }
 
   bool say(const std::string& text) const {
     return ::send(fd_, text.data(), text.size(), MSG_NOSIGNAL) == static_cast<ssize_t>(text.size());

@@ -30,7 +30,11 @@ class DeviationOfTheApi : public ApiBench {
     ASSERT_TRUE(add_reference(folder_, "box", folder_ / "b.stl"));
     serve();
   }
-  Answer get(const std::string& target) { return ask(tcp(), request("GET", "/api/v1" + target, tokens[Role::viewer])); }
+  Answer get(const std::string& target) {
+    auto wire = tcp();
+    wire.wait_at_most(std::chrono::seconds(200));  // it computes at low priority
+    return ask(std::move(wire), request("GET", "/api/v1" + target, tokens[Role::viewer]));
+  }
 };
 
 TEST_F(DeviationOfTheApi, AModelIsComparedOnceAndItsFileHasAValuePerVertex) {
