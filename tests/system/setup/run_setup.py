@@ -3,8 +3,11 @@
 
 Usage: run_setup.py BIN KIND, inside `scanrig-sim own-network`. Exits 1 with what was not as it should be.
 """
+import contextlib
 import json
+import os
 import pathlib
+import pty
 import re
 import shutil
 import subprocess
@@ -12,6 +15,7 @@ import sys
 import tempfile
 import threading
 import time
+import tty
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "sim" / "apps"))
@@ -101,27 +105,31 @@ class Person:
             self.answer(self.asked, str(1 + self.offered.index(LAMPS[lit[0]] if lit else "nothing")))
 
 
-def converse(binaries, kind, rig_folder, new, rig):
-    command = [binaries / "scanrig", "setup", "--out", new / "rig.toml", "--state", new, "--http-port", "0",
-               "--gpio-socket", rig_folder / "gpio.sock", "--interactive"]
-    for port in kind["ports"]:
-        command += ["--port", rig_folder / port]
-    process = subprocess.Popen([str(word) for word in command], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                               stderr=subprocess.STDOUT, text=True, bufsize=1)
-    timer = threading.Timer(SETUP_S, process.kill)
+def converse(command, rig, limit_s=SETUP_S, **options):
+    """Runs a command at a terminal, with a person who does what it asks for. Returns (exit code, text, questions)."""
+    here, there = pty.openpty()
+    tty.setraw(there)
+    process = subprocess.Popen([str(word) for word in command], stdin=there, stdout=there, stderr=there, **options)
+    os.close(there)
+    timer = threading.Timer(limit_s, process.kill)
     timer.start()
-
-    def reply(text):
-        process.stdin.write(text + "\n")
-        process.stdin.flush()
-
-    person, text = Person(rig, reply), ""
-    for line in process.stdout:
-        text += line
-        person.read(line.rstrip("\n"))
+    person, text = Person(rig, lambda reply: os.write(here, f"{reply}\n".encode())), ""
+    with open(here, encoding="utf-8", closefd=False) as lines, contextlib.suppress(OSError):  # no one has it open
+        for line in lines:
+            text += line
+            person.read(line.rstrip("\n"))
     code = process.wait()
     timer.cancel()
+    os.close(here)
     return code, text, person.questions
+
+
+def set_up(binaries, kind, rig_folder, new, rig):
+    command = [binaries / "scanrig", "setup", "--out", new / "rig.toml", "--state", new, "--http-port", "0",
+               "--gpio-socket", rig_folder / "gpio.sock"]
+    for port in kind["ports"]:
+        command += ["--port", rig_folder / port]
+    return converse(command, rig)
 
 
 def scan(binaries, new, rig):
@@ -155,7 +163,7 @@ def check(binaries, name, folder):
         new.mkdir()
         (new / "drives").symlink_to((folder / "rig" / "drives").resolve())
         shutil.copy(folder / "rig" / "calibration.json", new)
-        code, text, questions = converse(binaries, kind, folder / "rig", new, rig)
+        code, text, questions = set_up(binaries, kind, folder / "rig", new, rig)
         print(text)
         if code != 0:
             return f"setup ended with {code}"
