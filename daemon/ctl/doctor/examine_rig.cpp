@@ -173,7 +173,9 @@ std::string usb_serial_of(const fs::path& device) {
   return {};
 }
 
+/// Whether a udev rule gives the name: one of the rig's, or those by serial number that every Debian has.
 bool a_rule_names(const fs::path& device) {
+  if (device.native().starts_with("/dev/serial/by-id/")) return true;
   const std::string name = device.lexically_relative("/dev").string();
   for (const char* folder : {"/etc/udev/rules.d", "/usr/lib/udev/rules.d", "/lib/udev/rules.d"}) {
     for (const fs::path& rule : entries(folder)) {

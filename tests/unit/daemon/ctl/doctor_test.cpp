@@ -14,7 +14,9 @@ namespace scanrig::ctl::doctor {
 namespace {
 
 using testing::ElementsAre;
+using testing::HasSubstr;
 using testing::IsEmpty;
+using testing::Not;
 
 /// One side's image: plain light of `grey`, and independent grains of `contrast` grey values behind a lens.
 cv::Mat image(double grey, double contrast, int seed, double blur_px = 1.2) {
@@ -182,6 +184,16 @@ TEST_F(DoctorMachine, LessSpaceThanTheReserveIsFound) {
   ASSERT_TRUE(create_directories_synced(folder_));
   rig_.storage.reserve_gib = 1e9;
   EXPECT_THAT(found(), ElementsAre("disk_full"));
+}
+
+TEST(DoctorReport, HasTheMissingUdevRuleOfANumberedPortAndNoneOfANameBySerialNumber) {
+  const auto printed = [](const char* device) {
+    Report report;
+    print_missing_snippets(device, "/etc/scanrig/rig.toml", report);
+    return report.text();
+  };
+  EXPECT_THAT(printed("/dev/ttyUSB0"), HasSubstr("SYMLINK+=\"scanrig/turntable\""));
+  EXPECT_THAT(printed("/dev/serial/by-id/usb-FTDI_1234"), Not(HasSubstr("SYMLINK")));
 }
 
 TEST(DoctorReport, AsJsonHasEachFindingWithItsRemedy) {
