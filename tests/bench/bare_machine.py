@@ -36,18 +36,19 @@ def why_not():
     return None if archive() else "not measured: no Debian archive is configured here"
 
 
-def make(suite, root):
-    """Makes a machine with nothing but essential packages and apt."""
-    subprocess.run(["mmdebstrap", "--quiet", "--variant=minbase", suite, root, archive()], check=True, timeout=600)
+def make(suite, root, packages=()):
+    """Makes a machine with nothing but essential packages, apt and `packages`."""
+    more = [f"--include={','.join(packages)}"] if packages else []
+    subprocess.run(["mmdebstrap", "--quiet", "--variant=minbase", *more, suite, root, archive()], check=True, timeout=600)
     shutil.copy("/etc/resolv.conf", root / "etc/resolv.conf")
 
 
 @contextlib.contextmanager
-def bare_machine(suite):
-    """Root folder of a bare machine; removed afterwards."""
+def bare_machine(suite, packages=()):
+    """Root folder of a bare machine with `packages`; removed afterwards."""
     root = pathlib.Path(tempfile.mkdtemp(prefix="scanrig-bare-"))
     try:
-        make(suite, root)
+        make(suite, root, packages)
         yield root
     finally:
         shutil.rmtree(root)

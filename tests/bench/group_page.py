@@ -1,10 +1,11 @@
-"""The page in Debian's Chromium: what a person does, attacks, bars, the bundle; the packages."""
+"""The page in Debian's Chromium: what a person does, attacks, bars, the bundle; the guides; the packages."""
 import filecmp
 import gzip
 import json
 import pathlib
 import time
 
+import page_guide
 import page_package
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
@@ -67,4 +68,4 @@ def bundle(bench, scratch):
         bench.at_most(f"bundle of the page, gzip: {name}", limit, sum(size[path] for path in shares[name]), "kB", digits=0)
 
 
-PARTS = {"scenes": scenes, "bars": bars, "bundle": bundle, "package": page_package.measure}
+PARTS = {"scenes": scenes, "bars": bars, "bundle": bundle, "guide": page_guide.measure, "package": page_package.measure}

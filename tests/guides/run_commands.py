@@ -73,6 +73,7 @@ WITH_SERVICE = (
     Step("scanrig health"),
     Step("scanrig status --watch", endless=True),
     Step("scanrig open"),
+    Step("scanrig open --role engineer"),
     Step("scanrig open --kiosk", more=("--browser", "true")),
     Step("scanrig token add tablet --role operator", more=CONFIG),
     Step("scanrig token list", more=CONFIG),

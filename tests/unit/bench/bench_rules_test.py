@@ -16,6 +16,7 @@ sys.path.insert(0, str(BENCH))
 
 import bench
 import budget
+import page_guide
 import parts
 import record
 import sample
@@ -254,6 +255,22 @@ class Arguments(unittest.TestCase):
     def test_an_unknown_part_and_a_quick_record_are_refused(self):
         self.assertRaises(SystemExit, self.parse, "station", "--only", "no-such-part")
         self.assertRaises(SystemExit, self.parse, "station", "--quick", "--record")
+
+
+class GuidesThatAreFollowed(unittest.TestCase):
+    def test_every_step_of_a_person_is_in_its_guide(self):
+        for guide in page_guide.GUIDES:
+            self.assertTrue(page_guide.actions(*guide))
+
+    def test_steps_are_those_of_the_guide_in_its_order(self):
+        texts = [step.text for step, _ in page_guide.actions(*page_guide.GUIDES[0])]
+        order = [texts.index(text) for text in ("apt install ./scanrig_*.deb", "scanrig setup", "systemctl start scanrigd",
+                                                "Press Reset at the panel")]
+        self.assertEqual(order, sorted(order))
+
+    def test_what_a_guide_no_longer_has_is_refused(self):
+        self.assertRaises(LookupError, page_guide.actions, "install.md", {"...Press the purple button": "never"})
+        self.assertRaises(LookupError, page_guide.actions, "install.md", {"scanrig no-such-verb": "never"})
 
 
 if __name__ == "__main__":
