@@ -18,7 +18,7 @@ MINUTES = {
 LONG = {
     "station": {"fuzz", "asan", "tsan"},
     "motion": {"fuzz"},
-    "page": {"package"},
+    "page": {"package", "arm64"},
     "calibration": {"debian13"},
     "cameras": {"debian13", "fuzz"},
     "end-to-end": {"bare_machine"},

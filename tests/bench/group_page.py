@@ -5,6 +5,7 @@ import json
 import pathlib
 import time
 
+import package_arm64
 import page_guide
 import page_package
 
@@ -68,4 +69,5 @@ def bundle(bench, scratch):
         bench.at_most(f"bundle of the page, gzip: {name}", limit, sum(size[path] for path in shares[name]), "kB", digits=0)
 
 
-PARTS = {"scenes": scenes, "bars": bars, "bundle": bundle, "guide": page_guide.measure, "package": page_package.measure}
+PARTS = {"scenes": scenes, "bars": bars, "bundle": bundle, "guide": page_guide.measure, "package": page_package.measure,
+         "arm64": package_arm64.measure}
