@@ -347,7 +347,7 @@ def measure(bench, scratch):
     if reason:
         bench.line("a new user with the guides", "a model", reason, None)
         return
-    if packages := page_package.build(bench, [ROOT / "dev", "package"], ROOT / "out" / "package"):
+    if packages := page_package.build_here(bench):
         begun = time.monotonic()
         walk(bench, packages)
         bench.at_most("guide: from a bare machine to a model", LIMIT_MIN, (time.monotonic() - begun) / 60, "min", digits=1)

@@ -68,7 +68,8 @@ def free_port():
 
 class Machine:
     """`folder` keeps its disk, its sockets and its console output. `system`: system.sqfs, and in the folder above
-    vmlinuz, initrd, base.sqfs. `kept`: output of keep(), to start from; None to boot."""
+    vmlinuz, initrd, base.sqfs. `kept`: output of keep(), to start from; None to boot. `turntable_port`: serial port
+    of the host, for a USB serial adapter; None: no adapter can be plugged in."""
 
     def __init__(self, folder, system, app, turntable_port, kept=None, cores=2):
         self.folder = pathlib.Path(folder)
@@ -103,7 +104,7 @@ class Machine:
             "-chardev", f"socket,id=eyes,path={self.folder / 'eyes.sock'}",
             "-device", "virtserialport,chardev=eyes,name=eyes",
             "-device", "qemu-xhci,id=usb",
-            "-chardev", f"serial,id=turntable,path={turntable_port}",
+            *(["-chardev", f"serial,id=turntable,path={turntable_port}"] if turntable_port else []),
             "-netdev", f"user,id=net,restrict=on,hostfwd=tcp:127.0.0.1:{self.http_port}-:80",
             "-device", "virtio-net-pci,netdev=net", *(["-incoming", f"exec:cat {kept}"] if kept else [])]
         self.process = subprocess.Popen([str(word) for word in command], stdin=subprocess.DEVNULL,
