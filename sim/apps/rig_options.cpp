@@ -34,9 +34,38 @@ Result<std::optional<RigVariation>> DrawnRigOptions::variation() const {
   return std::optional(variation);
 }
 
+void ProfileOptions::add_to(CLI::App& app, bool has_object) {
+  app.add_option("--profile", profile, "laboratory (1): ideal light, lenses and mechanics; workshop (2): as they are")
+      ->capture_default_str();
+  app.add_option("--without", without,
+                 "Effects of the workshop to leave out, NAME,...; docs/reference/simulated-rig.md");
+  app.add_option("--gamma", gamma, "Exponent of the images' values, 0.45 as of many USB cameras")
+      ->capture_default_str();
+  app.add_flag("--cold", is_cold, "The cameras are switched on with the first exposure, and drift");
+  if (!has_object) return;
+  app.add_option("--with", with, "What hands do to one view: creep, rock, finger, overexposed, sticker, shadow");
+  app.add_option("--material", material, "Of the object, of the workshop satin; several joined by + in patches");
+}
+
+Result<ChosenProfile> ProfileOptions::chosen() const {
+  auto effects = choose_effects(profile, without, with);
+  if (!effects) return pass_on(effects);
+  if (effects->is_none() && (profile == "laboratory" || profile == "1") && (!material.empty() || is_cold)) {
+    return fail(ErrorCode::invalid_input, "profile {}: has neither materials nor drift; give --profile workshop, too",
+                profile);
+  }
+  if (!(gamma >= 0.3 && gamma <= 1.0)) {
+    return fail(ErrorCode::out_of_range, "--gamma {}: choose 0.3 to 1", gamma);
+  }
+  ChosenProfile chosen{.effects = *effects, .material = material, .coding = {.gamma = gamma}, .is_cold = is_cold};
+  if (const auto known = Materials::named(chosen.material_name(), chosen.effects); !known) return pass_on(known);
+  return chosen;
+}
+
 void ShootBoardOptions::add_to(CLI::App& app) {
   app.add_option("--out", folder, "The folder to make")->required();
   rig.add_to(app);
+  profile.add_to(app, false);
   app.add_option("--seed", series.seed, "The print, how the board is put down, faults and noise")
       ->capture_default_str();
   app.add_option("--scale", series.image_scale, "Resolution, as a share of 1280x960")->capture_default_str();
@@ -63,6 +92,9 @@ Result<SeriesOptions> ShootBoardOptions::chosen() const {
   auto variation = rig.variation();
   if (!variation) return pass_on(variation);
   options.rig = *variation;
+  auto of_rig = profile.chosen();
+  if (!of_rig) return pass_on(of_rig);
+  options.profile = *of_rig;
   if (const auto set = set_by_name(options.print, kPrintErrorNames, print); !set) return pass_on(set, "--print");
   if (const auto set = set_by_name(options.faults, kSeriesFaultNames, faults); !set) return pass_on(set, "--faults");
   return options;

@@ -24,6 +24,8 @@ using Chosen = std::function<Result<void>()>;
 struct ShootVerb {
   sim::ShootOptions options;
   sim::DrawnRigOptions rig;
+  sim::ProfileOptions profile;
+  bool is_calibration_true = false;
   std::string folder;
 };
 
@@ -38,6 +40,22 @@ void add_scene(CLI::App& app, sim::SceneOptions& scene) {
   app.add_flag("!--no-noise", scene.noise, "Leave the sensors' noise out");
 }
 
+Result<void> shoot_chosen(ShootVerb& verb) {
+  const auto rig = verb.rig.variation();
+  if (!rig) return pass_on(rig);
+  auto profile = verb.profile.chosen();
+  if (!profile) return pass_on(profile);
+  if (!profile->effects.is_none() && verb.options.calibration.empty() && !verb.is_calibration_true) {
+    return fail(
+        ErrorCode::invalid_input,
+        "shoot: a workshop has no exact calibration; give --calibration FILE, solved from images of shoot-board "
+        "--profile workshop, or --true-calibration");
+  }
+  verb.options.scene.rig = *rig;
+  verb.options.scene.profile = std::move(*profile);
+  return sim::shoot(verb.options, verb.folder);
+}
+
 void add_shoot(CLI::App& app, ShootVerb& verb, Chosen& chosen) {
   auto& options = verb.options;
   auto* shoot = app.add_subcommand("shoot", "Render a whole scan, with its truth, into a folder");
@@ -47,14 +65,11 @@ void add_shoot(CLI::App& app, ShootVerb& verb, Chosen& chosen) {
       ->capture_default_str();
   shoot->add_option("--views", options.views, "Table angles per pose")->check(CLI::Range(1, 99))->capture_default_str();
   verb.rig.add_to(*shoot);
-  shoot->callback([&] {
-    chosen = [&]() -> Result<void> {
-      const auto rig = verb.rig.variation();
-      if (!rig) return pass_on(rig);
-      verb.options.scene.rig = *rig;
-      return sim::shoot(verb.options, verb.folder);
-    };
-  });
+  verb.profile.add_to(*shoot, true);
+  shoot->add_option("--calibration", options.calibration,
+                    "A calibration.json solved from the images of shoot-board with the same profile and rig");
+  shoot->add_flag("--true-calibration", verb.is_calibration_true, "The exact calibration, which no workshop has");
+  shoot->callback([&] { chosen = [&] { return shoot_chosen(verb); }; });
 }
 
 void add_shoot_board(CLI::App& app, sim::ShootBoardOptions& verb, Chosen& chosen) {
@@ -89,7 +104,25 @@ Result<void> serve_rig(const sim::WireRigOptions& options) {
   return {};
 }
 
-void add_rig(CLI::App& app, sim::WireRigOptions& o, sim::SceneOptions& scene, Chosen& chosen) {
+struct RigVerb {
+  sim::WireRigOptions options;
+  sim::SceneOptions scene;
+  sim::ProfileOptions profile;
+};
+
+Result<void> serve_chosen(RigVerb& verb) {
+  sim::WireRigOptions& o = verb.options;
+  auto profile = verb.profile.chosen();
+  if (!profile) return pass_on(profile);
+  verb.scene.poses = o.toml.poses;
+  verb.scene.views = o.toml.views;
+  verb.scene.profile = std::move(*profile);
+  if (o.toml.cameras == "gige") o.scene = verb.scene;
+  return serve_rig(o);
+}
+
+void add_rig(CLI::App& app, RigVerb& verb, Chosen& chosen) {
+  sim::WireRigOptions& o = verb.options;
   auto* rig =
       app.add_subcommand("rig", "The simulated rig on the wire, until SIGTERM; see docs/reference/simulated-rig.md");
   rig->add_option("--dir", o.toml.folder, "folder for rig.toml, ports and sockets")->required();
@@ -116,13 +149,12 @@ void add_rig(CLI::App& app, sim::WireRigOptions& o, sim::SceneOptions& scene, Ch
       ->check(CLI::Range(0, 1000000));
   rig->add_option("--camera-state", o.camera_state,
                   "gige: seed of a state in which another program left the cameras; without it a sound one");
-  add_scene(*rig, scene);
+  add_scene(*rig, verb.scene);
+  verb.profile.add_to(*rig, true);
   rig->callback([&] {
     o.axis.gear_ratio = o.toml.gear_ratio;
     o.axis.pulses_per_motor_rev = o.toml.pulses_per_motor_rev;
-    scene.poses = o.toml.poses;
-    if (o.toml.cameras == "gige") o.scene = scene;
-    chosen = [&] { return serve_rig(o); };
+    chosen = [&] { return serve_chosen(verb); };
   });
 }
 
@@ -161,15 +193,14 @@ int main(int argc, char** argv) {
   Chosen chosen;
   ShootVerb shoot_verb;
   sim::ShootBoardOptions board_verb;
-  sim::WireRigOptions rig_options;
-  rig_options.toml.drive = "leadshine-rs";
-  rig_options.toml.panel = "gpio";
-  sim::SceneOptions scene;
+  RigVerb rig_verb;
+  rig_verb.options.toml.drive = "leadshine-rs";
+  rig_verb.options.toml.panel = "gpio";
   ControlVerb control_verb;
   std::vector<std::string> command;
   add_shoot(app, shoot_verb, chosen);
   add_shoot_board(app, board_verb, chosen);
-  add_rig(app, rig_options, scene, chosen);
+  add_rig(app, rig_verb, chosen);
   add_control(app, control_verb, chosen);
   add_own_network(app, command, chosen);
   try {

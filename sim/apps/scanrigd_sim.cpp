@@ -24,6 +24,7 @@ using namespace scanrig;
 struct SimOptions {
   sim::SimRigOptions rig;
   sim::DrawnRigOptions drawn_rig;
+  sim::ProfileOptions profile;
   std::filesystem::path socket = "out/api.sock";
   std::optional<int> http_port{};
   std::filesystem::path jobs = "out/jobs";
@@ -33,7 +34,7 @@ struct SimOptions {
   std::string clock = "real";
   std::string operator_at_rig = "auto";
   double trouble = 0.0;
-  bool own_calibration = false;
+  bool own_calibration = false, true_calibration = false;
   bool background_cameras = false;
   std::filesystem::path config;  ///< a rig of real drivers on simulated wires
   bool make_safe = false, beside_daemon = false;
@@ -55,6 +56,8 @@ void add_options(CLI::App& app, SimOptions& o) {
       ->check(CLI::Range(1.0, 1000.0));
   app.add_option("--seed", o.rig.seed, "placements, sensor noise, table errors")->capture_default_str();
   o.drawn_rig.add_to(app);
+  o.profile.add_to(app, true);
+  app.add_flag("--true-calibration", o.true_calibration, "of a workshop: the exact calibration, which no workshop has");
   app.add_flag("--own-calibration", o.own_calibration,
                "the rig knows only the calibration that it made: calibration.json beside the jobs, if it is there");
   app.add_option("--views", o.views, "views per pose")->capture_default_str()->check(CLI::Range(1, 360));
@@ -97,9 +100,11 @@ CalibratorOptions calibrator_of(const sim::SimRig& rig, const JobStoreOptions& j
   return {.cameras = jobs.cameras, .solver = calibration_solver(options, jobs.calibration_file)};
 }
 
-/// The exact one, of the default rig. A drawn rig, and one with --own-calibration, has to be calibrated first.
+/// The exact one, of the default rig. A drawn rig, a workshop, and one with --own-calibration, has to be calibrated
+/// first.
 Result<void> write_calibration(const SimOptions& o, const sim::SimRig& rig, const std::filesystem::path& file) {
-  if (o.rig.rig || o.own_calibration) return {};
+  const bool is_workshop = !o.rig.profile.effects.is_none();
+  if (o.rig.rig || o.own_calibration || (is_workshop && !o.true_calibration)) return {};
   return rig.write_calibration(file);
 }
 
@@ -108,6 +113,10 @@ Result<void> run(SimOptions o, const SignalStop& stop) {
   auto drawn = o.drawn_rig.variation();
   if (!drawn) return pass_on(drawn);
   o.rig.rig = *drawn;
+  auto profile = o.profile.chosen();
+  if (!profile) return pass_on(profile);
+  o.rig.profile = std::move(*profile);
+  o.rig.views = o.views;
   std::unique_ptr<Clock> clock;
   if (o.clock == "virtual") {
     clock = std::make_unique<VirtualClock>();
@@ -171,17 +180,23 @@ Result<Ended> run_on_wires(const SimOptions& o, const config::RigConfig& config,
     return run_daemon(open->devices(), options, clock, stop.token());
   }
   options.hang_margin = kRenderingMargin;
+  const auto profile = o.profile.chosen();
+  if (!profile) return pass_on(profile);
   auto scene = sim::Scene::create({.object = o.rig.object,
                                    .height_mm = o.rig.height_mm,
                                    .seed = o.rig.seed,
                                    .poses = options.recipes.at("default").poses,
                                    .image_scale = o.rig.image_scale,
                                    .same_rest_twice = o.rig.same_rest_twice,
-                                   .noise = o.rig.noise});
+                                   .noise = o.rig.noise,
+                                   .profile = *profile,
+                                   .views = options.recipes.at("default").views});
   if (!scene) return pass_on(scene);
   if (auto made = create_directories_synced(config.calibration_file.parent_path()); !made) return pass_on(made);
-  if (auto written = sim::write_calibration(**scene, config.calibration_file); !written) return pass_on(written);
-  options.jobs.profile = sim::profile_sha256();
+  if (profile->effects.is_none() || o.true_calibration) {
+    if (auto written = sim::write_calibration(**scene, config.calibration_file); !written) return pass_on(written);
+  }
+  options.jobs.profile = profile->sha256();
   options.jobs.cameras = {(*scene)->rig().left.serial, (*scene)->rig().right.serial};
   sim::WireCamera camera(std::move(*scene), config.stereo_camera.truth, clock);
   options.on_scanned = [&camera](const std::filesystem::path& folder) { return camera.write_truth(folder); };

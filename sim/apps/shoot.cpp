@@ -33,11 +33,14 @@ struct ViewAngle {
 
 Result<ordered_json> shoot_view(Scene& scene, int pose, const ViewAngle& angle, const fs::path& folder,
                                 std::uint64_t exposure) {
+  constexpr double kSecondsPerView = 10.0;
   const std::string path = fmt::format("pose{}/view{:02}", pose + 1, angle.index);
   if (const auto made = create_directories_synced(folder / path); !made) return pass_on(made);
   ordered_json files = ordered_json::object();
   for (const bool pattern : {true, false}) {
-    const StereoImages images = scene.shoot(pose, to_radians(angle.true_deg), pattern, exposure++);
+    const std::uint64_t views_before = exposure / 2;
+    const double minutes = kSecondsPerView / 60.0 * static_cast<double>(views_before);
+    const StereoImages images = scene.shoot(pose, to_radians(angle.true_deg), pattern, exposure++, minutes);
     for (const bool left : {true, false}) {
       const std::string name = fmt::format("{}_{}", left ? "left" : "right", pattern ? "pattern" : "plain");
       const std::string file = fmt::format("{}/{}.png", path, name);
@@ -46,7 +49,7 @@ Result<ordered_json> shoot_view(Scene& scene, int pose, const ViewAngle& angle, 
       files[name] = {{"path", file}, {"sha256", *hash}};
     }
   }
-  const int seconds = 10 * static_cast<int>(exposure / 2);
+  const int seconds = static_cast<int>(kSecondsPerView) * static_cast<int>(exposure / 2);
   return ordered_json{{"index", angle.index},
                       {"commanded_deg", angle.commanded_deg},
                       {"measured_deg", encoder_reading(angle.rest_deg)},
@@ -66,7 +69,7 @@ Result<ordered_json> manifest(const fs::path& folder, const SceneOptions& option
                       {"created", "2026-11-21T09:00:00Z"},
                       {"state", "scanned"},
                       {"source", "stereo"},
-                      {"profile", profile_sha256()},
+                      {"profile", options.profile.sha256()},
                       {"calibration", {{"file", "calibration.json"}, {"sha256", sha256(*calibration)}}},
                       {"poses", ordered_json::array()}};
 }
@@ -81,10 +84,21 @@ Result<void> shoot(const ShootOptions& options, const fs::path& folder) {
   if (fs::exists(folder / "scan.json", ignored)) {
     return fail(ErrorCode::exists, "shoot: {} holds a scan already; name another folder", folder.string());
   }
-  auto scene = Scene::create(options.scene);
+  SceneOptions scene_options = options.scene;
+  scene_options.views = options.views;
+  auto scene = Scene::create(scene_options);
   if (!scene) return pass_on(scene);
+  std::string solved;
+  if (!options.calibration.empty()) {
+    auto read = read_file(options.calibration);
+    if (!read) return pass_on(read, "shoot: calibration");
+    solved = std::move(*read);
+  }
   if (const auto made = create_directories_synced(folder); !made) return made;
-  if (const auto written = write_calibration(**scene, folder / "calibration.json"); !written) return written;
+  const fs::path calibration = folder / "calibration.json";
+  const auto written_calibration =
+      solved.empty() ? write_calibration(**scene, calibration) : write_file_atomically(calibration, solved);
+  if (!written_calibration) return written_calibration;
   auto json = manifest(folder, options.scene);
   if (!json) return pass_on(json);
   std::vector<PoseTruth> truth;
@@ -95,7 +109,7 @@ Result<void> shoot(const ShootOptions& options, const fs::path& folder) {
     for (int index = 0; index < options.views; ++index, exposure += 2) {
       const double commanded = 360.0 * index / options.views;
       const double rest_deg = resting_angle(commanded + 360.0 * pose, options.scene.seed) - 360.0 * pose;
-      const double true_deg = options.scene.rig ? (*scene)->drawn_rig().table.true_deg(rest_deg) : rest_deg;
+      const double true_deg = (*scene)->drawn_rig().table.true_deg(rest_deg);
       const auto view = shoot_view(**scene, pose, {index, commanded, rest_deg, true_deg}, folder, exposure);
       if (!view) return pass_on(view);
       views.push_back(*view);

@@ -10,11 +10,13 @@ namespace scanrig::sim {
 struct ShootOptions {
   SceneOptions scene;
   int views = 8;  ///< per pose, evenly around the circle
+  /// A solved calibration to put into the scan; empty: the scene's own, which is exact but for a lens residual.
+  std::filesystem::path calibration{};
 };
 
 /// Renders a whole scan into the new folder `folder` (docs/reference/scan-folder.md, truth included), without devices
 /// or daemon. The small errors of the table come from the profile. The same options give the same bytes. Fails as
-/// Scene::create, and with `exists` (the folder has a scan), `out_of_range` (views), `io`.
+/// Scene::create, and with `exists` (the folder has a scan), `out_of_range` (views), `not_found` (calibration), `io`.
 Result<void> shoot(const ShootOptions& options, const std::filesystem::path& folder);
 
 }  // namespace scanrig::sim

@@ -5,8 +5,7 @@
 namespace scanrig::sim {
 
 double SharedState::true_angle_deg(Clock::TimePoint at) const {
-  const double reported = axis.angle(at);
-  return scene->options().rig ? scene->drawn_rig().table.true_deg(reported) : reported;
+  return scene->drawn_rig().table.true_deg(axis.angle(at));
 }
 
 void SharedState::edge(Light light) {

@@ -39,6 +39,7 @@ struct SharedState {
       : clock(the_clock), scene(std::move(the_scene)), board(*scene) {}
 
   Clock& clock;
+  const Clock::TimePoint begun = clock.now();
   const std::unique_ptr<Scene> scene;
   BoardOnTable board;
   std::mutex mutex;

@@ -51,7 +51,7 @@ class Rig final : public SimRig {
     return sim::write_truth(*state_.scene, taken, folder);
   }
 
-  std::string profile_sha256() const override { return sim::profile_sha256(); }
+  std::string profile_sha256() const override { return state_.scene->options().profile.sha256(); }
   std::array<double, 2> measured_board_length() const override {
     return {state_.board.measured_length_mm(), BoardOnTable::kLengthSigmaMm};
   }
@@ -84,7 +84,9 @@ Result<std::unique_ptr<SimRig>> SimRig::create(const SimRigOptions& options, Clo
                               .image_scale = options.image_scale,
                               .same_rest_twice = options.same_rest_twice,
                               .noise = options.noise,
-                              .rig = options.rig});
+                              .rig = options.rig,
+                              .profile = options.profile,
+                              .views = options.views});
   if (!scene) return pass_on(scene, "simulated rig");
   return std::make_unique<Rig>(std::move(*scene), clock);
 }

@@ -13,6 +13,7 @@
 #include "drivers/panel/panel.h"
 #include "drivers/projector/projector.h"
 #include "drivers/turntable/turntable.h"
+#include "sim/scene/effects.h"
 #include "sim/scene/rig_variation.h"
 
 namespace scanrig::sim {
@@ -27,6 +28,8 @@ struct SimRigOptions {
   bool same_rest_twice = false;  ///< the operator does not turn the object over
   bool noise = true;
   std::optional<RigVariation> rig = std::nullopt;  ///< a drawn rig; nothing: the default rig, without any error
+  ChosenProfile profile{};
+  int views = 8;  ///< per pose: which of them handling spoils
 };
 
 /// The default rig, or a drawn one, in this process: turntable, projector, cameras and panel over one rendered scene.

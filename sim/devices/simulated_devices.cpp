@@ -65,8 +65,9 @@ StereoFrame SimStereoCamera::render(const Exposure& e) {
   if (e.board != 0 && e.board != board_) b.board.put(e.board);
   board_ = e.board;
   const double angle = to_radians(e.angle_deg);
+  const double minutes = std::chrono::duration<double, std::ratio<60>>(e.taken - b.begun).count();
   const StereoImages images =
-      e.board != 0 ? b.board.shoot(angle, e.number) : b.scene->shoot(e.placement, angle, e.pattern, e.number);
+      e.board != 0 ? b.board.shoot(angle, e.number) : b.scene->shoot(e.placement, angle, e.pattern, e.number, minutes);
   return StereoFrame{images.left, images.right, PixelFormat::bayer_rggb8, e.trigger, e.taken};
 }
 

@@ -6,7 +6,6 @@
 #include <optional>
 
 #include "sim/scene/board_renderer.h"
-#include "sim/scene/rig_variation.h"
 #include "sim/scene/scene.h"
 
 namespace scanrig::sim {
@@ -28,6 +27,8 @@ class BoardOnTable {
 
  private:
   const Scene& scene_;
+  const DrawnRig rig_;  // as calibrated
+  const std::array<CameraModel, 2> cameras_;
   const PrintedBoard board_;
   std::optional<BoardScene> placed_;
   std::array<std::unique_ptr<RayMap>, 2> rays_;  // of the eyes, made once

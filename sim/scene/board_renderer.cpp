@@ -66,7 +66,7 @@ class BoardShot {
     const Transform table_from_eye = turntable_from_table_.inverse() * camera.eye_from_turntable.inverse();
     table_from_eye_ = table_from_eye.linear();
     eye_ = table_from_eye.translation();
-    focus_ = (camera.eye_from_turntable * Vector3d(0.0, profile().aim_height_mm, 0.0)).z();
+    focus_ = (camera.eye_from_turntable * Vector3d(0.0, profile().aim_height_mm, 0.0)).z() + camera.focus_off_mm;
     for (const auto& box : scene.boxes_) {
       const Transform box_from_table = box.table_from_box.inverse();
       boxes_.push_back({box_from_table * eye_, box_from_table.linear() * table_from_eye_});

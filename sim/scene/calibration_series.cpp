@@ -5,7 +5,6 @@
 #include <set>
 
 #include "core/units.h"
-#include "sim/scene/image_sensor.h"
 #include "sim/scene/profile.h"
 #include "sim/scene/random.h"
 #include "sim/scene/rest_error.h"
@@ -28,6 +27,8 @@ enum class SeriesRandom : std::uint8_t {
   cold,
   cut_off
 };
+
+constexpr double kMinutesPerPair = 0.25;
 
 bool can_be_made(const BoardLayout& b) {
   const bool markers = b.marker_mm > 0.0;
@@ -76,7 +77,8 @@ Result<std::unique_ptr<CalibrationSeries>> CalibrationSeries::create(const Serie
 
 CalibrationSeries::CalibrationSeries(const SeriesOptions& o)
     : options_(o),
-      rig_(o.rig ? draw_rig(*o.rig, o.image_scale) : DrawnRig{.geometry = default_rig(o.image_scale)}),
+      rig_(make_rig(o.rig, o.profile.effects, o.image_scale)),
+      cameras_(both_cameras(o.profile, o.image_scale)),
       board_(o.board, o.print, mix(o.seed, SeriesRandom::print)) {
   if (o.hand_held > 0) {
     plan_hand_held();
@@ -126,6 +128,8 @@ void CalibrationSeries::plan_hand_held() {
 
 void CalibrationSeries::add_faults() {
   change_cameras();
+  for (std::size_t i = 0; i < pairs_.size() && options_.profile.is_cold; ++i)
+    pairs_[i].rig = at_time(pairs_[i].rig, options_.profile.effects, {static_cast<double>(i) * kMinutesPerPair});
   const SeriesFaults& f = options_.faults;
   const auto bits = [&](int n) { return mix(options_.seed, SeriesRandom::blurred, n); };
   for (int i = 0; i < static_cast<int>(f.blurred); ++i) {
@@ -210,7 +214,7 @@ StereoImages CalibrationSeries::shoot(std::size_t index) {
     const cv::Mat light =
         scene_->render(eye, rays->map, angle, mix(options_.seed, SeriesRandom::sampling, index, camera));
     const std::uint64_t key = options_.noise ? mix(options_.seed, SeriesRandom::exposure, index, camera) | 1 : 0;
-    return expose(through_lens(light, options_.image_scale, blur), key, rig_.noise_factor);
+    return cameras_[camera].sensor.expose(cameras_[camera].lens.image(light, blur), key, rig_.noise_factor);
   };
   return {image(seen.left, 0, pair.left_blur_px), image(seen.right, 1, pair.right_blur_px)};
 }

@@ -42,6 +42,7 @@ struct SeriesOptions {
   int angles = 7;                 ///< per placement, one more of the flat one
   int hand_held = 0;              ///< that many pairs of a board held by hand instead of the plan
   SeriesFaults faults{};
+  ChosenProfile profile{};  ///< as declared: profile 1; of another the effects on optics, sensors, mechanics and drift
 };
 
 /// One pair of images to take, and the truth of it.
@@ -88,6 +89,7 @@ class CalibrationSeries {
 
   SeriesOptions options_;
   DrawnRig rig_;
+  std::array<CameraModel, 2> cameras_;
   PrintedBoard board_;
   std::vector<SeriesPair> pairs_;
   std::vector<PlacedBoard> placed_;  // by pair

@@ -32,6 +32,7 @@ Result<void> write_calibration_truth(const CalibrationSeries& series, const std:
   const auto& options = series.options();
   ordered_json json = {{"format", "scanrig-calibration-truth"}, {"version", 1}, {"seed", options.seed}};
   if (options.rig) json["rig_seed"] = options.rig->seed;
+  json.update(profile_json(options.profile));
   json.update(rig_json(series.rig()));
   json["board"] = board_json(series.board());
   json["pairs"] = ordered_json::array();

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/result.h"
+#include "sim/scene/materials.h"
 #include "sim/scene/surface_colour.h"
 #include "sim/scene/triangle_mesh.h"
 
@@ -16,6 +17,7 @@ struct Object {
   TriangleMesh mesh;
   std::vector<Eigen::Vector3d> normals;  ///< unit, one per vertex, for shading
   std::shared_ptr<const SurfaceColour> colour;
+  Materials materials{};
 };
 
 /// The built-in figurine, or the OBJ, PLY or GLB `file`, scaled to `height_mm`. A file's object is scaled so that its

@@ -34,6 +34,7 @@ struct Eye {
   std::array<double, 5> distortion{};
   Transform eye_from_turntable = Transform::Identity();
   std::optional<LensResidual> residual = std::nullopt;  ///< nothing: exactly Brown's model
+  double focus_off_mm = 0.0;                            ///< of the plane in focus, behind the aim point
 
   /// Pixel of a point in the turntable frame in front of the eye.
   [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& point_in_turntable) const;

@@ -2,11 +2,16 @@
 
 #include <opencv2/core/mat.hpp>
 
+#include "sim/scene/bounce_light.h"
 #include "sim/scene/dot_pattern.h"
+#include "sim/scene/handling.h"
+#include "sim/scene/lamp.h"
 #include "sim/scene/object.h"
 #include "sim/scene/optics.h"
 #include "sim/scene/ray_caster.h"
+#include "sim/scene/ray_map.h"
 #include "sim/scene/room_light.h"
+#include "sim/scene/screen_light.h"
 #include "sim/scene/table_top.h"
 
 namespace scanrig::sim {
@@ -15,6 +20,15 @@ namespace scanrig::sim {
 struct Radiance {
   cv::Mat pattern;
   cv::Mat plain;
+};
+
+/// What profile 2 adds in one view; a nullptr adds nothing.
+struct ViewEffects {
+  Effects effects{};
+  Handling handling{};
+  const BounceLight* bounce = nullptr;
+  const ScreenLight* screen = nullptr;
+  const RayMap* rays = nullptr;  ///< of the camera: as its lens, at less cost
 };
 
 /// One object on the table in one pose.
@@ -31,6 +45,6 @@ struct Placed {
 /// pixels on an edge take sixteen jittered samples. `sampling_seed` chooses the random angles. Same arguments, same
 /// bits, for any number of threads.
 Radiance render(const Placed& placed, const Eye& camera, const Eye& projector, const DotPattern& dots, double angle,
-                std::uint64_t sampling_seed = 0);
+                std::uint64_t sampling_seed = 0, const ViewEffects& effects = {});
 
 }  // namespace scanrig::sim

@@ -107,15 +107,36 @@ TableErrors draw_table(const RigVariation& v) {
 
 }  // namespace
 
+bool TableErrors::is_ideal() const {
+  const bool turns_true = axis.runout_mm == 0.0 && axis.wobble_rad == 0.0 && axis.worm_deg == 0.0;
+  return !is_drawn && turns_true && axis_from_top.matrix() == Transform::Identity().matrix();
+}
+
+Transform AxisErrors::motion(double true_rad) const {
+  if (runout_mm == 0.0 && wobble_rad == 0.0) return Transform::Identity();
+  // Phases in turns, drawn once: a first harmonic alike in both axes would only move the axis.
+  const auto harmonics = [true_rad](double first, double second) {
+    return 0.8 * std::cos(true_rad + 2.0 * std::numbers::pi * first) +
+           0.6 * std::cos(2.0 * true_rad + 2.0 * std::numbers::pi * second);
+  };
+  const Vector3d shift(runout_mm * harmonics(0.13, 0.71), 0.0, runout_mm * harmonics(0.06, 0.38));
+  const Vector3d turn(wobble_rad * harmonics(0.55, 0.92), 0.0, wobble_rad * harmonics(0.47, 0.24));
+  return small_motion(turn, shift);
+}
+
 double TableErrors::true_deg(double reported_deg) const {
   const double at = to_radians(reported_deg);
   const double forward = gear_factor * reported_deg + amplitude_deg[0] * std::sin(at + phase_rad[0]) +
                          amplitude_deg[1] * std::sin(2.0 * at + phase_rad[1]);
-  return reversed ? -forward : forward;
+  const double by_worm =
+      axis.worm_deg == 0.0
+          ? 0.0
+          : axis.worm_deg * std::sin(2.0 * std::numbers::pi * reported_deg / AxisErrors::kWormTurnDeg + 1.0);
+  return reversed ? -(forward + by_worm) : forward + by_worm;
 }
 
 Transform TableErrors::motion(double true_deg) const {
-  if (runout_mm == 0.0) return Transform::Identity();
+  if (runout_mm == 0.0) return axis.motion(to_radians(true_deg));
   constexpr double kLever = 60.0;  // mm
   const auto place = (std::llround(100.0 * true_deg) % 36000 + 36000) % 36000;
   std::array<double, 5> sizes{};
@@ -125,7 +146,8 @@ Transform TableErrors::motion(double true_deg) const {
     sizes[i] = runout_mm * (1.1 * std::cos(at + phase(1)) + 0.7 * std::cos(2.0 * at + phase(2)) +
                             0.4 * normal(mix(seed, i, 3, place)));
   }
-  return small_motion(Vector3d(sizes[3], 0.0, sizes[4]) / kLever, {sizes[0], sizes[1], sizes[2]});
+  return axis.motion(to_radians(true_deg)) *
+         small_motion(Vector3d(sizes[3], 0.0, sizes[4]) / kLever, {sizes[0], sizes[1], sizes[2]});
 }
 
 Transform TableErrors::turntable_from_ideal(double true_rad) const {

@@ -44,8 +44,21 @@ inline constexpr std::array<NamedValue<RigVariation>, 12> kRigVariationNames = {
     {"reversed", &RigVariation::reversed},
 }};
 
+/// Mechanics of profile 2's turntable.
+struct AxisErrors {
+  double runout_mm = 0.0;   ///< radial: each way, first and second harmonic together
+  double wobble_rad = 0.0;  ///< likewise, about both horizontal axes
+  double worm_deg = 0.0;    ///< amplitude of the angle's error, over one turn of the worm
+
+  static constexpr double kWormTurnDeg = 4.0;
+
+  /// Runout and wobble at the true angle (radians): applied after the turn.
+  [[nodiscard]] Transform motion(double true_rad) const;
+};
+
 /// The table of one rig: where it really is when it reports an angle.
 struct TableErrors {
+  bool is_drawn = false;  ///< by a RigVariation
   bool reversed = false;
   double gear_factor = 1.0;               ///< true turn per reported turn
   std::array<double, 2> amplitude_deg{};  ///< of the periodic error of the angle, one and two periods a turn
@@ -53,11 +66,14 @@ struct TableErrors {
   double runout_mm = 0.0;
   std::uint64_t seed = 0;                           ///< of the runout's shape
   Transform axis_from_top = Transform::Identity();  ///< the top's tilt; turns with the table
+  AxisErrors axis{};                                ///< of profile 2, beside those
 
   /// Angle about the axis, counter-clockwise seen from above, when the table reports `reported_deg`.
   [[nodiscard]] double true_deg(double reported_deg) const;
   /// What the table does beside turning, at the true angle: applied after the turn. Same angle, same motion.
   [[nodiscard]] Transform motion(double true_deg) const;
+  /// Whether the table is where it reports to be: profile 1.
+  [[nodiscard]] bool is_ideal() const;
   /// Turntable frame from a frame in which the table top turns without any error at the true angle (radians).
   [[nodiscard]] Transform turntable_from_ideal(double true_rad) const;
 };

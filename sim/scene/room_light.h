@@ -14,6 +14,13 @@ namespace scanrig::sim {
 struct Surroundings {
   Eigen::Vector3f ambient = Eigen::Vector3f::Zero();  ///< from sky, table and the object itself; a free, upward face: 1
   float openness = 1.0F;                              ///< share of the hemisphere that no part of the object covers
+
+  Surroundings& operator+=(const Surroundings& other) {
+    ambient += other.ambient;
+    openness += other.openness;
+    return *this;
+  }
+  Surroundings operator/(float n) const { return {ambient / n, openness / n}; }
 };
 
 /// The plain exposure's light: a sky that is the same all around, and three large soft boxes fixed in the room. The

@@ -5,11 +5,16 @@
 #include <opencv2/core.hpp>
 #include <tuple>
 
-#include "sim/scene/image_sensor.h"
+#include "core/units.h"
 #include "sim/scene/random.h"
 #include "sim/scene/rests.h"
 
 namespace scanrig::sim {
+namespace {
+
+enum class LightRandom : std::uint8_t { flash = 90, room };
+
+}  // namespace
 
 Result<std::unique_ptr<Scene>> Scene::create(const SceneOptions& options) {
   if (!(options.image_scale >= 0.1 && options.image_scale <= 1.0) || options.poses < 1) {
@@ -18,6 +23,10 @@ Result<std::unique_ptr<Scene>> Scene::create(const SceneOptions& options) {
   }
   auto object = load_object(options.object, options.height_mm);
   if (!object) return pass_on(object);
+  const auto materials = Materials::named(options.profile.material_name(), options.profile.effects);
+  if (!materials) return pass_on(materials);
+  object->materials = *materials;
+  object->colour = materials->coloured(object->colour);
   auto placements =
       draw_placements(object->mesh, options.seed, options.poses, options.same_rest_twice, options.any_size);
   if (!placements) return pass_on(placements, object->name);
@@ -28,11 +37,15 @@ Scene::Scene(Object object, std::vector<Transform> placements, const SceneOption
     : options_(options),
       object_(std::move(object)),
       placements_(std::move(placements)),
-      rig_(options.rig ? draw_rig(*options.rig, options.image_scale)
-                       : DrawnRig{.geometry = default_rig(options.image_scale)}),
+      rig_(make_rig(options.rig, options.profile.effects, options.image_scale)),
       rays_(object_.mesh),
       dots_(options.image_scale),
-      lights_(placements_.size()) {}
+      cameras_(both_cameras(options.profile, options.image_scale)),
+      lights_(placements_.size()),
+      bounces_(placements_.size()) {
+  // Of the scan alone: boards lay lower.
+  rig_.table.axis_from_top.translation().y() += options.profile.effects.top_height_mm;
+}
 
 const RoomLight& Scene::light_of(int pose) {
   auto& light = lights_[pose];
@@ -40,19 +53,49 @@ const RoomLight& Scene::light_of(int pose) {
   return *light;
 }
 
-Transform Scene::true_placement(int pose) const {
-  return options_.rig ? Transform(rig_.table.axis_from_top * placements_[pose]) : placements_[pose];
+const BouncePaths& Scene::bounces_of(int pose) {
+  auto& paths = bounces_[pose];
+  if (!paths) paths = std::make_unique<BouncePaths>(object_, rays_, placements_[pose]);
+  return *paths;
 }
 
-View Scene::look(int pose, double angle) {
+const RayMap& Scene::rays_of(int camera) {
+  auto& rays = ray_maps_[camera];
+  if (!rays) rays = std::make_unique<RayMap>(camera == 0 ? rig_.geometry.left : rig_.geometry.right);
+  return *rays;
+}
+
+Transform Scene::true_placement(int pose) const {
+  return rig_.table.is_ideal() ? placements_[pose] : Transform(rig_.table.axis_from_top * placements_[pose]);
+}
+
+View Scene::look(int pose, double angle, double minutes) {
   assert(pose >= 0 && pose < static_cast<int>(placements_.size()));
-  const Placed placed{object_, rays_, light_of(pose), placements_[pose], rig_.rim_dots};
-  const RigGeometry rig = options_.rig ? against_table_motion(rig_.geometry, rig_.table, angle) : rig_.geometry;
+  const Effects& effects = options_.profile.effects;
+  const RigGeometry then = at_time(rig_.geometry, effects, options_.profile.is_cold ? WarmUp{minutes} : WarmUp{});
+  const RigGeometry rig = rig_.table.is_ideal() ? then : against_table_motion(then, rig_.table, angle);
+  ViewEffects added{.effects = effects,
+                    .handling = Handling::of_view(effects, options_.seed, options_.views, pose, to_degrees(angle))};
+  const Placed placed{object_, rays_, light_of(pose), added.handling.moved(placements_[pose]), rig_.rim_dots};
+  std::optional<BounceLight> bounce;
+  if (effects.interreflection > 0.0) {
+    const Lamp lamp(rig.projector, dots_, effects, added.handling.finger);
+    added.bounce = &bounce.emplace(bounces_of(pose), object_, rays_, lamp, Transform(rot_y(angle)));
+  }
+  std::optional<ScreenLight> screen;
+  if (effects.folds > 0.0 || effects.screen_shadow > 0.0) {
+    added.screen = &screen.emplace(effects, object_, rays_, light_of(pose), rot_y(angle) * placements_[pose]);
+  }
   const auto seen_by = [&](const Eye& eye, int camera) {
     const std::uint64_t sampling = mix(static_cast<std::uint64_t>(pose), std::bit_cast<std::uint64_t>(angle), camera);
-    const Radiance light = render(placed, eye, rig.projector, dots_, angle, sampling);
-    const double scale = options_.image_scale;
-    return std::pair(through_lens(light.pattern, scale), through_lens(light.plain, scale));
+    if (!effects.is_none()) added.rays = &rays_of(camera);
+    Radiance light = render(placed, eye, rig.projector, dots_, angle, sampling, added);
+    if (added.handling.overexposed > 0.0) {
+      light.pattern *= 1.0 + added.handling.overexposed;
+      light.plain *= 1.0 + added.handling.overexposed;
+    }
+    const Lens& lens = cameras_[camera].lens;
+    return std::pair(lens.image(light.pattern), lens.image(light.plain));
   };
   View view;
   std::tie(view.left_pattern, view.left_plain) = seen_by(rig.left, 0);
@@ -60,25 +103,42 @@ View Scene::look(int pose, double angle) {
   return view;
 }
 
+cv::Mat Scene::exposed(const cv::Mat& on_sensor, int camera, std::uint64_t exposure) const {
+  const std::uint64_t key = options_.noise ? mix(options_.seed, exposure, camera) | 1 : 0;
+  return cameras_[camera].sensor.expose(on_sensor, key, rig_.noise_factor);
+}
+
 StereoImages Scene::expose(const View& view, bool pattern, std::uint64_t exposure) const {
-  const auto key = [&](int camera) { return options_.noise ? mix(options_.seed, exposure, camera) | 1 : 0; };
-  return {sim::expose(pattern ? view.left_pattern : view.left_plain, key(0), rig_.noise_factor),
-          sim::expose(pattern ? view.right_pattern : view.right_plain, key(1), rig_.noise_factor)};
+  const Effects& effects = options_.profile.effects;
+  if (effects.flash > 0.0 || effects.flicker > 0.0)
+    return expose(view, pattern ? LightLevels{.pattern = 1.0} : LightLevels{.plain = 1.0}, exposure);
+  return {exposed(pattern ? view.left_pattern : view.left_plain, 0, exposure),
+          exposed(pattern ? view.right_pattern : view.right_plain, 1, exposure)};
 }
 
 StereoImages Scene::expose(const View& view, const LightLevels& lights, std::uint64_t exposure) const {
-  const double dots = lights.is_slide_in ? lights.pattern : 0.0;
-  const double even = lights.plain + (lights.is_slide_in ? 0.0 : lights.pattern);
-  View mixed;
-  cv::addWeighted(view.left_pattern, dots, view.left_plain, even, 0.0, mixed.left_pattern);
-  cv::addWeighted(view.right_pattern, dots, view.right_plain, even, 0.0, mixed.right_pattern);
-  return expose(mixed, true, exposure);
+  const Effects& effects = options_.profile.effects;
+  const double flash = 1.0 + effects.flash * normal(mix(options_.seed, exposure, LightRandom::flash)),
+               room = 1.0 + effects.flicker * normal(mix(options_.seed, exposure, LightRandom::room));
+  const double slide = lights.is_slide_in ? lights.pattern : 0.0;
+  // The pattern's exposure has the room's light in it, which does not follow the flash.
+  const double dots = slide * flash, in_dots = slide * profile().pattern_room_light * (room - flash);
+  const double even = room * (lights.plain + (lights.is_slide_in ? 0.0 : lights.pattern)) + in_dots;
+  const auto mixed = [&](const cv::Mat& pattern, const cv::Mat& plain) {
+    cv::Mat light;
+    cv::addWeighted(pattern, dots, plain, even, 0.0, light);
+    return light;
+  };
+  return {exposed(mixed(view.left_pattern, view.left_plain), 0, exposure),
+          exposed(mixed(view.right_pattern, view.right_plain), 1, exposure)};
 }
 
-StereoImages Scene::shoot(int pose, double angle, bool pattern, std::uint64_t exposure) {
-  if (pose != pose_ || angle != angle_) view_ = look(pose, angle);
+StereoImages Scene::shoot(int pose, double angle, bool pattern, std::uint64_t exposure, double minutes) {
+  if (!options_.profile.is_cold) minutes = 0.0;
+  if (pose != pose_ || angle != angle_ || minutes != minutes_) view_ = look(pose, angle, minutes);
   pose_ = pose;
   angle_ = angle;
+  minutes_ = minutes;
   return expose(view_, pattern, exposure);
 }
 

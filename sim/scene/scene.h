@@ -7,10 +7,11 @@
 #include <vector>
 
 #include "core/result.h"
+#include "sim/scene/camera_model.h"
 #include "sim/scene/object.h"
 #include "sim/scene/optics.h"
 #include "sim/scene/renderer.h"
-#include "sim/scene/rig_variation.h"
+#include "sim/scene/rig_effects.h"
 
 namespace scanrig::sim {
 
@@ -24,6 +25,8 @@ struct SceneOptions {
   bool any_size = false;         ///< put it down although it is larger than the working volume, as an operator can
   bool noise = true;
   std::optional<RigVariation> rig = std::nullopt;  ///< a drawn rig; nothing: the default rig, without any error
+  ChosenProfile profile{};                         ///< as declared: profile 1
+  int views = 8;                                   ///< per pose: which of them handling spoils
 };
 
 /// Left and right image of one exposure, 8 bit BayerRG8.
@@ -50,20 +53,21 @@ class Scene {
  public:
   static constexpr std::uint64_t kFirstPreview = std::uint64_t{1} << 32;
 
-  /// Fails as load_object and draw_placements, and with `out_of_range` (image_scale outside 0.1 to 1, poses below 1).
+  /// Fails as load_object, draw_placements and Materials::named, and with `out_of_range` (image_scale outside 0.1 to 1,
+  /// poses below 1).
   static Result<std::unique_ptr<Scene>> create(const SceneOptions& options);
   /// For tests: a given object in given placements.
   Scene(Object object, std::vector<Transform> placements, const SceneOptions& options);
 
-  /// The scene with the table at the true `angle` (radians). Same pose and angle, same bits. Takes about 2 s in full
-  /// size.
-  View look(int pose, double angle);
+  /// The scene with the table at the true `angle` (radians), `minutes` after the first exposure. Same arguments, same
+  /// bits. Takes about 2 s in full size, with the effects of profile 2 about 5 s.
+  View look(int pose, double angle, double minutes = 0.0);
   /// `exposure` counts exposures, previews from kFirstPreview; with the seed it names the noise.
   [[nodiscard]] StereoImages expose(const View& view, bool pattern, std::uint64_t exposure) const;
   /// The same in any mixture of lights.
   [[nodiscard]] StereoImages expose(const View& view, const LightLevels& lights, std::uint64_t exposure) const;
   /// Both; the second light of the same pose and angle costs next to nothing.
-  StereoImages shoot(int pose, double angle, bool pattern, std::uint64_t exposure);
+  StereoImages shoot(int pose, double angle, bool pattern, std::uint64_t exposure, double minutes = 0.0);
 
   [[nodiscard]] const Object& object() const { return object_; }
   [[nodiscard]] const RigGeometry& rig() const { return rig_.geometry; }
@@ -76,6 +80,9 @@ class Scene {
 
  private:
   const RoomLight& light_of(int pose);
+  const BouncePaths& bounces_of(int pose);
+  const RayMap& rays_of(int camera);
+  [[nodiscard]] cv::Mat exposed(const cv::Mat& on_sensor, int camera, std::uint64_t exposure) const;
 
   SceneOptions options_;
   Object object_;
@@ -83,11 +90,14 @@ class Scene {
   DrawnRig rig_;
   RayCaster rays_;
   DotPattern dots_;
-  std::vector<std::unique_ptr<RoomLight>> lights_;  // made when a pose is first seen
+  std::array<CameraModel, 2> cameras_;
+  std::vector<std::unique_ptr<RoomLight>> lights_;     // made when a pose is first seen
+  std::vector<std::unique_ptr<BouncePaths>> bounces_;  // likewise
+  std::array<std::unique_ptr<RayMap>, 2> ray_maps_;
 
   // The last thing shot.
   int pose_ = -1;
-  double angle_ = 0.0;
+  double angle_ = 0.0, minutes_ = 0.0;
   View view_;
 };
 

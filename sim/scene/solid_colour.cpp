@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "sim/scene/random.h"
+#include "sim/scene/solid_patches.h"
 #include "sim/scene/surface_colour.h"
 
 namespace scanrig::sim {
@@ -15,7 +16,7 @@ using Eigen::Vector3f;
 using Eigen::Vector3i;
 
 std::uint64_t cell_hash(const Vector3i& c, unsigned salt) {
-  const auto key = [](int i) { return static_cast<std::uint64_t>(i + 4096); };
+  const auto key = [](int i) { return static_cast<std::uint64_t>(std::int64_t{i} + 4096); };
   return mix(key(c.x()) << 40 | key(c.y()) << 20 | key(c.z()) | static_cast<std::uint64_t>(salt) << 58);
 }
 
@@ -42,33 +43,6 @@ double edge(double distance, double width) {
   return t * t * (3.0 - 2.0 * t);
 }
 
-/// The two nearest of randomly placed points, one in each cell of a grid.
-struct Patches {
-  std::uint64_t first = 0;   ///< random bits of the nearest
-  std::uint64_t second = 0;  ///< of the runner-up
-  double margin = 0.0;       ///< mm to the border between the two
-};
-
-Patches patches(const Vector3d& p, double size, unsigned salt) {
-  const Vector3i c = (p / size).array().floor().cast<int>();
-  double nearest = 1e300, next = 1e300;
-  Patches found;
-  for (int i = 0; i < 27; ++i) {
-    const Vector3i cell = c + Vector3i(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
-    const std::uint64_t h = cell_hash(cell, salt);
-    const Vector3d jitter(uniform(h), uniform(mix(h)), uniform(mix(h + 1)));
-    const double d = (p - size * (cell.cast<double>() + jitter)).norm();
-    if (d < nearest) {
-      next = nearest, found.second = found.first;
-      nearest = d, found.first = h;
-    } else if (d < next) {
-      next = d, found.second = h;
-    }
-  }
-  found.margin = 0.5 * (next - nearest);
-  return found;
-}
-
 class Painted final : public SurfaceColour {
  public:
   Vector3f albedo(const SurfacePoint& at) const override {
@@ -76,7 +50,7 @@ class Painted final : public SurfaceColour {
     const Vector3d warp(grain(at.position, 9.0, 0.0, 1), grain(at.position, 9.0, 0.0, 2),
                         grain(at.position, 9.0, 0.0, 3));
     const Vector3d p = at.position + 2.0 * warp;
-    const Patches patch = patches(p, 17.0, 4);
+    const SolidPatches patch = solid_patches(p, 17.0, 4);
     const double share = edge(patch.margin, 2.0 * width);  // 0.5 on the border
     const Vector3f colour = static_cast<float>(share) * paint(patch.first, p, width) +
                             static_cast<float>(1.0 - share) * paint(patch.second, p, width);
@@ -102,7 +76,7 @@ class Painted final : public SurfaceColour {
       const double phase = p.dot(across.normalized()) / kPeriod;
       share = edge(kPeriod * (std::abs(phase - std::floor(phase) - 0.5) - 0.25), width);
     } else {  // spots
-      const Patches spot = patches(p, 4.2, 8);
+      const SolidPatches spot = solid_patches(p, 4.2, 8);
       share = edge(spot.margin - 0.45, width);
     }
     return static_cast<float>(1.0 - 0.75 * share) * ground + static_cast<float>(0.75 * share) * figure;
@@ -126,6 +100,26 @@ class Stone final : public SurfaceColour {
 };
 
 }  // namespace
+
+SolidPatches solid_patches(const Vector3d& p, double size, unsigned salt) {
+  const Vector3i c = (p / size).array().floor().cast<int>();
+  double nearest = 1e300, next = 1e300;
+  SolidPatches found;
+  for (int i = 0; i < 27; ++i) {
+    const Vector3i cell = c + Vector3i(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 1);
+    const std::uint64_t h = cell_hash(cell, salt);
+    const Vector3d jitter(uniform(h), uniform(mix(h)), uniform(mix(h + 1)));
+    const double d = (p - size * (cell.cast<double>() + jitter)).norm();
+    if (d < nearest) {
+      next = nearest, found.second = found.first;
+      nearest = d, found.first = h;
+    } else if (d < next) {
+      next = d, found.second = h;
+    }
+  }
+  found.margin = 0.5 * (next - nearest);
+  return found;
+}
 
 std::unique_ptr<SurfaceColour> painted_colour() { return std::make_unique<Painted>(); }
 std::unique_ptr<SurfaceColour> stone_colour() { return std::make_unique<Stone>(); }

@@ -40,6 +40,16 @@ ordered_json whole_camera(const Eye& eye) {
 
 }  // namespace
 
+ordered_json profile_json(const ChosenProfile& chosen) {
+  if (chosen.effects.is_none()) return ordered_json::object();
+  ordered_json effects = ordered_json::object();
+  for (const Effect& effect : workshop_effects()) {
+    for (const auto& size : effect.sizes) effects[size.name] = chosen.effects.*size.member;
+  }
+  return {{"profile", "workshop"},        {"profile_sha256", chosen.sha256()}, {"material", chosen.material_name()},
+          {"gamma", chosen.coding.gamma}, {"is_cold", chosen.is_cold},         {"effects", effects}};
+}
+
 ordered_json rig_json(const DrawnRig& rig) {
   const TableErrors& t = rig.table;
   ordered_json dots = ordered_json::array();
@@ -48,17 +58,19 @@ ordered_json rig_json(const DrawnRig& rig) {
     const Eigen::Vector3d in_axis_frame = t.axis_from_top * Eigen::Vector3d(at.x(), 0.0, at.y());
     dots.push_back({in_axis_frame.x(), in_axis_frame.y(), in_axis_frame.z()});
   }
-  return {{"left", whole_camera(rig.geometry.left)},
-          {"right", whole_camera(rig.geometry.right)},
-          {"table",
-           {{"reversed", t.reversed},
-            {"gear_factor", t.gear_factor},
-            {"angle_amplitude_deg", t.amplitude_deg},
-            {"angle_phase_rad", t.phase_rad},
-            {"runout_mm", t.runout_mm},
-            {"axis_from_top", transform_json(t.axis_from_top)}}},
-          {"rim_dots", dots},
-          {"noise_factor", rig.noise_factor}};
+  return {
+      {"left", whole_camera(rig.geometry.left)},
+      {"right", whole_camera(rig.geometry.right)},
+      {"table",
+       {{"reversed", t.reversed},
+        {"gear_factor", t.gear_factor},
+        {"angle_amplitude_deg", t.amplitude_deg},
+        {"angle_phase_rad", t.phase_rad},
+        {"runout_mm", t.runout_mm},
+        {"axis_from_top", transform_json(t.axis_from_top)},
+        {"axis", {{"runout_mm", t.axis.runout_mm}, {"wobble_rad", t.axis.wobble_rad}, {"worm_deg", t.axis.worm_deg}}}}},
+      {"rim_dots", dots},
+      {"noise_factor", rig.noise_factor}};
 }
 
 }  // namespace scanrig::sim

@@ -75,7 +75,7 @@ Result<void> write_truth(const Scene& scene, const std::vector<PoseTruth>& poses
   projector["projector_from_turntable"] = transform_json(scene.rig().projector.eye_from_turntable);
   ordered_json json = {{"format", "scanrig-truth"},
                        {"version", 1},
-                       {"profile_sha256", profile_sha256()},
+                       {"profile_sha256", scene.options().profile.sha256()},
                        {"object", scene.object().name},
                        {"seed", scene.options().seed},
                        {"mesh", "truth.ply"},
@@ -97,8 +97,10 @@ Result<void> write_truth(const Scene& scene, const std::vector<PoseTruth>& poses
     return written;
   }
   if (auto written = write_calibration(scene, folder / "truth_calibration.json"); !written) return written;
-  if (scene.options().rig) {
-    ordered_json rig = {{"format", "scanrig-rig-truth"}, {"version", 1}, {"rig_seed", scene.options().rig->seed}};
+  if (scene.options().rig || !scene.options().profile.effects.is_none()) {
+    ordered_json rig = {{"format", "scanrig-rig-truth"}, {"version", 1}};
+    if (scene.options().rig) rig["rig_seed"] = scene.options().rig->seed;
+    rig.update(profile_json(scene.options().profile));
     rig.update(rig_json(scene.drawn_rig()));
     if (const auto written = write_file_atomically(folder / "rig_truth.json", rig.dump(2) + "\n"); !written)
       return written;

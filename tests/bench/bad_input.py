@@ -141,6 +141,11 @@ def object_cases(desk):
     yield "a truth of zero faces", *verdict(desk, BAD_INPUT, "truth.ply", "scanrig", "evaluate", folder)
     yield "a missing mesh", *verdict(desk, BAD_INPUT, "gone.ply", "scanrig-sim", "shoot", "--object",
                                                desk.home / "gone.ply", "--out", target)
+    for what, options in {"profile": ["--profile", "garage"], "effect": ["--profile", "2", "--without", "wobbel"],
+                          "material": ["--profile", "2", "--material", "velvet"]}.items():
+        yield f"a name of no {what}", *verdict(desk, BAD_INPUT, options[-1], "scanrig-sim", "shoot", *options, "--out", target)
+    yield "a workshop without a calibration", *verdict(desk, BAD_INPUT, "--true-calibration", "scanrig-sim", "shoot",
+                                                       "--profile", "workshop", "--out", target)
     yield "0 views to shoot", *verdict(desk, USAGE, "views", "scanrig-sim", "shoot", "--views", 0, "--out", target)
     yield "0 views for the daemon", *verdict(desk, USAGE, "views", "scanrigd-sim", "--views", 0, "--socket", target,
                                              "--jobs", target)

@@ -84,7 +84,7 @@ cv::Mat ShotScene::shoot(const cv::Mat& on_sensor, std::uint64_t noise, const Se
     cv::RNG(mix(noise, 77)).fill(more, cv::RNG::NORMAL, 0.0, sensor.noise_grey / 255.0);
     light += more;
   }
-  const cv::Mat raw = expose(light, mix(noise, 5) | 1);
+  const cv::Mat raw = ImageSensor().expose(light, mix(noise, 5) | 1);
   const auto images = to_view_images({"BayerRG8", raw, raw, raw, raw}, {});
   if (!images) throw std::runtime_error(images.error().message);
   return images->left_plain;

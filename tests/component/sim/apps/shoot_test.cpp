@@ -73,6 +73,26 @@ TEST_F(Shoot, WritesAWholeScanFolder) {
   }
 }
 
+TEST_F(Shoot, OfTheWorkshopNamesItsProfileAndItsSizes) {
+  options_.scene.profile = {.effects = choose_effects("workshop", "wobble", "").value(), .material = "gloss"};
+  options_.scene.poses = options_.views = 1;
+  const fs::path solved = folder_.string() + "_solved.json";
+  std::ofstream(solved) << "solved elsewhere";
+  options_.calibration = solved;
+  ASSERT_TRUE(shoot(options_, folder_));
+  const json scan = parse(folder_ / "scan.json"), rig = parse(folder_ / "rig_truth.json");
+  EXPECT_EQ(scan["profile"], options_.scene.profile.sha256());
+  EXPECT_EQ(parse(folder_ / "truth.json")["profile_sha256"], scan["profile"]);
+  EXPECT_EQ(rig["material"], "gloss");
+  EXPECT_EQ(rig["effects"]["wobble_deg"], 0.0);
+  EXPECT_EQ(rig["effects"]["runout_mm"], 0.010);
+  EXPECT_EQ(rig["table"]["axis"]["worm_deg"], 0.01);
+  EXPECT_EQ(read_file(folder_ / "calibration.json").value(), "solved elsewhere");
+  fs::remove(solved);
+  options_.calibration = folder_ / "gone.json";
+  EXPECT_EQ(shoot(options_, folder_.string() + "_other").error().code, ErrorCode::not_found);
+}
+
 TEST_F(Shoot, GivesTheSameBytesForTheSameSeed) {
   const fs::path other = folder_.string() + "_again";
   options_.scene.poses = 1;
@@ -103,19 +123,32 @@ TEST_F(Shoot, NamesTheFolderThatCannotBeMade) {
   EXPECT_EQ(done.error().code, ErrorCode::io);
 }
 
-TEST(View, RendersInTimeOnTwoCores) {
-  with_threads(2, [] {
-    auto scene = Scene::create({}).value();
+/// Processor time of one view, pattern and plain, of the second look.
+double seconds_of_view(const SceneOptions& options) {
+  double seconds = 0.0;
+  with_threads(2, [&] {
+    auto scene = Scene::create(options).value();
     (void)scene->shoot(0, 0.0, true, 1);  // the light of the pose is gathered once
     const std::clock_t begin = std::clock();
     (void)scene->shoot(0, 1.0, true, 2);
     (void)scene->shoot(0, 1.0, false, 3);
-    const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
-    testing::Test::RecordProperty("processor_seconds", std::to_string(seconds));
-    // The promise, 4 s on two idle cores, is tested by the bench. Other programs run here, so only a gross excess
-    // fails.
-    EXPECT_LT(seconds, 12.0 * kSlowness);
+    seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   });
+  return seconds;
+}
+
+// The promise, 4 s on two idle cores, is tested by the bench, and 6 s for the workshop. Other programs run here, so
+// only a gross excess fails.
+TEST(View, RendersInTimeOnTwoCores) {
+  const double seconds = seconds_of_view({});
+  testing::Test::RecordProperty("processor_seconds", std::to_string(seconds));
+  EXPECT_LT(seconds, 12.0 * kSlowness);
+}
+
+TEST(View, OfTheWorkshopRendersInTimeOnTwoCores) {
+  const double seconds = seconds_of_view({.profile = {.effects = choose_effects("workshop", "", "").value()}});
+  testing::Test::RecordProperty("processor_seconds", std::to_string(seconds));
+  EXPECT_LT(seconds, 18.0 * kSlowness);
 }
 
 }  // namespace

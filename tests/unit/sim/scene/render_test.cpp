@@ -99,10 +99,12 @@ TEST(Rendering, OfATiltedPlaneMatchesItsGeometry) {
   constexpr double kStep = 0.15;  // mm on the sheet
   double sum = 0.0, squares = 0.0;
   for (int window = 0; window < kWindows * kWindows; ++window) {
-    const Vector2d corner(-21.0 + 5.2 * (window % kWindows), -21.0 + 5.2 * (window / kWindows));
+    const int across = window % kWindows, down = window / kWindows;
+    const Vector2d corner(-21.0 + 5.2 * across, -21.0 + 5.2 * down);
     double numerator = 0.0, denominator = 0.0;
     for (int i = 0; i < kSide * kSide; ++i) {
-      const Vector3d on_sheet(corner.x() + kStep * (i % kSide), corner.y() + kStep * (i / kSide), 0.0);
+      const int column = i % kSide, row = i / kSide;
+      const Vector3d on_sheet(corner.x() + kStep * column, corner.y() + kStep * row, 0.0);
       const Vector3d point = turntable_from_sheet * on_sheet;
       const Vector2d l = eyes[0]->project(point), r = eyes[1]->project(point);
       const double slope = sample(image[1], r.x() + 0.5, r.y()) - sample(image[1], r.x() - 0.5, r.y());
@@ -145,7 +147,7 @@ TEST(Scene, RepeatsAnExposureAndChangesTheNoiseOfTheNext) {
 
 TEST(Sensor, HasTwoGreyLevelsOfNoiseAtMidGrey) {
   const cv::Mat light(200, 200, CV_32FC3, cv::Scalar::all(128.0 / 255.0));
-  const cv::Mat raw = expose(through_lens(light, 1.0), 77);
+  const cv::Mat raw = ImageSensor().expose(through_lens(light, 1.0), 77);
   cv::Scalar mean, deviation;
   cv::meanStdDev(raw(cv::Rect(80, 80, 40, 40)), mean, deviation);  // the middle, free of vignetting
   EXPECT_NEAR(mean[0], 128.0, 1.0);
@@ -154,7 +156,7 @@ TEST(Sensor, HasTwoGreyLevelsOfNoiseAtMidGrey) {
 
 TEST(Sensor, HasRedAtItsFirstPixel) {
   const cv::Mat light(64, 64, CV_32FC3, cv::Scalar(0.6, 0.4, 0.2));  // RGB
-  const cv::Mat raw = expose(through_lens(light, 1.0), 0);
+  const cv::Mat raw = ImageSensor().expose(through_lens(light, 1.0), 0);
   EXPECT_NEAR(raw.at<std::uint8_t>(32, 32), 153, 1);
   EXPECT_NEAR(raw.at<std::uint8_t>(32, 33), 102, 1);
   EXPECT_NEAR(raw.at<std::uint8_t>(33, 32), 102, 1);
