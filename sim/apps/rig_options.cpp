@@ -43,7 +43,8 @@ void ProfileOptions::add_to(CLI::App& app, bool has_object) {
       ->capture_default_str();
   app.add_flag("--cold", is_cold, "The cameras are switched on with the first exposure, and drift");
   if (!has_object) return;
-  app.add_option("--with", with, "What hands do to one view: creep, rock, finger, overexposed, sticker, shadow");
+  app.add_option("--with", with,
+                 "Also faint-dots; what hands do to one view: creep, rock, finger, overexposed, sticker, shadow");
   app.add_option("--material", material, "Of the object, of the workshop satin; several joined by + in patches");
 }
 

@@ -99,13 +99,19 @@ const std::vector<Effect>& workshop_effects() {
       // Assumed: lamps on the mains, exposures of 12 ms.
       {"room", "flicker", {{"flicker", &E::flicker, 0.02}}},
 
+      // As in the pair of a D415, whose dots stand faintly in the room's infrared light; the exposure is shorter.
+      {"room",
+       "faint-dots",
+       {{"room_light", &E::room_light, 2.4}, {"pattern_exposure", &E::pattern_exposure, 0.3}},
+       true},
+
       // Assumed: what operators report.
-      {kHandling, "creep", {{"creep_mm", &E::creep_mm, 0.05}}},
-      {kHandling, "rock", {{"rock_deg", &E::rock_deg, 0.02}}},
-      {kHandling, "finger", {{"finger", &E::finger, 0.9}}},
-      {kHandling, "overexposed", {{"overexposed", &E::overexposed, 1.5}}},
-      {kHandling, "sticker", {{"sticker", &E::sticker, 1.0}}},
-      {kHandling, "shadow", {{"shadow", &E::shadow, 0.95}}},
+      {kHandling, "creep", {{"creep_mm", &E::creep_mm, 0.05}}, true},
+      {kHandling, "rock", {{"rock_deg", &E::rock_deg, 0.02}}, true},
+      {kHandling, "finger", {{"finger", &E::finger, 0.9}}, true},
+      {kHandling, "overexposed", {{"overexposed", &E::overexposed, 1.5}}, true},
+      {kHandling, "sticker", {{"sticker", &E::sticker, 1.0}}, true},
+      {kHandling, "shadow", {{"shadow", &E::shadow, 0.95}}, true},
   };
   return effects;
 }
@@ -123,7 +129,7 @@ Result<Effects> choose_effects(std::string_view profile, std::string_view withou
   const auto set = [&](const Effect& effect, bool is_on) {
     for (const auto& size : effect.sizes) chosen.*size.member = is_on ? size.value : Effects{}.*size.member;
   };
-  for (const Effect& effect : workshop_effects()) set(effect, effect.family != kHandling);
+  for (const Effect& effect : workshop_effects()) set(effect, !effect.is_asked_for);
   const auto set_named = [&](bool is_on) {
     return [&set, is_on](std::string_view name) {
       bool is_found = false;

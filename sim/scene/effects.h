@@ -62,6 +62,9 @@ struct Effects {
   double table_gloss = 0.0;    ///< mirrored share, as cameras 15 to 30 degrees above see it
   double flicker = 0.0;        ///< sigma of the ambient light from exposure to exposure, as a share
 
+  double room_light = 0.0;        ///< plain light in the pattern's exposure, as a share of a plain exposure's
+  double pattern_exposure = 1.0;  ///< of the pattern, as a share of profile 1's
+
   // Handling, in one view
   double creep_mm = 0.0;
   double rock_deg = 0.0;
@@ -104,13 +107,14 @@ struct Effect {
   };
   std::string_view family, name;
   std::vector<Size> sizes;
+  bool is_asked_for = false;  ///< on only where its name or family is given
 };
 
 /// The effects of profile 2, "workshop", in the order of the table in docs/reference/simulated-rig.md.
 const std::vector<Effect>& workshop_effects();
 
-/// Chooses a profile, "laboratory" or 1, "workshop" or 2; of that one all but those in `without`, and of the family
-/// "handling" only those in `with`. Both: names of effects or families, separated
+/// Chooses a profile, "laboratory" or 1, "workshop" or 2; of that one all but those in `without`, and of those that are
+/// asked for only those in `with`. Both: names of effects or families, separated
 /// by commas. Fails with `not_found` (no such name; lists those there are), `invalid_input` (profile 1 has no effects).
 Result<Effects> choose_effects(std::string_view profile, std::string_view without, std::string_view with);
 

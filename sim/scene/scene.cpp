@@ -110,7 +110,7 @@ cv::Mat Scene::exposed(const cv::Mat& on_sensor, int camera, std::uint64_t expos
 
 StereoImages Scene::expose(const View& view, bool pattern, std::uint64_t exposure) const {
   const Effects& effects = options_.profile.effects;
-  if (effects.flash > 0.0 || effects.flicker > 0.0)
+  if (effects.flash > 0.0 || effects.flicker > 0.0 || effects.room_light > 0.0)
     return expose(view, pattern ? LightLevels{.pattern = 1.0} : LightLevels{.plain = 1.0}, exposure);
   return {exposed(pattern ? view.left_pattern : view.left_plain, 0, exposure),
           exposed(pattern ? view.right_pattern : view.right_plain, 1, exposure)};
@@ -122,7 +122,9 @@ StereoImages Scene::expose(const View& view, const LightLevels& lights, std::uin
                room = 1.0 + effects.flicker * normal(mix(options_.seed, exposure, LightRandom::room));
   const double slide = lights.is_slide_in ? lights.pattern : 0.0;
   // The pattern's exposure has the room's light in it, which does not follow the flash.
-  const double dots = slide * flash, in_dots = slide * profile().pattern_room_light * (room - flash);
+  const double dots = effects.pattern_exposure * slide * flash;
+  const double in_dots =
+      effects.pattern_exposure * slide * (profile().pattern_room_light * (room - flash) + effects.room_light * room);
   const double even = room * (lights.plain + (lights.is_slide_in ? 0.0 : lights.pattern)) + in_dots;
   const auto mixed = [&](const cv::Mat& pattern, const cv::Mat& plain) {
     cv::Mat light;

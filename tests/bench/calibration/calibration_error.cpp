@@ -1,5 +1,5 @@
 // calibration_error CALIBRATION RIG_SEED [NAME=NUMBER,...]: one line of JSON, the error of a calibration of this drawn
-// rig (0: the default rig) over the working volume, full resolution.
+// rig (0: the default rig, "workshop": that of profile 2) over the working volume, full resolution.
 #include <fmt/format.h>
 
 #include <cstdlib>
@@ -31,8 +31,10 @@ int print_error(const Calibration& calibration, const char* seed, const char* ch
     return report_error(set.error().message, 3);
   }
   constexpr double kFull = 1.0;
-  const auto rig =
-      variation.seed == 0 ? sim::DrawnRig{.geometry = sim::default_rig(kFull)} : sim::draw_rig(variation, kFull);
+  const bool is_workshop = std::string_view(seed) == "workshop";
+  const auto rig = is_workshop           ? sim::make_rig({}, sim::choose_effects("workshop", "", "").value(), kFull)
+                   : variation.seed == 0 ? sim::make_rig({}, {}, kFull)
+                                         : sim::make_rig(variation, {}, kFull);
   const CalibrationError error = calibration_error(calibration, rig.geometry);
   fmt::print("{{\"rms_um\": {:.4f}, \"max_um\": {:.4f}, \"scale_ppm\": {:.2f}, \"predicted_um\": {:.4f}}}\n",
              error.rms_um, error.max_um, error.scale_ppm, calibration.quality ? calibration.quality->volume_um : 0.0);

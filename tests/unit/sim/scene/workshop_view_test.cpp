@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 #include "core/hash.h"
 #include "core/parallel.h"
@@ -126,6 +127,23 @@ TEST(Lights, VaryFromExposureToExposure) {
   EXPECT_NEAR(spread(scene, view, false), 0.02, 0.004);
   Scene still = block(small({}, 0.1));
   EXPECT_LT(spread(still, still.look(0, 0.0), true), 1e-6);
+}
+
+TEST(Lights, OfABrightRoomLeaveFaintDots) {
+  Scene scene = block(small(alone({"faint-dots"}), 0.25)), dark = block(small({}, 0.25));
+  const auto dots_of = [](Scene& of) {
+    cv::Scalar mean, sigma;
+    const cv::Mat image = of.shoot(0, 0.0, true, 1).left;
+    cv::Mat green;  // one colour of the filters
+    cv::resize(image(cv::Rect(146, 146, 28, 28)), green, {14, 14}, 0, 0, cv::INTER_NEAREST);
+    cv::meanStdDev(green, mean, sigma);
+    return std::pair(mean[0], sigma[0] / mean[0]);
+  };
+  const auto [level, contrast] = dots_of(scene);
+  const auto [dark_level, dark_contrast] = dots_of(dark);
+  EXPECT_LT(contrast, 0.35 * dark_contrast);
+  EXPECT_LT(level, 200.0);
+  EXPECT_EQ(cv::norm(scene.shoot(0, 0.0, false, 2).left, dark.shoot(0, 0.0, false, 2).left, cv::NORM_INF), 0.0);
 }
 
 TEST(Interreflection, AtTheFootOfAWallIsHalfOfWhatTheTableSends) {
