@@ -73,6 +73,8 @@ TEST(ImageSensor, HasOffsetsOfItsColumns) {
   cv::Mat columns;
   cv::reduce(mean, columns, 0, cv::REDUCE_AVG);
   EXPECT_NEAR(deviation(columns), 0.3, 0.05);
+  // Each its own.
+  EXPECT_NEAR(deviation(columns.colRange(1, 300) - columns.colRange(0, 299)), 0.3 * std::sqrt(2.0), 0.07);
   cv::Mat rows;
   cv::reduce(mean, rows, 1, cv::REDUCE_AVG);
   EXPECT_LT(deviation(rows), 0.05);
@@ -115,6 +117,7 @@ TEST(ImageSensor, VignettesOffItsCentre) {
   const cv::Mat raw = ImageSensor(effects).expose(even_light(200, 1280, 960), 0);
   const int right = raw.at<std::uint8_t>(480, 1279), left = raw.at<std::uint8_t>(480, 0);
   EXPECT_GT(right, left + 4);
+  EXPECT_GT(raw.at<std::uint8_t>(0, 640), raw.at<std::uint8_t>(959, 640) + 1);
   EXPECT_EQ(raw.at<std::uint8_t>(450, 700), 200);
   EXPECT_NEAR(raw.at<std::uint8_t>(959, 0), 200 * (1.0 - 0.15 * 1.15),
               3);  // farther than the corner is from the middle
