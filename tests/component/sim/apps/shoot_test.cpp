@@ -146,7 +146,9 @@ TEST(View, RendersInTimeOnTwoCores) {
 }
 
 TEST(View, OfTheWorkshopRendersInTimeOnTwoCores) {
-  const double seconds = seconds_of_view({.profile = {.effects = choose_effects("workshop", "", "").value()}});
+  SceneOptions options;
+  options.profile.effects = choose_effects("workshop", "", "").value();
+  const double seconds = seconds_of_view(options);
   testing::Test::RecordProperty("processor_seconds", std::to_string(seconds));
   EXPECT_LT(seconds, 18.0 * kSlowness);
 }
