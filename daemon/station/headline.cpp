@@ -76,7 +76,7 @@ PanelOutputs lamps(const StationState& state, const JobTable& jobs, bool blink) 
   out.busy = (state.activity != Activity::none && !flip && !part) || state.unclassified;
   out.green = state.machine == MachineState::ready || part ||
               (out.busy && !state.maintenance && !warning && !out.red && !out.amber);
-  out.start_lamp = state.machine == MachineState::ready || flip || part;
+  out.start_lamp = (state.machine == MachineState::ready && !calibration_problem(state)) || flip || part;
   out.flip_request = flip && !calibrates;
   const auto last = jobs.find(state.last_started_job);
   if (last != jobs.end() && is_final(last->second->state)) {

@@ -48,7 +48,7 @@ class Daemon : public scan_samples::FolderTest {
   }
 
   bool wait_ready() {
-    return rig.panel.wait_for_lamps([](const auto& l) { return l.start_lamp && !l.flip_request; });
+    return rig.panel.wait_for_lamps([](const auto& l) { return l.green && !l.busy; });
   }
   bool wait_flip() {
     return rig.panel.wait_for_lamps([](const auto& l) { return l.flip_request; });

@@ -64,7 +64,7 @@ class WireRig {
     return wait_for([&] { return lamp("AMBER") && !lamp("BUSY") && !lamp("START_LAMP"); });
   }
   bool wait_ready() {
-    return wait_for([&] { return lamp("START_LAMP"); });
+    return wait_for([&] { return lamp("GREEN") && !lamp("BUSY"); });
   }
   bool wait_fault() {
     return wait_for([&] { return lamp("RED") && !lamp("BUSY"); });

@@ -31,6 +31,15 @@ TEST(Lamps, TellIdleWorkingActNowAndFaultApart) {
             (PanelOutputs{.green = true, .start_lamp = true}));
 }
 
+TEST(Lamps, StartIsDarkWhileTheCalibrationRefusesTheNextScan) {
+  StationState state;
+  state.machine = MachineState::ready;
+  EXPECT_TRUE(lamps(state, {}).start_lamp);
+  state.calibration.problem = Error{ErrorCode::not_found, "there is no calibration"};
+  EXPECT_FALSE(lamps(state, {}).start_lamp);
+  EXPECT_TRUE(lamps(state, {}).green);
+}
+
 TEST(Lamps, AFaultIsRedOnlyEvenWhileStopping) {
   EXPECT_EQ(of(MachineState::error, Activity::stopping), (PanelOutputs{.red = true, .busy = true}));
 }
