@@ -126,9 +126,11 @@ void add_reference(CLI::App& app, Chosen& chosen) {
   };
   auto* make = add("add", "keep a mesh; one of the same name is replaced");
   make->add_option("FILE", verb->file, "STL, PLY or OBJ in mm, or GLB")->required();
-  make->add_option("--name", verb->name, "on the page (default: as the file)");
+  make->add_option("--name", verb->name, "its name on the page (default: the name of the file)");
   add("list", "names and sizes");
-  add("remove", "delete one; what was compared with it stays")->add_option("NAME", verb->name, "of it")->required();
+  add("remove", "delete a mesh; what was compared with it stays")
+      ->add_option("NAME", verb->name, "of the mesh")
+      ->required();
 }
 
 }  // namespace

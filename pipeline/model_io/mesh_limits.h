@@ -1,8 +1,10 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -12,7 +14,7 @@
 #include "core/result.h"
 #include "pipeline/mesh/mesh.h"
 
-// Shared by the readers of PLY and OBJ.
+// Shared by the readers of mesh files.
 namespace scanrig {
 
 /// Larger than any meaningful coordinate, small enough to be squared in single precision.
@@ -39,6 +41,14 @@ std::optional<T> number(std::string_view word) {
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   if (error != std::errc{} || end != word.data() + word.size()) return std::nullopt;
   return value;
+}
+
+/// The three coordinates that a line of text continues with; nothing for what is no number, or absurd.
+inline std::optional<Eigen::Vector3f> next_vertex(std::string_view& line) {
+  Eigen::Vector3d v;
+  for (int k = 0; k < 3; ++k) v[k] = number<double>(next_word(line)).value_or(std::nan(""));
+  if (v.hasNaN() || !(v.cwiseAbs().maxCoeff() < kAbsurd)) return std::nullopt;
+  return v.cast<float>();
 }
 
 /// Adds the polygon's fan, corner by corner. False when there is no vertex `index`.

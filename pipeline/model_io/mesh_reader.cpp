@@ -15,12 +15,11 @@ Result<Mesh> parse_obj(std::string_view text, std::string_view name) {
     std::string_view rest = next_line(text);
     const auto keyword = next_word(rest);
     if (keyword == "v") {
-      Eigen::Vector3d v;
-      for (int k = 0; k < 3; ++k) v[k] = number<double>(next_word(rest)).value_or(std::nan(""));
-      if (!(v.cwiseAbs().maxCoeff() < kAbsurd) || v.hasNaN()) {
+      const auto vertex = next_vertex(rest);
+      if (!vertex) {
         return fail(ErrorCode::invalid_input, "{}, line {}: a vertex that is not a number", name, line_number);
       }
-      mesh.vertices.push_back(v.cast<float>());
+      mesh.vertices.push_back(*vertex);
     } else if (keyword == "f") {
       Fan fan;
       for (auto word = next_word(rest); !word.empty(); word = next_word(rest)) {

@@ -35,12 +35,11 @@ Result<Mesh> text_stl(std::string_view text, std::string_view name) {
     std::string_view rest = next_line(text);
     const auto keyword = next_word(rest);
     if (keyword == "vertex") {
-      Eigen::Vector3d v;
-      for (int k = 0; k < 3; ++k) v[k] = number<double>(next_word(rest)).value_or(std::nan(""));
-      if (v.hasNaN() || !(v.cwiseAbs().maxCoeff() < kAbsurd)) {
+      const auto vertex = next_vertex(rest);
+      if (!vertex) {
         return fail(ErrorCode::invalid_input, "{}, line {}: a vertex that is not a number", name, line_number);
       }
-      mesh.vertices.push_back(v.cast<float>());
+      mesh.vertices.push_back(*vertex);
       ++corners;
     } else if (keyword == "endloop" || keyword == "outer") {
       if (corners != (keyword == "endloop" ? 3 : 0)) {

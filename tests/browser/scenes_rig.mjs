@@ -115,7 +115,7 @@ export const scenarios = {
     await page.locator("button.stop").dispatchEvent("pointerdown");
     await until("STOP was sent", async () => (await page.locator(".stop-place").innerText()).includes("STOP SENT"));
     await until("the job is interrupted", () => jobOf(station)?.state === "interrupted");
-    await until("the other page says what was ordered", () => engineer.getByText(/^Last order: stop, by 127\.0\.0\.1, [\d:]+\.$/).count());
+    await until("the other page says what was ordered", () => engineer.getByText(/^Last order: stop \(127\.0\.0\.1\), [\d:]+\.$/).count());
     await check(page, station);
   },
 

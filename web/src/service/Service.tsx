@@ -191,7 +191,7 @@ function ConfigCard() {
   if (!may("engineer")) return null;
   const check = async () => {
     const { problems } = await order<ConfigCheck>("/config/check");
-    told.value = problems.length === 0 ? [words.configWell] : problems;
+    told.value = problems.length === 0 ? [words.configValid] : problems;
   };
   return (
     <section class="card">
