@@ -16,9 +16,11 @@ namespace {
 
 constexpr double kMinChi2 = 40.0;
 constexpr double kMinShiftPx = 0.01;
-constexpr double kAgreement = 0.9;   ///< of a camera's images with a motion between two placements
-constexpr double kUneven = 2.0;      ///< misfit of the worst placement over that of the middle one
-constexpr double kFocusShare = 0.3;  ///< of the chi-square that only the focal length explains
+constexpr double kAgreement = 0.9;       ///< of a camera's images with a motion between two placements
+constexpr double kUneven = 2.0;          ///< misfit of the worst placement over that of the middle one
+constexpr double kMedianChi2Of6 = 5.35;  ///< of six unknowns that explain nothing
+constexpr std::size_t kFewSlips = 6;     ///< of other placements: too few to know their misfit
+constexpr double kFocusShare = 0.3;      ///< of the chi-square that only the focal length explains
 
 /// Further unknowns: combinations of the solution's columns, in some of its sightings only.
 struct ExtraUnknowns {
@@ -148,8 +150,9 @@ class ChangeSearch {
     for (int camera = 0; camera < input_.cameras && input_.form == CalibrationInput::Form::table; ++camera) {
       if (!is_solved_for(camera)) continue;
       const auto gain = test_.of(camera_turn(solution_, camera, false, gradually(camera, placements.size())));
-      consider(gain, {.kind = RigChange::Kind::drift, .camera = camera, .share = 0.5});
+      consider(gain, {.kind = RigChange::Kind::drift, .camera = camera, .share = 0.5}, camera_);
     }
+    choose_slip();
     const bool is_slip = slip_ && (!camera_ || (slip_->chi2 > camera_->chi2 && !others_fit_badly(slip_->placement)));
     return is_slip ? slip_ : camera_;
   }
@@ -192,28 +195,44 @@ class ChangeSearch {
     change.share = static_cast<double>(pair) / static_cast<double>(placements.size());
     if (focus.chi2 - turn.chi2 > std::max(kMinChi2, kFocusShare * focus.chi2)) {
       change.kind = RigChange::Kind::focus;
-      return consider(focus, change);
+      return consider(focus, change, camera_);
     }
-    consider(turn, change);
+    consider(turn, change, camera_);
   }
 
   void try_slip(std::size_t pair) {
     const int placement = solution_.start.setup.placement_of_pair[pair];
     if (solution_.linear.placements[static_cast<std::size_t>(placement)].count != 6) return;
-    consider(test_.of(board_slip(solution_, placement, static_cast<int>(pair))),
-             {.kind = RigChange::Kind::board, .placement = input_.pairs[pair - 1].placement});
+    possible_slips_.push_back({test_.of(board_slip(solution_, placement, static_cast<int>(pair))),
+                               {.kind = RigChange::Kind::board, .placement = input_.pairs[pair - 1].placement}});
   }
 
-  void consider(const Gain& gain, RigChange change) {
+  /// What the model does not follow, a lens or an axis, shows as slips of every placement. One that slipped stands out.
+  [[nodiscard]] double misfit_of_others(int slipped) const {
+    std::vector<double> others;
+    for (const auto& [gain, change] : possible_slips_) {
+      if (change.placement != slipped) others.push_back(gain.chi2);
+    }
+    return others.size() < kFewSlips ? 1.0 : std::max(1.0, quantile(std::move(others), 0.5) / kMedianChi2Of6);
+  }
+
+  void choose_slip() {
+    for (auto [gain, change] : possible_slips_) {
+      gain.chi2 /= misfit_of_others(change.placement);
+      consider(gain, change, slip_);
+    }
+  }
+
+  static void consider(const Gain& gain, RigChange change, std::optional<RigChange>& best) {
     change.chi2 = gain.chi2;
     change.shift_px = gain.shift_px;
-    auto& best = change.kind == RigChange::Kind::board ? slip_ : camera_;
     if (gain.chi2 > kMinChi2 && gain.shift_px > kMinShiftPx && (!best || gain.chi2 > best->chi2)) best = change;
   }
 
   const CalibrationInput& input_;
   const CalibrationSolution& solution_;
   const ScoreTest test_;
+  std::vector<std::pair<Gain, RigChange>> possible_slips_;
   std::optional<RigChange> slip_, camera_;  ///< the best of each
 };
 

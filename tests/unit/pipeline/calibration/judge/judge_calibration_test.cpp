@@ -12,6 +12,7 @@ using ::testing::AllOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 TEST(JudgeCalibration, ACleanRigIsGradeAWithoutASentence) {
@@ -126,6 +127,15 @@ TEST(JudgeCalibration, ABoardThatSlippedIsNamed) {
   const auto judged = judge_calibration(rig.observe());
   ASSERT_TRUE(judged) << judged.error().message;
   EXPECT_THAT(judged->judgement.sentences, Contains(StartsWith("Board slipped in placement 5")));
+}
+
+// What no slip can explain shows as small slips everywhere.
+TEST(JudgeCalibration, AnAxisThatRunsOutIsNoSlip) {
+  RigFaults faults;
+  faults.runout_mm = 0.02;
+  const auto judged = judge_calibration(SyntheticBoardRig(faults, 102).observe());
+  ASSERT_TRUE(judged) << judged.error().message;
+  EXPECT_THAT(judged->judgement.sentences, Not(Contains(StartsWith("Board slipped"))));
 }
 
 TEST(JudgeCalibration, ASecondLengthThatContradictsIsRefused) {
