@@ -21,7 +21,8 @@ std::pair<double, double> size_of(const PoseMatrix& form, const PartMotion& moti
 
 WatchVerdict judge(const WatchedPart& part, const WatchOptions& options) {
   if (!(part.px > options.min_sigmas * part.expected_px) || !(part.px > options.max_px)) return WatchVerdict::holds;
-  return part.px > options.refused_px ? WatchVerdict::refused : WatchVerdict::moved;
+  const double refused_px = part.part == RigPart::axis ? options.refused_axis_px : options.refused_px;
+  return part.px > refused_px ? WatchVerdict::refused : WatchVerdict::moved;
 }
 
 WatchedPart camera_part(int camera, const MovedParts& moved, const RigEffects& effects) {

@@ -39,11 +39,12 @@ struct WatchedPart {
 };
 
 struct WatchOptions {
-  double max_px = 0.04;      ///< above, the part has moved: said, and the calibration refined
-  double refused_px = 0.15;  ///< above, refused
-  double min_sigmas = 3.0;   ///< less is what an untouched rig shows
-  double overlap_px = 0.1;   ///< overlap cannot tell the axis from stereo's error at incidence: said above this only
-  int min_dots = 12;         ///< per camera, in all views of a pose
+  double max_px = 0.04;          ///< above, the part has moved: said, and the calibration refined
+  double refused_px = 0.15;      ///< above, refused
+  double refused_axis_px = 1.0;  ///< of the axis: matching does not depend on it, and the dots measure it
+  double min_sigmas = 3.0;       ///< less is what an untouched rig shows
+  double overlap_px = 0.1;  ///< overlap cannot tell the axis from stereo's error at incidence: said above this only
+  int min_dots = 12;        ///< per camera, in all views of a pose
   RigDrift drift{};
 };
 

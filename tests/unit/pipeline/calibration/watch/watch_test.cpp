@@ -126,6 +126,19 @@ TEST(Watch, NamesTheAxisWhenBothImagesShiftAlike) {
   EXPECT_EQ(part_of(watch, RigPart::right_camera).verdict, WatchVerdict::holds);
 }
 
+// Matching does not depend on the axis, and the dots measure it: it is mended where a camera would be refused.
+TEST(Refinement, MendsAnAxisThatIsFarOff) {
+  const RigChange far = {.table_shift = Eigen::Vector3d(0.1, 0, 0), .table_tilt = {0, 0, to_radians(0.05)}};
+  const auto [before, after] = before_and_after(far);
+  EXPECT_GT(before, 60.0);
+  EXPECT_LE(after, 20.0);
+  const Watch watch = watch_rig(WatchedRig(far).observe());
+  EXPECT_EQ(watch.verdict, WatchVerdict::moved);
+  EXPECT_THAT(watch.sentences, ElementsAre(HasSubstr("Table axis moved by 0.10 mm, 0.05")));
+  const RigChange loose = {.table_shift = Eigen::Vector3d(1.5, 0, 0)};
+  EXPECT_EQ(watch_rig(WatchedRig(loose).observe()).verdict, WatchVerdict::refused);
+}
+
 TEST(Watch, RefusesWithThePartThatMoved) {
   WatchedRig rig(right_columns(0.25));
   const Watch watch = watch_rig(rig.observe());
