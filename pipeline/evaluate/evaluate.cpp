@@ -96,8 +96,9 @@ Eigen::Vector3d centre_of(const Mesh& mesh) {
   return box.center();
 }
 
-void score_measured(const Mesh& model, const Truth& truth, const SurfaceIndex& surface, const EvaluateOptions& options,
-                    Scores& scores) {
+/// Returns the best rigid motion onto the truth.
+Transform score_measured(const Mesh& model, const Truth& truth, const SurfaceIndex& surface,
+                         const EvaluateOptions& options, Scores& scores) {
   const std::vector<std::uint32_t> faces = measured_faces(model, true);
   const std::vector<SurfaceSample> samples = sample_surface(model, faces, options.samples);
   const auto nearest = nearest_to(samples, surface);
@@ -109,6 +110,7 @@ void score_measured(const Mesh& model, const Truth& truth, const SurfaceIndex& s
   const Eigen::Vector3d centre = centre_of(truth.mesh);
   scores.alignment_deg = to_degrees(rotation_angle(motion.linear()));
   scores.alignment_mm = (motion * centre - centre).norm();
+  return motion;
 }
 
 Result<void> score_coverage(const Mesh& model, const std::vector<SurfaceSample>& truth, const std::vector<int>& views,
@@ -191,7 +193,9 @@ Result<Scores> evaluate(const Claim& claim, const Truth& truth, const ScanFolder
   const auto model_surface = SurfaceIndex::create(model);
   if (!model_surface) return pass_on(model_surface, "model");
   Scores scores;
-  score_measured(model, truth, *true_surface, options, scores);
+  const Transform truth_from_model = score_measured(model, truth, *true_surface, options, scores);
+  SigmaProbe probe(model, sample_surface(model, measured_faces(model, true), options.sigma_samples), truth,
+                   *true_surface, truth_from_model);
   score_topology(model, truth.mesh, *model_surface, scores);
   scores.pose2 = pose_error(claim, truth);
   const std::vector<std::uint32_t> closed = measured_faces(model, false);
@@ -213,9 +217,11 @@ Result<Scores> evaluate(const Claim& claim, const Truth& truth, const ScanFolder
   if (!closed.empty()) carve.emplace(truth.mesh, options.carve_voxel_mm);
   const auto seen = for_each_view(truth, *true_surface, options.observable, context, [&](const TrueView& view) {
     count_view(view, truth_samples, views);
+    probe.see(view);
     if (carve) carve->cut(view);
   });
   if (!seen) return pass_on(seen);
+  scores.sigma_classes = probe.figures();
   if (const auto covered = score_coverage(model, truth_samples, views, scores); !covered) return pass_on(covered);
   if (carve) scores.closed = figures(carve->distances(sample_surface(model, closed, options.samples)), closed_area);
 

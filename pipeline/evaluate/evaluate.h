@@ -16,8 +16,9 @@
 namespace scanrig {
 
 struct EvaluateOptions {
-  std::size_t samples = 200'000;  ///< spread over each surface
-  double carve_voxel_mm = 0.5;    ///< of the ideal carve
+  std::size_t samples = 200'000;       ///< spread over each surface
+  std::size_t sigma_samples = 40'000;  ///< of measured area, for the classes of sigma
+  double carve_voxel_mm = 0.5;         ///< of the ideal carve
   ObservableRule observable;
   AlignmentOptions alignment;
   TextureFigureOptions texture;

@@ -78,6 +78,13 @@ json to_json(const Scores& s) {
                    {"genus", s.genus},
                    {"true_genus", s.true_genus ? json(*s.true_genus) : json()},
                    {"self_intersecting_faces", s.self_intersections}}}};
+  for (const SigmaClass& one : s.sigma_classes) {
+    result["sigma"]["classes"].push_back({{"name", one.name},
+                                          {"count", one.count},
+                                          {"ratio", number(one.ratio)},
+                                          {"share_within_2", number(one.within_2)},
+                                          {"median_mm", number(one.median_mm)}});
+  }
   if (s.pose2) result["pose2_error"] = {{"deg", s.pose2->deg}, {"mm", s.pose2->mm}};
   if (s.texture) {
     result["texture"] = {{"patches", s.texture->patches},
@@ -113,6 +120,10 @@ std::string to_table(const Scores& s) {
   text += row("normals, p95", s.normal_p95_deg, "deg");
   text += row("error / sigma (1 is honest)", s.sigma_ratio, "");
   text += row("beyond 2 sigma (4.6 is normal)", 100.0 * s.beyond_2_sigma, "%");
+  for (const SigmaClass& one : s.sigma_classes) {
+    text += fmt::format("  {:<34}{:>8.4f} mm{:>7.2f}{:>7.1f} % within 2\n", one.name, one.median_mm, one.ratio,
+                        100.0 * one.within_2);
+  }
   if (s.texture) text += row("texture offset, p95", s.texture->p95_px, "px");
   text += fmt::format("{} vertices, {} faces\n\n", s.vertices, s.faces);
   text += fmt::format("{:<44}{:>10} {:>10}  ok\n", "gate", "limit", "measured");

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/evaluate/sigma_figures.h"
+
 namespace scanrig {
 
 inline constexpr double kNoFigure = std::numeric_limits<double>::quiet_NaN();
@@ -44,6 +46,7 @@ struct Scores {
   double sigma_ratio = kNoFigure;
   double beyond_2_sigma = kNoFigure;
   double beyond_3_sigma = kNoFigure;
+  std::vector<SigmaClass> sigma_classes;  ///< the same after the best rigid motion, by class; empty without sigma
 
   std::size_t vertices = 0;
   std::size_t faces = 0;

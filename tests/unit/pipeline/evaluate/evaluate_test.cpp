@@ -3,7 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <functional>
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "core/parallel.h"
 #include "pipeline/model_io/model_files.h"
@@ -139,6 +142,56 @@ TEST(Evaluate, SigmaIsHonestWhenErrorsAreAsLargeAsSigma) {
   const Scores boasting = score(model);
   EXPECT_NEAR(boasting.sigma_ratio, 5.0, 0.2);
   EXPECT_EQ(boasting.beyond_3_sigma, 1.0);
+}
+
+const SigmaClass* class_of(const Scores& scores, const std::string& name) {
+  const auto found = std::ranges::find(scores.sigma_classes, name, &SigmaClass::name);
+  return found == scores.sigma_classes.end() ? nullptr : &*found;
+}
+
+/// A ball in which every vertex is off along its normal by so many of its sigmas.
+Mesh wavy_ball(const std::function<double(const Eigen::Vector3d&)>& sigmas_off, float sigma) {
+  Mesh model = ball();
+  for (auto& vertex : model.vertices) {
+    const Eigen::Vector3d outward = (vertex.cast<double>() - kCentre).normalized();
+    vertex += (static_cast<double>(sigma) * sigmas_off(outward) * outward).cast<float>();
+  }
+  model.sigma.assign(model.vertices.size(), sigma);
+  return model;
+}
+
+TEST(Evaluate, SigmaIsJudgedByClassAndAfterAlignment) {
+  Mesh model =
+      wavy_ball([](const Eigen::Vector3d& n) { return std::sin(40.0 * n.x()) * (n.y() > 0.0 ? 1.0 : 3.0); }, 0.02F);
+  for (std::size_t v = 0; v < model.vertices.size(); ++v) {
+    model.views[v] = static_cast<double>(model.vertices[v].y()) > kCentre.y() ? 7 : 2;
+    model.vertices[v] += Eigen::Vector3f(0.3F, 0.0F, 0.1F);
+  }
+  const Scores scores = score(model);
+  const SigmaClass *many = class_of(scores, "5 views and more"), *two = class_of(scores, "2 views");
+  ASSERT_TRUE(many && two);
+  EXPECT_NEAR(two->ratio / many->ratio, 3.0, 0.3);
+  EXPECT_EQ(many->within_2, 1.0);
+  EXPECT_LT(two->within_2, 0.6);
+  EXPECT_EQ(class_of(scores, "1 view"), nullptr);
+  const SigmaClass* curved = class_of(scores, kRadius < 20.0 ? "radius 5 to 20 mm" : "radius over 20 mm");
+  ASSERT_TRUE(curved);
+  EXPECT_EQ(curved->count, class_of(scores, "all")->count);
+}
+
+TEST(Evaluate, DistancesAreJudgedByTheSigmaOfBothEnds) {
+  const auto noise = [](const Eigen::Vector3d& n) { return std::sin(997.0 * n.x() + 389.0 * n.y()); };
+  const SigmaClass* honest = nullptr;
+  const Scores scores = score(wavy_ball(noise, 0.02F));
+  honest = class_of(scores, "distances 20 to 80 mm");
+  ASSERT_TRUE(honest);
+  EXPECT_GT(honest->count, 1000U);
+  EXPECT_GT(honest->ratio, 0.3) << "waves vary less between vertices than noise";
+  EXPECT_LT(honest->ratio, 1.0);
+  Mesh boasting = wavy_ball(noise, 0.02F);
+  boasting.sigma.assign(boasting.vertices.size(), 0.004F);
+  const Scores less = score(boasting);
+  EXPECT_NEAR(class_of(less, "distances 20 to 80 mm")->ratio / honest->ratio, 5.0, 0.1);
 }
 
 TEST(Evaluate, HolesBitsAndCrossingsAreCounted) {
