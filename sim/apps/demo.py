@@ -39,6 +39,8 @@ def arguments():
     parser.add_argument("--no-noise", action="store_true", help="sensors without noise")
     parser.add_argument("--calibration", choices=("own", "true"), default="own",
                         help="own: the rig calibrates itself once; true: the rig knows its exact geometry")
+    parser.add_argument("--profile", choices=("workshop", "laboratory"), default="workshop",
+                        help="workshop: light, lenses, materials and mechanics as they are; laboratory: ideal ones")
     parser.add_argument("--wire", action="store_true",
                         help="the shipped daemon over wires: Modbus drive, GPIO lines, two GigE cameras")
     parser.add_argument("--bin", type=pathlib.Path, required=True, help=argparse.SUPPRESS)
@@ -80,7 +82,7 @@ def free_port(wanted):
 def scene(options):
     """Options for the object on the table, common to both simulators."""
     words = ["--seed", options.seed, "--views", options.views, "--height-mm", options.height_mm,
-             "--scale", options.scale]
+             "--scale", options.scale, "--profile", options.profile]
     if options.object:
         words += ["--object", options.object]
     words += [flag for flag, on in (("--same-rest", options.same_rest), ("--no-noise", options.no_noise)) if on]
@@ -95,12 +97,12 @@ class SimulatedStation:
         self.socket = folder / "api.sock"
         self.processes = []
 
-    def start(self, options, log, calibration=None, extra=()):
+    def start(self, options, log, calibration=None, extra=("--true-calibration",)):
         """Returns the process that is the daemon."""
         if calibration:
             self.jobs.mkdir(parents=True)
             shutil.copy(calibration, self.jobs)
-            extra = ["--own-calibration", *extra]
+            extra = ["--own-calibration"]
         if options.page:
             extra = ["--http-port", free_port(PAGE_PORT), "--background-cameras", *extra]
         command = [options.bin / "scanrigd-sim", "--socket", self.socket, "--jobs", self.jobs, *scene(options), *extra]
@@ -226,17 +228,19 @@ def link_results(job, folder):
 
 
 def print_accuracies(options, job, folder):
-    """What the calibration costs: the same images with the rig's own and with the true one."""
+    """What the calibration costs: the same images with the rig's own and with the true one. Aligned: the shape alone."""
     true = folder / "true_calibration"
     demo_calibration.with_true_calibration(job, true)
     subprocess.run([options.bin / "scanrig", "reconstruct", true, "--no-texture", "--voxel-mm", str(VOXEL_MM)],
                    stdout=subprocess.DEVNULL, check=True)
     evaluated = subprocess.run([options.bin / "scanrig", "evaluate", true, "--json"], capture_output=True, text=True)
-    print("Accuracy on the measured surface")
+    print(f"Accuracy on the measured surface, {options.profile}")
     for name, text in (("own calibration", (folder / "scores.json").read_text()),
                        ("true calibration", evaluated.stdout)):
-        measured = json.loads(text)["measured"]
-        print(f"  {name:<18} median {measured['median_mm']:.4f} mm, p95 {measured['p95_mm']:.4f} mm")
+        scores = json.loads(text)
+        measured, aligned = scores["measured"], scores["aligned"]
+        print(f"  {name:<18} median {measured['median_mm']:.4f} mm, p95 {measured['p95_mm']:.4f} mm; "
+              f"aligned {aligned['median_mm']:.4f} and {aligned['p95_mm']:.4f} mm")
 
 
 def scores_of(options, folder):

@@ -17,7 +17,7 @@ def own_calibration(options, start_rig, log):
     Raises RuntimeError.
     """
     simulator = hashlib.sha256((options.bin / "scanrig-sim").read_bytes()).hexdigest()[:12]
-    kept = KEPT / f"{simulator}-{options.scale:g}"
+    kept = KEPT / f"{simulator}-{options.profile}-{options.scale:g}"
     if (kept / CALIBRATION).is_file():
         print(f"Calibration  {kept}/{CALIBRATION}, made by this rig before", flush=True)
         return kept
