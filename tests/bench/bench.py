@@ -39,6 +39,7 @@ class Bench:
         self.cores = len(os.sched_getaffinity(0))
         self.group = ""
         self.lines = []
+        self.made = set()  # folders of bench.out that this run has made, for the parts that follow
         self.profile = ""
 
     @property

@@ -13,7 +13,7 @@ MINUTES = {
     "calibration": {"rigs": 12, "faults": 8, "models": 8, "watch": 9, "drift": 6},
     "cameras": {"triggers": 4, "matrix": 3, "wire": 12, "hil": 8, "memory": 12},
     "page": {"scenes": 5, "bars": 9, "bundle": 1, "guide": 30},
-    "real-rig": {"realism": 3, "calibration": 12},
+    "real-rig": {"realism": 3, "calibration": 6, "materials": 14, "disturbed": 8},
     "end-to-end": {"models": 14, "render": 1, "same_model": 4, "dragon": 8, "rim": 1, "bad_input": 4, "sigkill": 4},
 }
 LONG = {

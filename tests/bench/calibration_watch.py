@@ -36,21 +36,23 @@ def turn_right_camera(axis, px):
     return change
 
 
-def move_axis(calibration):
-    """By 0.05 mm to the side and 0.02 deg."""
-    turn, shift = rotation(2, math.radians(0.02)), [0.05, 0.0, 0.0]
-    for side in ("left", "right"):
-        pose = calibration[side]["camera_from_turntable"]
-        moved = times(pose["rotation"], shift)
-        pose["translation"] = [a + b for a, b in zip(pose["translation"], moved)]
-        pose["rotation"] = product(pose["rotation"], turn)
+def move_axis(mm, deg):
+    """To the side and about the line of sight."""
+    def change(calibration):
+        turn, shift = rotation(2, math.radians(deg)), [mm, 0.0, 0.0]
+        for side in ("left", "right"):
+            pose = calibration[side]["camera_from_turntable"]
+            moved = times(pose["rotation"], shift)
+            pose["translation"] = [a + b for a, b in zip(pose["translation"], moved)]
+            pose["rotation"] = product(pose["rotation"], turn)
+    return change
 
 
 # What has moved since, a word of the sentence that names it, and how far from the untouched rig's a refined model may be:
 # what refining with dots and rows leaves in simulation, um. Rows off by 0.1 px cost 1 um and refining them 9.
 CHANGES = {"0.1 px along rows": (turn_right_camera(1, 0.1), "amera", 8),
            "0.1 px across rows": (turn_right_camera(0, 0.1), "amera", 9),
-           "axis 0.05 mm and 0.02 deg": (move_axis, "Table axis moved", 9)}
+           "axis 0.05 mm and 0.02 deg": (move_axis(0.05, 0.02), "Table axis moved", 9)}
 
 
 def reconstruct(bench, scan, model, mode):

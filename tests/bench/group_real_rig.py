@@ -1,6 +1,10 @@
 """The simulated workshop: how its images compare with real ones, and whether the solver calibrates it."""
 import json
 
+import real_rig_disturbed
+import real_rig_materials
+import real_rig_scans
+
 MATERIALS = ("satin", "gloss", "translucent", "dark", "metal")
 # A rendered figure counts as near a real one within these factors: rigs, surfaces and light differ.
 NEAR = 1.5
@@ -68,20 +72,17 @@ def realism(bench, scratch):
         near(bench, f"workshop {what}, contrast beside {name}", [r["contrast"] for r in real], rendered["contrast"])
 
 
-def calibration(bench, scratch):
+def calibration(bench, _scratch):
     """Boards of the workshop, and the project's own solver: as on a real rig, never the truth."""
-    boards = scratch / "boards"
-    bench.run([bench.bin / "scanrig-sim", "shoot-board", "--profile", "workshop", "--out", boards], 1200, check=True)
-    done = bench.run([bench.bin / "scanrig", "calibrate", boards, "--json", "--out", boards / "calibration.json",
-                      "--rim-dots", "40x84.5x2.4"], 600)
-    if done.returncode != 0:
-        bench.line("calibration of the workshop", "is solved", done.stderr.strip()[-300:], False)
-        return
-    error = json.loads(bench.run([bench.bin / "calibration_error", boards / "calibration.json", "workshop"], 60,
-                                 check=True).stdout)
-    bench.line("calibration of the workshop: grade", "A or B", grade := json.loads(done.stdout)["grade"], grade in "AB")
+    file = real_rig_scans.own_calibration(bench)
+    judged = json.loads((file.parent / "judgement.json").read_text())
+    error = json.loads(bench.run([bench.bin / "calibration_error", file, "workshop"], 60, check=True).stdout)
+    bench.line("calibration of the workshop: grade", "A or B", grade := judged["grade"], grade in "AB")
+    said = " ".join(judged.get("sentences", []))
+    bench.line("the same: what it says of a sound rig", "nothing", said or "nothing", not said)
     bench.at_most("calibration of the workshop: volume error, rms", 15, error["rms_um"], "um", digits=1)
     bench.line("the same, predicted by the solver", "reported", f"{error['predicted_um']:.1f} um", True)
 
 
-PARTS = {"realism": realism, "calibration": calibration}
+PARTS = {"realism": realism, "calibration": calibration, "materials": real_rig_materials.measure,
+         "disturbed": real_rig_disturbed.measure}
