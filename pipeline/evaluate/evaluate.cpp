@@ -9,6 +9,7 @@
 #include "core/units.h"
 #include "pipeline/evaluate/ideal_carve.h"
 #include "pipeline/evaluate/self_intersection.h"
+#include "pipeline/evaluate/sigma_figures.h"
 #include "pipeline/evaluate/texture_figures.h"
 #include "pipeline/mesh/alignment.h"
 #include "pipeline/mesh/topology.h"
@@ -75,12 +76,10 @@ void score_sigma(const std::vector<SurfaceSample>& samples, const std::vector<Su
   if (model.sigma.empty()) return;
   std::vector<double> ratios;
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    double sigma = 0.0;
-    for (int k = 0; k < 3; ++k) sigma += samples[i].weights[k] * model.sigma[model.faces[samples[i].face][k]];
+    const double sigma = sigma_at(model, samples[i]);
     if (sigma > 0.0) ratios.push_back(nearest[i].distance / sigma);
   }
   if (ratios.empty()) return;
-  constexpr double kNormalMedian = 0.67449;
   scores.sigma_ratio = quantile(ratios, 0.5) / kNormalMedian;
   const auto beyond = [&ratios](double limit) {
     const auto count = std::count_if(ratios.begin(), ratios.end(), [limit](double r) { return r > limit; });

@@ -120,8 +120,9 @@ std::string to_table(const Scores& s) {
   text += row("normals, p95", s.normal_p95_deg, "deg");
   text += row("error / sigma (1 is honest)", s.sigma_ratio, "");
   text += row("beyond 2 sigma (4.6 is normal)", 100.0 * s.beyond_2_sigma, "%");
+  if (!s.sigma_classes.empty()) text += "after alignment: median error, error / sigma, share within 2 sigma\n";
   for (const SigmaClass& one : s.sigma_classes) {
-    text += fmt::format("  {:<34}{:>8.4f} mm{:>7.2f}{:>7.1f} % within 2\n", one.name, one.median_mm, one.ratio,
+    text += fmt::format("  {:<34}{:>8.4f} mm{:>7.2f}{:>7.1f} %\n", one.name, one.median_mm, one.ratio,
                         100.0 * one.within_2);
   }
   if (s.texture) text += row("texture offset, p95", s.texture->p95_px, "px");

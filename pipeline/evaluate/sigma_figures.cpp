@@ -14,7 +14,6 @@
 namespace scanrig {
 namespace {
 
-constexpr double kNormalMedian = 0.67449;
 constexpr double kMinDistance = 20.0, kMaxDistance = 80.0;  // mm, of the pairs
 constexpr std::size_t kPartners = 3;                        // of each point
 
@@ -54,19 +53,23 @@ double radius_at(const Mesh& mesh, const std::vector<Eigen::Vector3f>& normals, 
 
 }  // namespace
 
+double sigma_at(const Mesh& model, const SurfaceSample& sample) {
+  const Mesh::Face& face = model.faces[sample.face];
+  const Eigen::Vector3d corners(model.sigma[face[0]], model.sigma[face[1]], model.sigma[face[2]]);
+  return sample.weights.dot(corners);
+}
+
 SigmaProbe::SigmaProbe(const Mesh& model, const std::vector<SurfaceSample>& samples, const Truth& truth,
                        const SurfaceIndex& surface, const Transform& truth_from_model) {
   if (model.sigma.size() != model.vertices.size() || model.views.size() != model.vertices.size()) return;
   const std::vector<Eigen::Vector3f> normals = vertex_normals(truth.mesh);
   for (const SurfaceSample& sample : samples) {
-    Point point{.model = truth_from_model * sample.point};
+    Point point;
+    point.model = truth_from_model * sample.point;
     const Mesh::Face& face = model.faces[sample.face];
-    point.views = 255;
-    for (std::size_t k = 0; k < 3; ++k) {
-      point.sigma += sample.weights[static_cast<Eigen::Index>(k)] * static_cast<double>(model.sigma[face[k]]);
-      point.views = std::min<int>(point.views, model.views[face[k]]);
-    }
+    point.sigma = sigma_at(model, sample);
     if (!(point.sigma > 0.0)) continue;
+    point.views = std::min({model.views[face[0]], model.views[face[1]], model.views[face[2]]});
     const auto nearest = surface.nearest(point.model);
     point.truth = nearest.point;
     point.radius = radius_at(truth.mesh, normals, nearest.face);

@@ -11,6 +11,12 @@
 
 namespace scanrig {
 
+/// Median of the absolute value of a standard normal distribution.
+inline constexpr double kNormalMedian = 0.67449;
+
+/// Sigma that the model claims at a sample of its surface; the model has one for every vertex.
+double sigma_at(const Mesh& model, const SurfaceSample& sample);
+
 /// Honesty of sigma in one class of points, or of distances between points.
 struct SigmaClass {
   std::string name;        ///< "views 2", "incidence 40 to 60 deg", "radius under 5 mm", "distances 20 to 80 mm"
@@ -38,9 +44,9 @@ class SigmaProbe {
 
  private:
   struct Point {
-    Eigen::Vector3d model;  ///< in the truth's frame
-    Eigen::Vector3d truth;  ///< nearest to it
-    Eigen::Vector3d normal;
+    Eigen::Vector3d model = Eigen::Vector3d::Zero();  ///< the model's point, in the truth's frame
+    Eigen::Vector3d truth = Eigen::Vector3d::Zero();  ///< nearest to it
+    Eigen::Vector3d normal = Eigen::Vector3d::Zero();
     double sigma = 0.0, radius = 0.0, facing = 0.0;
     int views = 0;  ///< by the model's own account
   };
