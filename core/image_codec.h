@@ -35,6 +35,10 @@ Result<cv::Mat> decode_tiff(std::string_view bytes);
 /// A PNG or a TIFF, by its first bytes.
 Result<cv::Mat> decode_image(std::string_view bytes);
 
+/// An image of anybody's camera: PNG or TIFF, grey or colour, 8 or 16 bits a channel as the result has them; alpha is
+/// dropped. TIFF in strips, samples side by side.
+Result<cv::Mat> decode_camera_image(std::string_view bytes);
+
 /// Whether an image of that size may be decoded at all.
 constexpr bool is_image_size(std::uint64_t width, std::uint64_t height) {
   return width > 0 && height > 0 && width < kMaxImagePixels && width * height <= kMaxImagePixels;

@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "core/image_codec.h"
+#include "core/tiff_field.h"
 
 namespace scanrig {
 namespace {
@@ -39,13 +40,6 @@ bool write(TIFF* file, const cv::Mat1f& depth) {
   return written;
 }
 
-template <typename Value>
-Value field(TIFF* file, std::uint32_t tag) {
-  Value value{};
-  TIFFGetFieldDefaulted(file, tag, &value);
-  return value;
-}
-
 }  // namespace
 
 Result<std::vector<std::byte>> encode_tiff(const cv::Mat1f& depth) {
@@ -65,11 +59,11 @@ Result<cv::Mat> decode_tiff(std::string_view bytes) {
   std::istringstream stream{std::string(bytes)};
   const File file(TIFFStreamOpen("depth", &stream), TIFFClose);
   if (!file) return fail(ErrorCode::invalid_input, "the TIFF image cannot be decoded: its header is unreadable");
-  const auto width = field<std::uint32_t>(file.get(), TIFFTAG_IMAGEWIDTH);
-  const auto height = field<std::uint32_t>(file.get(), TIFFTAG_IMAGELENGTH);
-  const bool fits = field<std::uint16_t>(file.get(), TIFFTAG_BITSPERSAMPLE) == 32 &&
-                    field<std::uint16_t>(file.get(), TIFFTAG_SAMPLESPERPIXEL) == 1 &&
-                    field<std::uint16_t>(file.get(), TIFFTAG_SAMPLEFORMAT) == SAMPLEFORMAT_IEEEFP &&
+  const auto width = tiff_field<std::uint32_t>(file.get(), TIFFTAG_IMAGEWIDTH);
+  const auto height = tiff_field<std::uint32_t>(file.get(), TIFFTAG_IMAGELENGTH);
+  const bool fits = tiff_field<std::uint16_t>(file.get(), TIFFTAG_BITSPERSAMPLE) == 32 &&
+                    tiff_field<std::uint16_t>(file.get(), TIFFTAG_SAMPLESPERPIXEL) == 1 &&
+                    tiff_field<std::uint16_t>(file.get(), TIFFTAG_SAMPLEFORMAT) == SAMPLEFORMAT_IEEEFP &&
                     TIFFIsTiled(file.get()) == 0 && is_image_size(width, height);
   if (!fits) return fail(ErrorCode::invalid_input, "the TIFF image is not 32-bit float depth");
   cv::Mat1f depth(static_cast<int>(height), static_cast<int>(width));

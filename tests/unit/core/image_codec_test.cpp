@@ -165,5 +165,32 @@ TEST(DecodeImage, NoiseIsNotAnImage) {
   EXPECT_EQ(decode_jpeg("certainly no image").error().code, ErrorCode::invalid_input);
 }
 
+TEST(CameraImage, GreyAndColourOf8And16BitsAreReadAsTheyAre) {
+  for (const char* extension : {".png", ".tiff"}) {
+    for (const int type : {CV_8UC1, CV_8UC3, CV_16UC1, CV_16UC3}) {
+      cv::Mat image = noise(type);
+      if (image.depth() == CV_16U) image *= 251;
+      const auto read = decode_camera_image(text(written_elsewhere(extension, image)));
+      ASSERT_TRUE(read) << extension << " " << read.error().message;
+      EXPECT_TRUE(same(*read, image)) << extension << " type " << type;
+    }
+  }
+}
+
+TEST(CameraImage, AlphaIsDropped) {
+  const cv::Mat image = noise(CV_8UC4);
+  const cv::Mat read = decode_camera_image(text(written_elsewhere(".png", image))).value();
+  ASSERT_EQ(read.type(), CV_8UC3);
+  EXPECT_EQ(read.at<cv::Vec3b>(5, 7)[1], image.at<cv::Vec4b>(5, 7)[1]);
+}
+
+TEST(CameraImage, WhatIsCutOrNoImageIsRefused) {
+  const Bytes whole = written_elsewhere(".png", noise(CV_16UC1));
+  EXPECT_EQ(decode_camera_image(text(whole).substr(0, whole.size() / 2)).error().code, ErrorCode::invalid_input);
+  EXPECT_EQ(decode_camera_image("no image").error().code, ErrorCode::invalid_input);
+  const cv::Mat depth(4, 4, CV_32FC1, cv::Scalar(1.0));
+  EXPECT_EQ(decode_camera_image(text(written_elsewhere(".tiff", depth))).error().code, ErrorCode::invalid_input);
+}
+
 }  // namespace
 }  // namespace scanrig
