@@ -71,4 +71,17 @@ CoarseDisparity coarse_disparity(const cv::Mat1f& left, const cv::Mat1f& right, 
   return out;
 }
 
+cv::Mat1f confirmed(const cv::Mat1f& here, const cv::Mat1f& there, float towards, float tolerance_px) {
+  cv::Mat1f out(here.size(), kUnmeasured);
+  for (int v = 0; v < here.rows; ++v) {
+    for (int u = 0; u < here.cols; ++u) {
+      const float d = here(v, u);
+      if (std::isnan(d)) continue;
+      const int landing = static_cast<int>(std::lround(static_cast<float>(u) + towards * d));
+      if (landing >= 0 && landing < here.cols && std::abs(there(v, landing) - d) <= tolerance_px) out(v, u) = d;
+    }
+  }
+  return out;
+}
+
 }  // namespace scanrig

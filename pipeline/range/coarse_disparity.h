@@ -15,4 +15,8 @@ struct CoarseDisparity {
 CoarseDisparity coarse_disparity(const cv::Mat1f& left, const cv::Mat1f& right, int min_disparity, int max_disparity,
                                  cv::Range rows);
 
+/// Disparities that the other image's disparities confirm within a tolerance; surface seen by one camera only becomes
+/// NaN. `towards`: -1 from the left image to the right, +1 back.
+cv::Mat1f confirmed(const cv::Mat1f& here, const cv::Mat1f& there, float towards, float tolerance_px);
+
 }  // namespace scanrig

@@ -13,7 +13,9 @@ namespace {
 /// The matched range image; without a depth where nothing matches.
 Result<RangeImage> match_whole(const Rectification& frames, const cv::Mat& left, const cv::Mat& right,
                                const Context& context) {
-  auto range = match_stereo(frames, left, right, {}, {}, {}, context);
+  StereoOptions any_rows;
+  any_rows.max_rows_px = std::numeric_limits<double>::infinity();
+  auto range = match_stereo(frames, left, right, {}, {}, any_rows, context);
   if (!range && range.error().code == ErrorCode::degenerate) return RangeImage{};
   return range;
 }

@@ -58,20 +58,15 @@ RectifyingMap make_map(const Camera& camera, const Projection& projection, const
 }
 
 Result<void> check_image(const RectifyingMap& map, const cv::Mat& image) {
-  if (image.depth() != CV_8U || (image.channels() != 1 && image.channels() != 3)) {
-    return fail(ErrorCode::invalid_input, "rectify: an image must have 8 bits and one or three channels");
+  if (image.type() != CV_32FC1 && image.type() != CV_8UC1 && image.type() != CV_8UC3) {
+    return fail(ErrorCode::invalid_input,
+                "rectify: an image must have 8 bits and one or three channels, or be grey values");
   }
   if (image.size() != map.u.size()) {
     return fail(ErrorCode::invalid_input, "rectify: the image has {}x{} pixels, the calibration {}x{}", image.cols,
                 image.rows, map.u.cols, map.u.rows);
   }
   return {};
-}
-
-std::array<float, 4> spline_weights(float t) {
-  const float s = 1.0f - t;
-  return {s * s * s / 6.0f, (3.0f * t * t * t - 6.0f * t * t + 4.0f) / 6.0f,
-          (3.0f * s * s * s - 6.0f * s * s + 4.0f) / 6.0f, t * t * t / 6.0f};
 }
 
 void resample_row(const cv::Mat1f& coefficients, const float* us, const float* vs, float* out, int width) {

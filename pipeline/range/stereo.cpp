@@ -8,6 +8,7 @@
 #include "core/parallel.h"
 #include "pipeline/range/coarse_disparity.h"
 #include "pipeline/range/dense_match.h"
+#include "pipeline/range/row_alignment.h"
 
 namespace scanrig {
 namespace {
@@ -80,15 +81,22 @@ RangeImage to_range(const RectifiedPair& pair, const DenseDisparity& disparity) 
 
 }  // namespace
 
-Result<RangeImage> match_rectified(const RectifiedPair& pair, const StereoOptions& options, const Context& context) {
-  if (const auto fits = check(pair); !fits) return pass_on(fits);
-  const cv::Range rows = object_rows(pair.left_object, pair.left.rows, options.row_margin_px);
+Result<RangeImage> match_rectified(const RectifiedPair& given, const StereoOptions& options, const Context& context) {
+  if (const auto fits = check(given); !fits) return pass_on(fits);
+  const cv::Range rows = object_rows(given.left_object, given.left.rows, options.row_margin_px);
   if (rows.size() < options.min_rows) return fail(ErrorCode::degenerate, "range: the mask shows no object");
   context.report("range", 0.0);
   if (context.stopped()) return fail(ErrorCode::stopped, "range: stopped before matching");
+  RectifiedPair pair = given;
   CoarseDisparity coarse;
+  RowField corrected;
   try {
     coarse = coarse_disparity(pair.left, pair.right, pair.min_disparity, pair.max_disparity, rows);
+    RowAlignmentOptions alignment;
+    alignment.max_px = options.max_rows_px;
+    const auto aligned = align_rows(pair, coarse, rows, alignment);
+    if (!aligned) return pass_on(aligned);
+    corrected = *aligned;
   } catch (const cv::Exception& error) {
     return fail(ErrorCode::internal, "range: semi-global matching: {}", error.what());
   }
@@ -100,7 +108,7 @@ Result<RangeImage> match_rectified(const RectifiedPair& pair, const StereoOption
   if (cv::countNonZero(range.depth == range.depth) == 0) {
     return fail(ErrorCode::degenerate, "range: no stereo matches; check the projector and the calibration");
   }
-  range.row_offsets = find_row_offsets(pair, disparity->value, disparity->sigma);
+  range.row_offsets = find_row_offsets(pair, disparity->value, disparity->sigma, {}, corrected);
   context.report("range", 1.0);
   return range;
 }

@@ -13,13 +13,15 @@ namespace scanrig {
 
 /// Limits and steps of stereo matching; the defaults come from scans with known truth, see README.md.
 struct StereoOptions {
-  double min_zncc = 0.8;          ///< correlation below which a match is rejected
   double left_right_px = 0.3;     ///< the match from the right image must come back this near, or within 3 sigma
   double max_sigma_px = 0.25;     ///< beyond it a pixel counts as not measured
+  double max_centre = 2.5;        ///< residual variance of a window's middle over the whole's: else another surface
+  float surface_px = 1.0f;        ///< nodes whose disparities differ by more lie on different surfaces
   double good_sigma_px = 0.08;    ///< a larger window is tried only above this
   double neighbour_px = 0.25;     ///< neighbours 4 px away must predict a pixel this well, or within 3 sigma
   int min_patch_px = 150;         ///< smaller islands are dropped
   double tolerance_sigmas = 3.0;  ///< "within 3 sigma" above
+  double max_rows_px = 3.0;       ///< rows farther off are refused, see row_alignment.h
 
   // Windows; a radius is 5, 7, 10 or 15.
   std::uint8_t sharp_radius_px = 7;                        ///< first window
@@ -29,11 +31,10 @@ struct StereoOptions {
   float smooth_step_px = 1.5f;  ///< see WindowOptions: where the signal is low the coarse disparities are worse too
   float smooth_curvature_prior = 0.15f;  ///< see WindowOptions
   float window_sigmas = 3.0f;  ///< within this many standard deviations a larger window agrees with a smaller one
-  // Noise of neighbouring pixels is correlated (demosaicing, resampling), so the residual underestimates it. The
-  // smoothing's own share is sqrt(4 pi) times its width.
-  float sharp_inflation = 1.7f;   ///< factor on sigma of sharp windows
-  float smooth_inflation = 2.5f;  ///< factor on sigma of smooth windows
-  float tilt = 0.6f;              ///< px of disparity per px at which sigma has grown by 1.4
+  // Factors on sigma where too few windows are matched to measure them, see noise_correlation.h.
+  float sharp_noise = 1.7f;
+  float smooth_noise = 2.5f;
+  float tilt = 0.6f;  ///< px of disparity per px at which sigma has grown by 1.4
 
   // Search.
   int left_node_stride_px = 4;        ///< grid of the patches matched first

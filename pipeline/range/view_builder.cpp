@@ -44,6 +44,24 @@ void cut_at_table(RangeImage& range, const Rectification& rectification, double 
   }
 }
 
+/// Of the left and the right camera; none of grey images. `not_found`: there is no screen to key by, or nothing of
+/// another colour.
+Result<std::vector<Silhouette>> silhouettes_of(const Rectification& rectification, const StereoImages& images,
+                                               double angle_rad, const ViewOptions& options) {
+  std::vector<Silhouette> result;
+  if (images.left_pattern.channels() != 3) return result;
+  for (const bool is_left : {true, false}) {
+    auto made = silhouette_of(
+        is_left ? images.left_plain : images.right_plain, is_left ? rectification.left_map : rectification.right_map,
+        is_left ? rectification.left : rectification.right,
+        (is_left ? rectification.left_from_turntable : rectification.right_from_turntable) * rot_y(angle_rad),
+        options.silhouette);
+    if (!made) return pass_on(made, is_left ? "left image" : "right image");
+    result.push_back(std::move(*made));
+  }
+  return result;
+}
+
 }  // namespace
 
 Result<View> make_view(const Rectification& rectification, const StereoImages& images, double angle_rad, int index,
@@ -52,25 +70,22 @@ Result<View> make_view(const Rectification& rectification, const StereoImages& i
   view.index = index;
   view.angle_rad = angle_rad;
   const Transform left_from_pose = rectification.left_from_turntable * rot_y(angle_rad);
+  auto silhouettes = silhouettes_of(rectification, images, angle_rad, options);
+  const bool has_key = silhouettes || silhouettes.error().code != ErrorCode::not_found;
+  if (!silhouettes && has_key) return pass_on(silhouettes);
   cv::Mat1b left_object, right_object;
-  const bool colour = images.left_pattern.channels() == 3;
-  if (colour) {
-    auto left = silhouette_of(images.left_plain, rectification.left_map, rectification.left, left_from_pose,
-                              options.silhouette);
-    if (!left) return pass_on(left, "left image");
-    auto right = silhouette_of(images.right_plain, rectification.right_map, rectification.right,
-                               rectification.right_from_turntable * rot_y(angle_rad), options.silhouette);
-    if (!right) return pass_on(right, "right image");
-    left_object = inside(*left, options.mixed_px);
-    right_object = inside(*right, options.mixed_px);
-    view.silhouettes = {std::move(*left), std::move(*right)};
+  if (silhouettes) view.silhouettes = std::move(*silhouettes);
+  if (!view.silhouettes.empty()) {
+    left_object = inside(view.silhouettes[0], options.mixed_px);
+    right_object = inside(view.silhouettes[1], options.mixed_px);
   }
   auto range = match_stereo(rectification, images.left_pattern, images.right_pattern, left_object, right_object,
                             options.stereo, context);
+  if (!range && !has_key) return fail(ErrorCode::degenerate, "{}", silhouettes.error().message);
   if (!range) return pass_on(range);
   view.range = std::move(*range);
   view.range.camera_from_pose = left_from_pose;
-  if (colour) {
+  if (!view.silhouettes.empty()) {
     cv::compare(view.silhouettes.front().outside_px, options.background_px, view.range.background, cv::CMP_GT);
     for (int v = 0; v < view.range.depth.rows; ++v) {
       for (int u = 0; u < view.range.depth.cols; ++u) {
@@ -80,6 +95,7 @@ Result<View> make_view(const Rectification& rectification, const StereoImages& i
   } else {
     cut_at_table(view.range, rectification, options.table_clearance_mm);
     if (cv::countNonZero(view.range.depth == view.range.depth) == 0) {
+      if (!has_key) return fail(ErrorCode::degenerate, "{}", silhouettes.error().message);
       return fail(ErrorCode::degenerate,
                   "range: no surface was measured above the table; check that the object is on the table");
     }

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace scanrig {
 namespace {
@@ -13,6 +14,7 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 // Exponents of x and y of the six shape functions.
 constexpr std::array<int, 6> kPowerX = {0, 1, 0, 2, 1, 0};
 constexpr std::array<int, 6> kPowerY = {0, 0, 1, 0, 1, 2};
+constexpr int kCentre = 3;
 
 /// Sums over a window, times powers of y, one per column ("lane"): adding row by row vectorises in any instruction set
 /// and always in the same order. x and y are in units of the radius.
@@ -47,17 +49,21 @@ class Window {
     return count_ >= options.min_support * kSide * kSide && variance_ > 1e-3;
   }
   [[nodiscard]] DisparityPatch match(const MatchImage& there, DisparityPatch patch, const WindowOptions& options);
+  [[nodiscard]] WindowResidual residual(const MatchImage& there, const DisparityPatch& patch) const;
 
  private:
   struct Fit {
     Vector6 rhs;  // J^T r
     double residual_variance = 0.0;
     double zncc = 0.0;
+    double gain = 0.0, offset = 0.0;
   };
 
   void assemble();
   void sample_row(const float* cubic, const DisparityPatch& patch, int row, float* out) const;
   [[nodiscard]] Fit compare(const MatchImage& there, const DisparityPatch& patch) const;
+  [[nodiscard]] double centre_variance(const MatchImage& there, const DisparityPatch& patch, const Fit& fit) const;
+  [[nodiscard]] double correlation_by_chance() const;
 
   int u_, v_, width_ = 0;
   alignas(64) float x_[kLanes];
@@ -87,8 +93,10 @@ Window<R>::Window(const MatchImage& here, const MatchMask& mask, int u, int v, c
     for (int k = 0; k < kLanes; ++k) {
       const bool inside = k < kSide;
       const float expected = patch.at(static_cast<float>(k - R), static_cast<float>(row - R));
-      // False for NaN too: unknown pixels stay out.
-      const bool same = inside && used[k] != 0 && std::abs(coarse[k] - expected) < options.step_px;
+      // Both false for NaN.
+      const float off = std::abs(coarse[k] - expected);
+      const bool near = off < options.step_px, far = off >= options.step_px;
+      const bool same = inside && used[k] != 0 && (near || (options.unknown_joins && !far));
       const float w = same ? 1.0f : 0.0f;
       weight_[row][k] = w;
       value_[row][k] = same ? value[k] : 0.0f;
@@ -196,6 +204,8 @@ typename Window<R>::Fit Window<R>::compare(const MatchImage& there, const Dispar
   fit.rhs.setZero();
   if (!(there_variance > 1e-6)) return fit;
   const double gain = covariance / there_variance, offset = -gain * s / count_;
+  fit.gain = gain;
+  fit.offset = offset;
   fit.zncc = covariance / std::sqrt(there_variance * variance_);
   fit.residual_variance = variance_ * std::max(0.0, 1.0 - fit.zncc * fit.zncc);
   // r = gain s + offset - l, made orthogonal to gain and offset (whose columns are l and 1).
@@ -244,8 +254,53 @@ DisparityPatch Window<R>::match(const MatchImage& there, DisparityPatch patch, c
   if (std::abs(shape[0] - start) > 3.0 || std::abs(shape[1]) > 0.95 * R) return patch;
   patch.sigma = static_cast<float>(std::sqrt(variance_gain * fit.residual_variance) * std::abs(1.0 - shape[1] / R));
   patch.zncc = static_cast<float>(fit.zncc);
-  patch.valid = converged;
+  patch.residual = static_cast<float>(fit.residual_variance);
+  patch.gain = static_cast<float>(fit.gain);
+  patch.centre = static_cast<float>(centre_variance(there, patch, fit) / std::max(fit.residual_variance, 1e-9));
+  patch.valid = converged && fit.zncc > static_cast<double>(options.significance) * correlation_by_chance();
   return patch;
+}
+
+template <int R>
+double Window<R>::correlation_by_chance() const {
+  const double slopes = gg_.at(x_, 0, 0) / (variance_ * count_);  // 1 / l^2
+  return 1.0 / std::sqrt(std::max(1.0, count_ * std::min(1.0, slopes / std::numbers::pi)));
+}
+
+/// Of the residual within kCentre pixels of the middle.
+template <int R>
+double Window<R>::centre_variance(const MatchImage& there, const DisparityPatch& patch, const Fit& fit) const {
+  const float mean = static_cast<float>(mean_), gain = static_cast<float>(fit.gain),
+              offset = static_cast<float>(fit.offset);
+  float squares = 0.0f, count = 0.0f;
+  for (int row = R - kCentre; row <= R + kCentre; ++row) {
+    alignas(64) float sample[kLanes];
+    sample_row(there.cubic.row(v_ + row - R), patch, row, sample);
+    for (int k = R - kCentre; k <= R + kCentre; ++k) {
+      const float r = (gain * (sample[k] - mean) + offset - value_[row][k]) * weight_[row][k];
+      squares += r * r;
+      count += weight_[row][k];
+    }
+  }
+  return count > 0.0f ? static_cast<double>(squares / count) : 0.0;
+}
+
+template <int R>
+WindowResidual Window<R>::residual(const MatchImage& there, const DisparityPatch& patch) const {
+  WindowResidual out{kSide, {}, {}, {}};
+  const Fit fit = compare(there, patch);
+  const float mean = static_cast<float>(mean_), gain = static_cast<float>(fit.gain),
+              offset = static_cast<float>(fit.offset);
+  for (int row = 0; row < kSide; ++row) {
+    alignas(64) float sample[kLanes];
+    sample_row(there.cubic.row(v_ + row - R), patch, row, sample);
+    for (int k = 0; k < kSide; ++k) {
+      out.residual.push_back((gain * (sample[k] - mean) + offset - value_[row][k]) * weight_[row][k]);
+      out.slope.push_back(slope_[row][k]);
+      out.used.push_back(weight_[row][k] > 0.0f ? 1 : 0);
+    }
+  }
+  return out;
 }
 
 template <int R>
@@ -260,6 +315,15 @@ DisparityPatch match_with(const MatchImage& here, const MatchImage& there, const
   return window.match(there, patch, options);
 }
 
+template <int R>
+WindowResidual residual_with(const MatchImage& here, const MatchImage& there, const MatchMask& mask, int u, int v,
+                             const DisparityPatch& patch, const WindowOptions& options) {
+  using W = Window<R>;
+  if (u < R || v < R || u + W::kLanes - R > here.value.cols || v + R >= here.value.rows) return {};
+  const W window(here, mask, u, v, patch, options);
+  return window.usable(options) ? window.residual(there, patch) : WindowResidual{};
+}
+
 }  // namespace
 
 MatchImage::MatchImage(const cv::Mat1f& image) : value(image), cubic(image) {}
@@ -271,6 +335,16 @@ DisparityPatch match_window(const MatchImage& here, const MatchImage& there, con
     case 7: return match_with<7>(here, there, mask, u, v, patch, options);
     case 10: return match_with<10>(here, there, mask, u, v, patch, options);
     default: return match_with<15>(here, there, mask, u, v, patch, options);
+  }
+}
+
+WindowResidual window_residual(const MatchImage& here, const MatchImage& there, const MatchMask& mask, int u, int v,
+                               const DisparityPatch& patch, const WindowOptions& options) {
+  switch (patch.radius) {
+    case 5: return residual_with<5>(here, there, mask, u, v, patch, options);
+    case 7: return residual_with<7>(here, there, mask, u, v, patch, options);
+    case 10: return residual_with<10>(here, there, mask, u, v, patch, options);
+    default: return residual_with<15>(here, there, mask, u, v, patch, options);
   }
 }
 

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <opencv2/core/mat.hpp>
+#include <vector>
 
 #include "pipeline/range/spline.h"
 
@@ -14,6 +15,9 @@ struct DisparityPatch {
   std::array<float, 6> c{};
   float sigma = 0.0f;  ///< of c0, px
   float zncc = 0.0f;
+  float residual = 0.0f;  ///< variance of what the patch leaves unexplained, grey values squared
+  float gain = 1.0f;      ///< of the other image's values
+  float centre = 0.0f;    ///< variance of the residual in the middle of the window, in units of that of the whole
   std::uint8_t radius = 0;
   bool valid = false;
 
@@ -47,15 +51,27 @@ struct WindowOptions {
   int max_iterations = 8;        ///< Gauss-Newton steps
   double precision_px = 3e-3;    ///< a smaller step ends the iteration
   float step_px = 1.0f;          ///< a coarse disparity farther than this from the patch belongs to another surface
+  bool unknown_joins = false;    ///< pixels without a coarse disparity belong to the patch
   float min_support = 0.45f;     ///< share of the window that must belong to the patch
+  float significance = 2.0f;     ///< a window's correlation must be so many times that of unlike images
   float curvature_prior = 0.5f;  ///< px over a window of radius 7: the second order is worth its noise only above this
 };
 
 /// Least-squares matching of the window around (u, v) with second-order shape, gain and offset [Sutton, Orteu and
 /// Schreier, Image Correlation, 2009, ch. 5]: Gauss-Newton from `patch`, with the gradient of `here` (inverse
-/// compositional). `patch.radius` is 5, 7, 10 or 15. Returns the patch where it stopped; invalid when it diverged or
-/// had too little signal.
+/// compositional). `patch.radius` is 5, 7, 10 or 15. Returns the patch where it stopped; invalid when it diverged, had
+/// too little signal or a correlation that unlike images have by chance: 1 / sqrt(n) for n independent samples, of
+/// which an image has one per pi l^2 pixels, l being its correlation length (rms of the values by that of their slope).
 DisparityPatch match_window(const MatchImage& here, const MatchImage& there, const MatchMask& mask, int u, int v,
                             const DisparityPatch& patch, const WindowOptions& options);
+
+/// What a patch leaves unexplained of its window, grey values, and d value / du there; row by row, `side` each way.
+struct WindowResidual {
+  int side = 0;
+  std::vector<float> residual, slope;
+  std::vector<std::uint8_t> used;  ///< 0: left out
+};
+WindowResidual window_residual(const MatchImage& here, const MatchImage& there, const MatchMask& mask, int u, int v,
+                               const DisparityPatch& patch, const WindowOptions& options);
 
 }  // namespace scanrig

@@ -146,6 +146,21 @@ void measure(const cv::Mat1f& ours, const cv::Mat1f& sgbm, const cv::Mat1b& shee
   result.sgbm.rim_bridged_px = median(sgbm_bridged);
 }
 
+double sigmas_off(const cv::Mat1f& disparity, const cv::Mat1f& sigma, const cv::Mat1b& sheet) {
+  D415Measure ignored;
+  const Vector6 quadric = fit_sheet(disparity, sheet, ignored);
+  std::vector<double> ratios;
+  for (int v = 0; v < sheet.rows; ++v) {
+    for (int u = 0; u < sheet.cols; ++u) {
+      if (sheet(v, u) == 0 || std::isnan(disparity(v, u))) continue;
+      const double off = static_cast<double>(disparity(v, u)) - terms(u, v).dot(quadric);
+      ratios.push_back(std::abs(off) / static_cast<double>(sigma(v, u)));
+    }
+  }
+  constexpr double kNormal = 0.6745;
+  return median(ratios) / kNormal;
+}
+
 cv::Mat1f plain_sgbm(const cv::Mat1b& left, const cv::Mat1b& right) {
   const auto matcher = cv::StereoSGBM::create(kLowest, kDisparities, 9, 8 * 81, 32 * 81, 1, 63, 5, 100, 2,
                                               cv::StereoSGBM::MODE_SGBM_3WAY);
@@ -162,7 +177,8 @@ cv::Mat1f plain_sgbm(const cv::Mat1b& left, const cv::Mat1b& right) {
 
 }  // namespace
 
-Result<D415Comparison> measure_d415(const std::filesystem::path& folder) {
+Result<D415Comparison> measure_d415(const std::filesystem::path& folder,
+                                    const std::function<cv::Mat1f(const cv::Mat1f&)>& change_right) {
   const cv::Mat1b left = cv::imread(folder / "image0.png", cv::IMREAD_GRAYSCALE);
   const cv::Mat1b right = cv::imread(folder / "image1.png", cv::IMREAD_GRAYSCALE);
   constexpr int kHeader = 128;  // bytes before the data of a small .npy file
@@ -176,6 +192,7 @@ Result<D415Comparison> measure_d415(const std::filesystem::path& folder) {
   RectifiedPair pair;
   left.convertTo(pair.left, CV_32F);
   right.convertTo(pair.right, CV_32F);
+  if (change_right) pair.right = change_right(pair.right);
   pair.left_projection = {Projection::Kind::pinhole, 1280, 720, kFocal, kFocal, 633.127, 354.453};
   pair.right_cx = pair.left_projection.cx;
   pair.baseline_mm = kBaseline;
@@ -187,7 +204,10 @@ Result<D415Comparison> measure_d415(const std::filesystem::path& folder) {
   D415Comparison result;
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const cv::Mat1f disparity(cv::Mat(kFocal * kBaseline / range->depth));
-  measure(disparity, plain_sgbm(left, right), sheet_region(segmented), result);
+  const cv::Mat1f sigma(cv::Mat(range->sigma.mul(kFocal * kBaseline / range->depth.mul(range->depth))));
+  const cv::Mat1b sheet = sheet_region(segmented);
+  measure(disparity, plain_sgbm(left, right), sheet, result);
+  result.error_by_sigma = sigmas_off(disparity, sigma, sheet);
   return result;
 }
 

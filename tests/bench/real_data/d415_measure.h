@@ -1,6 +1,8 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
+#include <opencv2/core/mat.hpp>
 
 #include "core/result.h"
 
@@ -23,13 +25,16 @@ struct D415Measure {
 
 struct D415Comparison {
   D415Measure ours;
-  D415Measure sgbm;  ///< OpenCV's SGBM, block 9, 3WAY, on the images brightened three times
-  int rim_rays = 0;  ///< number of rays that count
+  D415Measure sgbm;             ///< OpenCV's SGBM, block 9, 3WAY, on the images brightened three times
+  double error_by_sigma = 0.0;  ///< of our sheet: median distance from the quadric in sigma, by a normal distribution's
+  int rim_rays = 0;             ///< number of rays that count
   double seconds = 0.0;
 };
 
-/// `folder` holds image0.png, image1.png, real_segment_image_0.npy. Fails with `not_found` or as match_rectified()
+/// `folder` holds image0.png, image1.png, real_segment_image_0.npy. `change_right`: what is done to the right image
+/// before matching. Fails with `not_found` or as match_rectified()
 /// does.
-Result<D415Comparison> measure_d415(const std::filesystem::path& folder);
+Result<D415Comparison> measure_d415(const std::filesystem::path& folder,
+                                    const std::function<cv::Mat1f(const cv::Mat1f&)>& change_right = {});
 
 }  // namespace scanrig::bench

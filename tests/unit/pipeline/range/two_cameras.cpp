@@ -76,6 +76,24 @@ Surface disc(const Eigen::Vector3d& centre, const Eigen::Vector3d& normal, doubl
   };
 }
 
+Surface strip(const Eigen::Vector3d& centre, double width, double height) {
+  return [=](const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) -> std::optional<double> {
+    const double t = (centre.z() - origin.z()) / direction.z();
+    const Eigen::Vector3d off = origin + t * direction - centre;
+    if (!(t > 0.0) || std::abs(off.x()) > width / 2 || std::abs(off.y()) > height / 2) return std::nullopt;
+    return t;
+  };
+}
+
+Surface cylinder(double x, double z, double radius) {
+  return [=](const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) -> std::optional<double> {
+    const Eigen::Vector2d from(origin.x() - x, origin.z() - z), along(direction.x(), direction.z());
+    const double a = along.squaredNorm(), b = from.dot(along), c = from.squaredNorm() - radius * radius;
+    if (b * b < a * c) return std::nullopt;
+    return (-b - std::sqrt(b * b - a * c)) / a;
+  };
+}
+
 Surface nearest_of(const Surface& a, const Surface& b) {
   return [=](const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
     const auto first = a(origin, direction), second = b(origin, direction);
@@ -114,7 +132,8 @@ cv::Mat3b render(const Camera& camera, const Surface& surface, const Look& look)
             continue;
           }
           const Eigen::Vector3d lit = projector.camera_from_turntable * Eigen::Vector3d(origin + *distance * direction);
-          const double light = look.dots ? 0.35 + dots(640.0 * lit.x() / lit.z(), 640.0 * lit.y() / lit.z()) : 1.0;
+          const double dot = look.dots ? dots(640.0 * lit.x() / lit.z(), 640.0 * lit.y() / lit.z()) : 0.0;
+          const double light = look.dots ? look.room_light + look.dot_light * dot : 1.0;
           colour += look.object * light / 4;
         }
       }

@@ -13,6 +13,10 @@ namespace scanrig::test {
 using Surface = std::function<std::optional<double>(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction)>;
 
 Surface ball(const Eigen::Vector3d& centre, double radius);
+/// The upright strip of `width` (along x) and `height` around `centre`, facing +z.
+Surface strip(const Eigen::Vector3d& centre, double width, double height);
+/// The upright cylinder around (`x`, `z`), of any height.
+Surface cylinder(double x, double z, double radius);
 /// The disc around `centre` with unit `normal`.
 Surface disc(const Eigen::Vector3d& centre, const Eigen::Vector3d& normal, double radius);
 Surface nearest_of(const Surface& a, const Surface& b);
@@ -23,6 +27,8 @@ Calibration default_rig(cv::Size size);
 
 struct Look {
   bool dots = true;                          ///< smooth random dots from a projector between the cameras
+  double dot_light = 1.0;                    ///< of a dot, by the object's own
+  double room_light = 0.35;                  ///< between dots
   double noise = 2.0;                        ///< grey levels
   Eigen::Vector3d screen = {150, 50, 20};    ///< BGR of what is not the object
   Eigen::Vector3d object = {120, 120, 120};  ///< BGR of the object between dots

@@ -20,8 +20,8 @@ struct Rig {
   Calibration calibration = test::default_rig({360, 280});
   Rectification rectification = *rectify(calibration, {20.0, 80.0});
 
-  [[nodiscard]] StereoImages shoot(const Surface& surface) const {
-    test::Look dots, plain;
+  [[nodiscard]] StereoImages shoot(const Surface& surface, const test::Look& look = {}) const {
+    test::Look dots = look, plain = look;
     plain.dots = false;
     StereoImages images;
     images.left_pattern = test::render(calibration.left, surface, dots);
@@ -108,6 +108,28 @@ TEST(ViewBuilder, SeparatesGreyObjectsFromTheTableByHeight) {
       EXPECT_GE((turntable_from_camera * view->range.projection.unproject(u, v, depth)).y(), 0.5);
     }
   }
+}
+
+int measured_pixels(const View& view) { return cv::countNonZero(view.range.depth == view.range.depth); }
+
+TEST(ViewBuilder, MeasuresWithoutSilhouettesWhereThereIsNoScreenOfOneColour) {
+  const Rig rig;
+  const auto view = make_view(
+      rig.rectification, rig.shoot(test::ball(kBall, kRadius), {.screen = {70, 70, 70}, .object = {110, 120, 130}}),
+      0.0, 0, {}, {});
+  ASSERT_TRUE(view) << view.error().message;
+  EXPECT_TRUE(view->silhouettes.empty());
+  EXPECT_TRUE(view->range.background.empty());
+  EXPECT_GT(measured_pixels(*view), 7000);
+}
+
+TEST(ViewBuilder, MeasuresAnObjectInTheScreensColour) {
+  const Rig rig;
+  const auto view =
+      make_view(rig.rectification, rig.shoot(test::ball(kBall, kRadius), {.object = {150, 50, 20}}), 0.0, 0, {}, {});
+  ASSERT_TRUE(view) << view.error().message;
+  EXPECT_TRUE(view->silhouettes.empty());
+  EXPECT_GT(measured_pixels(*view), 7000);
 }
 
 ErrorCode failure(const Rig& rig, const StereoImages& images, const Context& context = {}) {
