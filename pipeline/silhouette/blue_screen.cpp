@@ -1,6 +1,7 @@
 #include "pipeline/silhouette/blue_screen.h"
 
 #include <algorithm>
+#include <array>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
@@ -9,38 +10,54 @@
 namespace scanrig {
 namespace {
 
+/// What the border shows: the channel that is strongest there, and its share of the light.
+struct Screen {
+  int channel = 0;
+  double share = 0.0;  ///< 0: the border is dark
+};
+
 /// Share of the screen's chroma in a pixel: 0 grey, 1 the screen.
-cv::Mat1f screen_key(const cv::Mat3f& image, double screen_share) {
+cv::Mat1f screen_key(const cv::Mat3f& image, const Screen& screen) {
   cv::Mat1f key(image.size());
-  const float scale = 1.0f / static_cast<float>(screen_share - 1.0 / 3.0);
+  const float scale = 1.0f / static_cast<float>(screen.share - 1.0 / 3.0);
   for (int y = 0; y < image.rows; ++y) {
     for (int x = 0; x < image.cols; ++x) {
       const cv::Vec3f& c = image(y, x);
       const float sum = c[0] + c[1] + c[2];
       // Dark pixels are drawn towards grey by less than one grey level per channel.
-      key(y, x) = ((c[0] + 1.0f) / (sum + 3.0f) - 1.0f / 3.0f) * scale;
+      key(y, x) = ((c[screen.channel] + 1.0f) / (sum + 3.0f) - 1.0f / 3.0f) * scale;
     }
   }
   return key;
 }
 
-/// The median share of blue along the image's border; 0 when it is dark.
-double border_blue_share(const cv::Mat3f& image, const BlueScreenOptions& options) {
+float median_of(std::vector<float>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Medians along the image's border.
+Screen screen_at_border(const cv::Mat3f& image, const BlueScreenOptions& options) {
   const int border = options.border_px;
-  std::vector<float> shares;
+  std::array<std::vector<float>, 3> shares;
   for (int y = 0; y < image.rows; ++y) {
     const bool whole_row = y < border || y >= image.rows - border;
     for (int x = 0; x < image.cols; ++x) {
       if (!whole_row && x == border) x = image.cols - border;
       const cv::Vec3f& c = image(y, x);
       const float sum = c[0] + c[1] + c[2];
-      if (sum > options.dark_level) shares.push_back(c[0] / sum);
+      if (!(sum > options.dark_level)) continue;
+      for (int k = 0; k < 3; ++k) shares[static_cast<std::size_t>(k)].push_back(c[k] / sum);
     }
   }
-  if (shares.size() < static_cast<std::size_t>(image.cols)) return 0.0;
-  const auto middle = shares.begin() + static_cast<std::ptrdiff_t>(shares.size() / 2);
-  std::nth_element(shares.begin(), middle, shares.end());
-  return static_cast<double>(*middle);
+  Screen screen;
+  if (shares[0].size() < static_cast<std::size_t>(image.cols)) return screen;
+  for (int k = 0; k < 3; ++k) {
+    const auto share = static_cast<double>(median_of(shares[static_cast<std::size_t>(k)]));
+    if (share > screen.share) screen = {k, share};
+  }
+  return screen;
 }
 
 /// Clears parts smaller than `smallest` pixels.
@@ -123,26 +140,29 @@ bool touches_border(const cv::Mat1b& mask) {
 
 Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const BlueScreenOptions& options) {
   if (image.type() != CV_8UC3 || image.cols < 4 * options.border_px || image.rows < 4 * options.border_px) {
-    return fail(ErrorCode::invalid_input,
-                "silhouette: a blue screen needs a colour image (BGR, 8 bit) of {} px or more", 4 * options.border_px);
+    return fail(ErrorCode::invalid_input, "silhouette: a screen needs a colour image (BGR, 8 bit) of {} px or more",
+                4 * options.border_px);
   }
   cv::Mat3f colour, smooth;
   image.convertTo(colour, CV_32F);
   cv::boxFilter(colour, smooth, CV_32F, {3, 3}, {-1, -1}, true, cv::BORDER_REPLICATE);
-  const double share = border_blue_share(smooth, options);
-  if (share < options.min_blue_share) {
+  const Screen screen_colour = screen_at_border(smooth, options);
+  if (screen_colour.share == 0.0) {
     return fail(ErrorCode::degenerate,
-                "silhouette: the border of the image is not blue ({:.0f} % of its light); check that the screen is in "
-                "place and lit",
-                100.0 * share);
+                "silhouette: the border of the image is dark; check that the screen is in place and lit");
   }
-  const cv::Mat1f key = screen_key(smooth, share);
+  if (screen_colour.share < options.min_key_share) {
+    return fail(ErrorCode::not_found,
+                "silhouette: the border of the image has no colour of its own ({:.0f} % of its light in one channel); "
+                "check that the blue or green screen is in place",
+                100.0 * screen_colour.share);
+  }
+  const cv::Mat1f key = screen_key(smooth, screen_colour);
   cv::Mat1b object(key.size());
   cv::compare(key, options.object_key, object, cv::CMP_LT);
   const int largest = largest_part(object);
   if (largest < options.min_hole_px) {
-    return fail(ErrorCode::degenerate,
-                "silhouette: no object before the blue screen; check that the object is on the table");
+    return fail(ErrorCode::not_found, "silhouette: no object before the screen; check that the object is on the table");
   }
   remove_parts(object, std::max<double>(options.min_hole_px, options.min_part_share * largest), 8);
   cv::Mat1b screen(255 - object);

@@ -7,23 +7,23 @@
 namespace scanrig {
 
 struct BlueScreenOptions {
-  int border_px = 12;            ///< width of the frame around the image that shows the screen
-  float dark_level = 12;         ///< sum of B, G, R below which chroma is noise
-  int mixed_band_px = 7;         ///< diameter of the disc around the mask's edge in which pixels can be mixed
-  int colour_window_px = 15;     ///< side of the window for the colours of object and screen near a mixed pixel
-  float min_contrast = 25.0f;    ///< grey levels squared between these colours; with less a mixture cannot be separated
-  double min_blue_share = 0.45;  ///< B / (B + G + R) that a screen needs to serve as a key
-  double object_key = 0.6;       ///< 0: grey, 1: the screen's chroma; an object's pixel lies below this
+  int border_px = 12;           ///< width of the frame around the image that shows the screen
+  float dark_level = 12;        ///< sum of B, G, R below which chroma is noise
+  int mixed_band_px = 7;        ///< diameter of the disc around the mask's edge in which pixels can be mixed
+  int colour_window_px = 15;    ///< side of the window for the colours of object and screen near a mixed pixel
+  float min_contrast = 25.0f;   ///< grey levels squared between these colours; with less a mixture cannot be separated
+  double min_key_share = 0.45;  ///< of a screen's light in its strongest channel, to serve as a key
+  double object_key = 0.6;      ///< 0: grey, 1: the screen's chroma; an object's pixel lies below this
   double min_part_share = 0.005;  ///< of the largest part; smaller islands are specks
   int min_hole_px = 40;           ///< smaller openings are highlights or noise, larger ones show the screen
 };
 
-/// The object's outline before a blue screen and on a blue table, by chroma (shadows on blue stay blue), to sub-pixel:
-/// the line where half of a pixel's light comes from the object. `image`: BGR, 8 bit, linear light, plain light. The
-/// screen's chroma is taken from the image's border.
+/// The object's outline before a screen and on a table of one colour, by chroma (shadows on it keep the colour), to
+/// sub-pixel: the line where half of a pixel's light comes from the object. `image`: BGR, 8 bit, linear light, plain
+/// light. The screen's colour, blue, green or red, is taken from the image's border.
 /// Returns the signed distance to the outline in pixels, positive outside the object, of the image's size.
-/// Fails with `invalid_input` (not BGR, 8 bit), `degenerate` (no blue border, no object), `out_of_range` (the object
-/// reaches the border).
+/// Fails with `invalid_input` (not BGR, 8 bit), `degenerate` (the border is dark), `not_found` (the border has no
+/// colour to key by, or nothing differs from it), `out_of_range` (the object reaches the border).
 Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const BlueScreenOptions& options = {});
 
 }  // namespace scanrig

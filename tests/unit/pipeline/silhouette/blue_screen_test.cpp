@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <opencv2/core.hpp>
 #include <random>
 
 namespace scanrig {
@@ -129,14 +130,40 @@ TEST(BlueScreen, KeepsHighlightsAndDarkSpots) {
 TEST(BlueScreen, ReportsAMissingObject) {
   const auto outside = blue_screen_outline(Scene().image());
   ASSERT_FALSE(outside);
+  EXPECT_EQ(outside.error().code, ErrorCode::not_found);
+}
+
+TEST(BlueScreen, LearnsTheColourOfTheScreenFromTheBorder) {
+  const Shape object = disc(120.3, 98.6, 55.2);
+  cv::Mat3b image = Scene().paint(object, Colour(95, 55, 40)).image();  // bluish, but not as blue as the screen
+  const auto before_blue = blue_screen_outline(image);
+  ASSERT_TRUE(before_blue);
+  for (cv::Vec3b& pixel : image) pixel = {pixel[1], pixel[0], pixel[2]};
+  const auto before_green = blue_screen_outline(image);
+  ASSERT_TRUE(before_green) << before_green.error().message;
+  EXPECT_EQ(cv::countNonZero(*before_green != *before_blue), 0);
+  cv::Mat3b blue_object = Scene().paint(object, kScreen).image();
+  for (int y = 0; y < kHeight; ++y) {
+    for (int x = 0; x < kWidth; ++x) {
+      if (object(x, y) > 0.0) blue_object(y, x) = {45, 140, 15};
+    }
+  }
+  const auto blue_before_green = blue_screen_outline(blue_object);
+  ASSERT_TRUE(blue_before_green) << blue_before_green.error().message;
+  EXPECT_LT(outline_error(*blue_before_green, object), 0.5);
+}
+
+TEST(BlueScreen, ReportsADarkBorder) {
+  const auto outside = blue_screen_outline(cv::Mat3b(kHeight, kWidth, cv::Vec3b(2, 1, 1)));
+  ASSERT_FALSE(outside);
   EXPECT_EQ(outside.error().code, ErrorCode::degenerate);
 }
 
-TEST(BlueScreen, ReportsAScreenThatIsNotBlue) {
+TEST(BlueScreen, ReportsAScreenWithoutColour) {
   const auto outside = blue_screen_outline(cv::Mat3b(kHeight, kWidth, cv::Vec3b(80, 80, 80)));
   ASSERT_FALSE(outside);
-  EXPECT_EQ(outside.error().code, ErrorCode::degenerate);
-  EXPECT_NE(outside.error().message.find("blue"), std::string::npos);
+  EXPECT_EQ(outside.error().code, ErrorCode::not_found);
+  EXPECT_NE(outside.error().message.find("colour"), std::string::npos);
 }
 
 TEST(BlueScreen, ReportsAnObjectAtTheBorder) {
