@@ -128,7 +128,9 @@ void VoxelLabels::mark_doubtful(const BlockGrid& grid, float doubt_reach_mm) {
         surface = true;
         measured = measured || (block.support[n] == Support::measured && is_measured(i + face));
       }
-      if (surface) (measured ? certain : doubtful).push_back(i);
+      // What views looked through is open, however narrow: no repair may fill it.
+      const bool is_open = !has(i, kInside) && block.support[n] == Support::free;
+      if (surface || is_open) (measured || is_open ? certain : doubtful).push_back(i);
     }
   }
   std::vector<std::uint8_t> reached(flags_.size());

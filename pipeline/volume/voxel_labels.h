@@ -13,7 +13,8 @@ class VoxelLabels {
  public:
   enum Flag : std::uint8_t { kInside = 1, kDoubtful = 2, kGrown = 4, kQueued = 8 };
 
-  /// `doubt_reach_mm`: the solid is doubtful this deep below a closed surface.
+  /// `doubt_reach_mm`: the solid is doubtful this deep below a closed surface. Space that a view looked through is
+  /// certain.
   VoxelLabels(const BlockGrid& grid, float doubt_reach_mm);
 
   [[nodiscard]] std::uint8_t at(std::size_t i) const { return flags_[i]; }

@@ -185,6 +185,21 @@ TEST(Integrate, BridgesOfUnseenSpaceBetweenCloseLegsAreCut) {
   EXPECT_NEAR(volume(repaired->mesh), volume(bridged->mesh), 0.01 * volume(bridged->mesh));
 }
 
+TEST(Integrate, AHoleThatOneViewLooksThroughStaysOpenHoweverNarrow) {
+  const Rig rig{.mm_per_pixel = 0.2, .views = 12};
+  const Solid plate = box({-14, 30, -3}, {14, 54, 3});
+  const Eigen::Vector3d middle(0, 42, 0);
+  const auto eye = take_views({.views = 1}, cast_into(plate)).front().range.camera_from_pose.inverse().translation();
+  const Eigen::Vector3d along = (eye - middle).normalized();
+  for (const double radius : {0.9, 1.4, 4.0}) {
+    const Solid drilled = carve(plate, rod(middle - 30 * along, middle + 30 * along, radius));
+    const auto surface = integrate_views(take_views(rig, cast_into(drilled)), {.voxel_mm = 0.4});
+    ASSERT_TRUE(surface) << surface.error().message;
+    expect_closed(surface->mesh, 1);
+    EXPECT_EQ(surface->report.voxels_filled, 0U) << radius;
+  }
+}
+
 TEST(Integrate, ImportedOrthographicScansWithoutBackgroundMakeAClosedSolid) {
   const Solid ring = torus({0, 30, 0}, Eigen::Vector3d::UnitZ(), 18, 7);
   std::vector<View> views;

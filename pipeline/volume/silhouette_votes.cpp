@@ -1,0 +1,340 @@
+#include "pipeline/volume/silhouette_votes.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "core/parallel.h"
+#include "pipeline/silhouette/contour_distance.h"
+#include "pipeline/volume/integrate.h"
+#include "pipeline/volume/range_sampler.h"
+
+namespace scanrig {
+namespace {
+
+constexpr std::size_t kBlock = 1024;
+
+struct MeasuredPoint {
+  Eigen::Vector3f point;  ///< pose frame
+  int views = 0;          ///< that measured it
+};
+
+/// One silhouette as a camera of the pose.
+struct Outline {
+  Silhouette* silhouette;
+  std::size_t view;  ///< in the span
+  std::size_t camera;
+  Eigen::Matrix3f rotation;
+  Eigen::Vector3f translation;
+
+  [[nodiscard]] std::optional<cv::Point> pixel_of(const Eigen::Vector3f& point) const {
+    const Eigen::Vector3f p = rotation * point + translation;
+    if (!(p.z() > 0.0F)) return std::nullopt;
+    const Projection& projection = silhouette->projection;
+    const cv::Point at(static_cast<int>(std::lround(projection.fx * p.x() / p.z() + projection.cx)),
+                       static_cast<int>(std::lround(projection.fy * p.y() / p.z() + projection.cy)));
+    const cv::Mat1f& px = silhouette->outside_px;
+    return at.inside({0, 0, px.cols, px.rows}) ? std::optional(at) : std::nullopt;
+  }
+  /// Nothing outside the image: the object is inside of it.
+  [[nodiscard]] bool puts_outside(const Eigen::Vector3f& point, double margin_px) const {
+    const auto at = pixel_of(point);
+    return at && static_cast<double>(silhouette->outside_px(*at)) > margin_px;
+  }
+};
+
+std::vector<Outline> outlines_of(std::span<View> views) {
+  std::vector<Outline> outlines;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    for (std::size_t c = 0; c < views[v].silhouettes.size(); ++c) {
+      Silhouette& s = views[v].silhouettes[c];
+      outlines.push_back(
+          {&s, v, c, s.camera_from_pose.linear().cast<float>(), s.camera_from_pose.translation().cast<float>()});
+    }
+  }
+  return outlines;
+}
+
+double mm_per_pixel(const RangeImage& range) {
+  for (const float depth : range.depth) {
+    if (!std::isnan(depth)) return range.projection.mm_per_pixel(static_cast<double>(depth));
+  }
+  return range.projection.mm_per_pixel(1.0);
+}
+
+/// Points that at least `min_views` views measured, and more than see through them to surface behind. Views agree
+/// within their sigmas, or half a pixel: a silhouette resolves no more.
+class MeasuredSurface {
+ public:
+  MeasuredSurface(std::span<const View> views, const SilhouetteVoteOptions& options) : options_(options) {
+    pixel_mm_ = static_cast<float>(mm_per_pixel(views.front().range));
+    const double band = options.contour_px * static_cast<double>(pixel_mm_);
+    std::vector<std::optional<RangeSampler>> made(views.size());
+    parallel_for(views.size(), [&](std::size_t v) {
+      made[v].emplace(views[v].range, Transform::Identity(), band, static_cast<double>(pixel_mm_),
+                      RangeSamplerOptions{});
+    });
+    for (auto& sampler : made) samplers_.push_back(std::move(*sampler));
+  }
+
+  [[nodiscard]] std::vector<MeasuredPoint> points(std::span<const View> views) const {
+    std::vector<std::vector<MeasuredPoint>> of_view(views.size());
+    parallel_for(views.size(), [&](std::size_t v) {
+      const RangeImage& range = views[v].range;
+      const Transform pose_from_camera = range.camera_from_pose.inverse();
+      for (int y = 0; y < range.depth.rows; y += options_.stride_px) {
+        for (int x = 0; x < range.depth.cols; x += options_.stride_px) {
+          const float depth = range.depth(y, x);
+          if (std::isnan(depth)) continue;
+          const Eigen::Vector3d point = pose_from_camera * range.projection.unproject(x, y, static_cast<double>(depth));
+          const int count = views_of(point.cast<float>(), range.sigma(y, x));
+          if (count >= options_.min_views) of_view[v].push_back({point.cast<float>(), count});
+        }
+      }
+    });
+    std::vector<MeasuredPoint> all;
+    for (const auto& points : of_view) all.insert(all.end(), points.begin(), points.end());
+    return all;
+  }
+
+ private:
+  /// 0 where as many see through.
+  [[nodiscard]] int views_of(const Eigen::Vector3f& point, float sigma) const {
+    int confirmed = 0, seen_through = 0;
+    for (const RangeSampler& view : samplers_) {
+      const RangeSample s = view.sample(point);
+      if (s.kind == RangeSample::Kind::surface) {
+        const float tolerance = std::hypot(options_.sigmas * std::hypot(sigma, s.sigma), 0.5F * pixel_mm_);
+        if (std::abs(s.distance) <= tolerance) ++confirmed;
+      } else if (s.clearly_free && std::isfinite(s.distance)) {
+        ++seen_through;
+      }
+    }
+    return confirmed > seen_through ? confirmed : 0;
+  }
+
+  SilhouetteVoteOptions options_;
+  float pixel_mm_ = 0.0F;
+  std::vector<RangeSampler> samplers_;
+};
+
+/// Votes on each silhouette: per pixel the number of views that measured a point there which the silhouette puts
+/// outside. A point that as many silhouettes put outside has no vote: several silhouettes are right.
+struct Votes {
+  cv::Mat1b against;  ///< 0: none
+  cv::Mat1b surface;  ///< 255 where a measured point lies
+};
+
+/// Of each point, the number of silhouettes that put it outside.
+std::vector<int> put_outside(const std::vector<Outline>& outlines, const std::vector<MeasuredPoint>& points,
+                             const SilhouetteVoteOptions& options) {
+  std::vector<int> count(points.size());
+  parallel_for((points.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
+    for (std::size_t i = block * kBlock; i < std::min(points.size(), (block + 1) * kBlock); ++i) {
+      for (const Outline& outline : outlines) {
+        count[i] += outline.puts_outside(points[i].point, options.contour_px) ? 1 : 0;
+      }
+    }
+  });
+  return count;
+}
+
+std::vector<Votes> count_votes(const std::vector<Outline>& outlines, const std::vector<MeasuredPoint>& points,
+                               const std::vector<int>& outside_of, const SilhouetteVoteOptions& options) {
+  std::vector<Votes> votes(outlines.size());
+  parallel_for(outlines.size(), [&](std::size_t s) {
+    const cv::Mat1f& outside = outlines[s].silhouette->outside_px;
+    Votes& here = votes[s];
+    here = {cv::Mat1b(outside.size(), uchar{0}), cv::Mat1b(outside.size(), uchar{0})};
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const auto at = outlines[s].pixel_of(points[i].point);
+      if (!at || outside_of[i] >= points[i].views) continue;
+      here.surface(*at) = 255;
+      if (static_cast<double>(outside(*at)) <= options.contour_px) continue;
+      here.against(*at) = std::max(here.against(*at), cv::saturate_cast<uchar>(points[i].views));
+    }
+  });
+  return votes;
+}
+
+cv::Mat disc(int radius) { return cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * radius + 1, 2 * radius + 1}); }
+
+bool touches_border(const cv::Rect& box, const cv::Size& size) {
+  return box.x == 0 || box.y == 0 || box.br().x == size.width || box.br().y == size.height;
+}
+
+cv::Rect box_of(const cv::Mat& stats, int part) {
+  return {stats.at<int>(part, cv::CC_STAT_LEFT), stats.at<int>(part, cv::CC_STAT_TOP),
+          stats.at<int>(part, cv::CC_STAT_WIDTH), stats.at<int>(part, cv::CC_STAT_HEIGHT)};
+}
+
+/// Openings of the silhouette whose sure part is contradicted for the most part: they go whole.
+void add_openings(const cv::Mat1f& outside_px, const cv::Mat1b& contradicted, const SilhouetteVoteOptions& options,
+                  cv::Mat1b& region) {
+  cv::Mat1i labels;
+  cv::Mat stats, centroids;
+  const int parts = cv::connectedComponentsWithStats(outside_px > 0.0F, labels, stats, centroids, 4, CV_32S);
+  for (int part = 1; part < parts; ++part) {
+    const cv::Rect box = box_of(stats, part);
+    if (touches_border(box, outside_px.size())) continue;
+    const cv::Mat1b opening(labels(box) == part);
+    const cv::Mat1b sure(opening & (outside_px(box) > options.contour_px));
+    const int against = cv::countNonZero(sure & contradicted(box));
+    if (against >= options.min_region_px && 2 * against >= cv::countNonZero(sure)) region(box).setTo(255, opening);
+  }
+}
+
+/// The part of the silhouette's outside that measured surface contradicts; empty: none.
+cv::Mat1b contradicted_region(const cv::Mat1f& outside_px, const cv::Mat1b& against,
+                              const SilhouetteVoteOptions& options) {
+  cv::Mat1b joined;  // votes lie a stride apart, on surface seen at an angle farther
+  cv::morphologyEx(against > 0, joined, cv::MORPH_CLOSE, disc(2 * options.stride_px));
+  joined &= outside_px > options.contour_px;
+  cv::Mat1i labels;
+  cv::Mat stats, centroids;
+  const int parts = cv::connectedComponentsWithStats(joined, labels, stats, centroids, 8, CV_32S);
+  cv::Mat1b contradicted(outside_px.size(), uchar{0});
+  for (int part = 1; part < parts; ++part) {
+    if (stats.at<int>(part, cv::CC_STAT_AREA) < options.min_region_px) continue;
+    contradicted.setTo(255, labels == part);
+  }
+  if (cv::countNonZero(contradicted) == 0) return {};
+  cv::Mat1b region;  // the contour's own uncertainty around the part, and a pixel
+  cv::dilate(contradicted, region, disc(static_cast<int>(std::ceil(options.contour_px)) + 1));
+  region &= outside_px > 0.0F;
+  add_openings(outside_px, contradicted, options, region);
+  return region;
+}
+
+int median_votes(const cv::Mat1b& against, const cv::Mat1b& region) {
+  std::vector<uchar> votes;
+  for (int y = 0; y < against.rows; ++y) {
+    for (int x = 0; x < against.cols; ++x) {
+      if (region(y, x) != 0 && against(y, x) != 0) votes.push_back(against(y, x));
+    }
+  }
+  if (votes.empty()) return 0;
+  const auto middle = votes.begin() + static_cast<std::ptrdiff_t>(votes.size() / 2);
+  std::nth_element(votes.begin(), middle, votes.end());
+  return *middle;
+}
+
+/// Free space in the left camera's range image came from the silhouette too.
+void forget_background(View& view, std::size_t camera, const cv::Mat1b& region) {
+  if (camera != 0 || view.range.background.size() != region.size()) return;
+  view.range.background = view.range.background.clone();
+  view.range.background.setTo(0, region);
+}
+
+std::optional<SilhouetteFinding> mend(const Outline& outline, View& view, const Votes& votes,
+                                      const SilhouetteVoteOptions& options) {
+  cv::Mat1f outside = outline.silhouette->outside_px.clone();  // copies of a view share their pixels
+  cv::Mat1b region = contradicted_region(outside, votes.against, options);
+  if (region.empty()) return std::nullopt;
+  cv::Mat1b object;
+  cv::morphologyEx(votes.surface, object, cv::MORPH_CLOSE, disc(2 * options.stride_px));
+  SilhouetteFinding finding{.view = view.index, .camera = outline.camera, .views = median_votes(votes.against, region)};
+  finding.area_px = cv::countNonZero(region);
+  finding.share = std::min(1.0, cv::countNonZero(region & object) / std::max(1.0, 1.0 * cv::countNonZero(object)));
+  if (finding.share > options.max_contradicted) {
+    finding.kind = SilhouetteFinding::Kind::whole;
+    region.setTo(255);
+    outside.setTo(-std::numeric_limits<float>::max());
+  } else {
+    outside.setTo(-1.0F, region);
+    outside = contour_distance(outside);
+  }
+  outline.silhouette->outside_px = outside;
+  forget_background(view, outline.camera, region);
+  return finding;
+}
+
+/// Rays of a silhouette that meet nothing of what the others leave.
+class Surplus {
+ public:
+  Surplus(const std::vector<Outline>& outlines, const Eigen::AlignedBox3f& box, const SilhouetteVoteOptions& options)
+      : outlines_(outlines), box_(box), options_(options) {}
+
+  [[nodiscard]] std::optional<SilhouetteFinding> of(std::size_t s, const View& view) const {
+    const cv::Mat1f& outside = outlines_[s].silhouette->outside_px;
+    const int stride = options_.surplus_stride_px;
+    cv::Mat1b grid(outside.rows / stride, outside.cols / stride, uchar{0});
+    int inside = 0;
+    for (int y = 0; y < grid.rows; ++y) {
+      for (int x = 0; x < grid.cols; ++x) {
+        const cv::Point pixel(x * stride + stride / 2, y * stride + stride / 2);
+        if (!(static_cast<double>(outside(pixel)) < -options_.contour_px)) continue;
+        ++inside;
+        grid(y, x) = is_empty(s, pixel) ? 255 : 0;
+      }
+    }
+    const int empty = cv::countNonZero(grid);
+    SilhouetteFinding finding{.kind = SilhouetteFinding::Kind::surplus,
+                              .view = view.index,
+                              .camera = outlines_[s].camera,
+                              .area_px = 1.0 * empty * stride * stride,
+                              .share = empty / std::max(1.0, 1.0 * inside),
+                              .views = options_.min_silhouettes};
+    if (empty < 2 || finding.share < options_.min_surplus) return std::nullopt;
+    return finding;
+  }
+
+ private:
+  /// Whether every place along the ray is outside at least `min_silhouettes` others.
+  [[nodiscard]] bool is_empty(std::size_t s, cv::Point pixel) const {
+    const Outline& own = outlines_[s];
+    const Projection& projection = own.silhouette->projection;
+    const Eigen::Vector3f ray = own.rotation.transpose() * projection.unproject(pixel.x, pixel.y, 1.0).cast<float>();
+    const Eigen::Vector3f eye = -(own.rotation.transpose() * own.translation);
+    const float middle = (box_.center() - eye).norm() / ray.norm(), reach = 0.5F * box_.diagonal().norm() / ray.norm();
+    const auto step = static_cast<float>(options_.contour_px * projection.mm_per_pixel(static_cast<double>(middle)));
+    for (float depth = middle - reach; depth <= middle + reach; depth += step) {
+      const Eigen::Vector3f point = eye + depth * ray;
+      if (!box_.contains(point)) continue;
+      int outside = 0;
+      for (std::size_t o = 0; o < outlines_.size() && outside < options_.min_silhouettes; ++o) {
+        if (o != s && outlines_[o].puts_outside(point, options_.contour_px)) ++outside;
+      }
+      if (outside < options_.min_silhouettes) return false;
+    }
+    return true;
+  }
+
+  const std::vector<Outline>& outlines_;
+  Eigen::AlignedBox3f box_;
+  SilhouetteVoteOptions options_;
+};
+
+}  // namespace
+
+Result<SilhouetteVerdict> vote_on_silhouettes(std::span<View> views, const SilhouetteVoteOptions& options,
+                                              const Context& context) {
+  SilhouetteVerdict verdict;
+  const std::vector<Outline> outlines = outlines_of(views);
+  if (outlines.empty()) return verdict;
+  const std::vector<MeasuredPoint> points = MeasuredSurface(views, options).points(views);
+  if (context.stopped()) return fail(ErrorCode::stopped, "silhouettes: stopped");
+  if (points.empty()) return verdict;
+  const std::vector<int> outside_of = put_outside(outlines, points, options);
+  const auto disputed = std::ranges::count_if(outside_of, [&](int n) { return n >= options.min_disputing; });
+  verdict.disputed_share = static_cast<double>(disputed) / static_cast<double>(points.size());
+  const std::vector<Votes> votes = count_votes(outlines, points, outside_of, options);
+  std::vector<std::optional<SilhouetteFinding>> mended(outlines.size()), surplus(outlines.size());
+  parallel_for(outlines.size(),
+               [&](std::size_t s) { mended[s] = mend(outlines[s], views[outlines[s].view], votes[s], options); });
+  if (context.stopped()) return fail(ErrorCode::stopped, "silhouettes: stopped");
+  Eigen::AlignedBox3f box;
+  for (const MeasuredPoint& point : points) box.extend(point.point);
+  const auto room = Eigen::Vector3f::Constant(static_cast<float>(VolumeOptions{}.hull_room_mm));
+  const Surplus rays(outlines, {box.min() - room, box.max() + room}, options);
+  parallel_for(outlines.size(), [&](std::size_t s) { surplus[s] = rays.of(s, views[outlines[s].view]); });
+  for (std::size_t s = 0; s < outlines.size(); ++s) {
+    if (mended[s]) verdict.findings.push_back(*mended[s]);
+    if (surplus[s] && !mended[s]) verdict.findings.push_back(*surplus[s]);
+  }
+  return verdict;
+}
+
+}  // namespace scanrig
