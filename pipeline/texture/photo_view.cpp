@@ -92,6 +92,13 @@ void PhotoView::find_edges() {
   cv::distanceTransform(inside, edge_px_away_, cv::DIST_L2, cv::DIST_MASK_5);
 }
 
+void PhotoView::leave_out(const cv::Mat1b& mask) {
+  if (window_.empty()) return;
+  cv::Mat1f away;
+  cv::distanceTransform(mask(window_) == 0, away, cv::DIST_L2, cv::DIST_MASK_5);
+  edge_px_away_ = cv::min(edge_px_away_, away);
+}
+
 std::optional<Sight> PhotoView::look(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
   const double cosine = normal.dot(towards(point));
   if (cosine <= cos_limit_) return std::nullopt;

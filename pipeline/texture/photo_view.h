@@ -32,6 +32,9 @@ class PhotoView {
   /// The colour there, between pixels (bicubic); `pixel` as returned by look().
   [[nodiscard]] Sample sample(const Eigen::Vector2d& pixel) const;
 
+  /// From now on the photo shows nothing where `mask`, of its size, is not 0, and fades out towards it.
+  void leave_out(const cv::Mat1b& mask);
+
   [[nodiscard]] const Photo& photo() const { return *photo_; }
   [[nodiscard]] Transform camera_from_model() const { return camera_from_model_; }
   [[nodiscard]] const Eigen::Vector3d& centre() const { return centre_; }  ///< of projection, model frame

@@ -9,6 +9,7 @@
 #include "pipeline/mesh/solid_properties.h"
 #include "pipeline/texture/atlas.h"
 #include "pipeline/texture/chart_cutting.h"
+#include "pipeline/texture/photo_check.h"
 #include "pipeline/texture/photo_view.h"
 #include "pipeline/texture/point_colour.h"
 #include "pipeline/texture/shading.h"
@@ -110,12 +111,14 @@ double seen_share(const Mesh& mesh, const std::vector<PointColour>& colours) {
   return seen / std::max(all, 1e-12);
 }
 
-/// Fills in the model's light, gain, seen share and vertex colours; returns the linear paint at the vertices, unseen
-/// ones filled from their surroundings.
-Result<std::vector<PointColour>> colour_vertices(std::span<const PhotoView> views, const TextureOptions& options,
+/// Leaves contradicted photos out of `views`. Fills in the model's light, gain, seen share and vertex colours; returns
+/// the linear paint at the vertices, unseen ones filled from their surroundings.
+Result<std::vector<PointColour>> colour_vertices(std::span<PhotoView> views, const TextureOptions& options,
                                                  TexturedModel& model) {
   Mesh& mesh = model.mesh.mesh;
   model.light = light_from_photos(views, mesh, mesh.normals, options.blending);
+  model.contradicted = leave_out_contradicted(views, model.light, mesh, mesh.normals, options.blending, options.check);
+  if (!model.contradicted.empty()) model.light = light_from_photos(views, mesh, mesh.normals, options.blending);
   std::vector<PointColour> colours(mesh.vertices.size());
   for_blocks(colours.size(), [&](std::size_t v) {
     colours[v] = blend_photos(views, model.light, mesh.vertices[v].cast<double>(), mesh.normals[v].cast<double>(),

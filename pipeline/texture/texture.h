@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <opencv2/core/mat.hpp>
 #include <span>
+#include <vector>
 
 #include "core/context.h"
 #include "core/result.h"
@@ -45,6 +46,30 @@ struct BlendOptions {
   int fill_rounds = 60;                                            ///< of smoothing on unseen surface
 };
 
+/// Search for photos that differ from all others.
+struct PhotoCheckOptions {
+  std::size_t spots = 60000;       ///< vertices that are compared
+  int cells = 80;                  ///< across the photo's width
+  std::size_t min_looks = 4;       ///< photos that show a spot, for it to be compared
+  std::size_t min_cell_looks = 5;  ///< spots in a cell
+  /// A cell is off if its median difference is this many times what the blending tolerates (outlier_share and _floor),
+  /// and this many times what one cell in a hundred of the middle photo shows: gloss and cast shadows do that too.
+  float min_off = 2.0F;
+  float rare_factor = 2.5F;
+  double rare_share = 0.01;
+  float grown_off = 0.5F;   ///< neighbours of such a cell belong to it from this share of that difference
+  double min_share = 0.01;  ///< of the object's area in the photo: smaller parts are left to the blending
+  double max_share = 0.5;   ///< beyond it the photo is left out whole
+};
+
+/// A photo, or a part of it, that shows other colours than all others and was left out.
+struct ContradictedPhoto {
+  std::size_t photo = 0;    ///< in the order given
+  double share = 0.0;       ///< of the object's area in it
+  double brightness = 1.0;  ///< of that part, against the other photos: below 1 a shadow, above a reflection
+  bool is_whole = false;    ///< nothing of it is used
+};
+
 struct TextureOptions {
   int atlas_px = 4096;              ///< side of the square atlas
   double max_texels_per_px = 2.0;   ///< of a photo's pixel; less where the charts would not fit
@@ -59,6 +84,7 @@ struct TextureOptions {
   WhiteOptions white{};
   ChartOptions charts{};
   BlendOptions blending{};
+  PhotoCheckOptions check{};
 };
 
 struct TexturedModel {
@@ -68,6 +94,7 @@ struct TexturedModel {
   double texels_per_px = 0.0;  ///< of the atlas, against a photo's pixel
   std::size_t charts = 0;
   double seen_share = 0.0;  ///< of the area; the rest is filled from its surroundings
+  std::vector<ContradictedPhoto> contradicted;
 };
 
 /// Colours `mesh` (mm, model frame) from `photos`; the order of the photos matters little, at least one is needed. Each
