@@ -8,9 +8,10 @@ namespace scanrig {
 namespace {
 
 // Measured with 16 views of 1280x960 and voxels of 0.25 mm, report.json's process_peak_memory_mib: 1240 to 1370 MiB
-// before the integration, 170 to 375 MiB more for models of 13,400 to 22,400 mm2.
+// before the integration (without the 2 bytes per pixel of grey patterns), 170 to 375 MiB more for models of 13,400 to
+// 22,400 mm2.
 constexpr double kProgram = 200e6;
-constexpr double kBytesPerPixel = 72.0;
+constexpr double kBytesPerPixel = 74.0;
 constexpr double kBytesPerSurfaceVoxel = 1100.0;
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -12,9 +13,8 @@
 #include "pipeline/range/rectification.h"
 #include "pipeline/range/view_builder.h"
 #include "pipeline/reconstruct/live_mesh.h"
+#include "pipeline/reconstruct/reconstruction_state.h"
 #include "pipeline/reconstruct/report.h"
-#include "pipeline/reconstruct/rig_watch.h"
-#include "pipeline/reconstruct/stage_log.h"
 #include "pipeline/reconstruct/voxel_size.h"
 #include "pipeline/registration/refine_pose.h"
 #include "pipeline/registration/register_views.h"
@@ -36,6 +36,12 @@ Result<VolumeOptions::Fusion> fusion_of(const std::string& name) {
   return fail(ErrorCode::invalid_input, "fusion \"{}\" is neither \"evidence\" nor \"paper\"", name);
 }
 
+cv::Mat1b grey_of(const cv::Mat& image) {
+  cv::Mat1b grey;
+  cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
+  return grey;
+}
+
 Result<PoseOptions> pose_options_of(const std::string& rests) {
   PoseOptions options;
   if (rests == "hull") {
@@ -49,40 +55,6 @@ Result<PoseOptions> pose_options_of(const std::string& rests) {
 }
 
 }  // namespace
-
-struct Reconstruction::State {
-  struct PlainPair {
-    cv::Mat3b left, right;
-  };
-
-  struct PoseState {
-    std::vector<View> views;
-    std::vector<PlainPair> plain;   ///< one per view; empty for range scans and grey sensors
-    std::optional<RigWatch> watch;  ///< none: range scans, or switched off
-    RegistrationReport registration;
-    Surface partial;
-    bool finished = false;
-  };
-
-  ReconstructOptions options;
-  std::optional<Calibration> calibration;
-  std::optional<Rectification> rectification;
-  std::vector<PoseState> poses;
-  StageLog log;
-
-  Result<PoseState*> open_pose(std::size_t pose);
-  Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context);
-  Result<void> watch_view(PoseState& pose, const ViewImages& images);
-  Result<void> judge_rig(PoseState& pose, const Context& context);
-  Result<void> finish_pose(std::size_t pose, const Context& context);
-  Result<Transform> find_pose(Report& report, const Context& context);
-  Result<Surface> surface(const Transform& pose1_from_pose2, const Context& context);
-  [[nodiscard]] std::vector<Photo> photos(const Transform& pose1_from_pose2) const;
-  [[nodiscard]] std::vector<LivePhoto> live_photos(const PoseState& pose) const;
-  Result<void> add_texture(TexturedMesh& model, const Transform& pose1_from_pose2, Report& report,
-                           const Context& context);
-  Result<Model> finish(const ScanIdentity& identity, const Context& context);
-};
 
 Result<Reconstruction::State::PoseState*> Reconstruction::State::open_pose(std::size_t pose) {
   if (pose > 1) return fail(ErrorCode::invalid_input, "a scan has one or two poses, not {}", pose + 1);
@@ -109,6 +81,8 @@ Result<void> Reconstruction::State::add_view(std::size_t pose, const ViewImages&
   if (auto done = watch_view(**open, images); !done) return done;
   if (images.left_plain.channels() == 3) {
     (*open)->plain.push_back({images.left_plain, images.right_plain});
+    (*open)->pattern.push_back(
+        {(*open)->views.size() - 1, grey_of(images.left_pattern), grey_of(images.right_pattern)});
   }
   return {};
 }
@@ -139,18 +113,13 @@ Result<void> Reconstruction::State::finish_pose(std::size_t pose, const Context&
   PoseState& state = **open;
   if (state.views.empty()) return fail(ErrorCode::invalid_input, "pose {} has no views", pose + 1);
   if (auto done = judge_rig(state, context); !done) return pass_on(done, fmt::format("pose {}", pose + 1));
-  {
-    const StageLog::Timer timer(log, "registration");
-    context.report("registration", 0.0);
-    const auto registration = calibration ? registration_options(*calibration) : RegistrationOptions::imported();
-    auto report = register_views(state.views, registration, context);
-    if (!report) return pass_on(report, fmt::format("pose {}", pose + 1));
-    state.registration = std::move(*report);
-    if (state.watch) state.watch->add_overlap(state.registration);
-  }
+  if (auto done = register_pose(pose, context); !done) return pass_on(done, fmt::format("pose {}", pose + 1));
   const StageLog::Timer timer(log, "partial model");
   const PosedViews posed{.views = state.views};
-  auto partial = integrate({&posed, 1}, {.voxel_mm = std::max(options.partial_voxel_mm, options.voxel_mm)}, context);
+  auto partial = integrate({&posed, 1},
+                           {.voxel_mm = std::max(options.partial_voxel_mm, options.voxel_mm),
+                            .table_without_silhouettes = calibration.has_value()},
+                           context);
   if (!partial) return pass_on(partial, fmt::format("pose {}", pose + 1));
   state.partial = std::move(*partial);
   state.finished = true;
@@ -181,7 +150,9 @@ Result<Surface> Reconstruction::State::surface(const Transform& pose1_from_pose2
   std::vector<PosedViews> posed;
   posed.push_back({.views = poses[0].views});
   if (poses.size() > 1) posed.push_back({.views = poses[1].views, .model_from_pose = pose1_from_pose2});
-  return integrate(posed, {.voxel_mm = options.voxel_mm, .fusion = *fusion}, context);
+  return integrate(
+      posed, {.voxel_mm = options.voxel_mm, .fusion = *fusion, .table_without_silhouettes = calibration.has_value()},
+      context);
 }
 
 std::vector<Photo> Reconstruction::State::photos(const Transform& pose1_from_pose2) const {
@@ -233,6 +204,7 @@ Result<Model> Reconstruction::State::finish(const ScanIdentity& identity, const 
   model.mesh.mesh = std::move(integrated->mesh);
   if (auto done = add_texture(model.mesh, *pose1_from_pose2, report, context); !done) return pass_on(done, "texture");
   report.add_surface(model.mesh.mesh, integrated->report);
+  report.add_disagreements(disagreements);
   model.report = std::make_shared<const nlohmann::json>(report.finished(log));
   return model;
 }
@@ -242,9 +214,17 @@ Result<void> Reconstruction::State::add_texture(TexturedMesh& model, const Trans
   const auto photographs = options.texture ? photos(pose1_from_pose2) : std::vector<Photo>();
   if (photographs.empty()) return {};
   const StageLog::Timer timer(log, "texture");
+  std::vector<std::pair<std::size_t, int>> views;  // pose and view of every two photographs
+  for (std::size_t p = 0; p < poses.size(); ++p) {
+    for (std::size_t v = 0; v < poses[p].plain.size(); ++v) views.emplace_back(p, poses[p].views[v].index);
+  }
   auto textured = texture_mesh(model.mesh, photographs, {}, context);
   if (!textured) return pass_on(textured);
   report.add_texture(*textured);
+  for (const ContradictedPhoto& photo : textured->contradicted) {
+    const auto [pose, view] = views[photo.photo / 2];
+    disagreements.push_back(of_photo(pose, view, photo.photo % 2, photo));
+  }
   model = std::move(textured->mesh);
   return {};
 }

@@ -219,6 +219,10 @@ void Report::add_texture(const TexturedModel& textured) {
                          {"seen_share", textured.seen_share}};
 }
 
+void Report::add_disagreements(std::span<const Disagreement> disagreements) {
+  (*json_)["disagreements"] = disagreements_json(disagreements);
+}
+
 json Report::finished(const StageLog& log) const {
   json report = *json_;
   report["stages"] = log.to_json();

@@ -6,6 +6,7 @@
 #include <span>
 
 #include "pipeline/pose/estimate_pose.h"
+#include "pipeline/reconstruct/disagreements.h"
 #include "pipeline/reconstruct/reconstruct.h"
 #include "pipeline/reconstruct/rig_watch.h"
 #include "pipeline/reconstruct/stage_log.h"
@@ -30,6 +31,7 @@ class Report {
   void add_refinement(const RefinedPose& refined);
   void add_surface(const Mesh& mesh, const VolumeReport& volume);
   void add_texture(const TexturedModel& textured);
+  void add_disagreements(std::span<const Disagreement> disagreements);
   [[nodiscard]] nlohmann::json finished(const StageLog& log) const;
 
  private:

@@ -94,10 +94,12 @@ Result<void> RigWatch::judge(std::span<View> views, WatchMode mode) {
   }
   if (result_.verdict != WatchVerdict::moved || !result_.refined) return {};
   frames_ = carry_frames(rectification_, calibration_, *result_.refined);
-  for (std::size_t v = 0; v < views.size(); ++v) {
-    retriangulate(views[v], rectification_, *frames_, result_.refined_angles_rad[v]);
-  }
+  for (std::size_t v = 0; v < views.size(); ++v) carry(views[v], v);
   return {};
+}
+
+void RigWatch::carry(View& view, std::size_t v) const {
+  if (frames_) retriangulate(view, rectification_, *frames_, result_.refined_angles_rad[v]);
 }
 
 void RigWatch::add_overlap(const RegistrationReport& registration) {

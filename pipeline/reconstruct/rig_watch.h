@@ -33,6 +33,8 @@ class RigWatch {
   /// Judges the views added, and refines them in `refine`. Fails with `below_limits` when a part has moved too far;
   /// the message is for the operator.
   Result<void> judge(std::span<View> views, WatchMode mode);
+  /// Brings view `v`, made anew after judge(), to the refined rig.
+  void carry(View& view, std::size_t v) const;
   void add_overlap(const RegistrationReport& registration);
 
   [[nodiscard]] const Watch& result() const { return result_; }

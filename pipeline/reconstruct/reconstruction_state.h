@@ -1,0 +1,67 @@
+#pragma once
+
+#include <opencv2/core/mat.hpp>
+#include <optional>
+#include <vector>
+
+#include "pipeline/range/rectification.h"
+#include "pipeline/reconstruct/disagreements.h"
+#include "pipeline/reconstruct/live_mesh.h"
+#include "pipeline/reconstruct/reconstruct.h"
+#include "pipeline/reconstruct/report.h"
+#include "pipeline/reconstruct/rig_watch.h"
+#include "pipeline/reconstruct/stage_log.h"
+#include "pipeline/registration/register_views.h"
+#include "pipeline/texture/texture.h"
+#include "pipeline/volume/integrate.h"
+
+namespace scanrig {
+
+/// What a Reconstruction holds. reconstruct.cpp has its stages, judge_pose.cpp what they say of single images.
+struct Reconstruction::State {
+  struct PlainPair {
+    cv::Mat3b left, right;
+  };
+  struct GreyPair {
+    std::size_t order;  ///< of the view in its pose, as added
+    cv::Mat1b left, right;
+  };
+
+  struct PoseState {
+    std::vector<View> views;
+    std::vector<PlainPair> plain;   ///< one per view; empty for range scans and grey sensors
+    std::vector<GreyPair> pattern;  ///< likewise
+    std::optional<RigWatch> watch;  ///< none: range scans, or switched off
+    RegistrationReport registration;
+    Surface partial;
+    bool finished = false;
+  };
+
+  ReconstructOptions options;
+  std::optional<Calibration> calibration;
+  std::optional<Rectification> rectification;
+  std::vector<PoseState> poses;
+  std::vector<Disagreement> disagreements;
+  StageLog log;
+
+  Result<PoseState*> open_pose(std::size_t pose);
+  Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context);
+  Result<void> watch_view(PoseState& pose, const ViewImages& images);
+  Result<void> judge_rig(PoseState& pose, const Context& context);
+  Result<void> register_pose(std::size_t pose, const Context& context);
+  Result<void> align_views(std::size_t pose, const Context& context);
+  Result<void> judge_silhouettes(std::size_t pose, const Context& context);
+  Result<void> measure_without_key(std::size_t pose, const Context& context);
+  bool undo_motions(std::size_t pose, const RegistrationOptions& priors);
+  bool leave_out_misfits(std::size_t pose);
+  Result<void> finish_pose(std::size_t pose, const Context& context);
+  Result<Transform> find_pose(Report& report, const Context& context);
+  Result<Surface> surface(const Transform& pose1_from_pose2, const Context& context);
+  [[nodiscard]] std::vector<Photo> photos(const Transform& pose1_from_pose2) const;
+  [[nodiscard]] std::vector<LivePhoto> live_photos(const PoseState& pose) const;
+  Result<void> add_texture(TexturedMesh& model, const Transform& pose1_from_pose2, Report& report,
+                           const Context& context);
+  Result<Model> finish(const ScanIdentity& identity, const Context& context);
+};
+
+}  // namespace scanrig
