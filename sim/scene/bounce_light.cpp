@@ -6,6 +6,7 @@
 
 #include "core/parallel.h"
 #include "sim/scene/profile.h"
+#include "sim/scene/screen_colour.h"
 
 namespace scanrig::sim {
 
@@ -37,12 +38,13 @@ std::vector<Vector3f> vertex_albedos(const Object& object) {
 
 }  // namespace
 
-BouncePaths::BouncePaths(const Object& object, const RayCaster& rays, const Transform& table_from_object)
+BouncePaths::BouncePaths(const Object& object, const RayCaster& rays, const Transform& table_from_object,
+                         ScreenColour colour)
     : table_from_object_(table_from_object),
       vertex_count_(static_cast<int>(object.mesh.vertices.size())),
       met_(static_cast<std::size_t>(vertex_count_) * kVertexRays + kNodes * kTableRays),
       albedo_(vertex_albedos(object)) {
-  albedo_.push_back(rgb(profile().table_albedo));
+  albedo_.push_back(on_screen(profile().table_albedo, colour));
   const auto around_vertex = hemisphere(kVertexRays), over_table = hemisphere(kTableRays);
   const auto fill = [&](const Vector3d& from, const Vector3d& normal, const std::vector<Vector3d>& directions,
                         int* met) {

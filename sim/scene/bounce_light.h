@@ -2,6 +2,7 @@
 
 #include <vector>
 
+#include "sim/scene/effects.h"
 #include "sim/scene/gathering.h"
 #include "sim/scene/lamp.h"
 #include "sim/scene/object.h"
@@ -13,7 +14,8 @@ namespace scanrig::sim {
 /// object.
 class BouncePaths {
  public:
-  BouncePaths(const Object& object, const RayCaster& rays, const Transform& table_from_object);
+  BouncePaths(const Object& object, const RayCaster& rays, const Transform& table_from_object,
+              ScreenColour colour = ScreenColour::blue);
 
  private:
   friend class BounceLight;

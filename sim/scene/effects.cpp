@@ -151,10 +151,16 @@ std::string ChosenProfile::material_name() const {
 
 std::string canonical_text(const ChosenProfile& chosen) {
   std::string text = canonical_text(profile());
-  if (chosen.effects.is_none() && chosen.coding == PixelCoding() && chosen.material.empty()) return text;
+  if (chosen.effects.is_none() && chosen.coding == PixelCoding() && chosen.material.empty() &&
+      chosen.screen == ScreenColour::blue) {
+    return text;
+  }
   text += fmt::format("workshop, profile version {}\nmaterial {}\n", kWorkshopVersion, chosen.material_name());
   text += fmt::format("coding {} bit, gamma {}\n", chosen.coding.bits, chosen.coding.gamma);
   text += fmt::format("cold {}\n", chosen.is_cold);
+  if (chosen.screen != ScreenColour::blue) {
+    text += fmt::format("screen {}\n", chosen.screen == ScreenColour::green ? "green" : "none");
+  }
   for (const Effect& effect : workshop_effects()) {
     for (const auto& size : effect.sizes) text += fmt::format("{} {}\n", size.name, chosen.effects.*size.member);
   }

@@ -86,11 +86,15 @@ struct PixelCoding {
   bool operator==(const PixelCoding&) const = default;
 };
 
+/// What stands behind the object, and the table's colour.
+enum class ScreenColour { blue, green, none };
+
 /// What is chosen of a profile.
 struct ChosenProfile {
   Effects effects{};
   std::string material{};  ///< of materials.h; empty: the profile's own, matt without gloss of profile 1, satin of 2
   PixelCoding coding{};
+  ScreenColour screen = ScreenColour::blue;
   bool is_cold = false;  ///< cameras are switched on with the first exposure; else warm
 
   /// SHA-256 of profile, effects and material.

@@ -16,12 +16,16 @@ constexpr std::uint64_t kHandled = 0x68616e64;
 
 }  // namespace
 
+Handling Handling::all(const Effects& e) {
+  return {e.creep_mm, e.rock_deg, e.finger, e.overexposed, e.sticker, e.shadow};
+}
+
 Handling Handling::of_view(const Effects& e, std::uint64_t seed, int views, int pose, double angle_deg) {
   if (pose != 0 || views < 2) return {};
   const double step = 360.0 / views;
   const auto chosen = 1.0 + static_cast<double>(mix(seed, kHandled) % static_cast<std::uint64_t>(views - 1));
   if (std::abs(std::remainder(angle_deg - chosen * step, 360.0)) > 0.25 * step) return {};
-  return {e.creep_mm, e.rock_deg, e.finger, e.overexposed, e.sticker, e.shadow};
+  return all(e);
 }
 
 Transform Handling::moved(const Transform& table_from_object) const {

@@ -11,8 +11,9 @@ namespace scanrig::sim {
 struct Handling {
   double creep_mm = 0.0, rock_deg = 0.0, finger = 0.0, overexposed = 0.0, sticker = 0.0, shadow = 0.0;
 
-  /// Of the view at `angle_deg` of `pose`: one view in `views` a turn, drawn by the seed, of the first pose. The first
-  /// view of a pose is spared, as it is taken twice.
+  /// all(): of any view. of_view(): of the view at `angle_deg` of `pose`: one view in `views` a turn, drawn by the
+  /// seed, of the first pose. The first view of a pose is spared, as it is taken twice.
+  static Handling all(const Effects& effects);
   static Handling of_view(const Effects& effects, std::uint64_t seed, int views, int pose, double angle_deg);
 
   /// table_from_object with the object moved: crept along +X, rocked about +X.

@@ -37,6 +37,19 @@ cv::Mat ImageSensor::cross_talked(const cv::Mat& on_sensor) const {
   return mixed;
 }
 
+double ImageSensor::black_of(std::uint64_t noise_key) const {
+  const double drawn = uniform(mix(noise_key, PixelRandom::black, is_left_));
+  return effects_.black_grey + effects_.black_drift_grey * (2.0 * drawn - 1.0);
+}
+
+double ImageSensor::hot_excess(int x, int y) const {
+  if (!(effects_.hot_pixels > 0.0)) return 0.0;
+  const double drawn =
+      uniform(mix(static_cast<std::uint64_t>(PixelRandom::hot), is_left_, static_cast<std::size_t>(y), x)) /
+      effects_.hot_pixels;
+  return drawn < 1.0 ? 30.0 + 170.0 * drawn : 0.0;
+}
+
 cv::Mat ImageSensor::expose(const cv::Mat& on_sensor, std::uint64_t noise_key, double noise_factor) const {
   const Profile& p = profile();
   const Effects& e = effects_;
@@ -46,10 +59,8 @@ cv::Mat ImageSensor::expose(const cv::Mat& on_sensor, std::uint64_t noise_key, d
   const double cx = 0.5 * (raw.cols - 1), cy = 0.5 * (raw.rows - 1);
   const double off_x = e.vignetting_off_px * raw.cols / p.width, off_y = -0.5 * off_x;
   const double gain = 1.0 + (is_left_ ? 0.5 : -0.5) * e.gain_difference;
-  const double black =
-      e.black_grey + e.black_drift_grey * (2.0 * uniform(mix(noise_key, PixelRandom::black, is_left_)) - 1.0);
   const auto own = [&](PixelRandom what, auto... at) { return mix(static_cast<std::uint64_t>(what), is_left_, at...); };
-  std::vector<double> column(raw.cols, black);
+  std::vector<double> column(raw.cols, black_of(noise_key));
   for (int x = 0; x < raw.cols && e.column_grey > 0.0; ++x)
     column[x] += e.column_grey * normal(own(PixelRandom::column, x));
   parallel_for(static_cast<std::size_t>(raw.rows), [&](std::size_t row) {
@@ -60,10 +71,7 @@ cv::Mat ImageSensor::expose(const cv::Mat& on_sensor, std::uint64_t noise_key, d
       double grey = 255.0 * in[x] * (1.0 - e.vignetting * off);
       if (gain != 1.0) grey *= gain;
       if (e.prnu > 0.0) grey *= 1.0 + e.prnu * normal(own(PixelRandom::gain, row, x));
-      if (e.hot_pixels > 0.0) {
-        const double drawn = uniform(own(PixelRandom::hot, row, x)) / e.hot_pixels;
-        if (drawn < 1.0) grey += 30.0 + 170.0 * drawn;
-      }
+      grey += hot_excess(x, y);
       if (noise_key != 0) {
         const double variance = p.read_noise * p.read_noise + p.shot_noise_variance * std::max(0.0, grey);
         grey += noise_factor * std::sqrt(variance) * normal(mix(noise_key, row, x));

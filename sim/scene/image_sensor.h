@@ -26,6 +26,10 @@ class ImageSensor {
   /// deviation.
   [[nodiscard]] cv::Mat expose(const cv::Mat& on_sensor, std::uint64_t noise_key, double noise_factor = 1.0) const;
 
+  /// Grey level of 255 that exposure `noise_key` adds to all pixels, and what pixel (x, y) always has beside that.
+  [[nodiscard]] double black_of(std::uint64_t noise_key) const;
+  [[nodiscard]] double hot_excess(int x, int y) const;
+
  private:
   [[nodiscard]] cv::Mat cross_talked(const cv::Mat& on_sensor) const;
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 
+#include "sim/scene/artefacts.h"
 #include "sim/scene/figurine.h"
 #include "sim/scene/mesh_file.h"
 
@@ -12,13 +13,17 @@ namespace {
 
 using Eigen::Vector3d;
 
+constexpr float kArtefactAlbedo = 0.6F;  // sprayed or ceramic, as the guideline asks: diffuse
+
 Result<MeshFile> read_mesh(const std::filesystem::path& file) {
   std::string kind = file.extension().string();
   std::transform(kind.begin(), kind.end(), kind.begin(), [](unsigned char c) { return std::tolower(c); });
   if (kind == ".obj") return read_obj(file);
   if (kind == ".ply") return read_ply(file);
   if (kind == ".glb") return read_glb(file);
-  return fail(ErrorCode::unsupported, "object {}: cannot be read; give an OBJ, PLY or GLB file", file.string());
+  return fail(ErrorCode::unsupported,
+              "object {}: cannot be read; give an OBJ, PLY or GLB file, sphere, ball-bar, plane or step-gauge",
+              file.string());
 }
 
 Result<void> check(const TriangleMesh& mesh, const std::filesystem::path& file) {
@@ -64,6 +69,12 @@ Result<Object> load_object(const std::filesystem::path& file, double height_mm) 
     object.mesh = figurine();
     for (auto& v : object.mesh.vertices) v *= height_mm / 100.0;
     object.colour = painted_colour();
+  } else if (auto calibrated = artefact(file.native())) {
+    object.name = file.string();
+    object.mesh = std::move(*calibrated);
+    object.is_upright = true;
+    const std::vector<Eigen::Vector3f> colours(object.mesh.vertices.size(), Eigen::Vector3f::Constant(kArtefactAlbedo));
+    object.colour = vertex_colour(colours, object.mesh.triangles);
   } else {
     auto read = read_mesh(file);
     if (!read) return pass_on(read);

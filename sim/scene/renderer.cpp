@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "sim/scene/profile.h"
 #include "sim/scene/random.h"
+#include "sim/scene/screen_colour.h"
 #include "sim/scene/surface_colour.h"
 #include "sim/scene/table_top.h"
 
@@ -46,7 +47,8 @@ class Shot {
         camera_(camera),
         added_(added),
         lamp_(projector, dots, added.effects, added.handling.finger),
-        screen_albedo_(rgb(profile().backdrop_albedo)) {
+        backdrop_(added.colour),
+        screen_albedo_(on_screen(profile().backdrop_albedo, added.colour)) {
     turntable_from_table_ = rot_y(angle);
     turntable_from_object_ = turntable_from_table_ * placed.table_from_object;
     object_from_turntable_ = turntable_from_object_.inverse();
@@ -165,7 +167,8 @@ class Shot {
     Vector3f below = 0.5F * sky * screen_albedo_;
     if (rise < 0.0) {
       const Vector3d on_table = from - from.y() / way.y() * way;
-      if (std::hypot(on_table.x(), on_table.z()) < p.table_radius_mm) below = 0.8F * rgb(p.table_albedo);
+      if (std::hypot(on_table.x(), on_table.z()) < p.table_radius_mm)
+        below = 0.8F * on_screen(p.table_albedo, added_.colour);
     }
     const Vector3f room = upwards * above + (1.0F - upwards) * below;
     const double to_screen = way.dot(backdrop_.normal) < 0.0 ? backdrop_.distance(from, way) : -1.0;
@@ -233,7 +236,8 @@ class Shot {
     const Vector3d in_table = turntable_from_table_.inverse() * point;
     Place at{point, Vector3d::UnitY(), Vector3f::Zero(), footprint(depth, 0.4, width)};
     const float dot = static_cast<float>(rim_dot_share(in_table, at.footprint, placed_.rim_dots));
-    at.albedo = (1.0F - dot) * rgb(p.table_albedo) + dot * rgb(p.rim_dot_albedo);
+    at.albedo =
+        (1.0F - dot) * on_screen(p.table_albedo, added_.colour) + dot * on_screen(p.rim_dot_albedo, added_.colour);
     if (added_.bounce) at.bounced = added_.bounce->on_table(in_table.x(), in_table.z());
     Sample s;
     s.surface = Surface::table;

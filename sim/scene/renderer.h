@@ -26,6 +26,7 @@ struct Radiance {
 struct ViewEffects {
   Effects effects{};
   Handling handling{};
+  ScreenColour colour = ScreenColour::blue;  ///< of screen and table
   const BounceLight* bounce = nullptr;
   const ScreenLight* screen = nullptr;
   const RayMap* rays = nullptr;  ///< of the camera: as its lens, at less cost

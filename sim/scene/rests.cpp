@@ -207,4 +207,15 @@ Result<std::vector<Transform>> draw_placements(const TriangleMesh& mesh, std::ui
   return placements;
 }
 
+Result<std::vector<Transform>> upright_placements(const TriangleMesh& mesh, std::uint64_t seed, int count,
+                                                  bool any_size) {
+  std::vector<Transform> placements;
+  for (int i = 0; i < count; ++i) {
+    const auto placed = put_down(mesh, -Vector3d::UnitY(), mix(seed, 6, i), any_size);
+    if (!placed) return pass_on(placed);
+    placements.push_back(*placed);
+  }
+  return placements;
+}
+
 }  // namespace scanrig::sim

@@ -27,4 +27,8 @@ std::vector<Rest> stable_rests(const TriangleMesh& mesh, std::uint64_t seed);
 Result<std::vector<Transform>> draw_placements(const TriangleMesh& mesh, std::uint64_t seed, int count, bool same_rest,
                                                bool any_size = false);
 
+/// `count` placements of an object with a holder, upright, otherwise as draw_placements(). Fails with `invalid_input`.
+Result<std::vector<Transform>> upright_placements(const TriangleMesh& mesh, std::uint64_t seed, int count,
+                                                  bool any_size = false);
+
 }  // namespace scanrig::sim

@@ -9,6 +9,7 @@
 #include "core/parallel.h"
 #include "sim/scene/gathering.h"
 #include "sim/scene/profile.h"
+#include "sim/scene/screen_colour.h"
 #include "sim/scene/surface_colour.h"
 
 namespace scanrig::sim {
@@ -22,16 +23,17 @@ constexpr int kTableRays = 300;   // a shadow on an even table shows every step
 constexpr double kReach = 200.0;  // mm; no part of the object is farther
 
 /// Light along a ray that leaves `from` (table frame) and meets no part of the object.
-Vector3f room(const Vector3d& from, const Vector3d& direction) {
+Vector3f room(const Vector3d& from, const Vector3d& direction, ScreenColour colour) {
   const Profile& p = profile();
   if (direction.y() >= 0.0) return Vector3f::Constant(static_cast<float>(0.7 + 0.3 * direction.y()));
   const double t = -from.y() / direction.y();
   const bool table = std::hypot(from.x() + t * direction.x(), from.z() + t * direction.z()) < p.table_radius_mm;
-  return table ? Vector3f(0.9F * rgb(p.table_albedo)) : Vector3f(0.5F * rgb(p.backdrop_albedo));
+  return table ? Vector3f(0.9F * on_screen(p.table_albedo, colour))
+               : Vector3f(0.5F * on_screen(p.backdrop_albedo, colour));
 }
 
 Surroundings gather(const RayCaster& rays, const Transform& object_from_table, const std::vector<Vector3d>& directions,
-                    const Vector3d& from, const Vector3d& normal) {
+                    const Vector3d& from, const Vector3d& normal, ScreenColour colour) {
   const Vector3f mutual(0.16F, 0.15F, 0.14F);  // light between the object's own parts
   const Eigen::Matrix3d frame = frame_around(normal);
   Surroundings s;
@@ -42,7 +44,7 @@ Surroundings gather(const RayCaster& rays, const Transform& object_from_table, c
     if (rays.blocked(object_from_table * start, object_from_table.linear() * (kReach * direction))) {
       s.ambient += mutual;
     } else {
-      s.ambient += room(start, direction);
+      s.ambient += room(start, direction, colour);
       ++open;
     }
   }
@@ -54,7 +56,8 @@ Surroundings gather(const RayCaster& rays, const Transform& object_from_table, c
 
 }  // namespace
 
-RoomLight::RoomLight(const Object& object, const RayCaster& rays, const Transform& table_from_object)
+RoomLight::RoomLight(const Object& object, const RayCaster& rays, const Transform& table_from_object,
+                     ScreenColour colour)
     : vertices_(object.mesh.vertices.size()), table_(TableGrid::kAcross, TableGrid::kAcross, CV_32F) {
   const Transform object_from_table = table_from_object.inverse();
   const auto around_vertex = hemisphere(kVertexRays), over_table = hemisphere(kTableRays);
@@ -62,7 +65,7 @@ RoomLight::RoomLight(const Object& object, const RayCaster& rays, const Transfor
   parallel_for((vertices_.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
     for (std::size_t i = chunk * kChunk; i < std::min(vertices_.size(), (chunk + 1) * kChunk); ++i) {
       vertices_[i] = gather(rays, object_from_table, around_vertex, table_from_object * object.mesh.vertices[i],
-                            table_from_object.linear() * object.normals[i]);
+                            table_from_object.linear() * object.normals[i], colour);
     }
   });
   for (int i = 0; i < 4; ++i) average_with_neighbours(object.mesh.triangles, vertices_);
@@ -70,7 +73,7 @@ RoomLight::RoomLight(const Object& object, const RayCaster& rays, const Transfor
     const int j = static_cast<int>(row);
     for (int i = 0; i < TableGrid::kAcross; ++i) {
       table_.at<float>(j, i) =
-          gather(rays, object_from_table, over_table, TableGrid::node(i, j), Vector3d::UnitY()).openness;
+          gather(rays, object_from_table, over_table, TableGrid::node(i, j), Vector3d::UnitY(), colour).openness;
     }
   });
 }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/transform.h"
+#include "sim/scene/effects.h"
 #include "sim/scene/object.h"
 #include "sim/scene/ray_caster.h"
 
@@ -28,7 +29,8 @@ struct Surroundings {
 /// grid over the table.
 class RoomLight {
  public:
-  RoomLight(const Object& object, const RayCaster& rays, const Transform& table_from_object);
+  RoomLight(const Object& object, const RayCaster& rays, const Transform& table_from_object,
+            ScreenColour colour = ScreenColour::blue);
 
   [[nodiscard]] Surroundings at_vertex(int vertex) const { return vertices_[vertex]; }
   /// `x`, `z` in the table's own (turning) frame.

@@ -27,8 +27,9 @@ Result<std::unique_ptr<Scene>> Scene::create(const SceneOptions& options) {
   if (!materials) return pass_on(materials);
   object->materials = *materials;
   object->colour = materials->coloured(object->colour);
-  auto placements =
-      draw_placements(object->mesh, options.seed, options.poses, options.same_rest_twice, options.any_size);
+  auto placements = object->is_upright ? upright_placements(object->mesh, options.seed, options.poses, options.any_size)
+                                       : draw_placements(object->mesh, options.seed, options.poses,
+                                                         options.same_rest_twice, options.any_size);
   if (!placements) return pass_on(placements, object->name);
   return std::make_unique<Scene>(std::move(*object), std::move(*placements), options);
 }
@@ -49,13 +50,13 @@ Scene::Scene(Object object, std::vector<Transform> placements, const SceneOption
 
 const RoomLight& Scene::light_of(int pose) {
   auto& light = lights_[pose];
-  if (!light) light = std::make_unique<RoomLight>(object_, rays_, placements_[pose]);
+  if (!light) light = std::make_unique<RoomLight>(object_, rays_, placements_[pose], options_.profile.screen);
   return *light;
 }
 
 const BouncePaths& Scene::bounces_of(int pose) {
   auto& paths = bounces_[pose];
-  if (!paths) paths = std::make_unique<BouncePaths>(object_, rays_, placements_[pose]);
+  if (!paths) paths = std::make_unique<BouncePaths>(object_, rays_, placements_[pose], options_.profile.screen);
   return *paths;
 }
 
@@ -75,7 +76,10 @@ View Scene::look(int pose, double angle, double minutes) {
   const RigGeometry then = at_time(rig_.geometry, effects, options_.profile.is_cold ? WarmUp{minutes} : WarmUp{});
   const RigGeometry rig = rig_.table.is_ideal() ? then : against_table_motion(then, rig_.table, angle);
   ViewEffects added{.effects = effects,
-                    .handling = Handling::of_view(effects, options_.seed, options_.views, pose, to_degrees(angle))};
+                    .handling = options_.spoils_all ? Handling::all(effects)
+                                                    : Handling::of_view(effects, options_.seed, options_.views, pose,
+                                                                        to_degrees(angle)),
+                    .colour = options_.profile.screen};
   const Placed placed{object_, rays_, light_of(pose), added.handling.moved(placements_[pose]), rig_.rim_dots};
   std::optional<BounceLight> bounce;
   if (effects.interreflection > 0.0) {

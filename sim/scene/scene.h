@@ -16,7 +16,7 @@
 namespace scanrig::sim {
 
 struct SceneOptions {
-  std::filesystem::path object;  ///< OBJ, PLY or GLB; empty: the built-in figurine
+  std::filesystem::path object;  ///< OBJ, PLY or GLB, or an artefact's name; empty: the built-in figurine
   double height_mm = 100.0;      ///< see load_object
   std::uint64_t seed = 1;        ///< placements and noise
   int poses = 2;
@@ -27,6 +27,7 @@ struct SceneOptions {
   std::optional<RigVariation> rig = std::nullopt;  ///< a drawn rig; nothing: the default rig, without any error
   ChosenProfile profile{};                         ///< as declared: profile 1
   int views = 8;                                   ///< per pose: which of them handling spoils
+  bool spoils_all = false;                         ///< handling spoils every view: a source of single ones
 };
 
 /// Left and right image of one exposure, 8 bit BayerRG8.

@@ -8,6 +8,7 @@
 #include "sim/scene/profile.h"
 #include "sim/scene/random.h"
 #include "sim/scene/room_light.h"
+#include "sim/scene/screen_colour.h"
 
 namespace scanrig::sim {
 namespace {
@@ -41,7 +42,7 @@ double rim_dot_share(const Vector3d& in_table, double size, const RimDotErrors& 
   return std::clamp(inside / std::max(size, 0.1) + 0.5, 0.0, 1.0);
 }
 
-Backdrop::Backdrop() {
+Backdrop::Backdrop(ScreenColour colour) : albedo(on_screen(profile().backdrop_albedo, colour)) {
   const Vector3d aim(0.0, profile().aim_height_mm, 0.0);
   const double elevation = to_radians(profile().elevation_deg);
   normal = Vector3d(0.0, std::sin(elevation), std::cos(elevation));
@@ -52,7 +53,6 @@ Vector3f Backdrop::plain_light(const Vector3d& on_cloth) const {
   // Cloth lit a little less towards the sides and the floor.
   const double fall = (on_cloth - point).squaredNorm() / (300.0 * 300.0);
   const Surroundings free{Vector3f::Constant(0.8F), 1.0F};
-  const Vector3f albedo = Eigen::Map<const Vector3d>(profile().backdrop_albedo).cast<float>();
   return static_cast<float>(1.0 - 0.25 * fall) *
          albedo.cwiseProduct(RoomLight::irradiance(free, Vector3d(0.0, 0.5, 0.87)));
 }

@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <array>
 
+#include "sim/scene/effects.h"
+
 namespace scanrig::sim {
 
 inline constexpr int kRimDots = 40;
@@ -24,11 +26,12 @@ Eigen::Vector2d rim_dot_centre(int dot);
 /// Share of a rim dot under a sample `size` mm wide. `in_table`: point of the table top, in the table's frame.
 double rim_dot_share(const Eigen::Vector3d& in_table, double size, const RimDotErrors& errors);
 
-/// The blue cloth behind the table: a plane in the turntable frame that faces the default rig's cameras.
+/// The cloth behind the table: a plane in the turntable frame that faces the default rig's cameras.
 struct Backdrop {
-  Backdrop();
+  explicit Backdrop(ScreenColour colour = ScreenColour::blue);
 
   Eigen::Vector3d normal, point;
+  Eigen::Vector3f albedo;
 
   /// From `eye` along `way`, in lengths of it.
   [[nodiscard]] double distance(const Eigen::Vector3d& eye, const Eigen::Vector3d& way) const {
