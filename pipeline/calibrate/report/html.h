@@ -21,6 +21,8 @@ std::string table(const Row& head, const std::vector<Row>& rows);
 
 /// A drawing over its caption.
 std::string figure(const std::string& drawing, std::string_view caption, std::string_view style = "");
+/// The whole page, with the style of all reports.
+std::string page(std::string_view title, const std::string& content);
 /// Figures side by side.
 std::string row_of(const std::string& figures);
 

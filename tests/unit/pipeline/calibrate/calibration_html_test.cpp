@@ -7,6 +7,7 @@
 
 #include "pipeline/calibrate/report/drawing.h"
 #include "pipeline/calibrate/report/html.h"
+#include "tests/unit/pipeline/calibrate/well_formed.h"
 #include "tests/unit/pipeline/calibration/synthetic_board_rig.h"
 
 namespace scanrig {
@@ -40,24 +41,6 @@ const FolderCalibration& outcome_with_all() {
 }
 
 const CalibrationOrigin kOrigin{.date = "2026-11-25T09:00:00Z"};
-
-/// The first tag that has no partner; empty: well-formed.
-std::string unclosed(const std::string& page) {
-  std::vector<std::string> open;
-  static const std::regex kTag("<(/?)([a-z0-9]+)((?:\"[^\"]*\"|[^>\"])*?)(/?)>");
-  const std::string body = page.substr(page.find('\n'));  // after the document type
-  for (std::sregex_iterator tag(body.begin(), body.end(), kTag), end; tag != end; ++tag) {
-    if ((*tag)[4].length() > 0) continue;
-    if ((*tag)[1].length() == 0) {
-      open.push_back((*tag)[2]);
-    } else if (open.empty() || open.back() != (*tag)[2].str()) {
-      return (*tag)[0];
-    } else {
-      open.pop_back();
-    }
-  }
-  return open.empty() ? "" : open.back();
-}
 
 std::size_t count_of(const std::string& text, const std::string& piece) {
   std::size_t count = 0;
