@@ -45,6 +45,8 @@ void ProfileOptions::add_to(CLI::App& app, bool has_object) {
   if (!has_object) return;
   app.add_option("--with", with,
                  "Also faint-dots; what hands do to one view: creep, rock, finger, overexposed, sticker, shadow");
+  app.add_option("--screen", screen, "Colour of screen and table: blue, green, or none for a grey room")
+      ->capture_default_str();
   app.add_option("--material", material, "Of the object, of the workshop satin; several joined by + in patches");
 }
 
@@ -59,6 +61,10 @@ Result<ChosenProfile> ProfileOptions::chosen() const {
     return fail(ErrorCode::out_of_range, "--gamma {}: choose 0.3 to 1", gamma);
   }
   ChosenProfile chosen{.effects = *effects, .material = material, .coding = {.gamma = gamma}, .is_cold = is_cold};
+  if (screen != "blue" && screen != "green" && screen != "none") {
+    return fail(ErrorCode::not_found, "--screen {}: choose blue, green or none", screen);
+  }
+  if (screen != "blue") chosen.screen = screen == "green" ? ScreenColour::green : ScreenColour::none;
   if (const auto known = Materials::named(chosen.material_name(), chosen.effects); !known) return pass_on(known);
   return chosen;
 }

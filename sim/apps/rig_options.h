@@ -20,7 +20,7 @@ struct DrawnRigOptions {
 
 /// Options of the command line for the profile of the simulated rig. They refer to this object.
 struct ProfileOptions {
-  std::string profile = "laboratory", without, with, material;
+  std::string profile = "laboratory", without, with, material, screen = "blue";
   double gamma = 1.0;
   bool is_cold = false;
 

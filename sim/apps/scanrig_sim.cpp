@@ -10,6 +10,7 @@
 #include "sim/apps/scanrig_sim_ctl.h"
 #include "sim/apps/shoot.h"
 #include "sim/apps/shoot_board.h"
+#include "sim/apps/shoot_flats.h"
 #include "sim/apps/wire_rig.h"
 #include "sim/wire/control_socket.h"
 #include "sim/wire/loopback.h"
@@ -31,7 +32,8 @@ struct ShootVerb {
 
 /// The object on the table and the resolution of its images.
 void add_scene(CLI::App& app, sim::SceneOptions& scene) {
-  app.add_option("--object", scene.object, "OBJ, PLY or GLB file; the built-in figurine if not given");
+  app.add_option("--object", scene.object,
+                 "OBJ, PLY or GLB file; sphere, ball-bar, plane or step-gauge; the built-in figurine if not given");
   app.add_option("--height-mm", scene.height_mm, "Largest extent of the object")->capture_default_str();
   app.add_option("--seed", scene.seed, "Placements, noise and table errors")->capture_default_str();
   app.add_option("--scale", scene.image_scale, "Resolution, as a share of 1280x960")->capture_default_str();
@@ -66,6 +68,7 @@ void add_shoot(CLI::App& app, ShootVerb& verb, Chosen& chosen) {
   shoot->add_option("--views", options.views, "Table angles per pose")->check(CLI::Range(1, 99))->capture_default_str();
   verb.rig.add_to(*shoot);
   verb.profile.add_to(*shoot, true);
+  shoot->add_flag("--spoil-all", options.scene.spoils_all, "Handling spoils every view, not one of a scan");
   shoot->add_option("--calibration", options.calibration,
                     "A calibration.json solved from the images of shoot-board with the same profile and rig");
   shoot->add_flag("--true-calibration", verb.is_calibration_true, "The exact calibration, which no workshop has");
@@ -80,6 +83,33 @@ void add_shoot_board(CLI::App& app, sim::ShootBoardOptions& verb, Chosen& chosen
     chosen = [&]() -> Result<void> {
       const auto options = verb.chosen();
       return options ? sim::shoot_board(*options, verb.folder) : pass_on(options);
+    };
+  });
+}
+
+struct FlatsVerb {
+  sim::ShootFlatsOptions options;
+  sim::ProfileOptions profile;
+  std::string folder;
+};
+
+void add_shoot_flats(CLI::App& app, FlatsVerb& verb, Chosen& chosen) {
+  auto* shoot = app.add_subcommand(
+      "shoot-flats", "Render flat images of both cameras, with their truth; see docs/reference/characterisation.md");
+  shoot->add_option("--out", verb.folder, "The folder to make")->required();
+  shoot->add_option("--seed", verb.options.seed, "Noise, drift and flicker")->capture_default_str();
+  shoot->add_option("--scale", verb.options.image_scale, "Resolution, as a share of 1280x960")->capture_default_str();
+  shoot->add_option("--exposures-us", verb.options.exposures_us, "Second last: 70 % of full scale; last: saturated")
+      ->delimiter(',')
+      ->capture_default_str();
+  shoot->add_option("--dark-pairs", verb.options.dark_pairs, "Pairs with covered lenses")->capture_default_str();
+  verb.profile.add_to(*shoot, false);
+  shoot->callback([&] {
+    chosen = [&]() -> Result<void> {
+      auto profile = verb.profile.chosen();
+      if (!profile) return pass_on(profile);
+      verb.options.profile = std::move(*profile);
+      return sim::shoot_flats(verb.options, verb.folder);
     };
   });
 }
@@ -193,6 +223,7 @@ int main(int argc, char** argv) {
   Chosen chosen;
   ShootVerb shoot_verb;
   sim::ShootBoardOptions board_verb;
+  FlatsVerb flats_verb;
   RigVerb rig_verb;
   rig_verb.options.toml.drive = "leadshine-rs";
   rig_verb.options.toml.panel = "gpio";
@@ -200,6 +231,7 @@ int main(int argc, char** argv) {
   std::vector<std::string> command;
   add_shoot(app, shoot_verb, chosen);
   add_shoot_board(app, board_verb, chosen);
+  add_shoot_flats(app, flats_verb, chosen);
   add_rig(app, rig_verb, chosen);
   add_control(app, control_verb, chosen);
   add_own_network(app, command, chosen);
