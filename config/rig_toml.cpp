@@ -4,7 +4,10 @@
 #include <toml++/toml.h>
 
 #include <algorithm>
+#include <array>
 #include <sstream>
+#include <utility>
+#include <vector>
 
 namespace scanrig::config {
 namespace {
@@ -250,7 +253,62 @@ std::string rest(const RigConfig& rig) {
   return text;
 }
 
+/// The lines of one table, the comment before it included; the head of the file has no name.
+struct TableText {
+  std::string name;  ///< "recipe" of [recipe.small]
+  std::string text;
+};
+
+/// "recipe" of "[recipe.small]" and "[[recipe]]"; empty for another line.
+std::string table_name(std::string_view line) {
+  if (line.empty() || line.front() != '[') return "";
+  const auto begin = line.find_first_not_of("[ \"'");
+  if (begin == std::string_view::npos) return "";
+  return std::string(line.substr(begin, line.find_first_of(". ]\"'", begin) - begin));
+}
+
+std::vector<TableText> tables_of(const std::string& text) {
+  std::vector<TableText> tables(1);
+  std::string comment;  // lines that belong to the table that follows
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    if (auto name = table_name(line); !name.empty()) {
+      tables.push_back({std::move(name), std::exchange(comment, "") + line + "\n"});
+    } else if (line.starts_with('#') && tables.size() > 1) {
+      comment += line + "\n";
+    } else {
+      tables.back().text += std::exchange(comment, "") + line + "\n";
+    }
+  }
+  tables.back().text += comment;
+  return tables;
+}
+
+bool is_of_devices(const TableText& table) {
+  constexpr std::array kNames{"", "safety", "turntable", "projector", "stereo_camera", "panel", "gpio"};
+  return std::ranges::find(kNames, table.name) != kNames.end();
+}
+
+/// Without empty lines at the end.
+void add_table(const TableText& table, std::string& text) {
+  while (text.ends_with("\n\n")) text.pop_back();
+  if (!text.empty()) text += "\n";
+  text += table.text;
+}
+
 }  // namespace
+
+std::string with_other_tables(const std::string& found, const std::string& present) {
+  std::string text;
+  for (const auto& table : tables_of(found)) {
+    if (is_of_devices(table)) add_table(table, text);
+  }
+  for (const auto& table : tables_of(present)) {
+    if (!is_of_devices(table)) add_table(table, text);
+  }
+  while (text.ends_with("\n\n")) text.pop_back();
+  return text;
+}
 
 std::string rig_toml(const RigConfig& rig) {
   return "# Written by scanrig setup. Every key: docs/guide/configure.md; the shipped example has more of them.\n"

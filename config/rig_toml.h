@@ -11,4 +11,8 @@ namespace scanrig::config {
 /// profile. Left out, so at their defaults: quiet hours, webhook, board, limits of the recipes, packets, regions.
 std::string rig_toml(const RigConfig& rig);
 
+/// `found`, a text of rig_toml(), but with those tables of `present` that are not about devices, as they are written
+/// there. Tables of devices: safety, turntable, projector, stereo_camera, panel, gpio.
+std::string with_other_tables(const std::string& found, const std::string& present);
+
 }  // namespace scanrig::config

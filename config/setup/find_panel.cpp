@@ -178,8 +178,7 @@ class ModuleWiring {
 };
 
 Result<PanelWiring> wiring_of_module(const discovery::SerialDevice& module, const Dialogue& dialogue, Clock& clock) {
-  const auto begun =
-      dialogue.prompt("Close the guard and release every button and the emergency stop, then press Enter.");
+  const auto begun = dialogue.wait_until_done("Close the guard and release every button and the emergency stop");
   if (!begun) return pass_on(begun);
   IoModuleProbe probe(module.line, clock);
   if (auto there = probe.begin(); !there) return pass_on(there, "setup");

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "config/rig_toml.h"
+#include "config/setup/camera_images.h"
 #include "config/setup/find_panel.h"
 #include "core/files.h"
 #include "drivers/camera/camera_list.h"
@@ -29,11 +30,12 @@ constexpr int kHomingEnabled = 22;  ///< GRBL's setting $22
 }  // namespace
 
 Result<RigConfig> Setup::run() {
+  read_present();
   for (const auto step : {&Setup::find_serial_devices, &Setup::find_turntable, &Setup::find_panel,
                           &Setup::find_projector, &Setup::find_cameras}) {
     if (auto done = (this->*step)(); !done) return pass_on(done);
   }
-  choose_rest();
+  if (present_.empty()) choose_rest();
   if (auto saved = save(); !saved) return pass_on(saved);
   return rig_;
 }
@@ -41,7 +43,9 @@ Result<RigConfig> Setup::run() {
 Result<void> Setup::save() const {
   auto draft = options_.out;
   draft += ".new";
-  if (auto written = write_file_atomically(draft, rig_toml(rig_)); !written) return written;
+  const auto found = rig_toml(rig_);
+  const auto text = present_.empty() ? found : with_other_tables(found, present_);
+  if (auto written = write_file_atomically(draft, text); !written) return written;
   const auto read = read_rig_config(draft);
   std::error_code ignored;
   std::filesystem::remove(draft, ignored);
@@ -49,12 +53,37 @@ Result<void> Setup::save() const {
   return fail(ErrorCode::internal, "setup: what was found makes no valid rig.toml: {}", read.error().message);
 }
 
+/// The named ports, then those of this machine that are not among them under another name.
+std::vector<std::string> ports_to_check(std::vector<std::string> ports) {
+  const auto place = [](const std::string& port) {
+    std::error_code error;
+    auto real = std::filesystem::weakly_canonical(port, error);
+    return error ? std::filesystem::path(port) : real;
+  };
+  for (auto& port : discovery::serial_ports()) {
+    const auto is_same = [&](const std::string& named) { return place(named) == place(port); };
+    if (std::ranges::none_of(ports, is_same)) ports.push_back(std::move(port));
+  }
+  return ports;
+}
+
+void Setup::read_present() {
+  if (options_.present.empty()) return;
+  auto read = read_rig_config(options_.present);
+  if (!read) {
+    dialogue_.tell(fmt::format("{} cannot be used and is replaced as a whole.", options_.present.string()));
+    return;
+  }
+  present_ = read->text;
+  rig_ = *std::move(read);
+  rig_.gpio_socket.reset();
+}
+
 Result<void> Setup::find_serial_devices() {
   auto profiles = read_drive_profiles(options_.out);
   if (!profiles) return pass_on(profiles);
   profiles_ = *std::move(profiles);
-  auto ports = options_.ports;
-  for (auto& port : discovery::serial_ports()) ports.push_back(std::move(port));
+  const auto ports = ports_to_check(options_.ports);
   for (const auto& port : ports) {
     dialogue_.tell(fmt::format("Checking what is connected to {}.", port));
     auto device = discovery::find_serial_device(port, profiles_, clock_);
@@ -155,6 +184,10 @@ Result<void> Setup::find_panel() {
   rig_.panel.io_module.reply_timeout = kReplyTimeout;
   rig_.safety.estop = wiring->estop;
   rig_.safety.guard = wiring->guard;
+  if (!rig_.safety.guard) {  // what only a guard allows
+    rig_.safety.remote_start = false;
+    rig_.safety.home_after_restart = SafetyConfig::HomeAfterRestart::on_reset;
+  }
   lights_ = std::move(wiring->lights);
   return {};
 }
@@ -199,6 +232,22 @@ std::string first_of(const std::vector<std::string>& offered, const std::vector<
   return like == offered.end() ? "" : *like;
 }
 
+/// A format with colour. Fails with `unsupported`.
+Result<std::string> colour_format(const std::string& serial, const CameraCapabilities& camera) {
+  auto format = first_of(camera.pixel_formats,
+                         {"BayerRG8", "BayerGR8", "BayerGB8", "BayerBG8", "RGB8", "BGR8", "YUV422_8"}, "Bayer");
+  if (!format.empty()) return format;
+  return fail(ErrorCode::unsupported,
+              "setup: camera {} has no colour format ({}); colour separates the object from the blue screen", serial,
+              fmt::join(camera.pixel_formats, ", "));
+}
+
+template <class T>
+std::vector<T> without(std::vector<T> all, std::size_t index) {
+  if (index < all.size()) all.erase(all.begin() + static_cast<std::ptrdiff_t>(index));
+  return all;
+}
+
 Result<void> Setup::find_cameras() {
   dialogue_.tell("Looking for cameras.");
   const auto found = find_aravis_cameras();
@@ -208,38 +257,42 @@ Result<void> Setup::find_cameras() {
                 "(scanrig camera list), then run setup again. V4L2 cameras are named by hand in rig.toml",
                 found.size());
   }
+  const auto capabilities = aravis_capabilities(found[0].serial);
+  if (!capabilities) return pass_on(capabilities, "setup");
+  const auto format = colour_format(found[0].serial, *capabilities);
+  if (!format) return pass_on(format);
   std::vector<std::string> names;
   for (const auto& camera : found)
     names.push_back(fmt::format("{} {} at {}", camera.name, camera.serial, camera.where));
-  const auto left = dialogue_.choose("Which camera is on the left, seen from behind both cameras?", names);
+  CameraImages images;
+  if (!options_.images.empty()) images = take_images(found, *format, options_.images, clock_);
+  if (!images.trouble.empty()) dialogue_.tell(fmt::format("No image of each camera: {}.", images.trouble));
+  const auto left =
+      dialogue_.choose("Which camera is on the left, seen from behind both cameras?", names, images.files);
   if (!left) return pass_on(left);
-  auto others = names;
-  others.erase(others.begin() + static_cast<std::ptrdiff_t>(*left));
-  const auto other = dialogue_.choose("Which camera is on the right?", others);
+  const auto other =
+      dialogue_.choose("Which camera is on the right?", without(names, *left), without(images.files, *left));
   if (!other) return pass_on(other);
-  const std::size_t right = *other < *left ? *other : *other + 1;
+  return use_cameras(found[*left], found[*other < *left ? *other : *other + 1]);
+}
+
+Result<void> Setup::use_cameras(const FoundCamera& left, const FoundCamera& right) {
   auto& options = rig_.stereo_camera.aravis;
+  rig_.stereo_camera.driver = StereoCameraConfig::Driver::aravis;
   const auto use = [&](const FoundCamera& camera) -> AravisSensorOptions {
     return {camera.serial, camera.kind == "GigEVision" ? camera.where : ""};
   };
-  options.left = use(found[*left]);
-  options.right = use(found[right]);
-  const auto capabilities = aravis_capabilities(options.left.serial);
+  options.left = use(left);
+  options.right = use(right);
+  const auto capabilities = aravis_capabilities(left.serial);
   if (!capabilities) return pass_on(capabilities, "setup");
-  options.pixel_format =
-      first_of(capabilities->pixel_formats,
-               {"BayerRG8", "BayerGR8", "BayerGB8", "BayerBG8", "RGB8", "BGR8", "YUV422_8"}, "Bayer");
-  if (options.pixel_format.empty()) {
-    return fail(ErrorCode::unsupported,
-                "setup: camera {} has no colour format ({}); colour separates the object from the blue screen",
-                options.left.serial, fmt::join(capabilities->pixel_formats, ", "));
-  }
+  auto format = colour_format(left.serial, *capabilities);
+  if (!format) return pass_on(format);
+  options.pixel_format = *std::move(format);
   const bool stays_on = rig_.projector.driver == ProjectorConfig::Driver::manual;
   options.trigger_source = stays_on ? "Software" : first_of(capabilities->trigger_sources, {"Line0", "Line1"}, "Line");
-  if (options.trigger_source.empty()) {
-    return fail(ErrorCode::unsupported, "setup: camera {} has no trigger input", options.left.serial);
-  }
-  return {};
+  if (!options.trigger_source.empty()) return {};
+  return fail(ErrorCode::unsupported, "setup: camera {} has no trigger input", left.serial);
 }
 
 void Setup::choose_rest() {

@@ -8,6 +8,7 @@
 #include "config/setup/dialogue.h"
 #include "config/setup/setup_options.h"
 #include "core/clock.h"
+#include "drivers/camera/camera_list.h"
 #include "drivers/discovery/serial_devices.h"
 
 namespace scanrig::config::setup {
@@ -28,6 +29,8 @@ class Setup {
   void reverse_sign() { motion().scale.positive_ccw = !motion().scale.positive_ccw; }
 
  private:
+  /// Begins with the file that is there, where it can be read.
+  void read_present();
   Result<void> find_serial_devices();
   Result<void> find_turntable();
   Result<void> use_drive(const discovery::SerialDevice& device);
@@ -36,6 +39,7 @@ class Setup {
   Result<void> find_panel();
   Result<void> find_projector();
   Result<void> find_cameras();
+  Result<void> use_cameras(const FoundCamera& left, const FoundCamera& right);
   void choose_rest();
 
   AxisTurntableOptions& motion() {
@@ -47,6 +51,7 @@ class Setup {
   const Dialogue& dialogue_;
   Clock& clock_;
   RigConfig rig_;
+  std::string present_{};  ///< text of the file that is there; empty: none that can be used
   std::map<std::string, DriveProfile> profiles_;
   std::vector<discovery::SerialDevice> controllers_;  ///< drives and GRBL
   std::vector<discovery::SerialDevice> modules_;

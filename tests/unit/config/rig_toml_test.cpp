@@ -8,6 +8,7 @@ namespace scanrig::config {
 namespace {
 
 using testing::HasSubstr;
+using testing::Not;
 
 class RigToml : public RigFile {
  protected:
@@ -115,6 +116,30 @@ TEST_F(RigToml, V4l2CamerasAreNamedByDeviceOrSerialNumber) {
 
 TEST_F(RigToml, AKeyThatAPersonMayChangeHasAComment) {
   EXPECT_THAT(rig_toml(example()), HasSubstr("# motor turns per table turn"));
+}
+
+TEST_F(RigToml, WhatIsNotAboutDevicesStaysAsItIsWritten) {
+  auto old = example();
+  old.turntable.modbus.scale.gear_ratio = 77;
+  old.api.tokens = "/ours/tokens.json";
+  old.api.http_port = 8090;
+  old.storage.root = "/ours/jobs";
+  old.gpio_socket = "/ours/gpio.sock";
+  const std::string recipe =
+      "# Small parts first.\n[recipe.small]\nviews = 4  # few\nposes = 1\nflip_timeout_min = 30\n";
+  const auto present = rig_toml(old) + "\n" + recipe;
+  auto found = example();
+  found.turntable.modbus.scale.gear_ratio = 90;
+  const auto text = with_other_tables(rig_toml(found), present);
+  for (const auto& kept : {recipe, std::string("root = \"/ours/jobs\""), std::string("http_port = 8090")})
+    EXPECT_THAT(text, HasSubstr(kept));
+  for (const auto* gone : {"gear_ratio = 77", "gpio.sock"}) EXPECT_THAT(text, Not(HasSubstr(gone)));
+  const auto again = read(text);
+  ASSERT_TRUE(again) << again.error().message << "\n" << text;
+  EXPECT_EQ(again->turntable.motion().scale.gear_ratio, 90);
+  EXPECT_EQ(again->recipes.at("small").views, 4);
+  EXPECT_EQ(again->api.http_port, 8090);
+  EXPECT_EQ(with_other_tables(text, text), text) << "done twice, the same";
 }
 
 }  // namespace
