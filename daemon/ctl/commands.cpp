@@ -225,6 +225,7 @@ void add_doctor(CLI::App& app, Chosen& chosen) {
   sub->add_option("--machine-root", verb->machine_root)->group("");  // tests only
   sub->add_flag("--yes-move", verb->yes_move)->group("");            // old name
   sub->add_flag("--answers", verb->answers)->group("");              // old name
+  sub->add_flag("--page", verb->page)->group("");                    // for the service only
   sub->add_flag("--json", verb->json, "print JSON");
   sub->callback([&chosen, verb] { chosen = [verb] { return examine_rig(*verb); }; });
 }
@@ -241,6 +242,9 @@ void add_setup(CLI::App& app, Chosen& chosen) {
       ->capture_default_str()
       ->check(CLI::Range(0, 65535));
   sub->add_flag("--interactive", verb->answers, "replies come on standard input although it is no terminal");
+  sub->add_flag("--page", verb->page)->group("");  // for the service only, as the next two
+  sub->add_option("--present", verb->options.present)->group("");
+  sub->add_option("--images", verb->options.images)->group("");
   sub->callback([&chosen, verb] { chosen = [verb] { return set_up(*verb); }; });
 }
 
@@ -275,6 +279,28 @@ void add_camera(CLI::App& app, Chosen& chosen) {
   }
 }
 
+void add_characterise(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<CharacteriseVerb>();
+  auto* sub = app.get_subcommand("camera")->add_subcommand(
+      "characterise", "gain, noise, black level and hot pixels from images of a sheet of paper");
+  auto* from = sub->add_option("--from", verb->from, "folder of flat images; else they are taken at the rig");
+  sub->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
+  sub->add_option("--out", verb->out, "the file to write (default: characterisation.json beside the calibration)");
+  sub->add_option("--images", verb->images, "at the rig: new folder for the images")
+      ->capture_default_str()
+      ->excludes(from);
+  sub->add_option("--light", verb->light, "at the rig: what the projector does")
+      ->check(CLI::IsMember({"none", "plain"}))
+      ->capture_default_str();
+  sub->add_option("--gain", verb->gain, "at the rig: instead of the configuration's")->excludes(from);
+  sub->add_option("--gamma", verb->gamma, "with which the camera codes its values, as 0.45")
+      ->check(CLI::Range(0.2, 1.0))
+      ->capture_default_str();
+  sub->add_flag("--interactive", verb->answers, "replies come on standard input although it is no terminal");
+  sub->add_flag("--json", verb->json, "print JSON");
+  sub->callback([&chosen, verb] { chosen = [verb] { return characterise_cameras(*verb); }; });
+}
+
 /// Started by the tools that move the table, on their socket.
 void add_guardian(CLI::App& app, Chosen& chosen) {
   const auto config = std::make_shared<std::filesystem::path>();
@@ -292,6 +318,7 @@ void add_rig_commands(CLI::App& app, Chosen& chosen) {
   add_projector(app, chosen);
   add_doctor(app, chosen);
   add_camera(app, chosen);
+  add_characterise(app, chosen);
   add_guardian(app, chosen);
 }
 

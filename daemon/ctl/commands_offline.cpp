@@ -41,6 +41,27 @@ void add_board(CLI::App& app, Chosen& chosen) {
   sub->callback([&chosen, verb, ignored] { chosen = [verb] { return board(*verb); }; });
 }
 
+void add_range(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<RangeVerb>();
+  auto* sub = app.add_subcommand("range", "measure one stereo pair of anybody's cameras: disparity, depth, sigma");
+  sub->add_option("LEFT", verb->left, "the left image: PNG or TIFF, 8 to 16 bits")->required();
+  sub->add_option("RIGHT", verb->right, "the right image")->required();
+  sub->add_option("--out", verb->out, "new folder for disparity.tiff, depth.tiff, sigma.tiff and colours.png")
+      ->required();
+  auto* calibration = sub->add_option("--calibration", verb->calibration, "calibration.json, or a folder that has one");
+  sub->add_flag("--rectified", verb->rectified, "the rows of both images correspond already")->excludes(calibration);
+  sub->add_option("--focal", verb->focal_px, "focal length of a rectified pair, pixels")->excludes(calibration);
+  sub->add_option("--baseline", verb->baseline_mm, "distance of its cameras, mm")->excludes(calibration);
+  sub->add_option("--centre", verb->centre, "its principal point, pixels (default: the image's middle)")
+      ->expected(2)
+      ->excludes(calibration);
+  sub->add_option("--disparities", verb->disparities,
+                  "lowest and highest, pixels (default: of the working volume; rectified: 0 to a quarter of the width)")
+      ->expected(2);
+  sub->add_flag("--json", verb->json, "print JSON");
+  sub->callback([&chosen, verb] { chosen = [verb] { return range(*verb); }; });
+}
+
 void add_evaluate(CLI::App& app, Chosen& chosen) {
   const auto verb = std::make_shared<EvaluateVerb>();
   auto* sub = app.add_subcommand("evaluate", "compare a model with the truth of a simulated scan");
@@ -48,6 +69,40 @@ void add_evaluate(CLI::App& app, Chosen& chosen) {
   sub->add_option("--model", verb->model, "the model's folder (default: DIR/model)");
   sub->add_flag("--json", verb->json, "print JSON");
   sub->callback([&chosen, verb] { chosen = [verb] { return evaluate(*verb); }; });
+}
+
+void add_acceptance(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<AcceptanceVerb>();
+  auto* sub = app.add_subcommand("acceptance", "measure a calibrated artefact in models of it: VDI/VDE 2634");
+  sub->require_subcommand(1);
+  const auto add = [&](const char* name, const char* description) {
+    auto* action = add_action(*sub, chosen, name, description, verb, &measure_artefact);
+    action->add_option("MODEL", verb->models, "mesh, folder of a model or scan, or job; several: repeated measurements")
+        ->required();
+    action->add_option("--limit", verb->limits, "NAME=MM: form, size, spacing, flatness or step; beyond it ends with 8")
+        ->allow_extra_args(false);
+    action->add_option("--report", verb->report, "new page to write, as .html");
+    action->add_option("--jobs", verb->jobs, "folder of all jobs (default: the one that the configuration names)");
+    action->add_option("--config", verb->config, "the rig's configuration")->capture_default_str();
+    action->add_flag("--json", verb->json, "print JSON");
+    return action;
+  };
+  auto* sphere = add("sphere", "one ball: probing error, form and size");
+  auto* bar = add("ball-bar", "two balls: sphere spacing error, and each ball");
+  auto* flat = add("plane", "the largest flat face: flatness measurement error");
+  auto* steps = add("step-gauge", "parallel faces: errors of their heights");
+  for (auto* action : {sphere, bar}) {
+    action->add_option("--diameter", verb->diameter_mm, "of a ball, mm, as calibrated")->required();
+  }
+  bar->add_option("--length", verb->length_mm, "between the balls' centres, mm, as calibrated")->required();
+  steps->add_option("--heights", verb->heights_mm, "of the steps over the lowest one, mm, as calibrated: 20,30,35")
+      ->required()
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  for (auto* action : {sphere, bar, flat, steps}) {
+    action->add_option("--uncertainty", verb->uncertainty_mm,
+                       "of the calibration, mm, k = 2, as the certificate states it");
+  }
 }
 
 void add_import(CLI::App& app, Chosen& chosen) {
@@ -137,7 +192,9 @@ void add_reference(CLI::App& app, Chosen& chosen) {
 
 void add_offline_commands(CLI::App& app, Chosen& chosen) {
   add_reconstruct(app, chosen);
+  add_range(app, chosen);
   add_evaluate(app, chosen);
+  add_acceptance(app, chosen);
   add_import(app, chosen);
   add_convert(app, chosen);
   add_board(app, chosen);

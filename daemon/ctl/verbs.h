@@ -165,12 +165,41 @@ struct ConvertVerb {
 };
 ExitCode convert(const ConvertVerb& verb);
 
+struct RangeVerb {
+  std::filesystem::path left, right;  ///< PNG or TIFF, 8 to 16 bits, grey or colour
+  std::filesystem::path calibration;  ///< a calibration.json, or a folder with one; empty: `rectified`
+  std::filesystem::path out;          ///< the folder to make
+  bool rectified = false;             ///< rows correspond already
+  double focal_px = 0.0;              ///< of a rectified pair
+  double baseline_mm = 0.0;           ///< of a rectified pair
+  std::vector<double> centre;         ///< of a rectified pair: principal point of both images, px; empty: the middle
+  std::vector<int> disparities;       ///< lowest and highest, px; empty: of the working volume, or 0 to width / 4
+  bool json = false;
+};
+/// Measures one stereo pair: disparity.tiff (px), depth.tiff and sigma.tiff (mm), colours.png.
+ExitCode range(const RangeVerb& verb);
+
 struct EvaluateVerb {
   std::filesystem::path scan;
   std::filesystem::path model;  ///< empty: `model` in the scan folder
   bool json = false;
 };
 ExitCode evaluate(const EvaluateVerb& verb);
+
+struct AcceptanceVerb {
+  std::string what;                           ///< "sphere", "ball-bar", "plane", "step-gauge"
+  std::vector<std::filesystem::path> models;  ///< meshes, folders of models or scans, jobs
+  double diameter_mm = 0.0, length_mm = 0.0;
+  std::vector<double> heights_mm;
+  double uncertainty_mm = 0.0;      ///< k = 2, of these
+  std::vector<std::string> limits;  ///< "NAME=MM"
+  std::filesystem::path report;     ///< empty: none
+  std::filesystem::path jobs;       ///< of jobs by their id; empty: the folder that `config` names
+  std::filesystem::path config = "/etc/scanrig/rig.toml";
+  bool json = false;
+};
+/// What the scanner makes of a calibrated artefact. `below_limits` when a limit is missed.
+ExitCode measure_artefact(const AcceptanceVerb& verb);
 
 struct ImportVerb {
   std::vector<std::filesystem::path> conf;  ///< one per pose
@@ -249,9 +278,24 @@ struct CameraVerb {
 /// `preview` uses a running daemon; the others need the cameras for themselves.
 ExitCode camera(const CameraVerb& verb);
 
+struct CharacteriseVerb {
+  std::filesystem::path from;  ///< folder of flat images; empty: they are taken at the rig
+  std::filesystem::path config = "/etc/scanrig/rig.toml";
+  std::filesystem::path out;               ///< empty: beside the calibration that `config` names, else here
+  std::filesystem::path images = "flats";  ///< at the rig: new folder for what is taken
+  std::string light = "none";              ///< projector mode: none, plain
+  std::optional<double> gain;              ///< instead of the configuration's
+  double gamma = 1.0;
+  bool answers = false;  ///< replies come on standard input although it is no terminal
+  bool json = false;
+};
+/// Noise, gain and defects of both cameras from flat images.
+ExitCode characterise_cameras(const CharacteriseVerb& verb);
+
 struct SetupVerb {
   config::setup::SetupOptions options;
   bool answers = false;  ///< replies come on standard input
+  bool page = false;     ///< run by the service, for a person at the page: options.out is a draft
 };
 /// Finds what is connected, prompts for the rest, writes a rig.toml and lets the doctor examine the rig.
 ExitCode set_up(const SetupVerb& verb);
@@ -261,6 +305,7 @@ struct DoctorVerb {
   bool yes_move = false;  ///< the table may be turned
   bool answers = false;   ///< a person at the rig replies on standard input although it is no terminal
   bool json = false;
+  bool page = false;                   ///< run by the service, for a person at the page: the table does not turn
   std::filesystem::path machine_root;  ///< tests only: /proc and /sys are read below it
 };
 /// `device` when there is a finding.

@@ -1,16 +1,16 @@
-#include <cmath>
+#include <array>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "core/files.h"
 #include "core/image_codec.h"
 #include "core/signal_stop.h"
+#include "daemon/ctl/camera_bench.h"
 #include "daemon/ctl/client.h"
-#include "daemon/ctl/offline_rig_config.h"
 #include "daemon/ctl/verbs.h"
-#include "daemon/rig/open_devices.h"
 #include "daemon/rig/preview.h"
 #include "drivers/camera/camera_list.h"
+#include "pipeline/characterise/characterisation_file.h"
 
 namespace scanrig::ctl {
 namespace {
@@ -19,62 +19,7 @@ using std::chrono::milliseconds;
 using std::chrono::seconds;
 
 constexpr seconds kConnectLimit{10};
-constexpr seconds kExposureLimit{2};
 constexpr milliseconds kPeriod{200};
-constexpr int kTries = 4;
-
-/// The cameras, and their light, of a rig that no daemon uses.
-class Bench {
- public:
-  static Result<std::unique_ptr<Bench>> open(const CameraVerb& verb) {
-    auto rig = offline_rig_config(verb.config);
-    if (!rig) return pass_on(rig);
-    auto& camera = rig->stereo_camera;
-    if (camera.driver == config::StereoCameraConfig::Driver::simulated) {
-      return fail(ErrorCode::unsupported, "{}: simulated cameras belong to scanrigd-sim", verb.config.string());
-    }
-    if (verb.exposure_us) camera.aravis.exposure = camera.v4l2.exposure = std::chrono::microseconds(*verb.exposure_us);
-    if (verb.gain) {
-      camera.aravis.gain = verb.gain;
-      camera.v4l2.gain = static_cast<int>(std::lround(*verb.gain));
-    }
-    std::unique_ptr<Bench> bench(new Bench(std::move(*rig)));
-    auto devices = open_devices(bench->rig_, bench->clock_);
-    if (!devices) return pass_on(devices);
-    bench->devices_ = std::move(*devices);
-    const auto ready = bench->devices_.camera->prepare(Deadline::after(bench->clock_, kConnectLimit));
-    if (!ready) return tl::unexpected(of_device(ready.error()));
-    return bench;
-  }
-
-  /// `light`: none, pattern or plain. A bad exposure is retaken, as the daemon does.
-  Result<StereoFrame> expose(const std::string& light) {
-    auto pair = expose_once(light);
-    for (int i = 1; i < kTries && !pair; ++i) {
-      if (pair.error().code != ErrorCode::timeout && pair.error().code != ErrorCode::protocol) break;
-      pair = expose_once(light);
-    }
-    return std::move(pair).map_error(of_device);
-  }
-  Clock& clock() { return clock_; }
-
- private:
-  explicit Bench(config::RigConfig rig) : rig_(std::move(rig)) {}
-  Deadline deadline() { return Deadline::after(clock_, kExposureLimit); }
-
-  Result<StereoFrame> expose_once(const std::string& light) {
-    auto& camera = *devices_.camera;
-    if (light == "none") return camera.capture_preview(deadline());
-    if (auto armed = camera.arm(deadline()); !armed) return pass_on(armed);
-    const auto fired = devices_.projector->fire(light == "plain" ? Light::plain : Light::pattern, deadline());
-    if (!fired) return pass_on(fired);
-    return camera.collect(deadline());
-  }
-
-  const config::RigConfig rig_;
-  RealClock clock_;
-  OpenDevices devices_;
-};
 
 /// Prints at once; on one line, if not indented.
 void print_json(const nlohmann::ordered_json& all, int indent = -1) {
@@ -103,26 +48,47 @@ void tell_files(const CameraVerb& verb, const std::filesystem::path& left, const
   fmt::print("{}\n{}\n", left.string(), right.string());
 }
 
+/// Brightness below which an image is dim, by the noise of each camera, 0 to 1.
+using DimLimits = std::array<double, 2>;
+
+/// Of the rig's cameras, as they are characterised; a file of other cameras is named, and not used.
+DimLimits dim_limits(const config::RigConfig& rig) {
+  constexpr double kUnknown = 0.03, kReadNoises = 10.0, kFullScale = 255.0;
+  DimLimits limits{kUnknown, kUnknown};
+  const auto [left, right] = rig.stereo_camera.serials();
+  const auto file = rig.calibration_file.parent_path() / kCharacterisationFile;
+  for (const auto& [side, serial] : {std::pair(0U, left), std::pair(1U, right)}) {
+    const auto noise = noise_model_of(file, serial);
+    if (!noise) fmt::print(stderr, "{}\n", as_sentence(noise.error().message));
+    if (!noise || !noise->is_measured) continue;
+    limits.at(side) = (noise->black + kReadNoises * noise->read_noise) / kFullScale;
+  }
+  return limits;
+}
+
 /// Remedy for an image; empty: nothing.
-std::string_view advice(const ImageQuality& evidence) {
-  constexpr double kDim = 0.03, kFull = 0.01;
+std::string_view advice(const ImageQuality& evidence, double dim_limit) {
+  constexpr double kFull = 0.01;
   if (evidence.saturated > kFull) return "too bright: lower exposure_us or gain";
-  if (evidence.brightness < kDim) return "dim: raise exposure_us, gain or light";
+  if (evidence.brightness < dim_limit) return "dim: raise exposure_us, gain or light";
   return "";
 }
 
-nlohmann::ordered_json to_json(const ImageQuality& evidence) {
+nlohmann::ordered_json to_json(const ImageQuality& evidence, double dim_limit) {
   return {{"brightness", evidence.brightness},
           {"saturated", evidence.saturated},
           {"blur_px", evidence.blur_px},
-          {"advice", advice(evidence)}};
+          {"advice", advice(evidence, dim_limit)}};
 }
 
-void tell(const CameraVerb& verb, const StereoFrame& pair) {
-  if (verb.json) return print_json({{"left", to_json(pair.left_evidence)}, {"right", to_json(pair.right_evidence)}});
-  for (const auto& [side, evidence] :
-       {std::pair("left", pair.left_evidence), std::pair("right", pair.right_evidence)}) {
-    const auto what_to_do = advice(evidence);
+void tell(const CameraVerb& verb, const StereoFrame& pair, const DimLimits& limits) {
+  if (verb.json) {
+    return print_json(
+        {{"left", to_json(pair.left_evidence, limits[0])}, {"right", to_json(pair.right_evidence, limits[1])}});
+  }
+  for (const auto& [side, evidence, limit] :
+       {std::tuple("left", pair.left_evidence, limits[0]), std::tuple("right", pair.right_evidence, limits[1])}) {
+    const auto what_to_do = advice(evidence, limit);
     fmt::print("{:<5}  brightness {:5.1f} %  at full scale {:5.2f} %  blur {:4.2f} px{}{}\n", side,
                100 * evidence.brightness, 100 * evidence.saturated, evidence.blur_px, what_to_do.empty() ? "" : "  ",
                what_to_do);
@@ -130,13 +96,14 @@ void tell(const CameraVerb& verb, const StereoFrame& pair) {
   std::fflush(stdout);
 }
 
-ExitCode tune(const CameraVerb& verb, Bench& bench) {
+ExitCode tune(const CameraVerb& verb, CameraBench& bench) {
   const SignalStop signal;
+  const DimLimits limits = dim_limits(bench.rig());
   for (int i = 0; (verb.count == 0 || i < verb.count) && !signal.token().stop_requested(); ++i) {
     if (i > 0) bench.clock().sleep_for(kPeriod);
     const auto pair = bench.expose(verb.light);
     if (!pair) return report_error(pair.error());
-    tell(verb, *pair);
+    tell(verb, *pair, limits);
   }
   return ExitCode::ok;
 }
@@ -147,7 +114,7 @@ Result<void> write_png(const std::filesystem::path& file, const cv::Mat& image) 
   return write_file_atomically(file, *bytes);
 }
 
-ExitCode grab(const CameraVerb& verb, Bench& bench) {
+ExitCode grab(const CameraVerb& verb, CameraBench& bench) {
   const auto left = verb.out / "left.png", right = verb.out / "right.png";
   for (const auto& file : {left, right}) {
     if (!std::filesystem::exists(file)) continue;
@@ -209,7 +176,7 @@ ExitCode preview_of_daemon(const CameraVerb& verb, const std::filesystem::path& 
       clock);
 }
 
-ExitCode preview_of_cameras(const CameraVerb& verb, Bench& bench) {
+ExitCode preview_of_cameras(const CameraVerb& verb, CameraBench& bench) {
   Preview pictures(bench.clock(), [] { return true; });
   const auto told = [](const Error& error) {
     return tl::unexpected(RequestError{exit_code(error.code), error.message});
@@ -237,7 +204,7 @@ ExitCode camera(const CameraVerb& verb) {
     if (!rig) return report_error(rig.error());
     if (send_request(rig->api.socket, "GET", "/api/v1/status")) return preview_of_daemon(verb, rig->api.socket);
   }
-  const auto bench = Bench::open(verb);
+  const auto bench = CameraBench::open(verb.config, {verb.exposure_us, verb.gain});
   if (!bench) return report_error(bench.error());
   if (verb.what == "preview") return preview_of_cameras(verb, **bench);
   return verb.what == "tune" ? tune(verb, **bench) : grab(verb, **bench);

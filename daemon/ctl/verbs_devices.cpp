@@ -1,4 +1,7 @@
+#include <sys/prctl.h>
+
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -230,12 +233,23 @@ ExitCode projector(const ProjectorVerb& verb) {
 
 namespace {
 
+/// At the page the service is at the other end of the pipes: where it dies, this program must let go of the devices.
+doctor::Operator person_for(bool page, bool interactive, bool quiet_output) {
+  if (!page) return {interactive, quiet_output};
+  ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  return {true, quiet_output, doctor::Operator::Face::page};
+}
+
 /// Examines the rig, prints the report, and keeps it for the page. Fails as doctor::examine_rig().
 Result<void> consult(const doctor::Rig& rig, bool may_turn, bool as_json, const doctor::Operator& person, Clock& clock,
                      doctor::Report& report) {
   const auto moved = doctor::examine_rig(rig, may_turn, person, clock, report);
   const std::string written = report.json();
-  fmt::print("{}", as_json ? written : report.text());
+  if (person.face() == doctor::Operator::Face::page) {
+    person.tell(report.text());
+  } else {
+    fmt::print("{}", as_json ? written : report.text());
+  }
   // A job folder that is missing, or not to be written to, has its finding.
   std::ignore = write_file_atomically(rig.config.storage.root / kDoctorFile, written);
   return moved;
@@ -244,10 +258,11 @@ Result<void> consult(const doctor::Rig& rig, bool may_turn, bool as_json, const 
 }  // namespace
 
 ExitCode examine_rig(const DoctorVerb& verb) {
-  const auto rig = offline_rig_config(verb.config);
+  // For the page the service runs, but has lent its devices.
+  const auto rig = verb.page ? config::read_rig_config(verb.config) : offline_rig_config(verb.config);
   if (!rig) return report_error(rig.error());
   RealClock clock;
-  const doctor::Operator person(verb.answers, verb.json);
+  const auto person = person_for(verb.page, verb.answers, verb.json);
   doctor::Report report;
   const auto moved = consult({*rig, verb.config, verb.machine_root}, verb.yes_move, verb.json, person, clock, report);
   if (!moved) return report_error(moved.error());
@@ -268,7 +283,7 @@ class OperatorDialogue final : public config::setup::Dialogue {
  public:
   explicit OperatorDialogue(const doctor::Operator& person) : person_(person) {}
   void tell(const std::string& text) const override { person_.tell(text); }
-  [[nodiscard]] Result<std::string> prompt(const std::string& question) const override {
+  [[nodiscard]] Result<std::string> prompt(const config::setup::Question& question) const override {
     auto reply = person_.prompt(question);
     if (!reply) return fail(ErrorCode::refused, "setup: the replies have ended; nothing was written");
     while (!reply->empty() && reply->back() <= ' ') reply->pop_back();
@@ -302,12 +317,12 @@ Result<std::size_t> examine(config::setup::Setup& setup, const doctor::Rig& rig,
 ExitCode set_up(const SetupVerb& verb) {
   const auto& file = verb.options.out;
   std::error_code error;
-  if (std::filesystem::exists(file, error)) {
+  if (!verb.page && std::filesystem::exists(file, error)) {
     return report_error(
         ExitCode::refused,
         fmt::format("setup: {} is there already; move it away, or name another file with --out", file.string()));
   }
-  const doctor::Operator person(verb.answers, false);
+  const auto person = person_for(verb.page, verb.answers, false);
   if (!person.there()) {
     return report_error(ExitCode::refused,
                         "setup: no person is there to reply; run it at a terminal, or with --interactive");
@@ -317,6 +332,7 @@ ExitCode set_up(const SetupVerb& verb) {
   config::setup::Setup setup(verb.options, dialogue, clock);
   const auto rig = setup.run();
   if (!rig) return report_error(of_device(rig.error()));
+  if (verb.page) return ExitCode::ok;  // the page shows it first, and runs the doctor after
   fmt::print("{} is written. The doctor examines the rig.\n", file.string());
   const auto left = examine(setup, {*rig, file}, person, clock);
   if (!left) return report_error(left.error());

@@ -28,6 +28,9 @@ Result<void> make_model(const ScanFolder& scan, const ReconstructVerb& verb, con
     if (!pose["watch"].is_object() || verb.lines) continue;
     for (const auto& sentence : pose["watch"]["sentences"]) fmt::print(stderr, "{}\n", sentence.get<std::string>());
   }
+  for (const auto& disagreement : model->report->at("disagreements")) {
+    if (!verb.lines) fmt::print(stderr, "{}\n", disagreement["sentence"].get<std::string>());
+  }
   return write_model(*model, out);
 }
 

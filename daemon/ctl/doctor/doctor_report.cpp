@@ -34,21 +34,38 @@ std::string Report::json() const {
   return all.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
 }
 
-Operator::Operator(bool interactive, bool quiet_output)
-    : there_(interactive || ::isatty(STDIN_FILENO) == 1), quiet_output_(quiet_output) {}
+Operator::Operator(bool interactive, bool quiet_output, Face face)
+    : there_(interactive || face == Face::page || ::isatty(STDIN_FILENO) == 1),
+      quiet_output_(quiet_output),
+      face_(face) {}
+
+void Operator::print(const std::string& line) const {
+  std::FILE* out = quiet_output_ ? stderr : stdout;
+  fmt::print(out, "{}\n", line);
+  std::fflush(out);
+}
 
 void Operator::tell(const std::string& text) const {
-  std::FILE* out = quiet_output_ ? stderr : stdout;
-  fmt::print(out, "{}\n", text);
-  std::fflush(out);
+  print(face_ == Face::page ? config::setup::to_line({.told = text}) : text);
+}
+
+std::optional<std::string> Operator::reply() const {
+  std::string line;
+  if (!std::getline(std::cin, line)) return std::nullopt;
+  return line;
 }
 
 std::optional<std::string> Operator::prompt(const std::string& question) const {
   if (!there_) return std::nullopt;
-  tell(question);
-  std::string line;
-  if (!std::getline(std::cin, line)) return std::nullopt;
-  return line;
+  if (face_ == Face::page) return prompt(config::setup::Question{.text = question});
+  print(question);
+  return reply();
+}
+
+std::optional<std::string> Operator::prompt(const config::setup::Question& question) const {
+  if (!there_) return std::nullopt;
+  print(face_ == Face::page ? config::setup::to_line({.question = question}) : question.printed());
+  return reply();
 }
 
 }  // namespace scanrig::ctl::doctor

@@ -53,7 +53,7 @@ void check_estop(const config::RigConfig& rig, Panel& panel, bool drive_answers,
   const auto pressed = wait_for_estop(panel, false, clock);
   if (!pressed) return report.find("panel", pressed.error().message + ".", "Check the panel's wiring.");
   if (!*pressed) {
-    std::ignore = person.prompt("Release the emergency stop, then press Enter.");
+    std::ignore = person.prompt(config::setup::Question{.text = "Release the emergency stop"});
     return report.find("estop_not_wired",
                        fmt::format("The emergency stop was to be pressed, and its input ({}) did not change.", line),
                        "Wire the second, normally closed contact of the emergency stop to this input; look for a "

@@ -276,7 +276,9 @@ Result<void> examine_rig(const Rig& rig, bool may_turn, const Operator& person, 
   examine_projector(rig.config, clock, report);
   const bool drive_answers = examine_drive(rig.config, clock, report);
   const bool estop_works = examine_panel(rig.config, drive_answers, person, clock, report);
-  const auto permitted = [&] { return may_turn || person.prompt("Is everyone clear? Turn the table? [y/N]") == "y"; };
+  const auto permitted = [&] {
+    return may_turn || (person.is_at_rig() && person.prompt("Is everyone clear? Turn the table? [y/N]") == "y");
+  };
   if (auto seen = examine_sight(rig, clock, report); !seen) return seen;
   examine_machine(rig, clock, report);
   Result<void> moved;

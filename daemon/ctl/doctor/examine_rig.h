@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "config/rig_config.h"
+#include "config/setup/dialogue.h"
 #include "core/clock.h"
 #include "drivers/camera/stereo_camera.h"
 #include "drivers/projector/projector.h"
@@ -47,18 +48,29 @@ class Report {
 /// The person at the rig, at a terminal or at the other end of standard input.
 class Operator {
  public:
+  /// `page`: the service is at the other end, for a person at the page. Then all is lines of setup::to_line().
+  enum class Face { terminal, page };
+
   /// `interactive`: a person replies on standard input although it is no terminal. Prompts go to standard error with
   /// `quiet_output`, so that standard output stays JSON.
-  Operator(bool interactive, bool quiet_output);
+  Operator(bool interactive, bool quiet_output, Face face = Face::terminal);
 
   [[nodiscard]] bool there() const { return there_; }
+  /// True for a person who may let the table turn: a browser can be anywhere.
+  [[nodiscard]] bool is_at_rig() const { return there_ && face_ == Face::terminal; }
+  [[nodiscard]] Face face() const { return face_; }
   void tell(const std::string& text) const;
   /// The line that was entered; nothing without a person there.
   [[nodiscard]] std::optional<std::string> prompt(const std::string& question) const;
+  [[nodiscard]] std::optional<std::string> prompt(const config::setup::Question& question) const;
 
  private:
+  void print(const std::string& line) const;
+  [[nodiscard]] std::optional<std::string> reply() const;
+
   bool there_;
   bool quiet_output_;
+  Face face_;
 };
 
 /// The rig to be examined, and the file that a motion's guardian reads again.

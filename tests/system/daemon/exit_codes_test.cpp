@@ -29,6 +29,16 @@ TEST_F(Programs, EndWithTheDocumentedCodeAndOneSentence) {
   EXPECT_EQ(scanrig({"import", "stanford", "--pose", folder_ / "nowhere.conf", "--out", folder_ / "scan"}), 3);
   EXPECT_THAT(output, HasSubstr("nowhere.conf"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "scan"));
+  EXPECT_EQ(scanrig({"acceptance", "sphere", "--diameter", "25", folder_ / "nowhere"}), 3);
+  EXPECT_THAT(output, HasSubstr("nowhere"));
+  EXPECT_EQ(sentences(), 1);
+  EXPECT_EQ(scanrig({"acceptance", "sphere", "--diameter", "25", "--limit", "flatness=1", folder_ / "nowhere"}), 3);
+  EXPECT_THAT(output, HasSubstr("limit flatness"));
+  EXPECT_EQ(scanrig({"camera", "characterise", "--from", folder_ / "nowhere", "--config", folder_ / "none.toml"}), 3);
+  EXPECT_THAT(output, HasSubstr("nowhere"));
+  EXPECT_EQ(sentences(), 1);
+  EXPECT_EQ(scanrig({"camera", "characterise", "--config", folder_ / "none.toml"}), 3);
+  EXPECT_THAT(output, HasSubstr("none.toml"));
   boot("none");
   ask_until("status", [](const json& status) { return status["machine"] == "Halted" && status["activity"] == "none"; });
   EXPECT_EQ(scanrig({"start", "--socket", socket()}), 6);
