@@ -215,7 +215,7 @@ const char* const kSchemas = R"({
   "stored": {"type": "integer", "description": "views that survive a power cut"},
   "model": {"type": "string", "description": "path of the model; empty until it is there"},
   "report": {"type": "string"},
-  "remarks": {"type": "array", "items": {"type": "string"}, "description": "done: that the rig has moved since its calibration"},
+  "remarks": {"type": "array", "items": {"type": "string"}, "description": "done: that the rig has moved since its calibration, images that the others contradict"},
   "config_sha256": {"type": "array", "items": {"type": "string"},
     "description": "SHA-256 of each rig.toml that its views were taken under; of a rig without one none"},
   "error": {"$ref": "#/components/schemas/MaybeProblem"}}},
@@ -351,6 +351,23 @@ const char* const kSchemas = R"({
     "name": {"type": "string"}, "poses": {"type": "integer"}, "views": {"type": "integer", "description": "of each pose"}}}}}},
 "ConfigCheck": {"type": "object", "required": ["ok", "problems"], "additionalProperties": false, "properties": {
   "ok": {"type": "boolean"}, "problems": {"type": "array", "items": {"type": "string"}}}},
+"Setup": {"type": "object", "required": ["phase", "who", "owner", "refused", "told", "question", "draft", "problem"], "additionalProperties": false, "properties": {
+  "phase": {"type": "string", "enum": ["none", "lending", "working", "found", "written", "examined", "failed"]},
+  "who": {"type": "string", "nullable": true, "description": "who began it"},
+  "owner": {"type": "boolean", "description": "the key was the owner's: it may reply"},
+  "refused": {"type": "string", "nullable": true, "description": "why it could not begin now"},
+  "told": {"type": "array", "items": {"type": "string"}, "description": "what was found, and what to do"},
+  "question": {"allOf": [{"$ref": "#/components/schemas/SetupQuestion"}], "nullable": true},
+  "draft": {"type": "string", "nullable": true, "description": "text of the rig.toml that was found; for the owner"},
+  "problem": {"type": "string", "nullable": true, "description": "why it failed"}}},
+"SetupQuestion": {"type": "object", "required": ["number", "kind", "text", "min", "max", "options"], "additionalProperties": false, "properties": {
+  "number": {"type": "integer"},
+  "kind": {"type": "string", "enum": ["yes_or_no", "number", "choice", "done"]},
+  "text": {"type": "string"}, "min": {"type": "number"}, "max": {"type": "number"},
+  "options": {"type": "array", "items": {"$ref": "#/components/schemas/SetupOption"}}}},
+"SetupOption": {"type": "object", "required": ["text", "image"], "additionalProperties": false, "properties": {
+  "text": {"type": "string"}, "image": {"type": "boolean", "description": "GET setup/image/{option} has one"}}},
+"SetupKey": {"type": "object", "required": ["key"], "additionalProperties": false, "properties": {"key": {"type": "string"}}},
 "OpenApi": {"type": "object", "required": ["openapi", "paths"]}
 })";
 

@@ -108,7 +108,7 @@ ApiResponse error_response(unsigned status, const Error& error) {
 std::vector<Route> all_routes() {
   std::vector<Route> all;
   for (auto part : {station_routes(), job_routes(), model_routes(), order_routes(), calibration_routes(),
-                    service_routes(), page_routes()}) {
+                    setup_routes(), service_routes(), page_routes()}) {
     std::ranges::move(part, std::back_inserter(all));
   }
   return all;

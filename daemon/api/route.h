@@ -11,6 +11,7 @@
 #include <variant>
 #include <vector>
 
+#include "config/setup/session.h"
 #include "core/result.h"
 #include "daemon/api/request.h"
 #include "daemon/api/roles.h"
@@ -67,8 +68,11 @@ struct ApiStation {
   std::filesystem::path storage{};       ///< absolute; where jobs are kept
   std::function<Result<std::string>(std::string_view side, bool is_middle)> preview_jpeg{};  ///< of "left" or "right"
   std::function<Result<PlacementView>(const AwaitedPlacement&)> look_at_board{};
-  std::function<Result<void>()> check_config{};            ///< of the file that the daemon was started with
-  std::function<void(ControlLoop::Reply)> reload{};        ///< of it; reads the disk
+  std::function<Result<void>()> check_config{};      ///< of the file that the daemon was started with
+  std::function<void(ControlLoop::Reply)> reload{};  ///< of it; reads the disk
+  std::shared_ptr<config::setup::Session> setup{};   ///< null: there are no devices to lend
+  std::function<void(const std::string& who, ControlLoop::Reply)> begin_setup{};
+  std::function<void(ControlLoop::Reply)> end_setup{};
   std::function<void(std::function<void()>)> on_worker{};  ///< for work that touches the disk
   /// For work of seconds: one after the other, at low priority; the token when the server ends.
   std::function<void(std::function<void(const std::stop_token&)>)> on_background{};
@@ -151,6 +155,7 @@ std::vector<Route> job_routes();          ///< jobs as they are, their files and
 std::vector<Route> model_routes();        ///< lengths on a model, its deviation from a reference
 std::vector<Route> order_routes();        ///< actions on jobs: queued, cancelled, bundled, deleted, ...
 std::vector<Route> calibration_routes();  ///< calibrating the rig, and how its board stands
+std::vector<Route> setup_routes();        ///< scanrig setup from the page
 std::vector<Route> service_routes();      ///< health, metrics, the OpenAPI document
 std::vector<Route> page_routes();         ///< the web page, what it starts from, logging in and out
 

@@ -77,7 +77,7 @@ struct ApiServer::Impl {
         loop(control),
         core(
             {control, [this] { return latest_facts(); }, with.storage, with.preview_jpeg, with.look_at_board,
-             with.check_config, with.reload,
+             with.check_config, with.reload, with.setup, with.begin_setup, with.end_setup,
              [this](std::function<void()> work) { net::post(core.workers, std::move(work)); },
              [this](auto work) { run_in_background(std::move(work)); }, &core.hub, &core.access,
              [this] { return page_address(); }, with.http_origin.starts_with("https://"), with.insecure_http, with.log},

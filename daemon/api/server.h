@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "config/setup/session.h"
 #include "core/result.h"
 #include "daemon/api/admission.h"
 #include "daemon/api/roles.h"
@@ -35,6 +36,12 @@ struct ApiOptions {
   std::function<Result<void>()> check_config = no_config;  ///< of the file that the daemon was started with; likewise
   /// Reads that file again and restarts with it if the rig is idle; the reply as for orders to the ControlLoop.
   std::function<void(ControlLoop::Reply)> reload = no_reload;  ///< may take long; from any thread
+  /// Setup from the page; null: this service has no devices to lend.
+  std::shared_ptr<config::setup::Session> setup{};
+  /// Lends it the devices for a request of `who`, and takes them back. Fail as orders to the ControlLoop; the reply of
+  /// begin is the key.
+  std::function<void(const std::string& who, ControlLoop::Reply)> begin_setup{};
+  std::function<void(ControlLoop::Reply)> end_setup{};
   ApiLimits limits{};
   const RecentLog* log = nullptr;                                  ///< for the page; null: there is none
   std::function<void(JournalEntry)> journal = [](const auto&) {};  ///< orders refused; from any thread, must not wait

@@ -246,12 +246,16 @@ std::vector<std::string> read_rig_remarks(const fs::path& report) {
   const auto text = read_file(report);
   const auto json = text ? nlohmann::json::parse(*text, nullptr, false) : nlohmann::json();
   std::vector<std::string> remarks;
-  for (const auto& pose : json.is_object() ? member(json, "poses") : nlohmann::json::array()) {
-    for (const auto& sentence : member(member(pose, "watch"), "sentences")) {
-      if (!sentence.is_string() || std::ranges::count(remarks, sentence.get<std::string>()) > 0) continue;
+  if (!json.is_object()) return remarks;
+  const auto add = [&remarks](const nlohmann::json& sentence) {
+    if (sentence.is_string() && std::ranges::count(remarks, sentence.get<std::string>()) == 0) {
       remarks.push_back(sentence);
     }
+  };
+  for (const auto& pose : member(json, "poses")) {
+    for (const auto& sentence : member(member(pose, "watch"), "sentences")) add(sentence);
   }
+  for (const auto& disagreement : member(json, "disagreements")) add(member(disagreement, "sentence"));
   return remarks;
 }
 

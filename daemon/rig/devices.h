@@ -205,6 +205,46 @@ class AutoReopenProjector final : public Projector {
   AutoReopen<Projector> projector_;
 };
 
+/// Devices that another program has: every use fails and says so, but stop(), which is `make_safe`. That has to free
+/// the drive and stop it by another path; once it has succeeded nothing can have moved since, and it is not repeated.
+class LentDevices final : Turntable, Projector, StereoCamera, Panel {
+ public:
+  explicit LentDevices(std::function<Result<void>()> make_safe) : make_safe_(std::move(make_safe)) {}
+  Devices devices() { return {*this, *this, *this, *this}; }
+
+ private:
+  template <class Value = void>
+  static Result<Value> lent(std::string_view device) {
+    return fail(ErrorCode::busy, "{}: lent to setup", device);
+  }
+  Result<void> home(Deadline) override { return lent("turntable"); }
+  Result<Move> rotate_to(Degrees, Deadline) override { return lent<Move>("turntable"); }
+  Result<void> stop(Deadline) override {
+    const std::lock_guard guard(mutex_);
+    if (is_safe_) return {};
+    auto made = make_safe_();
+    is_safe_ = made.has_value();
+    return made;
+  }
+  Result<void> reset_alarm(Deadline) override { return lent("turntable"); }
+  Result<TurntableStatus> status(Deadline) override { return lent<TurntableStatus>("turntable"); }
+  void request_stop() noexcept override {}
+  void drop_stop_request() noexcept override {}
+  Result<void> fire(Light, Deadline) override { return lent("projector"); }
+  Result<void> turn_off(Deadline) override { return lent("projector"); }
+  void request_off() noexcept override {}
+  Result<void> prepare(Deadline) override { return lent("camera"); }
+  Result<void> arm(Deadline) override { return lent("camera"); }
+  Result<StereoFrame> collect(Deadline) override { return lent<StereoFrame>("camera"); }
+  Result<StereoFrame> capture_preview(Deadline) override { return lent<StereoFrame>("camera"); }
+  Result<PanelInputs> wait_change(const PanelInputs&, Deadline) override { return lent<PanelInputs>("panel"); }
+  Result<void> show(const PanelOutputs&, Deadline) override { return lent("panel"); }
+
+  const std::function<Result<void>()> make_safe_;
+  std::mutex mutex_;
+  bool is_safe_ = false;
+};
+
 class AutoReopenPanel final : public Panel {
  public:
   explicit AutoReopenPanel(AutoReopen<Panel>::Open open) : panel_(std::move(open)) {}

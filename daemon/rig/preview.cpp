@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/image_codec.h"
+#include "pipeline/storage/calibration_file.h"
 
 namespace scanrig {
 namespace {
@@ -11,6 +12,7 @@ namespace {
 constexpr auto kBeforeRetry = std::chrono::seconds(2);  ///< after cameras that did not respond
 constexpr int kQuality = 80, kFocusQuality = 95;        ///< of the JPEG, per cent
 constexpr int kFocusPx = 512;
+constexpr auto kBetweenLooks = std::chrono::milliseconds(500);  ///< at the board
 
 /// Begins at an even pixel: the colours of a sensor repeat every two.
 cv::Mat middle_of(const cv::Mat& image) {
@@ -92,6 +94,21 @@ void Preview::failed(const Error& error) {
   problem_ = error;
   asked_ = false;
   not_before_ = clock_.now() + kBeforeRetry;
+}
+
+Result<PlacementView> PlacementAid::look(const AwaitedPlacement& awaited) {
+  const auto pair = preview_.latest();  // also requests the next one
+  if (!pair) return pass_on(pair);
+  const std::scoped_lock lock(mutex_);
+  if (seen_ && seen_for_ == awaited && clock_.now() < not_before_) return *seen_;
+  const auto calibration = read_calibration(calibration_file_);
+  const auto& plan = calibration_plan();
+  seen_ = compare_placement(pair->left, pair->right, to_string(pair->format), board_,
+                            plan.at(static_cast<std::size_t>(awaited.placement)), calibration ? &*calibration : nullptr,
+                            awaited.table_deg);
+  seen_for_ = awaited;
+  not_before_ = clock_.now() + kBetweenLooks;
+  return *seen_;
 }
 
 }  // namespace scanrig

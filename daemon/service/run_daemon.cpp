@@ -10,7 +10,7 @@
 #include "daemon/jobs/housekeeping_thread.h"
 #include "daemon/journal/log_entries.h"
 #include "daemon/rig/panel_thread.h"
-#include "daemon/rig/placement_aid.h"
+#include "daemon/rig/preview.h"
 #include "daemon/rig/rig_thread.h"
 #include "daemon/rig/turntable_thread.h"
 #include "daemon/service/exit_watchdog.h"
@@ -157,7 +157,8 @@ ControlLoopOptions loop_options(const DaemonOptions& options, const std::optiona
       .auto_home = options.auto_home,
       .manual_light = options.manual_light,
       .calibration = options.calibrator.solver ? std::optional(calibration_recipe()) : std::nullopt,
-      .accepts_calibrations = options.accepts_calibrations};
+      .accepts_calibrations = options.accepts_calibrations,
+      .lent = options.lent};
   ControlLoopOptions for_loop{.rules = rules,
                               .warning = options.warning,
                               .hang_limit = options.hang_limit,

@@ -61,6 +61,7 @@ struct DaemonOptions {
   bool guard = false;         ///< there is a guard
   bool auto_home = false;     ///< after a restart a closed guard homes the table, without Reset
   bool manual_light = false;  ///< the projector is switched by hand
+  bool lent = false;          ///< setup has the devices; the given ones are LentDevices
   AcquisitionOptions acquisition;
   Clock::Duration warning = std::chrono::seconds(2);
   ReconstructorFactory reconstructor;

@@ -16,6 +16,9 @@
 namespace scanrig {
 namespace {
 
+/// For setup's program to end, and another process to stop the table.
+constexpr auto kMakeSafeLimit = std::chrono::seconds(5);
+
 std::uintmax_t gib(double count) { return static_cast<std::uintmax_t>(count * (1u << 30)); }
 
 /// V4L2 devices named by their path have no identity; two sensors in one device have one number.
@@ -121,10 +124,12 @@ Result<void> Service::run(SignalStop& stop, const Run& run) {
   if (!config) return pass_on(config);
   report_crashes_to(crash_folder(config->storage.root));
   journal_.emplace(standard_sink());
+  stop_ = stop.token();
   awake_.emplace([this](const std::string& problem) { tell(Priority::warning, problem); });
   stop.on_hangup([this] { reload([](const auto&) {}); });
   auto ended = run_again_and_again(run, std::move(*config));
   stop.on_hangup({});
+  setup_.reset();
   awake_.reset();
   tell(Priority::notice, name_ + " ends.");
   journal_.reset();
@@ -133,15 +138,22 @@ Result<void> Service::run(SignalStop& stop, const Run& run) {
 
 Result<void> Service::run_again_and_again(const Run& run, config::RigConfig config) {
   std::optional<config::RigConfig> before;
+  bool lent = false;
   for (bool again = false;; again = true) {
     if (again) manager_.begins_again();
     tell_begin(config);
+    if (!lent) make_setup(config);
     begun_ = false;
-    const auto ended = run(config, options_for(config, again));
+    const auto options = options_for(config, again);
+    const auto ended = lent ? run_lent(options) : run(config, options);
     if (ended && *ended == Ended::reload) {
       const std::lock_guard guard(mutex_);
-      before = std::exchange(config, std::move(*next_));
+      if (next_) before = std::exchange(config, std::move(*next_));
       next_.reset();
+      lent = std::exchange(lends_next_, false);
+    } else if (!ended && !begun_ && std::exchange(lent, false)) {
+      tell(Priority::error, fmt::format("No setup: {}", ended.error().message));
+      setup_->end();
     } else if (!ended && !begun_ && before) {
       tell(Priority::error, fmt::format("New configuration failed, old one restored: {}", ended.error().message));
       config = std::move(*before);
@@ -163,6 +175,11 @@ DaemonOptions Service::options_for(const config::RigConfig& config, bool again) 
     return checked ? Result<void>() : pass_on(checked);
   };
   options.api.reload = [this](ControlLoop::Reply reply) { reload(std::move(reply)); };
+  options.api.setup = setup_;
+  options.api.begin_setup = [this](const std::string& who, ControlLoop::Reply reply) {
+    begin_setup(who, std::move(reply));
+  };
+  options.api.end_setup = [this](ControlLoop::Reply reply) { end_setup(std::move(reply)); };
   options.on_loop = [this](ControlLoop& loop) {
     const std::lock_guard guard(mutex_);
     loop_ = &loop;
@@ -185,6 +202,112 @@ DaemonOptions Service::options_for(const config::RigConfig& config, bool again) 
   };
   options.journal = [this](JournalEntry entry) { journal_->write(std::move(entry)); };
   return options;
+}
+
+/// Its program finds the devices of this machine and asks also where the present configuration has one.
+void Service::make_setup(const config::RigConfig& config) {
+  if (cameras_ != config::Cameras::real) return;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe").replace_filename("scanrig").string();
+  auto file = std::filesystem::absolute(file_), draft = file;
+  draft += ".found";
+  const auto state = crash_folder(config.storage.root).parent_path();
+  std::vector<std::string> setup{program,
+                                 "setup",
+                                 "--page",
+                                 "--out",
+                                 draft.string(),
+                                 "--present",
+                                 file.string(),
+                                 "--state",
+                                 config.storage.root.parent_path().string(),
+                                 "--images",
+                                 (state / "setup").string()};
+  std::vector<std::string> ports{config.turntable.device()};
+  if (config.panel.driver == config::PanelConfig::Driver::modbus_io) ports.push_back(config.panel.io_module.device);
+  for (auto& port : ports) setup.insert(setup.end(), {"--port", std::move(port)});
+  if (config.gpio_socket) setup.insert(setup.end(), {"--gpio-socket", config.gpio_socket->string()});
+  const auto check = [](const std::filesystem::path& found) -> Result<void> {
+    const auto read = config::read_rig_config(found);
+    return read ? Result<void>() : pass_on(read);
+  };
+  setup_ = std::make_shared<config::setup::Session>(
+      config::setup::SessionOptions{.setup = std::move(setup),
+                                    .doctor = {program, "doctor", "--page", "--config", file.string()},
+                                    .file = file,
+                                    .draft = draft,
+                                    .check = check});
+  setup_->on_silence([this] {
+    tell(Priority::warning, "Setup's browser is gone: the service takes its devices back.");
+    end_setup([](const auto&) {});
+  });
+}
+
+void Service::begin_setup(const std::string& who, ControlLoop::Reply reply) {
+  const auto key = setup_->claim(who);
+  if (!key) return reply(key);
+  restart_for_setup(event::ReloadRequested::Why::lend,
+                    [this, who, key = *key, reply = std::move(reply)](const Result<std::string>& taken) {
+                      if (!taken) {
+                        setup_->end();
+                        return reply(taken);
+                      }
+                      tell(Priority::notice, fmt::format("{} begins setup: the service closes its devices.", who));
+                      reply(key);
+                    });
+}
+
+/// Called for any end: by a person, by Stop, by a browser that is gone.
+void Service::end_setup(ControlLoop::Reply reply) {
+  restart_for_setup(event::ReloadRequested::Why::give_back,
+                    [this, reply = std::move(reply)](const Result<std::string>& taken) {
+                      if (taken) tell(Priority::notice, "Setup has ended: the service opens its devices.");
+                      reply(taken);
+                    });
+}
+
+/// A changed file that cannot be used changes nothing.
+void Service::restart_for_setup(event::ReloadRequested::Why why, ControlLoop::Reply reply) {
+  const bool lends = why == event::ReloadRequested::Why::lend;
+  auto config = lends ? fail(ErrorCode::refused, "") : read();
+  if (!lends && !config) tell(Priority::error, "The configuration stays as it was: " + config.error().message);
+  std::unique_lock guard(mutex_);
+  if (!loop_ || std::exchange(reloading_, true)) {
+    guard.unlock();  // the reply may end the session, whose thread may wait here
+    return reply(fail(ErrorCode::busy, "The service is already starting, ending or reloading."));
+  }
+  lends_next_ = lends;
+  next_.reset();
+  if (config) next_ = std::move(*config);
+  loop_->ask(event::ReloadRequested{.why = why}, [this, reply = std::move(reply)](const Result<std::string>& taken) {
+    if (taken) {
+      manager_.reloading();
+      return reply(taken);
+    }
+    {
+      const std::lock_guard again(mutex_);
+      lends_next_ = reloading_ = false;
+      next_.reset();
+    }
+    reply(taken);
+  });
+}
+
+Result<Ended> Service::run_lent(DaemonOptions options) {
+  RealClock clock;
+  LentDevices devices([this]() -> Result<void> {
+    if (setup_->end()) end_setup([](const auto&) {});  // by Stop: then the devices are not needed any more
+    return make_safe_in_process("/proc/self/exe", file_);
+  });
+  options.lent = true;
+  options.hang_margin = kMakeSafeLimit;
+  options.on_loop = [this, on_loop = std::move(options.on_loop)](ControlLoop& loop) {
+    on_loop(loop);
+    if (auto begun = setup_->begin(); !begun) {
+      tell(Priority::error, as_sentence(begun.error().message));
+      end_setup([](const auto&) {});
+    }
+  };
+  return run_daemon(devices.devices(), options, clock, stop_);
 }
 
 void Service::tell_begin(const config::RigConfig& config) {

@@ -67,6 +67,11 @@ ControlLoop::ControlLoop(Clock& clock, ControlLoopOptions options, JobTable know
     state_.cause = options_.latch->cause;
     state_.fault_device = options_.latch->device;
   }
+  if (options_.rules.lent) {
+    state_.machine = MachineState::maintenance;
+    state_.maintenance.emplace();
+    state_.cause = "The devices are lent to setup.";
+  }
   publish({});
 }
 

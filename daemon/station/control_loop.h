@@ -71,7 +71,7 @@ class ControlLoop {
   /// Does what event::JobRequested lists. `reply` comes when it is done (a bundle: later), with the job's id or the
   /// bundle's path. Fails with `not_found`, `busy`, `refused`, `exists`, `io`.
   void ask(event::JobRequested what, Reply reply) { inbox_.post({std::move(what), std::move(reply)}); }
-  /// Ends the loop if the rig is idle. Fails with `busy`, `refused`.
+  /// Ends the loop if the rig is idle, as event::ReloadRequested lists. Fails with `busy`, `refused`.
   void ask(event::ReloadRequested what, Reply reply) { inbox_.post({std::move(what), std::move(reply)}); }
   [[nodiscard]] std::shared_ptr<const Snapshot> snapshot() const { return published_.get(); }
   [[nodiscard]] const StationRules& rules() const { return options_.rules; }  ///< from any thread; they never change

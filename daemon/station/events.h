@@ -254,9 +254,15 @@ struct ModelReady {
   std::optional<CalibrationOutcome> calibration{};
   std::vector<std::string> remarks{};
 };
-/// The daemon is to restart under a new configuration; accepted only while the rig is idle.
+/// The daemon is to restart; accepted only while the rig is idle.
 struct ReloadRequested {
+  enum class Why {
+    configuration,  ///< it has changed
+    lend,           ///< from maintenance: the devices are closed, so that setup can have them
+    give_back       ///< setup is over, the devices are opened again
+  };
   std::string still_doing{};  ///< work that continues beside the rig; empty: none
+  Why why = Why::configuration;
 };
 struct Shutdown {};
 }  // namespace event

@@ -59,8 +59,10 @@ RemoteActions remote_actions(const StationState& state, const StationRules& rule
   const auto refusal = [&](Button button) {
     return next(state, event::Pressed{button, Origin::remote, {}}, rules).refused;
   };
+  auto lend = next(state, event::ReloadRequested{.why = event::ReloadRequested::Why::lend}, rules);
   return {.start_refused = refusal(Button::start),
           .reset_refused = refusal(Button::reset),
+          .setup_refused = std::move(lend.refused),
           .start_offer = start_offer(state)};
 }
 

@@ -63,10 +63,64 @@ void pulse(StepBuilder& m) {
   m.act(action::Pulse{});
 }
 
+/// Ends the control loop, once the rig is seen stopped.
+void restart(StepBuilder& m, const char* cause) {
+  m.s().shutting_down = m.s().reloading = true;
+  m.s().maintenance.reset();
+  m.s().machine = MachineState::halted;
+  m.s().cause = cause;
+  m.stop_rig();
+}
+
+/// A reload must not clear a latched fault.
+void reload(StepBuilder& m, const std::string& still_doing) {
+  constexpr const char* kStays = "The configuration is not reloaded";
+  const auto& s = m.s();
+  if (m.rules().lent) return m.refuse_lent();
+  if (s.shutting_down) return m.refuse(ErrorCode::busy, "{}: the service is ending or reloading.", kStays);
+  if (s.machine == MachineState::error) {
+    return m.refuse(ErrorCode::refused, "{}: fix the fault, then press Reset at the panel.", kStays);
+  }
+  const bool idle = s.machine == MachineState::halted || s.machine == MachineState::ready;
+  if (!idle || s.activity != Activity::none) {
+    return m.refuse(ErrorCode::busy, "{}: the rig is busy ({}, {}). Try again when idle.", kStays, to_string(s.machine),
+                    to_string(s.activity));
+  }
+  if (!m.require_disk()) return;
+  if (!still_doing.empty()) return m.refuse(ErrorCode::busy, "{}: {}. Try again later.", kStays, still_doing);
+  restart(m, "The configuration is reloaded.");
+}
+
+/// A latch stays: the restart finds it again.
+void lend(StepBuilder& m, const std::string& still_doing) {
+  const auto& s = m.s();
+  if (s.shutting_down) {
+    return m.refuse(ErrorCode::busy, "The service is ending or restarting. Try again later.");
+  }
+  if (m.rules().lent) return m.refuse(ErrorCode::busy, "Setup has the devices already.");
+  if (!s.maintenance) return m.refuse(ErrorCode::refused, "Setup needs the devices: switch maintenance on first.");
+  if (s.activity != Activity::none) {
+    return m.refuse(ErrorCode::busy, "The rig is busy ({}): wait or press Stop.", to_string(s.activity));
+  }
+  if (!m.require_disk()) return;
+  if (!still_doing.empty()) return m.refuse(ErrorCode::busy, "Not now: {}. Try again later.", still_doing);
+  restart(m, "The devices are lent to setup.");
+}
+
+/// Also while Stop is carried out.
+void give_back(StepBuilder& m) {
+  if (m.s().shutting_down) {
+    return m.refuse(ErrorCode::busy, "The service is ending or restarting. Try again later.");
+  }
+  if (!m.rules().lent) return m.refuse(ErrorCode::refused, "Setup is not running.");
+  restart(m, "Setup has ended.");
+}
+
 }  // namespace
 
 void ask_maintenance(StepBuilder& m, const event::MaintenanceRequested& asked) {
   if (m.s().shutting_down) return m.refuse(ErrorCode::refused, "The service is shutting down.");
+  if (m.rules().lent) return m.refuse_lent();
   if (asked.what == Task::on) return begin(m, asked.requester);
   if (!m.s().maintenance) return m.refuse(ErrorCode::refused, "Maintenance mode is off. Switch it on first.");
   if (m.s().activity != Activity::none) {
@@ -79,6 +133,15 @@ void ask_maintenance(StepBuilder& m, const event::MaintenanceRequested& asked) {
     case Task::jog: return jog(m, asked);
     case Task::pulse: return pulse(m);
     case Task::lamp_test: return m.act(action::TestLamps{});
+  }
+}
+
+void ask_restart(StepBuilder& m, const event::ReloadRequested& asked) {
+  using Why = event::ReloadRequested::Why;
+  switch (asked.why) {
+    case Why::configuration: return reload(m, asked.still_doing);
+    case Why::lend: return lend(m, asked.still_doing);
+    case Why::give_back: return give_back(m);
   }
 }
 

@@ -62,7 +62,13 @@ std::string how_to_go_on_in_maintenance(const StationState& state, const Station
   return after_steps(state, fmt::format("{}, or switch maintenance off", motion));
 }
 
+OperatorMessage when_lent(const StationState& state) {
+  if (state.activity == Activity::stopping) return {"Setup ends: the rig is made safe.", kWaitForStanding};
+  return {"Setup has the devices: nothing moves, no jobs.", "Answer its questions on the screen Service, or end it."};
+}
+
 OperatorMessage in_maintenance(const StationState& state, const StationRules& rules) {
+  if (rules.lent) return when_lent(state);
   switch (state.activity) {
     case Activity::none: return {"Maintenance mode: no jobs.", how_to_go_on_in_maintenance(state, rules)};
     case Activity::warning: return {"Maintenance: the table is about to move.", kKeepAway};

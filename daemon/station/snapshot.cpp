@@ -11,22 +11,25 @@ void EventCounter::fault(const Error& error) {
 
 void EventCounter::see(const Event& event, Clock::TimePoint now) {
   std::visit(
-      Overloaded{
-          [&](const event::ViewStored& e) {
-            ++counters_.views_stored;
-            counters_.retakes += e.retake_reasons.size();
-          },
-          [&](const event::MovementChecked& e) { counters_.retakes += e.movement_check.retake_reasons.size(); },
-          [&](const event::StageProgress& e) {
-            const auto since = running_.try_emplace({e.job, e.stage}, now).first;
-            if (e.fraction < 1.0) return;
-            const std::chrono::duration<double> spent = now - since->second;
-            counters_.stage_seconds[e.stage] += spent.count();
-            running_.erase(since);
-          },
-          [&](const event::RigFailed& e) { fault(e.error); }, [&](const event::StopFailed& e) { fault(e.error); },
-          [&](const event::PanelFailed& e) { fault(e.error); }, [&](const event::StoreFailed& e) { fault(e.error); },
-          [&](const event::EstopChanged& e) { counters_.faults += e.ok ? 0 : 1; }, [](const auto&) {}},
+      Overloaded{[&](const event::ViewStored& e) {
+                   ++counters_.views_stored;
+                   counters_.retakes += e.retake_reasons.size();
+                 },
+                 [&](const event::MovementChecked& e) { counters_.retakes += e.movement_check.retake_reasons.size(); },
+                 [&](const event::StageProgress& e) {
+                   const auto since = running_.try_emplace({e.job, e.stage}, now).first;
+                   if (e.fraction < 1.0) return;
+                   const std::chrono::duration<double> spent = now - since->second;
+                   counters_.stage_seconds[e.stage] += spent.count();
+                   running_.erase(since);
+                 },
+                 [&](const event::RigFailed& e) { fault(e.error); },
+                 [&](const event::StopFailed& e) { fault(e.error); },
+                 [&](const event::PanelFailed& e) {
+                   if (e.error.code != ErrorCode::busy) fault(e.error);  // lent to setup is no fault
+                 },
+                 [&](const event::StoreFailed& e) { fault(e.error); },
+                 [&](const event::EstopChanged& e) { counters_.faults += e.ok ? 0 : 1; }, [](const auto&) {}},
       event);
 }
 

@@ -57,9 +57,10 @@ struct Headline {
   std::string word = "WAIT";  ///< "READY"; "5/8": the view that is being taken
 };
 
-/// Whether Start and Reset would be obeyed, pressed remotely now. Stop always is.
+/// Whether Start, Reset and setup would be obeyed, pressed remotely now. Stop always is.
 struct RemoteActions {
   std::optional<Error> start_refused{}, reset_refused{};  ///< why; nothing: it would be obeyed
+  std::optional<Error> setup_refused{};                   ///< why the devices would not be lent to setup
   std::string start_offer{};                              ///< start_offer() in transition.h
 };
 

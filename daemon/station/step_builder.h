@@ -53,6 +53,7 @@ class StepBuilder {
   bool require_safe();
   /// The same for a requester away from the panel, who needs a guard between person and table.
   bool remote_may_move(std::string_view what);
+  void refuse_lent() { refuse(ErrorCode::refused, "Setup has the devices: end it first."); }
   /// Refuses with a reason while the job disk does not respond.
   bool require_disk();
   /// The first device that is known to be absent; null: none is.
@@ -75,6 +76,8 @@ class StepBuilder {
 
 // maintenance.cpp
 void ask_maintenance(StepBuilder& m, const event::MaintenanceRequested& asked);
+/// Restarts the daemon: under a new configuration, without devices while setup has them, or with them again.
+void ask_restart(StepBuilder& m, const event::ReloadRequested& asked);
 void reset_in_maintenance(StepBuilder& m, Origin origin);
 /// Ends the warning: the requested action starts.
 void move_in_maintenance(StepBuilder& m);

@@ -30,6 +30,7 @@ class Transition : public StepBuilder {
   void operator()(const event::Pressed& e) {
     if (e.button == Button::stop) return stop();
     if (s().shutting_down) return refuse(ErrorCode::refused, "The service is shutting down.");
+    if (rules().lent) return refuse_lent();
     const bool remote = e.origin == Origin::remote;
     switch (e.button) {
       case Button::start:
@@ -188,6 +189,7 @@ class Transition : public StepBuilder {
   void operator()(const event::PanelFailed& e) {
     s().panel_known = false;
     s().panel_problem = e.error;
+    if (rules().lent) return;  // setup has it
     if (s().machine != MachineState::error) fault(e.error.message + ".", "panel");
   }
 
@@ -223,25 +225,7 @@ class Transition : public StepBuilder {
     act(action::RunJobRequest{{.what = event::JobRequested::What::accept, .job = e.job}});
   }
 
-  /// A reload must not clear a latched fault.
-  void operator()(const event::ReloadRequested& e) {
-    constexpr const char* kStays = "The configuration is not reloaded";
-    if (s().shutting_down) return refuse(ErrorCode::busy, "{}: the service is ending or reloading.", kStays);
-    if (s().machine == MachineState::error) {
-      return refuse(ErrorCode::refused, "{}: fix the fault, then press Reset at the panel.", kStays);
-    }
-    const bool idle = s().machine == MachineState::halted || s().machine == MachineState::ready;
-    if (!idle || s().activity != Activity::none) {
-      return refuse(ErrorCode::busy, "{}: the rig is busy ({}, {}). Try again when idle.", kStays,
-                    to_string(s().machine), to_string(s().activity));
-    }
-    if (!require_disk()) return;
-    if (!e.still_doing.empty()) return refuse(ErrorCode::busy, "{}: {}. Try again later.", kStays, e.still_doing);
-    s().shutting_down = s().reloading = true;
-    s().machine = MachineState::halted;
-    s().cause = "The configuration is reloaded.";
-    stop_rig();
-  }
+  void operator()(const event::ReloadRequested& e) { ask_restart(*this, e); }
 
   void operator()(const event::Shutdown&) {
     s().reloading = false;

@@ -22,6 +22,7 @@ struct StationRules {
   bool manual_light = false;            ///< the projector is switched by hand
   std::optional<Recipe> calibration{};  ///< how the rig is calibrated; nothing: this service cannot solve one
   bool accepts_calibrations = false;    ///< a calibration that grades becomes the rig's without a person
+  bool lent = false;                    ///< setup has the devices: nothing moves, no job starts
 };
 
 constexpr DegreesPerSecond kMaxJogSpeed{10};
