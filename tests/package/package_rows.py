@@ -68,7 +68,7 @@ def in_place(machine):
     groups = " ".join(sorted(machine.do("id -nG scanrig").split()))
     expect(groups == GROUPS, f"groups: {groups}")
     folders = machine.do("stat -c '%n %U %a' /etc/scanrig /var/lib/scanrig").splitlines()
-    expect(folders == ["/etc/scanrig root 755", "/var/lib/scanrig scanrig 755"], f"folders: {folders}")
+    expect(folders == ["/etc/scanrig root 775", "/var/lib/scanrig scanrig 755"], f"folders: {folders}")
     set_values = machine.do("sysctl -e -p /usr/lib/sysctl.d/50-scanrig.conf")
     now = machine.do("grep -v '^#' /usr/lib/sysctl.d/50-scanrig.conf | cut -d= -f1 | xargs sysctl")
     expect(now == set_values and now, f"kernel settings: {now}, asked: {set_values}")

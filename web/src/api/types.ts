@@ -213,6 +213,35 @@ export interface ConfigCheck {
   problems: string[]; // a sentence each
 }
 
+export interface SetupOption {
+  text: string;
+  image: boolean;
+}
+
+export interface SetupQuestion {
+  number: number;
+  kind: "yes_or_no" | "number" | "choice" | "done";
+  text: string;
+  min: number;
+  max: number;
+  options: SetupOption[];
+}
+
+export interface Setup {
+  phase: "none" | "lending" | "working" | "found" | "written" | "examined" | "failed";
+  who: string | null;
+  owner: boolean; // this page may answer
+  refused: string | null; // why it could not begin now
+  told: string[];
+  question: SetupQuestion | null;
+  draft: string | null; // the rig.toml that was found
+  problem: string | null;
+}
+
+export interface SetupKey {
+  key: string;
+}
+
 export interface Reference {
   name: string;
   bytes: number;

@@ -8,6 +8,7 @@ import { bytes, minutesSince, words } from "../words.ts";
 import { FocusCard } from "./Focus.tsx";
 import { LogCard } from "./Log.tsx";
 import { qrSvg } from "./qr.ts";
+import { SetupCard } from "./Setup.tsx";
 
 const PERIOD_MS = 1000;
 const HEALTH_PERIOD_MS = 5000;
@@ -185,7 +186,7 @@ function AccessCard() {
   );
 }
 
-/// rig.toml as scanrig setup or a person has left it: setup itself needs the devices, which the service holds.
+/// rig.toml as a person has left it.
 function ConfigCard() {
   const told = useSignal<string[]>([]);
   if (!may("engineer")) return null;
@@ -221,6 +222,7 @@ export function Service() {
         <HealthCard />
         <DoctorCard />
         <TableCard />
+        <SetupCard />
         <FocusCard />
         <LogCard />
       </div>
