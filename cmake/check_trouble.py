@@ -33,7 +33,7 @@ FAILED = ("daemon/station/*", "daemon/rig/*", "daemon/jobs/*", "daemon/runtime/d
 NO_MODEL = ("pipeline/**/*",)
 FOUND = ("daemon/ctl/doctor/*",)
 PRODUCT = ("core", "config", "daemon", "drivers", "pipeline")
-NOT_OF_A_JOB = ("pipeline/importers/", "pipeline/exporters/", "pipeline/evaluate/")  # only `scanrig` at a terminal
+NOT_OF_A_JOB = ("pipeline/importers/", "pipeline/exporters/", "pipeline/evaluate/", "pipeline/acceptance/")  # only `scanrig` at a terminal
 
 FAILURE = re.compile(r"ErrorCode::|\bfail\(")
 WITHOUT_MODEL = re.compile(

@@ -173,9 +173,41 @@ def config_cases(desk, config):
                                                      "--pose", conf, "--out", target)
 
 
+def instrument_cases(desk, config):
+    """Artefacts and flat images that are none."""
+    yield "a model without the steps of a gauge", *verdict(desk, BAD_INPUT, "20.000, 30.000 mm", "scanrig", "acceptance",
+                                                           "step-gauge", "--heights", "20,30", desk.good)
+    yield "a limit of another artefact", *verdict(desk, BAD_INPUT, "flatness", "scanrig", "acceptance", "sphere", "--diameter",
+                                                  25, "--limit", "flatness=0.1", desk.good)
+    flats, target = desk.home / "flats", desk.home / "never"
+    desk.run("scanrig-sim", "shoot-flats", "--scale", 0.25, "--dark-pairs", 1, "--exposures-us", "500,2000,8000,12500", "--out",
+             flats, check=True)
+
+    def characterise(folder, named, *options):
+        return verdict(desk, BAD_INPUT, named, "scanrig", "camera", "characterise", "--from", folder, "--out", target, *options)
+
+    yield "an overexposed flat", *characterise(flats, "left_12500us_01: overexposed", "--config", "none.toml")
+    for image in flats.glob("*_12500us_*.png"):
+        image.unlink()
+    yield "flats of other cameras", *characterise(flats, "SIM-L", "--config", config)
+    shutil.copytree(flats, folder := desk.home / "one_of_a_pair")
+    (folder / "right_2000us_02.png").unlink()
+    yield "one flat of a pair", *characterise(folder, "right_2000us_01.png", "--config", "none.toml")
+    shutil.copytree(flats, folder := desk.home / "two_sizes")
+    desk.run("scanrig-sim", "shoot-flats", "--scale", 0.3, "--dark-pairs", 1, "--exposures-us", "500,2000", "--out",
+             desk.home / "larger", check=True)
+    shutil.copyfile(desk.home / "larger/left_2000us_01.png", folder / "left_2000us_02.png")
+    yield "flats of two sizes", *characterise(folder, "384 x 288", "--config", "none.toml")
+    shutil.copytree(flats, folder := desk.home / "underexposed")
+    for number in (1, 2):
+        shutil.copyfile(flats / f"left_dark_0{number}.png", folder / f"left_500us_0{number}.png")
+    yield "an underexposed flat", *characterise(folder, "left_500us_01: underexposed", "--config", "none.toml")
+
+
 def cases(binaries, scratch, config):
     """Yields (name, ok, what was seen). `config`: a valid rig.toml."""
     desk = Desk(binaries, scratch)
     yield from scan_cases(desk)
     yield from object_cases(desk)
     yield from config_cases(desk, pathlib.Path(config))
+    yield from instrument_cases(desk, pathlib.Path(config))

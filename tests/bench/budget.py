@@ -13,7 +13,8 @@ MINUTES = {
     "calibration": {"rigs": 12, "faults": 8, "models": 8, "watch": 9, "drift": 6},
     "cameras": {"triggers": 4, "matrix": 3, "wire": 12, "hil": 8, "memory": 12},
     "page": {"scenes": 5, "bars": 9, "bundle": 1, "guide": 30},
-    "real-rig": {"realism": 3, "calibration": 6, "materials": 14, "disturbed": 8},
+    "real-rig": {"realism": 2, "calibration": 4, "materials": 8, "disturbed": 4, "acceptance": 4, "characterise": 1,
+                 "contradicted": 9, "screens": 2, "topology": 3, "rows": 3, "faint": 1, "edges": 3, "pairs": 1},
     "end-to-end": {"models": 14, "render": 1, "same_model": 4, "dragon": 8, "rim": 1, "bad_input": 4, "sigkill": 4},
 }
 LONG = {

@@ -1,9 +1,14 @@
-"""The simulated workshop: how its images compare with real ones, and whether the solver calibrates it."""
+"""The rig as it is: the simulated workshop beside real images, and its calibration; one image that contradicts the
+others; screens of other colours; holes and handles."""
 import json
 
+import range_pairs
 import real_rig_disturbed
+import real_rig_instruments
 import real_rig_materials
 import real_rig_scans
+from contradicted_images import contradicted
+from screens_topology import screens, topology
 
 MATERIALS = ("satin", "gloss", "translucent", "dark", "metal")
 # A rendered figure counts as near a real one within these factors: rigs, surfaces and light differ.
@@ -12,19 +17,6 @@ NEAR = 1.5
 
 def shoot(bench, folder, *options):
     bench.run([bench.bin / "scanrig-sim", "shoot", "--out", folder, "--views", 1, "--poses", 1, *options], 300, check=True)
-
-
-def white_block(file):
-    """As plain as the D415's sheet: a block whose dots are all its detail."""
-    corners = [(x, y, z) for x in (0, 60) for y in (0, 70) for z in (0, 50)]
-    faces = [(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1), (2, 3, 7), (2, 7, 6), (0, 2, 6), (0, 6, 4),
-             (1, 5, 7), (1, 7, 3)]
-    file.write_text("ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n"
-                    "property uchar red\nproperty uchar green\nproperty uchar blue\nelement face 12\n"
-                    "property list uchar int vertex_indices\nend_header\n"
-                    + "".join(f"{x} {y} {z} 205 205 205\n" for x, y, z in corners)
-                    + "".join(f"3 {a} {b} {c}\n" for a, b, c in faces))
-    return file
 
 
 def correlations(figures):
@@ -45,7 +37,7 @@ def realism(bench, scratch):
     shoot(bench, laboratory)
     shoot(bench, workshop, "--profile", "workshop", "--true-calibration")
     shoot(bench, faint, "--profile", "workshop", "--true-calibration", "--with", "faint-dots", "--object",
-          white_block(scratch / "block.ply"), "--height-mm", 100)
+          range_pairs.block(scratch / "block.ply"), "--height-mm", 100)
     parts = []
     for name in MATERIALS:
         parts.append(scratch / name)
@@ -85,4 +77,6 @@ def calibration(bench, _scratch):
 
 
 PARTS = {"realism": realism, "calibration": calibration, "materials": real_rig_materials.measure,
-         "disturbed": real_rig_disturbed.measure}
+         "disturbed": real_rig_disturbed.measure, "acceptance": real_rig_instruments.acceptance,
+         "characterise": real_rig_instruments.characterise, "contradicted": contradicted, "screens": screens,
+         "topology": topology, **range_pairs.PARTS}

@@ -1,0 +1,58 @@
+"""Screens of other colours, none, and an object as blue as the screen; holes and handles of objects of known genus."""
+import json
+
+import pierced_objects
+
+MAX_CLOSED_WRONGLY = 0.03
+SAME_COVERAGE = 0.01
+
+
+def scan(bench, folder, *options):
+    """Scores of the model, or why there is none."""
+    bench.run([bench.bin / "scanrig-sim", "shoot", "--out", folder, "--scale", 0.5, "--poses", 1, "--views", 12, *options],
+              600, check=True)
+    done = bench.run([bench.bin / "scanrig", "reconstruct", folder, "--no-texture", "--voxel-mm", 0.4], 300)
+    if done.returncode != 0:
+        return None, " ".join(done.stderr.split())[-200:]
+    scores = bench.run([bench.bin / "scanrig", "evaluate", folder, "--json"], 300, check=True)
+    return json.loads(scores.stdout), "; ".join(done.stderr.split("\n")).strip("; ")
+
+
+def coverage(scores):
+    return scores["covered_0.15_mm"]
+
+
+def screens(bench, scratch):
+    workshop = ("--profile", "workshop", "--true-calibration")
+    cases = {"blue": (), "green": ("--screen", "green"), "none": ("--screen", "none"),
+             "blue object": (*workshop, "--material", "screen-blue")}
+    sound = {}
+    for name, options in cases.items():
+        scores, said = scan(bench, scratch / name.replace(" ", "-"), *options)
+        if scores is None:
+            bench.line(f"screen: {name}", "a model", said, False)
+            continue
+        sound.setdefault("coverage", scores)
+        wrong = scores["whole"]["share_over_0.50_mm"] - sound["coverage"]["whole"]["share_over_0.50_mm"]
+        if said:
+            bench.note(f"{name}: {said}")
+        if name == "none":
+            bench.at_most("no screen: area more than 0.5 mm off, beyond that with a blue screen", 100 * MAX_CLOSED_WRONGLY,
+                          100 * wrong, "%", digits=2)
+        elif name != "blue":
+            least = coverage(sound["coverage"]) - SAME_COVERAGE
+            bench.at_least(f"screen: {name}: observable surface within 0.15 mm", 100 * least, 100 * coverage(scores), "%")
+
+
+def topology(bench, scratch):
+    right, crossing, objects = 0, 0, pierced_objects.all_objects()
+    for number, (name, genus, mesh) in enumerate(objects):
+        file = pierced_objects.write(scratch / f"object{number}.ply", mesh)
+        scores, said = scan(bench, scratch / f"scan{number}", "--object", file, "--height-mm", 100)
+        found = scores["topology"] if scores else {"genus": None, "self_intersecting_faces": 0}
+        right += 1 if found["genus"] == genus else 0
+        crossing += found["self_intersecting_faces"]
+        if found["genus"] != genus:
+            bench.note(f"{name}: genus {found['genus']} instead of {genus} {said if not scores else ''}")
+    bench.line("genus of objects with holes and handles, 0 to 5", f"right in {len(objects)}", str(right), right == len(objects))
+    bench.line("the same: faces that cross another", "none", str(crossing or "none"), crossing == 0)
