@@ -63,8 +63,11 @@ CameraImages take_images(const std::vector<FoundCamera>& cameras, const std::str
   }
   const auto keep = [&](const cv::Mat& image, PixelFormat format, std::size_t i) {
     auto written = write_image(image, format, folder / fmt::format("camera{}.jpg", i + 1));
-    if (written) images.files[i] = *std::move(written);
-    if (!written) images.trouble = written.error().message;
+    if (written) {
+      images.files[i] = *std::move(written);
+    } else {
+      images.trouble = written.error().message;
+    }
   };
   for (std::size_t i = 0; i + 1 < cameras.size(); i = i + 3 == cameras.size() ? i + 1 : i + 2) {
     AravisOptions pair;
