@@ -104,7 +104,10 @@ Result<void> Reconstruction::State::judge_rig(PoseState& pose, const Context& co
   const StageLog::Timer timer(log, "watch");
   context.report("watch", 0.0);
   const auto mode = watch_mode_of(options.watch);
-  return mode ? pose.watch->judge(pose.views, *mode) : Result<void>(pass_on(mode));
+  if (!mode) return pass_on(mode);
+  auto judged = pose.watch->judge(pose.views, *mode);
+  context.report("watch", 1.0);
+  return judged;
 }
 
 Result<void> Reconstruction::State::finish_pose(std::size_t pose, const Context& context) {
