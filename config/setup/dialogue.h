@@ -58,7 +58,7 @@ struct Message {
 
 /// One line of JSON, without its end.
 std::string to_line(const Message& message);
-/// Nothing for a line that is none.
+/// Nothing where the line is not such a message.
 std::optional<Message> read_line(std::string_view line);
 
 }  // namespace scanrig::config::setup

@@ -266,7 +266,7 @@ Result<void> Setup::find_cameras() {
     names.push_back(fmt::format("{} {} at {}", camera.name, camera.serial, camera.where));
   CameraImages images;
   if (!options_.images.empty()) images = take_images(found, *format, options_.images, clock_);
-  if (!images.trouble.empty()) dialogue_.tell(fmt::format("No image of each camera: {}.", images.trouble));
+  if (!images.trouble.empty()) dialogue_.tell(fmt::format("Not every camera gave an image: {}.", images.trouble));
   const auto left =
       dialogue_.choose("Which camera is on the left, seen from behind both cameras?", names, images.files);
   if (!left) return pass_on(left);

@@ -126,14 +126,14 @@ cv::Mat1b odd_cells(const Cells& cells, float limit, const PhotoCheckOptions& op
 }
 
 /// A photo that differs from the blend.
-struct Odd {
+struct OddPhoto {
   ContradictedPhoto photo;
   cv::Mat1b cells;
   double amount = 0.0;  ///< differences of those cells together
 };
 
-std::optional<Odd> judge(std::size_t p, const Cells& cells, float limit, const PhotoCheckOptions& options) {
-  Odd odd{.photo = {.photo = p}, .cells = odd_cells(cells, limit, options)};
+std::optional<OddPhoto> judge(std::size_t p, const Cells& cells, float limit, const PhotoCheckOptions& options) {
+  OddPhoto odd{.photo = {.photo = p}, .cells = odd_cells(cells, limit, options)};
   if (odd.cells.empty()) return std::nullopt;
   std::vector<float> brightness;
   for (int y = 0; y < odd.cells.rows; ++y) {
@@ -149,7 +149,7 @@ std::optional<Odd> judge(std::size_t p, const Cells& cells, float limit, const P
   return odd;
 }
 
-void leave_out(PhotoView& view, const Odd& odd, const PhotoCheckOptions& options) {
+void leave_out(PhotoView& view, const OddPhoto& odd, const PhotoCheckOptions& options) {
   cv::Mat1b cells;
   cv::dilate(odd.cells, cells, cv::Mat1b::ones(3, 3));  // its soft edge
   if (odd.photo.is_whole) cells.setTo(255);
@@ -158,14 +158,14 @@ void leave_out(PhotoView& view, const Odd& odd, const PhotoCheckOptions& options
   view.leave_out(pixels(cv::Rect({0, 0}, view.photo().image.size())));
 }
 
-std::vector<Odd> odd_photos(std::span<PhotoView> views, const RigLight& light, const Mesh& mesh,
-                            const std::vector<Eigen::Vector3f>& normals, const BlendOptions& blending,
-                            const PhotoCheckOptions& options) {
+std::vector<OddPhoto> odd_photos(std::span<PhotoView> views, const RigLight& light, const Mesh& mesh,
+                                 const std::vector<Eigen::Vector3f>& normals, const BlendOptions& blending,
+                                 const PhotoCheckOptions& options) {
   const auto spots = differences(views, light, mesh, normals, blending, options);
   std::vector<Cells> cells(views.size());
   parallel_for(views.size(), [&](std::size_t p) { cells[p] = cells_of(p, views[p].photo(), spots, options); });
   const float limit = limit_of(cells, options);
-  std::vector<Odd> result;
+  std::vector<OddPhoto> result;
   for (std::size_t p = 0; p < views.size(); ++p) {
     if (auto odd = judge(p, cells[p], limit, options)) result.push_back(std::move(*odd));
   }
@@ -182,10 +182,10 @@ std::vector<ContradictedPhoto> leave_out_contradicted(std::span<PhotoView> views
     auto odd = odd_photos(views, light, mesh, normals, blending, options);
     // A photo that is off all over shifts the blend, and the photos around it seem off too: it goes first, by itself.
     const auto worst =
-        std::ranges::max_element(odd, {}, [](const Odd& one) { return one.photo.is_whole ? one.amount : 0.0; });
+        std::ranges::max_element(odd, {}, [](const OddPhoto& one) { return one.photo.is_whole ? one.amount : 0.0; });
     const bool is_whole = worst != odd.end() && worst->photo.is_whole;
     if (is_whole) odd = {std::move(*worst)};
-    for (const Odd& one : odd) {
+    for (const OddPhoto& one : odd) {
       leave_out(views[one.photo.photo], one, options);
       result.push_back(one.photo);
     }

@@ -39,15 +39,15 @@ TEST(SetupQuestions, AreAskedUntilTheReplyIsOne) {
 }
 
 TEST(SetupQuestions, OneCandidateIsNoQuestion) {
-  const Script nobody({});
-  EXPECT_EQ(nobody.choose("Which one?", {"the only one"}).value(), 0U);
-  EXPECT_THAT(nobody.asked, IsEmpty());
+  const Script silent({});
+  EXPECT_EQ(silent.choose("Which one?", {"the only one"}).value(), 0U);
+  EXPECT_THAT(silent.asked, IsEmpty());
 }
 
 TEST(SetupQuestions, EndWhenTheRepliesEnd) {
-  const Script nobody({});
-  EXPECT_EQ(nobody.wait_until_done("Release it").error().code, ErrorCode::refused);
-  EXPECT_EQ(nobody.prompt_number("How many?", 1, 2).error().code, ErrorCode::refused);
+  const Script silent({});
+  EXPECT_EQ(silent.wait_until_done("Release it").error().code, ErrorCode::refused);
+  EXPECT_EQ(silent.prompt_number("How many?", 1, 2).error().code, ErrorCode::refused);
 }
 
 TEST(SetupQuestions, CarryWhatCanBeChosenAndItsPictures) {
