@@ -137,20 +137,19 @@ double seconds_of_view(const SceneOptions& options) {
   return seconds;
 }
 
-// The promise, 4 s on two idle cores, is tested by the bench, and 6 s for the workshop. Other programs run here, so
-// only a gross excess fails.
+// The promises, 4 s on two idle cores and 6 s for the workshop, are tested by the bench. Other programs run here, and
+// machines differ by a factor of two: the plain profile may not take 2.5 times its promise, and the workshop, whose
+// measure is the plain profile on the same machine in the same minute, not over 1.5 times what the promises allow it.
 TEST(View, RendersInTimeOnTwoCores) {
   const double seconds = seconds_of_view({});
   testing::Test::RecordProperty("processor_seconds", std::to_string(seconds));
-  EXPECT_LT(seconds, 12.0 * kSlowness);
-}
+  EXPECT_LT(seconds, 2.5 * 2 * 4.0 * kSlowness);
 
-TEST(View, OfTheWorkshopRendersInTimeOnTwoCores) {
   SceneOptions options;
   options.profile.effects = choose_effects("workshop", "", "").value();
-  const double seconds = seconds_of_view(options);
-  testing::Test::RecordProperty("processor_seconds", std::to_string(seconds));
-  EXPECT_LT(seconds, 18.0 * kSlowness);
+  const double of_workshop = seconds_of_view(options);
+  testing::Test::RecordProperty("processor_seconds_of_the_workshop", std::to_string(of_workshop));
+  EXPECT_LT(of_workshop / seconds, 1.5 * 6.0 / 4.0);
 }
 
 }  // namespace
