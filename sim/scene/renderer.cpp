@@ -173,11 +173,14 @@ class Shot {
     const Vector3f room = upwards * above + (1.0F - upwards) * below;
     const double to_screen = way.dot(backdrop_.normal) < 0.0 ? backdrop_.distance(from, way) : -1.0;
     if (to_screen <= 0.0) return room;
-    const Vector3d on_screen = from + to_screen * way;
+    const Vector3d on_screen = from + to_screen * way, off_middle = on_screen - backdrop_.point;
     const double blur = 2.0 * wide * to_screen * way.norm();
-    const double inside = std::min(on_screen.y(), kScreenReach - (on_screen - backdrop_.point).norm());
+    const double inside = std::min(on_screen.y(), kScreenReach - off_middle.norm());
     const auto screen = static_cast<float>(std::clamp(0.5 + inside / blur, 0.0, 1.0));
-    return screen > 0.0F ? Vector3f(screen * backdrop_.plain_light(on_screen) + (1.0F - screen) * room) : room;
+    if (screen == 0.0F) return room;
+    // A wide lobe around a way that nearly misses the screen still sees its edge.
+    const Vector3d seen = backdrop_.point + std::min(1.0, kScreenReach / off_middle.norm()) * off_middle;
+    return screen * backdrop_.plain_light(seen) + (1.0F - screen) * room;
   }
 
   /// Averaging width of one sample on a surface, as the width of a box of the same standard deviation: mm.

@@ -199,6 +199,21 @@ TEST(TableTop, MirrorsTheObject) {
   EXPECT_GT(beside[2], 2.0F * beside[0]);  // of the screen
 }
 
+TEST(Gloss, AddsLightOnEverySlopeOfASphere) {
+  SceneOptions options = small(alone({"gloss"}), 0.5);
+  options.object = "sphere", options.poses = 1;
+  for (const char* material : {"matt", "satin", "gloss"}) {
+    options.profile.material = material;
+    const View with = Scene::create(options).value()->look(0, 0.0);
+    options.profile.effects = {};
+    const View without = Scene::create(options).value()->look(0, 0.0);
+    options.profile.effects = alone({"gloss"});
+    double least = 0.0;
+    cv::minMaxLoc(with.left_plain - without.left_plain, &least);
+    EXPECT_GE(least, -1e-5) << material;
+  }
+}
+
 TEST(Screen, HasFoldsAndTheObjectsShadow) {
   const Object object = grey(box({40.0, 40.0, 5.0}), 0.6F);
   const RayCaster rays(object.mesh);
