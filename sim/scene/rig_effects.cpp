@@ -33,6 +33,7 @@ DrawnRig make_rig(const std::optional<RigVariation>& variation, const Effects& e
     const double tilt = to_radians(effects.top_tilt_deg) * std::sqrt(0.5);  // about each axis
     rig.table.axis_from_top = rig.table.axis_from_top * small_motion({tilt, 0.0, tilt}, Vector3d::Zero());
   }
+  rig.table.axis_from_top.translation().y() += effects.top_height_mm;
   return rig;
 }
 

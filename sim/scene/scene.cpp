@@ -43,10 +43,7 @@ Scene::Scene(Object object, std::vector<Transform> placements, const SceneOption
       dots_(options.image_scale),
       cameras_(both_cameras(options.profile, options.image_scale)),
       lights_(placements_.size()),
-      bounces_(placements_.size()) {
-  // Of the scan alone: boards lay lower.
-  rig_.table.axis_from_top.translation().y() += options.profile.effects.top_height_mm;
-}
+      bounces_(placements_.size()) {}
 
 const RoomLight& Scene::light_of(int pose) {
   auto& light = lights_[pose];

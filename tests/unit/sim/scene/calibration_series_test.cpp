@@ -7,6 +7,7 @@
 #include "core/parallel.h"
 #include "core/units.h"
 #include "sim/scene/profile.h"
+#include "sim/scene/rig_effects.h"
 
 namespace scanrig::sim {
 namespace {
@@ -74,6 +75,19 @@ TEST(Series, PutsTheBoardDownAsPlannedWithinTheErrorsOfAnOperator) {
       EXPECT_NEAR(lowest, plan.on_block ? 40.0 : 0.0, 0.2) << plan.number;
     }
   }
+}
+
+TEST(Series, OfAWorkshopShowsTheTopLowerThanItIs) {
+  SeriesOptions options;
+  options.placements = {1};
+  const auto flat = made(options);
+  options.profile.effects =
+      choose_effects("workshop", "optics,sensor,projector,materials,drift,room,runout,wobble,worm,tilt", "").value();
+  const auto sunk = made(options);
+  // Boards are where they were; rim dots are on the top, in a scan as in a calibration.
+  EXPECT_LT(largest_shift(*flat, *sunk), 1e-6);
+  EXPECT_DOUBLE_EQ(make_rig({}, options.profile.effects, 1.0).table.axis_from_top.translation().y(), 0.05);
+  EXPECT_GT(largest_difference(flat->shoot(0), sunk->shoot(0)), 1.0);
 }
 
 TEST(Series, ReportsTheAngleOfADriveThatErrs) {
