@@ -1,5 +1,6 @@
 """Scans of the simulated workshop, with a calibration that the project's own solver made from the workshop's boards."""
 import json
+import math
 import shutil
 
 import mesh_shapes
@@ -55,3 +56,27 @@ def reconstruct(bench, scan, model, *options):
 def evaluate(bench, scan, model):
     done = bench.run([bench.bin / "scanrig", "evaluate", scan, "--model", model, "--json"], 600, check=True)
     return json.loads(done.stdout)
+
+
+def raised(transform, mm):
+    """pose1_from_pose2 of frames whose origins lie `mm` higher."""
+    rotation, translation = transform["rotation"], list(transform["translation"])
+    for row in range(3):
+        translation[row] += (mm if row == 1 else 0.0) - mm * rotation[row][1]
+    return {"rotation": rotation, "translation": translation}
+
+
+def pose2_error(scan, report):
+    """Degrees, and mm at the model's centre, that pose1_from_pose2 is off in the rig's own frame: boards sink into the top,
+    so that of a calibration lies higher or lower than the truth's."""
+    sunk = json.loads((scan / "rig_truth.json").read_text())["effects"]["top_height_mm"]
+    true = json.loads((scan / "truth.json").read_text())["pose1_from_pose2"]
+    found = raised(report["pose1_from_pose2"], sunk)
+    turn = [[sum(a * b for a, b in zip(row, other)) for other in true["rotation"]] for row in found["rotation"]]
+    # Off the truth: x -> turn (x - true translation) + found translation.
+    centre = report["mesh"]["centre_of_mass"]
+    from_true = [c - t for c, t in zip(centre, true["translation"])]
+    off = [sum(a * b for a, b in zip(row, from_true)) + t - c for row, t, c in zip(turn, found["translation"], centre)]
+    # Of small angles the trace's arc cosine keeps too few digits.
+    axis = [turn[2][1] - turn[1][2], turn[0][2] - turn[2][0], turn[1][0] - turn[0][1]]
+    return math.degrees(math.asin(min(1.0, math.hypot(*axis) / 2))), math.hypot(*off)
