@@ -127,11 +127,11 @@ def edges(bench, scratch):
                   100 * seen["edges_wrong_beyond_2px"] / near["pixels"], "%")
     bench.at_most("comb, not seen by all three: more than 3 sigma off, most in a view", 5, seen["hidden_wrong"], "pixels",
                   digits=0)
-    figurine = figures(bench, "scan", shoot(bench, scratch / "figurine", views=6))
+    figurine = figures(bench, "scan", shoot(bench, scratch / "figurine-edges", views=6))
     if figurine:
         bench.at_most("figurine, not seen by all three: more than 3 sigma off, most in a view", 5,
                       figurine["hidden_wrong"], "pixels", digits=0)
-    steep = figures(bench, "scan", shoot(bench, scratch / "cylinder", "--object", cylinder(scratch / "cylinder.ply"),
+    steep = figures(bench, "scan", shoot(bench, scratch / "steep", "--object", cylinder(scratch / "cylinder.ply"),
                                          "--height-mm", 86))
     if steep:
         for low, band in ((55, "60"), (60, "70"), (70, "80")):

@@ -34,7 +34,7 @@ cv::Mat1f by_opencv(const cv::Mat1f& left, const cv::Mat1f& right) {
   constexpr int kBlock = 3;
   const auto matcher = cv::StereoSGBM::create(0, kDisparities, kBlock, 8 * kBlock * kBlock, 32 * kBlock * kBlock, 1, 63,
                                               10, 100, 2, cv::StereoSGBM::MODE_HH);
-  cv::Mat1b a, b;
+  cv::Mat a, b;
   cv::copyMakeBorder(left, a, 0, 0, kDisparities, 0, cv::BORDER_REPLICATE);
   cv::copyMakeBorder(right, b, 0, 0, kDisparities, 0, cv::BORDER_REPLICATE);
   a.convertTo(a, CV_8U);
