@@ -26,10 +26,10 @@ double BoardOnTable::measured_length_mm() const {
 void BoardOnTable::put(int number) {
   const PlannedPlacement& planned = calibration_plan().at(static_cast<std::size_t>(number) - 1);
   const double facing = -to_radians(rig_.table.true_deg(-planned.mark_deg));
-  PlacedBoard placed =
-      put_down(planned, board_.layout(), facing, false, mix(scene_.options().seed, BoardRandom::place));
-  placed.table_from_board.translation().y() -= scene_.options().profile.effects.top_height_mm;
-  placed_.emplace(board_, std::move(placed), rig_.rim_dots);
+  const PlacedBoard placed =
+      sunk(put_down(planned, board_.layout(), facing, false, mix(scene_.options().seed, BoardRandom::place)),
+           scene_.options().profile.effects.top_height_mm);
+  placed_.emplace(board_, placed, rig_.rim_dots);
 }
 
 StereoImages BoardOnTable::shoot(double angle, std::uint64_t exposure) {

@@ -112,6 +112,12 @@ PlacedBoard put_down(const PlannedPlacement& plan, const BoardLayout& board, dou
   return placed;
 }
 
+PlacedBoard sunk(PlacedBoard placed, double mm) {
+  placed.table_from_board.translation().y() -= mm;
+  for (Block& block : placed.blocks) block.table_from_block.translation().y() -= mm;
+  return placed;
+}
+
 PlacedBoard held_by_hand(std::uint64_t seed, int number) {
   const auto within = [&](double size, int n) { return size * (2.0 * uniform(mix(seed, 0x6868, number, n)) - 1.0); };
   const Vector3d middle(within(25.0, 0), 58.0 + within(18.0, 1), within(35.0, 2));

@@ -46,6 +46,9 @@ struct PlacedBoard {
 PlacedBoard put_down(const PlannedPlacement& placement, const BoardLayout& board, double facing_rad, bool exactly,
                      std::uint64_t seed);
 
+/// The board and what holds it, pressed into the table top.
+PlacedBoard sunk(PlacedBoard placed, double mm);
+
 /// The board held in mid-air before the cameras, differently for every `number`.
 PlacedBoard held_by_hand(std::uint64_t seed, int number);
 

@@ -93,9 +93,9 @@ void CalibrationSeries::plan_placements() {
     const auto& chosen = options_.placements;
     if (!chosen.empty() && std::ranges::find(chosen, planned.number) == chosen.end()) continue;
     const double facing = -to_radians(rig_.table.true_deg(-planned.mark_deg));
-    PlacedBoard placed =
-        put_down(planned, options_.board, facing, options_.exact_placements, mix(options_.seed, SeriesRandom::place));
-    placed.table_from_board.translation().y() -= options_.profile.effects.top_height_mm;
+    const PlacedBoard placed = sunk(
+        put_down(planned, options_.board, facing, options_.exact_placements, mix(options_.seed, SeriesRandom::place)),
+        options_.profile.effects.top_height_mm);
     int image = 0;
     for (const double angle : planned_angles(planned, options_.angles)) {
       SeriesPair pair;

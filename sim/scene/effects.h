@@ -49,7 +49,7 @@ struct Effects {
   double wobble_deg = 0.0;     ///< likewise, about both horizontal axes
   double worm_deg = 0.0;       ///< amplitude of the angle's error
   double top_tilt_deg = 0.0;   ///< of the table top against the axis
-  double top_height_mm = 0.0;  ///< above where the boards of a calibration show it: they sit that deep in it
+  double top_height_mm = 0.0;  ///< above where boards of a calibration show it: they sink into it
 
   // From cold to warm
   double drift_px = 0.0;           ///< turn of the cameras against each other
