@@ -15,6 +15,7 @@
 #include "daemon/ctl/verbs.h"
 #include "pipeline/deviation/references.h"
 #include "pipeline/evaluate/evaluate.h"
+#include "pipeline/evaluate/frame_height.h"
 #include "pipeline/importers/import_stanford.h"
 
 namespace scanrig::ctl {
@@ -73,14 +74,19 @@ ExitCode reconstruct(const ReconstructVerb& verb) {
 ExitCode evaluate(const EvaluateVerb& verb) {
   const auto truth = read_truth(verb.scan);
   if (!truth) return report_error(truth.error());
-  const auto claim = read_claim(verb.model.empty() ? verb.scan / "model" : verb.model);
+  auto claim = read_claim(verb.model.empty() ? verb.scan / "model" : verb.model);
   if (!claim) return report_error(claim.error());
   const auto photos = ScanFolder::open(verb.scan);
   if (!photos) return report_error(photos.error());
 
+  const auto calibration = photos->load_calibration();
+  if (!calibration) return report_error(calibration.error());
+
   const SignalStop stop;
-  const auto scores = scanrig::evaluate(*claim, *truth, &*photos, {}, {stop.token(), {}});
+  const double height = frame_height(*calibration, *truth);
+  auto scores = scanrig::evaluate(raised(std::move(*claim), height), *truth, &*photos, {}, {stop.token(), {}});
   if (!scores) return report_error(scores.error());
+  scores->frame_height_mm = height;
   const auto limits = gates(*scores);
   if (verb.json) {
     fmt::print("{}\n", to_json(*scores).dump(2));

@@ -61,6 +61,7 @@ json to_json(const Scores& s) {
                  {"unobservable_share", 1.0 - s.observable_share},
                  {"whole", to_json(s.whole)},
                  {"aligned", to_json(s.aligned)},
+                 {"frame_height_mm", s.frame_height_mm},
                  {"alignment", {{"deg", s.alignment_deg}, {"mm", s.alignment_mm}}},
                  {"normals",
                   {{"median_deg", number(s.normal_median_deg)},
@@ -114,6 +115,7 @@ std::string to_table(const Scores& s) {
   text += row("observable truth within 0.15 mm", 100.0 * s.covered_015, "%");
   text += row("closed share of the model", 100.0 * s.closed_share, "%");
   text += row("unobservable share of the truth", 100.0 * (1.0 - s.observable_share), "%");
+  text += row("origin above the truth's, taken out", s.frame_height_mm, "mm");
   text += row("alignment, turn", s.alignment_deg, "deg");
   text += row("alignment, shift", s.alignment_mm, "mm");
   text += row("normals, median", s.normal_median_deg, "deg");

@@ -38,6 +38,7 @@ struct Scores {
 
   /// Of measured area after the best rigid motion onto the truth.
   DistanceFigures aligned;
+  double frame_height_mm = 0.0;  ///< of the calibration's origin above the truth's; taken out, see frame_height.h
   double alignment_deg = 0.0;
   double alignment_mm = 0.0;  ///< at the object's centre
 

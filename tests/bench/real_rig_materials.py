@@ -58,6 +58,6 @@ def measure(bench, scratch):
         scores = real_rig_scans.evaluate(bench, scan, model)
         judge_shape(bench, what, material, scores)
         judge_sigma(bench, what, scores)
-        degrees, mm = real_rig_scans.pose2_error(scan, report)
+        degrees, mm = scores["pose2_error"]["deg"], scores["pose2_error"]["mm"]
         bench.line(f"{what}: pose 2", f"<= {POSE[0]} deg, {POSE[1]} mm", f"{degrees:.4f} deg, {mm:.4f} mm",
                    degrees <= POSE[0] and mm <= POSE[1])

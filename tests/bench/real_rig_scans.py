@@ -1,10 +1,8 @@
 """Scans of the simulated workshop, with a calibration that the project's own solver made from the workshop's boards."""
 import json
-import math
 import shutil
 
 import mesh_shapes
-from calibration_watch import times
 
 WORKSHOP = ["--profile", "workshop"]
 RIM_DOTS = "40x84.5x2.4"
@@ -57,25 +55,3 @@ def reconstruct(bench, scan, model, *options):
 def evaluate(bench, scan, model):
     done = bench.run([bench.bin / "scanrig", "evaluate", scan, "--model", model, "--json"], 600, check=True)
     return json.loads(done.stdout)
-
-
-def in_truth_frame(transform, mm):
-    """pose1_from_pose2 of a frame that lies `mm` higher than the truth's, in that of the truth."""
-    up = [0.0, mm, 0.0]
-    shifted = [t + a - b for t, a, b in zip(transform["translation"], up, times(transform["rotation"], up))]
-    return transform["rotation"], shifted
-
-
-def pose2_error(scan, report):
-    """Degrees, and mm at the model's centre, that pose1_from_pose2 is off. A calibration's frame begins at the rim dots, on
-    the top; the truth's begins where boards lie, which sink into it."""
-    higher = json.loads((scan / "rig_truth.json").read_text())["effects"]["top_height_mm"]
-    true = json.loads((scan / "truth.json").read_text())["pose1_from_pose2"]
-    rotation, translation = in_truth_frame(report["pose1_from_pose2"], higher)
-    turn = [times(true["rotation"], row) for row in rotation]  # found times the transpose of the true rotation
-    centre = report["mesh"]["centre_of_mass"]
-    moved = times(turn, [c - t for c, t in zip(centre, true["translation"])])
-    off = [m + t - c for m, t, c in zip(moved, translation, centre)]
-    # Of small angles the trace's arc cosine keeps too few digits.
-    axis = [turn[2][1] - turn[1][2], turn[0][2] - turn[2][0], turn[1][0] - turn[0][1]]
-    return math.degrees(math.asin(min(1.0, math.hypot(*axis) / 2))), math.hypot(*off)
