@@ -26,7 +26,7 @@ ALLOWED = {
     "tests": set(FOLDERS),
 }
 # Leaves of the pipeline, lowest first: a leaf may include those before it.
-PIPELINE_ORDER = ["calibration", "characterise", "silhouette", "movement", "range", "registration", "mesh", "volume", "pose", "texture",
+PIPELINE_ORDER = ["calibration", "characterise", "exposures", "silhouette", "movement", "range", "registration", "mesh", "volume", "pose", "texture",
                   "model_io", "deviation", "storage", "calibrate", "acceptance", "exporters", "importers",
                   "reconstruct", "evaluate"]
 # Folders of the daemon, and which others each may include.

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/parallel.h"
+#include "pipeline/exposures/merge_exposures.h"
 #include "pipeline/range/disparity_range.h"
 #include "pipeline/range/spline.h"
 
@@ -58,9 +59,10 @@ RectifyingMap make_map(const Camera& camera, const Projection& projection, const
 }
 
 Result<void> check_image(const RectifyingMap& map, const cv::Mat& image) {
-  if (image.type() != CV_32FC1 && image.type() != CV_8UC1 && image.type() != CV_8UC3) {
+  const bool is_of_sensor = image.depth() == CV_8U || image.depth() == CV_16U;
+  if (image.type() != CV_32FC1 && !(is_of_sensor && (image.channels() == 1 || image.channels() == 3))) {
     return fail(ErrorCode::invalid_input,
-                "rectify: an image must have 8 bits and one or three channels, or be grey values");
+                "rectify: an image must have 8 or 16 bits and one or three channels, or be grey values");
   }
   if (image.size() != map.u.size()) {
     return fail(ErrorCode::invalid_input, "rectify: the image has {}x{} pixels, the calibration {}x{}", image.cols,
@@ -89,17 +91,25 @@ void resample_row(const cv::Mat1f& coefficients, const float* us, const float* v
   }
 }
 
-cv::Mat1f grey_values(const cv::Mat& image) {
+template <class Value>
+cv::Mat1f weighted_grey(const cv::Mat& image, float scale) {
   cv::Mat1f grey(image.size());
-  if (image.channels() == 1) {
-    image.convertTo(grey, CV_32F);
-    return grey;
-  }
   for (int y = 0; y < image.rows; ++y) {
-    const cv::Vec3b* bgr = image.ptr<cv::Vec3b>(y);
+    const auto* bgr = image.ptr<cv::Vec<Value, 3>>(y);
     float* out = grey[y];
-    for (int x = 0; x < image.cols; ++x) out[x] = 0.25f * static_cast<float>(bgr[x][0] + 2 * bgr[x][1] + bgr[x][2]);
+    for (int x = 0; x < image.cols; ++x)
+      out[x] = 0.25f * scale * static_cast<float>(bgr[x][0] + 2 * bgr[x][1] + bgr[x][2]);
   }
+  return grey;
+}
+
+cv::Mat1f grey_values(const cv::Mat& image) {
+  const bool is_merged = image.depth() == CV_16U;
+  const float scale = is_merged ? 1.0f / static_cast<float>(kMergedUnitsPerGrey) : 1.0f;
+  if (image.channels() == 3)
+    return is_merged ? weighted_grey<ushort>(image, scale) : weighted_grey<uchar>(image, scale);
+  cv::Mat1f grey;
+  image.convertTo(grey, CV_32F, static_cast<double>(scale));
   return grey;
 }
 

@@ -42,7 +42,8 @@ Result<Rectification> rectify(const Calibration& calibration, const WorkingVolum
 Result<cv::Mat> rectified(const RectifyingMap& map, const cv::Mat& image);
 
 /// The same as grey float values without loss of sub-pixel position (cubic B-spline, prefiltered), for matching.
-/// Colour is weighted 1:2:1 (B, G, R), as often as a Bayer sensor samples them. Grey values (CV_32F) may be given too.
+/// Colour is weighted 1:2:1 (B, G, R), as often as a Bayer sensor samples them. Images of 16 bit are those of
+/// merge_exposures(). Grey values (CV_32F) may be given too.
 Result<cv::Mat1f> rectified_grey(const RectifyingMap& map, const cv::Mat& image);
 
 }  // namespace scanrig

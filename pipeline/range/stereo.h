@@ -73,7 +73,8 @@ struct RectifiedPair {
 /// Fails with `invalid_input` (sizes, no disparities to search), `degenerate` (nothing matched), `stopped`.
 Result<RangeImage> match_rectified(const RectifiedPair& pair, const StereoOptions& options, const Context& context);
 
-/// The same from the sensors' pattern images (8 bit, BGR or grey). Masks are in the rectified grids.
+/// The same from the sensors' pattern images (8 bit or merged exposures, BGR or grey). Masks are in the rectified
+/// grids.
 Result<RangeImage> match_stereo(const Rectification& rectification, const cv::Mat& left_pattern,
                                 const cv::Mat& right_pattern, const cv::Mat1b& left_object,
                                 const cv::Mat1b& right_object, const StereoOptions& options, const Context& context);

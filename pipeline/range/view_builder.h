@@ -13,7 +13,7 @@ namespace scanrig {
 
 /// The sensors' images of one view, 8 bit, all BGR or all grey.
 struct StereoImages {
-  cv::Mat left_pattern, right_pattern;  ///< projector on
+  cv::Mat left_pattern, right_pattern;  ///< projector on; may be merged exposures
   cv::Mat left_plain, right_plain;      ///< projector off, plain light; not needed when grey
 };
 

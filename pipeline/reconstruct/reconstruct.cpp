@@ -36,8 +36,8 @@ Result<VolumeOptions::Fusion> fusion_of(const std::string& name) {
   return fail(ErrorCode::invalid_input, "fusion \"{}\" is neither \"evidence\" nor \"paper\"", name);
 }
 
-cv::Mat1b grey_of(const cv::Mat& image) {
-  cv::Mat1b grey;
+cv::Mat grey_of(const cv::Mat& image) {
+  cv::Mat grey;
   cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
   return grey;
 }

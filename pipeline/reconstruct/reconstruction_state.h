@@ -23,8 +23,8 @@ struct Reconstruction::State {
     cv::Mat3b left, right;
   };
   struct GreyPair {
-    std::size_t order;  ///< of the view in its pose, as added
-    cv::Mat1b left, right;
+    std::size_t order;    ///< of the view in its pose, as added
+    cv::Mat left, right;  ///< 8 bit, or merged exposures of 16
   };
 
   struct PoseState {

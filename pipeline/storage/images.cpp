@@ -3,6 +3,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/units.h"
+#include "pipeline/exposures/merge_exposures.h"
 
 namespace scanrig {
 namespace {
@@ -26,6 +27,15 @@ Result<void> check_image(const std::string& name, const cv::Mat& image, const st
   return {};
 }
 
+/// All exposures of one side as one image.
+cv::Mat merged_pattern(const RawView& raw, bool is_left) {
+  const cv::Mat& first = is_left ? raw.left_pattern : raw.right_pattern;
+  if (raw.more_patterns.empty()) return demosaiced(first, raw.pixel_format);
+  std::vector<OtherExposure> more;
+  for (const PatternExposure& one : raw.more_patterns) more.push_back({is_left ? one.left : one.right, one.factor});
+  return demosaiced(merge_exposures(first, more, NoiseModel{}), raw.pixel_format);
+}
+
 }  // namespace
 
 cv::Mat& RawView::image(std::string_view role) {
@@ -43,6 +53,14 @@ Result<void> check_images(const RawView& raw, std::string_view source) {
   if (source == "calibration") return {};
   if (raw.left_pattern.size() != raw.left_plain.size() || raw.right_pattern.size() != raw.right_plain.size()) {
     return fail(ErrorCode::invalid_input, "the pattern and the plain image of a camera differ in size");
+  }
+  for (const PatternExposure& more : raw.more_patterns) {
+    const auto [left, right] = pattern_roles(more.factor);
+    if (const auto checked = check_image(left, more.left, raw.pixel_format); !checked) return checked;
+    if (const auto checked = check_image(right, more.right, raw.pixel_format); !checked) return checked;
+    if (more.left.size() != raw.left_pattern.size() || more.right.size() != raw.right_pattern.size()) {
+      return fail(ErrorCode::invalid_input, "{} or {}: an exposure differs in size from the first", left, right);
+    }
   }
   return {};
 }
@@ -62,8 +80,8 @@ Result<ViewImages> to_view_images(const RawView& raw, const ViewRecord& record) 
     ViewImages images;
     images.index = record.index;
     images.angle_rad = to_radians(record.measured_deg);
-    images.left_pattern = demosaiced(raw.left_pattern, raw.pixel_format);
-    images.right_pattern = demosaiced(raw.right_pattern, raw.pixel_format);
+    images.left_pattern = merged_pattern(raw, true);
+    images.right_pattern = merged_pattern(raw, false);
     images.left_plain = demosaiced(raw.left_plain, raw.pixel_format);
     images.right_plain = demosaiced(raw.right_plain, raw.pixel_format);
     return images;

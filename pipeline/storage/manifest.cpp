@@ -14,7 +14,7 @@ namespace {
 
 using nlohmann::ordered_json;
 
-constexpr int kVersion = 5;             ///< 4 had no calibrations
+constexpr int kVersion = 6;             ///< 4 had no calibrations, 5 one exposure of the pattern a view
 constexpr int kCurrentKeysVersion = 4;  ///< older versions use old names of two keys
 constexpr std::array kStates = {"queued",    "scanning", "waiting_for_flip", "scanned", "interrupted",
                                 "cancelled", "failed"};
@@ -42,6 +42,7 @@ ordered_json to_json(const ViewRecord& view) {
                        {"taken", view.taken},
                        {"pixel_format", view.pixel_format},
                        {"files", files}};
+  if (!view.pattern_factors.empty()) json["pattern_factors"] = view.pattern_factors;
   add_retake_reasons(json, view.retake_reasons);
   if (view.grid) {
     json["grid"] = {{"fx", view.grid->fx}, {"fy", view.grid->fy}, {"cx", view.grid->cx}, {"cy", view.grid->cy}};
@@ -94,6 +95,19 @@ std::vector<Error> read_retake_reasons(JsonObject& object, int version) {
   return reasons;
 }
 
+/// The first exposure, of factor 1, is not among them.
+std::vector<double> read_pattern_factors(JsonObject& object) {
+  if (!object.has("pattern_factors")) return {};
+  std::vector<double> factors = object.numbers("pattern_factors");
+  std::set<double> known{1.0};
+  for (const double factor : factors) {
+    if (factor >= kMinPatternFactor && factor <= kMaxPatternFactor && known.insert(factor).second) continue;
+    object.reject("pattern_factors", fmt::format("must be different numbers of {:g} to {:g}, without 1",
+                                                 kMinPatternFactor, kMaxPatternFactor));
+  }
+  return factors;
+}
+
 ViewRecord read_view(JsonObject object, const std::string& source, int version) {
   ViewRecord view;
   view.index = object.integer("index", 0, 9999);
@@ -107,6 +121,10 @@ ViewRecord read_view(JsonObject object, const std::string& source, int version) 
       images ? object.one_of("pixel_format", {"Mono8", "BayerRG8", "BGR8"}) : object.one_of("pixel_format", {""});
   JsonObject files = object.object("files");
   for (const std::string& role : view_roles(source)) view.files[role] = read_file_record(files.object(role));
+  if (source == "stereo") view.pattern_factors = read_pattern_factors(object);
+  for (const double factor : view.pattern_factors) {
+    for (const std::string& role : pattern_roles(factor)) view.files[role] = read_file_record(files.object(role));
+  }
   files.close();
   view.retake_reasons = read_retake_reasons(object, version);
   if (!images) {
@@ -211,6 +229,10 @@ std::vector<std::string> view_roles(std::string_view source) {
   if (source == "range") return {"range"};
   if (source == "calibration") return {"left_plain", "right_plain"};
   return {"left_pattern", "right_pattern", "left_plain", "right_plain"};
+}
+
+std::array<std::string, 2> pattern_roles(double factor) {
+  return {fmt::format("left_pattern_x{:g}", factor), fmt::format("right_pattern_x{:g}", factor)};
 }
 
 Result<void> check_words(const Manifest& manifest) {

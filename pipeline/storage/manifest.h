@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -12,6 +13,9 @@
 #include "pipeline/calibration/camera.h"
 
 namespace scanrig {
+
+/// Limits of ViewRecord::pattern_factors.
+inline constexpr double kMinPatternFactor = 1.0 / 64.0, kMaxPatternFactor = 64.0;
 
 /// The manifest of docs/reference/scan-folder.md.
 struct FileRecord {
@@ -27,6 +31,8 @@ struct ViewRecord {
   double settling_ms = 0.0;
   std::string taken{};         ///< ISO 8601
   std::string pixel_format{};  ///< "Mono8", "BayerRG8", "BGR8"; empty for range scans
+  /// Of the exposures of the pattern besides the first: how many times its duration each lasted.
+  std::vector<double> pattern_factors{};
   std::map<std::string, FileRecord> files{};
   std::vector<Error> retake_reasons{};                 ///< reasons of the retakes of its exposures
   std::optional<Projection> grid{};                    ///< range scans: orthographic
@@ -66,12 +72,15 @@ struct Manifest {
 std::string to_json(const Manifest& manifest);
 
 /// Reads version 1 too, which has no movement_checks, and version 2, which has no configuration; the written version is
-/// 5. Fails with `not_found`, `io`, `invalid_input` (naming file and key), `unsupported` (version). Sizes of range
+/// 6. Fails with `not_found`, `io`, `invalid_input` (naming file and key), `unsupported` (version). Sizes of range
 /// grids are those of their files and stay 0 here.
 Result<Manifest> read_manifest(const std::filesystem::path& file);
 
-/// The files of a view of this source: "left_plain" and so on.
+/// The files that every view of this source has: "left_plain" and so on.
 std::vector<std::string> view_roles(std::string_view source);
+
+/// The files of one more exposure of the pattern, left and right: "left_pattern_x8" lasted 8 times as long.
+std::array<std::string, 2> pattern_roles(double factor);
 
 /// Checks that `state` and `source` are words of the format. Fails with `invalid_input`.
 Result<void> check_words(const Manifest& manifest);

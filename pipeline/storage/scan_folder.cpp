@@ -144,6 +144,16 @@ Result<void> ScanFolder::add_view(std::size_t pose, ViewRecord record, const Raw
     if (!bytes) return pass_on(bytes, who);
     encoded.emplace_back(role, std::move(*bytes));
   }
+  record.pattern_factors.clear();
+  for (const PatternExposure& more : images.more_patterns) {
+    record.pattern_factors.push_back(more.factor);
+    const auto roles = pattern_roles(more.factor);
+    for (const bool is_left : {true, false}) {
+      auto bytes = encode_png(is_left ? more.left : more.right);
+      if (!bytes) return pass_on(bytes, who);
+      encoded.emplace_back(roles[is_left ? 0 : 1], std::move(*bytes));
+    }
+  }
   record.pixel_format = images.pixel_format;
   return store_view(pose, std::move(record), encoded, ".png");
 }
@@ -233,6 +243,13 @@ Result<RawView> ScanFolder::load_raw(std::size_t pose, std::size_t view) const {
     auto loaded = load_sensor_image(**record, role);
     if (!loaded) return pass_on(loaded);
     raw.image(role) = std::move(*loaded);
+  }
+  for (const double factor : (*record)->pattern_factors) {
+    const auto [left_role, right_role] = pattern_roles(factor);
+    auto left = load_sensor_image(**record, left_role), right = load_sensor_image(**record, right_role);
+    if (!left) return pass_on(left);
+    if (!right) return pass_on(right);
+    raw.more_patterns.push_back({factor, std::move(*left), std::move(*right)});
   }
   if (const auto checked = check_images(raw, manifest_.source); !checked) {
     return pass_on(checked, (path_ / (*record)->files.at("left_plain").path).parent_path().string());

@@ -96,7 +96,8 @@ TEST(Rectification, ReportsCamerasThatDoNotSeeTheTable) {
 TEST(Rectification, RefusesImagesThatDoNotFitTheCalibration) {
   const auto r = rectify(test::default_rig({320, 240}));
   ASSERT_TRUE(r);
-  for (const cv::Mat& image : {cv::Mat(240, 300, CV_8UC1), cv::Mat(240, 320, CV_16UC1), cv::Mat()}) {
+  for (const cv::Mat& image :
+       {cv::Mat(240, 300, CV_8UC1), cv::Mat(240, 320, CV_8UC2), cv::Mat(240, 320, CV_32SC1), cv::Mat()}) {
     EXPECT_EQ(rectified(r->left_map, image).error().code, ErrorCode::invalid_input);
     EXPECT_EQ(rectified_grey(r->left_map, image).error().code, ErrorCode::invalid_input);
   }

@@ -43,8 +43,20 @@ TEST_F(BadScanFolderTest, AMissingKeyIsNamedWithItsPath) {
 
 TEST_F(BadScanFolderTest, AFutureVersionIsUnsupported) {
   with_one_view();
-  edit_manifest("\"version\": 5", "\"version\": 6");
+  edit_manifest("\"version\": 6", "\"version\": 7");
   expect_refused(ErrorCode::unsupported, {"scan.json", "version"});
+}
+
+TEST_F(BadScanFolderTest, ExposuresOfThePatternAreDifferentNumbersWithFiles) {
+  with_one_view();
+  const std::string now = *read_file(scan_ / "scan.json");
+  for (const char* factors : {"[0]", "[1]", "[100]", "[8, 8]"}) {
+    write_text(scan_ / "scan.json",
+               replaced(now, "\"files\"", fmt::format("\"pattern_factors\": {}, \"files\"", factors)));
+    expect_refused(ErrorCode::invalid_input, {"scan.json", "poses[0].views[0].pattern_factors"});
+  }
+  write_text(scan_ / "scan.json", replaced(now, "\"files\"", "\"pattern_factors\": [8], \"files\""));
+  expect_refused(ErrorCode::invalid_input, {"scan.json", "left_pattern_x8"});
 }
 
 TEST_F(BadScanFolderTest, AnUnknownStateIsRefused) {

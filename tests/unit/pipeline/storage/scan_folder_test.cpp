@@ -108,13 +108,14 @@ TEST_F(ScanFolderTest, ReasonsOfRetakesAreKept) {
 TEST_F(ScanFolderTest, AnOlderFolderIsReadAndBecomesANewOneWithItsNextChange) {
   ScanFolder scan = with_one_view();
   const std::string now = *read_file(scan_ / "scan.json");
-  const auto fourth = replaced(now, "\"version\": 5", "\"version\": 4");
+  const auto fifth = replaced(now, "\"version\": 6", "\"version\": 5");
+  const auto fourth = replaced(fifth, "\"version\": 5", "\"version\": 4");
   const auto third =
       replaced(replaced(fourth, "\"version\": 4", "\"version\": 3"), "movement_checks", "closures");  // old name
   const auto second = replaced(replaced(third, "\"version\": 3", "\"version\": 2"), "  \"config_sha256\": [],\n", "");
   const auto first =
       replaced(replaced(second, "\"version\": 2", "\"version\": 1"), ",\n      \"closures\": []", "");  // old name
-  for (const auto& old : {first, second, third, fourth}) {
+  for (const auto& old : {first, second, third, fourth, fifth}) {
     write_text(scan_ / "scan.json", old);
     auto again = ScanFolder::open(scan_);
     ASSERT_TRUE(again) << again.error().message;
@@ -134,7 +135,7 @@ TEST_F(ScanFolderTest, RetakesAndMovementChecksOfAnOlderFolderAreRead) {
                                           .shift_px = 0.5,
                                           .unmoved = true,
                                           .retake_reasons = {{ErrorCode::protocol, "torn"}}}));
-  edit_manifest("\"version\": 5", "\"version\": 3");
+  edit_manifest("\"version\": 6", "\"version\": 3");
   edit_manifest("movement_checks", "closures");  // old name
   edit_manifest("retake_reasons", "spoilt");     // old name
   edit_manifest("retake_reasons", "spoilt");     // old name
@@ -171,7 +172,7 @@ TEST_F(ScanFolderTest, EachConfigurationOfItsViewsIsKeptOnce) {
 TEST_F(ScanFolderTest, TheDocumentedManifestIsRead) {
   const std::string zeros(64, '0');
   std::string text = R"({
-    "format": "scanrig-scan", "version": 5, "id": "20261121-093000-1", "created": "2026-11-21T09:30:00Z",
+    "format": "scanrig-scan", "version": 6, "id": "20261121-093000-1", "created": "2026-11-21T09:30:00Z",
     "state": "scanning", "source": "stereo", "profile": "", "config_sha256": ["HASH"],
     "calibration": { "file": "calibration.json", "sha256": "HASH" },
     "poses": [
@@ -271,6 +272,42 @@ TEST_F(ScanFolderTest, InconsistentImagesAreNotStored) {
   EXPECT_EQ(scan.add_view(0, record(0), raw).error().code, ErrorCode::invalid_input);
   EXPECT_EQ(scan.add_view(1, record(0), raw_view(0)).error().code, ErrorCode::invalid_input) << "pose 2 before pose 1";
   EXPECT_TRUE(scan.manifest().poses.empty());
+}
+
+TEST_F(ScanFolderTest, MoreExposuresOfThePatternAreKeptAndReadBack) {
+  ScanFolder scan = create();
+  RawView raw = raw_view(0);
+  raw.more_patterns = {{8.0, raw_view(20).left_pattern, raw_view(20).right_pattern},
+                       {0.25, raw_view(30).left_pattern, raw_view(30).right_pattern}};
+  ASSERT_TRUE(scan.add_view(0, record(0), raw));
+  ASSERT_TRUE(scan.add_view(0, record(1), raw_view(1)));
+  const auto again = ScanFolder::open(scan_);
+  ASSERT_TRUE(again) << again.error().message;
+  const ViewRecord& view = again->manifest().poses[0].views[0];
+  EXPECT_EQ(view.pattern_factors, (std::vector<double>{8.0, 0.25}));
+  EXPECT_EQ(view.files.at("right_pattern_x0.25").path, "pose1/view00/right_pattern_x0.25.png");
+  const auto loaded = again->load_raw(0, 0);
+  ASSERT_TRUE(loaded) << loaded.error().message;
+  ASSERT_EQ(loaded->more_patterns.size(), 2u);
+  EXPECT_TRUE(same(loaded->more_patterns[0].left, raw_view(20).left_pattern));
+  EXPECT_TRUE(same(loaded->more_patterns[1].right, raw_view(30).right_pattern));
+  EXPECT_EQ(again->load_images(0, 0)->left_pattern.type(), CV_16UC3);
+  EXPECT_EQ(again->load_images(0, 0)->left_plain.type(), CV_8UC3);
+  EXPECT_EQ(again->load_images(0, 1)->left_pattern.type(), CV_8UC3);
+
+  ASSERT_TRUE(scan.add_view(0, record(0), raw_view(2))) << "taken again with one exposure";
+  EXPECT_FALSE(std::filesystem::exists(scan_ / "pose1/view00/left_pattern_x8.png"));
+  EXPECT_TRUE(ScanFolder::open(scan_)->load_raw(0, 0)->more_patterns.empty());
+}
+
+TEST_F(ScanFolderTest, ExposuresThatDifferInSizeAreNotStored) {
+  ScanFolder scan = create();
+  RawView raw = raw_view(0);
+  raw.more_patterns = {{8.0, raw.left_pattern, cv::Mat::zeros(10, 10, CV_8UC1)}};
+  const auto added = scan.add_view(0, record(0), raw);
+  ASSERT_FALSE(added);
+  EXPECT_EQ(added.error().code, ErrorCode::invalid_input);
+  EXPECT_NE(added.error().message.find("right_pattern_x8"), std::string::npos) << added.error().message;
 }
 
 TEST_F(ScanFolderTest, ACalibrationHasTwoPlainImagesAViewAndNeedsNoCalibration) {
