@@ -1,6 +1,9 @@
 #include "config/camera_section.h"
 
+#include <algorithm>
 #include <charconv>
+
+#include "pipeline/storage/manifest.h"
 
 namespace scanrig::config {
 namespace {
@@ -37,10 +40,34 @@ void expect_colour(Section& s, const std::string& format, std::string_view such_
 }
 
 /// A frame arrives only after its exposure has ended.
-void expect_longer(Section& s, std::chrono::milliseconds timeout, std::chrono::microseconds exposure) {
+void expect_longer(Section& s, std::chrono::milliseconds timeout, const StereoCameraConfig& camera) {
+  const auto exposure = camera.longest_exposure();
   if (timeout > exposure) return;
   s.report("frame_timeout_ms",
-           fmt::format("{} is not longer than the exposure_us of {}", timeout.count(), exposure.count()));
+           fmt::format("{} is not longer than the {} of {}", timeout.count(),
+                       exposure == camera.exposure ? "exposure_us" : "pattern_exposures_us", exposure.count()));
+}
+
+/// Up to 64 times as long or as short as `exposure_us`, as scans can record them.
+void read_pattern_exposures(Section& s, StereoCameraConfig& camera) {
+  if (!s.has("pattern_exposures_us")) return;
+  s.items("pattern_exposures_us", [&](std::optional<std::int64_t> us, std::string_view) {
+    const double factor = static_cast<double>(us.value_or(0)) / static_cast<double>(camera.exposure.count());
+    const bool fits = us && static_cast<double>(*us) >= kExposureUs.min &&
+                      static_cast<double>(*us) <= kExposureUs.max && factor >= kMinPatternFactor &&
+                      factor <= kMaxPatternFactor;
+    auto& others = camera.pattern_exposures;
+    if (fits && factor != 1.0 &&
+        std::find(others.begin(), others.end(), std::chrono::microseconds(*us)) == others.end())
+      return others.push_back(std::chrono::microseconds(*us));
+    s.report(
+        "pattern_exposures_us",
+        fmt::format("must be different whole numbers of {} to {}, other than exposure_us and at most {:g} times as "
+                    "long or as short",
+                    kExposureUs.min, kExposureUs.max, kMaxPatternFactor));
+  });
+  if (camera.pattern_exposures.size() > kMaxPatternExposures)
+    s.report("pattern_exposures_us", fmt::format("has more than {} exposures", kMaxPatternExposures));
 }
 
 void read_region(Section& s, Region& region) {
@@ -154,17 +181,20 @@ void read_stereo_camera(Section& s, const std::filesystem::path& base, Cameras c
     case Driver::simulated:
       s.path("truth", base, camera.truth);
       s.number("exposure_us", camera.exposure, kExposureUs);
+      read_pattern_exposures(s, camera);
       break;
     case Driver::aravis:
       read_aravis(s, camera.aravis);
       camera.exposure = camera.aravis.exposure;
-      expect_longer(s, camera.aravis.frame_timeout, camera.exposure);
+      read_pattern_exposures(s, camera);
+      expect_longer(s, camera.aravis.frame_timeout, camera);
       break;
     case Driver::v4l2:
     case Driver::v4l2_side_by_side:
       read_v4l2(s, camera.driver == Driver::v4l2_side_by_side, camera.v4l2);
       camera.exposure = camera.v4l2.exposure;
-      expect_longer(s, camera.v4l2.frame_timeout, camera.exposure);
+      read_pattern_exposures(s, camera);
+      expect_longer(s, camera.v4l2.frame_timeout, camera);
       break;
   }
 }

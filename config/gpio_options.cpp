@@ -64,7 +64,7 @@ CameraStrobeProjectorOptions camera_strobe_options(const RigConfig& rig) {
   CameraStrobeProjectorOptions options;
   options.pattern_output = rig.projector.line.line;
   if (rig.projector.plain_line) options.plain_output = rig.projector.plain_line->line;
-  options.exposure = rig.stereo_camera.aravis.exposure;
+  options.exposure = rig.stereo_camera.longest_exposure();
   return options;
 }
 

@@ -8,8 +8,8 @@ namespace {
 void expect_as_long_as(std::chrono::microseconds exposure, std::string_view key, std::chrono::microseconds light,
                        Section& s) {
   if (light >= exposure) return;
-  s.report(key,
-           fmt::format("{} is shorter than the exposure_us of {} in [stereo_camera]", light.count(), exposure.count()));
+  s.report(key, fmt::format("{} is shorter than the longest exposure of {} in [stereo_camera]", light.count(),
+                            exposure.count()));
 }
 
 /// Reads polarity and pulse of both lines.

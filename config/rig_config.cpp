@@ -273,7 +273,7 @@ void read_rig(Section& root, const std::filesystem::path& base, const std::vecto
   });
   read_safety(root, rig);
   root.section("projector", [&](Section& s) {
-    read_projector(s, rig.stereo_camera.exposure, rig.projector);
+    read_projector(s, rig.stereo_camera.longest_exposure(), rig.projector);
     check_projector(s, rig);
   });
   rig.projector.io_module = rig.panel.io_module;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <map>
@@ -78,6 +79,8 @@ struct ProjectorConfig {
   std::chrono::seconds warm_up{600};  ///< a job starts automatically only after the projector was connected this long
 };
 
+inline constexpr std::size_t kMaxPatternExposures = 2;
+
 struct StereoCameraConfig {
   enum class Driver { aravis, v4l2, v4l2_side_by_side, simulated };
   Driver driver = Driver::aravis;
@@ -85,6 +88,21 @@ struct StereoCameraConfig {
   V4l2Options v4l2;             ///< with `right` for v4l2, without for v4l2-side-by-side
   std::filesystem::path truth;  ///< simulated: the control socket that returns the position of the table
   std::chrono::microseconds exposure{12000};
+  /// Other exposures of the pattern, for views with dark or bright parts; at most kMaxPatternExposures.
+  std::vector<std::chrono::microseconds> pattern_exposures{};
+
+  /// The same as multiples of `exposure`.
+  [[nodiscard]] std::vector<double> pattern_factors() const {
+    std::vector<double> factors;
+    for (const auto other : pattern_exposures)
+      factors.push_back(static_cast<double>(other.count()) / static_cast<double>(exposure.count()));
+    return factors;
+  }
+  [[nodiscard]] std::chrono::microseconds longest_exposure() const {
+    auto longest = exposure;
+    for (const auto other : pattern_exposures) longest = std::max(longest, other);
+    return longest;
+  }
 
   /// Serial numbers of the left and the right camera; empty for simulated ones: their owner has them.
   [[nodiscard]] std::pair<std::string, std::string> serials() const {

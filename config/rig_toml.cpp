@@ -173,6 +173,12 @@ std::string camera_table(const AravisSensorOptions& camera) {
   return fmt::format("{{ serial = {}, address = {} }}", quoted(camera.serial), quoted(camera.address));
 }
 
+void add_pattern_exposures(Table& t, const StereoCameraConfig& camera) {
+  std::vector<long> us;
+  for (const auto exposure : camera.pattern_exposures) us.push_back(exposure.count());
+  if (!us.empty()) t.add("pattern_exposures_us", fmt::format("[{}]", fmt::join(us, ", ")));
+}
+
 void add_v4l2(Table& t, const StereoCameraConfig& camera) {
   const V4l2Options& v4l2 = camera.v4l2;
   const auto sensor = [](const V4l2SensorOptions& options) {
@@ -186,6 +192,7 @@ void add_v4l2(Table& t, const StereoCameraConfig& camera) {
   t.text("pixel_format", v4l2.pixel_format);
   t.add("size", fmt::format("{{ width = {}, height = {} }}", v4l2.size.width, v4l2.size.height));
   t.number("exposure_us", camera.exposure.count(), "set it with the page's focus aid");
+  add_pattern_exposures(t, camera);
   t.number("frame_timeout_ms", v4l2.frame_timeout.count());
 }
 
@@ -200,6 +207,7 @@ std::string stereo_camera(const StereoCameraConfig& camera) {
                                  aravis.falling_edge ? "falling" : "rising"));
     t.text("pixel_format", aravis.pixel_format);
     t.number("exposure_us", camera.exposure.count(), "set it with the page's focus aid");
+    add_pattern_exposures(t, camera);
     t.number("frame_timeout_ms", aravis.frame_timeout.count());
     t.text("clock", aravis.frame_clock == TriggeringOptions::FrameClock::ptp ? "ptp" : "interval", "interval | ptp");
     return t.text();

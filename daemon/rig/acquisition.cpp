@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "core/timestamp.h"
+#include "daemon/rig/exposure_choice.h"
 
 namespace scanrig {
 namespace {
@@ -45,18 +46,19 @@ Result<void> Acquisition::home() {
   return {};
 }
 
-Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle, bool plain_only) {
+Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle, ViewExposures exposures) {
   const unsigned before = interrupts_;
   if (id.job != std::exchange(job_, id.job)) image_checker_.begin();
-  judges_images_ = !plain_only;
+  judges_images_ = exposures != ViewExposures::plain_only;
   // The cameras are prepared before the table has stopped. If they fail, the exposure returns the error.
   std::ignore = devices_.camera.prepare(Deadline::after(clock_, options_.connect_limit));
   const auto move = turn_to(angle);
   if (!move) return pass_on(move);
+  if (auto usual = set_exposure(1.0); !usual) return pass_on(usual);
 
   TakenView view{.id = id};
   StereoFrame pattern;
-  if (!plain_only) {
+  if (judges_images_) {
     auto taken = expose(Light::pattern, before, view.record.retake_reasons);
     if (!taken) return pass_on(taken);
     pattern = std::move(*taken);
@@ -72,7 +74,35 @@ Result<TakenView> Acquisition::take_view(const ViewId& id, Degrees angle, bool p
   view.record.taken = iso_time(std::chrono::system_clock::now());
   view.record.pixel_format = to_string(plain->format);
   view.images = {view.record.pixel_format, pattern.left, pattern.right, plain->left, plain->right};
+  if (exposures == ViewExposures::all) {
+    if (auto added = add_exposures(view, before); !added) return pass_on(added);
+  }
   return view;
+}
+
+Result<void> Acquisition::add_exposures(TakenView& view, unsigned before) {
+  const RawView& seen = view.images;
+  const auto factors = wanted_exposures({{seen.left_pattern, seen.left_plain}, {seen.right_pattern, seen.right_plain}},
+                                        options_.pattern_factors);
+  judges_images_ = false;  // parts of them are meant to be dark or overexposed
+  for (const double factor : factors) {
+    if (auto set = set_exposure(factor); !set) return set;
+    auto taken = expose(Light::pattern, before, view.record.retake_reasons);
+    const auto usual = set_exposure(1.0);
+    if (!taken) return pass_on(taken);
+    if (!usual) return usual;
+    view.images.more_patterns.push_back({factor, taken->left, taken->right});
+  }
+  return {};
+}
+
+/// After a failure the time is set again before the next view.
+Result<void> Acquisition::set_exposure(double factor) {
+  if (exposure_ == factor) return {};
+  exposure_.reset();
+  auto set = from(kCamera, devices_.camera.scale_exposure(factor, Deadline::after(clock_, options_.camera_limit)));
+  if (set) exposure_ = factor;
+  return set;
 }
 
 Result<Degrees> Acquisition::jog(const action::Jog& jog) {

@@ -3,6 +3,9 @@
 #include <atomic>
 #include <chrono>
 #include <functional>
+#include <optional>
+#include <utility>
+#include <vector>
 
 #include "core/clock.h"
 #include "daemon/rig/devices.h"
@@ -30,7 +33,16 @@ struct AcquisitionOptions {
   Clock::Duration check_limit = std::chrono::milliseconds(500);  ///< for each device
   /// For cameras that have to be connected: the library takes 2.5 s to notice each GigE camera that vanished.
   Clock::Duration connect_limit = std::chrono::seconds(8);
+  /// Exposures of the pattern offered to every view besides the configured one, as multiples of it.
+  std::vector<double> pattern_factors{};
   int retake_limit = 3;  ///< exposures to retake in a row before the view fails
+};
+
+/// What is taken of a view.
+enum class ViewExposures {
+  all,          ///< pattern, plain light, and other exposures of the pattern if the view wants them
+  one_pattern,  ///< one of each light: to compare with the same view taken before
+  plain_only,   ///< of a calibration; not judged, as the board's glare is no fault of the rig
 };
 
 /// The order in which the devices do one thing. Every wait has a deadline.
@@ -41,20 +53,18 @@ class Acquisition {
   Acquisition(
       const Devices& devices, Clock& clock, AcquisitionOptions options,
       std::function<void(const StereoFrame&)> seen = [](const auto&) {})
-      : devices_(devices), clock_(clock), options_(options), seen_(std::move(seen)) {}
+      : devices_(devices), clock_(clock), options_(std::move(options)), seen_(std::move(seen)) {}
 
   // Errors are passed on as the devices return them: each names its device.
 
   /// Clears an alarm, turns the projector off, homes. Fails as Turntable::home.
   Result<void> home();
 
-  /// Turns to `angle`, the shorter way, and takes the four images. Retakes an exposure with lost, torn or unfit frames
+  /// Turns to `angle`, the shorter way, and takes the images. Retakes an exposure with lost, torn or unfit frames
   /// (see ImageChecker), or during which camera or projector vanished, and notes the reason.
   /// Unwinds a table wound up by several jobs on the way. Fails as the device that failed; the table has then been
   /// commanded to stop.
-  /// `plain_only`: without the pattern's two images; those of the plain light are not judged, as the board's glare is
-  /// no fault of the rig.
-  Result<TakenView> take_view(const ViewId& id, Degrees angle, bool plain_only = false);
+  Result<TakenView> take_view(const ViewId& id, Degrees angle, ViewExposures exposures = ViewExposures::all);
 
   /// Turns to `angle` as take_view() does. Fails as Turntable::rotate_to.
   Result<Move> turn_to(Degrees angle);
@@ -97,6 +107,9 @@ class Acquisition {
   /// `before`: what interrupts() was when the view started.
   Result<StereoFrame> expose(Light light, unsigned before, std::vector<Error>& retake_reasons);
   Result<StereoFrame> expose_once(Light light);
+  /// Adds the other exposures that the view wants; afterwards the cameras expose as configured again.
+  Result<void> add_exposures(TakenView& view, unsigned before);
+  Result<void> set_exposure(double factor);
 
   Devices devices_;
   Clock& clock_;
@@ -105,7 +118,8 @@ class Acquisition {
   std::atomic<unsigned> interrupts_ = 0;
   ImageChecker image_checker_;
   bool judges_images_ = true;
-  std::string job_;  ///< whose images it has seen
+  std::optional<double> exposure_ = 1.0;  ///< the cameras' time, as a multiple; nothing: not known
+  std::string job_;                       ///< whose images it has seen
   std::string failed_;
   double position_deg_ = 0.0;  ///< where the last move ended, turns counted from home
 };

@@ -98,6 +98,10 @@ class WatchedCamera final : public StereoCamera {
     const DeviceWatch::Call call(watch_, "prepare", deadline);
     return camera_.prepare(deadline);
   }
+  Result<void> scale_exposure(double factor, Deadline deadline) override {
+    const DeviceWatch::Call call(watch_, "scale_exposure", deadline);
+    return camera_.scale_exposure(factor, deadline);
+  }
   Result<void> arm(Deadline deadline) override {
     const DeviceWatch::Call call(watch_, "arm", deadline);
     return camera_.arm(deadline);

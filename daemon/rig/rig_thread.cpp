@@ -7,8 +7,16 @@
 #include "daemon/runtime/actor.h"
 
 namespace scanrig {
+namespace {
 
-RigThread::RigThread(const Devices& devices, Clock& clock, AcquisitionOptions options, Preview& preview,
+ViewExposures exposures_of(const action::TakeView& view) {
+  if (view.plain_only) return ViewExposures::plain_only;
+  return view.movement_check ? ViewExposures::one_pattern : ViewExposures::all;
+}
+
+}  // namespace
+
+RigThread::RigThread(const Devices& devices, Clock& clock, const AcquisitionOptions& options, Preview& preview,
                      std::function<void(Event)> post_event, Clock::Duration hang_margin)
     : post_event_(std::move(post_event)),
       stop_limit_(options.stop_limit),
@@ -95,7 +103,7 @@ Event RigThread::perform(const Asked& asked) {
     return event::Homed{};
   }
   if (const auto* view = std::get_if<action::TakeView>(&command)) {
-    auto taken = acquisition_.take_view(view->id, view->angle, view->plain_only);
+    auto taken = acquisition_.take_view(view->id, view->angle, exposures_of(*view));
     if (!taken) return event::RigFailed{taken.error(), acquisition_.failed_device()};
     auto shared = std::make_shared<const TakenView>(std::move(*taken));
     if (view->movement_check) return event::CheckViewTaken{std::move(shared)};

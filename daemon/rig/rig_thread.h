@@ -19,7 +19,7 @@ class RigThread {
  public:
   /// `preview` outlives it, is given every pair and gets its images from it.
   /// `hang_margin`: a call that is this late hangs.
-  RigThread(const Devices& devices, Clock& clock, AcquisitionOptions options, Preview& preview,
+  RigThread(const Devices& devices, Clock& clock, const AcquisitionOptions& options, Preview& preview,
             std::function<void(Event)> post_event, Clock::Duration hang_margin = DeviceWatch::kMargin);
   /// Stops what moves and joins.
   ~RigThread();

@@ -100,6 +100,7 @@ DaemonOptions options_from(const config::RigConfig& config) {
   options.bundle.crash_folder = crash_folder(config.storage.root);
   if (config.quiet_hours) options.quiet_hours = QuietHours{config.quiet_hours->from, config.quiet_hours->to};
   options.warm_up = config.projector.warm_up;
+  options.acquisition.pattern_factors = config.stereo_camera.pattern_factors();
   options.api = {.socket = config.api.socket,
                  .groups = {config.api.viewer_group, config.api.operator_group, config.api.engineer_group},
                  .http_port = config.api.http_port,

@@ -100,10 +100,12 @@ Result<void> set_up_black_level(ArvCamera* camera, const AravisOptions& options,
   return set_number_if_present(camera, "BlackLevel", options.black_level.value_or(kLowest), kCoarseLevel, attempt);
 }
 
-Result<void> set_up_exposure(ArvCamera* camera, const AravisOptions& options, const GenicamCall& attempt) {
-  const auto wanted = static_cast<double>(options.exposure.count());
+}  // namespace
+
+Result<void> set_exposure(ArvCamera* camera, std::chrono::microseconds exposure, const GenicamCall& attempt) {
+  const auto wanted = static_cast<double>(exposure.count());
   double got = 0.0;
-  auto set = attempt(fmt::format("set the exposure to {} us", options.exposure.count()), [&](GError** error) {
+  auto set = attempt(fmt::format("set the exposure to {} us", exposure.count()), [&](GError** error) {
     arv_camera_set_exposure_time(camera, wanted, error);
     if (!*error) got = arv_camera_get_exposure_time(camera, error);
   });
@@ -111,12 +113,10 @@ Result<void> set_up_exposure(ArvCamera* camera, const AravisOptions& options, co
   constexpr double kCoarse = 0.05;  // cameras round to lines of the sensor
   if (std::abs(got - wanted) > kCoarse * wanted) {
     return fail(ErrorCode::invalid_input, "{}: asked for an exposure of {} us it takes {:.0f} us", attempt.who(),
-                options.exposure.count(), got);
+                exposure.count(), got);
   }
   return {};
 }
-
-}  // namespace
 
 Result<void> set_up_image(ArvCamera* camera, const AravisOptions& options, bool is_standard,
                           const GenicamCall& attempt) {
@@ -129,7 +129,7 @@ Result<void> set_up_image(ArvCamera* camera, const AravisOptions& options, bool 
   if (auto set = set_up_colours(camera, attempt); !set) return set;
   if (auto set = set_up_gain(camera, options, is_standard, attempt); !set) return set;
   if (auto set = set_up_black_level(camera, options, is_standard, attempt); !set) return set;
-  return set_up_exposure(camera, options, attempt);
+  return set_exposure(camera, options.exposure, attempt);
 }
 
 }  // namespace scanrig

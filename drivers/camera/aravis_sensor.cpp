@@ -310,6 +310,15 @@ Result<void> AravisSensor::trigger() {
   return triggered;
 }
 
+Result<void> AravisSensor::scale_exposure(double factor, Deadline deadline) {
+  const auto exposure = scaled_exposure(configured_exposure_, factor);
+  options_.exposure = exposure;  // for a camera that has to be connected
+  if (!camera_ || *lost_) return {};
+  return request(
+      "change its exposure",
+      [exposure, attempt = attempt_](ArvCamera* camera) { return set_exposure(camera, exposure, attempt); }, deadline);
+}
+
 /// The library repeats a request without reply for seconds: done on a thread that the caller does not wait for beyond
 /// `deadline`. The thread has the camera to itself until then, and the camera is given up after.
 Result<void> AravisSensor::request(const char* what, Act act, Deadline deadline) {

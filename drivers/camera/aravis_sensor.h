@@ -27,6 +27,7 @@ class AravisSensor final : public Sensor, private CameraStrobe {
   [[nodiscard]] bool shares_host_clock() const override { return false; }
   Result<bool> listen_to_line(bool line) override;
   Result<void> trigger() override;
+  Result<void> scale_exposure(double factor, Deadline deadline) override;
   [[nodiscard]] CameraStrobe* strobe() override { return options_.strobe_outputs.empty() ? nullptr : this; }
 
  private:
@@ -45,7 +46,8 @@ class AravisSensor final : public Sensor, private CameraStrobe {
   void ask_whether_there();
 
   const AravisSensorOptions sensor_;
-  const AravisOptions options_;
+  AravisOptions options_;  // with the exposure as it is scaled
+  const std::chrono::microseconds configured_exposure_ = options_.exposure;
   Clock& clock_;
   const GenicamCall attempt_;
   GRef<ArvCamera> camera_;

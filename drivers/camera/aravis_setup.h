@@ -17,6 +17,9 @@ Result<void> set_up(ArvCamera* camera, const AravisOptions& options, const std::
 Result<void> set_up_image(ArvCamera* camera, const AravisOptions& options, bool is_standard,
                           const GenicamCall& attempt);
 
+/// Sets the exposure and reads it back. Fails with `invalid_input` (the camera takes another one), and as GenicamCall.
+Result<void> set_exposure(ArvCamera* camera, std::chrono::microseconds exposure, const GenicamCall& attempt);
+
 /// True if the camera's clock follows PTP or is about to.
 bool has_ptp_on(ArvCamera* camera);
 

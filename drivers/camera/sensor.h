@@ -22,6 +22,11 @@ struct SensorFrame {
   Clock::TimePoint arrival{};  ///< time when this process received it
 };
 
+/// `factor` times the configured exposure, in whole microseconds.
+inline std::chrono::microseconds scaled_exposure(std::chrono::microseconds configured, double factor) {
+  return std::chrono::round<std::chrono::microseconds>(std::chrono::duration<double, std::micro>(configured) * factor);
+}
+
 /// One sensor of a StereoCamera: a queue of frames, one per trigger.
 /// Threads: one owner.
 class Sensor {
@@ -49,6 +54,9 @@ class Sensor {
   virtual Result<bool> listen_to_line(bool line) = 0;
   /// Starts one exposure. Fails with `io`, `timeout`.
   virtual Result<void> trigger() = 0;
+
+  /// See StereoCamera::scale_exposure().
+  virtual Result<void> scale_exposure(double factor, Deadline deadline) = 0;
 
   /// Its outputs for a projector; null if there are none.
   [[nodiscard]] virtual CameraStrobe* strobe() { return nullptr; }

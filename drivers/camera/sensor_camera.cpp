@@ -1,5 +1,7 @@
 #include "drivers/camera/sensor_camera.h"
 
+#include <algorithm>
+
 #include "drivers/camera/image_memory.h"
 #include "drivers/camera/image_quality.h"
 
@@ -9,6 +11,8 @@ namespace {
 using Finding = TriggerTracker::Finding;
 
 constexpr int kWarmUpTries = 4;
+// A running sensor applies a new exposure to the second or third frame after it; assumed of 15 frames a second.
+constexpr auto kExposureLag = std::chrono::milliseconds(200);
 constexpr const char* kRedo = "repeat the exposure, and if this goes on check the cable and the load on the line";
 
 double milliseconds(std::chrono::nanoseconds time) { return std::chrono::duration<double, std::milli>(time).count(); }
@@ -40,6 +44,14 @@ Result<void> SensorCamera::arm(Deadline deadline) {
   }
   armed_ = true;
   trigger_after_ = clock_.now();
+  return {};
+}
+
+Result<void> SensorCamera::scale_exposure(double factor, Deadline deadline) {
+  for (Channel& channel : channels_) {
+    if (auto scaled = channel.sensor->scale_exposure(factor, deadline); !scaled) return scaled;
+  }
+  if (options_.by == TriggeringOptions::By::free_run) exposure_settled_ = clock_.now() + kExposureLag;
   return {};
 }
 
@@ -171,7 +183,7 @@ Result<StereoFrame> SensorCamera::collect(Deadline deadline) {
     return fail(ErrorCode::protocol, "camera: nothing to collect, it was not armed");
   }
   in_step_ = options_.by == TriggeringOptions::By::free_run;
-  if (options_.by != TriggeringOptions::By::line) trigger_after_ = clock_.now();
+  if (options_.by != TriggeringOptions::By::line) trigger_after_ = std::max(clock_.now(), exposure_settled_);
   if (options_.by == TriggeringOptions::By::software) {
     for (Channel& channel : channels_) {
       if (auto triggered = channel.sensor->trigger(); !triggered) return pass_on(triggered);

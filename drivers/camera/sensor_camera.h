@@ -53,6 +53,7 @@ class SensorCamera final : public StereoCamera {
   Result<void> arm(Deadline deadline) override;
   /// Fails with `timeout` (a frame is missing), `protocol` (torn, old, skipped, too many, different moments), `io`.
   Result<StereoFrame> collect(Deadline deadline) override;
+  Result<void> scale_exposure(double factor, Deadline deadline) override;
   /// Takes a pair by software, one sensor after the other; of freely running sensors the next pair.
   Result<StereoFrame> capture_preview(Deadline deadline) override;
 
@@ -97,7 +98,8 @@ class SensorCamera final : public StereoCamera {
   bool armed_ = false;
   bool in_step_ = false;  // no failure since the ledgers were last verified
   Clock::TimePoint trigger_after_{};
-  Clock::TimePoint last_in_step_{};  // time of the last good exposure or warm-up
+  Clock::TimePoint exposure_settled_{};  // frames that started earlier may have the exposure before
+  Clock::TimePoint last_in_step_{};      // time of the last good exposure or warm-up
   TriggerCounts counts_;
 };
 

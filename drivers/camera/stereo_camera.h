@@ -4,6 +4,7 @@
 #include <limits>
 #include <opencv2/core/mat.hpp>
 #include <string>
+#include <tuple>
 
 #include "core/clock.h"
 #include "core/result.h"
@@ -55,6 +56,15 @@ class StereoCamera {
   /// Makes both sensors wait for the next edge; frames still in flight are discarded.
   /// Fails with `timeout`, `protocol`, `io`.
   virtual Result<void> arm(Deadline deadline) = 0;
+
+  /// Every exposure from the next arm() on lasts `factor` times the configured time, after a reconnection too, until
+  /// this is called again. Not between arm() and collect(). Fails with `unsupported` (the device has no other exposures
+  /// than the configured one), `invalid_input` (it refuses this one), `io`, `timeout`; then the time is unknown.
+  virtual Result<void> scale_exposure(double factor, Deadline deadline) {
+    std::ignore = deadline;
+    if (factor == 1.0) return {};
+    return fail(ErrorCode::unsupported, "camera: has one exposure only; leave pattern_exposures_us out");
+  }
 
   /// The pair that belongs to the edge after arm(). Fails with `timeout` (a frame is missing), `protocol` (torn, or the
   /// two frames do not belong together), `io`. After a failure, arm() again and repeat the exposure.

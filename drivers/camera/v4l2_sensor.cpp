@@ -282,6 +282,18 @@ Result<bool> V4l2Sensor::listen_to_line(bool) {
   return fail(ErrorCode::unsupported, "{}: V4L2 has no trigger to choose", name_);
 }
 
+Result<void> V4l2Sensor::scale_exposure(double factor, Deadline) {
+  options_.exposure = scaled_exposure(configured_exposure_, factor);
+  if (descriptor_ < 0 || lost_) return {};  // set when it is connected
+  for (const Wanted& wanted : wanted_controls()) {
+    if (wanted.id != V4L2_CID_EXPOSURE_ABSOLUTE) continue;
+    const auto may_read = set_control(wanted);
+    if (!may_read) return pass_on(may_read);
+    if (*may_read) return check_control(wanted);
+  }
+  return {};
+}
+
 Result<void> V4l2Sensor::trigger() { return fail(ErrorCode::unsupported, "{}: V4L2 has no software trigger", name_); }
 
 std::unique_ptr<SensorCamera> v4l2_camera(const V4l2Options& options, VideoCalls& calls, Clock& clock) {

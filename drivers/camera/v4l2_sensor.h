@@ -24,6 +24,7 @@ class V4l2Sensor final : public Sensor {
   [[nodiscard]] bool shares_host_clock() const override { return true; }
   Result<bool> listen_to_line(bool) override;
   Result<void> trigger() override;
+  Result<void> scale_exposure(double factor, Deadline deadline) override;
 
  private:
   struct Wanted {
@@ -53,7 +54,8 @@ class V4l2Sensor final : public Sensor {
 
   const std::string name_;
   const V4l2SensorOptions sensor_;
-  const V4l2Options options_;
+  V4l2Options options_;  // with the exposure as it is scaled
+  const std::chrono::microseconds configured_exposure_ = options_.exposure;
   VideoCalls& calls_;
   Clock& clock_;
   int descriptor_ = -1;

@@ -16,6 +16,9 @@ class BackgroundCamera final : public StereoCamera {
  public:
   explicit BackgroundCamera(StereoCamera& camera) : camera_(camera) {}
   Result<void> prepare(Deadline deadline) override { return camera_.prepare(deadline); }
+  Result<void> scale_exposure(double factor, Deadline deadline) override {
+    return camera_.scale_exposure(factor, deadline);
+  }
   Result<void> arm(Deadline deadline) override { return camera_.arm(deadline); }
   Result<StereoFrame> collect(Deadline deadline) override {
     return in_background([&] { return camera_.collect(deadline); });

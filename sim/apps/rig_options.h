@@ -3,10 +3,14 @@
 #include <CLI/CLI.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "sim/scene/calibration_series.h"
 
 namespace scanrig::sim {
+
+/// Other exposures of the pattern that the cameras of a workshop offer: 96 and 3 ms beside 12 ms.
+inline const std::vector<double> kWorkshopPatternFactors{8.0, 0.25};
 
 /// Options of the command line for a drawn rig, `--rig-seed` and `--rig`. They refer to this object.
 struct DrawnRigOptions {

@@ -27,6 +27,7 @@ struct ShootVerb {
   sim::DrawnRigOptions rig;
   sim::ProfileOptions profile;
   bool is_calibration_true = false;
+  bool is_exposed_once = false;
   std::string folder;
 };
 
@@ -53,6 +54,7 @@ Result<void> shoot_chosen(ShootVerb& verb) {
         "shoot: a workshop has no exact calibration; give --calibration FILE, solved from images of shoot-board "
         "--profile workshop, or --true-calibration");
   }
+  if (!profile->effects.is_none() && !verb.is_exposed_once) verb.options.pattern_factors = sim::kWorkshopPatternFactors;
   verb.options.scene.rig = *rig;
   verb.options.scene.profile = std::move(*profile);
   return sim::shoot(verb.options, verb.folder);
@@ -71,6 +73,8 @@ void add_shoot(CLI::App& app, ShootVerb& verb, Chosen& chosen) {
   shoot->add_flag("--spoil-all", options.scene.spoils_all, "Handling spoils every view, not one of a scan");
   shoot->add_option("--calibration", options.calibration,
                     "A calibration.json solved from the images of shoot-board with the same profile and rig");
+  shoot->add_flag("--one-exposure", verb.is_exposed_once,
+                  "Never a longer or shorter exposure of the pattern, which views of a workshop may want");
   shoot->add_flag("--true-calibration", verb.is_calibration_true, "The exact calibration, which no workshop has");
   shoot->callback([&] { chosen = [&] { return shoot_chosen(verb); }; });
 }

@@ -148,6 +148,7 @@ Result<void> run(SimOptions o, const SignalStop& stop) {
   options.remote = options.guard = true;  // a simulated table cannot hurt a person
   options.reconstructor = pipeline_reconstructor(reconstruct);
   options.hang_margin = kRenderingMargin;
+  if (!o.rig.profile.effects.is_none()) options.acquisition.pattern_factors = sim::kWorkshopPatternFactors;
   options.on_scanned = [&r](const std::filesystem::path& folder) { return r.write_truth(folder); };
 
   std::optional<sim::Operator> operator_thread;

@@ -13,6 +13,9 @@ class TroubledCamera final : public StereoCamera {
  public:
   TroubledCamera(SimRig& rig, double share, std::uint64_t seed) : rig_(rig), share_(share), seed_(seed) {}
   Result<void> prepare(Deadline deadline) override { return rig_.camera().prepare(deadline); }
+  Result<void> scale_exposure(double factor, Deadline deadline) override {
+    return rig_.camera().scale_exposure(factor, deadline);
+  }
   Result<void> arm(Deadline deadline) override;
   Result<StereoFrame> collect(Deadline deadline) override { return rig_.camera().collect(deadline); }
   Result<StereoFrame> capture_preview(Deadline deadline) override { return rig_.camera().capture_preview(deadline); }

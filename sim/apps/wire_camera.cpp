@@ -53,7 +53,7 @@ Result<StereoFrame> WireCamera::collect(Deadline deadline) {
   }
   const auto e = *std::exchange(exposed_, std::nullopt);
   if (!e) return pass_on(e);
-  const auto images = scene_->shoot(e->placement, to_radians(e->angle_deg), e->pattern, ++exposures_);
+  const auto images = scene_->shoot(e->placement, to_radians(e->angle_deg), e->pattern, ++exposures_, 0.0, factor_);
   return StereoFrame{images.left, images.right, PixelFormat::bayer_rggb8, 1, e->taken};
 }
 

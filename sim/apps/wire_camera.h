@@ -26,6 +26,10 @@ class WireCamera final : public StereoCamera {
 
   Result<void> prepare(Deadline deadline) override;
   Result<void> arm(Deadline deadline) override;
+  Result<void> scale_exposure(double factor, Deadline) override {
+    factor_ = factor;
+    return {};
+  }
   Result<StereoFrame> collect(Deadline deadline) override;
   /// Exposed under the plain light.
   Result<StereoFrame> capture_preview(Deadline deadline) override;
@@ -50,6 +54,7 @@ class WireCamera final : public StereoCamera {
   Clock& clock_;
   std::uint64_t exposures_ = 0, previews_ = 0;
   bool armed_ = false;
+  double factor_ = 1.0;  // of the configured exposure
   std::optional<Result<Exposure>> exposed_;
 
   mutable std::mutex mutex_;

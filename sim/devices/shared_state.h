@@ -25,6 +25,7 @@ struct Exposure {
   int board = 0;  ///< number of the board's placement; 0: the object is on the table
   double angle_deg = 0.0;
   bool pattern = false;
+  double factor = 1.0;  ///< of the cameras' usual duration
   std::uint64_t number = 0;
   std::uint64_t trigger = 0;
   Clock::TimePoint taken;
@@ -55,6 +56,7 @@ struct SharedState {
   bool armed = false;
   std::uint64_t triggers = 0;
   std::uint64_t exposures = 0;
+  double exposure_factor = 1.0;
   std::optional<Exposure> in_flight;
   int frames_to_lose = 0;
 
@@ -72,6 +74,8 @@ struct SharedState {
 
   /// Of the table. Call with `mutex` held.
   [[nodiscard]] double true_angle_deg(Clock::TimePoint at) const;
+  /// Of the next exposure. Call with `mutex` held.
+  [[nodiscard]] Clock::Duration exposure_time() const;
   /// The trigger edge, at the beginning of an exposure. Call with `mutex` held.
   void edge(Light light);
 };

@@ -10,8 +10,7 @@ Result<void> SimProjector::fire(Light light, Deadline deadline) {
   std::unique_lock lock(b.mutex);
   b.dark_requested = false;
   b.edge(light);
-  const auto over =
-      b.clock.now() + std::chrono::round<Clock::Duration>(std::chrono::duration<double>(profile().exposure_s));
+  const auto over = b.clock.now() + b.exposure_time();
   const bool cut = b.clock.wait_until(lock, b.changed, std::min(over, deadline.at), [&b] { return b.dark_requested; });
   if (cut || deadline.at < over) b.in_flight.reset();  // half an exposure does not count
   if (cut) return fail(ErrorCode::io, "projector: went dark on request before the pulse was over");
@@ -35,6 +34,12 @@ Result<void> SimStereoCamera::arm(Deadline) {
   state_.in_flight.reset();
   state_.triggers = 0;
   state_.armed = collectable_ = true;
+  return {};
+}
+
+Result<void> SimStereoCamera::scale_exposure(double factor, Deadline) {
+  const std::scoped_lock lock(state_.mutex);
+  state_.exposure_factor = factor;
   return {};
 }
 
@@ -66,8 +71,8 @@ StereoFrame SimStereoCamera::render(const Exposure& e) {
   board_ = e.board;
   const double angle = to_radians(e.angle_deg);
   const double minutes = std::chrono::duration<double, std::ratio<60>>(e.taken - b.begun).count();
-  const StereoImages images =
-      e.board != 0 ? b.board.shoot(angle, e.number) : b.scene->shoot(e.placement, angle, e.pattern, e.number, minutes);
+  const StereoImages images = e.board != 0 ? b.board.shoot(angle, e.number)
+                                           : b.scene->shoot(e.placement, angle, e.pattern, e.number, minutes, e.factor);
   return StereoFrame{images.left, images.right, PixelFormat::bayer_rggb8, e.trigger, e.taken};
 }
 
@@ -81,6 +86,7 @@ Result<StereoFrame> SimStereoCamera::capture_preview(Deadline) {
                       .board = b.board_placement,
                       .angle_deg = b.true_angle_deg(now),
                       .pattern = false,
+                      .factor = 1.0,
                       .number = Scene::kFirstPreview + previews_++,
                       .trigger = b.triggers,
                       .taken = now,

@@ -49,6 +49,7 @@ class SimStereoCamera final : public StereoCamera {
   explicit SimStereoCamera(SharedState& state) : state_(state) {}
   Result<void> prepare(Deadline) override { return {}; }
   Result<void> arm(Deadline deadline) override;
+  Result<void> scale_exposure(double factor, Deadline deadline) override;
   Result<StereoFrame> collect(Deadline deadline) override;
   Result<StereoFrame> capture_preview(Deadline deadline) override;
 

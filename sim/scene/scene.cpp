@@ -136,13 +136,15 @@ StereoImages Scene::expose(const View& view, const LightLevels& lights, std::uin
           exposed(mixed(view.right_pattern, view.right_plain), 1, exposure)};
 }
 
-StereoImages Scene::shoot(int pose, double angle, bool pattern, std::uint64_t exposure, double minutes) {
+StereoImages Scene::shoot(int pose, double angle, bool pattern, std::uint64_t exposure, double minutes,
+                          double duration) {
   if (!options_.profile.is_cold) minutes = 0.0;
   if (pose != pose_ || angle != angle_ || minutes != minutes_) view_ = look(pose, angle, minutes);
   pose_ = pose;
   angle_ = angle;
   minutes_ = minutes;
-  return expose(view_, pattern, exposure);
+  if (duration == 1.0) return expose(view_, pattern, exposure);
+  return expose(view_, pattern ? LightLevels{.pattern = duration} : LightLevels{.plain = duration}, exposure);
 }
 
 }  // namespace scanrig::sim

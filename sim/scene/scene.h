@@ -68,7 +68,9 @@ class Scene {
   /// The same in any mixture of lights.
   [[nodiscard]] StereoImages expose(const View& view, const LightLevels& lights, std::uint64_t exposure) const;
   /// Both; the second light of the same pose and angle costs next to nothing.
-  StereoImages shoot(int pose, double angle, bool pattern, std::uint64_t exposure, double minutes = 0.0);
+  /// `duration`: of the exposure, as a multiple of the usual one.
+  StereoImages shoot(int pose, double angle, bool pattern, std::uint64_t exposure, double minutes = 0.0,
+                     double duration = 1.0);
 
   [[nodiscard]] const Object& object() const { return object_; }
   [[nodiscard]] const RigGeometry& rig() const { return rig_.geometry; }

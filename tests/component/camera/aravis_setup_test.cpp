@@ -33,6 +33,34 @@ TEST(AravisSetup, CamerasAreFoundByTheirSerialNumbers) {
   EXPECT_TRUE(frame) << frame.error().message;
 }
 
+TEST(AravisSetup, AnExposureIsScaledForBothAndKeptOverAReconnection) {
+  AravisBench bench;
+  ASSERT_TRUE(expose(bench));
+  const auto deadline = [&] { return Deadline::after(bench.clock(), std::chrono::seconds(8)); };
+  const auto exposures = [&] {
+    return bench.far().tell("value left ExposureTime") + " " + bench.far().tell("value right ExposureTime");
+  };
+  ASSERT_EQ(exposures(), "2000 2000");
+  ASSERT_TRUE(bench.camera().scale_exposure(8.0, deadline()));
+  EXPECT_EQ(exposures(), "16000 16000");
+  EXPECT_TRUE(expose(bench));
+  const auto until = [&](bool is_there) {
+    for (const auto by = deadline(); bench.camera().prepare(deadline()).has_value() != is_there;) {
+      if (by.expired(bench.clock())) return false;
+      bench.clock().sleep_for(milliseconds(20));
+    }
+    return true;
+  };
+  ASSERT_TRUE(bench.plug(false));
+  ASSERT_TRUE(until(false)) << "the loss is noticed";
+  ASSERT_TRUE(bench.plug(true));
+  ASSERT_TRUE(until(true)) << "it is connected again";
+  EXPECT_EQ(exposures(), "16000 16000");
+  ASSERT_TRUE(bench.camera().scale_exposure(1.0, deadline()));
+  EXPECT_EQ(exposures(), "2000 2000");
+  EXPECT_TRUE(expose(bench));
+}
+
 TEST(AravisSetup, AnotherCameraAtTheAddressIsRefusedByName) {
   const auto error = refused([](auto& options) { options.right.serial = "40019999"; });
   EXPECT_EQ(error.code, ErrorCode::invalid_input);

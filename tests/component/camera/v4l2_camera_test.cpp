@@ -75,6 +75,22 @@ TEST(V4l2Camera, ExposureIsManualAndFocusFixed) {
   EXPECT_EQ(bench.video().known[V4L2_CID_FOCUS_AUTO], 0);
 }
 
+TEST(V4l2Camera, AnExposureIsScaledFromTheConfiguredOne) {
+  V4l2Bench bench(false, [](auto&, auto& video) { video.known = {{V4L2_CID_EXPOSURE_ABSOLUTE, 1}}; });
+  ASSERT_TRUE(bench.opened()) << bench.opened().error().message;
+  const auto scaled = [&](double factor) {
+    return bench.camera().scale_exposure(factor, Deadline::after(bench.clock(), std::chrono::seconds(1)));
+  };
+  ASSERT_TRUE(scaled(8.0));
+  EXPECT_EQ(bench.video().known[V4L2_CID_EXPOSURE_ABSOLUTE], 160);
+  ASSERT_TRUE(scaled(1.0));
+  EXPECT_EQ(bench.video().known[V4L2_CID_EXPOSURE_ABSOLUTE], 20);
+  bench.video().limit[V4L2_CID_EXPOSURE_ABSOLUTE] = 100;
+  const auto refused = scaled(8.0);
+  ASSERT_FALSE(refused);
+  EXPECT_EQ(refused.error().code, ErrorCode::invalid_input);
+}
+
 TEST(V4l2Camera, WhiteBalanceAndGainAreNotLeftToTheDevice) {
   V4l2Bench bench(false, [](auto& options, auto& video) {
     video.known = {{V4L2_CID_AUTO_WHITE_BALANCE, 1}, {V4L2_CID_AUTOGAIN, 1}, {V4L2_CID_GAIN, 3}};

@@ -68,6 +68,70 @@ TEST_F(AcquisitionTest, ALostExposureIsRedoneAndNamed) {
   EXPECT_EQ(view->images.left_pattern.at<unsigned char>(0, 0), 200) << "the retake is the pattern again";
 }
 
+/// Offers every view a longer and a shorter exposure of the pattern.
+class ExposuresTest : public testing::Test {
+ protected:
+  VirtualClock clock;
+  fakes::FakeRig rig{clock};
+  Acquisition acquisition{rig.devices(), clock, {.pattern_factors = {8.0, 0.25}}};
+};
+
+TEST_F(ExposuresTest, ADarkViewIsExposedLongerToo) {
+  ASSERT_TRUE(acquisition.home());
+  rig.line.light = 15;
+  const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
+  ASSERT_TRUE(view) << view.error().message;
+  ASSERT_EQ(view->images.more_patterns.size(), 1u);
+  EXPECT_EQ(view->images.more_patterns[0].factor, 8.0);
+  EXPECT_EQ(view->images.more_patterns[0].right.at<unsigned char>(0, 0), 120);
+  EXPECT_EQ(rig.line.factors, (std::vector<double>{1.0, 1.0, 8.0}));
+  EXPECT_EQ(rig.line.factor, 1.0) << "previews too are as configured";
+}
+
+TEST_F(ExposuresTest, AnOverexposedPatternIsExposedShorterTooAndAGoodOneOnce) {
+  ASSERT_TRUE(acquisition.home());
+  rig.line.light = 255;
+  ASSERT_TRUE(acquisition.take_view({"job", 0, 0}, {0.0}));
+  rig.line.light = 200;
+  const auto good = acquisition.take_view({"job", 0, 1}, {45.0});
+  ASSERT_TRUE(good);
+  EXPECT_TRUE(good->images.more_patterns.empty());
+  EXPECT_EQ(rig.line.factors, (std::vector<double>{1.0, 1.0, 0.25, 1.0, 1.0}));
+}
+
+TEST_F(ExposuresTest, AMovementCheckAndACalibrationTakeNoMore) {
+  ASSERT_TRUE(acquisition.home());
+  rig.line.light = 15;
+  ASSERT_TRUE(acquisition.take_view({"job", 0, 0}, {0.0}, ViewExposures::one_pattern));
+  ASSERT_TRUE(acquisition.take_view({"job", 0, 0}, {0.0}, ViewExposures::plain_only));
+  EXPECT_EQ(rig.line.exposures, 3);
+}
+
+TEST_F(ExposuresTest, CamerasWithOneExposureSayWhatToDo) {
+  ASSERT_TRUE(acquisition.home());
+  rig.line.light = 15;
+  rig.line.has_one_exposure = true;
+  const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
+  ASSERT_FALSE(view);
+  EXPECT_EQ(view.error().code, ErrorCode::unsupported);
+  EXPECT_NE(view.error().message.find("pattern_exposures_us"), std::string::npos);
+}
+
+TEST_F(ExposuresTest, ALostLongExposureIsTakenAgainAndTheNextViewIsAsConfigured) {
+  ASSERT_TRUE(acquisition.home());
+  rig.line.light = 15;
+  rig.line.fires_before = 2;
+  rig.line.at_fire = [this] {
+    const std::lock_guard guard(rig.line.mutex);
+    rig.line.lose = 1;
+  };
+  const auto view = acquisition.take_view({"job", 0, 0}, {0.0});
+  ASSERT_TRUE(view) << view.error().message;
+  EXPECT_EQ(view->record.retake_reasons.size(), 1u);
+  EXPECT_EQ(rig.line.factors, (std::vector<double>{1.0, 1.0, 8.0, 8.0}));
+  EXPECT_EQ(rig.line.factor, 1.0);
+}
+
 TEST_F(AcquisitionTest, ACameraThatStaysSilentFailsTheView) {
   ASSERT_TRUE(acquisition.home());
   rig.line.lose = 100;

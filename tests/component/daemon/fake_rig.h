@@ -128,8 +128,12 @@ struct TriggerLine {
   Clock::TimePoint ready_at{};    ///< time of the last request to prepare the cameras
   Clock::Duration ready_takes{};  ///< time they need for that
   Light last = Light::plain;
-  int scene = 0;    ///< the cameras' scene: another number, another image
-  cv::Mat picture;  ///< the plain image, instead of a grey one; empty: none
+  int scene = 0;                  ///< the cameras' scene: another number, another image
+  cv::Mat picture;                ///< the plain image, instead of a grey one; empty: none
+  std::vector<double> factors;    ///< of the cameras' exposures since the start
+  double factor = 1.0;            ///< of the next exposures
+  int light = 200;                ///< grey value of the pattern in an exposure of the usual duration
+  bool has_one_exposure = false;  ///< the cameras refuse another one
 };
 
 class FakeProjector final : public Projector {
@@ -189,6 +193,12 @@ class FakeCamera final : public StereoCamera {
     line_.armed = true;
     return {};
   }
+  Result<void> scale_exposure(double factor, Deadline deadline) override {
+    const std::lock_guard guard(line_.mutex);
+    if (line_.has_one_exposure) return StereoCamera::scale_exposure(factor, deadline);
+    line_.factor = factor;
+    return {};
+  }
   Result<StereoFrame> capture_preview(Deadline) override {
     const std::lock_guard guard(line_.mutex);
     if (auto answers = there(); !answers) return pass_on(answers);
@@ -206,7 +216,11 @@ class FakeCamera final : public StereoCamera {
       line_.armed = false;
       lost = line_.lose > 0;
       if (lost) --line_.lose;
-      const cv::Scalar grey((line_.last == Light::pattern ? 200 : 100) + line_.scene);
+      line_.factors.push_back(line_.factor);
+      const bool is_dark = line_.light < 100;  // in both lights
+      const int plain = is_dark ? line_.light : 100;
+      const cv::Scalar grey(std::min(255.0, line_.factor * (line_.last == Light::pattern ? line_.light : plain)) +
+                            line_.scene);
       const bool drawn = line_.last == Light::plain && !line_.picture.empty();
       frame.left = drawn ? line_.picture : cv::Mat(48, 64, CV_8UC1, grey);
       frame.right = drawn ? line_.picture : cv::Mat(48, 64, CV_8UC1, grey);

@@ -111,6 +111,29 @@ TEST_F(EyesConfigTest, OneV4l2DeviceMayDeliverBothImages) {
   EXPECT_FALSE(rig->stereo_camera.v4l2.right);
 }
 
+TEST_F(EyesConfigTest, OtherExposuresOfThePatternFitCameraAndLight) {
+  EXPECT_TRUE(read(example_)->stereo_camera.pattern_exposures.empty());
+  const std::string lit = replaced(example_, "pulse_us = 15000", "pulse_us = 96000");
+  const auto with = [&](const std::string& list) {
+    return replaced(lit, "# pattern_exposures_us = [96000, 3000]", "pattern_exposures_us = " + list);
+  };
+  const auto rig = read(with("[96000, 3000]"));
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->stereo_camera.pattern_factors(), (std::vector<double>{8.0, 0.25}));
+  EXPECT_EQ(rig->stereo_camera.longest_exposure(), microseconds(96000));
+  for (const char* bad : {"[12000]", "[5]", "[\"long\"]", "[900000]", "[3000, 3000]", "[3000, 6000, 24000]"}) {
+    const auto refused = read(with(bad));
+    ASSERT_FALSE(refused) << bad;
+    EXPECT_THAT(refused.error().message, HasSubstr("[stereo_camera] pattern_exposures_us: ")) << bad;
+  }
+  const auto dark = read(replaced(with("[96000]"), "pulse_us = 96000", "pulse_us = 15000"));
+  ASSERT_FALSE(dark);
+  EXPECT_THAT(dark.error().message, HasSubstr("pulse_us: 15000 is shorter than the longest exposure of 96000"));
+  const auto late = read(replaced(with("[600000]"), "pulse_us = 96000", "pulse_us = 700000"));
+  ASSERT_FALSE(late);
+  EXPECT_THAT(late.error().message, HasSubstr("500 is not longer than the pattern_exposures_us of 600000"));
+}
+
 TEST_F(EyesConfigTest, WhatACameraCannotDoIsToldWithLineAndRange) {
   expect_problem("exposure_us = 12000", "exposure_us = 5",
                  "[stereo_camera] exposure_us: 5 is not between 10 and 1000000");
@@ -199,7 +222,7 @@ TEST_F(EyesConfigTest, WhatALightCrafterCannotDoIsToldWithLineAndRange) {
   problem("depth_bits = 8", "depth_bits = 9", "depth_bits: 9 is not between 1 and 8");
   problem("blue = 255", "blue = 256", "led_current.blue: 256 is not between 0 and 255");
   problem("exposure_us = 12000", "exposure_us = 11999",
-          "exposure_us: 11999 is shorter than the exposure_us of 12000 in [stereo_camera]");
+          "exposure_us: 11999 is shorter than the longest exposure of 12000 in [stereo_camera]");
   problem("exposure_us = 12000", "exposure_us = 20000000", "exposure_us: 20000000 is not between 235 and 10000000");
   problem("image = 3", "image = 3\ntrigger_out = { delay_ns = 3000 }",
           "trigger_out.delay_ns: 3000 is not between -20000 and 2700", "trigger_out");

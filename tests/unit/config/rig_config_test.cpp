@@ -98,7 +98,7 @@ TEST_F(RigConfigTest, AGrblTurntableHasItsOwnKeys) {
 
 TEST_F(RigConfigTest, RulesBetweenKeysAreChecked) {
   expect_problem("pulse_us = 15000", "pulse_us = 11000",
-                 "[projector] pulse_us: 11000 is shorter than the exposure_us of 12000 in [stereo_camera]");
+                 "[projector] pulse_us: 11000 is shorter than the longest exposure of 12000 in [stereo_camera]");
   expect_problem("\"40012346\"", "\"40012345\"", "[stereo_camera] right: has the same serial number as left",
                  "right = ");
   expect_problem("unit_id = 1", "unit_id = 32",
@@ -298,7 +298,7 @@ TEST_F(RigConfigTest, AProjectorOnAnIoModuleNeedsThePanelsModuleAndChannelsOfIts
                     "[projector]\n");
   expect_problem_in(text, "channel = 8", "channel = 0", "[projector] channel: is on the same contact as lamp_red");
   expect_problem_in(text, "pulse_us = 40000", "pulse_us = 11000",
-                    "[projector] pulse_us: 11000 is shorter than the exposure_us of 12000 in [stereo_camera]");
+                    "[projector] pulse_us: 11000 is shorter than the longest exposure of 12000 in [stereo_camera]");
 }
 
 TEST_F(RigConfigTest, SimulatedCamerasAreKnownOnlyToThoseWhoAskForThem) {
