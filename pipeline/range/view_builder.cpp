@@ -7,12 +7,14 @@
 namespace scanrig {
 namespace {
 
-Result<Silhouette> silhouette_of(const cv::Mat& plain, const RectifyingMap& map, const Projection& projection,
-                                 const Transform& camera_from_pose, const BlueScreenOptions& options) {
-  const auto image = rectified(map, plain);
+Result<Silhouette> silhouette_of(const cv::Mat& plain, const cv::Mat& pattern, const RectifyingMap& map,
+                                 const Projection& projection, const Transform& camera_from_pose,
+                                 const BlueScreenOptions& options) {
+  const auto image = rectified(map, plain), lit = rectified(map, pattern);
   if (!image) return pass_on(image);
+  if (!lit) return pass_on(lit);
   try {
-    auto outline = blue_screen_outline(*image, options);
+    auto outline = blue_screen_outline(*image, *lit, options);
     if (!outline) return pass_on(outline);
     return Silhouette{projection, camera_from_pose, std::move(*outline)};
   } catch (const cv::Exception& error) {
@@ -52,8 +54,8 @@ Result<std::vector<Silhouette>> silhouettes_of(const Rectification& rectificatio
   if (images.left_pattern.channels() != 3) return result;
   for (const bool is_left : {true, false}) {
     auto made = silhouette_of(
-        is_left ? images.left_plain : images.right_plain, is_left ? rectification.left_map : rectification.right_map,
-        is_left ? rectification.left : rectification.right,
+        is_left ? images.left_plain : images.right_plain, is_left ? images.left_pattern : images.right_pattern,
+        is_left ? rectification.left_map : rectification.right_map, is_left ? rectification.left : rectification.right,
         (is_left ? rectification.left_from_turntable : rectification.right_from_turntable) * rot_y(angle_rad),
         options.silhouette);
     if (!made) return pass_on(made, is_left ? "left image" : "right image");

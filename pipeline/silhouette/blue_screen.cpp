@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "pipeline/exposures/merge_exposures.h"
 #include "pipeline/silhouette/contour_distance.h"
 
 namespace scanrig {
@@ -74,6 +75,31 @@ void remove_parts(cv::Mat1b& mask, double smallest, int connectivity) {
   }
 }
 
+cv::Mat3f smoothed(const cv::Mat& image) {
+  cv::Mat3f colour, smooth;
+  image.convertTo(colour, CV_32F, image.depth() == CV_16U ? 1.0 / kMergedUnitsPerGrey : 1.0);
+  cv::boxFilter(colour, smooth, CV_32F, {3, 3}, {-1, -1}, true, cv::BORDER_REPLICATE);
+  return smooth;
+}
+
+/// What the projector lights and what has not the screen's chroma then, gaps of the pattern included. Less than that at
+/// its edge, where pixels are mixed.
+cv::Mat1b lit_object(const cv::Mat3f& smooth, const Screen& screen, const BlueScreenOptions& options) {
+  const cv::Mat1f key = screen_key(smooth, screen);
+  cv::Mat1b lit(key.size());
+  for (int y = 0; y < key.rows; ++y) {
+    for (int x = 0; x < key.cols; ++x) {
+      const cv::Vec3f& c = smooth(y, x);
+      lit(y, x) = key(y, x) < static_cast<float>(options.lit_key) && c[0] + c[1] + c[2] > options.dark_level ? 255 : 0;
+    }
+  }
+  remove_parts(lit, options.min_hole_px, 8);
+  const cv::Mat band = cv::getStructuringElement(cv::MORPH_ELLIPSE, {options.mixed_band_px, options.mixed_band_px});
+  cv::morphologyEx(lit, lit, cv::MORPH_CLOSE, band);
+  cv::erode(lit, lit, cv::Mat());
+  return lit;
+}
+
 int largest_part(const cv::Mat1b& mask) {
   cv::Mat1i labels;
   cv::Mat stats, centroids;
@@ -129,6 +155,46 @@ cv::Mat1f outside_share(const cv::Mat3f& image, const cv::Mat1b& object, const B
   return field;
 }
 
+cv::Mat1f light_of(const cv::Mat3f& image, int window_px) {
+  cv::Mat1f light;
+  cv::transform(image, light, cv::Matx13f(1.0f, 1.0f, 1.0f));
+  cv::boxFilter(light, light, CV_32F, {window_px, window_px}, {-1, -1}, true, cv::BORDER_REPLICATE);
+  return light;
+}
+
+/// The foot of a dark object turns away from the projector and mirrors the table, brighter than it is itself: what has
+/// the screen's colour beside it, and not the pattern's light that the screen has, is taken for the object. In the
+/// object's own shadow that is too much; other views bound it there.
+void add_mirroring_rim(cv::Mat1b& object, const cv::Mat3f& plain, const cv::Mat3f& pattern,
+                       const BlueScreenOptions& options) {
+  const cv::Mat1f plain_light = light_of(plain, options.mixed_band_px), lit = light_of(pattern, options.mixed_band_px);
+  const auto grown = [&](int px) {
+    cv::Mat1b out;
+    cv::dilate(object, out, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * px + 1, 2 * px + 1}));
+    return out;
+  };
+  const cv::Mat1b near = grown(options.mirror_px), far(255 - grown(3 * options.mirror_px));
+  std::vector<float> lights, shares;
+  for (int y = 0; y < far.rows; y += 4) {
+    for (int x = 0; x < far.cols; x += 4) {
+      if (far(y, x) == 0 || !(plain_light(y, x) > options.dark_level)) continue;
+      lights.push_back(plain_light(y, x));
+      shares.push_back(lit(y, x) / plain_light(y, x));
+    }
+  }
+  if (lights.empty()) return;
+  const float dark = options.dark_object * median_of(lights), unlit = options.unlit * median_of(shares);
+  BlueScreenOptions wide = options;
+  wide.colour_window_px = 4 * options.mirror_px + 1;
+  const cv::Mat1f object_light = light_of(colour_around(plain, object, wide), 1);
+  for (int y = 0; y < object.rows; ++y) {
+    for (int x = 0; x < object.cols; ++x) {
+      if (near(y, x) == 0 || object(y, x) != 0 || !(object_light(y, x) < dark)) continue;
+      if (lit(y, x) < unlit * plain_light(y, x)) object(y, x) = 255;
+    }
+  }
+}
+
 bool touches_border(const cv::Mat1b& mask) {
   const int right = mask.cols - 2, bottom = mask.rows - 2;
   return cv::countNonZero(mask.rowRange(0, 2)) + cv::countNonZero(mask.rowRange(bottom, mask.rows)) +
@@ -138,14 +204,17 @@ bool touches_border(const cv::Mat1b& mask) {
 
 }  // namespace
 
-Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const BlueScreenOptions& options) {
+Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const cv::Mat& pattern, const BlueScreenOptions& options) {
   if (image.type() != CV_8UC3 || image.cols < 4 * options.border_px || image.rows < 4 * options.border_px) {
     return fail(ErrorCode::invalid_input, "silhouette: a screen needs a colour image (BGR, 8 bit) of {} px or more",
                 4 * options.border_px);
   }
-  cv::Mat3f colour, smooth;
+  if (!pattern.empty() && (pattern.size() != image.size() || pattern.channels() != 3)) {
+    return fail(ErrorCode::invalid_input, "silhouette: the images of both lights differ in size or channels");
+  }
+  cv::Mat3f colour;
   image.convertTo(colour, CV_32F);
-  cv::boxFilter(colour, smooth, CV_32F, {3, 3}, {-1, -1}, true, cv::BORDER_REPLICATE);
+  const cv::Mat3f smooth = smoothed(image);
   const Screen screen_colour = screen_at_border(smooth, options);
   if (screen_colour.share == 0.0) {
     return fail(ErrorCode::degenerate,
@@ -160,11 +229,13 @@ Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const BlueScreenOpti
   const cv::Mat1f key = screen_key(smooth, screen_colour);
   cv::Mat1b object(key.size());
   cv::compare(key, options.object_key, object, cv::CMP_LT);
+  if (!pattern.empty()) object |= lit_object(smoothed(pattern), screen_colour, options);
   const int largest = largest_part(object);
   if (largest < options.min_hole_px) {
     return fail(ErrorCode::not_found, "silhouette: no object before the screen; check that the object is on the table");
   }
   remove_parts(object, std::max<double>(options.min_hole_px, options.min_part_share * largest), 8);
+  if (!pattern.empty()) add_mirroring_rim(object, smooth, smoothed(pattern), options);
   cv::Mat1b screen(255 - object);
   remove_parts(screen, options.min_hole_px, 4);
   object = 255 - screen;

@@ -14,16 +14,23 @@ struct BlueScreenOptions {
   float min_contrast = 25.0f;   ///< grey levels squared between these colours; with less a mixture cannot be separated
   double min_key_share = 0.45;  ///< of a screen's light in its strongest channel, to serve as a key
   double object_key = 0.6;      ///< 0: grey, 1: the screen's chroma; an object's pixel lies below this
+  double lit_key = 0.4;         ///< the same in the pattern's light
+  int mirror_px = 24;           ///< so wide a rim of a dark object may mirror the table
+  float dark_object = 0.35f;    ///< of the screen's light: a darker object shows what it mirrors
+  float unlit = 0.7f;           ///< of the screen's light of the pattern, per plain light: less is not lit by it
   double min_part_share = 0.005;  ///< of the largest part; smaller islands are specks
   int min_hole_px = 40;           ///< smaller openings are highlights or noise, larger ones show the screen
 };
 
 /// The object's outline before a screen and on a table of one colour, by chroma (shadows on it keep the colour), to
 /// sub-pixel: the line where half of a pixel's light comes from the object. `image`: BGR, 8 bit, linear light, plain
-/// light. The screen's colour, blue, green or red, is taken from the image's border.
+/// light. The screen's colour, blue, green or red, is taken from the image's border. `pattern`: the same with the
+/// projector on, 8 bit or merged exposures, or empty; a dark glossy surface mirrors screen and table, but what the
+/// projector lights directly has its own colour there.
 /// Returns the signed distance to the outline in pixels, positive outside the object, of the image's size.
 /// Fails with `invalid_input` (not BGR, 8 bit), `degenerate` (the border is dark), `not_found` (the border has no
 /// colour to key by, or nothing differs from it), `out_of_range` (the object reaches the border).
-Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const BlueScreenOptions& options = {});
+Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const cv::Mat& pattern = {},
+                                      const BlueScreenOptions& options = {});
 
 }  // namespace scanrig

@@ -127,6 +127,62 @@ TEST(BlueScreen, KeepsHighlightsAndDarkSpots) {
   EXPECT_LT((*outside)(110, 130), -20.0f);
 }
 
+/// The scene in the pattern's light: spots of 4 px, twice as bright as the plain light, and gaps that are nearly dark.
+cv::Mat3b in_pattern(Scene scene) {
+  return scene
+      .paint([](double, double) { return -10.0; },
+             [](int x, int y, const Colour& below) { return ((x / 4 + y / 4) % 2 == 0 ? 2.0 : 0.05) * below; })
+      .image();
+}
+
+TEST(BlueScreen, KeepsADarkSurfaceThatMirrorsTheScreenWhereThePatternLightsIt) {
+  const Shape object = ring(120, 100, 60, 12);
+  const Colour dark(12, 12, 12), mirrored = Colour(0.5 * dark + 0.4 * kScreen);
+  Scene plain, lit;
+  plain.paint(object, dark).paint(disc(120, 60, 9), mirrored).paint(disc(85, 100, 14), mirrored);
+  lit.paint(object, dark);
+  const auto pattern = in_pattern(lit);
+  const auto without = blue_screen_outline(plain.image()), with = blue_screen_outline(plain.image(), pattern);
+  ASSERT_TRUE(without && with);
+  EXPECT_GT((*without)(60, 120), 0.0f) << "else this test shows nothing";
+  EXPECT_LT((*with)(60, 120), -10.0f);
+  EXPECT_LT((*with)(100, 85), -10.0f);
+  EXPECT_GT((*with)(100, 120), 8.0f) << "the loop shows the screen in both lights";
+  EXPECT_LT(outline_error(*with, object), 0.25);
+}
+
+TEST(BlueScreen, ThePatternsLightDoesNotMoveTheOutline) {
+  const Shape object = disc(120.3, 98.6, 55.2);
+  const cv::Mat3b plain = Scene().paint(object, kGrey).image(), pattern = in_pattern(Scene().paint(object, kGrey));
+  const auto outside = blue_screen_outline(plain, pattern);
+  ASSERT_TRUE(outside) << outside.error().message;
+  EXPECT_LT(outline_error(*outside, object), 0.12);
+}
+
+TEST(BlueScreen, KeepsTheFootOfADarkObjectThatMirrorsTheTableButNoShadowOfALightOne) {
+  const Shape object = disc(120, 90, 50);
+  const Shape foot = [&](double x, double y) { return std::max(object(x, y), 132.0 - y); };  // the lowest 8 px
+  const Shape shadow = [](double x, double y) { return std::max({std::abs(x - 120) - 60, 132.0 - y, y - 170.0}); };
+  const auto dimmed = [](int, int, const Colour& below) { return 0.1 * below; };
+  for (const bool is_dark : {true, false}) {
+    const Colour own = is_dark ? Colour(10, 10, 10) : kGrey;
+    Scene plain, lit;
+    plain.paint(object, own);
+    if (is_dark) plain.paint(foot, 0.6 * kScreen);
+    lit.paint(object, own).paint(foot, dimmed);
+    if (!is_dark) lit.paint([&](double x, double y) { return std::max(shadow(x, y), -object(x, y)); }, dimmed);
+    const auto outside = blue_screen_outline(plain.image(), in_pattern(lit));
+    ASSERT_TRUE(outside) << outside.error().message;
+    EXPECT_LT(outline_error(*outside, object), 0.4) << (is_dark ? "dark" : "light");
+  }
+}
+
+TEST(BlueScreen, RefusesAPatternOfAnotherSize) {
+  const auto outside = blue_screen_outline(Scene().paint(disc(120, 100, 50), kGrey).image(), cv::Mat3b(10, 10));
+  ASSERT_FALSE(outside);
+  EXPECT_EQ(outside.error().code, ErrorCode::invalid_input);
+}
+
 TEST(BlueScreen, ReportsAMissingObject) {
   const auto outside = blue_screen_outline(Scene().image());
   ASSERT_FALSE(outside);
