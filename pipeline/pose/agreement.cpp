@@ -50,15 +50,21 @@ SampleCheck check_sample(const PoseObservations& observations, int level, const 
   double best_facing = options.min_facing;
   if (sample.point.y() < -2.0 * reach_mm) return kFreeSpace;  // inside the table
   const RangeLevel& images = observations.measured->images[level];
+  const std::size_t enough = std::min(options.witnesses, (images.size() + 2) / 3);
+  std::size_t witnesses = 0;
   for (std::size_t v = 0; v < images.size(); ++v) {
-    for (const Silhouette& s : observations.views[v].silhouettes) {
-      if (outside_silhouette(s, sample.point, options.silhouette_px)) return kFreeSpace;
-    }
+    const View& view = observations.views[v];
     const Eigen::Vector3d p = images[v].camera_from_pose * sample.point;
-    if (images[v].projection.kind == Projection::Kind::pinhole && p.z() <= 0.0) continue;
-    if (looked_through(images[v], observations.views[v].range.background, 1 << level, p, reach_mm, options.clear_px)) {
-      return kFreeSpace;
+    const bool behind = images[v].projection.kind == Projection::Kind::pinhole && p.z() <= 0.0;
+    const bool is_outside = std::any_of(view.silhouettes.begin(), view.silhouettes.end(), [&](const Silhouette& s) {
+      return outside_silhouette(s, sample.point, options.silhouette_px);
+    });
+    if (is_outside ||
+        (!behind && looked_through(images[v], view.range.background, 1 << level, p, reach_mm, options.clear_px))) {
+      if (++witnesses >= enough) return kFreeSpace;
+      continue;
     }
+    if (behind) continue;
     const Eigen::Vector3d normal = images[v].camera_from_pose.linear() * sample.normal;
     if (-normal.z() < best_facing) continue;
     const auto plane = tangent_plane_near(images[v], p);

@@ -25,6 +25,7 @@ struct AgreementOptions {
   double min_facing = 0.25;      ///< cosine below which a view does not judge a point
   double min_agreement = 0.6;    ///< cosine between corresponding normals
   double silhouette_px = 2.0;    ///< farther outside a silhouette than this is outside
+  std::size_t witnesses = 3;     ///< views that look through a point, or a third of them, make it free space
   int clear_px = 2;              ///< free space must also hold for neighbours at this distance
   double tolerance = 4.0;        ///< standard deviations off the surface that contradict
   double wide_tolerance = 12.0;  ///< the same, for small features that are distinct from the noise of edges
