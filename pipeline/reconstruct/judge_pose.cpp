@@ -75,6 +75,40 @@ Result<void> Reconstruction::State::judge_silhouettes(std::size_t pose, const Co
   return {};
 }
 
+/// What one pose measured says of the other's silhouettes: the foot of each, where a dark object mirrors the table, is
+/// the other's top.
+Result<void> Reconstruction::State::judge_silhouettes_of_both(const Transform& pose1_from_pose2,
+                                                              const Context& context) {
+  if (!calibration || poses.size() < 2) return {};
+  std::vector<View> all;  // share their pixels with the poses' views
+  std::vector<std::pair<std::size_t, std::size_t>> origin;
+  for (std::size_t p = 0; p < poses.size(); ++p) {
+    const Transform pose_from_model = p == 0 ? Transform::Identity() : pose1_from_pose2.inverse();
+    for (std::size_t v = 0; v < poses[p].views.size(); ++v) {
+      View& view = all.emplace_back(poses[p].views[v]);
+      view.index = static_cast<int>(origin.size());
+      view.range.camera_from_pose = view.range.camera_from_pose * pose_from_model;
+      for (Silhouette& s : view.silhouettes) s.camera_from_pose = s.camera_from_pose * pose_from_model;
+      origin.emplace_back(p, v);
+    }
+  }
+  const auto verdict = vote_on_silhouettes(all, {}, context);
+  if (!verdict) return pass_on(verdict);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    View& view = poses[origin[i].first].views[origin[i].second];
+    view.range.background = all[i].range.background;
+    for (std::size_t c = 0; c < view.silhouettes.size(); ++c)
+      view.silhouettes[c].outside_px = all[i].silhouettes[c].outside_px;
+  }
+  for (SilhouetteFinding finding : verdict->findings) {
+    if (finding.kind == SilhouetteFinding::Kind::surplus) continue;  // said of each pose already
+    const auto [pose, view] = origin[static_cast<std::size_t>(finding.view)];
+    finding.view = poses[pose].views[view].index;
+    disagreements.push_back(of_silhouette(pose, finding));
+  }
+  return {};
+}
+
 /// All views of the pose anew, as of a rig without a screen.
 Result<void> Reconstruction::State::measure_without_key(std::size_t pose, const Context& context) {
   PoseState& state = poses[pose];

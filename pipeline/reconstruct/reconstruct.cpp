@@ -200,6 +200,7 @@ Result<Model> Reconstruction::State::finish(const ScanIdentity& identity, const 
   }
   const auto pose1_from_pose2 = find_pose(report, context);
   if (!pose1_from_pose2) return pass_on(pose1_from_pose2, "pose 2 in pose 1");
+  if (auto done = judge_silhouettes_of_both(*pose1_from_pose2, context); !done) return pass_on(done);
   auto integrated = surface(*pose1_from_pose2, context);
   if (!integrated) return pass_on(integrated, "integration");
 

@@ -51,6 +51,7 @@ struct Reconstruction::State {
   Result<void> register_pose(std::size_t pose, const Context& context);
   Result<void> align_views(std::size_t pose, const Context& context);
   Result<void> judge_silhouettes(std::size_t pose, const Context& context);
+  Result<void> judge_silhouettes_of_both(const Transform& pose1_from_pose2, const Context& context);
   Result<void> measure_without_key(std::size_t pose, const Context& context);
   bool undo_motions(std::size_t pose, const RegistrationOptions& priors);
   bool leave_out_misfits(std::size_t pose);
