@@ -181,7 +181,7 @@ Result<StereoFrame> Acquisition::expose_once(Light light) {
   if (judges_images_) {
     if (auto good = from(kCamera, image_checker_.judge(light, *frame)); !good) return pass_on(good);
   }
-  seen_(*frame);
+  if (exposure_ == 1.0) seen_(*frame);
   return frame;
 }
 

@@ -49,7 +49,7 @@ enum class ViewExposures {
 /// Threads: one owner, which owns turntable, projector and camera too.
 class Acquisition {
  public:
-  /// `seen` is called with every pair fit for use.
+  /// `seen` is called with every pair fit for use that was exposed as configured.
   Acquisition(
       const Devices& devices, Clock& clock, AcquisitionOptions options,
       std::function<void(const StereoFrame&)> seen = [](const auto&) {})

@@ -229,13 +229,14 @@ Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const cv::Mat& patte
   const cv::Mat1f key = screen_key(smooth, screen_colour);
   cv::Mat1b object(key.size());
   cv::compare(key, options.object_key, object, cv::CMP_LT);
-  if (!pattern.empty()) object |= lit_object(smoothed(pattern), screen_colour, options);
+  const cv::Mat3f lit = pattern.empty() ? cv::Mat3f() : smoothed(pattern);
+  if (!lit.empty()) object |= lit_object(lit, screen_colour, options);
   const int largest = largest_part(object);
   if (largest < options.min_hole_px) {
     return fail(ErrorCode::not_found, "silhouette: no object before the screen; check that the object is on the table");
   }
   remove_parts(object, std::max<double>(options.min_hole_px, options.min_part_share * largest), 8);
-  if (!pattern.empty()) add_mirroring_rim(object, smooth, smoothed(pattern), options);
+  if (!lit.empty()) add_mirroring_rim(object, smooth, lit, options);
   cv::Mat1b screen(255 - object);
   remove_parts(screen, options.min_hole_px, 4);
   object = 255 - screen;

@@ -73,7 +73,9 @@ class ExposuresTest : public testing::Test {
  protected:
   VirtualClock clock;
   fakes::FakeRig rig{clock};
-  Acquisition acquisition{rig.devices(), clock, {.pattern_factors = {8.0, 0.25}}};
+  int shown = 0;
+  Acquisition acquisition{
+      rig.devices(), clock, {.pattern_factors = {8.0, 0.25}}, [this](const StereoFrame&) { ++shown; }};
 };
 
 TEST_F(ExposuresTest, ADarkViewIsExposedLongerToo) {
@@ -86,6 +88,7 @@ TEST_F(ExposuresTest, ADarkViewIsExposedLongerToo) {
   EXPECT_EQ(view->images.more_patterns[0].right.at<unsigned char>(0, 0), 120);
   EXPECT_EQ(rig.line.factors, (std::vector<double>{1.0, 1.0, 8.0}));
   EXPECT_EQ(rig.line.factor, 1.0) << "previews too are as configured";
+  EXPECT_EQ(shown, 2) << "the page shows no overexposed image";
 }
 
 TEST_F(ExposuresTest, AnOverexposedPatternIsExposedShorterTooAndAGoodOneOnce) {
