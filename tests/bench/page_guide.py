@@ -236,7 +236,8 @@ def read_status(reader, step):
 
 
 def press_reset(reader, _):
-    ok, seen = reader.tap("reset", ["lamp_green", "start_lamp"], 60)
+    """The lamp in Start stays dark: there is no calibration."""
+    ok, seen = reader.tap("reset", ["lamp_green", "!start_lamp"], 60)
     return ok, f"{seen}; {last_line(reader.machine.run('scanrig status')[1])}"
 
 
