@@ -20,6 +20,7 @@ sys.path[:0] = [str(ROOT / folder) for folder in ("tests/guides", "tests/system/
 import commands as guides  # noqa: E402
 from control_client import ControlClient  # noqa: E402
 from run_setup import converse  # noqa: E402
+import stepped_block  # noqa: E402
 
 LIMIT_MIN = 15
 APT_S, RIG_S, RENDER_S, TALK_S, CALIBRATE_S, SCAN_S, MODEL_S = 300, 600, 60, 240, 600, 300, 600
@@ -308,6 +309,13 @@ def export_model(reader, step):
     return state["state"] == "done" and code == 0, f"job {state['state']}: {said}"
 
 
+def add_reference(reader, step):
+    """A design of the part; any will do that the service can read."""
+    stepped_block.write(reader.machine.root / "root" / "bracket.obj")
+    code, said = reader.machine.run(step.text.replace("bracket.stl", "/root/bracket.obj"))
+    return code == 0, said
+
+
 INSTALL = {
     "apt install ./scanrig_*.deb": say_yes,
     "scanrig-demo": show_demo,
@@ -335,6 +343,7 @@ OPERATE = {
     "...5. Press Start": continue_scan,
     "...Green again: all views are taken": see_done,
     "scanrig export ID": export_model,
+    "scanrig reference add bracket.stl": add_reference,
 }
 # In their order: the guide, what a person or this file does there, sections that have other tests.
 GUIDES = (("install.md", INSTALL, ()), ("calibrate.md", CALIBRATE, ("When something goes wrong", "Does it still hold?")),
