@@ -127,14 +127,18 @@ struct Votes {
   cv::Mat1b surface;  ///< 255 where a measured point lies
 };
 
-/// Of each point, the number of silhouettes that put it outside.
+/// Of each point, the number of views whose silhouettes put it outside: what is mirrored to one camera of a view is to
+/// the other.
 std::vector<int> put_outside(const std::vector<Outline>& outlines, const std::vector<MeasuredPoint>& points,
                              const SilhouetteVoteOptions& options) {
   std::vector<int> count(points.size());
   parallel_for((points.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
     for (std::size_t i = block * kBlock; i < std::min(points.size(), (block + 1) * kBlock); ++i) {
+      std::optional<std::size_t> last;  // outlines are in the order of views
       for (const Outline& outline : outlines) {
-        count[i] += outline.puts_outside(points[i].point, options.contour_px) ? 1 : 0;
+        if (last == outline.view || !outline.puts_outside(points[i].point, options.contour_px)) continue;
+        last = outline.view;
+        ++count[i];
       }
     }
   });
@@ -170,9 +174,11 @@ cv::Rect box_of(const cv::Mat& stats, int part) {
           stats.at<int>(part, cv::CC_STAT_WIDTH), stats.at<int>(part, cv::CC_STAT_HEIGHT)};
 }
 
-/// Openings of the silhouette whose sure part is contradicted for the most part: they go whole.
-void add_openings(const cv::Mat1f& outside_px, const cv::Mat1b& contradicted, const SilhouetteVoteOptions& options,
-                  cv::Mat1b& region) {
+/// Openings of the silhouette that go whole: those whose sure part is contradicted for the most part, and those that
+/// surface covers, with as many points as one view gives: narrow ones have no sure part, as of a crease that mirrors
+/// the screen. The pixels along the contour do not count: surface beside a true opening reaches them.
+void add_openings(const cv::Mat1f& outside_px, const cv::Mat1b& contradicted, const cv::Mat1b& surface,
+                  const SilhouetteVoteOptions& options, cv::Mat1b& region) {
   cv::Mat1i labels;
   cv::Mat stats, centroids;
   const int parts = cv::connectedComponentsWithStats(outside_px > 0.0F, labels, stats, centroids, 4, CV_32S);
@@ -182,13 +188,18 @@ void add_openings(const cv::Mat1f& outside_px, const cv::Mat1b& contradicted, co
     const cv::Mat1b opening(labels(box) == part);
     const cv::Mat1b sure(opening & (outside_px(box) > options.contour_px));
     const int against = cv::countNonZero(sure & contradicted(box));
-    if (against >= options.min_region_px && 2 * against >= cv::countNonZero(sure)) region(box).setTo(255, opening);
+    const cv::Mat1b inner(opening & (outside_px(box) > 1.0F));
+    const cv::Mat1b& core = cv::countNonZero(inner) > 0 ? inner : opening;
+    const int points = cv::countNonZero(core & surface(box));
+    const bool is_covered = points * options.stride_px * options.stride_px >= cv::countNonZero(core);
+    const bool is_refuted = against >= options.min_region_px && 2 * against >= cv::countNonZero(sure);
+    if (is_covered || is_refuted) region(box).setTo(255, opening);
   }
 }
 
-/// The part of the silhouette's outside that measured surface contradicts; empty: none.
-cv::Mat1b contradicted_region(const cv::Mat1f& outside_px, const cv::Mat1b& against,
-                              const SilhouetteVoteOptions& options) {
+/// The part of the silhouette's sure outside that measured surface contradicts.
+cv::Mat1b contradicted_part(const cv::Mat1f& outside_px, const cv::Mat1b& against,
+                            const SilhouetteVoteOptions& options) {
   cv::Mat1b joined;  // votes lie a stride apart, on surface seen at an angle farther
   cv::morphologyEx(against > 0, joined, cv::MORPH_CLOSE, disc(2 * options.stride_px));
   joined &= outside_px > options.contour_px;
@@ -200,11 +211,16 @@ cv::Mat1b contradicted_region(const cv::Mat1f& outside_px, const cv::Mat1b& agai
     if (stats.at<int>(part, cv::CC_STAT_AREA) < options.min_region_px) continue;
     contradicted.setTo(255, labels == part);
   }
-  if (cv::countNonZero(contradicted) == 0) return {};
-  cv::Mat1b region;  // the contour's own uncertainty around the part, and a pixel
+  return contradicted;
+}
+
+/// That part with the contour's own uncertainty around it, and openings that surface covers.
+cv::Mat1b region_to_mend(const cv::Mat1f& outside_px, const cv::Mat1b& contradicted, const cv::Mat1b& surface,
+                         const SilhouetteVoteOptions& options) {
+  cv::Mat1b region;  // and a pixel
   cv::dilate(contradicted, region, disc(static_cast<int>(std::ceil(options.contour_px)) + 1));
   region &= outside_px > 0.0F;
-  add_openings(outside_px, contradicted, options, region);
+  add_openings(outside_px, contradicted, surface, options, region);
   return region;
 }
 
@@ -228,11 +244,13 @@ void forget_background(View& view, std::size_t camera, const cv::Mat1b& region) 
   view.range.background.setTo(0, region);
 }
 
+/// Narrow openings are closed without a word, as the key does.
 std::optional<SilhouetteFinding> mend(const Outline& outline, View& view, const Votes& votes,
                                       const SilhouetteVoteOptions& options) {
   cv::Mat1f outside = outline.silhouette->outside_px.clone();  // copies of a view share their pixels
-  cv::Mat1b region = contradicted_region(outside, votes.against, options);
-  if (region.empty()) return std::nullopt;
+  const cv::Mat1b contradicted = contradicted_part(outside, votes.against, options);
+  cv::Mat1b region = region_to_mend(outside, contradicted, votes.surface, options);
+  if (cv::countNonZero(region) == 0) return std::nullopt;
   cv::Mat1b object;
   cv::morphologyEx(votes.surface, object, cv::MORPH_CLOSE, disc(2 * options.stride_px));
   SilhouetteFinding finding{.view = view.index, .camera = outline.camera, .views = median_votes(votes.against, region)};
@@ -248,6 +266,7 @@ std::optional<SilhouetteFinding> mend(const Outline& outline, View& view, const 
   }
   outline.silhouette->outside_px = outside;
   forget_background(view, outline.camera, region);
+  if (cv::countNonZero(contradicted) == 0) return std::nullopt;
   return finding;
 }
 

@@ -16,7 +16,7 @@ struct SilhouetteVoteOptions {
   int stride_px = 2;              ///< one pixel in this many, each way, of the range images votes
   int min_region_px = 40;         ///< smaller contradictions stay: openings of that size are closed by the key already
   double max_contradicted = 0.5;  ///< of the object's area in the image: beyond it the silhouette is left out whole
-  int min_disputing = 3;          ///< silhouettes that put a measured point outside, for it to be disputed
+  int min_disputing = 3;          ///< views whose silhouettes put a measured point outside, for it to be disputed
   int min_silhouettes = 2;        ///< others that see a ray's whole length empty, for it to be named as surplus
   int surplus_stride_px = 8;      ///< grid of those rays
   double min_surplus = 0.01;      ///< of the silhouette's area: less is not named
@@ -39,16 +39,17 @@ struct SilhouetteFinding {
 
 struct SilhouetteVerdict {
   std::vector<SilhouetteFinding> findings;  ///< in the order of views
-  /// Of the points that `min_views` measured, those that `min_disputing` silhouettes put outside: more than a few per
+  /// Of the points that `min_views` measured, those that `min_disputing` views put outside: more than a few per
   /// cent are no single image. The object has the screen's colour, or the calibration is off.
   double disputed_share = 0.0;
 };
 
 /// Judges every silhouette of one pose by the surface that its registered views measured, and mends it: a point that
-/// more views measured than silhouettes put it outside votes against each of these. Where votes cover a connected part
-/// of a silhouette, that part becomes object, and background in the view's range image becomes unknown there. Opening
-/// and screen that nothing contradicts stay, so what views look through stays open. Same bits for any number of
-/// threads. Fails with `stopped`; some silhouettes may then be mended.
+/// more views measured than have silhouettes that put it outside votes against each of these. Where votes cover a
+/// connected part of a silhouette, that part becomes object, and background in the view's range image becomes unknown
+/// there; so do narrow openings that surface covers, which are no finding. Opening and screen that nothing contradicts
+/// stay, so what views look through stays open. Same bits for any number of threads. Fails with `stopped`; some
+/// silhouettes may then be mended.
 Result<SilhouetteVerdict> vote_on_silhouettes(std::span<View> views, const SilhouetteVoteOptions& options,
                                               const Context& context);
 

@@ -62,6 +62,15 @@ void put_sticker(View& view, std::size_t camera, const cv::Point& centre, int ra
   view.range.normal.setTo(cv::Vec3f::all(kUnmeasured), sticker);
 }
 
+/// As a crease that mirrors the screen does: too narrow for a pixel that is surely outside.
+void put_crease(View& view, std::size_t camera, const cv::Point& from, const cv::Point& to) {
+  cv::Mat1f& outside = view.silhouettes[camera].outside_px;
+  cv::Mat1b crease(outside.size(), uchar{0});
+  cv::line(crease, from, to, 255, 3);
+  outside.setTo(0.5F, crease);
+  outside = contour_distance(outside);
+}
+
 /// Where a camera of the view sees a point.
 cv::Point seen_at(const View& view, std::size_t camera, const Eigen::Vector3d& point) {
   const Silhouette& s = view.silhouettes[camera];
@@ -113,6 +122,26 @@ TEST(SilhouetteVotes, AStickerInOneSilhouetteDoesNotCutAHoleIntoMeasuredSurface)
     EXPECT_NEAR(findings[0].area_px, 3.14 * 18 * 18, 150.0);  // the opening goes whole
     EXPECT_GT(spoilt, 5.0 * sound);
     EXPECT_LT(greatest_error(views), 1.5 * sound);
+  }
+}
+
+TEST(SilhouetteVotes, ANarrowOpeningThatSurfaceCoversIsClosedWithoutAWord) {
+  const double sound = greatest_error(seen_ball());
+  auto views = seen_ball();
+  const cv::Point middle = seen_at(views[3], 1, {0, 30, 0});
+  put_crease(views[3], 1, middle + cv::Point(-30, 10), middle + cv::Point(25, -15));
+  EXPECT_GT(greatest_error(views), 3.0 * sound);
+  EXPECT_TRUE(vote(views).empty());
+  EXPECT_LT(greatest_error(views), 1.5 * sound);
+}
+
+TEST(SilhouetteVotes, ANarrowSlitThatViewsLookThroughStaysOpen) {
+  const auto slit = carve(box({-20, 0, -4}, {20, 40, 4}), box({-1.2, 10, -20}, {1.2, 30, 20}));
+  auto views = with_own_pixels(take_views({.views = 12}, cast_into(slit)));
+  const auto before = views;
+  EXPECT_TRUE(vote(views).empty());
+  for (std::size_t c = 0; c < 2; ++c) {
+    EXPECT_EQ(cv::countNonZero(views[0].silhouettes[c].outside_px != before[0].silhouettes[c].outside_px), 0);
   }
 }
 
