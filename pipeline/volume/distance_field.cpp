@@ -37,6 +37,32 @@ SurfaceStatistics surface_statistics(const std::vector<std::vector<RangeSampler>
   return result;
 }
 
+struct WeightedDistance {
+  float distance, sigma, weight;
+};
+
+/// A view that is most of the mean says nothing of it.
+Scatter scatter_of(const std::vector<WeightedDistance>& views) {
+  constexpr float kLargest = 4.0F;     // an outlier's, in standard deviations
+  constexpr float kExpected = 0.798F;  // mean of a standard normal variable's absolute value
+  constexpr float kMaxShare = 0.8F;
+  float weight = 0.0F, sum = 0.0F, variance = 0.0F;
+  for (const auto& view : views) {
+    weight += view.weight;
+    sum += view.weight * view.distance;
+    variance += view.weight * view.weight * view.sigma * view.sigma;
+  }
+  Scatter scatter;
+  for (const auto& view : views) {
+    const float share = view.weight / weight;
+    if (share > kMaxShare) continue;
+    const float expected = std::sqrt(variance / (weight * weight) + (1.0F - 2.0F * share) * view.sigma * view.sigma);
+    scatter.sum += std::min(kLargest, std::abs(view.distance - sum / weight) / expected) / kExpected;
+    scatter.count += 1.0F;
+  }
+  return scatter;
+}
+
 }  // namespace
 
 Field::Field(std::vector<std::vector<RangeSampler>> views_of_pose, const std::vector<Transform>& model_from_pose,
@@ -170,6 +196,7 @@ FieldValue Field::from_class_table(const Eigen::Vector3f& point, const Neighbour
 
 PointEvidence Field::evidence_at(const Eigen::Vector3f& point) const {
   PointEvidence result;
+  std::vector<WeightedDistance> counted;
   const Neighbourhood all = everywhere();
   float weight = 0.0F, sum = 0.0F, variance = 0.0F;
   for (const auto* view : all.views) {
@@ -180,13 +207,17 @@ PointEvidence Field::evidence_at(const Eigen::Vector3f& point) const {
     sum += w * s.distance;
     variance += w * w * s.sigma * s.sigma;
     result.normal += w * s.normal;
-    if (std::abs(s.distance) < std::max(class_threshold_, view_sigmas_ * s.sigma)) ++result.views;
+    if (std::abs(s.distance) < std::max(class_threshold_, view_sigmas_ * s.sigma)) {
+      ++result.views;
+      counted.push_back({s.distance, s.sigma, w});
+    }
   }
   result.value = at(point, all);
   if (!(weight > 0.0F)) return result;
   result.surface_distance = sum / weight;
   result.normal.normalize();
   result.sigma = std::sqrt(variance) / weight;
+  result.scatter = scatter_of(counted);
   return result;
 }
 

@@ -23,13 +23,19 @@ struct FieldValue {
   Support support = Support::bounds;
 };
 
+/// How far views lie from their mean, each in units of what its sigma lets expect.
+struct Scatter {
+  float sum = 0.0F, count = 0.0F;  ///< of views; their quotient is 1 where sigmas are right
+};
+
 /// Data of the range images for a point of the surface.
 struct PointEvidence {
   FieldValue value;
   float surface_distance = 0.0F;  ///< weighted mean of the views' distances, without hull and free space
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
-  int views = 0;  ///< that measured the surface within a voxel of the point
-  float sigma = 0.0F;
+  int views = 0;       ///< that measured the surface within a voxel of the point
+  float sigma = 0.0F;  ///< of `surface_distance`
+  Scatter scatter;
 };
 
 /// The signed distance of the whole object at any point of the model's frame, gathered from all views.

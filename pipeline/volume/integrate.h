@@ -38,6 +38,7 @@ struct VolumeOptions {
   std::size_t seed_stride = 8;             ///< one measured point in this many is a start of the surface
   int relax_rounds = 8;                    ///< of a seven-point mean where unmeasured: a Gaussian of 1.5 voxels
   int smoothing_rounds = 4;                ///< of the staircases on unmeasured surface
+  int scatter_rounds = 40;                 ///< over which the scatter of views is averaged: six edges around
   float min_agreement = 0.5F;              ///< cosine between surface and measured normal, for moving a vertex onto it
   float doubt_reach_mm = 8.0F;             ///< the solid is doubtful this deep below a closed surface
   float max_filled_mm = 2.0F;              ///< a doubtful tunnel wider than this is not filled

@@ -54,7 +54,7 @@ void smooth_unmeasured(float voxel_mm, int rounds, Mesh& mesh) {
 
 /// One step along the measured normal; `views` and `sigma` where the vertex ends on measured surface.
 void settle_vertex(const Field& field, const VolumeOptions& options, const Eigen::Vector3f& outward, Mesh& mesh,
-                   std::size_t v) {
+                   std::vector<Scatter>& scatter, std::size_t v) {
   Eigen::Vector3f& position = mesh.vertices[v];
   PointEvidence evidence = field.evidence_at(position);
   if (evidence.views == 0 || evidence.normal.dot(outward) < options.min_agreement) return;
@@ -66,6 +66,35 @@ void settle_vertex(const Field& field, const VolumeOptions& options, const Eigen
   position = moved;
   mesh.views[v] = static_cast<std::uint8_t>(std::min(evidence.views, 255));
   mesh.sigma[v] = evidence.sigma;
+  scatter[v] = evidence.scatter;
+}
+
+/// Sums over the neighbours, round after round: a Gaussian whose width is the root of so many edges.
+void spread(const Adjacency& around, int rounds, std::vector<Scatter>& scatter) {
+  std::vector<Scatter> before;
+  for (int round = 0; round < rounds; ++round) {
+    before = scatter;
+    parallel_for((scatter.size() + kChunk - 1) / kChunk, [&](std::size_t chunk) {
+      for (std::size_t v = chunk * kChunk; v < std::min(scatter.size(), (chunk + 1) * kChunk); ++v) {
+        Scatter sum = before[v];
+        for (auto i = around.first[v]; i < around.first[v + 1]; ++i) {
+          sum.sum += before[around.neighbour[i]].sum;
+          sum.count += before[around.neighbour[i]].count;
+        }
+        const auto of = static_cast<float>(1 + around.first[v + 1] - around.first[v]);
+        scatter[v] = {sum.sum / of, sum.count / of};
+      }
+    });
+  }
+}
+
+/// Where the views around scatter more than their sigmas let expect, sigma is larger by that [the Birge ratio].
+void widen_sigma(const VolumeOptions& options, std::vector<Scatter>& scatter, Mesh& mesh) {
+  constexpr float kTooFew = 1e-3F;  // views around, after the spreading
+  spread(adjacency(mesh), options.scatter_rounds, scatter);
+  for (std::size_t v = 0; v < mesh.sigma.size(); ++v) {
+    if (scatter[v].count > kTooFew) mesh.sigma[v] *= std::max(1.0F, scatter[v].sum / scatter[v].count);
+  }
 }
 
 }  // namespace
@@ -75,10 +104,12 @@ void finish_surface(const Field& field, const VolumeOptions& options, Mesh& mesh
   mesh.views.assign(count, 0);
   mesh.sigma.assign(count, std::numeric_limits<float>::quiet_NaN());
   const std::vector<Eigen::Vector3f> outward = vertex_normals(mesh);
+  std::vector<Scatter> scatter(count);
   parallel_for((count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
     const std::size_t end = std::min(count, (chunk + 1) * kChunk);
-    for (std::size_t v = chunk * kChunk; v < end; ++v) settle_vertex(field, options, outward[v], mesh, v);
+    for (std::size_t v = chunk * kChunk; v < end; ++v) settle_vertex(field, options, outward[v], mesh, scatter, v);
   });
+  widen_sigma(options, scatter, mesh);
   smooth_unmeasured(static_cast<float>(options.voxel_mm), options.smoothing_rounds, mesh);
   mesh.normals = vertex_normals(mesh);
 }

@@ -72,6 +72,28 @@ TEST(Integrate, VerticesHaveTheNumberOfTheirViewsAndTheirSigma) {
   }
 }
 
+double median_sigma(const std::vector<View>& views) {
+  const auto surface = integrate_views(views);
+  EXPECT_TRUE(surface);
+  std::vector<float> sigmas;
+  for (std::size_t v = 0; surface && v < surface->mesh.vertices.size(); ++v) {
+    if (surface->mesh.views[v] >= 3) sigmas.push_back(surface->mesh.sigma[v]);
+  }
+  std::sort(sigmas.begin(), sigmas.end());
+  return sigmas.empty() ? 0.0 : static_cast<double>(sigmas[sigmas.size() / 2]);
+}
+
+TEST(Integrate, ViewsThatScatterMoreThanTheirSigmasSayWidenSigma) {
+  auto views = take_views({}, cast_into(ball()));
+  const double sound = median_sigma(views);
+  for (std::size_t v = 0; v < views.size(); ++v) views[v].range.depth += v % 2 == 0 ? 0.04F : -0.04F;
+  const double scattered = median_sigma(views);
+  EXPECT_GT(scattered, 2.5 * sound);
+  EXPECT_LT(scattered, 6.0 * sound);
+  for (View& view : views) view.range.sigma *= 10.0F;  // they say it
+  EXPECT_NEAR(median_sigma(views), 10.0 * sound, 0.1 * sound);
+}
+
 TEST(Integrate, NoiseIsAveragedAndDropoutsLeaveNoHoles) {
   const auto views = take_views({.noise_mm = 0.04, .dropouts = 0.05}, cast_into(ball()));
   const auto surface = integrate_views(views);
