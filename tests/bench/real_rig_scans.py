@@ -6,6 +6,7 @@ import mesh_shapes
 
 WORKSHOP = ["--profile", "workshop"]
 RIM_DOTS = "40x84.5x2.4"
+BELOW_LIMITS = 8  # exit code of `scanrig evaluate` for a model that misses one of its own limits
 
 
 def own_calibration(bench):
@@ -53,5 +54,8 @@ def reconstruct(bench, scan, model, *options):
 
 
 def evaluate(bench, scan, model):
-    done = bench.run([bench.bin / "scanrig", "evaluate", scan, "--model", model, "--json"], 600, check=True)
+    """Scores against the truth, whether or not the model reaches the limits of `scanrig evaluate`."""
+    done = bench.run([bench.bin / "scanrig", "evaluate", scan, "--model", model, "--json"], 600)
+    if done.returncode not in (0, BELOW_LIMITS):
+        raise RuntimeError(f"{scan.name} cannot be evaluated: {done.stderr.strip()[-300:]}")
     return json.loads(done.stdout)

@@ -1,7 +1,6 @@
 """Screens of other colours, none, and an object as blue as the screen; holes and handles of objects of known genus."""
-import json
-
 import pierced_objects
+import real_rig_scans
 
 MAX_CLOSED_WRONGLY = 0.03
 SAME_COVERAGE = 0.01
@@ -14,8 +13,7 @@ def scan(bench, folder, *options):
     done = bench.run([bench.bin / "scanrig", "reconstruct", folder, "--no-texture", "--voxel-mm", 0.4], 300)
     if done.returncode != 0:
         return None, " ".join(done.stderr.split())[-200:]
-    scores = bench.run([bench.bin / "scanrig", "evaluate", folder, "--json"], 300, check=True)
-    return json.loads(scores.stdout), "; ".join(done.stderr.split("\n")).strip("; ")
+    return real_rig_scans.evaluate(bench, folder, folder / "model"), "; ".join(done.stderr.split("\n")).strip("; ")
 
 
 def coverage(scores):
