@@ -86,11 +86,14 @@ double median_sigma(const std::vector<View>& views) {
 TEST(Integrate, ViewsThatScatterMoreThanTheirSigmasSayWidenSigma) {
   auto views = take_views({}, cast_into(ball()));
   const double sound = median_sigma(views);
-  for (std::size_t v = 0; v < views.size(); ++v) views[v].range.depth += v % 2 == 0 ? 0.04F : -0.04F;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    cv::Mat1f& depth = views[v].range.depth;
+    depth = depth + (v % 2 == 0 ? 0.04 : -0.04);
+  }
   const double scattered = median_sigma(views);
   EXPECT_GT(scattered, 2.5 * sound);
   EXPECT_LT(scattered, 6.0 * sound);
-  for (View& view : views) view.range.sigma *= 10.0F;  // they say it
+  for (View& view : views) view.range.sigma = 10.0 * view.range.sigma;  // they say it
   EXPECT_NEAR(median_sigma(views), 10.0 * sound, 0.1 * sound);
 }
 
