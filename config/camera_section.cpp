@@ -62,7 +62,7 @@ void read_pattern_exposures(Section& s, StereoCameraConfig& camera) {
       return others.push_back(std::chrono::microseconds(*us));
     s.report(
         "pattern_exposures_us",
-        fmt::format("must be different whole numbers of {} to {}, other than exposure_us and at most {:g} times as "
+        fmt::format("must be different whole numbers from {} to {}, other than exposure_us and at most {:g} times as "
                     "long or as short",
                     kExposureUs.min, kExposureUs.max, kMaxPatternFactor));
   });

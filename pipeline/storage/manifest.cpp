@@ -102,7 +102,7 @@ std::vector<double> read_pattern_factors(JsonObject& object) {
   std::set<double> known{1.0};
   for (const double factor : factors) {
     if (factor >= kMinPatternFactor && factor <= kMaxPatternFactor && known.insert(factor).second) continue;
-    object.reject("pattern_factors", fmt::format("must be different numbers of {:g} to {:g}, without 1",
+    object.reject("pattern_factors", fmt::format("must be different numbers from {:g} to {:g}, without 1",
                                                  kMinPatternFactor, kMaxPatternFactor));
   }
   return factors;

@@ -312,7 +312,7 @@ def export_model(reader, step):
 def add_reference(reader, step):
     """A design of the part; any will do that the service can read."""
     stepped_block.write(reader.machine.root / "root" / "bracket.obj")
-    code, said = reader.machine.run(step.text.replace("bracket.stl", "/root/bracket.obj"))
+    code, said = reader.machine.run(step.text.replace(".stl", ".obj"))
     return code == 0, said
 
 
