@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <opencv2/calib3d.hpp>
 
 #include "core/parallel.h"
@@ -24,6 +25,59 @@ bool points_back(const DisparityPatch& patch, int u, int v, const Nodes& there, 
   });
   return is_confirmed;
 }
+
+/// Pixels of the left image with the patch of their own surface.
+struct MatchedPixels {
+  const MatchSide& forward;
+  const Nodes& nodes;
+  const Nodes& back;
+  const MatchMask& mask;
+  const StereoOptions& options;
+
+  /// Matched, and confirmed from the right image; else invalid.
+  [[nodiscard]] DisparityPatch at(int u, int v) const {
+    if (mask.usable(v, u) == 0) return {};
+    DisparityPatch patch = forward.match_pixel(nodes, u, v);
+    patch.valid = patch.valid && points_back(patch, u, v, back, options) && on_surface(patch, u, v);
+    return patch;
+  }
+
+  /// From the matched pixels of a lattice: the mean of those beside (u, v) where their surfaces meet in it within their
+  /// sigma, else matched itself.
+  [[nodiscard]] DisparityPatch at(const Nodes& lattice, int u, int v) const {
+    const int stride = lattice.stride, column = u / stride, row = v / stride;
+    const bool in_column = u % stride == 0, in_row = v % stride == 0;
+    if (in_column && in_row) return lattice.at(column, row);
+    DisparityPatch mean;
+    const int last_column = column + (in_column ? 0 : 1), last_row = row + (in_row ? 0 : 1);
+    if (mask.usable(v, u) == 0) return mean;
+    if (last_column >= lattice.columns || last_row >= lattice.rows) return at(u, v);
+    float least = std::numeric_limits<float>::infinity(), most = -least, count = 0.0F;
+    for (int y = row; y <= last_row; ++y) {
+      for (int x = column; x <= last_column; ++x) {
+        if (!lattice.at(x, y).valid) return at(u, v);
+        const DisparityPatch patch =
+            lattice.at(x, y).moved(static_cast<float>(u - x * stride), static_cast<float>(v - y * stride));
+        least = std::min(least, patch.c[0]);
+        most = std::max(most, patch.c[0]);
+        for (std::size_t i = 0; i < 3; ++i) mean.c[i] += patch.c[i];
+        mean.sigma += patch.sigma;
+        count += 1.0F;
+      }
+    }
+    for (std::size_t i = 0; i < 3; ++i) mean.c[i] /= count;
+    mean.sigma /= count;
+    if (most - least > mean.sigma) return at(u, v);
+    mean.valid = on_surface(mean, u, v);
+    return mean;
+  }
+
+ private:
+  /// A pixel on another surface than its window would be an extrapolation.
+  [[nodiscard]] bool on_surface(const DisparityPatch& patch, int u, int v) const {
+    return std::abs(patch.c[0] - mask.disparity(v, u)) < options.surface_px;
+  }
+};
 
 cv::Mat1b everywhere(const cv::Mat1b& mask, cv::Size size) { return mask.empty() ? cv::Mat1b(size, 255) : mask; }
 
@@ -52,17 +106,24 @@ Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDi
   forward.rematch(nodes, context);
   context.report("range", 0.6);
 
+  const MatchedPixels pixels{forward, nodes, back, left_mask, options};
+  Nodes lattice(size, options.lattice_px);
+  parallel_for(static_cast<std::size_t>(lattice.rows), [&](std::size_t row) {
+    if (context.stopped()) return;
+    const int v = static_cast<int>(row) * lattice.stride;
+    for (int column = 0; column < lattice.columns; ++column) {
+      lattice.at(column, static_cast<int>(row)) = pixels.at(column * lattice.stride, v);
+    }
+  });
+  context.report("range", 0.8);
   DenseDisparity out{cv::Mat1f(size, kUnmeasured), cv::Mat1f(size, kUnmeasured),
                      cv::Mat2f(size, cv::Vec2f(kUnmeasured, kUnmeasured))};
   parallel_for(static_cast<std::size_t>(size.height), [&](std::size_t row) {
     if (context.stopped()) return;
     const int v = static_cast<int>(row);
     for (int u = 0; u < size.width; ++u) {
-      if (left_mask.usable(v, u) == 0) continue;
-      const DisparityPatch patch = forward.match_pixel(nodes, u, v);
-      if (!patch.valid || !points_back(patch, u, v, back, options)) continue;
-      // A pixel on another surface than its window would be an extrapolation.
-      if (!(std::abs(patch.c[0] - left_mask.disparity(v, u)) < options.surface_px)) continue;
+      const DisparityPatch patch = pixels.at(lattice, u, v);
+      if (!patch.valid) continue;
       out.value(v, u) = patch.c[0];
       // Tilted away, the two windows differ by more than the model covers: factor from known truth, see README.md.
       out.sigma(v, u) = patch.sigma * std::hypot(1.0f, patch.c[1] / options.tilt, patch.c[2] / options.tilt);

@@ -84,11 +84,14 @@ DisparityPatch MatchSide::match_smooth(int u, int v, DisparityPatch patch, std::
 
 /// Matches with the window that fits signal and shape. The smaller of two sharp ones where the larger one's result is
 /// outside its confidence (a crease, a step: the rule of intersecting confidence intervals [Katkovnik 1999]). Large
-/// smoothed ones where the signal is low.
-DisparityPatch MatchSide::match(int u, int v, const DisparityPatch& start, const WindowOptions& window) const {
+/// smoothed ones where the signal is low. `is_creased`: a crease may be in the window.
+DisparityPatch MatchSide::match(int u, int v, const DisparityPatch& start, bool is_creased,
+                                const WindowOptions& window) const {
   DisparityPatch best = match_sharp(u, v, start, options_.sharp_radius_px, window);
-  const DisparityPatch small = match_sharp(u, v, best.valid ? best : start, options_.crease_radius_px, window);
-  if (good(small) && (!good(best) || !compatible(small, best))) best = small;
+  if (is_creased || !good(best)) {
+    const DisparityPatch small = match_sharp(u, v, best.valid ? best : start, options_.crease_radius_px, window);
+    if (good(small) && (!good(best) || !compatible(small, best))) best = small;
+  }
   if (good(best) && double(best.sigma) <= options_.good_sigma_px) return best;
   for (const std::uint8_t radius : options_.smooth_radii_px) {
     const DisparityPatch large = match_smooth(u, v, best.valid ? best : start, radius, window);
@@ -151,7 +154,7 @@ void MatchSide::rematch(Nodes& nodes, const Context& context) const {
       const int u = column * stride, v = row * stride;
       if (mask_.usable(v, u) == 0 || nodes.at(column, row).valid) continue;
       const DisparityPatch start = plane_patch(mask_.disparity, u, v, options_);
-      if (start.valid) nodes.at(column, row) = match(u, v, start, steps(options_.coarse_iterations));
+      if (start.valid) nodes.at(column, row) = match(u, v, start, true, steps(options_.coarse_iterations));
     }
   });
 }
@@ -194,7 +197,7 @@ void MatchSide::grow(Nodes& nodes, const Context& context) {
                                static_cast<float>((row - y) * nodes.stride));
           }
         }
-        if (start.valid) grown[at(column, row)] = match(u, v, start, window);
+        if (start.valid) grown[at(column, row)] = match(u, v, start, true, window);
       }
     });
     any = false;
@@ -215,13 +218,17 @@ DisparityPatch MatchSide::match_pixel(const Nodes& nodes, int u, int v) const {
   DisparityPatch start;
   const float surface = mask_.disparity(v, u);
   if (std::isnan(surface)) return start;
+  int around = 0;
+  bool is_creased = false;
   nodes.around(u, v, [&](const DisparityPatch& patch) {
     if (std::abs(patch.c[0] - surface) >= options_.surface_px) return;
+    ++around;
+    is_creased |= patch.radius == options_.crease_radius_px;
     if (!start.valid || patch.zncc > start.zncc) start = patch;
   });
-  if (start.valid) return match(u, v, start, steps(options_.node_iterations));
+  if (start.valid) return match(u, v, start, is_creased || around < 4, steps(options_.node_iterations));
   start = plane_patch(mask_.disparity, u, v, options_);
-  return start.valid ? match(u, v, start, steps(options_.coarse_iterations)) : start;
+  return start.valid ? match(u, v, start, true, steps(options_.coarse_iterations)) : start;
 }
 
 }  // namespace scanrig

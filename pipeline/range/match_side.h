@@ -88,7 +88,8 @@ class MatchSide {
                                            WindowOptions window) const;
   [[nodiscard]] DisparityPatch match_smooth(int u, int v, DisparityPatch patch, std::uint8_t radius,
                                             WindowOptions window) const;
-  [[nodiscard]] DisparityPatch match(int u, int v, const DisparityPatch& start, const WindowOptions& window) const;
+  [[nodiscard]] DisparityPatch match(int u, int v, const DisparityPatch& start, bool is_creased,
+                                     const WindowOptions& window) const;
   void fill_mask(const Nodes& nodes, int column, int row);
 
   const LayeredImage& here_;

@@ -39,6 +39,7 @@ struct MatchImage {
   explicit MatchImage(const cv::Mat1f& image);
   cv::Mat1f value;
   CubicRows cubic;
+  cv::Mat1f slope;  ///< d value / du
 };
 
 /// Constraints on the pixels of the image that the matcher starts from.
@@ -64,6 +65,13 @@ struct WindowOptions {
 /// which an image has one per pi l^2 pixels, l being its correlation length (rms of the values by that of their slope).
 DisparityPatch match_window(const MatchImage& here, const MatchImage& there, const MatchMask& mask, int u, int v,
                             const DisparityPatch& patch, const WindowOptions& options);
+
+/// Sets of instructions that match_window() is compiled for, the best last. All give the same bits.
+enum class Instructions : std::uint8_t { baseline, avx2 };
+/// Those of this processor, `baseline` first.
+std::vector<Instructions> available_instructions();
+/// For tests and measurements: the best is used from the start. Must be available.
+void use_instructions(Instructions instructions);
 
 /// What a patch leaves unexplained of its window, grey values, and d value / du there; row by row, `side` each way.
 struct WindowResidual {

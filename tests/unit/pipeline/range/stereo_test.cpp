@@ -6,9 +6,11 @@
 #include <cstring>
 #include <opencv2/core.hpp>
 #include <string>
+#include <vector>
 
 #include "core/parallel.h"
 #include "core/units.h"
+#include "pipeline/range/window_match.h"
 #include "tests/bench/real_data/d415_measure.h"
 #include "tests/unit/pipeline/range/range_error.h"
 #include "tests/unit/pipeline/range/two_cameras.h"
@@ -23,6 +25,20 @@ cv::Mat1b where_known(const cv::Mat1f& depth) {
   cv::Mat1b known;
   cv::compare(depth, depth, known, cv::CMP_EQ);
   return known;
+}
+
+/// Within 2 px of a bend of the surface, steps apart.
+cv::Mat1b where_bent(const cv::Mat1f& depth) {
+  cv::Mat1b bent(depth.size(), std::uint8_t{0});
+  for (int v = 0; v < depth.rows; ++v) {
+    for (int u = 2; u + 2 < depth.cols; ++u) {
+      const float bend = depth(v, u - 1) - 2.0F * depth(v, u) + depth(v, u + 1);
+      const float step = std::abs(depth(v, u + 1) - depth(v, u - 1));
+      if (!(std::abs(bend) > 0.03F && step < 0.4F)) continue;  // false for NaN
+      for (int x = u - 2; x <= u + 2; ++x) bent(v, x) = 255;
+    }
+  }
+  return bent;
 }
 
 /// A rendered surface before the rectified default rig.
@@ -146,6 +162,41 @@ TEST(Stereo, GivesTheSameBitsForAnyNumberOfThreads) {
       EXPECT_EQ(std::memcmp(first.data, range->depth.data, first.total() * sizeof(float)), 0) << threads << " threads";
     });
   }
+}
+
+TEST(Stereo, GivesTheSameBitsForEverySetOfInstructions) {
+  const Scene scene(test::ball(kMiddle, 10), {280, 240});
+  const std::vector<Instructions> all = available_instructions();
+  cv::Mat1f depth, sigma;
+  for (const Instructions one : all) {
+    use_instructions(one);
+    const auto range = scene.match();
+    use_instructions(all.back());
+    ASSERT_TRUE(range) << range.error().message;
+    if (depth.empty()) {
+      depth = range->depth;
+      sigma = range->sigma;
+    }
+    EXPECT_EQ(std::memcmp(depth.data, range->depth.data, depth.total() * sizeof(float)), 0) << static_cast<int>(one);
+    EXPECT_EQ(std::memcmp(sigma.data, range->sigma.data, sigma.total() * sizeof(float)), 0) << static_cast<int>(one);
+  }
+}
+
+TEST(Stereo, MatchesEveryPixelWhereTheSurfaceBends) {
+  // A ridge of two planes: between matched pixels on both sides of it no mean of them lies on the surface.
+  const Scene scene(test::nearest_of(test::disc({-9, 45, 0}, Eigen::Vector3d(-0.6, 0.3, 0.74).normalized(), 14),
+                                     test::disc({9, 45, 0}, Eigen::Vector3d(0.6, 0.3, 0.74).normalized(), 14)));
+  StereoOptions every;
+  every.lattice_px = 1;
+  const auto range = scene.match();
+  const auto whole = match_stereo(scene.rectification, scene.left, scene.right, scene.object, {}, every, {});
+  ASSERT_TRUE(range && whole);
+  const cv::Mat1b ridge = where_bent(scene.truth);
+  ASSERT_GT(cv::countNonZero(ridge), 300);
+  const RangeError c = test::compare(*range, scene.truth, ridge), d = test::compare(*whole, scene.truth, ridge);
+  EXPECT_LT(c.median, 1.03 * d.median);
+  EXPECT_LT(c.p95, 1.08 * d.p95);
+  EXPECT_GE(c.coverage, d.coverage - 0.005);
 }
 
 TEST(Stereo, ReportsImagesWithoutMatches) {
