@@ -30,14 +30,24 @@ cv::Mat1b widened(const cv::Mat1b& image, int margin) {
   return out;
 }
 
-cv::Mat1f match(const cv::Mat1b& here, const cv::Mat1b& there, int min_disparity, int count) {
+/// Disparities to search: lowest, and how many.
+struct Search {
+  int lowest = 0, count = 0;
+
+  static Search between(int lowest, int highest) {
+    return {lowest, std::max(16, (highest - lowest + 16) / 16 * 16)};  // OpenCV wants a multiple of 16
+  }
+};
+
+cv::Mat1f match(const cv::Mat1b& here, const cv::Mat1b& there, const Search& search, int speckle_px) {
   constexpr int kBlock = 5;
-  const auto matcher = cv::StereoSGBM::create(min_disparity, count, kBlock, 4 * kBlock * kBlock, 24 * kBlock * kBlock,
-                                              -1, 31, 3, 60, 2, cv::StereoSGBM::MODE_SGBM_3WAY);
+  const auto matcher =
+      cv::StereoSGBM::create(search.lowest, search.count, kBlock, 4 * kBlock * kBlock, 24 * kBlock * kBlock, -1, 31, 3,
+                             speckle_px, 2, cv::StereoSGBM::MODE_SGBM_3WAY);
   cv::Mat1s fixed;
   matcher->compute(here, there, fixed);
   cv::Mat1f disparity(fixed.size());
-  const short unknown = static_cast<short>((min_disparity - 1) * 16);
+  const short unknown = static_cast<short>((search.lowest - 1) * 16);
   for (int y = 0; y < fixed.rows; ++y) {
     for (int x = 0; x < fixed.cols; ++x) {
       disparity(y, x) = fixed(y, x) <= unknown ? kUnmeasured : static_cast<float>(fixed(y, x)) / 16.0f;
@@ -52,22 +62,68 @@ cv::Mat1f flipped(const cv::Mat1f& image) {
   return out;
 }
 
-}  // namespace
-
-CoarseDisparity coarse_disparity(const cv::Mat1f& left, const cv::Mat1f& right, int min_disparity, int max_disparity,
-                                 cv::Range rows) {
-  const int count = std::max(16, (max_disparity - min_disparity + 16) / 16 * 16);
+/// Of two images of one size, each in its turn.
+CoarseDisparity match_both(const cv::Mat1b& left, const cv::Mat1b& right, const Search& search, int speckle_px) {
   // OpenCV leaves out the columns whose search would leave the image.
-  const int margin = std::max({std::abs(min_disparity), std::abs(min_disparity + count), 16});
-  const cv::Mat1b a = widened(flattened(left.rowRange(rows)), margin);
-  const cv::Mat1b b = widened(flattened(right.rowRange(rows)), margin);
+  const int margin = std::max({std::abs(search.lowest), std::abs(search.lowest + search.count), 16});
+  const cv::Mat1b a = widened(left, margin), b = widened(right, margin);
   cv::Mat1b a_mirrored, b_mirrored;
   cv::flip(a, a_mirrored, 1);
   cv::flip(b, b_mirrored, 1);
   const cv::Range columns(margin, margin + left.cols);
-  CoarseDisparity out{cv::Mat1f(left.size(), kUnmeasured), cv::Mat1f(right.size(), kUnmeasured)};
-  match(a, b, min_disparity, count).colRange(columns).copyTo(out.left.rowRange(rows));
-  flipped(match(b_mirrored, a_mirrored, min_disparity, count)).colRange(columns).copyTo(out.right.rowRange(rows));
+  return {match(a, b, search, speckle_px).colRange(columns),
+          flipped(match(b_mirrored, a_mirrored, search, speckle_px)).colRange(columns)};
+}
+
+/// The columns that show the object, and some around.
+cv::Range object_columns(const cv::Mat1b& mask, cv::Range rows, int width) {
+  constexpr int kMargin = 32;  // more than the windows that flatten and aggregate
+  if (mask.empty()) return {0, width};
+  const cv::Rect box = cv::boundingRect(mask.rowRange(rows));
+  return {std::max(0, box.x - kMargin), std::min(width, box.x + box.width + kMargin)};
+}
+
+/// Those of `search` that occur, from images a quarter as large; all of it where too few are found there.
+Search occurring(const cv::Mat1b& left, const cv::Mat1b& right, const Search& search) {
+  constexpr int kScale = 4, kMargin = 12, kSpeckle = 6, kFewest = 200;
+  cv::Mat1b a, b;
+  cv::resize(left, a, {}, 1.0 / kScale, 1.0 / kScale, cv::INTER_AREA);
+  cv::resize(right, b, {}, 1.0 / kScale, 1.0 / kScale, cv::INTER_AREA);
+  const int highest = search.lowest + search.count;
+  const CoarseDisparity small =
+      match_both(a, b, Search::between(search.lowest / kScale - 1, highest / kScale + 1), kSpeckle);
+  const cv::Mat1f found = confirmed(small.left, small.right, -1.0F, 1.0F);
+  cv::Mat1b known;
+  cv::compare(found, found, known, cv::CMP_EQ);  // not NaN
+  if (cv::countNonZero(known) < kFewest) return search;
+  double least = 0.0, most = 0.0;
+  cv::minMaxLoc(found, &least, &most, nullptr, nullptr, known);
+  return Search::between(std::max(search.lowest, static_cast<int>(least * kScale) - kMargin),
+                         std::min(highest, static_cast<int>(most * kScale) + kMargin));
+}
+
+}  // namespace
+
+CoarseDisparity coarse_disparity(const RectifiedPair& pair, cv::Range rows) {
+  const cv::Size size = pair.left.size();
+  const cv::Range left_columns = object_columns(pair.left_object, rows, size.width);
+  const cv::Range right_columns = object_columns(pair.right_object, rows, size.width);
+  cv::Mat1b left = flattened(pair.left(rows, left_columns)), right = flattened(pair.right(rows, right_columns));
+  // In the boxes; their widths are made equal.
+  const int shift = left_columns.start - right_columns.start, wider = std::max(left.cols, right.cols);
+  cv::copyMakeBorder(left, left, 0, 0, 0, wider - left.cols, cv::BORDER_REPLICATE);
+  cv::copyMakeBorder(right, right, 0, 0, 0, wider - right.cols, cv::BORDER_REPLICATE);
+  Search search =
+      Search::between(std::max(pair.min_disparity - shift, -wider), std::min(pair.max_disparity - shift, wider));
+  if (!pair.left_object.empty()) search = occurring(left, right, search);
+  constexpr int kSpeckle = 60;
+  const CoarseDisparity boxes = match_both(left, right, search, kSpeckle);
+  CoarseDisparity out{cv::Mat1f(size, kUnmeasured), cv::Mat1f(size, kUnmeasured)};
+  const auto paste = [&](const cv::Mat1f& box, cv::Range columns, cv::Mat1f& whole) {
+    cv::add(box.colRange(0, columns.size()), static_cast<double>(shift), whole(rows, columns));
+  };
+  paste(boxes.left, left_columns, out.left);
+  paste(boxes.right, right_columns, out.right);
   return out;
 }
 

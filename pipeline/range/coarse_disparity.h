@@ -2,6 +2,8 @@
 
 #include <opencv2/core/mat.hpp>
 
+#include "pipeline/range/stereo.h"
+
 namespace scanrig {
 
 /// Disparities to about a third of a pixel, of both images of a rectified pair: u_left - u_right, px, NaN unknown.
@@ -11,9 +13,9 @@ struct CoarseDisparity {
 };
 
 /// Semi-global matching [Hirschmueller 2008; OpenCV, MODE_SGBM_3WAY] on images freed of shading, each image in its
-/// turn. `rows`: the only rows that are matched. Throws what OpenCV throws.
-CoarseDisparity coarse_disparity(const cv::Mat1f& left, const cv::Mat1f& right, int min_disparity, int max_disparity,
-                                 cv::Range rows);
+/// turn. `rows`: the only rows that are matched. Of a pair with masks only their boxes are, and only the disparities
+/// that matching at a quarter of the size finds there. Throws what OpenCV throws.
+CoarseDisparity coarse_disparity(const RectifiedPair& pair, cv::Range rows);
 
 /// Disparities that the other image's disparities confirm within a tolerance; surface seen by one camera only becomes
 /// NaN. `towards`: -1 from the left image to the right, +1 back.

@@ -162,7 +162,7 @@ Result<RowField> align_rows(RectifiedPair& pair, CoarseDisparity& coarse, cv::Ra
     field = offsets.right_field;
     move_rows(pair, original, field);
     if (offsets.largest_px > options.again_px && round == 0) {
-      coarse = coarse_disparity(pair.left, pair.right, pair.min_disparity, pair.max_disparity, rows);
+      coarse = coarse_disparity(pair, rows);
     }
   }
   return field;

@@ -91,7 +91,7 @@ Result<RangeImage> match_rectified(const RectifiedPair& given, const StereoOptio
   CoarseDisparity coarse;
   RowField corrected;
   try {
-    coarse = coarse_disparity(pair.left, pair.right, pair.min_disparity, pair.max_disparity, rows);
+    coarse = coarse_disparity(pair, rows);
     RowAlignmentOptions alignment;
     alignment.max_px = options.max_rows_px;
     const auto aligned = align_rows(pair, coarse, rows, alignment);

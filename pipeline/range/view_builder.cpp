@@ -1,8 +1,11 @@
 #include "pipeline/range/view_builder.h"
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <opencv2/core.hpp>
+
+#include "core/parallel.h"
 
 namespace scanrig {
 namespace {
@@ -52,14 +55,18 @@ Result<std::vector<Silhouette>> silhouettes_of(const Rectification& rectificatio
                                                double angle_rad, const ViewOptions& options) {
   std::vector<Silhouette> result;
   if (images.left_pattern.channels() != 3) return result;
-  for (const bool is_left : {true, false}) {
-    auto made = silhouette_of(
+  std::array<Result<Silhouette>, 2> made{fail(ErrorCode::internal, ""), fail(ErrorCode::internal, "")};
+  parallel_for(made.size(), [&](std::size_t i) {
+    const bool is_left = i == 0;
+    made[i] = silhouette_of(
         is_left ? images.left_plain : images.right_plain, is_left ? images.left_pattern : images.right_pattern,
         is_left ? rectification.left_map : rectification.right_map, is_left ? rectification.left : rectification.right,
         (is_left ? rectification.left_from_turntable : rectification.right_from_turntable) * rot_y(angle_rad),
         options.silhouette);
-    if (!made) return pass_on(made, is_left ? "left image" : "right image");
-    result.push_back(std::move(*made));
+  });
+  for (std::size_t i = 0; i < made.size(); ++i) {
+    if (!made[i]) return pass_on(made[i], i == 0 ? "left image" : "right image");
+    result.push_back(std::move(*made[i]));
   }
   return result;
 }

@@ -168,16 +168,13 @@ cv::Mat1f light_of(const cv::Mat3f& image, int window_px) {
 void add_mirroring_rim(cv::Mat1b& object, const cv::Mat3f& plain, const cv::Mat3f& pattern,
                        const BlueScreenOptions& options) {
   const cv::Mat1f plain_light = light_of(plain, options.mixed_band_px), lit = light_of(pattern, options.mixed_band_px);
-  const auto grown = [&](int px) {
-    cv::Mat1b out;
-    cv::dilate(object, out, cv::getStructuringElement(cv::MORPH_ELLIPSE, {2 * px + 1, 2 * px + 1}));
-    return out;
-  };
-  const cv::Mat1b near = grown(options.mirror_px), far(255 - grown(3 * options.mirror_px));
+  cv::Mat1f away;  // px from the object
+  cv::distanceTransform(255 - object, away, cv::DIST_L2, cv::DIST_MASK_5);
+  const float near = static_cast<float>(options.mirror_px), far = 3.0F * near;
   std::vector<float> lights, shares;
-  for (int y = 0; y < far.rows; y += 4) {
-    for (int x = 0; x < far.cols; x += 4) {
-      if (far(y, x) == 0 || !(plain_light(y, x) > options.dark_level)) continue;
+  for (int y = 0; y < away.rows; y += 4) {
+    for (int x = 0; x < away.cols; x += 4) {
+      if (away(y, x) <= far || !(plain_light(y, x) > options.dark_level)) continue;
       lights.push_back(plain_light(y, x));
       shares.push_back(lit(y, x) / plain_light(y, x));
     }
@@ -189,7 +186,7 @@ void add_mirroring_rim(cv::Mat1b& object, const cv::Mat3f& plain, const cv::Mat3
   const cv::Mat1f object_light = light_of(colour_around(plain, object, wide), 1);
   for (int y = 0; y < object.rows; ++y) {
     for (int x = 0; x < object.cols; ++x) {
-      if (near(y, x) == 0 || object(y, x) != 0 || !(object_light(y, x) < dark)) continue;
+      if (away(y, x) > near || object(y, x) != 0 || !(object_light(y, x) < dark)) continue;
       if (lit(y, x) < unlit * plain_light(y, x)) object(y, x) = 255;
     }
   }
