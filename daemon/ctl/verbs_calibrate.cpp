@@ -53,10 +53,9 @@ Result<Board> board_of(const BoardOptions& options) {
   return board;
 }
 
-/// A measured length of the longest row of corners.
 std::optional<MeasuredLength> row_length(const std::vector<double>& measured, const Board& board) {
   if (measured.size() != 2) return std::nullopt;
-  return MeasuredLength{(board.corner_columns() - 1) * board.square_mm, measured[0], measured[1]};
+  return first_row_length(board, measured[0], measured[1]);
 }
 
 Result<CalibrateOptions> options_of(const CalibrateFolderVerb& verb, const CalibrationImages& images) {
@@ -272,8 +271,10 @@ ExitCode board(const BoardVerb& verb) {
   const auto pdf = print_board(*wanted, page);
   if (!pdf) return report_error(pdf.error());
   if (auto written = write_file_atomically(verb.out, *pdf); !written) return report_error(written.error());
-  fmt::print("{}\nPrint it at 100 %, then measure its length marks: {}\n", verb.out.string(),
-             board_check_line(*wanted));
+  fmt::print(
+      "{}\nPrint it at 100 % and compare its length marks: {}\n"
+      "Then measure its first row from the first to the last inner corner, {:g} mm as ordered: that is its length.\n",
+      verb.out.string(), board_check_line(*wanted), first_row_length(*wanted, 0.0, 0.0).nominal_mm);
   return ExitCode::ok;
 }
 

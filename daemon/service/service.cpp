@@ -57,10 +57,7 @@ CalibrateOptions calibrate_options_from(const config::RigConfig& rig) {
   CalibrateOptions options;
   options.board = config.board;
   options.board_kind = config.board_kind;
-  if (config.length_mm) {
-    const double nominal = config.board.square_mm * (config.board.corner_columns() - 1);
-    options.length = MeasuredLength{nominal, *config.length_mm, config.length_sigma_mm};
-  }
+  if (config.length_mm) options.length = first_row_length(config.board, *config.length_mm, config.length_sigma_mm);
   options.rim_dots = config.rim_dots;
   options.table_radius_mm = config.table_radius_mm;
   options.gear_ratio = rig.turntable.motion().scale.gear_ratio;

@@ -27,7 +27,8 @@ std::string pixel_format_of(const CalibrationImages& images, const CalibrateOpti
 std::optional<MeasuredLength> listed_length(const CalibrationImages& images, const Board& board) {
   if (images.lengths.empty()) return std::nullopt;
   const BoardLength& length = images.lengths.front();
-  return MeasuredLength{(board.corner(length.to) - board.corner(length.from)).norm(), length.mm, length.sigma_mm};
+  return MeasuredLength{(board.corner(length.to) - board.corner(length.from)).norm(), length.mm, length.sigma_mm,
+                        std::array<int, 2>{length.from, length.to}};
 }
 
 CalibrationInput input_of(const CalibrationImages& images, const CalibrateOptions& options, const Board& board,

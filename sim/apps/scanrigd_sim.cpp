@@ -92,7 +92,7 @@ constexpr auto kRenderingMargin = std::chrono::minutes(2);
 CalibratorOptions calibrator_of(const sim::SimRig& rig, const JobStoreOptions& jobs) {
   CalibrateOptions options;
   const auto [length_mm, sigma_mm] = rig.measured_board_length();
-  options.length = MeasuredLength{(Board{}.corner_columns() - 1) * Board{}.square_mm, length_mm, sigma_mm};
+  options.length = first_row_length(Board{}, length_mm, sigma_mm);
   const auto& profile = sim::profile();
   constexpr int kRimDots = 40;
   options.rim_dots = RimDots{kRimDots, profile.rim_dot_radius_mm, profile.rim_dot_diameter_mm};

@@ -29,7 +29,8 @@ bool are_swapped(const SolvedCalibration& solved) {
 std::optional<double> contradiction(const CalibrationInput& input, const SolvedCalibration& solved) {
   if (!input.second_length) return std::nullopt;
   const ScalePrior second = scale_prior(input.second_length);
-  const double away = second.mean - (solved.board.scale - 1.0);
+  const double away =
+      input.second_length->measured_mm / length_on_board(input.board, solved.board, *input.second_length) - 1.0;
   if (std::abs(away) <= kSigmas * std::hypot(second.sigma, solved.board.scale_sigma)) return std::nullopt;
   return away;
 }

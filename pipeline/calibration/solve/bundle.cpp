@@ -109,7 +109,8 @@ class Bundle {
 
   void add_board_priors() {
     const bool paper = input_.board_kind == BoardKind::paper;
-    const ScalePrior scale = scale_prior(input_.length);
+    const bool joins_corners = input_.length && input_.length->corners;
+    const ScalePrior scale = scale_prior(joins_corners ? std::nullopt : input_.length);
     const double skew = paper ? 1e-3 : 1e-4;
     add(prior_cost({scale.mean, 0, 0, 0, 0, 0}, {scale.sigma, skew, skew, 0.1, 0.1, 0.1}), nullptr, {u_.shape.data()});
     const std::vector<double> offset =
@@ -120,6 +121,11 @@ class Bundle {
       all.push_back(corner.data());
     }
     add(offset_modes_cost(input_.board, kModeMm), nullptr, all);
+    if (!joins_corners) return;
+    const auto [from, to] = *input_.length->corners;
+    add(length_cost(input_.board, *input_.length), nullptr,
+        {u_.shape.data(), u_.offsets[static_cast<std::size_t>(from)].data(),
+         u_.offsets[static_cast<std::size_t>(to)].data()});
   }
 
   void add_table() {

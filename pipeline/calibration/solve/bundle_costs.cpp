@@ -2,6 +2,7 @@
 
 #include <ceres/cost_function.h>
 #include <ceres/manifold.h>
+#include <ceres/sized_cost_function.h>
 
 #include <Eigen/QR>
 #include <algorithm>
@@ -233,6 +234,31 @@ class OffsetModesCost final : public ceres::CostFunction {
   Eigen::MatrixXd rows_;
 };
 
+class LengthCost final : public ceres::SizedCostFunction<1, 6, 3, 3> {
+ public:
+  LengthCost(const Board& board, const MeasuredLength& length) : board_(board), length_(length) {}
+  bool Evaluate(double const* const* b, double* residuals, double** j) const override {
+    std::array<Eigen::Matrix<double, 3, 6>, 2> by_shape;
+    std::array<Eigen::Vector3d, 2> ends;
+    for (std::size_t i = 0; i < 2; ++i) {
+      const int id = (*length_.corners)[i];
+      ends[i] = corner_in_board(b[0], b[i + 1], ordered_corner(board_, id), corner_share(board_, id), &by_shape[i]);
+    }
+    const Eigen::Vector3d apart = ends[1] - ends[0];
+    const Eigen::RowVector3d along = apart.transpose() / (apart.norm() * length_.sigma_mm);
+    residuals[0] = (apart.norm() - length_.measured_mm) / length_.sigma_mm;
+    if (!j) return true;
+    if (j[0]) Eigen::Map<Eigen::Matrix<double, 1, 6>>(j[0], 1, 6) = along * (by_shape[1] - by_shape[0]);
+    if (j[1]) Eigen::Map<Eigen::RowVector3d>(j[1], 3) = -along;
+    if (j[2]) Eigen::Map<Eigen::RowVector3d>(j[2], 3) = along;
+    return true;
+  }
+
+ private:
+  Board board_;
+  MeasuredLength length_;
+};
+
 class PoseManifold final : public ceres::Manifold {
  public:
   int AmbientSize() const override { return 7; }
@@ -283,6 +309,9 @@ ceres::CostFunction* motion_cost(double reported_rad, double angle_sigma, double
 ceres::CostFunction* azimuth_cost(int cameras, double sigma) { return new AzimuthCost(cameras, sigma); }
 ceres::CostFunction* height_cost(double height, double sigma) { return new HeightCost(height, sigma); }
 ceres::CostFunction* offset_modes_cost(const Board& board, double sigma) { return new OffsetModesCost(board, sigma); }
+ceres::CostFunction* length_cost(const Board& board, const MeasuredLength& length) {
+  return new LengthCost(board, length);
+}
 ceres::Manifold* pose_manifold() { return new PoseManifold; }
 
 }  // namespace scanrig

@@ -28,6 +28,9 @@ ceres::CostFunction* height_cost(double height, double sigma);
 /// Offsets have no shift, turn, scale, aspect, shear or quadratic warp in common. Blocks: the offset of every corner.
 ceres::CostFunction* offset_modes_cost(const Board& board, double sigma);
 
+/// The distance of two corners, each with its offset, is the measured one. Blocks: shape, both offsets.
+ceres::CostFunction* length_cost(const Board& board, const MeasuredLength& length);
+
 ceres::Manifold* pose_manifold();  ///< of a PoseBlock, changed on the left
 
 }  // namespace scanrig

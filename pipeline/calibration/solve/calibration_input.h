@@ -30,7 +30,12 @@ struct MeasuredLength {
   double nominal_mm = 0.0;
   double measured_mm = 0.0;
   double sigma_mm = 0.0;  ///< standard uncertainty of measured_mm
+  /// Numbers of the inner corners that it joins: each is printed a hundredth of a millimetre from its place, and only
+  /// the images know where. None: marks elsewhere on the board, as exact as the board as a whole.
+  std::optional<std::array<int, 2>> corners{};
 };
+/// From the first to the last inner corner of the first row.
+MeasuredLength first_row_length(const Board& board, double measured_mm, double sigma_mm);
 
 /// What a calibration is solved from. Angles: CalibrationInput::pairs, counter-clockwise seen from above.
 struct CalibrationInput {

@@ -5,6 +5,7 @@
 
 #include "core/statistics.h"
 #include "core/units.h"
+#include "pipeline/calibration/solve/sighting_model.h"
 #include "pipeline/calibration/solve/solution.h"
 #include "pipeline/calibration/solve/volume_error.h"
 
@@ -102,6 +103,18 @@ std::vector<Transform> turned_boards(const CalibrationInput& input, const Starti
 }
 
 }  // namespace
+
+double length_on_board(const Board& board, const SolvedBoard& solved, const MeasuredLength& length) {
+  if (!length.corners) return length.nominal_mm * solved.scale;
+  const std::array<double, 6> shape{solved.scale - 1.0, solved.aspect,     solved.shear,
+                                    solved.warp_mm[0],  solved.warp_mm[1], solved.warp_mm[2]};
+  const auto end = [&](std::size_t i) {
+    const int id = (*length.corners)[i];
+    return corner_in_board(shape.data(), solved.offsets_mm[static_cast<std::size_t>(id)].data(),
+                           ordered_corner(board, id), corner_share(board, id), nullptr);
+  };
+  return (end(1) - end(0)).norm();
+}
 
 void describe_images(const CalibrationInput& input, const CalibrationSolution& solution,
                      const std::vector<std::array<std::string, 2>>& reasons, SolvedCalibration& out) {

@@ -78,15 +78,29 @@ Eigen::Vector2d table_pixel(const double* lens, const double* camera, const doub
   return pixel;
 }
 
-Eigen::Vector2d corner_pixel(const double* lens, const double* camera, const double* motion, const double* placement,
-                             const double* shape, const double* offset, const Eigen::Vector2d& place,
-                             const Eigen::Vector2d& share, PixelJacobians* jacobians) {
+Eigen::Vector3d corner_in_board(const double* shape, const double* offset, const Eigen::Vector2d& place,
+                                const Eigen::Vector2d& share, Eigen::Matrix<double, 3, 6>* by_shape) {
   const double scale = 1.0 + shape[0], x = place.x(), y = place.y();
   const Eigen::Vector3d print((1.0 + 0.5 * shape[1]) * x + 0.5 * shape[2] * y,
                               (1.0 - 0.5 * shape[1]) * y + 0.5 * shape[2] * x, 0.0);
   const Eigen::Vector3d bend(share.x() * share.x(), share.x() * share.y(), share.y() * share.y());
+  if (by_shape) {
+    by_shape->setZero();
+    by_shape->col(0) = print;
+    by_shape->col(1) << 0.5 * scale * x, -0.5 * scale * y, 0.0;
+    by_shape->col(2) << 0.5 * scale * y, 0.5 * scale * x, 0.0;
+    by_shape->row(2).tail<3>() = bend;
+  }
   Eigen::Vector3d in_board = scale * print + Eigen::Vector3d(offset[0], offset[1], offset[2]);
   in_board.z() += shape[3] * bend.x() + shape[4] * bend.y() + shape[5] * bend.z();
+  return in_board;
+}
+
+Eigen::Vector2d corner_pixel(const double* lens, const double* camera, const double* motion, const double* placement,
+                             const double* shape, const double* offset, const Eigen::Vector2d& place,
+                             const Eigen::Vector2d& share, PixelJacobians* jacobians) {
+  Eigen::Matrix<double, 3, 6> by_shape;
+  const Eigen::Vector3d in_board = corner_in_board(shape, offset, place, share, jacobians ? &by_shape : nullptr);
   const Eigen::Matrix3d rotation = rotation_of(placement);
   const Eigen::Vector3d in_table_axes = rotation * in_board;
   const Eigen::Vector3d in_table = in_table_axes + Eigen::Vector3d(placement[4], placement[5], placement[6]);
@@ -95,11 +109,7 @@ Eigen::Vector2d corner_pixel(const double* lens, const double* camera, const dou
   if (!jacobians) return pixel;
   by_pose(by_table, in_table_axes, jacobians->placement);
   jacobians->point = by_table * rotation;
-  const auto& b = jacobians->point;
-  jacobians->shape.col(0) = b * print;
-  jacobians->shape.col(1) = 0.5 * scale * (b.col(0) * x - b.col(1) * y);
-  jacobians->shape.col(2) = 0.5 * scale * (b.col(0) * y + b.col(1) * x);
-  jacobians->shape.rightCols<3>() = b.col(2) * bend.transpose();
+  jacobians->shape = jacobians->point * by_shape;
   return pixel;
 }
 

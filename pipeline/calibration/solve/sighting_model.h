@@ -19,6 +19,10 @@ Eigen::Vector2d table_pixel(const double* lens, const double* camera, const doub
                             const Eigen::Vector3d& point_in_table, PixelJacobians* jacobians,
                             Eigen::Matrix<double, 2, 3>* by_point);
 
+/// A corner's place in the board's frame, mm. `place`: ordered_corner(); `share`: corner_share().
+Eigen::Vector3d corner_in_board(const double* shape, const double* offset, const Eigen::Vector2d& place,
+                                const Eigen::Vector2d& share, Eigen::Matrix<double, 3, 6>* by_shape);
+
 /// The same of a corner of a placed board. `place`: ordered_corner(); `share`: corner_share().
 Eigen::Vector2d corner_pixel(const double* lens, const double* camera, const double* motion, const double* placement,
                              const double* shape, const double* offset, const Eigen::Vector2d& place,

@@ -21,8 +21,17 @@ constexpr double kFieldEvidence = 3.0;  ///< chi-square per coefficient
 constexpr double kCoarse = 1e-4, kMiddle = 1e-6, kFine = 1e-9;  ///< tolerance of the bundle
 constexpr double kMadToSigma = 1.4826;
 
-Result<void> check_length(const std::optional<MeasuredLength>& length) {
+Result<void> check_length(const std::optional<MeasuredLength>& length, const Board& board) {
   if (!length) return {};
+  if (length->corners) {
+    const auto [from, to] = *length->corners;
+    if (from == to || std::min(from, to) < 0 || std::max(from, to) >= board.corner_count()) {
+      return fail(ErrorCode::invalid_input,
+                  "calibration: a measured length joins corners {} and {}, which are not two "
+                  "of the board's {}",
+                  from, to, board.corner_count());
+    }
+  }
   const std::array<double, 3> values = {length->nominal_mm, length->measured_mm, length->sigma_mm};
   if (std::ranges::all_of(values, [](double mm) { return std::isfinite(mm) && mm > 0.0; })) return {};
   return fail(ErrorCode::invalid_input,
@@ -48,7 +57,7 @@ Result<void> check_input(const CalibrationInput& input) {
     return fail(ErrorCode::invalid_input, "calibration: needs one or two cameras and a board of 4 x 4 squares or more");
   }
   for (const auto& length : {input.length, input.second_length}) {
-    if (auto fine = check_length(length); !fine) return fine;
+    if (auto fine = check_length(length, input.board); !fine) return fine;
   }
   for (const BoardPair& pair : input.pairs) {
     for (const BoardSight* sight : {&pair.left, &pair.right}) {

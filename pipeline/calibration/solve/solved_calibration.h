@@ -62,6 +62,9 @@ struct SolvedBoard : BoardPrint {
   double scale_sigma = 0.0;
 };
 
+/// A length on the board as solved, mm.
+double length_on_board(const Board& board, const SolvedBoard& solved, const MeasuredLength& length);
+
 struct SolvedTable {
   double gear = 1.0;                           ///< turned angle over reported angle; < 0: turns the other way
   std::vector<double> angle_error_deg;         ///< per pair: turned minus gear times reported

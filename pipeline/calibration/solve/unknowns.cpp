@@ -57,6 +57,11 @@ Camera make_camera(const CalibrationInput& input, const Unknowns& unknowns, int 
   return made;
 }
 
+MeasuredLength first_row_length(const Board& board, double measured_mm, double sigma_mm) {
+  const int last = board.corner_columns() - 1;
+  return {last * board.square_mm, measured_mm, sigma_mm, std::array<int, 2>{0, last}};
+}
+
 ScalePrior scale_prior(const std::optional<MeasuredLength>& length) {
   if (!length) return {};
   return {length->measured_mm / length->nominal_mm - 1.0, length->sigma_mm / length->nominal_mm};

@@ -50,6 +50,8 @@ class SyntheticBoardRig {
   [[nodiscard]] const RigFaults& faults() const { return faults_; }
   /// right_from_left
   [[nodiscard]] Eigen::Isometry3d stereo() const { return pose_[1] * pose_[0].inverse(); }
+  /// Between two corners as printed, mm.
+  [[nodiscard]] double printed_mm(std::size_t from, std::size_t to) const { return (print_[to] - print_[from]).norm(); }
   [[nodiscard]] double focal(int camera) const { return focal_[camera]; }
 
  private:

@@ -209,6 +209,21 @@ TEST(SolveCalibration, TheMeasuredLengthSetsTheScale) {
   EXPECT_NEAR(unknown->board.scale_sigma, 3e-3, 1e-4);
 }
 
+TEST(SolveCalibration, ALengthBetweenCornersCountsFromWhereTheyArePrinted) {
+  RigFaults faults;
+  faults.print_mm = 0.01;
+  for (const unsigned seed : {21U, 22U, 23U}) {
+    SyntheticBoardRig rig(faults, seed);
+    CalibrationInput input = rig.observe(3);
+    input.length = first_row_length(input.board, rig.printed_mm(0, 10), 0.002);
+    const auto solved = solve_calibration(input);
+    ASSERT_TRUE(solved) << solved.error().message;
+    EXPECT_LT(std::abs(rig.error_of(solved->calibration).scale_ppm), 60.0) << seed;
+    EXPECT_LT(solved->board.scale_sigma, 4e-5);
+    EXPECT_NEAR(length_on_board(input.board, solved->board, *input.length), input.length->measured_mm, 0.002);
+  }
+}
+
 TEST(SolveCalibration, HandHeldBoardsGiveTheStereoPair) {
   SyntheticBoardRig rig({}, 13);
   const auto solved = solve_calibration(rig.observe_hand_held(20));
@@ -232,6 +247,8 @@ TEST(SolveCalibration, RefusesWhatItCannotSolve) {
   EXPECT_EQ(code_of(wrong), "invalid_input");
   wrong = input;
   wrong.length = MeasuredLength{100.0, 100.0, 0.0};
+  EXPECT_EQ(code_of(wrong), "invalid_input");
+  wrong.length = MeasuredLength{100.0, 100.0, 0.01, std::array<int, 2>{0, 88}};
   EXPECT_EQ(code_of(wrong), "invalid_input");
   wrong = input;
   wrong.pairs[3].left.corners[5].id = 88;
