@@ -22,7 +22,8 @@ struct RangeImage {
   cv::Mat3f normal;  ///< unit, camera frame, towards the camera (z < 0); NaN where depth is
   /// 255 where a NaN pixel shows background (free space all along its ray); empty: background unknown.
   cv::Mat1b background;
-  RowOffsets row_offsets = {};  ///< of the stereo pair; empty for imported range scans
+  RowOffsets row_offsets = {};      ///< of the stereo pair; empty for imported range scans
+  bool background_is_whole = true;  ///< else pixels that are neither measured nor background may be either
 };
 
 /// One table angle of one pose, for registration and volume.
@@ -30,7 +31,7 @@ struct View {
   int index = 0;
   double angle_rad = 0.0;  ///< table angle as measured
   RangeImage range;
-  std::vector<Silhouette> silhouettes;  ///< of the left and the right camera; empty without a blue screen
+  std::vector<Silhouette> silhouettes;  ///< of the left and the right camera; without a key, free_space()
 };
 
 }  // namespace scanrig

@@ -4,6 +4,9 @@
 #include <cmath>
 #include <limits>
 #include <opencv2/core.hpp>
+#include <utility>
+
+#include "pipeline/range/free_space.h"
 
 #include "core/parallel.h"
 
@@ -71,6 +74,37 @@ Result<std::vector<Silhouette>> silhouettes_of(const Rectification& rectificatio
   return result;
 }
 
+Result<TwoLights> two_lights(const RectifyingMap& map, const cv::Mat& pattern, const cv::Mat& plain) {
+  auto grey = rectified_grey(map, pattern);
+  if (!grey) return pass_on(grey);
+  if (plain.empty() || plain.channels() != 3) return TwoLights{std::move(*grey), {}};
+  auto colour = rectified(map, plain);
+  if (!colour) return pass_on(colour);
+  return TwoLights{std::move(*grey), std::move(*colour)};
+}
+
+/// Without a key: background, and what is not background as silhouettes. They hold more than the object.
+Result<void> add_free_space(View& view, const Rectification& rectification, const StereoImages& images,
+                            const ViewOptions& options) {
+  const auto left = two_lights(rectification.left_map, images.left_pattern, images.left_plain);
+  if (!left) return pass_on(left);
+  const auto right = two_lights(rectification.right_map, images.right_pattern, images.right_plain);
+  if (!right) return pass_on(right);
+  FreeSpaceOptions free_options;
+  free_options.clearance_mm = options.table_clearance_mm;
+  auto seen = free_space(rectification, view.range, *left, *right, free_options);
+  if (!seen) return pass_on(seen);
+  cv::compare(seen->left, options.background_px, view.range.background, cv::CMP_GT);
+  view.range.background_is_whole = false;
+  for (const bool is_left : {true, false}) {
+    view.silhouettes.push_back(
+        {is_left ? rectification.left : rectification.right,
+         (is_left ? rectification.left_from_turntable : rectification.right_from_turntable) * rot_y(view.angle_rad),
+         is_left ? seen->left : seen->right});
+  }
+  return {};
+}
+
 }  // namespace
 
 Result<View> make_view(const Rectification& rectification, const StereoImages& images, double angle_rad, int index,
@@ -102,6 +136,7 @@ Result<View> make_view(const Rectification& rectification, const StereoImages& i
       }
     }
   } else {
+    if (auto done = add_free_space(view, rectification, images, options); !done) return pass_on(done);
     cut_at_table(view.range, rectification, options.table_clearance_mm);
     if (cv::countNonZero(view.range.depth == view.range.depth) == 0) {
       if (!has_key) return fail(ErrorCode::degenerate, "{}", silhouettes.error().message);

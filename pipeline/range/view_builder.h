@@ -27,8 +27,9 @@ struct ViewOptions {
 };
 
 /// All data of one table angle: range image in the rectified left camera's frame with its background, and both
-/// silhouettes. Grey images, and colour images without a screen of one colour or with an object of just this colour,
-/// have no silhouettes and no background; table and surroundings are separated from the object by height and radius.
+/// silhouettes. Grey images, and colour images without a screen of one colour or with an object of just this colour:
+/// table and surroundings are separated from the object by height and radius; background and silhouettes are what
+/// free_space() finds, and `background_is_whole` is false.
 /// `angle_rad` is the table's measured angle.
 /// Fails with `invalid_input` (sizes, types), `degenerate` (no screen, nothing seen or matched), `out_of_range` (the
 /// object reaches the border of an image), `stopped`.

@@ -59,7 +59,7 @@ Result<void> Reconstruction::State::register_pose(std::size_t pose, const Contex
 
 Result<void> Reconstruction::State::judge_silhouettes(std::size_t pose, const Context& context) {
   PoseState& state = poses[pose];
-  const auto is_bare = [](const View& view) { return view.silhouettes.empty(); };
+  const auto is_bare = [](const View& view) { return view.silhouettes.empty() || !view.range.background_is_whole; };
   const auto bare = std::ranges::count_if(state.views, is_bare);
   if (bare > 0 && !state.plain.empty()) {
     disagreements.push_back(of_missing_screen(pose, std::ranges::find_if(state.views, is_bare)->index,
@@ -114,7 +114,7 @@ Result<void> Reconstruction::State::measure_without_key(std::size_t pose, const 
   PoseState& state = poses[pose];
   for (std::size_t v = 0; v < state.views.size(); ++v) {
     const View& old = state.views[v];
-    const StereoImages images{state.pattern[v].left, state.pattern[v].right, {}, {}};
+    const StereoImages images{state.pattern[v].left, state.pattern[v].right, state.plain[v].left, state.plain[v].right};
     auto view = make_view(*rectification, images, old.angle_rad, old.index, {}, context);
     if (!view) return pass_on(view, fmt::format("view {}", old.index));
     if (state.watch) state.watch->carry(*view, state.pattern[v].order);

@@ -201,6 +201,15 @@ bool touches_border(const cv::Mat1b& mask) {
 
 }  // namespace
 
+cv::Mat1f outline_near(const cv::Mat& image, const cv::Mat1b& mask, const cv::Mat1b& surely_object,
+                       const BlueScreenOptions& options) {
+  cv::Mat3f colour;
+  image.convertTo(colour, CV_32F);
+  cv::Mat1f field = outside_share(colour, mask, options);
+  field.setTo(-0.5f, surely_object);
+  return contour_distance(field);
+}
+
 Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const cv::Mat& pattern, const BlueScreenOptions& options) {
   if (image.type() != CV_8UC3 || image.cols < 4 * options.border_px || image.rows < 4 * options.border_px) {
     return fail(ErrorCode::invalid_input, "silhouette: a screen needs a colour image (BGR, 8 bit) of {} px or more",

@@ -33,4 +33,9 @@ struct BlueScreenOptions {
 Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const cv::Mat& pattern = {},
                                       const BlueScreenOptions& options = {});
 
+/// The same distance for an object known to a few pixels: `mask` is 255 on it and up to `mixed_band_px` / 2 too large
+/// or too small. Where object and surroundings have the same light its edge stays. `image`: BGR, 8 bit.
+cv::Mat1f outline_near(const cv::Mat& image, const cv::Mat1b& mask, const cv::Mat1b& surely_object,
+                       const BlueScreenOptions& options = {});
+
 }  // namespace scanrig

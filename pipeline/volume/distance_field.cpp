@@ -93,7 +93,7 @@ Field::Neighbourhood Field::near(const Eigen::Vector3f& centre, float radius) co
   Neighbourhood result{{}, hull_.near(centre, radius, band_)};
   for (const auto& views : views_of_pose_) {
     for (const auto& view : views) {
-      if (!view.has_background() || !view.has_no_data_near(centre, radius)) result.views.push_back(&view);
+      if (!view.has_outline() || !view.has_no_data_near(centre, radius)) result.views.push_back(&view);
     }
   }
   return result;
@@ -112,7 +112,7 @@ float Field::bounds(const Eigen::Vector3f& point, const Neighbourhood& neighbour
   const float hull = neighbourhood.hull.distance(point);
   std::vector<float> beside;
   for (const auto* view : neighbourhood.views) {
-    if (!view->has_background()) beside.push_back(view->beside_footprint_mm(point));
+    if (!view->has_outline()) beside.push_back(view->beside_footprint_mm(point));
   }
   const std::size_t rank = std::max<std::size_t>(1, std::min(views_behind, beside.size() / images_per_outside_));
   if (beside.size() <= rank) return hull;

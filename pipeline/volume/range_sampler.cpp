@@ -21,7 +21,7 @@ RangeSampler::RangeSampler(const RangeImage& range, const Transform& model_from_
       camera_from_model_(range.camera_from_pose * model_from_pose.inverse()),
       rotation_(camera_from_model_.linear().cast<float>()),
       translation_(camera_from_model_.translation().cast<float>()),
-      has_background_(!range.background.empty()),
+      has_outline_(!range.background.empty() && range.background_is_whole),
       band_mm_(static_cast<float>(band_mm)) {
   crop(range);
   make_planes(range);
@@ -29,7 +29,7 @@ RangeSampler::RangeSampler(const RangeImage& range, const Transform& model_from_
   const int voxel_pixels = std::max(1, static_cast<int>(std::ceil(voxel_mm / mm_per_pixel())));
   drop_specks_and_fade_edges(voxel_pixels);
   make_tiles();
-  if (!has_background_) make_footprint();
+  if (!has_outline_) make_footprint();
   erode_free_depth(voxel_pixels);
 }
 
@@ -38,7 +38,9 @@ void RangeSampler::crop(const RangeImage& range) {
   int x0 = range.depth.cols, x1 = -1, y0 = range.depth.rows, y1 = -1;
   for (int y = 0; y < range.depth.rows; ++y) {
     for (int x = 0; x < range.depth.cols; ++x) {
-      const bool dull = std::isnan(range.depth(y, x)) && (!has_background_ || range.background(y, x) != 0);
+      const bool dull =
+          std::isnan(range.depth(y, x)) &&
+          (has_outline_ ? range.background(y, x) != 0 : range.background.empty() || range.background(y, x) == 0);
       if (dull) continue;
       x0 = std::min(x0, x);
       x1 = std::max(x1, x);
@@ -66,7 +68,8 @@ void RangeSampler::make_planes(const RangeImage& range) {
       Pixel& p = pixel(x, y);
       const float depth = range.depth(v, u);
       if (std::isnan(depth)) {
-        if (has_background_ && range.background(v, u) != 0) p = {.free_depth = kInfinity, .state = State::background};
+        if (!range.background.empty() && range.background(v, u) != 0)
+          p = {.free_depth = kInfinity, .state = State::background};
         continue;
       }
       const auto& n = range.normal(v, u);
@@ -250,7 +253,7 @@ RangeSample RangeSampler::sample(const Eigen::Vector3f& point) const {
   if (!(at.u >= 0.0F && at.v >= 0.0F && at.u < static_cast<float>(width_ - 1) &&
         at.v < static_cast<float>(height_ - 1))) {
     const float u = at.u + static_cast<float>(crop_.x), v = at.v + static_cast<float>(crop_.y);
-    if (!has_background_ || !projection_.contains({u, v})) return result;
+    if (!has_outline_ || !projection_.contains({u, v})) return result;
     result.kind = RangeSample::Kind::free;
     result.clearly_free = true;
     result.distance = kInfinity;
@@ -299,7 +302,7 @@ bool RangeSampler::has_no_data_near(const Eigen::Vector3f& point, float radius) 
       radius * static_cast<float>(std::max(projection_.fx, projection_.fy)) / (pinhole ? at.depth - radius : 1.0F) + 2;
   const bool touches_outside = at.u < pixels || at.v < pixels || at.u + pixels > static_cast<float>(width_ - 1) ||
                                at.v + pixels > static_cast<float>(height_ - 1);
-  if (touches_outside && has_background_) return false;
+  if (touches_outside && has_outline_) return false;
   const auto tile = [](float position, int count) {
     return std::clamp(static_cast<int>(position) / kTile, 0, count - 1);
   };

@@ -54,7 +54,7 @@ class RangeSampler {
   /// silhouette where a range image has neither silhouettes nor background.
   [[nodiscard]] float beside_footprint_mm(const Eigen::Vector3f& point_in_model) const;
 
-  [[nodiscard]] bool has_background() const { return has_background_; }
+  [[nodiscard]] bool has_outline() const { return has_outline_; }
   struct SurfacePixel {
     Eigen::Vector3f point;  ///< model frame
     float weight;
@@ -99,7 +99,7 @@ class RangeSampler {
   Eigen::Vector3f translation_;
   Projection projection_;  ///< of the crop
   cv::Rect crop_;
-  bool has_background_ = false;  ///< then all of the image outside the crop is background
+  bool has_outline_ = false;  ///< then all of the image outside the crop is background
   float band_mm_ = 0.0F;
   int width_ = 0, height_ = 0;
   std::vector<Pixel> pixels_;

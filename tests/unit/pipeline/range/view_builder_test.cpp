@@ -91,15 +91,25 @@ TEST(ViewBuilder, DrawsBothSilhouettesAndTheBackground) {
 }
 
 TEST(ViewBuilder, SeparatesGreyObjectsFromTheTableByHeight) {
-  const Rig rig;
+  const Calibration high = test::default_rig({300, 540});  // down to the table
+  const Rig rig{high, *rectify(high, {20.0, 80.0})};
   const Surface scene = test::nearest_of(test::ball({0, 22, 0}, 10), test::disc({0, 0, 0}, {0, 1, 0}, 60));
   StereoImages images = rig.shoot(scene);
   for (cv::Mat* image : {&images.left_pattern, &images.right_pattern}) cv::cvtColor(*image, *image, cv::COLOR_BGR2GRAY);
   images.left_plain = images.right_plain = cv::Mat();
   const auto view = make_view(rig.rectification, images, 0.0, 0, {}, {});
   ASSERT_TRUE(view) << view.error().message;
-  EXPECT_TRUE(view->silhouettes.empty());
-  EXPECT_TRUE(view->range.background.empty());
+  ASSERT_EQ(view->silhouettes.size(), 2u);
+  EXPECT_FALSE(view->range.background_is_whole);
+  // What is matched with the table is free; the ball is not, nor what nothing lights.
+  const cv::Mat1b table(test::true_depth(rig.rectification.left, rig.rectification.left_from_turntable,
+                                         test::disc({0, 0, 0}, {0, 1, 0}, 60)) > 0.0f);
+  const cv::Mat1b ball(test::true_depth(rig.rectification.left, rig.rectification.left_from_turntable,
+                                        test::ball({0, 22, 0}, 10)) > 0.0f);
+  const cv::Mat1b& background = view->range.background;
+  EXPECT_EQ(cv::countNonZero(background & ball), 0);
+  EXPECT_GT(cv::countNonZero(background & table), 0.4 * cv::countNonZero(table & ~ball));
+  EXPECT_EQ(cv::countNonZero((view->silhouettes[0].outside_px > 0.5f) & ball), 0);
   const Transform turntable_from_camera = view->range.camera_from_pose.inverse();
   for (int v = 0; v < view->range.depth.rows; ++v) {
     for (int u = 0; u < view->range.depth.cols; ++u) {
@@ -118,8 +128,10 @@ TEST(ViewBuilder, MeasuresWithoutSilhouettesWhereThereIsNoScreenOfOneColour) {
       rig.rectification, rig.shoot(test::ball(kBall, kRadius), {.screen = {70, 70, 70}, .object = {110, 120, 130}}),
       0.0, 0, {}, {});
   ASSERT_TRUE(view) << view.error().message;
-  EXPECT_TRUE(view->silhouettes.empty());
-  EXPECT_TRUE(view->range.background.empty());
+  EXPECT_FALSE(view->range.background_is_whole);
+  const cv::Mat1b shown(test::true_depth(rig.rectification.left, rig.rectification.left_from_turntable,
+                                         test::ball(kBall, kRadius)) > 0.0f);
+  EXPECT_EQ(cv::countNonZero(view->range.background & shown), 0);
   EXPECT_GT(measured_pixels(*view), 7000);
 }
 
@@ -128,7 +140,7 @@ TEST(ViewBuilder, MeasuresAnObjectInTheScreensColour) {
   const auto view =
       make_view(rig.rectification, rig.shoot(test::ball(kBall, kRadius), {.object = {150, 50, 20}}), 0.0, 0, {}, {});
   ASSERT_TRUE(view) << view.error().message;
-  EXPECT_TRUE(view->silhouettes.empty());
+  EXPECT_FALSE(view->range.background_is_whole);
   EXPECT_GT(measured_pixels(*view), 7000);
 }
 
