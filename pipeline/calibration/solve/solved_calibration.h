@@ -8,6 +8,7 @@
 
 #include "pipeline/calibration/board_print.h"
 #include "pipeline/calibration/camera.h"
+#include "pipeline/calibration/solve/calibration_input.h"
 
 namespace scanrig {
 
