@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 
@@ -21,8 +22,6 @@ template <class Vector, class Value>
 SCANRIG_LANES void load(Vector& into, const Value* from) {
   std::memcpy(&into, from, sizeof(Vector));
 }
-
-SCANRIG_LANES void store(float* into, const Lanes& from) { std::memcpy(into, &from, sizeof(Lanes)); }
 
 /// Sum of the lanes in double precision, always in the same order.
 SCANRIG_LANES double sum_of(const LaneDoubles& v) {

@@ -6,9 +6,8 @@
 #include <opencv2/core.hpp>
 #include <utility>
 
-#include "pipeline/range/free_space.h"
-
 #include "core/parallel.h"
+#include "pipeline/range/free_space.h"
 
 namespace scanrig {
 namespace {
