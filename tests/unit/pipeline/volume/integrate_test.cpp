@@ -214,7 +214,8 @@ TEST(Integrate, AHoleThatOneViewLooksThroughStaysOpenHoweverNarrow) {
   const Rig rig{.mm_per_pixel = 0.2, .views = 12};
   const Solid plate = box({-14, 30, -3}, {14, 54, 3});
   const Eigen::Vector3d middle(0, 42, 0);
-  const auto eye = take_views({.views = 1}, cast_into(plate)).front().range.camera_from_pose.inverse().translation();
+  const Eigen::Vector3d eye =
+      take_views({.views = 1}, cast_into(plate)).front().range.camera_from_pose.inverse().translation();
   const Eigen::Vector3d along = (eye - middle).normalized();
   for (const double radius : {0.9, 1.4, 4.0}) {
     const Solid drilled = carve(plate, rod(middle - 30 * along, middle + 30 * along, radius));
