@@ -130,20 +130,20 @@ void grow(const cv::Mat& plain, const FreeSpaceOptions& options, Seen& seen) {
   const int side = side_of(light.cols, options);
   for (int round = 0; round < options.rounds; ++round) {
     const cv::Mat1b like = like_background(light, seen.background, options);
-    const cv::Mat1f alike = share_of(like & seen.object, side);
+    const cv::Mat1f alike = share_of(cv::Mat1b(like & seen.object), side);
     const cv::Mat1f object = share_of(seen.object, side);
     cv::Mat1b taken;
     cv::compare(alike, options.max_alike * object, taken, cv::CMP_LE);
     taken &= like & ~seen.object;
     cv::morphologyEx(taken | seen.background, taken, cv::MORPH_OPEN, disc(1));
     const int before = cv::countNonZero(seen.background);
-    seen.background |= joined_to(taken | seen.background, seen.background);
+    seen.background |= joined_to(cv::Mat1b(taken | seen.background), seen.background);
     if (cv::countNonZero(seen.background) == before) break;
   }
 }
 
 cv::Mat1f outline(const Seen& seen, const cv::Mat& plain) {
-  if (!plain.empty()) return outline_near(plain, 255 - seen.background, seen.object);
+  if (!plain.empty()) return outline_near(plain, cv::Mat1b(255 - seen.background), seen.object);
   cv::Mat1f field(seen.background.size(), -0.5f);
   field.setTo(0.5f, seen.background);
   return contour_distance(field);

@@ -155,43 +155,6 @@ cv::Mat1f outside_share(const cv::Mat3f& image, const cv::Mat1b& object, const B
   return field;
 }
 
-cv::Mat1f light_of(const cv::Mat3f& image, int window_px) {
-  cv::Mat1f light;
-  cv::transform(image, light, cv::Matx13f(1.0f, 1.0f, 1.0f));
-  cv::boxFilter(light, light, CV_32F, {window_px, window_px}, {-1, -1}, true, cv::BORDER_REPLICATE);
-  return light;
-}
-
-/// The foot of a dark object turns away from the projector and mirrors the table, brighter than it is itself: what has
-/// the screen's colour beside it, and not the pattern's light that the screen has, is taken for the object. In the
-/// object's own shadow that is too much; other views bound it there.
-void add_mirroring_rim(cv::Mat1b& object, const cv::Mat3f& plain, const cv::Mat3f& pattern,
-                       const BlueScreenOptions& options) {
-  const cv::Mat1f plain_light = light_of(plain, options.mixed_band_px), lit = light_of(pattern, options.mixed_band_px);
-  cv::Mat1f away;  // px from the object
-  cv::distanceTransform(255 - object, away, cv::DIST_L2, cv::DIST_MASK_5);
-  const float near = static_cast<float>(options.mirror_px), far = 3.0F * near;
-  std::vector<float> lights, shares;
-  for (int y = 0; y < away.rows; y += 4) {
-    for (int x = 0; x < away.cols; x += 4) {
-      if (away(y, x) <= far || !(plain_light(y, x) > options.dark_level)) continue;
-      lights.push_back(plain_light(y, x));
-      shares.push_back(lit(y, x) / plain_light(y, x));
-    }
-  }
-  if (lights.empty()) return;
-  const float dark = options.dark_object * median_of(lights), unlit = options.unlit * median_of(shares);
-  BlueScreenOptions wide = options;
-  wide.colour_window_px = 4 * options.mirror_px + 1;
-  const cv::Mat1f object_light = light_of(colour_around(plain, object, wide), 1);
-  for (int y = 0; y < object.rows; ++y) {
-    for (int x = 0; x < object.cols; ++x) {
-      if (away(y, x) > near || object(y, x) != 0 || !(object_light(y, x) < dark)) continue;
-      if (lit(y, x) < unlit * plain_light(y, x)) object(y, x) = 255;
-    }
-  }
-}
-
 bool touches_border(const cv::Mat1b& mask) {
   const int right = mask.cols - 2, bottom = mask.rows - 2;
   return cv::countNonZero(mask.rowRange(0, 2)) + cv::countNonZero(mask.rowRange(bottom, mask.rows)) +
@@ -235,14 +198,12 @@ Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const cv::Mat& patte
   const cv::Mat1f key = screen_key(smooth, screen_colour);
   cv::Mat1b object(key.size());
   cv::compare(key, options.object_key, object, cv::CMP_LT);
-  const cv::Mat3f lit = pattern.empty() ? cv::Mat3f() : smoothed(pattern);
-  if (!lit.empty()) object |= lit_object(lit, screen_colour, options);
+  if (!pattern.empty()) object |= lit_object(smoothed(pattern), screen_colour, options);
   const int largest = largest_part(object);
   if (largest < options.min_hole_px) {
     return fail(ErrorCode::not_found, "silhouette: no object before the screen; check that the object is on the table");
   }
   remove_parts(object, std::max<double>(options.min_hole_px, options.min_part_share * largest), 8);
-  if (!lit.empty()) add_mirroring_rim(object, smooth, lit, options);
   cv::Mat1b screen(255 - object);
   remove_parts(screen, options.min_hole_px, 4);
   object = 255 - screen;

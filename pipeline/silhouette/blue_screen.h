@@ -15,9 +15,6 @@ struct BlueScreenOptions {
   double min_key_share = 0.45;  ///< of a screen's light in its strongest channel, to serve as a key
   double object_key = 0.6;      ///< 0: grey, 1: the screen's chroma; an object's pixel lies below this
   double lit_key = 0.4;         ///< the same in the pattern's light
-  int mirror_px = 24;           ///< so wide a rim of a dark object may mirror the table
-  float dark_object = 0.35f;    ///< of the screen's light: a darker object shows what it mirrors
-  float unlit = 0.7f;           ///< of the screen's light of the pattern, per plain light: less is not lit by it
   double min_part_share = 0.005;  ///< of the largest part; smaller islands are specks
   int min_hole_px = 40;           ///< smaller openings are highlights or noise, larger ones show the screen
 };

@@ -174,11 +174,9 @@ cv::Rect box_of(const cv::Mat& stats, int part) {
           stats.at<int>(part, cv::CC_STAT_WIDTH), stats.at<int>(part, cv::CC_STAT_HEIGHT)};
 }
 
-/// Openings of the silhouette that go whole: those whose sure part is contradicted for the most part, and those that
-/// surface covers, with as many points as one view gives: narrow ones have no sure part, as of a crease that mirrors
-/// the screen. The pixels along the contour do not count: surface beside a true opening reaches them.
-void add_openings(const cv::Mat1f& outside_px, const cv::Mat1b& contradicted, const cv::Mat1b& surface,
-                  const SilhouetteVoteOptions& options, cv::Mat1b& region) {
+/// Openings of the silhouette whose sure part is contradicted for the most part go whole.
+void add_openings(const cv::Mat1f& outside_px, const cv::Mat1b& contradicted, const SilhouetteVoteOptions& options,
+                  cv::Mat1b& region) {
   cv::Mat1i labels;
   cv::Mat stats, centroids;
   const int parts = cv::connectedComponentsWithStats(outside_px > 0.0F, labels, stats, centroids, 4, CV_32S);
@@ -188,12 +186,7 @@ void add_openings(const cv::Mat1f& outside_px, const cv::Mat1b& contradicted, co
     const cv::Mat1b opening(labels(box) == part);
     const cv::Mat1b sure(opening & (outside_px(box) > options.contour_px));
     const int against = cv::countNonZero(sure & contradicted(box));
-    const cv::Mat1b inner(opening & (outside_px(box) > 1.0F));
-    const cv::Mat1b& core = cv::countNonZero(inner) > 0 ? inner : opening;
-    const int points = cv::countNonZero(core & surface(box));
-    const bool is_covered = points * options.stride_px * options.stride_px >= cv::countNonZero(core);
-    const bool is_refuted = against >= options.min_region_px && 2 * against >= cv::countNonZero(sure);
-    if (is_covered || is_refuted) region(box).setTo(255, opening);
+    if (against >= options.min_region_px && 2 * against >= cv::countNonZero(sure)) region(box).setTo(255, opening);
   }
 }
 
@@ -214,14 +207,27 @@ cv::Mat1b contradicted_part(const cv::Mat1f& outside_px, const cv::Mat1b& agains
   return contradicted;
 }
 
-/// That part with the contour's own uncertainty around it, and openings that surface covers.
-cv::Mat1b region_to_mend(const cv::Mat1f& outside_px, const cv::Mat1b& contradicted, const cv::Mat1b& surface,
+/// That part with the contour's own uncertainty around it, and openings that it refutes.
+cv::Mat1b region_to_mend(const cv::Mat1f& outside_px, const cv::Mat1b& contradicted,
                          const SilhouetteVoteOptions& options) {
   cv::Mat1b region;  // and a pixel
   cv::dilate(contradicted, region, disc(static_cast<int>(std::ceil(options.contour_px)) + 1));
   region &= outside_px > 0.0F;
-  add_openings(outside_px, contradicted, surface, options, region);
+  add_openings(outside_px, contradicted, options, region);
   return region;
+}
+
+/// Where measured surface reaches beyond the outline: at the rim of a dark object, which mirrors the screen, by several
+/// pixels all around, and over creases that do.
+cv::Mat1b covered_rim(const cv::Mat1f& outside_px, const cv::Mat1b& surface, const SilhouetteVoteOptions& options) {
+  cv::Mat1b covered(surface & (outside_px > options.rim_px)), beside;
+  cv::morphologyEx(covered, covered, cv::MORPH_CLOSE, disc(options.stride_px));
+  covered &= outside_px > options.rim_px;
+  cv::dilate(covered, beside, disc(static_cast<int>(std::ceil(options.rim_px)) + 1));
+  beside &= outside_px <= options.rim_px;
+  beside &= outside_px > 0.0F;
+  beside |= covered;
+  return beside;
 }
 
 int median_votes(const cv::Mat1b& against, const cv::Mat1b& region) {
@@ -244,13 +250,14 @@ void forget_background(View& view, std::size_t camera, const cv::Mat1b& region) 
   view.range.background.setTo(0, region);
 }
 
-/// Narrow openings are closed without a word, as the key does.
+/// The rim is mended without a word: it is no single image's.
 std::optional<SilhouetteFinding> mend(const Outline& outline, View& view, const Votes& votes,
                                       const SilhouetteVoteOptions& options) {
   cv::Mat1f outside = outline.silhouette->outside_px.clone();  // copies of a view share their pixels
   const cv::Mat1b contradicted = contradicted_part(outside, votes.against, options);
-  cv::Mat1b region = region_to_mend(outside, contradicted, votes.surface, options);
-  if (cv::countNonZero(region) == 0) return std::nullopt;
+  const cv::Mat1b region = region_to_mend(outside, contradicted, options);
+  cv::Mat1b mended(region | covered_rim(outside, votes.surface, options));
+  if (cv::countNonZero(mended) == 0) return std::nullopt;
   cv::Mat1b object;
   cv::morphologyEx(votes.surface, object, cv::MORPH_CLOSE, disc(2 * options.stride_px));
   SilhouetteFinding finding{.view = view.index, .camera = outline.camera, .views = median_votes(votes.against, region)};
@@ -258,14 +265,14 @@ std::optional<SilhouetteFinding> mend(const Outline& outline, View& view, const 
   finding.share = std::min(1.0, cv::countNonZero(region & object) / std::max(1.0, 1.0 * cv::countNonZero(object)));
   if (finding.share > options.max_contradicted) {
     finding.kind = SilhouetteFinding::Kind::whole;
-    region.setTo(255);
+    mended.setTo(255);
     outside.setTo(-std::numeric_limits<float>::max());
   } else {
-    outside.setTo(-1.0F, region);
+    outside.setTo(-1.0F, mended);
     outside = contour_distance(outside);
   }
   outline.silhouette->outside_px = outside;
-  forget_background(view, outline.camera, region);
+  forget_background(view, outline.camera, mended);
   if (cv::countNonZero(contradicted) == 0) return std::nullopt;
   return finding;
 }

@@ -14,7 +14,9 @@ struct SilhouetteVoteOptions {
   int min_views = 2;              ///< that measured a point, for it to vote against a silhouette
   float sigmas = 3.0F;            ///< within this many standard deviations two views agree on a point
   int stride_px = 2;              ///< one pixel in this many, each way, of the range images votes
-  int min_region_px = 40;         ///< smaller contradictions stay: openings of that size are closed by the key already
+  double rim_px = 1.0;            ///< surface may reach beyond the outline by this; where it reaches farther, so does
+                                  ///< the outline
+  int min_region_px = 40;         ///< smaller contradictions are not named
   double max_contradicted = 0.5;  ///< of the object's area in the image: beyond it the silhouette is left out whole
   int min_disputing = 3;          ///< views whose silhouettes put a measured point outside, for it to be disputed
   int min_silhouettes = 2;        ///< others that see a ray's whole length empty, for it to be named as surplus
@@ -47,8 +49,8 @@ struct SilhouetteVerdict {
 /// Judges every silhouette of one pose by the surface that its registered views measured, and mends it: a point that
 /// more views measured than have silhouettes that put it outside votes against each of these. Where votes cover a
 /// connected part of a silhouette, that part becomes object, and background in the view's range image becomes unknown
-/// there; so do narrow openings that surface covers, which are no finding. Opening and screen that nothing contradicts
-/// stay, so what views look through stays open. Same bits for any number of threads. Fails with `stopped`; some
+/// there; so does the rim where surface reaches a little beyond the outline, which is no finding. Opening and screen
+/// that nothing contradicts stay, so what views look through stays open. Same bits for any number of threads. Fails with `stopped`; some
 /// silhouettes may then be mended.
 Result<SilhouetteVerdict> vote_on_silhouettes(std::span<View> views, const SilhouetteVoteOptions& options,
                                               const Context& context);

@@ -159,24 +159,6 @@ TEST(BlueScreen, ThePatternsLightDoesNotMoveTheOutline) {
   EXPECT_LT(outline_error(*outside, object), 0.12);
 }
 
-TEST(BlueScreen, KeepsTheFootOfADarkObjectThatMirrorsTheTableButNoShadowOfALightOne) {
-  const Shape object = disc(120, 90, 50);
-  const Shape foot = [&](double x, double y) { return std::max(object(x, y), 132.0 - y); };  // the lowest 8 px
-  const Shape shadow = [](double x, double y) { return std::max({std::abs(x - 120) - 60, 132.0 - y, y - 170.0}); };
-  const auto dimmed = [](int, int, const Colour& below) { return 0.1 * below; };
-  for (const bool is_dark : {true, false}) {
-    const Colour own = is_dark ? Colour(10, 10, 10) : kGrey;
-    Scene plain, lit;
-    plain.paint(object, own);
-    if (is_dark) plain.paint(foot, 0.6 * kScreen);
-    lit.paint(object, own).paint(foot, dimmed);
-    if (!is_dark) lit.paint([&](double x, double y) { return std::max(shadow(x, y), -object(x, y)); }, dimmed);
-    const auto outside = blue_screen_outline(plain.image(), in_pattern(lit));
-    ASSERT_TRUE(outside) << outside.error().message;
-    EXPECT_LT(outline_error(*outside, object), 0.4) << (is_dark ? "dark" : "light");
-  }
-}
-
 TEST(BlueScreen, RefusesAPatternOfAnotherSize) {
   const auto outside = blue_screen_outline(Scene().paint(disc(120, 100, 50), kGrey).image(), cv::Mat3b(10, 10));
   ASSERT_FALSE(outside);

@@ -62,6 +62,13 @@ void put_sticker(View& view, std::size_t camera, const cv::Point& centre, int ra
   view.range.normal.setTo(cv::Vec3f::all(kUnmeasured), sticker);
 }
 
+/// As of a dark object, whose rim mirrors the screen: the outline is inside of the true one.
+void shrink(View& view, std::size_t camera, float by_px) {
+  cv::Mat1f& outside = view.silhouettes[camera].outside_px;
+  outside += by_px;
+  if (camera == 0) view.range.background.setTo(255, outside > 0.0F);
+}
+
 /// As a crease that mirrors the screen does: too narrow for a pixel that is surely outside.
 void put_crease(View& view, std::size_t camera, const cv::Point& from, const cv::Point& to) {
   cv::Mat1f& outside = view.silhouettes[camera].outside_px;
@@ -94,6 +101,13 @@ double greatest_error(const std::vector<View>& views) {
              : 1e9;
 }
 
+std::size_t measured_vertices(const std::vector<View>& views) {
+  const PosedViews pose{views};
+  const auto surface = integrate({&pose, 1}, {.voxel_mm = 0.5});
+  EXPECT_TRUE(surface);
+  return surface ? surface->report.measured_vertices : 0;
+}
+
 TEST(SilhouetteVotes, SoundSilhouettesStayAsTheyAre) {
   for (auto views : {seen_ball(), pierced_block()}) {
     const auto before = views;
@@ -123,6 +137,17 @@ TEST(SilhouetteVotes, AStickerInOneSilhouetteDoesNotCutAHoleIntoMeasuredSurface)
     EXPECT_GT(spoilt, 5.0 * sound);
     EXPECT_LT(greatest_error(views), 1.5 * sound);
   }
+}
+
+TEST(SilhouetteVotes, ARimThatMirrorsTheScreenCutsNoMeasuredSurface) {
+  const std::size_t sound = measured_vertices(seen_ball());
+  auto views = seen_ball();
+  for (View& view : views) {
+    for (const std::size_t camera : {0U, 1U}) shrink(view, camera, 2.8F);
+  }
+  EXPECT_LT(measured_vertices(views), sound * 9 / 10) << sound;
+  EXPECT_TRUE(vote(views).empty());
+  EXPECT_GT(measured_vertices(views), sound * 97 / 100);
 }
 
 TEST(SilhouetteVotes, ANarrowOpeningThatSurfaceCoversIsClosedWithoutAWord) {
