@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "core/parallel.h"
 #include "core/statistics.h"
@@ -72,6 +73,43 @@ double median_sigma(const RangeImage& range) {
   return quantile(std::move(sigmas), 0.5);
 }
 
+/// Views of one pose, as one surface.
+MeasuredPose joined(const std::vector<MeasuredPose>& surfaces, const std::vector<std::size_t>& views) {
+  MeasuredPose all;
+  all.images.emplace_back();
+  all.samples.emplace_back();
+  for (const std::size_t v : views) {
+    const MeasuredPose& one = surfaces[v];
+    all.images[0].insert(all.images[0].end(), one.images[0].begin(), one.images[0].end());
+    all.samples[0].insert(all.samples[0].end(), one.samples[0].begin(), one.samples[0].end());
+    all.size_mm = std::max(all.size_mm, one.size_mm);
+  }
+  return all;
+}
+
+/// Drops motions that all the moved views share with those of no motion does not show alike: a step between two views
+/// that share little can be noise along what they leave open.
+void confirm(const std::vector<MeasuredPose>& surfaces, const MovedViewOptions& options,
+             std::vector<ObjectMotion>& motions) {
+  const auto views_of = [&](const ObjectMotion& motion) {
+    std::vector<std::size_t> views;
+    for (std::size_t k = 0; k < motion.views; ++k) views.push_back((motion.view + k) % surfaces.size());
+    return views;
+  };
+  std::vector<std::size_t> staying(surfaces.size());
+  std::iota(staying.begin(), staying.end(), std::size_t{0});
+  for (const ObjectMotion& motion : motions) {
+    for (const std::size_t v : views_of(motion)) std::erase(staying, v);
+  }
+  const MeasuredPose rest = joined(surfaces, staying);
+  std::erase_if(motions, [&](ObjectMotion& motion) {
+    const MeasuredPose moved = joined(surfaces, views_of(motion));
+    const Step together = step_between(rest, moved, options);
+    motion.mm = rms_motion(motion.back, surfaces[motion.view].samples[0]);
+    return rms_motion(together.motion.inverse() * motion.back, moved.samples[0]) > options.max_difference * motion.mm;
+  });
+}
+
 /// Runs of views between the steps, as motions against the longest run.
 std::vector<ObjectMotion> motions_of(const std::vector<Step>& steps, const std::vector<std::size_t>& large) {
   const std::size_t views = steps.size();
@@ -115,7 +153,7 @@ std::vector<ObjectMotion> find_object_motions(std::span<const View> views, const
   // A single step does not close the ring: what it closes with is too small to be told from vibration.
   if (large.size() < 2) return {};
   std::vector<ObjectMotion> motions = motions_of(steps, large);
-  for (ObjectMotion& motion : motions) motion.mm = rms_motion(motion.back, surfaces[motion.view].samples[0]);
+  confirm(surfaces, options, motions);
   return motions;
 }
 

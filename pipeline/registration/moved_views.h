@@ -19,6 +19,7 @@ struct MovedViewOptions {
   double step_sigma_deg = 0.1;   ///< the same, how far it may have rocked
   double bias_mm = 0.01;         ///< error of two views' distance that more points do not average away
   double min_overlap = 0.1;      ///< of two neighbours; with less their step is unknown
+  double max_difference = 0.33;  ///< share of a motion by which all moved views together may show another
   double samples_across = 70.0;  ///< points compared, across the object
 };
 
@@ -32,8 +33,9 @@ struct ObjectMotion {
 
 /// Where the object moved between the views of one pose, which `register_views` has been through: each view is aligned
 /// with the one before it around the ring, by itself. What the priors cover is vibration; so is what all views share. A
-/// step beyond both is the object's. Registration does not undo it: its robust weights take such a view for outliers.
-/// In the order of the views. Same bits for any number of threads.
+/// step beyond both is the object's, if all that the moved views share with the others says so. Registration does not
+/// undo it: its robust weights take such a view for outliers. In the order of the views. Same bits for any number of
+/// threads.
 std::vector<ObjectMotion> find_object_motions(std::span<const View> views, const RegistrationOptions& priors,
                                               const MovedViewOptions& options = {});
 

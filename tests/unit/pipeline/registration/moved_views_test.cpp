@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 #include "tests/unit/pipeline/registration/analytic_views.h"
 
 namespace scanrig {
@@ -11,18 +14,27 @@ using testing::RigModel;
 
 constexpr int kViews = 12;
 
-/// The work piece, which stands elsewhere on the table from `first` view to the one before `end`.
-std::vector<View> views_with(const Transform& moved, int first, int end) {
+/// What the view sees where the work piece stands elsewhere than believed.
+void see_moved(View& view, const Transform& moved, const RigModel& rig, unsigned seed) {
+  const Transform believed = view.range.camera_from_pose;
+  view.range = testing::see(testing::workpiece(), believed * moved, rig, seed);
+  view.range.camera_from_pose = believed;
+}
+
+/// The work piece, which stands elsewhere on the table from `first` view to the one before `end`: `moved(view)`.
+template <class Moved>
+std::vector<View> views_with_each(const Moved& moved, int first, int end) {
   RigModel rig;
   rig.noise_mm = 0.01;
   auto views = testing::turn_around(testing::workpiece(), kViews, rig);
   for (int v = first; v < end; ++v) {
-    const Transform believed = views[static_cast<std::size_t>(v)].range.camera_from_pose;
-    auto& range = views[static_cast<std::size_t>(v)].range;
-    range = testing::see(testing::workpiece(), believed * moved, rig, 100U + static_cast<unsigned>(v));
-    range.camera_from_pose = believed;
+    see_moved(views[static_cast<std::size_t>(v)], moved(v), rig, 100U + static_cast<unsigned>(v));
   }
   return views;
+}
+
+std::vector<View> views_with(const Transform& moved, int first, int end) {
+  return views_with_each([&](int) { return moved; }, first, end);
 }
 
 /// The motions of views that stand elsewhere, and how well they stand once these are undone.
@@ -71,6 +83,15 @@ TEST(MovedViews, AnObjectThatStaysWhereItSlippedToIsNamedOnce) {
   EXPECT_EQ(undone.motions[0].view, 7U);
   EXPECT_EQ(undone.motions[0].views, 5U);
   EXPECT_NEAR(undone.motions[0].mm, 0.1, 0.02);
+}
+
+TEST(MovedViews, StepsBetweenWhichViewsDriftAreNoMotionOfTheObject) {
+  // Neighbours within the drift differ by 0.02 mm, its ends from the others by 0.06.
+  const auto drifted = [](int view) {
+    const double turn = 0.5 * std::numbers::pi * (view - 3) / 5.0;
+    return small_motion({0, 0, 0}, {0.06 * std::cos(turn), 0, 0.06 * std::sin(turn)});
+  };
+  EXPECT_TRUE(find_object_motions(views_with_each(drifted, 3, 9), {}).empty());
 }
 
 TEST(MovedViews, TheFirstViewMayBeTheOneThatStandsElsewhere) {
