@@ -91,6 +91,7 @@ Result<void> add_free_space(View& view, const Rectification& rectification, cons
   if (!right) return pass_on(right);
   FreeSpaceOptions free_options;
   free_options.clearance_mm = options.table_clearance_mm;
+  if (!options.plain_differs) free_options.rounds = 0;
   auto seen = free_space(rectification, view.range, *left, *right, free_options);
   if (!seen) return pass_on(seen);
   cv::compare(seen->left, options.background_px, view.range.background, cv::CMP_GT);

@@ -24,6 +24,7 @@ struct ViewOptions {
   float rim_px = 2.5f;         ///< depth this near to the outline is left out: the surface turns away there
   double background_px = 1.0;  ///< free space starts this far outside the outline, so that no mixed pixel claims it
   double table_clearance_mm = 0.5;  ///< without a blue screen, what is lower counts as the table
+  bool plain_differs = true;  ///< false: the object has the background's plain light; free space does not grow by it
 };
 
 /// All data of one table angle: range image in the rectified left camera's frame with its background, and both

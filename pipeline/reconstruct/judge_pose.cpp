@@ -109,13 +109,15 @@ Result<void> Reconstruction::State::judge_silhouettes_of_both(const Transform& p
   return {};
 }
 
-/// All views of the pose anew, as of a rig without a screen.
+/// All views of the pose anew, as of a rig without a screen: the object has its colour.
 Result<void> Reconstruction::State::measure_without_key(std::size_t pose, const Context& context) {
   PoseState& state = poses[pose];
+  ViewOptions without_key;
+  without_key.plain_differs = false;
   for (std::size_t v = 0; v < state.views.size(); ++v) {
     const View& old = state.views[v];
     const StereoImages images{state.pattern[v].left, state.pattern[v].right, state.plain[v].left, state.plain[v].right};
-    auto view = make_view(*rectification, images, old.angle_rad, old.index, {}, context);
+    auto view = make_view(*rectification, images, old.angle_rad, old.index, without_key, context);
     if (!view) return pass_on(view, fmt::format("view {}", old.index));
     if (state.watch) state.watch->carry(*view, state.pattern[v].order);
     state.views[v] = std::move(*view);
