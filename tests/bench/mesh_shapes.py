@@ -30,7 +30,8 @@ def paint(*phases):
 
 
 def knot(file, around=96, along=720):
-    """A trefoil of a tube: genus 1, it hides parts of itself."""
+    """A trefoil of a tube that is thicker on one side, so that it fits onto itself in one way only: genus 1, it hides
+    parts of itself."""
     def centre(t):
         return (math.sin(t) + 2 * math.sin(2 * t), math.cos(t) - 2 * math.cos(2 * t), -1.4 * math.sin(3 * t))
 
@@ -43,18 +44,23 @@ def knot(file, around=96, along=720):
         up = cross(side, tangent)
         for j in range(around):
             s = 2 * math.pi * j / around
-            r = 0.55 + 0.04 * math.sin(12 * t)
+            r = 0.55 + 0.04 * math.sin(12 * t) + 0.08 * math.sin(t)
             x, y, z = (p[k] + r * (math.cos(s) * side[k] + math.sin(s) * up[k]) for k in range(3))
             vertices.append((x, y, z, paint(24 * t, 3 * s)))
     return write_ply(file, vertices, [face[::-1] for face in grid_faces(around, along, True)])
 
 
 def pawn(file, around=240):
-    """Turned on a lathe and then given flats and grooves: creases, necks, a dome."""
+    """Turned on a lathe, then given flats and grooves, and bent, so that it fits onto itself in one way only: creases,
+    necks, a dome."""
     profile = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.25), (0.9, 0.35), (0.55, 0.5), (0.42, 1.2), (0.36, 1.7), (0.62, 1.82),
                (0.62, 1.95), (0.4, 2.02)]
     profile += [(0.55 * math.sin(a), 2.45 - 0.55 * math.cos(a)) for a in (0.8 + 0.13 * k for k in range(18))]
     profile.append((0.0, 3.0))
+
+    def bent(y):
+        return 0.05 * y * y
+
     rings = []
     for (r0, y0), (r1, y1) in zip(profile, profile[1:]):
         steps = max(1, round(math.hypot(r1 - r0, y1 - y0) / 0.02))
@@ -65,10 +71,10 @@ def pawn(file, around=240):
         for j in range(around):
             s = 2 * math.pi * j / around
             flat = 1.0 - 0.08 * max(0.0, math.cos(5 * s)) ** 6 * (1.0 if 0.5 < y < 1.8 else 0.0)
-            vertices.append((r * flat * math.cos(s), y, -r * flat * math.sin(s), paint(40 * y, 9 * s)))
+            vertices.append((r * flat * math.cos(s) + bent(y), y, -r * flat * math.sin(s), paint(40 * y, 9 * s)))
     faces = grid_faces(around, len(rings), False)
     bottom, top = len(vertices), len(vertices) + 1
-    vertices += [(0.0, rings[0][1], 0.0, 160), (0.0, 3.0, 0.0, 160)]
+    vertices += [(bent(rings[0][1]), rings[0][1], 0.0, 160), (bent(3.0), 3.0, 0.0, 160)]
     last = (len(rings) - 1) * around
     for j in range(around):
         following = (j + 1) % around
