@@ -50,8 +50,8 @@ struct SilhouetteVerdict {
 /// more views measured than have silhouettes that put it outside votes against each of these. Where votes cover a
 /// connected part of a silhouette, that part becomes object, and background in the view's range image becomes unknown
 /// there; so does the rim where surface reaches a little beyond the outline, which is no finding. Opening and screen
-/// that nothing contradicts stay, so what views look through stays open. Same bits for any number of threads. Fails with `stopped`; some
-/// silhouettes may then be mended.
+/// that nothing contradicts stay, so what views look through stays open. Same bits for any number of threads. Fails
+/// with `stopped`; some silhouettes may then be mended.
 Result<SilhouetteVerdict> vote_on_silhouettes(std::span<View> views, const SilhouetteVoteOptions& options,
                                               const Context& context);
 
