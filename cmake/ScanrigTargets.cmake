@@ -92,10 +92,13 @@ function(scanrig_program name)
 endfunction()
 
 # Time-out of a test in seconds; the test that may take longest starts first. Under a sanitizer everything is several
-# times slower.
+# times slower, in an emulator of another processor ten times.
 function(scanrig_time_limit test seconds)
   if(SCANRIG_SANITIZE)
     math(EXPR seconds "8 * ${seconds}")
+  elseif(CMAKE_CROSSCOMPILING)
+    math(EXPR seconds "16 * ${seconds}")
+    set_property(TEST ${test} APPEND PROPERTY ENVIRONMENT SCANRIG_EMULATED=1)
   endif()
   set_tests_properties(${test} PROPERTIES TIMEOUT ${seconds} COST ${seconds})
 endfunction()
