@@ -89,8 +89,8 @@ MeasuredPose joined(const std::vector<MeasuredPose>& surfaces, const std::vector
 
 /// Drops motions that all the moved views share with those of no motion does not show alike: a step between two views
 /// that share little can be noise along what they leave open.
-void confirm(const std::vector<MeasuredPose>& surfaces, const MovedViewOptions& options,
-             std::vector<ObjectMotion>& motions) {
+void drop_unconfirmed(const std::vector<MeasuredPose>& surfaces, const MovedViewOptions& options,
+                      std::vector<ObjectMotion>& motions) {
   const auto views_of = [&](const ObjectMotion& motion) {
     std::vector<std::size_t> views;
     for (std::size_t k = 0; k < motion.views; ++k) views.push_back((motion.view + k) % surfaces.size());
@@ -102,10 +102,9 @@ void confirm(const std::vector<MeasuredPose>& surfaces, const MovedViewOptions& 
     for (const std::size_t v : views_of(motion)) std::erase(staying, v);
   }
   const MeasuredPose rest = joined(surfaces, staying);
-  std::erase_if(motions, [&](ObjectMotion& motion) {
+  std::erase_if(motions, [&](const ObjectMotion& motion) {
     const MeasuredPose moved = joined(surfaces, views_of(motion));
     const Step together = step_between(rest, moved, options);
-    motion.mm = rms_motion(motion.back, surfaces[motion.view].samples[0]);
     return rms_motion(together.motion.inverse() * motion.back, moved.samples[0]) > options.max_difference * motion.mm;
   });
 }
@@ -153,7 +152,8 @@ std::vector<ObjectMotion> find_object_motions(std::span<const View> views, const
   // A single step does not close the ring: what it closes with is too small to be told from vibration.
   if (large.size() < 2) return {};
   std::vector<ObjectMotion> motions = motions_of(steps, large);
-  confirm(surfaces, options, motions);
+  for (ObjectMotion& motion : motions) motion.mm = rms_motion(motion.back, surfaces[motion.view].samples[0]);
+  drop_unconfirmed(surfaces, options, motions);
   return motions;
 }
 

@@ -220,11 +220,11 @@ cv::Mat1b region_to_mend(const cv::Mat1f& outside_px, const cv::Mat1b& contradic
 /// Where measured surface reaches beyond the outline: at the rim of a dark object, which mirrors the screen, by several
 /// pixels all around, and over creases that do.
 cv::Mat1b covered_rim(const cv::Mat1f& outside_px, const cv::Mat1b& surface, const SilhouetteVoteOptions& options) {
-  cv::Mat1b covered(surface & (outside_px > options.rim_px)), beside;
+  cv::Mat1b covered(surface & (outside_px > options.max_beyond_px)), beside;
   cv::morphologyEx(covered, covered, cv::MORPH_CLOSE, disc(options.stride_px));
-  covered &= outside_px > options.rim_px;
-  cv::dilate(covered, beside, disc(static_cast<int>(std::ceil(options.rim_px)) + 1));
-  beside &= outside_px <= options.rim_px;
+  covered &= outside_px > options.max_beyond_px;
+  cv::dilate(covered, beside, disc(static_cast<int>(std::ceil(options.max_beyond_px)) + 1));
+  beside &= outside_px <= options.max_beyond_px;
   beside &= outside_px > 0.0F;
   beside |= covered;
   return beside;

@@ -14,8 +14,7 @@ struct SilhouetteVoteOptions {
   int min_views = 2;              ///< that measured a point, for it to vote against a silhouette
   float sigmas = 3.0F;            ///< within this many standard deviations two views agree on a point
   int stride_px = 2;              ///< one pixel in this many, each way, of the range images votes
-  double rim_px = 1.0;            ///< surface may reach beyond the outline by this; where it reaches farther, so does
-                                  ///< the outline
+  double max_beyond_px = 1.0;     ///< of measured surface beyond the outline; where it is more, the outline moves
   int min_region_px = 40;         ///< smaller contradictions are not named
   double max_contradicted = 0.5;  ///< of the object's area in the image: beyond it the silhouette is left out whole
   int min_disputing = 3;          ///< views whose silhouettes put a measured point outside, for it to be disputed
