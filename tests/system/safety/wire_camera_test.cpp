@@ -20,7 +20,7 @@ const WireRig::Changes kSimulatedCamera{
      "pixel_format = \"RGGB\"\nsize = { width = 640, height = 240 }\n",
      "driver = \"simulated\"\ntruth = \"control.sock\"\n"},
     {"frame_timeout_ms = 500\n", ""},
-    {"views = 8", "views = 3"},
+    {"views = 8", "views = 6"},
     {"speed_deg_s = 45", "speed_deg_s = 180"},
     {"acceleration_deg_s2 = 90", "acceleration_deg_s2 = 720"}};
 
@@ -53,7 +53,7 @@ TEST_F(CameraOnWires, AScanShowsTheObjectAtTheTrueAngleAndInTheLightThereWas) {
   const auto scan = ScanFolder::open(job);
   ASSERT_TRUE(scan) << scan.error().message;
   const auto& views = scan->manifest().poses.at(0).views;
-  ASSERT_EQ(views.size(), 3u);
+  ASSERT_EQ(views.size(), 6u);
   for (std::size_t v = 0; v < views.size(); ++v) {
     EXPECT_NEAR(views[v].measured_deg, views[v].commanded_deg, 0.02);
     EXPECT_GT(views[v].settling_ms, 100);
