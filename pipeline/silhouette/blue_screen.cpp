@@ -17,6 +17,8 @@ struct Screen {
   double share = 0.0;  ///< 0: the border is dark
 };
 
+float light_of(const cv::Vec3f& colour) { return colour[0] + colour[1] + colour[2]; }
+
 /// Share of the screen's chroma in a pixel: 0 grey, 1 the screen.
 cv::Mat1f screen_key(const cv::Mat3f& image, const Screen& screen) {
   cv::Mat1f key(image.size());
@@ -24,7 +26,7 @@ cv::Mat1f screen_key(const cv::Mat3f& image, const Screen& screen) {
   for (int y = 0; y < image.rows; ++y) {
     for (int x = 0; x < image.cols; ++x) {
       const cv::Vec3f& c = image(y, x);
-      const float sum = c[0] + c[1] + c[2];
+      const float sum = light_of(c);
       // Dark pixels are drawn towards grey by less than one grey level per channel.
       key(y, x) = ((c[screen.channel] + 1.0f) / (sum + 3.0f) - 1.0f / 3.0f) * scale;
     }
@@ -38,20 +40,27 @@ float median_of(std::vector<float>& values) {
   return *middle;
 }
 
-/// Medians along the image's border.
-Screen screen_at_border(const cv::Mat3f& image, const BlueScreenOptions& options) {
-  const int border = options.border_px;
-  std::array<std::vector<float>, 3> shares;
-  for (int y = 0; y < image.rows; ++y) {
-    const bool whole_row = y < border || y >= image.rows - border;
-    for (int x = 0; x < image.cols; ++x) {
-      if (!whole_row && x == border) x = image.cols - border;
-      const cv::Vec3f& c = image(y, x);
-      const float sum = c[0] + c[1] + c[2];
-      if (!(sum > options.dark_level)) continue;
-      for (int k = 0; k < 3; ++k) shares[static_cast<std::size_t>(k)].push_back(c[k] / sum);
+/// Calls visit(x, y) for the pixels of the frame around the image.
+template <class Visit>
+void for_frame(cv::Size size, int border, const Visit& visit) {
+  for (int y = 0; y < size.height; ++y) {
+    const bool whole_row = y < border || y >= size.height - border;
+    for (int x = 0; x < size.width; ++x) {
+      if (!whole_row && x == border) x = size.width - border;
+      visit(x, y);
     }
   }
+}
+
+/// Medians along the image's border.
+Screen screen_at_border(const cv::Mat3f& image, const BlueScreenOptions& options) {
+  std::array<std::vector<float>, 3> shares;
+  for_frame(image.size(), options.border_px, [&](int x, int y) {
+    const cv::Vec3f& c = image(y, x);
+    const float sum = light_of(c);
+    if (!(sum > options.dark_level)) return;
+    for (int k = 0; k < 3; ++k) shares[static_cast<std::size_t>(k)].push_back(c[k] / sum);
+  });
   Screen screen;
   if (shares[0].size() < static_cast<std::size_t>(image.cols)) return screen;
   for (int k = 0; k < 3; ++k) {
@@ -82,15 +91,32 @@ cv::Mat3f smoothed(const cv::Mat& image) {
   return smooth;
 }
 
+/// Light up to which the chroma of the pattern's image is noise: in the frame, where plain light shows the screen,
+/// another chroma is. The projector does not light all of it, so it is dark there.
+float noise_level(const cv::Mat3f& pattern, const cv::Mat1f& key, const cv::Mat1b& object,
+                  const BlueScreenOptions& options) {
+  std::vector<float> wrong;
+  for_frame(key.size(), options.border_px, [&](int x, int y) {
+    const float light = light_of(pattern(y, x));
+    const bool is_lit = key(y, x) < static_cast<float>(options.lit_key) && light > options.dark_level;
+    if (is_lit && object(y, x) == 0) wrong.push_back(light);
+  });
+  if (wrong.empty()) return options.dark_level;
+  const auto high = wrong.begin() + static_cast<std::ptrdiff_t>(0.99 * static_cast<double>(wrong.size() - 1));
+  std::nth_element(wrong.begin(), high, wrong.end());
+  return *high;
+}
+
 /// What the projector lights and what has not the screen's chroma then, gaps of the pattern included. Less than that at
-/// its edge, where pixels are mixed.
-cv::Mat1b lit_object(const cv::Mat3f& smooth, const Screen& screen, const BlueScreenOptions& options) {
+/// its edge, where pixels are mixed. `object`: what has another chroma than the screen in plain light.
+cv::Mat1b lit_object(const cv::Mat3f& smooth, const Screen& screen, const cv::Mat1b& object,
+                     const BlueScreenOptions& options) {
   const cv::Mat1f key = screen_key(smooth, screen);
+  const float dark = noise_level(smooth, key, object, options);
   cv::Mat1b lit(key.size());
   for (int y = 0; y < key.rows; ++y) {
     for (int x = 0; x < key.cols; ++x) {
-      const cv::Vec3f& c = smooth(y, x);
-      lit(y, x) = key(y, x) < static_cast<float>(options.lit_key) && c[0] + c[1] + c[2] > options.dark_level ? 255 : 0;
+      lit(y, x) = key(y, x) < static_cast<float>(options.lit_key) && light_of(smooth(y, x)) > dark ? 255 : 0;
     }
   }
   remove_parts(lit, options.min_hole_px, 8);
@@ -198,7 +224,7 @@ Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const cv::Mat& patte
   const cv::Mat1f key = screen_key(smooth, screen_colour);
   cv::Mat1b object(key.size());
   cv::compare(key, options.object_key, object, cv::CMP_LT);
-  if (!pattern.empty()) object |= lit_object(smoothed(pattern), screen_colour, options);
+  if (!pattern.empty()) object |= lit_object(smoothed(pattern), screen_colour, object, options);
   const int largest = largest_part(object);
   if (largest < options.min_hole_px) {
     return fail(ErrorCode::not_found, "silhouette: no object before the screen; check that the object is on the table");

@@ -159,6 +159,19 @@ TEST(BlueScreen, ThePatternsLightDoesNotMoveTheOutline) {
   EXPECT_LT(outline_error(*outside, object), 0.12);
 }
 
+TEST(BlueScreen, DoesNotTakeNoiseForAnObjectWhereTheProjectorDoesNotReach) {
+  const Shape object = disc(120.3, 98.6, 55.2);
+  const cv::Mat3b plain = Scene().paint(object, kGrey).image();
+  // The screen's light and that of a black level, hardly brighter than noise.
+  const cv::Mat3b dark = Scene().paint(disc(120, 100, 500), Colour(8, 4, 4)).image();
+  const cv::Mat3b pattern = in_pattern(Scene().paint(object, kGrey));
+  dark(cv::Rect(0, 0, 70, 50)).copyTo(pattern(cv::Rect(0, 0, 70, 50)));
+  const auto outside = blue_screen_outline(plain, pattern);
+  ASSERT_TRUE(outside) << outside.error().message;
+  EXPECT_LT(outline_error(*outside, object), 0.12);
+  EXPECT_GT((*outside)(20, 20), 30.0f);
+}
+
 TEST(BlueScreen, RefusesAPatternOfAnotherSize) {
   const auto outside = blue_screen_outline(Scene().paint(disc(120, 100, 50), kGrey).image(), cv::Mat3b(10, 10));
   ASSERT_FALSE(outside);
