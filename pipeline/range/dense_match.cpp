@@ -8,6 +8,7 @@
 
 #include "core/parallel.h"
 #include "pipeline/range/match_side.h"
+#include "pipeline/range/node_curvature.h"
 
 namespace scanrig {
 namespace {
@@ -20,7 +21,7 @@ bool points_back(const DisparityPatch& patch, int u, int v, const Nodes& there, 
   const float fraction = landing - static_cast<float>(column);
   const double tolerance = std::max(options.left_right_px, options.tolerance_sigmas * static_cast<double>(patch.sigma));
   bool is_confirmed = false;
-  there.around(column, v, [&](const DisparityPatch& back) {
+  there.around(column, v, [&](const DisparityPatch& back, const DisparityPatch&) {
     is_confirmed |= static_cast<double>(std::abs(back.at(fraction, 0.0f) + patch.c[0])) <= tolerance;
   });
   return is_confirmed;
@@ -104,6 +105,7 @@ Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDi
   forward.grow(nodes, context);
   forward.assign(nodes);
   forward.rematch(nodes, context);
+  nodes.curvature = node_curvature(nodes, options);
   context.report("range", 0.6);
 
   const MatchedPixels pixels{forward, nodes, back, left_mask, options};

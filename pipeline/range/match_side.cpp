@@ -58,12 +58,6 @@ bool MatchSide::good(const DisparityPatch& patch) const {
          static_cast<double>(patch.centre) <= options_.max_centre;
 }
 
-/// Whether the smaller window's noise explains a larger window's result.
-bool MatchSide::compatible(const DisparityPatch& small, const DisparityPatch& large) const {
-  const float spread = std::sqrt(std::max(0.0f, small.sigma * small.sigma - large.sigma * large.sigma));
-  return std::abs(small.c[0] - large.c[0]) <= options_.window_sigmas * spread;
-}
-
 DisparityPatch MatchSide::match_sharp(int u, int v, DisparityPatch patch, std::uint8_t radius,
                                       WindowOptions window) const {
   patch.radius = radius;
@@ -82,24 +76,22 @@ DisparityPatch MatchSide::match_smooth(int u, int v, DisparityPatch patch, std::
   return patch;
 }
 
-/// Matches with the window that fits signal and shape. The smaller of two sharp ones where the larger one's result is
-/// outside its confidence (a crease, a step: the rule of intersecting confidence intervals [Katkovnik 1999]). Large
-/// smoothed ones where the signal is low. `is_creased`: a crease may be in the window.
-DisparityPatch MatchSide::match(int u, int v, const DisparityPatch& start, bool is_creased,
-                                const WindowOptions& window) const {
-  DisparityPatch best = match_sharp(u, v, start, options_.sharp_radius_px, window);
-  if (is_creased || !good(best)) {
-    const DisparityPatch small = match_sharp(u, v, best.valid ? best : start, options_.crease_radius_px, window);
-    if (good(small) && (!good(best) || !compatible(small, best))) best = small;
+/// Matches with the smallest window whose signal suffices, else with the most certain one. Large ones on smoothed
+/// images: they begin where noise dominates.
+DisparityPatch MatchSide::match(int u, int v, const DisparityPatch& start, const WindowOptions& window) const {
+  DisparityPatch best, from = start;
+  // Whether the window's result suffices.
+  const auto take = [&](const DisparityPatch& patch) {
+    if (patch.valid && !best.valid) from = patch;
+    if (good(patch) && (!best.valid || patch.sigma < best.sigma)) from = best = patch;
+    return best.valid && static_cast<double>(best.sigma) <= options_.good_sigma_px;
+  };
+  for (const std::uint8_t radius : options_.sharp_radii_px) {
+    if (take(match_sharp(u, v, from, radius, window))) return best;
   }
-  if (good(best) && double(best.sigma) <= options_.good_sigma_px) return best;
   for (const std::uint8_t radius : options_.smooth_radii_px) {
-    const DisparityPatch large = match_smooth(u, v, best.valid ? best : start, radius, window);
-    if (!good(large) || (good(best) && (large.sigma >= best.sigma || !compatible(best, large)))) continue;
-    best = large;
-    if (double(best.sigma) <= options_.good_sigma_px) break;
+    if (take(match_smooth(u, v, from, radius, window))) break;
   }
-  best.valid = good(best);
   return best;
 }
 
@@ -121,7 +113,8 @@ void MatchSide::measure_noise() {
     tried[i].at = at;
     const DisparityPatch start = plane_patch(mask_.disparity, at.x, at.y, options_);
     if (start.valid)
-      tried[i].patch = match_sharp(at.x, at.y, start, options_.sharp_radius_px, steps(options_.coarse_iterations));
+      tried[i].patch =
+          match_sharp(at.x, at.y, start, options_.sharp_radii_px.front(), steps(options_.coarse_iterations));
   });
   std::erase_if(tried, [](const MatchedPixel& pixel) { return !pixel.patch.valid; });
   // The better half by correlation: noise is what matched windows leave.
@@ -154,7 +147,7 @@ void MatchSide::rematch(Nodes& nodes, const Context& context) const {
       const int u = column * stride, v = row * stride;
       if (mask_.usable(v, u) == 0 || nodes.at(column, row).valid) continue;
       const DisparityPatch start = plane_patch(mask_.disparity, u, v, options_);
-      if (start.valid) nodes.at(column, row) = match(u, v, start, true, steps(options_.coarse_iterations));
+      if (start.valid) nodes.at(column, row) = match(u, v, start, steps(options_.coarse_iterations));
     }
   });
 }
@@ -197,7 +190,7 @@ void MatchSide::grow(Nodes& nodes, const Context& context) {
                                static_cast<float>((row - y) * nodes.stride));
           }
         }
-        if (start.valid) grown[at(column, row)] = match(u, v, start, true, window);
+        if (start.valid) grown[at(column, row)] = match(u, v, start, window);
       }
     });
     any = false;
@@ -218,17 +211,16 @@ DisparityPatch MatchSide::match_pixel(const Nodes& nodes, int u, int v) const {
   DisparityPatch start;
   const float surface = mask_.disparity(v, u);
   if (std::isnan(surface)) return start;
-  int around = 0;
-  bool is_creased = false;
-  nodes.around(u, v, [&](const DisparityPatch& patch) {
+  WindowOptions window = steps(options_.node_iterations);
+  nodes.around(u, v, [&](const DisparityPatch& patch, const DisparityPatch& node) {
     if (std::abs(patch.c[0] - surface) >= options_.surface_px) return;
-    ++around;
-    is_creased |= patch.radius == options_.crease_radius_px;
-    if (!start.valid || patch.zncc > start.zncc) start = patch;
+    if (start.valid && patch.zncc <= start.zncc) return;
+    start = patch;
+    window.curvature = nodes.curvature_at(node);
   });
-  if (start.valid) return match(u, v, start, is_creased || around < 4, steps(options_.node_iterations));
+  if (start.valid) return match(u, v, start, window);
   start = plane_patch(mask_.disparity, u, v, options_);
-  return start.valid ? match(u, v, start, true, steps(options_.coarse_iterations)) : start;
+  return start.valid ? match(u, v, start, steps(options_.coarse_iterations)) : start;
 }
 
 }  // namespace scanrig

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <opencv2/core/mat.hpp>
 #include <vector>
 
@@ -20,6 +21,7 @@ struct LayeredImage {
 struct Nodes {
   int stride = 1, columns = 0, rows = 0;
   std::vector<DisparityPatch> patches;
+  std::vector<std::array<float, 3>> curvature;  ///< see node_curvature.h; empty: unknown
 
   Nodes(cv::Size size, int pixels_apart)
       : stride(pixels_apart),
@@ -34,7 +36,12 @@ struct Nodes {
     return const_cast<Nodes*>(this)->at(column, row);
   }
 
-  /// Calls visit(patch moved to (u, v)) for the valid nodes around it, nearest ring.
+  [[nodiscard]] std::array<float, 3> curvature_at(const DisparityPatch& node) const {
+    if (curvature.empty()) return {};
+    return curvature[static_cast<std::size_t>(&node - patches.data())];
+  }
+
+  /// Calls visit(patch moved to (u, v), node) for the valid nodes around it, nearest ring.
   template <class Visit>
   void around(int u, int v, const Visit& visit) const {
     const int left = u / stride, top = v / stride;
@@ -42,7 +49,7 @@ struct Nodes {
       for (int column = left; column <= std::min(left + 1, columns - 1); ++column) {
         const DisparityPatch& node = at(column, row);
         if (node.valid)
-          visit(node.moved(static_cast<float>(u - column * stride), static_cast<float>(v - row * stride)));
+          visit(node.moved(static_cast<float>(u - column * stride), static_cast<float>(v - row * stride)), node);
       }
     }
   }
@@ -83,13 +90,11 @@ class MatchSide {
 
  private:
   [[nodiscard]] bool good(const DisparityPatch& patch) const;
-  [[nodiscard]] bool compatible(const DisparityPatch& small, const DisparityPatch& large) const;
   [[nodiscard]] DisparityPatch match_sharp(int u, int v, DisparityPatch patch, std::uint8_t radius,
                                            WindowOptions window) const;
   [[nodiscard]] DisparityPatch match_smooth(int u, int v, DisparityPatch patch, std::uint8_t radius,
                                             WindowOptions window) const;
-  [[nodiscard]] DisparityPatch match(int u, int v, const DisparityPatch& start, bool is_creased,
-                                     const WindowOptions& window) const;
+  [[nodiscard]] DisparityPatch match(int u, int v, const DisparityPatch& start, const WindowOptions& window) const;
   void fill_mask(const Nodes& nodes, int column, int row);
 
   const LayeredImage& here_;

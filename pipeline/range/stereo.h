@@ -24,13 +24,11 @@ struct StereoOptions {
   double max_rows_px = 3.0;       ///< rows farther off are refused, see row_alignment.h
 
   // Windows; a radius is 5, 7, 10 or 15.
-  std::uint8_t sharp_radius_px = 7;                        ///< first window
-  std::uint8_t crease_radius_px = 5;                       ///< for creases and steps
+  std::array<std::uint8_t, 2> sharp_radii_px = {5, 7};
   std::array<std::uint8_t, 2> smooth_radii_px = {10, 15};  ///< for low signal, on smoothed images
   double smoothing_px = 0.7;                               ///< sigma of that smoothing
   float smooth_step_px = 1.5f;  ///< see WindowOptions: where the signal is low the coarse disparities are worse too
   float smooth_curvature_prior = 0.15f;  ///< see WindowOptions
-  float window_sigmas = 3.0f;  ///< within this many standard deviations a larger window agrees with a smaller one
   // Factors on sigma where too few windows are matched to measure them, see noise_correlation.h.
   float sharp_noise = 1.7f;
   float smooth_noise = 2.5f;

@@ -274,14 +274,15 @@ DisparityPatch Window<R>::match(const MatchImage& there, DisparityPatch patch, c
   if (!normal_.factorise()) return patch;
   const double variance_gain = normal_.first_of_inverse();
   constexpr std::array<double, kShapes> kUnit = {1.0, R, R, R * R, R * R, R * R};
-  std::array<double, kShapes> shape{}, step{};  // in units of the radius
+  std::array<double, kShapes> shape{}, known{}, step{};  // in units of the radius
   for (int i = 0; i < kShapes; ++i) shape[i] = static_cast<double>(patch.c[i]) * kUnit[i];
+  for (int i = 3; i < kShapes; ++i) known[i] = static_cast<double>(options.curvature[i - 3]) * kUnit[i];
   const double start = shape[0];
   bool converged = false;
   for (int iteration = 0; iteration < options.max_iterations && !converged; ++iteration) {
     const double stretch = 1.0 - shape[1] / R;
     double largest = 0.0;
-    for (int i = 0; i < kShapes; ++i) step[i] = stretch * fit.rhs[i] - (i < 3 ? 0.0 : prior * shape[i]);
+    for (int i = 0; i < kShapes; ++i) step[i] = stretch * fit.rhs[i] - (i < 3 ? 0.0 : prior * (shape[i] - known[i]));
     normal_.solve(step);
     for (int i = 0; i < kShapes; ++i) {
       shape[i] += step[i];

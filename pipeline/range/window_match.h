@@ -55,7 +55,9 @@ struct WindowOptions {
   bool unknown_joins = false;    ///< pixels without a coarse disparity belong to the patch
   float min_support = 0.45f;     ///< share of the window that must belong to the patch
   float significance = 2.0f;     ///< a window's correlation must be so many times that of unlike images
-  float curvature_prior = 0.5f;  ///< px over a window of radius 7: the second order is worth its noise only above this
+  float curvature_prior = 0.5f;  ///< px over a window of radius 7: a second order is worth its noise only if it differs
+                                 ///< from `curvature` by more
+  std::array<float, 3> curvature{};  ///< c3 to c5 as they are known from elsewhere
 };
 
 /// Least-squares matching of the window around (u, v) with second-order shape, gain and offset [Sutton, Orteu and
