@@ -21,6 +21,7 @@ std::array<float, 3> curvature_at(const Nodes& nodes, int column, int row, const
   if (!node.valid) return {};
   Matrix6 normal = Matrix6::Zero();
   Vector6 rhs = Vector6::Zero();
+  double squares = 0.0;
   int count = 0;
   for (int dy = -kNodesAround; dy <= kNodesAround; ++dy) {
     for (int dx = -kNodesAround; dx <= kNodesAround; ++dx) {
@@ -38,7 +39,9 @@ std::array<float, 3> curvature_at(const Nodes& nodes, int column, int row, const
       Vector6 shape;
       shape << 1.0, x_unit, y_unit, x_unit * x_unit, x_unit * y_unit, y_unit * y_unit;
       normal += shape * shape.transpose();
-      rhs += shape * static_cast<double>(other.c[0]);
+      const auto disparity = static_cast<double>(other.c[0] - node.c[0]);
+      rhs += shape * disparity;
+      squares += disparity * disparity;
       ++count;
     }
   }
@@ -46,9 +49,19 @@ std::array<float, 3> curvature_at(const Nodes& nodes, int column, int row, const
   const Eigen::LDLT<Matrix6> solver(normal);
   if (solver.info() != Eigen::Success || solver.rcond() < 1e-6) return {};
   const Vector6 fitted = solver.solve(rhs);
-  const double unit = 1.0 / (nodes.stride * nodes.stride);
-  return {static_cast<float>(fitted[3] * unit), static_cast<float>(fitted[4] * unit),
-          static_cast<float>(fitted[5] * unit)};
+  const Matrix6 inverse = solver.solve(Matrix6::Identity());
+  // Windows overlap, so neighbouring nodes err alike: so many count as one.
+  const int side = 2 * options.sharp_radii_px.front() + 1;
+  const double alike = static_cast<double>(side * side) / (nodes.stride * nodes.stride);
+  const double noise = alike * std::max(0.0, squares - rhs.dot(fitted)) / (count - 6);
+  std::array<float, 3> curvature{};
+  for (int i = 0; i < 3; ++i) {
+    const double value = fitted[3 + i], variance = noise * inverse(3 + i, 3 + i);
+    const double unit = nodes.stride * nodes.stride;
+    curvature[static_cast<std::size_t>(i)] =
+        static_cast<float>(value * value * value / (value * value + variance) / unit);
+  }
+  return curvature;
 }
 
 }  // namespace
