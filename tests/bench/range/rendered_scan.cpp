@@ -150,4 +150,41 @@ Result<nlohmann::json> measure_scan(const std::filesystem::path& folder, double 
   return json;
 }
 
+Result<MeasuredView> first_view(const std::filesystem::path& folder) {
+  const auto scan = ScanFolder::open(folder);
+  if (!scan) return pass_on(scan);
+  const auto calibration = scan->load_calibration();
+  if (!calibration) return pass_on(calibration);
+  const auto rectification = rectify(*calibration);
+  if (!rectification) return pass_on(rectification);
+  auto read = read_truth(folder);
+  if (!read) return pass_on(read);
+  const Truth truth = rectified_truth(std::move(*read), *rectification);
+  const auto surface = SurfaceIndex::create(truth.mesh);
+  if (!surface) return pass_on(surface);
+  const auto images = scan->load_images(0, 0);
+  if (!images) return pass_on(images);
+  const auto view =
+      make_view(*rectification, {images->left_pattern, images->right_pattern, images->left_plain, images->right_plain},
+                images->angle_rad, images->index, {}, {});
+  if (!view) return pass_on(view);
+  const auto photograph = rectified(rectification->left_map, images->left_plain);
+  if (!photograph) return pass_on(photograph);
+  const TrueView seen(truth, *surface, truth.poses[0], truth.poses[0].angles_deg[0], {});
+  MeasuredView out{*photograph, view->range.depth, view->range.sigma, {}};
+  cv::subtract(view->range.depth, seen.left().depth, out.error_mm);
+  std::vector<float> errors;
+  for (int v = 0; v < out.error_mm.rows; ++v) {
+    for (int u = 0; u < out.error_mm.cols; ++u) {
+      if (seen.left().face(v, u) < 0) out.error_mm(v, u) = kNan;
+      if (std::isfinite(out.error_mm(v, u))) errors.push_back(out.error_mm(v, u));
+    }
+  }
+  if (errors.empty()) return fail(ErrorCode::not_found, "{}: nothing is measured in its first view", folder.string());
+  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
+  std::nth_element(errors.begin(), middle, errors.end());
+  out.error_mm -= *middle;
+  return out;
+}
+
 }  // namespace scanrig::bench
