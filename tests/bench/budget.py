@@ -23,6 +23,7 @@ LONG = {
     "page": {"package", "arm64"},
     "calibration": {"debian13"},
     "cameras": {"debian13", "fuzz"},
+    "real-rig": {"effects"},
     "end-to-end": {"bare_machine"},
 }
 

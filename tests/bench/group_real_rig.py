@@ -4,6 +4,7 @@ import json
 
 import range_pairs
 import real_rig_disturbed
+import real_rig_effects
 import real_rig_instruments
 import real_rig_materials
 import real_rig_scans
@@ -77,6 +78,7 @@ def calibration(bench, _scratch):
 
 
 PARTS = {"realism": realism, "calibration": calibration, "materials": real_rig_materials.measure,
-         "disturbed": real_rig_disturbed.measure, "acceptance": real_rig_instruments.acceptance,
+         "disturbed": real_rig_disturbed.measure, "effects": real_rig_effects.measure,
+         "acceptance": real_rig_instruments.acceptance,
          "characterise": real_rig_instruments.characterise, "contradicted": contradicted, "screens": screens,
          "topology": topology, **range_pairs.PARTS}
