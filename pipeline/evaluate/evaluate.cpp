@@ -8,10 +8,10 @@
 #include "core/statistics.h"
 #include "core/units.h"
 #include "pipeline/evaluate/ideal_carve.h"
-#include "pipeline/evaluate/self_intersection.h"
 #include "pipeline/evaluate/sigma_figures.h"
 #include "pipeline/evaluate/texture_figures.h"
 #include "pipeline/mesh/alignment.h"
+#include "pipeline/mesh/self_intersection.h"
 #include "pipeline/mesh/topology.h"
 
 namespace scanrig {
@@ -143,7 +143,7 @@ void score_topology(const Mesh& model, const Mesh& truth, const SurfaceIndex& su
   scores.genus = found.genus();
   const Topology wanted = topology(truth);
   if (wanted.watertight()) scores.true_genus = wanted.genus();
-  scores.self_intersections = self_intersecting_faces(model, surface);
+  scores.self_intersections = self_intersecting_faces(model, surface).size();
 }
 
 std::optional<Scores::PoseError> pose_error(const Claim& claim, const Truth& truth) {

@@ -121,7 +121,8 @@ Result<void> Reconstruction::State::finish_pose(std::size_t pose, const Context&
   const PosedViews posed{.views = state.views};
   auto partial = integrate({&posed, 1},
                            {.voxel_mm = std::max(options.partial_voxel_mm, options.voxel_mm),
-                            .table_without_silhouettes = calibration.has_value()},
+                            .table_without_silhouettes = calibration.has_value(),
+                            .untangle = false},
                            context);
   if (!partial) return pass_on(partial, fmt::format("pose {}", pose + 1));
   state.partial = std::move(*partial);

@@ -190,7 +190,7 @@ Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions
     result.mesh = largest_component(all);
   }
   report.dropped_components = components(all).count - 1;
-  finish_surface(field, options, result.mesh);
+  if (auto done = finish_surface(field, options, result.mesh); !done) return pass_on(done);
   report.closed_vertices = static_cast<std::size_t>(std::count(result.mesh.views.begin(), result.mesh.views.end(), 0));
   report.measured_vertices = result.mesh.vertices.size() - report.closed_vertices;
   count_classes(field, grid, report);

@@ -46,6 +46,7 @@ struct VolumeOptions {
                                            ///< 0: `band_voxels`, or `band_sigmas` where that is more
   bool table_without_silhouettes = false;  ///< bound a pose by its plane y = 0 even if it has no silhouettes
   bool repair_handles = true;              ///< remove handles and tunnels that no measurement supports
+  bool untangle = true;                    ///< no face of the surface crosses another
 };
 
 struct VolumeReport {

@@ -6,6 +6,7 @@
 
 #include "core/parallel.h"
 #include "pipeline/mesh/solid_properties.h"
+#include "pipeline/volume/untangle.h"
 
 namespace scanrig {
 namespace {
@@ -99,11 +100,11 @@ void widen_sigma(const VolumeOptions& options, std::vector<Scatter>& scatter, Me
 
 }  // namespace
 
-void finish_surface(const Field& field, const VolumeOptions& options, Mesh& mesh) {
+Result<void> finish_surface(const Field& field, const VolumeOptions& options, Mesh& mesh) {
   const std::size_t count = mesh.vertices.size();
   mesh.views.assign(count, 0);
   mesh.sigma.assign(count, std::numeric_limits<float>::quiet_NaN());
-  const std::vector<Eigen::Vector3f> outward = vertex_normals(mesh);
+  const std::vector<Eigen::Vector3f> outward = vertex_normals(mesh), extracted = mesh.vertices;
   std::vector<Scatter> scatter(count);
   parallel_for((count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
     const std::size_t end = std::min(count, (chunk + 1) * kChunk);
@@ -111,7 +112,11 @@ void finish_surface(const Field& field, const VolumeOptions& options, Mesh& mesh
   });
   widen_sigma(options, scatter, mesh);
   smooth_unmeasured(static_cast<float>(options.voxel_mm), options.smoothing_rounds, mesh);
+  if (options.untangle) {
+    if (const auto back = untangle(extracted, mesh); !back) return pass_on(back);
+  }
   mesh.normals = vertex_normals(mesh);
+  return {};
 }
 
 }  // namespace scanrig

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <opencv2/core.hpp>
 
 #include "core/parallel.h"
 #include "core/units.h"

@@ -35,7 +35,7 @@ TEST(NodeCurvature, IsThatOfTheSurfaceUpToAStep) {
   const auto curvature = node_curvature(nodes, {});
   for (int row = 2; row + 2 < nodes.rows; ++row) {
     for (const int column : {4, 9, 11, 14}) {
-      const auto& c = curvature[static_cast<std::size_t>(row * nodes.columns + column)];
+      const auto& c = curvature[static_cast<std::size_t>(&nodes.at(column, row) - nodes.patches.data())];
       EXPECT_NEAR(c[0], 0.006F, 0.0012F) << column << " " << row;
       EXPECT_NEAR(c[1], 0.004F, 0.0012F) << column << " " << row;
       EXPECT_NEAR(c[2], 0.0F, 0.0012F) << column << " " << row;

@@ -1,9 +1,8 @@
-#include "pipeline/evaluate/self_intersection.h"
+#include "pipeline/mesh/self_intersection.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
-#include <numeric>
 #include <vector>
 
 #include "core/parallel.h"
@@ -32,7 +31,7 @@ bool cross(const Triangle& a, const Triangle& b) {
   return false;
 }
 
-Triangle corners(const Mesh& mesh, const Mesh::Face& face) {
+Triangle triangle_of(const Mesh& mesh, const Mesh::Face& face) {
   return {mesh.vertices[face[0]].cast<double>(), mesh.vertices[face[1]].cast<double>(),
           mesh.vertices[face[2]].cast<double>()};
 }
@@ -43,24 +42,26 @@ bool share_vertex(const Mesh::Face& a, const Mesh::Face& b) {
 
 }  // namespace
 
-std::size_t self_intersecting_faces(const Mesh& mesh, const SurfaceIndex& surface) {
+std::vector<std::uint32_t> self_intersecting_faces(const Mesh& mesh, const SurfaceIndex& surface) {
   constexpr std::size_t kBlock = 1024;
-  std::vector<std::size_t> found((mesh.faces.size() + kBlock - 1) / kBlock, 0);
+  std::vector<std::vector<std::uint32_t>> found((mesh.faces.size() + kBlock - 1) / kBlock);
   parallel_for(found.size(), [&](std::size_t block) {
     for (std::size_t i = block * kBlock; i < std::min(mesh.faces.size(), (block + 1) * kBlock); ++i) {
-      const Triangle mine = corners(mesh, mesh.faces[i]);
+      const Triangle mine = triangle_of(mesh, mesh.faces[i]);
       const Eigen::Vector3d centre = (mine[0] + mine[1] + mine[2]) / 3.0;
       double radius = 0.0;
       for (const auto& corner : mine) radius = std::max(radius, (corner - centre).norm());
       bool crossing = false;
       surface.near(centre, radius, [&](std::uint32_t j) {
         if (crossing || share_vertex(mesh.faces[i], mesh.faces[j])) return;
-        crossing = cross(mine, corners(mesh, mesh.faces[j]));
+        crossing = cross(mine, triangle_of(mesh, mesh.faces[j]));
       });
-      found[block] += crossing ? 1 : 0;
+      if (crossing) found[block].push_back(static_cast<std::uint32_t>(i));
     }
   });
-  return std::accumulate(found.begin(), found.end(), std::size_t{0});
+  std::vector<std::uint32_t> faces;
+  for (const auto& some : found) faces.insert(faces.end(), some.begin(), some.end());
+  return faces;
 }
 
 }  // namespace scanrig
