@@ -48,9 +48,9 @@ WindowOptions steps(int max_iterations) {
   return window;
 }
 
-/// Sigma of a window whose neighbouring pixels' noise is alike by `factor`, see noise_correlation.h: and the fit's own
-/// unknowns, six of shape, gain and offset, took as much of that noise out of the residuals as they fit.
-void widen(DisparityPatch& patch, float factor) {
+/// Sigma with the noise that neighbouring pixels share, `factor` of noise_correlation.h. The fit's eight unknowns (six
+/// of shape, gain, offset) also took part of that noise out of the residuals from which sigma is computed.
+void add_shared_noise(DisparityPatch& patch, float factor) {
   constexpr float kUnknowns = 8.0F;
   const auto side = static_cast<float>(2 * patch.radius + 1);
   const float taken = std::min(0.5F, kUnknowns * factor * factor / (side * side));
@@ -71,7 +71,7 @@ DisparityPatch MatchSide::match_sharp(int u, int v, DisparityPatch patch, std::u
                                       WindowOptions window) const {
   patch.radius = radius;
   patch = match_window(here_.sharp, there_.sharp, mask_, u, v, patch, window);
-  widen(patch, factors_.sharp);
+  add_shared_noise(patch, factors_.sharp);
   return patch;
 }
 
@@ -81,7 +81,7 @@ DisparityPatch MatchSide::match_smooth(int u, int v, DisparityPatch patch, std::
   window.step_px = options_.smooth_step_px;
   patch.radius = radius;
   patch = match_window(here_.smooth, there_.smooth, mask_, u, v, patch, window);
-  widen(patch, factors_.smooth);
+  add_shared_noise(patch, factors_.smooth);
   return patch;
 }
 

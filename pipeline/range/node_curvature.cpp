@@ -50,10 +50,10 @@ std::array<float, 3> curvature_at(const Nodes& nodes, int column, int row, const
   if (solver.info() != Eigen::Success || solver.rcond() < 1e-6) return {};
   const Vector6 fitted = solver.solve(rhs);
   const Matrix6 inverse = solver.solve(Matrix6::Identity());
-  // Windows overlap, so neighbouring nodes err alike: so many count as one.
+  // The windows of neighbouring nodes overlap, so their errors are shared: this many nodes count as one.
   const int side = 2 * options.sharp_radii_px.front() + 1;
-  const double alike = static_cast<double>(side * side) / (nodes.stride * nodes.stride);
-  const double noise = alike * std::max(0.0, squares - rhs.dot(fitted)) / (count - 6);
+  const double overlap = static_cast<double>(side * side) / (nodes.stride * nodes.stride);
+  const double noise = overlap * std::max(0.0, squares - rhs.dot(fitted)) / (count - 6);
   std::array<float, 3> curvature{};
   for (int i = 0; i < 3; ++i) {
     const double value = fitted[3 + i], variance = noise * inverse(3 + i, 3 + i);

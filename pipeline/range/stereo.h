@@ -67,7 +67,7 @@ struct RectifiedPair {
 
 /// Depth of every object pixel of the left image: semi-global matching as a seed, then least-squares matching with
 /// second-order shape functions, checked from the right image. `camera_from_pose` is left identity, `background` empty.
-/// Sigma is of one pixel; errors of pixels closer than a window (15 px) are correlated.
+/// Sigma is of one pixel; errors of pixels closer than a window (11 px or more) are correlated.
 /// Threads: spread over the current arena, same bits for any number.
 /// Fails with `invalid_input` (sizes, no disparities to search), `degenerate` (nothing matched), `stopped`.
 Result<RangeImage> match_rectified(const RectifiedPair& pair, const StereoOptions& options, const Context& context);

@@ -40,9 +40,9 @@ float median_of(std::vector<float>& values) {
   return *middle;
 }
 
-/// Calls visit(x, y) for the pixels of the frame around the image.
+/// Calls visit(x, y) for the pixels within `border` px of the image's edge.
 template <class Visit>
-void for_frame(cv::Size size, int border, const Visit& visit) {
+void for_border(cv::Size size, int border, const Visit& visit) {
   for (int y = 0; y < size.height; ++y) {
     const bool whole_row = y < border || y >= size.height - border;
     for (int x = 0; x < size.width; ++x) {
@@ -55,7 +55,7 @@ void for_frame(cv::Size size, int border, const Visit& visit) {
 /// Medians along the image's border.
 Screen screen_at_border(const cv::Mat3f& image, const BlueScreenOptions& options) {
   std::array<std::vector<float>, 3> shares;
-  for_frame(image.size(), options.border_px, [&](int x, int y) {
+  for_border(image.size(), options.border_px, [&](int x, int y) {
     const cv::Vec3f& c = image(y, x);
     const float sum = light_of(c);
     if (!(sum > options.dark_level)) return;
@@ -91,12 +91,12 @@ cv::Mat3f smoothed(const cv::Mat& image) {
   return smooth;
 }
 
-/// Light up to which the chroma of the pattern's image is noise: in the frame, where plain light shows the screen,
-/// another chroma is. The projector does not light all of it, so it is dark there.
+/// The brightness up to which the pattern image's chroma is noise. Plain light shows the screen at the border; where
+/// the pattern image has another chroma there, it is dark and noisy, for the projector does not reach everywhere.
 float noise_level(const cv::Mat3f& pattern, const cv::Mat1f& key, const cv::Mat1b& object,
                   const BlueScreenOptions& options) {
   std::vector<float> wrong;
-  for_frame(key.size(), options.border_px, [&](int x, int y) {
+  for_border(key.size(), options.border_px, [&](int x, int y) {
     const float light = light_of(pattern(y, x));
     const bool is_lit = key(y, x) < static_cast<float>(options.lit_key) && light > options.dark_level;
     if (is_lit && object(y, x) == 0) wrong.push_back(light);

@@ -7,8 +7,8 @@
 
 namespace scanrig {
 
-/// Takes corners of faces that cross another one back to `before`, where no two faces crossed; those around them, round
-/// after round, until none crosses. Such vertices count as not measured: `views` 0, `sigma` NaN.
+/// Moves the corners of faces that cross another face back to their positions in `before`, where no faces crossed, and
+/// repeats until none cross. Vertices moved back count as not measured: `views` 0, `sigma` NaN.
 /// `before`: one position per vertex. Returns the number of vertices taken back. Fails as SurfaceIndex::create.
 Result<std::size_t> untangle(const std::vector<Eigen::Vector3f>& before, Mesh& mesh);
 

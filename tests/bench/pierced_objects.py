@@ -65,8 +65,7 @@ def mesh_of_cells(cells):
     return [tuple(CELL_MM * n for n in corner) for corner in places], triangles
 
 
-def ring_mesh(radius=28.0, tube=6.0, around=96, across=48):
-    """Thin enough for its hole to be seen through from 22 deg above: a hole that no camera sees cannot be told."""
+def ring_mesh(radius=28.0, tube=11.0, around=96, across=48):
     points, triangles = [], []
     for i, j in itertools.product(range(around), range(across)):
         a, b = 2 * math.pi * i / around, 2 * math.pi * j / across

@@ -60,6 +60,25 @@ cv::Mat1f disparity_of(const cv::Mat1f& depth, const Rectification& r) {
   return disparity;
 }
 
+struct RenderedScan {
+  ScanFolder scan;
+  Rectification rectification;
+  Truth truth;  ///< as the rectified cameras see it
+};
+
+Result<RenderedScan> open_rendered(const std::filesystem::path& folder) {
+  auto scan = ScanFolder::open(folder);
+  if (!scan) return pass_on(scan);
+  const auto calibration = scan->load_calibration();
+  if (!calibration) return pass_on(calibration);
+  auto rectification = rectify(*calibration);
+  if (!rectification) return pass_on(rectification);
+  auto truth = read_truth(folder);
+  if (!truth) return pass_on(truth);
+  Truth seen = rectified_truth(std::move(*truth), *rectification);
+  return RenderedScan{std::move(*scan), std::move(*rectification), std::move(seen)};
+}
+
 DisparityPair compare(const RangeImage& range, const Truth& truth, const TrueView& view, const TrueView& near_table,
                       const Rectification& r) {
   DisparityPair pair;
@@ -97,28 +116,22 @@ DisparityPair compare(const RangeImage& range, const Truth& truth, const TrueVie
 }  // namespace
 
 Result<nlohmann::json> measure_scan(const std::filesystem::path& folder, double rows_px) {
-  const auto scan = ScanFolder::open(folder);
-  if (!scan) return pass_on(scan);
-  const auto calibration = scan->load_calibration();
-  if (!calibration) return pass_on(calibration);
-  auto rectification = rectify(*calibration);
-  if (!rectification) return pass_on(rectification);
-  auto read = read_truth(folder);
-  if (!read) return pass_on(read);
-  const Truth truth = rectified_truth(std::move(*read), *rectification);
+  auto opened = open_rendered(folder);
+  if (!opened) return pass_on(opened);
+  auto& [scan, rectification, truth] = *opened;
   const auto surface = SurfaceIndex::create(truth.mesh);
   if (!surface) return pass_on(surface);
-  if (rows_px != 0.0) move_rows(rectification->right_map, rows_px);
+  if (rows_px != 0.0) move_rows(rectification.right_map, rows_px);
   DisparityFigures figures;
   std::vector<double> errors;
   double seconds = 0.0, views = 0.0, rows = 0.0;
   for (std::size_t pose = 0; pose < truth.poses.size(); ++pose) {
     for (std::size_t v = 0; v < truth.poses[pose].angles_deg.size(); ++v) {
-      const auto images = scan->load_images(pose, v);
+      const auto images = scan.load_images(pose, v);
       if (!images) return pass_on(images);
       const auto start = std::chrono::steady_clock::now();
       const auto view = make_view(
-          *rectification, {images->left_pattern, images->right_pattern, images->left_plain, images->right_plain},
+          rectification, {images->left_pattern, images->right_pattern, images->left_plain, images->right_plain},
           images->angle_rad, images->index, {}, {});
       if (!view) return pass_on(view);
       seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -129,7 +142,7 @@ Result<nlohmann::json> measure_scan(const std::filesystem::path& folder, double 
       all.max_incidence_deg = 88.0;
       all.depth_jump_mm = 1e9;
       const TrueView seen(truth, *surface, truth.poses[pose], truth.poses[pose].angles_deg[v], all);
-      const DisparityPair pair = compare(view->range, truth, seen, seen, *rectification);
+      const DisparityPair pair = compare(view->range, truth, seen, seen, rectification);
       figures.add(pair);
       const cv::Mat1f& depth = view->range.depth;
       for (int y = 0; y < depth.rows; ++y) {
@@ -152,24 +165,18 @@ Result<nlohmann::json> measure_scan(const std::filesystem::path& folder, double 
 }
 
 Result<MeasuredView> first_view(const std::filesystem::path& folder) {
-  const auto scan = ScanFolder::open(folder);
-  if (!scan) return pass_on(scan);
-  const auto calibration = scan->load_calibration();
-  if (!calibration) return pass_on(calibration);
-  const auto rectification = rectify(*calibration);
-  if (!rectification) return pass_on(rectification);
-  auto read = read_truth(folder);
-  if (!read) return pass_on(read);
-  const Truth truth = rectified_truth(std::move(*read), *rectification);
+  auto opened = open_rendered(folder);
+  if (!opened) return pass_on(opened);
+  auto& [scan, rectification, truth] = *opened;
   const auto surface = SurfaceIndex::create(truth.mesh);
   if (!surface) return pass_on(surface);
-  const auto images = scan->load_images(0, 0);
+  const auto images = scan.load_images(0, 0);
   if (!images) return pass_on(images);
   const auto view =
-      make_view(*rectification, {images->left_pattern, images->right_pattern, images->left_plain, images->right_plain},
+      make_view(rectification, {images->left_pattern, images->right_pattern, images->left_plain, images->right_plain},
                 images->angle_rad, images->index, {}, {});
   if (!view) return pass_on(view);
-  const auto photograph = rectified(rectification->left_map, images->left_plain);
+  const auto photograph = rectified(rectification.left_map, images->left_plain);
   if (!photograph) return pass_on(photograph);
   const TrueView seen(truth, *surface, truth.poses[0], truth.poses[0].angles_deg[0], {});
   MeasuredView out{*photograph, view->range.depth, view->range.sigma, {}};
