@@ -22,6 +22,7 @@ struct RangeImage {
   cv::Mat3f normal;  ///< unit, camera frame, towards the camera (z < 0); NaN where depth is
   /// 255 where a NaN pixel shows background (free space all along its ray); empty: background unknown.
   cv::Mat1b background;
+  float window_px = 0.0F;           ///< half width of the window that a pixel was measured with; 0: the pixel alone
   RowOffsets row_offsets = {};      ///< of the stereo pair; empty for imported range scans
   bool background_is_whole = true;  ///< else pixels that are neither measured nor background may be either
 };

@@ -108,6 +108,7 @@ Result<RangeImage> match_rectified(const RectifiedPair& given, const StereoOptio
   if (cv::countNonZero(range.depth == range.depth) == 0) {
     return fail(ErrorCode::degenerate, "range: no stereo matches; check the projector and the calibration");
   }
+  range.window_px = static_cast<float>(options.sharp_radii_px.front());
   range.row_offsets = find_row_offsets(pair, disparity->value, disparity->sigma, {}, corrected);
   context.report("range", 1.0);
   return range;

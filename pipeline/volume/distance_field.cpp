@@ -81,6 +81,17 @@ Field::Field(std::vector<std::vector<RangeSampler>> views_of_pose, const std::ve
   centre_ = statistics.centre;
 }
 
+float Field::window_mm() const {
+  std::vector<float> of_views;
+  for (const auto& views : views_of_pose_) {
+    for (const auto& view : views) of_views.push_back(view.window_mm());
+  }
+  if (of_views.empty()) return 0.0F;
+  const auto middle = of_views.begin() + static_cast<std::ptrdiff_t>(of_views.size() / 2);
+  std::nth_element(of_views.begin(), middle, of_views.end());
+  return *middle;
+}
+
 Field::Neighbourhood Field::everywhere() const {
   Neighbourhood result{{}, hull_};
   for (const auto& views : views_of_pose_) {

@@ -26,6 +26,13 @@ struct FieldValue {
 /// How far views lie from their mean, each in units of what its sigma lets expect.
 struct Scatter {
   float sum = 0.0F, count = 0.0F;  ///< of views; their quotient is 1 where sigmas are right
+
+  Scatter& operator+=(const Scatter& other) {
+    sum += other.sum;
+    count += other.count;
+    return *this;
+  }
+  Scatter operator/(float divisor) const { return {sum / divisor, count / divisor}; }
 };
 
 /// Data of the range images for a point of the surface.
@@ -59,6 +66,8 @@ class Field {
   [[nodiscard]] std::size_t poses() const { return views_of_pose_.size(); }
   [[nodiscard]] float class_threshold() const { return class_threshold_; }
   [[nodiscard]] float band() const { return band_; }
+  /// Half width, on the surface, of what one measurement saw: median of the views, mm.
+  [[nodiscard]] float window_mm() const;
 
  private:
   [[nodiscard]] FieldValue from_evidence(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;

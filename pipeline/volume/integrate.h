@@ -39,6 +39,7 @@ struct VolumeOptions {
   int relax_rounds = 8;                    ///< of a seven-point mean where unmeasured: a Gaussian of 1.5 voxels
   int smoothing_rounds = 4;                ///< of the staircases on unmeasured surface
   int scatter_rounds = 40;                 ///< over which the scatter of views is averaged: six edges around
+  float shape_share = 0.4F;                ///< of shape finer than a matching window: error, see README.md
   float min_agreement = 0.5F;              ///< cosine between surface and measured normal, for moving a vertex onto it
   float doubt_reach_mm = 8.0F;             ///< the solid is doubtful this deep below a closed surface
   float max_filled_mm = 2.0F;              ///< a doubtful tunnel wider than this is not filled

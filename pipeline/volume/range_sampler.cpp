@@ -27,6 +27,7 @@ RangeSampler::RangeSampler(const RangeImage& range, const Transform& model_from_
   make_planes(range);
   close_pinholes();
   const int voxel_pixels = std::max(1, static_cast<int>(std::ceil(voxel_mm / mm_per_pixel())));
+  window_mm_ = range.window_px * static_cast<float>(mm_per_pixel());
   drop_specks_and_fade_edges(voxel_pixels);
   make_tiles();
   if (!has_outline_) make_footprint();

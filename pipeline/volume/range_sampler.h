@@ -55,6 +55,9 @@ class RangeSampler {
   [[nodiscard]] float beside_footprint_mm(const Eigen::Vector3f& point_in_model) const;
 
   [[nodiscard]] bool has_outline() const { return has_outline_; }
+  [[nodiscard]] float window_mm() const {
+    return window_mm_;
+  }  ///< half width of the range image's window, on the surface
   struct SurfacePixel {
     Eigen::Vector3f point;  ///< model frame
     float weight;
@@ -99,6 +102,7 @@ class RangeSampler {
   Eigen::Vector3f translation_;
   Projection projection_;  ///< of the crop
   cv::Rect crop_;
+  float window_mm_ = 0.0F;
   bool has_outline_ = false;  ///< then all of the image outside the crop is background
   float band_mm_ = 0.0F;
   int width_ = 0, height_ = 0;

@@ -7,6 +7,8 @@
 #include <numbers>
 
 #include "core/parallel.h"
+#include "core/statistics.h"
+#include "pipeline/mesh/self_intersection.h"
 #include "pipeline/mesh/solid_properties.h"
 #include "pipeline/mesh/topology.h"
 #include "tests/unit/pipeline/volume/analytic_rig.h"
@@ -95,6 +97,50 @@ TEST(Integrate, ViewsThatScatterMoreThanTheirSigmasSayWidenSigma) {
   EXPECT_LT(scattered, 6.0 * sound);
   for (View& view : views) view.range.sigma = 10.0 * view.range.sigma;  // they say it
   EXPECT_NEAR(median_sigma(views), 10.0 * sound, 0.1 * sound);
+}
+
+/// Median sigma of a cube's vertices near its upright edges, over that of the middles of its sides.
+double edge_over_side(const std::vector<View>& views) {
+  const auto surface = integrate_views(views);
+  EXPECT_TRUE(surface);
+  std::vector<double> edge, side;
+  for (std::size_t v = 0; surface && v < surface->mesh.vertices.size(); ++v) {
+    const Eigen::Vector3f& p = surface->mesh.vertices[v];
+    if (surface->mesh.views[v] < 2 || p.y() < 15.0F || p.y() > 25.0F) continue;
+    const float inner = std::min(std::abs(p.x()), std::abs(p.z()));
+    if (inner > 19.0F) edge.push_back(static_cast<double>(surface->mesh.sigma[v]));
+    if (inner < 5.0F) side.push_back(static_cast<double>(surface->mesh.sigma[v]));
+  }
+  EXPECT_GT(edge.size(), 20U);
+  EXPECT_GT(side.size(), 20U);
+  return edge.empty() || side.empty() ? 0.0 : quantile(edge, 0.5) / quantile(side, 0.5);
+}
+
+TEST(Integrate, SigmaIsWiderWhereShapeIsFinerThanAWindow) {
+  const Cast cube = cast_into(box({-20.0, 0.0, -20.0}, {20.0, 40.0, 20.0}));
+  auto views = take_views({}, cube);
+  const double by_pixel = edge_over_side(views);
+  EXPECT_LT(by_pixel, 2.0);
+  for (View& view : views) view.range.window_px = 5.0F;
+  EXPECT_GT(edge_over_side(views), 3.0 * by_pixel);
+
+  auto round = take_views({}, cast_into(ball()));
+  const double sound = median_sigma(round);
+  for (View& view : round) view.range.window_px = 5.0F;
+  EXPECT_LT(median_sigma(round), 1.1 * sound) << "a quadratic follows a ball";
+}
+
+TEST(Integrate, NoFaceCrossesAnotherHoweverNoisyTheSheet) {
+  const auto views = take_views({.noise_mm = 0.8}, cast_into(box({-20.0, 0.0, -0.3}, {20.0, 30.0, 0.3})));
+  const auto crossing = [&](bool untangle) {
+    const auto surface = integrate_views(views, {.voxel_mm = 0.5, .untangle = untangle});
+    EXPECT_TRUE(surface);
+    const auto index = SurfaceIndex::create(surface->mesh);
+    EXPECT_TRUE(index);
+    return self_intersecting_faces(surface->mesh, *index).size();
+  };
+  EXPECT_GT(crossing(false), 10U) << "else this test shows nothing";
+  EXPECT_EQ(crossing(true), 0U);
 }
 
 TEST(Integrate, NoiseIsAveragedAndDropoutsLeaveNoHoles) {
