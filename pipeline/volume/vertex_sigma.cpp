@@ -10,7 +10,7 @@ namespace {
 
 /// Rounds of Neighbours::smoothed() that make a Gaussian of this width.
 int rounds_for(const Neighbours& around, const Mesh& mesh, float width_mm) {
-  constexpr int kMost = 200;
+  constexpr int kMaxRounds = 200;
   double squares = 0.0;
   std::size_t edges = 0;
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
@@ -21,7 +21,7 @@ int rounds_for(const Neighbours& around, const Mesh& mesh, float width_mm) {
   }
   const double a_round = 3.0 / 7.0 * squares / static_cast<double>(std::max<std::size_t>(edges, 1));
   const double width = static_cast<double>(width_mm);
-  return std::clamp(static_cast<int>(std::lround(width * width / std::max(a_round, 1e-12))), 1, kMost);
+  return std::clamp(static_cast<int>(std::lround(width * width / std::max(a_round, 1e-12))), 1, kMaxRounds);
 }
 
 }  // namespace
