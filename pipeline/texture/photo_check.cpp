@@ -31,25 +31,22 @@ int cell_px(const Photo& photo, const PhotoCheckOptions& options) {
 std::vector<Difference> differences_at(std::span<const PhotoView> views, const RigLight& light,
                                        const Eigen::Vector3d& point, const Eigen::Vector3d& normal,
                                        const BlendOptions& blending, const PhotoCheckOptions& options) {
-  std::vector<Difference> result(views.size(), {{-1, -1}, 0.0F, 1.0F});
-  std::size_t looks = 0;
-  const PointColour blend = blend_photos(views, light, point, normal, blending);
+  std::vector<PhotoLook> looks;
+  look_from_all(views, light, point, normal, looks);
+  if (looks.size() < options.min_looks) return {};
+  const PointColour blend = blend_looks(views, looks, blending);
   if (!(blend.weight > 0.0F)) return {};
-  for (std::size_t p = 0; p < views.size(); ++p) {
-    const auto sight = views[p].look(point, normal);
-    if (!sight) continue;
-    ++looks;
-    const Photo& photo = views[p].photo();
-    const Eigen::Vector3f lit =
-        light.at(photo.turntable_from_model.linear() * normal, photo.turntable_from_model * point);
-    const Eigen::Vector3f difference = views[p].sample(sight->pixel).bgr.cwiseQuotient(lit) - blend.bgr;
+  std::vector<Difference> result(views.size(), {{-1, -1}, 0.0F, 1.0F});
+  for (const PhotoLook& look : looks) {
+    const PhotoView& view = views[look.photo];
+    const Eigen::Vector3f difference = view.sample(look.pixel).bgr.cwiseQuotient(look.light) - blend.bgr;
     const float tolerated = blending.outlier_floor + blending.outlier_share * blend.bgr.maxCoeff();
-    const int side = cell_px(photo, options);
+    const int side = cell_px(view.photo(), options);
     const float sum = difference.sum();
-    result[p] = {cv::Point(static_cast<int>(sight->pixel.x()) / side, static_cast<int>(sight->pixel.y()) / side),
-                 std::copysign(difference.norm() / tolerated, sum), 1.0F + sum / std::max(blend.bgr.sum(), 1e-4F)};
+    result[look.photo] = {cv::Point(static_cast<int>(look.pixel.x()) / side, static_cast<int>(look.pixel.y()) / side),
+                          std::copysign(difference.norm() / tolerated, sum),
+                          1.0F + sum / std::max(blend.bgr.sum(), 1e-4F)};
   }
-  if (looks < options.min_looks) return {};
   return result;
 }
 

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <limits>
 #include <opencv2/imgproc.hpp>
 
@@ -11,6 +13,9 @@
 
 namespace scanrig {
 namespace {
+
+using FourLanes = float __attribute__((vector_size(16)));
+using FourBytes = std::uint8_t __attribute__((vector_size(4)));
 
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 /// Two neighbouring pixels whose depths differ by more than this many pixel widths belong to two surfaces: steeper than
@@ -27,12 +32,13 @@ std::array<float, 4> cubic(float t) {
           0.5F * (t3 - t2)};
 }
 
-cv::Rect window_of(const Mesh& mesh, const Photo& photo) {
+/// The pixels that can show the mesh.
+cv::Rect window_of(const Mesh& mesh, const Photo& photo, const CameraTable& camera,
+                   const Transform& camera_from_model) {
   Eigen::AlignedBox2d box;
   for (const auto& v : mesh.vertices) {
-    const Eigen::Vector3d in_turntable = photo.turntable_from_model * v.cast<double>();
-    if ((photo.camera.camera_from_turntable * in_turntable).z() <= 0.0) continue;
-    box.extend(photo.camera.project(in_turntable));
+    const Eigen::Vector3d in_camera = camera_from_model * v.cast<double>();
+    if (in_camera.z() > 0.0) box.extend(camera.project(in_camera));
   }
   if (box.isEmpty()) return {};
   const Eigen::Array2d size(photo.image.cols, photo.image.rows);
@@ -48,6 +54,7 @@ cv::Rect window_of(const Mesh& mesh, const Photo& photo) {
 PhotoView::PhotoView(const Photo& photo, const Mesh& mesh, const SurfaceIndex& scene, const TextureOptions& options,
                      double typical)
     : photo_(&photo),
+      camera_(photo.camera),
       camera_from_model_(photo.camera.camera_from_turntable * photo.turntable_from_model),
       centre_(camera_from_model_.inverse().translation()),
       px_per_mm_at_1mm_(photo.camera.projection.fx / typical),
@@ -55,7 +62,7 @@ PhotoView::PhotoView(const Photo& photo, const Mesh& mesh, const SurfaceIndex& s
       edge_px_(options.edge_px),
       edge_fade_px_(options.edge_fade_px),
       saturated_(options.saturated),
-      window_(window_of(mesh, photo)) {
+      window_(window_of(mesh, photo, camera_, camera_from_model_)) {
   depth_ = cv::Mat1f(window_.size(), kNan);
   edge_px_away_ = cv::Mat1f(window_.size(), 0.0F);
   if (window_.empty()) return;
@@ -68,7 +75,7 @@ void PhotoView::cast(const SurfaceIndex& scene) {
   parallel_for(static_cast<std::size_t>(window_.height), [&](std::size_t row) {
     const int y = static_cast<int>(row);
     for (int x = 0; x < window_.width; ++x) {
-      const Eigen::Vector3d ray = model_from_camera * photo_->camera.ray({x + window_.x, y + window_.y});
+      const Eigen::Vector3d ray = model_from_camera * camera_.ray({x + window_.x, y + window_.y});
       if (const auto hit = scene.first_hit(centre_, ray)) depth_(y, x) = static_cast<float>(hit->distance);
     }
   });
@@ -102,10 +109,10 @@ void PhotoView::leave_out(const cv::Mat1b& mask) {
 std::optional<Sight> PhotoView::look(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
   const double cosine = normal.dot(towards(point));
   if (cosine <= cos_limit_) return std::nullopt;
-  const Eigen::Vector3d in_turntable = photo_->turntable_from_model * point;
-  const double z = (photo_->camera.camera_from_turntable * in_turntable).z();
+  const Eigen::Vector3d in_camera = camera_from_model_ * point;
+  const double z = in_camera.z();
   if (z <= 0.0) return std::nullopt;
-  const Eigen::Vector2d pixel = photo_->camera.project(in_turntable);
+  const Eigen::Vector2d pixel = camera_.project(in_camera);
   const double x = pixel.x() - window_.x;
   const double y = pixel.y() - window_.y;
   if (!(x >= 1.0 && y >= 1.0 && x < window_.width - 2 && y < window_.height - 2)) return std::nullopt;
@@ -129,23 +136,47 @@ std::optional<Sight> PhotoView::look(const Eigen::Vector3d& point, const Eigen::
   return Sight{pixel, fade * fade * quality};
 }
 
-Sample PhotoView::sample(const Eigen::Vector2d& pixel) const {
+std::optional<Eigen::Vector2d> PhotoView::pixel_of(const Eigen::Vector3d& point) const {
+  const Eigen::Vector3d in_camera = camera_from_model_ * point;
+  if (in_camera.z() <= 0.0) return std::nullopt;
+  return camera_.project(in_camera);
+}
+
+Sample PhotoView::sample(const Eigen::Vector2f& pixel) const {
   const cv::Mat3b& image = photo_->image;
   const int x = static_cast<int>(std::floor(pixel.x()));
   const int y = static_cast<int>(std::floor(pixel.y()));
-  const auto across = cubic(static_cast<float>(pixel.x() - x));
-  const auto down = cubic(static_cast<float>(pixel.y() - y));
-  Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-  uchar highest = 0;
-  for (int j = 0; j < 4; ++j) {
-    const cv::Vec3b* row = image[std::clamp(y - 1 + j, 0, image.rows - 1)];
-    for (int i = 0; i < 4; ++i) {
-      const cv::Vec3b& c = row[std::clamp(x - 1 + i, 0, image.cols - 1)];
-      sum += across[i] * down[j] * Eigen::Vector3f(c[0], c[1], c[2]);
-      highest = std::max({highest, c[0], c[1], c[2]});
+  const auto across = cubic(pixel.x() - static_cast<float>(x));
+  const auto down = cubic(pixel.y() - static_cast<float>(y));
+  FourLanes sum = {}, highest = {};  // b, g, r, and what comes next in the image
+  const auto add = [&](std::size_t j, auto&& pixel_at) {
+    FourLanes line = {};
+    for (std::size_t i = 0; i < 4; ++i) {
+      const FourLanes c = __builtin_convertvector(pixel_at(static_cast<int>(i)), FourLanes);
+      line += across[i] * c;
+      highest = c > highest ? c : highest;
+    }
+    sum += down[j] * line;
+  };
+  // The fourth byte of a pixel is the next one's first: there is one.
+  const bool is_inside = x >= 1 && y >= 1 && x + 3 < image.cols && y + 2 < image.rows;
+  for (std::size_t j = 0; j < 4; ++j) {
+    const cv::Vec3b* row = image[std::clamp(y - 1 + static_cast<int>(j), 0, image.rows - 1)];
+    if (is_inside) {
+      add(j, [&](int i) {
+        FourBytes bytes;
+        std::memcpy(&bytes, row + x - 1 + i, sizeof(bytes));
+        return bytes;
+      });
+    } else {
+      add(j, [&](int i) {
+        const cv::Vec3b& c = row[std::clamp(x - 1 + i, 0, image.cols - 1)];
+        return FourBytes{c[0], c[1], c[2], 0};
+      });
     }
   }
-  return {sum.cwiseMax(0.0F) / 255.0F, highest >= saturated_};
+  const float brightest = std::max({highest[0], highest[1], highest[2]});
+  return {Eigen::Vector3f(sum[0], sum[1], sum[2]).cwiseMax(0.0F) / 255.0F, brightest >= static_cast<float>(saturated_)};
 }
 
 double typical_px_per_mm(const Mesh& mesh, std::span<const Photo> photos) {

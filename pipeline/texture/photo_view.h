@@ -4,6 +4,7 @@
 #include <opencv2/core/mat.hpp>
 #include <optional>
 
+#include "pipeline/calibration/camera_table.h"
 #include "pipeline/mesh/surface_index.h"
 #include "pipeline/texture/texture.h"
 
@@ -29,8 +30,10 @@ class PhotoView {
 
   /// The place of `point` with unit `normal` (model frame, mm) in the photo; nothing if the photo does not show it.
   [[nodiscard]] std::optional<Sight> look(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const;
+  /// Where the photo shows `point` unless something is in front; nothing behind the camera.
+  [[nodiscard]] std::optional<Eigen::Vector2d> pixel_of(const Eigen::Vector3d& point) const;
   /// The colour there, between pixels (bicubic); `pixel` as returned by look().
-  [[nodiscard]] Sample sample(const Eigen::Vector2d& pixel) const;
+  [[nodiscard]] Sample sample(const Eigen::Vector2f& pixel) const;
 
   /// From now on the photo shows nothing where `mask`, of its size, is not 0, and fades out towards it.
   void leave_out(const cv::Mat1b& mask);
@@ -46,6 +49,7 @@ class PhotoView {
   void find_edges();
 
   const Photo* photo_;
+  CameraTable camera_;
   Transform camera_from_model_;
   Eigen::Vector3d centre_;
   double px_per_mm_at_1mm_;  ///< focal length over the typical resolution

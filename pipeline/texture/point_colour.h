@@ -4,8 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "pipeline/texture/photo_view.h"
-#include "pipeline/texture/rig_light.h"
+#include "pipeline/texture/photo_looks.h"
 
 namespace scanrig {
 
@@ -15,8 +14,24 @@ struct PointColour {
   float weight = 0.0F;                            ///< of all photos together; 0: no photo sees the point
 };
 
-/// Blends all photos that see `point` with unit `normal` (model frame, mm). Photos that disagree with the majority
-/// (highlights, shadows, an occlusion) lose weight. Continuous over the surface.
+/// What one photo gives for the paint of a point.
+struct PaintSample {
+  Eigen::Vector3f bgr;  ///< linear, the rig's light taken out
+  float weight;
+};
+/// `pixel` as of PhotoLook, `weight` of the photo there, `light` on the point.
+PaintSample paint_in(const PhotoView& view, const Eigen::Vector2f& pixel, float weight, const Eigen::Vector3f& light,
+                     const BlendOptions& options);
+
+/// The colour that most weight agrees on: photos that disagree with the majority (highlights, shadows, an occlusion)
+/// lose weight. Without samples weight 0.
+PointColour majority(std::span<const PaintSample> samples, const BlendOptions& options);
+
+/// The same of all photos that see a point, as looked up before.
+PointColour blend_looks(std::span<const PhotoView> views, std::span<const PhotoLook> looks,
+                        const BlendOptions& options);
+
+/// Blends all photos that see `point` with unit `normal` (model frame, mm) by majority(). Continuous over the surface.
 PointColour blend_photos(std::span<const PhotoView> views, const RigLight& light, const Eigen::Vector3d& point,
                          const Eigen::Vector3d& normal, const BlendOptions& options);
 

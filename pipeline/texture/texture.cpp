@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <optional>
 
 #include "core/parallel.h"
 #include "pipeline/mesh/solid_properties.h"
 #include "pipeline/texture/atlas.h"
 #include "pipeline/texture/chart_cutting.h"
+#include "pipeline/texture/face_colours.h"
 #include "pipeline/texture/photo_check.h"
 #include "pipeline/texture/photo_view.h"
 #include "pipeline/texture/point_colour.h"
@@ -47,18 +49,6 @@ void for_blocks(std::size_t count, const std::function<void(std::size_t)>& body)
   });
 }
 
-/// One byte per vertex and photo: 1 where the photo shows it.
-std::vector<std::uint8_t> seen_vertices(const Mesh& mesh, std::span<const PhotoView> views) {
-  std::vector<std::uint8_t> seen(mesh.vertices.size() * views.size());
-  for_blocks(mesh.vertices.size(), [&](std::size_t v) {
-    for (std::size_t p = 0; p < views.size(); ++p) {
-      seen[v * views.size() + p] =
-          views[p].look(mesh.vertices[v].cast<double>(), mesh.normals[v].cast<double>()) ? 1 : 0;
-    }
-  });
-  return seen;
-}
-
 /// One gain for the whole scan that makes the brightest paint a suitable white.
 double gain_for(const std::vector<PointColour>& colours, const TextureOptions& options) {
   std::vector<float> brightest;
@@ -75,27 +65,21 @@ Eigen::Vector3f mean_colour(const std::vector<PointColour>& colours) {
   return sum / static_cast<float>(colours.size());
 }
 
-/// Colour of the texel (x, y), which `face` owns.
-cv::Vec3b texel_colour(const AtlasLayout& layout, std::span<const PhotoView> views, const TexturedModel& model,
-                       const std::vector<PointColour>& at_vertices, const TextureOptions& options, int x, int y) {
+/// Colour of the texel (x, y), which a face owns.
+cv::Vec3b texel_colour(const AtlasLayout& layout, const TexturedModel& model,
+                       const std::vector<PointColour>& at_vertices, const TextureOptions& options, FaceColours& colours,
+                       int x, int y) {
   const auto gain = static_cast<float>(model.exposure_gain);
-  const Mesh& mesh = model.mesh.mesh;
-  const auto f = static_cast<std::size_t>(layout.owner(y, x));
-  const Mesh::Face& face = mesh.faces[f];
+  const auto f = static_cast<std::uint32_t>(layout.owner(y, x));
   const Eigen::Vector3d weights =
       barycentric(layout.corners[f], Eigen::Vector2d(x, y)).value_or(Eigen::Vector3d(1, 0, 0));
   // Beyond its rim a chart continues in the plane of the face, but with the light and the fill of the rim.
   const Eigen::Vector3d inside = weights.cwiseMax(0.0) / weights.cwiseMax(0.0).sum();
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   Eigen::Vector3f fill = Eigen::Vector3f::Zero();
   for (int k = 0; k < 3; ++k) {
-    const std::uint32_t v = face[static_cast<std::size_t>(k)];
-    point += weights[k] * mesh.vertices[v].cast<double>();
-    normal += inside[k] * mesh.normals[v].cast<double>();
-    fill += static_cast<float>(inside[k]) * at_vertices[v].bgr;
+    fill += static_cast<float>(inside[k]) * at_vertices[model.mesh.mesh.faces[f][static_cast<std::size_t>(k)]].bgr;
   }
-  const PointColour seen = blend_photos(views, model.light, point, normal.normalized(), options.blending);
+  const PointColour seen = colours.at(f, weights, inside);
   return to_srgb(gain * (seen.weight * seen.bgr + options.fill_weight * fill) / (seen.weight + options.fill_weight));
 }
 
@@ -111,18 +95,25 @@ double seen_share(const Mesh& mesh, const std::vector<PointColour>& colours) {
   return seen / std::max(all, 1e-12);
 }
 
-/// Leaves contradicted photos out of `views`. Fills in the model's light, gain, seen share and vertex colours; returns
-/// the linear paint at the vertices, unseen ones filled from their surroundings.
-Result<std::vector<PointColour>> colour_vertices(std::span<PhotoView> views, const TextureOptions& options,
-                                                 TexturedModel& model) {
+struct VertexPaint {
+  std::vector<PointColour> colours;  ///< linear; unseen vertices are filled from their surroundings
+  std::vector<std::uint8_t> seen;    ///< one byte per vertex and photo: 1 where the photo shows it
+};
+
+/// Leaves contradicted photos out of `views`. Fills in the model's light, gain, seen share and vertex colours.
+Result<VertexPaint> colour_vertices(std::span<PhotoView> views, const TextureOptions& options, TexturedModel& model) {
   Mesh& mesh = model.mesh.mesh;
   model.light = light_from_photos(views, mesh, mesh.normals, options.blending);
   model.contradicted = leave_out_contradicted(views, model.light, mesh, mesh.normals, options.blending, options.check);
   if (!model.contradicted.empty()) model.light = light_from_photos(views, mesh, mesh.normals, options.blending);
-  std::vector<PointColour> colours(mesh.vertices.size());
+  VertexPaint paint{std::vector<PointColour>(mesh.vertices.size()),
+                    std::vector<std::uint8_t>(mesh.vertices.size() * views.size())};
+  std::vector<PointColour>& colours = paint.colours;
   for_blocks(colours.size(), [&](std::size_t v) {
-    colours[v] = blend_photos(views, model.light, mesh.vertices[v].cast<double>(), mesh.normals[v].cast<double>(),
-                              options.blending);
+    thread_local std::vector<PhotoLook> looks;
+    look_from_all(views, model.light, mesh.vertices[v].cast<double>(), mesh.normals[v].cast<double>(), looks);
+    colours[v] = blend_looks(views, looks, options.blending);
+    for (const PhotoLook& look : looks) paint.seen[v * views.size() + look.photo] = 1;
   });
   if (std::none_of(colours.begin(), colours.end(), [](const PointColour& c) { return c.weight > 0.0F; })) {
     return fail(ErrorCode::degenerate, "texture: no photo sees the mesh; check the calibration");
@@ -135,7 +126,7 @@ Result<std::vector<PointColour>> colour_vertices(std::span<PhotoView> views, con
     const cv::Vec3b bgr = to_srgb(static_cast<float>(model.exposure_gain) * colours[v].bgr);
     mesh.colour[v] = {bgr[2], bgr[1], bgr[0]};
   }
-  return colours;
+  return paint;
 }
 
 /// Draws the atlas and fills in the texture coordinates.
@@ -144,11 +135,16 @@ void draw_atlas(const AtlasLayout& layout, std::span<const PhotoView> views, con
   const cv::Size size = layout.owner.size();
   const auto gain = static_cast<float>(model.exposure_gain);
   model.mesh.atlas = cv::Mat3b(size, to_srgb(gain * mean_colour(colours)));
-  parallel_for(static_cast<std::size_t>(size.height), [&](std::size_t row) {
-    const int y = static_cast<int>(row);
-    for (int x = 0; x < size.width; ++x) {
-      if (layout.owner(y, x) < 0) continue;
-      model.mesh.atlas(y, x) = texel_colour(layout, views, model, colours, options, x, y);
+  constexpr int kTile = 64;  // texels: a face's photos are looked up once in each
+  const int across = (size.width + kTile - 1) / kTile, down = (size.height + kTile - 1) / kTile;
+  parallel_for(static_cast<std::size_t>(across) * static_cast<std::size_t>(down), [&](std::size_t tile) {
+    const int left = static_cast<int>(tile) % across * kTile, top = static_cast<int>(tile) / across * kTile;
+    FaceColours of_faces(views, model.light, model.mesh.mesh, options.blending);
+    for (int y = top; y < std::min(top + kTile, size.height); ++y) {
+      for (int x = left; x < std::min(left + kTile, size.width); ++x) {
+        if (layout.owner(y, x) < 0) continue;
+        model.mesh.atlas(y, x) = texel_colour(layout, model, colours, options, of_faces, x, y);
+      }
     }
   });
   model.mesh.corner_uv.resize(layout.corners.size());
@@ -175,20 +171,22 @@ Result<TexturedModel> texture_mesh(const Mesh& mesh, std::span<const Photo> phot
   if (out.normals.size() != out.vertices.size()) out.normals = vertex_normals(out);
 
   const double px_per_mm = typical_px_per_mm(mesh, photos);
+  std::vector<std::optional<PhotoView>> made(photos.size());
+  parallel_for(made.size(), [&](std::size_t p) {
+    if (!context.stopped()) made[p].emplace(photos[p], out, *scene, options, px_per_mm);
+  });
+  if (context.stopped()) return stopped();
   std::vector<PhotoView> views;
-  for (const Photo& photo : photos) {
-    if (context.stopped()) return stopped();
-    views.emplace_back(photo, out, *scene, options, px_per_mm);
-    context.report("texture", 0.3 * static_cast<double>(views.size()) / static_cast<double>(photos.size()));
-  }
+  for (auto& view : made) views.push_back(std::move(*view));
+  context.report("texture", 0.3);
 
-  const auto colours = colour_vertices(views, options, model);
-  if (!colours) return pass_on(colours);
+  const auto paint = colour_vertices(views, options, model);
+  if (!paint) return pass_on(paint);
   context.report("texture", 0.4);
   if (context.stopped()) return stopped();
 
   const auto flat = chart_views(views, px_per_mm);
-  const auto charts = cut_into_charts(out, flat, views.size(), seen_vertices(out, views), options.charts);
+  const auto charts = cut_into_charts(out, flat, views.size(), paint->seen, options.charts);
   const auto layout = lay_out(out, flat, charts, options.atlas_px, options.max_texels_per_px, options.padding_px);
   if (!layout) {
     return fail(ErrorCode::out_of_range,
@@ -200,7 +198,7 @@ Result<TexturedModel> texture_mesh(const Mesh& mesh, std::span<const Photo> phot
   context.report("texture", 0.5);
   if (context.stopped()) return stopped();
 
-  draw_atlas(*layout, views, *colours, options, model);
+  draw_atlas(*layout, views, paint->colours, options, model);
   context.report("texture", 1.0);
   return model;
 }

@@ -6,8 +6,8 @@
 
 #include "core/parallel.h"
 #include "pipeline/mesh/solid_properties.h"
+#include "pipeline/mesh/vertex_neighbours.h"
 #include "pipeline/volume/untangle.h"
-#include "pipeline/volume/vertex_neighbours.h"
 #include "pipeline/volume/vertex_sigma.h"
 
 namespace scanrig {
@@ -16,7 +16,7 @@ namespace {
 constexpr std::size_t kChunk = 4096;  // vertices per task
 
 /// Smooths staircases of the carved surface; a vertex stays within half a voxel of where it was.
-void smooth_unmeasured(const Neighbours& around, float voxel_mm, int rounds, Mesh& mesh) {
+void smooth_unmeasured(const VertexNeighbours& around, float voxel_mm, int rounds, Mesh& mesh) {
   const std::vector<Eigen::Vector3f> original = mesh.vertices;
   for (int round = 0; round < rounds; ++round) {
     const std::vector<Eigen::Vector3f> before = mesh.vertices;
@@ -57,7 +57,7 @@ Result<void> finish_surface(const Field& field, const VolumeOptions& options, Me
   mesh.views.assign(count, 0);
   mesh.sigma.assign(count, std::numeric_limits<float>::quiet_NaN());
   const std::vector<Eigen::Vector3f> outward = vertex_normals(mesh), extracted = mesh.vertices;
-  const Neighbours around(mesh);
+  const VertexNeighbours around(mesh);
   std::vector<Scatter> scatter(count);
   parallel_for((count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
     const std::size_t end = std::min(count, (chunk + 1) * kChunk);

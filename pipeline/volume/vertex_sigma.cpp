@@ -8,8 +8,8 @@
 namespace scanrig {
 namespace {
 
-/// Rounds of Neighbours::smoothed() that make a Gaussian of this width.
-int rounds_for(const Neighbours& around, const Mesh& mesh, float width_mm) {
+/// Rounds of VertexNeighbours::smoothed() that make a Gaussian of this width.
+int rounds_for(const VertexNeighbours& around, const Mesh& mesh, float width_mm) {
   constexpr int kMaxRounds = 200;
   double squares = 0.0;
   std::size_t edges = 0;
@@ -26,7 +26,7 @@ int rounds_for(const Neighbours& around, const Mesh& mesh, float width_mm) {
 
 }  // namespace
 
-void widen_by_scatter(const Neighbours& around, int rounds, const std::vector<Scatter>& scatter, Mesh& mesh) {
+void widen_by_scatter(const VertexNeighbours& around, int rounds, const std::vector<Scatter>& scatter, Mesh& mesh) {
   constexpr float kTooFew = 1e-3F;  // views around, after the smoothing
   const std::vector<Scatter> mean = around.smoothed(scatter, rounds);
   for (std::size_t v = 0; v < mesh.sigma.size(); ++v) {
@@ -34,7 +34,7 @@ void widen_by_scatter(const Neighbours& around, int rounds, const std::vector<Sc
   }
 }
 
-void widen_by_fine_shape(const Neighbours& around, float share, float window_mm, Mesh& mesh) {
+void widen_by_fine_shape(const VertexNeighbours& around, float share, float window_mm, Mesh& mesh) {
   if (!(window_mm > 0.0F) || !(share > 0.0F)) return;
   // With G a Gaussian of the window's width, (1 - G)^2 keeps nothing of a quadratic but its constant fourth derivative.
   const int rounds = rounds_for(around, mesh, window_mm);

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "core/parallel.h"
@@ -12,25 +11,13 @@
 
 namespace scanrig {
 
-/// The vertices that share an edge with each vertex of a closed manifold.
-class Neighbours {
+/// The vertices that share an edge with each vertex, each once, in ascending order.
+class VertexNeighbours {
  public:
-  explicit Neighbours(const Mesh& mesh) {
-    // Every directed edge occurs once: a vertex's neighbours are the heads of its edges.
-    first_.assign(mesh.vertices.size() + 1, 0);
-    for (const auto& f : mesh.faces) {
-      for (const auto v : f) ++first_[v + 1];
-    }
-    for (std::size_t i = 1; i < first_.size(); ++i) first_[i] += first_[i - 1];
-    std::vector<std::uint32_t> fill = first_;
-    neighbour_.resize(3 * mesh.faces.size());
-    for (const auto& f : mesh.faces) {
-      for (std::size_t k = 0; k < 3; ++k) neighbour_[fill[f[k]]++] = f[(k + 1) % 3];
-    }
-  }
+  explicit VertexNeighbours(const Mesh& mesh);
 
   [[nodiscard]] std::span<const std::uint32_t> of(std::size_t vertex) const {
-    return std::span(neighbour_).subspan(first_[vertex], first_[vertex + 1] - first_[vertex]);
+    return {list_.data() + first_[vertex], list_.data() + first_[vertex + 1]};
   }
 
   /// Each value becomes the mean of its own and its neighbours', round after round: a Gaussian whose variance on each
@@ -54,7 +41,7 @@ class Neighbours {
  private:
   static constexpr std::size_t kChunk = 4096;  // vertices per task
 
-  std::vector<std::uint32_t> first_, neighbour_;
+  std::vector<std::uint32_t> first_, list_;  ///< offsets into the list, one more than vertices
 };
 
 }  // namespace scanrig

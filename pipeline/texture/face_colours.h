@@ -1,0 +1,58 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+#include "pipeline/texture/photo_looks.h"
+#include "pipeline/texture/point_colour.h"
+
+namespace scanrig {
+
+/// Colours of the texels of a few faces. Which photos show a face, where, and in which light, is looked up at its
+/// corners, once, and is interpolated between them; faces larger than a few pixels of a photo are looked up texel by
+/// texel. For one thread; its memory grows with the faces asked for. All arguments must outlive it.
+class FaceColours {
+ public:
+  FaceColours(std::span<const PhotoView> views, const RigLight& light, const Mesh& mesh, const BlendOptions& options)
+      : views_(views), light_(light), mesh_(mesh), options_(options) {}
+
+  /// The paint at a place of a face. `weights`: barycentric, beyond the face continued in its plane; `inside`: the
+  /// nearest within the face, whose light and weights hold.
+  [[nodiscard]] PointColour at(std::uint32_t face, const Eigen::Vector3d& weights, const Eigen::Vector3d& inside);
+
+ private:
+  /// One photo at the corners of a face, column by column.
+  struct Corners {
+    std::uint16_t photo = 0;
+    Eigen::Matrix<float, 2, 3> pixel = Eigen::Matrix<float, 2, 3>::Zero();
+    Eigen::Vector3f weight = Eigen::Vector3f::Zero();  ///< 0: the photo does not show that corner
+    Eigen::Matrix3f light = Eigen::Matrix3f::Ones();
+  };
+  struct Range {
+    std::size_t begin = 0, end = 0;
+    bool is_large = false;  ///< a face: too large to interpolate
+  };
+
+  const Range& looks_at_vertex(std::uint32_t vertex);
+  const Range& photos_of_face(std::uint32_t face);
+  /// The same for one photo that shows at least one corner; false if it cannot be interpolated.
+  bool add_photo(const Mesh::Face& face, std::uint16_t photo);
+  [[nodiscard]] PointColour look(const Mesh::Face& face, const Eigen::Vector3d& weights,
+                                 const Eigen::Vector3d& inside) const;
+
+  std::span<const PhotoView> views_;
+  const RigLight& light_;
+  const Mesh& mesh_;
+  const BlendOptions& options_;
+  std::unordered_map<std::uint32_t, Range> of_vertex_, of_face_;
+  std::vector<PhotoLook> looks_;  ///< of vertices
+  std::vector<Corners> photos_;   ///< of faces
+  std::vector<PhotoLook> found_;
+  std::vector<PaintSample> samples_;
+};
+
+}  // namespace scanrig
