@@ -1,10 +1,12 @@
 #include "pipeline/calibration/corners/disc_fit.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
 #include "pipeline/calibration/corners/small_fit.h"
 
@@ -39,8 +41,10 @@ RimDistance rim_distance(const DiscShape& shape, const Eigen::Vector2d& from_cen
 /// 1 inside, -1 outside.
 double level_at(const RimDistance& rim, double blur) { return -std::erf(rim.pixels / (blur * std::numbers::sqrt2)); }
 
-/// Offset and gain of every colour by linear least squares; returns the sum of squared residuals.
-double fit_levels(FitVector& p, std::span<const FitPixel> pixels, int colours, const DiscShape& shape) {
+/// Offset and gain of every colour by linear least squares; returns the sum of squared residuals. `level_of`: of a
+/// pixel.
+template <class LevelOf>
+double fit_levels(FitVector& p, std::span<const FitPixel> pixels, int colours, const LevelOf& level_of) {
   double cost = 0.0;
   for (int colour = 0; colour < colours; ++colour) {
     Eigen::Matrix2d normal = 1e-6 * Eigen::Matrix2d::Identity();
@@ -48,8 +52,7 @@ double fit_levels(FitVector& p, std::span<const FitPixel> pixels, int colours, c
     double squares = 0.0;
     for (const FitPixel& pixel : pixels) {
       if (pixel.colour != colour) continue;
-      const Eigen::Vector2d row(
-          1.0, level_at(rim_distance(shape, pixel.place - p.head<2>(), std::exp(p[3])), std::exp(p[2])));
+      const Eigen::Vector2d row(1.0, level_of(pixel));
       normal += row * row.transpose();
       slope += row * pixel.value;
       squares += pixel.value * pixel.value;
@@ -59,6 +62,57 @@ double fit_levels(FitVector& p, std::span<const FitPixel> pixels, int colours, c
     cost += squares - levels.dot(slope);
   }
   return cost;
+}
+
+/// The disc as predicted, 1 px blurred, shifted by whole pixels: levels on a grid, each computed once.
+class ShiftedLevels {
+ public:
+  ShiftedLevels(std::span<const FitPixel> pixels, int largest_shift, const DiscShape& shape) {
+    Eigen::AlignedBox2d box;
+    for (const FitPixel& pixel : pixels) box.extend(pixel.place);
+    const auto room = Eigen::Vector2d::Constant(largest_shift);
+    first_ = box.min() - room;
+    const Eigen::Vector2d size = box.max() + room - first_;
+    columns_ = static_cast<int>(std::lround(size.x())) + 1;
+    const int rows = static_cast<int>(std::lround(size.y())) + 1;
+    for (int row = 0; row < rows; ++row) {
+      for (int column = 0; column < columns_; ++column) {
+        levels_.push_back(level_at(rim_distance(shape, first_ + Eigen::Vector2d(column, row), 1.0), 1.0));
+      }
+    }
+  }
+  /// Where the disc is shifted by (x, y), at most `largest_shift`.
+  [[nodiscard]] double at(const FitPixel& pixel, int x, int y) const {
+    const int column = static_cast<int>(std::lround(pixel.place.x() - first_.x())) - x;
+    const int row = static_cast<int>(std::lround(pixel.place.y() - first_.y())) - y;
+    return levels_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+                   static_cast<std::size_t>(column)];
+  }
+
+ private:
+  Eigen::Vector2d first_{0.0, 0.0};
+  int columns_ = 0;
+  std::vector<double> levels_;
+};
+
+/// The whole shift within `search_px` that explains the pixels best, with blur and size as predicted.
+FitVector best_start(std::span<const FitPixel> pixels, int colours, const DiscShape& shape, double search_px) {
+  const int steps = static_cast<int>(std::ceil(search_px));
+  const ShiftedLevels levels(pixels, steps, shape);
+  FitVector best = FitVector::Zero(kFirstDiscColour + 2 * colours);
+  double best_cost = fit_levels(best, pixels, colours, [&](const FitPixel& pixel) { return levels.at(pixel, 0, 0); });
+  for (int y = -steps; y <= steps; ++y) {
+    for (int x = -steps; x <= steps; ++x) {
+      FitVector p = FitVector::Zero(best.size());
+      p.head<2>() << x, y;
+      const double cost = fit_levels(p, pixels, colours, [&](const FitPixel& pixel) { return levels.at(pixel, x, y); });
+      if (cost < best_cost) {
+        best_cost = cost;
+        best = p;
+      }
+    }
+  }
+  return best;
 }
 
 using ColourWeights = std::array<double, 3>;
@@ -149,7 +203,8 @@ Eigen::Matrix2d DiscShape::jacobian(const Eigen::Vector2d& from_centre) const {
 
 double explained_by_disc(std::span<const FitPixel> pixels, int colours, const DiscShape& shape) {
   FitVector p = FitVector::Zero(kFirstDiscColour + 2 * colours);
-  double explained = -fit_levels(p, pixels, colours, shape);
+  double explained = -fit_levels(
+      p, pixels, colours, [&](const FitPixel& pixel) { return level_at(rim_distance(shape, pixel.place, 1.0), 1.0); });
   for (int colour = 0; colour < colours; ++colour) {
     double count = 0.0;
     double sum = 0.0;
@@ -168,20 +223,7 @@ double explained_by_disc(std::span<const FitPixel> pixels, int colours, const Di
 std::optional<Disc> fit_disc(std::span<const FitPixel> pixels, int colours, const DiscShape& shape, double search_px) {
   const int unknowns = kFirstDiscColour + 2 * colours;
   if (static_cast<int>(pixels.size()) < 3 * unknowns) return std::nullopt;
-  FitVector best = FitVector::Zero(unknowns);
-  double best_cost = fit_levels(best, pixels, colours, shape);
-  const int steps = static_cast<int>(std::ceil(search_px));
-  for (int y = -steps; y <= steps; ++y) {
-    for (int x = -steps; x <= steps; ++x) {
-      FitVector p = FitVector::Zero(unknowns);
-      p.head<2>() << x, y;
-      const double cost = fit_levels(p, pixels, colours, shape);
-      if (cost < best_cost) {
-        best_cost = cost;
-        best = p;
-      }
-    }
-  }
+  FitVector best = best_start(pixels, colours, shape, search_px);
   // Colours differ in noise, the brighter ones have more: each counts by what the fit before leaves of it.
   ColourWeights weights{};
   for (int round = 0; round < 2; ++round) {

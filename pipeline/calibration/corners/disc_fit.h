@@ -39,8 +39,8 @@ struct Disc {
 /// of the light.
 double explained_by_disc(std::span<const FitPixel> pixels, int colours, const DiscShape& shape);
 
-/// Fits the image of a disc: shift, blur, size, gain and offset per colour. `pixels` are relative to `shape.centre()`.
-/// The shift is found within `search_px`. No value: not converged. Threads: any.
+/// Fits the image of a disc: shift, blur, size, gain and offset per colour. `pixels` are relative to `shape.centre()`,
+/// whole pixels from each other. The shift is found within `search_px`. No value: not converged. Threads: any.
 std::optional<Disc> fit_disc(std::span<const FitPixel> pixels, int colours, const DiscShape& shape, double search_px);
 
 }  // namespace scanrig
