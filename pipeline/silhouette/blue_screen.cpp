@@ -85,9 +85,9 @@ void remove_parts(cv::Mat1b& mask, double smallest, int connectivity) {
 }
 
 cv::Mat3f smoothed(const cv::Mat& image) {
-  cv::Mat3f colour, smooth;
-  image.convertTo(colour, CV_32F, image.depth() == CV_16U ? 1.0 / kMergedUnitsPerGrey : 1.0);
-  cv::boxFilter(colour, smooth, CV_32F, {3, 3}, {-1, -1}, true, cv::BORDER_REPLICATE);
+  cv::Mat3f smooth;
+  cv::boxFilter(image, smooth, CV_32F, {3, 3}, {-1, -1}, true, cv::BORDER_REPLICATE);
+  if (image.depth() == CV_16U) smooth *= 1.0 / kMergedUnitsPerGrey;
   return smooth;
 }
 
@@ -158,7 +158,7 @@ cv::Mat3f colour_around(const cv::Mat3f& image, const cv::Mat1b& mask, const Blu
 
 /// 1/2 - alpha, alpha the object's share in a pixel's light. Only a pixel near the mask's edge can be mixed; its light
 /// is compared there with the object's and the screen's colour nearby.
-cv::Mat1f outside_share(const cv::Mat3f& image, const cv::Mat1b& object, const BlueScreenOptions& options) {
+cv::Mat1f outside_share_in(const cv::Mat3f& image, const cv::Mat1b& object, const BlueScreenOptions& options) {
   const cv::Mat1b screen(255 - object);
   const cv::Mat3f object_colour = colour_around(image, object, options);
   const cv::Mat3f screen_colour = colour_around(image, screen, options);
@@ -181,6 +181,20 @@ cv::Mat1f outside_share(const cv::Mat3f& image, const cv::Mat1b& object, const B
   return field;
 }
 
+/// The same of a whole image: beyond the colours around the object all of it is screen.
+cv::Mat1f outside_share(const cv::Mat& image, const cv::Mat1b& object, const BlueScreenOptions& options) {
+  const int margin = options.colour_window_px + options.mixed_band_px;
+  cv::Rect box = cv::boundingRect(object);
+  box = cv::Rect(box.x - margin, box.y - margin, box.width + 2 * margin, box.height + 2 * margin) &
+        cv::Rect({0, 0}, object.size());
+  cv::Mat1f field(object.size(), 0.5f);
+  if (box.empty()) return field;
+  cv::Mat3f colour;
+  image(box).convertTo(colour, CV_32F);
+  outside_share_in(colour, object(box), options).copyTo(field(box));
+  return field;
+}
+
 bool touches_border(const cv::Mat1b& mask) {
   const int right = mask.cols - 2, bottom = mask.rows - 2;
   return cv::countNonZero(mask.rowRange(0, 2)) + cv::countNonZero(mask.rowRange(bottom, mask.rows)) +
@@ -192,9 +206,7 @@ bool touches_border(const cv::Mat1b& mask) {
 
 cv::Mat1f outline_near(const cv::Mat& image, const cv::Mat1b& mask, const cv::Mat1b& surely_object,
                        const BlueScreenOptions& options) {
-  cv::Mat3f colour;
-  image.convertTo(colour, CV_32F);
-  cv::Mat1f field = outside_share(colour, mask, options);
+  cv::Mat1f field = outside_share(image, mask, options);
   field.setTo(-0.5f, surely_object);
   return contour_distance(field);
 }
@@ -207,8 +219,6 @@ Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const cv::Mat& patte
   if (!pattern.empty() && (pattern.size() != image.size() || pattern.channels() != 3)) {
     return fail(ErrorCode::invalid_input, "silhouette: the images of both lights differ in size or channels");
   }
-  cv::Mat3f colour;
-  image.convertTo(colour, CV_32F);
   const cv::Mat3f smooth = smoothed(image);
   const Screen screen_colour = screen_at_border(smooth, options);
   if (screen_colour.share == 0.0) {
@@ -237,7 +247,7 @@ Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const cv::Mat& patte
     return fail(ErrorCode::out_of_range,
                 "silhouette: the object reaches the border of the image, it is larger than the working volume");
   }
-  return contour_distance(outside_share(colour, object, options));
+  return contour_distance(outside_share(image, object, options));
 }
 
 }  // namespace scanrig

@@ -69,9 +69,7 @@ cv::Mat1f contour_distance(const cv::Mat1f& field) {
   // Beyond the band: the foot point of the nearest pixel beside the line.
   cv::Mat1b away(field.size());
   std::vector<cv::Vec2f> feet(1);
-  for (int y = 0; y < field.rows; ++y) {
-    for (int x = 0; x < field.cols; ++x) away(y, x) = band.square(y, x) <= 1.0f ? 0 : 255;
-  }
+  cv::compare(band.square, 1.0, away, cv::CMP_GT);
   cv::Mat1f distance;
   cv::Mat1i labels;
   cv::distanceTransform(away, distance, labels, cv::DIST_L2, cv::DIST_MASK_5, cv::DIST_LABEL_PIXEL);
@@ -84,13 +82,17 @@ cv::Mat1f contour_distance(const cv::Mat1f& field) {
     }
   }
   for (int y = 0; y < field.rows; ++y) {
+    const float *square = band.square[y], *outside = field[y];
+    const int* label = labels[y];
+    float* out = distance[y];
     for (int x = 0; x < field.cols; ++x) {
-      float d = std::sqrt(band.square(y, x));
-      if (d > static_cast<float>(kBand) && feet.size() > 1) {
-        const cv::Vec2f foot = feet[static_cast<std::size_t>(labels(y, x))];
-        d = std::min(d, std::hypot(foot[0] - static_cast<float>(x), foot[1] - static_cast<float>(y)));
+      float square_here = square[x];
+      if (square_here > static_cast<float>(kBand * kBand) && feet.size() > 1) {
+        const cv::Vec2f foot = feet[static_cast<std::size_t>(label[x])];
+        const float right = foot[0] - static_cast<float>(x), down = foot[1] - static_cast<float>(y);
+        square_here = std::min(square_here, right * right + down * down);
       }
-      distance(y, x) = field(y, x) > 0 ? d : -d;
+      out[x] = std::copysign(std::sqrt(square_here), outside[x] > 0 ? 1.0f : -1.0f);
     }
   }
   return distance;

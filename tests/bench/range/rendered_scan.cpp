@@ -60,11 +60,7 @@ cv::Mat1f disparity_of(const cv::Mat1f& depth, const Rectification& r) {
   return disparity;
 }
 
-struct RenderedScan {
-  ScanFolder scan;
-  Rectification rectification;
-  Truth truth;  ///< as the rectified cameras see it
-};
+}  // namespace
 
 Result<RenderedScan> open_rendered(const std::filesystem::path& folder) {
   auto scan = ScanFolder::open(folder);
@@ -79,8 +75,8 @@ Result<RenderedScan> open_rendered(const std::filesystem::path& folder) {
   return RenderedScan{std::move(*scan), std::move(*rectification), std::move(seen)};
 }
 
-DisparityPair compare(const RangeImage& range, const Truth& truth, const TrueView& view, const TrueView& near_table,
-                      const Rectification& r) {
+DisparityPair true_disparities(const RenderedScan& scan, const TrueView& view) {
+  const Truth& truth = scan.truth;
   DisparityPair pair;
   const TrueImage& left = view.left();
   cv::Mat1f depth = left.depth.clone();
@@ -104,16 +100,27 @@ DisparityPair compare(const RangeImage& range, const Truth& truth, const TrueVie
         const double cosine = std::clamp((image->centre - point).normalized().dot(normal), -1.0, 1.0);
         pair.incidence(v, u) = std::max(pair.incidence(v, u), static_cast<float>(to_degrees(std::acos(cosine))));
       }
-      pair.seen_by_all(v, u) = near_table.observes(point, normal) ? 255 : 0;
+      pair.seen_by_all(v, u) = view.observes(point, normal) ? 255 : 0;
     }
   });
-  pair.truth = disparity_of(depth, r);
+  pair.truth = disparity_of(depth, scan.rectification);
+  return pair;
+}
+
+DisparityPair compare(const RangeImage& range, const RenderedScan& scan, const TrueView& view) {
+  const Rectification& r = scan.rectification;
+  DisparityPair pair = true_disparities(scan, view);
   pair.measured = disparity_of(range.depth, r);
   pair.sigma = range.sigma.mul(r.left.fx * r.baseline_mm / range.depth.mul(range.depth));
   return pair;
 }
 
-}  // namespace
+ObservableRule every_point() {
+  ObservableRule all;
+  all.max_incidence_deg = 88.0;
+  all.depth_jump_mm = 1e9;
+  return all;
+}
 
 Result<nlohmann::json> measure_scan(const std::filesystem::path& folder, double rows_px) {
   auto opened = open_rendered(folder);
@@ -137,12 +144,8 @@ Result<nlohmann::json> measure_scan(const std::filesystem::path& folder, double 
       seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
       views += 1.0;
       for (const RowOffset& cell : view->range.row_offsets.cells) rows = std::max(rows, std::abs(cell.offset_px));
-      // Every point that all three see, however steep and near to a step.
-      ObservableRule all;
-      all.max_incidence_deg = 88.0;
-      all.depth_jump_mm = 1e9;
-      const TrueView seen(truth, *surface, truth.poses[pose], truth.poses[pose].angles_deg[v], all);
-      const DisparityPair pair = compare(view->range, truth, seen, seen, rectification);
+      const TrueView seen(truth, *surface, truth.poses[pose], truth.poses[pose].angles_deg[v], every_point());
+      const DisparityPair pair = compare(view->range, *opened, seen);
       figures.add(pair);
       const cv::Mat1f& depth = view->range.depth;
       for (int y = 0; y < depth.rows; ++y) {
