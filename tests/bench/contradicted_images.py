@@ -7,7 +7,7 @@ import change_image
 
 VIEWS, CASES = 16, 60
 # Of each kind of change: its share of the cases, what has to be named, and whether colours are needed for it.
-KINDS = {"sticker": (15, ("silhouette",), False), "tint": (15, ("silhouette", "photograph"), True),
+KINDS = {"sticker": (15, ("silhouette", "photograph"), True), "tint": (15, ("silhouette", "photograph"), True),
          "shadow": (8, ("photograph",), True), "reflection": (7, ("photograph", "silhouette"), True),
          "crept": (15, ("object moved",), False)}
 ONLY_HANDLING = ("--profile", "workshop", "--without", "optics,sensor,projector,materials,turntable,drift,room",
