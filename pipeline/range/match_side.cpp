@@ -53,7 +53,8 @@ WindowOptions steps(int max_iterations) {
 void add_shared_noise(DisparityPatch& patch, float factor) {
   constexpr float kUnknowns = 8.0F;
   const auto side = static_cast<float>(2 * patch.radius + 1);
-  const float taken = std::min(0.5F, kUnknowns * factor * factor / (side * side));
+  const float pixels = side * side / static_cast<float>(rows_apart(patch.radius));
+  const float taken = std::min(0.5F, kUnknowns * factor * factor / pixels);
   patch.sigma *= factor / std::sqrt(1.0F - taken);
 }
 

@@ -18,6 +18,8 @@ template <int R>
 class Window {
  public:
   static constexpr int kSide = 2 * R + 1;
+  static constexpr int kRowStep = rows_apart(R);  // of the rows that are used; the middle one is
+  static constexpr int kFirstRow = R % kRowStep;
   static constexpr int kBlocks = (kSide + kLanes - 1) / kLanes;  // of lanes in a row
 
   SCANRIG_LANES Window(const MatchImage& here, const MatchMask& mask, int u, int v, const DisparityPatch& patch,
@@ -28,7 +30,7 @@ class Window {
     return u >= R && v >= R && u - R + kBlocks * kLanes <= here.value.cols && v + R < here.value.rows;
   }
   SCANRIG_LANES bool usable(const WindowOptions& options) const {
-    return count_ >= static_cast<double>(options.min_support) * kSide * kSide && variance_ > 1e-3;
+    return kRowStep * count_ >= static_cast<double>(options.min_support) * kSide * kSide && variance_ > 1e-3;
   }
   SCANRIG_LANES DisparityPatch match(const MatchImage& there, DisparityPatch patch, const WindowOptions& options);
   SCANRIG_LANES WindowResidual residual(const MatchImage& there, const DisparityPatch& patch) const;
@@ -62,7 +64,7 @@ class Window {
   SCANRIG_LANES Fit compare(const MatchImage& there, const DisparityPatch& patch, bool is_last) const;
   SCANRIG_LANES double correlation_by_chance() const {
     const double slopes = slopes_ / (variance_ * count_);  // 1 / l^2
-    return 1.0 / std::sqrt(std::max(1.0, count_ * std::min(1.0, slopes / std::numbers::pi)));
+    return 1.0 / std::sqrt(std::max(1.0, kRowStep * count_ * std::min(1.0 / kRowStep, slopes / std::numbers::pi)));
   }
 
   int u_, v_;
@@ -85,7 +87,7 @@ Window<R>::Window(const MatchImage& here, const MatchMask& mask, int u, int v, c
     Lanes x;
     x_of(block, x);
     const LaneInts is_inside = x <= static_cast<float>(R);
-    for (int row = 0; row < kSide; ++row) {
+    for (int row = kFirstRow; row < kSide; row += kRowStep) {
       const int line = v + row - R;
       const float y = static_cast<float>(row - R);
       Lanes value, slope, coarse;
@@ -108,7 +110,7 @@ Window<R>::Window(const MatchImage& here, const MatchMask& mask, int u, int v, c
       slope_[row][block] = is_used ? slope : none;
     }
     Lanes values = {}, weights = {};
-    for (int row = 0; row < kSide; ++row) {
+    for (int row = kFirstRow; row < kSide; row += kRowStep) {
       values += value_[row][block];
       weights += weight_[row][block];
     }
@@ -127,7 +129,7 @@ void Window<R>::assemble() {
   double squares = 0.0;
   for (int block = 0; block < kBlocks; ++block) {
     Lanes ggs[5] = {}, gs[3] = {}, gls[3] = {}, square = {};
-    for (int row = 0; row < kSide; ++row) {
+    for (int row = kFirstRow; row < kSide; row += kRowStep) {
       const float y = static_cast<float>(row - R) / R;
       Lanes& value = value_[row][block];
       value -= mean_ * weight_[row][block];
@@ -201,7 +203,7 @@ typename Window<R>::Fit Window<R>::compare(const MatchImage& there, const Dispar
   for (int block = 0; block < kBlocks; ++block) {
     Lanes moments[3] = {}, s = {}, ss = {}, sl = {};
     Lanes ms = {}, mss = {}, msl = {}, ml = {}, mll = {}, mn = {};  // of the middle rows
-    for (int row = 0; row < kSide; ++row) {
+    for (int row = kFirstRow; row < kSide; row += kRowStep) {
       Lanes there_value;
       sample(there_value, there, patch, row, block);
       const float y = static_cast<float>(row - R) / R;
@@ -306,19 +308,22 @@ DisparityPatch Window<R>::match(const MatchImage& there, DisparityPatch patch, c
 
 template <int R>
 WindowResidual Window<R>::residual(const MatchImage& there, const DisparityPatch& patch) const {
-  WindowResidual out{kSide, {}, {}, {}};
+  constexpr std::size_t kPixels = std::size_t{kSide} * kSide;
+  WindowResidual out{kSide, std::vector<float>(kPixels), std::vector<float>(kPixels),
+                     std::vector<std::uint8_t>(kPixels)};
   const Fit fit = compare(there, patch, false);
   const float gain = static_cast<float>(fit.gain), offset = static_cast<float>(fit.offset);
-  for (int row = 0; row < kSide; ++row) {
+  for (int row = kFirstRow; row < kSide; row += kRowStep) {
     for (int block = 0; block < kBlocks; ++block) {
       Lanes there_value;
       sample(there_value, there, patch, row, block);
       const Lanes weight = weight_[row][block], slope = slope_[row][block];
       const Lanes residual = (gain * (there_value - mean_) + offset - value_[row][block]) * weight;
       for (int k = 0; k < kLanes && block * kLanes + k < kSide; ++k) {
-        out.residual.push_back(residual[k]);
-        out.slope.push_back(slope[k]);
-        out.used.push_back(weight[k] > 0.0F ? 1 : 0);
+        const auto at = static_cast<std::size_t>(row * kSide + block * kLanes + k);
+        out.residual[at] = residual[k];
+        out.slope[at] = slope[k];
+        out.used[at] = weight[k] > 0.0F ? 1 : 0;
       }
     }
   }

@@ -86,7 +86,8 @@ TEST(Retriangulate, OfCamerasThatHaveNotMovedChangesNothing) {
   const cv::Mat1f truth = test::true_depth(rig.rectification.left, frames.left_from_turntable, rig.ball);
   View view = rig.matched(frames, truth);
   retriangulate(view, rig.rectification, frames, kAngle);
-  cv::Mat1f apart = cv::abs(view.range.depth - truth);
+  cv::Mat1f apart;
+  cv::absdiff(view.range.depth, truth, apart);
   cv::patchNaNs(apart, 0.0);
   EXPECT_LT(cv::norm(apart, cv::NORM_INF), 2e-4);
 }
