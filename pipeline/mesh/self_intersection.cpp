@@ -23,8 +23,15 @@ bool crosses(const Eigen::Vector3d& p, const Eigen::Vector3d& q, const Triangle&
   return (u > 0.0 && v > 0.0 && w > 0.0) || (u < 0.0 && v < 0.0 && w < 0.0);
 }
 
+/// Whether `b` lies on one side of the plane of `a`.
+bool is_beside(const Triangle& a, const Triangle& b) {
+  const double first = volume(a[0], a[1], a[2], b[0]);
+  return first * volume(a[0], a[1], a[2], b[1]) > 0.0 && first * volume(a[0], a[1], a[2], b[2]) > 0.0;
+}
+
 /// Two triangles cross if an edge of one crosses the other.
 bool cross(const Triangle& a, const Triangle& b) {
+  if (is_beside(a, b) || is_beside(b, a)) return false;
   for (int k = 0; k < 3; ++k) {
     if (crosses(a[k], a[(k + 1) % 3], b) || crosses(b[k], b[(k + 1) % 3], a)) return true;
   }

@@ -208,22 +208,22 @@ FieldValue Field::from_class_table(const Eigen::Vector3f& point, const Neighbour
 PointEvidence Field::evidence_at(const Eigen::Vector3f& point) const {
   PointEvidence result;
   std::vector<WeightedDistance> counted;
-  const Neighbourhood all = everywhere();
   float weight = 0.0F, sum = 0.0F, variance = 0.0F;
-  for (const auto* view : all.views) {
-    const RangeSample s = view->sample(point);
-    if (s.kind != RangeSample::Kind::surface) continue;
-    const float w = s.weight * taper(s.distance, band_);
-    weight += w;
-    sum += w * s.distance;
-    variance += w * w * s.sigma * s.sigma;
-    result.normal += w * s.normal;
-    if (std::abs(s.distance) < std::max(class_threshold_, view_sigmas_ * s.sigma)) {
-      ++result.views;
-      counted.push_back({s.distance, s.sigma, w});
+  for (const auto& views : views_of_pose_) {
+    for (const auto& view : views) {
+      const RangeSample s = view.sample(point);
+      if (s.kind != RangeSample::Kind::surface) continue;
+      const float w = s.weight * taper(s.distance, band_);
+      weight += w;
+      sum += w * s.distance;
+      variance += w * w * s.sigma * s.sigma;
+      result.normal += w * s.normal;
+      if (std::abs(s.distance) < std::max(class_threshold_, view_sigmas_ * s.sigma)) {
+        ++result.views;
+        counted.push_back({s.distance, s.sigma, w});
+      }
     }
   }
-  result.value = at(point, all);
   if (!(weight > 0.0F)) return result;
   result.surface_distance = sum / weight;
   result.normal.normalize();

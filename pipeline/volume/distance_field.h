@@ -37,7 +37,6 @@ struct Scatter {
 
 /// Data of the range images for a point of the surface.
 struct PointEvidence {
-  FieldValue value;
   float surface_distance = 0.0F;  ///< weighted mean of the views' distances, without hull and free space
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   int views = 0;       ///< that measured the surface within a voxel of the point

@@ -316,16 +316,21 @@ class Surplus {
     const Eigen::Vector3f eye = -(own.rotation.transpose() * own.translation);
     const float middle = (box_.center() - eye).norm() / ray.norm(), reach = 0.5F * box_.diagonal().norm() / ray.norm();
     const auto step = static_cast<float>(options_.contour_px * projection.mm_per_pixel(static_cast<double>(middle)));
-    for (float depth = middle - reach; depth <= middle + reach; depth += step) {
-      const Eigen::Vector3f point = eye + depth * ray;
-      if (!box_.contains(point)) continue;
-      int outside = 0;
-      for (std::size_t o = 0; o < outlines_.size() && outside < options_.min_silhouettes; ++o) {
-        if (o != s && outlines_[o].puts_outside(point, options_.contour_px)) ++outside;
-      }
-      if (outside < options_.min_silhouettes) return false;
+    // From the middle, where the object is: most rays meet it.
+    for (float away = 0.0F; away <= reach; away += step) {
+      if (!is_outside(s, eye + (middle + away) * ray) || !is_outside(s, eye + (middle - away) * ray)) return false;
     }
     return true;
+  }
+
+  /// Of at least `min_silhouettes` others, or of the box.
+  [[nodiscard]] bool is_outside(std::size_t s, const Eigen::Vector3f& point) const {
+    if (!box_.contains(point)) return true;
+    int outside = 0;
+    for (std::size_t o = 0; o < outlines_.size() && outside < options_.min_silhouettes; ++o) {
+      if (o != s && outlines_[o].puts_outside(point, options_.contour_px)) ++outside;
+    }
+    return outside >= options_.min_silhouettes;
   }
 
   const std::vector<Outline>& outlines_;
