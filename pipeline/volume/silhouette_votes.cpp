@@ -250,29 +250,43 @@ void forget_background(View& view, std::size_t camera, const cv::Mat1b& region) 
   view.range.background.setTo(0, region);
 }
 
+/// Where the outline and the votes are, and so much around that farther out only "far outside" matters.
+cv::Rect box_to_mend(const cv::Mat1f& outside_px, const Votes& votes) {
+  constexpr int kRoom = 96;  // px
+  const cv::Rect box = cv::boundingRect(cv::Mat1b((outside_px <= 0.0F) | votes.surface | votes.against));
+  const cv::Rect grown(box.x - kRoom, box.y - kRoom, box.width + 2 * kRoom, box.height + 2 * kRoom);
+  return grown & cv::Rect({0, 0}, outside_px.size());
+}
+
 /// The rim is mended without a word: it is no single image's.
 std::optional<SilhouetteFinding> mend(const Outline& outline, View& view, const Votes& votes,
                                       const SilhouetteVoteOptions& options) {
-  cv::Mat1f outside = outline.silhouette->outside_px.clone();  // copies of a view share their pixels
-  const cv::Mat1b contradicted = contradicted_part(outside, votes.against, options);
+  cv::Mat1f all = outline.silhouette->outside_px.clone();  // copies of a view share their pixels
+  const cv::Rect box = box_to_mend(all, votes);
+  if (box.empty()) return std::nullopt;
+  cv::Mat1f outside(all, box);
+  const cv::Mat1b against(votes.against, box), surface(votes.surface, box);
+  const cv::Mat1b contradicted = contradicted_part(outside, against, options);
   const cv::Mat1b region = region_to_mend(outside, contradicted, options);
-  cv::Mat1b mended(region | covered_rim(outside, votes.surface, options));
+  const cv::Mat1b mended(region | covered_rim(outside, surface, options));
   if (cv::countNonZero(mended) == 0) return std::nullopt;
   cv::Mat1b object;
-  cv::morphologyEx(votes.surface, object, cv::MORPH_CLOSE, disc(2 * options.stride_px));
-  SilhouetteFinding finding{.view = view.index, .camera = outline.camera, .views = median_votes(votes.against, region)};
+  cv::morphologyEx(surface, object, cv::MORPH_CLOSE, disc(2 * options.stride_px));
+  SilhouetteFinding finding{.view = view.index, .camera = outline.camera, .views = median_votes(against, region)};
   finding.area_px = cv::countNonZero(region);
   finding.share = std::min(1.0, cv::countNonZero(region & object) / std::max(1.0, 1.0 * cv::countNonZero(object)));
+  cv::Mat1b all_mended(all.size(), uchar{0});
   if (finding.share > options.max_contradicted) {
     finding.kind = SilhouetteFinding::Kind::whole;
-    mended.setTo(255);
-    outside.setTo(-std::numeric_limits<float>::max());
+    all_mended.setTo(255);
+    all.setTo(-std::numeric_limits<float>::max());
   } else {
+    mended.copyTo(all_mended(box));
     outside.setTo(-1.0F, mended);
-    outside = contour_distance(outside);
+    contour_distance(outside).copyTo(outside);
   }
-  outline.silhouette->outside_px = outside;
-  forget_background(view, outline.camera, mended);
+  outline.silhouette->outside_px = all;
+  forget_background(view, outline.camera, all_mended);
   if (cv::countNonZero(contradicted) == 0) return std::nullopt;
   return finding;
 }
