@@ -42,7 +42,7 @@ void BlockGrid::classify_blocks(const Field& field) {
     Eigen::Vector3i b(0, 0, static_cast<int>(z));
     for (b.y() = 0; b.y() < size_.y(); ++b.y()) {
       for (b.x() = 0; b.x() < size_.x(); ++b.x()) {
-        if (field.at(position(kBlockSide * b), everywhere).distance < 0.0F) slot_[linear(b)] = kInside;
+        if (field.is_inside(position(kBlockSide * b), everywhere)) slot_[linear(b)] = kInside;
       }
     }
   });

@@ -205,6 +205,11 @@ FieldValue Field::from_class_table(const Eigen::Vector3f& point, const Neighbour
   return {std::clamp(std::max(distance, outside), -band_, band_), distance > 0.0F ? Support::free : Support::bounds};
 }
 
+bool Field::is_inside(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const {
+  // Beyond that no measurement makes a point inside.
+  return !neighbourhood.hull.is_beyond(point, hull_tolerance_) && at(point, neighbourhood).distance < 0.0F;
+}
+
 PointEvidence Field::evidence_at(const Eigen::Vector3f& point) const {
   PointEvidence result;
   std::vector<WeightedDistance> counted;

@@ -60,6 +60,8 @@ class Field {
   [[nodiscard]] Neighbourhood everywhere() const;
 
   [[nodiscard]] FieldValue at(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;
+  /// Whether at() is negative; faster outside.
+  [[nodiscard]] bool is_inside(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;
   [[nodiscard]] PointEvidence evidence_at(const Eigen::Vector3f& point) const;
   [[nodiscard]] PoseDistance pose_distance(const Eigen::Vector3f& point, std::size_t pose) const;
   [[nodiscard]] std::size_t poses() const { return views_of_pose_.size(); }

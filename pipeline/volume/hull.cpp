@@ -24,6 +24,14 @@ float Hull::distance(const Eigen::Vector3f& p) const {
   return result;
 }
 
+bool Hull::is_beyond(const Eigen::Vector3f& p, float limit) const {
+  return std::max((box_.min() - p).maxCoeff(), (p - box_.max()).maxCoeff()) > limit ||
+         std::any_of(tables_.begin(), tables_.end(),
+                     [&](const auto& table) { return table.signedDistance(p) > limit; }) ||
+         std::any_of(outlines_.begin(), outlines_.end(),
+                     [&](const auto& outline) { return outline.distance(p) > limit; });
+}
+
 Hull Hull::near(const Eigen::Vector3f& centre, float radius, float band) const {
   Hull result = *this;
   // A contour's distance changes by about a millimetre per millimetre; a quarter is left for perspective.

@@ -19,6 +19,9 @@ class Hull {
   /// The largest of the distances to all bounds.
   [[nodiscard]] float distance(const Eigen::Vector3f& point_in_model) const;
 
+  /// Whether distance() is more than `limit`; faster.
+  [[nodiscard]] bool is_beyond(const Eigen::Vector3f& point_in_model, float limit) const;
+
   /// The same hull without the silhouettes that cannot matter within `radius` of `centre` while values below `-band`
   /// are equivalent.
   [[nodiscard]] Hull near(const Eigen::Vector3f& centre, float radius, float band) const;
