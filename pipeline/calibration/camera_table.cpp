@@ -11,8 +11,9 @@ constexpr double kMargin = 0.15;  // of the image's width around it: what the le
 
 }  // namespace
 
-CameraTable::CameraTable(const Camera& camera) : camera_(camera) {
-  camera_.camera_from_turntable = Transform::Identity();
+CameraTable::CameraTable(const Camera& camera) {
+  Camera at_origin = camera;
+  at_origin.camera_from_turntable = Transform::Identity();
   const Projection& p = camera.projection;
   const double margin = kMargin * p.width;
   first_ = {-margin, -margin};
@@ -23,13 +24,13 @@ CameraTable::CameraTable(const Camera& camera) : camera_(camera) {
   for (int row = 0; row < rows_; ++row) {
     for (int column = 0; column < columns_; ++column) {
       const Eigen::Vector2d pinhole = first_ + stride_ * Eigen::Vector2d(column, row);
-      added_.emplace_back(camera_.project(p.unproject(pinhole.x(), pinhole.y(), 1.0)) - pinhole);
+      added_.emplace_back(at_origin.project(p.unproject(pinhole.x(), pinhole.y(), 1.0)) - pinhole);
     }
   }
 }
 
 /// Beyond the table its border counts on: nothing there is in the image.
-Eigen::Vector2d CameraTable::added_at(const Eigen::Vector2d& pinhole_pixel) const {
+Eigen::Vector2d CameraTable::distorted(const Eigen::Vector2d& pinhole_pixel) const {
   const double x = std::clamp((pinhole_pixel.x() - first_.x()) / stride_, 0.0, columns_ - 1.001);
   const double y = std::clamp((pinhole_pixel.y() - first_.y()) / stride_, 0.0, rows_ - 1.001);
   const int column = static_cast<int>(x), row = static_cast<int>(y);
@@ -37,20 +38,8 @@ Eigen::Vector2d CameraTable::added_at(const Eigen::Vector2d& pinhole_pixel) cons
   const Eigen::Vector2d* above =
       &added_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) + static_cast<std::size_t>(column)];
   const Eigen::Vector2d* below = above + columns_;
-  return (1.0 - down) * ((1.0 - right) * above[0] + right * above[1]) +
+  return pinhole_pixel + (1.0 - down) * ((1.0 - right) * above[0] + right * above[1]) +
          down * ((1.0 - right) * below[0] + right * below[1]);
-}
-
-Eigen::Vector2d CameraTable::project(const Eigen::Vector3d& point_in_camera) const {
-  const Eigen::Vector2d pinhole = camera_.projection.project(point_in_camera);
-  return pinhole + added_at(pinhole);
-}
-
-Eigen::Vector3d CameraTable::ray(const Eigen::Vector2d& pixel) const {
-  constexpr int kRounds = 5;  // each leaves a tenth of the error or less: what lenses add changes slowly
-  Eigen::Vector2d pinhole = pixel;
-  for (int round = 0; round < kRounds; ++round) pinhole = pixel - added_at(pinhole);
-  return camera_.projection.unproject(pinhole.x(), pinhole.y(), 1.0);
 }
 
 }  // namespace scanrig

@@ -5,10 +5,8 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <limits>
 #include <opencv2/imgproc.hpp>
 
-#include "core/parallel.h"
 #include "core/units.h"
 
 namespace scanrig {
@@ -17,7 +15,6 @@ namespace {
 using FourLanes = float __attribute__((vector_size(16)));
 using FourBytes = std::uint8_t __attribute__((vector_size(4)));
 
-constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 /// Two neighbouring pixels whose depths differ by more than this many pixel widths belong to two surfaces: steeper than
 /// any used incidence (tan 79 deg).
 constexpr float kStep = 5.0F;
@@ -32,27 +29,9 @@ std::array<float, 4> cubic(float t) {
           0.5F * (t3 - t2)};
 }
 
-/// The pixels that can show the mesh.
-cv::Rect window_of(const Mesh& mesh, const Photo& photo, const CameraTable& camera,
-                   const Transform& camera_from_model) {
-  Eigen::AlignedBox2d box;
-  for (const auto& v : mesh.vertices) {
-    const Eigen::Vector3d in_camera = camera_from_model * v.cast<double>();
-    if (in_camera.z() > 0.0) box.extend(camera.project(in_camera));
-  }
-  if (box.isEmpty()) return {};
-  const Eigen::Array2d size(photo.image.cols, photo.image.rows);
-  const Eigen::Array2d low = box.min().array().floor().max(-2.0).min(size) - 2.0;
-  const Eigen::Array2d high = box.max().array().ceil().max(-2.0).min(size) + 3.0;
-  const cv::Rect wanted(cv::Point(static_cast<int>(low.x()), static_cast<int>(low.y())),
-                        cv::Point(static_cast<int>(high.x()), static_cast<int>(high.y())));
-  return wanted & cv::Rect(0, 0, photo.image.cols, photo.image.rows);
-}
-
 }  // namespace
 
-PhotoView::PhotoView(const Photo& photo, const Mesh& mesh, const SurfaceIndex& scene, const TextureOptions& options,
-                     double typical)
+PhotoView::PhotoView(const Photo& photo, const Mesh& mesh, const TextureOptions& options, double typical)
     : photo_(&photo),
       camera_(photo.camera),
       camera_from_model_(photo.camera.camera_from_turntable * photo.turntable_from_model),
@@ -62,47 +41,40 @@ PhotoView::PhotoView(const Photo& photo, const Mesh& mesh, const SurfaceIndex& s
       edge_px_(options.edge_px),
       edge_fade_px_(options.edge_fade_px),
       saturated_(options.saturated),
-      window_(window_of(mesh, photo, camera_, camera_from_model_)) {
-  depth_ = cv::Mat1f(window_.size(), kNan);
-  edge_px_away_ = cv::Mat1f(window_.size(), 0.0F);
-  if (window_.empty()) return;
-  cast(scene);
-  find_edges();
-}
-
-void PhotoView::cast(const SurfaceIndex& scene) {
-  const Eigen::Matrix3d model_from_camera = camera_from_model_.linear().transpose();
-  parallel_for(static_cast<std::size_t>(window_.height), [&](std::size_t row) {
-    const int y = static_cast<int>(row);
-    for (int x = 0; x < window_.width; ++x) {
-      const Eigen::Vector3d ray = model_from_camera * camera_.ray({x + window_.x, y + window_.y});
-      if (const auto hit = scene.first_hit(centre_, ray)) depth_(y, x) = static_cast<float>(hit->distance);
-    }
-  });
+      seen_(draw_depth(mesh, photo.camera.projection, camera_from_model_)) {
+  edge_px_away_ = cv::Mat1f(seen_.window.size(), 0.0F);
+  if (!seen_.window.empty()) find_edges();
 }
 
 void PhotoView::find_edges() {
   const float mm_per_px_at_1mm = static_cast<float>(1.0 / photo_->camera.projection.fx);
   // Written so that NaN (no mesh) against a number is a step as well.
   const auto step = [&](float a, float b) { return !(std::abs(a - b) <= kStep * mm_per_px_at_1mm * std::min(a, b)); };
-  cv::Mat1b inside(window_.size(), uchar{0});
-  parallel_for(static_cast<std::size_t>(window_.height), [&](std::size_t row) {
-    const int y = static_cast<int>(row);
-    for (int x = 0; x < window_.width; ++x) {
-      const float z = depth_(y, x);
-      const bool edge = std::isnan(z) || x == 0 || y == 0 || x == window_.width - 1 || y == window_.height - 1 ||
-                        step(z, depth_(y, x - 1)) || step(z, depth_(y, x + 1)) || step(z, depth_(y - 1, x)) ||
-                        step(z, depth_(y + 1, x));
+  const cv::Mat1f& depth = seen_.depth;
+  cv::Mat1b inside(depth.size(), uchar{0});
+  for (int y = 1; y + 1 < depth.rows; ++y) {
+    for (int x = 1; x + 1 < depth.cols; ++x) {
+      const float z = depth(y, x);
+      const bool edge = std::isnan(z) || step(z, depth(y, x - 1)) || step(z, depth(y, x + 1)) ||
+                        step(z, depth(y - 1, x)) || step(z, depth(y + 1, x));
       inside(y, x) = edge ? uchar{0} : uchar{255};
     }
-  });
+  }
   cv::distanceTransform(inside, edge_px_away_, cv::DIST_L2, cv::DIST_MASK_5);
 }
 
 void PhotoView::leave_out(const cv::Mat1b& mask) {
-  if (window_.empty()) return;
+  if (seen_.window.empty()) return;
+  cv::Mat1b kept(seen_.window.size(), uchar{255});
+  for (int y = 0; y < kept.rows; ++y) {
+    for (int x = 0; x < kept.cols; ++x) {
+      const Eigen::Vector2d pixel = camera_.distorted({x + seen_.window.x, y + seen_.window.y});
+      const cv::Point at(static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y())));
+      if (at.inside({0, 0, mask.cols, mask.rows}) && mask(at) != 0) kept(y, x) = 0;
+    }
+  }
   cv::Mat1f away;
-  cv::distanceTransform(mask(window_) == 0, away, cv::DIST_L2, cv::DIST_MASK_5);
+  cv::distanceTransform(kept, away, cv::DIST_L2, cv::DIST_MASK_5);
   edge_px_away_ = cv::min(edge_px_away_, away);
 }
 
@@ -112,15 +84,15 @@ std::optional<Sight> PhotoView::look(const Eigen::Vector3d& point, const Eigen::
   const Eigen::Vector3d in_camera = camera_from_model_ * point;
   const double z = in_camera.z();
   if (z <= 0.0) return std::nullopt;
-  const Eigen::Vector2d pixel = camera_.project(in_camera);
-  const double x = pixel.x() - window_.x;
-  const double y = pixel.y() - window_.y;
-  if (!(x >= 1.0 && y >= 1.0 && x < window_.width - 2 && y < window_.height - 2)) return std::nullopt;
+  const Eigen::Vector2d pinhole = photo_->camera.projection.project(in_camera);
+  const double x = pinhole.x() - seen_.window.x;
+  const double y = pinhole.y() - seen_.window.y;
+  if (!(x >= 1.0 && y >= 1.0 && x < seen_.window.width - 2 && y < seen_.window.height - 2)) return std::nullopt;
 
   const int near_x = static_cast<int>(std::lround(x));
   const int near_y = static_cast<int>(std::lround(y));
   // NaN (no mesh there) fails the comparison.
-  if (!(z <= depth_(near_y, near_x) + kSlack * z / photo_->camera.projection.fx)) return std::nullopt;
+  if (!(z <= seen_.depth(near_y, near_x) + kSlack * z / photo_->camera.projection.fx)) return std::nullopt;
 
   const int ix = static_cast<int>(x);
   const int iy = static_cast<int>(y);
@@ -131,6 +103,8 @@ std::optional<Sight> PhotoView::look(const Eigen::Vector3d& point, const Eigen::
   const double fade = std::min(1.0, (away - edge_px_) / edge_fade_px_);
   if (fade <= 0.0) return std::nullopt;
 
+  const Eigen::Vector2d pixel = camera_.distorted(pinhole);
+  if (!photo_->camera.projection.contains(pixel, 1.0)) return std::nullopt;
   const double beyond = (cosine - cos_limit_) / (1.0 - cos_limit_);
   const double quality = beyond * beyond * px_per_mm_at_1mm_ / z;
   return Sight{pixel, fade * fade * quality};
@@ -139,7 +113,7 @@ std::optional<Sight> PhotoView::look(const Eigen::Vector3d& point, const Eigen::
 std::optional<Eigen::Vector2d> PhotoView::pixel_of(const Eigen::Vector3d& point) const {
   const Eigen::Vector3d in_camera = camera_from_model_ * point;
   if (in_camera.z() <= 0.0) return std::nullopt;
-  return camera_.project(in_camera);
+  return camera_.distorted(photo_->camera.projection.project(in_camera));
 }
 
 Sample PhotoView::sample(const Eigen::Vector2f& pixel) const {

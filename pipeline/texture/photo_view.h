@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "pipeline/calibration/camera_table.h"
-#include "pipeline/mesh/surface_index.h"
+#include "pipeline/texture/depth_map.h"
 #include "pipeline/texture/texture.h"
 
 namespace scanrig {
@@ -24,9 +24,8 @@ struct Sample {
 /// A photo together with the mesh surface it shows. Refers to the given photo; threads: const functions from any.
 class PhotoView {
  public:
-  /// Casts one ray per pixel. `typical_px_per_mm` is the resolution with weight 1.
-  PhotoView(const Photo& photo, const Mesh& mesh, const SurfaceIndex& scene, const TextureOptions& options,
-            double typical_px_per_mm);
+  /// `typical_px_per_mm` is the resolution with weight 1.
+  PhotoView(const Photo& photo, const Mesh& mesh, const TextureOptions& options, double typical_px_per_mm);
 
   /// The place of `point` with unit `normal` (model frame, mm) in the photo; nothing if the photo does not show it.
   [[nodiscard]] std::optional<Sight> look(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const;
@@ -45,7 +44,6 @@ class PhotoView {
   [[nodiscard]] Eigen::Vector3d towards(const Eigen::Vector3d& point) const { return (centre_ - point).normalized(); }
 
  private:
-  void cast(const SurfaceIndex& scene);
   void find_edges();
 
   const Photo* photo_;
@@ -55,9 +53,8 @@ class PhotoView {
   double px_per_mm_at_1mm_;  ///< focal length over the typical resolution
   double cos_limit_, edge_px_, edge_fade_px_;
   int saturated_;
-  cv::Rect window_;         ///< the pixels that can show the mesh; the two maps cover it
-  cv::Mat1f depth_;         ///< z in the camera frame, mm; NaN where the photo shows no mesh
-  cv::Mat1f edge_px_away_;  ///< distance to the nearest depth edge or outline
+  DepthMap seen_;           ///< in pixels of a camera without distortion
+  cv::Mat1f edge_px_away_;  ///< of the same window: distance to the nearest depth edge or outline
 };
 
 /// Pixels per millimetre in the middle of the mesh, median over the photos.

@@ -161,8 +161,6 @@ void draw_atlas(const AtlasLayout& layout, std::span<const PhotoView> views, con
 Result<TexturedModel> texture_mesh(const Mesh& mesh, std::span<const Photo> photos, const TextureOptions& options,
                                    const Context& context) {
   if (auto good = check(mesh, photos, options); !good) return pass_on(good);
-  auto scene = SurfaceIndex::create(mesh);
-  if (!scene) return pass_on(scene, "texture");
   const auto stopped = [] { return fail(ErrorCode::stopped, "texture: stopped"); };
 
   TexturedModel model;
@@ -173,7 +171,7 @@ Result<TexturedModel> texture_mesh(const Mesh& mesh, std::span<const Photo> phot
   const double px_per_mm = typical_px_per_mm(mesh, photos);
   std::vector<std::optional<PhotoView>> made(photos.size());
   parallel_for(made.size(), [&](std::size_t p) {
-    if (!context.stopped()) made[p].emplace(photos[p], out, *scene, options, px_per_mm);
+    if (!context.stopped()) made[p].emplace(photos[p], out, options, px_per_mm);
   });
   if (context.stopped()) return stopped();
   std::vector<PhotoView> views;
