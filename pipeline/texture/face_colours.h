@@ -4,7 +4,6 @@
 #include <array>
 #include <cstdint>
 #include <span>
-#include <unordered_map>
 #include <vector>
 
 #include "pipeline/texture/photo_looks.h"
@@ -33,14 +32,20 @@ class FaceColours {
     Eigen::Matrix3f light = Eigen::Matrix3f::Ones();
   };
   struct Range {
-    std::size_t begin = 0, end = 0;
+    std::uint32_t begin = 0, end = 0;
     bool is_large = false;  ///< a face: too large to interpolate
   };
+  /// What is known of the vertices or faces that were asked for.
+  struct Known {
+    std::vector<std::uint32_t> slot;  ///< of each vertex or face, from 1; 0: not asked for yet
+    std::vector<Range> ranges;
+  };
 
-  const Range& looks_at_vertex(std::uint32_t vertex);
-  const Range& photos_of_face(std::uint32_t face);
-  /// The same for one photo that shows at least one corner; false if it cannot be interpolated.
-  bool add_photo(const Mesh::Face& face, std::uint16_t photo);
+  Range looks_at_vertex(std::uint32_t vertex);
+  Range photos_of_face(std::uint32_t face);
+  /// One photo at the corners of a face; a corner that it does not show has no look. False if it cannot be
+  /// interpolated.
+  bool add_photo(const Mesh::Face& face, std::uint16_t photo, const std::array<const PhotoLook*, 3>& seen);
   [[nodiscard]] PointColour look(const Mesh::Face& face, const Eigen::Vector3d& weights,
                                  const Eigen::Vector3d& inside) const;
 
@@ -48,7 +53,7 @@ class FaceColours {
   const RigLight& light_;
   const Mesh& mesh_;
   const BlendOptions& options_;
-  std::unordered_map<std::uint32_t, Range> of_vertex_, of_face_;
+  Known of_vertex_, of_face_;
   std::vector<PhotoLook> looks_;  ///< of vertices
   std::vector<Corners> photos_;   ///< of faces
   std::vector<PhotoLook> found_;

@@ -135,15 +135,17 @@ void draw_atlas(const AtlasLayout& layout, std::span<const PhotoView> views, con
   const cv::Size size = layout.owner.size();
   const auto gain = static_cast<float>(model.exposure_gain);
   model.mesh.atlas = cv::Mat3b(size, to_srgb(gain * mean_colour(colours)));
-  constexpr int kTile = 64;  // texels: a face's photos are looked up once in each
-  const int across = (size.width + kTile - 1) / kTile, down = (size.height + kTile - 1) / kTile;
-  parallel_for(static_cast<std::size_t>(across) * static_cast<std::size_t>(down), [&](std::size_t tile) {
-    const int left = static_cast<int>(tile) % across * kTile, top = static_cast<int>(tile) / across * kTile;
+  constexpr int kStrip = 64, kTile = 64;  // texels: a face's photos are looked up once in a strip; tile after tile
+  const int strips = (size.height + kStrip - 1) / kStrip;
+  parallel_for(static_cast<std::size_t>(strips), [&](std::size_t strip) {
+    const int top = static_cast<int>(strip) * kStrip, bottom = std::min(top + kStrip, size.height);
     FaceColours of_faces(views, model.light, model.mesh.mesh, options.blending);
-    for (int y = top; y < std::min(top + kTile, size.height); ++y) {
-      for (int x = left; x < std::min(left + kTile, size.width); ++x) {
-        if (layout.owner(y, x) < 0) continue;
-        model.mesh.atlas(y, x) = texel_colour(layout, model, colours, options, of_faces, x, y);
+    for (int left = 0; left < size.width; left += kTile) {
+      for (int y = top; y < bottom; ++y) {
+        for (int x = left; x < std::min(left + kTile, size.width); ++x) {
+          if (layout.owner(y, x) < 0) continue;
+          model.mesh.atlas(y, x) = texel_colour(layout, model, colours, options, of_faces, x, y);
+        }
       }
     }
   });

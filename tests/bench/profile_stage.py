@@ -124,7 +124,7 @@ def hash_of(name):
 def print_largest(stacks):
     """Functions by the share of samples in which they appear."""
     counts = collections.Counter(name for names in stacks for name in set(names))
-    for name, count in counts.most_common(30):
+    for name, count in sorted(counts.items(), key=lambda item: -item[1])[:30]:
         print(f"{100 * count / len(stacks):6.1f} %  {name}")
 
 
