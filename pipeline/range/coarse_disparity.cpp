@@ -1,6 +1,7 @@
 #include "pipeline/range/coarse_disparity.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
@@ -39,11 +40,12 @@ struct Search {
   }
 };
 
-cv::Mat1f match(const cv::Mat1b& here, const cv::Mat1b& there, const Search& search, int speckle_px) {
+/// `is_checked`: only disparities to which the right image's cheapest ones lead back within a pixel.
+cv::Mat1f match(const cv::Mat1b& here, const cv::Mat1b& there, const Search& search, int speckle_px, bool is_checked) {
   constexpr int kBlock = 5;
   const auto matcher =
-      cv::StereoSGBM::create(search.lowest, search.count, kBlock, 4 * kBlock * kBlock, 24 * kBlock * kBlock, -1, 31, 3,
-                             speckle_px, 2, cv::StereoSGBM::MODE_SGBM_3WAY);
+      cv::StereoSGBM::create(search.lowest, search.count, kBlock, 4 * kBlock * kBlock, 24 * kBlock * kBlock,
+                             is_checked ? 1 : -1, 31, 3, speckle_px, 2, cv::StereoSGBM::MODE_SGBM_3WAY);
   cv::Mat1s fixed;
   matcher->compute(here, there, fixed);
   cv::Mat1f disparity(fixed.size());
@@ -62,17 +64,42 @@ cv::Mat1f flipped(const cv::Mat1f& image) {
   return out;
 }
 
-/// Of two images of one size, each in its turn.
-CoarseDisparity match_both(const cv::Mat1b& left, const cv::Mat1b& right, const Search& search, int speckle_px) {
+/// The left image's disparities at the right image's pixels: the nearest surface's where several meet, the mean of both
+/// sides in gaps of a pixel.
+cv::Mat1f seen_from_right(const cv::Mat1f& left) {
+  constexpr float kSame = 2.0F;  // px: both sides of a gap are one surface
+  cv::Mat1f right(left.size(), kUnmeasured);
+  for (int y = 0; y < left.rows; ++y) {
+    const float* from = left[y];
+    float* to = right[y];
+    for (int x = 0; x < left.cols; ++x) {
+      if (std::isnan(from[x])) continue;
+      const int landing = static_cast<int>(std::lround(static_cast<float>(x) - from[x]));
+      if (landing >= 0 && landing < left.cols && !(to[landing] >= from[x])) to[landing] = from[x];
+    }
+    for (int x = 1; x + 1 < left.cols; ++x) {
+      if (std::isnan(to[x]) && std::abs(to[x - 1] - to[x + 1]) < kSame) to[x] = 0.5F * (to[x - 1] + to[x + 1]);
+    }
+  }
+  return right;
+}
+
+/// Of two images of one size. `from_both`: each in its turn, for disparities that both confirm; else from the left.
+CoarseDisparity match_both(const cv::Mat1b& left, const cv::Mat1b& right, const Search& search, int speckle_px,
+                           bool from_both) {
   // OpenCV leaves out the columns whose search would leave the image.
   const int margin = std::max({std::abs(search.lowest), std::abs(search.lowest + search.count), 16});
   const cv::Mat1b a = widened(left, margin), b = widened(right, margin);
+  if (!from_both) {
+    const cv::Mat1f disparity = match(a, b, search, speckle_px, true).colRange(margin, margin + left.cols);
+    return {disparity, seen_from_right(disparity)};
+  }
   cv::Mat1b a_mirrored, b_mirrored;
   cv::flip(a, a_mirrored, 1);
   cv::flip(b, b_mirrored, 1);
   const cv::Range columns(margin, margin + left.cols);
-  return {match(a, b, search, speckle_px).colRange(columns),
-          flipped(match(b_mirrored, a_mirrored, search, speckle_px)).colRange(columns)};
+  return {match(a, b, search, speckle_px, false).colRange(columns),
+          flipped(match(b_mirrored, a_mirrored, search, speckle_px, false)).colRange(columns)};
 }
 
 /// The columns that show the object, and some around.
@@ -91,7 +118,7 @@ Search occurring(const cv::Mat1b& left, const cv::Mat1b& right, const Search& se
   cv::resize(right, b, {}, 1.0 / kScale, 1.0 / kScale, cv::INTER_AREA);
   const int highest = search.lowest + search.count;
   const CoarseDisparity small =
-      match_both(a, b, Search::between(search.lowest / kScale - 1, highest / kScale + 1), kSpeckle);
+      match_both(a, b, Search::between(search.lowest / kScale - 1, highest / kScale + 1), kSpeckle, false);
   const cv::Mat1f found = confirmed(small.left, small.right, -1.0F, 1.0F);
   cv::Mat1b known;
   cv::compare(found, found, known, cv::CMP_EQ);  // not NaN
@@ -115,9 +142,11 @@ CoarseDisparity coarse_disparity(const RectifiedPair& pair, cv::Range rows) {
   cv::copyMakeBorder(right, right, 0, 0, 0, wider - right.cols, cv::BORDER_REPLICATE);
   Search search =
       Search::between(std::max(pair.min_disparity - shift, -wider), std::min(pair.max_disparity - shift, wider));
-  if (!pair.left_object.empty()) search = occurring(left, right, search);
+  // Masks leave no background to be matched wrongly, so one direction is enough.
+  const bool has_masks = !pair.left_object.empty() && !pair.right_object.empty();
+  if (has_masks) search = occurring(left, right, search);
   constexpr int kSpeckle = 60;
-  const CoarseDisparity boxes = match_both(left, right, search, kSpeckle);
+  const CoarseDisparity boxes = match_both(left, right, search, kSpeckle, !has_masks);
   CoarseDisparity out{cv::Mat1f(size, kUnmeasured), cv::Mat1f(size, kUnmeasured)};
   const auto paste = [&](const cv::Mat1f& box, cv::Range columns, cv::Mat1f& whole) {
     cv::add(box.colRange(0, columns.size()), static_cast<double>(shift), whole(rows, columns));
