@@ -148,10 +148,11 @@ Result<Rectification> rectify(const Calibration& calibration, const WorkingVolum
   return r;
 }
 
-Result<cv::Mat> rectified(const RectifyingMap& map, const cv::Mat& image) {
+Result<cv::Mat> rectified(const RectifyingMap& map, const cv::Mat& image, Resampling resampling) {
   if (const auto fits = check_image(map, image); !fits) return pass_on(fits);
   cv::Mat out;
-  cv::remap(image, out, map.u, map.v, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+  cv::remap(image, out, map.u, map.v, resampling == Resampling::cubic ? cv::INTER_CUBIC : cv::INTER_LINEAR,
+            cv::BORDER_REPLICATE);
   return out;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <opencv2/core/mat.hpp>
 
 #include "core/result.h"
@@ -37,9 +38,12 @@ struct WorkingVolume {
 /// `out_of_range` (no part of the working volume is seen by both cameras).
 Result<Rectification> rectify(const Calibration& calibration, const WorkingVolume& volume = {});
 
+/// Cubic, or, where no detail counts, linear in half the time.
+enum class Resampling : std::uint8_t { cubic, linear };
+
 /// A sensor image in the rectified grid, 8 bit, one or three channels; outside the sensor its border is continued.
 /// Fails with `invalid_input` for another size or type.
-Result<cv::Mat> rectified(const RectifyingMap& map, const cv::Mat& image);
+Result<cv::Mat> rectified(const RectifyingMap& map, const cv::Mat& image, Resampling resampling = Resampling::cubic);
 
 /// The same as grey float values without loss of sub-pixel position (cubic B-spline, prefiltered), for matching.
 /// Colour is weighted 1:2:1 (B, G, R), as often as a Bayer sensor samples them. Images of 16 bit are those of

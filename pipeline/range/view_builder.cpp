@@ -15,7 +15,7 @@ namespace {
 Result<Silhouette> silhouette_of(const cv::Mat& plain, const cv::Mat& pattern, const RectifyingMap& map,
                                  const Projection& projection, const Transform& camera_from_pose,
                                  const BlueScreenOptions& options) {
-  const auto image = rectified(map, plain), lit = rectified(map, pattern);
+  const auto image = rectified(map, plain), lit = rectified(map, pattern, Resampling::linear);
   if (!image) return pass_on(image);
   if (!lit) return pass_on(lit);
   try {
