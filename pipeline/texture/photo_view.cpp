@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <opencv2/imgproc.hpp>
 
 #include "core/units.h"
@@ -43,7 +44,23 @@ PhotoView::PhotoView(const Photo& photo, const Mesh& mesh, const TextureOptions&
       saturated_(options.saturated),
       seen_(draw_depth(mesh, photo.camera.projection, camera_from_model_)) {
   edge_px_away_ = cv::Mat1f(seen_.window.size(), 0.0F);
-  if (!seen_.window.empty()) find_edges();
+  if (seen_.window.empty()) return;
+  cut_at_border();
+  find_edges();
+}
+
+/// What the photo's border cuts off ends in an edge, towards which colours fade out.
+void PhotoView::cut_at_border() {
+  const cv::Rect& window = seen_.window;
+  for (int y = 0; y < window.height; ++y) {
+    for (int x = 0; x < window.width; ++x) {
+      const Eigen::Vector2d pinhole(x + window.x, y + window.y);
+      const bool is_seen = !std::isnan(seen_.depth(y, x));
+      if (is_seen && !photo_->camera.projection.contains(camera_.distorted(pinhole), 1.0)) {
+        seen_.depth(y, x) = std::numeric_limits<float>::quiet_NaN();
+      }
+    }
+  }
 }
 
 void PhotoView::find_edges() {

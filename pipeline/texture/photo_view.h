@@ -44,6 +44,7 @@ class PhotoView {
   [[nodiscard]] Eigen::Vector3d towards(const Eigen::Vector3d& point) const { return (centre_ - point).normalized(); }
 
  private:
+  void cut_at_border();
   void find_edges();
 
   const Photo* photo_;
