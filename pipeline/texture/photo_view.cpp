@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <limits>
@@ -152,16 +153,16 @@ Sample PhotoView::sample(const Eigen::Vector2f& pixel) const {
   // The fourth byte of a pixel is the next one's first: there is one.
   const bool is_inside = x >= 1 && y >= 1 && x + 3 < image.cols && y + 2 < image.rows;
   for (std::size_t j = 0; j < 4; ++j) {
-    const cv::Vec3b* row = image[std::clamp(y - 1 + static_cast<int>(j), 0, image.rows - 1)];
+    const uchar* row = image.ptr(std::clamp(y - 1 + static_cast<int>(j), 0, image.rows - 1));
     if (is_inside) {
       add(j, [&](int i) {
         FourBytes bytes;
-        std::memcpy(&bytes, row + x - 1 + i, sizeof(bytes));
+        std::memcpy(&bytes, row + std::ptrdiff_t{3} * (x - 1 + i), sizeof(bytes));
         return bytes;
       });
     } else {
       add(j, [&](int i) {
-        const cv::Vec3b& c = row[std::clamp(x - 1 + i, 0, image.cols - 1)];
+        const uchar* c = row + std::ptrdiff_t{3} * std::clamp(x - 1 + i, 0, image.cols - 1);
         return FourBytes{c[0], c[1], c[2], 0};
       });
     }

@@ -11,7 +11,8 @@ namespace {
 Mesh sheet(std::uint32_t side) {
   Mesh mesh;
   for (std::uint32_t i = 0; i < side * side; ++i) {
-    mesh.vertices.emplace_back(static_cast<float>(i % side), 0.0F, static_cast<float>(i / side));
+    const std::uint32_t row = i / side, column = i % side;
+    mesh.vertices.emplace_back(static_cast<float>(column), 0.0F, static_cast<float>(row));
   }
   for (std::uint32_t row = 0; row + 1 < side; ++row) {
     for (std::uint32_t column = 0; column + 1 < side; ++column) {
@@ -43,7 +44,7 @@ TEST(VertexNeighbours, AVertexWithoutFacesHasNone) {
 }
 
 TEST(VertexNeighbours, RoundsOfMeansAreAGaussian) {
-  constexpr std::uint32_t kSide = 41;
+  constexpr std::uint32_t kSide = 41, kMiddle = kSide / 2;
   constexpr int kRounds = 12;
   const Mesh mesh = sheet(kSide);
   std::vector<float> peak(mesh.vertices.size(), 0.0F);
@@ -51,7 +52,7 @@ TEST(VertexNeighbours, RoundsOfMeansAreAGaussian) {
   const std::vector<float> spread = VertexNeighbours(mesh).smoothed(peak, kRounds);
   double sum = 0.0, square = 0.0;
   for (std::size_t v = 0; v < spread.size(); ++v) {
-    const double off = static_cast<double>(mesh.vertices[v].x()) - kSide / 2;
+    const double off = static_cast<double>(mesh.vertices[v].x()) - kMiddle;
     sum += static_cast<double>(spread[v]);
     square += static_cast<double>(spread[v]) * off * off;
   }
