@@ -65,7 +65,8 @@ class RigCamerasTest : public testing::Test {
     const auto config = config::read_rig_config(folder_ / "rig.toml");
     ASSERT_TRUE(config) << config.error().message;
     config_ = *config;
-    config_.stereo_camera.aravis.frame_timeout *= kSlowness;  // a frame is sent when it is rendered
+    // A frame is sent when it is rendered; the first after a flip waits for a new scene, too.
+    config_.stereo_camera.aravis.frame_timeout = kSlowness * milliseconds(1500);
     lines_ = gpio::socket_lines(folder_ / "gpio.sock", clock_);
     projector_ = GpioProjector::open(config::gpio_projector_options(config_.projector), *lines_, clock_).value();
     auto camera = open_aravis(config_.stereo_camera.aravis, clock_, within(seconds(10)));
@@ -160,7 +161,8 @@ TEST_F(RigCamerasTest, ShowsTheOtherSideAfterTheFlipAndWritesTheTruthOfBoth) {
   const auto before = expose(Light::plain);
   EXPECT_EQ(send({{"turn_over", true}})["ok"], true);
   const auto after = expose(Light::plain);
-  ASSERT_TRUE(before && after);
+  ASSERT_TRUE(before) << before.error().message;
+  ASSERT_TRUE(after) << after.error().message;
   EXPECT_GT(difference(before->left, after->left), 40);
   EXPECT_EQ(send({{"write_truth", folder_}})["ok"], true);
   const auto truth = json::parse(*read_file(folder_ / "truth.json"));
