@@ -6,8 +6,7 @@
 namespace scanrig {
 namespace {
 
-constexpr int kCells = 160;       // across the image
-constexpr double kMargin = 0.15;  // of the image's width around it: what the lens pulls into the image
+constexpr int kCells = 160;  // across the image
 
 }  // namespace
 

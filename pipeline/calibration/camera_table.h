@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
 #include <vector>
 
 #include "pipeline/calibration/camera.h"
@@ -13,6 +12,9 @@ namespace scanrig {
 /// so any number of threads may use it.
 class CameraTable {
  public:
+  /// The table reaches this far around the image, of its width: a lens pulls no more into it.
+  static constexpr double kMargin = 0.15;
+
   explicit CameraTable(const Camera& camera);
 
   /// The pixel that shows what a camera without distortion shows at `pinhole_pixel`.

@@ -158,7 +158,7 @@ cv::Mat3f colour_around(const cv::Mat3f& image, const cv::Mat1b& mask, const Blu
 
 /// 1/2 - alpha, alpha the object's share in a pixel's light. Only a pixel near the mask's edge can be mixed; its light
 /// is compared there with the object's and the screen's colour nearby.
-cv::Mat1f outside_share_in(const cv::Mat3f& image, const cv::Mat1b& object, const BlueScreenOptions& options) {
+cv::Mat1f outside_share_within(const cv::Mat3f& image, const cv::Mat1b& object, const BlueScreenOptions& options) {
   const cv::Mat1b screen(255 - object);
   const cv::Mat3f object_colour = colour_around(image, object, options);
   const cv::Mat3f screen_colour = colour_around(image, screen, options);
@@ -191,7 +191,7 @@ cv::Mat1f outside_share(const cv::Mat& image, const cv::Mat1b& object, const Blu
   if (box.empty()) return field;
   cv::Mat3f colour;
   image(box).convertTo(colour, CV_32F);
-  outside_share_in(colour, object(box), options).copyTo(field(box));
+  outside_share_within(colour, object(box), options).copyTo(field(box));
   return field;
 }
 

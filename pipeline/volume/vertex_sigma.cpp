@@ -36,7 +36,7 @@ void widen_by_scatter(const VertexNeighbours& around, int rounds, const std::vec
 
 void widen_by_fine_shape(const VertexNeighbours& around, float share, float window_mm, Mesh& mesh) {
   if (!(window_mm > 0.0F) || !(share > 0.0F)) return;
-  // With G a Gaussian of the window's width, (1 - G)^2 keeps nothing of a quadratic but its constant fourth derivative.
+  // With G a Gaussian of the window's width, (1 - G)^2 leaves nothing of a quadratic.
   const int rounds = rounds_for(around, mesh, window_mm);
   const std::vector<Eigen::Vector3f> once = around.smoothed(mesh.vertices, rounds),
                                      twice = around.smoothed(once, rounds);
