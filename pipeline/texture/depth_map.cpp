@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "pipeline/calibration/camera_table.h"
+#include "pipeline/calibration/distortion_table.h"
 
 namespace scanrig {
 namespace {
@@ -32,7 +32,7 @@ cv::Rect window_of(const std::vector<Corner>& corners, const Projection& project
     if (c.inverse_depth > 0.0F) box.extend(Eigen::Vector2d(static_cast<double>(c.x), static_cast<double>(c.y)));
   }
   if (box.isEmpty()) return {};
-  const double margin = CameraTable::kMargin * projection.width;
+  const double margin = DistortionTable::kMargin * projection.width;
   const Eigen::Array2d lowest = Eigen::Array2d::Constant(-margin);
   const Eigen::Array2d highest = Eigen::Array2d(projection.width, projection.height) + margin;
   const Eigen::Array2d low = box.min().array().floor().max(lowest).min(highest) - 2.0;

@@ -35,7 +35,7 @@ std::array<float, 4> cubic(float t) {
 
 PhotoView::PhotoView(const Photo& photo, const Mesh& mesh, const TextureOptions& options, double typical)
     : photo_(&photo),
-      camera_(photo.camera),
+      distortion_(photo.camera),
       camera_from_model_(photo.camera.camera_from_turntable * photo.turntable_from_model),
       centre_(camera_from_model_.inverse().translation()),
       px_per_mm_at_1mm_(photo.camera.projection.fx / typical),
@@ -57,7 +57,7 @@ void PhotoView::cut_at_border() {
     for (int x = 0; x < window.width; ++x) {
       const Eigen::Vector2d pinhole(x + window.x, y + window.y);
       const bool is_seen = !std::isnan(seen_.depth(y, x));
-      if (is_seen && !photo_->camera.projection.contains(camera_.distorted(pinhole), 1.0)) {
+      if (is_seen && !photo_->camera.projection.contains(distortion_.distorted(pinhole), 1.0)) {
         seen_.depth(y, x) = std::numeric_limits<float>::quiet_NaN();
       }
     }
@@ -86,7 +86,7 @@ void PhotoView::leave_out(const cv::Mat1b& mask) {
   cv::Mat1b kept(seen_.window.size(), uchar{255});
   for (int y = 0; y < kept.rows; ++y) {
     for (int x = 0; x < kept.cols; ++x) {
-      const Eigen::Vector2d pixel = camera_.distorted({x + seen_.window.x, y + seen_.window.y});
+      const Eigen::Vector2d pixel = distortion_.distorted({x + seen_.window.x, y + seen_.window.y});
       const cv::Point at(static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y())));
       if (at.inside({0, 0, mask.cols, mask.rows}) && mask(at) != 0) kept(y, x) = 0;
     }
@@ -121,7 +121,7 @@ std::optional<Sight> PhotoView::look(const Eigen::Vector3d& point, const Eigen::
   const double fade = std::min(1.0, (away - edge_px_) / edge_fade_px_);
   if (fade <= 0.0) return std::nullopt;
 
-  const Eigen::Vector2d pixel = camera_.distorted(pinhole);
+  const Eigen::Vector2d pixel = distortion_.distorted(pinhole);
   if (!photo_->camera.projection.contains(pixel, 1.0)) return std::nullopt;
   const double beyond = (cosine - cos_limit_) / (1.0 - cos_limit_);
   const double quality = beyond * beyond * px_per_mm_at_1mm_ / z;
@@ -131,7 +131,7 @@ std::optional<Sight> PhotoView::look(const Eigen::Vector3d& point, const Eigen::
 std::optional<Eigen::Vector2d> PhotoView::pixel_of(const Eigen::Vector3d& point) const {
   const Eigen::Vector3d in_camera = camera_from_model_ * point;
   if (in_camera.z() <= 0.0) return std::nullopt;
-  return camera_.distorted(photo_->camera.projection.project(in_camera));
+  return distortion_.distorted(photo_->camera.projection.project(in_camera));
 }
 
 Sample PhotoView::sample(const Eigen::Vector2f& pixel) const {

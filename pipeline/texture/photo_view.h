@@ -4,7 +4,7 @@
 #include <opencv2/core/mat.hpp>
 #include <optional>
 
-#include "pipeline/calibration/camera_table.h"
+#include "pipeline/calibration/distortion_table.h"
 #include "pipeline/texture/depth_map.h"
 #include "pipeline/texture/texture.h"
 
@@ -48,7 +48,7 @@ class PhotoView {
   void find_edges();
 
   const Photo* photo_;
-  CameraTable camera_;
+  DistortionTable distortion_;
   Transform camera_from_model_;
   Eigen::Vector3d centre_;
   double px_per_mm_at_1mm_;  ///< focal length over the typical resolution

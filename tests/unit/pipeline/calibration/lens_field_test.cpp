@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "pipeline/calibration/camera.h"
-#include "pipeline/calibration/camera_table.h"
+#include "pipeline/calibration/distortion_table.h"
 
 namespace scanrig {
 namespace {
@@ -33,9 +33,9 @@ TEST(LensField, RaysHitThePixelTheyStartFrom) {
   EXPECT_LT(greatest, 1e-9);
 }
 
-TEST(CameraTable, GivesTheCamerasPixels) {
+TEST(DistortionTable, GivesTheCamerasPixels) {
   const Camera camera = camera_with_field();
-  const CameraTable table(camera);
+  const DistortionTable table(camera);
   double off = 0.0, added = 0.0;
   for (double v = -2.0; v < 962.0; v += 3.7) {
     for (double u = -2.0; u < 1282.0; u += 4.1) {

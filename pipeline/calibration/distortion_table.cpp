@@ -1,4 +1,4 @@
-#include "pipeline/calibration/camera_table.h"
+#include "pipeline/calibration/distortion_table.h"
 
 #include <algorithm>
 #include <cmath>
@@ -10,7 +10,7 @@ constexpr int kCells = 160;  // across the image
 
 }  // namespace
 
-CameraTable::CameraTable(const Camera& camera) {
+DistortionTable::DistortionTable(const Camera& camera) {
   Camera at_origin = camera;
   at_origin.camera_from_turntable = Transform::Identity();
   const Projection& p = camera.projection;
@@ -29,7 +29,7 @@ CameraTable::CameraTable(const Camera& camera) {
 }
 
 /// Beyond the table its border counts on: nothing there is in the image.
-Eigen::Vector2d CameraTable::distorted(const Eigen::Vector2d& pinhole_pixel) const {
+Eigen::Vector2d DistortionTable::distorted(const Eigen::Vector2d& pinhole_pixel) const {
   const double x = std::clamp((pinhole_pixel.x() - first_.x()) / stride_, 0.0, columns_ - 1.001);
   const double y = std::clamp((pinhole_pixel.y() - first_.y()) / stride_, 0.0, rows_ - 1.001);
   const int column = static_cast<int>(x), row = static_cast<int>(y);
