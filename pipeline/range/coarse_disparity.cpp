@@ -102,14 +102,6 @@ CoarseDisparity match_both(const cv::Mat1b& left, const cv::Mat1b& right, const 
           flipped(match(b_mirrored, a_mirrored, search, speckle_px, false)).colRange(columns)};
 }
 
-/// The columns that show the object, and some around.
-cv::Range object_columns(const cv::Mat1b& mask, cv::Range rows, int width) {
-  constexpr int kMargin = 32;  // more than the windows that flatten and aggregate
-  if (mask.empty()) return {0, width};
-  const cv::Rect box = cv::boundingRect(mask.rowRange(rows));
-  return {std::max(0, box.x - kMargin), std::min(width, box.x + box.width + kMargin)};
-}
-
 /// Those of `search` that occur, from images a quarter as large; all of it where too few are found there.
 Search occurring(const cv::Mat1b& left, const cv::Mat1b& right, const Search& search) {
   constexpr int kScale = 4, kMargin = 12, kSpeckle = 6, kFewest = 200;
@@ -131,28 +123,20 @@ Search occurring(const cv::Mat1b& left, const cv::Mat1b& right, const Search& se
 
 }  // namespace
 
-CoarseDisparity coarse_disparity(const RectifiedPair& pair, cv::Range rows) {
-  const cv::Size size = pair.left.size();
-  const cv::Range left_columns = object_columns(pair.left_object, rows, size.width);
-  const cv::Range right_columns = object_columns(pair.right_object, rows, size.width);
-  cv::Mat1b left = flattened(pair.left(rows, left_columns)), right = flattened(pair.right(rows, right_columns));
-  // In the boxes; their widths are made equal.
-  const int shift = left_columns.start - right_columns.start, wider = std::max(left.cols, right.cols);
-  cv::copyMakeBorder(left, left, 0, 0, 0, wider - left.cols, cv::BORDER_REPLICATE);
-  cv::copyMakeBorder(right, right, 0, 0, 0, wider - right.cols, cv::BORDER_REPLICATE);
-  Search search =
-      Search::between(std::max(pair.min_disparity - shift, -wider), std::min(pair.max_disparity - shift, wider));
+CoarseDisparity coarse_disparity(const RectifiedPair& pair, const PairBoxes& boxes) {
+  const cv::Mat1b left = flattened(pair.left(boxes.left)), right = flattened(pair.right(boxes.right));
+  const int shift = boxes.shift();
+  Search search = Search::between(std::max(pair.min_disparity - shift, -left.cols),
+                                  std::min(pair.max_disparity - shift, left.cols));
   // Masks leave no background to be matched wrongly, so one direction is enough.
   const bool has_masks = !pair.left_object.empty() && !pair.right_object.empty();
   if (has_masks) search = occurring(left, right, search);
   constexpr int kSpeckle = 60;
-  const CoarseDisparity boxes = match_both(left, right, search, kSpeckle, !has_masks);
+  const CoarseDisparity within = match_both(left, right, search, kSpeckle, !has_masks);
+  const cv::Size size = pair.left.size();
   CoarseDisparity out{cv::Mat1f(size, kUnmeasured), cv::Mat1f(size, kUnmeasured)};
-  const auto paste = [&](const cv::Mat1f& box, cv::Range columns, cv::Mat1f& whole) {
-    cv::add(box.colRange(0, columns.size()), static_cast<double>(shift), whole(rows, columns));
-  };
-  paste(boxes.left, left_columns, out.left);
-  paste(boxes.right, right_columns, out.right);
+  cv::add(within.left, static_cast<double>(shift), out.left(boxes.left));
+  cv::add(within.right, static_cast<double>(shift), out.right(boxes.right));
   return out;
 }
 

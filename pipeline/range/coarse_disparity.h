@@ -2,6 +2,7 @@
 
 #include <opencv2/core/mat.hpp>
 
+#include "pipeline/range/pair_boxes.h"
 #include "pipeline/range/stereo.h"
 
 namespace scanrig {
@@ -13,9 +14,9 @@ struct CoarseDisparity {
 };
 
 /// Semi-global matching [Hirschmueller 2008; OpenCV, MODE_SGBM_3WAY] on images freed of shading, each image in its
-/// turn. `rows`: the only rows that are matched. Of a pair with masks only their boxes are, and only the disparities
-/// that matching at a quarter of the size finds there. Throws what OpenCV throws.
-CoarseDisparity coarse_disparity(const RectifiedPair& pair, cv::Range rows);
+/// turn, in the boxes. Of a pair with masks only the disparities are searched that matching at a quarter of the size
+/// finds. Throws what OpenCV throws.
+CoarseDisparity coarse_disparity(const RectifiedPair& pair, const PairBoxes& boxes);
 
 /// Disparities that the other image's disparities confirm within a tolerance; surface seen by one camera only becomes
 /// NaN. `towards`: -1 from the left image to the right, +1 back.

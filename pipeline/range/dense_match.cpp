@@ -27,6 +27,11 @@ bool points_back(const DisparityPatch& patch, int u, int v, const Nodes& there, 
   return is_confirmed;
 }
 
+/// 1 on a lattice's line, falling to 0 at the next.
+float nearness(int pixel, int line, int stride) {
+  return 1.0F - static_cast<float>(std::abs(pixel - line)) / static_cast<float>(stride);
+}
+
 /// Pixels of the left image with the patch of their own surface.
 struct MatchedPixels {
   const MatchSide& forward;
@@ -43,8 +48,8 @@ struct MatchedPixels {
     return patch;
   }
 
-  /// From the matched pixels of a lattice: the mean of those beside (u, v) where their surfaces meet in it within their
-  /// sigma, else matched itself.
+  /// From the matched pixels of a lattice around (u, v): their mean, weighted by nearness, where their surfaces meet in
+  /// it; matched itself where they do not, or some are not matched; none where none is.
   [[nodiscard]] DisparityPatch at(const Nodes& lattice, int u, int v) const {
     const int stride = lattice.stride, column = u / stride, row = v / stride;
     const bool in_column = u % stride == 0, in_row = v % stride == 0;
@@ -53,22 +58,24 @@ struct MatchedPixels {
     const int last_column = column + (in_column ? 0 : 1), last_row = row + (in_row ? 0 : 1);
     if (mask.usable(v, u) == 0) return mean;
     if (last_column >= lattice.columns || last_row >= lattice.rows) return at(u, v);
-    float least = std::numeric_limits<float>::infinity(), most = -least, count = 0.0F;
+    float least = std::numeric_limits<float>::infinity(), most = -least, shares = 0.0F;
+    bool is_whole = true;
     for (int y = row; y <= last_row; ++y) {
       for (int x = column; x <= last_column; ++x) {
-        if (!lattice.at(x, y).valid) return at(u, v);
-        const DisparityPatch patch =
-            lattice.at(x, y).moved(static_cast<float>(u - x * stride), static_cast<float>(v - y * stride));
+        const DisparityPatch& node = lattice.at(x, y);
+        is_whole = is_whole && node.valid;
+        if (!node.valid) continue;
+        const DisparityPatch patch = node.moved(static_cast<float>(u - x * stride), static_cast<float>(v - y * stride));
+        const float share = nearness(u, x * stride, stride) * nearness(v, y * stride, stride);
         least = std::min(least, patch.c[0]);
         most = std::max(most, patch.c[0]);
-        for (std::size_t i = 0; i < 3; ++i) mean.c[i] += patch.c[i];
-        mean.sigma += patch.sigma;
-        count += 1.0F;
+        for (std::size_t i = 0; i < 3; ++i) mean.c[i] += share * patch.c[i];
+        mean.sigma += share * patch.sigma;
+        shares += share;
       }
     }
-    for (std::size_t i = 0; i < 3; ++i) mean.c[i] /= count;
-    mean.sigma /= count;
-    if (most - least > mean.sigma) return at(u, v);
+    if (shares == 0.0F) return mean;
+    if (!is_whole || most - least > options.lattice_sigmas * mean.sigma) return at(u, v);
     mean.valid = on_surface(mean, u, v);
     return mean;
   }
@@ -80,20 +87,56 @@ struct MatchedPixels {
   }
 };
 
-cv::Mat1b everywhere(const cv::Mat1b& mask, cv::Size size) { return mask.empty() ? cv::Mat1b(size, 255) : mask; }
+/// One image in its box: what it is compared with, and which of its pixels with what disparity towards the other one.
+struct BoxedSide {
+  LayeredImage image;
+  MatchMask mask;
+
+  BoxedSide(const cv::Mat1f& whole, const cv::Mat1b& object, const cv::Mat1f& disparity, const cv::Rect& box,
+            double smoothing_px)
+      : image(whole(box).clone(), smoothing_px),
+        mask{object.empty() ? cv::Mat1b(box.size(), 255) : object(box).clone(), disparity(box).clone()} {}
+};
+
+/// Matches every pixel of the lattice, then those between.
+void match_pixels(const MatchedPixels& pixels, Nodes& lattice, const StereoOptions& options, DenseDisparity& out,
+                  const Context& context) {
+  parallel_for(static_cast<std::size_t>(lattice.rows), [&](std::size_t row) {
+    if (context.stopped()) return;
+    const int v = static_cast<int>(row) * lattice.stride;
+    for (int column = 0; column < lattice.columns; ++column) {
+      lattice.at(column, static_cast<int>(row)) = pixels.at(column * lattice.stride, v);
+    }
+  });
+  context.report("range", 0.8);
+  parallel_for(static_cast<std::size_t>(out.value.rows), [&](std::size_t row) {
+    if (context.stopped()) return;
+    const int v = static_cast<int>(row);
+    for (int u = 0; u < out.value.cols; ++u) {
+      const DisparityPatch patch = pixels.at(lattice, u, v);
+      if (!patch.valid) continue;
+      out.value(v, u) = patch.c[0];
+      // Tilted away, the two windows differ by more than the model covers: factor from known truth, see README.md.
+      out.sigma(v, u) = patch.sigma * std::hypot(1.0f, patch.c[1] / options.tilt, patch.c[2] / options.tilt);
+      out.slope(v, u) = {patch.c[1], patch.c[2]};
+    }
+  });
+}
 
 }  // namespace
 
-Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDisparity& coarse,
+Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDisparity& coarse, const PairBoxes& boxes,
                                        const StereoOptions& options, const Context& context) {
   const cv::Size size = pair.left.size();
-  const LayeredImage left(pair.left, options.smoothing_px), right(pair.right, options.smoothing_px);
-  const cv::Mat1f coarse_left = confirmed(coarse.left, coarse.right, -1.0f, options.coarse_left_right_px);
-  cv::Mat1f coarse_right = confirmed(coarse.right, coarse.left, 1.0f, options.coarse_left_right_px);
-  coarse_right *= -1.0f;  // u_right - u_left, seen from the right
-  MatchMask left_mask{everywhere(pair.left_object, size), coarse_left};
-  MatchMask right_mask{everywhere(pair.right_object, size), coarse_right};
-  MatchSide forward(left, right, left_mask, options), backward(right, left, right_mask, options);
+  const cv::Mat1f sure_left = confirmed(coarse.left, coarse.right, -1.0f, options.coarse_left_right_px);
+  const cv::Mat1f sure_right = confirmed(coarse.right, coarse.left, 1.0f, options.coarse_left_right_px);
+  BoxedSide left(pair.left, pair.left_object, sure_left, boxes.left, options.smoothing_px);
+  BoxedSide right(pair.right, pair.right_object, sure_right, boxes.right, options.smoothing_px);
+  const auto shift = static_cast<float>(boxes.shift());
+  left.mask.disparity -= shift;
+  right.mask.disparity = shift - right.mask.disparity;  // u_right - u_left, seen from the right
+  MatchSide forward(left.image, right.image, left.mask, options),
+      backward(right.image, left.image, right.mask, options);
   forward.measure_noise();
   backward.set_noise(forward.noise());
   Nodes back = backward.match_nodes(options.right_node_stride_px, context);
@@ -108,31 +151,13 @@ Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDi
   nodes.curvature = node_curvature(nodes, options);
   context.report("range", 0.6);
 
-  const MatchedPixels pixels{forward, nodes, back, left_mask, options};
-  Nodes lattice(size, options.lattice_px);
-  parallel_for(static_cast<std::size_t>(lattice.rows), [&](std::size_t row) {
-    if (context.stopped()) return;
-    const int v = static_cast<int>(row) * lattice.stride;
-    for (int column = 0; column < lattice.columns; ++column) {
-      lattice.at(column, static_cast<int>(row)) = pixels.at(column * lattice.stride, v);
-    }
-  });
-  context.report("range", 0.8);
   DenseDisparity out{cv::Mat1f(size, kUnmeasured), cv::Mat1f(size, kUnmeasured),
                      cv::Mat2f(size, cv::Vec2f(kUnmeasured, kUnmeasured))};
-  parallel_for(static_cast<std::size_t>(size.height), [&](std::size_t row) {
-    if (context.stopped()) return;
-    const int v = static_cast<int>(row);
-    for (int u = 0; u < size.width; ++u) {
-      const DisparityPatch patch = pixels.at(lattice, u, v);
-      if (!patch.valid) continue;
-      out.value(v, u) = patch.c[0];
-      // Tilted away, the two windows differ by more than the model covers: factor from known truth, see README.md.
-      out.sigma(v, u) = patch.sigma * std::hypot(1.0f, patch.c[1] / options.tilt, patch.c[2] / options.tilt);
-      out.slope(v, u) = {patch.c[1], patch.c[2]};
-    }
-  });
+  DenseDisparity boxed{out.value(boxes.left), out.sigma(boxes.left), out.slope(boxes.left)};
+  Nodes lattice(boxes.left.size(), options.lattice_px);
+  match_pixels({forward, nodes, back, left.mask, options}, lattice, options, boxed, context);
   if (context.stopped()) return fail(ErrorCode::stopped, "range: stopped while matching");
+  boxed.value += shift;
   return out;
 }
 

@@ -16,9 +16,9 @@ struct DenseDisparity {
   cv::Mat2f slope;  ///< d value / du, d value / dv
 };
 
-/// Least-squares matching of every object pixel, from both images; only agreeing results are kept. Fails with
-/// `stopped`.
-Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDisparity& coarse,
+/// Least-squares matching of every object pixel in the boxes, from both images; only agreeing results are kept. Fails
+/// with `stopped`.
+Result<DenseDisparity> dense_disparity(const RectifiedPair& pair, const CoarseDisparity& coarse, const PairBoxes& boxes,
                                        const StereoOptions& options, const Context& context);
 
 /// Removes pixels that their surroundings contradict: lone pixels, specks, the rims of depth steps.

@@ -155,9 +155,9 @@ Result<FreeSpace> free_space(const Rectification& r, const RangeImage& range, co
                              const TwoLights& right, const FreeSpaceOptions& options) {
   try {
     const int infinity = static_cast<int>(std::floor(r.left.cx - r.right.cx));
-    const CoarseDisparity d = coarse_disparity(
-        {left.pattern, right.pattern, {}, {}, r.left, r.right.cx, r.baseline_mm, infinity, r.max_disparity},
-        {0, left.pattern.rows});
+    const RectifiedPair pair{left.pattern, right.pattern,  {}, {}, r.left, r.right.cx, r.baseline_mm,
+                             infinity,     r.max_disparity};
+    const CoarseDisparity d = coarse_disparity(pair, object_boxes(pair, {0, left.pattern.rows}));
     const Place in_left = place_of(r, true), in_right = place_of(r, false);
     Seen seen_left = seen_in(in_left, confirmed(d.left, d.right, -1.0f, options.coarse_agreement_px), options);
     Seen seen_right = seen_in(in_right, confirmed(d.right, d.left, 1.0f, options.coarse_agreement_px), options);

@@ -134,7 +134,7 @@ RowOffsets search(const RectifiedPair& pair, const RowAlignmentOptions& options)
 
 }  // namespace
 
-Result<RowField> align_rows(RectifiedPair& pair, CoarseDisparity& coarse, cv::Range rows,
+Result<RowField> align_rows(RectifiedPair& pair, CoarseDisparity& coarse, const PairBoxes& boxes,
                             const RowAlignmentOptions& options) {
   const RectifiedPair original = pair;
   RowField field;
@@ -162,7 +162,7 @@ Result<RowField> align_rows(RectifiedPair& pair, CoarseDisparity& coarse, cv::Ra
     field = offsets.right_field;
     move_rows(pair, original, field);
     if (offsets.largest_px > options.again_px && round == 0) {
-      coarse = coarse_disparity(pair, rows);
+      coarse = coarse_disparity(pair, boxes);
     }
   }
   return field;

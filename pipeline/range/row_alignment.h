@@ -24,12 +24,12 @@ struct RowAlignmentOptions {
 /// Measures the field of row offsets of a pair from coarse disparities, and moves the rows of the right image and its
 /// mask so that they correspond. The LEFT camera is held true: its pixels keep their lines of sight. Of the right image
 /// only rows move; columns stay as calibrated, so a disparity, and its depth, is that of the columns alone. `coarse` is
-/// computed again where rows were far off. `rows`: the only rows that are matched.
+/// computed again where rows were far off.
 /// Returns the field taken out, on the right image's pixels; zero where rows correspond or nothing is measured.
 /// Threads: spread over the current arena, same bits for any number.
 /// Fails with `refused`: rows are so far off that the calibration cannot be that of these cameras. Throws what OpenCV
 /// throws.
-Result<RowField> align_rows(RectifiedPair& pair, CoarseDisparity& coarse, cv::Range rows,
+Result<RowField> align_rows(RectifiedPair& pair, CoarseDisparity& coarse, const PairBoxes& boxes,
                             const RowAlignmentOptions& options = {});
 
 }  // namespace scanrig

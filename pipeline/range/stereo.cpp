@@ -88,20 +88,22 @@ Result<RangeImage> match_rectified(const RectifiedPair& given, const StereoOptio
   context.report("range", 0.0);
   if (context.stopped()) return fail(ErrorCode::stopped, "range: stopped before matching");
   RectifiedPair pair = given;
+  PairBoxes boxes;
   CoarseDisparity coarse;
   RowField corrected;
   try {
-    coarse = coarse_disparity(pair, rows);
+    boxes = object_boxes(pair, rows);
+    coarse = coarse_disparity(pair, boxes);
     RowAlignmentOptions alignment;
     alignment.max_px = options.max_rows_px;
-    const auto aligned = align_rows(pair, coarse, rows, alignment);
+    const auto aligned = align_rows(pair, coarse, boxes, alignment);
     if (!aligned) return pass_on(aligned);
     corrected = *aligned;
   } catch (const cv::Exception& error) {
     return fail(ErrorCode::internal, "range: semi-global matching: {}", error.what());
   }
   context.report("range", 0.2);
-  auto disparity = dense_disparity(pair, coarse, options, context);
+  auto disparity = dense_disparity(pair, coarse, boxes, options, context);
   if (!disparity) return pass_on(disparity);
   remove_outliers(*disparity, options);
   RangeImage range = to_range(pair, *disparity);

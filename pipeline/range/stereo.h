@@ -36,8 +36,9 @@ struct StereoOptions {
 
   // Search.
   int left_node_stride_px = 4;        ///< grid of the patches matched first
-  int right_node_stride_px = 3;       ///< the same in the right image
-  int lattice_px = 2;                 ///< pixels this far apart are matched; between them where surfaces bend
+  int right_node_stride_px = 4;       ///< the same in the right image
+  int lattice_px = 3;                 ///< pixels this far apart are matched, and between them where surfaces bend
+  float lattice_sigmas = 3.0f;        ///< the surfaces of neighbours of the lattice meet within so many sigma
   int coarse_iterations = 10;         ///< Gauss-Newton steps from a coarse disparity
   int node_iterations = 6;            ///< Gauss-Newton steps from a neighbouring patch
   int row_margin_px = 24;             ///< rows matched above and below the object

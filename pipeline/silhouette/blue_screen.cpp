@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pipeline/exposures/merge_exposures.h"
+#include "pipeline/silhouette/box_around.h"
 #include "pipeline/silhouette/contour_distance.h"
 
 namespace scanrig {
@@ -184,9 +185,7 @@ cv::Mat1f outside_share_within(const cv::Mat3f& image, const cv::Mat1b& object, 
 /// The same of a whole image: beyond the colours around the object all of it is screen.
 cv::Mat1f outside_share(const cv::Mat& image, const cv::Mat1b& object, const BlueScreenOptions& options) {
   const int margin = options.colour_window_px + options.mixed_band_px;
-  cv::Rect box = cv::boundingRect(object);
-  box = cv::Rect(box.x - margin, box.y - margin, box.width + 2 * margin, box.height + 2 * margin) &
-        cv::Rect({0, 0}, object.size());
+  const cv::Rect box = box_around(object, margin);
   cv::Mat1f field(object.size(), 0.5f);
   if (box.empty()) return field;
   cv::Mat3f colour;

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/parallel.h"
+#include "pipeline/silhouette/box_around.h"
 #include "pipeline/silhouette/contour_distance.h"
 #include "pipeline/volume/integrate.h"
 #include "pipeline/volume/range_sampler.h"
@@ -253,9 +254,7 @@ void forget_background(View& view, std::size_t camera, const cv::Mat1b& region) 
 /// Where the outline and the votes are, and so much around that farther out only "far outside" matters.
 cv::Rect box_to_mend(const cv::Mat1f& outside_px, const Votes& votes) {
   constexpr int kRoom = 96;  // px
-  const cv::Rect box = cv::boundingRect(cv::Mat1b((outside_px <= 0.0F) | votes.surface | votes.against));
-  const cv::Rect grown(box.x - kRoom, box.y - kRoom, box.width + 2 * kRoom, box.height + 2 * kRoom);
-  return grown & cv::Rect({0, 0}, outside_px.size());
+  return box_around(cv::Mat1b((outside_px <= 0.0F) | votes.surface | votes.against), kRoom);
 }
 
 /// The rim is mended without a word: it is no single image's.
