@@ -8,8 +8,9 @@
 namespace scanrig {
 namespace {
 
-/// Longest wait of a lamp for a quiet panel; part of panel_latency().
+/// Longest wait of a lamp for a quiet panel: while the station works, and while it does not.
 constexpr auto kLampWait = std::chrono::milliseconds(20);
+constexpr auto kIdleLampWait = std::chrono::milliseconds(100);
 constexpr auto kShowLimit = std::chrono::milliseconds(500);
 constexpr auto kRetry = std::chrono::seconds(1);  ///< after a panel that did not respond
 
@@ -29,7 +30,9 @@ std::vector<Event> changes(const PanelInputs& before, const PanelInputs& after) 
   return events;
 }
 
-Clock::Duration panel_latency(Clock::Duration read_time) { return PanelDebounce::kDebounce + kLampWait + read_time; }
+Clock::Duration panel_latency(Clock::Duration read_time) {
+  return PanelDebounce::kDebounce + kIdleLampWait + read_time;
+}
 
 PanelThread::PanelThread(Panel& panel, Clock& clock, PanelThreadOptions options, std::function<void(Event)> post_event,
                          std::function<void()> on_estop)
@@ -62,8 +65,8 @@ void PanelThread::run() {
       post_event_(event::PanelFailed{done.error()});
     }
     std::unique_lock lock(mutex_);
-    const auto pause = done ? clock_.now() : clock_.now() + kRetry;
-    if (clock_.wait_until(lock, changed_, pause, [this] { return stop_; })) break;
+    if (!done) clock_.wait_until(lock, changed_, clock_.now() + kRetry, [this] { return stop_; });
+    if (stop_) break;
   }
   std::ignore = show_wanted();  // the last lamps of the station; a panel that fails here was reported before
 }
@@ -83,8 +86,9 @@ Result<void> PanelThread::show_wanted() {
 
 Result<void> PanelThread::read_inputs() {
   // A panel whose first state is unread differs from nothing: compare with a quiet panel.
+  const auto wait = shown_ && !shown_->busy ? kIdleLampWait : kLampWait;
   const auto inputs = panel_.wait_change(known_.value_or(PanelInputs{}),
-                                         known_ ? Deadline::after(clock_, kLampWait) : Deadline{clock_.now()});
+                                         known_ ? Deadline::after(clock_, wait) : Deadline{clock_.now()});
   if (!inputs) return pass_on(inputs);
   if (!inputs->estop_ok && (!known_ || known_->estop_ok)) on_estop_();
   if (!known_) {

@@ -21,7 +21,8 @@ struct PanelThreadOptions {
   Clock::Duration hang_margin = DeviceWatch::kMargin;  ///< a call that is this late hangs
 };
 
-/// Worst time from an input's edge to its event: debouncing, the wait of the panel's thread for new lamps, `read_time`.
+/// Worst time from an input's edge to its event: debouncing, the longest wait of the panel's thread for new
+/// lamps, `read_time`.
 Clock::Duration panel_latency(Clock::Duration read_time);
 
 /// The owner of the panel: reports its inputs, shows the lamps it is given.
@@ -34,7 +35,7 @@ class PanelThread {
   PanelThread(const PanelThread&) = delete;
   PanelThread& operator=(const PanelThread&) = delete;
 
-  /// Lamps for the panel; shown within 20 ms. Does not wait.
+  /// Lamps for the panel; shown within 20 ms while it shows that the station works, else within 100 ms. Does not wait.
   void show(const PanelOutputs& outputs);
   /// The call of the panel in which this thread hangs. From any thread.
   [[nodiscard]] std::optional<HungCall> hung() const { return panel_.hung(); }
