@@ -32,7 +32,7 @@ Result<void> make_model(const ScanFolder& scan, const ReconstructVerb& verb, con
   for (const auto& disagreement : model->report->at("disagreements")) {
     if (!verb.lines) fmt::print(stderr, "{}\n", disagreement["sentence"].get<std::string>());
   }
-  return write_model(*model, out);
+  return write_model(*model, out, verb.options.threads);
 }
 
 }  // namespace

@@ -10,8 +10,8 @@ namespace {
 
 class PipelineReconstructor final : public Reconstructor {
  public:
-  PipelineReconstructor(Reconstruction reconstruction, std::filesystem::path scan)
-      : reconstruction_(std::move(reconstruction)), scan_(std::move(scan)) {}
+  PipelineReconstructor(Reconstruction reconstruction, std::filesystem::path scan, int threads)
+      : reconstruction_(std::move(reconstruction)), scan_(std::move(scan)), threads_(threads) {}
 
   Result<void> add_view(std::size_t pose, const RawView& raw, const ViewRecord& record,
                         const Context& context) override {
@@ -31,7 +31,7 @@ class PipelineReconstructor final : public Reconstructor {
     if (!scan) return pass_on(scan);
     const auto model = reconstruction_.finish(identity_of(scan->manifest()), context);
     if (!model) return pass_on(model);
-    return write_model(*model, folder);
+    return write_model(*model, folder, threads_);
   }
 
  private:
@@ -44,6 +44,7 @@ class PipelineReconstructor final : public Reconstructor {
 
   Reconstruction reconstruction_;
   std::filesystem::path scan_;
+  int threads_;
 };
 
 double gib(std::uintmax_t bytes) { return static_cast<double>(bytes) / (1u << 30); }
@@ -66,7 +67,8 @@ ReconstructorFactory pipeline_reconstructor(ReconstructOptions options, std::uin
     changed.voxel_mm = task.changes.voxel_mm.value_or(options.voxel_mm);
     if (!task.changes.fusion.empty()) changed.fusion = task.changes.fusion;
     if (auto fits = check_memory(task, changed.voxel_mm, memory_bytes); !fits) return pass_on(fits);
-    return std::make_unique<PipelineReconstructor>(Reconstruction(task.calibration, changed), task.folder);
+    return std::make_unique<PipelineReconstructor>(Reconstruction(task.calibration, changed), task.folder,
+                                                   changed.threads);
   };
 }
 

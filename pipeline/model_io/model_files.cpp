@@ -2,41 +2,57 @@
 
 #include <unistd.h>
 
+#include <functional>
 #include <system_error>
 
 #include "core/files.h"
 #include "core/image_codec.h"
+#include "core/parallel.h"
 
 namespace scanrig {
 namespace {
 
 namespace fs = std::filesystem;
 
-Result<ModelFiles> write_into(const fs::path& folder, const TexturedMesh& model, std::string_view report_json) {
-  ModelFiles files;
-  Result<void> written;
-  const auto write = [&](const char* name, std::string_view bytes) {
-    if (!written) return;
-    files.names.emplace_back(name);
-    written = write_file_atomically(folder / name, bytes);
-  };
-  const auto glb = encode_glb(model);
-  if (!glb) return pass_on(glb);
-  write("model.glb", *glb);
-  const auto view = encode_view_glb(model);
-  if (!view) return pass_on(view);
-  write("view.glb", *view);
-  write("model.ply", encode_ply(model.mesh));
-  write("model.stl", encode_stl(model.mesh));
+struct Encoding {
+  const char* name;
+  std::function<Result<std::string>()> encode;
+};
+
+/// The longest ones first: they are encoded side by side.
+std::vector<Encoding> encodings_of(const TexturedMesh& model) {
+  std::vector<Encoding> all;
   if (!model.atlas.empty()) {
-    const auto png = encode_png(model.atlas);
-    if (!png) return pass_on(png);
-    write("model.png", as_text(*png));
-    write("model.mtl", encode_mtl("model.png"));
-    write("model.obj", encode_obj(model, "model.mtl"));
+    all.push_back({"model.png", [&]() -> Result<std::string> {
+                     const auto png = encode_png(model.atlas);
+                     if (!png) return pass_on(png);
+                     return std::string(as_text(*png));
+                   }});
+    all.push_back({"model.obj", [&] { return encode_obj(model, "model.mtl"); }});
+    all.push_back({"model.mtl", [] { return encode_mtl("model.png"); }});
   }
-  if (!report_json.empty()) write("report.json", report_json);
-  if (!written) return pass_on(written);
+  all.push_back({"view.glb", [&] { return encode_view_glb(model); }});
+  all.push_back({"model.glb", [&] { return encode_glb(model); }});
+  all.push_back({"model.ply", [&] { return encode_ply(model.mesh); }});
+  all.push_back({"model.stl", [&] { return encode_stl(model.mesh); }});
+  return all;
+}
+
+Result<ModelFiles> write_into(const fs::path& folder, const TexturedMesh& model, std::string_view report_json) {
+  const std::vector<Encoding> encodings = encodings_of(model);
+  std::vector<Result<void>> written(encodings.size());
+  parallel_for(encodings.size(), [&](std::size_t i) {
+    const auto bytes = encodings[i].encode();
+    written[i] = bytes ? write_file_atomically(folder / encodings[i].name, *bytes) : Result<void>(pass_on(bytes));
+  });
+  ModelFiles files;
+  for (std::size_t i = 0; i < encodings.size(); ++i) {
+    if (!written[i]) return pass_on(written[i]);
+    files.names.emplace_back(encodings[i].name);
+  }
+  if (report_json.empty()) return files;
+  if (auto done = write_file_atomically(folder / "report.json", report_json); !done) return pass_on(done);
+  files.names.emplace_back("report.json");
   return files;
 }
 

@@ -64,37 +64,58 @@ Result<Reconstruction::State::PoseState*> Reconstruction::State::open_pose(std::
   return &poses[pose];
 }
 
-Result<void> Reconstruction::State::add_view(std::size_t pose, const ViewImages& images, const Context& context) {
-  auto open = open_pose(pose);
-  if (!open) return pass_on(open);
-  const StageLog::Timer timer(log, "range");
-  if (!rectification) {
-    auto made = rectify(*calibration);
-    if (!made) return pass_on(made, "calibration");
-    rectification = std::move(*made);
-  }
+Result<void> Reconstruction::State::rectify_once() {
+  if (rectification) return {};
+  auto made = rectify(*calibration);
+  if (!made) return pass_on(made, "calibration");
+  rectification = std::move(*made);
+  return {};
+}
+
+Result<View> Reconstruction::State::view_of(std::size_t pose, const ViewImages& images, const Context& context) const {
   const StereoImages stereo{images.left_pattern, images.right_pattern, images.left_plain, images.right_plain};
   const double gear = calibration->quality ? calibration->quality->gear : 1.0;
   auto view = make_view(*rectification, stereo, gear * images.angle_rad, images.index, {}, context);
   if (!view) return pass_on(view, fmt::format("pose {} view {}", pose + 1, images.index));
-  (*open)->views.push_back(std::move(*view));
-  if (auto done = watch_view(**open, images); !done) return done;
-  if (images.left_plain.channels() == 3) {
-    (*open)->plain.push_back({images.left_plain, images.right_plain});
-    (*open)->pattern.push_back(
-        {(*open)->views.size() - 1, grey_of(images.left_pattern), grey_of(images.right_pattern)});
+  return view;
+}
+
+Result<void> Reconstruction::State::add_views(std::size_t pose, std::span<const ImageSource> sources,
+                                              const Context& context) {
+  auto open = open_pose(pose);
+  if (!open) return pass_on(open);
+  const auto mode = watch_mode_of(options.watch);
+  if (!mode) return pass_on(mode);
+  const bool is_alone = sources.size() == 1;
+  std::vector<Result<ViewImages>> images(sources.size(), fail(ErrorCode::stopped, "stopped by request"));
+  std::vector<Result<View>> views(sources.size(), fail(ErrorCode::stopped, "stopped by request"));
+  {
+    const StageLog::Timer timer(log, "range");
+    if (auto done = rectify_once(); !done) return done;
+    parallel_for(sources.size(), [&](std::size_t i) {
+      if (context.stopped()) return;
+      images[i] = sources[i]();
+      if (images[i]) views[i] = view_of(pose, *images[i], is_alone ? context : Context{context.stop, {}});
+    });
   }
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if (!images[i]) return pass_on(images[i]);
+    if (!views[i]) return pass_on(views[i]);
+  }
+  for (std::size_t i = 0; i < sources.size(); ++i) take_view(**open, std::move(*views[i]), *images[i], *mode);
   return {};
 }
 
-Result<void> Reconstruction::State::watch_view(PoseState& pose, const ViewImages& images) {
-  const auto mode = watch_mode_of(options.watch);
-  if (!mode) return pass_on(mode);
-  if (*mode == WatchMode::off) return {};
-  const StageLog::Timer timer(log, "watch");
-  if (!pose.watch) pose.watch.emplace(*calibration, *rectification);
-  pose.watch->add(images, pose.views.back());
-  return {};
+void Reconstruction::State::take_view(PoseState& pose, View view, const ViewImages& images, WatchMode mode) {
+  pose.views.push_back(std::move(view));
+  if (mode != WatchMode::off) {
+    const StageLog::Timer timer(log, "watch");
+    if (!pose.watch) pose.watch.emplace(*calibration, *rectification);
+    pose.watch->add(images, pose.views.back());
+  }
+  if (images.left_plain.channels() != 3) return;
+  pose.plain.push_back({images.left_plain, images.right_plain});
+  pose.pattern.push_back({pose.views.size() - 1, grey_of(images.left_pattern), grey_of(images.right_pattern)});
 }
 
 /// The views are matched already. Cameras that moved by less than refuse them leave the matches as they are, so the
@@ -248,9 +269,14 @@ Reconstruction::Reconstruction(Reconstruction&&) noexcept = default;
 Reconstruction& Reconstruction::operator=(Reconstruction&&) noexcept = default;
 
 Result<void> Reconstruction::add_view(std::size_t pose, const ViewImages& images, const Context& context) {
+  const ImageSource source = [&images] { return images; };
+  return add_views(pose, {&source, 1}, context);
+}
+
+Result<void> Reconstruction::add_views(std::size_t pose, std::span<const ImageSource> sources, const Context& context) {
   if (!state_->calibration) return fail(ErrorCode::invalid_input, "a scan of range images takes no photographs");
   Result<void> done;
-  with_threads(state_->options.threads, [&] { done = state_->add_view(pose, images, context); });
+  with_threads(state_->options.threads, [&] { done = state_->add_views(pose, sources, context); });
   return done;
 }
 

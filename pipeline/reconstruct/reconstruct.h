@@ -1,9 +1,11 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -58,6 +60,13 @@ class Reconstruction {
   Reconstruction(Reconstruction&&) noexcept;
   Reconstruction& operator=(Reconstruction&&) noexcept;
 
+  /// Reads one view's images. Called from any thread.
+  using ImageSource = std::function<Result<ViewImages>()>;
+
+  /// Range images and silhouettes of views, side by side; they are added in their order, with the bits of one at a
+  /// time. `context` is told of the progress of a single one. Fails as add_view() and the sources do; none is added
+  /// then.
+  Result<void> add_views(std::size_t pose, std::span<const ImageSource> sources, const Context& context);
   /// Range image and silhouettes of one view. `pose` is 0 or 1. Fails with `invalid_input` (options, sizes),
   /// `degenerate` (nothing seen), `out_of_range` (the object is larger than the working volume), `stopped`.
   Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context);
@@ -90,6 +99,7 @@ class Reconstruction {
 Result<Model> reconstruct(const ScanFolder& scan, const ReconstructOptions& options, const Context& context);
 
 /// Mesh, texture and report.json into `folder` (made or replaced as a whole). Fails with `io`.
-Result<void> write_model(const Model& model, const std::filesystem::path& folder);
+/// `threads`: as in ReconstructOptions.
+Result<void> write_model(const Model& model, const std::filesystem::path& folder, int threads);
 
 }  // namespace scanrig

@@ -1,5 +1,8 @@
+#include <algorithm>
 #include <nlohmann/json.hpp>
+#include <vector>
 
+#include "core/parallel.h"
 #include "core/units.h"
 #include "pipeline/model_io/model_files.h"
 #include "pipeline/reconstruct/reconstruct.h"
@@ -7,23 +10,34 @@
 namespace scanrig {
 namespace {
 
+/// As many as are matched side by side: what keeps two cores busy, and no more images in memory than that needs.
+constexpr std::size_t kSideBySide = 2;
+
+Result<void> add_stereo_views(const ScanFolder& scan, std::size_t pose, std::size_t first, std::size_t count,
+                              Reconstruction& reconstruction, const Context& context) {
+  std::vector<Reconstruction::ImageSource> sources;
+  for (std::size_t v = first; v < first + count; ++v) {
+    sources.emplace_back([&scan, pose, v] { return scan.load_images(pose, v); });
+  }
+  return reconstruction.add_views(pose, sources, context);
+}
+
+Result<void> add_range_view(const ScanFolder& scan, std::size_t pose, std::size_t v, Reconstruction& reconstruction,
+                            const Context& context) {
+  auto range = scan.load_range(pose, v);
+  if (!range) return pass_on(range);
+  const ViewRecord& record = scan.manifest().poses[pose].views[v];
+  return reconstruction.add_range_view(pose, record.index, to_radians(record.measured_deg), std::move(*range), context);
+}
+
 Result<void> add_all(const ScanFolder& scan, std::size_t pose, Reconstruction& reconstruction, const Context& context) {
-  const auto& views = scan.manifest().poses[pose].views;
+  const std::size_t views = scan.manifest().poses[pose].views.size();
   const bool stereo = scan.manifest().source == "stereo";
-  for (std::size_t v = 0; v < views.size(); ++v) {
+  for (std::size_t v = 0; v < views; v += stereo ? kSideBySide : 1) {
     if (context.stopped()) return fail(ErrorCode::stopped, "stopped by request");
-    context.report("range", static_cast<double>(v) / static_cast<double>(views.size()));
-    Result<void> added;
-    if (stereo) {
-      const auto images = scan.load_images(pose, v);
-      if (!images) return pass_on(images);
-      added = reconstruction.add_view(pose, *images, context);
-    } else {
-      auto range = scan.load_range(pose, v);
-      if (!range) return pass_on(range);
-      added = reconstruction.add_range_view(pose, views[v].index, to_radians(views[v].measured_deg), std::move(*range),
-                                            context);
-    }
+    context.report("range", static_cast<double>(v) / static_cast<double>(views));
+    auto added = stereo ? add_stereo_views(scan, pose, v, std::min(kSideBySide, views - v), reconstruction, context)
+                        : add_range_view(scan, pose, v, reconstruction, context);
     if (!added) return added;
   }
   return {};
@@ -62,11 +76,13 @@ Result<Model> reconstruct(const ScanFolder& scan, const ReconstructOptions& opti
   return model;
 }
 
-Result<void> write_model(const Model& model, const std::filesystem::path& folder) {
+Result<void> write_model(const Model& model, const std::filesystem::path& folder, int threads) {
   const std::string report = model.report ? model.report->dump(1) + "\n" : std::string();
-  const auto written = write_model_files(model.mesh, report, folder);
-  if (!written) return pass_on(written);
-  return {};
+  Result<void> done;
+  with_threads(threads, [&] {
+    if (auto written = write_model_files(model.mesh, report, folder); !written) done = pass_on(written);
+  });
+  return done;
 }
 
 }  // namespace scanrig

@@ -45,8 +45,10 @@ struct Reconstruction::State {
   StageLog log;
 
   Result<PoseState*> open_pose(std::size_t pose);
-  Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context);
-  Result<void> watch_view(PoseState& pose, const ViewImages& images);
+  Result<void> rectify_once();
+  [[nodiscard]] Result<View> view_of(std::size_t pose, const ViewImages& images, const Context& context) const;
+  Result<void> add_views(std::size_t pose, std::span<const ImageSource> sources, const Context& context);
+  void take_view(PoseState& pose, View view, const ViewImages& images, WatchMode mode);
   Result<void> judge_rig(PoseState& pose, const Context& context);
   Result<void> register_pose(std::size_t pose, const Context& context);
   Result<void> align_views(std::size_t pose, const Context& context);
