@@ -1,6 +1,7 @@
 #include "pipeline/range/match_side.h"
 
 #include <Eigen/Cholesky>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
@@ -18,22 +19,44 @@ cv::Mat1f smoothed(const cv::Mat1f& image, double smoothing_px) {
   return out;
 }
 
+/// Sums over the pixels of one surface around a pixel, column by column; y and disparities from the pixel's own.
+struct PlaneSums {
+  static constexpr int kReach = 6, kSide = 2 * kReach + 1;
+  std::array<float, kSide> n{}, y{}, yy{}, d{}, yd{};
+
+  void add_row(const float* disparity, int first, int last, float centre, float same_px, float row) {
+    for (int k = first; k <= last; ++k) {
+      const float off = disparity[k - kReach] - centre;
+      const bool is_same = std::abs(off) < same_px;  // not NaN
+      const auto i = static_cast<std::size_t>(k);
+      const float one = is_same ? 1.0F : 0.0F, value = is_same ? off : 0.0F;
+      n[i] += one;
+      y[i] += row * one;
+      yy[i] += row * row * one;
+      d[i] += value;
+      yd[i] += row * value;
+    }
+  }
+};
+
 /// A plane through the coarse disparities around (u, v) that belong to the same surface as the pixel itself.
 DisparityPatch plane_patch(const cv::Mat1f& coarse, int u, int v, const StereoOptions& options) {
-  const int reach = options.plane_reach_px;
+  constexpr int kReach = PlaneSums::kReach;
   DisparityPatch patch;
   const float centre = coarse(v, u);
   if (std::isnan(centre)) return patch;
+  const int first = std::max(0, kReach - u), last = std::min(2 * kReach, coarse.cols - 1 - u + kReach);
+  PlaneSums sums;
+  for (int row = std::max(0, v - kReach); row <= std::min(coarse.rows - 1, v + kReach); ++row) {
+    sums.add_row(coarse[row] + u, first, last, centre, options.plane_same_px, static_cast<float>(row - v));
+  }
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d rhs = Eigen::Vector3d::Zero();
-  for (int y = std::max(0, v - reach); y <= std::min(coarse.rows - 1, v + reach); ++y) {
-    for (int x = std::max(0, u - reach); x <= std::min(coarse.cols - 1, u + reach); ++x) {
-      const float d = coarse(y, x);
-      if (!(std::abs(d - centre) < options.plane_same_px)) continue;
-      const Eigen::Vector3d row(1.0, x - u, y - v);
-      normal += row * row.transpose();
-      rhs += row * static_cast<double>(d - centre);
-    }
+  for (int k = first; k <= last; ++k) {
+    const auto i = static_cast<std::size_t>(k);
+    const double x = k - kReach, n = double(sums.n[i]), y = double(sums.y[i]), d = double(sums.d[i]);
+    normal += (Eigen::Matrix3d() << n, x * n, y, x * n, x * x * n, x * y, y, x * y, double(sums.yy[i])).finished();
+    rhs += Eigen::Vector3d(d, x * d, double(sums.yd[i]));
   }
   if (normal(0, 0) < options.min_plane_pixels) return patch;
   const Eigen::Vector3d plane = normal.ldlt().solve(rhs);

@@ -156,13 +156,14 @@ Result<cv::Mat> rectified(const RectifyingMap& map, const cv::Mat& image, Resamp
   return out;
 }
 
-Result<cv::Mat1f> rectified_grey(const RectifyingMap& map, const cv::Mat& image) {
+Result<cv::Mat1f> rectified_grey(const RectifyingMap& map, const cv::Mat& image, const cv::Rect& part) {
   if (const auto fits = check_image(map, image); !fits) return pass_on(fits);
   const cv::Mat1f coefficients = spline_coefficients(grey_values(image));
-  cv::Mat1f out(map.u.size());
-  parallel_for(static_cast<std::size_t>(out.rows), [&](std::size_t row) {
-    const int y = static_cast<int>(row);
-    resample_row(coefficients, map.u[y], map.v[y], out[y], out.cols);
+  cv::Mat1f out(map.u.size(), 0.0F);
+  const cv::Rect box = part.empty() ? cv::Rect({0, 0}, out.size()) : part;
+  parallel_for(static_cast<std::size_t>(box.height), [&](std::size_t row) {
+    const int y = box.y + static_cast<int>(row);
+    resample_row(coefficients, map.u[y] + box.x, map.v[y] + box.x, out[y] + box.x, box.width);
   });
   return out;
 }

@@ -47,7 +47,8 @@ Result<cv::Mat> rectified(const RectifyingMap& map, const cv::Mat& image, Resamp
 
 /// The same as grey float values without loss of sub-pixel position (cubic B-spline, prefiltered), for matching.
 /// Colour is weighted 1:2:1 (B, G, R), as often as a Bayer sensor samples them. Images of 16 bit are those of
-/// merge_exposures(). Grey values (CV_32F) may be given too.
-Result<cv::Mat1f> rectified_grey(const RectifyingMap& map, const cv::Mat& image);
+/// merge_exposures(). Grey values (CV_32F) may be given too. `part`: the only pixels that are computed, the others are
+/// 0; empty: all.
+Result<cv::Mat1f> rectified_grey(const RectifyingMap& map, const cv::Mat& image, const cv::Rect& part = {});
 
 }  // namespace scanrig

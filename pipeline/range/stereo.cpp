@@ -9,6 +9,7 @@
 #include "pipeline/range/coarse_disparity.h"
 #include "pipeline/range/dense_match.h"
 #include "pipeline/range/row_alignment.h"
+#include "pipeline/silhouette/box_around.h"
 
 namespace scanrig {
 namespace {
@@ -119,9 +120,10 @@ Result<RangeImage> match_rectified(const RectifiedPair& given, const StereoOptio
 Result<RangeImage> match_stereo(const Rectification& rectification, const cv::Mat& left_pattern,
                                 const cv::Mat& right_pattern, const cv::Mat1b& left_object,
                                 const cv::Mat1b& right_object, const StereoOptions& options, const Context& context) {
-  const auto left = rectified_grey(rectification.left_map, left_pattern);
+  constexpr int kMargin = 64;  // px: more than what rows are searched in
+  const auto left = rectified_grey(rectification.left_map, left_pattern, box_around(left_object, kMargin));
   if (!left) return pass_on(left, "left pattern image");
-  const auto right = rectified_grey(rectification.right_map, right_pattern);
+  const auto right = rectified_grey(rectification.right_map, right_pattern, box_around(right_object, kMargin));
   if (!right) return pass_on(right, "right pattern image");
   return match_rectified({*left, *right, left_object, right_object, rectification.left, rectification.right.cx,
                           rectification.baseline_mm, rectification.min_disparity, rectification.max_disparity},

@@ -38,13 +38,13 @@ struct StereoOptions {
   int left_node_stride_px = 4;        ///< grid of the patches matched first
   int right_node_stride_px = 4;       ///< the same in the right image
   int lattice_px = 3;                 ///< pixels this far apart are matched, and between them where surfaces bend
-  float lattice_sigmas = 3.0f;        ///< the surfaces of neighbours of the lattice meet within so many sigma
+  float meet_px = 0.12f;              ///< surfaces of neighbours of the lattice meet if within this between them,
+  float meet_sigmas = 3.0f;           ///< and within so many sigma
   int coarse_iterations = 10;         ///< Gauss-Newton steps from a coarse disparity
   int node_iterations = 6;            ///< Gauss-Newton steps from a neighbouring patch
   int row_margin_px = 24;             ///< rows matched above and below the object
   int min_rows = 16;                  ///< of the object and this margin
   float coarse_left_right_px = 1.5f;  ///< coarse disparities of both images must agree within this
-  int plane_reach_px = 6;             ///< a start plane is fitted to coarse disparities up to this far away
   float plane_same_px = 4.0f;         ///< disparity difference within one surface; slopes reach 0.7 px per px
   double min_plane_pixels = 30.0;
 
