@@ -24,7 +24,7 @@ LONG = {
     "page": {"package", "arm64"},
     "calibration": {"debian13"},
     "cameras": {"debian13", "fuzz"},
-    "real-rig": {"effects"},
+    "real-rig": {"effects", "sizes"},
     "end-to-end": {"bare_machine"},
 }
 

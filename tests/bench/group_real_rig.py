@@ -8,6 +8,7 @@ import real_rig_effects
 import real_rig_instruments
 import real_rig_materials
 import real_rig_scans
+import real_rig_sizes
 from contradicted_images import contradicted
 from screens_topology import screens, topology
 
@@ -81,4 +82,4 @@ PARTS = {"realism": realism, "calibration": calibration, "materials": real_rig_m
          "disturbed": real_rig_disturbed.measure, "effects": real_rig_effects.measure,
          "acceptance": real_rig_instruments.acceptance,
          "characterise": real_rig_instruments.characterise, "contradicted": contradicted, "screens": screens,
-         "topology": topology, **range_pairs.PARTS}
+         "topology": topology, "sizes": real_rig_sizes.measure, **range_pairs.PARTS}
