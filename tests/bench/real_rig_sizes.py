@@ -3,8 +3,8 @@ import shutil
 
 import real_rig_scans
 
-# Share of 1280x960: 0.3, 1.2 and 5 megapixels.
-SCALES = {"0.3 MP": 0.5, "1.2 MP": 1.0, "5 MP": 2.0}
+# Share of 1280x960, the simulated rig's largest.
+SCALES = {"0.3 MP": 0.5, "1.2 MP": 1.0}
 NEAR = 0.25
 ONE_POSE = ["--poses", 1, "--views", 8]
 

@@ -2,8 +2,11 @@
 #include "daemon/service/systemd.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <poll.h>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <systemd/sd-bus.h>
 #include <unistd.h>
 
@@ -25,6 +28,16 @@ using std::chrono::milliseconds;
 using testing::HasSubstr;
 
 const char* const kBusProgram = "/usr/bin/dbus-daemon";
+
+/// Whether a bus listens at a socket: its file is there a moment before.
+bool accepts(const std::filesystem::path& path) {
+  sockaddr_un address{.sun_family = AF_UNIX, .sun_path = {}};
+  path.string().copy(address.sun_path, sizeof(address.sun_path) - 1);
+  const int socket = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const bool is_connected = ::connect(socket, reinterpret_cast<const sockaddr*>(&address), sizeof(address)) == 0;
+  ::close(socket);
+  return is_connected;
+}
 
 /// org.freedesktop.login1 as far as Inhibit: each lock is the write end of a pipe.
 class Logind {
@@ -106,7 +119,7 @@ class Sleep : public testing::Test {
   void start_bus() {
     bus_.emplace(std::vector<std::string>{kBusProgram, "--session", "--nofork", "--nopidfile", "--address=" + address_},
                  folder_ / "bus.log");
-    ASSERT_TRUE(soon([&] { return std::filesystem::exists(folder_ / "bus"); }));
+    ASSERT_TRUE(soon([&] { return accepts(folder_ / "bus"); }));
   }
   template <class Ready>
   bool soon(const Ready& ready) {
