@@ -75,7 +75,8 @@ struct MatchedPixels {
       }
     }
     if (shares == 0.0F) return mean;
-    if (!is_whole || most - least > std::min(options.meet_px, options.meet_sigmas * mean.sigma)) return at(u, v);
+    if (!is_whole || most - least > std::min(options.lattice_agree_px, options.lattice_agree_sigmas * mean.sigma))
+      return at(u, v);
     mean.valid = on_surface(mean, u, v);
     return mean;
   }

@@ -15,8 +15,8 @@ cv::Range object_columns(const cv::Mat1b& mask, cv::Range rows, int width) {
   return {box.x, box.x + box.width};
 }
 
-/// The same columns and their neighbours, so many.
-int first_of_wider(cv::Range columns, int wanted, int width) { return std::min(columns.start, width - wanted); }
+/// First of `count` columns that hold `columns` and end within the image.
+int first_column(cv::Range columns, int count, int width) { return std::min(columns.start, width - count); }
 
 }  // namespace
 
@@ -25,8 +25,8 @@ PairBoxes object_boxes(const RectifiedPair& pair, cv::Range rows) {
   const cv::Range left = object_columns(pair.left_object, rows, width);
   const cv::Range right = object_columns(pair.right_object, rows, width);
   const int wider = std::max(left.size(), right.size());
-  return {{first_of_wider(left, wider, width), rows.start, wider, rows.size()},
-          {first_of_wider(right, wider, width), rows.start, wider, rows.size()}};
+  return {{first_column(left, wider, width), rows.start, wider, rows.size()},
+          {first_column(right, wider, width), rows.start, wider, rows.size()}};
 }
 
 }  // namespace scanrig

@@ -38,8 +38,8 @@ struct StereoOptions {
   int left_node_stride_px = 4;        ///< grid of the patches matched first
   int right_node_stride_px = 4;       ///< the same in the right image
   int lattice_px = 3;                 ///< pixels this far apart are matched, and between them where surfaces bend
-  float meet_px = 0.12f;              ///< surfaces of neighbours of the lattice meet if within this between them,
-  float meet_sigmas = 3.0f;           ///< and within so many sigma
+  float lattice_agree_px = 0.12f;     ///< neighbours on the lattice agree on a pixel between them within this,
+  float lattice_agree_sigmas = 3.0f;  ///< and within so many sigma; else it is matched
   int coarse_iterations = 10;         ///< Gauss-Newton steps from a coarse disparity
   int node_iterations = 6;            ///< Gauss-Newton steps from a neighbouring patch
   int row_margin_px = 24;             ///< rows matched above and below the object
