@@ -2,12 +2,12 @@
 
 #include <fcntl.h>
 #include <poll.h>
-#include <pty.h>
 #include <termios.h>
 #include <unistd.h>
 
 #include <array>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <system_error>
 #include <utility>
@@ -15,16 +15,21 @@
 namespace scanrig::sim::wire {
 
 Result<Pty> Pty::open(const std::filesystem::path& link) {
+  const auto failed = [](const char* what) {
+    return fail(ErrorCode::io, "cannot {} a pseudo-terminal: {}", what, std::strerror(errno));
+  };
+  // Never inherited, not even by a program that another thread starts just now: its copy would keep the line open.
+  const int master = ::posix_openpt(O_RDWR | O_NOCTTY | O_CLOEXEC);
+  if (master < 0) return failed("open");
+  Pty pty(master, link);
+  std::array<char, 64> name{};
+  if (::grantpt(master) != 0 || ::unlockpt(master) != 0) return failed("unlock");
+  if (::ptsname_r(master, name.data(), name.size()) != 0) return failed("name");
+  pty.slave_ = ::open(name.data(), O_RDWR | O_NOCTTY | O_CLOEXEC);
+  if (pty.slave_ < 0) return failed("open");
   termios raw{};
   cfmakeraw(&raw);
-  int master = -1, slave = -1;
-  std::array<char, 64> name{};
-  if (::openpty(&master, &slave, name.data(), &raw, nullptr) != 0) {
-    return fail(ErrorCode::io, "cannot open a pseudo-terminal: {}", std::strerror(errno));
-  }
-  ::fcntl(master, F_SETFD, FD_CLOEXEC);
-  ::fcntl(slave, F_SETFD, FD_CLOEXEC);
-  Pty pty(master, slave, link);
+  if (::tcsetattr(pty.slave_, TCSANOW, &raw) != 0) return failed("set up");
   std::error_code error;
   std::filesystem::remove(link, error);
   std::filesystem::create_symlink(name.data(), link, error);
@@ -41,7 +46,7 @@ Pty::~Pty() {
   if (master_ < 0) return;
   std::error_code ignored;
   std::filesystem::remove(link_, ignored);
-  ::close(slave_);
+  if (slave_ >= 0) ::close(slave_);
   ::close(master_);
 }
 

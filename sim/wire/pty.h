@@ -26,10 +26,10 @@ class Pty {
   void write(std::span<const std::uint8_t> bytes);
 
  private:
-  Pty(int master, int slave, std::filesystem::path link) : master_(master), slave_(slave), link_(std::move(link)) {}
+  Pty(int master, std::filesystem::path link) : master_(master), link_(std::move(link)) {}
 
   int master_;
-  int slave_;  // kept open, or the master side hangs up while no driver has the port open
+  int slave_ = -1;  // kept open, or the master side hangs up while no driver has the port open
   std::filesystem::path link_;
 };
 
