@@ -63,7 +63,7 @@ void add_options(CLI::App& app, SimOptions& o) {
   app.add_option("--views", o.views, "views per pose")->capture_default_str()->check(CLI::Range(1, 360));
   app.add_option("--scale", o.rig.image_scale, "of the images: 0.25 gives 320x240")
       ->capture_default_str()
-      ->check(CLI::Range(0.05, 1.0));
+      ->check(CLI::Range(sim::kSmallestImageScale, sim::kLargestImageScale));
   app.add_flag("!--no-noise", o.rig.noise, "leave the sensors' noise out");
   app.add_flag("--same-rest", o.rig.same_rest_twice, "the operator does not turn the object over");
   app.add_option("--voxel-mm", o.voxel_mm, "size of a voxel")->capture_default_str()->check(CLI::Range(0.05, 10.0));

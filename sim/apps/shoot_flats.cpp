@@ -118,11 +118,12 @@ ordered_json list_of(const RigGeometry& rig) {
 Result<void> shoot_flats(const ShootFlatsOptions& options, const fs::path& folder) {
   const auto& times = options.exposures_us;
   const bool are_times = times.size() >= 2 && std::ranges::all_of(times, [](double t) { return t >= 1.0; });
-  if (!(options.image_scale >= 0.1 && options.image_scale <= 1.0) || options.dark_pairs < 1 || !are_times) {
+  if (!(options.image_scale >= kSmallestImageScale && options.image_scale <= kLargestImageScale) ||
+      options.dark_pairs < 1 || !are_times) {
     return fail(ErrorCode::out_of_range,
-                "shoot-flats: image scale {}, {} dark pairs, {} exposures: choose 0.1 to 1, at least one pair and two "
-                "exposures of 1 us and more",
-                options.image_scale, options.dark_pairs, times.size());
+                "shoot-flats: image scale {}, {} dark pairs, {} exposures: choose {} to {}, at least one pair and "
+                "two exposures of 1 us and more",
+                options.image_scale, options.dark_pairs, times.size(), kSmallestImageScale, kLargestImageScale);
   }
   std::error_code ignored;
   if (fs::exists(folder / kTruth, ignored)) {

@@ -52,8 +52,9 @@ int placement_before(const std::vector<SeriesPair>& pairs, std::uint64_t bits) {
 }  // namespace
 
 Result<std::unique_ptr<CalibrationSeries>> CalibrationSeries::create(const SeriesOptions& o) {
-  if (!(o.image_scale >= 0.1 && o.image_scale <= 1.0)) {
-    return fail(ErrorCode::out_of_range, "series: image scale {}: choose 0.1 to 1", o.image_scale);
+  if (!(o.image_scale >= kSmallestImageScale && o.image_scale <= kLargestImageScale)) {
+    return fail(ErrorCode::out_of_range, "series: image scale {}: choose {} to {}", o.image_scale, kSmallestImageScale,
+                kLargestImageScale);
   }
   if (!can_be_made(o.board)) {
     return fail(

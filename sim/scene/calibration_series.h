@@ -63,7 +63,7 @@ struct SeriesPair {
 /// Threads: one at a time.
 class CalibrationSeries {
  public:
-  /// Fails with `out_of_range` (image scale outside 0.1 to 1, a board that cannot be made or is larger than the table,
+  /// Fails with `out_of_range` (image scale outside its limits, a board that cannot be made or is larger than the table,
   /// no such placement, angles outside 1 to 99, hand-held pairs below 0 or above 999).
   static Result<std::unique_ptr<CalibrationSeries>> create(const SeriesOptions& options);
 

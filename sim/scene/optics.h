@@ -53,6 +53,9 @@ struct RigGeometry {
 /// An eye at `centre` that looks at `target` with its x axis horizontal: eye_from_turntable.
 Transform looking_at(const Eigen::Vector3d& centre, const Eigen::Vector3d& target);
 
+/// Smallest and largest resolution of the simulated sensors, as shares of 1280x960: 128x96 and 4096x3072.
+inline constexpr double kSmallestImageScale = 0.1, kLargestImageScale = 3.2;
+
 /// The default rig with sensors of `image_scale` times the full resolution and the same field of view.
 RigGeometry default_rig(double image_scale = 1.0);
 

@@ -17,9 +17,9 @@ enum class LightRandom : std::uint8_t { flash = 90, room };
 }  // namespace
 
 Result<std::unique_ptr<Scene>> Scene::create(const SceneOptions& options) {
-  if (!(options.image_scale >= 0.1 && options.image_scale <= 1.0) || options.poses < 1) {
-    return fail(ErrorCode::out_of_range, "scene: image scale {} and {} poses: choose 0.1 to 1 and at least one pose",
-                options.image_scale, options.poses);
+  if (!(options.image_scale >= kSmallestImageScale && options.image_scale <= kLargestImageScale) || options.poses < 1) {
+    return fail(ErrorCode::out_of_range, "scene: image scale {} and {} poses: choose {} to {} and at least one pose",
+                options.image_scale, options.poses, kSmallestImageScale, kLargestImageScale);
   }
   auto object = load_object(options.object, options.height_mm);
   if (!object) return pass_on(object);
