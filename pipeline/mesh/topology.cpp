@@ -14,19 +14,29 @@ struct Edge {
   bool forward;  ///< the face walks from low to high
 };
 
-std::vector<Edge> sorted_edges(const Mesh& mesh) {
-  std::vector<Edge> edges;
-  edges.reserve(3 * mesh.faces.size());
+template <class Body>
+void for_each_edge(const Mesh& mesh, const Body& body) {
   for (std::uint32_t f = 0; f < mesh.faces.size(); ++f) {
     for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t a = mesh.faces[f][k];
-      const std::uint32_t b = mesh.faces[f][(k + 1) % 3];
-      edges.push_back({std::min(a, b), std::max(a, b), f, a < b});
+      const std::uint32_t a = mesh.faces[f][k], b = mesh.faces[f][(k + 1) % 3];
+      body(Edge{std::min(a, b), std::max(a, b), f, a < b});
     }
   }
-  std::sort(edges.begin(), edges.end(), [](const Edge& a, const Edge& b) {
-    return a.low != b.low ? a.low < b.low : a.high != b.high ? a.high < b.high : a.face < b.face;
-  });
+}
+
+/// By smaller vertex, larger vertex, face. A vertex has few edges: they are counted into their places, then sorted.
+std::vector<Edge> sorted_edges(const Mesh& mesh) {
+  std::vector<std::size_t> next(mesh.vertices.size() + 1);
+  for_each_edge(mesh, [&](const Edge& edge) { ++next[edge.low + 1]; });
+  std::partial_sum(next.begin(), next.end(), next.begin());
+  std::vector<Edge> edges(3 * mesh.faces.size());
+  for_each_edge(mesh, [&](const Edge& edge) { edges[next[edge.low]++] = edge; });
+  std::size_t first = 0;  // after the loop above `next` holds the ends
+  for (const std::size_t end : next) {
+    std::sort(edges.begin() + static_cast<std::ptrdiff_t>(first), edges.begin() + static_cast<std::ptrdiff_t>(end),
+              [](const Edge& a, const Edge& b) { return a.high != b.high ? a.high < b.high : a.face < b.face; });
+    first = end;
+  }
   return edges;
 }
 
@@ -113,6 +123,16 @@ Topology topology(const Mesh& mesh) {
   result.euler =
       static_cast<long>(std::count(used.begin(), used.end(), true)) - edge_count + static_cast<long>(mesh.faces.size());
   return result;
+}
+
+long genus_of_closed(const Mesh& mesh) {
+  std::vector<bool> used(mesh.vertices.size());
+  for (const auto& f : mesh.faces) {
+    for (const auto v : f) used[v] = true;
+  }
+  const auto vertices = static_cast<long>(std::count(used.begin(), used.end(), true));
+  const auto faces = static_cast<long>(mesh.faces.size());
+  return static_cast<long>(components(mesh).count) - (vertices - faces / 2) / 2;  // three edges for two faces
 }
 
 Mesh kept_faces(const Mesh& mesh, const std::vector<bool>& keep) {

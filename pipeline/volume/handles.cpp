@@ -36,21 +36,23 @@ std::vector<std::size_t> small_films(const VoxelLabels& labels, const std::vecto
 }
 
 /// Flips voxels; the change is kept if it leaves fewer handles.
-std::size_t flip_if_better(BlockGrid& grid, const VoxelLabels& labels, const std::vector<std::size_t>& voxels,
-                           float distance, float band_mm, long& genus) {
+std::size_t flip_if_better(BlockGrid& grid, Mesh& surface, const VoxelLabels& labels,
+                           const std::vector<std::size_t>& voxels, float distance, float band_mm, long& genus) {
   if (voxels.empty()) return 0;
   BlockGrid changed = grid;
   for (const auto i : voxels) changed.set(labels.node(i), distance, band_mm);
-  const long after = topology(largest_component(extract_surface(changed))).genus();
+  Mesh all = extract_surface(changed);
+  const long after = genus_of_closed(largest_component(all));
   if (after >= genus) return 0;
   genus = after;
   grid = std::move(changed);
+  surface = std::move(all);
   return voxels.size();
 }
 
 }  // namespace
 
-HandleRepair repair_handles(BlockGrid& grid, long genus, float band_mm, const VolumeOptions& options) {
+HandleRepair repair_handles(BlockGrid& grid, Mesh& surface, long genus, float band_mm, const VolumeOptions& options) {
   HandleRepair result{0, 0, genus};
   const float shallow = 0.5F * grid.voxel();  // a flipped voxel's distance: the film is about a voxel thick
   const auto max_voxels = static_cast<std::size_t>(std::pow(options.max_filled_mm / grid.voxel(), 2.0F));
@@ -61,7 +63,7 @@ HandleRepair repair_handles(BlockGrid& grid, long genus, float band_mm, const Vo
     std::vector<std::size_t> films = labels.grow(/*inside=*/cutting);
     if (!cutting) films = small_films(labels, films, max_voxels);
     const std::size_t flipped =
-        flip_if_better(grid, labels, films, cutting ? shallow : -shallow, band_mm, result.genus);
+        flip_if_better(grid, surface, labels, films, cutting ? shallow : -shallow, band_mm, result.genus);
     (cutting ? result.cut : result.filled) += flipped;
   }
   return result;

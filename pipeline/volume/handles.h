@@ -17,6 +17,7 @@ struct HandleRepair {
 /// voxels (those nearer to measured surface than to closed) by adding doubtful ones only where that makes no new loop
 /// (simple points). What cannot be added is a film: across a doubtful tunnel it is filled if small, across a doubtful
 /// bridge it is cut. Loops among certain voxels stay: they were measured, or looked through.
-HandleRepair repair_handles(BlockGrid& grid, long genus, float band_mm, const VolumeOptions& options);
+/// `surface`: the extracted surface of `grid`, before and after.
+HandleRepair repair_handles(BlockGrid& grid, Mesh& surface, long genus, float band_mm, const VolumeOptions& options);
 
 }  // namespace scanrig

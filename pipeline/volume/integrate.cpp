@@ -180,13 +180,12 @@ Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions
   Mesh all = extract_surface(grid);
   result.mesh = largest_component(all);
   if (result.mesh.faces.empty()) return fail(ErrorCode::degenerate, "volume: the surface encloses nothing");
-  report.genus = report.genus_before_repair = topology(result.mesh).genus();
+  report.genus = report.genus_before_repair = genus_of_closed(result.mesh);
   if (options.repair_handles && report.genus > 0) {
-    const HandleRepair repair = repair_handles(grid, report.genus, field.band(), options);
+    const HandleRepair repair = repair_handles(grid, all, report.genus, field.band(), options);
     report.voxels_cut = repair.cut;
     report.voxels_filled = repair.filled;
     report.genus = repair.genus;
-    all = extract_surface(grid);
     result.mesh = largest_component(all);
   }
   report.dropped_components = components(all).count - 1;

@@ -90,6 +90,7 @@ VoxelLabels::VoxelLabels(const BlockGrid& grid, float doubt_reach_mm) {
       }
     }
   });
+  mark_rim();
   mark_doubtful(grid, doubt_reach_mm);
 }
 
@@ -99,9 +100,14 @@ Eigen::Vector3i VoxelLabels::node(std::size_t i) const {
                                   static_cast<int>(i / (width * height)));
 }
 
-bool VoxelLabels::on_rim(std::size_t i) const {
-  const Eigen::Array3i p = (node(i) - first_).array();
-  return (p == 0).any() || (p == size_.array() - 1).any();
+void VoxelLabels::mark_rim() {
+  const Eigen::Vector3i last = size_ - Eigen::Vector3i::Ones();
+  for (int z = 0; z <= last.z(); ++z) {
+    for (int y = 0; y <= last.y(); ++y) {
+      const bool whole = z == 0 || z == last.z() || y == 0 || y == last.y();
+      for (int x = 0; x <= last.x(); x += whole ? 1 : last.x()) flags_[step(x, y, z)] |= kRim;
+    }
+  }
 }
 
 /// Every voxel is as certain as the piece of surface nearest to it, up to a depth.
@@ -203,7 +209,10 @@ std::vector<std::size_t> VoxelLabels::grow(bool inside) {
   const Neighbourhood& n = neighbourhood();
   std::array<std::ptrdiff_t, 26> steps;
   for (std::size_t k = 0; k < 26; ++k) steps[k] = step(n.offset[k].x(), n.offset[k].y(), n.offset[k].z());
-  const std::uint32_t touching = inside ? n.around18 : n.around6;
+  std::vector<std::ptrdiff_t> touching;
+  for (std::size_t k = 0; k < 26; ++k) {
+    if (((inside ? n.around18 : n.around6) >> k & 1U) != 0) touching.push_back(steps[k]);
+  }
   for (auto& flags : flags_) flags &= static_cast<std::uint8_t>(~(kGrown | kQueued));
 
   const Runs certain = certain_runs(inside);
@@ -216,9 +225,9 @@ std::vector<std::size_t> VoxelLabels::grow(bool inside) {
   std::vector<std::size_t> queue;
   const auto queue_around = [&](std::size_t i) {
     if (on_rim(i)) return;
-    for (std::size_t k = 0; k < 26; ++k) {
-      const std::size_t j = i + steps[k];
-      if ((touching >> k & 1U) == 0 || !is_in(j, inside) || has(j, kGrown) || has(j, kQueued) || on_rim(j)) continue;
+    for (const auto to : touching) {
+      const std::size_t j = i + to;
+      if (!is_in(j, inside) || has(j, kGrown) || has(j, kQueued) || on_rim(j)) continue;
       flags_[j] |= kQueued;
       queue.push_back(j);
     }

@@ -11,7 +11,7 @@ namespace scanrig {
 /// One byte per voxel over the stored blocks and the space between them, with a rim of outside voxels.
 class VoxelLabels {
  public:
-  enum Flag : std::uint8_t { kInside = 1, kDoubtful = 2, kGrown = 4, kQueued = 8 };
+  enum Flag : std::uint8_t { kInside = 1, kDoubtful = 2, kGrown = 4, kQueued = 8, kRim = 16 };
 
   /// `doubt_reach_mm`: the solid is doubtful this deep below a closed surface. Space that a view looked through is
   /// certain.
@@ -21,7 +21,7 @@ class VoxelLabels {
   [[nodiscard]] bool has(std::size_t i, Flag flag) const { return (flags_[i] & flag) != 0; }
   [[nodiscard]] std::size_t count() const { return flags_.size(); }
   [[nodiscard]] Eigen::Vector3i node(std::size_t i) const;  ///< of the grid
-  [[nodiscard]] bool on_rim(std::size_t i) const;
+  [[nodiscard]] bool on_rim(std::size_t i) const { return has(i, kRim); }
 
   /// Distances, in voxels, from index to index along the axes.
   [[nodiscard]] std::ptrdiff_t step(int dx, int dy, int dz) const {
@@ -40,6 +40,7 @@ class VoxelLabels {
     std::vector<Run> runs;
     std::vector<std::uint32_t> root;  ///< of each run's component
   };
+  void mark_rim();
   void mark_doubtful(const BlockGrid& grid, float doubt_reach_mm);
   [[nodiscard]] Runs certain_runs(bool inside) const;
   [[nodiscard]] bool is_in(std::size_t i, bool inside) const { return has(i, kInside) == inside; }
