@@ -32,14 +32,15 @@ def report(bench, what, unit, runs, asked):
     wall = fit.through([(x, run.seconds) for x, run in runs])
     processor = fit.through([(x, run.processor) for x, run in runs])
     steps = ", ".join(f"{x:g}: {run.seconds:.1f}" for x, run in runs)
-    bench.line(f"{what}: seconds ({steps})", "reported", words_of(wall, unit), True)
+    last = f"{runs[-1][1].seconds:.1f} s for {runs[-1][0]:g}"
+    bench.line(f"{what}: seconds", "reported", f"{last}; {words_of(wall, unit)} ({steps})", True)
     name = f"{what}: largest deviation from the line"
     if asked:
         bench.at_most(name, WITHIN, 100 * wall.worst, "%", digits=1)
     else:
         bench.line(name, "reported", f"{100 * wall.worst:.1f} %", True)
     bench.line(f"{what}: seconds of the processor", "reported",
-               f"{words_of(processor, unit)}; deviation {100 * processor.worst:.1f} %", True)
+               f"{runs[-1][1].processor:.1f} s; {words_of(processor, unit)}; deviation {100 * processor.worst:.1f} %", True)
     bench.note(f"repetitions of one kind differ by up to {100 * max(run.spread for _, run in runs):.0f} %")
 
 
