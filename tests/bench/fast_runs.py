@@ -19,7 +19,8 @@ def shoot(bench, name, *options):
 
 
 def thinned(scan, folder, views):
-    """The same scan of one pose with `views` of its views, evenly spread; images are links to those of `scan`."""
+    """The same scan of one pose with `views` of its views, evenly spread and numbered anew; images are links to those of
+    `scan`."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     for path in scan.iterdir():
@@ -29,7 +30,7 @@ def thinned(scan, folder, views):
     (pose,) = manifest["poses"]
     if len(pose["views"]) % views:
         raise ValueError(f"{views} of {len(pose['views'])} views are not evenly spread")
-    pose["views"] = pose["views"][::len(pose["views"]) // views]
+    pose["views"] = [{**view, "index": i} for i, view in enumerate(pose["views"][::len(pose["views"]) // views])]
     (folder / "scan.json").write_text(json.dumps(manifest))
     return folder
 

@@ -1,7 +1,8 @@
 // bench_fusion SCAN OUT VOXEL_MM ROUNDS: registered range images of a rendered scan of two poses for other programs, as
 // files in OUT, beside the times in which this project finds the pose and integrates just these images.
 // OUT: POSE_VIEW.f32, rows of depth in mm, NaN where unmeasured; own.ply, the surface; views.json: projections, where
-// each camera was, true and found motion between the poses, seconds. Watch and texture have no part in it.
+// each camera was, true and found motion between the poses, seconds, of wall and processor, also of an integration
+// without mending. Watch and texture have no part in it.
 
 #include <fmt/format.h>
 
@@ -148,8 +149,11 @@ Result<nlohmann::json> measure(const fs::path& folder, const fs::path& out, doub
     if (!motion) return pass_on(motion);
     const std::vector<PosedViews> posed = {{.views = poses[0].views},
                                            {.views = poses[1].views, .model_from_pose = *motion}};
-    json["integration_seconds"].push_back(
-        seconds_of([&] { surface = integrate(posed, {.voxel_mm = voxel_mm, .table_without_silhouettes = true}, {}); }));
+    const VolumeOptions options{.voxel_mm = voxel_mm, .table_without_silhouettes = true};
+    VolumeOptions bare = options;
+    bare.repair_handles = bare.untangle = false;
+    json["bare_seconds"].push_back(seconds_of([&] { surface = integrate(posed, bare, {}); }));
+    if (surface) json["integration_seconds"].push_back(seconds_of([&] { surface = integrate(posed, options, {}); }));
     if (!surface) return pass_on(surface);
   }
   json["views"] = write_views(poses, *motion, out);

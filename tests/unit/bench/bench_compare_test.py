@@ -59,7 +59,7 @@ class FewerViews(Folder):
     def scan(self, poses, views):
         scan = self.folder / "scan"
         (scan / "pose1").mkdir(parents=True)
-        manifest = {"poses": [{"name": f"pose{p + 1}", "views": [{"index": v} for v in range(views)]}
+        manifest = {"poses": [{"name": f"pose{p + 1}", "views": [{"index": v, "measured_deg": v} for v in range(views)]}
                               for p in range(poses)]}
         (scan / "scan.json").write_text(json.dumps(manifest))
         return scan
@@ -68,7 +68,8 @@ class FewerViews(Folder):
         scan = self.scan(1, 16)
         few = fast_runs.thinned(scan, self.folder / "few", 4)
         views = json.loads((few / "scan.json").read_text())["poses"][0]["views"]
-        self.assertEqual([view["index"] for view in views], [0, 4, 8, 12])
+        self.assertEqual([view["measured_deg"] for view in views], [0, 4, 8, 12])
+        self.assertEqual([view["index"] for view in views], [0, 1, 2, 3])
         self.assertEqual((few / "pose1").resolve(), (scan / "pose1").resolve())
         self.assertEqual(len(json.loads((scan / "scan.json").read_text())["poses"][0]["views"]), 16)
 
