@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """The one program that makes figures: ./dev bench GROUP... [--long] [--quick] [--only PART...] [--record]
+    [--compare FILE]
 
 Every group is a module beside this file with PARTS, the functions that measure its parts. Each calls bench.line() for
 each figure that an issue or a design page requires. Without --long a part takes samples and ends within its budget
@@ -16,6 +17,7 @@ import sys
 import time
 
 import budget
+import compare
 import parts
 import record as record_file
 
@@ -41,6 +43,7 @@ class Bench:
         self.lines = []
         self.made = set()  # folders of bench.out that this run has made, for the parts that follow
         self.profile = ""
+        self.earlier = None  # compare.Earlier
 
     @property
     def data(self):
@@ -75,7 +78,8 @@ class Bench:
         """`ok` is True, False or None (not measured; `measured` gives the reason)."""
         measured = " ".join(measured.replace(f"{ROOT}/", "").split())  # an error's text: one line, no place of this machine
         self.lines.append({"group": self.group, "what": what, "asked": asked, "measured": measured, "ok": ok})
-        print(f"{what} | {asked} | {measured} | {'-' if ok is None else 'ok' if ok else 'NO'}", flush=True)
+        beside = f" | {self.earlier.beside(self.lines[-1])}" if self.earlier else ""
+        print(f"{what} | {asked} | {measured} | {'-' if ok is None else 'ok' if ok else 'NO'}{beside}", flush=True)
 
     def at_most(self, what, limit, value, unit="", digits=3):
         if value is None:
@@ -141,6 +145,9 @@ def arguments():
                         "their lines into the existing table, each with its commit")
     parser.add_argument("--record", action="store_true", help="put the table into docs/measured.md; lines of --long "
                         "have tables of their own")
+    parser.add_argument("--compare", type=pathlib.Path, metavar="FILE", help="an earlier out/bench.json: its values and "
+                        "the ratios beside those of this run; exit code 1 when one got worse by more than --tolerance")
+    parser.add_argument("--tolerance", type=float, default=20, metavar="PERCENT", help="default: 20")
     parser.add_argument("--bin", required=True, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.record and options.quick:
@@ -148,7 +155,18 @@ def arguments():
     options.groups = list(dict.fromkeys(options.groups))
     options.modules = {group: load(group) for group in options.groups}
     check_only(parser, options)
+    options.earlier = earlier_of(parser, options)
     return options
+
+
+def earlier_of(parser, options):
+    """Read before anything runs: the run replaces out/bench.json."""
+    if options.compare is None:
+        return None
+    try:
+        return compare.Earlier(options.compare, options.tolerance / 100)
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        parser.error(f"--compare: {options.compare} is not the bench.json of an earlier run: {error}")
 
 
 def check_only(parser, options):
@@ -166,10 +184,11 @@ def main():
     options = arguments()
     bench = Bench(options.bin, options.quick, options.long)
     bench.only = set(options.only)
+    bench.earlier = options.earlier
     measured_commit = commit()
     how = "".join(f", {word}" for word in ("long", "quick") if getattr(options, word))
     print(f"commit {measured_commit}, {bench.cores} cores{how}")
-    print("what | asked | measured | ok")
+    print("what | asked | measured | ok" + (" | earlier, ratio" if bench.earlier else ""))
     for group, module in options.modules.items():
         parts.run_group(bench, group, module)
 
@@ -181,7 +200,10 @@ def main():
     (ROOT / "out" / "bench.json").write_text(json.dumps(record, indent=1) + "\n")
     if options.record:
         record_file.write(ROOT / "docs" / "measured.md", options.groups, record, again=bool(options.only))
-    return 1 if False in held else 0
+    if bench.earlier:
+        whole = [] if options.only else options.groups
+        print(*bench.earlier.summary(whole, bench.cores, (options.quick, options.long)), sep="\n")
+    return 1 if False in held or (bench.earlier and bench.earlier.worse) else 0
 
 
 if __name__ == "__main__":

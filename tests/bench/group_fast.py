@@ -3,25 +3,16 @@ import json
 import os
 import pathlib
 import shutil
-import statistics
-import subprocess
 import time
 
+import fast_peers
+import fast_scaling
 import motion_rig
+from fast_runs import Timed, median_of, shoot
 
 ROUNDS = 3
 REFERENCE_3WAY_S = 0.20  # OpenCV's 3WAY on the machine on which the times were asked for
 IDLE_S = 20
-
-
-def shoot(bench, name, *options):
-    """A rendered scan of the figurine in the laboratory, made once in a run."""
-    folder = bench.out / name
-    if folder not in bench.made:
-        shutil.rmtree(folder, ignore_errors=True)
-        bench.run([bench.bin / "scanrig-sim", "shoot", "--out", folder, *options], 1800, check=True)
-        bench.made.add(folder)
-    return folder
 
 
 def peers_of(bench):
@@ -47,28 +38,6 @@ def view(bench, _scratch):
                    f"{inner['p95_px']:.3f} px", True)
 
 
-class Timed:
-    """One reconstruction: wall seconds, peak memory, seconds of its stages."""
-
-    def __init__(self, bench, scan, model, *options):
-        shutil.rmtree(model, ignore_errors=True)
-        begun = time.monotonic()
-        process = subprocess.Popen([str(bench.bin / "scanrig"), "reconstruct", str(scan), "--out", str(model), *options],
-                                   stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-        _, error = process.communicate(timeout=1200)
-        self.seconds = time.monotonic() - begun
-        if process.returncode != 0:
-            raise RuntimeError(f"{scan.name}: {error.strip()[-300:]}")
-        stages = json.loads((model / "report.json").read_text())["stages"]
-        self.stages = {stage["stage"]: stage["seconds"] for stage in stages}
-        self.peak_mib = max(stage["process_peak_memory_mib"] for stage in stages)
-        self.geometry = (model / "model.ply").read_bytes()
-
-
-def median_of(runs, figure):
-    return statistics.median(figure(run) for run in runs)
-
-
 def scan(bench, scratch):
     """16 views offline."""
     folder = shoot(bench, "fast-scan")
@@ -86,19 +55,6 @@ def scan(bench, scratch):
     bench.at_least("the same: 2 threads against 1", 1.85, single.seconds / median_of(runs, lambda run: run.seconds))
     bench.line("the same: bits with 1 and 2 threads", "equal", "equal" if single.geometry == runs[0].geometry else "differ",
                single.geometry == runs[0].geometry)
-
-
-def scaling(bench, scratch):
-    """Seconds by views and by pixels, without texture, whose work is the atlas."""
-    def seconds(name, *options):
-        return Timed(bench, shoot(bench, name, *options), scratch / "model", "--no-texture").seconds
-
-    few, many = seconds("fast-8", "--views", "4"), seconds("fast-scan")
-    bench.line("8 to 16 views: seconds a view", "within 15 %", f"{few / 8:.2f}, {many / 16:.2f} s",
-               abs(few / 8 / (many / 16) - 1.0) <= 0.15)
-    small = seconds("fast-small", "--scale", "0.5")
-    bench.line("0.3 to 1.2 MP: seconds a megapixel and view", "within 15 %",
-               f"{small / 16 / 0.307:.2f}, {many / 16 / 1.229:.2f} s", abs(small / 0.307 / (many / 1.229) - 1.0) <= 0.15)
 
 
 def live(bench, _scratch):
@@ -143,4 +99,5 @@ def idle(bench, scratch):
     bench.at_most("idle daemon: wake-ups a second", 30, (after[1] - before[1]) / IDLE_S, digits=0)
 
 
-PARTS = {"view": view, "scan": scan, "scaling": scaling, "live": live, "idle": idle}
+PARTS = {"view": view, "scan": scan, "peers": fast_peers.measure, "scaling": fast_scaling.measure, "live": live,
+         "idle": idle}
