@@ -13,6 +13,7 @@
 #include "pipeline/mesh/alignment.h"
 #include "pipeline/mesh/self_intersection.h"
 #include "pipeline/mesh/topology.h"
+#include "pipeline/registration/pose_uncertainty.h"
 
 namespace scanrig {
 namespace {
@@ -146,11 +147,25 @@ void score_topology(const Mesh& model, const Mesh& truth, const SurfaceIndex& su
   scores.self_intersections = self_intersecting_faces(model, surface).size();
 }
 
+/// Largest share of `off` in its own standard deviation, over the principal directions.
+double in_sigmas(const Eigen::Vector3d& off, const Eigen::Matrix3d& covariance) {
+  const PrincipalSigmas known = principal_sigmas(covariance);
+  return (known.directions.transpose() * off).cwiseAbs().cwiseQuotient(known.sigma.cwiseMax(1e-12)).maxCoeff();
+}
+
+double in_sigmas(const Transform& off, const PoseUncertainty& known) {
+  const Eigen::AngleAxisd turn(off.linear());
+  return std::max(in_sigmas(turn.angle() * turn.axis(), known.covariance.topLeftCorner<3, 3>()),
+                  in_sigmas(off * known.centre - known.centre, known.covariance.bottomRightCorner<3, 3>()));
+}
+
 std::optional<Scores::PoseError> pose_error(const Claim& claim, const Truth& truth) {
   if (!claim.pose1_from_pose2 || !truth.pose1_from_pose2) return std::nullopt;
   const Transform off = *claim.pose1_from_pose2 * truth.pose1_from_pose2->inverse();
   const Eigen::Vector3d centre = centre_of(truth.mesh);
-  return Scores::PoseError{to_degrees(rotation_angle(off.linear())), (off * centre - centre).norm()};
+  Scores::PoseError error{to_degrees(rotation_angle(off.linear())), (off * centre - centre).norm()};
+  if (claim.pose_uncertainty) error.sigmas = in_sigmas(off, *claim.pose_uncertainty);
+  return error;
 }
 
 /// Calls `use` with every view of the truth. Fails with `stopped`.

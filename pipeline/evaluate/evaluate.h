@@ -24,10 +24,18 @@ struct EvaluateOptions {
   TextureFigureOptions texture;
 };
 
+/// How well a reconstruction says it knows `pose1_from_pose2`.
+struct PoseUncertainty {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< pose 1's turntable frame
+  /// Of (rotation vector in radians about `centre`, translation in mm).
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Identity();
+};
+
 /// A model to be judged.
 struct Claim {
   TexturedMesh model;                         ///< pose 1's turntable frame; `views` and `sigma` are its claims
   std::optional<Transform> pose1_from_pose2;  ///< as the reconstruction found it
+  std::optional<PoseUncertainty> pose_uncertainty = {};
 };
 
 /// Judges a model against the truth by the rules of pipeline/evaluate/README.md. `photos`: the scan's plain images for
@@ -37,7 +45,8 @@ Result<Scores> evaluate(const Claim& claim, const Truth& truth, const ScanFolder
                         const EvaluateOptions& options, const Context& context);
 
 /// The model that a reconstruction left in `folder`: model.ply, texture coordinates of model.obj and model.png if
-/// present, `pose1_from_pose2` of report.json if present. Fails with `not_found`, `io`, `invalid_input`.
+/// present, `pose1_from_pose2` of report.json if present, with its uncertainty. Fails with `not_found`, `io`,
+/// `invalid_input`.
 Result<Claim> read_claim(const std::filesystem::path& folder);
 
 /// Number of the truth's views in which each sample is observable.

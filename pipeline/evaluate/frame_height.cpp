@@ -46,6 +46,7 @@ double frame_height(const Calibration& calibration, const Truth& truth) {
 Claim raised(Claim claim, double height) {
   const Eigen::Vector3d up(0.0, height, 0.0);
   for (auto& vertex : claim.model.mesh.vertices) vertex += up.cast<float>();
+  if (claim.pose_uncertainty) claim.pose_uncertainty->centre += up;
   if (claim.pose1_from_pose2) {
     auto& pose = *claim.pose1_from_pose2;
     pose.translation() += up - pose.linear() * up;

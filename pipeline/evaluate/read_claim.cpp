@@ -52,16 +52,27 @@ Result<void> read_corner_uv(const std::filesystem::path& file, TexturedMesh& mod
   return model.corner_uv.size() == model.mesh.faces.size() ? Result<void>() : bad("faces are missing");
 }
 
-Result<std::optional<Transform>> read_pose2(const std::filesystem::path& file) {
+/// `pose1_from_pose2` and its uncertainty, where the report has them.
+Result<void> read_pose2(const std::filesystem::path& file, Claim& claim) {
   const auto text = read_file(file);
   if (!text) return pass_on(text);
   const auto report = nlohmann::json::parse(*text, nullptr, false);
   if (report.is_discarded()) return fail(ErrorCode::invalid_input, "{}: not valid JSON", file.string());
-  if (!report.is_object() || !report.contains("pose1_from_pose2")) return std::nullopt;
+  if (!report.is_object() || !report.contains("pose1_from_pose2")) return {};
   std::optional<Error> fault;
-  const Transform transform = JsonObject(&report, "", &fault).transform("pose1_from_pose2");
+  JsonObject root(&report, "", &fault);
+  claim.pose1_from_pose2 = root.transform("pose1_from_pose2");
+  if (report.contains(nlohmann::json::json_pointer("/pose_refinement/uncertainty"))) {
+    JsonObject known = root.object("pose_refinement").object("uncertainty");
+    const auto centre = known.numbers("centre_mm"), covariance = known.numbers("covariance");
+    if (centre.size() != 3 || covariance.size() != 36) {
+      return fail(ErrorCode::invalid_input, "{}: the pose's uncertainty must be 3 and 36 numbers", file.string());
+    }
+    claim.pose_uncertainty = {Eigen::Map<const Eigen::Vector3d>(centre.data()),
+                              Eigen::Map<const Eigen::Matrix<double, 6, 6>>(covariance.data())};
+  }
   if (fault) return tl::unexpected<Error>(fault->in(file.string()));
-  return transform;
+  return {};
 }
 
 }  // namespace
@@ -84,9 +95,7 @@ Result<Claim> read_claim(const std::filesystem::path& folder) {
     claim.model.atlas = *atlas;
   }
   if (std::filesystem::exists(folder / "report.json", error)) {
-    const auto pose2 = read_pose2(folder / "report.json");
-    if (!pose2) return pass_on(pose2);
-    claim.pose1_from_pose2 = *pose2;
+    if (auto read = read_pose2(folder / "report.json", claim); !read) return pass_on(read);
   }
   return claim;
 }

@@ -86,7 +86,8 @@ json to_json(const Scores& s) {
                                           {"share_within_2", number(one.within_2)},
                                           {"median_mm", number(one.median_mm)}});
   }
-  if (s.pose2) result["pose2_error"] = {{"deg", s.pose2->deg}, {"mm", s.pose2->mm}};
+  if (s.pose2)
+    result["pose2_error"] = {{"deg", s.pose2->deg}, {"mm", s.pose2->mm}, {"sigmas", number(s.pose2->sigmas)}};
   if (s.texture) {
     result["texture"] = {{"patches", s.texture->patches},
                          {"median_px", number(s.texture->median_px)},

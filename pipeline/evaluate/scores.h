@@ -60,6 +60,8 @@ struct Scores {
   struct PoseError {
     double deg = 0.0;
     double mm = 0.0;  ///< at the object's centre
+    /// The largest of the six principal directions of rotation and translation, in the model's own sigma there.
+    double sigmas = kNoFigure;
   };
   std::optional<PoseError> pose2;  ///< of the model's pose1_from_pose2
 

@@ -10,6 +10,7 @@
 #include "core/version.h"
 #include "pipeline/mesh/solid_properties.h"
 #include "pipeline/mesh/topology.h"
+#include "pipeline/registration/pose_uncertainty.h"
 
 namespace scanrig {
 namespace {
@@ -149,6 +150,23 @@ json mesh_json(const Mesh& mesh) {
   return result;
 }
 
+/// Of three coordinates: standard deviations, the weakest first, and its direction.
+json sigma_json(const Eigen::Matrix3d& covariance, double unit) {
+  const PrincipalSigmas found = principal_sigmas(covariance);
+  const Eigen::Vector3d weakest = found.directions.col(0);
+  return {{"sigma", {found.sigma[0] * unit, found.sigma[1] * unit, found.sigma[2] * unit}},
+          {"weakest", {weakest.x(), weakest.y(), weakest.z()}}};
+}
+
+json uncertainty_json(const RefinedPose& refined) {
+  json rows = json::array();
+  for (const double value : refined.covariance.reshaped()) rows.push_back(value);
+  return {{"centre_mm", {refined.centre.x(), refined.centre.y(), refined.centre.z()}},
+          {"rotation_deg", sigma_json(refined.covariance.topLeftCorner<3, 3>(), to_degrees(1.0))},
+          {"translation_mm", sigma_json(refined.covariance.bottomRightCorner<3, 3>(), 1.0)},
+          {"covariance", rows}};
+}
+
 }  // namespace
 
 Report::Report(const ReconstructOptions& options, const ScanIdentity& identity,
@@ -203,7 +221,8 @@ void Report::add_refinement(const RefinedPose& refined) {
                                  {"residual_rms_mm", number(refined.rms_mm)},
                                  {"overlap", refined.overlap},
                                  {"correspondences", refined.correspondences},
-                                 {"condition", number(refined.condition)}};
+                                 {"condition", number(refined.condition)},
+                                 {"uncertainty", uncertainty_json(refined)}};
 }
 
 void Report::add_surface(const Mesh& mesh, const VolumeReport& volume) {

@@ -7,6 +7,7 @@
 
 #include "core/parallel.h"
 #include "core/statistics.h"
+#include "pipeline/registration/pose_uncertainty.h"
 #include "pipeline/registration/robust.h"
 
 namespace scanrig {
@@ -23,6 +24,7 @@ struct Correspondence {
   Eigen::Vector3d normal;
   double distance;  ///< positive: moving pose 2 along the normal makes it larger
   double sigma;
+  int view1, view2;  ///< of pose 1 and pose 2
 };
 
 struct Found {
@@ -54,9 +56,10 @@ Found find(const std::vector<SurfacePoint>& samples, const RangeLevel& images, c
         const double distance = plane->normal.dot(point - plane->point);
         if (std::abs(distance) > capture_mm) continue;
         seen = true;
-        parts[b].correspondences.push_back({pose1_from_camera[v] * (moving ? point : plane->point),
-                                            pose1_from_camera[v].linear() * plane->normal,
-                                            moving ? distance : -distance, std::hypot(samples[i].sigma, plane->sigma)});
+        parts[b].correspondences.push_back(
+            {pose1_from_camera[v] * (moving ? point : plane->point), pose1_from_camera[v].linear() * plane->normal,
+             moving ? distance : -distance, std::hypot(samples[i].sigma, plane->sigma),
+             moving ? static_cast<int>(v) : samples[i].view, moving ? samples[i].view : static_cast<int>(v)});
       }
       if (seen) ++parts[b].samples_seen;
     }
@@ -93,7 +96,8 @@ struct Equations {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
 };
 
-Equations accumulate(const Found& found, const RefineOptions& options) {
+/// `scores`: of the correspondences used, if wanted.
+Equations accumulate(const Found& found, const RefineOptions& options, std::vector<MotionScore>* scores = nullptr) {
   Equations e;
   for (const Correspondence& c : found.correspondences) e.centre += c.moving;
   e.centre /= static_cast<double>(found.correspondences.size());
@@ -107,7 +111,9 @@ Equations accumulate(const Found& found, const RefineOptions& options) {
     Vector6 j;
     j << (c.moving - e.centre).cross(c.normal), c.normal;
     e.normal.noalias() += w * j * j.transpose();
-    e.right -= w * c.distance * j;
+    const Vector6 pull = w * c.distance * j;
+    e.right -= pull;
+    if (scores != nullptr) scores->push_back({pull, c.view1, c.view2});
   }
   return e;
 }
@@ -167,7 +173,8 @@ RefinedPose align(const MeasuredPose& pose1, const MeasuredPose& pose2, const Tr
       break;
   }
   if (found.correspondences.size() < options.min_correspondences) return {.pose1_from_pose2 = initial};
-  const Equations e = accumulate(found, options);
+  std::vector<MotionScore> scores;
+  const Equations e = accumulate(found, options, level == 0 ? &scores : nullptr);
   const std::vector<double> distances = distances_of(found);
   result.median_mm = quantile(distances, 0.5);
   result.rms_mm = root_mean_square(distances);
@@ -175,6 +182,7 @@ RefinedPose align(const MeasuredPose& pose1, const MeasuredPose& pose2, const Tr
                    static_cast<double>(pose1.samples[level].size() + pose2.samples[level].size());
   result.correspondences = static_cast<int>(found.correspondences.size());
   result.information = e.normal;
+  if (level == 0) result.covariance = motion_covariance(e.normal, scores);
   result.centre = e.centre;
   result.condition = condition_of(e.normal, arm);
   return result;

@@ -44,8 +44,10 @@ struct RefinedPose {
   int correspondences = 0;
   int iterations = 0;
   /// Information matrix of (rotation vector in radians about `centre`, translation in mm), 1/variance; from sigma and
-  /// the residuals.
+  /// the residuals, as if those of all points were independent.
   Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
+  /// Of the same, in pose 1's axes: how well the motion is really known, see pose_uncertainty.h. Of level 0 only.
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< of the shared surface, pose 1's frame
   /// Ratio of largest to smallest eigenvalue of the information, rotations measured by their arc at the object's size;
   /// above about 1e4 the data do not hold some motion (a turn of a body of revolution, a slide along a prism).

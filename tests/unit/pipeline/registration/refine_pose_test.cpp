@@ -4,6 +4,7 @@
 
 #include <cstring>
 
+#include "pipeline/registration/pose_uncertainty.h"
 #include "tests/unit/pipeline/registration/analytic_views.h"
 
 namespace scanrig {
@@ -70,6 +71,40 @@ TEST(RefinePose, ReportsTheCertaintyOfTheMotion) {
   const auto turned = refine_pose(views, views, rot_y(0.05), {}, Context{});
   ASSERT_TRUE(turned) << turned.error().message;
   EXPECT_GT(turned->condition, 1e4);
+  // Of a body of revolution the turn about its axis is open, and nothing else.
+  const PrincipalSigmas turn = principal_sigmas(turned->covariance.topLeftCorner<3, 3>());
+  EXPECT_GT(turn.sigma[0], 30.0 * turn.sigma[1]);
+  EXPECT_GT(std::abs(turn.directions.col(0).y()), 0.99);
+}
+
+/// Largest component of the motion's error in its own sigma, over the principal directions.
+double in_sigmas(const RefinedPose& refined, const Transform& truth) {
+  const Transform off = refined.pose1_from_pose2 * truth.inverse();
+  const Eigen::AngleAxisd turn(off.linear());
+  const auto worst = [](const Eigen::Vector3d& error, const Eigen::Matrix3d& covariance) {
+    const PrincipalSigmas known = principal_sigmas(covariance);
+    return (known.directions.transpose() * error).cwiseAbs().cwiseQuotient(known.sigma).maxCoeff();
+  };
+  return std::max(worst(turn.angle() * turn.axis(), refined.covariance.topLeftCorner<3, 3>()),
+                  worst(off * refined.centre - refined.centre, refined.covariance.bottomRightCorner<3, 3>()));
+}
+
+TEST(RefinePose, KnowsHowWellTheMotionIsKnown) {
+  RigModel rig{.width = 240, .height = 180, .focal_px = 850};
+  rig.noise_mm = 0.02;
+  const Transform truth = laid_down().inverse();
+  double sum = 0.0;
+  constexpr unsigned kTrials = 6;
+  for (unsigned trial = 0; trial < kTrials; ++trial) {
+    const auto first = testing::turn_around(testing::workpiece(), 6, rig, 10 + 2 * trial);
+    const auto second = testing::turn_around(testing::moved(testing::workpiece(), laid_down()), 6, rig, 11 + 2 * trial);
+    const auto refined = refine_pose(first, second, off_by(truth, 1, 1, trial), {}, Context{});
+    ASSERT_TRUE(refined) << refined.error().message;
+    const double sigmas = in_sigmas(*refined, truth);
+    EXPECT_LT(sigmas, 4.0) << trial;
+    sum += sigmas;
+  }
+  EXPECT_GT(sum / kTrials, 0.3);  // nor far too unsure
 }
 
 TEST(RefinePose, GivesTheSameBitsOnAnyNumberOfThreads) {
