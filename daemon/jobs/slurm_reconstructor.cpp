@@ -22,28 +22,29 @@ bool was_ended_from_outside(int code) {
   return code == static_cast<int>(ExitCode::stopped) || code == 128 + 15 || code == 128 + 9;
 }
 
-/// Why a job that has left the cluster gave no result.
-Error without_result(const std::string& id, const SlurmJob& job, const std::filesystem::path& run,
-                     const SlurmExecutorOptions& options) {
+/// Why a job that has left the cluster gave no result; nothing where its script was killed, as by a node that failed.
+std::optional<Error> limit_reached(const std::string& id, const SlurmJob& job, const std::filesystem::path& run,
+                                   const SlurmExecutorOptions& options) {
   const auto on = job.nodes.empty() ? "no node" : job.nodes;
   if (job.word == "TIMEOUT" || job.word == "DEADLINE") {
-    return {ErrorCode::timeout, fmt::format("Slurm's job {} on {} was ended after its {} min; raise timeout_min", id,
-                                            on, options.local.limit.count() / 60)};
+    return Error{ErrorCode::timeout, fmt::format("Slurm's job {} on {} was ended after its {} min; raise timeout_min",
+                                                 id, on, options.local.limit.count() / 60)};
   }
   if (job.word == "OUT_OF_MEMORY") {
-    return {ErrorCode::out_of_range,
-            fmt::format("Slurm's job {} on {} needed more than its {} MiB of memory; raise memory_gib or voxel_mm", id,
-                        on, options.local.memory_bytes >> 20)};
+    return Error{ErrorCode::out_of_range,
+                 fmt::format("Slurm's job {} on {} needed more than its {} MiB of memory; raise memory_gib or voxel_mm",
+                             id, on, options.local.memory_bytes >> 20)};
   }
   if (job.word == "CANCELLED") {
-    return {ErrorCode::stopped, fmt::format("Slurm's job {} was cancelled at the cluster; reprocess the scan", id)};
+    return Error{ErrorCode::stopped,
+                 fmt::format("Slurm's job {} was cancelled at the cluster; reprocess the scan", id)};
   }
   if (job.exit_code == kNoFolder) {
-    return {ErrorCode::not_found,
-            fmt::format("{} does not see {}; share this folder with the nodes or set slurm_stage", on, run.string())};
+    return Error{
+        ErrorCode::not_found,
+        fmt::format("{} does not see {}; share this folder with the nodes or set slurm_stage", on, run.string())};
   }
-  return {ErrorCode::internal,
-          fmt::format("Slurm's job {} ended on {} as {} without a result; see its nodes' logs", id, on, job.word)};
+  return std::nullopt;
 }
 
 class SlurmReconstructor final : public Reconstructor {
@@ -238,9 +239,10 @@ class SlurmReconstructor final : public Reconstructor {
       if (auto looked = look(watch, context); !looked) return pass_on(looked);
       if (watch.gone &&
           (end || WatchClock::now() >= *watch.gone + options_.files_limit || watch.job.exit_code == kNoFolder)) {
-        if (watch.job.state == SlurmJob::State::lost) return Came::nothing;
+        if (const auto reached = limit_reached(submission_->id, watch.job, run, options_))
+          return tl::unexpected(*reached);
         if (end && watch.job.word == "FAILED") return tl::unexpected(run_error(run, *end, progress.failure));
-        return tl::unexpected(without_result(submission_->id, watch.job, run, options_));
+        return Came::nothing;
       }
       if (!wait_or_stop(context.stop, options_.files_every)) return fail(ErrorCode::stopped, "stopped by request");
     }
