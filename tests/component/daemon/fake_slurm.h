@@ -37,10 +37,11 @@ if [ -e refuses ]; then echo 'sbatch: error: Batch job submission failed: Invali
 id=$(($(ls jobs | wc -l) + 1)); mkdir jobs/$id
 tasks=0
 for word; do
-  case $word in --job-name=*) echo "${word#*=}" > jobs/$id/name;; --array=*) tasks=${word#*-*-};; esac
+  case $word in --job-name=*) echo "${word#*=}" > jobs/$id/name;; --array=*) tasks=${word##*-};; esac
   script=$word
 done
 cp "$script" jobs/$id/script
+echo $tasks > jobs/$id/tasks
 echo RUNNING > jobs/$id/state
 if [ -e blind ]; then echo 66 > jobs/$id/exit; echo FAILED > jobs/$id/state; echo $id; exit; fi
 setsid sh -c "
@@ -65,7 +66,7 @@ array=
 for word; do case $word in --name=*) name=${word#*=};; --array) array=1;; esac; done
 for job in jobs/*; do
   if [ "$(cat $job/name 2> /dev/null)" = "$name" ] && [ "$(cat $job/state)" = RUNNING ]; then
-    if [ $array ]; then echo "0 RUNNING"; else basename $job; fi
+    if [ $array ]; then for task in $(seq 0 $(cat $job/tasks)); do echo "$task RUNNING"; done; else basename $job; fi
   fi
 done
 exit 0
