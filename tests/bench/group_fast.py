@@ -7,6 +7,7 @@ import statistics
 import subprocess
 import time
 
+import fast_slurm
 import motion_rig
 
 ROUNDS = 3
@@ -143,4 +144,4 @@ def idle(bench, scratch):
     bench.at_most("idle daemon: wake-ups a second", 30, (after[1] - before[1]) / IDLE_S, digits=0)
 
 
-PARTS = {"view": view, "scan": scan, "scaling": scaling, "live": live, "idle": idle}
+PARTS = {"view": view, "scan": scan, "scaling": scaling, "live": live, "idle": idle, "slurm": fast_slurm.measure}
