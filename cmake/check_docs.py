@@ -12,7 +12,7 @@ TOP = ("cmake", "config", "core", "daemon", "debian", "docs", "drivers", "pipeli
 MAX_PARAGRAPH_WORDS = 120
 MAX_DOC_LINES = 150
 MAX_LINES = {"README.md": 60, "docs/roadmap.md": 40, "docs/status.md": 60, "docs/develop/README.md": 80,
-             "docs/guide/trouble.md": 300}  # a table to look things up in
+             "docs/guide/trouble.md": 310}  # a table to look things up in
 MAX_LEAF_LINES = 40
 GENERATED = ("docs/measured.md", "docs/reference/states.md")  # by tests/bench/record.py and state_diagram_test.cpp
 CODE = (".h", ".cpp", ".py", ".toml", ".txt", ".service", ".socket", ".rules", ".conf")

@@ -189,14 +189,41 @@ void read_webhook(Section& s, WebhookConfig& webhook) {
   if (webhook.host.empty() || !number) s.report("url", fmt::format("\"{}\" is no http://HOST:PORT/PATH", url));
 }
 
-void read_reconstruction(Section& s, ReconstructionConfig& reconstruction) {
+void read_slurm(Section& s, bool is_used, const std::filesystem::path& base, SlurmConfig& slurm) {
+  using Fallback = SlurmConfig::Fallback;
+  const auto has = [&](const char* key) {
+    const bool found = s.has(key);
+    if (found && !is_used) s.report(key, "needs executor = \"slurm\"");
+    return found;
+  };
+  if (has("slurm_partition")) s.text("slurm_partition", slurm.partition);
+  if (has("slurm_options")) {
+    s.items("slurm_options", [&](std::optional<std::int64_t> number, std::string_view word) {
+      if (number || !word.starts_with('-')) s.report("slurm_options", "holds options of sbatch, such as \"--qos=low\"");
+      slurm.options.emplace_back(word);
+    });
+  }
+  if (has("slurm_program")) s.path("slurm_program", base, slurm.program);
+  if (has("slurm_stage")) s.path("slurm_stage", base, slurm.stage);
+  if (has("slurm_commands")) s.path("slurm_commands", base, slurm.commands);
+  if (has("slurm_cores")) s.number("slurm_cores", slurm.cores, {1, 1024});
+  if (has("slurm_resubmits")) s.number("slurm_resubmits", slurm.resubmits, {0, 100});
+  if (has("slurm_fallback")) {
+    s.choice<Fallback>("slurm_fallback", slurm.fallback, {{"local", Fallback::local}, {"wait", Fallback::wait}});
+  }
+  if (has("slurm_wait_min")) s.number("slurm_wait_min", slurm.wait, {1, 10080});
+}
+
+void read_reconstruction(Section& s, const std::filesystem::path& base, ReconstructionConfig& reconstruction) {
   using Executor = ReconstructionConfig::Executor;
-  s.choice<Executor>("executor", reconstruction.executor,
-                     {{"in_process", Executor::in_process}, {"process", Executor::process}});
+  s.choice<Executor>(
+      "executor", reconstruction.executor,
+      {{"in_process", Executor::in_process}, {"process", Executor::process}, {"slurm", Executor::slurm}});
   s.number("memory_gib", reconstruction.memory_gib, {1, 1024});
   s.number("voxel_mm", reconstruction.voxel_mm, {kMinVoxelMm, kMaxVoxelMm});
   s.accept_old_name("timeout_min", "limit_min");
   if (s.has("timeout_min")) s.number("timeout_min", reconstruction.timeout, {1, 1440});
+  read_slurm(s, reconstruction.executor == Executor::slurm, base, reconstruction.slurm);
 }
 
 bool is_loopback(std::string_view address) { return address.starts_with("127.") || address == "::1"; }
@@ -284,7 +311,7 @@ void read_rig(Section& root, const std::filesystem::path& base, const std::vecto
   });
   root.section("recipe", [&](Section& s) { read_recipes(s, rig); });
   root.section("storage", [&](Section& s) { read_storage(s, base, rig.storage); });
-  root.section("reconstruction", [&](Section& s) { read_reconstruction(s, rig.reconstruction); });
+  root.section("reconstruction", [&](Section& s) { read_reconstruction(s, base, rig.reconstruction); });
   if (root.has("quiet_hours")) {
     root.section("quiet_hours", [&](Section& s) {
       read_time_of_day(s, "from", rig.quiet_hours.emplace().from);

@@ -162,12 +162,27 @@ struct StorageConfig {
   std::optional<double> keep_gib;              ///< of all jobs
 };
 
+/// A cluster that makes the models.
+struct SlurmConfig {
+  enum class Fallback { local, wait };
+  std::string partition;                               ///< empty: the cluster's default
+  std::vector<std::string> options;                    ///< further words for sbatch
+  std::filesystem::path program = "/usr/bin/scanrig";  ///< on the nodes
+  std::filesystem::path stage;                         ///< empty: the nodes see the jobs' folder itself
+  std::filesystem::path commands;                      ///< folder of sbatch; empty: found in PATH
+  int cores = 2;
+  int resubmits = 2;                   ///< after lost nodes
+  Fallback fallback = Fallback::wait;  ///< while the controller is not reached
+  std::chrono::minutes wait{60};       ///< for the controller
+};
+
 struct ReconstructionConfig {
-  enum class Executor { in_process, process };
+  enum class Executor { in_process, process, slurm };
   Executor executor = Executor::in_process;
   double memory_gib = 6;
   double voxel_mm = 0.25;
-  std::chrono::minutes timeout{60};  ///< of the executor `process`
+  std::chrono::minutes timeout{60};  ///< of the executors `process` and `slurm`
+  SlurmConfig slurm;
 };
 
 struct ApiConfig {

@@ -1,6 +1,9 @@
 // Verbs that read and write files only.
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iterator>
 #include <memory>
+#include <sstream>
 
 #include "daemon/ctl/commands.h"
 #include "daemon/ctl/verbs.h"
@@ -29,6 +32,59 @@ void add_reconstruct(CLI::App& app, Chosen& chosen) {
   auto* json = sub->add_flag("--json", verb->json, "print JSON");
   sub->add_flag("--lines", verb->lines, "tell the progress in lines for a program")->excludes(json);
   sub->callback([&chosen, verb] { chosen = [verb] { return reconstruct(*verb); }; });
+}
+
+std::vector<std::string> words_of(const std::string& text) {
+  std::istringstream in(text);
+  return {std::istream_iterator<std::string>(in), {}};
+}
+
+/// Why `scanrig reconstruct` would not take these words; empty: it would.
+std::string problem_of_reconstruct(const std::string& text) {
+  auto words = words_of(text);
+  for (const char* own : {"--out", "--lines", "--json", "--threads"}) {
+    const auto is_own = [own](const std::string& word) {
+      return word == own || word.starts_with(std::string(own) + "=");
+    };
+    if (std::ranges::any_of(words, is_own)) return std::string(own) + " is set by farm itself";
+  }
+  CLI::App app;
+  Chosen ignored;
+  add_reconstruct(app, ignored);
+  words.insert(words.begin(), {"reconstruct", "DIR"});
+  std::ranges::reverse(words);  // as CLI11 takes them
+  try {
+    app.parse(words);
+  } catch (const CLI::ParseError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+void add_farm(CLI::App& app, Chosen& chosen) {
+  const auto verb = std::make_shared<FarmVerb>();
+  auto& options = verb->options;
+  auto* sub = app.add_subcommand("farm", "many scan folders on a Slurm cluster");
+  sub->require_subcommand(1);
+  auto* again = sub->add_subcommand("reprocess", "make the models of scan folders that are missing or made otherwise");
+  again->add_option("FOLDERS", options.scans, "scan folders that the nodes see under the same path")->required();
+  const CLI::Validator check(problem_of_reconstruct, "");
+  again
+      ->add_option_function<std::string>(
+          "--with", [verb](const std::string& text) { verb->options.with = words_of(text); },
+          "options of scanrig reconstruct, such as \"--voxel-mm 0.5\"")
+      ->check(check);
+  again->add_option("--out", options.out, "models are DIR/NAME (default: the model of each scan is replaced)");
+  again->add_option("--partition", options.partition, "of the cluster (default: its own)");
+  again->add_option_function<std::string>(
+      "--sbatch", [verb](const std::string& text) { verb->options.sbatch = words_of(text); },
+      "further options of sbatch, such as \"--qos=low --time=60\"");
+  again->add_option("--program", options.program, "scanrig on the nodes")->capture_default_str();
+  again->add_option("--commands", options.commands, "folder of sbatch and squeue (default: PATH)");
+  again->add_option("--cores", options.cores, "of a scan")->capture_default_str()->check(CLI::Range(1, 1024));
+  again->add_option("--memory-gib", options.memory_gib, "of a scan")->capture_default_str()->check(CLI::Range(1, 1024));
+  again->add_flag("--json", verb->json, "print JSON, a line per scan");
+  again->callback([&chosen, verb] { chosen = [verb] { return farm_reprocess(*verb); }; });
 }
 
 void add_board(CLI::App& app, Chosen& chosen) {
@@ -192,6 +248,7 @@ void add_reference(CLI::App& app, Chosen& chosen) {
 
 void add_offline_commands(CLI::App& app, Chosen& chosen) {
   add_reconstruct(app, chosen);
+  add_farm(app, chosen);
   add_range(app, chosen);
   add_evaluate(app, chosen);
   add_acceptance(app, chosen);

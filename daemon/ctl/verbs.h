@@ -7,6 +7,7 @@
 
 #include "config/setup/setup_options.h"
 #include "core/result.h"
+#include "daemon/ctl/farm.h"
 #include "pipeline/calibrate/calibrate_images.h"
 #include "pipeline/reconstruct/reconstruct.h"
 
@@ -122,6 +123,13 @@ struct ReconstructVerb {
   bool lines = false;  ///< for programs: "STAGE<tab>FRACTION", and "failed<tab>CODE<tab>MESSAGE" at the end
 };
 ExitCode reconstruct(const ReconstructVerb& verb);
+
+struct FarmVerb {
+  FarmOptions options;
+  bool json = false;  ///< an object per line
+};
+/// Prints a line per scan as it ends, then the counts. Ends with the code of the first failure.
+ExitCode farm_reprocess(const FarmVerb& verb);
 
 /// A calibration board as it is named at the command line.
 struct BoardOptions {

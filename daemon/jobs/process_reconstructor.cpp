@@ -1,52 +1,16 @@
 #include "daemon/jobs/executors.h"
 
-#include <charconv>
-#include <cstring>
 #include <system_error>
 #include <utility>
 
 #include "core/files.h"
 #include "daemon/jobs/child_process.h"
+#include "daemon/jobs/progress_lines.h"
 
 namespace scanrig {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Output of `scanrig reconstruct --lines`: "STAGE<tab>FRACTION", and at last "failed<tab>CODE<tab>MESSAGE".
-class ProgressLines {
- public:
-  explicit ProgressLines(const Context& context) : context_(context) {}
-
-  void operator()(std::string_view line) {
-    const auto tab = line.find('\t');
-    if (tab == std::string_view::npos) return;
-    const auto first = line.substr(0, tab), rest = line.substr(tab + 1);
-    double fraction = 0.0;
-    if (first == "failed") {
-      const auto end = std::min(rest.find('\t'), rest.size());
-      failure = Error{parse_error_code(rest.substr(0, end)).value_or(ErrorCode::internal),
-                      std::string(rest.substr(std::min(end + 1, rest.size())))};
-    } else if (std::from_chars(rest.data(), rest.data() + rest.size(), fraction).ec == std::errc()) {
-      context_.report(first, fraction);
-    }
-  }
-
-  std::optional<Error> failure{};
-
- private:
-  const Context& context_;
-};
-
-Error told_by(const ChildEnd& end, const std::optional<Error>& failure) {
-  if (failure) return *failure;
-  if (end.signal != 0) {
-    return {ErrorCode::internal,
-            fmt::format("the reconstruction crashed ({}); run `scanrig bundle` and send the archive to support",
-                        ::strsignal(end.signal))};
-  }
-  return {ErrorCode::internal, fmt::format("the reconstruction ended with {}: {}", end.code, end.last_words)};
-}
 
 class ProcessReconstructor final : public Reconstructor {
  public:

@@ -175,8 +175,11 @@ Result<std::unique_ptr<Reconstructor>> ReconstructionThread::make_reconstructor(
   }
   const auto calibration = scan.load_calibration();
   if (!calibration) return pass_on(calibration);
-  return factory_(
-      {.calibration = *calibration, .folder = message.folder, .views = recipe.all_views(), .changes = message.changes});
+  return factory_({.calibration = *calibration,
+                   .folder = message.folder,
+                   .views = recipe.all_views(),
+                   .changes = message.changes,
+                   .is_ending = [this] { return ending_.load(); }});
 }
 
 /// Takes the earlier views of a job that is resumed or reprocessed.

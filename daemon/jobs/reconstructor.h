@@ -46,6 +46,8 @@ struct ReconstructionTask {
   std::filesystem::path folder;  ///< of the job
   int views = 0;                 ///< of all poses, once they exist
   ReconstructionChanges changes{};
+  /// True once the daemon ends: work outside of its process then continues although a stop is requested.
+  std::function<bool()> is_ending = [] { return false; };
 };
 
 /// Fails with `out_of_range` when the work would need more memory than allowed.

@@ -37,10 +37,28 @@ Recipe recipe_from(const std::string& name, const config::RecipeConfig& config) 
           .limits = {config.min_measured_share, config.max_residual_mm}};
 }
 
+SlurmExecutorOptions slurm_options_from(const config::SlurmConfig& config, ProcessExecutorOptions local) {
+  using Fallback = SlurmExecutorOptions::Fallback;
+  return {.commands = config.commands,
+          .partition = config.partition,
+          .options = config.options,
+          .program = config.program,
+          .stage = config.stage,
+          .cores = config.cores,
+          .resubmits = config.resubmits,
+          .fallback = config.fallback == config::SlurmConfig::Fallback::local ? Fallback::local : Fallback::wait,
+          .away_limit = config.wait,
+          .local = std::move(local)};
+}
+
 ReconstructorFactory reconstructor_from(const config::ReconstructionConfig& config) {
-  if (config.executor == config::ReconstructionConfig::Executor::process) {
-    const auto outside = process_reconstructor(
-        {.program = {}, .limit = config.timeout, .memory_bytes = gib(config.memory_gib), .voxel_mm = config.voxel_mm});
+  using Executor = config::ReconstructionConfig::Executor;
+  if (config.executor != Executor::in_process) {
+    ProcessExecutorOptions local{
+        .program = {}, .limit = config.timeout, .memory_bytes = gib(config.memory_gib), .voxel_mm = config.voxel_mm};
+    const auto outside = config.executor == Executor::slurm
+                             ? slurm_reconstructor(slurm_options_from(config.slurm, std::move(local)))
+                             : process_reconstructor(std::move(local));
     return [=](const ReconstructionTask& task) -> Result<std::unique_ptr<Reconstructor>> {
       const auto voxel_mm = task.changes.voxel_mm.value_or(config.voxel_mm);
       if (auto fits = check_memory(task, voxel_mm, gib(config.memory_gib)); !fits) return pass_on(fits);

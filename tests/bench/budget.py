@@ -25,6 +25,7 @@ LONG = {
     "calibration": {"debian13"},
     "cameras": {"debian13", "fuzz"},
     "real-rig": {"effects", "sizes"},
+    "fast": {"slurm"},
     "end-to-end": {"bare_machine"},
 }
 

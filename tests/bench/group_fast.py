@@ -7,6 +7,7 @@ import time
 
 import fast_peers
 import fast_scaling
+import fast_slurm
 import motion_rig
 from fast_runs import Timed, median_of, shoot
 
@@ -100,4 +101,4 @@ def idle(bench, scratch):
 
 
 PARTS = {"view": view, "scan": scan, "peers": fast_peers.measure, "scaling": fast_scaling.measure, "live": live,
-         "idle": idle}
+         "idle": idle, "slurm": fast_slurm.measure}

@@ -92,6 +92,32 @@ TEST_F(RecipeConfigTest, ALineHasSignalsAndLimits) {
   EXPECT_EQ(recipe.max_residual_mm, 0.05);
 }
 
+TEST_F(RecipeConfigTest, AClusterHasKeysOfItsOwn) {
+  const std::string keys = R"(voxel_mm = 0.25
+slurm_partition = "scans"
+slurm_options = ["--qos=low", "--account=rig"]
+slurm_program = "/opt/scanrig"
+slurm_stage = "/srv/scans"
+slurm_cores = 4
+slurm_resubmits = 1
+slurm_fallback = "local"
+slurm_wait_min = 5
+)";
+  const auto in_process = replaced(example_, "voxel_mm = 0.25\n", keys);
+  const auto text = replaced(in_process, "executor = \"in_process\"", "executor = \"slurm\"");
+  const auto rig = read(text);
+  ASSERT_TRUE(rig) << rig.error().message;
+  const auto& reconstruction = rig->reconstruction;
+  EXPECT_EQ(reconstruction.executor, ReconstructionConfig::Executor::slurm);
+  EXPECT_THAT(reconstruction.slurm.options, testing::ElementsAre("--qos=low", "--account=rig"));
+  EXPECT_EQ(reconstruction.slurm.stage, "/srv/scans");
+  EXPECT_EQ(reconstruction.slurm.fallback, SlurmConfig::Fallback::local);
+  EXPECT_EQ(reconstruction.slurm.wait, std::chrono::minutes(5));
+  expect_problem(in_process, "slurm_stage: needs executor = \"slurm\"");
+  expect_problem(replaced(text, "\"--qos=low\"", "\"low\""), "holds options of sbatch");
+  expect_problem(replaced(text, "slurm_cores = 4", "slurm_cores = 0"), "slurm_cores");
+}
+
 TEST_F(RecipeConfigTest, OldNamesAreReadWithAWarning) {
   auto old_names = std::string(line_);
   for (const auto& [now, before] : {std::pair("flip = \"signal\"", "flip = \"line\""),        // old name
