@@ -63,8 +63,8 @@ struct SeriesPair {
 /// Threads: one at a time.
 class CalibrationSeries {
  public:
-  /// Fails with `out_of_range` (image scale outside its limits, a board that cannot be made or is larger than the table,
-  /// no such placement, angles outside 1 to 99, hand-held pairs below 0 or above 999).
+  /// Fails with `out_of_range` (image scale outside its limits, a board that cannot be made or is larger than the
+  /// table, no such placement, angles outside 1 to 99, hand-held pairs below 0 or above 999).
   static Result<std::unique_ptr<CalibrationSeries>> create(const SeriesOptions& options);
 
   [[nodiscard]] const SeriesOptions& options() const { return options_; }

@@ -54,8 +54,8 @@ class Scene {
  public:
   static constexpr std::uint64_t kFirstPreview = std::uint64_t{1} << 32;
 
-  /// Fails as load_object, draw_placements and Materials::named, and with `out_of_range` (image_scale outside its limits,
-  /// poses below 1).
+  /// Fails as load_object, draw_placements and Materials::named, and with `out_of_range` (image_scale outside its
+  /// limits, poses below 1).
   static Result<std::unique_ptr<Scene>> create(const SceneOptions& options);
   /// For tests: a given object in given placements.
   Scene(Object object, std::vector<Transform> placements, const SceneOptions& options);
