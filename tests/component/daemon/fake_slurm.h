@@ -1,5 +1,6 @@
 #pragma once
 
+#include <fmt/format.h>
 #include <sys/stat.h>
 
 #include <chrono>
@@ -84,7 +85,11 @@ exit 0
   }
   ~FakeSlurm() {
     remove("away");
-    for (int id = 1; id <= jobs(); ++id) run("scancel --name=" + name(id));
+    for (int id = 1; id <= jobs(); ++id) {
+      run("scancel --name=" + name(id));
+      // One that the test called lost still runs.
+      run(fmt::format("[ -e jobs/{0}/exit ] || kill -KILL -$(cat jobs/{0}/pid) 2> /dev/null", id));
+    }
   }
   FakeSlurm(const FakeSlurm&) = delete;
   FakeSlurm& operator=(const FakeSlurm&) = delete;
