@@ -215,7 +215,7 @@ TEST(Series, OfAHandHeldBoardNeedsNoTable) {
 }
 
 TEST(Series, RefusesWhatItCannotTake) {
-  EXPECT_EQ(CalibrationSeries::create({.image_scale = 2.0}).error().code, ErrorCode::out_of_range);
+  EXPECT_EQ(CalibrationSeries::create({.image_scale = 4.0}).error().code, ErrorCode::out_of_range);
   EXPECT_EQ(CalibrationSeries::create({.placements = {8}}).error().code, ErrorCode::out_of_range);
   EXPECT_EQ(CalibrationSeries::create({.angles = 0}).error().code, ErrorCode::out_of_range);
   EXPECT_EQ(CalibrationSeries::create({.hand_held = -1}).error().code, ErrorCode::out_of_range);
