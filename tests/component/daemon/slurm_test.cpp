@@ -15,7 +15,6 @@ namespace fs = std::filesystem;
 using fakes::comes_true;
 using std::chrono::milliseconds;
 using testing::HasSubstr;
-using testing::Not;
 
 constexpr const char* kMakes = "mkdir $out; echo cluster > $out/model.glb\n";
 
