@@ -31,6 +31,7 @@ PARSED = {
     "scanrig calibrate JOBS/ID": "likewise",
     "scanrig reconstruct": "needs a whole scan: tests/system/daemon/exit_codes_test.cpp",
     "scanrig convert": "likewise",
+    "scanrig farm": "needs a cluster: tests/component/daemon/farm_test.cpp",
     "scanrig acceptance": "needs a scanned artefact: ./dev bench real-rig",
     "scanrig doctor --allow-motion": "turns the table for 15 s: ./dev bench motion",
     "scanrig setup": "needs a person at the rig: tests/system/setup",
