@@ -216,9 +216,7 @@ class Farm {
   /// True when the scan has ended or waits to be submitted again.
   bool ends(FarmItem& item) {
     const auto code = run_end(item.folder());
-    const bool from_outside =
-        code && (*code == static_cast<int>(ExitCode::stopped) || *code == 128 + 15 || *code == 128 + 9);
-    if (code && !from_outside) {
+    if (code && !was_ended_from_outside(*code)) {
       take(item, *code);
       return true;
     }

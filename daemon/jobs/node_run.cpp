@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <csignal>
 #include <fstream>
 
 #include "core/files.h"
@@ -42,6 +43,11 @@ std::optional<int> run_end(const std::filesystem::path& run) {
   int code = 0;
   if (!text || std::from_chars(text->data(), text->data() + text->size(), code).ec != std::errc()) return std::nullopt;
   return code;
+}
+
+bool was_ended_from_outside(int code) {
+  return code == static_cast<int>(ExitCode::stopped) || code == kShellSignal + SIGTERM ||
+         code == kShellSignal + SIGKILL;
 }
 
 Error run_error(const std::filesystem::path& run, int code, const std::optional<Error>& failure) {

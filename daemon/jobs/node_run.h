@@ -30,6 +30,9 @@ std::string shell_word(const std::string& text);
 /// Its exit code, once it has ended.
 std::optional<int> run_end(const std::filesystem::path& run);
 
+/// Whether a signal of the cluster ended the run: exit code `stopped`, or a shell's for SIGTERM and SIGKILL.
+bool was_ended_from_outside(int code);
+
 /// The error of a run that ended with `code`: its own `failure` line, else its last words.
 Error run_error(const std::filesystem::path& run, int code, const std::optional<Error>& failure);
 

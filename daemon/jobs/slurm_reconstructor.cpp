@@ -17,11 +17,6 @@ namespace {
 
 using WatchClock = std::chrono::steady_clock;
 
-/// Exit codes of a run that a signal of the cluster ended: `stopped`, and a shell's for SIGTERM and SIGKILL.
-bool was_ended_from_outside(int code) {
-  return code == static_cast<int>(ExitCode::stopped) || code == 128 + 15 || code == 128 + 9;
-}
-
 /// Why a job that has left the cluster gave no result; nothing where its script was killed, as by a node that failed.
 std::optional<Error> limit_reached(const std::string& id, const SlurmJob& job, const std::filesystem::path& run,
                                    const SlurmExecutorOptions& options) {
