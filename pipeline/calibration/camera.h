@@ -23,7 +23,31 @@ struct Projection {
   double fy = 0.0;
   double cx = 0.0;  ///< pixels
   double cy = 0.0;
+  /// Of an image cropped to the object: its first pixel on the sensor, and the sensor's size. 0: not cropped.
+  int crop_x = 0;
+  int crop_y = 0;
+  int sensor_width = 0;
+  int sensor_height = 0;
 
+  [[nodiscard]] bool is_cropped() const { return sensor_width > 0; }
+  /// The part of this image that begins at (x, y); x and y may be negative within the sensor.
+  [[nodiscard]] Projection cropped(int x, int y, int part_width, int part_height) const {
+    Projection part = *this;
+    part.sensor_width = is_cropped() ? sensor_width : width;
+    part.sensor_height = is_cropped() ? sensor_height : height;
+    part.crop_x += x;
+    part.crop_y += y;
+    part.cx -= x;
+    part.cy -= y;
+    part.width = part_width;
+    part.height = part_height;
+    return part;
+  }
+  /// On the sensor, but cropped off.
+  [[nodiscard]] bool is_cropped_off(const Eigen::Vector2d& pixel, double margin = 0.0) const {
+    return is_cropped() && !contains(pixel) && pixel.x() + crop_x >= margin && pixel.y() + crop_y >= margin &&
+           pixel.x() + crop_x <= sensor_width - 1 - margin && pixel.y() + crop_y <= sensor_height - 1 - margin;
+  }
   /// Pixel (u, v) of a point in the camera frame. A pinhole point must have z > 0.
   [[nodiscard]] Eigen::Vector2d project(const Eigen::Vector3d& p) const {
     const double scale = kind == Kind::pinhole ? 1.0 / p.z() : 1.0;

@@ -18,7 +18,7 @@ bool looked_through(const RangeImage& image, const cv::Mat1b& background, int ba
                     const Eigen::Vector3d& p, double reach_mm, int clear_px) {
   const Projection& projection = image.projection;
   const Eigen::Vector2d pixel = projection.project(p);
-  if (!projection.contains(pixel, clear_px)) return false;
+  if (!projection.contains(pixel, clear_px)) return projection.is_cropped_off(pixel, clear_px);
   const int row = static_cast<int>(std::lround(pixel.y()));
   const int column = static_cast<int>(std::lround(pixel.x()));
   for (const auto& [dr, dc] :
@@ -38,7 +38,7 @@ bool outside_silhouette(const Silhouette& silhouette, const Eigen::Vector3d& p, 
   const Eigen::Vector3d q = silhouette.camera_from_pose * p;
   if (q.z() <= 0.0) return false;
   const Eigen::Vector2d pixel = silhouette.projection.project(q);
-  if (!silhouette.projection.contains(pixel)) return false;
+  if (!silhouette.projection.contains(pixel)) return silhouette.projection.is_cropped_off(pixel);
   return silhouette.outside_px(static_cast<int>(std::lround(pixel.y())), static_cast<int>(std::lround(pixel.x()))) >
          min_outside_px;
 }

@@ -96,9 +96,12 @@ Result<void> Reconstruction::State::judge_silhouettes_of_both(const Transform& p
   if (!verdict) return pass_on(verdict);
   for (std::size_t i = 0; i < all.size(); ++i) {
     View& view = poses[origin[i].first].views[origin[i].second];
-    view.range.background = all[i].range.background;
-    for (std::size_t c = 0; c < view.silhouettes.size(); ++c)
-      view.silhouettes[c].outside_px = all[i].silhouettes[c].outside_px;
+    all[i].range.camera_from_pose = view.range.camera_from_pose;
+    view.range = std::move(all[i].range);
+    for (std::size_t c = 0; c < view.silhouettes.size(); ++c) {
+      all[i].silhouettes[c].camera_from_pose = view.silhouettes[c].camera_from_pose;
+      view.silhouettes[c] = std::move(all[i].silhouettes[c]);
+    }
   }
   for (SilhouetteFinding finding : verdict->findings) {
     if (finding.kind == SilhouetteFinding::Kind::surplus) continue;  // said of each pose already

@@ -10,6 +10,7 @@
 #include "core/parallel.h"
 #include "pipeline/mesh/solid_properties.h"
 #include "pipeline/pose/estimate_pose.h"
+#include "pipeline/range/crop_view.h"
 #include "pipeline/range/rectification.h"
 #include "pipeline/range/view_builder.h"
 #include "pipeline/reconstruct/live_mesh.h"
@@ -77,6 +78,7 @@ Result<View> Reconstruction::State::view_of(std::size_t pose, const ViewImages& 
   const double gear = calibration->quality ? calibration->quality->gear : 1.0;
   auto view = make_view(*rectification, stereo, gear * images.angle_rad, images.index, {}, context);
   if (!view) return pass_on(view, fmt::format("pose {} view {}", pose + 1, images.index));
+  crop_to_object(*view);
   return view;
 }
 
@@ -147,6 +149,7 @@ Result<void> Reconstruction::State::finish_pose(std::size_t pose, const Context&
                            context);
   if (!partial) return pass_on(partial, fmt::format("pose {}", pose + 1));
   state.partial = std::move(*partial);
+  state.pattern.clear();  // only needed to measure anew without a key
   state.finished = true;
   return {};
 }
@@ -178,6 +181,18 @@ Result<Surface> Reconstruction::State::surface(const Transform& pose1_from_pose2
   return integrate(
       posed, {.voxel_mm = options.voxel_mm, .fusion = *fusion, .table_without_silhouettes = calibration.has_value()},
       context);
+}
+
+/// Colouring needs the photographs and where the views stand.
+void Reconstruction::State::release_range_images() {
+  for (PoseState& pose : poses) {
+    for (View& view : pose.views) {
+      view.range.depth = view.range.sigma = cv::Mat1f();
+      view.range.normal = cv::Mat3f();
+      view.range.background = cv::Mat1b();
+      view.silhouettes.clear();
+    }
+  }
 }
 
 std::vector<Photo> Reconstruction::State::photos(const Transform& pose1_from_pose2) const {
@@ -225,6 +240,7 @@ Result<Model> Reconstruction::State::finish(const ScanIdentity& identity, const 
   if (auto done = judge_silhouettes_of_both(*pose1_from_pose2, context); !done) return pass_on(done);
   auto integrated = surface(*pose1_from_pose2, context);
   if (!integrated) return pass_on(integrated, "integration");
+  release_range_images();
 
   Model model;
   model.mesh.mesh = std::move(integrated->mesh);

@@ -85,7 +85,7 @@ class Reconstruction {
   [[nodiscard]] std::optional<Eigen::Quaterniond> other_rest(std::size_t pose) const;
 
   /// Pose 2 into pose 1, integration, texture; with one pose, its own complete model. Every pose must be finished
-  /// before.
+  /// before. Once: the views are let go.
   /// Fails with `same_rest`, `ambiguous`, `no_overlap`, `degenerate`, `stopped`.
   Result<Model> finish(const ScanIdentity& identity, const Context& context);
 

@@ -60,6 +60,7 @@ struct Reconstruction::State {
   Result<void> finish_pose(std::size_t pose, const Context& context);
   Result<Transform> find_pose(Report& report, const Context& context);
   Result<Surface> surface(const Transform& pose1_from_pose2, const Context& context);
+  void release_range_images();
   [[nodiscard]] std::vector<Photo> photos(const Transform& pose1_from_pose2) const;
   [[nodiscard]] std::vector<LivePhoto> live_photos(const PoseState& pose) const;
   Result<void> add_texture(TexturedMesh& model, const Transform& pose1_from_pose2, Report& report,

@@ -33,8 +33,12 @@ json transform_json(const Transform& transform) {
 json view_json(const View& view, const ViewFit& fit) {
   const cv::Mat1f& depth = view.range.depth;
   const auto measured = static_cast<double>(cv::countNonZero(depth == depth));  // NaN differs from itself
+  const Projection& image = view.range.projection;
+  const bool is_cropped = image.is_cropped();
+  const double pixels =
+      1.0 * (is_cropped ? image.sensor_width : image.width) * (is_cropped ? image.sensor_height : image.height);
   return {{"index", fit.index},
-          {"measured_share_of_image", measured / static_cast<double>(depth.total())},
+          {"measured_share_of_image", measured / pixels},
           {"angle_correction_deg", number(fit.angle_correction_deg)},
           {"rotation_correction_deg", vector_json(fit.rotation_deg)},
           {"translation_correction_mm", vector_json(fit.translation_mm)},

@@ -87,6 +87,10 @@ RangeImage halved(const RangeImage& fine) {
   p.fy /= 2;
   p.cx = (p.cx - 0.5) / 2;
   p.cy = (p.cy - 0.5) / 2;
+  p.crop_x /= 2;
+  p.crop_y /= 2;
+  p.sensor_width /= 2;
+  p.sensor_height /= 2;
   coarse.camera_from_pose = fine.camera_from_pose;
   coarse.depth = cv::Mat1f(p.height, p.width, kNaN);
   coarse.sigma = cv::Mat1f(p.height, p.width, kNaN);
@@ -96,6 +100,9 @@ RangeImage halved(const RangeImage& fine) {
   }
   return coarse;
 }
+
+/// The first pixel of those that lie `stride` apart on the sensor, counted from `from`; `offset` were cropped off.
+int first_of_grid(int from, int stride, int offset) { return (((from - offset) % stride) + stride) % stride; }
 
 }  // namespace
 
@@ -166,8 +173,10 @@ std::vector<SurfacePoint> sample_image(const RangeImage& image, int count) {
   const double known = cv::countNonZero(image.depth == image.depth);  // NaN differs from itself
   const int stride = std::max(1, static_cast<int>(std::lround(std::sqrt(known / std::max(count, 1)))));
   std::vector<SurfacePoint> samples;
-  for (int row = stride / 2; row < image.depth.rows; row += stride) {
-    for (int column = stride / 2; column < image.depth.cols; column += stride) {
+  const int first_row = first_of_grid(stride / 2, stride, image.projection.crop_y);
+  const int first_column = first_of_grid(stride / 2, stride, image.projection.crop_x);
+  for (int row = first_row; row < image.depth.rows; row += stride) {
+    for (int column = first_column; column < image.depth.cols; column += stride) {
       if (const auto s = surface_point(image, row, column)) samples.push_back(*s);
     }
   }
@@ -185,7 +194,8 @@ std::vector<SurfacePoint> sample_surface(const RangeLevel& images, double spacin
     const Transform pose_from_camera = image.camera_from_pose.inverse();
     int stride = 0;  // set at the first measured pixel: two candidates along a cube's edge
     for (int row = 0; row < image.depth.rows; row += std::max(stride, 1)) {
-      for (int column = 0; column < image.depth.cols; column += std::max(stride, 1)) {
+      const int first_column = stride > 0 ? first_of_grid(0, stride, image.projection.crop_x) : 0;
+      for (int column = first_column; column < image.depth.cols; column += std::max(stride, 1)) {
         const auto s = surface_point(image, row, column);
         if (!s) continue;
         if (stride == 0) {

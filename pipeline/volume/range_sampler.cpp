@@ -55,9 +55,7 @@ void RangeSampler::crop(const RangeImage& range) {
                  : cv::Rect(x0 - margin, y0 - margin, x1 - x0 + 1 + 2 * margin, y1 - y0 + 1 + 2 * margin) & image;
   width_ = crop_.width;
   height_ = crop_.height;
-  projection_ = range.projection;
-  projection_.cx -= crop_.x;
-  projection_.cy -= crop_.y;
+  projection_ = range.projection.cropped(crop_.x, crop_.y, crop_.width, crop_.height);
 }
 
 void RangeSampler::make_planes(const RangeImage& range) {
@@ -253,8 +251,7 @@ RangeSample RangeSampler::sample(const Eigen::Vector3f& point) const {
   if (projection_.kind == Projection::Kind::pinhole && !(at.depth > 0.0F)) return result;
   if (!(at.u >= 0.0F && at.v >= 0.0F && at.u < static_cast<float>(width_ - 1) &&
         at.v < static_cast<float>(height_ - 1))) {
-    const float u = at.u + static_cast<float>(crop_.x), v = at.v + static_cast<float>(crop_.y);
-    if (!has_outline_ || !projection_.contains({u, v})) return result;
+    if (!has_outline_ || !projection_.is_cropped_off({at.u, at.v})) return result;
     result.kind = RangeSample::Kind::free;
     result.clearly_free = true;
     result.distance = kInfinity;

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/parallel.h"
+#include "pipeline/range/crop_view.h"
 #include "pipeline/silhouette/box_around.h"
 #include "pipeline/silhouette/contour_distance.h"
 #include "pipeline/volume/integrate.h"
@@ -30,19 +31,22 @@ struct Outline {
   Eigen::Matrix3f rotation;
   Eigen::Vector3f translation;
 
+  /// On the sensor; it may be cropped off.
   [[nodiscard]] std::optional<cv::Point> pixel_of(const Eigen::Vector3f& point) const {
     const Eigen::Vector3f p = rotation * point + translation;
     if (!(p.z() > 0.0F)) return std::nullopt;
     const Projection& projection = silhouette->projection;
     const cv::Point at(static_cast<int>(std::lround(projection.fx * p.x() / p.z() + projection.cx)),
                        static_cast<int>(std::lround(projection.fy * p.y() / p.z() + projection.cy)));
-    const cv::Mat1f& px = silhouette->outside_px;
-    return at.inside({0, 0, px.cols, px.rows}) ? std::optional(at) : std::nullopt;
+    return holds(at) || projection.is_cropped_off({at.x, at.y}) ? std::optional(at) : std::nullopt;
   }
-  /// Nothing outside the image: the object is inside of it.
+  [[nodiscard]] bool holds(const cv::Point& pixel) const {
+    return pixel.inside({0, 0, silhouette->outside_px.cols, silhouette->outside_px.rows});
+  }
+  /// Nothing outside the sensor: the object is inside of it.
   [[nodiscard]] bool puts_outside(const Eigen::Vector3f& point, double margin_px) const {
     const auto at = pixel_of(point);
-    return at && static_cast<double>(silhouette->outside_px(*at)) > margin_px;
+    return at && (!holds(*at) || static_cast<double>(silhouette->outside_px(*at)) > margin_px);
   }
 };
 
@@ -144,6 +148,18 @@ std::vector<int> put_outside(const std::vector<Outline>& outlines, const std::ve
     }
   });
   return count;
+}
+
+/// Cropped silhouettes hold all pixels at which the points are seen: a vote beyond them has a place.
+void uncrop_to(const std::vector<MeasuredPoint>& points, std::span<View> views, const std::vector<Outline>& outlines) {
+  parallel_for(outlines.size(), [&](std::size_t s) {
+    cv::Rect box;
+    for (const MeasuredPoint& point : points) {
+      const auto at = outlines[s].pixel_of(point.point);
+      if (at && !outlines[s].holds(*at)) box |= cv::Rect(*at, cv::Size(1, 1));
+    }
+    if (!box.empty()) uncrop(views[outlines[s].view], outlines[s].camera, box);
+  });
 }
 
 std::vector<Votes> count_votes(const std::vector<Outline>& outlines, const std::vector<MeasuredPoint>& points,
@@ -253,8 +269,7 @@ void forget_background(View& view, std::size_t camera, const cv::Mat1b& region) 
 
 /// Where the outline and the votes are, and so much around that farther out only "far outside" matters.
 cv::Rect box_to_mend(const cv::Mat1f& outside_px, const Votes& votes) {
-  constexpr int kRoom = 96;  // px
-  return box_around(cv::Mat1b((outside_px <= 0.0F) | votes.surface | votes.against), kRoom);
+  return box_around(cv::Mat1b((outside_px <= 0.0F) | votes.surface | votes.against), kCropRoomPx);
 }
 
 /// The rim is mended without a word: it is no single image's.
@@ -364,6 +379,7 @@ Result<SilhouetteVerdict> vote_on_silhouettes(std::span<View> views, const Silho
   const std::vector<int> outside_of = put_outside(outlines, points, options);
   const auto disputed = std::ranges::count_if(outside_of, [&](int n) { return n >= options.min_disputing; });
   verdict.disputed_share = static_cast<double>(disputed) / static_cast<double>(points.size());
+  uncrop_to(points, views, outlines);
   const std::vector<Votes> votes = count_votes(outlines, points, outside_of, options);
   std::vector<std::optional<SilhouetteFinding>> mended(outlines.size()), surplus(outlines.size());
   parallel_for(outlines.size(),

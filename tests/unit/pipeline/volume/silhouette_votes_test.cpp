@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <numbers>
@@ -9,6 +10,7 @@
 
 #include "core/parallel.h"
 #include "pipeline/mesh/topology.h"
+#include "pipeline/range/crop_view.h"
 #include "pipeline/silhouette/contour_distance.h"
 #include "pipeline/volume/integrate.h"
 #include "tests/unit/pipeline/volume/analytic_rig.h"
@@ -119,6 +121,59 @@ TEST(SilhouetteVotes, SoundSilhouettesStayAsTheyAre) {
       EXPECT_EQ(cv::countNonZero(views[v].range.background != before[v].range.background), 0);
     }
   }
+}
+
+/// The ball with an arm. To the left camera of view 0 it seems to have none: there the image is cropped to the ball.
+std::vector<View> with_a_lost_arm(bool cropped) {
+  static const auto taken = take_views({.views = 12}, cast_into(join({voted_ball(), rod({0, 30, 0}, {56, 30, 0}, 6)})));
+  auto views = with_own_pixels(taken);
+  cv::Mat1f& outside = views[0].silhouettes[0].outside_px;
+  cv::Mat1b lost(outside.size(), uchar{0});
+  cv::circle(lost, seen_at(views[0], 0, {0, 30, 0}), 70, 255, cv::FILLED);
+  outside.setTo(5.0F, cv::Mat1b(lost == 0));
+  outside = contour_distance(outside);
+  views[0].range.background.setTo(255, outside > 0.0F);
+  for (auto* image : {&views[0].range.depth, &views[0].range.sigma}) image->setTo(kUnmeasured, outside > 0.0F);
+  views[0].range.normal.setTo(cv::Vec3f::all(kUnmeasured), outside > 0.0F);
+  if (cropped) std::ranges::for_each(views, crop_to_object);
+  return views;
+}
+
+TEST(SilhouetteVotes, WhatWasCroppedOffIsVotedOnAndComesBack) {
+  for (const bool cropped : {false, true}) {
+    auto views = with_a_lost_arm(cropped);
+    const Eigen::Vector3d tip(54, 30, 0);
+    const Silhouette& s = views[0].silhouettes[0];
+    ASSERT_EQ(cropped, s.projection.is_cropped_off(s.projection.project(s.camera_from_pose * tip)));
+    const auto findings = vote(views);
+    ASSERT_EQ(findings.size(), 1U) << "cropped: " << cropped;
+    EXPECT_EQ(findings[0].view, 0);
+    EXPECT_EQ(findings[0].camera, 0U);
+    const cv::Point at = seen_at(views[0], 0, tip);
+    ASSERT_TRUE(at.inside({0, 0, s.outside_px.cols, s.outside_px.rows}));
+    EXPECT_LT(s.outside_px(at), 0.0F);
+    EXPECT_EQ(views[0].range.background(at), 0);
+    EXPECT_EQ(views[0].range.depth.size(), s.outside_px.size());
+  }
+}
+
+TEST(SilhouetteVotes, CroppedViewsMakeTheSameSurface) {
+  auto views = seen_ball();
+  const PosedViews pose{views};
+  const auto whole = integrate({&pose, 1}, {.voxel_mm = 0.5});
+  auto parts = seen_ball();
+  std::ranges::for_each(parts, crop_to_object);
+  const PosedViews cropped{parts};
+  const auto surface = integrate({&cropped, 1}, {.voxel_mm = 0.5});
+  ASSERT_TRUE(whole && surface);
+  EXPECT_LT(3 * parts.front().range.depth.total(), 2 * views.front().range.depth.total());
+  EXPECT_EQ(surface->mesh.faces, whole->mesh.faces);
+  ASSERT_EQ(surface->mesh.vertices.size(), whole->mesh.vertices.size());
+  float greatest = 0.0F;  // outlines are projected in single precision, from another corner
+  for (std::size_t v = 0; v < whole->mesh.vertices.size(); ++v) {
+    greatest = std::max(greatest, (surface->mesh.vertices[v] - whole->mesh.vertices[v]).norm());
+  }
+  EXPECT_LT(greatest, 1e-3F);
 }
 
 TEST(SilhouetteVotes, AStickerInOneSilhouetteDoesNotCutAHoleIntoMeasuredSurface) {
