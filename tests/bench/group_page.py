@@ -24,6 +24,9 @@ def why_not():
 
 def scenes(bench, scratch):
     """Each scene is a line; the list is the program's own."""
+    if reason := why_not():
+        bench.line("the page in a browser", "all scenes", reason, None)
+        return
     begun = time.monotonic()
     done = bench.run(["node", BROWSER / "scenarios.mjs", bench.bin], SCENE_S)
     if done.returncode == 77:
