@@ -42,6 +42,7 @@ class Bench:
         self.group = ""
         self.lines = []
         self.made = set()  # folders of bench.out that this run has made, for the parts that follow
+        self.measured = {}  # figures of this run that several parts need
         self.profile = ""
         self.earlier = None  # compare.Earlier
 

@@ -1,4 +1,8 @@
-"""How long a model takes: one view, its stages, a whole scan offline, and a job from its last image to its model."""
+"""How long a model takes: one view, its stages, a whole scan offline, and a job from its last image to its model.
+
+Seconds were asked for on one kind of machine, ratios elsewhere: OpenCV's 3WAY on the same pair, in the same run, says how
+much slower this machine is, and limits grow by that.
+"""
 import json
 import os
 import pathlib
@@ -17,21 +21,32 @@ IDLE_S = 20
 
 
 def peers_of(bench):
-    """The first view by this project and by OpenCV, in the same run."""
+    """The first view by this project and by OpenCV, once in a run."""
     scan = shoot(bench, "fast-scan")
-    return json.loads(bench.run([bench.bin / "bench_range", "peers", scan], 600, check=True).stdout)
+    if "peers" not in bench.measured:
+        bench.measured["peers"] = json.loads(bench.run([bench.bin / "bench_range", "peers", scan], 600, check=True).stdout)
+    return bench.measured["peers"]
+
+
+def slower(bench):
+    """How many times longer this machine takes than the one on which the times were asked for; not below 1."""
+    return max(1.0, peers_of(bench)["sgbm_3way"]["seconds"] / REFERENCE_3WAY_S)
+
+
+def seconds_at_most(bench, what, limit, value, digits=1):
+    here = limit * slower(bench)
+    bench.line(what, f"<= {limit:g} s x {slower(bench):.2f} = {here:.{digits}f} s", f"{value:.{digits}f} s", value <= here)
 
 
 def view(bench, _scratch):
     found = peers_of(bench)
     own, pixels = found["own"], found["object_px"]
-    slower = found["sgbm_3way"]["seconds"] / REFERENCE_3WAY_S
-    bench.note(f"OpenCV's 3WAY takes {found['sgbm_3way']['seconds']:.2f} s here, {REFERENCE_3WAY_S:.2f} s where the times "
-               f"were asked for: this machine is {slower:.1f} times slower")
-    bench.at_most("a view, images to range image with sigma, median of 5", 0.30, own["seconds"], "s", digits=2)
-    bench.at_most("the same, in times of OpenCV's 3WAY on the same pair", 1.5,
-                  own["seconds"] / found["sgbm_3way"]["seconds"], digits=2)
-    bench.at_least("the same, object pixels a second", 570000, pixels / own["seconds"], digits=0)
+    bench.line("OpenCV's 3WAY: this machine, slower than the limits' own", "reported",
+               f"{found['sgbm_3way']['seconds']:.2f} s for {REFERENCE_3WAY_S:.2f} s: x {slower(bench):.2f}", True)
+    seconds_at_most(bench, "a view, images to range image with sigma, median of 5", 0.30, own["seconds"], 2)
+    rate = 570000 / slower(bench)
+    bench.line("the same, object pixels a second", f">= 570000 / {slower(bench):.2f} = {rate:.0f}",
+               f"{pixels / own['seconds']:.0f}", pixels / own["seconds"] >= rate)
     for name, words in (("own", "this project"), ("sgbm_3way", "OpenCV 3WAY"), ("sgbm_hh4", "OpenCV HH4")):
         inner = found[name]["inner"]
         bench.line(f"the same view by {words}: seconds; measured; median, p95 error", "reported",
@@ -43,13 +58,13 @@ def scan(bench, scratch):
     """16 views offline."""
     folder = shoot(bench, "fast-scan")
     runs = [Timed(bench, folder, scratch / "model") for _ in range(bench.pick(5, ROUNDS, 1))]
-    bench.at_most("16 views offline, whole", 10, median_of(runs, lambda run: run.seconds), "s", digits=1)
+    seconds_at_most(bench, "16 views offline, whole", 10, median_of(runs, lambda run: run.seconds))
     bench.at_most("the same: peak memory", 700, median_of(runs, lambda run: run.peak_mib), "MB", digits=0)
     asked = {"integration": 1.2, "texture": 1.5, "pose": 0.7}
     for stage in runs[0].stages:
         seconds = median_of(runs, lambda run, stage=stage: run.stages[stage])
         if stage in asked:
-            bench.at_most(f"the same: {stage}", asked[stage], seconds, "s", digits=2)
+            seconds_at_most(bench, f"the same: {stage}", asked[stage], seconds, 2)
         else:
             bench.line(f"the same: {stage}", "reported", f"{seconds:.2f} s", True)
     single = Timed(bench, folder, scratch / "model", "--threads", "1")
@@ -59,20 +74,21 @@ def scan(bench, scratch):
 
 
 def live(bench, _scratch):
-    """From the last image on disk to the model on disk, of a job of two poses."""
+    """From the last image on disk to the model on disk, of a job of two poses; to the partial model of the first. The rig
+    on the wire renders its views before the job: as a real one, it needs the processor for sending them alone."""
     folder = bench.out / "fast-demo"
     shutil.rmtree(folder, ignore_errors=True)
     demo = pathlib.Path(__file__).resolve().parent.parent.parent / "sim" / "apps" / "demo.py"
     done = bench.run(["python3", demo, "--bin", bench.bin, "--out", folder, "--calibration", "true", "--profile",
-                      "laboratory"], 1800)
+                      "laboratory", "--wire"], 1800)
     reports = list(folder.rglob("model/report.json"))
     if not reports:
         bench.line("last image to model on disk", "<= 3.0 s", f"no model: {done.stderr.strip()[-200:]}", False)
         return
     images = [file for file in reports[0].parent.parent.rglob("*.png") if "pose2" in str(file)]
     written = max(file.stat().st_mtime for file in reports[0].parent.iterdir())
-    bench.at_most("last image to model on disk, job of two poses", 3.0,
-                  written - max(file.stat().st_mtime for file in images), "s", digits=1)
+    seconds_at_most(bench, "last image to model on disk, job of two poses", 3.0,
+                    written - max(file.stat().st_mtime for file in images))
 
 
 def idle(bench, scratch):
