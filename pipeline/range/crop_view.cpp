@@ -1,9 +1,9 @@
 #include "pipeline/range/crop_view.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "pipeline/silhouette/box_around.h"
+#include "pipeline/silhouette/contour_distance.h"
 
 namespace scanrig {
 namespace {
@@ -35,20 +35,6 @@ cv::Mat_<Pixel> placed(const cv::Mat_<Pixel>& image, const cv::Rect& box, const 
   return larger;
 }
 
-/// Beyond the image its border's distance grows by the way to it.
-cv::Mat1f placed_outline(const cv::Mat1f& outside_px, const cv::Rect& box) {
-  cv::Mat1f larger(box.size());
-  for (int y = 0; y < larger.rows; ++y) {
-    for (int x = 0; x < larger.cols; ++x) {
-      const int u = x + box.x, v = y + box.y;
-      const int inner_u = std::clamp(u, 0, outside_px.cols - 1), inner_v = std::clamp(v, 0, outside_px.rows - 1);
-      larger(y, x) =
-          outside_px(inner_v, inner_u) + std::hypot(static_cast<float>(u - inner_u), static_cast<float>(v - inner_v));
-    }
-  }
-  return larger;
-}
-
 }  // namespace
 
 void crop_to_object(View& view) {
@@ -75,7 +61,7 @@ void uncrop(View& view, std::size_t camera, const cv::Rect& box) {
   const cv::Rect all = (aligned((room + first) & sensor_of(s.projection), sensor_of(s.projection).size()) - first) |
                        cv::Rect({0, 0}, s.outside_px.size());
   if (all.size() == s.outside_px.size()) return;
-  s.outside_px = placed_outline(s.outside_px, all);
+  s.outside_px = distance_beyond(s.outside_px, all);
   s.projection = s.projection.cropped(all.x, all.y, all.width, all.height);
   if (camera != 0) return;
   RangeImage& range = view.range;

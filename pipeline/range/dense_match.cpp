@@ -60,11 +60,14 @@ struct MatchedPixels {
     if (last_column >= lattice.columns || last_row >= lattice.rows) return at(u, v);
     float least = std::numeric_limits<float>::infinity(), most = -least, shares = 0.0F;
     bool is_whole = true;
+    int count = 0;
     for (int y = row; y <= last_row; ++y) {
       for (int x = column; x <= last_column; ++x) {
         const DisparityPatch& node = lattice.at(x, y);
-        is_whole = is_whole && node.valid;
+        const bool is_beyond = mask.usable(y * stride, x * stride) == 0;  // off the object: nothing is missing there
+        is_whole = is_whole && (node.valid || is_beyond);
         if (!node.valid) continue;
+        ++count;
         const DisparityPatch patch = node.moved(static_cast<float>(u - x * stride), static_cast<float>(v - y * stride));
         const float share = nearness(u, x * stride, stride) * nearness(v, y * stride, stride);
         least = std::min(least, patch.c[0]);
@@ -75,7 +78,10 @@ struct MatchedPixels {
       }
     }
     if (shares == 0.0F) return mean;
-    if (!is_whole || most - least > std::min(options.lattice_agree_px, options.lattice_agree_sigmas * mean.sigma))
+    for (std::size_t i = 0; i < 3; ++i) mean.c[i] /= shares;
+    mean.sigma /= shares;
+    if (!is_whole || count < 2 ||
+        most - least > std::min(options.lattice_agree_px, options.lattice_agree_sigmas * mean.sigma))
       return at(u, v);
     mean.valid = on_surface(mean, u, v);
     return mean;

@@ -12,6 +12,8 @@
 namespace scanrig {
 namespace {
 
+constexpr int kRoomPx = 40;  // around the object: more than the windows around its edge
+
 /// What the border shows: the channel that is strongest there, and its share of the light.
 struct Screen {
   int channel = 0;
@@ -21,19 +23,19 @@ struct Screen {
 float light_of(const cv::Vec3f& colour) { return colour[0] + colour[1] + colour[2]; }
 
 /// Share of the screen's chroma in a pixel: 0 grey, 1 the screen.
-cv::Mat1f screen_key(const cv::Mat3f& image, const Screen& screen) {
-  cv::Mat1f key(image.size());
-  const float scale = 1.0f / static_cast<float>(screen.share - 1.0 / 3.0);
-  for (int y = 0; y < image.rows; ++y) {
-    for (int x = 0; x < image.cols; ++x) {
-      const cv::Vec3f& c = image(y, x);
-      const float sum = light_of(c);
-      // Dark pixels are drawn towards grey by less than one grey level per channel.
-      key(y, x) = ((c[screen.channel] + 1.0f) / (sum + 3.0f) - 1.0f / 3.0f) * scale;
-    }
+class ScreenKey {
+ public:
+  explicit ScreenKey(const Screen& screen)
+      : channel_(screen.channel), scale_(1.0f / static_cast<float>(screen.share - 1.0 / 3.0)) {}
+  float operator()(const cv::Vec3f& colour) const {
+    // Dark pixels are drawn towards grey by less than one grey level per channel.
+    return ((colour[channel_] + 1.0f) / (light_of(colour) + 3.0f) - 1.0f / 3.0f) * scale_;
   }
-  return key;
-}
+
+ private:
+  int channel_;
+  float scale_;
+};
 
 float median_of(std::vector<float>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -94,12 +96,12 @@ cv::Mat3f smoothed(const cv::Mat& image) {
 
 /// The brightness up to which the pattern image's chroma is noise. Plain light shows the screen at the border; where
 /// the pattern image has another chroma there, it is dark and noisy, for the projector does not reach everywhere.
-float noise_level(const cv::Mat3f& pattern, const cv::Mat1f& key, const cv::Mat1b& object,
+float noise_level(const cv::Mat3f& pattern, const ScreenKey& key, const cv::Mat1b& object,
                   const BlueScreenOptions& options) {
   std::vector<float> wrong;
-  for_border(key.size(), options.border_px, [&](int x, int y) {
+  for_border(pattern.size(), options.border_px, [&](int x, int y) {
     const float light = light_of(pattern(y, x));
-    const bool is_lit = key(y, x) < static_cast<float>(options.lit_key) && light > options.dark_level;
+    const bool is_lit = key(pattern(y, x)) < static_cast<float>(options.lit_key) && light > options.dark_level;
     if (is_lit && object(y, x) == 0) wrong.push_back(light);
   });
   if (wrong.empty()) return options.dark_level;
@@ -110,14 +112,16 @@ float noise_level(const cv::Mat3f& pattern, const cv::Mat1f& key, const cv::Mat1
 
 /// What the projector lights and what has not the screen's chroma then, gaps of the pattern included. Less than that at
 /// its edge, where pixels are mixed. `object`: what has another chroma than the screen in plain light.
-cv::Mat1b lit_object(const cv::Mat3f& smooth, const Screen& screen, const cv::Mat1b& object,
+cv::Mat1b lit_object(const cv::Mat3f& smooth, const ScreenKey& key, const cv::Mat1b& object,
                      const BlueScreenOptions& options) {
-  const cv::Mat1f key = screen_key(smooth, screen);
   const float dark = noise_level(smooth, key, object, options);
-  cv::Mat1b lit(key.size());
-  for (int y = 0; y < key.rows; ++y) {
-    for (int x = 0; x < key.cols; ++x) {
-      lit(y, x) = key(y, x) < static_cast<float>(options.lit_key) && light_of(smooth(y, x)) > dark ? 255 : 0;
+  cv::Mat1b lit(smooth.size());
+  for (int y = 0; y < lit.rows; ++y) {
+    const cv::Vec3f* colour = smooth[y];
+    uchar* out = lit[y];
+    for (int x = 0; x < lit.cols; ++x) {
+      const bool is_lit = (key(colour[x]) < static_cast<float>(options.lit_key)) & (light_of(colour[x]) > dark);
+      out[x] = is_lit ? 255 : 0;
     }
   }
   remove_parts(lit, options.min_hole_px, 8);
@@ -230,23 +234,30 @@ Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const cv::Mat& patte
                 "check that the blue or green screen is in place",
                 100.0 * screen_colour.share);
   }
-  const cv::Mat1f key = screen_key(smooth, screen_colour);
-  cv::Mat1b object(key.size());
-  cv::compare(key, options.object_key, object, cv::CMP_LT);
-  if (!pattern.empty()) object |= lit_object(smoothed(pattern), screen_colour, object, options);
+  const ScreenKey key(screen_colour);
+  cv::Mat1b object(smooth.size());
+  for (int y = 0; y < object.rows; ++y) {
+    for (int x = 0; x < object.cols; ++x) {
+      object(y, x) = static_cast<double>(key(smooth(y, x))) < options.object_key ? 255 : 0;
+    }
+  }
+  if (!pattern.empty()) object |= lit_object(smoothed(pattern), key, object, options);
   const int largest = largest_part(object);
   if (largest < options.min_hole_px) {
     return fail(ErrorCode::not_found, "silhouette: no object before the screen; check that the object is on the table");
   }
   remove_parts(object, std::max<double>(options.min_hole_px, options.min_part_share * largest), 8);
-  cv::Mat1b screen(255 - object);
-  remove_parts(screen, options.min_hole_px, 4);
-  object = 255 - screen;
   if (touches_border(object)) {
     return fail(ErrorCode::out_of_range,
                 "silhouette: the object reaches the border of the image, it is larger than the working volume");
   }
-  return contour_distance(outside_share(image, object, options));
+  // Only around the object is anything to be found.
+  const cv::Rect box = box_around(object, kRoomPx);
+  cv::Mat1b part(object, box), screen(255 - part);
+  remove_parts(screen, options.min_hole_px, 4);
+  part = 255 - screen;
+  const cv::Mat1f outside = contour_distance(outside_share(image(box), part, options));
+  return distance_beyond(outside, cv::Rect({-box.x, -box.y}, image.size()));
 }
 
 }  // namespace scanrig

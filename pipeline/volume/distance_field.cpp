@@ -5,6 +5,8 @@
 #include <functional>
 #include <limits>
 
+#include "core/parallel.h"
+
 namespace scanrig {
 namespace {
 
@@ -19,15 +21,23 @@ struct SurfaceStatistics {
 };
 
 SurfaceStatistics surface_statistics(const std::vector<std::vector<RangeSampler>>& views_of_pose) {
+  std::vector<const RangeSampler*> all;
+  for (const auto& views : views_of_pose) {
+    for (const auto& view : views) all.push_back(&view);
+  }
+  std::vector<std::vector<float>> weights_of(all.size());
+  std::vector<Eigen::Vector3d> sum_of(all.size(), Eigen::Vector3d::Zero());
+  parallel_for(all.size(), [&](std::size_t v) {
+    for (const auto& pixel : all[v]->surface()) {
+      weights_of[v].push_back(pixel.weight);
+      sum_of[v] += pixel.point.cast<double>();
+    }
+  });
   std::vector<float> weights;
   SurfaceStatistics result;
-  for (const auto& views : views_of_pose) {
-    for (const auto& view : views) {
-      for (const auto& pixel : view.surface()) {
-        weights.push_back(pixel.weight);
-        result.centre += pixel.point.cast<double>();
-      }
-    }
+  for (std::size_t v = 0; v < all.size(); ++v) {
+    weights.insert(weights.end(), weights_of[v].begin(), weights_of[v].end());
+    result.centre += sum_of[v];
   }
   if (weights.empty()) return result;
   result.centre /= static_cast<double>(weights.size());

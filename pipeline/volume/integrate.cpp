@@ -90,19 +90,26 @@ struct Prepared {
 Prepared prepare(std::span<const PosedViews> poses, const VolumeOptions& options, double band_mm) {
   Prepared result;
   for (const auto& pose : poses) {
-    std::vector<std::optional<RangeSampler>> made(pose.views.size());
+    struct Made {
+      std::optional<RangeSampler> sampler;
+      std::vector<Eigen::Vector3f> seeds;
+      Eigen::AlignedBox3f box;
+    };
+    std::vector<Made> made(pose.views.size());
     parallel_for(made.size(), [&](std::size_t i) {
-      made[i].emplace(pose.views[i].range, pose.model_from_pose, band_mm, options.voxel_mm, options.sampler);
+      made[i].sampler.emplace(pose.views[i].range, pose.model_from_pose, band_mm, options.voxel_mm, options.sampler);
+      std::size_t count = 0;
+      for (const auto& pixel : made[i].sampler->surface()) {
+        made[i].box.extend(pixel.point);
+        if (count++ % options.seed_stride == 0) made[i].seeds.push_back(pixel.point);
+      }
     });
     auto& views = result.views_of_pose.emplace_back();
-    for (auto& view : made) views.push_back(std::move(*view));
     result.model_from_pose.push_back(pose.model_from_pose);
-    for (const auto& view : views) {
-      std::size_t count = 0;
-      for (const auto& pixel : view.surface()) {
-        result.box.extend(pixel.point);
-        if (count++ % options.seed_stride == 0) result.seeds.push_back(pixel.point);
-      }
+    for (auto& view : made) {
+      views.push_back(std::move(*view.sampler));
+      result.box.extend(view.box);
+      result.seeds.insert(result.seeds.end(), view.seeds.begin(), view.seeds.end());
     }
   }
   return result;
@@ -119,7 +126,7 @@ Hull make_hull(std::span<const PosedViews> poses, const VolumeOptions& options, 
   return hull;
 }
 
-/// Classes on every fourth node of the stored blocks.
+/// Classes in the middle of each stored block.
 void count_classes(const Field& field, const BlockGrid& grid, VolumeReport& report) {
   struct Count {
     std::array<std::array<std::size_t, kVoxelClasses>, 2> classes{};
@@ -128,18 +135,16 @@ void count_classes(const Field& field, const BlockGrid& grid, VolumeReport& repo
   };
   std::vector<Count> counts(grid.blocks().size());
   parallel_for(counts.size(), [&](std::size_t i) {
-    for (int corner = 0; corner < 8; ++corner) {
-      const Eigen::Vector3i node = 4 * Eigen::Vector3i(corner & 1, corner >> 1 & 1, corner >> 2 & 1);
-      const Eigen::Vector3f point = grid.position(kBlockSide * grid.blocks()[i].index + node);
-      std::array<PoseDistance, 2> pose;
-      for (std::size_t p = 0; p < field.poses(); ++p) {
-        pose[p] = field.pose_distance(point, p);
-        ++counts[i].classes[p][static_cast<std::size_t>(pose[p].voxel_class)];
-      }
-      if (field.poses() < 2) continue;
-      ++counts[i].pairs[static_cast<std::size_t>(pose[0].voxel_class)][static_cast<std::size_t>(pose[1].voxel_class)];
-      counts[i].conflicts += combine(pose[0], pose[1], field.class_threshold()).conflict ? 1 : 0;
+    const Eigen::Vector3i middle = Eigen::Vector3i::Constant(kBlockSide / 2);
+    const Eigen::Vector3f point = grid.position(kBlockSide * grid.blocks()[i].index + middle);
+    std::array<PoseDistance, 2> pose;
+    for (std::size_t p = 0; p < field.poses(); ++p) {
+      pose[p] = field.pose_distance(point, p);
+      ++counts[i].classes[p][static_cast<std::size_t>(pose[p].voxel_class)];
     }
+    if (field.poses() < 2) return;
+    ++counts[i].pairs[static_cast<std::size_t>(pose[0].voxel_class)][static_cast<std::size_t>(pose[1].voxel_class)];
+    counts[i].conflicts += combine(pose[0], pose[1], field.class_threshold()).conflict ? 1 : 0;
   });
   report.class_counts.assign(field.poses(), {});
   for (const auto& count : counts) {

@@ -60,7 +60,7 @@ struct VolumeReport {
   long genus = 0;
   std::size_t voxels_cut = 0;     ///< taken out of the solid to undo a handle
   std::size_t voxels_filled = 0;  ///< added to it to undo a tunnel
-  /// On every fourth voxel of the active blocks: classes per pose, pairs of classes (two poses), conflicts.
+  /// On one voxel of each active block: classes per pose, pairs of classes (two poses), conflicts.
   std::vector<std::array<std::size_t, kVoxelClasses>> class_counts;
   ClassPairCounts class_pairs{};
   std::size_t conflicts = 0;

@@ -113,11 +113,11 @@ Eigen::Vector3f RangeSampler::point_on(const Pixel& plane, int x, int y) const {
 }
 
 /// Each pixel's point lies near the other's tangent plane.
-bool RangeSampler::one_surface(int x0, int y0, int x1, int y1) const {
-  const Pixel &a = pixel(x0, y0), &b = pixel(x1, y1);
+bool RangeSampler::one_surface(const std::vector<Eigen::Vector3f>& points, std::size_t i, std::size_t j) const {
+  const Pixel &a = pixels_[i], &b = pixels_[j];
   const float tolerance = options_.max_step * band_mm_;
-  return std::abs(a.normal.dot(point_on(b, x1, y1)) - a.offset) < tolerance &&
-         std::abs(b.normal.dot(point_on(a, x0, y0)) - b.offset) < tolerance;
+  return std::abs(a.normal.dot(points[j]) - a.offset) < tolerance &&
+         std::abs(b.normal.dot(points[i]) - b.offset) < tolerance;
 }
 
 /// Unknown pixels with at least five measured neighbours that agree take the neighbours' mean plane; twice, so that
@@ -161,12 +161,20 @@ void RangeSampler::close_pinholes() {
 /// voxels resolve into beads and loops. Weights of the rest fade towards the edges.
 void RangeSampler::drop_specks_and_fade_edges(int radius) {
   if (pixels_.empty()) return;
+  const auto at = [&](int x, int y) { return static_cast<std::size_t>(y) * width_ + x; };
+  std::vector<Eigen::Vector3f> points(pixels_.size());
+  for (int y = 0; y < height_; ++y) {
+    for (int x = 0; x < width_; ++x) {
+      if (pixel(x, y).state == State::surface) points[at(x, y)] = point_on(pixel(x, y), x, y);
+    }
+  }
   cv::Mat1b inner(height_, width_, uchar{0});
   for (int y = 1; y + 1 < height_; ++y) {
     for (int x = 1; x + 1 < width_; ++x) {
       if (pixel(x, y).state != State::surface) continue;
       const bool joined = std::all_of(std::begin(kBeside), std::end(kBeside), [&](const auto& step) {
-        return pixel(x + step[0], y + step[1]).state == State::surface && one_surface(x, y, x + step[0], y + step[1]);
+        return pixel(x + step[0], y + step[1]).state == State::surface &&
+               one_surface(points, at(x, y), at(x + step[0], y + step[1]));
       });
       if (joined) inner(y, x) = 255;
     }

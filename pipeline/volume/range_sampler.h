@@ -88,7 +88,7 @@ class RangeSampler {
   void erode_free_depth(int radius);
   void make_footprint();
   void make_tiles();
-  [[nodiscard]] bool one_surface(int x0, int y0, int x1, int y1) const;
+  [[nodiscard]] bool one_surface(const std::vector<Eigen::Vector3f>& points, std::size_t i, std::size_t j) const;
   [[nodiscard]] PixelPosition project(const Eigen::Vector3f& point_in_model) const;
   [[nodiscard]] Eigen::Vector3f point_on(const Pixel& pixel, int x, int y) const;
   [[nodiscard]] float depth_on_plane(const Pixel& plane, int x, int y) const;

@@ -1,5 +1,9 @@
 #include "pipeline/volume/relax.h"
 
+#include <algorithm>
+#include <array>
+#include <vector>
+
 #include "core/parallel.h"
 
 namespace scanrig {
@@ -66,24 +70,22 @@ std::array<float, BlockGrid::kNodes> relaxed(const BlockGrid& grid, const Block&
   return result;
 }
 
-/// True where all of a block and its surroundings is measured or of one sign; a cheap test on the block alone.
 bool has_unmeasured(const Block& block) {
-  for (const Support support : block.support) {
-    if (support != Support::measured) return true;
-  }
-  return false;
+  return std::ranges::any_of(block.support, [](Support support) { return support != Support::measured; });
 }
 
 }  // namespace
 
 void relax_unmeasured(BlockGrid& grid, float band_mm, int rounds) {
   std::vector<Block>& blocks = grid.blocks();
-  std::vector<std::array<float, BlockGrid::kNodes>> next(blocks.size());
+  std::vector<std::size_t> changing;
+  for (std::size_t i = 0; i < blocks.size(); ++i) {
+    if (has_unmeasured(blocks[i])) changing.push_back(i);
+  }
+  std::vector<std::array<float, BlockGrid::kNodes>> next(changing.size());
   for (int round = 0; round < rounds; ++round) {
-    parallel_for(blocks.size(), [&](std::size_t i) {
-      next[i] = has_unmeasured(blocks[i]) ? relaxed(grid, blocks[i], band_mm) : blocks[i].distance;
-    });
-    parallel_for(blocks.size(), [&](std::size_t i) { blocks[i].distance = next[i]; });
+    parallel_for(changing.size(), [&](std::size_t i) { next[i] = relaxed(grid, blocks[changing[i]], band_mm); });
+    parallel_for(changing.size(), [&](std::size_t i) { blocks[changing[i]].distance = next[i]; });
   }
 }
 

@@ -150,32 +150,38 @@ std::vector<int> put_outside(const std::vector<Outline>& outlines, const std::ve
   return count;
 }
 
-/// Cropped silhouettes hold all pixels at which the points are seen: a vote beyond them has a place.
-void uncrop_to(const std::vector<MeasuredPoint>& points, std::span<View> views, const std::vector<Outline>& outlines) {
-  parallel_for(outlines.size(), [&](std::size_t s) {
-    cv::Rect box;
-    for (const MeasuredPoint& point : points) {
-      const auto at = outlines[s].pixel_of(point.point);
-      if (at && !outlines[s].holds(*at)) box |= cv::Rect(*at, cv::Size(1, 1));
+/// Places where the silhouette was cropped off are left out and returned.
+cv::Rect count_votes(const Outline& outline, const std::vector<MeasuredPoint>& points,
+                     const std::vector<int>& outside_of, const SilhouetteVoteOptions& options, Votes& votes) {
+  const cv::Mat1f& outside = outline.silhouette->outside_px;
+  votes = {cv::Mat1b(outside.size(), uchar{0}), cv::Mat1b(outside.size(), uchar{0})};
+  cv::Rect cropped_off;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (outside_of[i] >= points[i].views) continue;
+    const auto at = outline.pixel_of(points[i].point);
+    if (!at) continue;
+    if (!outline.holds(*at)) {
+      cropped_off |= cv::Rect(*at, cv::Size(1, 1));
+      continue;
     }
-    if (!box.empty()) uncrop(views[outlines[s].view], outlines[s].camera, box);
-  });
+    votes.surface(*at) = 255;
+    if (static_cast<double>(outside(*at)) <= options.contour_px) continue;
+    votes.against(*at) = std::max(votes.against(*at), cv::saturate_cast<uchar>(points[i].views));
+  }
+  return cropped_off;
 }
 
-std::vector<Votes> count_votes(const std::vector<Outline>& outlines, const std::vector<MeasuredPoint>& points,
-                               const std::vector<int>& outside_of, const SilhouetteVoteOptions& options) {
+/// A vote on what was cropped off takes it in again.
+std::vector<Votes> count_votes(std::span<View> views, const std::vector<Outline>& outlines,
+                               const std::vector<MeasuredPoint>& points, const std::vector<int>& outside_of,
+                               const SilhouetteVoteOptions& options) {
   std::vector<Votes> votes(outlines.size());
   parallel_for(outlines.size(), [&](std::size_t s) {
-    const cv::Mat1f& outside = outlines[s].silhouette->outside_px;
-    Votes& here = votes[s];
-    here = {cv::Mat1b(outside.size(), uchar{0}), cv::Mat1b(outside.size(), uchar{0})};
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const auto at = outlines[s].pixel_of(points[i].point);
-      if (!at || outside_of[i] >= points[i].views) continue;
-      here.surface(*at) = 255;
-      if (static_cast<double>(outside(*at)) <= options.contour_px) continue;
-      here.against(*at) = std::max(here.against(*at), cv::saturate_cast<uchar>(points[i].views));
-    }
+    const Outline& outline = outlines[s];
+    const cv::Rect cropped_off = count_votes(outline, points, outside_of, options, votes[s]);
+    if (cropped_off.empty()) return;
+    uncrop(views[outline.view], outline.camera, cropped_off);
+    count_votes(outline, points, outside_of, options, votes[s]);
   });
   return votes;
 }
@@ -379,8 +385,7 @@ Result<SilhouetteVerdict> vote_on_silhouettes(std::span<View> views, const Silho
   const std::vector<int> outside_of = put_outside(outlines, points, options);
   const auto disputed = std::ranges::count_if(outside_of, [&](int n) { return n >= options.min_disputing; });
   verdict.disputed_share = static_cast<double>(disputed) / static_cast<double>(points.size());
-  uncrop_to(points, views, outlines);
-  const std::vector<Votes> votes = count_votes(outlines, points, outside_of, options);
+  const std::vector<Votes> votes = count_votes(views, outlines, points, outside_of, options);
   std::vector<std::optional<SilhouetteFinding>> mended(outlines.size()), surplus(outlines.size());
   parallel_for(outlines.size(),
                [&](std::size_t s) { mended[s] = mend(outlines[s], views[outlines[s].view], votes[s], options); });
