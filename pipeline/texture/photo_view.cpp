@@ -10,12 +10,11 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/units.h"
+#include "pipeline/texture/lanes.h"
+#include "pipeline/texture/rounding.h"
 
 namespace scanrig {
 namespace {
-
-using FourLanes = float __attribute__((vector_size(16)));
-using FourBytes = std::uint8_t __attribute__((vector_size(4)));
 
 /// Two neighbouring pixels whose depths differ by more than this many pixel widths belong to two surfaces: steeper than
 /// any used incidence (tan 79 deg).
@@ -29,6 +28,38 @@ std::array<float, 4> cubic(float t) {
   const float t3 = t2 * t;
   return {0.5F * (-t3 + 2.0F * t2 - t), 0.5F * (3.0F * t3 - 5.0F * t2 + 2.0F), 0.5F * (-3.0F * t3 + 4.0F * t2 + t),
           0.5F * (t3 - t2)};
+}
+
+/// Four pixels of a row from column `x` on, in the first twelve of sixteen bytes; the border's pixel beyond it, for
+/// which `copy` has room.
+const uchar* four_pixels(const cv::Mat3b& image, int x, int y, std::array<uchar, 16>& copy) {
+  const uchar* row = image.ptr(std::clamp(y, 0, image.rows - 1));
+  if (x >= 0 && x + 6 <= image.cols) return row + std::ptrdiff_t{3} * x;
+  for (int i = 0; i < 4; ++i) {
+    std::memcpy(copy.data() + std::ptrdiff_t{3} * i, row + std::ptrdiff_t{3} * std::clamp(x + i, 0, image.cols - 1), 3);
+  }
+  return copy.data();
+}
+
+/// The four bytes at `from` as numbers.
+FourLanes four_bytes(const uchar* from) {
+  std::uint32_t word = 0;
+  std::memcpy(&word, from, sizeof(word));
+  // Step by step, as every processor has it: GCC makes worse of a conversion from four bytes.
+  const auto bytes = reinterpret_cast<SixteenBytes>(FourWords{word, 0, 0, 0});
+  const SixteenBytes zero = {};
+  const auto shorts = reinterpret_cast<EightShorts>(
+      __builtin_shufflevector(bytes, zero, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23));
+  const auto ints = reinterpret_cast<FourInts>(
+      __builtin_shufflevector(shorts, reinterpret_cast<EightShorts>(zero), 0, 8, 1, 9, 2, 10, 3, 11));
+  return __builtin_convertvector(ints, FourLanes);
+}
+
+/// Whether a byte of the first twelve reaches `limit`.
+bool reaches(const SixteenBytes& bytes, int limit) {
+  if (limit > 255) return false;
+  const auto is_reached = reinterpret_cast<TwoLongs>(bytes >= static_cast<std::uint8_t>(std::max(limit, 0)));
+  return (is_reached[0] | (is_reached[1] & 0xFFFFFFFFU)) != 0;
 }
 
 }  // namespace
@@ -97,6 +128,7 @@ void PhotoView::leave_out(const cv::Mat1b& mask) {
 }
 
 std::optional<Sight> PhotoView::look(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
+  if (normal.dot(centre_ - point) <= 0.0) return std::nullopt;  // most photos, without a square root
   const double cosine = normal.dot(towards(point));
   if (cosine <= cos_limit_) return std::nullopt;
   const Eigen::Vector3d in_camera = camera_from_model_ * point;
@@ -107,15 +139,14 @@ std::optional<Sight> PhotoView::look(const Eigen::Vector3d& point, const Eigen::
   const double y = pinhole.y() - seen_.window.y;
   if (!(x >= 1.0 && y >= 1.0 && x < seen_.window.width - 2 && y < seen_.window.height - 2)) return std::nullopt;
 
-  const int near_x = static_cast<int>(std::lround(x));
-  const int near_y = static_cast<int>(std::lround(y));
-  // NaN (no mesh there) fails the comparison.
-  if (!(z <= seen_.depth(near_y, near_x) + kSlack * z / photo_->camera.projection.fx)) return std::nullopt;
-
   const int ix = static_cast<int>(x);
   const int iy = static_cast<int>(y);
   const double fx = x - ix;
   const double fy = y - iy;
+  const double nearest = seen_.depth(iy + (fy >= 0.5 ? 1 : 0), ix + (fx >= 0.5 ? 1 : 0));
+  // NaN (no mesh there) fails the comparison.
+  if (!(z <= nearest + kSlack * z / photo_->camera.projection.fx)) return std::nullopt;
+
   const double away = (1 - fy) * ((1 - fx) * edge_px_away_(iy, ix) + fx * edge_px_away_(iy, ix + 1)) +
                       fy * ((1 - fx) * edge_px_away_(iy + 1, ix) + fx * edge_px_away_(iy + 1, ix + 1));
   const double fade = std::min(1.0, (away - edge_px_) / edge_fade_px_);
@@ -136,39 +167,22 @@ std::optional<Eigen::Vector2d> PhotoView::pixel_of(const Eigen::Vector3d& point)
 
 Sample PhotoView::sample(const Eigen::Vector2f& pixel) const {
   const cv::Mat3b& image = photo_->image;
-  const int x = static_cast<int>(std::floor(pixel.x()));
-  const int y = static_cast<int>(std::floor(pixel.y()));
+  const int x = rounded_down(pixel.x()), y = rounded_down(pixel.y());
   const auto across = cubic(pixel.x() - static_cast<float>(x));
   const auto down = cubic(pixel.y() - static_cast<float>(y));
-  FourLanes sum = {}, highest = {};  // b, g, r, and what comes next in the image
-  const auto add = [&](std::size_t j, auto&& pixel_at) {
+  FourLanes sum = {};
+  SixteenBytes highest = {};
+  std::array<uchar, 16> copy{};
+  for (int j = 0; j < 4; ++j) {
+    const uchar* four = four_pixels(image, x - 1, y - 1 + j, copy);
     FourLanes line = {};
-    for (std::size_t i = 0; i < 4; ++i) {
-      const FourLanes c = __builtin_convertvector(pixel_at(static_cast<int>(i)), FourLanes);
-      line += across[i] * c;
-      highest = c > highest ? c : highest;
-    }
-    sum += down[j] * line;
-  };
-  // The fourth byte of a pixel is the next one's first: there is one.
-  const bool is_inside = x >= 1 && y >= 1 && x + 3 < image.cols && y + 2 < image.rows;
-  for (std::size_t j = 0; j < 4; ++j) {
-    const uchar* row = image.ptr(std::clamp(y - 1 + static_cast<int>(j), 0, image.rows - 1));
-    if (is_inside) {
-      add(j, [&](int i) {
-        FourBytes bytes;
-        std::memcpy(&bytes, row + std::ptrdiff_t{3} * (x - 1 + i), sizeof(bytes));
-        return bytes;
-      });
-    } else {
-      add(j, [&](int i) {
-        const uchar* c = row + std::ptrdiff_t{3} * std::clamp(x - 1 + i, 0, image.cols - 1);
-        return FourBytes{c[0], c[1], c[2], 0};
-      });
-    }
+    for (std::size_t i = 0; i < 4; ++i) line += across[i] * four_bytes(four + 3 * i);
+    sum += down[static_cast<std::size_t>(j)] * line;
+    SixteenBytes bytes;
+    std::memcpy(&bytes, four, sizeof(bytes));
+    highest = bytes > highest ? bytes : highest;
   }
-  const float brightest = std::max({highest[0], highest[1], highest[2]});
-  return {Eigen::Vector3f(sum[0], sum[1], sum[2]).cwiseMax(0.0F) / 255.0F, brightest >= static_cast<float>(saturated_)};
+  return {Eigen::Vector3f(sum[0], sum[1], sum[2]).cwiseMax(0.0F) / 255.0F, reaches(highest, saturated_)};
 }
 
 double typical_px_per_mm(const Mesh& mesh, std::span<const Photo> photos) {
