@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "core/parallel.h"
+#include "pipeline/texture/blocks.h"
 
 namespace scanrig {
 namespace {
@@ -35,34 +36,68 @@ std::optional<std::vector<cv::Point>> pack(const std::vector<cv::Size>& sizes, i
   return places;
 }
 
-void draw_face(const std::array<Eigen::Vector2d, 3>& corners, double depth, int face, const std::vector<double>& depths,
-               cv::Mat1i& owner) {
+/// The texel centres in the box around a face.
+cv::Rect box_around(const std::array<Eigen::Vector2d, 3>& corners) {
   const Eigen::Vector2d low = corners[0].cwiseMin(corners[1]).cwiseMin(corners[2]);
   const Eigen::Vector2d high = corners[0].cwiseMax(corners[1]).cwiseMax(corners[2]);
-  for (int y = static_cast<int>(std::ceil(low.y())); y <= high.y(); ++y) {
-    for (int x = static_cast<int>(std::ceil(low.x())); x <= high.x(); ++x) {
-      const auto weights = barycentric(corners, {x, y});
-      if (!weights || weights->minCoeff() < 0.0) continue;
+  const cv::Point first(static_cast<int>(std::ceil(low.x())), static_cast<int>(std::ceil(low.y())));
+  const cv::Point last(static_cast<int>(std::floor(high.x())), static_cast<int>(std::floor(high.y())));
+  return {first, last + cv::Point(1, 1)};
+}
+
+void draw_face(const std::array<Eigen::Vector2d, 3>& corners, double depth, int face, const std::vector<double>& depths,
+               cv::Mat1i& owner) {
+  const cv::Rect box = box_around(corners);
+  for (int y = box.y; y < box.br().y; ++y) {
+    for (int x = box.x; x < box.br().x; ++x) {
       int& now = owner(y, x);
-      if (now < 0 || depth < depths[static_cast<std::size_t>(now)]) now = face;
+      if (now >= 0 && !(depth < depths[static_cast<std::size_t>(now)])) continue;
+      const auto weights = barycentric(corners, {x, y});
+      if (weights && weights->minCoeff() >= 0.0) now = face;
     }
   }
 }
 
-/// Gives the faces at the rim of a chart the texels next to it.
-void pad(cv::Mat1i chart, int padding) {
+/// Gives the faces at the rim of a chart the texels next to it, round after round.
+void pad(cv::Mat1i chart, int padding, std::vector<std::uint8_t>& is_padded) {
+  struct Padding {
+    cv::Point texel;
+    int face;
+  };
+  const auto around = [&](cv::Point at) {
+    return cv::Rect(at - cv::Point(1, 1), cv::Size(3, 3)) & cv::Rect({0, 0}, chart.size());
+  };
+  const auto first_neighbour = [&](cv::Point at) {
+    const cv::Rect box = around(at);
+    for (int y = box.y; y < box.br().y; ++y) {
+      for (int x = box.x; x < box.br().x; ++x) {
+        if (chart(y, x) >= 0) return chart(y, x);
+      }
+    }
+    return -1;
+  };
+  std::vector<Padding> rim, next;
+  for (int y = 0; y < chart.rows; ++y) {
+    for (int x = 0; x < chart.cols; ++x) {
+      const int face = chart(y, x) < 0 ? first_neighbour({x, y}) : -1;
+      if (face >= 0) rim.push_back({{x, y}, face});
+    }
+  }
   for (int round = 0; round < padding; ++round) {
-    const cv::Mat1i before = chart.clone();
-    for (int y = 0; y < chart.rows; ++y) {
-      for (int x = 0; x < chart.cols; ++x) {
-        if (before(y, x) >= 0) continue;
-        for (int v = std::max(0, y - 1); v <= std::min(y + 1, chart.rows - 1) && chart(y, x) < 0; ++v) {
-          for (int u = std::max(0, x - 1); u <= std::min(x + 1, chart.cols - 1) && chart(y, x) < 0; ++u) {
-            chart(y, x) = before(v, u);
-          }
+    for (const Padding& one : rim) {
+      chart(one.texel) = one.face;
+      is_padded[static_cast<std::size_t>(one.face)] = 1;
+    }
+    next.clear();
+    for (const Padding& one : rim) {
+      const cv::Rect box = around(one.texel);
+      for (int y = box.y; y < box.br().y; ++y) {
+        for (int x = box.x; x < box.br().x; ++x) {
+          if (chart(y, x) < 0) next.push_back({{x, y}, first_neighbour({x, y})});
         }
       }
     }
+    std::swap(rim, next);
   }
 }
 
@@ -77,6 +112,12 @@ std::optional<Eigen::Vector3d> barycentric(const std::array<Eigen::Vector2d, 3>&
   const double first = (p.x() * b.y() - p.y() * b.x()) / area;
   const double second = (a.x() * p.y() - a.y() * p.x()) / area;
   return Eigen::Vector3d(1.0 - first - second, first, second);
+}
+
+cv::Rect AtlasLayout::box_of(std::size_t face) const {
+  const int beyond = is_padded[face] != 0 ? padding_px : 0;
+  const cv::Rect box = box_around(corners[face]);
+  return (box - cv::Point(beyond, beyond) + cv::Size(2 * beyond, 2 * beyond)) & cv::Rect({0, 0}, owner.size());
 }
 
 std::optional<AtlasLayout> lay_out(const Mesh& mesh, std::span<const ChartView> views, std::span<const Chart> charts,
@@ -111,14 +152,16 @@ std::optional<AtlasLayout> lay_out(const Mesh& mesh, std::span<const ChartView> 
   }
   if (!places) return std::nullopt;
 
-  layout.owner = cv::Mat1i(atlas_px, atlas_px, -1);
+  layout.owner = filled<int>({atlas_px, atlas_px}, -1);
+  layout.padding_px = padding_px;
+  layout.is_padded.assign(mesh.faces.size(), 0);
   parallel_for(charts.size(), [&](std::size_t c) {
     const Eigen::Vector2d origin((*places)[c].x + padding_px, (*places)[c].y + padding_px);
     for (const auto f : charts[c].faces) {
       for (auto& corner : layout.corners[f]) corner = layout.texels_per_px * (corner - boxes[c].min()) + origin;
       draw_face(layout.corners[f], depths[f], static_cast<int>(f), depths, layout.owner);
     }
-    pad(layout.owner(cv::Rect((*places)[c], sizes[c])), padding_px);
+    pad(layout.owner(cv::Rect((*places)[c], sizes[c])), padding_px, layout.is_padded);
   });
   return layout;
 }

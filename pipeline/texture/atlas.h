@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <cstdint>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <span>
@@ -15,6 +17,11 @@ struct AtlasLayout {
   double texels_per_px = 0.0;
   std::vector<std::array<Eigen::Vector2d, 3>> corners;  ///< one per face, texels
   cv::Mat1i owner;  ///< the face whose plane colours a texel, padding included; -1: none
+  int padding_px = 0;
+  std::vector<std::uint8_t> is_padded;  ///< one per face: 1 if it owns texels beyond itself
+
+  /// The texels among which are all that a face owns.
+  [[nodiscard]] cv::Rect box_of(std::size_t face) const;
 };
 
 /// Packs the charts' projections into a square of `atlas_px`, at the largest scale up to `max_texels_per_px` that fits;

@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "pipeline/texture/photo_view.h"
+#include "pipeline/texture/photo_looks.h"
 
 namespace scanrig {
 
@@ -32,9 +32,8 @@ std::vector<ChartView> chart_views(std::span<const PhotoView> photos, double px_
 
 /// Cuts the surface into few charts. The photo that flattens a face decides its resolution, not its colour, so few
 /// large charts are best: a greedy set cover picks the views, iterated conditional modes smooth the borders, small
-/// charts join a neighbour where its view shows them. `seen`: one byte per vertex and photo, 1 where the photo shows
-/// it.
+/// charts join a neighbour where its view shows them. `looks`: of the mesh's vertices.
 std::vector<Chart> cut_into_charts(const Mesh& mesh, std::span<const ChartView> views, std::size_t photos,
-                                   const std::vector<std::uint8_t>& seen, const ChartOptions& options);
+                                   const VertexLooks& looks, const ChartOptions& options);
 
 }  // namespace scanrig

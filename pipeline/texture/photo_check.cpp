@@ -6,6 +6,7 @@
 
 #include "core/parallel.h"
 #include "core/statistics.h"
+#include "pipeline/texture/blocks.h"
 #include "pipeline/texture/point_colour.h"
 
 namespace scanrig {
@@ -55,7 +56,7 @@ std::vector<std::vector<Difference>> differences(std::span<const PhotoView> view
                                                  const BlendOptions& blending, const PhotoCheckOptions& options) {
   const std::size_t step = mesh.vertices.size() / options.spots + 1;
   std::vector<std::vector<Difference>> at((mesh.vertices.size() + step - 1) / step);
-  parallel_for(at.size(), [&](std::size_t i) {
+  for_each_in_blocks(at.size(), [&](std::size_t i) {
     const std::size_t v = i * step;
     at[i] = differences_at(views, light, mesh.vertices[v].cast<double>(), normals[v].cast<double>(), blending, options);
   });

@@ -1,5 +1,7 @@
 #include "pipeline/texture/photo_looks.h"
 
+#include "core/parallel.h"
+
 namespace scanrig {
 
 Eigen::Vector3f light_on(const PhotoView& view, const RigLight& light, const Eigen::Vector3d& point,
@@ -17,6 +19,23 @@ void look_from_all(std::span<const PhotoView> views, const RigLight& light, cons
     looks.push_back({static_cast<std::uint16_t>(p), sight->pixel.cast<float>(), static_cast<float>(sight->weight),
                      light_on(views[p], light, point, normal)});
   }
+}
+
+VertexLooks::VertexLooks(std::span<const PhotoView> views, const RigLight& light, const Mesh& mesh)
+    : blocks_((mesh.vertices.size() + kBlock - 1) / kBlock) {
+  parallel_for(blocks_.size(), [&](std::size_t b) {
+    std::vector<PhotoLook> all, looks;
+    Block& block = blocks_[b];
+    for (std::size_t i = 0; i < kBlock; ++i) {
+      if (const std::size_t v = b * kBlock + i; v < mesh.vertices.size()) {
+        look_from_all(views, light, mesh.vertices[v].cast<double>(), mesh.normals[v].cast<double>(), looks);
+        all.insert(all.end(), looks.begin(), looks.end());
+      }
+      block.first[i + 1] = static_cast<std::uint32_t>(all.size());
+      looks.clear();
+    }
+    block.looks.assign(all.begin(), all.end());
+  });
 }
 
 }  // namespace scanrig

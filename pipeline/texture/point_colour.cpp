@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "core/parallel.h"
 #include "pipeline/mesh/vertex_neighbours.h"
+#include "pipeline/texture/blocks.h"
 
 namespace scanrig {
 
@@ -62,7 +62,7 @@ RigLight light_from_photos(std::span<const PhotoView> views, const Mesh& mesh,
                            const std::vector<Eigen::Vector3f>& normals, const BlendOptions& options) {
   const std::size_t step = mesh.vertices.size() / options.light_spots + 1;
   std::vector<std::vector<LightSample>> spots((mesh.vertices.size() + step - 1) / step);
-  parallel_for(spots.size(), [&](std::size_t i) {
+  for_each_in_blocks(spots.size(), [&](std::size_t i) {
     const std::size_t v = i * step;
     const Eigen::Vector3d point = mesh.vertices[v].cast<double>();
     const Eigen::Vector3d normal = normals[v].cast<double>();

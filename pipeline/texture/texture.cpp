@@ -9,6 +9,7 @@
 #include "core/parallel.h"
 #include "pipeline/mesh/solid_properties.h"
 #include "pipeline/texture/atlas.h"
+#include "pipeline/texture/blocks.h"
 #include "pipeline/texture/chart_cutting.h"
 #include "pipeline/texture/face_colours.h"
 #include "pipeline/texture/photo_check.h"
@@ -18,8 +19,6 @@
 
 namespace scanrig {
 namespace {
-
-constexpr std::size_t kBlock = 1024;
 
 Result<void> check(const Mesh& mesh, std::span<const Photo> photos, const TextureOptions& options) {
   if (mesh.faces.empty()) return fail(ErrorCode::degenerate, "texture: the mesh has no faces");
@@ -43,12 +42,6 @@ Result<void> check(const Mesh& mesh, std::span<const Photo> photos, const Textur
   return {};
 }
 
-void for_blocks(std::size_t count, const std::function<void(std::size_t)>& body) {
-  parallel_for((count + kBlock - 1) / kBlock, [&](std::size_t block) {
-    for (std::size_t i = block * kBlock; i < std::min(count, (block + 1) * kBlock); ++i) body(i);
-  });
-}
-
 /// One gain for the whole scan that makes the brightest paint a suitable white.
 double gain_for(const std::vector<PointColour>& colours, const TextureOptions& options) {
   std::vector<float> brightest;
@@ -65,12 +58,11 @@ Eigen::Vector3f mean_colour(const std::vector<PointColour>& colours) {
   return sum / static_cast<float>(colours.size());
 }
 
-/// Colour of the texel (x, y), which a face owns.
+/// Colour of the texel (x, y), which the face `f` owns and `colours` has chosen.
 cv::Vec3b texel_colour(const AtlasLayout& layout, const TexturedModel& model,
                        const std::vector<PointColour>& at_vertices, const TextureOptions& options, FaceColours& colours,
-                       int x, int y) {
+                       std::size_t f, int x, int y) {
   const auto gain = static_cast<float>(model.exposure_gain);
-  const auto f = static_cast<std::uint32_t>(layout.owner(y, x));
   const Eigen::Vector3d weights =
       barycentric(layout.corners[f], Eigen::Vector2d(x, y)).value_or(Eigen::Vector3d(1, 0, 0));
   // Beyond its rim a chart continues in the plane of the face, but with the light and the fill of the rim.
@@ -79,7 +71,7 @@ cv::Vec3b texel_colour(const AtlasLayout& layout, const TexturedModel& model,
   for (int k = 0; k < 3; ++k) {
     fill += static_cast<float>(inside[k]) * at_vertices[model.mesh.mesh.faces[f][static_cast<std::size_t>(k)]].bgr;
   }
-  const PointColour seen = colours.at(f, weights, inside);
+  const PointColour seen = colours.at(weights, inside);
   return to_srgb(gain * (seen.weight * seen.bgr + options.fill_weight * fill) / (seen.weight + options.fill_weight));
 }
 
@@ -96,8 +88,8 @@ double seen_share(const Mesh& mesh, const std::vector<PointColour>& colours) {
 }
 
 struct VertexPaint {
+  VertexLooks looks;
   std::vector<PointColour> colours;  ///< linear; unseen vertices are filled from their surroundings
-  std::vector<std::uint8_t> seen;    ///< one byte per vertex and photo: 1 where the photo shows it
 };
 
 /// Leaves contradicted photos out of `views`. Fills in the model's light, gain, seen share and vertex colours.
@@ -106,15 +98,10 @@ Result<VertexPaint> colour_vertices(std::span<PhotoView> views, const TextureOpt
   model.light = light_from_photos(views, mesh, mesh.normals, options.blending);
   model.contradicted = leave_out_contradicted(views, model.light, mesh, mesh.normals, options.blending, options.check);
   if (!model.contradicted.empty()) model.light = light_from_photos(views, mesh, mesh.normals, options.blending);
-  VertexPaint paint{std::vector<PointColour>(mesh.vertices.size()),
-                    std::vector<std::uint8_t>(mesh.vertices.size() * views.size())};
+  VertexPaint paint{VertexLooks(views, model.light, mesh), std::vector<PointColour>(mesh.vertices.size())};
   std::vector<PointColour>& colours = paint.colours;
-  for_blocks(colours.size(), [&](std::size_t v) {
-    thread_local std::vector<PhotoLook> looks;
-    look_from_all(views, model.light, mesh.vertices[v].cast<double>(), mesh.normals[v].cast<double>(), looks);
-    colours[v] = blend_looks(views, looks, options.blending);
-    for (const PhotoLook& look : looks) paint.seen[v * views.size() + look.photo] = 1;
-  });
+  for_each_in_blocks(colours.size(),
+                     [&](std::size_t v) { colours[v] = blend_looks(views, paint.looks.of(v), options.blending); });
   if (std::none_of(colours.begin(), colours.end(), [](const PointColour& c) { return c.weight > 0.0F; })) {
     return fail(ErrorCode::degenerate, "texture: no photo sees the mesh; check the calibration");
   }
@@ -122,40 +109,37 @@ Result<VertexPaint> colour_vertices(std::span<PhotoView> views, const TextureOpt
   model.exposure_gain = gain_for(colours, options);
   fill_unseen(mesh, options.blending.fill_rounds, colours);
   mesh.colour.resize(colours.size());
-  for (std::size_t v = 0; v < colours.size(); ++v) {
+  for_each_in_blocks(colours.size(), [&](std::size_t v) {
     const cv::Vec3b bgr = to_srgb(static_cast<float>(model.exposure_gain) * colours[v].bgr);
     mesh.colour[v] = {bgr[2], bgr[1], bgr[0]};
-  }
+  });
   return paint;
 }
 
-/// Draws the atlas and fills in the texture coordinates.
-void draw_atlas(const AtlasLayout& layout, std::span<const PhotoView> views, const std::vector<PointColour>& colours,
+/// Draws the atlas, face after face, and fills in the texture coordinates.
+void draw_atlas(const AtlasLayout& layout, std::span<const PhotoView> views, const VertexPaint& paint,
                 const TextureOptions& options, TexturedModel& model) {
   const cv::Size size = layout.owner.size();
   const auto gain = static_cast<float>(model.exposure_gain);
-  model.mesh.atlas = cv::Mat3b(size, to_srgb(gain * mean_colour(colours)));
-  constexpr int kStrip = 64, kTile = 64;  // texels: a face's photos are looked up once in a strip; tile after tile
-  const int strips = (size.height + kStrip - 1) / kStrip;
-  parallel_for(static_cast<std::size_t>(strips), [&](std::size_t strip) {
-    const int top = static_cast<int>(strip) * kStrip, bottom = std::min(top + kStrip, size.height);
-    FaceColours of_faces(views, model.light, model.mesh.mesh, options.blending);
-    for (int left = 0; left < size.width; left += kTile) {
-      for (int y = top; y < bottom; ++y) {
-        for (int x = left; x < std::min(left + kTile, size.width); ++x) {
-          if (layout.owner(y, x) < 0) continue;
-          model.mesh.atlas(y, x) = texel_colour(layout, model, colours, options, of_faces, x, y);
+  model.mesh.atlas = filled<cv::Vec3b>(size, to_srgb(gain * mean_colour(paint.colours)));
+  model.mesh.corner_uv.resize(layout.corners.size());
+  for_blocks(layout.corners.size(), [&](std::size_t begin, std::size_t end) {
+    FaceColours of_face(views, model.light, model.mesh.mesh, paint.looks, options.blending);
+    for (std::size_t f = begin; f < end; ++f) {
+      of_face.choose(static_cast<std::uint32_t>(f));
+      const cv::Rect box = layout.box_of(f);
+      for (int y = box.y; y < box.br().y; ++y) {
+        for (int x = box.x; x < box.br().x; ++x) {
+          if (layout.owner(y, x) != static_cast<int>(f)) continue;
+          model.mesh.atlas(y, x) = texel_colour(layout, model, paint.colours, options, of_face, f, x, y);
         }
+      }
+      for (std::size_t k = 0; k < 3; ++k) {
+        // A texel's centre is half a texel from its corner, and (0, 0) is the corner of the first.
+        model.mesh.corner_uv[f][k] = ((layout.corners[f][k].array() + 0.5) / size.width).matrix().cast<float>();
       }
     }
   });
-  model.mesh.corner_uv.resize(layout.corners.size());
-  for (std::size_t f = 0; f < layout.corners.size(); ++f) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      // A texel's centre is half a texel from its corner, and (0, 0) is the corner of the first.
-      model.mesh.corner_uv[f][k] = ((layout.corners[f][k].array() + 0.5) / size.width).matrix().cast<float>();
-    }
-  }
 }
 
 }  // namespace
@@ -186,7 +170,7 @@ Result<TexturedModel> texture_mesh(const Mesh& mesh, std::span<const Photo> phot
   if (context.stopped()) return stopped();
 
   const auto flat = chart_views(views, px_per_mm);
-  const auto charts = cut_into_charts(out, flat, views.size(), paint->seen, options.charts);
+  const auto charts = cut_into_charts(out, flat, views.size(), paint->looks, options.charts);
   const auto layout = lay_out(out, flat, charts, options.atlas_px, options.max_texels_per_px, options.padding_px);
   if (!layout) {
     return fail(ErrorCode::out_of_range,
@@ -198,7 +182,7 @@ Result<TexturedModel> texture_mesh(const Mesh& mesh, std::span<const Photo> phot
   context.report("texture", 0.5);
   if (context.stopped()) return stopped();
 
-  draw_atlas(*layout, views, paint->colours, options, model);
+  draw_atlas(*layout, views, *paint, options, model);
   context.report("texture", 1.0);
   return model;
 }
