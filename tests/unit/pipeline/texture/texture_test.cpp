@@ -171,6 +171,54 @@ TEST(TextureTest, theChartsAreFewAndFillTheAtlasAtTheScaleThatFits) {
   }
 }
 
+/// Texels of the faces themselves.
+cv::Mat1b texels_of_faces(const TexturedMesh& mesh) {
+  cv::Mat1b drawn(mesh.atlas.size(), uchar{0});
+  for (const auto& uv : mesh.corner_uv) {
+    std::array<cv::Point, 3> corners;
+    for (std::size_t k = 0; k < 3; ++k) {
+      corners[k] = cv::Point(static_cast<int>(std::lround(uv[k].x() * static_cast<float>(drawn.cols) - 0.5F)),
+                             static_cast<int>(std::lround(uv[k].y() * static_cast<float>(drawn.rows) - 0.5F)));
+    }
+    cv::fillConvexPoly(drawn, corners, cv::Scalar(255));
+  }
+  return drawn;
+}
+
+TEST(TextureTest, theColourOfAChartContinuesAroundIt) {
+  PaintedScene scene = white_ball();
+  scene.paint = [](std::size_t, const Eigen::Vector3d& p) {
+    return Eigen::Vector3d::Constant(p.y() > 45.0 ? 0.7 : 0.1).eval();
+  };
+  const TextureOptions options = small_atlas();
+  const auto model =
+      texture_mesh(scene.mesh(1.5), scene.photos(rig_camera(0.0, kElevation, kScale), turns(6)), options, {});
+  ASSERT_TRUE(model);
+  const cv::Mat3b& atlas = model->mesh.atlas;
+  const cv::Mat1b inner = texels_of_faces(model->mesh);
+  const int reach = options.padding_px - 1;  // drawn faces may be a texel larger
+  cv::Mat1b outer;
+  cv::dilate(inner, outer, cv::Mat1b::ones(2 * reach + 1, 2 * reach + 1));
+  int around = 0, unlike = 0;
+  for (int y = 0; y < atlas.rows; ++y) {
+    for (int x = 0; x < atlas.cols; ++x) {
+      if (outer(y, x) == 0 || inner(y, x) != 0) continue;
+      const cv::Rect box =
+          cv::Rect(x - reach, y - reach, 2 * reach + 1, 2 * reach + 1) & cv::Rect({0, 0}, atlas.size());
+      int difference = 255;
+      for (int v = box.y; v < box.br().y; ++v) {
+        for (int u = box.x; u < box.br().x; ++u) {
+          if (inner(v, u) != 0) difference = std::min(difference, std::abs(atlas(v, u)[1] - atlas(y, x)[1]));
+        }
+      }
+      ++around;
+      unlike += difference > 15 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(around, 1000);
+  EXPECT_LT(unlike, around / 100);
+}
+
 TEST(TextureTest, geometryStaysAsItWas) {
   const Mesh mesh = striped_ball().mesh(2.0);
   const auto model = texture_mesh(mesh, striped_photos(), small_atlas(), {});
