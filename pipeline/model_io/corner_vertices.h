@@ -20,6 +20,7 @@ struct CornerVertices {
     const bool textured = model.corner_uv.size() == model.mesh.faces.size();
     std::vector<std::uint32_t> first(model.mesh.vertices.size(), none);
     std::vector<std::uint32_t> next;
+    faces.reserve(model.mesh.faces.size());
     for (std::size_t f = 0; f < model.mesh.faces.size(); ++f) {
       Mesh::Face face;
       for (std::size_t k = 0; k < 3; ++k) {

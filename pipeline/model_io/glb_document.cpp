@@ -16,6 +16,7 @@ constexpr int kClampToEdge = 33071;
 std::string container(std::string text, const std::string& binary) {
   text.resize((text.size() + 3) / 4 * 4, ' ');
   std::string file;
+  file.reserve(28 + text.size() + binary.size());
   append_bytes(file, kMagic);
   append_bytes(file, std::uint32_t{2});
   append_bytes(file, static_cast<std::uint32_t>(12 + 8 + text.size() + 8 + binary.size()));

@@ -31,11 +31,10 @@ class GlbDocument {
   int add_view(std::string_view bytes, std::optional<int> target = {}, std::optional<int> stride = {});
   /// Of a buffer view; returns its number.
   int add_accessor(int view, std::size_t offset, int component, std::size_t count, const char* type);
-  /// A view and an accessor of values of `per_value` components' groups each.
+  /// A view and an accessor of values of `per_value` components' groups each, in the file as in memory.
   template <class T>
   int add(const std::vector<T>& values, int component, const char* type, int per_value, int target) {
-    std::string bytes;
-    for (const T& value : values) append_bytes(bytes, value);
+    const std::string_view bytes(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
     return add_accessor(add_view(bytes, target), 0, component, values.size() * static_cast<std::size_t>(per_value),
                         type);
   }

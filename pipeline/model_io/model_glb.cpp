@@ -15,6 +15,8 @@ json add_geometry(const TexturedMesh& model, bool textured, GlbDocument& documen
   const auto normals =
       model.mesh.normals.size() == model.mesh.vertices.size() ? model.mesh.normals : vertex_normals(model.mesh);
   std::vector<Eigen::Vector3f> positions, directions;
+  positions.reserve(corners.vertex.size());
+  directions.reserve(corners.vertex.size());
   Eigen::Vector3f low = Eigen::Vector3f::Constant(std::numeric_limits<float>::infinity());
   Eigen::Vector3f high = -low;
   for (const auto v : corners.vertex) {

@@ -268,6 +268,15 @@ TEST_F(ModelFilesTest, theObjReadsBackAndItsTextureStartsAtTheBottom) {
   EXPECT_THAT(encode_mtl("model.png"), HasSubstr("map_Kd model.png"));
 }
 
+TEST_F(ModelFilesTest, anObjFaceNamesItsVerticesAndItsTextureCoordinates) {
+  TexturedMesh model = tetrahedron();
+  model.mesh.vertices[1].x() = 59.1234567F;
+  const std::string text = encode_obj(model, "model.mtl");
+  EXPECT_THAT(text, HasSubstr("v 59.12346 0 0\n"));
+  // Three coordinates of their own for each of the four faces: the second face has the fourth to the sixth.
+  EXPECT_THAT(text, HasSubstr("f 1/1 3/2 2/3\nf 1/4 2/5 4/6\n"));
+}
+
 TEST_F(ModelFilesTest, theStlHasFiftyBytesPerFaceAndNamesItsUnit) {
   const std::string bytes = encode_stl(tetrahedron().mesh);
   ASSERT_EQ(bytes.size(), 84u + 4u * 50u);
