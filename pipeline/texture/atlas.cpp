@@ -152,7 +152,9 @@ std::optional<AtlasLayout> lay_out(const Mesh& mesh, std::span<const ChartView> 
   }
   if (!places) return std::nullopt;
 
-  layout.owner = filled<int>({atlas_px, atlas_px}, -1);
+  int rows = 0;
+  for (std::size_t c = 0; c < charts.size(); ++c) rows = std::max(rows, (*places)[c].y + sizes[c].height);
+  layout.owner = filled<int>({atlas_px, rows}, -1);
   layout.padding_px = padding_px;
   layout.is_padded.assign(mesh.faces.size(), 0);
   parallel_for(charts.size(), [&](std::size_t c) {

@@ -16,7 +16,7 @@ namespace scanrig {
 struct AtlasLayout {
   double texels_per_px = 0.0;
   std::vector<std::array<Eigen::Vector2d, 3>> corners;  ///< one per face, texels
-  cv::Mat1i owner;  ///< the face whose plane colours a texel, padding included; -1: none
+  cv::Mat1i owner;  ///< the face whose plane colours a texel, padding included; -1: none. Down to the last chart
   int padding_px = 0;
   std::vector<std::uint8_t> is_padded;  ///< one per face: 1 if it owns texels beyond itself
 

@@ -119,9 +119,9 @@ Result<VertexPaint> colour_vertices(std::span<PhotoView> views, const TextureOpt
 /// Draws the atlas, face after face, and fills in the texture coordinates.
 void draw_atlas(const AtlasLayout& layout, std::span<const PhotoView> views, const VertexPaint& paint,
                 const TextureOptions& options, TexturedModel& model) {
-  const cv::Size size = layout.owner.size();
+  const int side = options.atlas_px;
   const auto gain = static_cast<float>(model.exposure_gain);
-  model.mesh.atlas = filled<cv::Vec3b>(size, to_srgb(gain * mean_colour(paint.colours)));
+  model.mesh.atlas = filled<cv::Vec3b>({side, side}, to_srgb(gain * mean_colour(paint.colours)));
   model.mesh.corner_uv.resize(layout.corners.size());
   for_blocks(layout.corners.size(), [&](std::size_t begin, std::size_t end) {
     FaceColours of_face(views, model.light, model.mesh.mesh, paint.looks, options.blending);
@@ -136,7 +136,7 @@ void draw_atlas(const AtlasLayout& layout, std::span<const PhotoView> views, con
       }
       for (std::size_t k = 0; k < 3; ++k) {
         // A texel's centre is half a texel from its corner, and (0, 0) is the corner of the first.
-        model.mesh.corner_uv[f][k] = ((layout.corners[f][k].array() + 0.5) / size.width).matrix().cast<float>();
+        model.mesh.corner_uv[f][k] = ((layout.corners[f][k].array() + 0.5) / side).matrix().cast<float>();
       }
     }
   });
