@@ -1,6 +1,7 @@
 #include "pipeline/registration/range_surface.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -37,6 +38,30 @@ double depth_on_plane(const Projection& projection, const Eigen::Vector2d& pixel
   if (projection.kind == Projection::Kind::orthographic) return p.z() + normal.dot(p - q) / normal.z();
   return p.z() * normal.dot(p) / normal.dot(q);
 }
+
+/// The rays of a pixel and of the four grid points around it, and where the first meets their planes.
+class CornerRays {
+ public:
+  CornerRays(const Projection& projection, const Eigen::Vector2d& pixel, int column, int row)
+      : is_pinhole_(projection.kind == Projection::Kind::pinhole) {
+    const Eigen::Vector2d scale(1.0 / projection.fx, 1.0 / projection.fy), centre(projection.cx, projection.cy);
+    ray_ = (pixel - centre).cwiseProduct(scale);
+    const Eigen::Vector2d low = (Eigen::Vector2d(column, row) - centre).cwiseProduct(scale);
+    corner_ = {low, {low.x() + scale.x(), low.y()}, {low.x(), low.y() + scale.y()}, low + scale};
+  }
+  /// Of the plane through corner `k` at `depth`, under the pixel.
+  [[nodiscard]] double depth_on_plane(int k, double depth, const Eigen::Vector3d& normal) const {
+    const Eigen::Vector2d& corner = corner_[static_cast<std::size_t>(k)];
+    const auto flat = normal.head<2>();
+    if (!is_pinhole_) return depth + flat.dot(corner - ray_) / normal.z();
+    return depth * (flat.dot(corner) + normal.z()) / (flat.dot(ray_) + normal.z());
+  }
+
+ private:
+  bool is_pinhole_;
+  Eigen::Vector2d ray_;
+  std::array<Eigen::Vector2d, 4> corner_;
+};
 
 std::optional<SurfacePoint> surface_point(const RangeImage& image, int row, int column) {
   const float depth = image.depth(row, column);
@@ -119,30 +144,29 @@ std::optional<SurfacePoint> surface_at(const RangeImage& image, const Eigen::Vec
   if (!image.projection.contains(pixel)) return std::nullopt;
   const int column = std::min(static_cast<int>(pixel.x()), image.projection.width - 2);
   const int row = std::min(static_cast<int>(pixel.y()), image.projection.height - 2);
+  const float* depth[2] = {image.depth[row] + column, image.depth[row + 1] + column};
+  const float lowest = std::min({depth[0][0], depth[0][1], depth[1][0], depth[1][1]});
+  const float highest = std::max({depth[0][0], depth[0][1], depth[1][0], depth[1][1]});
+  if (std::isnan(depth[0][0] + depth[0][1] + depth[1][0] + depth[1][1])) return std::nullopt;
+  const double footprint = image.projection.mm_per_pixel(lowest);
+  if (highest - lowest > kMaxSlope * footprint) return std::nullopt;
   const double u = pixel.x() - column;
   const double v = pixel.y() - row;
   const double weight[4] = {(1 - u) * (1 - v), u * (1 - v), (1 - u) * v, u * v};
+  const CornerRays rays(image.projection, pixel, column, row);
   double chord = 0.0;
   double tangent = 0.0;
   double sigma = 0.0;
-  float lowest = std::numeric_limits<float>::infinity();
-  float highest = -lowest;
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
   for (int k = 0; k < 4; ++k) {
-    const int r = row + k / 2;
-    const int c = column + k % 2;
-    const float d = image.depth(r, c);
-    if (std::isnan(d)) return std::nullopt;
-    lowest = std::min(lowest, d);
-    highest = std::max(highest, d);
-    const Eigen::Vector3d n = to_eigen(image.normal(r, c));
+    const double d = static_cast<double>(depth[k / 2][k % 2]);
+    const Eigen::Vector3d n = to_eigen(image.normal(row + k / 2, column + k % 2));
     chord += weight[k] * d;
-    tangent += weight[k] * depth_on_plane(image.projection, pixel, image.projection.unproject(c, r, d), n);
-    sigma += weight[k] * image.sigma(r, c);
+    tangent += weight[k] * rays.depth_on_plane(k, d, n);
+    sigma += weight[k] * static_cast<double>(image.sigma(row + k / 2, column + k % 2));
     normal += weight[k] * n;
   }
-  const double footprint = image.projection.mm_per_pixel(lowest);
-  if (highest - lowest > kMaxSlope * footprint || !(std::abs(chord - tangent) < footprint)) return std::nullopt;
+  if (!(std::abs(chord - tangent) < footprint)) return std::nullopt;
   SurfacePoint s;
   // Chords fall inside a curved surface by as much as tangent planes stand outside it.
   s.point = image.projection.unproject(pixel.x(), pixel.y(), 0.5 * (chord + tangent));
