@@ -11,7 +11,9 @@
 #include "pipeline/silhouette/box_around.h"
 #include "pipeline/silhouette/contour_distance.h"
 #include "pipeline/volume/integrate.h"
+#include "pipeline/volume/posed_outline.h"
 #include "pipeline/volume/range_sampler.h"
+#include "pipeline/volume/silhouette_surplus.h"
 
 namespace scanrig {
 namespace {
@@ -20,47 +22,12 @@ constexpr std::size_t kBlock = 1024;
 
 struct MeasuredPoint {
   Eigen::Vector3f point;  ///< pose frame
-  int views = 0;          ///< that measured it
+  float sigma;            ///< of its depth, mm
+  int views;              ///< that measured it; not counted for points within all outlines
+  int outside_of =
+      0;  ///< views whose silhouettes put it outside: what is mirrored to one camera of a view is to the other
+  bool is_beyond = false;  ///< an outline, if only by what moves it
 };
-
-/// One silhouette as a camera of the pose.
-struct Outline {
-  Silhouette* silhouette;
-  std::size_t view;  ///< in the span
-  std::size_t camera;
-  Eigen::Matrix3f rotation;
-  Eigen::Vector3f translation;
-
-  /// On the sensor; it may be cropped off.
-  [[nodiscard]] std::optional<cv::Point> pixel_of(const Eigen::Vector3f& point) const {
-    const Eigen::Vector3f p = rotation * point + translation;
-    if (!(p.z() > 0.0F)) return std::nullopt;
-    const Projection& projection = silhouette->projection;
-    const cv::Point at(static_cast<int>(std::lround(projection.fx * p.x() / p.z() + projection.cx)),
-                       static_cast<int>(std::lround(projection.fy * p.y() / p.z() + projection.cy)));
-    return holds(at) || projection.is_cropped_off({at.x, at.y}) ? std::optional(at) : std::nullopt;
-  }
-  [[nodiscard]] bool holds(const cv::Point& pixel) const {
-    return pixel.inside({0, 0, silhouette->outside_px.cols, silhouette->outside_px.rows});
-  }
-  /// Nothing outside the sensor: the object is inside of it.
-  [[nodiscard]] bool puts_outside(const Eigen::Vector3f& point, double margin_px) const {
-    const auto at = pixel_of(point);
-    return at && (!holds(*at) || static_cast<double>(silhouette->outside_px(*at)) > margin_px);
-  }
-};
-
-std::vector<Outline> outlines_of(std::span<View> views) {
-  std::vector<Outline> outlines;
-  for (std::size_t v = 0; v < views.size(); ++v) {
-    for (std::size_t c = 0; c < views[v].silhouettes.size(); ++c) {
-      Silhouette& s = views[v].silhouettes[c];
-      outlines.push_back(
-          {&s, v, c, s.camera_from_pose.linear().cast<float>(), s.camera_from_pose.translation().cast<float>()});
-    }
-  }
-  return outlines;
-}
 
 double mm_per_pixel(const RangeImage& range) {
   for (const float depth : range.depth) {
@@ -69,8 +36,45 @@ double mm_per_pixel(const RangeImage& range) {
   return range.projection.mm_per_pixel(1.0);
 }
 
-/// Points that at least `min_views` views measured, and more than see through them to surface behind. Views agree
-/// within their sigmas, or half a pixel: a silhouette resolves no more.
+std::vector<MeasuredPoint> measured_points(std::span<const View> views, const SilhouetteVoteOptions& options) {
+  std::vector<std::vector<MeasuredPoint>> of_view(views.size());
+  parallel_for(views.size(), [&](std::size_t v) {
+    const RangeImage& range = views[v].range;
+    const Transform pose_from_camera = range.camera_from_pose.inverse();
+    for (int y = 0; y < range.depth.rows; y += options.stride_px) {
+      for (int x = 0; x < range.depth.cols; x += options.stride_px) {
+        const float depth = range.depth(y, x);
+        if (std::isnan(depth)) continue;
+        const Eigen::Vector3d point = pose_from_camera * range.projection.unproject(x, y, static_cast<double>(depth));
+        of_view[v].push_back({point.cast<float>(), range.sigma(y, x), options.min_views});
+      }
+    }
+  });
+  std::vector<MeasuredPoint> all;
+  for (const auto& points : of_view) all.insert(all.end(), points.begin(), points.end());
+  return all;
+}
+
+/// Where the outlines are: `outside_of` and `is_beyond` of every point.
+void compare_with_outlines(const std::vector<PosedOutline>& outlines, const SilhouetteVoteOptions& options,
+                           std::vector<MeasuredPoint>& points) {
+  parallel_for((points.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
+    for (std::size_t i = block * kBlock; i < std::min(points.size(), (block + 1) * kBlock); ++i) {
+      MeasuredPoint& point = points[i];
+      std::optional<std::size_t> last;  // outlines are in the order of views
+      for (const PosedOutline& outline : outlines) {
+        const double outside_px = outline.outside_px(point.point);
+        point.is_beyond |= outside_px > options.max_beyond_px;
+        if (last == outline.view || !(outside_px > options.contour_px)) continue;
+        last = outline.view;
+        ++point.outside_of;
+      }
+    }
+  });
+}
+
+/// Keeps of the points beyond an outline those that at least `min_views` views measured, and more than see through them
+/// to surface behind. Views agree within their sigmas, or half a pixel: a silhouette resolves no more.
 class MeasuredSurface {
  public:
   MeasuredSurface(std::span<const View> views, const SilhouetteVoteOptions& options) : options_(options) {
@@ -84,24 +88,13 @@ class MeasuredSurface {
     for (auto& sampler : made) samplers_.push_back(std::move(*sampler));
   }
 
-  [[nodiscard]] std::vector<MeasuredPoint> points(std::span<const View> views) const {
-    std::vector<std::vector<MeasuredPoint>> of_view(views.size());
-    parallel_for(views.size(), [&](std::size_t v) {
-      const RangeImage& range = views[v].range;
-      const Transform pose_from_camera = range.camera_from_pose.inverse();
-      for (int y = 0; y < range.depth.rows; y += options_.stride_px) {
-        for (int x = 0; x < range.depth.cols; x += options_.stride_px) {
-          const float depth = range.depth(y, x);
-          if (std::isnan(depth)) continue;
-          const Eigen::Vector3d point = pose_from_camera * range.projection.unproject(x, y, static_cast<double>(depth));
-          const int count = views_of(point.cast<float>(), range.sigma(y, x));
-          if (count >= options_.min_views) of_view[v].push_back({point.cast<float>(), count});
-        }
+  void confirm(std::vector<MeasuredPoint>& points) const {
+    parallel_for((points.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
+      for (std::size_t i = block * kBlock; i < std::min(points.size(), (block + 1) * kBlock); ++i) {
+        if (points[i].is_beyond) points[i].views = views_of(points[i].point, points[i].sigma);
       }
     });
-    std::vector<MeasuredPoint> all;
-    for (const auto& points : of_view) all.insert(all.end(), points.begin(), points.end());
-    return all;
+    std::erase_if(points, [&](const MeasuredPoint& point) { return point.views < options_.min_views; });
   }
 
  private:
@@ -129,36 +122,21 @@ class MeasuredSurface {
 /// outside. A point that as many silhouettes put outside has no vote: several silhouettes are right.
 struct Votes {
   cv::Mat1b against;  ///< 0: none
-  cv::Mat1b surface;  ///< 255 where a measured point lies
+  cv::Mat1b surface;  ///< 255 where a measured point beyond an outline lies
 };
 
-/// Of each point, the number of views whose silhouettes put it outside: what is mirrored to one camera of a view is to
-/// the other.
-std::vector<int> put_outside(const std::vector<Outline>& outlines, const std::vector<MeasuredPoint>& points,
-                             const SilhouetteVoteOptions& options) {
-  std::vector<int> count(points.size());
-  parallel_for((points.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
-    for (std::size_t i = block * kBlock; i < std::min(points.size(), (block + 1) * kBlock); ++i) {
-      std::optional<std::size_t> last;  // outlines are in the order of views
-      for (const Outline& outline : outlines) {
-        if (last == outline.view || !outline.puts_outside(points[i].point, options.contour_px)) continue;
-        last = outline.view;
-        ++count[i];
-      }
-    }
-  });
-  return count;
-}
+/// Whether the silhouettes of fewer views than measured it put it outside.
+bool has_vote(const MeasuredPoint& point) { return point.outside_of < point.views; }
 
 /// Places where the silhouette was cropped off are left out and returned.
-cv::Rect count_votes(const Outline& outline, const std::vector<MeasuredPoint>& points,
-                     const std::vector<int>& outside_of, const SilhouetteVoteOptions& options, Votes& votes) {
+cv::Rect count_votes(const PosedOutline& outline, const std::vector<MeasuredPoint>& points,
+                     const SilhouetteVoteOptions& options, Votes& votes) {
   const cv::Mat1f& outside = outline.silhouette->outside_px;
   votes = {cv::Mat1b(outside.size(), uchar{0}), cv::Mat1b(outside.size(), uchar{0})};
   cv::Rect cropped_off;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (outside_of[i] >= points[i].views) continue;
-    const auto at = outline.pixel_of(points[i].point);
+  for (const MeasuredPoint& point : points) {
+    if (!point.is_beyond || !has_vote(point)) continue;
+    const auto at = outline.pixel_of(point.point);
     if (!at) continue;
     if (!outline.holds(*at)) {
       cropped_off |= cv::Rect(*at, cv::Size(1, 1));
@@ -166,22 +144,21 @@ cv::Rect count_votes(const Outline& outline, const std::vector<MeasuredPoint>& p
     }
     votes.surface(*at) = 255;
     if (static_cast<double>(outside(*at)) <= options.contour_px) continue;
-    votes.against(*at) = std::max(votes.against(*at), cv::saturate_cast<uchar>(points[i].views));
+    votes.against(*at) = std::max(votes.against(*at), cv::saturate_cast<uchar>(point.views));
   }
   return cropped_off;
 }
 
 /// A vote on what was cropped off takes it in again.
-std::vector<Votes> count_votes(std::span<View> views, const std::vector<Outline>& outlines,
-                               const std::vector<MeasuredPoint>& points, const std::vector<int>& outside_of,
-                               const SilhouetteVoteOptions& options) {
+std::vector<Votes> count_votes(std::span<View> views, const std::vector<PosedOutline>& outlines,
+                               const std::vector<MeasuredPoint>& points, const SilhouetteVoteOptions& options) {
   std::vector<Votes> votes(outlines.size());
   parallel_for(outlines.size(), [&](std::size_t s) {
-    const Outline& outline = outlines[s];
-    const cv::Rect cropped_off = count_votes(outline, points, outside_of, options, votes[s]);
+    const PosedOutline& outline = outlines[s];
+    const cv::Rect cropped_off = count_votes(outline, points, options, votes[s]);
     if (cropped_off.empty()) return;
     uncrop(views[outline.view], outline.camera, cropped_off);
-    count_votes(outline, points, outside_of, options, votes[s]);
+    count_votes(outline, points, options, votes[s]);
   });
   return votes;
 }
@@ -278,9 +255,25 @@ cv::Rect box_to_mend(const cv::Mat1f& outside_px, const Votes& votes) {
   return box_around(cv::Mat1b((outside_px <= 0.0F) | votes.surface | votes.against), kCropRoomPx);
 }
 
+/// Where measured points lie in the image.
+cv::Mat1b object_seen(const PosedOutline& outline, const std::vector<MeasuredPoint>& points,
+                      const SilhouetteVoteOptions& options) {
+  cv::Mat1b object(outline.silhouette->outside_px.size(), uchar{0});
+  for (const MeasuredPoint& point : points) {
+    const auto at = has_vote(point) ? outline.pixel_of(point.point) : std::nullopt;
+    if (at && outline.holds(*at)) object(*at) = 255;
+  }
+  cv::morphologyEx(object, object, cv::MORPH_CLOSE, disc(2 * options.stride_px));
+  return object;
+}
+
+double share_of_object(const cv::Mat1b& region, const cv::Mat1b& object) {
+  return std::min(1.0, cv::countNonZero(region & object) / std::max(1.0, 1.0 * cv::countNonZero(object)));
+}
+
 /// The rim is mended without a word: it is no single image's.
-std::optional<SilhouetteFinding> mend(const Outline& outline, View& view, const Votes& votes,
-                                      const SilhouetteVoteOptions& options) {
+std::optional<SilhouetteFinding> mend(const PosedOutline& outline, View& view, const Votes& votes,
+                                      const std::vector<MeasuredPoint>& points, const SilhouetteVoteOptions& options) {
   cv::Mat1f all = outline.silhouette->outside_px.clone();  // copies of a view share their pixels
   const cv::Rect box = box_to_mend(all, votes);
   if (box.empty()) return std::nullopt;
@@ -290,11 +283,9 @@ std::optional<SilhouetteFinding> mend(const Outline& outline, View& view, const 
   const cv::Mat1b region = region_to_mend(outside, contradicted, options);
   const cv::Mat1b mended(region | covered_rim(outside, surface, options));
   if (cv::countNonZero(mended) == 0) return std::nullopt;
-  cv::Mat1b object;
-  cv::morphologyEx(surface, object, cv::MORPH_CLOSE, disc(2 * options.stride_px));
   SilhouetteFinding finding{.view = view.index, .camera = outline.camera, .views = median_votes(against, region)};
   finding.area_px = cv::countNonZero(region);
-  finding.share = std::min(1.0, cv::countNonZero(region & object) / std::max(1.0, 1.0 * cv::countNonZero(object)));
+  if (finding.area_px > 0.0) finding.share = share_of_object(region, object_seen(outline, points, options)(box));
   cv::Mat1b all_mended(all.size(), uchar{0});
   if (finding.share > options.max_contradicted) {
     finding.kind = SilhouetteFinding::Kind::whole;
@@ -311,84 +302,26 @@ std::optional<SilhouetteFinding> mend(const Outline& outline, View& view, const 
   return finding;
 }
 
-/// Rays of a silhouette that meet nothing of what the others leave.
-class Surplus {
- public:
-  Surplus(const std::vector<Outline>& outlines, const Eigen::AlignedBox3f& box, const SilhouetteVoteOptions& options)
-      : outlines_(outlines), box_(box), options_(options) {}
-
-  [[nodiscard]] std::optional<SilhouetteFinding> of(std::size_t s, const View& view) const {
-    const cv::Mat1f& outside = outlines_[s].silhouette->outside_px;
-    const int stride = options_.surplus_stride_px;
-    cv::Mat1b grid(outside.rows / stride, outside.cols / stride, uchar{0});
-    int inside = 0;
-    for (int y = 0; y < grid.rows; ++y) {
-      for (int x = 0; x < grid.cols; ++x) {
-        const cv::Point pixel(x * stride + stride / 2, y * stride + stride / 2);
-        if (!(static_cast<double>(outside(pixel)) < -options_.contour_px)) continue;
-        ++inside;
-        grid(y, x) = is_empty(s, pixel) ? 255 : 0;
-      }
-    }
-    const int empty = cv::countNonZero(grid);
-    SilhouetteFinding finding{.kind = SilhouetteFinding::Kind::surplus,
-                              .view = view.index,
-                              .camera = outlines_[s].camera,
-                              .area_px = 1.0 * empty * stride * stride,
-                              .share = empty / std::max(1.0, 1.0 * inside),
-                              .views = options_.min_silhouettes};
-    if (empty < 2 || finding.share < options_.min_surplus) return std::nullopt;
-    return finding;
-  }
-
- private:
-  /// Whether every place along the ray is outside at least `min_silhouettes` others.
-  [[nodiscard]] bool is_empty(std::size_t s, cv::Point pixel) const {
-    const Outline& own = outlines_[s];
-    const Projection& projection = own.silhouette->projection;
-    const Eigen::Vector3f ray = own.rotation.transpose() * projection.unproject(pixel.x, pixel.y, 1.0).cast<float>();
-    const Eigen::Vector3f eye = -(own.rotation.transpose() * own.translation);
-    const float middle = (box_.center() - eye).norm() / ray.norm(), reach = 0.5F * box_.diagonal().norm() / ray.norm();
-    const auto step = static_cast<float>(options_.contour_px * projection.mm_per_pixel(static_cast<double>(middle)));
-    // From the middle, where the object is: most rays meet it.
-    for (float away = 0.0F; away <= reach; away += step) {
-      if (!is_outside(s, eye + (middle + away) * ray) || !is_outside(s, eye + (middle - away) * ray)) return false;
-    }
-    return true;
-  }
-
-  /// Of at least `min_silhouettes` others, or of the box.
-  [[nodiscard]] bool is_outside(std::size_t s, const Eigen::Vector3f& point) const {
-    if (!box_.contains(point)) return true;
-    int outside = 0;
-    for (std::size_t o = 0; o < outlines_.size() && outside < options_.min_silhouettes; ++o) {
-      if (o != s && outlines_[o].puts_outside(point, options_.contour_px)) ++outside;
-    }
-    return outside >= options_.min_silhouettes;
-  }
-
-  const std::vector<Outline>& outlines_;
-  Eigen::AlignedBox3f box_;
-  SilhouetteVoteOptions options_;
-};
-
 }  // namespace
 
 Result<SilhouetteVerdict> vote_on_silhouettes(std::span<View> views, const SilhouetteVoteOptions& options,
                                               const Context& context) {
   SilhouetteVerdict verdict;
-  const std::vector<Outline> outlines = outlines_of(views);
+  const std::vector<PosedOutline> outlines = outlines_of(views);
   if (outlines.empty()) return verdict;
-  const std::vector<MeasuredPoint> points = MeasuredSurface(views, options).points(views);
+  std::vector<MeasuredPoint> points = measured_points(views, options);
+  compare_with_outlines(outlines, options, points);
+  if (std::ranges::any_of(points, &MeasuredPoint::is_beyond)) MeasuredSurface(views, options).confirm(points);
   if (context.stopped()) return fail(ErrorCode::stopped, "silhouettes: stopped");
   if (points.empty()) return verdict;
-  const std::vector<int> outside_of = put_outside(outlines, points, options);
-  const auto disputed = std::ranges::count_if(outside_of, [&](int n) { return n >= options.min_disputing; });
+  const auto disputed = std::ranges::count_if(
+      points, [&](const MeasuredPoint& point) { return point.outside_of >= options.min_disputing; });
   verdict.disputed_share = static_cast<double>(disputed) / static_cast<double>(points.size());
-  const std::vector<Votes> votes = count_votes(views, outlines, points, outside_of, options);
+  const std::vector<Votes> votes = count_votes(views, outlines, points, options);
   std::vector<std::optional<SilhouetteFinding>> mended(outlines.size()), surplus(outlines.size());
-  parallel_for(outlines.size(),
-               [&](std::size_t s) { mended[s] = mend(outlines[s], views[outlines[s].view], votes[s], options); });
+  parallel_for(outlines.size(), [&](std::size_t s) {
+    mended[s] = mend(outlines[s], views[outlines[s].view], votes[s], points, options);
+  });
   if (context.stopped()) return fail(ErrorCode::stopped, "silhouettes: stopped");
   Eigen::AlignedBox3f box;
   for (const MeasuredPoint& point : points) box.extend(point.point);
