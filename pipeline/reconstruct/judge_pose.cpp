@@ -119,7 +119,8 @@ Result<void> Reconstruction::State::measure_without_key(std::size_t pose, const 
   without_key.plain_differs = false;
   for (std::size_t v = 0; v < state.views.size(); ++v) {
     const View& old = state.views[v];
-    const StereoImages images{state.pattern[v].left, state.pattern[v].right, state.plain[v].left, state.plain[v].right};
+    const StereoImages images{state.pattern[v].left, state.pattern[v].right, state.plain[v].left.whole(),
+                              state.plain[v].right.whole()};
     auto view = make_view(*rectification, images, old.angle_rad, old.index, without_key, context);
     if (!view) return pass_on(view, fmt::format("view {}", old.index));
     if (state.watch) state.watch->carry(*view, state.pattern[v].order);

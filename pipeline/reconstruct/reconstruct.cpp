@@ -116,7 +116,7 @@ void Reconstruction::State::take_view(PoseState& pose, View view, const ViewImag
     pose.watch->add(images, pose.views.back());
   }
   if (images.left_plain.channels() != 3) return;
-  pose.plain.push_back({images.left_plain, images.right_plain});
+  pose.plain.push_back({{images.left_plain}, {images.right_plain}});
   pose.pattern.push_back({pose.views.size() - 1, grey_of(images.left_pattern), grey_of(images.right_pattern)});
 }
 
@@ -149,7 +149,8 @@ Result<void> Reconstruction::State::finish_pose(std::size_t pose, const Context&
                            context);
   if (!partial) return pass_on(partial, fmt::format("pose {}", pose + 1));
   state.partial = std::move(*partial);
-  state.pattern.clear();  // only needed to measure anew without a key
+  state.pattern.clear();  // only needed to measure anew without a key, as are whole photographs
+  crop_photos(state);
   state.finished = true;
   return {};
 }
@@ -183,6 +184,15 @@ Result<Surface> Reconstruction::State::surface(const Transform& pose1_from_pose2
       context);
 }
 
+void Reconstruction::State::crop_photos(PoseState& pose) const {
+  for (std::size_t v = 0; v < pose.plain.size(); ++v) {
+    const auto& silhouettes = pose.views[v].silhouettes;
+    if (silhouettes.size() < 2) continue;
+    crop_photo(pose.plain[v].left, silhouettes[0], rectification->left_map);
+    crop_photo(pose.plain[v].right, silhouettes[1], rectification->right_map);
+  }
+}
+
 /// Colouring needs the photographs and where the views stand.
 void Reconstruction::State::release_range_images() {
   for (PoseState& pose : poses) {
@@ -206,8 +216,8 @@ std::vector<Photo> Reconstruction::State::photos(const Transform& pose1_from_pos
       const Transform turntable_from_pose = left_from_turntable.inverse() * poses[p].views[v].range.camera_from_pose;
       const Transform turntable_from_model = turntable_from_pose * pose_from_model;
       const Calibration& cameras = poses[p].watch ? poses[p].watch->calibration() : *calibration;
-      photos.push_back({cameras.left, turntable_from_model, poses[p].plain[v].left});
-      photos.push_back({cameras.right, turntable_from_model, poses[p].plain[v].right});
+      photos.push_back({cameras.left, turntable_from_model, poses[p].plain[v].left.whole()});
+      photos.push_back({cameras.right, turntable_from_model, poses[p].plain[v].right.whole()});
     }
   }
   return photos;
@@ -218,7 +228,7 @@ std::vector<LivePhoto> Reconstruction::State::live_photos(const PoseState& pose)
   std::vector<LivePhoto> photos;
   for (std::size_t v = 0; v < pose.views.size(); ++v) {
     photos.push_back({turntable_from_left * pose.views[v].range.camera_from_pose,
-                      v < pose.plain.size() ? pose.plain[v].left : cv::Mat3b()});
+                      v < pose.plain.size() ? pose.plain[v].left.whole() : cv::Mat3b()});
   }
   if (!photos.empty()) photos.front().gain = live_gain(pose.views.front(), calibration->left, photos.front());
   for (LivePhoto& photo : photos) photo.gain = photos.front().gain;

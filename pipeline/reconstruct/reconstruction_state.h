@@ -6,6 +6,7 @@
 
 #include "pipeline/range/rectification.h"
 #include "pipeline/reconstruct/disagreements.h"
+#include "pipeline/reconstruct/kept_photo.h"
 #include "pipeline/reconstruct/live_mesh.h"
 #include "pipeline/reconstruct/reconstruct.h"
 #include "pipeline/reconstruct/report.h"
@@ -20,7 +21,7 @@ namespace scanrig {
 /// What a Reconstruction holds. reconstruct.cpp has its stages, judge_pose.cpp what they say of single images.
 struct Reconstruction::State {
   struct PlainPair {
-    cv::Mat3b left, right;
+    KeptPhoto left, right;
   };
   struct GreyPair {
     std::size_t order;    ///< of the view in its pose, as added
@@ -60,6 +61,7 @@ struct Reconstruction::State {
   Result<void> finish_pose(std::size_t pose, const Context& context);
   Result<Transform> find_pose(Report& report, const Context& context);
   Result<Surface> surface(const Transform& pose1_from_pose2, const Context& context);
+  void crop_photos(PoseState& pose) const;
   void release_range_images();
   [[nodiscard]] std::vector<Photo> photos(const Transform& pose1_from_pose2) const;
   [[nodiscard]] std::vector<LivePhoto> live_photos(const PoseState& pose) const;
