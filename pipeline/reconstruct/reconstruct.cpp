@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/heap.h"
 #include "core/parallel.h"
 #include "pipeline/mesh/solid_properties.h"
 #include "pipeline/pose/estimate_pose.h"
@@ -248,9 +249,11 @@ Result<Model> Reconstruction::State::finish(const ScanIdentity& identity, const 
   const auto pose1_from_pose2 = find_pose(report, context);
   if (!pose1_from_pose2) return pass_on(pose1_from_pose2, "pose 2 in pose 1");
   if (auto done = judge_silhouettes_of_both(*pose1_from_pose2, context); !done) return pass_on(done);
+  give_memory_back();  // of the matching, or it would add to the peak
   auto integrated = surface(*pose1_from_pose2, context);
   if (!integrated) return pass_on(integrated, "integration");
   release_range_images();
+  give_memory_back();
 
   Model model;
   model.mesh.mesh = std::move(integrated->mesh);

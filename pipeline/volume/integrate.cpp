@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <optional>
 
 #include "core/parallel.h"
@@ -156,6 +157,31 @@ void count_classes(const Field& field, const BlockGrid& grid, VolumeReport& repo
   }
 }
 
+/// The field's zero set, closed and repaired: its largest component.
+Result<Mesh> extract(const Field& field, const Eigen::AlignedBox3f& box, const std::vector<Eigen::Vector3f>& seeds,
+                     const VolumeOptions& options, VolumeReport& report, const Context& context) {
+  BlockGrid grid(box, static_cast<float>(options.voxel_mm));
+  if (auto ok = grid.fill(field, seeds, context); !ok) return pass_on(ok);
+  report.active_voxels = grid.blocks().size() * BlockGrid::kNodes;
+  relax_unmeasured(grid, field.band(), options.relax_rounds);
+  context.report("volume", 0.7);
+
+  Mesh all = extract_surface(grid);
+  Mesh mesh = largest_component(all);
+  if (mesh.faces.empty()) return fail(ErrorCode::degenerate, "volume: the surface encloses nothing");
+  report.genus = report.genus_before_repair = genus_of_closed(mesh);
+  if (options.repair_handles && report.genus > 0) {
+    const HandleRepair repair = repair_handles(grid, all, report.genus, field.band(), options);
+    report.voxels_cut = repair.cut;
+    report.voxels_filled = repair.filled;
+    report.genus = repair.genus;
+    mesh = largest_component(all);
+  }
+  report.dropped_components = components(all).count - 1;
+  count_classes(field, grid, report);
+  return mesh;
+}
+
 }  // namespace
 
 Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions& options, const Context& context) {
@@ -173,31 +199,15 @@ Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions
     const auto room = Eigen::Vector3f::Constant(static_cast<float>(options.hull_room_mm));
     box = {box.min() - room, box.max() + room};
   }
-  const Field field(std::move(prepared.views_of_pose), prepared.model_from_pose, make_hull(poses, options, box),
-                    options, report.band_mm);
+  auto field = std::make_unique<const Field>(std::move(prepared.views_of_pose), prepared.model_from_pose,
+                                             make_hull(poses, options, box), options, report.band_mm);
   context.report("volume", 0.2);
-  BlockGrid grid(box, static_cast<float>(options.voxel_mm));
-  if (auto ok = grid.fill(field, prepared.seeds, context); !ok) return pass_on(ok);
-  report.active_voxels = grid.blocks().size() * BlockGrid::kNodes;
-  relax_unmeasured(grid, field.band(), options.relax_rounds);
-  context.report("volume", 0.7);
-
-  Mesh all = extract_surface(grid);
-  result.mesh = largest_component(all);
-  if (result.mesh.faces.empty()) return fail(ErrorCode::degenerate, "volume: the surface encloses nothing");
-  report.genus = report.genus_before_repair = genus_of_closed(result.mesh);
-  if (options.repair_handles && report.genus > 0) {
-    const HandleRepair repair = repair_handles(grid, all, report.genus, field.band(), options);
-    report.voxels_cut = repair.cut;
-    report.voxels_filled = repair.filled;
-    report.genus = repair.genus;
-    result.mesh = largest_component(all);
-  }
-  report.dropped_components = components(all).count - 1;
-  if (auto done = finish_surface(field, options, result.mesh); !done) return pass_on(done);
+  auto extracted = extract(*field, box, prepared.seeds, options, report, context);
+  if (!extracted) return pass_on(extracted);
+  result.mesh = std::move(*extracted);
+  if (auto done = finish_surface(std::move(field), options, result.mesh); !done) return pass_on(done);
   report.closed_vertices = static_cast<std::size_t>(std::count(result.mesh.views.begin(), result.mesh.views.end(), 0));
   report.measured_vertices = result.mesh.vertices.size() - report.closed_vertices;
-  count_classes(field, grid, report);
   context.report("volume", 1.0);
   return result;
 }

@@ -52,7 +52,7 @@ void settle_vertex(const Field& field, const VolumeOptions& options, const Eigen
 
 }  // namespace
 
-Result<void> finish_surface(const Field& field, const VolumeOptions& options, Mesh& mesh) {
+Result<void> finish_surface(std::unique_ptr<const Field> field, const VolumeOptions& options, Mesh& mesh) {
   const std::size_t count = mesh.vertices.size();
   mesh.views.assign(count, 0);
   mesh.sigma.assign(count, std::numeric_limits<float>::quiet_NaN());
@@ -61,10 +61,12 @@ Result<void> finish_surface(const Field& field, const VolumeOptions& options, Me
   std::vector<Scatter> scatter(count);
   parallel_for((count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
     const std::size_t end = std::min(count, (chunk + 1) * kChunk);
-    for (std::size_t v = chunk * kChunk; v < end; ++v) settle_vertex(field, options, outward[v], mesh, scatter, v);
+    for (std::size_t v = chunk * kChunk; v < end; ++v) settle_vertex(*field, options, outward[v], mesh, scatter, v);
   });
+  const float window_mm = field->window_mm();
+  field.reset();  // much memory, of which the rest needs nothing
   widen_by_scatter(around, options.scatter_rounds, scatter, mesh);
-  widen_by_fine_shape(around, options.shape_share, field.window_mm(), mesh);
+  widen_by_fine_shape(around, options.shape_share, window_mm, mesh);
   smooth_unmeasured(around, static_cast<float>(options.voxel_mm), options.smoothing_rounds, mesh);
   if (options.untangle) {
     if (const auto back = untangle(extracted, mesh); !back) return pass_on(back);

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <memory>
+
 #include "core/result.h"
 #include "pipeline/mesh/mesh.h"
 #include "pipeline/volume/distance_field.h"
@@ -9,6 +11,6 @@ namespace scanrig {
 /// Moves every vertex of an extracted surface that range images support onto the measured zero set, smooths the rest
 /// (by less than a voxel), and fills in normals, `views` and `sigma`. The topology is unchanged. Where faces cross
 /// after that their vertices stay where they were, see untangle.h. Fails with `internal`.
-Result<void> finish_surface(const Field& field, const VolumeOptions& options, Mesh& mesh);
+Result<void> finish_surface(std::unique_ptr<const Field> field, const VolumeOptions& options, Mesh& mesh);
 
 }  // namespace scanrig
