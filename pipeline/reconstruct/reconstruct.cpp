@@ -9,6 +9,7 @@
 
 #include "core/heap.h"
 #include "core/parallel.h"
+#include "core/units.h"
 #include "pipeline/mesh/solid_properties.h"
 #include "pipeline/pose/estimate_pose.h"
 #include "pipeline/range/crop_view.h"
@@ -166,8 +167,13 @@ Result<Transform> Reconstruction::State::find_pose(Report& report, const Context
   const auto estimate = estimate_pose(first, second, *pose_options, context);
   if (!estimate) return pass_on(estimate);
   report.add_estimate(*estimate);
-  const auto refined = refine_pose(poses[0].views, poses[1].views, estimate->pose1_from_pose2,
-                                   {.contacts = estimate->best.contacts}, context);
+  RefineOptions refinement;
+  refinement.contacts = estimate->best.contacts;
+  if (calibration) {
+    const RegistrationOptions known = registration_options(*calibration);
+    refinement.axis = {to_radians(known.axis_tilt_sigma_deg), known.axis_shift_sigma_mm};
+  }
+  const auto refined = refine_pose(poses[0].views, poses[1].views, estimate->pose1_from_pose2, refinement, context);
   if (!refined) return pass_on(refined);
   report.add_refinement(*refined);
   return refined->pose1_from_pose2;

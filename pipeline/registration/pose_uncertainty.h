@@ -3,6 +3,8 @@
 #include <Eigen/Core>
 #include <span>
 
+#include "core/transform.h"
+
 namespace scanrig {
 
 /// What one correspondence says of a motion.
@@ -19,6 +21,18 @@ struct MotionScore {
 /// a pose, that alone. Directions that the surfaces leave open have a very large variance.
 Eigen::Matrix<double, 6, 6> motion_covariance(const Eigen::Matrix<double, 6, 6>& information,
                                               std::span<const MotionScore> scores);
+
+/// How well the turntable's axis is known, to which both poses' frames are tied: standard deviations.
+struct AxisKnown {
+  double tilt_rad = 0.0;  ///< about x and about z
+  double shift_mm = 0.0;  ///< along x and along z
+};
+
+/// Covariance that a wrong axis adds to the motion from pose 2 to pose 1 (rotation vector, translation at `centre` in
+/// pose 1): both poses are seen in the same wrong frame, which a turn of the object does not cancel. It is nothing that
+/// views could disagree about.
+Eigen::Matrix<double, 6, 6> axis_covariance(const Transform& pose1_from_pose2, const Eigen::Vector3d& centre,
+                                            const AxisKnown& axis);
 
 /// Principal standard deviations of three coordinates, weakest first, and their directions in columns.
 struct PrincipalSigmas {

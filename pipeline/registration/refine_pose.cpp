@@ -182,7 +182,10 @@ RefinedPose align(const MeasuredPose& pose1, const MeasuredPose& pose2, const Tr
                    static_cast<double>(pose1.samples[level].size() + pose2.samples[level].size());
   result.correspondences = static_cast<int>(found.correspondences.size());
   result.information = e.normal;
-  if (level == 0) result.covariance = motion_covariance(e.normal, scores);
+  if (level == 0) {
+    result.covariance =
+        motion_covariance(e.normal, scores) + axis_covariance(result.pose1_from_pose2, e.centre, options.axis);
+  }
   result.centre = e.centre;
   result.condition = condition_of(e.normal, arm);
   return result;

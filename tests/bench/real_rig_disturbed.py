@@ -57,8 +57,8 @@ def measure(bench, scratch):
         before, _ = median_and_sentences(bench, scan, model, "off")
         after, said = median_and_sentences(bench, scan, model, "refine")
         figures = f"{before:.4f} mm, {after:.4f} mm" if before and after else f"no model: {' '.join(said)}"
-        bench.line(f"calibration off, {name}: median without and with refinement; undisturbed {sound:.4f} mm",
-                   f"refined within {FACTOR} of the undisturbed", figures, after is not None and after <= FACTOR * sound)
+        bench.line(f"calibration off, {name}: median without and with refinement",
+                   f"refined within {FACTOR} of the undisturbed", f"{figures}; undisturbed {sound:.4f} mm", after is not None and after <= FACTOR * sound)
         if word:
             bench.line(f"calibration off, {name}: named", word, " ".join(said) or "nothing", word in " ".join(said))
         else:

@@ -6,8 +6,8 @@ Usage: scale.py. Prints the tables. The measured figures stand here, each with i
 # A scan of two poses of 8 views at 1280x960, four images a view of 8 bit.
 VIEWS, IMAGES_A_VIEW, PIXELS = 16, 4, 1280 * 960
 FOLDER_MB = 53          # the rendered figurine's folder on disk, images as PNG (part `scan` of the group `fast`)
-CORE_S = 2 * 28         # 28 s on two cores (part `scan`)
-MEMORY_GB = 1.3         # peak (part `scan`)
+CORE_S = 2 * 23         # 23 s on two cores (part `scan`)
+MEMORY_GB = 0.65        # peak (part `scan`)
 OVERHEAD_S = 1.0        # a job at the cluster (part `slurm`), rounded
 MODEL_MB = 157          # the folder of its model; of it model.glb 25, view.glb 4, OBJ 62 with its image, STL 42, PLY 24
 GLB_MB = 29             # model.glb and view.glb alone
