@@ -1,6 +1,7 @@
 #include "pipeline/reconstruct/kept_photo.h"
 
 #include <cmath>
+#include <opencv2/core.hpp>
 
 namespace scanrig {
 
