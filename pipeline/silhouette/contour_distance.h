@@ -9,7 +9,7 @@ namespace scanrig {
 /// A field without a zero gives infinities.
 cv::Mat1f contour_distance(const cv::Mat1f& field);
 
-/// Distances of a larger image, `box` in the pixels of this one: beyond it the distance at its border and the way to it.
+/// Distances of a larger image, `box` in the pixels of this one: beyond this one, its border's and the way to it.
 cv::Mat1f distance_beyond(const cv::Mat1f& outside_px, const cv::Rect& box);
 
 }  // namespace scanrig
