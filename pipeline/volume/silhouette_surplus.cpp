@@ -1,6 +1,7 @@
 #include "pipeline/volume/silhouette_surplus.h"
 
 #include <algorithm>
+#include <opencv2/core.hpp>
 
 namespace scanrig {
 
