@@ -105,6 +105,19 @@ TEST(RefinePose, KnowsHowWellTheMotionIsKnown) {
   EXPECT_GT(sum / kTrials, 0.3);  // nor far too unsure
 }
 
+TEST(RefinePose, IsNoSurerThanTheAxisOfTheTurntable) {
+  const TwoPoses& scan = two_poses();
+  RefineOptions options;
+  const auto views_alone = refine_pose(scan.first, scan.second, scan.pose1_from_pose2, options, Context{});
+  options.axis = {1e-4, 0.01};
+  const auto refined = refine_pose(scan.first, scan.second, scan.pose1_from_pose2, options, Context{});
+  ASSERT_TRUE(views_alone && refined);
+  EXPECT_EQ(refined->pose1_from_pose2.matrix(), views_alone->pose1_from_pose2.matrix());
+  const auto of_axis = axis_covariance(refined->pose1_from_pose2, refined->centre, options.axis);
+  EXPECT_GT(of_axis.norm(), 1e-6);
+  EXPECT_TRUE(refined->covariance.isApprox(views_alone->covariance + of_axis, 1e-9));
+}
+
 TEST(RefinePose, GivesTheSameBitsOnAnyNumberOfThreads) {
   const TwoPoses& scan = two_poses();
   Result<RefinedPose> one;
