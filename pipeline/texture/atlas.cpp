@@ -5,7 +5,7 @@
 #include <numeric>
 
 #include "core/parallel.h"
-#include "pipeline/texture/blocks.h"
+#include "pipeline/texture/filled_image.h"
 
 namespace scanrig {
 namespace {
@@ -154,7 +154,7 @@ std::optional<AtlasLayout> lay_out(const Mesh& mesh, std::span<const ChartView> 
 
   int rows = 0;
   for (std::size_t c = 0; c < charts.size(); ++c) rows = std::max(rows, (*places)[c].y + sizes[c].height);
-  layout.owner = filled<int>({atlas_px, rows}, -1);
+  layout.owner = filled_image<int>({atlas_px, rows}, -1);
   layout.padding_px = padding_px;
   layout.is_padded.assign(mesh.faces.size(), 0);
   parallel_for(charts.size(), [&](std::size_t c) {

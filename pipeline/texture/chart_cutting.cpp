@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "core/parallel.h"
-#include "pipeline/texture/blocks.h"
+#include "core/parallel_blocks.h"
 
 namespace scanrig {
 namespace {

@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "pipeline/calibration/distortion_table.h"
-#include "pipeline/texture/lanes.h"
+#include "pipeline/texture/four_lanes.h"
 #include "pipeline/texture/rounding.h"
 
 namespace scanrig {

@@ -5,8 +5,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/parallel.h"
+#include "core/parallel_blocks.h"
 #include "core/statistics.h"
-#include "pipeline/texture/blocks.h"
 #include "pipeline/texture/point_colour.h"
 
 namespace scanrig {

@@ -10,7 +10,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "core/units.h"
-#include "pipeline/texture/lanes.h"
+#include "pipeline/texture/four_lanes.h"
 #include "pipeline/texture/rounding.h"
 
 namespace scanrig {

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "core/parallel_blocks.h"
 #include "pipeline/mesh/vertex_neighbours.h"
-#include "pipeline/texture/blocks.h"
 
 namespace scanrig {
 

@@ -9,9 +9,9 @@
 #include "core/parallel.h"
 #include "pipeline/mesh/solid_properties.h"
 #include "pipeline/texture/atlas.h"
-#include "pipeline/texture/blocks.h"
 #include "pipeline/texture/chart_cutting.h"
 #include "pipeline/texture/face_colours.h"
+#include "pipeline/texture/filled_image.h"
 #include "pipeline/texture/photo_check.h"
 #include "pipeline/texture/photo_view.h"
 #include "pipeline/texture/point_colour.h"
@@ -121,7 +121,7 @@ void draw_atlas(const AtlasLayout& layout, std::span<const PhotoView> views, con
                 const TextureOptions& options, TexturedModel& model) {
   const int side = options.atlas_px;
   const auto gain = static_cast<float>(model.exposure_gain);
-  model.mesh.atlas = filled<cv::Vec3b>({side, side}, to_srgb(gain * mean_colour(paint.colours)));
+  model.mesh.atlas = filled_image<cv::Vec3b>({side, side}, to_srgb(gain * mean_colour(paint.colours)));
   model.mesh.corner_uv.resize(layout.corners.size());
   for_blocks(layout.corners.size(), [&](std::size_t begin, std::size_t end) {
     FaceColours of_face(views, model.light, model.mesh.mesh, paint.looks, options.blending);

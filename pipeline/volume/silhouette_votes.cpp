@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
-#include "core/parallel.h"
+#include "core/parallel_blocks.h"
 #include "pipeline/range/crop_view.h"
 #include "pipeline/silhouette/box_around.h"
 #include "pipeline/silhouette/contour_distance.h"
@@ -17,8 +17,6 @@
 
 namespace scanrig {
 namespace {
-
-constexpr std::size_t kBlock = 1024;
 
 struct MeasuredPoint {
   Eigen::Vector3f point;  ///< pose frame
@@ -58,26 +56,24 @@ std::vector<MeasuredPoint> measured_points(std::span<const View> views, const Si
 /// Where the outlines are: `outside_of` and `is_beyond` of every point.
 void compare_with_outlines(const std::vector<PosedOutline>& outlines, const SilhouetteVoteOptions& options,
                            std::vector<MeasuredPoint>& points) {
-  parallel_for((points.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
-    for (std::size_t i = block * kBlock; i < std::min(points.size(), (block + 1) * kBlock); ++i) {
-      MeasuredPoint& point = points[i];
-      std::optional<std::size_t> last;  // outlines are in the order of views
-      for (const PosedOutline& outline : outlines) {
-        const double outside_px = outline.outside_px(point.point);
-        point.is_beyond |= outside_px > options.max_beyond_px;
-        if (last == outline.view || !(outside_px > options.contour_px)) continue;
-        last = outline.view;
-        ++point.outside_of;
-      }
+  for_each_in_blocks(points.size(), [&](std::size_t i) {
+    MeasuredPoint& point = points[i];
+    std::optional<std::size_t> last;  // outlines are in the order of views
+    for (const PosedOutline& outline : outlines) {
+      const double outside_px = outline.outside_px(point.point);
+      point.is_beyond |= outside_px > options.max_beyond_px;
+      if (last == outline.view || !(outside_px > options.contour_px)) continue;
+      last = outline.view;
+      ++point.outside_of;
     }
   });
 }
 
 /// Keeps of the points beyond an outline those that at least `min_views` views measured, and more than see through them
 /// to surface behind. Views agree within their sigmas, or half a pixel: a silhouette resolves no more.
-class MeasuredSurface {
+class ConfirmingViews {
  public:
-  MeasuredSurface(std::span<const View> views, const SilhouetteVoteOptions& options) : options_(options) {
+  ConfirmingViews(std::span<const View> views, const SilhouetteVoteOptions& options) : options_(options) {
     pixel_mm_ = static_cast<float>(mm_per_pixel(views.front().range));
     const double band = options.contour_px * static_cast<double>(pixel_mm_);
     std::vector<std::optional<RangeSampler>> made(views.size());
@@ -89,10 +85,8 @@ class MeasuredSurface {
   }
 
   void confirm(std::vector<MeasuredPoint>& points) const {
-    parallel_for((points.size() + kBlock - 1) / kBlock, [&](std::size_t block) {
-      for (std::size_t i = block * kBlock; i < std::min(points.size(), (block + 1) * kBlock); ++i) {
-        if (points[i].is_beyond) points[i].views = views_of(points[i].point, points[i].sigma);
-      }
+    for_each_in_blocks(points.size(), [&](std::size_t i) {
+      if (points[i].is_beyond) points[i].views = views_of(points[i].point, points[i].sigma);
     });
     std::erase_if(points, [&](const MeasuredPoint& point) { return point.views < options_.min_views; });
   }
@@ -311,7 +305,7 @@ Result<SilhouetteVerdict> vote_on_silhouettes(std::span<View> views, const Silho
   if (outlines.empty()) return verdict;
   std::vector<MeasuredPoint> points = measured_points(views, options);
   compare_with_outlines(outlines, options, points);
-  if (std::ranges::any_of(points, &MeasuredPoint::is_beyond)) MeasuredSurface(views, options).confirm(points);
+  if (std::ranges::any_of(points, &MeasuredPoint::is_beyond)) ConfirmingViews(views, options).confirm(points);
   if (context.stopped()) return fail(ErrorCode::stopped, "silhouettes: stopped");
   if (points.empty()) return verdict;
   const auto disputed = std::ranges::count_if(

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/parallel.h"
+#include "core/parallel_blocks.h"
 #include "pipeline/mesh/solid_properties.h"
 #include "pipeline/mesh/vertex_neighbours.h"
 #include "pipeline/volume/untangle.h"
@@ -12,8 +12,6 @@
 
 namespace scanrig {
 namespace {
-
-constexpr std::size_t kChunk = 4096;  // vertices per task
 
 /// Smooths staircases of the carved surface; a vertex stays within half a voxel of where it was.
 void smooth_unmeasured(const VertexNeighbours& around, float voxel_mm, int rounds, Mesh& mesh) {
@@ -59,10 +57,7 @@ Result<void> finish_surface(std::unique_ptr<const Field> field, const VolumeOpti
   const std::vector<Eigen::Vector3f> outward = vertex_normals(mesh), extracted = mesh.vertices;
   const VertexNeighbours around(mesh);
   std::vector<Scatter> scatter(count);
-  parallel_for((count + kChunk - 1) / kChunk, [&](std::size_t chunk) {
-    const std::size_t end = std::min(count, (chunk + 1) * kChunk);
-    for (std::size_t v = chunk * kChunk; v < end; ++v) settle_vertex(*field, options, outward[v], mesh, scatter, v);
-  });
+  for_each_in_blocks(count, [&](std::size_t v) { settle_vertex(*field, options, outward[v], mesh, scatter, v); });
   const float window_mm = field->window_mm();
   field.reset();  // much memory, of which the rest needs nothing
   widen_by_scatter(around, options.scatter_rounds, scatter, mesh);

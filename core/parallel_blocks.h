@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <opencv2/core/mat.hpp>
 
 #include "core/parallel.h"
 
 namespace scanrig {
 
-/// Runs `body(begin, end)` for blocks of neighbours that together are [0, count).
+/// Runs `body(begin, end)` for blocks of neighbours that together are [0, count): for work that is too little for a
+/// task of its own.
 template <class Body>
 void for_blocks(std::size_t count, const Body& body) {
   constexpr std::size_t kBlock = 1024;
@@ -22,14 +22,6 @@ void for_each_in_blocks(std::size_t count, const Body& body) {
   for_blocks(count, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) body(i);
   });
-}
-
-/// An image of one value.
-template <class Value>
-cv::Mat_<Value> filled(cv::Size size, const Value& value) {
-  cv::Mat_<Value> image(size);
-  for_each_in_blocks(image.total(), [&](std::size_t i) { image.template ptr<Value>()[i] = value; });
-  return image;
 }
 
 }  // namespace scanrig
