@@ -47,7 +47,7 @@ Matrix6 motion_covariance(const Matrix6& information, std::span<const MotionScor
   return scale.asDiagonal() * covariance * scale.asDiagonal();
 }
 
-Matrix6 axis_covariance(const Transform& pose1_from_pose2, const Eigen::Vector3d& centre, const AxisKnown& axis) {
+Matrix6 axis_covariance(const Transform& pose1_from_pose2, const Eigen::Vector3d& centre, const AxisUncertainty& axis) {
   // A frame moved by the small turn f and shift d sees the motion as F T F^-1: off by f - R f, and at the centre by
   // f x c + d - R (f x c2 + d), with c2 the same point in pose 2.
   const Eigen::Matrix3d& turn = pose1_from_pose2.linear();

@@ -22,8 +22,8 @@ struct MotionScore {
 Eigen::Matrix<double, 6, 6> motion_covariance(const Eigen::Matrix<double, 6, 6>& information,
                                               std::span<const MotionScore> scores);
 
-/// How well the turntable's axis is known, to which both poses' frames are tied: standard deviations.
-struct AxisKnown {
+/// Of the turntable's axis, to which both poses' frames are tied: standard deviations.
+struct AxisUncertainty {
   double tilt_rad = 0.0;  ///< about x and about z
   double shift_mm = 0.0;  ///< along x and along z
 };
@@ -32,7 +32,7 @@ struct AxisKnown {
 /// pose 1): both poses are seen in the same wrong frame, which a turn of the object does not cancel. It is nothing that
 /// views could disagree about.
 Eigen::Matrix<double, 6, 6> axis_covariance(const Transform& pose1_from_pose2, const Eigen::Vector3d& centre,
-                                            const AxisKnown& axis);
+                                            const AxisUncertainty& axis);
 
 /// Principal standard deviations of three coordinates, weakest first, and their directions in columns.
 struct PrincipalSigmas {

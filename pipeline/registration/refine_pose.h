@@ -32,7 +32,7 @@ struct RefineOptions {
   double contact_share = 1e-3;           ///< weight of the contacts against the surfaces': negligible beside them
   double capture_medians = 8.0;          ///< the capture distance shrinks to this many median residuals ...
   double min_capture = 0.005;            ///< ... but not below this share of the object's size
-  AxisKnown axis = {};                   ///< of the turntable; nothing for poses that were placed by hand
+  AxisUncertainty axis = {};             ///< of the turntable; nothing for poses that were placed by hand
   double settled_mm = 1e-4;              ///< motion of the surface that ends the iteration on the finest level
   double coarse_settled_mm = 5e-3;       ///< the same on the other levels
 };

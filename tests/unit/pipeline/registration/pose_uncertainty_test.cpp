@@ -29,7 +29,7 @@ Vector6 error_of(const Transform& seen, const Transform& true_motion, const Eige
 }
 
 TEST(PoseUncertainty, AWrongAxisSpreadsTheMotionAsPredicted) {
-  const AxisKnown axis{to_radians(0.01), 0.02};
+  const AxisUncertainty axis{to_radians(0.01), 0.02};
   Transform motion = Transform::Identity();
   motion.linear() =
       Eigen::AngleAxisd(to_radians(140.0), Eigen::Vector3d(0.8, 0.1, 0.6).normalized()).toRotationMatrix();
