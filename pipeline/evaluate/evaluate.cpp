@@ -135,7 +135,7 @@ Result<void> score_coverage(const Mesh& model, const std::vector<SurfaceSample>&
   return {};
 }
 
-void score_topology(const Mesh& model, const Mesh& truth, const SurfaceIndex& surface, Scores& scores) {
+void score_topology(const Mesh& model, const Mesh& truth, Scores& scores) {
   const Topology found = topology(model);
   scores.vertices = model.vertices.size();
   scores.faces = model.faces.size();
@@ -144,7 +144,7 @@ void score_topology(const Mesh& model, const Mesh& truth, const SurfaceIndex& su
   scores.genus = found.genus();
   const Topology wanted = topology(truth);
   if (wanted.watertight()) scores.true_genus = wanted.genus();
-  scores.self_intersections = self_intersecting_faces(model, surface).size();
+  scores.self_intersections = self_intersecting_faces(model).size();
 }
 
 /// Largest share of `off` in its own standard deviation, over the principal directions.
@@ -210,7 +210,7 @@ Result<Scores> evaluate(const Claim& claim, const Truth& truth, const ScanFolder
   const Transform truth_from_model = score_measured(model, truth, *true_surface, options, scores);
   SigmaProbe probe(model, sample_surface(model, measured_faces(model, true), options.sigma_samples), truth,
                    *true_surface, truth_from_model);
-  score_topology(model, truth.mesh, *model_surface, scores);
+  score_topology(model, truth.mesh, scores);
   scores.pose2 = pose_error(claim, truth);
   const std::vector<std::uint32_t> closed = measured_faces(model, false);
   const double closed_area = area_of(model, closed);

@@ -2,8 +2,11 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+
+#include "core/parallel_blocks.h"
 
 namespace scanrig {
 namespace {
@@ -83,19 +86,29 @@ Result<SolidProperties> solid_properties(const Mesh& mesh) {
 }
 
 std::vector<Eigen::Vector3f> vertex_normals(const Mesh& mesh) {
+  struct FaceShare {
+    Eigen::Vector3d unit;
+    std::array<double, 3> angles;  ///< at the corners; none of a face without area
+  };
+  constexpr std::size_t kBatch = 65536;  // faces, computed side by side and added in their order
+  std::vector<FaceShare> shares(std::min(kBatch, mesh.faces.size()));
   std::vector<Eigen::Vector3d> sums(mesh.vertices.size(), Eigen::Vector3d::Zero());
-  for (const auto& face : mesh.faces) {
-    const auto [a, b, c] = corners(mesh, face);
-    const Eigen::Vector3d normal = (b - a).cross(c - a);
-    if (!(normal.norm() > 0.0)) continue;
-    const Eigen::Vector3d unit = normal.normalized();
-    sums[face[0]] += angle_between(b - a, c - a) * unit;
-    sums[face[1]] += angle_between(c - b, a - b) * unit;
-    sums[face[2]] += angle_between(a - c, b - c) * unit;
+  for (std::size_t first = 0; first < mesh.faces.size(); first += kBatch) {
+    const std::size_t count = std::min(kBatch, mesh.faces.size() - first);
+    for_each_in_blocks(count, [&](std::size_t i) {
+      const auto [a, b, c] = corners(mesh, mesh.faces[first + i]);
+      const Eigen::Vector3d normal = (b - a).cross(c - a);
+      shares[i] = {Eigen::Vector3d::Zero(), {}};
+      if (!(normal.norm() > 0.0)) return;
+      shares[i] = {normal.normalized(),
+                   {angle_between(b - a, c - a), angle_between(c - b, a - b), angle_between(a - c, b - c)}};
+    });
+    for (std::size_t i = 0; i < count; ++i) {
+      for (std::size_t k = 0; k < 3; ++k) sums[mesh.faces[first + i][k]] += shares[i].angles[k] * shares[i].unit;
+    }
   }
-  std::vector<Eigen::Vector3f> normals;
-  normals.reserve(sums.size());
-  for (const auto& sum : sums) normals.push_back(sum.normalized().cast<float>());
+  std::vector<Eigen::Vector3f> normals(sums.size());
+  for_each_in_blocks(sums.size(), [&](std::size_t v) { normals[v] = sums[v].normalized().cast<float>(); });
   return normals;
 }
 

@@ -205,7 +205,7 @@ Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions
   auto extracted = extract(*field, box, prepared.seeds, options, report, context);
   if (!extracted) return pass_on(extracted);
   result.mesh = std::move(*extracted);
-  if (auto done = finish_surface(std::move(field), options, result.mesh); !done) return pass_on(done);
+  finish_surface(std::move(field), options, result.mesh);
   report.closed_vertices = static_cast<std::size_t>(std::count(result.mesh.views.begin(), result.mesh.views.end(), 0));
   report.measured_vertices = result.mesh.vertices.size() - report.closed_vertices;
   context.report("volume", 1.0);

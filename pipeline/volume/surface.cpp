@@ -50,7 +50,7 @@ void settle_vertex(const Field& field, const VolumeOptions& options, const Eigen
 
 }  // namespace
 
-Result<void> finish_surface(std::unique_ptr<const Field> field, const VolumeOptions& options, Mesh& mesh) {
+void finish_surface(std::unique_ptr<const Field> field, const VolumeOptions& options, Mesh& mesh) {
   const std::size_t count = mesh.vertices.size();
   mesh.views.assign(count, 0);
   mesh.sigma.assign(count, std::numeric_limits<float>::quiet_NaN());
@@ -63,11 +63,8 @@ Result<void> finish_surface(std::unique_ptr<const Field> field, const VolumeOpti
   widen_by_scatter(around, options.scatter_rounds, scatter, mesh);
   widen_by_fine_shape(around, options.shape_share, window_mm, mesh);
   smooth_unmeasured(around, static_cast<float>(options.voxel_mm), options.smoothing_rounds, mesh);
-  if (options.untangle) {
-    if (const auto back = untangle(extracted, mesh); !back) return pass_on(back);
-  }
+  if (options.untangle) untangle(extracted, mesh);
   mesh.normals = vertex_normals(mesh);
-  return {};
 }
 
 }  // namespace scanrig

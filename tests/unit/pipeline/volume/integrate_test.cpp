@@ -135,9 +135,7 @@ TEST(Integrate, NoFaceCrossesAnotherHoweverNoisyTheSheet) {
   const auto crossing = [&](bool untangle) {
     const auto surface = integrate_views(views, {.voxel_mm = 0.5, .untangle = untangle});
     EXPECT_TRUE(surface);
-    const auto index = SurfaceIndex::create(surface->mesh);
-    EXPECT_TRUE(index);
-    return self_intersecting_faces(surface->mesh, *index).size();
+    return self_intersecting_faces(surface->mesh).size();
   };
   EXPECT_GT(crossing(false), 10U) << "else this test shows nothing";
   EXPECT_EQ(crossing(true), 0U);

@@ -34,10 +34,7 @@ Mesh sheets() {
   return mesh;
 }
 
-std::size_t crossing(const Mesh& mesh) {
-  const auto surface = SurfaceIndex::create(mesh);
-  return surface ? self_intersecting_faces(mesh, *surface).size() : 1000;
-}
+std::size_t crossing(const Mesh& mesh) { return self_intersecting_faces(mesh).size(); }
 
 TEST(Untangle, TakesBackTheCornersOfFacesThatCross) {
   Mesh mesh = sheets();
@@ -46,9 +43,7 @@ TEST(Untangle, TakesBackTheCornersOfFacesThatCross) {
   mesh.vertices[kPeak].y() = 1.4F;  // through the upper sheet
   mesh.vertices[kCalm].y() = 0.2F;
   ASSERT_GT(crossing(mesh), 0U) << "else this test shows nothing";
-  const auto back = untangle(before, mesh);
-  ASSERT_TRUE(back) << back.error().message;
-  EXPECT_GT(*back, 0U);
+  EXPECT_GT(untangle(before, mesh), 0U);
   EXPECT_EQ(crossing(mesh), 0U);
   EXPECT_EQ(mesh.vertices[kPeak], before[kPeak]);
   EXPECT_EQ(mesh.views[kPeak], 0);
@@ -61,9 +56,7 @@ TEST(Untangle, LeavesASoundMeshAlone) {
   Mesh mesh = sheets();
   const auto before = mesh.vertices;
   mesh.vertices[7].y() = 0.3F;
-  const auto back = untangle(before, mesh);
-  ASSERT_TRUE(back) << back.error().message;
-  EXPECT_EQ(*back, 0U);
+  EXPECT_EQ(untangle(before, mesh), 0U);
   EXPECT_EQ(mesh.vertices[7].y(), 0.3F);
 }
 
@@ -71,8 +64,7 @@ TEST(Untangle, EndsWhereFacesCrossedBefore) {
   Mesh mesh = sheets();
   mesh.vertices[2 * kSide + 2].y() = 1.4F;
   const auto before = mesh.vertices;
-  const auto back = untangle(before, mesh);
-  ASSERT_TRUE(back) << back.error().message;
+  untangle(before, mesh);
   EXPECT_GT(crossing(mesh), 0U);
 }
 
