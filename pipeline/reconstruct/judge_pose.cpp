@@ -92,7 +92,7 @@ Result<void> Reconstruction::State::judge_silhouettes_of_both(const Transform& p
       origin.emplace_back(p, v);
     }
   }
-  const auto verdict = vote_on_silhouettes(all, {}, context);
+  const auto verdict = vote_on_silhouettes(all, {.finds_surplus = false}, context);  // said of each pose already
   if (!verdict) return pass_on(verdict);
   for (std::size_t i = 0; i < all.size(); ++i) {
     View& view = poses[origin[i].first].views[origin[i].second];
@@ -104,7 +104,6 @@ Result<void> Reconstruction::State::judge_silhouettes_of_both(const Transform& p
     }
   }
   for (SilhouetteFinding finding : verdict->findings) {
-    if (finding.kind == SilhouetteFinding::Kind::surplus) continue;  // said of each pose already
     const auto [pose, view] = origin[static_cast<std::size_t>(finding.view)];
     finding.view = poses[pose].views[view].index;
     disagreements.push_back(of_silhouette(pose, finding));

@@ -317,11 +317,13 @@ Result<SilhouetteVerdict> vote_on_silhouettes(std::span<View> views, const Silho
     mended[s] = mend(outlines[s], views[outlines[s].view], votes[s], points, options);
   });
   if (context.stopped()) return fail(ErrorCode::stopped, "silhouettes: stopped");
-  Eigen::AlignedBox3f box;
-  for (const MeasuredPoint& point : points) box.extend(point.point);
-  const auto room = Eigen::Vector3f::Constant(static_cast<float>(VolumeOptions{}.hull_room_mm));
-  const Surplus rays(outlines, {box.min() - room, box.max() + room}, options);
-  parallel_for(outlines.size(), [&](std::size_t s) { surplus[s] = rays.of(s, views[outlines[s].view]); });
+  if (options.finds_surplus) {
+    Eigen::AlignedBox3f box;
+    for (const MeasuredPoint& point : points) box.extend(point.point);
+    const auto room = Eigen::Vector3f::Constant(static_cast<float>(VolumeOptions{}.hull_room_mm));
+    const Surplus rays(outlines, {box.min() - room, box.max() + room}, options);
+    parallel_for(outlines.size(), [&](std::size_t s) { surplus[s] = rays.of(s, views[outlines[s].view]); });
+  }
   for (std::size_t s = 0; s < outlines.size(); ++s) {
     if (mended[s]) verdict.findings.push_back(*mended[s]);
     if (surplus[s] && !mended[s]) verdict.findings.push_back(*surplus[s]);

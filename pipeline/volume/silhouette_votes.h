@@ -21,6 +21,7 @@ struct SilhouetteVoteOptions {
   int min_silhouettes = 2;        ///< others that see a ray's whole length empty, for it to be named as surplus
   int surplus_stride_px = 8;      ///< grid of those rays
   double min_surplus = 0.01;      ///< of the silhouette's area: less is not named
+  bool finds_surplus = true;      ///< else surplus is not looked for
 };
 
 /// What is wrong with one silhouette, found by disagreement with the other images of its pose.
