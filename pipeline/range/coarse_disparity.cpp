@@ -1,10 +1,12 @@
 #include "pipeline/range/coarse_disparity.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "pipeline/range/range_image.h"
 
@@ -64,6 +66,15 @@ cv::Mat1f flipped(const cv::Mat1f& image) {
   return out;
 }
 
+/// Between two columns of a row; NaN for NaN.
+float at(const float* row, int width, float x) {
+  if (std::isnan(x)) return x;
+  const float inside = std::clamp(x, 0.0F, static_cast<float>(width - 1));
+  const int left = std::min(static_cast<int>(inside), width - 2);
+  const float share = inside - static_cast<float>(left);
+  return row[left] + share * (row[left + 1] - row[left]);
+}
+
 /// The left image's disparities at the right image's pixels: the nearest surface's where several meet, the mean of both
 /// sides in gaps of a pixel.
 cv::Mat1f seen_from_right(const cv::Mat1f& left) {
@@ -102,23 +113,111 @@ CoarseDisparity match_both(const cv::Mat1b& left, const cv::Mat1b& right, const 
           flipped(match(b_mirrored, a_mirrored, search, speckle_px, false)).colRange(columns)};
 }
 
-/// Those of `search` that occur, from images a quarter as large; all of it where too few are found there.
-Search occurring(const cv::Mat1b& left, const cv::Mat1b& right, const Search& search) {
-  constexpr int kScale = 4, kMargin = 12, kSpeckle = 6, kFewest = 200;
-  cv::Mat1b a, b;
+/// A smooth surface near the disparities, and what to search beside it: a tenth to a third of all that occur.
+struct Guide {
+  cv::Mat1f base;
+  Search beside;
+};
+
+/// A quadratic through the disparities, each weighted by how well the one before fits.
+cv::Mat1f smooth_surface(const cv::Mat1f& disparity, const cv::Mat1b& is_known) {
+  constexpr int kRounds = 5, kTerms = 6, kStride = 2;
+  constexpr float kNear = 4.0F;  // px
+  using Terms = Eigen::Matrix<double, kTerms, 1>;
+  const auto terms = [size = disparity.size()](int x, int y) {
+    const double u = 2.0 * x / size.width - 1.0, v = 2.0 * y / size.height - 1.0;
+    return (Terms() << 1.0, u, v, u * u, u * v, v * v).finished();
+  };
+  Terms surface = Terms::Zero();
+  for (int round = 0; round < kRounds; ++round) {
+    Eigen::Matrix<double, kTerms, kTerms> normal = Eigen::Matrix<double, kTerms, kTerms>::Identity() * 1e-3;
+    Terms rhs = Terms::Zero();
+    for (int y = 0; y < disparity.rows; y += kStride) {
+      for (int x = 0; x < disparity.cols; x += kStride) {
+        if (is_known(y, x) == 0) continue;
+        const Terms t = terms(x, y);
+        const double value = static_cast<double>(disparity(y, x)), off = value - surface.dot(t);
+        const double weight = round == 0 ? 1.0 : 1.0 / std::max(1.0, std::abs(off) / static_cast<double>(kNear));
+        normal += weight * t * t.transpose();
+        rhs += weight * value * t;
+      }
+    }
+    surface = normal.ldlt().solve(rhs);
+  }
+  cv::Mat1f out(disparity.size());
+  for (int y = 0; y < out.rows; ++y) {
+    for (int x = 0; x < out.cols; ++x) out(y, x) = static_cast<float>(surface.dot(terms(x, y)));
+  }
+  return out;
+}
+
+/// A pixel x of the left image is seen at x - beside in the right one moved by `base`: beside = d - base(x - beside).
+float beside_base(const float* base, int width, int x, float disparity) {
+  constexpr int kRounds = 4;
+  float beside = disparity - base[x];
+  for (int round = 0; round < kRounds; ++round) beside = disparity - at(base, width, static_cast<float>(x) - beside);
+  return beside;
+}
+
+/// What leads beside the base, less the outliers that were smooth enough not to be taken for speckles.
+Search range_beside(const cv::Mat1f& base, const cv::Mat1f& disparity, const cv::Mat1b& is_known, float scale) {
+  constexpr double kOutliers = 0.003;  // on each side
+  constexpr int kMargin = 16;          // px
+  std::vector<float> beside;
+  for (int y = 0; y < base.rows; ++y) {
+    for (int x = 0; x < base.cols; ++x) {
+      if (is_known(y, x) != 0) beside.push_back(scale * beside_base(base[y], base.cols, x, disparity(y, x)));
+    }
+  }
+  const auto quantile = [&](double share) {
+    const auto place = beside.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(beside.size() - 1));
+    std::nth_element(beside.begin(), place, beside.end());
+    return *place;
+  };
+  const float least = quantile(kOutliers), most = quantile(1.0 - kOutliers);
+  return Search::between(static_cast<int>(std::floor(least)) - kMargin, static_cast<int>(std::ceil(most)) + kMargin);
+}
+
+/// From images a quarter as large; none where too little is found there.
+std::optional<Guide> guide_for(const cv::Mat1b& left, const cv::Mat1b& right, const cv::Mat1b& object,
+                               const Search& search) {
+  constexpr int kScale = 4, kSpeckle = 40, kFewest = 200;
+  cv::Mat1b a, b, is_object, is_known;
   cv::resize(left, a, {}, 1.0 / kScale, 1.0 / kScale, cv::INTER_AREA);
   cv::resize(right, b, {}, 1.0 / kScale, 1.0 / kScale, cv::INTER_AREA);
-  const int highest = search.lowest + search.count;
-  const CoarseDisparity small =
-      match_both(a, b, Search::between(search.lowest / kScale - 1, highest / kScale + 1), kSpeckle, false);
-  const cv::Mat1f found = confirmed(small.left, small.right, -1.0F, 1.0F);
-  cv::Mat1b known;
-  cv::compare(found, found, known, cv::CMP_EQ);  // not NaN
-  if (cv::countNonZero(known) < kFewest) return search;
-  double least = 0.0, most = 0.0;
-  cv::minMaxLoc(found, &least, &most, nullptr, nullptr, known);
-  return Search::between(std::max(search.lowest, static_cast<int>(least * kScale) - kMargin),
-                         std::min(highest, static_cast<int>(most * kScale) + kMargin));
+  const Search small = Search::between(search.lowest / kScale - 1, (search.lowest + search.count) / kScale + 1);
+  const CoarseDisparity both = match_both(a, b, small, kSpeckle, false);
+  const cv::Mat1f found = confirmed(both.left, both.right, -1.0F, 1.0F);
+  cv::resize(object, is_object, found.size(), 0.0, 0.0, cv::INTER_NEAREST);
+  cv::compare(found, found, is_known, cv::CMP_EQ);  // not NaN
+  is_known &= is_object;
+  if (cv::countNonZero(is_known) < kFewest) return std::nullopt;
+  const cv::Mat1f base = smooth_surface(found, is_known);
+  Guide guide{{}, range_beside(base, found, is_known, kScale)};
+  cv::resize(base, guide.base, left.size(), 0.0, 0.0, cv::INTER_LINEAR);
+  guide.base *= kScale;
+  return guide;
+}
+
+/// Searches beside the guide only: in the right image moved by its base.
+CoarseDisparity match_guided(const cv::Mat1b& left, const cv::Mat1b& right, const Guide& guide, int speckle_px) {
+  cv::Mat1f columns(left.size()), rows(left.size());
+  for (int y = 0; y < left.rows; ++y) {
+    for (int x = 0; x < left.cols; ++x) {
+      columns(y, x) = static_cast<float>(x) - guide.base(y, x);
+      rows(y, x) = static_cast<float>(y);
+    }
+  }
+  cv::Mat1b moved;
+  cv::remap(right, moved, columns, rows, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
+  cv::Mat1f disparity = match_both(left, moved, guide.beside, speckle_px, false).left;
+  for (int y = 0; y < left.rows; ++y) {
+    float* beside = disparity[y];
+    for (int x = 0; x < left.cols; ++x) {
+      beside[x] += at(guide.base[y], left.cols, static_cast<float>(x) - beside[x]);  // NaN stays
+    }
+  }
+  return {disparity, seen_from_right(disparity)};
 }
 
 }  // namespace
@@ -126,13 +225,14 @@ Search occurring(const cv::Mat1b& left, const cv::Mat1b& right, const Search& se
 CoarseDisparity coarse_disparity(const RectifiedPair& pair, const PairBoxes& boxes) {
   const cv::Mat1b left = flattened(pair.left(boxes.left)), right = flattened(pair.right(boxes.right));
   const int shift = boxes.shift();
-  Search search = Search::between(std::max(pair.min_disparity - shift, -left.cols),
-                                  std::min(pair.max_disparity - shift, left.cols));
+  const Search search = Search::between(std::max(pair.min_disparity - shift, -left.cols),
+                                        std::min(pair.max_disparity - shift, left.cols));
   // Masks leave no background to be matched wrongly, so one direction is enough.
   const bool has_masks = !pair.left_object.empty() && !pair.right_object.empty();
-  if (has_masks) search = occurring(left, right, search);
+  const auto guide = has_masks ? guide_for(left, right, pair.left_object(boxes.left), search) : std::nullopt;
   constexpr int kSpeckle = 60;
-  const CoarseDisparity within = match_both(left, right, search, kSpeckle, !has_masks);
+  const CoarseDisparity within =
+      guide ? match_guided(left, right, *guide, kSpeckle) : match_both(left, right, search, kSpeckle, !has_masks);
   const cv::Size size = pair.left.size();
   CoarseDisparity out{cv::Mat1f(size, kUnmeasured), cv::Mat1f(size, kUnmeasured)};
   cv::add(within.left, static_cast<double>(shift), out.left(boxes.left));

@@ -14,8 +14,8 @@ struct CoarseDisparity {
 };
 
 /// Semi-global matching [Hirschmueller 2008; OpenCV, MODE_SGBM_3WAY] on images freed of shading, each image in its
-/// turn, in the boxes. Of a pair with masks only the disparities are searched that matching at a quarter of the size
-/// finds. Throws what OpenCV throws.
+/// turn, in the boxes. Of a pair with masks only those are searched that lie about as far from a quadratic surface
+/// as disparities found at a quarter of the size do. Throws what OpenCV throws.
 CoarseDisparity coarse_disparity(const RectifiedPair& pair, const PairBoxes& boxes);
 
 /// Disparities that the other image's disparities confirm within a tolerance; surface seen by one camera only becomes

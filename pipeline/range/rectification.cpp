@@ -71,10 +71,12 @@ Result<void> check_image(const RectifyingMap& map, const cv::Mat& image) {
   return {};
 }
 
-void resample_row(const cv::Mat1f& coefficients, const float* us, const float* vs, float* out, int width) {
+void resample_row(const cv::Mat1f& coefficients, const cv::Point& first, const float* us, const float* vs, float* out,
+                  int width) {
   const float u_last = static_cast<float>(coefficients.cols - 1), v_last = static_cast<float>(coefficients.rows - 1);
   for (int x = 0; x < width; ++x) {
-    const float u = std::clamp(us[x], 0.0f, u_last), v = std::clamp(vs[x], 0.0f, v_last);
+    const float u = std::clamp(us[x] - static_cast<float>(first.x), 0.0f, u_last);
+    const float v = std::clamp(vs[x] - static_cast<float>(first.y), 0.0f, v_last);
     const int column = static_cast<int>(u), line = static_cast<int>(v);
     const auto across = spline_weights(u - static_cast<float>(column));
     const auto down = spline_weights(v - static_cast<float>(line));
@@ -156,14 +158,26 @@ Result<cv::Mat> rectified(const RectifyingMap& map, const cv::Mat& image, Resamp
   return out;
 }
 
+cv::Rect sensor_box(const RectifyingMap& map, const cv::Rect& box, int room_px) {
+  double left = 0.0, right = 0.0, top = 0.0, bottom = 0.0;
+  cv::minMaxLoc(map.u(box), &left, &right);
+  cv::minMaxLoc(map.v(box), &top, &bottom);
+  const cv::Point first(static_cast<int>(std::floor(left)) - room_px, static_cast<int>(std::floor(top)) - room_px);
+  const cv::Point end(static_cast<int>(std::ceil(right)) + room_px, static_cast<int>(std::ceil(bottom)) + room_px);
+  return cv::Rect(first, end) & cv::Rect({0, 0}, map.u.size());
+}
+
 Result<cv::Mat1f> rectified_grey(const RectifyingMap& map, const cv::Mat& image, const cv::Rect& part) {
   if (const auto fits = check_image(map, image); !fits) return pass_on(fits);
-  const cv::Mat1f coefficients = spline_coefficients(grey_values(image));
   cv::Mat1f out(map.u.size(), 0.0F);
   const cv::Rect box = part.empty() ? cv::Rect({0, 0}, out.size()) : part;
+  constexpr int kRoom = 20;  // px: farther out nothing matters to the spline
+  const cv::Rect sensor = sensor_box(map, box, kRoom);
+  if (sensor.empty()) return out;
+  const cv::Mat1f coefficients = spline_coefficients(grey_values(image(sensor)));
   parallel_for(static_cast<std::size_t>(box.height), [&](std::size_t row) {
     const int y = box.y + static_cast<int>(row);
-    resample_row(coefficients, map.u[y] + box.x, map.v[y] + box.x, out[y] + box.x, box.width);
+    resample_row(coefficients, sensor.tl(), map.u[y] + box.x, map.v[y] + box.x, out[y] + box.x, box.width);
   });
   return out;
 }

@@ -45,6 +45,9 @@ enum class Resampling : std::uint8_t { cubic, linear };
 /// Fails with `invalid_input` for another size or type.
 Result<cv::Mat> rectified(const RectifyingMap& map, const cv::Mat& image, Resampling resampling = Resampling::cubic);
 
+/// What of the sensor is seen within `box` of the map's image, and `room_px` around it.
+cv::Rect sensor_box(const RectifyingMap& map, const cv::Rect& box, int room_px);
+
 /// The same as grey float values without loss of sub-pixel position (cubic B-spline, prefiltered), for matching.
 /// Colour is weighted 1:2:1 (B, G, R), as often as a Bayer sensor samples them. Images of 16 bit are those of
 /// merge_exposures(). Grey values (CV_32F) may be given too. `part`: the only pixels that are computed, the others are

@@ -16,16 +16,26 @@ constexpr std::size_t kSurfaces = 3;
 /// A farther node's surface must fit so much better: variances of 49 pixels differ by less in 19 of 20 (Fisher's F).
 constexpr float kClearly = 1.6F;
 
-/// The surfaces of the nodes around a pixel, nearest node first, described around the pixel.
+/// A node's surface at a pixel (x, y) away.
+struct SurfaceHere {
+  const DisparityPatch* node;
+  float x, y;
+  float disparity;
+
+  [[nodiscard]] DisparityPatch patch() const { return node->moved(x, y); }
+};
+
+/// The surfaces of the nodes around a pixel, nearest node first.
 struct Surfaces {
-  std::array<DisparityPatch, kSurfaces> patches;
+  std::array<SurfaceHere, kSurfaces> found;
   std::size_t count = 0;
 
-  void add(const DisparityPatch& patch, float apart_px) {
+  void add(const DisparityPatch& node, float x, float y, float apart_px) {
+    const float disparity = node.at(x, y);
     for (std::size_t i = 0; i < count; ++i) {
-      if (std::abs(patches[i].c[0] - patch.c[0]) < apart_px) return;
+      if (std::abs(found[i].disparity - disparity) < apart_px) return;
     }
-    if (count < kSurfaces) patches[count++] = patch;
+    if (count < kSurfaces) found[count++] = {&node, x, y, disparity};
   }
 };
 
@@ -39,8 +49,7 @@ Surfaces surfaces_around(const Nodes& nodes, int u, int v, float apart_px) {
         const bool is_inner = x >= column && x <= column + 1 && y >= row && y <= row + 1;
         const DisparityPatch& node = nodes.at(x, y);
         if (!node.valid || is_inner != (ring == 0)) continue;
-        out.add(node.moved(static_cast<float>(u - x * nodes.stride), static_cast<float>(v - y * nodes.stride)),
-                apart_px);
+        out.add(node, static_cast<float>(u - x * nodes.stride), static_cast<float>(v - y * nodes.stride), apart_px);
       }
     }
   }
@@ -85,8 +94,8 @@ void assign_pixels(MatchMask& mask, const Nodes& nodes, const LayeredImage& here
       const Surfaces surfaces = surfaces_around(nodes, u, v, apart_px);
       if (surfaces.count == 0) continue;
       const float coarse = mask.disparity(v, u);
-      if (surfaces.count == 1 && std::abs(coarse - surfaces.patches[0].c[0]) < apart_px) {
-        assigned(v, u) = surfaces.patches[0].c[0];
+      if (surfaces.count == 1 && std::abs(coarse - surfaces.found[0].disparity) < apart_px) {
+        assigned(v, u) = surfaces.found[0].disparity;
         continue;
       }
       const auto is_smooth = [&](const DisparityPatch& patch) { return patch.radius >= options.smooth_radii_px[0]; };
@@ -94,12 +103,12 @@ void assign_pixels(MatchMask& mask, const Nodes& nodes, const LayeredImage& here
         return misfit(smooth ? here.smooth : here.sharp, smooth ? there.smooth : there.sharp, mask.usable, u, v, patch);
       };
       // Surfaces are compared in one kind of image; a patch of poor residual must not win by it.
-      const bool any_smooth =
-          std::any_of(surfaces.patches.begin(), surfaces.patches.begin() + surfaces.count, is_smooth);
+      const bool any_smooth = std::any_of(surfaces.found.begin(), surfaces.found.begin() + surfaces.count,
+                                          [&](const SurfaceHere& surface) { return is_smooth(*surface.node); });
       float best = std::numeric_limits<float>::infinity();
       assigned(v, u) = kUnmeasured;
       for (std::size_t i = 0; i < surfaces.count; ++i) {
-        const DisparityPatch& patch = surfaces.patches[i];
+        const DisparityPatch patch = surfaces.found[i].patch();
         const float own = off_in(is_smooth(patch), patch);
         if (own > static_cast<float>(options.max_centre) * std::max(patch.residual, 1e-3F)) continue;
         const float off = is_smooth(patch) == any_smooth ? own : off_in(any_smooth, patch);

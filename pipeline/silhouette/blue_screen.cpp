@@ -73,18 +73,28 @@ Screen screen_at_border(const cv::Mat3f& image, const BlueScreenOptions& options
   return screen;
 }
 
-/// Clears parts smaller than `smallest` pixels.
-void remove_parts(cv::Mat1b& mask, double smallest, int connectivity) {
+/// Clears parts smaller than `smallest(pixels of the largest)`; how large that is.
+template <class Smallest>
+int remove_small_parts(cv::Mat1b& mask, int connectivity, const Smallest& smallest) {
   cv::Mat1i labels;
   cv::Mat stats, centroids;
   const int count = cv::connectedComponentsWithStats(mask, labels, stats, centroids, connectivity, CV_32S);
+  int largest = 0;
+  for (int i = 1; i < count; ++i) largest = std::max(largest, stats.at<int>(i, cv::CC_STAT_AREA));
   std::vector<std::uint8_t> kept(static_cast<std::size_t>(count), 0);
   for (int i = 1; i < count; ++i) {
-    kept[static_cast<std::size_t>(i)] = stats.at<int>(i, cv::CC_STAT_AREA) >= smallest ? 255 : 0;
+    kept[static_cast<std::size_t>(i)] = stats.at<int>(i, cv::CC_STAT_AREA) >= smallest(largest) ? 255 : 0;
   }
   for (int y = 0; y < mask.rows; ++y) {
-    for (int x = 0; x < mask.cols; ++x) mask(y, x) = kept[static_cast<std::size_t>(labels(y, x))];
+    const int* label = labels[y];
+    uchar* out = mask[y];
+    for (int x = 0; x < mask.cols; ++x) out[x] = kept[static_cast<std::size_t>(label[x])];
   }
+  return largest;
+}
+
+void remove_parts(cv::Mat1b& mask, double smallest, int connectivity) {
+  remove_small_parts(mask, connectivity, [smallest](int) { return smallest; });
 }
 
 cv::Mat3f smoothed(const cv::Mat& image) {
@@ -129,15 +139,6 @@ cv::Mat1b lit_object(const cv::Mat3f& smooth, const ScreenKey& key, const cv::Ma
   cv::morphologyEx(lit, lit, cv::MORPH_CLOSE, band);
   cv::erode(lit, lit, cv::Mat());
   return lit;
-}
-
-int largest_part(const cv::Mat1b& mask) {
-  cv::Mat1i labels;
-  cv::Mat stats, centroids;
-  const int count = cv::connectedComponentsWithStats(mask, labels, stats, centroids, 8, CV_32S);
-  int largest = 0;
-  for (int i = 1; i < count; ++i) largest = std::max(largest, stats.at<int>(i, cv::CC_STAT_AREA));
-  return largest;
 }
 
 /// The colour of the pixels in `mask` around each pixel; those away from the mask's edge have priority.
@@ -237,16 +238,18 @@ Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const cv::Mat& patte
   const ScreenKey key(screen_colour);
   cv::Mat1b object(smooth.size());
   for (int y = 0; y < object.rows; ++y) {
+    const cv::Vec3f* colour = smooth[y];
+    uchar* out = object[y];
     for (int x = 0; x < object.cols; ++x) {
-      object(y, x) = static_cast<double>(key(smooth(y, x))) < options.object_key ? 255 : 0;
+      out[x] = static_cast<double>(key(colour[x])) < options.object_key ? 255 : 0;
     }
   }
   if (!pattern.empty()) object |= lit_object(smoothed(pattern), key, object, options);
-  const int largest = largest_part(object);
+  const int largest = remove_small_parts(
+      object, 8, [&](int part) { return std::max<double>(options.min_hole_px, options.min_part_share * part); });
   if (largest < options.min_hole_px) {
     return fail(ErrorCode::not_found, "silhouette: no object before the screen; check that the object is on the table");
   }
-  remove_parts(object, std::max<double>(options.min_hole_px, options.min_part_share * largest), 8);
   if (touches_border(object)) {
     return fail(ErrorCode::out_of_range,
                 "silhouette: the object reaches the border of the image, it is larger than the working volume");
