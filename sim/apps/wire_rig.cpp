@@ -12,8 +12,6 @@
 namespace scanrig::sim {
 namespace {
 
-constexpr std::chrono::milliseconds kLineWatch{5};
-
 /// Table angles of a job: the table is wound up from pose to pose, and each pose may end with its first view once more.
 /// Angles beyond two turns repeat, see rest_error_deg().
 std::vector<Place> places_of_job(const WireRigOptions& o) {
@@ -58,7 +56,6 @@ Result<std::unique_ptr<WireRig>> WireRig::start(const WireRigOptions& o, Clock& 
   rig->panel_ = std::move(*panel);
   if (auto started = rig->start_cameras(o, clock); !started) return pass_on(started);
   if (auto written = write_rig_toml(o.toml); !written) return pass_on(written);
-  rig->line_watch_ = std::jthread([&rig = *rig](const std::stop_token& stop) { rig.watch_line(stop); });
   return rig;
 }
 
@@ -90,6 +87,7 @@ Result<void> WireRig::connect_drive(const WireRigOptions& o, Clock& clock) {
     if (!server) return pass_on(server);
     drive_ = std::move(drive);
     server_ = std::move(*server);
+    server_->set_line({});
     return {};
   };
   const auto modbus = [&](auto& drive) { return wire::ModbusServer::start(port_, 1, drive, clock); };
@@ -134,7 +132,7 @@ void WireRig::set_fault(std::optional<wire::WireFault> fault) {
 
 void WireRig::apply_fault() {
   server_->clear_faults();
-  if (!powered_ || !settings_match_) {
+  if (!powered_) {
     server_->inject({.kind = wire::WireFault::Kind::request_lost});
   } else if (fault_) {
     server_->inject(*fault_);
@@ -155,27 +153,6 @@ void WireRig::set_estop_cuts_power(bool cuts) {
 void WireRig::set_positive_ccw(bool ccw) {
   const std::scoped_lock lock(mutex_);
   positive_ccw_ = ccw;
-}
-
-void WireRig::set_line(const wire::LineSettings& settings) {
-  const std::scoped_lock lock(mutex_);
-  drive_settings_ = settings;
-}
-
-/// A driver with other port settings than the drive's sends only noise.
-void WireRig::watch_line(const std::stop_token& stop) {
-  while (!stop.stop_requested()) {
-    const auto settings = wire::line_settings(port_);
-    {
-      const std::scoped_lock lock(mutex_);
-      const bool understood = !settings || *settings == drive_settings_;
-      if (understood != settings_match_) {
-        settings_match_ = understood;
-        apply_fault();
-      }
-    }
-    std::this_thread::sleep_for(kLineWatch);
-  }
 }
 
 }  // namespace scanrig::sim

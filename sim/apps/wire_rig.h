@@ -7,7 +7,6 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "core/clock.h"
@@ -63,8 +62,8 @@ class WireRig {
   void set_fault(std::optional<wire::WireFault> fault);
   Result<void> plug_in(bool plugged);
   void set_estop_cuts_power(bool cuts);
-  /// Settings of the drive's own port: it receives only requests with the same settings.
-  void set_line(const wire::LineSettings& settings);
+  /// Settings of the drive's own port.
+  void set_line(const wire::LineSettings& settings) { server_->set_line(settings); }
   void set_positive_ccw(bool ccw);
   [[nodiscard]] wire::SimulatedDrive& drive() { return *drive_; }
 
@@ -74,21 +73,17 @@ class WireRig {
   Result<void> connect_drive(const WireRigOptions& options, Clock& clock);
   Result<void> start_cameras(const WireRigOptions& options, Clock& clock);
   void apply_fault();
-  void watch_line(const std::stop_token& stop);
 
   const std::filesystem::path port_;
   mutable std::mutex mutex_;
   bool positive_ccw_ = true;
   bool estop_cuts_power_ = true;
   bool powered_ = true;
-  wire::LineSettings drive_settings_;
-  bool settings_match_ = true;  ///< the client's port settings equal the drive's
   std::optional<wire::WireFault> fault_;
   std::unique_ptr<wire::SimulatedDrive> drive_;
   std::unique_ptr<wire::WireServer> server_;
   std::unique_ptr<RigPanel> panel_;
   std::unique_ptr<RigCameras> cameras_;
-  std::jthread line_watch_;  ///< last: joined before the other members are destroyed
 };
 
 }  // namespace scanrig::sim

@@ -33,6 +33,11 @@ void WireServer::clear_faults() {
   faults_.clear();
 }
 
+void WireServer::set_line(const LineSettings& settings) {
+  const std::scoped_lock lock(mutex_);
+  line_ = settings;
+}
+
 std::vector<WireFrame> WireServer::log() const {
   const std::scoped_lock lock(mutex_);
   return log_;
@@ -50,6 +55,10 @@ void WireServer::note(bool from_master, const Bytes& bytes) {
 
 std::optional<WireFault> WireServer::next_fault(std::uint8_t function) {
   const std::scoped_lock lock(mutex_);
+  // A client with other settings sends only noise.
+  if (const auto client = line_ ? line_settings(link_) : std::nullopt; client && *client != *line_) {
+    return WireFault{.kind = WireFault::Kind::request_lost};
+  }
   for (auto fault = faults_.begin(); fault != faults_.end(); ++fault) {
     if (fault->function && *fault->function != function) continue;
     const WireFault found = *fault;

@@ -10,6 +10,7 @@
 
 #include "core/clock.h"
 #include "core/result.h"
+#include "sim/wire/line_settings.h"
 #include "sim/wire/modbus_frame.h"
 #include "sim/wire/pty.h"
 #include "sim/wire/wire_fault.h"
@@ -31,6 +32,9 @@ class WireServer {
 
   void inject(const WireFault& fault);
   void clear_faults();
+  /// Settings of the device's own port: it receives only requests of a client with the same ones. Before the first
+  /// call any will do.
+  void set_line(const LineSettings& settings);
   /// Pulls the adapter, and plugs it in again (fails with `io`).
   void vanish();
   Result<void> come_back();
@@ -57,6 +61,7 @@ class WireServer {
 
   mutable std::mutex mutex_;
   std::deque<WireFault> faults_;
+  std::optional<LineSettings> line_;
   std::vector<WireFrame> log_;
   Bytes last_reply_;  // server's thread only
 
