@@ -3,12 +3,15 @@
 Seconds were asked for on one kind of machine, ratios elsewhere: OpenCV's 3WAY on the same pair, in the same run, says how
 much slower this machine is, and limits grow by that.
 """
+import contextlib
 import json
 import os
 import pathlib
 import shutil
+import threading
 import time
 
+import fast_acquisition
 import fast_peers
 import fast_scaling
 import fast_slurm
@@ -73,22 +76,74 @@ def scan(bench, scratch):
                single.geometry == runs[0].geometry)
 
 
+class WrittenAt(threading.Thread):
+    """When the first file of this pattern was written: live meshes are removed with the end of their job."""
+
+    def __init__(self, folder, pattern):
+        super().__init__(daemon=True)
+        self.folder, self.pattern, self.at, self.is_over = folder, pattern, None, threading.Event()
+
+    def run(self):
+        while self.at is None and not self.is_over.wait(0.1):
+            with contextlib.suppress(FileNotFoundError):  # removed between the two calls
+                self.at = next((file.stat().st_mtime for file in self.folder.glob(self.pattern)), None)
+
+    def __enter__(self):
+        self.start()
+        return self
+
+    def __exit__(self, *_):
+        self.is_over.set()
+        self.join()
+
+
+def last_image(job, pose):
+    return max(file.stat().st_mtime for file in (job / pose).rglob("*.png"))
+
+
+def last_read_out(job, placement):
+    """Of the cameras, by the rig's stamps, as a time of files. The first view again, which ends a pose, is kept on disk
+    only where something has moved."""
+    exposures = json.loads((job / "stamps.json").read_text())["exposures"]
+    return max(one["read_ns"] for one in exposures if one["placement"] == placement) / 1e9 + time.time() - time.monotonic()
+
+
 def live(bench, _scratch):
     """From the last image on disk to the model on disk, of a job of two poses; to the partial model of the first. The rig
     on the wire renders its views before the job: as a real one, it needs the processor for sending them alone."""
     folder = bench.out / "fast-demo"
     shutil.rmtree(folder, ignore_errors=True)
     demo = pathlib.Path(__file__).resolve().parent.parent.parent / "sim" / "apps" / "demo.py"
-    done = bench.run(["python3", demo, "--bin", bench.bin, "--out", folder, "--calibration", "true", "--profile",
-                      "laboratory", "--wire"], 1800)
+    with WrittenAt(folder, "rig/jobs/*/live/pose1.glb") as partial:
+        done = bench.run(["python3", demo, "--bin", bench.bin, "--out", folder, "--calibration", "true", "--profile",
+                          "laboratory", "--wire"], 1800)
     reports = list(folder.rglob("model/report.json"))
     if not reports:
         bench.line("last image to model on disk", "<= 3.0 s", f"no model: {done.stderr.strip()[-200:]}", False)
         return
-    images = [file for file in reports[0].parent.parent.rglob("*.png") if "pose2" in str(file)]
+    job = reports[0].parent.parent
     written = max(file.stat().st_mtime for file in reports[0].parent.iterdir())
     seconds_at_most(bench, "last image to model on disk, job of two poses", 3.0,
-                    written - max(file.stat().st_mtime for file in images))
+                    written - last_image(job, "pose2"))
+    what = "last image of pose 1 to its partial model, shown at the flip"
+    if partial.at is None:
+        bench.line(what, "<= 1.0 s", "no partial model", False)
+    else:
+        seconds_at_most(bench, what, 1.0, partial.at - last_read_out(job, 0))
+        bench.note(f"since the last view on disk, before the movement check: {partial.at - last_image(job, 'pose1'):.1f} s")
+
+
+def used_by(process):
+    """Seconds of the processor and voluntary switches of all its threads so far."""
+    tasks = f"/proc/{process}/task"
+    ticks = switches = 0
+    for task in os.listdir(tasks):
+        fields = open(f"{tasks}/{task}/stat").read().rpartition(")")[2].split()
+        ticks += int(fields[11]) + int(fields[12])
+        for line in open(f"{tasks}/{task}/status"):
+            if line.startswith("voluntary_ctxt"):
+                switches += int(line.split()[1])
+    return ticks / os.sysconf("SC_CLK_TCK"), switches
 
 
 def idle(bench, scratch):
@@ -97,24 +152,16 @@ def idle(bench, scratch):
         rig.start_daemon()
         rig.get_ready()
         time.sleep(5)
-        tasks = f"/proc/{rig.daemon.pid}/task"
-
-        def used():
-            ticks = switches = 0
-            for task in os.listdir(tasks):
-                fields = open(f"{tasks}/{task}/stat").read().rpartition(")")[2].split()
-                ticks += int(fields[11]) + int(fields[12])
-                for line in open(f"{tasks}/{task}/status"):
-                    if line.startswith("voluntary_ctxt"):
-                        switches += int(line.split()[1])
-            return ticks / os.sysconf("SC_CLK_TCK"), switches
-
-        before = used()
+        before = [used_by(process.pid) for process in (rig.daemon, rig.process)]
         time.sleep(IDLE_S)
-        after = used()
-    bench.at_most("idle daemon: share of a core", 0.3, 100 * (after[0] - before[0]) / IDLE_S, "%", digits=2)
-    bench.at_most("idle daemon: wake-ups a second", 30, (after[1] - before[1]) / IDLE_S, digits=0)
+        after = [used_by(process.pid) for process in (rig.daemon, rig.process)]
+    (share, wakes), (rig_share, rig_wakes) = [((b[0] - a[0]) / IDLE_S, (b[1] - a[1]) / IDLE_S)
+                                              for a, b in zip(before, after)]
+    bench.at_most("idle daemon: share of a core", 0.3, 100 * share, "%", digits=2)
+    bench.at_most("idle daemon: wake-ups a second", 30, wakes, digits=0)
+    bench.line("the simulated rig beside it: share of a core, wake-ups a second", "reported",
+               f"{100 * rig_share:.2f} %, {rig_wakes:.0f}", True)
 
 
 PARTS = {"view": view, "scan": scan, "peers": fast_peers.measure, "scaling": fast_scaling.measure, "live": live,
-         "idle": idle, "slurm": fast_slurm.measure}
+         "acquisition": fast_acquisition.measure, "idle": idle, "slurm": fast_slurm.measure}
