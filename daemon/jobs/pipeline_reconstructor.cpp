@@ -26,6 +26,7 @@ class PipelineReconstructor final : public Reconstructor {
   std::string live_pose(std::size_t pose) override {
     return encoded(reconstruction_.live_pose(pose), reconstruction_.other_rest(pose));
   }
+  Result<void> prepare(const Context& context) override { return reconstruction_.prepare(context); }
   Result<void> finish(const std::filesystem::path& folder, const Context& context) override {
     const auto scan = ScanFolder::open(scan_);  // now that it is complete
     if (!scan) return pass_on(scan);

@@ -221,7 +221,18 @@ Result<void> ReconstructionThread::add(int pose, const RawView& raw, const ViewR
     show(fmt::format("pose{}_view{:02}", pose + 1, record.index),
          current_->reconstructor->live_view(static_cast<std::size_t>(pose)), is_first);
   }
-  return added;
+  return added ? close_when_whole(pose, record.index) : added;
+}
+
+/// The first view is taken once more, to see whether anything moved. Meanwhile the pose is closed: a scan in which
+/// something has moved gets no model.
+Result<void> ReconstructionThread::close_when_whole(int pose, int view) {
+  const Recipe& recipe = current_->recipe;
+  if (recipe.is_calibration() || view + 1 < recipe.views_of(pose)) return {};
+  auto closed = close_pose(pose);
+  // In its turn, after what may have come to end the job.
+  if (closed && pose + 1 == recipe.poses) inbox_.post(Prepare{current_->job});
+  return closed;
 }
 
 void ReconstructionThread::handle(const AddView& message) {
@@ -234,12 +245,16 @@ void ReconstructionThread::handle(const AddView& message) {
 }
 
 Result<void> ReconstructionThread::close_pose(int pose) {
+  if (pose < current_->poses_closed) return {};
   const auto progress = [&](std::string_view stage, double fraction) {
     tell_progress(fmt::format("{} pose {}", stage, pose + 1), fraction);
   };
   auto closed = catch_exceptions(
       kWork, [&] { return current_->reconstructor->finish_pose(static_cast<std::size_t>(pose), context(progress)); });
-  if (closed) {
+  if (!closed) return closed;
+  current_->poses_closed = pose + 1;
+  // After the last pose the model itself is soon there.
+  if (current_->poses_closed < current_->recipe.poses) {
     show(fmt::format("pose{}", pose + 1), current_->reconstructor->live_pose(static_cast<std::size_t>(pose)), true);
   }
   return closed;
@@ -275,6 +290,15 @@ void ReconstructionThread::handle(const CheckPlacement& message) {
 
 void ReconstructionThread::handle(const DropPose& message) {
   if (works_on(message.job)) current_->reconstructor->drop_pose(static_cast<std::size_t>(message.pose));
+}
+
+void ReconstructionThread::handle(const Prepare& message) {
+  if (!works_on(message.job)) return;
+  if (auto marked = mark(); !marked) return check(marked);
+  const auto progress = [this](std::string_view stage, double fraction) {
+    tell_progress(std::string(stage), fraction);
+  };
+  check(catch_exceptions(kWork, [&] { return current_->reconstructor->prepare(context(progress)); }));
 }
 
 void ReconstructionThread::handle(const Finish& message) {

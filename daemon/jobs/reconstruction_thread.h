@@ -82,13 +82,16 @@ class ReconstructionThread {
     std::string job;
     int pose;
   };
+  struct Prepare {
+    std::string job;
+  };
   struct Finish {
     std::string job;
   };
   struct Abandon {
     std::string job;
   };
-  using Message = std::variant<Begin, Rebuild, AddView, FinishPose, CheckPlacement, DropPose, Finish, Abandon>;
+  using Message = std::variant<Begin, Rebuild, AddView, FinishPose, CheckPlacement, DropPose, Prepare, Finish, Abandon>;
 
   struct Current {
     std::string job;
@@ -98,6 +101,7 @@ class ReconstructionThread {
     std::unique_ptr<Reconstructor> reconstructor{};
     bool quarantined = false;  ///< the scan continues without a model
     int views_done = 0;
+    int poses_closed = 0;
     std::vector<std::string> live{};  ///< names of the meshes that are shown
     std::optional<Error> error{};
   };
@@ -111,6 +115,7 @@ class ReconstructionThread {
   void handle(const FinishPose& message);
   void handle(const CheckPlacement& message);
   void handle(const DropPose& message);
+  void handle(const Prepare& message);
   void handle(const Finish& message);
   void handle(const Abandon& message);
 
@@ -124,6 +129,7 @@ class ReconstructionThread {
   Result<void> catch_up(const ScanFolder& scan);
   Result<void> add(int pose, const RawView& raw, const ViewRecord& record);
   Result<void> add_stored(const ScanFolder& scan, std::size_t pose, std::size_t view);
+  Result<void> close_when_whole(int pose, int view);
   Result<void> close_pose(int pose);
   void show(std::string name, const std::string& glb, bool replaces);
   void hide();

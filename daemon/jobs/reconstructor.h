@@ -31,6 +31,8 @@ class Reconstructor {
   /// this one shows nothing.
   virtual std::string live_view(std::size_t) { return {}; }
   virtual std::string live_pose(std::size_t) { return {}; }
+  /// What finish() would begin with, once all poses are finished.
+  virtual Result<void> prepare(const Context&) { return {}; }
   /// Makes the model and writes its files and report.json together: after a failure there is no `folder`.
   virtual Result<void> finish(const std::filesystem::path& folder, const Context& context) = 0;
 };

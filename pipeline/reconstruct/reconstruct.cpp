@@ -242,13 +242,14 @@ std::vector<LivePhoto> Reconstruction::State::live_photos(const PoseState& pose)
   return photos;
 }
 
-Result<Model> Reconstruction::State::finish(const ScanIdentity& identity, const Context& context) {
+Result<void> Reconstruction::State::prepare(const Context& context) {
+  if (prepared) return {};
   if (poses.empty()) return fail(ErrorCode::invalid_input, "the scan has no views");
   for (std::size_t p = 0; p < poses.size(); ++p) {
     if (!poses[p].finished) return fail(ErrorCode::invalid_input, "pose {} is not finished", p + 1);
   }
   if (options.voxel_mm == 0.0) options.voxel_mm = voxel_for(poses.front().views.front().range);
-  Report report(options, identity, calibration);
+  Report report(options, calibration);
   for (const PoseState& pose : poses) {
     report.add_pose(pose.views, pose.registration, pose.partial.report, pose.watch ? &*pose.watch : nullptr);
   }
@@ -260,11 +261,18 @@ Result<Model> Reconstruction::State::finish(const ScanIdentity& identity, const 
   if (!integrated) return pass_on(integrated, "integration");
   release_range_images();
   give_memory_back();
+  prepared.emplace(Prepared{*pose1_from_pose2, std::move(*integrated), std::move(report)});
+  return {};
+}
 
+Result<Model> Reconstruction::State::finish(const ScanIdentity& identity, const Context& context) {
+  if (auto done = prepare(context); !done) return pass_on(done);
+  auto& [pose1_from_pose2, surface, report] = *prepared;
+  report.add_identity(identity);
   Model model;
-  model.mesh.mesh = std::move(integrated->mesh);
-  if (auto done = add_texture(model.mesh, *pose1_from_pose2, report, context); !done) return pass_on(done, "texture");
-  report.add_surface(model.mesh.mesh, integrated->report);
+  model.mesh.mesh = std::move(surface.mesh);
+  if (auto done = add_texture(model.mesh, pose1_from_pose2, report, context); !done) return pass_on(done, "texture");
+  report.add_surface(model.mesh.mesh, surface.report);
   report.add_disagreements(disagreements);
   model.report = std::make_shared<const nlohmann::json>(report.finished(log));
   return model;
@@ -348,6 +356,12 @@ Mesh Reconstruction::live_pose(std::size_t pose) const {
 std::optional<Eigen::Quaterniond> Reconstruction::other_rest(std::size_t pose) const {
   if (pose >= state_->poses.size() || !state_->poses[pose].finished) return std::nullopt;
   return turn_to_other_rest(state_->poses[pose].partial.mesh);
+}
+
+Result<void> Reconstruction::prepare(const Context& context) {
+  Result<void> done;
+  with_threads(state_->options.threads, [&] { done = state_->prepare(context); });
+  return done;
 }
 
 Result<Model> Reconstruction::finish(const ScanIdentity& identity, const Context& context) {

@@ -84,9 +84,10 @@ class Reconstruction {
   /// Where a finished pose can be turned over to; turn_to_other_rest().
   [[nodiscard]] std::optional<Eigen::Quaterniond> other_rest(std::size_t pose) const;
 
-  /// Pose 2 into pose 1, integration, texture; with one pose, its own complete model. Every pose must be finished
-  /// before. Once: the views are let go.
-  /// Fails with `same_rest`, `ambiguous`, `no_overlap`, `degenerate`, `stopped`.
+  /// Pose 2 into pose 1, and integration: what finish() begins with, sooner. Every pose must be finished before, none
+  /// comes after. Fails with `same_rest`, `ambiguous`, `no_overlap`, `degenerate`, `stopped`.
+  Result<void> prepare(const Context& context);
+  /// As prepare(), then the texture; with one pose, its own complete model. Once: the views are let go.
   Result<Model> finish(const ScanIdentity& identity, const Context& context);
 
  private:

@@ -38,11 +38,19 @@ struct Reconstruction::State {
     bool finished = false;
   };
 
+  /// What finish() needs of the finished poses alone.
+  struct Prepared {
+    Transform pose1_from_pose2;
+    Surface surface;
+    Report report;
+  };
+
   ReconstructOptions options;
   std::optional<Calibration> calibration;
   std::optional<Rectification> rectification;
   std::vector<PoseState> poses;
   std::vector<Disagreement> disagreements;
+  std::optional<Prepared> prepared;
   StageLog log;
 
   Result<PoseState*> open_pose(std::size_t pose);
@@ -67,6 +75,7 @@ struct Reconstruction::State {
   [[nodiscard]] std::vector<LivePhoto> live_photos(const PoseState& pose) const;
   Result<void> add_texture(TexturedMesh& model, const Transform& pose1_from_pose2, Report& report,
                            const Context& context);
+  Result<void> prepare(const Context& context);
   Result<Model> finish(const ScanIdentity& identity, const Context& context);
 };
 

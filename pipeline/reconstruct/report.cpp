@@ -173,23 +173,27 @@ json uncertainty_json(const RefinedPose& refined) {
 
 }  // namespace
 
-Report::Report(const ReconstructOptions& options, const ScanIdentity& identity,
-               const std::optional<Calibration>& calibration)
+Report::Report(const ReconstructOptions& options, const std::optional<Calibration>& calibration)
     : json_(std::make_unique<json>()) {
   json& report = *json_;
   report["format"] = "scanrig-report";
   report["version"] = 2;
   report["software"] = {{"name", "scanrig"}, {"version", kVersion}, {"compiler", kCompiler}};
-  report["scan"] = identity.id;
-  report["profile_sha256"] = identity.profile;
-  report["config_sha256"] = identity.config_sha256;
   report["calibration_sha256"] = calibration ? calibration->sha256 : "";
   report["options"] = {{"voxel_mm", options.voxel_mm}, {"fusion", options.fusion}, {"rests", options.rests},
                        {"texture", options.texture},   {"watch", options.watch},   {"threads", options.threads}};
   report["poses"] = json::array();
 }
 
+void Report::add_identity(const ScanIdentity& identity) {
+  json& report = *json_;
+  report["scan"] = identity.id;
+  report["profile_sha256"] = identity.profile;
+  report["config_sha256"] = identity.config_sha256;
+}
+
 Report::~Report() = default;
+Report::Report(Report&&) noexcept = default;
 
 void Report::add_pose(std::span<const View> views, const RegistrationReport& registration, const VolumeReport& partial,
                       const RigWatch* watch) {

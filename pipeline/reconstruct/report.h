@@ -20,9 +20,11 @@ namespace scanrig {
 /// Collects report.json, docs/reference/report.md. Lengths mm, angles degrees.
 class Report {
  public:
-  Report(const ReconstructOptions& options, const ScanIdentity& identity,
-         const std::optional<Calibration>& calibration);
+  Report(const ReconstructOptions& options, const std::optional<Calibration>& calibration);
   ~Report();
+  Report(Report&&) noexcept;
+
+  void add_identity(const ScanIdentity& identity);
 
   /// `watch`: none without one.
   void add_pose(std::span<const View> views, const RegistrationReport& registration, const VolumeReport& partial,

@@ -14,6 +14,7 @@ struct ReconstructionLog {
   std::mutex mutex;
   std::vector<std::string> calls;                ///< "view 0/3", "pose 0", "finish"
   std::vector<std::pair<int, int>> grey_levels;  ///< of pattern and plain, per view
+  int prepared = 0;                              ///< models
   Result<void> answer_to_view{};
   Result<void> answer_to_finish{};
   std::function<void()> at_finish = [] {};  ///< may throw
@@ -34,6 +35,11 @@ class FakeReconstructor final : public Reconstructor {
     context.report("registration", 1.0);
     const std::lock_guard guard(log_.mutex);
     log_.calls.push_back(fmt::format("pose {}", pose));
+    return {};
+  }
+  Result<void> prepare(const Context&) override {
+    const std::lock_guard guard(log_.mutex);
+    ++log_.prepared;
     return {};
   }
   std::string live_view(std::size_t) override { return "view so far"; }

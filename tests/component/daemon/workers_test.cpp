@@ -138,6 +138,16 @@ TEST_F(Workers, ReconstructionOutlivesWhatIsThrownBesideIt) {
   EXPECT_TRUE(wait_for<event::ModelReady>());
 }
 
+using Lists = std::vector<std::vector<std::string>>;
+
+Lists lists_of(const std::vector<Event>& events) {
+  Lists lists;
+  for (const auto& event : events) {
+    if (const auto* meshes = std::get_if<event::LiveMeshes>(&event)) lists.push_back(meshes->names);
+  }
+  return lists;
+}
+
 TEST_F(Workers, WhatAScanShowsSoFarIsListedAndGoneWithItsEnd) {
   make_job("job", "scanned", JobState::reconstructing);
   const auto live = store->folder("job") / "live";
@@ -148,20 +158,60 @@ TEST_F(Workers, WhatAScanShowsSoFarIsListedAndGoneWithItsEnd) {
     ReconstructionThread reconstruction(
         clock, [&](const ReconstructionTask&) { return std::make_unique<fakes::FakeReconstructor>(log); },
         [&](Event event) { tell(std::move(event)); });
+    reconstruction.rebuild("job", store->folder("job"), {.poses = 2, .views = 2}, {});
+    std::unique_lock lock(mutex);
+    changed.wait_for(lock, std::chrono::minutes(1), [&] {
+      return std::ranges::any_of(events, [](const Event& e) { return std::holds_alternative<event::ModelReady>(e); });
+    });
+  }
+  EXPECT_THAT(lists_of(events), ElementsAre(ElementsAre("pose1_view00"), ElementsAre("pose1_view00", "pose1_view01"),
+                                            ElementsAre("pose1"), testing::IsEmpty()));
+  EXPECT_EQ(shown, "pose so far");
+  EXPECT_FALSE(fs::exists(live));
+}
+
+TEST_F(Workers, APoseIsClosedWithItsLastViewWhateverTheMovementCheckWillSay) {
+  auto info = store->create("job", {.recipe = {.poses = 1, .views = 2}, .exported = false});
+  ASSERT_TRUE(info) << info.error().message;
+  auto scan = ScanFolder::open(store->folder("job"));
+  for (int view = 0; view < 2; ++view) {
+    ASSERT_TRUE(scan->add_view(0, {.index = view}, scan_samples::raw_view(view)));
+  }
+  fakes::ReconstructionLog log;
+  const auto prepared = [&] {
+    const std::lock_guard guard(log.mutex);
+    return log.prepared;
+  };
+  const auto attempts = [&] { return read_attempt_record(store->folder("job")).ended_by_death; };
+  {
+    ReconstructionThread reconstruction(
+        clock, [&](const ReconstructionTask&) { return std::make_unique<fakes::FakeReconstructor>(log); },
+        [&](Event event) { tell(std::move(event)); });
+    reconstruction.begin("job", *scan, {.poses = 1, .views = 2});
+    const auto end = clock.now() + std::chrono::minutes(1);
+    while (prepared() == 0 && clock.now() < end) clock.sleep_for(std::chrono::milliseconds(5));
+    EXPECT_EQ(prepared(), 1);
+    reconstruction.finish_pose("job", 0);
+    reconstruction.abandon("job");  // something has moved
+  }
+  EXPECT_THAT(log.calls, ElementsAre("view 0/0", "view 0/1", "pose 0")) << "once, and no model";
+  EXPECT_EQ(attempts(), 0) << "the mark is gone with the job";
+}
+
+TEST_F(Workers, ThePoseAfterWhichTheModelComesIsNotShown) {
+  make_job("job", "scanned", JobState::reconstructing);
+  fakes::ReconstructionLog log;
+  {
+    ReconstructionThread reconstruction(
+        clock, [&](const ReconstructionTask&) { return std::make_unique<fakes::FakeReconstructor>(log); },
+        [&](Event event) { tell(std::move(event)); });
     reconstruction.rebuild("job", store->folder("job"), {.poses = 1, .views = 2}, {});
     std::unique_lock lock(mutex);
     changed.wait_for(lock, std::chrono::minutes(1), [&] {
       return std::ranges::any_of(events, [](const Event& e) { return std::holds_alternative<event::ModelReady>(e); });
     });
   }
-  std::vector<std::vector<std::string>> lists;
-  for (const auto& event : events) {
-    if (const auto* meshes = std::get_if<event::LiveMeshes>(&event)) lists.push_back(meshes->names);
-  }
-  EXPECT_THAT(lists, ElementsAre(ElementsAre("pose1_view00"), ElementsAre("pose1_view00", "pose1_view01"),
-                                 ElementsAre("pose1"), testing::IsEmpty()));
-  EXPECT_EQ(shown, "pose so far");
-  EXPECT_FALSE(fs::exists(live));
+  EXPECT_EQ(lists_of(events), (Lists{{"pose1_view00"}, {"pose1_view00", "pose1_view01"}, {}}));
 }
 
 }  // namespace

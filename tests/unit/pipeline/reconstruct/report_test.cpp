@@ -12,7 +12,9 @@ TEST(Report, NamesItsScanAndTheConfigurationsOfItsViews) {
   manifest.id = "20261121-093000-1";
   manifest.profile = "p";
   manifest.config_sha256 = {"a", "b"};
-  const auto report = Report({}, identity_of(manifest), std::nullopt).finished({});
+  Report made({}, std::nullopt);
+  made.add_identity(identity_of(manifest));
+  const auto report = made.finished({});
   EXPECT_EQ(report["scan"], "20261121-093000-1");
   EXPECT_EQ(report["profile_sha256"], "p");
   EXPECT_EQ(report["config_sha256"], nlohmann::json::array({"a", "b"}));
@@ -26,7 +28,7 @@ TEST(Report, NamesEveryImageThatTheOthersContradict) {
       of_silhouette(1, {.kind = SilhouetteFinding::Kind::surplus, .view = 2, .camera = 1, .share = 0.02}),
       of_motion(0, view, {.view = 6, .views = 3, .mm = 0.051}),
       of_photo(0, 4, 1, {.photo = 9, .share = 0.7, .brightness = 2.5, .is_whole = true})};
-  Report report({}, identity_of({}), std::nullopt);
+  Report report({}, std::nullopt);
   report.add_disagreements(found);
   const auto json = report.finished({})["disagreements"];
   ASSERT_EQ(json.size(), 4U);
