@@ -356,7 +356,8 @@ TEST_F(DaemonWithSlurm, EndsAndComesBackWhileItsJobRuns) {
     get_ready();
     scan_both_poses();
     at_the_rig.reset();  // the clock moves without the operator, until the reconstruction begins
-    ASSERT_TRUE(comes_true([&] { return fs::exists(job_folders().at(0) / "slurm.json") && slurm.jobs() == 1; }));
+    ASSERT_TRUE(comes_true(
+        [&] { return fs::exists(job_folders().at(0) / "slurm.json") && slurm.jobs() == 1 && slurm.runs(1); }));
     shut_down();
     EXPECT_EQ(slurm.state(1), "RUNNING");
     scan_samples::write_text(folder_ / "go", "");
