@@ -2,14 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/parallel.h"
 
 namespace scanrig {
 namespace {
 
-constexpr std::size_t kMaxBlocks = 400'000;  // about 1 GB of nodes
-constexpr double kMaxBlocksInBox = 3e7;
+constexpr std::size_t kMaxBlocks = 1'600'000;  // about 4 GB of nodes
+constexpr double kMaxBlocksInBox = 1e8;
 const std::array<Eigen::Vector3i, 6> kFaces = {
     Eigen::Vector3i{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}};
 
@@ -34,17 +35,28 @@ bool BlockGrid::all_inside(const Eigen::Vector3i& block) const {
   return contains(block) && slot_[linear(block)] == kInside;
 }
 
+Eigen::Vector3i BlockGrid::block_at(std::size_t linear) const {
+  const auto x = static_cast<std::size_t>(size_.x()), y = static_cast<std::size_t>(size_.y());
+  return Eigen::Vector3i(static_cast<int>(linear % x), static_cast<int>(linear / x % y),
+                         static_cast<int>(linear / x / y));
+}
+
 /// The sign of each block's first node represents the block until it is stored.
-void BlockGrid::classify_blocks(const Field& field) {
+void BlockGrid::classify_blocks(Field& field) {
   slot_.assign(static_cast<std::size_t>(size_.prod()), kOutside);
-  const Field::Neighbourhood everywhere = field.everywhere();
-  parallel_for(static_cast<std::size_t>(size_.z()), [&](std::size_t z) {
-    Eigen::Vector3i b(0, 0, static_cast<int>(z));
-    for (b.y() = 0; b.y() < size_.y(); ++b.y()) {
-      for (b.x() = 0; b.x() < size_.x(); ++b.x()) {
-        if (field.is_inside(position(kBlockSide * b), everywhere)) slot_[linear(b)] = kInside;
-      }
+  std::vector<std::vector<std::size_t>> of_layer(static_cast<std::size_t>(size_.z()));
+  const std::size_t layer = static_cast<std::size_t>(size_.x()) * size_.y();
+  parallel_for(of_layer.size(), [&](std::size_t z) {
+    for (std::size_t i = z * layer; i < (z + 1) * layer; ++i) {
+      if (field.may_be_inside(position(kBlockSide * block_at(i)))) of_layer[z].push_back(i);
     }
+  });
+  std::vector<std::size_t> undecided;
+  for (const auto& blocks : of_layer) undecided.insert(undecided.end(), blocks.begin(), blocks.end());
+  const auto point_of = [&](std::size_t i) { return position(kBlockSide * block_at(undecided[i])); };
+  const Field::Neighbourhood everywhere = field.everywhere();
+  field.for_each_in_bricks(undecided.size(), point_of, [&](std::size_t i) {
+    if (field.at(point_of(i), everywhere).distance < 0.0F) slot_[undecided[i]] = kInside;
   });
 }
 
@@ -83,6 +95,13 @@ void BlockGrid::evaluate(const Field& field, Block& block) const {
       }
     }
   }
+  const Eigen::Vector3f middle = position(first + Eigen::Vector3i::Constant(kBlockSide / 2));
+  std::array<PoseDistance, 2> pose;
+  for (std::size_t p = 0; p < field.poses(); ++p) {
+    pose[p] = field.pose_distance(middle, p);
+    block.classes[p] = pose[p].voxel_class;
+  }
+  block.is_in_conflict = field.poses() > 1 && combine(pose[0], pose[1], field.class_threshold()).conflict;
 }
 
 /// Neighbours that are not stored although the surface passes between them and this block.
@@ -108,33 +127,56 @@ std::vector<Eigen::Vector3i> BlockGrid::open_neighbours(const Block& block) cons
   return result;
 }
 
-Result<void> BlockGrid::fill(const Field& field, const std::vector<Eigen::Vector3f>& seeds, const Context& context) {
+/// Stores `wanted` blocks of a brick and follows the surface within it; blocks that it reaches in others are queued.
+void BlockGrid::follow(std::vector<Eigen::Vector3i> wanted, const Bricks& bricks, std::size_t brick, const Field& field,
+                       const Context& context, std::vector<bool>& is_queued,
+                       std::vector<std::vector<Eigen::Vector3i>>& queue) {
+  while (!wanted.empty() && blocks_.size() + wanted.size() <= kMaxBlocks && !context.stopped()) {
+    const std::size_t first = blocks_.size();
+    if (first + wanted.size() > blocks_.capacity()) blocks_.reserve((first + wanted.size()) * 5 / 4);
+    blocks_.resize(first + wanted.size());
+    parallel_for(wanted.size(), [&](std::size_t i) {
+      blocks_[first + i].index = wanted[i];
+      if (!context.stopped()) evaluate(field, blocks_[first + i]);
+    });
+    for (std::size_t i = 0; i < wanted.size(); ++i) slot_[linear(wanted[i])] = static_cast<std::int32_t>(first + i);
+    wanted.clear();
+    for (std::size_t i = first; i < blocks_.size(); ++i) {
+      for (const auto& other : open_neighbours(blocks_[i])) {
+        if (is_queued[linear(other)]) continue;
+        is_queued[linear(other)] = true;
+        const std::size_t its = bricks.of(position(kBlockSide * other));
+        (its == brick ? wanted : queue[its]).push_back(other);
+      }
+    }
+  }
+  queue[brick].insert(queue[brick].end(), wanted.begin(), wanted.end());  // of a grid that is full
+}
+
+Result<void> BlockGrid::fill(Field& field, const std::vector<Eigen::Vector3f>& seeds, const Context& context) {
   if (size_.cast<double>().prod() > kMaxBlocksInBox) {
     return fail(ErrorCode::out_of_range, "volume: {} x {} x {} blocks of 8 voxels exceed the limit; use larger voxels",
                 size_.x(), size_.y(), size_.z());
   }
   classify_blocks(field);
   if (context.stopped()) return fail(ErrorCode::stopped, "volume: stopped");
-  std::vector<Eigen::Vector3i> wanted = seed_blocks(seeds);
-  while (!wanted.empty()) {
-    const std::size_t first = blocks_.size();
-    if (first + wanted.size() > kMaxBlocks) {
-      return fail(ErrorCode::out_of_range,
-                  "volume: the surface needs more than {} blocks of 8 voxels; use larger voxels", kMaxBlocks);
-    }
-    blocks_.resize(first + wanted.size());
-    parallel_for(wanted.size(), [&](std::size_t i) {
-      blocks_[first + i].index = wanted[i];
-      if (!context.stopped()) evaluate(field, blocks_[first + i]);
-    });
-    if (context.stopped()) return fail(ErrorCode::stopped, "volume: stopped");
-    for (std::size_t i = 0; i < wanted.size(); ++i) slot_[linear(wanted[i])] = static_cast<std::int32_t>(first + i);
-    wanted.clear();
-    std::vector<bool> is_wanted(slot_.size());
-    for (const auto& block : blocks_) {
-      for (const auto& other : open_neighbours(block)) {
-        if (!is_wanted[linear(other)]) wanted.push_back(other);
-        is_wanted[linear(other)] = true;
+  const Bricks& bricks = field.bricks();
+  std::vector<std::vector<Eigen::Vector3i>> queue(bricks.count());
+  std::vector<bool> is_queued(slot_.size());
+  for (const auto& block : seed_blocks(seeds)) {
+    is_queued[linear(block)] = true;
+    queue[bricks.of(position(kBlockSide * block))].push_back(block);
+  }
+  const auto is_waiting = [](const auto& blocks) { return !blocks.empty(); };
+  while (std::ranges::any_of(queue, is_waiting)) {
+    for (std::size_t brick = 0; brick < queue.size(); ++brick) {
+      if (queue[brick].empty()) continue;
+      field.focus(brick);
+      follow(std::exchange(queue[brick], {}), bricks, brick, field, context, is_queued, queue);
+      if (context.stopped()) return fail(ErrorCode::stopped, "volume: stopped");
+      if (!queue[brick].empty()) {
+        return fail(ErrorCode::out_of_range,
+                    "volume: the surface needs more than {} blocks of 8 voxels; use larger voxels", kMaxBlocks);
       }
     }
   }

@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
-#include <functional>
+#include <optional>
 #include <vector>
 
 #include "core/context.h"
@@ -23,6 +23,9 @@ class BlockGrid {
     Eigen::Vector3i index;  ///< of the block; its first node is kBlockSide times that
     std::array<float, kNodes> distance;
     std::array<Support, kNodes> support;
+    /// In each pose, of a node in the middle; none of a block that a repair has added.
+    std::array<std::optional<VoxelClass>, 2> classes{};
+    bool is_in_conflict = false;  ///< what the poses say of that node
     [[nodiscard]] static int node(int x, int y, int z) { return (z * kBlockSide + y) * kBlockSide + x; }
   };
 
@@ -31,7 +34,7 @@ class BlockGrid {
 
   /// Stores the blocks around `seeds` and wherever the sign of `field` changes from block to block, then follows the
   /// surface from block to block until it is closed. Fails with `out_of_range`, `stopped`.
-  Result<void> fill(const Field& field, const std::vector<Eigen::Vector3f>& seeds, const Context& context);
+  Result<void> fill(Field& field, const std::vector<Eigen::Vector3f>& seeds, const Context& context);
 
   /// Gives one node a distance; stores its block and the blocks it touches if they are missing.
   void set(const Eigen::Vector3i& node, float distance, float band_mm);
@@ -57,10 +60,13 @@ class BlockGrid {
     return (static_cast<std::size_t>(block.z()) * size_.y() + block.y()) * size_.x() + block.x();
   }
   Block& store(const Eigen::Vector3i& block, float band_mm);
-  void classify_blocks(const Field& field);
+  [[nodiscard]] Eigen::Vector3i block_at(std::size_t linear) const;
+  void classify_blocks(Field& field);
   [[nodiscard]] std::vector<Eigen::Vector3i> seed_blocks(const std::vector<Eigen::Vector3f>& seeds) const;
   [[nodiscard]] std::vector<Eigen::Vector3i> open_neighbours(const Block& block) const;
   void evaluate(const Field& field, Block& block) const;
+  void follow(std::vector<Eigen::Vector3i> wanted, const Bricks& bricks, std::size_t brick, const Field& field,
+              const Context& context, std::vector<bool>& is_queued, std::vector<std::vector<Eigen::Vector3i>>& queue);
 
   Eigen::Vector3f origin_;
   float voxel_;

@@ -14,39 +14,6 @@ namespace {
 /// at each other, and there is no jump where the band ends.
 float taper(float distance, float band) { return std::clamp(1.5F * (1.0F - std::abs(distance) / band), 0.0F, 1.0F); }
 
-/// Middle weight over all measured pixels, and their centroid.
-struct SurfaceStatistics {
-  float median_weight = 1.0F;
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-};
-
-SurfaceStatistics surface_statistics(const std::vector<std::vector<RangeSampler>>& views_of_pose) {
-  std::vector<const RangeSampler*> all;
-  for (const auto& views : views_of_pose) {
-    for (const auto& view : views) all.push_back(&view);
-  }
-  std::vector<std::vector<float>> weights_of(all.size());
-  std::vector<Eigen::Vector3d> sum_of(all.size(), Eigen::Vector3d::Zero());
-  parallel_for(all.size(), [&](std::size_t v) {
-    for (const auto& pixel : all[v]->surface()) {
-      weights_of[v].push_back(pixel.weight);
-      sum_of[v] += pixel.point.cast<double>();
-    }
-  });
-  std::vector<float> weights;
-  SurfaceStatistics result;
-  for (std::size_t v = 0; v < all.size(); ++v) {
-    weights.insert(weights.end(), weights_of[v].begin(), weights_of[v].end());
-    result.centre += sum_of[v];
-  }
-  if (weights.empty()) return result;
-  result.centre /= static_cast<double>(weights.size());
-  const auto middle = weights.begin() + static_cast<std::ptrdiff_t>(weights.size() / 2);
-  std::nth_element(weights.begin(), middle, weights.end());
-  result.median_weight = *middle;
-  return result;
-}
-
 struct WeightedDistance {
   float distance, sigma, weight;
 };
@@ -75,26 +42,49 @@ Scatter scatter_of(const std::vector<WeightedDistance>& views) {
 
 }  // namespace
 
-Field::Field(std::vector<std::vector<RangeSampler>> views_of_pose, const std::vector<Transform>& model_from_pose,
-             Hull hull, const VolumeOptions& options, double band_mm)
+Field::Field(std::vector<std::vector<FieldView>> views_of_pose, const SurfaceStatistics& statistics,
+             const std::vector<Transform>& model_from_pose, Hull hull, Bricks bricks, const VolumeOptions& options,
+             double band_mm)
     : views_of_pose_(std::move(views_of_pose)),
       hull_(std::move(hull)),
+      bricks_(std::move(bricks)),
+      room_mm_(kBrickRoom * static_cast<float>(options.voxel_mm)),
       fusion_(options.fusion),
       images_per_outside_(options.images_per_outside),
       view_sigmas_(options.view_sigmas),
       band_(static_cast<float>(band_mm)),
       class_threshold_(static_cast<float>(options.class_voxels * options.voxel_mm)),
-      hull_tolerance_(options.hull_tolerance * band_) {
+      hull_tolerance_(options.hull_tolerance * band_),
+      free_weight_(statistics.median_weight),
+      centre_(statistics.centre) {
   for (const auto& transform : model_from_pose) pose_from_model_.push_back(transform.inverse());
-  const SurfaceStatistics statistics = surface_statistics(views_of_pose_);
-  free_weight_ = statistics.median_weight;
-  centre_ = statistics.centre;
+}
+
+void Field::focus(std::size_t brick) {
+  if (bricks_.count() == 1 || focused_ == brick) return;
+  release();
+  std::vector<FieldView*> all;
+  for (auto& views : views_of_pose_) {
+    for (auto& view : views) all.push_back(&view);
+  }
+  const auto room = Eigen::Vector3f::Constant(room_mm_);
+  const Eigen::AlignedBox3f bare = bricks_.box(brick), box(bare.min() - room, bare.max() + room);
+  parallel_for(all.size(), [&](std::size_t i) { all[i]->sampler.focus(box, all[i]->part); });
+  focused_ = brick;
+}
+
+void Field::release() {
+  if (bricks_.count() == 1) return;
+  for (auto& views : views_of_pose_) {
+    for (auto& view : views) view.sampler.release();
+  }
+  focused_.reset();
 }
 
 float Field::window_mm() const {
   std::vector<float> of_views;
   for (const auto& views : views_of_pose_) {
-    for (const auto& view : views) of_views.push_back(view.window_mm());
+    for (const auto& view : views) of_views.push_back(view.sampler.window_mm());
   }
   if (of_views.empty()) return 0.0F;
   const auto middle = of_views.begin() + static_cast<std::ptrdiff_t>(of_views.size() / 2);
@@ -105,7 +95,7 @@ float Field::window_mm() const {
 Field::Neighbourhood Field::everywhere() const {
   Neighbourhood result{{}, hull_};
   for (const auto& views : views_of_pose_) {
-    for (const auto& view : views) result.views.push_back(&view);
+    for (const auto& view : views) result.views.push_back(&view.sampler);
   }
   return result;
 }
@@ -113,7 +103,7 @@ Field::Neighbourhood Field::everywhere() const {
 Field::Neighbourhood Field::near(const Eigen::Vector3f& centre, float radius) const {
   Neighbourhood result{{}, hull_.near(centre, radius, band_)};
   for (const auto& views : views_of_pose_) {
-    for (const auto& view : views) {
+    for (const auto& [view, part] : views) {
       if (!view.has_outline() || !view.has_no_data_near(centre, radius)) result.views.push_back(&view);
     }
   }
@@ -184,13 +174,13 @@ PoseDistance Field::pose_distance(const Eigen::Vector3f& point, std::size_t pose
   const Eigen::Vector3d outward = horizontal(p - centre_);
   std::vector<std::pair<double, std::size_t>> order;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    order.emplace_back(-outward.dot(horizontal(views[i].towards_camera(centre_))), i);
+    order.emplace_back(-outward.dot(horizontal(views[i].sampler.towards_camera(centre_))), i);
   }
   std::sort(order.begin(), order.end());
   order.resize((views.size() + 1) / 2);
   std::vector<ViewDistance> distances;
   for (const auto& [cosine, i] : order) {
-    const RangeSample s = views[i].sample(point);
+    const RangeSample s = views[i].sampler.sample(point);
     if (s.kind != RangeSample::Kind::none) distances.push_back({s.distance, s.weight, s.sigma});
   }
   return classify(distances, class_threshold_);
@@ -215,17 +205,12 @@ FieldValue Field::from_class_table(const Eigen::Vector3f& point, const Neighbour
   return {std::clamp(std::max(distance, outside), -band_, band_), distance > 0.0F ? Support::free : Support::bounds};
 }
 
-bool Field::is_inside(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const {
-  // Beyond that no measurement makes a point inside.
-  return !neighbourhood.hull.is_beyond(point, hull_tolerance_) && at(point, neighbourhood).distance < 0.0F;
-}
-
 PointEvidence Field::evidence_at(const Eigen::Vector3f& point) const {
   PointEvidence result;
   std::vector<WeightedDistance> counted;
   float weight = 0.0F, sum = 0.0F, variance = 0.0F;
   for (const auto& views : views_of_pose_) {
-    for (const auto& view : views) {
+    for (const auto& [view, part] : views) {
       const RangeSample s = view.sample(point);
       if (s.kind != RangeSample::Kind::surface) continue;
       const float w = s.weight * taper(s.distance, band_);

@@ -1,9 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "core/parallel_blocks.h"
+#include "pipeline/volume/bricks.h"
 #include "pipeline/volume/class_table.h"
 #include "pipeline/volume/hull.h"
 #include "pipeline/volume/integrate.h"
@@ -44,12 +47,46 @@ struct PointEvidence {
   Scatter scatter;
 };
 
-/// The signed distance of the whole object at any point of the model's frame, gathered from all views.
+/// A view of the field, and where its pixels come from when only some of them are held.
+struct FieldView {
+  RangeSampler sampler;
+  RangeSampler::PartSource part;
+};
+
+/// Middle weight over all measured pixels, and their centroid.
+struct SurfaceStatistics {
+  float median_weight = 1.0F;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+};
+
+/// The signed distance of the whole object at any point of the model's frame, gathered from all views. With more than
+/// one brick only the pixels that one brick needs are held: before points are evaluated their brick is focused, which
+/// no other thread may use meanwhile. The values are the same.
 class Field {
  public:
-  /// `views_of_pose`: prepared views, pose after pose.
-  Field(std::vector<std::vector<RangeSampler>> views_of_pose, const std::vector<Transform>& model_from_pose, Hull hull,
-        const VolumeOptions& options, double band_mm);
+  /// `views_of_pose`: pose after pose; with one brick they hold all their pixels. `bricks` of the space around all
+  /// points that are evaluated.
+  Field(std::vector<std::vector<FieldView>> views_of_pose, const SurfaceStatistics& statistics,
+        const std::vector<Transform>& model_from_pose, Hull hull, Bricks bricks, const VolumeOptions& options,
+        double band_mm);
+
+  [[nodiscard]] const Bricks& bricks() const { return bricks_; }
+  /// Prepares for points within `kBrickRoom` voxels of a brick.
+  void focus(std::size_t brick);
+  /// Lets the pixels go until the next focus(), where there is one.
+  void release();
+  /// `body(i)` for the numbers [0, count), in parallel, brick after brick; `point_of(i)`: where i belongs.
+  template <class PointOf, class Body>
+  void for_each_in_bricks(std::size_t count, const PointOf& point_of, const Body& body) {
+    if (bricks_.count() == 1) return for_each_in_blocks(count, body);
+    const auto of_brick = bricks_.sorted(count, point_of);
+    for (std::size_t brick = 0; brick < of_brick.size(); ++brick) {
+      if (of_brick[brick].empty()) continue;
+      focus(brick);
+      for_each_in_blocks(of_brick[brick].size(), [&](std::size_t i) { body(of_brick[brick][i]); });
+    }
+  }
+  static constexpr float kBrickRoom = 12.0F;  ///< a block from its first node, and how far a vertex is moved
 
   /// The views and bounds that matter near one place.
   struct Neighbourhood {
@@ -60,8 +97,10 @@ class Field {
   [[nodiscard]] Neighbourhood everywhere() const;
 
   [[nodiscard]] FieldValue at(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;
-  /// Whether at() is negative; faster outside.
-  [[nodiscard]] bool is_inside(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;
+  /// False where at() is positive whatever the views measured; needs no brick in focus.
+  [[nodiscard]] bool may_be_inside(const Eigen::Vector3f& point) const {
+    return !hull_.is_beyond(point, hull_tolerance_);
+  }
   [[nodiscard]] PointEvidence evidence_at(const Eigen::Vector3f& point) const;
   [[nodiscard]] PoseDistance pose_distance(const Eigen::Vector3f& point, std::size_t pose) const;
   [[nodiscard]] std::size_t poses() const { return views_of_pose_.size(); }
@@ -76,9 +115,12 @@ class Field {
   [[nodiscard]] float bounds(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood,
                              std::size_t views_behind) const;
 
-  std::vector<std::vector<RangeSampler>> views_of_pose_;
+  std::vector<std::vector<FieldView>> views_of_pose_;
   std::vector<Transform> pose_from_model_;
   Hull hull_;
+  Bricks bricks_;
+  std::optional<std::size_t> focused_;
+  float room_mm_;
   VolumeOptions::Fusion fusion_;
   std::size_t images_per_outside_;
   float view_sigmas_;

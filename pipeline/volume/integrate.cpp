@@ -12,6 +12,7 @@
 #include "pipeline/volume/handles.h"
 #include "pipeline/volume/hull.h"
 #include "pipeline/volume/marching_cubes.h"
+#include "pipeline/volume/prepare_views.h"
 #include "pipeline/volume/relax.h"
 #include "pipeline/volume/surface.h"
 
@@ -46,8 +47,13 @@ Result<void> check(std::span<const PosedViews> poses, const VolumeOptions& optio
     if (!is_rigid(poses[p].model_from_pose)) {
       return fail(ErrorCode::invalid_input, "volume: pose {}: model_from_pose is not a rigid motion", p + 1);
     }
+    if (!poses[p].full.empty() && poses[p].full.size() != poses[p].views.size()) {
+      return fail(ErrorCode::invalid_input, "volume: pose {} has {} views, but {} range images in full", p + 1,
+                  poses[p].views.size(), poses[p].full.size());
+    }
     for (const auto& view : poses[p].views) {
-      if (auto ok = check(view.range); !ok) {
+      const bool is_elsewhere = !poses[p].full.empty() && view.range.depth.empty();
+      if (auto ok = check(view.range); !ok && !is_elsewhere) {
         return pass_on(ok, fmt::format("volume: pose {}, view {}", p + 1, view.index));
       }
       for (const auto& s : view.silhouettes) {
@@ -61,7 +67,7 @@ Result<void> check(std::span<const PosedViews> poses, const VolumeOptions& optio
   return {};
 }
 
-/// Half width of the zone of evidence.
+/// Half width of the zone of evidence. Coarser range images have the same sigmas.
 double band(std::span<const PosedViews> poses, const VolumeOptions& options) {
   if (options.band_mm > 0.0) return options.band_mm;
   std::vector<float> sigmas;
@@ -81,41 +87,6 @@ bool has_silhouettes(const PosedViews& pose) {
   return std::any_of(pose.views.begin(), pose.views.end(), [](const View& v) { return !v.silhouettes.empty(); });
 }
 
-struct Prepared {
-  std::vector<std::vector<RangeSampler>> views_of_pose;
-  std::vector<Transform> model_from_pose;
-  std::vector<Eigen::Vector3f> seeds;  ///< one measured point in about eight
-  Eigen::AlignedBox3f box;             ///< of everything measured
-};
-
-Prepared prepare(std::span<const PosedViews> poses, const VolumeOptions& options, double band_mm) {
-  Prepared result;
-  for (const auto& pose : poses) {
-    struct Made {
-      std::optional<RangeSampler> sampler;
-      std::vector<Eigen::Vector3f> seeds;
-      Eigen::AlignedBox3f box;
-    };
-    std::vector<Made> made(pose.views.size());
-    parallel_for(made.size(), [&](std::size_t i) {
-      made[i].sampler.emplace(pose.views[i].range, pose.model_from_pose, band_mm, options.voxel_mm, options.sampler);
-      std::size_t count = 0;
-      for (const auto& pixel : made[i].sampler->surface()) {
-        made[i].box.extend(pixel.point);
-        if (count++ % options.seed_stride == 0) made[i].seeds.push_back(pixel.point);
-      }
-    });
-    auto& views = result.views_of_pose.emplace_back();
-    result.model_from_pose.push_back(pose.model_from_pose);
-    for (auto& view : made) {
-      views.push_back(std::move(*view.sampler));
-      result.box.extend(view.box);
-      result.seeds.insert(result.seeds.end(), view.seeds.begin(), view.seeds.end());
-    }
-  }
-  return result;
-}
-
 Hull make_hull(std::span<const PosedViews> poses, const VolumeOptions& options, const Eigen::AlignedBox3f& box) {
   Hull hull(box);
   for (const auto& pose : poses) {
@@ -128,40 +99,23 @@ Hull make_hull(std::span<const PosedViews> poses, const VolumeOptions& options, 
 }
 
 /// Classes in the middle of each stored block.
-void count_classes(const Field& field, const BlockGrid& grid, VolumeReport& report) {
-  struct Count {
-    std::array<std::array<std::size_t, kVoxelClasses>, 2> classes{};
-    ClassPairCounts pairs{};
-    std::size_t conflicts = 0;
-  };
-  std::vector<Count> counts(grid.blocks().size());
-  parallel_for(counts.size(), [&](std::size_t i) {
-    const Eigen::Vector3i middle = Eigen::Vector3i::Constant(kBlockSide / 2);
-    const Eigen::Vector3f point = grid.position(kBlockSide * grid.blocks()[i].index + middle);
-    std::array<PoseDistance, 2> pose;
-    for (std::size_t p = 0; p < field.poses(); ++p) {
-      pose[p] = field.pose_distance(point, p);
-      ++counts[i].classes[p][static_cast<std::size_t>(pose[p].voxel_class)];
-    }
-    if (field.poses() < 2) return;
-    ++counts[i].pairs[static_cast<std::size_t>(pose[0].voxel_class)][static_cast<std::size_t>(pose[1].voxel_class)];
-    counts[i].conflicts += combine(pose[0], pose[1], field.class_threshold()).conflict ? 1 : 0;
-  });
-  report.class_counts.assign(field.poses(), {});
-  for (const auto& count : counts) {
-    for (std::size_t a = 0; a < kVoxelClasses; ++a) {
-      for (std::size_t p = 0; p < field.poses(); ++p) report.class_counts[p][a] += count.classes[p][a];
-      for (std::size_t b = 0; b < kVoxelClasses; ++b) report.class_pairs[a][b] += count.pairs[a][b];
-    }
-    report.conflicts += count.conflicts;
+void count_classes(std::size_t poses, const BlockGrid& grid, VolumeReport& report) {
+  report.class_counts.assign(poses, {});
+  for (const auto& block : grid.blocks()) {
+    const auto [a, b] = block.classes;
+    if (a) ++report.class_counts[0][static_cast<std::size_t>(*a)];
+    if (b) ++report.class_counts[1][static_cast<std::size_t>(*b)];
+    if (a && b) ++report.class_pairs[static_cast<std::size_t>(*a)][static_cast<std::size_t>(*b)];
+    report.conflicts += block.is_in_conflict ? 1 : 0;
   }
 }
 
 /// The field's zero set, closed and repaired: its largest component.
-Result<Mesh> extract(const Field& field, const Eigen::AlignedBox3f& box, const std::vector<Eigen::Vector3f>& seeds,
+Result<Mesh> extract(Field& field, const Eigen::AlignedBox3f& box, const std::vector<Eigen::Vector3f>& seeds,
                      const VolumeOptions& options, VolumeReport& report, const Context& context) {
   BlockGrid grid(box, static_cast<float>(options.voxel_mm));
   if (auto ok = grid.fill(field, seeds, context); !ok) return pass_on(ok);
+  field.release();
   report.active_voxels = grid.blocks().size() * BlockGrid::kNodes;
   relax_unmeasured(grid, field.band(), options.relax_rounds);
   context.report("volume", 0.7);
@@ -178,7 +132,7 @@ Result<Mesh> extract(const Field& field, const Eigen::AlignedBox3f& box, const s
     mesh = largest_component(all);
   }
   report.dropped_components = components(all).count - 1;
-  count_classes(field, grid, report);
+  count_classes(field.poses(), grid, report);
   return mesh;
 }
 
@@ -190,7 +144,7 @@ Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions
   VolumeReport& report = result.report;
   report.band_mm = band(poses, options);
   context.report("volume", 0.0);
-  Prepared prepared = prepare(poses, options, report.band_mm);
+  PreparedViews prepared = prepare_views(poses, options, report.band_mm);
   if (prepared.seeds.empty()) return fail(ErrorCode::degenerate, "volume: no view measured any surface");
   if (context.stopped()) return fail(ErrorCode::stopped, "volume: stopped");
 
@@ -199,8 +153,10 @@ Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions
     const auto room = Eigen::Vector3f::Constant(static_cast<float>(options.hull_room_mm));
     box = {box.min() - room, box.max() + room};
   }
-  auto field = std::make_unique<const Field>(std::move(prepared.views_of_pose), prepared.model_from_pose,
-                                             make_hull(poses, options, box), options, report.band_mm);
+  const Bricks bricks = bricks_for(prepared, box, options);
+  report.bricks = bricks.count();
+  auto field = std::make_unique<Field>(std::move(prepared.views_of_pose), prepared.statistics, prepared.model_from_pose,
+                                       make_hull(poses, options, box), bricks, options, report.band_mm);
   context.report("volume", 0.2);
   auto extracted = extract(*field, box, prepared.seeds, options, report, context);
   if (!extracted) return pass_on(extracted);

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -8,6 +10,7 @@
 #include "core/result.h"
 #include "core/transform.h"
 #include "pipeline/mesh/mesh.h"
+#include "pipeline/range/compact_range.h"
 #include "pipeline/range/range_image.h"
 #include "pipeline/volume/class_table.h"
 #include "pipeline/volume/range_sampler.h"
@@ -18,6 +21,9 @@ namespace scanrig {
 struct PosedViews {
   std::span<const View> views;
   Transform model_from_pose = Transform::Identity();
+  /// Their range images in full, where those of `views` are coarser or empty; placed as they are. Empty: those of
+  /// `views`.
+  std::span<const CompactRange> full{};
 };
 
 struct VolumeOptions {
@@ -48,11 +54,16 @@ struct VolumeOptions {
   bool table_without_silhouettes = false;  ///< bound a pose by its plane y = 0 even if it has no silhouettes
   bool repair_handles = true;              ///< remove handles and tunnels that no measurement supports
   bool untangle = true;                    ///< no face of the surface crosses another
+  /// For range images prepared for sampling. What needs more is done place by place, with the same bits; the floor is
+  /// what one of `max_bricks_per_axis`^3 places needs, and one view.
+  std::uintmax_t memory_bytes = std::numeric_limits<std::uintmax_t>::max();
+  int max_bricks_per_axis = 12;
 };
 
 struct VolumeReport {
   double band_mm = 0.0;
   std::size_t active_voxels = 0;
+  std::size_t bricks = 1;  ///< places, one after another
   std::size_t measured_vertices = 0;
   std::size_t closed_vertices = 0;     ///< closed by the hull, the table or at the end of free space
   std::size_t dropped_components = 0;  ///< loose pieces and enclosed cavities

@@ -24,14 +24,55 @@ RangeSampler::RangeSampler(const RangeImage& range, const Transform& model_from_
       has_outline_(!range.background.empty() && range.background_is_whole),
       band_mm_(static_cast<float>(band_mm)) {
   crop(range);
-  make_planes(range);
+  set_area({0, 0, width_, height_});
+  make_planes(range, {0, 0});
   close_pinholes();
-  const int voxel_pixels = std::max(1, static_cast<int>(std::ceil(voxel_mm / mm_per_pixel())));
+  voxel_pixels_ = std::max(1, static_cast<int>(std::ceil(voxel_mm / mm_per_pixel())));
   window_mm_ = range.window_px * static_cast<float>(mm_per_pixel());
-  drop_specks_and_fade_edges(voxel_pixels);
+  drop_specks_and_fade_edges(voxel_pixels_);
   make_tiles();
   if (!has_outline_) make_footprint();
-  erode_free_depth(voxel_pixels);
+  erode_free_depth(voxel_pixels_);
+}
+
+/// Farther than this from a pixel nothing changes it: pinholes, specks with the surface that joins them, fading,
+/// erosion.
+int RangeSampler::margin() const {
+  return 3 * voxel_pixels_ + options_.pinhole_passes + static_cast<int>(std::ceil(options_.fade_px)) + 4;
+}
+
+cv::Rect RangeSampler::area_for(const Eigen::AlignedBox3f& box) const {
+  const cv::Rect all(0, 0, width_, height_);
+  Eigen::AlignedBox2f seen;
+  for (int i = 0; i < 8; ++i) {
+    const auto at = project(box.corner(static_cast<Eigen::AlignedBox3f::CornerType>(i)));
+    if (projection_.kind == Projection::Kind::pinhole && !(at.depth > 0.0F)) return all;
+    seen.extend(Eigen::Vector2f(at.u, at.v));
+  }
+  // Of a point its four neighbours are sampled; a pixel more for rounding.
+  const Eigen::Array2f last(static_cast<float>(width_), static_cast<float>(height_));
+  const Eigen::Array2f low = (seen.min().array().floor() - 1.0F).max(0.0F).min(last);
+  const Eigen::Array2f high = (seen.max().array().floor() + 3.0F).max(0.0F).min(last);
+  const cv::Point first(static_cast<int>(low.x()), static_cast<int>(low.y()));
+  const cv::Point end(static_cast<int>(high.x()), static_cast<int>(high.y()));
+  if (first.x >= end.x || first.y >= end.y) return {};
+  const cv::Point around(margin(), margin());
+  return cv::Rect(first - around, end + around) & all;
+}
+
+void RangeSampler::focus(const Eigen::AlignedBox3f& box, const PartSource& part) {
+  set_area(area_for(box));
+  if (area_.empty()) return;
+  make_planes(part(area_ + crop_.tl()), crop_.tl() + area_.tl());
+  close_pinholes();
+  drop_specks_and_fade_edges(voxel_pixels_);
+  erode_free_depth(voxel_pixels_);
+}
+
+void RangeSampler::set_area(const cv::Rect& area) {
+  static_assert(sizeof(Pixel) == kBytesPerPixel);
+  area_ = area;
+  pixels_ = std::vector<Pixel>(static_cast<std::size_t>(area.area()));
 }
 
 /// Everything outside the crop is background, or everything is unknown.
@@ -58,12 +99,12 @@ void RangeSampler::crop(const RangeImage& range) {
   projection_ = range.projection.cropped(crop_.x, crop_.y, crop_.width, crop_.height);
 }
 
-void RangeSampler::make_planes(const RangeImage& range) {
-  pixels_.resize(static_cast<std::size_t>(width_) * height_);
+/// `first`: of the pixels of `range`, in the whole image.
+void RangeSampler::make_planes(const RangeImage& range, const cv::Point& first) {
   const Eigen::Matrix3f model_from_camera = rotation_.transpose();
-  for (int y = 0; y < height_; ++y) {
-    for (int x = 0; x < width_; ++x) {
-      const int u = x + crop_.x, v = y + crop_.y;
+  for (int y = area_.y; y < area_.br().y; ++y) {
+    for (int x = area_.x; x < area_.br().x; ++x) {
+      const int u = x + crop_.x - first.x, v = y + crop_.y - first.y;
       Pixel& p = pixel(x, y);
       const float depth = range.depth(v, u);
       if (std::isnan(depth)) {
@@ -125,14 +166,14 @@ bool RangeSampler::one_surface(const std::vector<Eigen::Vector3f>& points, std::
 void RangeSampler::close_pinholes() {
   for (int pass = 0; pass < options_.pinhole_passes; ++pass) {
     const std::vector<Pixel> before = pixels_;
-    for (int y = 1; y + 1 < height_; ++y) {
-      for (int x = 1; x + 1 < width_; ++x) {
+    for (int y = area_.y + 1; y + 1 < area_.br().y; ++y) {
+      for (int x = area_.x + 1; x + 1 < area_.br().x; ++x) {
         if (pixel(x, y).state != State::unknown) continue;
         Eigen::Vector3f normal = Eigen::Vector3f::Zero();
         float depth = 0.0F, nearest = kInfinity, farthest = -kInfinity, weight = kInfinity, sigma = 0.0F;
         int count = 0;
         for (const auto& [dx, dy] : kNeighbours) {
-          const Pixel& q = before[static_cast<std::size_t>(y + dy) * width_ + x + dx];
+          const Pixel& q = before[index(x + dx, y + dy)];
           if (q.state != State::surface) continue;
           const float z = depth_on_plane(q, x, y);
           nearest = std::min(nearest, z);
@@ -161,30 +202,30 @@ void RangeSampler::close_pinholes() {
 /// voxels resolve into beads and loops. Weights of the rest fade towards the edges.
 void RangeSampler::drop_specks_and_fade_edges(int radius) {
   if (pixels_.empty()) return;
-  const auto at = [&](int x, int y) { return static_cast<std::size_t>(y) * width_ + x; };
+  const cv::Point first = area_.tl(), end = area_.br();
   std::vector<Eigen::Vector3f> points(pixels_.size());
-  for (int y = 0; y < height_; ++y) {
-    for (int x = 0; x < width_; ++x) {
-      if (pixel(x, y).state == State::surface) points[at(x, y)] = point_on(pixel(x, y), x, y);
+  for (int y = first.y; y < end.y; ++y) {
+    for (int x = first.x; x < end.x; ++x) {
+      if (pixel(x, y).state == State::surface) points[index(x, y)] = point_on(pixel(x, y), x, y);
     }
   }
-  cv::Mat1b inner(height_, width_, uchar{0});
-  for (int y = 1; y + 1 < height_; ++y) {
-    for (int x = 1; x + 1 < width_; ++x) {
+  cv::Mat1b inner(area_.size(), uchar{0});
+  for (int y = first.y + 1; y + 1 < end.y; ++y) {
+    for (int x = first.x + 1; x + 1 < end.x; ++x) {
       if (pixel(x, y).state != State::surface) continue;
       const bool joined = std::all_of(std::begin(kBeside), std::end(kBeside), [&](const auto& step) {
         return pixel(x + step[0], y + step[1]).state == State::surface &&
-               one_surface(points, at(x, y), at(x + step[0], y + step[1]));
+               one_surface(points, index(x, y), index(x + step[0], y + step[1]));
       });
-      if (joined) inner(y, x) = 255;
+      if (joined) inner(y - first.y, x - first.x) = 255;
     }
   }
   cv::Mat1f to_edge, to_core;
   cv::distanceTransform(inner, to_edge, cv::DIST_L2, cv::DIST_MASK_PRECISE);
   cv::distanceTransform(to_edge < static_cast<float>(radius), to_core, cv::DIST_L2, cv::DIST_MASK_PRECISE);
-  for (int y = 0; y < height_; ++y) {
-    for (int x = 0; x < width_; ++x) {
-      Pixel& p = pixel(x, y);
+  for (int y = 0; y < area_.height; ++y) {
+    for (int x = 0; x < area_.width; ++x) {
+      Pixel& p = pixel(first.x + x, first.y + y);
       if (p.state != State::surface) continue;
       if (to_core(y, x) > static_cast<float>(radius) + 1.0F) p = Pixel{};
       p.weight *= std::min(1.0F, (1.0F + to_edge(y, x)) / options_.fade_px);
@@ -194,16 +235,14 @@ void RangeSampler::drop_specks_and_fade_edges(int radius) {
 
 void RangeSampler::erode_free_depth(int radius) {
   if (pixels_.empty()) return;
-  cv::Mat1f depth(height_, width_);
-  for (int y = 0; y < height_; ++y) {
-    for (int x = 0; x < width_; ++x) depth(y, x) = std::min(pixel(x, y).free_depth, std::numeric_limits<float>::max());
-  }
+  cv::Mat1f depth(area_.size());
+  const auto free_depth = [](const Pixel& p) { return std::min(p.free_depth, std::numeric_limits<float>::max()); };
+  std::transform(pixels_.begin(), pixels_.end(), depth.begin(), free_depth);
   cv::Mat1f eroded;
   const int size = 2 * radius + 1;
   cv::erode(depth, eroded, cv::getStructuringElement(cv::MORPH_RECT, {size, size}));
-  for (int y = 0; y < height_; ++y) {
-    for (int x = 0; x < width_; ++x) pixel(x, y).free_depth = eroded(y, x);
-  }
+  auto at = eroded.begin();
+  for (Pixel& p : pixels_) p.free_depth = *at++;
 }
 
 /// The measured pixels, gaps bridged and enclosed holes filled.

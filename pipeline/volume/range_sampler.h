@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "core/transform.h"
@@ -38,12 +39,26 @@ struct RangeSamplerOptions {
 };
 
 /// A range image prepared for sampling: tangent planes in the model frame, pinholes of a pixel or two closed, specks
-/// and flying pixels removed, free space eroded by a voxel. Immutable, so any number of threads may sample it.
+/// and flying pixels removed, free space eroded by a voxel. All of its pixels, or those around one place: the bits of a
+/// sample are the same. Any number of threads may sample it.
 class RangeSampler {
  public:
-  /// `band_mm`: half width of the zone around the surface in which it is evidence.
+  /// Gives the pixels of a box of a range image; the projection of what it returns is not looked at. Called from any
+  /// thread.
+  using PartSource = std::function<RangeImage(const cv::Rect& box)>;
+
+  /// All of `range`. `band_mm`: half width of the zone around the surface in which it is evidence.
   RangeSampler(const RangeImage& range, const Transform& model_from_pose, double band_mm, double voxel_mm,
                const RangeSamplerOptions& options);
+
+  /// From now on only points within `box` (model frame) may be sampled; `part` gives the pixels, of the image that this
+  /// was made of. Everything but sample() and surface() holds for all points still.
+  void focus(const Eigen::AlignedBox3f& box, const PartSource& part);
+  /// No point may be sampled until the next focus(); its pixels are let go.
+  void release() { set_area({}); }
+  /// Pixels that focus() prepares for `box`, of the part that measured anything.
+  [[nodiscard]] cv::Rect area_for(const Eigen::AlignedBox3f& box) const;
+  static constexpr std::size_t kBytesPerPixel = 32;
 
   [[nodiscard]] RangeSample sample(const Eigen::Vector3f& point_in_model) const;
 
@@ -82,19 +97,25 @@ class RangeSampler {
   };
 
   void crop(const RangeImage& range);
-  void make_planes(const RangeImage& range);
+  void set_area(const cv::Rect& area);
+  void make_planes(const RangeImage& range, const cv::Point& first);
   void close_pinholes();
   void drop_specks_and_fade_edges(int radius);
   void erode_free_depth(int radius);
   void make_footprint();
   void make_tiles();
   [[nodiscard]] bool one_surface(const std::vector<Eigen::Vector3f>& points, std::size_t i, std::size_t j) const;
+  [[nodiscard]] int margin() const;
   [[nodiscard]] PixelPosition project(const Eigen::Vector3f& point_in_model) const;
   [[nodiscard]] Eigen::Vector3f point_on(const Pixel& pixel, int x, int y) const;
   [[nodiscard]] float depth_on_plane(const Pixel& plane, int x, int y) const;
   [[nodiscard]] double mm_per_pixel() const;
-  [[nodiscard]] const Pixel& pixel(int x, int y) const { return pixels_[static_cast<std::size_t>(y) * width_ + x]; }
-  [[nodiscard]] Pixel& pixel(int x, int y) { return pixels_[static_cast<std::size_t>(y) * width_ + x]; }
+  /// Of the crop's pixel (x, y), which must be in `area_`.
+  [[nodiscard]] std::size_t index(int x, int y) const {
+    return static_cast<std::size_t>(y - area_.y) * area_.width + (x - area_.x);
+  }
+  [[nodiscard]] const Pixel& pixel(int x, int y) const { return pixels_[index(x, y)]; }
+  [[nodiscard]] Pixel& pixel(int x, int y) { return pixels_[index(x, y)]; }
 
   RangeSamplerOptions options_;
   Transform camera_from_model_;
@@ -105,7 +126,9 @@ class RangeSampler {
   float window_mm_ = 0.0F;
   bool has_outline_ = false;  ///< then all of the image outside the crop is background
   float band_mm_ = 0.0F;
-  int width_ = 0, height_ = 0;
+  int width_ = 0, height_ = 0;  ///< of the crop
+  int voxel_pixels_ = 1;
+  cv::Rect area_;  ///< of the crop: the pixels that are held
   std::vector<Pixel> pixels_;
   cv::Mat1f footprint_px_;  ///< distance to the footprint, positive beside it; empty if the background is given
   cv::Mat1f tile_reach_;    ///< beyond this depth nothing in the tile is free or surface

@@ -50,14 +50,16 @@ void settle_vertex(const Field& field, const VolumeOptions& options, const Eigen
 
 }  // namespace
 
-void finish_surface(std::unique_ptr<const Field> field, const VolumeOptions& options, Mesh& mesh) {
+void finish_surface(std::unique_ptr<Field> field, const VolumeOptions& options, Mesh& mesh) {
   const std::size_t count = mesh.vertices.size();
   mesh.views.assign(count, 0);
   mesh.sigma.assign(count, std::numeric_limits<float>::quiet_NaN());
   const std::vector<Eigen::Vector3f> outward = vertex_normals(mesh), extracted = mesh.vertices;
   const VertexNeighbours around(mesh);
   std::vector<Scatter> scatter(count);
-  for_each_in_blocks(count, [&](std::size_t v) { settle_vertex(*field, options, outward[v], mesh, scatter, v); });
+  field->for_each_in_bricks(
+      count, [&](std::size_t v) { return extracted[v]; },
+      [&](std::size_t v) { settle_vertex(*field, options, outward[v], mesh, scatter, v); });
   const float window_mm = field->window_mm();
   field.reset();  // much memory, of which the rest needs nothing
   widen_by_scatter(around, options.scatter_rounds, scatter, mesh);

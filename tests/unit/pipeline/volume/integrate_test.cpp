@@ -193,6 +193,19 @@ class Cup : public testing::Test {
     first_ = take_views({}, cast_into(upside_down));
     second_ = take_views({}, cast_into(moved(upside_down, turned_over_)));
   }
+  static void expect_same_bits(const Result<Surface>& a, const Result<Surface>& b) {
+    ASSERT_TRUE(a && b);
+    ASSERT_EQ(a->mesh.vertices.size(), b->mesh.vertices.size());
+    ASSERT_EQ(a->mesh.sigma.size(), b->mesh.sigma.size());
+    const auto are_same = [](const auto& x, const auto& y) {
+      return std::memcmp(x.data(), y.data(), x.size() * sizeof(x[0])) == 0;
+    };
+    EXPECT_TRUE(are_same(a->mesh.vertices, b->mesh.vertices));
+    EXPECT_TRUE(are_same(a->mesh.sigma, b->mesh.sigma));
+    EXPECT_EQ(a->mesh.faces, b->mesh.faces);
+    EXPECT_EQ(a->mesh.views, b->mesh.views);
+  }
+
   Transform turned_over_ = Transform::Identity();  // pose 2 from pose 1
   Solid solid_;
   std::vector<View> first_, second_;
@@ -231,13 +244,33 @@ TEST_F(Cup, SameBitsForAnyNumberOfThreads) {
   Result<Surface> one = fail(ErrorCode::internal, ""), three = one;
   with_threads(1, [&] { one = integrate(poses, {.voxel_mm = 0.8}); });
   with_threads(3, [&] { three = integrate(poses, {.voxel_mm = 0.8}); });
-  ASSERT_TRUE(one && three);
-  ASSERT_EQ(one->mesh.vertices.size(), three->mesh.vertices.size());
-  EXPECT_EQ(std::memcmp(one->mesh.vertices.data(), three->mesh.vertices.data(),
-                        one->mesh.vertices.size() * sizeof(Eigen::Vector3f)),
-            0);
-  EXPECT_EQ(one->mesh.faces, three->mesh.faces);
-  EXPECT_EQ(one->mesh.views, three->mesh.views);
+  expect_same_bits(one, three);
+}
+
+TEST_F(Cup, SameBitsWithinAnyMemory) {
+  const std::vector<PosedViews> poses = {{first_}, {second_, turned_over_.inverse()}};
+  for (const auto fusion : {Fusion::evidence, Fusion::paper}) {
+    const auto whole = integrate(poses, {.voxel_mm = 0.8, .fusion = fusion});
+    const auto in_places =
+        integrate(poses, {.voxel_mm = 0.8, .fusion = fusion, .memory_bytes = 1, .max_bricks_per_axis = 3});
+    expect_same_bits(whole, in_places);
+    EXPECT_EQ(whole->report.bricks, 1U);
+    EXPECT_EQ(in_places->report.bricks, 27U);
+    EXPECT_EQ(whole->report.class_pairs, in_places->report.class_pairs);
+    EXPECT_EQ(whole->report.active_voxels, in_places->report.active_voxels);
+  }
+}
+
+TEST_F(Cup, CompactRangeImagesGiveTheSameSurfaceAndTheSameBitsWithinAnyMemory) {
+  std::vector<CompactRange> full;
+  for (const View& view : first_) full.emplace_back(view.range);
+  const PosedViews compact{.views = first_, .full = full};
+  const auto whole = integrate({&compact, 1}, {.voxel_mm = 0.8});
+  const auto in_places = integrate({&compact, 1}, {.voxel_mm = 0.8, .memory_bytes = 1, .max_bricks_per_axis = 2});
+  expect_same_bits(whole, in_places);
+  const auto plain = integrate_views(first_, {.voxel_mm = 0.8});
+  ASSERT_TRUE(plain);
+  EXPECT_NEAR(volume(whole->mesh), volume(plain->mesh), 1e-4 * volume(plain->mesh));
 }
 
 TEST(Integrate, BridgesOfUnseenSpaceBetweenCloseLegsAreCut) {

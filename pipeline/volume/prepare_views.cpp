@@ -1,0 +1,134 @@
+#include "pipeline/volume/prepare_views.h"
+
+#include <algorithm>
+#include <optional>
+
+#include "core/parallel.h"
+#include "pipeline/volume/block_grid.h"
+
+namespace scanrig {
+namespace {
+
+/// A view on its way into the field.
+struct MadeView {
+  std::optional<RangeSampler> sampler;
+  std::vector<Eigen::Vector3f> seeds;
+  Eigen::AlignedBox3f box;
+  std::vector<float> weights;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+};
+
+RangeSampler::PartSource part_of(const PosedViews& pose, std::size_t v) {
+  if (!pose.full.empty()) return [full = &pose.full[v]](const cv::Rect& box) { return full->part(box); };
+  return [range = &pose.views[v].range](const cv::Rect& box) {
+    RangeImage part;
+    part.depth = range->depth(box);
+    part.sigma = range->sigma(box);
+    part.normal = range->normal(box);
+    if (!range->background.empty()) part.background = range->background(box);
+    return part;
+  };
+}
+
+std::uintmax_t bytes_of(const PosedViews& pose, std::size_t v) {
+  const Projection& p = pose.full.empty() ? pose.views[v].range.projection : pose.full[v].header().projection;
+  return std::uintmax_t{RangeSampler::kBytesPerPixel} * static_cast<std::uintmax_t>(p.width) *
+         static_cast<std::uintmax_t>(p.height);
+}
+
+MadeView make_one(const PosedViews& pose, std::size_t v, const VolumeOptions& options, double band_mm) {
+  MadeView made;
+  const RangeImage expanded = pose.full.empty() ? RangeImage() : pose.full[v].whole();
+  made.sampler.emplace(pose.full.empty() ? pose.views[v].range : expanded, pose.model_from_pose, band_mm,
+                       options.voxel_mm, options.sampler);
+  std::size_t count = 0;
+  for (const auto& pixel : made.sampler->surface()) {
+    made.box.extend(pixel.point);
+    if (count++ % options.seed_stride == 0) made.seeds.push_back(pixel.point);
+    made.weights.push_back(pixel.weight);
+    made.sum += pixel.point.cast<double>();
+  }
+  return made;
+}
+
+SurfaceStatistics statistics_of(std::vector<float>& weights, const Eigen::Vector3d& sum) {
+  SurfaceStatistics result;
+  if (weights.empty()) return result;
+  result.centre = sum / static_cast<double>(weights.size());
+  const auto middle = weights.begin() + static_cast<std::ptrdiff_t>(weights.size() / 2);
+  std::nth_element(weights.begin(), middle, weights.end());
+  result.median_weight = *middle;
+  return result;
+}
+
+/// Of the fullest brick, all views together.
+std::uintmax_t bytes_for(const PreparedViews& prepared, const Bricks& bricks, float room_mm) {
+  std::uintmax_t fullest = 0;
+  for (std::size_t brick = 0; brick < bricks.count(); ++brick) {
+    Eigen::AlignedBox3f box = bricks.box(brick);
+    box = {box.min() - Eigen::Vector3f::Constant(room_mm), box.max() + Eigen::Vector3f::Constant(room_mm)};
+    std::uintmax_t pixels = 0;
+    for (const auto& views : prepared.views_of_pose) {
+      for (const auto& view : views) pixels += static_cast<std::uintmax_t>(view.sampler.area_for(box).area());
+    }
+    fullest = std::max(fullest, pixels * RangeSampler::kBytesPerPixel);
+  }
+  return fullest;
+}
+
+}  // namespace
+
+PreparedViews prepare_views(std::span<const PosedViews> poses, const VolumeOptions& options, double band_mm) {
+  constexpr std::uintmax_t kWhilePrepared = 3;  // times what a prepared view keeps
+  PreparedViews result;
+  std::uintmax_t all_bytes = 0, largest = 1;
+  for (const auto& pose : poses) {
+    for (std::size_t v = 0; v < pose.views.size(); ++v) {
+      all_bytes += bytes_of(pose, v);
+      largest = std::max(largest, bytes_of(pose, v));
+    }
+  }
+  result.are_held = all_bytes <= options.memory_bytes;
+  std::vector<float> weights;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const auto& pose : poses) {
+    auto& views = result.views_of_pose.emplace_back();
+    result.model_from_pose.push_back(pose.model_from_pose);
+    const std::size_t count = pose.views.size();
+    const std::size_t at_once = result.are_held ? count
+                                                : static_cast<std::size_t>(std::clamp<std::uintmax_t>(
+                                                      options.memory_bytes / (kWhilePrepared * largest), 1, count));
+    for (std::size_t first = 0; first < count; first += at_once) {
+      std::vector<MadeView> made(std::min(at_once, count - first));
+      parallel_for(made.size(), [&](std::size_t i) {
+        made[i] = make_one(pose, first + i, options, band_mm);
+        if (!result.are_held) made[i].sampler->release();
+      });
+      for (std::size_t i = 0; i < made.size(); ++i) {
+        views.push_back({std::move(*made[i].sampler), part_of(pose, first + i)});
+        result.box.extend(made[i].box);
+        result.seeds.insert(result.seeds.end(), made[i].seeds.begin(), made[i].seeds.end());
+        weights.insert(weights.end(), made[i].weights.begin(), made[i].weights.end());
+        sum += made[i].sum;
+      }
+    }
+  }
+  result.statistics = statistics_of(weights, sum);
+  return result;
+}
+
+Bricks bricks_for(const PreparedViews& prepared, const Eigen::AlignedBox3f& box, const VolumeOptions& options) {
+  if (prepared.are_held) return {box, 1};
+  const auto voxel_mm = static_cast<float>(options.voxel_mm);
+  const auto blocks = Eigen::Vector3f::Constant(3.0F * kBlockSide * voxel_mm);  // as the grid covers more than the box
+  const Eigen::AlignedBox3f around(box.min() - blocks, box.max() + blocks);
+  for (int per_axis = 2;; ++per_axis) {
+    const Bricks bricks(around, per_axis);
+    if (per_axis >= options.max_bricks_per_axis ||
+        bytes_for(prepared, bricks, Field::kBrickRoom * voxel_mm) <= options.memory_bytes) {
+      return bricks;
+    }
+  }
+}
+
+}  // namespace scanrig
