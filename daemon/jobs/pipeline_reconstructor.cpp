@@ -11,7 +11,9 @@ namespace {
 class PipelineReconstructor final : public Reconstructor {
  public:
   PipelineReconstructor(Reconstruction reconstruction, std::filesystem::path scan, int threads)
-      : reconstruction_(std::move(reconstruction)), scan_(std::move(scan)), threads_(threads) {}
+      : reconstruction_(std::move(reconstruction)), scan_(std::move(scan)), threads_(threads) {
+    reconstruction_.images_are_in(scan_);
+  }
 
   Result<void> add_view(std::size_t pose, const RawView& raw, const ViewRecord& record,
                         const Context& context) override {

@@ -8,9 +8,10 @@
 namespace scanrig {
 namespace {
 
-cv::Rect aligned(const cv::Rect& box, const cv::Size& image) {
-  const auto down = [](int at) { return at / kCropAlignPx * kCropAlignPx; };
-  const auto up = [](int at) { return (at + kCropAlignPx - 1) / kCropAlignPx * kCropAlignPx; };
+cv::Rect aligned(const cv::Rect& box, const cv::Size& image, int step = 1) {
+  const int align = step * kCropAlignPx;
+  const auto down = [&](int at) { return at / align * align; };
+  const auto up = [&](int at) { return (at + align - 1) / align * align; };
   const cv::Point first(down(box.x), down(box.y)), end(up(box.br().x), up(box.br().y));
   return cv::Rect(first, end) & cv::Rect({0, 0}, image);
 }
@@ -37,7 +38,9 @@ cv::Mat_<Pixel> placed(const cv::Mat_<Pixel>& image, const cv::Rect& box, const 
 
 }  // namespace
 
-void crop_to_object(View& view) {
+void crop_to_object(View& view) { crop_to_object_in_steps(view, 1); }
+
+void crop_to_object_in_steps(View& view, int step) {
   const auto is_full = [](const Silhouette& s) { return !s.outside_px.empty() && !s.projection.is_cropped(); };
   if (view.range.background.empty() || !view.range.background_is_whole || view.silhouettes.empty() ||
       !std::ranges::all_of(view.silhouettes, is_full)) {
@@ -45,7 +48,8 @@ void crop_to_object(View& view) {
   }
   for (std::size_t camera = 0; camera < view.silhouettes.size(); ++camera) {
     Silhouette& s = view.silhouettes[camera];
-    const cv::Rect box = aligned(box_around(cv::Mat1b(s.outside_px < 0.0F), kCropRoomPx), s.outside_px.size());
+    const cv::Rect box =
+        aligned(box_around(cv::Mat1b(s.outside_px < 0.0F), step * kCropRoomPx), s.outside_px.size(), step);
     if (box.empty()) continue;
     if (camera == 0) crop_range(view.range, box);
     s.projection = s.projection.cropped(box.x, box.y, box.width, box.height);
@@ -63,8 +67,10 @@ void uncrop(View& view, std::size_t camera, const cv::Rect& box) {
   if (all.size() == s.outside_px.size()) return;
   s.outside_px = distance_beyond(s.outside_px, all);
   s.projection = s.projection.cropped(all.x, all.y, all.width, all.height);
-  if (camera != 0) return;
-  RangeImage& range = view.range;
+  if (camera == 0) widen(view.range, all);
+}
+
+void widen(RangeImage& range, const cv::Rect& all) {
   range.projection = range.projection.cropped(all.x, all.y, all.width, all.height);
   range.depth = placed(range.depth, all, kUnmeasured);
   range.sigma = placed(range.sigma, all, kUnmeasured);

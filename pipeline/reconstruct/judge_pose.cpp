@@ -118,12 +118,13 @@ Result<void> Reconstruction::State::measure_without_key(std::size_t pose, const 
   without_key.plain_differs = false;
   for (std::size_t v = 0; v < state.views.size(); ++v) {
     const View& old = state.views[v];
-    const StereoImages images{state.pattern[v].left, state.pattern[v].right, state.plain[v].left.whole(),
-                              state.plain[v].right.whole()};
-    auto view = make_view(*rectification, images, old.angle_rad, old.index, without_key, context);
+    const auto images = whole_images(pose, v);
+    if (!images) return pass_on(images, fmt::format("view {}", old.index));
+    const StereoImages stereo{images->left_pattern, images->right_pattern, images->left_plain, images->right_plain};
+    auto view = make_view(*rectification, stereo, old.angle_rad, old.index, without_key, context);
     if (!view) return pass_on(view, fmt::format("view {}", old.index));
     if (state.watch) state.watch->carry(*view, state.pattern[v].order);
-    state.views[v] = std::move(*view);
+    set_view(state, v, std::move(*view));
   }
   return align_views(pose, context);
 }
@@ -137,6 +138,7 @@ bool Reconstruction::State::leave_out_misfits(std::size_t pose) {
     const auto at = static_cast<std::ptrdiff_t>(*v);
     disagreements.push_back(of_misfit(pose, state.views[*v], state.registration.views[*v].median_after_mm));
     state.views.erase(state.views.begin() + at);
+    if (!state.full.empty()) state.full.erase(state.full.begin() + at);
     if (state.plain.empty()) continue;
     state.plain.erase(state.plain.begin() + at);
     state.pattern.erase(state.pattern.begin() + at);

@@ -112,13 +112,14 @@ Mesh live_mesh_of_view(const View& view, const Camera& left, const LivePhoto& ph
 }
 
 void colour_by_views(Mesh& mesh, const std::vector<View>& views, const Camera& left,
-                     const std::vector<LivePhoto>& photos) {
+                     const std::function<LivePhoto(std::size_t)>& photo_of) {
   mesh.colour.assign(mesh.vertices.size(), kGrey);
-  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-    const Eigen::Vector3d point = mesh.vertices[v].cast<double>();
-    double max_directness = 0.0;
-    for (std::size_t i = 0; i < std::min(views.size(), photos.size()); ++i) {
-      const RangeImage& range = views[i].range;
+  std::vector<double> max_directness(mesh.vertices.size(), 0.0);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const RangeImage& range = views[i].range;
+    const LivePhoto photo = photo_of(i);
+    for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+      const Eigen::Vector3d point = mesh.vertices[v].cast<double>();
       const Eigen::Vector3d in_camera = range.camera_from_pose * point;
       const Eigen::Vector2d pixel = range.projection.project(in_camera);
       if (!pixel.allFinite() || !range.projection.contains(pixel)) continue;
@@ -127,9 +128,9 @@ void colour_by_views(Mesh& mesh, const std::vector<View>& views, const Camera& l
       if (!(std::abs(depth - in_camera.z()) < kSameDepth)) continue;
       const Eigen::Vector3d normal = range.camera_from_pose.linear() * mesh.normals[v].cast<double>();
       const double directness = -normal.dot(in_camera.normalized());
-      if (directness <= max_directness) continue;
-      max_directness = directness;
-      mesh.colour[v] = colour_at(left, photos[i], point);
+      if (directness <= max_directness[v]) continue;
+      max_directness[v] = directness;
+      mesh.colour[v] = colour_at(left, photo, point);
     }
   }
 }

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cstddef>
+#include <functional>
 #include <opencv2/core/mat.hpp>
 #include <optional>
 #include <vector>
@@ -29,9 +30,9 @@ double live_gain(const View& view, const Camera& left, const LivePhoto& photo);
 Mesh live_mesh_of_view(const View& view, const Camera& left, const LivePhoto& photo, std::size_t max_vertices = 4000);
 
 /// Colours each vertex as the view shows it that looks at it most directly; grey where none does. `mesh.normals` are
-/// needed.
+/// needed. `photo_of`: of each view, one after another.
 void colour_by_views(Mesh& mesh, const std::vector<View>& views, const Camera& left,
-                     const std::vector<LivePhoto>& photos);
+                     const std::function<LivePhoto(std::size_t)>& photo_of);
 
 /// Rotation that turns the solid from the rest in which it lies, its foot towards -y, into the most stable other one in
 /// which a camera from the side sees that foot. Nothing where the solid has none, or is not closed.

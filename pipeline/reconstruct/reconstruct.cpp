@@ -39,12 +39,6 @@ Result<VolumeOptions::Fusion> fusion_of(const std::string& name) {
   return fail(ErrorCode::invalid_input, "fusion \"{}\" is neither \"evidence\" nor \"paper\"", name);
 }
 
-cv::Mat grey_of(const cv::Mat& image) {
-  cv::Mat grey;
-  cv::cvtColor(image, grey, cv::COLOR_BGR2GRAY);
-  return grey;
-}
-
 Result<PoseOptions> pose_options_of(const std::string& rests) {
   PoseOptions options;
   if (rests == "hull") {
@@ -80,7 +74,7 @@ Result<View> Reconstruction::State::view_of(std::size_t pose, const ViewImages& 
   const double gear = calibration->quality ? calibration->quality->gear : 1.0;
   auto view = make_view(*rectification, stereo, gear * images.angle_rad, images.index, {}, context);
   if (!view) return pass_on(view, fmt::format("pose {} view {}", pose + 1, images.index));
-  crop_to_object(*view);
+  crop_to_object_in_steps(*view, step());
   return view;
 }
 
@@ -110,16 +104,12 @@ Result<void> Reconstruction::State::add_views(std::size_t pose, std::span<const 
   return {};
 }
 
-void Reconstruction::State::take_view(PoseState& pose, View view, const ViewImages& images, WatchMode mode) {
-  pose.views.push_back(std::move(view));
-  if (mode != WatchMode::off) {
-    const StageLog::Timer timer(log, "watch");
-    if (!pose.watch) pose.watch.emplace(*calibration, *rectification);
-    pose.watch->add(images, pose.views.back());
+void Reconstruction::State::set_view(PoseState& pose, std::size_t v, View view) const {
+  if (step() > 1) {
+    pose.full[v] = CompactRange(view.range);
+    view = thinned(view, step());
   }
-  if (images.left_plain.channels() != 3) return;
-  pose.plain.push_back({{images.left_plain}, {images.right_plain}});
-  pose.pattern.push_back({pose.views.size() - 1, grey_of(images.left_pattern), grey_of(images.right_pattern)});
+  pose.views[v] = std::move(view);
 }
 
 /// The views are matched already. Cameras that moved by less than refuse them leave the matches as they are, so the
@@ -131,6 +121,11 @@ Result<void> Reconstruction::State::judge_rig(PoseState& pose, const Context& co
   const auto mode = watch_mode_of(options.watch);
   if (!mode) return pass_on(mode);
   auto judged = pose.watch->judge(pose.views, *mode);
+  for (std::size_t v = 0; judged && pose.watch->is_refined() && v < pose.full.size(); ++v) {
+    View whole{.range = pose.full[v].whole(), .silhouettes = {}};
+    pose.watch->carry(whole, v);
+    pose.full[v] = CompactRange(whole.range);
+  }
   context.report("watch", 1.0);
   return judged;
 }
@@ -184,20 +179,15 @@ Result<Surface> Reconstruction::State::surface(const Transform& pose1_from_pose2
   const auto fusion = fusion_of(options.fusion);
   if (!fusion) return pass_on(fusion);
   std::vector<PosedViews> posed;
-  posed.push_back({.views = poses[0].views});
-  if (poses.size() > 1) posed.push_back({.views = poses[1].views, .model_from_pose = pose1_from_pose2});
+  for (PoseState& pose : poses) {
+    parallel_for(pose.full.size(), [&](std::size_t v) { follow_thinned(pose.full[v], pose.views[v].range, step()); });
+    posed.push_back({.views = pose.views,
+                     .model_from_pose = posed.empty() ? Transform::Identity() : pose1_from_pose2,
+                     .full = pose.full});
+  }
   return integrate(
       posed, {.voxel_mm = options.voxel_mm, .fusion = *fusion, .table_without_silhouettes = calibration.has_value()},
       context);
-}
-
-void Reconstruction::State::crop_photos(PoseState& pose) const {
-  for (std::size_t v = 0; v < pose.plain.size(); ++v) {
-    const auto& silhouettes = pose.views[v].silhouettes;
-    if (silhouettes.size() < 2) continue;
-    crop_photo(pose.plain[v].left, silhouettes[0], rectification->left_map);
-    crop_photo(pose.plain[v].right, silhouettes[1], rectification->right_map);
-  }
 }
 
 /// Colouring needs the photographs and where the views stand.
@@ -207,39 +197,10 @@ void Reconstruction::State::release_range_images() {
       view.range.depth = view.range.sigma = cv::Mat1f();
       view.range.normal = cv::Mat3f();
       view.range.background = cv::Mat1b();
-      view.silhouettes.clear();
+      if (!reads_again()) view.silhouettes.clear();  // else they say what is wanted of the photographs
     }
+    pose.full = std::vector<CompactRange>();
   }
-}
-
-std::vector<Photo> Reconstruction::State::photos(const Transform& pose1_from_pose2) const {
-  std::vector<Photo> photos;
-  for (std::size_t p = 0; p < poses.size(); ++p) {
-    const Transform pose_from_model = p == 0 ? Transform::Identity() : pose1_from_pose2.inverse();
-    for (std::size_t v = 0; v < poses[p].plain.size(); ++v) {
-      // The registration of the view's range image holds for its photographs too.
-      const Transform left_from_turntable =
-          poses[p].watch ? poses[p].watch->left_from_turntable() : rectification->left_from_turntable;
-      const Transform turntable_from_pose = left_from_turntable.inverse() * poses[p].views[v].range.camera_from_pose;
-      const Transform turntable_from_model = turntable_from_pose * pose_from_model;
-      const Calibration& cameras = poses[p].watch ? poses[p].watch->calibration() : *calibration;
-      photos.push_back({cameras.left, turntable_from_model, poses[p].plain[v].left.whole()});
-      photos.push_back({cameras.right, turntable_from_model, poses[p].plain[v].right.whole()});
-    }
-  }
-  return photos;
-}
-
-std::vector<LivePhoto> Reconstruction::State::live_photos(const PoseState& pose) const {
-  const Transform turntable_from_left = rectification->left_from_turntable.inverse();
-  std::vector<LivePhoto> photos;
-  for (std::size_t v = 0; v < pose.views.size(); ++v) {
-    photos.push_back({turntable_from_left * pose.views[v].range.camera_from_pose,
-                      v < pose.plain.size() ? pose.plain[v].left.whole() : cv::Mat3b()});
-  }
-  if (!photos.empty()) photos.front().gain = live_gain(pose.views.front(), calibration->left, photos.front());
-  for (LivePhoto& photo : photos) photo.gain = photos.front().gain;
-  return photos;
 }
 
 Result<void> Reconstruction::State::prepare(const Context& context) {
@@ -280,14 +241,16 @@ Result<Model> Reconstruction::State::finish(const ScanIdentity& identity, const 
 
 Result<void> Reconstruction::State::add_texture(TexturedMesh& model, const Transform& pose1_from_pose2, Report& report,
                                                 const Context& context) {
-  const auto photographs = options.texture ? photos(pose1_from_pose2) : std::vector<Photo>();
-  if (photographs.empty()) return {};
+  if (!options.texture) return {};
   const StageLog::Timer timer(log, "texture");
+  const auto photographs = photos(pose1_from_pose2);
+  if (!photographs) return pass_on(photographs);
+  if (photographs->empty()) return {};
   std::vector<std::pair<std::size_t, int>> views;  // pose and view of every two photographs
   for (std::size_t p = 0; p < poses.size(); ++p) {
     for (std::size_t v = 0; v < poses[p].plain.size(); ++v) views.emplace_back(p, poses[p].views[v].index);
   }
-  auto textured = texture_mesh(model.mesh, photographs, {}, context);
+  auto textured = texture_mesh(model.mesh, *photographs, {}, context);
   if (!textured) return pass_on(textured);
   report.add_texture(*textured);
   for (const ContradictedPhoto& photo : textured->contradicted) {
@@ -310,6 +273,8 @@ Reconstruction::Reconstruction(ReconstructOptions options) : state_(std::make_un
 Reconstruction::~Reconstruction() = default;
 Reconstruction::Reconstruction(Reconstruction&&) noexcept = default;
 Reconstruction& Reconstruction::operator=(Reconstruction&&) noexcept = default;
+
+void Reconstruction::images_are_in(std::filesystem::path scan_folder) { state_->folder = std::move(scan_folder); }
 
 Result<void> Reconstruction::add_view(std::size_t pose, const ViewImages& images, const Context& context) {
   const ImageSource source = [&images] { return images; };
@@ -340,8 +305,10 @@ Result<void> Reconstruction::finish_pose(std::size_t pose, const Context& contex
 
 Mesh Reconstruction::live_view(std::size_t pose) const {
   if (!state_->rectification || pose >= state_->poses.size() || state_->poses[pose].views.empty()) return {};
-  const State::PoseState& state = state_->poses[pose];
-  return live_mesh_of_view(state.views.back(), state_->calibration->left, state_->live_photos(state).back());
+  const std::vector<View>& views = state_->poses[pose].views;
+  LivePhoto photo = state_->live_photo(pose, views.size() - 1);
+  photo.gain = live_gain(views.front(), state_->calibration->left, state_->live_photo(pose, 0));
+  return live_mesh_of_view(views.back(), state_->calibration->left, photo);
 }
 
 Mesh Reconstruction::live_pose(std::size_t pose) const {
@@ -349,7 +316,12 @@ Mesh Reconstruction::live_pose(std::size_t pose) const {
   const State::PoseState& state = state_->poses[pose];
   Mesh mesh = state.partial.mesh;
   if (mesh.normals.size() != mesh.vertices.size()) mesh.normals = vertex_normals(mesh);
-  colour_by_views(mesh, state.views, state_->calibration->left, state_->live_photos(state));
+  const double gain = live_gain(state.views.front(), state_->calibration->left, state_->live_photo(pose, 0));
+  colour_by_views(mesh, state.views, state_->calibration->left, [&](std::size_t v) {
+    LivePhoto photo = state_->live_photo(pose, v);
+    photo.gain = gain;
+    return photo;
+  });
   return mesh;
 }
 

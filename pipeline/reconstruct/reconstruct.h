@@ -63,6 +63,10 @@ class Reconstruction {
   /// Reads one view's images. Called from any thread.
   using ImageSource = std::function<Result<ViewImages>()>;
 
+  /// The views' images are also in this scan folder, in the order in which they are added here: of large images
+  /// (thinning_step()) photographs are read again from there when they are wanted, and not kept.
+  void images_are_in(std::filesystem::path scan_folder);
+
   /// Range images and silhouettes of views, side by side; they are added in their order, with the bits of one at a
   /// time. `context` is told of the progress of a single one. Fails as add_view() and the sources do; none is added
   /// then.
@@ -87,7 +91,8 @@ class Reconstruction {
   /// Pose 2 into pose 1, and integration: what finish() begins with, sooner. Every pose must be finished before, none
   /// comes after. Fails with `same_rest`, `ambiguous`, `no_overlap`, `degenerate`, `stopped`.
   Result<void> prepare(const Context& context);
-  /// As prepare(), then the texture; with one pose, its own complete model. Once: the views are let go.
+  /// As prepare(), then the texture; with one pose, its own complete model. Once: the views are let go. Fails as
+  /// prepare(), and as ScanFolder where photographs are read again.
   Result<Model> finish(const ScanIdentity& identity, const Context& context);
 
  private:

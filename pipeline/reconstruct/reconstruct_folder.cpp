@@ -47,7 +47,9 @@ Result<Reconstruction> begin(const ScanFolder& scan, const ReconstructOptions& o
   if (scan.manifest().source != "stereo") return Reconstruction(options);
   auto calibration = scan.load_calibration();
   if (!calibration) return pass_on(calibration);
-  return Reconstruction(std::move(*calibration), options);
+  Reconstruction reconstruction(std::move(*calibration), options);
+  reconstruction.images_are_in(scan.path());
+  return reconstruction;
 }
 
 }  // namespace

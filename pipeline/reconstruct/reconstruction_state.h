@@ -1,10 +1,14 @@
 #pragma once
 
+#include <filesystem>
 #include <opencv2/core/mat.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
+#include "pipeline/range/compact_range.h"
 #include "pipeline/range/rectification.h"
+#include "pipeline/range/thinned_view.h"
 #include "pipeline/reconstruct/disagreements.h"
 #include "pipeline/reconstruct/kept_photo.h"
 #include "pipeline/reconstruct/live_mesh.h"
@@ -18,7 +22,8 @@
 
 namespace scanrig {
 
-/// What a Reconstruction holds. reconstruct.cpp has its stages, judge_pose.cpp what they say of single images.
+/// What a Reconstruction holds. reconstruct.cpp has its stages, judge_pose.cpp what they say of single images,
+/// photographs.cpp where these are.
 struct Reconstruction::State {
   struct PlainPair {
     KeptPhoto left, right;
@@ -29,10 +34,11 @@ struct Reconstruction::State {
   };
 
   struct PoseState {
-    std::vector<View> views;
-    std::vector<PlainPair> plain;   ///< one per view; empty for range scans and grey sensors
-    std::vector<GreyPair> pattern;  ///< likewise
-    std::optional<RigWatch> watch;  ///< none: range scans, or switched off
+    std::vector<View> views;         ///< thinned, where images are large
+    std::vector<CompactRange> full;  ///< then their range images as measured; else empty
+    std::vector<PlainPair> plain;    ///< one per view; empty for range scans and grey sensors
+    std::vector<GreyPair> pattern;   ///< likewise
+    std::optional<RigWatch> watch;   ///< none: range scans, or switched off
     RegistrationReport registration;
     Surface partial;
     bool finished = false;
@@ -53,6 +59,10 @@ struct Reconstruction::State {
   std::optional<Prepared> prepared;
   StageLog log;
 
+  std::filesystem::path folder;  ///< with the views' images; empty: they are kept
+
+  [[nodiscard]] int step() const { return calibration ? thinning_step(calibration->left.projection) : 1; }
+  [[nodiscard]] bool reads_again() const { return step() > 1 && !folder.empty(); }
   Result<PoseState*> open_pose(std::size_t pose);
   Result<void> rectify_once();
   [[nodiscard]] Result<View> view_of(std::size_t pose, const ViewImages& images, const Context& context) const;
@@ -69,10 +79,13 @@ struct Reconstruction::State {
   Result<void> finish_pose(std::size_t pose, const Context& context);
   Result<Transform> find_pose(Report& report, const Context& context);
   Result<Surface> surface(const Transform& pose1_from_pose2, const Context& context);
+  void set_view(PoseState& pose, std::size_t v, View view) const;
   void crop_photos(PoseState& pose) const;
   void release_range_images();
-  [[nodiscard]] std::vector<Photo> photos(const Transform& pose1_from_pose2) const;
-  [[nodiscard]] std::vector<LivePhoto> live_photos(const PoseState& pose) const;
+  Result<ViewImages> whole_images(std::size_t pose, std::size_t v) const;
+  Result<KeptPhoto> photo(const ScanFolder* scan, std::size_t pose, std::size_t v, std::size_t camera) const;
+  Result<std::vector<Photo>> photos(const Transform& pose1_from_pose2) const;
+  [[nodiscard]] LivePhoto live_photo(std::size_t pose, std::size_t v) const;
   Result<void> add_texture(TexturedMesh& model, const Transform& pose1_from_pose2, Report& report,
                            const Context& context);
   Result<void> prepare(const Context& context);

@@ -26,7 +26,7 @@ struct Cells {
 };
 
 int cell_px(const Photo& photo, const PhotoCheckOptions& options) {
-  return std::max(1, photo.image.cols / options.cells);
+  return std::max(1, photo.camera.projection.width / options.cells);
 }
 
 std::vector<Difference> differences_at(std::span<const PhotoView> views, const RigLight& light,
@@ -72,7 +72,8 @@ float median_of(std::vector<float>& values) {
 Cells cells_of(std::size_t p, const Photo& photo, const std::vector<std::vector<Difference>>& spots,
                const PhotoCheckOptions& options) {
   const int side = cell_px(photo, options);
-  const cv::Size size(photo.image.cols / side + 1, photo.image.rows / side + 1);
+  const Projection& sensor = photo.camera.projection;
+  const cv::Size size(sensor.width / side + 1, sensor.height / side + 1);
   std::vector<std::vector<float>> off(static_cast<std::size_t>(size.area())), brightness(off.size());
   for (const auto& spot : spots) {
     if (spot.empty() || spot[p].cell.x < 0) continue;
@@ -153,7 +154,8 @@ void leave_out(PhotoView& view, const OddPhoto& odd, const PhotoCheckOptions& op
   if (odd.photo.is_whole) cells.setTo(255);
   cv::Mat1b pixels;
   cv::resize(cells, pixels, cells.size() * cell_px(view.photo(), options), 0, 0, cv::INTER_NEAREST);
-  view.leave_out(pixels(cv::Rect({0, 0}, view.photo().image.size())));
+  const Projection& sensor = view.photo().camera.projection;
+  view.leave_out(pixels(cv::Rect(0, 0, sensor.width, sensor.height)));
 }
 
 std::vector<OddPhoto> odd_photos(std::span<PhotoView> views, const RigLight& light, const Mesh& mesh,

@@ -30,13 +30,19 @@ std::array<float, 4> cubic(float t) {
           0.5F * (t3 - t2)};
 }
 
-/// Four pixels of a row from column `x` on, in the first twelve of sixteen bytes; the border's pixel beyond it, for
-/// which `copy` has room.
-const uchar* four_pixels(const cv::Mat3b& image, int x, int y, std::array<uchar, 16>& copy) {
-  const uchar* row = image.ptr(std::clamp(y, 0, image.rows - 1));
-  if (x >= 0 && x + 6 <= image.cols) return row + std::ptrdiff_t{3} * x;
-  for (int i = 0; i < 4; ++i) {
-    std::memcpy(copy.data() + std::ptrdiff_t{3} * i, row + std::ptrdiff_t{3} * std::clamp(x + i, 0, image.cols - 1), 3);
+/// Four pixels of a row from column `x` on, in the first twelve of sixteen bytes; the border's pixel beyond the sensor
+/// and black beyond the part that is held, for which `copy` has room.
+const uchar* four_pixels(const Photo& photo, int x, int y, std::array<uchar, 16>& copy) {
+  const cv::Mat3b& image = photo.image;
+  const Projection& sensor = photo.camera.projection;
+  const int v = std::clamp(y, 0, sensor.height - 1) - photo.first.y, u = x - photo.first.x;
+  const bool is_held = v >= 0 && v < image.rows;
+  if (is_held && u >= 0 && u + 6 <= image.cols) return image.ptr(v) + std::ptrdiff_t{3} * u;
+  copy.fill(0);
+  for (int i = 0; is_held && i < 4; ++i) {
+    const int at = std::clamp(x + i, 0, sensor.width - 1) - photo.first.x;
+    if (at < 0 || at >= image.cols) continue;
+    std::memcpy(copy.data() + std::ptrdiff_t{3} * i, image.ptr(v) + std::ptrdiff_t{3} * at, 3);
   }
   return copy.data();
 }
@@ -166,7 +172,6 @@ std::optional<Eigen::Vector2d> PhotoView::pixel_of(const Eigen::Vector3d& point)
 }
 
 Sample PhotoView::sample(const Eigen::Vector2f& pixel) const {
-  const cv::Mat3b& image = photo_->image;
   const int x = rounded_down(pixel.x()), y = rounded_down(pixel.y());
   const auto across = cubic(pixel.x() - static_cast<float>(x));
   const auto down = cubic(pixel.y() - static_cast<float>(y));
@@ -174,7 +179,7 @@ Sample PhotoView::sample(const Eigen::Vector2f& pixel) const {
   SixteenBytes highest = {};
   std::array<uchar, 16> copy{};
   for (int j = 0; j < 4; ++j) {
-    const uchar* four = four_pixels(image, x - 1, y - 1 + j, copy);
+    const uchar* four = four_pixels(*photo_, x - 1, y - 1 + j, copy);
     FourLanes line = {};
     for (std::size_t i = 0; i < 4; ++i) line += across[i] * four_bytes(four + 3 * i);
     sum += down[static_cast<std::size_t>(j)] * line;

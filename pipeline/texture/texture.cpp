@@ -28,8 +28,8 @@ Result<void> check(const Mesh& mesh, std::span<const Photo> photos, const Textur
   if (photos.empty()) return fail(ErrorCode::invalid_input, "texture: no photos");
   for (std::size_t p = 0; p < photos.size(); ++p) {
     const Projection& projection = photos[p].camera.projection;
-    if (photos[p].image.empty() || photos[p].image.cols != projection.width ||
-        photos[p].image.rows != projection.height) {
+    const cv::Rect sensor(0, 0, projection.width, projection.height), part(photos[p].first, photos[p].image.size());
+    if (part.empty() || (part & sensor) != part || (photos[p].first == cv::Point() && part != sensor)) {
       return fail(ErrorCode::invalid_input, "texture: photo {} is {} x {}, its camera {} x {}", p, photos[p].image.cols,
                   photos[p].image.rows, projection.width, projection.height);
     }

@@ -20,7 +20,8 @@ namespace scanrig {
 struct Photo {
   Camera camera;
   Transform turntable_from_model = Transform::Identity();  ///< rot_y(table angle) * pose_from_model
-  cv::Mat3b image;  ///< BGR, linear light, lens distortion included, pixel centres at integers
+  cv::Mat3b image;       ///< BGR, linear light, lens distortion included, pixel centres at integers
+  cv::Point first = {};  ///< of the image, on the sensor: it may be a part; the rest counts as black
 };
 
 /// Cutting of the surface into charts.

@@ -1,6 +1,7 @@
 #include "pipeline/volume/marching_cubes.h"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 
 #include "core/parallel.h"
@@ -137,10 +138,27 @@ struct Octet {
   }
 };
 
-/// Vertices on the edges that start in one block.
-struct BlockVertices {
-  std::vector<std::uint32_t> of_edge;  ///< 3 node + axis -> number within the block; empty: no vertices
+/// Vertices on the edges that start in one block, in the order of the edges, 3 node + axis: a bit an edge, and the
+/// number of those before each word. A number for every edge would be more than all else of a fine grid.
+class BlockVertices {
+ public:
   std::vector<Eigen::Vector3f> positions;
+
+  void mark(int edge) { is_cut_[edge / 64] |= std::uint64_t{1} << (edge % 64); }
+  void count() {
+    for (std::size_t word = 1; word < kWords; ++word) {
+      before_[word] = static_cast<std::uint16_t>(before_[word - 1] + std::popcount(is_cut_[word - 1]));
+    }
+  }
+  [[nodiscard]] std::uint32_t number(int edge) const {
+    const std::uint64_t below = (std::uint64_t{1} << (edge % 64)) - 1;
+    return static_cast<std::uint32_t>(before_[edge / 64] + std::popcount(is_cut_[edge / 64] & below));
+  }
+
+ private:
+  static constexpr std::size_t kWords = 3 * BlockGrid::kNodes / 64;
+  std::array<std::uint64_t, kWords> is_cut_{};
+  std::array<std::uint16_t, kWords> before_{};
 };
 
 BlockVertices cut_edges(const BlockGrid& grid, const BlockGrid::Block& block) {
@@ -152,13 +170,13 @@ BlockVertices cut_edges(const BlockGrid& grid, const BlockGrid::Block& block) {
       const Eigen::Vector3i step = Eigen::Vector3i::Unit(axis);
       const float there = octet.distance(n + step);
       if ((here < 0.0F) == (there < 0.0F)) continue;
-      if (result.of_edge.empty()) result.of_edge.resize(std::size_t{3} * BlockGrid::kNodes);
-      result.of_edge[3 * node(n) + axis] = static_cast<std::uint32_t>(result.positions.size());
+      result.mark(3 * node(n) + axis);
       // A hair's breadth from the nodes, so that no triangle shrinks to nothing.
       const float t = std::clamp(here / (here - there), 0.01F, 0.99F);
       result.positions.push_back(grid.position(kBlockSide * block.index + n) + grid.voxel() * t * step.cast<float>());
     }
   });
+  result.count();
   return result;
 }
 
@@ -179,7 +197,7 @@ std::vector<Mesh::Face> cell_faces(const Numbering& numbering, const Eigen::Vect
     const auto* owner = octet.block[Octet::which(n)];
     const auto slot = static_cast<std::size_t>(owner - numbering.grid.blocks().data());
     const int local = node(n.unaryExpr([](int c) { return c % kBlockSide; }));
-    return numbering.first[slot] + numbering.vertices[slot].of_edge[3 * local + edge / 4];
+    return numbering.first[slot] + numbering.vertices[slot].number(3 * local + edge / 4);
   };
   for_each_node(kBlockSide, [&](const Eigen::Vector3i& cell) {
     unsigned inside = 0;
@@ -227,14 +245,24 @@ Mesh extract_surface(const BlockGrid& grid) {
   parallel_for(vertices.size(), [&](std::size_t i) { vertices[i] = cut_edges(grid, grid.blocks()[i]); });
   Numbering numbering{grid, vertices, {}};
   Mesh mesh;
-  for (const auto& block : vertices) {
+  std::size_t count = 0;
+  for (const auto& block : vertices) count += block.positions.size();
+  mesh.vertices.reserve(count);
+  for (auto& block : vertices) {
     numbering.first.push_back(static_cast<std::uint32_t>(mesh.vertices.size()));
     mesh.vertices.insert(mesh.vertices.end(), block.positions.begin(), block.positions.end());
+    block.positions = std::vector<Eigen::Vector3f>();
   }
   const std::vector<Eigen::Vector3i> cells = blocks_with_cells(grid);
   std::vector<std::vector<Mesh::Face>> faces(cells.size());
   parallel_for(cells.size(), [&](std::size_t i) { faces[i] = cell_faces(numbering, cells[i]); });
-  for (const auto& part : faces) mesh.faces.insert(mesh.faces.end(), part.begin(), part.end());
+  count = 0;
+  for (const auto& part : faces) count += part.size();
+  mesh.faces.reserve(count);
+  for (auto& part : faces) {
+    mesh.faces.insert(mesh.faces.end(), part.begin(), part.end());
+    part = std::vector<Mesh::Face>();
+  }
   return mesh;
 }
 

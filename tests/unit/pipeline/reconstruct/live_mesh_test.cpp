@@ -95,7 +95,7 @@ TEST(LiveMesh, AVertexHasTheColourOfTheViewThatSeesIt) {
   Mesh mesh;
   mesh.vertices = {{-50, 0, -100}, {50, 0, 40}, {-50, 0, 0}, {-50, 0, -100}};
   mesh.normals = {{0, 0, -1}, {0, 0, -1}, {0, 0, -1}, {0, 0, 1}};
-  colour_by_views(mesh, {wall_with_step()}, left_camera(), {two_colours()});
+  colour_by_views(mesh, {wall_with_step()}, left_camera(), [](std::size_t) { return two_colours(); });
   EXPECT_EQ(mesh.colour[0], kShownRed);
   EXPECT_EQ(mesh.colour[1], kShownGreen);
   EXPECT_EQ(mesh.colour[2], (std::array<std::uint8_t, 3>{150, 150, 150})) << "behind what the view sees";
