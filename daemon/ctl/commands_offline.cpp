@@ -22,6 +22,11 @@ void add_reconstruct(CLI::App& app, Chosen& chosen) {
   sub->add_option("--voxel-mm", verb->options.voxel_mm,
                   "size of a voxel (default: 0.25, or what suits imported range images)")
       ->check(CLI::Range(kMinVoxelMm, kMaxVoxelMm));
+  sub->add_option_function<double>(
+         "--memory-gib",
+         [verb](double gib) { verb->options.memory_bytes = static_cast<std::uintmax_t>(gib * (1U << 30)); },
+         "keep within this much memory; the model is the same (default: no limit)")
+      ->check(CLI::Range(0.25, 1024.0));
   sub->add_option("--fusion", verb->options.fusion, "how poses are integrated")
       ->check(CLI::IsMember({"evidence", "paper"}));
   sub->add_option("--rests", verb->options.rests, "how rests are found")->check(CLI::IsMember({"hull", "egi"}));
@@ -42,7 +47,7 @@ std::vector<std::string> words_of(const std::string& text) {
 /// Why `scanrig reconstruct` would not take these words; empty: it would.
 std::string problem_of_reconstruct(const std::string& text) {
   auto words = words_of(text);
-  for (const char* own : {"--out", "--lines", "--json", "--threads"}) {
+  for (const char* own : {"--out", "--lines", "--json", "--threads", "--memory-gib"}) {
     const auto is_own = [own](const std::string& word) {
       return word == own || word.starts_with(std::string(own) + "=");
     };

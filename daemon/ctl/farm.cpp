@@ -163,7 +163,8 @@ class Farm {
 
   /// The scans are lines within the script: the nodes need no further file.
   [[nodiscard]] std::string script(int each) const {
-    std::vector<std::string> words{"--threads", fmt::format("{}", options_.cores)};
+    std::vector<std::string> words{"--threads", fmt::format("{}", options_.cores), "--memory-gib",
+                                   fmt::format("{}", options_.memory_gib)};
     words.insert(words.end(), options_.with.begin(), options_.with.end());
     auto text = fmt::format("#!/bin/sh\n{}first=$((SLURM_ARRAY_TASK_ID * {} + 1))\n",
                             run_function(options_.program, words), each) +

@@ -14,13 +14,10 @@
 
 namespace scanrig {
 
-/// The real reconstruction, in this process. Refuses a job that would need more than `memory_bytes` before it
-/// starts.
+/// The real reconstruction, in this process, within `memory_bytes`; check_memory() of the pipeline refuses a job before
+/// it starts.
 ReconstructorFactory pipeline_reconstructor(ReconstructOptions options,
                                             std::uintmax_t memory_bytes = std::numeric_limits<std::uintmax_t>::max());
-
-/// Checks that the estimated memory is within `memory_bytes`. Fails with `out_of_range` and the remedy.
-Result<void> check_memory(const ReconstructionTask& task, double voxel_mm, std::uintmax_t memory_bytes);
 
 struct ProcessExecutorOptions {
   std::filesystem::path program;  ///< the scanrig command; empty: the one beside this program

@@ -50,18 +50,7 @@ class PipelineReconstructor final : public Reconstructor {
   int threads_;
 };
 
-double gib(std::uintmax_t bytes) { return static_cast<double>(bytes) / (1u << 30); }
-
 }  // namespace
-
-Result<void> check_memory(const ReconstructionTask& task, double voxel_mm, std::uintmax_t memory_bytes) {
-  const auto needed = estimated_memory(task.calibration, task.views, voxel_mm);
-  if (needed <= memory_bytes) return {};
-  return fail(ErrorCode::out_of_range,
-              "the reconstruction with voxels of {} mm would need about {:.1f} GiB, [reconstruction] memory_gib allows "
-              "{:.1f}: use larger voxels or allow more",
-              voxel_mm, gib(needed), gib(memory_bytes));
-}
 
 ReconstructorFactory pipeline_reconstructor(ReconstructOptions options, std::uintmax_t memory_bytes) {
   return [options = std::move(options),
@@ -69,7 +58,9 @@ ReconstructorFactory pipeline_reconstructor(ReconstructOptions options, std::uin
     auto changed = options;
     changed.voxel_mm = task.changes.voxel_mm.value_or(options.voxel_mm);
     if (!task.changes.fusion.empty()) changed.fusion = task.changes.fusion;
-    if (auto fits = check_memory(task, changed.voxel_mm, memory_bytes); !fits) return pass_on(fits);
+    changed.memory_bytes = memory_bytes;
+    auto fits = check_memory(task.calibration, task.views, changed.voxel_mm, memory_bytes);
+    if (!fits) return pass_on(fits);
     return std::make_unique<PipelineReconstructor>(Reconstruction(task.calibration, changed), task.folder,
                                                    changed.threads);
   };

@@ -43,7 +43,8 @@ class ProcessReconstructor final : public Reconstructor {
   [[nodiscard]] ChildCommand command(const fs::path& out, ProgressLines& lines) const {
     ChildCommand command{
         .words = {options_.program.string(), "reconstruct", folder_.string(), "--lines", "--out", out.string(),
-                  "--voxel-mm", fmt::format("{}", changes_.voxel_mm.value_or(options_.voxel_mm))},
+                  "--voxel-mm", fmt::format("{}", changes_.voxel_mm.value_or(options_.voxel_mm)), "--memory-gib",
+                  fmt::format("{}", static_cast<double>(options_.memory_bytes) / (1U << 30))},
         .limit = options_.limit,
         .memory_bytes = options_.memory_bytes,
         .on_line = [&lines](std::string_view line) { lines(line); }};

@@ -165,8 +165,10 @@ class SlurmReconstructor final : public Reconstructor {
   }
 
   [[nodiscard]] Result<std::filesystem::path> write_script() const {
-    std::vector<std::string> words{"--voxel-mm", fmt::format("{}", changes_.voxel_mm.value_or(options_.local.voxel_mm)),
-                                   "--threads", fmt::format("{}", options_.cores)};
+    std::vector<std::string> words{
+        "--voxel-mm",   fmt::format("{}", changes_.voxel_mm.value_or(options_.local.voxel_mm)),
+        "--threads",    fmt::format("{}", options_.cores),
+        "--memory-gib", fmt::format("{}", static_cast<double>(options_.local.memory_bytes) / (1U << 30))};
     if (!changes_.fusion.empty()) words.insert(words.end(), {"--fusion", changes_.fusion});
     const auto run = places_.run(*submission_), file = run / "job.sh";
     std::ofstream script(file);

@@ -12,6 +12,7 @@
 #include "daemon/rig/make_safe.h"
 #include "daemon/rig/open_devices.h"
 #include "daemon/service/crash_report.h"
+#include "pipeline/reconstruct/memory.h"
 
 namespace scanrig {
 namespace {
@@ -61,7 +62,8 @@ ReconstructorFactory reconstructor_from(const config::ReconstructionConfig& conf
                              : process_reconstructor(std::move(local));
     return [=](const ReconstructionTask& task) -> Result<std::unique_ptr<Reconstructor>> {
       const auto voxel_mm = task.changes.voxel_mm.value_or(config.voxel_mm);
-      if (auto fits = check_memory(task, voxel_mm, gib(config.memory_gib)); !fits) return pass_on(fits);
+      auto fits = check_memory(task.calibration, task.views, voxel_mm, gib(config.memory_gib));
+      if (!fits) return pass_on(fits);
       return outside(task);
     };
   }

@@ -16,6 +16,7 @@
 #include "pipeline/range/rectification.h"
 #include "pipeline/range/view_builder.h"
 #include "pipeline/reconstruct/live_mesh.h"
+#include "pipeline/reconstruct/memory.h"
 #include "pipeline/reconstruct/reconstruction_state.h"
 #include "pipeline/reconstruct/report.h"
 #include "pipeline/reconstruct/voxel_size.h"
@@ -142,7 +143,8 @@ Result<void> Reconstruction::State::finish_pose(std::size_t pose, const Context&
   auto partial = integrate({&posed, 1},
                            {.voxel_mm = std::max(options.partial_voxel_mm, options.voxel_mm),
                             .table_without_silhouettes = calibration.has_value(),
-                            .untangle = false},
+                            .untangle = false,
+                            .memory_bytes = prepared_bytes()},
                            context);
   if (!partial) return pass_on(partial, fmt::format("pose {}", pose + 1));
   state.partial = std::move(*partial);
@@ -174,6 +176,12 @@ Result<Transform> Reconstruction::State::find_pose(Report& report, const Context
   return refined->pose1_from_pose2;
 }
 
+/// Half of what is left: blocks and mesh want the rest.
+std::uintmax_t Reconstruction::State::prepared_bytes() const {
+  return options.memory_bytes == std::numeric_limits<std::uintmax_t>::max() ? options.memory_bytes
+                                                                            : memory_left(options.memory_bytes) / 2;
+}
+
 Result<Surface> Reconstruction::State::surface(const Transform& pose1_from_pose2, const Context& context) {
   const StageLog::Timer timer(log, "integration");
   const auto fusion = fusion_of(options.fusion);
@@ -185,9 +193,12 @@ Result<Surface> Reconstruction::State::surface(const Transform& pose1_from_pose2
                      .model_from_pose = posed.empty() ? Transform::Identity() : pose1_from_pose2,
                      .full = pose.full});
   }
-  return integrate(
-      posed, {.voxel_mm = options.voxel_mm, .fusion = *fusion, .table_without_silhouettes = calibration.has_value()},
-      context);
+  return integrate(posed,
+                   {.voxel_mm = options.voxel_mm,
+                    .fusion = *fusion,
+                    .table_without_silhouettes = calibration.has_value(),
+                    .memory_bytes = prepared_bytes()},
+                   context);
 }
 
 /// Colouring needs the photographs and where the views stand.

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
@@ -30,6 +32,8 @@ struct ReconstructOptions {
   /// moved too far; `report`: compared alone; `off`. Only for calibrations of known quality.
   std::string watch = "refine";
   double partial_voxel_mm = 0.8;  ///< minimum for partial models: they only serve the search for the pose
+  /// Of this process, at its peak: what needs more is done part by part, with the same bits; memory.h.
+  std::uintmax_t memory_bytes = std::numeric_limits<std::uintmax_t>::max();
 };
 
 /// Origin of the data, for the report.
@@ -101,7 +105,7 @@ class Reconstruction {
 };
 
 /// Reconstructs a scan folder from its files. Same input and options, same bits. Fails as the stages and the files do,
-/// and with `invalid_input` for an incomplete scan.
+/// and with `invalid_input` for an incomplete scan, `out_of_range` where not even the least fits into the memory.
 Result<Model> reconstruct(const ScanFolder& scan, const ReconstructOptions& options, const Context& context);
 
 /// Mesh, texture and report.json into `folder` (made or replaced as a whole). Fails with `io`.

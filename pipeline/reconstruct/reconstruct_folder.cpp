@@ -5,6 +5,7 @@
 #include "core/parallel.h"
 #include "core/units.h"
 #include "pipeline/model_io/model_files.h"
+#include "pipeline/reconstruct/memory.h"
 #include "pipeline/reconstruct/reconstruct.h"
 
 namespace scanrig {
@@ -30,23 +31,31 @@ Result<void> add_range_view(const ScanFolder& scan, std::size_t pose, std::size_
   return reconstruction.add_range_view(pose, record.index, to_radians(record.measured_deg), std::move(*range), context);
 }
 
-Result<void> add_all(const ScanFolder& scan, std::size_t pose, Reconstruction& reconstruction, const Context& context) {
+/// `at_once`: stereo views.
+Result<void> add_all(const ScanFolder& scan, std::size_t pose, std::size_t at_once, Reconstruction& reconstruction,
+                     const Context& context) {
   const std::size_t views = scan.manifest().poses[pose].views.size();
   const bool stereo = scan.manifest().source == "stereo";
-  for (std::size_t v = 0; v < views; v += stereo ? kSideBySide : 1) {
+  for (std::size_t v = 0; v < views; v += stereo ? at_once : 1) {
     if (context.stopped()) return fail(ErrorCode::stopped, "stopped by request");
     context.report("range", static_cast<double>(v) / static_cast<double>(views));
-    auto added = stereo ? add_stereo_views(scan, pose, v, std::min(kSideBySide, views - v), reconstruction, context)
+    auto added = stereo ? add_stereo_views(scan, pose, v, std::min(at_once, views - v), reconstruction, context)
                         : add_range_view(scan, pose, v, reconstruction, context);
     if (!added) return added;
   }
   return {};
 }
 
-Result<Reconstruction> begin(const ScanFolder& scan, const ReconstructOptions& options) {
+Result<Reconstruction> begin(const ScanFolder& scan, const ReconstructOptions& options, std::size_t& at_once) {
   if (scan.manifest().source != "stereo") return Reconstruction(options);
   auto calibration = scan.load_calibration();
   if (!calibration) return pass_on(calibration);
+  std::size_t views = 0;
+  for (const PoseRecord& pose : scan.manifest().poses) views += pose.views.size();
+  const int count = static_cast<int>(views);
+  if (auto fits = check_memory(*calibration, count, options.voxel_mm, options.memory_bytes); !fits)
+    return pass_on(fits);
+  at_once = views_at_once(*calibration, count, options.memory_bytes, kSideBySide);
   Reconstruction reconstruction(std::move(*calibration), options);
   reconstruction.images_are_in(scan.path());
   return reconstruction;
@@ -67,10 +76,12 @@ Result<Model> reconstruct(const ScanFolder& scan, const ReconstructOptions& opti
                   scan.path().string(), pose.name, pose.views.size());
     }
   }
-  auto reconstruction = begin(scan, options);
+  std::size_t at_once = 1;
+  auto reconstruction = begin(scan, options, at_once);
   if (!reconstruction) return pass_on(reconstruction);
   for (std::size_t pose = 0; pose < poses.size(); ++pose) {
-    if (auto added = add_all(scan, pose, *reconstruction, context); !added) return pass_on(added, scan.path().string());
+    if (auto added = add_all(scan, pose, at_once, *reconstruction, context); !added)
+      return pass_on(added, scan.path().string());
     if (auto done = reconstruction->finish_pose(pose, context); !done) return pass_on(done, scan.path().string());
   }
   auto model = reconstruction->finish(identity_of(scan.manifest()), context);

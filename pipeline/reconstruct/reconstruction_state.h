@@ -78,6 +78,7 @@ struct Reconstruction::State {
   bool leave_out_misfits(std::size_t pose);
   Result<void> finish_pose(std::size_t pose, const Context& context);
   Result<Transform> find_pose(Report& report, const Context& context);
+  [[nodiscard]] std::uintmax_t prepared_bytes() const;
   Result<Surface> surface(const Transform& pose1_from_pose2, const Context& context);
   void set_view(PoseState& pose, std::size_t v, View view) const;
   void crop_photos(PoseState& pose) const;
