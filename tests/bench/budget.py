@@ -25,7 +25,7 @@ LONG = {
     "calibration": {"debian13"},
     "cameras": {"debian13", "fuzz"},
     "real-rig": {"effects", "sizes"},
-    "fast": {"slurm"},
+    "fast": {"slurm", "large"},
     "end-to-end": {"bare_machine"},
 }
 

@@ -12,6 +12,7 @@ import threading
 import time
 
 import fast_acquisition
+import fast_large
 import fast_peers
 import fast_scaling
 import fast_slurm
@@ -164,4 +165,4 @@ def idle(bench, scratch):
 
 
 PARTS = {"view": view, "scan": scan, "peers": fast_peers.measure, "scaling": fast_scaling.measure, "live": live,
-         "acquisition": fast_acquisition.measure, "idle": idle, "slurm": fast_slurm.measure}
+         "acquisition": fast_acquisition.measure, "idle": idle, "large": fast_large.measure, "slurm": fast_slurm.measure}
