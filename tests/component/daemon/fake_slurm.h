@@ -105,7 +105,7 @@ exit 0
   [[nodiscard]] std::string submissions() const { return read_file(folder_ / "submissions").value_or(""); }
   [[nodiscard]] std::string name(int id) const { return line("name", id); }
   [[nodiscard]] std::string state(int id) const { return line("state", id); }
-  /// Whether its processes have begun: before, whoever ends sbatch ends them.
+  /// Whether its processes have begun: before, they end with sbatch.
   [[nodiscard]] bool runs(int id) const { return !line("pid", id).empty(); }
   void set_state(int id, const std::string& state) const { scan_samples::write_text(of(id) / "state", state + "\n"); }
   /// The job's processes end, as with its node.
