@@ -21,9 +21,9 @@ class Bricks {
   }
   [[nodiscard]] Eigen::AlignedBox3f box(std::size_t brick) const {
     const auto side = static_cast<std::size_t>(per_axis_);
+    const std::size_t row = brick / side, layer = row / side;
     const Eigen::Array3f size = box_.sizes().array() / static_cast<float>(per_axis_);
-    const Eigen::Array3f i(static_cast<float>(brick % side), static_cast<float>(brick / side % side),
-                           static_cast<float>(brick / side / side));
+    const Eigen::Array3f i(static_cast<float>(brick % side), static_cast<float>(row % side), static_cast<float>(layer));
     const Eigen::Vector3f low = (box_.min().array() + i * size).matrix();
     return {low, (low.array() + size).matrix()};
   }
