@@ -53,8 +53,8 @@ class WireRig {
   [[nodiscard]] bool lamp(const std::string& name) const { return lines->level(name); }
 
   /// Checks repeatedly, without disturbing any thread.
-  bool wait_for(const std::function<bool()>& as_wanted) {
-    for (const auto end = Deadline::after(clock, kReplyTimeout); !end.expired(clock);
+  bool wait_for(const std::function<bool()>& as_wanted, Clock::Duration limit = kReplyTimeout) {
+    for (const auto end = Deadline::after(clock, limit); !end.expired(clock);
          clock.sleep_for(std::chrono::milliseconds(1))) {
       if (as_wanted()) return true;
     }

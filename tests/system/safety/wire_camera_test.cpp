@@ -24,6 +24,8 @@ const WireRig::Changes kSimulatedCamera{
     {"speed_deg_s = 45", "speed_deg_s = 180"},
     {"acceleration_deg_s2 = 90", "acceleration_deg_s2 = 720"}};
 
+constexpr std::chrono::minutes kScanLimit(2);  // of a pose, which takes 18 s
+
 /// scanrigd-sim over wires: every driver but the camera's is the shipped one.
 class CameraOnWires : public testing::Test {
  protected:
@@ -46,7 +48,7 @@ TEST_F(CameraOnWires, AScanShowsTheObjectAtTheTrueAngleAndInTheLightThereWas) {
   rig.press("RESET");
   ASSERT_TRUE(rig.wait_ready());
   rig.press("START");
-  ASSERT_TRUE(rig.wait_for([&] { return rig.lamp("FLIP"); })) << *read_file(rig.folder / "daemon.log");
+  ASSERT_TRUE(rig.wait_for([&] { return rig.lamp("FLIP"); }, kScanLimit)) << *read_file(rig.folder / "daemon.log");
   EXPECT_EQ(truth.last_question(), "{\"get\":\"truth\"}\n");
 
   const auto job = rig.only_job();
@@ -65,7 +67,7 @@ TEST_F(CameraOnWires, AScanShowsTheObjectAtTheTrueAngleAndInTheLightThereWas) {
       << "another side of the object";
 
   rig.press("START");
-  EXPECT_TRUE(rig.wait_for([&] { return std::filesystem::exists(job / "truth.json"); }));
+  EXPECT_TRUE(rig.wait_for([&] { return std::filesystem::exists(job / "truth.json"); }, kScanLimit));
   EXPECT_EQ(ScanFolder::open(job)->manifest().state, "scanned");
 }
 
