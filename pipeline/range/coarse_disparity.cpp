@@ -67,7 +67,7 @@ cv::Mat1f flipped(const cv::Mat1f& image) {
 }
 
 /// Between two columns of a row; NaN for NaN.
-float at(const float* row, int width, float x) {
+float value_at(const float* row, int width, float x) {
   if (std::isnan(x)) return x;
   const float inside = std::clamp(x, 0.0F, static_cast<float>(width - 1));
   const int left = std::min(static_cast<int>(inside), width - 2);
@@ -113,10 +113,10 @@ CoarseDisparity match_both(const cv::Mat1b& left, const cv::Mat1b& right, const 
           flipped(match(b_mirrored, a_mirrored, search, speckle_px, false)).colRange(columns)};
 }
 
-/// A smooth surface near the disparities, and what to search beside it: a tenth to a third of all that occur.
+/// A smooth surface near the disparities, and the residuals to search: a third as many, or fewer, as disparities occur.
 struct Guide {
   cv::Mat1f base;
-  Search beside;
+  Search residuals;
 };
 
 /// A quadratic through the disparities, each weighted by how well the one before fits.
@@ -151,27 +151,28 @@ cv::Mat1f smooth_surface(const cv::Mat1f& disparity, const cv::Mat1b& is_known) 
   return out;
 }
 
-/// A pixel x of the left image is seen at x - beside in the right one moved by `base`: beside = d - base(x - beside).
-float beside_base(const float* base, int width, int x, float disparity) {
+/// A pixel x of the left image is seen at x - r in the right one moved by `base`; the residual r = d - base(x - r).
+float residual_of(const float* base, int width, int x, float disparity) {
   constexpr int kRounds = 4;
-  float beside = disparity - base[x];
-  for (int round = 0; round < kRounds; ++round) beside = disparity - at(base, width, static_cast<float>(x) - beside);
-  return beside;
+  float residual = disparity - base[x];
+  for (int round = 0; round < kRounds; ++round)
+    residual = disparity - value_at(base, width, static_cast<float>(x) - residual);
+  return residual;
 }
 
-/// What leads beside the base, less the outliers that were smooth enough not to be taken for speckles.
-Search range_beside(const cv::Mat1f& base, const cv::Mat1f& disparity, const cv::Mat1b& is_known, float scale) {
+/// All that occur, less the outliers that were smooth enough not to be taken for speckles.
+Search residuals_to_search(const cv::Mat1f& base, const cv::Mat1f& disparity, const cv::Mat1b& is_known, float scale) {
   constexpr double kOutliers = 0.003;  // on each side
   constexpr int kMargin = 16;          // px
-  std::vector<float> beside;
+  std::vector<float> residual;
   for (int y = 0; y < base.rows; ++y) {
     for (int x = 0; x < base.cols; ++x) {
-      if (is_known(y, x) != 0) beside.push_back(scale * beside_base(base[y], base.cols, x, disparity(y, x)));
+      if (is_known(y, x) != 0) residual.push_back(scale * residual_of(base[y], base.cols, x, disparity(y, x)));
     }
   }
   const auto quantile = [&](double share) {
-    const auto place = beside.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(beside.size() - 1));
-    std::nth_element(beside.begin(), place, beside.end());
+    const auto place = residual.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(residual.size() - 1));
+    std::nth_element(residual.begin(), place, residual.end());
     return *place;
   };
   const float least = quantile(kOutliers), most = quantile(1.0 - kOutliers);
@@ -193,13 +194,13 @@ std::optional<Guide> guide_for(const cv::Mat1b& left, const cv::Mat1b& right, co
   is_known &= is_object;
   if (cv::countNonZero(is_known) < kFewest) return std::nullopt;
   const cv::Mat1f base = smooth_surface(found, is_known);
-  Guide guide{{}, range_beside(base, found, is_known, kScale)};
+  Guide guide{{}, residuals_to_search(base, found, is_known, kScale)};
   cv::resize(base, guide.base, left.size(), 0.0, 0.0, cv::INTER_LINEAR);
   guide.base *= kScale;
   return guide;
 }
 
-/// Searches beside the guide only: in the right image moved by its base.
+/// Searches the residuals only, in the right image moved by the base.
 CoarseDisparity match_guided(const cv::Mat1b& left, const cv::Mat1b& right, const Guide& guide, int speckle_px) {
   cv::Mat1f columns(left.size()), rows(left.size());
   for (int y = 0; y < left.rows; ++y) {
@@ -210,11 +211,11 @@ CoarseDisparity match_guided(const cv::Mat1b& left, const cv::Mat1b& right, cons
   }
   cv::Mat1b moved;
   cv::remap(right, moved, columns, rows, cv::INTER_LINEAR, cv::BORDER_REPLICATE);
-  cv::Mat1f disparity = match_both(left, moved, guide.beside, speckle_px, false).left;
+  cv::Mat1f disparity = match_both(left, moved, guide.residuals, speckle_px, false).left;
   for (int y = 0; y < left.rows; ++y) {
-    float* beside = disparity[y];
+    float* residual = disparity[y];
     for (int x = 0; x < left.cols; ++x) {
-      beside[x] += at(guide.base[y], left.cols, static_cast<float>(x) - beside[x]);  // NaN stays
+      residual[x] += value_at(guide.base[y], left.cols, static_cast<float>(x) - residual[x]);  // NaN stays
     }
   }
   return {disparity, seen_from_right(disparity)};

@@ -60,6 +60,18 @@ class Workers : public scan_samples::FolderTest {
     return found;
   }
 
+  /// The whole work on "job", to its model.
+  void rebuild(const Recipe& recipe, fakes::ReconstructionLog& log) {
+    ReconstructionThread reconstruction(
+        clock, [&](const ReconstructionTask&) { return std::make_unique<fakes::FakeReconstructor>(log); },
+        [&](Event event) { tell(std::move(event)); });
+    reconstruction.rebuild("job", store->folder("job"), recipe, {});
+    std::unique_lock lock(mutex);
+    changed.wait_for(lock, std::chrono::minutes(1), [&] {
+      return std::ranges::any_of(events, [](const Event& e) { return std::holds_alternative<event::ModelReady>(e); });
+    });
+  }
+
   RealClock clock;
   std::optional<JobStore> store;
   JobTable table;
@@ -154,16 +166,7 @@ TEST_F(Workers, WhatAScanShowsSoFarIsListedAndGoneWithItsEnd) {
   fakes::ReconstructionLog log;
   std::string shown;
   log.at_finish = [&] { shown = read_file(live / "pose1.glb").value_or("nothing"); };
-  {
-    ReconstructionThread reconstruction(
-        clock, [&](const ReconstructionTask&) { return std::make_unique<fakes::FakeReconstructor>(log); },
-        [&](Event event) { tell(std::move(event)); });
-    reconstruction.rebuild("job", store->folder("job"), {.poses = 2, .views = 2}, {});
-    std::unique_lock lock(mutex);
-    changed.wait_for(lock, std::chrono::minutes(1), [&] {
-      return std::ranges::any_of(events, [](const Event& e) { return std::holds_alternative<event::ModelReady>(e); });
-    });
-  }
+  rebuild({.poses = 2, .views = 2}, log);
   EXPECT_THAT(lists_of(events), ElementsAre(ElementsAre("pose1_view00"), ElementsAre("pose1_view00", "pose1_view01"),
                                             ElementsAre("pose1"), testing::IsEmpty()));
   EXPECT_EQ(shown, "pose so far");
@@ -201,16 +204,7 @@ TEST_F(Workers, APoseIsClosedWithItsLastViewWhateverTheMovementCheckWillSay) {
 TEST_F(Workers, ThePoseAfterWhichTheModelComesIsNotShown) {
   make_job("job", "scanned", JobState::reconstructing);
   fakes::ReconstructionLog log;
-  {
-    ReconstructionThread reconstruction(
-        clock, [&](const ReconstructionTask&) { return std::make_unique<fakes::FakeReconstructor>(log); },
-        [&](Event event) { tell(std::move(event)); });
-    reconstruction.rebuild("job", store->folder("job"), {.poses = 1, .views = 2}, {});
-    std::unique_lock lock(mutex);
-    changed.wait_for(lock, std::chrono::minutes(1), [&] {
-      return std::ranges::any_of(events, [](const Event& e) { return std::holds_alternative<event::ModelReady>(e); });
-    });
-  }
+  rebuild({.poses = 1, .views = 2}, log);
   EXPECT_EQ(lists_of(events), (Lists{{"pose1_view00"}, {"pose1_view00", "pose1_view01"}, {}}));
 }
 
