@@ -1,5 +1,7 @@
 #include "pipeline/mesh/vertex_neighbours.h"
 
+#include <cmath>
+
 namespace scanrig {
 
 VertexNeighbours::VertexNeighbours(const Mesh& mesh) : first_(mesh.vertices.size() + 1, 0) {
@@ -26,6 +28,21 @@ VertexNeighbours::VertexNeighbours(const Mesh& mesh) : first_(mesh.vertices.size
   }
   first_.back() = kept;
   list_.resize(kept);
+}
+
+int VertexNeighbours::rounds_for(const Mesh& mesh, float width_mm) const {
+  constexpr int kMaxRounds = 200;
+  double squares = 0.0;
+  std::size_t edges = 0;
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
+    for (const std::uint32_t n : of(v)) {
+      squares += static_cast<double>((mesh.vertices[v] - mesh.vertices[n]).squaredNorm());
+      ++edges;
+    }
+  }
+  const double a_round = 3.0 / 7.0 * squares / static_cast<double>(std::max<std::size_t>(edges, 1));
+  const double width = static_cast<double>(width_mm);
+  return std::clamp(static_cast<int>(std::lround(width * width / std::max(a_round, 1e-12))), 1, kMaxRounds);
 }
 
 }  // namespace scanrig

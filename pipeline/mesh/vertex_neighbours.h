@@ -20,6 +20,9 @@ class VertexNeighbours {
     return {list_.data() + first_[vertex], list_.data() + first_[vertex + 1]};
   }
 
+  /// Rounds of smoothed() that make a Gaussian of this width on the mesh, at least one and at most 200.
+  [[nodiscard]] int rounds_for(const Mesh& mesh, float width_mm) const;
+
   /// Each value becomes the mean of its own and its neighbours', round after round: a Gaussian whose variance on each
   /// axis is 3/7 of a squared edge a round, where a vertex has six neighbours.
   template <class Value>

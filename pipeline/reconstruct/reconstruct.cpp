@@ -142,6 +142,7 @@ Result<void> Reconstruction::State::finish_pose(std::size_t pose, const Context&
   const PosedViews posed{.views = state.views};
   auto partial = integrate({&posed, 1},
                            {.voxel_mm = std::max(options.partial_voxel_mm, options.voxel_mm),
+                            .denoise = std::nullopt,
                             .table_without_silhouettes = calibration.has_value(),
                             .untangle = false,
                             .memory_bytes = prepared_bytes()},

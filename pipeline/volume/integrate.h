@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -13,6 +14,7 @@
 #include "pipeline/range/compact_range.h"
 #include "pipeline/range/range_image.h"
 #include "pipeline/volume/class_table.h"
+#include "pipeline/volume/denoise.h"
 #include "pipeline/volume/range_sampler.h"
 
 namespace scanrig {
@@ -34,18 +36,18 @@ struct VolumeOptions {
   double voxel_mm = 0.25;
   Fusion fusion = Fusion::evidence;
   RangeSamplerOptions sampler{};
-  double band_voxels = 3.0;                ///< minimum of the band below
-  double band_sigmas = 4.0;                ///< of the data's median sigma, where that is more
-  double class_voxels = 2.0;               ///< d_TH of the paper, in voxels
-  float view_sigmas = 4.0F;                ///< a point within this of a view's surface counts as measured by it
-  float hull_tolerance = 0.4F;             ///< a measured surface may extend beyond the hull by this share of the band
-  std::size_t images_per_outside = 5;      ///< without silhouettes a point beside one footprint in this many is outside
-  double hull_room_mm = 25.0;              ///< the hull of a pose extends this far beyond its measured points
-  std::size_t seed_stride = 8;             ///< one measured point in this many is a start of the surface
-  int relax_rounds = 8;                    ///< of a seven-point mean where unmeasured: a Gaussian of 1.5 voxels
-  int smoothing_rounds = 4;                ///< of the staircases on unmeasured surface
-  int scatter_rounds = 40;                 ///< over which the scatter of views is averaged: six edges around
-  float shape_share = 0.4F;                ///< of shape finer than a matching window: error, see README.md
+  double band_voxels = 3.0;            ///< minimum of the band below
+  double band_sigmas = 4.0;            ///< of the data's median sigma, where that is more
+  double class_voxels = 2.0;           ///< d_TH of the paper, in voxels
+  float view_sigmas = 4.0F;            ///< a point within this of a view's surface counts as measured by it
+  float hull_tolerance = 0.4F;         ///< a measured surface may extend beyond the hull by this share of the band
+  std::size_t images_per_outside = 5;  ///< without silhouettes a point beside one footprint in this many is outside
+  double hull_room_mm = 25.0;          ///< the hull of a pose extends this far beyond its measured points
+  std::size_t seed_stride = 8;         ///< one measured point in this many is a start of the surface
+  int relax_rounds = 8;                ///< of a seven-point mean where unmeasured: a Gaussian of 1.5 voxels
+  int smoothing_rounds = 4;            ///< of the staircases on unmeasured surface
+  int scatter_rounds = 40;             ///< over which the scatter of views is averaged: six edges around
+  std::optional<DenoiseOptions> denoise = DenoiseOptions{};  ///< of the measured surface
   float min_agreement = 0.5F;              ///< cosine between surface and measured normal, for moving a vertex onto it
   float doubt_reach_mm = 8.0F;             ///< the solid is doubtful this deep below a closed surface
   float max_filled_mm = 2.0F;              ///< a doubtful tunnel wider than this is not filled

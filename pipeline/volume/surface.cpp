@@ -7,8 +7,8 @@
 #include "core/parallel_blocks.h"
 #include "pipeline/mesh/solid_properties.h"
 #include "pipeline/mesh/vertex_neighbours.h"
+#include "pipeline/volume/denoise.h"
 #include "pipeline/volume/untangle.h"
-#include "pipeline/volume/vertex_sigma.h"
 
 namespace scanrig {
 namespace {
@@ -48,6 +48,15 @@ void settle_vertex(const Field& field, const VolumeOptions& options, const Eigen
   scatter[v] = evidence.scatter;
 }
 
+/// Where the views around scatter more than their sigmas let expect, sigma is larger by that [the Birge ratio].
+void widen_by_scatter(const VertexNeighbours& around, int rounds, const std::vector<Scatter>& scatter, Mesh& mesh) {
+  constexpr float kTooFew = 1e-3F;  // views around, after the smoothing
+  const std::vector<Scatter> mean = around.smoothed(scatter, rounds);
+  for (std::size_t v = 0; v < mesh.sigma.size(); ++v) {
+    if (mean[v].count > kTooFew) mesh.sigma[v] *= std::max(1.0F, mean[v].sum / mean[v].count);
+  }
+}
+
 }  // namespace
 
 void finish_surface(std::unique_ptr<Field> field, const VolumeOptions& options, Mesh& mesh) {
@@ -63,7 +72,7 @@ void finish_surface(std::unique_ptr<Field> field, const VolumeOptions& options, 
   const float window_mm = field->window_mm();
   field.reset();  // much memory, of which the rest needs nothing
   widen_by_scatter(around, options.scatter_rounds, scatter, mesh);
-  widen_by_fine_shape(around, options.shape_share, window_mm, mesh);
+  if (options.denoise) denoise(around, *options.denoise, window_mm, mesh);
   smooth_unmeasured(around, static_cast<float>(options.voxel_mm), options.smoothing_rounds, mesh);
   if (options.untangle) untangle(extracted, mesh);
   mesh.normals = vertex_normals(mesh);
