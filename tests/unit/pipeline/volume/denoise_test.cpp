@@ -86,14 +86,14 @@ TEST(Denoise, TakesNoiseOutOfAQuadraticAndItsSigmaWithIt) {
 }
 
 /// The highest vertex of a sheet of waves as long as a matching window, denoised.
-float crest(float height_mm, float* least_sigma) {
+float crest(float height_mm, float* min_sigma) {
   Mesh mesh = sheet([&](float x, float) { return height_mm * std::sin(std::numbers::pi_v<float> * x / kWindowMm); });
   denoise(VertexNeighbours(mesh), {}, kWindowMm, mesh);
   float highest = 0.0F;
   for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) {
     if (!is_inner(v)) continue;
     highest = std::max(highest, mesh.vertices[v].y());
-    *least_sigma = std::min(*least_sigma, mesh.sigma[v]);
+    *min_sigma = std::min(*min_sigma, mesh.sigma[v]);
   }
   return highest;
 }
