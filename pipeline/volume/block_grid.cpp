@@ -14,6 +14,9 @@ constexpr double kMaxBlocksInBox = 1e8;
 const std::array<Eigen::Vector3i, 6> kFaces = {
     Eigen::Vector3i{-1, 0, 0}, {1, 0, 0}, {0, -1, 0}, {0, 1, 0}, {0, 0, -1}, {0, 0, 1}};
 
+/// Of a block's nodes along one axis.
+bool is_coarse(int node) { return node % 2 == 0 || node == kBlockSide - 1; }
+
 }  // namespace
 
 BlockGrid::BlockGrid(const Eigen::AlignedBox3f& box, float voxel_mm) : voxel_(voxel_mm) {
@@ -82,16 +85,48 @@ std::vector<Eigen::Vector3i> BlockGrid::seed_blocks(const std::vector<Eigen::Vec
   return result;
 }
 
+/// Gives a node between evaluated ones the mean of their distances where they lie on one side of the surface, alike
+/// supported and each farther from it than the node can be from them: no wall or thread passes between.
+bool BlockGrid::interpolate_far_node(Block& block, const Eigen::Vector3i& node) const {
+  const auto around = [](int n) { return is_coarse(n) ? std::array{n, n} : std::array{n - 1, n + 1}; };
+  const auto x = around(node.x()), y = around(node.y()), z = around(node.z());
+  const int corner = Block::node(x[0], y[0], z[0]);
+  const float far = 2.0F * voxel_;
+  float sum = 0.0F;
+  for (int i = 0; i < 8; ++i) {
+    const int n = Block::node(x[i & 1], y[i >> 1 & 1], z[i >> 2]);
+    const float distance = block.distance[n];
+    const bool is_alike = block.support[n] == block.support[corner] && std::abs(distance) > far &&
+                          (distance > 0.0F) == (block.distance[corner] > 0.0F);
+    if (!is_alike) return false;
+    sum += distance;
+  }
+  block.distance[Block::node(node.x(), node.y(), node.z())] = sum / 8.0F;
+  block.support[Block::node(node.x(), node.y(), node.z())] = block.support[corner];
+  return true;
+}
+
+/// Every second node first, and the last ones. A node between them is evaluated only where the surface may be near.
 void BlockGrid::evaluate(const Field& field, Block& block) const {
   const Eigen::Vector3i first = kBlockSide * block.index;
   const Eigen::Vector3f half = Eigen::Vector3f::Constant(0.5F * voxel_ * (kBlockSide - 1));
   const Field::Neighbourhood neighbourhood = field.near(position(first) + half, half.norm());
+  const auto evaluate_node = [&](int x, int y, int z) {
+    const FieldValue value = field.at(position(first + Eigen::Vector3i(x, y, z)), neighbourhood);
+    block.distance[Block::node(x, y, z)] = value.distance;
+    block.support[Block::node(x, y, z)] = value.support;
+  };
+  constexpr std::array<int, 5> kCoarse = {0, 2, 4, 6, kBlockSide - 1};
+  for (const int z : kCoarse) {
+    for (const int y : kCoarse) {
+      for (const int x : kCoarse) evaluate_node(x, y, z);
+    }
+  }
   for (int z = 0; z < kBlockSide; ++z) {
     for (int y = 0; y < kBlockSide; ++y) {
       for (int x = 0; x < kBlockSide; ++x) {
-        const FieldValue value = field.at(position(first + Eigen::Vector3i(x, y, z)), neighbourhood);
-        block.distance[Block::node(x, y, z)] = value.distance;
-        block.support[Block::node(x, y, z)] = value.support;
+        if (is_coarse(x) && is_coarse(y) && is_coarse(z)) continue;
+        if (!interpolate_far_node(block, {x, y, z})) evaluate_node(x, y, z);
       }
     }
   }

@@ -65,6 +65,7 @@ class BlockGrid {
   [[nodiscard]] std::vector<Eigen::Vector3i> seed_blocks(const std::vector<Eigen::Vector3f>& seeds) const;
   [[nodiscard]] std::vector<Eigen::Vector3i> open_neighbours(const Block& block) const;
   void evaluate(const Field& field, Block& block) const;
+  bool interpolate_far_node(Block& block, const Eigen::Vector3i& node) const;
   void follow(std::vector<Eigen::Vector3i> wanted, const Bricks& bricks, std::size_t brick, const Field& field,
               const Context& context, std::vector<bool>& is_queued, std::vector<std::vector<Eigen::Vector3i>>& queue);
 
