@@ -22,19 +22,19 @@ struct Beyond {
 };
 
 /// `rounds` of smoothing make the first width, twice as many the next.
-std::vector<Beyond> beyond_quadratics(const VertexNeighbours& around, const Mesh& mesh, int rounds) {
+std::vector<Beyond> beyond_quadratics(const VertexNeighbours& around, const Mesh& mesh,
+                                      const std::vector<Eigen::Vector3f>& normals, int rounds) {
   const std::size_t count = mesh.vertices.size();
   std::vector<Placed> placed(count);
   for (std::size_t v = 0; v < count; ++v) placed[v] << mesh.vertices[v], is_measured(mesh, v) ? 1.0F : 0.0F;
-  const std::vector<Eigen::Vector3f> normals = vertex_normals(mesh);
   std::vector<Beyond> result(count);
   std::vector<Placed> once = around.smoothed(placed, rounds);
   for (std::size_t k = 0; k < kScales; ++k, rounds *= 2) {
     std::vector<Placed> twice = around.smoothed(once, rounds);
-    for (std::size_t v = 0; v < count; ++v) {
+    for_each_in_blocks(count, [&](std::size_t v) {
       result[v].height_mm[k] = (placed[v] - 2.0F * once[v] + twice[v]).head<3>().dot(normals[v]);
       result[v].measured = twice[v].w();
-    }
+    });
     once = std::move(twice);
   }
   return result;
@@ -70,16 +70,16 @@ float interpolated(const ByRoughness& at, const ByRoughness& values, float ratio
 void denoise(const VertexNeighbours& around, const DenoiseOptions& options, float window_mm, Mesh& mesh) {
   if (!(window_mm > 0.0F)) return;
   const int rounds = around.rounds_for(mesh, 0.5F * window_mm);
-  const std::vector<Beyond> beyond = beyond_quadratics(around, mesh, rounds);
-  const std::vector<float> mean = mean_height(around, mesh, beyond, rounds << (kScales - 1));
   const std::vector<Eigen::Vector3f> normals = vertex_normals(mesh);
-  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
-    if (!is_measured(mesh, v)) continue;
+  const std::vector<Beyond> beyond = beyond_quadratics(around, mesh, normals, rounds);
+  const std::vector<float> mean = mean_height(around, mesh, beyond, rounds << (kScales - 1));
+  for_each_in_blocks(mesh.vertices.size(), [&](std::size_t v) {
+    if (!is_measured(mesh, v)) return;
     const float ratio = mean[v] / mesh.sigma[v], left = interpolated(options.roughness, options.sigma, ratio) *
                                                         std::max(1.0F, ratio / options.roughness.back());
     if (beyond[v].measured < options.min_measured) {
       mesh.sigma[v] *= std::max(1.0F, left);
-      continue;
+      return;
     }
     float noise = 0.0F, finer = 0.0F;
     for (std::size_t k = 0; k < kScales; ++k) {
@@ -88,7 +88,7 @@ void denoise(const VertexNeighbours& around, const DenoiseOptions& options, floa
     }
     mesh.vertices[v] -= noise * normals[v];
     mesh.sigma[v] *= left;
-  }
+  });
 }
 
 }  // namespace scanrig
