@@ -78,13 +78,13 @@ SampleCheck check_sample(const PoseObservations& observations, int level, const 
   return best;
 }
 
-bool contradicts(const SampleCheck& t, double spread_mm, double tolerance) {
-  if (t.kind == SampleCheck::Kind::free_space) return true;
-  return t.kind == SampleCheck::Kind::surface &&
-         std::abs(t.distance_mm) > tolerance * std::hypot(static_cast<double>(t.sigma_mm), spread_mm);
-}
-
 }  // namespace
+
+bool contradicts(const SampleCheck& check, double spread_mm, double tolerance) {
+  if (check.kind == SampleCheck::Kind::free_space) return true;
+  return check.kind == SampleCheck::Kind::surface &&
+         std::abs(check.distance_mm) > tolerance * std::hypot(static_cast<double>(check.sigma_mm), spread_mm);
+}
 
 std::vector<SampleCheck> check_samples(const PoseObservations& pose1, const PoseObservations& pose2,
                                        const Transform& pose1_from_pose2, int level, double reach_mm,

@@ -44,6 +44,10 @@ std::vector<SampleCheck> check_samples(const PoseObservations& pose1, const Pose
                                        const Transform& pose1_from_pose2, int level, double reach_mm,
                                        const AgreementOptions& options);
 
+/// True for a sample in free space, or `tolerance` standard deviations off the surface; `spread_mm`, the error not
+/// covered by sigma, is added to sigma.
+bool contradicts(const SampleCheck& check, double spread_mm, double tolerance);
+
 /// Summary of the checks.
 struct Agreement {
   double confirmed = 0.0;     ///< shares of all samples
@@ -53,7 +57,7 @@ struct Agreement {
   [[nodiscard]] double score() const { return confirmed - 2.0 * contradicted; }
 };
 
-/// Counts with `options.tolerance`; `spread_mm`, the error not covered by sigma, is added to sigma.
+/// Counts with `options.tolerance`.
 Agreement count_agreement(const std::vector<SampleCheck>& sample_checks, double spread_mm,
                           const AgreementOptions& options);
 

@@ -13,6 +13,7 @@
 #include "pipeline/pose/point_pairs.h"
 #include "pipeline/pose/rest_pairs.h"
 #include "pipeline/pose/stable_rests.h"
+#include "pipeline/pose/symmetry.h"
 #include "pipeline/range/range_image.h"
 
 namespace scanrig {
@@ -58,6 +59,11 @@ struct PoseOptions {
   SearchRound last_round = {0, 10, 0.01, 0.015, 0, 0.0};  ///< for rivals; keeps all that are `same_deg` apart
   AgreementOptions agreement;
   PointPairOptions voting;
+  SymmetryOptions symmetry;
+  double flat_share = 0.004;          ///< of the object's size: surface this near to a table lies flat on it
+  double max_unexplained = 0.015;     ///< share of the samples that may show the object twice as it stood
+  double min_turned_over_deg = 30.0;  ///< of motions that fit equally well one with this tilt, or less than its
+                                      ///< supplement, is preferred: both poses then share surface from all sides
 };
 
 /// A motion between the poses after refinement, with the verdict on it.
@@ -84,15 +90,24 @@ struct PoseEstimate {
   int refined = 0;              ///< motions aligned at all
   double overlap = 0.0;
   double condition = 0.0;  ///< of the refinement, see RefinedPose
+  /// The motions `symmetry.elements[i] * pose1_from_pose2`, and all free turns of them, fit as well as this one and
+  /// give the same surface. `none`: no other does.
+  Symmetry symmetry;
+  /// Motions that turn the object over and motions that do not fit alike; one that does was taken.
+  bool turned_over_is_assumed = false;
 };
 
 /// Transform from pose 2's frame to pose 1's. Generators: pairs of stable tangent planes [Park and Subbarao 2002,
 /// section 3] and votes of oriented point pairs. All hypotheses are refined and judged by the range images of both
 /// poses, free space and silhouettes; the verdict trims nothing. Same bits for any number of threads.
-/// Fails with `not_closed` and `degenerate` (no valid solid or measured surface), `no_overlap` (no hypothesis fits),
-/// `same_rest` (the object was not turned over), `ambiguous` (more than one solution fits; the message lists them),
-/// `stopped`.
+/// Several motions that fit and give the same surface, within what sigma and sampling tell, are one answer with a
+/// symmetry. Fails with `not_closed` and `degenerate` (no valid solid or measured surface), `no_overlap` (no hypothesis
+/// fits), `same_rest` (the object was not turned over), `ambiguous` (several motions fit that give different surfaces;
+/// the message lists them), `stopped`.
 Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose2, const PoseOptions& options,
                                    const Context& context);
+
+/// Whether a motion between poses turns the object over, and not only about the vertical.
+bool turns_over(const Transform& pose1_from_pose2, const PoseOptions& options = {});
 
 }  // namespace scanrig

@@ -127,6 +127,16 @@ void add_contacts(const RefineOptions& options, const Transform& pose1_from_pose
   }
 }
 
+/// Holds the turns that the surfaces leave open; along them alone the solution differs.
+void hold_turns(const RefineOptions& options, Equations& e) {
+  const double w = e.normal.trace();
+  for (const FreeTurn& turn : options.held) {
+    Vector6 k;
+    k << turn.axis, turn.axis.cross(e.centre - turn.point);
+    e.normal += w / k.squaredNorm() * k * k.transpose();
+  }
+}
+
 double condition_of(const Matrix6& information, double arm_mm) {
   Vector6 arc;
   arc << Eigen::Vector3d::Constant(1.0 / arm_mm), Eigen::Vector3d::Ones();
@@ -160,6 +170,7 @@ RefinedPose align(const MeasuredPose& pose1, const MeasuredPose& pose2, const Tr
   while (result.iterations < options.max_iterations && found.correspondences.size() >= options.min_correspondences) {
     Equations e = accumulate(found, options);
     add_contacts(options, result.pose1_from_pose2, e);
+    hold_turns(options, e);
     const Matrix6 damped = e.normal + 1e-9 * e.normal.trace() * Matrix6::Identity();
     const Vector6 x = damped.ldlt().solve(e.right);
     const Eigen::Translation3d to_centre(e.centre);

@@ -18,12 +18,19 @@ struct Contact {
   double offset_mm = 0.0;                                     ///< normal.x = offset
 };
 
+/// A turn of pose 2 that changes no surface, of a body of revolution: noise would let it drift. Pose 1's frame.
+struct FreeTurn {
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitY();  ///< unit
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< on the axis
+};
+
 struct RefineOptions {
   double capture_mm = 12.0;  ///< farthest distance between corresponding surfaces at the start
   double keep = 0.8;         ///< share of the correspondences that is used, the closest ones
   int levels = 3;
   int max_iterations = 25;  ///< maximum Gauss-Newton steps per level
   std::vector<Contact> contacts;
+  std::vector<FreeTurn> held;            ///< turns that stay as they start
   double min_facing = 0.25;              ///< cosine below which a view does not judge a point
   double min_agreement = 0.6;            ///< cosine between corresponding normals
   std::size_t min_correspondences = 30;  ///< fewer are no overlap

@@ -1,0 +1,156 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/unit/pipeline/pose/posed_scan.h"
+#include "tests/unit/pipeline/pose/turned_solids.h"
+
+namespace scanrig {
+namespace {
+
+using testing::PosedScan;
+using testing::Solid;
+using testing::turn;
+using Group = Symmetry::Group;
+
+const Eigen::Matrix3d kLaidDown = turn(25, Eigen::Vector3d::UnitY()) * turn(90, Eigen::Vector3d::UnitX());
+const Eigen::Matrix3d kTurnedOnTheTable = turn(65, Eigen::Vector3d::UnitY());
+
+/// Farthest distance of the model's surface from the object: pose 2's range images placed in pose 1.
+double surface_error(const PosedScan& scan, const Solid& solid, const Transform& pose1_from_pose2) {
+  double error = 0.0;
+  for (const View& view : scan.views2) {
+    const Transform pose1_from_camera = pose1_from_pose2 * view.range.camera_from_pose.inverse();
+    for (int row = 0; row < view.range.depth.rows; ++row) {
+      for (int column = 0; column < view.range.depth.cols; ++column) {
+        const float depth = view.range.depth(row, column);
+        if (std::isnan(depth)) continue;
+        error =
+            std::max(error, std::abs(solid(pose1_from_camera * view.range.projection.unproject(column, row, depth))));
+      }
+    }
+  }
+  return error;
+}
+
+/// A model with this symmetry, as good as noise of 0.01 mm allows.
+void expect_model(const Result<PoseEstimate>& estimate, const PosedScan& scan, const Solid& solid, Group group,
+                  int fold, std::size_t motions) {
+  ASSERT_TRUE(estimate) << estimate.error().message;
+  EXPECT_STREQ(to_string(estimate->symmetry.group), to_string(group)) << describe(estimate->symmetry);
+  EXPECT_EQ(estimate->symmetry.fold, fold);
+  EXPECT_EQ(estimate->symmetry.motions, motions);
+  EXPECT_LT(surface_error(scan, solid, estimate->pose1_from_pose2), 0.12);
+}
+
+TEST(Symmetry, OfABoxIsThreeHalfTurns) {
+  const Solid box = testing::block({-30, 0, -20}, {30, 30, 20});
+  const PosedScan scan = testing::scan(box, kLaidDown);
+  expect_model(scan.estimate(), scan, box, Group::dihedral, 2, 4);
+}
+
+TEST(Symmetry, OfACubeIsAllItsTwentyFourPositions) {
+  const Solid cube = testing::block({-20, 0, -20}, {20, 40, 20});
+  const PosedScan scan = testing::scan(cube, kLaidDown);
+  expect_model(scan.estimate(), scan, cube, Group::cubic, 4, 24);
+}
+
+TEST(Symmetry, OfAHexagonalPrismIsDihedral) {
+  const Solid prism = testing::prism(6, 20, 50);
+  const PosedScan scan = testing::scan(prism, kLaidDown);
+  expect_model(scan.estimate(), scan, prism, Group::dihedral, 6, 12);
+}
+
+TEST(Symmetry, OfABottleIsAnyTurnAboutItsAxis) {
+  const PosedScan scan = testing::scan(testing::bottle(), kLaidDown);
+  const auto estimate = scan.estimate();
+  expect_model(estimate, scan, testing::bottle(), Group::axial, 0, 0);
+  ASSERT_TRUE(estimate);
+  EXPECT_FALSE(estimate->symmetry.two_sided);
+  EXPECT_GT(estimate->symmetry.axis.y(), 0.9999);
+  EXPECT_LT(std::hypot(estimate->symmetry.point.x(), estimate->symmetry.point.z()), 0.05);
+}
+
+TEST(Symmetry, OfACylinderHasTwoSides) {
+  const Solid cylinder = testing::upright_cylinder({0, 0, 0}, 20, 50);
+  const PosedScan scan = testing::scan(cylinder, kLaidDown);
+  const auto estimate = scan.estimate();
+  expect_model(estimate, scan, cylinder, Group::axial, 0, 0);
+  ASSERT_TRUE(estimate);
+  EXPECT_TRUE(estimate->symmetry.two_sided);
+}
+
+/// A ball shows nothing of how it was turned.
+TEST(Symmetry, OfABallThatWasNotTurnedOverStillGivesItsModel) {
+  const Solid ball = testing::ball({0, 25, 0}, 25);
+  const PosedScan scan = testing::scan(ball, kTurnedOnTheTable);
+  const auto estimate = scan.estimate();
+  ASSERT_TRUE(estimate) << estimate.error().message;
+  EXPECT_TRUE(estimate->symmetry.is_continuous()) << describe(estimate->symmetry);
+  EXPECT_LT(surface_error(scan, ball, estimate->pose1_from_pose2), 0.12);
+}
+
+/// A cap of 0.08 mm, eight times the noise of a pixel, on a side of a box that both poses see.
+TEST(Symmetry, IsNotClaimedOfABoxWithALowBump) {
+  const Solid box = testing::block({-30, 0, -20}, {30, 30, 20});
+  const Solid bumped = testing::with_bump(box, {30, 17, 6}, Eigen::Vector3d::UnitX(), 0.08, 12);
+  const PosedScan scan = testing::scan(bumped, kLaidDown);
+  const auto estimate = scan.estimate();
+  if (!estimate) {
+    EXPECT_EQ(estimate.error().code, ErrorCode::ambiguous) << estimate.error().message;
+    return;
+  }
+  EXPECT_LT(rotation_angle(estimate->pose1_from_pose2.linear().transpose() * scan.pose1_from_pose2.linear()),
+            to_radians(0.3));
+  EXPECT_LT(surface_error(scan, bumped, estimate->pose1_from_pose2), 0.12);
+}
+
+TEST(Symmetry, OfABottleThatOnlyTurnedOnTheTableIsNoReasonToTakeItForTurnedOver) {
+  const auto estimate = testing::scan(testing::bottle(), kTurnedOnTheTable).estimate();
+  ASSERT_FALSE(estimate);
+  EXPECT_EQ(estimate.error().code, ErrorCode::same_rest) << estimate.error().message;
+}
+
+/// Its hollow is on top twice.
+TEST(Symmetry, OfACupThatStandsTwiceDoesNot) {
+  const Solid cup = testing::lathed({{0, 0}, {22, 0}, {22, 50}, {18, 50}, {18, 5}, {0, 5}});
+  const auto estimate = testing::scan(cup, kTurnedOnTheTable).estimate();
+  ASSERT_FALSE(estimate);
+  EXPECT_EQ(estimate.error().code, ErrorCode::same_rest) << estimate.error().message;
+}
+
+/// What is on top is seen in pose 1 alone, what is below in pose 2 alone, and the sides that both see fit four ways.
+TEST(Symmetry, DoesNotHideThatBothEndsDiffer) {
+  const Solid both_ends =
+      testing::together({testing::block({-20, 5, -20}, {20, 45, 20}), testing::ball({10, 45, 4}, 5),
+                         testing::block({-14, 0, 6}, {-4, 6, 14}), testing::block({-14, 0, -14}, {-8, 6, -8}),
+                         testing::block({12, 0, -4}, {18, 6, 4})});
+  const auto estimate =
+      testing::scan(both_ends, turn(33, Eigen::Vector3d::UnitY()) * turn(180, Eigen::Vector3d::UnitX())).estimate();
+  ASSERT_FALSE(estimate) << describe(estimate->symmetry);
+  EXPECT_EQ(estimate.error().code, ErrorCode::ambiguous) << estimate.error().message;
+}
+
+TEST(Symmetry, IsSaidInOneSentence) {
+  Symmetry symmetry;
+  symmetry.group = Group::dihedral;
+  symmetry.fold = 6;
+  EXPECT_EQ(describe(symmetry),
+            "the part is the same after each turn by 60 deg about one axis, and turned end for end");
+  symmetry.of = Symmetry::Of::pose2;
+  symmetry.group = Group::axial;
+  EXPECT_EQ(describe(symmetry), "what pose 2 shows of the part is the same after every turn about one axis");
+}
+
+TEST(Symmetry, GivesTheSameBitsOnAnyNumberOfThreads) {
+  const PosedScan scan = testing::scan(testing::prism(6, 20, 50), kLaidDown);
+  Result<PoseEstimate> one, many;
+  with_threads(1, [&] { one = scan.estimate(); });
+  with_threads(3, [&] { many = scan.estimate(); });
+  ASSERT_TRUE(one && many);
+  EXPECT_TRUE(one->pose1_from_pose2.matrix() == many->pose1_from_pose2.matrix());
+  EXPECT_TRUE(one->symmetry.axis == many->symmetry.axis);
+}
+
+}  // namespace
+}  // namespace scanrig
