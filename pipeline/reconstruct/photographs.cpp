@@ -85,7 +85,26 @@ Result<KeptPhoto> Reconstruction::State::photo(const ScanFolder* scan, std::size
   return photo;
 }
 
-Result<std::vector<Photo>> Reconstruction::State::photos(const Transform& pose1_from_pose2) const {
+/// `scan`: as of photo().
+Result<void> Reconstruction::State::add_photos(const ScanFolder* scan, std::size_t pose,
+                                               const Transform& pose_from_model, std::vector<Photo>& photos) const {
+  for (std::size_t v = 0; v < poses[pose].plain.size(); ++v) {
+    // The registration of the view's range image holds for its photographs too.
+    const Transform left_from_turntable =
+        poses[pose].watch ? poses[pose].watch->left_from_turntable() : rectification->left_from_turntable;
+    const Transform turntable_from_pose = left_from_turntable.inverse() * poses[pose].views[v].range.camera_from_pose;
+    const Transform turntable_from_model = turntable_from_pose * pose_from_model;
+    const Calibration& cameras = poses[pose].watch ? poses[pose].watch->calibration() : *calibration;
+    for (std::size_t camera = 0; camera < 2; ++camera) {
+      auto kept = photo(scan, pose, v, camera);
+      if (!kept) return pass_on(kept);
+      photos.push_back({camera == 0 ? cameras.left : cameras.right, turntable_from_model, kept->pixels, kept->first});
+    }
+  }
+  return {};
+}
+
+Result<std::vector<Photo>> Reconstruction::State::photos(const FoundPose& pose2) const {
   std::vector<Photo> photos;
   std::optional<ScanFolder> scan;
   if (reads_again()) {
@@ -94,22 +113,36 @@ Result<std::vector<Photo>> Reconstruction::State::photos(const Transform& pose1_
     scan = std::move(*opened);
   }
   for (std::size_t p = 0; p < poses.size(); ++p) {
-    const Transform pose_from_model = p == 0 ? Transform::Identity() : pose1_from_pose2.inverse();
-    for (std::size_t v = 0; v < poses[p].plain.size(); ++v) {
-      // The registration of the view's range image holds for its photographs too.
-      const Transform left_from_turntable =
-          poses[p].watch ? poses[p].watch->left_from_turntable() : rectification->left_from_turntable;
-      const Transform turntable_from_pose = left_from_turntable.inverse() * poses[p].views[v].range.camera_from_pose;
-      const Transform turntable_from_model = turntable_from_pose * pose_from_model;
-      const Calibration& cameras = poses[p].watch ? poses[p].watch->calibration() : *calibration;
-      for (std::size_t camera = 0; camera < 2; ++camera) {
-        auto kept = photo(scan ? &*scan : nullptr, p, v, camera);
-        if (!kept) return pass_on(kept);
-        photos.push_back({camera == 0 ? cameras.left : cameras.right, turntable_from_model, kept->pixels, kept->first});
-      }
-    }
+    const std::size_t first = photos.size();
+    const Transform pose_from_model = p == 0 ? Transform::Identity() : pose2.pose1_from_pose2.inverse();
+    if (auto done = add_photos(scan ? &*scan : nullptr, p, pose_from_model, photos); !done) return pass_on(done);
+    for (std::size_t i = first; pose2.layers && i < photos.size(); ++i) photos[i].layer = static_cast<int>(p);
   }
   return photos;
+}
+
+/// Each pose's own photographs on its own surface, then both together.
+Result<ColourDecision> Reconstruction::State::turn_by_colours(const PoseEstimate& estimate,
+                                                              const Context& context) const {
+  std::optional<ScanFolder> scan;
+  if (reads_again()) {
+    auto opened = ScanFolder::open(folder);
+    if (!opened) return pass_on(opened);
+    scan = std::move(*opened);
+  }
+  std::vector<std::vector<PaintedPoint>> painted;
+  for (std::size_t p = 0; p < 2; ++p) {
+    std::vector<Photo> photographs;
+    if (auto done = add_photos(scan ? &*scan : nullptr, p, Transform::Identity(), photographs); !done) {
+      return pass_on(done);
+    }
+    auto paint = paint_of(poses[p].partial.mesh, photographs, context);
+    if (!paint) return pass_on(paint);
+    painted.push_back(std::move(*paint));
+  }
+  std::vector<Transform> motions;
+  for (const Transform& element : estimate.symmetry.elements) motions.push_back(element * estimate.pose1_from_pose2);
+  return turn_by_colour(painted[0], painted[1], motions, estimate.symmetry.free_turns());
 }
 
 /// Grey where there is no photograph, or it cannot be read: it is only to be looked at.

@@ -155,8 +155,8 @@ Result<void> Reconstruction::State::finish_pose(std::size_t pose, const Context&
   return {};
 }
 
-Result<Transform> Reconstruction::State::find_pose(Report& report, const Context& context) {
-  if (poses.size() < 2) return Transform::Identity();
+Result<Reconstruction::State::FoundPose> Reconstruction::State::find_pose(Report& report, const Context& context) {
+  if (poses.size() < 2) return FoundPose{};
   const StageLog::Timer timer(log, "pose");
   const auto pose_options = pose_options_of(options.rests);
   if (!pose_options) return pass_on(pose_options);
@@ -165,16 +165,50 @@ Result<Transform> Reconstruction::State::find_pose(Report& report, const Context
   const auto estimate = estimate_pose(first, second, *pose_options, context);
   if (!estimate) return pass_on(estimate);
   report.add_estimate(*estimate);
+  FoundPose found{.pose1_from_pose2 = estimate->pose1_from_pose2};
   RefineOptions refinement;
   refinement.contacts = estimate->best.contacts;
+  refinement.held = estimate->symmetry.free_turns();
+  if (estimate->symmetry.group != Symmetry::Group::none) {
+    auto chosen = choose_turn(*estimate, report, context);
+    if (!chosen) return pass_on(chosen);
+    found = *chosen;
+    // The symmetry carries the planes that the part touches to other planes that it touches.
+    const Transform element = found.pose1_from_pose2 * estimate->pose1_from_pose2.inverse();
+    for (Contact& contact : refinement.contacts) {
+      contact.normal_in_pose1 = element.linear() * contact.normal_in_pose1;
+      contact.offset_mm += contact.normal_in_pose1.dot(element.translation());
+    }
+  }
   if (calibration) {
     const RegistrationOptions known = registration_options(*calibration);
     refinement.axis = {to_radians(known.axis_tilt_sigma_deg), known.axis_shift_sigma_mm};
   }
-  const auto refined = refine_pose(poses[0].views, poses[1].views, estimate->pose1_from_pose2, refinement, context);
+  const auto refined = refine_pose(poses[0].views, poses[1].views, found.pose1_from_pose2, refinement, context);
   if (!refined) return pass_on(refined);
   report.add_refinement(*refined);
-  return refined->pose1_from_pose2;
+  found.pose1_from_pose2 = refined->pose1_from_pose2;
+  return found;
+}
+
+/// Of the motions that the shape leaves open: by the colours, if these show it.
+Result<Reconstruction::State::FoundPose> Reconstruction::State::choose_turn(const PoseEstimate& estimate,
+                                                                            Report& report, const Context& context) {
+  FoundPose found{.pose1_from_pose2 = estimate.pose1_from_pose2};
+  if (poses[0].plain.empty() || poses[1].plain.empty()) {
+    report.add_turn(estimate, nullptr);
+    return found;
+  }
+  const auto colours = turn_by_colours(estimate, context);
+  if (!colours) return pass_on(colours);
+  report.add_turn(estimate, &*colours);
+  found.layers = !colours->is_decided;
+  if (!colours->is_decided) return found;
+  found.pose1_from_pose2 = colours->pose1_from_pose2;
+  if (turns_over(found.pose1_from_pose2)) return found;
+  return fail(ErrorCode::same_rest,
+              "the colours show that the object was not turned over between the two poses; lay it on another side and "
+              "scan pose 2 again");
 }
 
 /// Half of what is left: blocks and mesh want the rest.
@@ -226,36 +260,36 @@ Result<void> Reconstruction::State::prepare(const Context& context) {
   for (const PoseState& pose : poses) {
     report.add_pose(pose.views, pose.registration, pose.partial.report, pose.watch ? &*pose.watch : nullptr);
   }
-  const auto pose1_from_pose2 = find_pose(report, context);
-  if (!pose1_from_pose2) return pass_on(pose1_from_pose2, "pose 2 in pose 1");
-  if (auto done = judge_silhouettes_of_both(*pose1_from_pose2, context); !done) return pass_on(done);
+  const auto pose2 = find_pose(report, context);
+  if (!pose2) return pass_on(pose2, "pose 2 in pose 1");
+  if (auto done = judge_silhouettes_of_both(pose2->pose1_from_pose2, context); !done) return pass_on(done);
   give_memory_back();  // of the matching, or it would add to the peak
-  auto integrated = surface(*pose1_from_pose2, context);
+  auto integrated = surface(pose2->pose1_from_pose2, context);
   if (!integrated) return pass_on(integrated, "integration");
   release_range_images();
   give_memory_back();
-  prepared.emplace(Prepared{*pose1_from_pose2, std::move(*integrated), std::move(report)});
+  prepared.emplace(Prepared{*pose2, std::move(*integrated), std::move(report)});
   return {};
 }
 
 Result<Model> Reconstruction::State::finish(const ScanIdentity& identity, const Context& context) {
   if (auto done = prepare(context); !done) return pass_on(done);
-  auto& [pose1_from_pose2, surface, report] = *prepared;
+  auto& [pose2, surface, report] = *prepared;
   report.add_identity(identity);
   Model model;
   model.mesh.mesh = std::move(surface.mesh);
-  if (auto done = add_texture(model.mesh, pose1_from_pose2, report, context); !done) return pass_on(done, "texture");
+  if (auto done = add_texture(model.mesh, pose2, report, context); !done) return pass_on(done, "texture");
   report.add_surface(model.mesh.mesh, surface.report);
   report.add_disagreements(disagreements);
   model.report = std::make_shared<const nlohmann::json>(report.finished(log));
   return model;
 }
 
-Result<void> Reconstruction::State::add_texture(TexturedMesh& model, const Transform& pose1_from_pose2, Report& report,
+Result<void> Reconstruction::State::add_texture(TexturedMesh& model, const FoundPose& pose2, Report& report,
                                                 const Context& context) {
   if (!options.texture) return {};
   const StageLog::Timer timer(log, "texture");
-  const auto photographs = photos(pose1_from_pose2);
+  const auto photographs = photos(pose2);
   if (!photographs) return pass_on(photographs);
   if (photographs->empty()) return {};
   std::vector<std::pair<std::size_t, int>> views;  // pose and view of every two photographs

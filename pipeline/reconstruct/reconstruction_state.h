@@ -16,6 +16,7 @@
 #include "pipeline/reconstruct/report.h"
 #include "pipeline/reconstruct/rig_watch.h"
 #include "pipeline/reconstruct/stage_log.h"
+#include "pipeline/reconstruct/turn_by_colour.h"
 #include "pipeline/registration/register_views.h"
 #include "pipeline/texture/texture.h"
 #include "pipeline/volume/integrate.h"
@@ -44,9 +45,15 @@ struct Reconstruction::State {
     bool finished = false;
   };
 
+  /// Place of pose 2. `layers`: its photographs may lie otherwise on the surface than pose 1's.
+  struct FoundPose {
+    Transform pose1_from_pose2 = Transform::Identity();
+    bool layers = false;
+  };
+
   /// What finish() needs of the finished poses alone.
   struct Prepared {
-    Transform pose1_from_pose2;
+    FoundPose pose2;
     Surface surface;
     Report report;
   };
@@ -77,7 +84,8 @@ struct Reconstruction::State {
   bool undo_motions(std::size_t pose, const RegistrationOptions& priors);
   bool leave_out_misfits(std::size_t pose);
   Result<void> finish_pose(std::size_t pose, const Context& context);
-  Result<Transform> find_pose(Report& report, const Context& context);
+  Result<FoundPose> find_pose(Report& report, const Context& context);
+  Result<FoundPose> choose_turn(const PoseEstimate& estimate, Report& report, const Context& context);
   [[nodiscard]] std::uintmax_t prepared_bytes() const;
   Result<Surface> surface(const Transform& pose1_from_pose2, const Context& context);
   void set_view(PoseState& pose, std::size_t v, View view) const;
@@ -85,10 +93,12 @@ struct Reconstruction::State {
   void release_range_images();
   Result<ViewImages> whole_images(std::size_t pose, std::size_t v) const;
   Result<KeptPhoto> photo(const ScanFolder* scan, std::size_t pose, std::size_t v, std::size_t camera) const;
-  Result<std::vector<Photo>> photos(const Transform& pose1_from_pose2) const;
+  Result<std::vector<Photo>> photos(const FoundPose& pose2) const;
+  Result<void> add_photos(const ScanFolder* scan, std::size_t pose, const Transform& pose_from_model,
+                          std::vector<Photo>& photos) const;
+  Result<ColourDecision> turn_by_colours(const PoseEstimate& estimate, const Context& context) const;
   [[nodiscard]] LivePhoto live_photo(std::size_t pose, std::size_t v) const;
-  Result<void> add_texture(TexturedMesh& model, const Transform& pose1_from_pose2, Report& report,
-                           const Context& context);
+  Result<void> add_texture(TexturedMesh& model, const FoundPose& pose2, Report& report, const Context& context);
   Result<void> prepare(const Context& context);
   Result<Model> finish(const ScanIdentity& identity, const Context& context);
 };

@@ -154,6 +154,29 @@ json mesh_json(const Mesh& mesh) {
   return result;
 }
 
+json symmetry_json(const Symmetry& symmetry) {
+  const bool has_axis = symmetry.axis.norm() > 0.5;
+  const bool has_point = has_axis || symmetry.group == Symmetry::Group::spherical;
+  return {{"group", to_string(symmetry.group)},
+          {"of", to_string(symmetry.of)},
+          {"fold", symmetry.is_continuous() ? json() : json(symmetry.fold)},
+          {"two_sided", symmetry.two_sided},
+          {"axis", has_axis ? vector_json(symmetry.axis) : json()},
+          {"point", has_point ? vector_json(symmetry.point) : json()},
+          {"motions", symmetry.motions == 0 ? json() : json(symmetry.motions)}};
+}
+
+/// Without a full stop.
+std::string turn_sentence(const PoseEstimate& estimate, const ColourDecision* colours) {
+  const char* how = "; nothing shows which of its turns it made";
+  if (colours != nullptr && colours->is_decided) how = "; its colours show how it was turned";
+  if (colours != nullptr && !colours->is_decided) {
+    how = "; nothing shows how it was turned, so each place has the colours of one pose alone";
+  }
+  const bool is_assumed = estimate.turned_over_is_assumed && !(colours != nullptr && colours->is_decided);
+  return describe(estimate.symmetry) + how + (is_assumed ? "; it is taken for turned over" : "");
+}
+
 /// Of three coordinates: standard deviations, the weakest first, and its direction.
 json sigma_json(const Eigen::Matrix3d& covariance, double unit) {
   const PrincipalSigmas found = principal_sigmas(covariance);
@@ -220,7 +243,26 @@ void Report::add_estimate(const PoseEstimate& estimate) {
                                {"hypotheses", estimate.hypotheses},
                                {"refined", estimate.refined},
                                {"overlap", estimate.overlap},
-                               {"condition", number(estimate.condition)}};
+                               {"condition", number(estimate.condition)},
+                               {"symmetry", symmetry_json(estimate.symmetry)}};
+}
+
+void Report::add_turn(const PoseEstimate& estimate, const ColourDecision* colours) {
+  json turn = {{"decided_by", "nothing"},
+               {"turned_over_is_assumed", estimate.turned_over_is_assumed},
+               {"sentence", turn_sentence(estimate, colours)},
+               {"colours", json()}};
+  if (colours != nullptr) {
+    if (colours->is_decided) {
+      turn["decided_by"] = "colours";
+      turn["turned_over_is_assumed"] = false;
+    }
+    turn["colours"] = {{"correlation", number(colours->correlation)},
+                       {"next_correlation", number(colours->next)},
+                       {"confidence_sigma", number(colours->confidence)},
+                       {"contrast", number(colours->contrast)}};
+  }
+  (*json_)["pose_estimate"]["turn"] = turn;
 }
 
 void Report::add_refinement(const RefinedPose& refined) {

@@ -10,6 +10,7 @@
 #include "pipeline/reconstruct/reconstruct.h"
 #include "pipeline/reconstruct/rig_watch.h"
 #include "pipeline/reconstruct/stage_log.h"
+#include "pipeline/reconstruct/turn_by_colour.h"
 #include "pipeline/registration/refine_pose.h"
 #include "pipeline/registration/register_views.h"
 #include "pipeline/texture/texture.h"
@@ -30,6 +31,8 @@ class Report {
   void add_pose(std::span<const View> views, const RegistrationReport& registration, const VolumeReport& partial,
                 const RigWatch* watch);
   void add_estimate(const PoseEstimate& estimate);
+  /// After add_estimate(), of a part with a symmetry. `colours`: null without photographs.
+  void add_turn(const PoseEstimate& estimate, const ColourDecision* colours);
   void add_refinement(const RefinedPose& refined);
   void add_surface(const Mesh& mesh, const VolumeReport& volume);
   void add_texture(const TexturedModel& textured);

@@ -1,5 +1,8 @@
 #include "pipeline/texture/face_colours.h"
 
+#include <algorithm>
+#include <limits>
+
 namespace scanrig {
 namespace {
 
@@ -13,7 +16,12 @@ void FaceColours::choose(std::uint32_t face) {
   is_large_ = false;
   photos_.clear();
   const auto& [a, b, c] = face_;
+  int layer = std::numeric_limits<int>::max();
+  for (const std::uint32_t corner : face_) {
+    if (!looks_.of(corner).empty()) layer = std::min(layer, views_[looks_.of(corner).front().photo].photo().layer);
+  }
   for_photos_of_face({looks_.of(a), looks_.of(b), looks_.of(c)}, [&](std::uint16_t photo, const auto& seen) {
+    if (views_[photo].photo().layer > layer) return true;
     is_large_ = !add_photo(photo, seen);
     return !is_large_;
   });

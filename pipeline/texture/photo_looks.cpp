@@ -13,9 +13,13 @@ Eigen::Vector3f light_on(const PhotoView& view, const RigLight& light, const Eig
 void look_from_all(std::span<const PhotoView> views, const RigLight& light, const Eigen::Vector3d& point,
                    const Eigen::Vector3d& normal, std::vector<PhotoLook>& looks) {
   looks.clear();
+  int layer = std::numeric_limits<int>::max();
   for (std::size_t p = 0; p < views.size(); ++p) {
+    if (views[p].photo().layer > layer) continue;
     const auto sight = views[p].look(point, normal);
     if (!sight) continue;
+    if (views[p].photo().layer < layer) looks.clear();
+    layer = views[p].photo().layer;
     looks.push_back({static_cast<std::uint16_t>(p), sight->pixel.cast<float>(), static_cast<float>(sight->weight),
                      light_on(views[p], light, point, normal)});
   }

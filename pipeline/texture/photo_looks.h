@@ -21,8 +21,8 @@ struct PhotoLook {
   Eigen::Vector3f light = Eigen::Vector3f::Ones();  ///< of the rig on the point, BGR
 };
 
-/// Every photo that shows `point` with unit `normal` (model frame, mm), in the order of `views`; `looks` is
-/// overwritten.
+/// Every photo of the lowest layer that shows `point` with unit `normal` (model frame, mm), in the order of `views`;
+/// `looks` is overwritten.
 void look_from_all(std::span<const PhotoView> views, const RigLight& light, const Eigen::Vector3d& point,
                    const Eigen::Vector3d& normal, std::vector<PhotoLook>& looks);
 

@@ -61,12 +61,18 @@ PointColour blend_photos(std::span<const PhotoView> views, const RigLight& light
 RigLight light_from_photos(std::span<const PhotoView> views, const Mesh& mesh,
                            const std::vector<Eigen::Vector3f>& normals, const BlendOptions& options) {
   const std::size_t step = mesh.vertices.size() / options.light_spots + 1;
-  std::vector<std::vector<LightSample>> spots((mesh.vertices.size() + step - 1) / step);
+  const std::size_t places = (mesh.vertices.size() + step - 1) / step;
+  std::vector<int> layers;  // what photos of different layers show at a place need not be one spot
+  for (const PhotoView& view : views) layers.push_back(view.photo().layer);
+  std::ranges::sort(layers);
+  layers.erase(std::unique(layers.begin(), layers.end()), layers.end());
+  std::vector<std::vector<LightSample>> spots(places * layers.size());
   for_each_in_blocks(spots.size(), [&](std::size_t i) {
-    const std::size_t v = i * step;
+    const std::size_t v = (i % places) * step;
     const Eigen::Vector3d point = mesh.vertices[v].cast<double>();
     const Eigen::Vector3d normal = normals[v].cast<double>();
     for (const PhotoView& view : views) {
+      if (view.photo().layer != layers[i / places]) continue;
       const auto sight = view.look(point, normal);
       if (!sight) continue;
       const Sample sample = view.sample(sight->pixel.cast<float>());

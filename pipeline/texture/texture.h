@@ -22,6 +22,9 @@ struct Photo {
   Transform turntable_from_model = Transform::Identity();  ///< rot_y(table angle) * pose_from_model
   cv::Mat3b image;       ///< BGR, linear light, lens distortion included, pixel centres at integers
   cv::Point first = {};  ///< of the image, on the sensor: it may be a part; the rest counts as black
+  /// Photos of one layer are blended; where one of a lower layer shows the surface, those of higher ones are not used.
+  /// For photos of which it is not known how they lie to the others.
+  int layer = 0;
 };
 
 /// Cutting of the surface into charts.
