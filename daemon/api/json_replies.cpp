@@ -85,6 +85,20 @@ void add_retakes(ordered_json& json, const std::vector<Error>& reasons) {
   json["retake_reasons"] = json["spoilt"] = to_json(reasons);  // spoilt: old name
 }
 
+ordered_json suggestions_json(const std::vector<SuggestedRest>& suggestions) {
+  auto list = ordered_json::array();
+  for (const auto& one : suggestions) {
+    list.push_back({{"number", list.size() + 1},
+                    {"sentence", one.sentence},
+                    {"doubt", one.doubt},
+                    {"gain", one.gain},
+                    {"unseen_after", one.unseen_after},
+                    {"overlap", one.overlap},
+                    {"image", one.has_image}});
+  }
+  return list;
+}
+
 }  // namespace
 
 ordered_json to_detailed_json(const JobInfo& job) {
@@ -109,6 +123,7 @@ ordered_json to_detailed_json(const JobInfo& job) {
   json["stages"] = ordered_json::array();
   for (const auto& stage : job.stages) json["stages"].push_back({{"name", stage.name}, {"fraction", stage.fraction}});
   json["live"] = job.live;
+  json["suggestions"] = suggestions_json(job.suggestions);
   return json;
 }
 

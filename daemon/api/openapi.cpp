@@ -368,16 +368,25 @@ const char* const kSchemas = R"({
 "SetupOption": {"type": "object", "required": ["text", "image"], "additionalProperties": false, "properties": {
   "text": {"type": "string"}, "image": {"type": "boolean", "description": "GET setup/image/{option} has one"}}},
 "SetupKey": {"type": "object", "required": ["key"], "additionalProperties": false, "properties": {"key": {"type": "string"}}},
+"Suggestion": {"type": "object", "required": ["number", "sentence", "doubt", "gain", "unseen_after", "overlap", "image"], "additionalProperties": false, "properties": {
+  "number": {"type": "integer", "description": "from 1"},
+  "sentence": {"type": "string", "description": "for the operator: how to lay it down, and what that shows"},
+  "doubt": {"type": "string", "description": "why its pose may not be found; empty: it can be"},
+  "gain": {"type": "number", "description": "share of the unseen surface that it would show"},
+  "unseen_after": {"type": "number", "description": "share of all surface that would stay unseen"},
+  "overlap": {"type": "number", "description": "share of the surface seen that both poses would see"},
+  "image": {"type": "boolean", "description": "GET suggestions/{number} has one"}}},
 "OpenApi": {"type": "object", "required": ["openapi", "paths"]}
 })";
 
 const char* const kJobDetail = R"({
-"description": "closures is the old name of movement_checks", "required": ["movement_checks", "closures", "stages", "live"],
+"description": "closures is the old name of movement_checks", "required": ["movement_checks", "closures", "stages", "live", "suggestions"],
 "properties": {
   "stored": {"type": "array", "description": null, "items": {"$ref": "#/components/schemas/StoredView"}},
   "movement_checks": {"type": "array", "items": {"$ref": "#/components/schemas/MovementCheck"}},
   "closures": {"type": "array", "items": {"$ref": "#/components/schemas/MovementCheck"}, "deprecated": true, "description": "old name of movement_checks"},
   "stages": {"type": "array", "items": {"$ref": "#/components/schemas/Stage"}},
-  "live": {"type": "array", "items": {"type": "string"}, "description": "what the scan shows so far: files live/NAME.glb of the job, which never change"}}})";
+  "live": {"type": "array", "items": {"type": "string"}, "description": "what the scan shows so far: files live/NAME.glb of the job, which never change"},
+  "suggestions": {"type": "array", "items": {"$ref": "#/components/schemas/Suggestion"}, "description": "how the part can lie in the next pose, best first, until the model is made; empty: not known"}}})";
 
 }  // namespace scanrig

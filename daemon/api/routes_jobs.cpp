@@ -58,6 +58,27 @@ void send_file(const ApiStation& station, const Values& values, const std::strin
   send({.body = *file, .type = media_type(path)});
 }
 
+Route suggestion_route() {
+  return {.method = Method::get,
+          .path = "/api/v1/jobs/{id}/suggestions/{number}",
+          .role = Role::viewer,
+          .description = "How a job's part can lie in the next pose, as seen from between the cameras. Orange: unseen.",
+          .in_path = {kJobId,
+                      {.name = "number",
+                       .type = RequestField::Type::integer,
+                       .description = "of the suggestion",
+                       .required = true,
+                       .min = 1,
+                       .max = 9}},
+          .reply = {.description = "an image", .type = "image/png"},
+          .errors = {500},
+          .slow = true,
+          .handle = [](const ApiStation& station, const Values& values, const Send& send) {
+            const auto name = rest_image(static_cast<int>(*values.integer("number")));
+            send_file(station, values, "live/" + name, send);
+          }};
+}
+
 Route list_route() {
   return {.method = Method::get,
           .path = "/api/v1/jobs",
@@ -89,6 +110,7 @@ std::vector<Route> job_routes() {
        .in_path = {kJobId},
        .reply = {.description = "the job", .schema = "JobDetail"},
        .handle = show},
+      suggestion_route(),
       {.method = Method::get,
        .path = "/api/v1/jobs/{id}/files",
        .role = Role::viewer,

@@ -108,13 +108,13 @@ fs::path model_file(const fs::path& job_folder, RecipeKind kind) {
   return model_folder(job_folder) / (kind == RecipeKind::scan ? "model.glb" : "calibration.json");
 }
 /// Not synced: nothing needs it after a power cut. A client that reads it by its name reads the whole.
-Result<void> write_live_mesh(const fs::path& job_folder, const std::string& name, std::string_view glb) {
-  const auto file = job_folder / kLive / (name + ".glb");
+Result<void> write_live_file(const fs::path& job_folder, const std::string& name, std::string_view bytes) {
+  const auto file = job_folder / kLive / name;
   const auto half = job_folder / kLive / (name + ".tmp");
   std::error_code error;
   fs::create_directory(file.parent_path(), error);
   std::ofstream out(half, std::ios::binary);
-  out << glb;
+  out << bytes;
   out.close();
   if (out.good()) fs::rename(half, file, error);
   if (out.good() && !error) return {};
@@ -122,7 +122,7 @@ Result<void> write_live_mesh(const fs::path& job_folder, const std::string& name
   return fail(ErrorCode::io, "cannot write {}", file.string());
 }
 
-void remove_live_meshes(const fs::path& job_folder) {
+void remove_live_files(const fs::path& job_folder) {
   std::error_code ignored;  // removed with the job
   fs::remove_all(job_folder / kLive, ignored);
 }
@@ -256,6 +256,7 @@ std::vector<std::string> read_rig_remarks(const fs::path& report) {
     for (const auto& sentence : member(member(pose, "watch"), "sentences")) add(sentence);
   }
   for (const auto& disagreement : member(json, "disagreements")) add(member(disagreement, "sentence"));
+  add(member(member(json, "next_rest"), "sentence"));
   return remarks;
 }
 

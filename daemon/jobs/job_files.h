@@ -19,9 +19,9 @@ std::filesystem::path model_folder(const std::filesystem::path& job_folder);
 std::filesystem::path model_file(const std::filesystem::path& job_folder, RecipeKind kind = RecipeKind::scan);
 std::filesystem::path report_file(const std::filesystem::path& job_folder);
 
-/// live/NAME.glb: what the scan shows so far, while it is made. Fails with `io`.
-Result<void> write_live_mesh(const std::filesystem::path& job_folder, const std::string& name, std::string_view glb);
-void remove_live_meshes(const std::filesystem::path& job_folder);
+/// live/NAME: what the scan shows so far, while it is made. Fails with `io`.
+Result<void> write_live_file(const std::filesystem::path& job_folder, const std::string& name, std::string_view bytes);
+void remove_live_files(const std::filesystem::path& job_folder);
 
 struct FolderSize {
   std::uintmax_t bytes = 0;
@@ -72,7 +72,8 @@ Result<void> note_check(const std::filesystem::path& root, const std::string& ca
 /// ISO 8601; empty: this calibration was not checked, or the record cannot be read.
 std::string last_check(const std::filesystem::path& root, const std::string& calibration_sha256);
 
-/// What the watch of report.json says of the rig, each sentence once; none where it cannot be read.
+/// What report.json says of the rig, of single images, and of another rest than the suggested one, each sentence once;
+/// none where it cannot be read.
 std::vector<std::string> read_rig_remarks(const std::filesystem::path& report);
 
 /// Why the model of report.json is beyond the limits; nothing when it is within, or without limits. An unreadable

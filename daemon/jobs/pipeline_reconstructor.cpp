@@ -26,7 +26,23 @@ class PipelineReconstructor final : public Reconstructor {
   }
   std::string live_view(std::size_t pose) override { return encoded(reconstruction_.live_view(pose)); }
   std::string live_pose(std::size_t pose) override {
-    return encoded(reconstruction_.live_pose(pose), reconstruction_.other_rest(pose));
+    Mesh mesh = reconstruction_.live_pose(pose);
+    suggestions_ = reconstruction_.suggest_rests(pose, mesh);
+    return encoded(std::move(mesh),
+                   suggestions_.empty() ? std::nullopt : std::optional(suggestions_.front().next.turn));
+  }
+  std::vector<Suggestion> suggestions(std::size_t) override {
+    std::vector<Suggestion> all;
+    for (RestSuggestion& one : suggestions_) {
+      all.push_back({{.sentence = one.sentence,
+                      .doubt = one.doubt,
+                      .gain = one.next.gain,
+                      .unseen_after = one.next.unseen_after,
+                      .overlap = one.next.overlap,
+                      .has_image = !one.png.empty()},
+                     std::move(one.png)});
+    }
+    return all;
   }
   Result<void> prepare(const Context& context) override { return reconstruction_.prepare(context); }
   Result<void> finish(const std::filesystem::path& folder, const Context& context) override {
@@ -46,6 +62,7 @@ class PipelineReconstructor final : public Reconstructor {
   }
 
   Reconstruction reconstruction_;
+  std::vector<RestSuggestion> suggestions_{};  ///< of the pose that was finished last
   std::filesystem::path scan_;
   int threads_;
 };

@@ -256,21 +256,36 @@ Result<void> ReconstructionThread::close_pose(int pose) {
   // After the last pose the model itself is soon there.
   if (current_->poses_closed < current_->recipe.poses) {
     show(fmt::format("pose{}", pose + 1), current_->reconstructor->live_pose(static_cast<std::size_t>(pose)), true);
+    suggest(pose);
   }
   return closed;
 }
 
 /// A mesh that cannot be written is not shown; the job does not need it. `replaces`: instead of those before.
 void ReconstructionThread::show(std::string name, const std::string& glb, bool replaces) {
-  if (glb.empty() || !write_live_mesh(current_->folder, name, glb)) return;
+  if (glb.empty() || !write_live_file(current_->folder, name + ".glb", glb)) return;
   if (replaces) current_->live.clear();
   current_->live.push_back(std::move(name));
   post_event_(event::LiveMeshes{current_->job, current_->live});
 }
 
+/// How the part can be laid down next. An image that cannot be written is not shown.
+void ReconstructionThread::suggest(int pose) {
+  std::vector<SuggestedRest> rests;
+  for (auto& [rest, png] : current_->reconstructor->suggestions(static_cast<std::size_t>(pose))) {
+    const auto name = rest_image(static_cast<int>(rests.size()) + 1);
+    rest.has_image = !png.empty() && write_live_file(current_->folder, name, png).has_value();
+    rests.push_back(rest);
+  }
+  if (rests.empty()) return;
+  current_->has_suggestions = true;
+  post_event_(event::RestsSuggested{current_->job, std::move(rests)});
+}
+
 void ReconstructionThread::hide() {
-  remove_live_meshes(current_->folder);
+  remove_live_files(current_->folder);
   if (!current_->live.empty()) post_event_(event::LiveMeshes{current_->job, {}});
+  if (current_->has_suggestions) post_event_(event::RestsSuggested{current_->job, {}});
 }
 
 void ReconstructionThread::handle(const FinishPose& message) {

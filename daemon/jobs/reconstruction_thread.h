@@ -103,6 +103,7 @@ class ReconstructionThread {
     int views_done = 0;
     int poses_closed = 0;
     std::vector<std::string> live{};  ///< names of the meshes that are shown
+    bool has_suggestions = false;     ///< rests for the next pose
     std::optional<Error> error{};
   };
 
@@ -132,6 +133,7 @@ class ReconstructionThread {
   Result<void> close_when_whole(int pose, int view);
   Result<void> close_pose(int pose);
   void show(std::string name, const std::string& glb, bool replaces);
+  void suggest(int pose);
   void hide();
   void check(const Result<void>& done);
   Result<event::ModelReady> make_model();

@@ -6,9 +6,11 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/context.h"
 #include "core/result.h"
+#include "daemon/station/job_info.h"
 #include "pipeline/calibration/camera.h"
 #include "pipeline/storage/images.h"
 
@@ -31,6 +33,12 @@ class Reconstructor {
   /// this one shows nothing.
   virtual std::string live_view(std::size_t) { return {}; }
   virtual std::string live_pose(std::size_t) { return {}; }
+  /// How the object of that pose could lie in the next one, best first, each with a PNG of it; after live_pose().
+  struct Suggestion {
+    SuggestedRest rest;
+    std::string png;
+  };
+  virtual std::vector<Suggestion> suggestions(std::size_t) { return {}; }
   /// What finish() would begin with, once all poses are finished.
   virtual Result<void> prepare(const Context&) { return {}; }
   /// Makes the model and writes its files and report.json together: after a failure there is no `folder`.

@@ -243,6 +243,11 @@ struct LiveMeshes {
   std::string job;
   std::vector<std::string> names;
 };
+/// How the part could lie in the next pose, best first; none: it is not known.
+struct RestsSuggested {
+  std::string job;
+  std::vector<SuggestedRest> rests;
+};
 struct ReconstructionFailed {
   std::string job;
   Error error;
@@ -277,7 +282,7 @@ using Event =
                  event::JobsOrdered, event::JobRequested, event::RequestDone, event::JobUpdated, event::JobRemoved,
                  event::JobStarted, event::JobNotStarted, event::JobUnreadable, event::CheckViewTaken,
                  event::MovementChecked, event::FlipTimedOut, event::ViewStored, event::PoseStored, event::JobClosed,
-                 event::StoreFailed, event::DiskChecked, event::StageProgress, event::LiveMeshes,
+                 event::StoreFailed, event::DiskChecked, event::StageProgress, event::LiveMeshes, event::RestsSuggested,
                  event::ReconstructionFailed, event::ModelReady, event::ReloadRequested, event::Shutdown>;
 
 /// Actions that the station requests. None of them waits.

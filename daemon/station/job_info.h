@@ -1,5 +1,7 @@
 #pragma once
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <chrono>
@@ -110,6 +112,19 @@ struct CalibrationOutcome {
   bool operator==(const CalibrationOutcome&) const = default;
 };
 
+/// One way to lay the part down for the next pose, predicted from what its scan has measured.
+struct SuggestedRest {
+  std::string sentence{};                    ///< "Lay it on its back: shows 81 % of what is unseen."
+  std::string doubt{};                       ///< why its pose may not be found; empty: it can be
+  double gain = 0.0;                         ///< share of the unseen surface that it would show
+  double unseen_after = 0.0, overlap = 0.0;  ///< shares as in docs/reference/report.md
+  bool has_image = false;                    ///< live/restN.png of the job, N from 1
+  bool operator==(const SuggestedRest&) const = default;
+};
+
+/// Name of its image among the live files of a job; `number` from 1.
+inline std::string rest_image(int number) { return fmt::format("rest{}.png", number); }
+
 /// Data of one job.
 struct JobInfo {
   std::string id{};
@@ -128,6 +143,7 @@ struct JobInfo {
   std::vector<StageShare> stages{};  ///< of the reconstruction, in the order of their start
   std::optional<CalibrationOutcome> calibration{};  ///< of a calibration that is solved
   std::vector<std::string> live{};                  ///< meshes of what its scan shows so far, event::LiveMeshes
+  std::vector<SuggestedRest> suggestions{};         ///< for the next pose, best first
   std::string repeated{};              ///< why the views of the current placement were dropped; empty: they were not
   std::optional<Error> error{};        ///< why it failed, was interrupted or cancelled; or did not pass
   std::vector<std::string> remarks{};  ///< done: sentences on the rig, as its watch found it

@@ -103,6 +103,7 @@ std::optional<JobEnd> update(JobTable& table, const Event& event) {
           },
           [&](const event::StageProgress& e) { change(e.job, [&](JobInfo& job) { set_progress(job, e); }); },
           [&](const event::LiveMeshes& e) { change(e.job, [&](JobInfo& job) { job.live = e.names; }); },
+          [&](const event::RestsSuggested& e) { change(e.job, [&](JobInfo& job) { job.suggestions = e.rests; }); },
           [&](const event::ReconstructionFailed& e) {
             change(e.job, [&](JobInfo& job) {
               job.error = e.error;

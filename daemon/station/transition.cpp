@@ -247,6 +247,7 @@ class Transition : public StepBuilder {
   // These concern the list of jobs or the requester.
   void operator()(const event::StageProgress&) {}
   void operator()(const event::LiveMeshes&) {}
+  void operator()(const event::RestsSuggested&) {}
   void operator()(const event::RequestDone&) {}
 
  private:

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
 #include "pipeline/mesh/solid_properties.h"
-#include "pipeline/pose/stable_rests.h"
 #include "pipeline/texture/shading.h"
 
 namespace scanrig {
@@ -16,7 +16,6 @@ using Rgb = std::array<std::uint8_t, 3>;
 constexpr Rgb kGrey = {150, 150, 150};
 constexpr double kMaxStep = 4.0;    // edge of a triangle over the grid's spacing
 constexpr double kSameDepth = 1.5;  // mm between a vertex and what a view sees there
-constexpr double kFootSeen = 0.5;   // cosine: the old foot is turned up by 60 deg at least
 
 constexpr std::size_t kGainSamples = 2000;
 
@@ -133,18 +132,6 @@ void colour_by_views(Mesh& mesh, const std::vector<View>& views, const Camera& l
       mesh.colour[v] = colour_at(left, photo, point);
     }
   }
-}
-
-std::optional<Eigen::Quaterniond> turn_to_other_rest(const Mesh& solid) {
-  const auto properties = solid_properties(solid);
-  if (!properties) return std::nullopt;
-  const auto stable = rests_on_hull(solid, *properties, 0.0, {});
-  if (!stable) return std::nullopt;
-  const Eigen::Vector3d down = -Eigen::Vector3d::UnitY();
-  const auto shows_the_foot = [&](const StableRest& rest) { return rest.normal.dot(down) < kFootSeen; };
-  const auto other = std::ranges::find_if(stable->rests, shows_the_foot);
-  if (other == stable->rests.end()) return std::nullopt;
-  return Eigen::Quaterniond::FromTwoVectors(other->normal, down);
 }
 
 }  // namespace scanrig

@@ -1,10 +1,8 @@
 #pragma once
 
-#include <Eigen/Geometry>
 #include <cstddef>
 #include <functional>
 #include <opencv2/core/mat.hpp>
-#include <optional>
 #include <vector>
 
 #include "pipeline/calibration/camera.h"
@@ -33,9 +31,5 @@ Mesh live_mesh_of_view(const View& view, const Camera& left, const LivePhoto& ph
 /// needed. `photo_of`: of each view, one after another.
 void colour_by_views(Mesh& mesh, const std::vector<View>& views, const Camera& left,
                      const std::function<LivePhoto(std::size_t)>& photo_of);
-
-/// Rotation that turns the solid from the rest in which it lies, its foot towards -y, into the most stable other one in
-/// which a camera from the side sees that foot. Nothing where the solid has none, or is not closed.
-std::optional<Eigen::Quaterniond> turn_to_other_rest(const Mesh& solid);
 
 }  // namespace scanrig

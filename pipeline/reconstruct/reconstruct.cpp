@@ -249,6 +249,23 @@ void Reconstruction::State::release_range_images() {
   }
 }
 
+/// The next pose's table angles are this one's: the recipe is the same.
+std::vector<RestSuggestion> Reconstruction::State::suggest_rests(std::size_t pose, const Mesh& live_pose) {
+  const StageLog::Timer timer(log, "next rest");
+  PoseState& state = poses[pose];
+  const Calibration& rig = state.watch ? state.watch->calibration() : *calibration;
+  std::vector<double> angles_rad;
+  for (const View& view : state.views) angles_rad.push_back(view.angle_rad);
+  const auto found = next_rests(state.partial.mesh, angles_rad, rig_eyes(rig));
+  if (!found) return {};  // a partial model that is no solid: nothing is suggested
+  auto suggestions = suggestions_of(*found, rig);
+  for (RestSuggestion& suggestion : suggestions) {
+    suggestion.png = draw_rest(live_pose, suggestion.next, rig).value_or("");
+    state.suggested.push_back(suggestion.next);
+  }
+  return suggestions;
+}
+
 Result<void> Reconstruction::State::prepare(const Context& context) {
   if (prepared) return {};
   if (poses.empty()) return fail(ErrorCode::invalid_input, "the scan has no views");
@@ -262,6 +279,7 @@ Result<void> Reconstruction::State::prepare(const Context& context) {
   }
   const auto pose2 = find_pose(report, context);
   if (!pose2) return pass_on(pose2, "pose 2 in pose 1");
+  if (poses.size() > 1) report.add_next_rest(poses[0].suggested, pose2->pose1_from_pose2);
   if (auto done = judge_silhouettes_of_both(pose2->pose1_from_pose2, context); !done) return pass_on(done);
   give_memory_back();  // of the matching, or it would add to the peak
   auto integrated = surface(pose2->pose1_from_pose2, context);
@@ -371,9 +389,11 @@ Mesh Reconstruction::live_pose(std::size_t pose) const {
   return mesh;
 }
 
-std::optional<Eigen::Quaterniond> Reconstruction::other_rest(std::size_t pose) const {
-  if (pose >= state_->poses.size() || !state_->poses[pose].finished) return std::nullopt;
-  return turn_to_other_rest(state_->poses[pose].partial.mesh);
+std::vector<RestSuggestion> Reconstruction::suggest_rests(std::size_t pose, const Mesh& live_pose) {
+  if (!state_->rectification || pose >= state_->poses.size() || !state_->poses[pose].finished) return {};
+  std::vector<RestSuggestion> suggestions;
+  with_threads(state_->options.threads, [&] { suggestions = state_->suggest_rests(pose, live_pose); });
+  return suggestions;
 }
 
 Result<void> Reconstruction::prepare(const Context& context) {

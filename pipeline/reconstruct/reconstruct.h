@@ -16,6 +16,7 @@
 #include "pipeline/calibration/camera.h"
 #include "pipeline/mesh/mesh.h"
 #include "pipeline/range/range_image.h"
+#include "pipeline/reconstruct/rest_suggestion.h"
 #include "pipeline/storage/images.h"
 #include "pipeline/storage/scan_folder.h"
 
@@ -89,8 +90,10 @@ class Reconstruction {
   /// without such a view, and of imported range images.
   [[nodiscard]] Mesh live_view(std::size_t pose) const;
   [[nodiscard]] Mesh live_pose(std::size_t pose) const;
-  /// Where a finished pose can be turned over to; turn_to_other_rest().
-  [[nodiscard]] std::optional<Eigen::Quaterniond> other_rest(std::size_t pose) const;
+  /// The best other rests of a finished pose's object, with images from live_pose(). They are kept for the report,
+  /// which then says whether pose 2 lies on one of them; the search for the pose does not use them. Empty where there
+  /// is none, and of imported range images.
+  [[nodiscard]] std::vector<RestSuggestion> suggest_rests(std::size_t pose, const Mesh& live_pose);
 
   /// Pose 2 into pose 1, and integration: what finish() begins with, sooner. Every pose must be finished before, none
   /// comes after. Fails with `same_rest`, `ambiguous`, `no_overlap`, `degenerate`, `stopped`.

@@ -14,6 +14,7 @@
 #include "pipeline/reconstruct/live_mesh.h"
 #include "pipeline/reconstruct/reconstruct.h"
 #include "pipeline/reconstruct/report.h"
+#include "pipeline/reconstruct/rest_suggestion.h"
 #include "pipeline/reconstruct/rig_watch.h"
 #include "pipeline/reconstruct/stage_log.h"
 #include "pipeline/reconstruct/turn_by_colour.h"
@@ -42,6 +43,7 @@ struct Reconstruction::State {
     std::optional<RigWatch> watch;   ///< none: range scans, or switched off
     RegistrationReport registration;
     Surface partial;
+    std::vector<NextRest> suggested;  ///< to the operator, for the next pose
     bool finished = false;
   };
 
@@ -84,6 +86,7 @@ struct Reconstruction::State {
   bool undo_motions(std::size_t pose, const RegistrationOptions& priors);
   bool leave_out_misfits(std::size_t pose);
   Result<void> finish_pose(std::size_t pose, const Context& context);
+  std::vector<RestSuggestion> suggest_rests(std::size_t pose, const Mesh& live_pose);
   Result<FoundPose> find_pose(Report& report, const Context& context);
   Result<FoundPose> choose_turn(const PoseEstimate& estimate, Report& report, const Context& context);
   [[nodiscard]] std::uintmax_t prepared_bytes() const;

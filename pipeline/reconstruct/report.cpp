@@ -275,6 +275,10 @@ void Report::add_refinement(const RefinedPose& refined) {
                                  {"uncertainty", uncertainty_json(refined)}};
 }
 
+void Report::add_next_rest(std::span<const NextRest> suggested, const Transform& pose1_from_pose2) {
+  if (!suggested.empty()) (*json_)["next_rest"] = next_rest_json(suggested, pose1_from_pose2);
+}
+
 void Report::add_surface(const Mesh& mesh, const VolumeReport& volume) {
   (*json_)["integration"] = volume_json(volume);
   (*json_)["mesh"] = mesh_json(mesh);

@@ -8,6 +8,7 @@
 #include "pipeline/pose/estimate_pose.h"
 #include "pipeline/reconstruct/disagreements.h"
 #include "pipeline/reconstruct/reconstruct.h"
+#include "pipeline/reconstruct/rest_suggestion.h"
 #include "pipeline/reconstruct/rig_watch.h"
 #include "pipeline/reconstruct/stage_log.h"
 #include "pipeline/reconstruct/turn_by_colour.h"
@@ -34,6 +35,8 @@ class Report {
   /// After add_estimate(), of a part with a symmetry. `colours`: null without photographs.
   void add_turn(const PoseEstimate& estimate, const ColourDecision* colours);
   void add_refinement(const RefinedPose& refined);
+  /// `suggested`: to the operator after pose 1; nothing is added where it is empty.
+  void add_next_rest(std::span<const NextRest> suggested, const Transform& pose1_from_pose2);
   void add_surface(const Mesh& mesh, const VolumeReport& volume);
   void add_texture(const TexturedModel& textured);
   void add_disagreements(std::span<const Disagreement> disagreements);

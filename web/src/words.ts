@@ -23,6 +23,8 @@ export const words = {
   progress: (stored: number, all: number) => `${stored} of ${all} views stored`,
   live: "Measured so far",
   flipPicture: "Turn the object over, to stand on another side.",
+  suggested: (number: number) => (number === 1 ? "Best next side" : "Or else"),
+  suggestionKey: "Orange: not seen so far.",
   devices: "Devices",
   queue: "Queue",
   filters: { all: "All", queue: "Queue", trouble: "Trouble" },

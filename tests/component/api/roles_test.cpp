@@ -25,7 +25,7 @@ class Document : public ApiBench {
   /// `path` with good values for its parameters, except that `which` is `value`.
   static std::string fill(std::string path, const std::string& which = "", const std::string& value = "") {
     const std::map<std::string, std::string> good{
-        {"id", "old"}, {"file", "model%2Freport.json"}, {"side", "left"}, {"name", "none.js"}};
+        {"id", "old"}, {"file", "model%2Freport.json"}, {"side", "left"}, {"name", "none.js"}, {"number", "1"}};
     for (const auto& [name, text] : good) {
       const auto at = path.find("{" + name + "}");
       if (at != std::string::npos) path.replace(at, name.size() + 2, name == which ? value : text);

@@ -44,6 +44,9 @@ class FakeReconstructor final : public Reconstructor {
   }
   std::string live_view(std::size_t) override { return "view so far"; }
   std::string live_pose(std::size_t) override { return "pose so far"; }
+  std::vector<Suggestion> suggestions(std::size_t) override {
+    return {{{.sentence = "Lay it on its back.", .gain = 0.75}, "an image"}, {{.sentence = "Turn it over."}, ""}};
+  }
   Result<void> finish(const std::filesystem::path& folder, const Context& context) override {
     context.report("texture", 1.0);
     log_.at_finish();

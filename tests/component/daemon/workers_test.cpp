@@ -173,6 +173,26 @@ TEST_F(Workers, WhatAScanShowsSoFarIsListedAndGoneWithItsEnd) {
   EXPECT_FALSE(fs::exists(live));
 }
 
+TEST_F(Workers, HowThePartCanLieNextIsToldWithImagesAndForgottenWithTheEnd) {
+  make_job("job", "scanned", JobState::reconstructing);
+  const auto live = store->folder("job") / "live";
+  fakes::ReconstructionLog log;
+  std::string image;
+  log.at_finish = [&] { image = read_file(live / rest_image(1)).value_or("nothing"); };
+  rebuild({.poses = 2, .views = 2}, log);
+  std::vector<std::vector<SuggestedRest>> told;
+  for (const auto& event : events) {
+    if (const auto* one = std::get_if<event::RestsSuggested>(&event)) told.push_back(one->rests);
+  }
+  ASSERT_EQ(told.size(), 2U) << "after pose 1, none after the last, and that they are gone";
+  ASSERT_EQ(told[0].size(), 2U);
+  EXPECT_EQ(told[0][0].sentence, "Lay it on its back.");
+  EXPECT_TRUE(told[0][0].has_image);
+  EXPECT_FALSE(told[0][1].has_image);
+  EXPECT_TRUE(told[1].empty());
+  EXPECT_EQ(image, "an image");
+}
+
 TEST_F(Workers, APoseIsClosedWithItsLastViewWhateverTheMovementCheckWillSay) {
   auto info = store->create("job", {.recipe = {.poses = 1, .views = 2}, .exported = false});
   ASSERT_TRUE(info) << info.error().message;

@@ -38,6 +38,10 @@ export async function order<T = unknown>(
   return response.json();
 }
 
+export function suggestionOf(job: string, number: number): string {
+  return `${API}/jobs/${encodeURIComponent(job)}/suggestions/${number}`;
+}
+
 export function fileOf(job: string, path: string): string {
   return `${API}/jobs/${encodeURIComponent(job)}/files/${encodeURIComponent(path)}`;
 }

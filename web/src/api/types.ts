@@ -65,6 +65,13 @@ export interface StoredView {
   retakes: number;
 }
 
+export interface Suggestion {
+  number: number; // from 1
+  sentence: string;
+  doubt: string; // empty: none
+  image: boolean;
+}
+
 export interface Job {
   id: string;
   state: JobState;
@@ -87,6 +94,7 @@ export interface Job {
   error: Problem | null;
   stages: { name: string; fraction: number }[];
   live: string[]; // meshes of what the scan shows so far
+  suggestions: Suggestion[]; // how the part can lie in the next pose, best first
 }
 
 export interface Health {

@@ -9,6 +9,7 @@ export function Live({ job }: { job: Job }) {
   const canvas = useRef<HTMLCanvasElement>(null);
   const view = useRef<LiveView | null>(null);
   const isFlip = job.state === "waiting_for_flip";
+  const caption = isFlip ? (job.suggestions[0]?.sentence ?? words.flipPicture) : words.live;
   useEffect(() => {
     if (!canvas.current) return;
     view.current = openLive(canvas.current, (name) => fileOf(job.id, `live/${name}.glb`));
@@ -18,8 +19,8 @@ export function Live({ job }: { job: Job }) {
   useEffect(() => view.current?.turnOver(isFlip), [isFlip]);
   return (
     <figure class="live">
-      <canvas ref={canvas} class="view3d" aria-label={isFlip ? words.flipPicture : words.live} />
-      <figcaption>{isFlip ? words.flipPicture : words.live}</figcaption>
+      <canvas ref={canvas} class="view3d" aria-label={caption} />
+      <figcaption>{caption}</figcaption>
     </figure>
   );
 }

@@ -5,6 +5,7 @@ import { may, Order } from "../parts/Order.tsx";
 import { words } from "../words.ts";
 import { Live } from "./Live.tsx";
 import { Picture } from "./Picture.tsx";
+import { Suggestions } from "./Suggestions.tsx";
 
 function Buttons() {
   const now = status.value;
@@ -50,6 +51,7 @@ export function Station() {
   return (
     <main class="columns">
       <div class="stack">
+        {active?.state === "waiting_for_flip" && active.suggestions.length > 0 && <Suggestions job={active} />}
         {active && active.live.length > 0 && <Live key={active.id} job={active} />}
         <div class="pictures">
           <Picture side="left" />

@@ -4,8 +4,6 @@
 
 #include <limits>
 
-#include "tests/unit/pipeline/pose/solid_mesh.h"
-
 namespace scanrig {
 namespace {
 
@@ -100,31 +98,6 @@ TEST(LiveMesh, AVertexHasTheColourOfTheViewThatSeesIt) {
   EXPECT_EQ(mesh.colour[1], kShownGreen);
   EXPECT_EQ(mesh.colour[2], (std::array<std::uint8_t, 3>{150, 150, 150})) << "behind what the view sees";
   EXPECT_EQ(mesh.colour[3], (std::array<std::uint8_t, 3>{150, 150, 150})) << "turned away";
-}
-
-/// Where the rotation puts the face of a box whose outward normal is `normal`.
-Eigen::Vector3d turned(const Mesh& solid, const Eigen::Vector3d& normal) {
-  const auto rotation = turn_to_other_rest(solid);
-  EXPECT_TRUE(rotation);
-  return rotation ? *rotation * normal : Eigen::Vector3d::Zero();
-}
-
-TEST(OtherRest, IsTheMostStableOneThatShowsTheFoot) {
-  const Mesh upright = testing::box_mesh({-20, 0, -10}, {20, 100, 10});
-  const Eigen::Vector3d broad = turned(upright, Eigen::Vector3d::UnitZ());
-  EXPECT_NEAR(std::abs(broad.y()), 1.0, 1e-6) << "it lies on a broad side";
-  EXPECT_NEAR(turned(upright, -Eigen::Vector3d::UnitY()).y(), 0.0, 1e-6) << "its foot is seen from the side";
-}
-
-TEST(OtherRest, OfAFlatPlateIsItsOtherSide) {
-  const Mesh plate = testing::box_mesh({-50, 0, -40}, {50, 5, 40});
-  EXPECT_NEAR(turned(plate, Eigen::Vector3d::UnitY()).y(), -1.0, 1e-6);
-}
-
-TEST(OtherRest, OfAnOpenMeshIsNotKnown) {
-  Mesh open = testing::box_mesh({-50, 0, -40}, {50, 5, 40});
-  open.faces.pop_back();
-  EXPECT_FALSE(turn_to_other_rest(open));
 }
 
 }  // namespace
