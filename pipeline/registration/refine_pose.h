@@ -30,7 +30,7 @@ struct RefineOptions {
   int levels = 3;
   int max_iterations = 25;  ///< maximum Gauss-Newton steps per level
   std::vector<Contact> contacts;
-  std::vector<FreeTurn> held;            ///< turns that stay as they start
+  std::vector<FreeTurn> held{};          ///< turns that stay as they start
   double min_facing = 0.25;              ///< cosine below which a view does not judge a point
   double min_agreement = 0.6;            ///< cosine between corresponding normals
   std::size_t min_correspondences = 30;  ///< fewer are no overlap
