@@ -23,7 +23,7 @@ struct Turn {
 
 Turn rotation_about(const Transform& motion, const Eigen::Vector3d& near) {
   const Eigen::AngleAxisd rotation(motion.linear());
-  const Eigen::Vector3d a = rotation.axis();
+  const Eigen::Vector3d& a = rotation.axis();
   const Eigen::Vector3d shift = motion * near - near;
   const Eigen::Vector3d across = shift - a * a.dot(shift);
   return {a, near + 0.5 * (across + a.cross(across) / std::tan(0.5 * rotation.angle())), rotation.angle()};

@@ -11,6 +11,7 @@
 #include "core/parallel.h"
 #include "core/parallel_blocks.h"
 #include "core/units.h"
+#include "pipeline/mesh/solid_properties.h"
 #include "pipeline/texture/photo_view.h"
 #include "pipeline/texture/point_colour.h"
 
