@@ -82,14 +82,11 @@ Stiffness stiffness_of(const std::vector<const SurfaceSample*>& shared) {
   return {6.0 * std::max(0.0, solver.eigenvalues()[0]) / normal.trace(), axis.normalized()};
 }
 
-void judge_outlook(NextRest& next, const std::optional<SelfMatch>& symmetry, const NextRestOptions& options) {
+void judge_outlook(NextRest& next, const NextRestOptions& options) {
   if (next.overlap < options.min_overlap) {
     next.outlook = PoseOutlook::small_overlap;
   } else if (next.stiffness < options.min_stiffness) {
     next.outlook = PoseOutlook::weak;
-  } else if (symmetry) {
-    next.outlook = PoseOutlook::symmetric;
-    next.weak_axis = symmetry->axis;
   }
 }
 
@@ -106,13 +103,12 @@ NextRest predicted(const StableRest& rest, const Samples& samples, const std::ve
       shared.push_back(&samples.all[i]);
     }
   }
-  const auto share = [](std::size_t count, double of_one) { return static_cast<double>(count) * of_one; };
-  const std::size_t measured = samples.all.size() - samples.unseen;
-  if (samples.unseen > 0) next.gain = share(gained, 1.0) / static_cast<double>(samples.unseen);
-  next.unseen_after = share(samples.unseen - gained, samples.share_of_unseen);
-  const double here = share(measured, samples.share_of_measured);
-  const double in_both = share(both, samples.share_of_measured);
-  const double there = in_both + share(gained, samples.share_of_unseen);
+  const auto gain = static_cast<double>(gained), unseen = static_cast<double>(samples.unseen);
+  const auto measured = static_cast<double>(samples.all.size() - samples.unseen);
+  if (samples.unseen > 0) next.gain = gain / unseen;
+  next.unseen_after = (unseen - gain) * samples.share_of_unseen;
+  const double in_both = static_cast<double>(both) * samples.share_of_measured;
+  const double here = measured * samples.share_of_measured, there = in_both + gain * samples.share_of_unseen;
   if (here + there > 0.0) next.overlap = 2.0 * in_both / (here + there);
   const Stiffness stiffness = stiffness_of(shared);
   next.stiffness = stiffness.value;
@@ -140,8 +136,6 @@ Result<NextRests> next_rests(const Mesh& partial, std::span<const double> angles
   if (!stable) return pass_on(stable);
 
   const Samples samples = samples_of(partial, options.samples);
-  const std::span measured(samples.all.data() + samples.unseen, samples.all.size() - samples.unseen);
-  const auto symmetry = find_self_match(partial, *surface, measured, properties->size_mm, options.self_match);
   const Eigen::Vector3d down = -Eigen::Vector3d::UnitY();
   NextRests found{.unseen = static_cast<double>(samples.unseen) * samples.share_of_unseen, .rests = {}};
   for (const StableRest& rest : stable->rests) {
@@ -152,7 +146,7 @@ Result<NextRests> next_rests(const Mesh& partial, std::span<const double> angles
     NextRest next =
         predicted(rest, samples, seen_by_rig(samples.all, *surface, placed, angles_rad, eyes, options.sight));
     next.turn = turn;
-    judge_outlook(next, symmetry, options);
+    judge_outlook(next, options);
     found.rests.push_back(next);
   }
   std::stable_sort(found.rests.begin(), found.rests.end(), is_better);

@@ -7,7 +7,6 @@
 #include "core/result.h"
 #include "pipeline/mesh/mesh.h"
 #include "pipeline/pose/rig_sight.h"
-#include "pipeline/pose/self_match.h"
 #include "pipeline/pose/stable_rests.h"
 
 namespace scanrig {
@@ -16,14 +15,12 @@ namespace scanrig {
 enum class PoseOutlook {
   findable,
   small_overlap,  ///< too little of the surface would be seen in both poses
-  weak,           ///< the surface seen in both may turn or slide along itself
-  symmetric       ///< the object looks the same after a turn
+  weak            ///< the surface seen in both may turn or slide along itself
 };
 
 struct NextRestOptions {
   StableRestOptions stable;
   SightOptions sight;
-  SelfMatchOptions self_match;
   std::size_t samples = 3000;    ///< of the unseen surface, and of the measured one
   double same_rest_deg = 15.0;   ///< a rest nearer to the present one is that
   double min_margin_mm = 0.0;    ///< between the centre of mass and the support's edge: else it tips over
@@ -42,7 +39,7 @@ struct NextRest {
   /// The least eigenvalue of the point-to-plane normal matrix over the surface seen in both, over their mean; turns are
   /// about its middle, in units of its mean reach. 0: it can move along itself.
   double stiffness = 0.0;
-  Eigen::Vector3d weak_axis = Eigen::Vector3d::Zero();  ///< of the least stiff turn or shift, or of the symmetry
+  Eigen::Vector3d weak_axis = Eigen::Vector3d::Zero();  ///< of the least stiff turn or shift
   PoseOutlook outlook = PoseOutlook::findable;
 };
 

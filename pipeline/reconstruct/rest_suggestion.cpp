@@ -39,8 +39,8 @@ std::string doubt_of(PoseOutlook outlook) {
   switch (outlook) {
     case PoseOutlook::findable: return "";
     case PoseOutlook::small_overlap: return "Its pose may not be found: too little is seen in both poses.";
-    case PoseOutlook::weak: return "Its pose may not be found: what both poses see can turn or slide along itself.";
-    case PoseOutlook::symmetric: return "Its pose may not be found: the part looks the same after a turn.";
+    case PoseOutlook::weak:
+      return "Its pose may be known less well: what both poses see can turn or slide along itself.";
   }
   return "";
 }
@@ -50,7 +50,6 @@ std::string_view name_of(PoseOutlook outlook) {
     case PoseOutlook::findable: return "findable";
     case PoseOutlook::small_overlap: return "small overlap";
     case PoseOutlook::weak: return "weak";
-    case PoseOutlook::symmetric: return "symmetric";
   }
   return "";
 }

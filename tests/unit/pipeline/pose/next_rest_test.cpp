@@ -234,17 +234,10 @@ TEST(NextRest, ACylinderMayTurnAboutItsAxis) {
   EXPECT_GT(std::abs(over->weak_axis.y()), 0.98);
 }
 
-TEST(NextRest, ABoxLooksTheSameAfterHalfATurn) {
+/// Several motions fit, and are one answer.
+TEST(NextRest, ASymmetricBoxIsFoundAllTheSame) {
   const auto found = rests_of(partial(kBox, above_the_base));
   const NextRest* next = on(found, Eigen::Vector3d::UnitX());
-  ASSERT_NE(next, nullptr);
-  EXPECT_EQ(next->outlook, PoseOutlook::symmetric);
-}
-
-TEST(NextRest, ABumpTellsItsSidesApart) {
-  const Solid marked = testing::together({kBox, testing::ball({24, 36, 12}, 7)});
-  const auto found = rests_of(partial(marked, above_the_base));
-  const NextRest* next = on(found, Eigen::Vector3d::UnitZ());
   ASSERT_NE(next, nullptr);
   EXPECT_EQ(next->outlook, PoseOutlook::findable);
 }
