@@ -17,10 +17,12 @@ constexpr float kEdgeMm = 0.25F, kSigmaMm = 0.01F, kWindowMm = 1.0F;
 /// A measured sheet over x and z, its middle at 0.
 Mesh sheet(const std::function<float(float x, float z)>& height) {
   Mesh mesh;
-  for (std::uint32_t i = 0; i < kSheetSide * kSheetSide; ++i) {
-    const float x = (static_cast<float>(i % kSheetSide) - 0.5F * kSheetSide) * kEdgeMm,
-                z = (static_cast<float>(i / kSheetSide) - 0.5F * kSheetSide) * kEdgeMm;
-    mesh.vertices.emplace_back(x, height(x, z), z);
+  const auto along = [](std::uint32_t index) { return (static_cast<float>(index) - 0.5F * kSheetSide) * kEdgeMm; };
+  for (std::uint32_t row = 0; row < kSheetSide; ++row) {
+    for (std::uint32_t column = 0; column < kSheetSide; ++column) {
+      const float x = along(column), z = along(row);
+      mesh.vertices.emplace_back(x, height(x, z), z);
+    }
   }
   for (std::uint32_t row = 0; row + 1 < kSheetSide; ++row) {
     for (std::uint32_t column = 0; column + 1 < kSheetSide; ++column) {
