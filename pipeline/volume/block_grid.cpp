@@ -26,6 +26,7 @@ BlockGrid::BlockGrid(const Eigen::AlignedBox3f& box, float voxel_mm) : voxel_(vo
   const Eigen::Vector3f high = (box.max() / block_mm).array().floor() + 2.0F;
   origin_ = low * block_mm;
   size_ = (high - low).cast<int>();
+  slot_.assign(static_cast<std::size_t>(size_.x()) * size_.y() * size_.z(), kOutside);
 }
 
 const BlockGrid::Block* BlockGrid::find(const Eigen::Vector3i& block) const {
@@ -46,7 +47,6 @@ Eigen::Vector3i BlockGrid::block_at(std::size_t linear) const {
 
 /// The sign of each block's first node represents the block until it is stored.
 void BlockGrid::classify_blocks(Field& field) {
-  slot_.assign(static_cast<std::size_t>(size_.prod()), kOutside);
   std::vector<std::vector<std::size_t>> of_layer(static_cast<std::size_t>(size_.z()));
   const std::size_t layer = static_cast<std::size_t>(size_.x()) * size_.y();
   parallel_for(of_layer.size(), [&](std::size_t z) {

@@ -54,17 +54,29 @@ std::size_t flip_if_better(BlockGrid& grid, Mesh& surface, const VoxelLabels& la
 
 HandleRepair repair_handles(BlockGrid& grid, Mesh& surface, long genus, float band_mm, const VolumeOptions& options) {
   HandleRepair result{0, 0, genus};
-  const float shallow = 0.5F * grid.voxel();  // a flipped voxel's distance: the film is about a voxel thick
-  const auto max_voxels = static_cast<std::size_t>(std::pow(options.max_filled_mm / grid.voxel(), 2.0F));
+  const auto flip = [&](const VoxelLabels& labels, const std::vector<std::size_t>& voxels, bool cutting) {
+    const float shallow = 0.5F * grid.voxel();  // a flipped voxel's distance: the film is about a voxel thick
+    const std::size_t flipped =
+        flip_if_better(grid, surface, labels, voxels, cutting ? shallow : -shallow, band_mm, result.genus);
+    (cutting ? result.cut : result.filled) += flipped;
+  };
   // Cut first: space that no view saw may be empty, space that a view saw through is.
   for (const bool cutting : {true, false}) {
-    if (result.genus <= 0) break;
-    VoxelLabels labels(grid, options.doubt_reach_mm);
+    if (result.genus <= 0) return result;
+    VoxelLabels labels(grid);
+    labels.doubt_unmeasured(grid, options.doubt_reach_mm);
     std::vector<std::size_t> films = labels.grow(/*inside=*/cutting);
+    const auto max_voxels = static_cast<std::size_t>(std::pow(options.max_filled_mm / grid.voxel(), 2.0F));
     if (!cutting) films = small_films(labels, films, max_voxels);
-    const std::size_t flipped =
-        flip_if_better(grid, surface, labels, films, cutting ? shallow : -shallow, band_mm, result.genus);
-    (cutting ? result.cut : result.filled) += flipped;
+    flip(labels, films, cutting);
+  }
+  for (const bool cutting : {true, false}) {
+    if (result.genus <= 0) return result;
+    VoxelLabels labels(grid);
+    labels.doubt_thin(grid, options.thin_layers);
+    std::vector<std::size_t> films = labels.grow(/*inside=*/cutting);
+    std::erase_if(films, [&](std::size_t i) { return !labels.closes_short_loop(i, cutting, options.short_loop); });
+    flip(labels, films, cutting);
   }
   return result;
 }

@@ -16,8 +16,9 @@ struct HandleRepair {
 /// Removes handles that are not supported by measurements, `genus` of them or fewer. A set is rebuilt from its certain
 /// voxels (those nearer to measured surface than to closed) by adding doubtful ones only where that makes no new loop
 /// (simple points). What cannot be added is a film: across a doubtful tunnel it is filled if small, across a doubtful
-/// bridge it is cut. Loops among certain voxels stay: they were measured, or looked through.
-/// `surface`: the extracted surface of `grid`, before and after.
+/// bridge it is cut. Loops among certain voxels stay: they were measured, or looked through. Last, measured or not,
+/// what is below the resolution: short loops through thin solid are cut, through thin space filled. `surface`: the
+/// extracted surface of `grid`, before and after.
 HandleRepair repair_handles(BlockGrid& grid, Mesh& surface, long genus, float band_mm, const VolumeOptions& options);
 
 }  // namespace scanrig

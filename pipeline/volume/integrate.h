@@ -51,6 +51,8 @@ struct VolumeOptions {
   float min_agreement = 0.5F;              ///< cosine between surface and measured normal, for moving a vertex onto it
   float doubt_reach_mm = 8.0F;             ///< the solid is doubtful this deep below a closed surface
   float max_filled_mm = 2.0F;              ///< a doubtful tunnel wider than this is not filled
+  int thin_layers = 2;                     ///< solid and space are thin up to twice as many voxels
+  int short_loop = 20;                     ///< voxels: a handle or tunnel with a shorter loop is not resolved if thin
   double band_mm = 0.0;                    ///< half width of the zone around a surface in which it is evidence;
                                            ///< 0: `band_voxels`, or `band_sigmas` where that is more
   bool table_without_silhouettes = false;  ///< bound a pose by its plane y = 0 even if it has no silhouettes

@@ -10,6 +10,7 @@ namespace scanrig {
 namespace {
 
 constexpr int kCorners = kBlockSide + 1;  // nodes along a block's cells, the next block's first included
+constexpr float kNearestToNode = 0.1F;    // of a cut edge
 
 /// The edge between two corners that differ in one coordinate.
 int edge_between(int a, int b) {
@@ -171,8 +172,8 @@ BlockVertices cut_edges(const BlockGrid& grid, const BlockGrid::Block& block) {
       const float there = octet.distance(n + step);
       if ((here < 0.0F) == (there < 0.0F)) continue;
       result.mark(3 * node(n) + axis);
-      // A hair's breadth from the nodes, so that no triangle shrinks to nothing.
-      const float t = std::clamp(here / (here - there), 0.01F, 0.99F);
+      // Away from the nodes, so that no triangle is so small that noise decides its normal.
+      const float t = std::clamp(here / (here - there), kNearestToNode, 1.0F - kNearestToNode);
       result.positions.push_back(grid.position(kBlockSide * block.index + n) + grid.voxel() * t * step.cast<float>());
     }
   });

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <bit>
 #include <numeric>
+#include <unordered_set>
+#include <utility>
 
 #include "core/parallel.h"
 
@@ -42,30 +44,34 @@ const Neighbourhood& neighbourhood() {
   return instance;
 }
 
-/// Components of `members` among the 26 neighbours that touch the voxel in the middle.
-int components_around(std::uint32_t members, bool inside) {
+std::uint32_t touching_it(bool inside) { return inside ? neighbourhood().around18 : neighbourhood().around6; }
+
+/// Of `members` among the 26 neighbours: those joined with `first`, a single one.
+std::uint32_t component_of(std::uint32_t first, std::uint32_t members, bool inside) {
   const Neighbourhood& n = neighbourhood();
   const auto& touching = inside ? n.touching18 : n.touching6;
-  std::uint32_t left = members & (inside ? n.around18 : n.around6);
-  int count = 0;
-  while (left != 0) {
-    std::uint32_t component = left & -left, front = component;
-    while (front != 0) {
-      const auto voxel = static_cast<std::size_t>(std::countr_zero(front));
-      front &= front - 1;
-      const std::uint32_t fresh = touching[voxel] & members & ~component;
-      component |= fresh;
-      front |= fresh;
-    }
-    left &= ~component;
-    ++count;
+  std::uint32_t component = first, front = first;
+  while (front != 0) {
+    const auto voxel = static_cast<std::size_t>(std::countr_zero(front));
+    front &= front - 1;
+    const std::uint32_t fresh = touching[voxel] & members & ~component;
+    component |= fresh;
+    front |= fresh;
   }
+  return component;
+}
+
+/// Components of `members` among the 26 neighbours that touch the voxel in the middle.
+int components_around(std::uint32_t members, bool inside) {
+  std::uint32_t left = members & touching_it(inside);
+  int count = 0;
+  for (; left != 0; ++count) left &= ~component_of(left & -left, members, inside);
   return count;
 }
 
 }  // namespace
 
-VoxelLabels::VoxelLabels(const BlockGrid& grid, float doubt_reach_mm) {
+VoxelLabels::VoxelLabels(const BlockGrid& grid) {
   Eigen::Vector3i low = grid.size(), high = Eigen::Vector3i::Zero();
   for (const auto& block : grid.blocks()) {
     low = low.cwiseMin(block.index);
@@ -91,7 +97,6 @@ VoxelLabels::VoxelLabels(const BlockGrid& grid, float doubt_reach_mm) {
     }
   });
   mark_rim();
-  mark_doubtful(grid, doubt_reach_mm);
 }
 
 Eigen::Vector3i VoxelLabels::node(std::size_t i) const {
@@ -110,10 +115,24 @@ void VoxelLabels::mark_rim() {
   }
 }
 
-/// Every voxel is as certain as the piece of surface nearest to it, up to a depth.
-void VoxelLabels::mark_doubtful(const BlockGrid& grid, float doubt_reach_mm) {
-  const std::array<std::ptrdiff_t, 6> faces = {step(1, 0, 0),  step(-1, 0, 0), step(0, 1, 0),
-                                               step(0, -1, 0), step(0, 0, 1),  step(0, 0, -1)};
+std::array<std::ptrdiff_t, 6> VoxelLabels::faces() const {
+  return {step(1, 0, 0), step(-1, 0, 0), step(0, 1, 0), step(0, -1, 0), step(0, 0, 1), step(0, 0, -1)};
+}
+
+template <class Body>
+void VoxelLabels::for_each_stored(const BlockGrid& grid, const Body& body) const {
+  for (const auto& block : grid.blocks()) {
+    for (int n = 0; n < BlockGrid::kNodes; ++n) {
+      const Eigen::Vector3i p =
+          kBlockSide * block.index - first_ +
+          Eigen::Vector3i(n % kBlockSide, n / kBlockSide % kBlockSide, n / (kBlockSide * kBlockSide));
+      body(static_cast<std::size_t>(step(p.x(), p.y(), p.z())), block, n);
+    }
+  }
+}
+
+void VoxelLabels::doubt_unmeasured(const BlockGrid& grid, float reach_mm) {
+  const auto faces = this->faces();
   const auto is_measured = [&](std::size_t i) {
     const Eigen::Vector3i n = node(i);
     const auto* block = grid.find(n.unaryExpr([](int c) { return c / kBlockSide; }));
@@ -122,45 +141,83 @@ void VoxelLabels::mark_doubtful(const BlockGrid& grid, float doubt_reach_mm) {
            block->support[BlockGrid::Block::node(local.x(), local.y(), local.z())] == Support::measured;
   };
   std::vector<std::size_t> certain, doubtful;
-  for (const auto& block : grid.blocks()) {
-    for (int n = 0; n < BlockGrid::kNodes; ++n) {
-      const Eigen::Vector3i p =
-          kBlockSide * block.index - first_ +
-          Eigen::Vector3i(n % kBlockSide, n / kBlockSide % kBlockSide, n / (kBlockSide * kBlockSide));
-      const auto i = static_cast<std::size_t>(step(p.x(), p.y(), p.z()));
-      bool surface = false, measured = false;  // both ends of a cut edge must be
-      for (const auto face : faces) {
-        if (has(i + face, kInside) == has(i, kInside)) continue;
-        surface = true;
-        measured = measured || (block.support[n] == Support::measured && is_measured(i + face));
-      }
-      // What views looked through is open, however narrow: no repair may fill it.
-      const bool is_open = !has(i, kInside) && block.support[n] == Support::free;
-      if (surface || is_open) (measured || is_open ? certain : doubtful).push_back(i);
+  for_each_stored(grid, [&](std::size_t i, const BlockGrid::Block& block, int n) {
+    bool surface = false, measured = false;  // both ends of a cut edge must be
+    for (const auto face : faces) {
+      if (has(i + face, kInside) == has(i, kInside)) continue;
+      surface = true;
+      measured = measured || (block.support[n] == Support::measured && is_measured(i + face));
     }
-  }
+    // What views looked through is open, however narrow: no repair may fill it.
+    const bool is_open = !has(i, kInside) && block.support[n] == Support::free;
+    if (surface || is_open) (measured || is_open ? certain : doubtful).push_back(i);
+  });
   std::vector<std::uint8_t> reached(flags_.size());
   for (const auto i : certain) reached[i] = 1;
   for (const auto i : doubtful) reached[i] = 2;
-  const int depth = static_cast<int>(doubt_reach_mm / grid.voxel());
+  const int depth = static_cast<int>(reach_mm / grid.voxel());
   for (int layer = 0; layer < depth && !doubtful.empty(); ++layer) {
-    for (auto* front : {&certain, &doubtful}) {
-      std::vector<std::size_t> next;
-      for (const auto i : *front) {
-        if (on_rim(i)) continue;
-        for (const auto face : faces) {
-          const std::size_t j = i + face;
-          if (reached[j] != 0 || has(j, kInside) != has(i, kInside)) continue;
-          reached[j] = reached[i];
-          next.push_back(j);
-        }
-      }
-      *front = std::move(next);
-    }
+    for (auto* front : {&certain, &doubtful}) *front = next_layer(*front, reached);
   }
   for (std::size_t i = 0; i < flags_.size(); ++i) {
+    flags_[i] &= static_cast<std::uint8_t>(~kDoubtful);
     if (reached[i] == 2 && !on_rim(i)) flags_[i] |= kDoubtful;
   }
+}
+
+/// The opening of solid and space [Serra 1982]: what a core, `layers` below the surface, reaches in as many steps.
+void VoxelLabels::doubt_thin(const BlockGrid& grid, int layers) {
+  constexpr std::uint8_t kShallow = 1, kThick = 2;
+  const auto faces = this->faces();
+  for (auto& flags : flags_) flags &= static_cast<std::uint8_t>(~kDoubtful);
+  std::vector<std::uint8_t> reached(flags_.size());
+  std::vector<std::size_t> front, shallow;
+  for_each_stored(grid, [&](std::size_t i, const BlockGrid::Block&, int) {
+    const bool surface = std::any_of(faces.begin(), faces.end(),
+                                     [&](std::ptrdiff_t face) { return has(i + face, kInside) != has(i, kInside); });
+    if (surface) front.push_back(i);
+  });
+  for (const auto i : front) reached[i] = kShallow;
+  for (int layer = 0; layer < layers; ++layer) {
+    shallow.insert(shallow.end(), front.begin(), front.end());
+    front = next_layer(front, reached);
+  }
+  for (const auto i : front) reached[i] = kThick;
+  for (int layer = 0; layer < layers; ++layer) {
+    std::vector<std::size_t> next;
+    for (const auto i : front) {
+      if (on_rim(i)) continue;
+      for (const auto face : faces) {
+        const std::size_t j = i + face;
+        if (reached[j] != kShallow || has(j, kInside) != has(i, kInside)) continue;
+        reached[j] = kThick;
+        next.push_back(j);
+      }
+    }
+    front = std::move(next);
+  }
+  for (const auto i : shallow) {
+    if (reached[i] == kShallow && !on_rim(i)) flags_[i] |= kDoubtful;
+  }
+  for_each_stored(grid, [&](std::size_t i, const BlockGrid::Block& block, int n) {
+    if (!has(i, kInside) && block.support[n] == Support::free) flags_[i] &= static_cast<std::uint8_t>(~kDoubtful);
+  });
+}
+
+/// Neighbours of `front` through faces, of its own kind, that were not reached; they take its mark.
+std::vector<std::size_t> VoxelLabels::next_layer(const std::vector<std::size_t>& front,
+                                                 std::vector<std::uint8_t>& reached) const {
+  std::vector<std::size_t> next;
+  for (const auto i : front) {
+    if (on_rim(i)) continue;
+    for (const auto face : faces()) {
+      const std::size_t j = i + face;
+      if (reached[j] != 0 || has(j, kInside) != has(i, kInside)) continue;
+      reached[j] = reached[i];
+      next.push_back(j);
+    }
+  }
+  return next;
 }
 
 /// Certain voxels of a set as runs along x, joined into components through their faces.
@@ -211,7 +268,7 @@ std::vector<std::size_t> VoxelLabels::grow(bool inside) {
   for (std::size_t k = 0; k < 26; ++k) steps[k] = step(n.offset[k].x(), n.offset[k].y(), n.offset[k].z());
   std::vector<std::ptrdiff_t> touching;
   for (std::size_t k = 0; k < 26; ++k) {
-    if (((inside ? n.around18 : n.around6) >> k & 1U) != 0) touching.push_back(steps[k]);
+    if ((touching_it(inside) >> k & 1U) != 0) touching.push_back(steps[k]);
   }
   for (auto& flags : flags_) flags &= static_cast<std::uint8_t>(~(kGrown | kQueued));
 
@@ -268,6 +325,32 @@ std::vector<std::size_t> VoxelLabels::grow(bool inside) {
   blocked.erase(std::unique(blocked.begin(), blocked.end()), blocked.end());
   std::erase_if(blocked, [&](std::size_t i) { return has(i, kGrown); });
   return blocked;
+}
+
+bool VoxelLabels::closes_short_loop(std::size_t blocked, bool inside, int longest) const {
+  const Neighbourhood& n = neighbourhood();
+  const auto at = [&](std::size_t k) { return blocked + step(n.offset[k].x(), n.offset[k].y(), n.offset[k].z()); };
+  std::uint32_t grown = 0;
+  for (std::size_t k = 0; k < 26; ++k) grown |= has(at(k), kGrown) ? 1U << k : 0U;
+  const std::uint32_t ends = grown & touching_it(inside), start = component_of(ends & -ends, grown, inside);
+  std::vector<std::size_t> front, goals;
+  for (std::size_t k = 0; k < 26; ++k) {
+    if ((ends >> k & 1U) != 0) ((start >> k & 1U) != 0 ? front : goals).push_back(at(k));
+  }
+  std::unordered_set<std::size_t> seen(front.begin(), front.end());
+  for (int length = 2; length < longest && !front.empty(); ++length) {  // of the loop that ends in `front`
+    std::vector<std::size_t> next;
+    for (const std::size_t i : front) {
+      if (std::find(goals.begin(), goals.end(), i) != goals.end()) return true;
+      if (on_rim(i)) continue;
+      for (std::size_t k = 0; k < 26; ++k) {
+        const std::size_t j = i + step(n.offset[k].x(), n.offset[k].y(), n.offset[k].z());
+        if ((touching_it(inside) >> k & 1U) != 0 && has(j, kGrown) && seen.insert(j).second) next.push_back(j);
+      }
+    }
+    front = std::move(next);
+  }
+  return false;
 }
 
 }  // namespace scanrig

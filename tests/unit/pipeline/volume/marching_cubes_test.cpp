@@ -52,5 +52,23 @@ TEST(MarchingCubes, EveryCellSurfaceIsOpenOnlyOnTheCellsFaces) {
   }
 }
 
+/// A ball's surface passes by the nodes at any distance.
+TEST(MarchingCubes, NoEdgeIsSoShortThatNoiseTurnsItsFaces) {
+  constexpr int kNodesAlong = 24;
+  BlockGrid grid(Eigen::AlignedBox3f(Eigen::Vector3f::Zero(), Eigen::Vector3f::Constant(kNodesAlong)), 1.0F);
+  const Eigen::Vector3f centre(11.6F, 12.3F, 11.9F);
+  for (int i = 0; i < kNodesAlong * kNodesAlong * kNodesAlong; ++i) {
+    const Eigen::Vector3i node(i % kNodesAlong, i / kNodesAlong % kNodesAlong, i / (kNodesAlong * kNodesAlong));
+    grid.set(node, (node.cast<float>() - centre).norm() - 8.3F, 3.0F);
+  }
+  const Mesh surface = extract_surface(grid);
+  ASSERT_GT(surface.faces.size(), 500U);
+  for (const Mesh::Face& face : surface.faces) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_GE((surface.vertices[face[k]] - surface.vertices[face[(k + 1) % 3]]).norm(), 0.1F);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace scanrig
