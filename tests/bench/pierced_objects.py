@@ -3,11 +3,13 @@ import itertools
 import math
 
 CELL_MM = 2.0
+FINE_MM = 1.0
+FINE_EXTENT_MM = math.sqrt(60**2 + 50**2 + 42**2)  # of a thin plate, which keeps its size
 
 
-def block(low, high):
+def block(low, high, cell_mm=CELL_MM):
     """Cells from `low` to below `high`, in mm."""
-    ranges = [range(round(a / CELL_MM), round(b / CELL_MM)) for a, b in zip(low, high)]
+    ranges = [range(round(a / cell_mm), round(b / cell_mm)) for a, b in zip(low, high)]
     return set(itertools.product(*ranges))
 
 
@@ -24,6 +26,14 @@ def plate(*holes):
     for x, y, radius in holes:
         cells = drilled(cells, x, y, radius)
     return cells | block((-6, 0, -26), (66, 10, 36))
+
+
+def thin_plate(holes):
+    """60 mm wide, 50 high, 2 thick, on a foot; holes of 3 mm in a row."""
+    cells = block((0, 0, 0), (60, 50, 2), FINE_MM)
+    for x in range(10, 10 * holes + 1, 10):
+        cells -= block((x, 30, 0), (x + 3, 33, 2), FINE_MM)
+    return cells | block((0, 0, -20), (60, 6, 22), FINE_MM)
 
 
 def cup(handles):
@@ -57,12 +67,12 @@ def faces_of(cells):
             yield corners if side else corners[::-1]
 
 
-def mesh_of_cells(cells):
+def mesh_of_cells(cells, cell_mm=CELL_MM):
     places, triangles = {}, []
     for corners in faces_of(cells):
         a, b, c, d = (places.setdefault(corner, len(places)) for corner in corners)
         triangles += [(a, b, c), (a, c, d)]
-    return [tuple(CELL_MM * n for n in corner) for corner in places], triangles
+    return [tuple(cell_mm * n for n in corner) for corner in places], triangles
 
 
 def ring_mesh(radius=28.0, tube=11.0, around=96, across=48):
@@ -94,3 +104,8 @@ def all_objects():
     fine = ("plate with a hole of 8 mm", 1, mesh_of_cells(plate((30, 44, 3.5))))
     cups = [(f"cup with {n} handles", n, mesh_of_cells(cup(n))) for n in (1, 2)]
     return [*plates, fine, *cups, ("ring", 1, ring_mesh())]
+
+
+def fine_objects():
+    """The same, with holes that images of half the size do not resolve."""
+    return [(f"thin plate with {n} holes of 3 mm", n, mesh_of_cells(thin_plate(n), FINE_MM)) for n in (2, 5)]

@@ -6,11 +6,16 @@ MAX_CLOSED_WRONGLY = 0.03
 SAME_COVERAGE = 0.01
 
 
-def scan(bench, folder, *options):
+HALF = ("--scale", 0.5), ("--voxel-mm", 0.4)
+WHOLE = (), ()
+
+
+def scan(bench, folder, *options, resolution=HALF):
     """Scores of the model, or why there is none."""
-    bench.run([bench.bin / "scanrig-sim", "shoot", "--out", folder, "--scale", 0.5, "--poses", 1, "--views", 12, *options],
+    of_images, of_model = resolution
+    bench.run([bench.bin / "scanrig-sim", "shoot", "--out", folder, *of_images, "--poses", 1, "--views", 12, *options],
               600, check=True)
-    done = bench.run([bench.bin / "scanrig", "reconstruct", folder, "--no-texture", "--voxel-mm", 0.4], 300)
+    done = bench.run([bench.bin / "scanrig", "reconstruct", folder, "--no-texture", *of_model], 300)
     if done.returncode != 0:
         return None, " ".join(done.stderr.split())[-200:]
     return real_rig_scans.evaluate(bench, folder, folder / "model"), "; ".join(done.stderr.split("\n")).strip("; ")
@@ -43,14 +48,18 @@ def screens(bench, scratch):
 
 
 def topology(bench, scratch):
-    right, crossing, objects = 0, 0, pierced_objects.all_objects()
-    for number, (name, genus, mesh) in enumerate(objects):
+    objects = [(*one, 100, HALF) for one in pierced_objects.all_objects()]
+    objects += [(*one, pierced_objects.FINE_EXTENT_MM, WHOLE) for one in pierced_objects.fine_objects()]
+    right, crossing = 0, 0
+    for number, (name, genus, mesh, extent_mm, resolution) in enumerate(objects):
         file = pierced_objects.write(scratch / f"object{number}.ply", mesh)
-        scores, said = scan(bench, scratch / f"scan{number}", "--object", file, "--height-mm", 100)
+        scores, said = scan(bench, scratch / f"scan{number}", "--object", file, "--height-mm", extent_mm,
+                            resolution=resolution)
         found = scores["topology"] if scores else {"genus": None, "self_intersecting_faces": 0}
         right += 1 if found["genus"] == genus else 0
         crossing += found["self_intersecting_faces"]
         if found["genus"] != genus:
             bench.note(f"{name}: genus {found['genus']} instead of {genus} {said if not scores else ''}")
-    bench.line("genus of objects with holes and handles, 0 to 5", f"right in {len(objects)}", str(right), right == len(objects))
+    bench.line("genus of objects with holes and handles, 0 to 5, holes from 3 mm", f"right in {len(objects)}", str(right),
+               right == len(objects))
     bench.line("the same: faces that cross another", "none", str(crossing or "none"), crossing == 0)
