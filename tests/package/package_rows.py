@@ -11,8 +11,10 @@ SIMULATED_JOBS = "/var/lib/scanrig-sim/jobs"
 SIMULATED = "--socket /run/scanrig-sim/api.sock"
 GROUPS = "dialout gpio plugdev scanrig video"
 # A small part, small images and a coarse model: an emulated machine is slow.
-SMALL = "--object /run/packages/part.obj --height-mm 50 --scale 0.12 --views 6 --voxel-mm 5 --operator helper"
-JOB_S, RECOVERY_S, INSTALL_S = 300, 60, 180
+SMALL = "--object /run/packages/part.obj --height-mm 50 --scale 0.12 --voxel-mm 5 --operator helper"
+SHORT_JOB = "--views 6 --clock virtual"
+ENDLESS_JOB = "--views 72 --clock real"  # outlasts an upgrade however slow the machine
+JOB_S, RECOVERY_S, INSTALL_S = 300, 60, 300
 
 
 def expect(true, what):
@@ -92,7 +94,8 @@ def simulate(machine, unit, socket, jobs, options):
 
 def first_page(machine):
     """One command after the installation gives a page with a rig to try."""
-    simulate(machine, "scanrigd-sim", "/run/scanrig-sim/api.sock", SIMULATED_JOBS, "--clock virtual --http-port 8081")
+    simulate(machine, "scanrigd-sim", "/run/scanrig-sim/api.sock", SIMULATED_JOBS,
+             f"{SHORT_JOB} --http-port 8081")
     begun = time.monotonic()
     address = machine.do("scanrig-demo", RECOVERY_S).splitlines()[0]
     found = re.match(r"(http://127\.0\.0\.1:8081/)#code=\S+$", address)
@@ -147,7 +150,7 @@ def upgraded(machine):
                f"chown -R scanrig: {JOBS}", RECOVERY_S)
     finished = machine.do(f"ls {JOBS} | grep -v '[.]'")
     before = hashes(machine, finished)
-    simulate(machine, "scanrigd", "/run/scanrig/api.sock", JOBS, "--clock real")
+    simulate(machine, "scanrigd", "/run/scanrig/api.sock", JOBS, ENDLESS_JOB)
     machine.do("systemctl start scanrigd.service", RECOVERY_S)  # without its socket: this program opens one itself
     wait_until_ready(machine)
     machine.do("scanrig start 2>&1")
