@@ -21,9 +21,7 @@ Result<void> decide(const std::vector<Hypothesis>& field, const Scene& scene, co
   if (field.empty())
     return fail(ErrorCode::no_overlap, "pose estimation: no motion between the poses could be proposed");
   const Candidate& best = field[0].candidate;
-  const Agreement& t = best.agreement;
-  if (t.confirmed < options.min_overlap || t.contradicted > options.max_contradicted * (t.confirmed + t.contradicted) ||
-      t.median_mm > options.max_median * scene.size_mm) {
+  if (!fits(best.agreement, scene.size_mm, options)) {
     return fail(ErrorCode::no_overlap,
                 "pose estimation: the two poses do not fit together; the best of {} tried: {}. "
                 "Check that it is the same object and that the poses share enough surface",
@@ -72,8 +70,20 @@ Result<void> resolve_rivals(std::vector<Hypothesis>& field, const PoseInput& pos
 
 }  // namespace
 
+bool fits(const Agreement& t, double size_mm, const PoseOptions& options) {
+  return t.confirmed >= options.min_overlap &&
+         t.contradicted <= options.max_contradicted * (t.confirmed + t.contradicted) &&
+         !(t.median_mm > options.max_median * size_mm);
+}
+
 Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose2, const PoseOptions& options,
                                    const Context& context) {
+  std::vector<Candidate> fitting;
+  return estimate_pose(pose1, pose2, options, context, fitting);
+}
+
+Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose2, const PoseOptions& options,
+                                   const Context& context, std::vector<Candidate>& fitting) {
   auto scene = set_scene(pose1, pose2, options);
   if (!scene) return pass_on(scene);
   scene->observations1 = {&scene->measured1, pose1.views};
@@ -93,6 +103,8 @@ Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose
   }
   settle(field, *scene, options);
   if (auto ok = decide(field, *scene, options); !ok) return pass_on(ok);
+  fitting = {field[0].candidate};
+  for (const Candidate* rival : rivals_of(field, options)) fitting.push_back(*rival);
   if (auto ok = resolve_rivals(field, pose1, pose2, *scene, options, estimate); !ok) return pass_on(ok);
   estimate.best = field[0].candidate;
   estimate.pose1_from_pose2 = estimate.best.pose1_from_pose2;

@@ -22,6 +22,7 @@ namespace scanrig {
 struct PoseInput {
   const Mesh& solid;  ///< closed; unmeasured surface is closed by hull and table
   std::span<const View> views;
+  const MeasuredPose* measured = nullptr;  ///< measured_pose(views, PoseOptions::levels), where it is made already
 };
 
 /// One narrowing of the candidates: align, check the samples, keep the best distinct ones.
@@ -106,6 +107,14 @@ struct PoseEstimate {
 /// the message lists them), `stopped`.
 Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose2, const PoseOptions& options,
                                    const Context& context);
+
+/// As estimate_pose(), and into `fitting` the motions that fit and that nothing separates, best first, whether or not
+/// they are an answer: other poses may decide between them.
+Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose2, const PoseOptions& options,
+                                   const Context& context, std::vector<Candidate>& fitting);
+
+/// Whether two poses that agree so much fit together. `size_mm`: of the object.
+bool fits(const Agreement& agreement, double size_mm, const PoseOptions& options);
 
 /// Whether a motion between poses turns the object over, and not only about the vertical.
 bool turns_over(const Transform& pose1_from_pose2, const PoseOptions& options = {});

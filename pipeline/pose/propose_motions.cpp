@@ -61,8 +61,8 @@ Result<Scene> set_scene(const PoseInput& pose1, const PoseInput& pose2, const Po
   if (!properties2) return pass_on(properties2, "pose 2");
   scene.solid1 = {*properties1, height_above_table(pose1.solid), {}};
   scene.solid2 = {*properties2, height_above_table(pose2.solid), {}};
-  scene.measured1 = measured_pose(pose1.views, options.levels);
-  scene.measured2 = measured_pose(pose2.views, options.levels);
+  scene.measured1 = pose1.measured ? *pose1.measured : measured_pose(pose1.views, options.levels);
+  scene.measured2 = pose2.measured ? *pose2.measured : measured_pose(pose2.views, options.levels);
   scene.size_mm = 0.5 * (scene.measured1.size_mm + scene.measured2.size_mm);
   scene.middle2 = properties2->centre_of_mass;
   for (const MeasuredPose* pose : {&scene.measured1, &scene.measured2}) {
