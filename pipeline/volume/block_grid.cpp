@@ -131,12 +131,14 @@ void BlockGrid::evaluate(const Field& field, Block& block) const {
     }
   }
   const Eigen::Vector3f middle = position(first + Eigen::Vector3i::Constant(kBlockSide / 2));
-  std::array<PoseDistance, 2> pose;
+  std::array<PoseDistance, kMaxIntegratedPoses> pose;
   for (std::size_t p = 0; p < field.poses(); ++p) {
     pose[p] = field.pose_distance(middle, p);
     block.classes[p] = pose[p].voxel_class;
+    for (std::size_t other = 0; other < p; ++other) {
+      block.is_in_conflict |= combine(pose[other], pose[p], field.class_threshold()).conflict;
+    }
   }
-  block.is_in_conflict = field.poses() > 1 && combine(pose[0], pose[1], field.class_threshold()).conflict;
 }
 
 /// Neighbours that are not stored although the surface passes between them and this block.

@@ -24,8 +24,8 @@ class BlockGrid {
     std::array<float, kNodes> distance;
     std::array<Support, kNodes> support;
     /// In each pose, of a node in the middle; none of a block that a repair has added.
-    std::array<std::optional<VoxelClass>, 2> classes{};
-    bool is_in_conflict = false;  ///< what the poses say of that node
+    std::array<std::optional<VoxelClass>, kMaxIntegratedPoses> classes{};
+    bool is_in_conflict = false;  ///< two of the poses contradict each other there
     [[nodiscard]] static int node(int x, int y, int z) { return (z * kBlockSide + y) * kBlockSide + x; }
   };
 

@@ -36,8 +36,9 @@ bool is_rigid(const Transform& transform) {
 }
 
 Result<void> check(std::span<const PosedViews> poses, const VolumeOptions& options) {
-  if (poses.empty() || poses.size() > 2) {
-    return fail(ErrorCode::invalid_input, "volume: one or two poses can be integrated, not {}", poses.size());
+  const std::size_t limit = options.fusion == VolumeOptions::Fusion::paper ? 2 : kMaxIntegratedPoses;
+  if (poses.empty() || poses.size() > limit) {
+    return fail(ErrorCode::invalid_input, "volume: 1 to {} poses can be integrated, not {}", limit, poses.size());
   }
   if (!(options.voxel_mm > 0.0) || !(options.band_mm >= 0.0)) {
     return fail(ErrorCode::invalid_input, "volume: voxel_mm must be positive and band_mm not negative, got {} and {}",
@@ -102,10 +103,11 @@ Hull make_hull(std::span<const PosedViews> poses, const VolumeOptions& options, 
 void count_classes(std::size_t poses, const BlockGrid& grid, VolumeReport& report) {
   report.class_counts.assign(poses, {});
   for (const auto& block : grid.blocks()) {
-    const auto [a, b] = block.classes;
-    if (a) ++report.class_counts[0][static_cast<std::size_t>(*a)];
-    if (b) ++report.class_counts[1][static_cast<std::size_t>(*b)];
-    if (a && b) ++report.class_pairs[static_cast<std::size_t>(*a)][static_cast<std::size_t>(*b)];
+    for (std::size_t p = 0; p < poses; ++p) {
+      if (block.classes[p]) ++report.class_counts[p][static_cast<std::size_t>(*block.classes[p])];
+    }
+    const auto &a = block.classes[0], &b = block.classes[1];
+    if (poses == 2 && a && b) ++report.class_pairs[static_cast<std::size_t>(*a)][static_cast<std::size_t>(*b)];
     report.conflicts += block.is_in_conflict ? 1 : 0;
   }
 }

@@ -19,6 +19,9 @@
 
 namespace scanrig {
 
+/// Of one model.
+inline constexpr std::size_t kMaxIntegratedPoses = 8;
+
 /// The views of one pose and its place in the model: the identity for pose 1, pose1_from_pose2 for pose 2.
 struct PosedViews {
   std::span<const View> views;
@@ -31,7 +34,7 @@ struct PosedViews {
 struct VolumeOptions {
   enum class Fusion {
     evidence,  ///< each view of each pose gives surface, free or nothing; the results are averaged
-    paper      ///< a signed distance and a class per pose, two poses combined by the class table
+    paper      ///< a signed distance and a class per pose, one or two poses combined by the class table
   };
   double voxel_mm = 0.25;
   Fusion fusion = Fusion::evidence;
@@ -86,10 +89,10 @@ struct Surface {
   VolumeReport report;
 };
 
-/// The closed surface of the object from the range images and silhouettes of one pose (a partial model) or two (the
+/// The closed surface of the object from the range images and silhouettes of one pose (a partial model) or more (the
 /// complete one) [Park and Subbarao 2002, sections 2 and 4]. The mesh is one watertight component in the model's frame
 /// (mm), with normals, `views` and `sigma`; same bits for any number of threads.
-/// Fails with `invalid_input` (no pose or more than two, an unsuitable option or matrix, not a rotation matrix),
+/// Fails with `invalid_input` (no pose or too many, an unsuitable option or matrix, not a rotation matrix),
 /// `degenerate` (no surface measured), `out_of_range` (too many voxels), `stopped`.
 Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions& options = {},
                           const Context& context = {});

@@ -239,6 +239,19 @@ TEST_F(Cup, HollowUnseenInPoseOneIsOpenedByPoseTwoInBothModes) {
   }
 }
 
+/// Pose 1 once more as a third one: nothing new is seen, and what was seen stays.
+TEST_F(Cup, ThreePosesGiveTheSurfaceThatTwoGive) {
+  const Transform back = turned_over_.inverse();
+  const auto two = integrate(std::vector<PosedViews>{{first_}, {second_, back}}, {.voxel_mm = 0.8});
+  const auto three = integrate(std::vector<PosedViews>{{first_}, {second_, back}, {first_}}, {.voxel_mm = 0.8});
+  ASSERT_TRUE(two && three);
+  expect_closed(three->mesh, 0);
+  EXPECT_NEAR(volume(three->mesh), volume(two->mesh), 0.005 * volume(two->mesh));
+  EXPECT_LE(accuracy(three->mesh, solid_).median, 0.005);
+  ASSERT_EQ(three->report.class_counts.size(), 3U);
+  EXPECT_EQ(three->report.class_counts[0], three->report.class_counts[2]);
+}
+
 TEST_F(Cup, SameBitsForAnyNumberOfThreads) {
   const std::vector<PosedViews> poses = {{first_}, {second_, turned_over_.inverse()}};
   Result<Surface> one = fail(ErrorCode::internal, ""), three = one;
@@ -341,7 +354,9 @@ TEST(Integrate, RefusesUnsuitableInput) {
   };
   const std::vector<PosedViews> one = {{ball_views()}};
   EXPECT_EQ(code({}), ErrorCode::invalid_input);
-  EXPECT_EQ(code(std::vector<PosedViews>(3, one[0])), ErrorCode::invalid_input);
+  EXPECT_EQ(code(std::vector<PosedViews>(kMaxIntegratedPoses + 1, one[0])), ErrorCode::invalid_input);
+  EXPECT_EQ(code(std::vector<PosedViews>(3, one[0]), {.fusion = VolumeOptions::Fusion::paper}),
+            ErrorCode::invalid_input);
   EXPECT_EQ(code(one, {.voxel_mm = 0.0}), ErrorCode::invalid_input);
   EXPECT_EQ(code(one, {.voxel_mm = 0.5, .band_mm = -1.0}), ErrorCode::invalid_input);
   std::vector<PosedViews> stretched = one;
