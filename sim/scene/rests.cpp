@@ -189,18 +189,23 @@ std::vector<Rest> stable_rests(const TriangleMesh& mesh, std::uint64_t seed) {
 Result<std::vector<Transform>> draw_placements(const TriangleMesh& mesh, std::uint64_t seed, int count, bool same_rest,
                                                bool any_size) {
   const auto rests = stable_rests(mesh, seed);
-  const int first = draw(rests, uniform(mix(seed, 4)), [](const Rest&) { return true; });
-  int second = first;
-  if (first >= 0 && !same_rest) {
-    const auto turned_over = [&](const Rest& r) { return angle_between(r.down, rests[first].down) > to_radians(30.0); };
-    second = draw(rests, uniform(mix(seed, 5)), turned_over);
+  std::vector<int> drawn = {draw(rests, uniform(mix(seed, 4)), [](const Rest&) { return true; })};
+  const auto turned_over = [&](const Rest& rest) {
+    return std::ranges::all_of(drawn, [&](int d) { return angle_between(rest.down, rests[d].down) > to_radians(30.0); });
+  };
+  for (int i = 1; i < std::max(count, 2) && drawn.front() >= 0 && !same_rest; ++i) {
+    const std::uint64_t key = i == 1 ? mix(seed, 5) : mix(seed, 5, i);
+    const int next = draw(rests, uniform(key), turned_over);
+    if (next < 0) break;
+    drawn.push_back(next);
   }
-  if (second < 0) {
+  if (drawn.front() < 0 || (drawn.size() < 2 && !same_rest)) {
     return fail(ErrorCode::degenerate, "object: it has {} stable rest(s) on a table, two are needed", rests.size());
   }
   std::vector<Transform> placements;
   for (int i = 0; i < count; ++i) {
-    const auto placed = put_down(mesh, rests[i % 2 ? second : first].down, mix(seed, 6, i), any_size);
+    const Rest& rest = rests[drawn[static_cast<std::size_t>(i) % drawn.size()]];
+    const auto placed = put_down(mesh, rest.down, mix(seed, 6, i), any_size);
     if (!placed) return pass_on(placed);
     placements.push_back(*placed);
   }

@@ -20,10 +20,11 @@ struct Rest {
 /// Most likely first. Same seed, same rests.
 std::vector<Rest> stable_rests(const TriangleMesh& mesh, std::uint64_t seed);
 
-/// Two of the rests more than 30 degrees apart, drawn by chance, and the placements for them: lowest point on y = 0,
-/// bounding cylinder within 3 mm of the axis, turned at random. `count` placements alternate between the two; with
-/// `same_rest` all use the first (turned and moved anew each time). Fails with `degenerate` (fewer than two such
-/// rests), `invalid_input` (larger than the working volume, unless `any_size`).
+/// Rests more than 30 degrees apart, one for each of `count` placements and two at least, drawn by chance, and the
+/// placements for them: lowest point on y = 0, bounding cylinder within 3 mm of the axis, turned at random. Where there
+/// are not so many rests they come again, in their order; with `same_rest` all use the first. Each is turned and moved
+/// anew. Fails with `degenerate` (fewer than two such rests), `invalid_input` (larger than the working volume, unless
+/// `any_size`).
 Result<std::vector<Transform>> draw_placements(const TriangleMesh& mesh, std::uint64_t seed, int count, bool same_rest,
                                                bool any_size = false);
 

@@ -74,6 +74,24 @@ TEST(Placements, StandOnTheTableWithTheCentreOfMassOverTheContacts) {
   }
 }
 
+TEST(Placements, OfManyPosesAreOnRestsOfTheirOwnAsFarAsThereAre) {
+  const auto mesh = box({30.0, 20.0, 10.0});
+  const auto two = draw_placements(mesh, 5, 2, false), four = draw_placements(mesh, 5, 4, false);
+  ASSERT_TRUE(two && four);
+  for (int i = 0; i < 2; ++i) EXPECT_EQ((*two)[i].matrix(), (*four)[i].matrix());
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < i; ++j) {
+      const Vector3d up1 = (*four)[i].linear().row(1), up2 = (*four)[j].linear().row(1);
+      EXPECT_GT(degrees_between(up1, up2), 30.0) << i << " and " << j;
+    }
+  }
+  const auto eight = draw_placements(mesh, 5, 8, false);  // a box has six rests
+  ASSERT_TRUE(eight);
+  const Vector3d first = (*eight)[0].linear().row(1), seventh = (*eight)[6].linear().row(1);
+  EXPECT_LT(degrees_between(first, seventh), 0.01);
+  EXPECT_GT(rotation_angle((*eight)[0].linear() * (*eight)[6].linear().transpose()), 0.01);
+}
+
 TEST(Placements, OfAForgetfulOperatorUseTheSameRestTurned) {
   const auto placements = draw_placements(box({30.0, 20.0, 10.0}), 5, 2, true);
   ASSERT_TRUE(placements);
