@@ -159,13 +159,35 @@ double in_sigmas(const Transform& off, const PoseUncertainty& known) {
                   in_sigmas(off * known.centre - known.centre, known.covariance.bottomRightCorner<3, 3>()));
 }
 
-std::optional<Scores::PoseError> pose_error(const Claim& claim, const Truth& truth) {
-  if (!claim.pose1_from_pose2 || !truth.pose1_from_pose2) return std::nullopt;
-  const Transform off = *claim.pose1_from_pose2 * truth.pose1_from_pose2->inverse();
-  const Eigen::Vector3d centre = centre_of(truth.mesh);
+/// `centre`: of the object, in the frame of both motions.
+Scores::PoseError pose_error(const Transform& claimed, const Transform& truth, const Eigen::Vector3d& centre,
+                             const std::optional<PoseUncertainty>& known) {
+  const Transform off = claimed * truth.inverse();
   Scores::PoseError error{to_degrees(rotation_angle(off.linear())), (off * centre - centre).norm()};
-  if (claim.pose_uncertainty) error.sigmas = in_sigmas(off, *claim.pose_uncertainty);
+  if (known) error.sigmas = in_sigmas(off, *known);
   return error;
+}
+
+void score_poses(const Claim& claim, const Truth& truth, Scores& scores) {
+  const Eigen::Vector3d centre = centre_of(truth.mesh);
+  if (claim.pose1_from_pose2 && truth.pose1_from_pose2) {
+    scores.pose2 = pose_error(*claim.pose1_from_pose2, *truth.pose1_from_pose2, centre, claim.pose_uncertainty);
+  }
+  if (claim.frame_of_pose >= truth.poses.size()) return;
+  const Transform& frame_from_truth = truth.poses[claim.frame_of_pose].table_from_truth;
+  for (const ClaimedPose& further : claim.further_poses) {
+    if (further.pose >= truth.poses.size()) continue;
+    const Transform frame_from_pose = frame_from_truth * truth.poses[further.pose].table_from_truth.inverse();
+    scores.further_poses.push_back({further.pose, pose_error(further.frame_from_pose, frame_from_pose,
+                                                             frame_from_truth * centre, further.uncertainty)});
+  }
+}
+
+/// The model in pose 1's frame, by the truth: which pose's frame it has is a convention.
+TexturedMesh in_frame_of_pose1(TexturedMesh model, const Transform& truth_from_frame) {
+  for (auto& vertex : model.mesh.vertices) vertex = (truth_from_frame * vertex.cast<double>()).cast<float>();
+  for (auto& normal : model.mesh.normals) normal = (truth_from_frame.linear() * normal.cast<double>()).cast<float>();
+  return model;
 }
 
 /// Calls `use` with every view of the truth. Fails with `stopped`.
@@ -188,19 +210,8 @@ void count_view(const TrueView& view, const std::vector<SurfaceSample>& samples,
                   [&](std::size_t i) { views[i] += view.observes(samples[i].point, samples[i].normal) ? 1 : 0; });
 }
 
-}  // namespace
-
-std::vector<int> observable_views(const std::vector<SurfaceSample>& samples, const Truth& truth,
-                                  const SurfaceIndex& surface, const ObservableRule& rule) {
-  std::vector<int> views(samples.size(), 0);
-  for (const TruePose& pose : truth.poses) {
-    for (const double angle : pose.angles_deg) count_view({truth, surface, pose, angle, rule}, samples, views);
-  }
-  return views;
-}
-
-Result<Scores> evaluate(const Claim& claim, const Truth& truth, const ScanFolder* photos,
-                        const EvaluateOptions& options, const Context& context) {
+Result<Scores> evaluate_in_truth_frame(const Claim& claim, const Truth& truth, const ScanFolder* photos,
+                                       const EvaluateOptions& options, const Context& context) {
   const Mesh& model = claim.model.mesh;
   const auto true_surface = SurfaceIndex::create(truth.mesh);
   if (!true_surface) return pass_on(true_surface, "truth");
@@ -211,7 +222,7 @@ Result<Scores> evaluate(const Claim& claim, const Truth& truth, const ScanFolder
   SigmaProbe probe(model, sample_surface(model, measured_faces(model, true), options.sigma_samples), truth,
                    *true_surface, truth_from_model);
   score_topology(model, truth.mesh, scores);
-  scores.pose2 = pose_error(claim, truth);
+  score_poses(claim, truth, scores);
   const std::vector<std::uint32_t> closed = measured_faces(model, false);
   const double closed_area = area_of(model, closed);
   scores.closed_share = closed_area / (closed_area + scores.measured.area_mm2);
@@ -245,6 +256,28 @@ Result<Scores> evaluate(const Claim& claim, const Truth& truth, const ScanFolder
     scores.texture = *texture;
   }
   return scores;
+}
+
+}  // namespace
+
+std::vector<int> observable_views(const std::vector<SurfaceSample>& samples, const Truth& truth,
+                                  const SurfaceIndex& surface, const ObservableRule& rule) {
+  std::vector<int> views(samples.size(), 0);
+  for (const TruePose& pose : truth.poses) {
+    for (const double angle : pose.angles_deg) count_view({truth, surface, pose, angle, rule}, samples, views);
+  }
+  return views;
+}
+
+Result<Scores> evaluate(const Claim& claim, const Truth& truth, const ScanFolder* photos,
+                        const EvaluateOptions& options, const Context& context) {
+  if (claim.frame_of_pose > 0 && claim.frame_of_pose < truth.poses.size()) {
+    Claim moved = claim;
+    const Transform truth_from_frame = truth.poses[claim.frame_of_pose].table_from_truth.inverse();
+    moved.model = in_frame_of_pose1(std::move(moved.model), truth_from_frame);
+    return evaluate_in_truth_frame(moved, truth, photos, options, context);
+  }
+  return evaluate_in_truth_frame(claim, truth, photos, options, context);
 }
 
 }  // namespace scanrig

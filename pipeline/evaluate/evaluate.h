@@ -31,9 +31,18 @@ struct PoseUncertainty {
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Identity();
 };
 
+/// Where a reconstruction of three poses or more says that one of them lies.
+struct ClaimedPose {
+  std::size_t pose = 2;  ///< from 0
+  Transform frame_from_pose = Transform::Identity();
+  std::optional<PoseUncertainty> uncertainty{};
+};
+
 /// A model to be judged.
 struct Claim {
-  TexturedMesh model;                         ///< pose 1's turntable frame; `views` and `sigma` are its claims
+  TexturedMesh model;                        ///< turntable frame of `frame_of_pose`; `views` and `sigma` are its claims
+  std::size_t frame_of_pose = 0;             ///< the first pose that was kept
+  std::vector<ClaimedPose> further_poses{};  ///< all but pose 2 in pose 1
   std::optional<Transform> pose1_from_pose2;  ///< as the reconstruction found it
   std::optional<PoseUncertainty> pose_uncertainty = {};
 };
@@ -45,8 +54,8 @@ Result<Scores> evaluate(const Claim& claim, const Truth& truth, const ScanFolder
                         const EvaluateOptions& options, const Context& context);
 
 /// The model that a reconstruction left in `folder`: model.ply, texture coordinates of model.obj and model.png if
-/// present, `pose1_from_pose2` of report.json if present, with its uncertainty. Fails with `not_found`, `io`,
-/// `invalid_input`.
+/// present, the motions between the poses of report.json if present, with their uncertainty. Fails with `not_found`,
+/// `io`, `invalid_input`.
 Result<Claim> read_claim(const std::filesystem::path& folder);
 
 /// Number of the truth's views in which each sample is observable.

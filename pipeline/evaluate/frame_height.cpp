@@ -47,9 +47,11 @@ Claim raised(Claim claim, double height) {
   const Eigen::Vector3d up(0.0, height, 0.0);
   for (auto& vertex : claim.model.mesh.vertices) vertex += up.cast<float>();
   if (claim.pose_uncertainty) claim.pose_uncertainty->centre += up;
-  if (claim.pose1_from_pose2) {
-    auto& pose = *claim.pose1_from_pose2;
-    pose.translation() += up - pose.linear() * up;
+  const auto raise = [&](Transform& pose) { pose.translation() += up - pose.linear() * up; };
+  if (claim.pose1_from_pose2) raise(*claim.pose1_from_pose2);
+  for (ClaimedPose& further : claim.further_poses) {
+    raise(further.frame_from_pose);
+    if (further.uncertainty) further.uncertainty->centre += up;
   }
   return claim;
 }

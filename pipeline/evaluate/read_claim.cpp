@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <charconv>
 #include <nlohmann/json.hpp>
 #include <string_view>
@@ -52,24 +54,49 @@ Result<void> read_corner_uv(const std::filesystem::path& file, TexturedMesh& mod
   return model.corner_uv.size() == model.mesh.faces.size() ? Result<void>() : bad("faces are missing");
 }
 
-/// `pose1_from_pose2` and its uncertainty, where the report has them.
-Result<void> read_pose2(const std::filesystem::path& file, Claim& claim) {
+constexpr int kLastPose = 7;
+
+/// Nothing, with `fault` set, where it is no uncertainty.
+std::optional<PoseUncertainty> read_uncertainty(JsonObject holder) {
+  JsonObject known = holder.object("uncertainty");
+  const auto centre = known.numbers("centre_mm"), covariance = known.numbers("covariance");
+  if (centre.size() != 3 || covariance.size() != 36) {
+    known.reject("covariance", "and centre_mm must be 36 and 3 numbers");
+    return std::nullopt;
+  }
+  return PoseUncertainty{Eigen::Map<const Eigen::Vector3d>(centre.data()),
+                         Eigen::Map<const Eigen::Matrix<double, 6, 6>>(covariance.data())};
+}
+
+/// Of a report of three poses or more.
+void read_further_poses(JsonObject& root, Claim& claim) {
+  claim.frame_of_pose = static_cast<std::size_t>(root.object("pose_graph").integer("frame_of_pose", 0, kLastPose));
+  for (JsonObject& placed : root.object("pose_refinement").objects("poses")) {
+    ClaimedPose found{.pose = static_cast<std::size_t>(placed.integer("pose", 0, kLastPose))};
+    found.frame_from_pose = root.transform(fmt::format("pose{}_from_pose{}", claim.frame_of_pose + 1, found.pose + 1));
+    found.uncertainty = read_uncertainty(placed);
+    if (claim.frame_of_pose == 0 && found.pose == 1) {
+      claim.pose_uncertainty = found.uncertainty;
+    } else {
+      claim.further_poses.push_back(std::move(found));
+    }
+  }
+}
+
+/// The motions between poses and their uncertainty, where the report has them.
+Result<void> read_poses(const std::filesystem::path& file, Claim& claim) {
   const auto text = read_file(file);
   if (!text) return pass_on(text);
   const auto report = nlohmann::json::parse(*text, nullptr, false);
   if (report.is_discarded()) return fail(ErrorCode::invalid_input, "{}: not valid JSON", file.string());
-  if (!report.is_object() || !report.contains("pose1_from_pose2")) return {};
+  if (!report.is_object()) return {};
   std::optional<Error> fault;
   JsonObject root(&report, "", &fault);
-  claim.pose1_from_pose2 = root.transform("pose1_from_pose2");
-  if (report.contains(nlohmann::json::json_pointer("/pose_refinement/uncertainty"))) {
-    JsonObject known = root.object("pose_refinement").object("uncertainty");
-    const auto centre = known.numbers("centre_mm"), covariance = known.numbers("covariance");
-    if (centre.size() != 3 || covariance.size() != 36) {
-      return fail(ErrorCode::invalid_input, "{}: the pose's uncertainty must be 3 and 36 numbers", file.string());
-    }
-    claim.pose_uncertainty = {Eigen::Map<const Eigen::Vector3d>(centre.data()),
-                              Eigen::Map<const Eigen::Matrix<double, 6, 6>>(covariance.data())};
+  if (report.contains("pose1_from_pose2")) claim.pose1_from_pose2 = root.transform("pose1_from_pose2");
+  if (report.contains("pose_graph")) {
+    read_further_poses(root, claim);
+  } else if (report.contains(nlohmann::json::json_pointer("/pose_refinement/uncertainty"))) {
+    claim.pose_uncertainty = read_uncertainty(root.object("pose_refinement"));
   }
   if (fault) return tl::unexpected<Error>(fault->in(file.string()));
   return {};
@@ -95,7 +122,7 @@ Result<Claim> read_claim(const std::filesystem::path& folder) {
     claim.model.atlas = *atlas;
   }
   if (std::filesystem::exists(folder / "report.json", error)) {
-    if (auto read = read_pose2(folder / "report.json", claim); !read) return pass_on(read);
+    if (auto read = read_poses(folder / "report.json", claim); !read) return pass_on(read);
   }
   return claim;
 }

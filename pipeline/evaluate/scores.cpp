@@ -20,6 +20,10 @@ json to_json(const DistanceFigures& d) {
           {"share_over_0.50_mm", number(d.share_over_050)}};
 }
 
+json to_json(const Scores::PoseError& error) {
+  return {{"deg", error.deg}, {"mm", error.mm}, {"sigmas", number(error.sigmas)}};
+}
+
 std::string row(const char* name, const DistanceFigures& d) {
   return fmt::format("{:<34}{:>9.4f} {:>9.4f} {:>9.3f} {:>9.3f}\n", name, d.median, d.p95, 100.0 * d.share_over_025,
                      100.0 * d.share_over_050);
@@ -46,6 +50,10 @@ std::vector<Gate> gates(const Scores& s) {
   if (s.pose2) {
     all.push_back({"pose 2, deg", 0.01, s.pose2->deg});
     all.push_back({"pose 2, mm", 0.01, s.pose2->mm});
+  }
+  for (const auto& [pose, error] : s.further_poses) {
+    all.push_back({fmt::format("pose {}, deg", pose + 1), 0.01, error.deg});
+    all.push_back({fmt::format("pose {}, mm", pose + 1), 0.01, error.mm});
   }
   if (s.texture) all.push_back({"texture offset, median px", 0.5, s.texture->median_px});
   return all;
@@ -86,8 +94,11 @@ json to_json(const Scores& s) {
                                           {"share_within_2", number(one.within_2)},
                                           {"median_mm", number(one.median_mm)}});
   }
-  if (s.pose2)
-    result["pose2_error"] = {{"deg", s.pose2->deg}, {"mm", s.pose2->mm}, {"sigmas", number(s.pose2->sigmas)}};
+  if (s.pose2) result["pose2_error"] = to_json(*s.pose2);
+  for (const auto& [pose, error] : s.further_poses) {
+    json& row = result["further_pose_errors"].emplace_back(to_json(error));
+    row["pose"] = pose;
+  }
   if (s.texture) {
     result["texture"] = {{"patches", s.texture->patches},
                          {"median_px", number(s.texture->median_px)},

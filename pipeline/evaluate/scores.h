@@ -64,6 +64,11 @@ struct Scores {
     double sigmas = kNoFigure;
   };
   std::optional<PoseError> pose2;  ///< of the model's pose1_from_pose2
+  struct FurtherPose {
+    std::size_t pose = 2;  ///< from 0
+    PoseError error;
+  };
+  std::vector<FurtherPose> further_poses;  ///< of three or more
 
   struct TextureFigures {
     std::size_t patches = 0;
@@ -82,7 +87,7 @@ struct Gate {
   [[nodiscard]] bool ok() const { return at_most ? measured <= limit : measured >= limit; }
 };
 
-/// The gates A, B, C and E, pose 2, topology and texture, as far as there are figures.
+/// The gates A, B, C and E, pose 2 and further ones, topology and texture, as far as there are figures.
 std::vector<Gate> gates(const Scores& scores);
 
 nlohmann::json to_json(const Scores& scores);

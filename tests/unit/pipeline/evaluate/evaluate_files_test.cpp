@@ -97,6 +97,36 @@ TEST_F(EvaluateFilesTest, AModelsClaimsAreReadBack) {
   EXPECT_EQ(read_claim(folder_ / "absent").error().code, ErrorCode::not_found);
 }
 
+TEST_F(EvaluateFilesTest, PlacesOfManyPosesAreReadInTheFrameOfTheFirstThatWasKept) {
+  const TexturedMesh model{ball(kRadius, kCentre, 10), {}, {}};
+  const std::string place = R"({ "rotation": [[1,0,0],[0,1,0],[0,0,1]], "translation": [1, 2, )";
+  std::string zeros = "0";
+  for (int i = 1; i < 36; ++i) zeros += ", 0";
+  const std::string known = R"("uncertainty": { "centre_mm": [4, 5, 6], "covariance": [)" + zeros + "] } }";
+  const auto report_of = [&](int frame) {
+    const std::string first = std::to_string(frame + 1);
+    return R"({ "pose_graph": { "frame_of_pose": )" + std::to_string(frame) + R"( }, "pose)" + first +
+           R"(_from_pose3": )" + place + R"(3] }, "pose)" + first + (frame == 0 ? "_from_pose2" : "_from_pose4") +
+           R"(": )" + place + R"(7] }, "pose_refinement": { "poses": [ { "pose": )" + (frame == 0 ? "1" : "3") + ", " +
+           known + R"(, { "pose": 2, )" + known + "] } }";
+  };
+  ASSERT_TRUE(write_model_files(model, report_of(0), folder_ / "model"));
+  const auto whole = read_claim(folder_ / "model");
+  ASSERT_TRUE(whole) << whole.error().message;
+  EXPECT_EQ(whole->pose1_from_pose2->translation(), Eigen::Vector3d(1, 2, 7));
+  EXPECT_TRUE(whole->pose_uncertainty);
+  ASSERT_EQ(whole->further_poses.size(), 1U);
+  EXPECT_EQ(whole->further_poses[0].pose, 2U);
+  EXPECT_EQ(whole->further_poses[0].frame_from_pose.translation(), Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(whole->further_poses[0].uncertainty->centre, Eigen::Vector3d(4, 5, 6));
+  ASSERT_TRUE(write_model_files(model, report_of(1), folder_ / "model"));
+  const auto second = read_claim(folder_ / "model");
+  ASSERT_TRUE(second) << second.error().message;
+  EXPECT_EQ(second->frame_of_pose, 1U);
+  EXPECT_FALSE(second->pose1_from_pose2);
+  EXPECT_EQ(second->further_poses.size(), 2U);
+}
+
 /// Blobs of grey without period.
 cv::Mat1b speckle() {
   cv::Mat1f noise(300, 400);

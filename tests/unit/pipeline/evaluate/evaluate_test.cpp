@@ -234,6 +234,38 @@ TEST(Evaluate, TheSecondPoseIsComparedWithItsTruth) {
   EXPECT_NEAR(scores->pose2->mm, 0.03, 1e-5);
 }
 
+TEST(Evaluate, FurtherPosesAreComparedInTheFrameOfTheFirstThatWasKept) {
+  Truth truth = rig_and_ball({0.0});
+  for (const double turn : {1.0, 2.0}) {
+    TruePose& pose = truth.poses.emplace_back(truth.poses.front());
+    pose.table_from_truth = Transform::Identity();
+    pose.table_from_truth.rotate(Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitX())).translate(Eigen::Vector3d(1, 2, 3));
+  }
+  const Transform pose2_from_truth = truth.poses[1].table_from_truth;
+  Claim claim = claim_of(ball());
+  claim.frame_of_pose = 1;
+  for (auto& v : claim.model.mesh.vertices) v = (pose2_from_truth * v.cast<double>()).cast<float>();
+  const Eigen::Vector3d centre = pose2_from_truth * kCentre;
+  ClaimedPose third{.pose = 2};
+  third.frame_from_pose = Eigen::Translation3d(Eigen::Vector3d(0, 0, 0.03) + centre) *
+                          Eigen::AngleAxisd(to_radians(0.5), Eigen::Vector3d::UnitY()) * Eigen::Translation3d(-centre) *
+                          pose2_from_truth * truth.poses[2].table_from_truth.inverse();
+  third.uncertainty = PoseUncertainty{centre, 1e-4 * Eigen::Matrix<double, 6, 6>::Identity()};
+  claim.further_poses = {third};
+  const auto scores = evaluate(claim, truth, nullptr, quick(), {});
+  ASSERT_TRUE(scores);
+  EXPECT_FALSE(scores->pose2);
+  ASSERT_EQ(scores->further_poses.size(), 1U);
+  EXPECT_NEAR(scores->further_poses[0].error.deg, 0.5, 1e-6);
+  EXPECT_NEAR(scores->further_poses[0].error.mm, 0.03, 1e-5);
+  EXPECT_NEAR(scores->further_poses[0].error.sigmas, 3.0, 0.01);
+  EXPECT_LT(scores->measured.median, 0.01);
+  const auto all = gates(*scores);
+  const auto gate = std::ranges::find(all, "pose 3, deg", &Gate::name);
+  ASSERT_NE(gate, all.end());
+  EXPECT_FALSE(gate->ok());
+}
+
 TEST(Evaluate, TheResultDoesNotDependOnThreads) {
   Mesh model = ball(kRadius + 0.05, kCentre + Eigen::Vector3d(0.1, 0.0, 0.0));
   for (std::size_t i = 0; i < model.vertices.size(); ++i) model.views[i] = model.vertices[i].y() > 40.0F ? 1 : 0;
