@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <utility>
 
 namespace scanrig {
 namespace {
@@ -94,6 +95,15 @@ Disagreement of_misfit(std::size_t pose, const View& view, double residual_mm) {
           .unit = "mm",
           .sentence = fmt::format("View {} of pose {} does not fit the others by {:.3f} mm: it is not used.",
                                   view.index + 1, pose + 1, residual_mm)};
+}
+
+Disagreement of_pose(std::size_t pose, std::string sentence) {
+  return {.pose = pose,
+          .what = "pose",
+          .action = "left out",
+          .amount = 1.0,
+          .unit = "share",
+          .sentence = std::move(sentence)};
 }
 
 Disagreement of_photo(std::size_t pose, int view, std::size_t camera, const ContradictedPhoto& photo) {

@@ -12,12 +12,12 @@
 
 namespace scanrig {
 
-/// One image, or the object in one view, that the other images of its scan contradict.
+/// One image, the object in one view, or a whole pose, that the other images of its scan contradict.
 struct Disagreement {
   std::size_t pose = 0;
   int view = 0;
   std::string camera{};    ///< `left`, `right`; empty: of the view
-  std::string what{};      ///< `silhouette`, `photograph`, `object moved`, `view`
+  std::string what{};      ///< `silhouette`, `photograph`, `object moved`, `view`, `pose`
   std::string action{};    ///< `part left out`, `left out`, `corrected`, `kept`
   double amount = 0.0;     ///< in `unit`
   std::string unit{};      ///< `share` of the object's area in the image, or `mm`
@@ -32,6 +32,8 @@ Disagreement of_screen_colour(std::size_t pose, double share);
 Disagreement of_motion(std::size_t pose, const View& view, const ObjectMotion& motion);
 /// The view was left out.
 Disagreement of_misfit(std::size_t pose, const View& view, double residual_mm);
+/// The pose was left out.
+Disagreement of_pose(std::size_t pose, std::string sentence);
 Disagreement of_photo(std::size_t pose, int view, std::size_t camera, const ContradictedPhoto& photo);
 
 nlohmann::json disagreements_json(std::span<const Disagreement> disagreements);

@@ -26,57 +26,74 @@ Result<PoseOptions> pose_options_of(const std::string& rests) {
 
 }  // namespace
 
-Result<Reconstruction::State::FoundPose> Reconstruction::State::find_pose(Report& report, const Context& context) {
-  if (poses.size() < 2) return FoundPose{};
-  const StageLog::Timer timer(log, "pose");
-  const auto pose_options = pose_options_of(options.rests);
-  if (!pose_options) return pass_on(pose_options);
-  const PoseInput first{.solid = poses[0].partial.mesh, .views = poses[0].views};
-  const PoseInput second{.solid = poses[1].partial.mesh, .views = poses[1].views};
-  const auto estimate = estimate_pose(first, second, *pose_options, context);
-  if (!estimate) return pass_on(estimate);
-  report.add_estimate(*estimate);
-  FoundPose found{.pose1_from_pose2 = estimate->pose1_from_pose2};
-  RefineOptions refinement;
-  refinement.contacts = estimate->best.contacts;
-  refinement.held = estimate->symmetry.free_turns();
-  if (estimate->symmetry.group != Symmetry::Group::none) {
-    auto chosen = choose_turn(*estimate, report, context);
-    if (!chosen) return pass_on(chosen);
-    found = *chosen;
-    // The symmetry carries the planes that the part touches to other planes that it touches.
-    const Transform element = found.pose1_from_pose2 * estimate->pose1_from_pose2.inverse();
-    for (Contact& contact : refinement.contacts) {
-      contact.normal_in_pose1 = element.linear() * contact.normal_in_pose1;
-      contact.offset_mm += contact.normal_in_pose1.dot(element.translation());
-    }
+std::vector<Contact> carried(std::vector<Contact> contacts, const Transform& element) {
+  for (Contact& contact : contacts) {
+    contact.normal_in_pose1 = element.linear() * contact.normal_in_pose1;
+    contact.offset_mm += contact.normal_in_pose1.dot(element.translation());
   }
+  return contacts;
+}
+
+RefineOptions Reconstruction::State::refine_options() const {
+  RefineOptions refinement;
   if (calibration) {
     const RegistrationOptions known = registration_options(*calibration);
     refinement.axis = {to_radians(known.axis_tilt_sigma_deg), known.axis_shift_sigma_mm};
   }
-  const auto refined = refine_pose(poses[0].views, poses[1].views, found.pose1_from_pose2, refinement, context);
-  if (!refined) return pass_on(refined);
+  return refinement;
+}
+
+Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_poses(Report& report, const Context& context) {
+  if (poses.size() < 2) return FoundPoses{.model_from_pose = {Transform::Identity()}};
+  const StageLog::Timer timer(log, "pose");
+  const auto pose_options = pose_options_of(options.rests);
+  if (!pose_options) return pass_on(pose_options);
+  return poses.size() == 2 ? find_second_pose(*pose_options, report, context)
+                           : find_many_poses(*pose_options, report, context);
+}
+
+Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_second_pose(const PoseOptions& pose_options,
+                                                                                  Report& report,
+                                                                                  const Context& context) {
+  const PoseInput first{.solid = poses[0].partial.mesh, .views = poses[0].views};
+  const PoseInput second{.solid = poses[1].partial.mesh, .views = poses[1].views};
+  const auto estimate = estimate_pose(first, second, pose_options, context);
+  if (!estimate) return pass_on(estimate, "pose 2 in pose 1");
+  report.add_estimate(*estimate);
+  FoundPoses found{.model_from_pose = {Transform::Identity(), estimate->pose1_from_pose2}};
+  RefineOptions refinement = refine_options();
+  refinement.contacts = estimate->best.contacts;
+  refinement.held = estimate->symmetry.free_turns();
+  if (estimate->symmetry.group != Symmetry::Group::none) {
+    auto chosen = choose_turn(*estimate, report, context);
+    if (!chosen) return pass_on(chosen, "pose 2 in pose 1");
+    found = *chosen;
+    // The symmetry carries the planes that the part touches to other planes that it touches.
+    const Transform element = *found.model_from_pose[1] * estimate->pose1_from_pose2.inverse();
+    refinement.contacts = carried(std::move(refinement.contacts), element);
+  }
+  const auto refined = refine_pose(poses[0].views, poses[1].views, *found.model_from_pose[1], refinement, context);
+  if (!refined) return pass_on(refined, "pose 2 in pose 1");
   report.add_refinement(*refined);
-  found.pose1_from_pose2 = refined->pose1_from_pose2;
+  found.model_from_pose[1] = refined->pose1_from_pose2;
   return found;
 }
 
 /// Of the motions that the shape leaves open: by the colours, if these show it.
-Result<Reconstruction::State::FoundPose> Reconstruction::State::choose_turn(const PoseEstimate& estimate,
-                                                                            Report& report, const Context& context) {
-  FoundPose found{.pose1_from_pose2 = estimate.pose1_from_pose2};
+Result<Reconstruction::State::FoundPoses> Reconstruction::State::choose_turn(const PoseEstimate& estimate,
+                                                                             Report& report, const Context& context) {
+  FoundPoses found{.model_from_pose = {Transform::Identity(), estimate.pose1_from_pose2}};
   if (poses[0].plain.empty() || poses[1].plain.empty()) {
     report.add_turn(estimate, nullptr);
     return found;
   }
-  const auto colours = turn_by_colours(estimate, context);
+  const auto colours = turn_by_colours(0, 1, estimate, context);
   if (!colours) return pass_on(colours);
   report.add_turn(estimate, &*colours);
   found.layers = !colours->is_decided;
   if (!colours->is_decided) return found;
-  found.pose1_from_pose2 = colours->pose1_from_pose2;
-  if (turns_over(found.pose1_from_pose2)) return found;
+  found.model_from_pose[1] = colours->pose1_from_pose2;
+  if (turns_over(colours->pose1_from_pose2)) return found;
   return fail(ErrorCode::same_rest,
               "the colours show that the object was not turned over between the two poses; lay it on another side and "
               "scan pose 2 again");

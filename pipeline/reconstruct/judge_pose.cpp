@@ -75,15 +75,15 @@ Result<void> Reconstruction::State::judge_silhouettes(std::size_t pose, const Co
   return {};
 }
 
-/// What one pose measured says of the other's silhouettes: the foot of each, where a dark object mirrors the table, is
-/// the other's top.
-Result<void> Reconstruction::State::judge_silhouettes_of_both(const Transform& pose1_from_pose2,
-                                                              const Context& context) {
+/// What one pose measured says of the others' silhouettes: the foot of each, where a dark object mirrors the table, is
+/// another's top.
+Result<void> Reconstruction::State::judge_silhouettes_of_all(const FoundPoses& found, const Context& context) {
   if (!calibration || poses.size() < 2) return {};
   std::vector<View> all;  // share their pixels with the poses' views
   std::vector<std::pair<std::size_t, std::size_t>> origin;
   for (std::size_t p = 0; p < poses.size(); ++p) {
-    const Transform pose_from_model = p == 0 ? Transform::Identity() : pose1_from_pose2.inverse();
+    if (!found.model_from_pose[p]) continue;
+    const Transform pose_from_model = p == 0 ? Transform::Identity() : found.model_from_pose[p]->inverse();
     for (std::size_t v = 0; v < poses[p].views.size(); ++v) {
       View& view = all.emplace_back(poses[p].views[v]);
       view.index = static_cast<int>(origin.size());

@@ -104,7 +104,7 @@ Result<void> Reconstruction::State::add_photos(const ScanFolder* scan, std::size
   return {};
 }
 
-Result<std::vector<Photo>> Reconstruction::State::photos(const FoundPose& pose2) const {
+Result<std::vector<Photo>> Reconstruction::State::photos(const FoundPoses& found) const {
   std::vector<Photo> photos;
   std::optional<ScanFolder> scan;
   if (reads_again()) {
@@ -113,16 +113,18 @@ Result<std::vector<Photo>> Reconstruction::State::photos(const FoundPose& pose2)
     scan = std::move(*opened);
   }
   for (std::size_t p = 0; p < poses.size(); ++p) {
+    if (!found.model_from_pose[p]) continue;
     const std::size_t first = photos.size();
-    const Transform pose_from_model = p == 0 ? Transform::Identity() : pose2.pose1_from_pose2.inverse();
+    const Transform pose_from_model = p == 0 ? Transform::Identity() : found.model_from_pose[p]->inverse();
     if (auto done = add_photos(scan ? &*scan : nullptr, p, pose_from_model, photos); !done) return pass_on(done);
-    for (std::size_t i = first; pose2.layers && i < photos.size(); ++i) photos[i].layer = static_cast<int>(p);
+    for (std::size_t i = first; found.layers && i < photos.size(); ++i) photos[i].layer = static_cast<int>(p);
   }
   return photos;
 }
 
 /// Each pose's own photographs on its own surface, then both together.
-Result<ColourDecision> Reconstruction::State::turn_by_colours(const PoseEstimate& estimate,
+Result<ColourDecision> Reconstruction::State::turn_by_colours(std::size_t pose1, std::size_t pose2,
+                                                              const PoseEstimate& estimate,
                                                               const Context& context) const {
   std::optional<ScanFolder> scan;
   if (reads_again()) {
@@ -131,7 +133,7 @@ Result<ColourDecision> Reconstruction::State::turn_by_colours(const PoseEstimate
     scan = std::move(*opened);
   }
   std::vector<std::vector<PaintedPoint>> painted;
-  for (std::size_t p = 0; p < 2; ++p) {
+  for (const std::size_t p : {pose1, pose2}) {
     std::vector<Photo> photographs;
     if (auto done = add_photos(scan ? &*scan : nullptr, p, Transform::Identity(), photographs); !done) {
       return pass_on(done);

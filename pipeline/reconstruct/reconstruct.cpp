@@ -40,7 +40,10 @@ Result<VolumeOptions::Fusion> fusion_of(const std::string& name) {
 }  // namespace
 
 Result<Reconstruction::State::PoseState*> Reconstruction::State::open_pose(std::size_t pose) {
-  if (pose > 1) return fail(ErrorCode::invalid_input, "a scan has one or two poses, not {}", pose + 1);
+  if (pose >= kMaxPoses) return fail(ErrorCode::invalid_input, "a scan has 1 to {} poses, not {}", kMaxPoses, pose + 1);
+  if (pose > 1 && options.fusion == "paper") {
+    return fail(ErrorCode::invalid_input, "fusion \"paper\" combines two poses, not {}: use \"evidence\"", pose + 1);
+  }
   if (pose > poses.size()) return fail(ErrorCode::invalid_input, "pose {} has no views before pose {}", pose, pose + 1);
   if (pose == poses.size()) poses.emplace_back();
   if (poses[pose].finished) return fail(ErrorCode::invalid_input, "pose {} is finished already", pose + 1);
@@ -146,16 +149,16 @@ std::uintmax_t Reconstruction::State::prepared_bytes() const {
                                                                             : memory_left(options.memory_bytes) / 2;
 }
 
-Result<Surface> Reconstruction::State::surface(const Transform& pose1_from_pose2, const Context& context) {
+Result<Surface> Reconstruction::State::surface(const FoundPoses& found, const Context& context) {
   const StageLog::Timer timer(log, "integration");
   const auto fusion = fusion_of(options.fusion);
   if (!fusion) return pass_on(fusion);
   std::vector<PosedViews> posed;
-  for (PoseState& pose : poses) {
+  for (std::size_t p = 0; p < poses.size(); ++p) {
+    if (!found.model_from_pose[p]) continue;
+    PoseState& pose = poses[p];
     parallel_for(pose.full.size(), [&](std::size_t v) { follow_thinned(pose.full[v], pose.views[v].range, step()); });
-    posed.push_back({.views = pose.views,
-                     .model_from_pose = posed.empty() ? Transform::Identity() : pose1_from_pose2,
-                     .full = pose.full});
+    posed.push_back({.views = pose.views, .model_from_pose = *found.model_from_pose[p], .full = pose.full});
   }
   return integrate(posed,
                    {.voxel_mm = options.voxel_mm,
@@ -189,41 +192,43 @@ Result<void> Reconstruction::State::prepare(const Context& context) {
   for (const PoseState& pose : poses) {
     report.add_pose(pose.views, pose.registration, pose.partial.report, pose.watch ? &*pose.watch : nullptr);
   }
-  const auto pose2 = find_pose(report, context);
-  if (!pose2) return pass_on(pose2, "pose 2 in pose 1");
-  if (poses.size() > 1) report.add_next_rest(poses[0].suggested, pose2->pose1_from_pose2);
-  if (auto done = judge_silhouettes_of_both(pose2->pose1_from_pose2, context); !done) return pass_on(done);
+  auto found = find_poses(report, context);
+  if (!found) return pass_on(found);
+  const bool has_pose2 = poses.size() > 1 && found->model_from_pose[0] && found->model_from_pose[1];
+  if (has_pose2) report.add_next_rest(poses[0].suggested, *found->model_from_pose[1]);
+  if (auto done = judge_silhouettes_of_all(*found, context); !done) return pass_on(done);
   give_memory_back();  // of the matching, or it would add to the peak
-  auto integrated = surface(pose2->pose1_from_pose2, context);
+  auto integrated = surface(*found, context);
   if (!integrated) return pass_on(integrated, "integration");
   release_range_images();
   give_memory_back();
-  prepared.emplace(Prepared{*pose2, std::move(*integrated), std::move(report)});
+  prepared.emplace(Prepared{std::move(*found), std::move(*integrated), std::move(report)});
   return {};
 }
 
 Result<Model> Reconstruction::State::finish(const ScanIdentity& identity, const Context& context) {
   if (auto done = prepare(context); !done) return pass_on(done);
-  auto& [pose2, surface, report] = *prepared;
+  auto& [found, surface, report] = *prepared;
   report.add_identity(identity);
   Model model;
   model.mesh.mesh = std::move(surface.mesh);
-  if (auto done = add_texture(model.mesh, pose2, report, context); !done) return pass_on(done, "texture");
+  if (auto done = add_texture(model.mesh, found, report, context); !done) return pass_on(done, "texture");
   report.add_surface(model.mesh.mesh, surface.report);
   report.add_disagreements(disagreements);
   model.report = std::make_shared<const nlohmann::json>(report.finished(log));
   return model;
 }
 
-Result<void> Reconstruction::State::add_texture(TexturedMesh& model, const FoundPose& pose2, Report& report,
+Result<void> Reconstruction::State::add_texture(TexturedMesh& model, const FoundPoses& found, Report& report,
                                                 const Context& context) {
   if (!options.texture) return {};
   const StageLog::Timer timer(log, "texture");
-  const auto photographs = photos(pose2);
+  const auto photographs = photos(found);
   if (!photographs) return pass_on(photographs);
   if (photographs->empty()) return {};
   std::vector<std::pair<std::size_t, int>> views;  // pose and view of every two photographs
   for (std::size_t p = 0; p < poses.size(); ++p) {
+    if (!found.model_from_pose[p]) continue;
     for (std::size_t v = 0; v < poses[p].plain.size(); ++v) views.emplace_back(p, poses[p].views[v].index);
   }
   auto textured = texture_mesh(model.mesh, *photographs, {}, context);

@@ -76,8 +76,9 @@ class Reconstruction {
   /// time. `context` is told of the progress of a single one. Fails as add_view() and the sources do; none is added
   /// then.
   Result<void> add_views(std::size_t pose, std::span<const ImageSource> sources, const Context& context);
-  /// Range image and silhouettes of one view. `pose` is 0 or 1. Fails with `invalid_input` (options, sizes),
-  /// `degenerate` (nothing seen), `out_of_range` (the object is larger than the working volume), `stopped`.
+  /// Range image and silhouettes of one view. `pose` counts from 0, up to kMaxPoses. Fails with `invalid_input`
+  /// (options, sizes), `degenerate` (nothing seen), `out_of_range` (the object is larger than the working volume),
+  /// `stopped`.
   Result<void> add_view(std::size_t pose, const ViewImages& images, const Context& context);
   /// An imported range image, placed in its pose.
   Result<void> add_range_view(std::size_t pose, int index, double angle_rad, RangeImage range, const Context& context);
@@ -95,8 +96,9 @@ class Reconstruction {
   /// is none, and of imported range images.
   [[nodiscard]] std::vector<RestSuggestion> suggest_rests(std::size_t pose, const Mesh& live_pose);
 
-  /// Pose 2 into pose 1, and integration: what finish() begins with, sooner. Every pose must be finished before, none
-  /// comes after. Fails with `same_rest`, `ambiguous`, `no_overlap`, `degenerate`, `stopped`.
+  /// All poses into one frame, that of the first which is kept, and integration: what finish() begins with, sooner. Of
+  /// three poses or more, one that does not fit is left out, and the report names it. Every pose must be finished
+  /// before, none comes after. Fails with `same_rest`, `ambiguous`, `no_overlap`, `degenerate`, `stopped`.
   Result<void> prepare(const Context& context);
   /// As prepare(), then the texture; with one pose, its own complete model. Once: the views are let go. Fails as
   /// prepare(), and as ScanFolder where photographs are read again.

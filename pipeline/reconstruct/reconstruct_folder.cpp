@@ -5,6 +5,7 @@
 #include "core/parallel.h"
 #include "core/units.h"
 #include "pipeline/model_io/model_files.h"
+#include "pipeline/pose/place_poses.h"
 #include "pipeline/reconstruct/memory.h"
 #include "pipeline/reconstruct/reconstruct.h"
 
@@ -70,6 +71,10 @@ ScanIdentity identity_of(const Manifest& manifest) {
 Result<Model> reconstruct(const ScanFolder& scan, const ReconstructOptions& options, const Context& context) {
   const auto& poses = scan.manifest().poses;
   if (poses.empty()) return fail(ErrorCode::invalid_input, "{} has no poses", scan.path().string());
+  if (poses.size() > kMaxPoses) {
+    return fail(ErrorCode::invalid_input, "{}: a scan has 1 to {} poses, not {}", scan.path().string(), kMaxPoses,
+                poses.size());
+  }
   for (const PoseRecord& pose : poses) {
     if (!pose.complete) {
       return fail(ErrorCode::invalid_input, "{}: {} is not complete: only {} of its views were taken",

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/pose/place_poses.h"
 #include "pipeline/range/compact_range.h"
 #include "pipeline/range/rectification.h"
 #include "pipeline/range/thinned_view.h"
@@ -23,6 +24,9 @@
 #include "pipeline/volume/integrate.h"
 
 namespace scanrig {
+
+/// The contacts of a symmetric part after `element`, a motion that carries it onto itself.
+std::vector<Contact> carried(std::vector<Contact> contacts, const Transform& element);
 
 /// What a Reconstruction holds. reconstruct.cpp has its stages, judge_pose.cpp what they say of single images,
 /// photographs.cpp where these are.
@@ -47,15 +51,15 @@ struct Reconstruction::State {
     bool finished = false;
   };
 
-  /// Place of pose 2. `layers`: its photographs may lie otherwise on the surface than pose 1's.
-  struct FoundPose {
-    Transform pose1_from_pose2 = Transform::Identity();
+  /// Places of the poses. `layers`: photographs of one may lie otherwise on the surface than another's.
+  struct FoundPoses {
+    std::vector<std::optional<Transform>> model_from_pose{};  ///< nothing: left out. The first that is kept: identity
     bool layers = false;
   };
 
   /// What finish() needs of the finished poses alone.
   struct Prepared {
-    FoundPose pose2;
+    FoundPoses found;
     Surface surface;
     Report report;
   };
@@ -81,27 +85,33 @@ struct Reconstruction::State {
   Result<void> register_pose(std::size_t pose, const Context& context);
   Result<void> align_views(std::size_t pose, const Context& context);
   Result<void> judge_silhouettes(std::size_t pose, const Context& context);
-  Result<void> judge_silhouettes_of_both(const Transform& pose1_from_pose2, const Context& context);
+  Result<void> judge_silhouettes_of_all(const FoundPoses& found, const Context& context);
   Result<void> measure_without_key(std::size_t pose, const Context& context);
   bool undo_motions(std::size_t pose, const RegistrationOptions& priors);
   bool leave_out_misfits(std::size_t pose);
   Result<void> finish_pose(std::size_t pose, const Context& context);
   std::vector<RestSuggestion> suggest_rests(std::size_t pose, const Mesh& live_pose);
-  Result<FoundPose> find_pose(Report& report, const Context& context);
-  Result<FoundPose> choose_turn(const PoseEstimate& estimate, Report& report, const Context& context);
+  /// Of one pose, of two (find_pose.cpp) and of more (find_poses.cpp).
+  Result<FoundPoses> find_poses(Report& report, const Context& context);
+  Result<FoundPoses> find_second_pose(const PoseOptions& pose_options, Report& report, const Context& context);
+  Result<FoundPoses> find_many_poses(const PoseOptions& pose_options, Report& report, const Context& context);
+  Result<FoundPoses> choose_turn(const PoseEstimate& estimate, Report& report, const Context& context);
+  Result<void> choose_turns(const PlacedPoses& placed, FoundPoses& found, const Context& context);
+  [[nodiscard]] RefineOptions refine_options() const;
   [[nodiscard]] std::uintmax_t prepared_bytes() const;
-  Result<Surface> surface(const Transform& pose1_from_pose2, const Context& context);
+  Result<Surface> surface(const FoundPoses& found, const Context& context);
   void set_view(PoseState& pose, std::size_t v, View view) const;
   void crop_photos(PoseState& pose) const;
   void release_range_images();
   Result<ViewImages> whole_images(std::size_t pose, std::size_t v) const;
   Result<KeptPhoto> photo(const ScanFolder* scan, std::size_t pose, std::size_t v, std::size_t camera) const;
-  Result<std::vector<Photo>> photos(const FoundPose& pose2) const;
+  Result<std::vector<Photo>> photos(const FoundPoses& found) const;
   Result<void> add_photos(const ScanFolder* scan, std::size_t pose, const Transform& pose_from_model,
                           std::vector<Photo>& photos) const;
-  Result<ColourDecision> turn_by_colours(const PoseEstimate& estimate, const Context& context) const;
+  Result<ColourDecision> turn_by_colours(std::size_t pose1, std::size_t pose2, const PoseEstimate& estimate,
+                                         const Context& context) const;
   [[nodiscard]] LivePhoto live_photo(std::size_t pose, std::size_t v) const;
-  Result<void> add_texture(TexturedMesh& model, const FoundPose& pose2, Report& report, const Context& context);
+  Result<void> add_texture(TexturedMesh& model, const FoundPoses& found, Report& report, const Context& context);
   Result<void> prepare(const Context& context);
   Result<Model> finish(const ScanIdentity& identity, const Context& context);
 };

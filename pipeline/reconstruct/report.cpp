@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
@@ -166,6 +167,34 @@ json symmetry_json(const Symmetry& symmetry) {
           {"motions", symmetry.motions == 0 ? json() : json(symmetry.motions)}};
 }
 
+json estimate_json(const PoseEstimate& estimate) {
+  json alternatives = json::array();
+  for (const Candidate& candidate : estimate.alternatives) alternatives.push_back(candidate_json(candidate));
+  return {{"pose1_from_pose2", transform_json(estimate.pose1_from_pose2)},
+          {"chosen", candidate_json(estimate.best)},
+          {"alternatives", alternatives},
+          {"tangent_planes", {counts_json(estimate.counts1), counts_json(estimate.counts2)}},
+          {"pairs", estimate.pairs},
+          {"hypotheses", estimate.hypotheses},
+          {"refined", estimate.refined},
+          {"overlap", estimate.overlap},
+          {"condition", number(estimate.condition)},
+          {"symmetry", symmetry_json(estimate.symmetry)}};
+}
+
+/// `poses` from 0.
+json pair_json(const PosePair& pair) {
+  const bool is_placed = pair.pose1_from_pose2.has_value();
+  return {{"poses", {pair.pose1, pair.pose2}},
+          {"verdict", to_string(pair.verdict)},
+          {"confirmed", is_placed ? json(pair.judged.confirmed) : json()},
+          {"contradicted", is_placed ? json(pair.judged.contradicted) : json()},
+          {"residual_median_mm", json()},
+          {"overlap", json()},
+          {"estimate", pair.estimate ? estimate_json(*pair.estimate) : json()},
+          {"message", pair.message.empty() ? json() : json(pair.message)}};
+}
+
 /// Without a full stop.
 std::string turn_sentence(const PoseEstimate& estimate, const ColourDecision* colours) {
   const char* how = "; nothing shows which of its turns it made";
@@ -185,12 +214,12 @@ json sigma_json(const Eigen::Matrix3d& covariance, double unit) {
           {"weakest", {weakest.x(), weakest.y(), weakest.z()}}};
 }
 
-json uncertainty_json(const RefinedPose& refined) {
+json uncertainty_json(const Eigen::Vector3d& centre, const Eigen::Matrix<double, 6, 6>& covariance) {
   json rows = json::array();
-  for (const double value : refined.covariance.reshaped()) rows.push_back(value);
-  return {{"centre_mm", {refined.centre.x(), refined.centre.y(), refined.centre.z()}},
-          {"rotation_deg", sigma_json(refined.covariance.topLeftCorner<3, 3>(), to_degrees(1.0))},
-          {"translation_mm", sigma_json(refined.covariance.bottomRightCorner<3, 3>(), 1.0)},
+  for (const double value : covariance.reshaped()) rows.push_back(value);
+  return {{"centre_mm", {centre.x(), centre.y(), centre.z()}},
+          {"rotation_deg", sigma_json(covariance.topLeftCorner<3, 3>(), to_degrees(1.0))},
+          {"translation_mm", sigma_json(covariance.bottomRightCorner<3, 3>(), 1.0)},
           {"covariance", rows}};
 }
 
@@ -232,20 +261,7 @@ void Report::add_pose(std::span<const View> views, const RegistrationReport& reg
                                {"partial_model", volume_json(partial)}});
 }
 
-void Report::add_estimate(const PoseEstimate& estimate) {
-  json alternatives = json::array();
-  for (const Candidate& candidate : estimate.alternatives) alternatives.push_back(candidate_json(candidate));
-  (*json_)["pose_estimate"] = {{"pose1_from_pose2", transform_json(estimate.pose1_from_pose2)},
-                               {"chosen", candidate_json(estimate.best)},
-                               {"alternatives", alternatives},
-                               {"tangent_planes", {counts_json(estimate.counts1), counts_json(estimate.counts2)}},
-                               {"pairs", estimate.pairs},
-                               {"hypotheses", estimate.hypotheses},
-                               {"refined", estimate.refined},
-                               {"overlap", estimate.overlap},
-                               {"condition", number(estimate.condition)},
-                               {"symmetry", symmetry_json(estimate.symmetry)}};
-}
+void Report::add_estimate(const PoseEstimate& estimate) { (*json_)["pose_estimate"] = estimate_json(estimate); }
 
 void Report::add_turn(const PoseEstimate& estimate, const ColourDecision* colours) {
   json turn = {{"decided_by", "nothing"},
@@ -272,7 +288,34 @@ void Report::add_refinement(const RefinedPose& refined) {
                                  {"overlap", refined.overlap},
                                  {"correspondences", refined.correspondences},
                                  {"condition", number(refined.condition)},
-                                 {"uncertainty", uncertainty_json(refined)}};
+                                 {"uncertainty", uncertainty_json(refined.centre, refined.covariance)}};
+}
+
+void Report::add_placed(const PlacedPoses& placed, std::span<const std::size_t> kept, std::span<const PoseLink> links,
+                        const RefinedPoses& refined, bool layers) {
+  json of_poses = json::array(), pairs = json::array(), left_out = json::array();
+  for (std::size_t i = 1; i < kept.size(); ++i) {
+    (*json_)[fmt::format("pose{}_from_pose{}", kept[0] + 1, kept[i] + 1)] = transform_json(refined.model_from_pose[i]);
+    of_poses.push_back({{"pose", kept[i]}, {"uncertainty", uncertainty_json(refined.centre, refined.covariance[i])}});
+  }
+  for (const PosePair& pair : placed.pairs) pairs.push_back(pair_json(pair));
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    const auto is_its = [&](const json& pair) {
+      return pair["poses"][0] == kept[links[i].pose1] && pair["poses"][1] == kept[links[i].pose2];
+    };
+    json& pair = *std::find_if(pairs.begin(), pairs.end(), is_its);
+    pair["residual_median_mm"] = number(refined.links[i].median_mm);
+    pair["overlap"] = refined.links[i].overlap;
+  }
+  for (const LeftOutPose& pose : placed.left_out) {
+    left_out.push_back({{"pose", pose.pose}, {"sentence", pose.sentence}});
+  }
+  (*json_)["pose_graph"] = {{"frame_of_pose", kept[0]}, {"poses", std::vector<std::size_t>(kept.begin(), kept.end())},
+                            {"pairs", pairs},           {"searches", placed.searches},
+                            {"left_out", left_out},     {"colours_of_one_pose_each", layers}};
+  (*json_)["pose_refinement"] = {{"residual_median_mm", number(refined.median_mm)},
+                                 {"residual_rms_mm", number(refined.rms_mm)},
+                                 {"poses", of_poses}};
 }
 
 void Report::add_next_rest(std::span<const NextRest> suggested, const Transform& pose1_from_pose2) {

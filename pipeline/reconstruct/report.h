@@ -6,6 +6,7 @@
 #include <span>
 
 #include "pipeline/pose/estimate_pose.h"
+#include "pipeline/pose/place_poses.h"
 #include "pipeline/reconstruct/disagreements.h"
 #include "pipeline/reconstruct/reconstruct.h"
 #include "pipeline/reconstruct/rest_suggestion.h"
@@ -13,6 +14,7 @@
 #include "pipeline/reconstruct/stage_log.h"
 #include "pipeline/reconstruct/turn_by_colour.h"
 #include "pipeline/registration/refine_pose.h"
+#include "pipeline/registration/refine_poses.h"
 #include "pipeline/registration/register_views.h"
 #include "pipeline/texture/texture.h"
 #include "pipeline/volume/integrate.h"
@@ -35,6 +37,9 @@ class Report {
   /// After add_estimate(), of a part with a symmetry. `colours`: null without photographs.
   void add_turn(const PoseEstimate& estimate, const ColourDecision* colours);
   void add_refinement(const RefinedPose& refined);
+  /// Of three poses or more. `kept`: poses of the model; `links` count among these.
+  void add_placed(const PlacedPoses& placed, std::span<const std::size_t> kept, std::span<const PoseLink> links,
+                  const RefinedPoses& refined, bool layers);
   /// `suggested`: to the operator after pose 1; nothing is added where it is empty.
   void add_next_rest(std::span<const NextRest> suggested, const Transform& pose1_from_pose2);
   void add_surface(const Mesh& mesh, const VolumeReport& volume);

@@ -50,6 +50,15 @@ TEST_F(RecipeConfigTest, ARecipeMayLeaveEverythingButTheScanToTheButton) {
   EXPECT_FALSE(rig->storage.keep_days);
 }
 
+TEST_F(RecipeConfigTest, AScanHasUpToEightPoses) {
+  const auto rig =
+      read(example_ + replaced(line_, "poses = 2\nflip_timeout_min = 2\nflip = \"signal\"\nstart = \"part_present\"",
+                               "poses = 8\nflip_timeout_min = 2"));
+  ASSERT_TRUE(rig) << rig.error().message;
+  EXPECT_EQ(rig->recipes.at("line").poses, 8);
+  expect_problem(with_inputs() + replaced(line_, "poses = 2", "poses = 9"), "poses");
+}
+
 TEST_F(RecipeConfigTest, ACalibrationHasTheStandardBoardUnlessAnotherIsNamed) {
   const auto standard = read(example_);
   ASSERT_TRUE(standard) << standard.error().message;
