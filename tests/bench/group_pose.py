@@ -1,5 +1,6 @@
-"""Poses: the rest that is suggested for the next one, and more than two of them."""
+"""Poses: how the object was turned over, more than two of them, and the rest that is suggested next."""
+import pose_campaign
 import pose_guided_flip
 import pose_many
 
-PARTS = {"guided_flip": pose_guided_flip.measure, "poses": pose_many.measure}
+PARTS = {"campaign": pose_campaign.measure, "guided_flip": pose_guided_flip.measure, "poses": pose_many.measure}
