@@ -191,7 +191,8 @@ Result<std::vector<Transform>> draw_placements(const TriangleMesh& mesh, std::ui
   const auto rests = stable_rests(mesh, seed);
   std::vector<int> drawn = {draw(rests, uniform(mix(seed, 4)), [](const Rest&) { return true; })};
   const auto turned_over = [&](const Rest& rest) {
-    return std::ranges::all_of(drawn, [&](int d) { return angle_between(rest.down, rests[d].down) > to_radians(30.0); });
+    return std::ranges::all_of(drawn,
+                               [&](int d) { return angle_between(rest.down, rests[d].down) > to_radians(30.0); });
   };
   for (int i = 1; i < std::max(count, 2) && drawn.front() >= 0 && !same_rest; ++i) {
     const std::uint64_t key = i == 1 ? mix(seed, 5) : mix(seed, 5, i);
