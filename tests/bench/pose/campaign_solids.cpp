@@ -39,10 +39,11 @@ class DistanceGrid {
   }
   [[nodiscard]] double value(std::size_t id) const { return static_cast<double>(value_[id]); }
   [[nodiscard]] Eigen::Vector3d at(std::size_t id) const {
+    const Eigen::Vector3d off_flat_faces(0.013, 0.017, 0.011);  // these have round numbers
     const auto n = static_cast<std::size_t>(count_);
-    const Eigen::Vector3d place(static_cast<double>(id % n) + 0.013, static_cast<double>(id / n % n) + 0.017,
-                                static_cast<double>(id / (n * n)) + 0.011);  // off the round numbers of flat faces
-    return cell_ * place - Eigen::Vector3d::Constant(kReachMm);
+    const std::size_t x = id % n, y = id / n % n, z = id / n / n;
+    const Eigen::Vector3d node(static_cast<double>(x), static_cast<double>(y), static_cast<double>(z));
+    return cell_ * (node + off_flat_faces) - Eigen::Vector3d::Constant(kReachMm);
   }
 
  private:
