@@ -14,9 +14,9 @@ struct JointScore {
   int view1 = 0, view2 = 0;  ///< of these poses
 };
 
-/// As motion_covariance(), of the motions of all poses but the first, six coordinates each; `information` is their
-/// normal matrix. Scores are summed by the views that they share; pairs of views that both sums hold are taken out
-/// once. With two poses the same.
+/// Of the motions of all poses but the first, six coordinates each; `information` is their normal matrix. Scores are
+/// summed by the views that they share; pairs of views that both sums hold are taken out once. Sources and what is
+/// taken for independent: motion_covariance(), which is this of two poses.
 Eigen::MatrixXd joint_covariance(const Eigen::MatrixXd& information, std::span<const JointScore> scores);
 
 }  // namespace scanrig
