@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/parallel.h"
+#include "core/transform.h"
 #include "core/units.h"
 #include "pipeline/mesh/mesh.h"
 #include "pipeline/range/range_image.h"
@@ -137,6 +138,16 @@ inline std::vector<View> turn_around(const Solid& solid, int count, const RigMod
 inline Solid workpiece() {
   return together({block({-30, 0, -20}, {30, 22, 20}), block({-30, 10, -20}, {-8, 62, 6}), ball({17, 24, 4}, 14),
                    block({5, 0, 15}, {30, 12, 32})});
+}
+
+/// `t` disturbed by `angle_deg` about some axis through the middle of a workpiece and by `shift_mm`.
+inline Transform off_by(const Transform& t, double angle_deg, double shift_mm, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  const auto direction = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized(); };
+  const Eigen::Translation3d middle(0, 25, 0);
+  const Eigen::Vector3d turn = to_radians(angle_deg) * direction();
+  return middle * small_motion(turn, shift_mm * direction()) * middle.inverse() * t;
 }
 
 }  // namespace scanrig::testing

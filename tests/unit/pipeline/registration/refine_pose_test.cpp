@@ -35,16 +35,6 @@ const TwoPoses& two_poses() {
   return poses;
 }
 
-/// `t` disturbed by `angle_deg` about some axis through the middle of the object and by `shift_mm`.
-Transform off_by(const Transform& t, double angle_deg, double shift_mm, unsigned seed) {
-  std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0.0, 1.0);
-  const auto direction = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized(); };
-  const Eigen::Translation3d middle(0, 25, 0);
-  const Eigen::Vector3d turn = to_radians(angle_deg) * direction();
-  return middle * small_motion(turn, shift_mm * direction()) * middle.inverse() * t;
-}
-
 void expect_near(const Transform& got, const Transform& truth, double angle_deg, double shift_mm) {
   EXPECT_LT(to_degrees(rotation_angle(got.linear().transpose() * truth.linear())), angle_deg);
   const Eigen::Vector3d middle = truth.inverse() * Eigen::Vector3d(0, 25, 0);
@@ -54,7 +44,8 @@ void expect_near(const Transform& got, const Transform& truth, double angle_deg,
 TEST(RefinePose, ReachesAHundredthFromEightDegreesAndFiveMillimetres) {
   const TwoPoses& scan = two_poses();
   for (unsigned seed = 1; seed <= 6; ++seed) {
-    const auto refined = refine_pose(scan.first, scan.second, off_by(scan.pose1_from_pose2, 8, 5, seed), {}, Context{});
+    const auto refined =
+        refine_pose(scan.first, scan.second, testing::off_by(scan.pose1_from_pose2, 8, 5, seed), {}, Context{});
     ASSERT_TRUE(refined) << refined.error().message;
     expect_near(refined->pose1_from_pose2, scan.pose1_from_pose2, 0.01, 0.01);
     EXPECT_GT(refined->overlap, 0.4);
@@ -96,7 +87,7 @@ TEST(RefinePose, KnowsHowWellTheMotionIsKnown) {
   for (unsigned trial = 0; trial < kTrials; ++trial) {
     const auto first = testing::turn_around(testing::workpiece(), 6, rig, 10 + 2 * trial);
     const auto second = testing::turn_around(testing::moved(testing::workpiece(), laid_down()), 6, rig, 11 + 2 * trial);
-    const auto refined = refine_pose(first, second, off_by(truth, 1, 1, trial), {}, Context{});
+    const auto refined = refine_pose(first, second, testing::off_by(truth, 1, 1, trial), {}, Context{});
     ASSERT_TRUE(refined) << refined.error().message;
     const double sigmas = in_sigmas(*refined, truth);
     EXPECT_LT(sigmas, 4.0) << trial;
@@ -122,7 +113,7 @@ TEST(RefinePose, GivesTheSameBitsOnAnyNumberOfThreads) {
   const TwoPoses& scan = two_poses();
   Result<RefinedPose> one;
   Result<RefinedPose> many;
-  const Transform start = off_by(scan.pose1_from_pose2, 4, 2, 3);
+  const Transform start = testing::off_by(scan.pose1_from_pose2, 4, 2, 3);
   with_threads(1, [&] { one = refine_pose(scan.first, scan.second, start, {}, Context{}); });
   with_threads(3, [&] { many = refine_pose(scan.first, scan.second, start, {}, Context{}); });
   ASSERT_TRUE(one && many);

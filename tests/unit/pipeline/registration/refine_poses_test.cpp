@@ -43,19 +43,10 @@ const ThreePoses& three_poses() {
   return poses;
 }
 
-Transform displaced(const Transform& t, double angle_deg, double shift_mm, unsigned seed) {
-  std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0.0, 1.0);
-  const auto direction = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)).normalized(); };
-  const Eigen::Translation3d middle(0, 25, 0);
-  const Eigen::Vector3d turn = to_radians(angle_deg) * direction();
-  return middle * small_motion(turn, shift_mm * direction()) * middle.inverse() * t;
-}
-
 std::vector<Transform> starts(double angle_deg, double shift_mm) {
   std::vector<Transform> made = three_poses().model_from_pose;
   for (std::size_t i = 1; i < made.size(); ++i)
-    made[i] = displaced(made[i], angle_deg, shift_mm, 3 * static_cast<unsigned>(i));
+    made[i] = testing::off_by(made[i], angle_deg, shift_mm, 3 * static_cast<unsigned>(i));
   return made;
 }
 
@@ -89,7 +80,7 @@ TEST(RefinePoses, OfTwoPosesIsRefinePose) {
   RefineOptions options;
   options.axis = {1e-4, 0.01};
   const auto spans = scan.spans();
-  const Transform start = displaced(scan.model_from_pose[1], 2, 1, 5);
+  const Transform start = testing::off_by(scan.model_from_pose[1], 2, 1, 5);
   const auto pair = refine_pose(spans[0], spans[1], start, options, Context{});
   const std::vector<Transform> both = {Transform::Identity(), start};
   const auto joint = refine_poses(std::span(spans).first(2), both, std::vector<PoseLink>{{0, 1}}, options, Context{});
