@@ -4,11 +4,11 @@ import os
 import shutil
 
 import hollow_objects
+import real_rig_scans
 
 SCALE, POSES, HEIGHT_MM = 0.5, 4, 80
 MAX_UNSEEN, MIN_SHARE_SEEN = 0.02, 0.9  # of the objects: 18 of 20
 MAX_SECONDS = 6.0                       # of the stage `pose`, two quiet cores
-BELOW_LIMITS = 8
 
 
 def shoot(bench, scan, file, poses, seed):
@@ -17,19 +17,8 @@ def shoot(bench, scan, file, poses, seed):
     return ran.returncode == 0, ran.stderr.strip()[-200:]
 
 
-def reconstruct(bench, scan, model):
-    """The report, or the sentence of the failure."""
-    ran = bench.run([bench.bin / "scanrig", "reconstruct", scan, "--out", model, "--no-texture"], 900)
-    if ran.returncode != 0:
-        return None, ran.stderr.strip()[-300:]
-    return json.loads((model / "report.json").read_text()), ""
-
-
 def pose_errors(bench, scan, model):
-    ran = bench.run([bench.bin / "scanrig", "evaluate", scan, "--model", model, "--json"], 600)
-    if ran.returncode not in (0, BELOW_LIMITS):
-        return []
-    scores = json.loads(ran.stdout)
+    scores = real_rig_scans.evaluate(bench, scan, model)
     return [error for error in [scores.get("pose2_error"), *scores.get("further_pose_errors", [])] if error]
 
 
@@ -62,7 +51,7 @@ def whole(bench, objects, folder):
         if not is_shot:
             bench.line(f"{name}: is scanned", "yes", why, False)
             continue
-        report, why = reconstruct(bench, scan, scan / "model")
+        report, why = real_rig_scans.reconstruct(bench, scan, scan / "model")
         figures = seen(bench, scan, scan / "model") if report else None
         errors = pose_errors(bench, scan, scan / "model") if report else []
         done.append({"name": name, "scan": scan, "report": report, "why": why, "seen": figures, "errors": errors})
@@ -84,7 +73,7 @@ def one_of_another_object(bench, done, folder):
     for number, one in enumerate(done):
         pose, other = number % POSES, done[(number + 1) % len(done)]["scan"]
         scan = swapped(one["scan"], pose, other, folder / f"swapped_{number}")
-        report, why = reconstruct(bench, scan, scan / "model")
+        report, why = real_rig_scans.reconstruct(bench, scan, scan / "model")
         left = [entry["pose"] for entry in report["pose_graph"]["left_out"]] if report else []
         if left == [pose]:
             found += 1

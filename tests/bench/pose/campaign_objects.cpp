@@ -63,8 +63,8 @@ Distance handle(Chance& c, double radius, double height) {
 Distance mug(Chance& c) {
   const double height = c.between(45, 75), foot = c.between(16, 24), rim = foot + c.between(-3, 7),
                wall = c.between(3, 5);
-  const Distance outer = lathe({{0, 0}, {foot, 0}, {rim, height}, {0, height}});
-  const Distance inner = lathe({{0, 6}, {foot - wall, 6}, {rim - wall, height + 9}, {0, height + 9}});
+  const Distance outer = lathed({{0, 0}, {foot, 0}, {rim, height}, {0, height}});
+  const Distance inner = lathed({{0, 6}, {foot - wall, 6}, {rim - wall, height + 9}, {0, height + 9}});
   return laid(without(united({outer, handle(c, 0.5 * (foot + rim), height)}), inner),
               Transform(Eigen::Translation3d(0, -0.5 * height, 0)));
 }
@@ -171,7 +171,7 @@ Distance turned_part(Chance& c) {
     y = next;
   }
   profile.emplace_back(0, y);
-  Distance solid = lathe(std::move(profile));
+  Distance solid = lathed(std::move(profile));
   if (c.among(2) == 0) {
     const double low = c.between(-35, 0);
     solid = without(std::move(solid), block({c.between(8, 15), low, -40}, {40, low + c.between(15, 35), 40}));

@@ -9,6 +9,7 @@
 #include "core/units.h"
 #include "pipeline/pose/rig_sight.h"
 #include "pipeline/range/crop_view.h"
+#include "tests/bench/pose/depth_steps.h"
 
 namespace scanrig::campaign {
 namespace {
@@ -130,24 +131,6 @@ Sight look(const Placed& placed, const Camera& camera, const Transform& camera_f
   return sight;
 }
 
-cv::Mat1b beside_steps(const cv::Mat1f& depth) {
-  cv::Mat1b steps(depth.size(), uchar{0});
-  const auto compare = [&](cv::Point a, cv::Point b) {
-    const float da = depth(a), db = depth(b);
-    const bool is_step = std::isnan(da) != std::isnan(db) || std::abs(da - db) > kStepMm;
-    if (is_step) steps(a) = steps(b) = 255;
-  };
-  for (int v = 0; v + 1 < depth.rows; ++v) {
-    for (int u = 0; u + 1 < depth.cols; ++u) {
-      compare({u, v}, {u + 1, v});
-      compare({u, v}, {u, v + 1});
-    }
-  }
-  const int reach = 2 * kLostBesideStepPx + 1;
-  cv::dilate(steps, steps, cv::getStructuringElement(cv::MORPH_ELLIPSE, {reach, reach}));
-  return steps;
-}
-
 Vector3d face_normal(const Mesh& mesh, int face) {
   const Mesh::Face& f = mesh.faces[static_cast<std::size_t>(face)];
   const Vector3d a = mesh.vertices[f[0]].cast<double>();
@@ -241,7 +224,7 @@ void measure(const Placed& placed, const Rig& rig, const TableAngle& angle, cons
       object_from_turntable * rig.truth.left.camera_from_turntable.inverse().translation(),
       object_from_turntable * rig.truth.right.camera_from_turntable.inverse().translation(),
       object_from_turntable * eyes.projector};
-  const cv::Mat1b lost = beside_steps(sight.depth);
+  const cv::Mat1b lost = beside_steps(sight.depth, kStepMm, kLostBesideStepPx);
   const cv::Mat1f noise = smooth_noise(lost.size(), kNoiseSigmaPx * kImageScale, chance);
   const cv::Mat1f texture = smooth_noise(lost.size(), kTextureSigmaPx * kImageScale, chance);
   const cv::Mat1f spots = smooth_noise(lost.size(), 2.0 * kNoiseSigmaPx * kImageScale, chance);

@@ -145,18 +145,6 @@ void move_onto(const Distance& solid, double max_mm, Mesh& mesh) {
 
 }  // namespace
 
-Distance ball(const Eigen::Vector3d& centre, double radius) {
-  return [=](const Eigen::Vector3d& p) { return (p - centre).norm() - radius; };
-}
-
-Distance block(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
-  return [middle = Eigen::Vector3d(0.5 * (low + high)),
-          half = Eigen::Vector3d(0.5 * (high - low))](const Eigen::Vector3d& p) {
-    const Eigen::Vector3d q = (p - middle).cwiseAbs() - half;
-    return q.cwiseMax(0.0).norm() + std::min(q.maxCoeff(), 0.0);
-  };
-}
-
 Distance rod(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radius) {
   const Eigen::Vector3d axis = (b - a).normalized(), middle = 0.5 * (a + b);
   const double half = 0.5 * (b - a).norm();
@@ -183,26 +171,6 @@ Distance ring(const Eigen::Vector3d& centre, const Eigen::Vector3d& axis, double
   return [=, axis = Eigen::Vector3d(axis.normalized())](const Eigen::Vector3d& p) {
     const double along = (p - centre).dot(axis);
     return std::hypot((p - centre - along * axis).norm() - radius, along) - thickness;
-  };
-}
-
-Distance lathe(std::vector<Eigen::Vector2d> profile) {
-  return [profile = std::move(profile)](const Eigen::Vector3d& p) {
-    const Eigen::Vector2d q(std::hypot(p.x(), p.z()), p.y());
-    double nearest = std::numeric_limits<double>::infinity();
-    bool inside = false;
-    for (std::size_t i = 0; i < profile.size(); ++i) {
-      const Eigen::Vector2d& a = profile[i];
-      const Eigen::Vector2d& b = profile[(i + 1) % profile.size()];
-      if ((a.y() > q.y()) != (b.y() > q.y()) && q.x() < a.x() + (b.x() - a.x()) * (q.y() - a.y()) / (b.y() - a.y())) {
-        inside = !inside;
-      }
-      if (a.x() <= 0.0 && b.x() <= 0.0) continue;  // the axis is no surface
-      const Eigen::Vector2d edge = b - a;
-      const double t = std::clamp((q - a).dot(edge) / edge.squaredNorm(), 0.0, 1.0);
-      nearest = std::min(nearest, (q - a - t * edge).norm());
-    }
-    return inside ? -nearest : nearest;
   };
 }
 

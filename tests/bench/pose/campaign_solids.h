@@ -1,26 +1,25 @@
 #pragma once
 
-#include <functional>
 #include <vector>
 
 #include "pipeline/mesh/mesh.h"
+#include "tests/unit/pipeline/pose/turned_solids.h"
 
-/// Solids by signed distance and their meshes.
+/// Solids by signed distance, more of them than unit tests need, and their meshes.
 namespace scanrig::campaign {
 
 /// Signed distance in mm, negative inside; nowhere more than the distance to the surface.
-using Distance = std::function<double(const Eigen::Vector3d&)>;
+using Distance = testing::Solid;
+using testing::ball;
+using testing::block;
+using testing::lathed;
 
-Distance ball(const Eigen::Vector3d& centre, double radius);
-Distance block(const Eigen::Vector3d& low, const Eigen::Vector3d& high);
 /// A cylinder from `a` to `b`.
 Distance rod(const Eigen::Vector3d& a, const Eigen::Vector3d& b, double radius);
 /// Balls of `radii` along the polyline `points`, and all between them.
 Distance chain(std::vector<Eigen::Vector3d> points, std::vector<double> radii);
 /// A ring about `axis`.
 Distance ring(const Eigen::Vector3d& centre, const Eigen::Vector3d& axis, double radius, double thickness);
-/// What the closed polygon of (radius, height) sweeps about the y axis.
-Distance lathe(std::vector<Eigen::Vector2d> profile);
 /// All points with normal.x <= offset.
 Distance half_space(const Eigen::Vector3d& normal, double offset);
 

@@ -20,6 +20,7 @@
 #include "pipeline/model_io/mesh_reader.h"
 #include "pipeline/pose/next_rest.h"
 #include "pipeline/volume/integrate.h"
+#include "tests/bench/pose/depth_steps.h"
 
 namespace {
 
@@ -100,24 +101,6 @@ cv::Mat1f depth_in(const Object& object, const Camera& camera, const Transform& 
   return depth;
 }
 
-cv::Mat1b beside_steps(const cv::Mat1f& depth) {
-  cv::Mat1b steps(depth.size(), uchar{0});
-  const auto compare = [&](cv::Point a, cv::Point b) {
-    const float da = depth(a), db = depth(b);
-    const bool is_step = std::isnan(da) != std::isnan(db) || std::abs(da - db) > kStepMm;
-    if (is_step) steps(a) = steps(b) = 255;
-  };
-  for (int v = 0; v + 1 < depth.rows; ++v) {
-    for (int u = 0; u + 1 < depth.cols; ++u) {
-      compare({u, v}, {u + 1, v});
-      compare({u, v}, {u, v + 1});
-    }
-  }
-  const int reach = 2 * kLostBesideStepPx + 1;
-  cv::dilate(steps, steps, cv::getStructuringElement(cv::MORPH_ELLIPSE, {reach, reach}));
-  return steps;
-}
-
 /// The view at one table angle; its frame is the pose's turntable frame.
 View view_of(const Object& object, const Transform& pose_from_object, double angle_rad, int index,
              const Calibration& calibration, unsigned seed) {
@@ -145,7 +128,7 @@ View view_of(const Object& object, const Transform& pose_from_object, double ang
   range.normal = cv::Mat3f(range.depth.size(), cv::Vec3f::all(kUnmeasured));
   cv::compare(face, 0, range.background, cv::CMP_LT);
   cv::erode(range.background, range.background, cv::Mat1b::ones(5, 5));
-  const cv::Mat1b lost = beside_steps(range.depth);
+  const cv::Mat1b lost = beside_steps(range.depth, kStepMm, kLostBesideStepPx);
   const Transform camera_from_object = range.camera_from_pose * pose_from_object;
   const Transform object_from_camera = camera_from_object.inverse();
   const double min_cosine = std::cos(to_radians(kMaxIncidenceDeg));
