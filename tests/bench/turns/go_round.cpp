@@ -89,8 +89,10 @@ Result<Rig> modbus_rig(const DriveProfile& profile, const std::filesystem::path&
 Result<Rig> make_rig(const std::string& drive, const std::filesystem::path& profiles, const std::filesystem::path& port,
                      Clock& clock) {
   if (drive == "grbl") return grbl_rig(port, clock);
-  const auto profile = config::read_drive_profile(profiles / (drive + ".toml"));
+  auto profile = config::read_drive_profile(profiles / (drive + ".toml"));
   if (!profile) return pass_on(profile);
+  // The drive's watch over its commander runs on the fast clock: it would stop the motor after 30 ms of a busy machine.
+  profile->communication_timeout.reset();
   if (drive == "oriental-az") return modbus_rig<sim::wire::OrientalDrive>(*profile, port, clock);
   return modbus_rig<sim::wire::LeadshineDrive>(*profile, port, clock);
 }

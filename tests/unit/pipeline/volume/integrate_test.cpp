@@ -354,7 +354,7 @@ TEST(Integrate, RefusesUnsuitableInput) {
   };
   const std::vector<PosedViews> one = {{ball_views()}};
   EXPECT_EQ(code({}), ErrorCode::invalid_input);
-  EXPECT_EQ(code(std::vector<PosedViews>(kMaxIntegratedPoses + 1, one[0])), ErrorCode::invalid_input);
+  EXPECT_EQ(code(std::vector<PosedViews>(kMaxPoses + 1, one[0])), ErrorCode::invalid_input);
   EXPECT_EQ(code(std::vector<PosedViews>(3, one[0]), {.fusion = VolumeOptions::Fusion::paper}),
             ErrorCode::invalid_input);
   EXPECT_EQ(code(one, {.voxel_mm = 0.0}), ErrorCode::invalid_input);
