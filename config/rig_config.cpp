@@ -12,6 +12,7 @@
 #include "config/section.h"
 #include "config/turntable_section.h"
 #include "core/files.h"
+#include "core/max_poses.h"
 #include "pipeline/reconstruct/voxel_size.h"
 
 namespace scanrig::config {
@@ -85,7 +86,7 @@ void read_recipe(Section& s, const RigConfig& rig, RecipeConfig& recipe) {
   using Flip = RecipeConfig::Flip;
   using Start = RecipeConfig::Start;
   s.number("views", recipe.views, {3, 72});
-  s.number("poses", recipe.poses, {1, 8});
+  s.number("poses", recipe.poses, {1, kMaxPoses});
   s.number("flip_timeout_min", recipe.flip_timeout, {1, 1440});
   s.accept_old_value("flip", "signal", "line");
   if (s.has("flip")) s.choice<Flip>("flip", recipe.flip, {{"button", Flip::button}, {"signal", Flip::signal}});

@@ -6,6 +6,7 @@
 
 #include "core/files.h"
 #include "core/image_codec.h"
+#include "core/max_poses.h"
 #include "core/strict_json.h"
 #include "pipeline/evaluate/evaluate.h"
 #include "pipeline/model_io/mesh_reader.h"
@@ -54,7 +55,7 @@ Result<void> read_corner_uv(const std::filesystem::path& file, TexturedMesh& mod
   return model.corner_uv.size() == model.mesh.faces.size() ? Result<void>() : bad("faces are missing");
 }
 
-constexpr int kLastPose = 7;
+constexpr int kLastPose = static_cast<int>(kMaxPoses) - 1;
 
 /// Nothing, with `fault` set, where it is no uncertainty.
 std::optional<PoseUncertainty> read_uncertainty(JsonObject holder) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/max_poses.h"
 #include "pipeline/pose/estimate_pose.h"
 #include "pipeline/pose/pose_graph.h"
 
@@ -44,8 +45,6 @@ struct PlacedPoses {
   std::vector<LeftOutPose> left_out;
   int searches = 0;
 };
-
-constexpr std::size_t kMaxPoses = 8;
 
 /// Places three poses or more in the frame of the first that is kept. Pairs are estimated by estimate_pose(), those
 /// with the first pose before the others, and pose_graph.h keeps what fits together. A pair that confirms what follows

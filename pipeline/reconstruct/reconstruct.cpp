@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/heap.h"
+#include "core/max_poses.h"
 #include "core/parallel.h"
 #include "pipeline/mesh/solid_properties.h"
 #include "pipeline/range/crop_view.h"

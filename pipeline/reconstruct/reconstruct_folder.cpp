@@ -2,10 +2,10 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "core/max_poses.h"
 #include "core/parallel.h"
 #include "core/units.h"
 #include "pipeline/model_io/model_files.h"
-#include "pipeline/pose/place_poses.h"
 #include "pipeline/reconstruct/memory.h"
 #include "pipeline/reconstruct/reconstruct.h"
 

@@ -131,7 +131,7 @@ void BlockGrid::evaluate(const Field& field, Block& block) const {
     }
   }
   const Eigen::Vector3f middle = position(first + Eigen::Vector3i::Constant(kBlockSide / 2));
-  std::array<PoseDistance, kMaxIntegratedPoses> pose;
+  std::array<PoseDistance, kMaxPoses> pose;
   for (std::size_t p = 0; p < field.poses(); ++p) {
     pose[p] = field.pose_distance(middle, p);
     block.classes[p] = pose[p].voxel_class;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/context.h"
+#include "core/max_poses.h"
 #include "core/result.h"
 #include "pipeline/volume/distance_field.h"
 
@@ -24,7 +25,7 @@ class BlockGrid {
     std::array<float, kNodes> distance;
     std::array<Support, kNodes> support;
     /// In each pose, of a node in the middle; none of a block that a repair has added.
-    std::array<std::optional<VoxelClass>, kMaxIntegratedPoses> classes{};
+    std::array<std::optional<VoxelClass>, kMaxPoses> classes{};
     bool is_in_conflict = false;  ///< two of the poses contradict each other there
     [[nodiscard]] static int node(int x, int y, int z) { return (z * kBlockSide + y) * kBlockSide + x; }
   };

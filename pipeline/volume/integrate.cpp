@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "core/max_poses.h"
 #include "core/parallel.h"
 #include "pipeline/mesh/topology.h"
 #include "pipeline/volume/block_grid.h"
@@ -36,7 +37,7 @@ bool is_rigid(const Transform& transform) {
 }
 
 Result<void> check(std::span<const PosedViews> poses, const VolumeOptions& options) {
-  const std::size_t limit = options.fusion == VolumeOptions::Fusion::paper ? 2 : kMaxIntegratedPoses;
+  const std::size_t limit = options.fusion == VolumeOptions::Fusion::paper ? 2 : kMaxPoses;
   if (poses.empty() || poses.size() > limit) {
     return fail(ErrorCode::invalid_input, "volume: 1 to {} poses can be integrated, not {}", limit, poses.size());
   }

@@ -19,9 +19,6 @@
 
 namespace scanrig {
 
-/// Of one model.
-inline constexpr std::size_t kMaxIntegratedPoses = 8;
-
 /// The views of one pose and its place in the model: the identity for pose 1, pose1_from_pose2 for pose 2.
 struct PosedViews {
   std::span<const View> views;
