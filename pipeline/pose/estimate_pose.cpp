@@ -37,6 +37,25 @@ Result<void> not_turned_over(const Transform& motion) {
               to_degrees(Eigen::AngleAxisd(motion.linear()).angle()));
 }
 
+/// Of the best and its rivals the one that was picked comes first. Whether one of them is it.
+bool take_picked(std::vector<Hypothesis>& field, const PoseOptions& options) {
+  if (!options.picked) return false;
+  auto nearest = field.end();
+  double nearest_deg = options.same_deg;
+  for (auto h = field.begin(); h != field.end(); ++h) {
+    if (h != field.begin() && !is_rival(h->candidate, field[0].candidate, options)) continue;
+    const auto& linear = h->candidate.pose1_from_pose2.linear();
+    const double away_deg = to_degrees(rotation_angle(options.picked->linear().transpose() * linear));
+    if (away_deg >= nearest_deg) continue;
+    nearest = h;
+    nearest_deg = away_deg;
+  }
+  if (nearest == field.end()) return false;
+  std::rotate(field.begin(), nearest, nearest + 1);
+  for (Hypothesis& h : field) h.candidate.angle_to_best_deg = apart_deg(h.candidate, field[0].candidate);
+  return true;
+}
+
 /// Rivals that give the same surface are one answer; others are `ambiguous`.
 Result<void> resolve_rivals(std::vector<Hypothesis>& field, const PoseInput& pose1, const PoseInput& pose2,
                             const Scene& scene, const PoseOptions& options, PoseEstimate& estimate) {
@@ -49,12 +68,16 @@ Result<void> resolve_rivals(std::vector<Hypothesis>& field, const PoseInput& pos
       std::ranges::none_of(all, [&](const Candidate* c) { return turns_over(c->pose1_from_pose2, options); });
   if (rivals.empty()) return is_all_left ? not_turned_over(field[0].candidate.pose1_from_pose2) : Result<void>{};
   auto symmetry = symmetry_of(field[0], rivals, pose1, pose2, scene, options);
+  if (!symmetry && take_picked(field, options)) {
+    estimate.is_picked = true;
+    return {};
+  }
   if (!symmetry && !is_all_left) {
     std::string others;
     for (const Candidate* c : rivals) others += fmt::format("; {}", describe(*c));
     return fail(ErrorCode::ambiguous,
                 "pose estimation: the part is too symmetric, several motions fit that give different shapes: {}{}. "
-                "Add a mark of clay or change pose 2",
+                "Choose the right one, add a pose that decides, or scan again with a mark of clay",
                 describe(field[0].candidate), others);
   }
   if (left != all.end()) {

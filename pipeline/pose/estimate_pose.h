@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -61,8 +62,10 @@ struct PoseOptions {
   AgreementOptions agreement;
   PointPairOptions voting;
   SymmetryOptions symmetry;
-  double flat_share = 0.004;          ///< of the object's size: surface this near to a table lies flat on it
-  double max_unexplained = 0.015;     ///< share of the samples that may show the object twice as it stood
+  double flat_share = 0.004;       ///< of the object's size: surface this near to a table lies flat on it
+  double max_unexplained = 0.015;  ///< share of the samples that may show the object twice as it stood
+  /// Picked by a person: of motions that fit and give different surfaces, the one within `same_deg` of this is it.
+  std::optional<Transform> picked{};
   double min_turned_over_deg = 30.0;  ///< of motions that fit equally well one with this tilt, or less than its
                                       ///< supplement, is preferred: both poses then share surface from all sides
 };
@@ -96,6 +99,7 @@ struct PoseEstimate {
   Symmetry symmetry;
   /// Motions that turn the object over and motions that do not fit alike; one that does was taken.
   bool turned_over_is_assumed = false;
+  bool is_picked = false;  ///< `options.picked` decided
 };
 
 /// Transform from pose 2's frame to pose 1's. Generators: pairs of stable tangent planes [Park and Subbarao 2002,

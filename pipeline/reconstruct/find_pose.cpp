@@ -46,8 +46,9 @@ RefineOptions Reconstruction::State::refine_options() const {
 Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_poses(Report& report, const Context& context) {
   if (poses.size() < 2) return FoundPoses{.model_from_pose = {Transform::Identity()}};
   const StageLog::Timer timer(log, "pose");
-  const auto pose_options = pose_options_of(options.rests);
+  auto pose_options = pose_options_of(options.rests);
   if (!pose_options) return pass_on(pose_options);
+  pose_options->picked = options.picked;
   return poses.size() == 2 ? find_second_pose(*pose_options, report, context)
                            : find_many_poses(*pose_options, report, context);
 }
@@ -57,7 +58,9 @@ Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_second_pos
                                                                                   const Context& context) {
   const PoseInput first{.solid = poses[0].partial.mesh, .views = poses[0].views};
   const PoseInput second{.solid = poses[1].partial.mesh, .views = poses[1].views};
-  const auto estimate = estimate_pose(first, second, pose_options, context);
+  std::vector<Candidate> fitting;
+  const auto estimate = estimate_pose(first, second, pose_options, context, fitting);
+  if (!estimate && estimate.error().code == ErrorCode::ambiguous) keep_choices(fitting);
   if (!estimate) return pass_on(estimate, "pose 2 in pose 1");
   report.add_estimate(*estimate);
   FoundPoses found{.model_from_pose = {Transform::Identity(), estimate->pose1_from_pose2}};
@@ -77,6 +80,21 @@ Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_second_pos
   report.add_refinement(*refined);
   found.model_from_pose[1] = refined->pose1_from_pose2;
   return found;
+}
+
+/// For a person, who may know what no measurement separates.
+void Reconstruction::State::keep_choices(const std::vector<Candidate>& fitting) {
+  const Mesh first = live_pose(0), second = live_pose(1);
+  choices.clear();
+  for (const Candidate& candidate : fitting) {
+    PoseChoice& choice = choices.emplace_back();
+    choice.pose1_from_pose2 = candidate.pose1_from_pose2;
+    choice.sentence =
+        fmt::format("pose 2 turned by {:.0f} deg: {:.0f} % of the surface confirmed, {:.1f} % contradicted",
+                    to_degrees(rotation_angle(candidate.pose1_from_pose2.linear())),
+                    100 * candidate.agreement.confirmed, 100 * candidate.agreement.contradicted);
+    if (calibration) choice.png = draw_choice(first, second, choice.pose1_from_pose2, *calibration).value_or("");
+  }
 }
 
 /// Of the motions that the shape leaves open: by the colours, if these show it.

@@ -285,6 +285,20 @@ Result<void> Reconstruction::finish_pose(std::size_t pose, const Context& contex
   return done;
 }
 
+Mesh Reconstruction::State::live_pose(std::size_t pose) const {
+  if (!rectification || pose >= poses.size() || !poses[pose].finished) return {};
+  const PoseState& state = poses[pose];
+  Mesh mesh = state.partial.mesh;
+  if (mesh.normals.size() != mesh.vertices.size()) mesh.normals = vertex_normals(mesh);
+  const double gain = live_gain(state.views.front(), calibration->left, live_photo(pose, 0));
+  colour_by_views(mesh, state.views, calibration->left, [&](std::size_t v) {
+    LivePhoto photo = live_photo(pose, v);
+    photo.gain = gain;
+    return photo;
+  });
+  return mesh;
+}
+
 Mesh Reconstruction::live_view(std::size_t pose) const {
   if (!state_->rectification || pose >= state_->poses.size() || state_->poses[pose].views.empty()) return {};
   const std::vector<View>& views = state_->poses[pose].views;
@@ -293,19 +307,9 @@ Mesh Reconstruction::live_view(std::size_t pose) const {
   return live_mesh_of_view(views.back(), state_->calibration->left, photo);
 }
 
-Mesh Reconstruction::live_pose(std::size_t pose) const {
-  if (!state_->rectification || pose >= state_->poses.size() || !state_->poses[pose].finished) return {};
-  const State::PoseState& state = state_->poses[pose];
-  Mesh mesh = state.partial.mesh;
-  if (mesh.normals.size() != mesh.vertices.size()) mesh.normals = vertex_normals(mesh);
-  const double gain = live_gain(state.views.front(), state_->calibration->left, state_->live_photo(pose, 0));
-  colour_by_views(mesh, state.views, state_->calibration->left, [&](std::size_t v) {
-    LivePhoto photo = state_->live_photo(pose, v);
-    photo.gain = gain;
-    return photo;
-  });
-  return mesh;
-}
+Mesh Reconstruction::live_pose(std::size_t pose) const { return state_->live_pose(pose); }
+
+std::vector<PoseChoice> Reconstruction::choices() const { return state_->choices; }
 
 std::vector<RestSuggestion> Reconstruction::suggest_rests(std::size_t pose, const Mesh& live_pose) {
   if (!state_->rectification || pose >= state_->poses.size() || !state_->poses[pose].finished) return {};

@@ -13,11 +13,13 @@
 
 #include "core/context.h"
 #include "core/result.h"
+#include "core/transform.h"
 #include "pipeline/calibration/camera.h"
 #include "pipeline/mesh/mesh.h"
 #include "pipeline/range/range_image.h"
 #include "pipeline/reconstruct/rest_suggestion.h"
 #include "pipeline/storage/images.h"
+#include "pipeline/storage/pose_choices.h"
 #include "pipeline/storage/scan_folder.h"
 
 namespace scanrig {
@@ -32,7 +34,8 @@ struct ReconstructOptions {
   /// `refine`: the rig is compared with its calibration, which is refined where it has moved and refused where it has
   /// moved too far; `report`: compared alone; `off`. Only for calibrations of known quality.
   std::string watch = "refine";
-  double partial_voxel_mm = 0.8;  ///< minimum for partial models: they only serve the search for the pose
+  double partial_voxel_mm = 0.8;      ///< minimum for partial models: they only serve the search for the pose
+  std::optional<Transform> picked{};  ///< pose1_from_pose2 as a person picked it, where several fit; pose_choices.h
   /// Of this process, at its peak: what needs more is done part by part, with the same bits; memory.h.
   std::uintmax_t memory_bytes = std::numeric_limits<std::uintmax_t>::max();
 };
@@ -100,6 +103,8 @@ class Reconstruction {
   /// three poses or more, one that does not fit is left out, and the report names it. Every pose must be finished
   /// before, none comes after. Fails with `same_rest`, `ambiguous`, `no_overlap`, `degenerate`, `stopped`.
   Result<void> prepare(const Context& context);
+  /// Of two poses, after prepare() or finish() failed with `ambiguous`: the motions that fit, best first.
+  [[nodiscard]] std::vector<PoseChoice> choices() const;
   /// As prepare(), then the texture; with one pose, its own complete model. Once: the views are let go. Fails as
   /// prepare(), and as ScanFolder where photographs are read again.
   Result<Model> finish(const ScanIdentity& identity, const Context& context);

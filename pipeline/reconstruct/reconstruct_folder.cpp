@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <tuple>
 #include <vector>
 
 #include "core/max_poses.h"
@@ -47,7 +48,10 @@ Result<void> add_all(const ScanFolder& scan, std::size_t pose, std::size_t at_on
   return {};
 }
 
-Result<Reconstruction> begin(const ScanFolder& scan, const ReconstructOptions& options, std::size_t& at_once) {
+Result<Reconstruction> begin(const ScanFolder& scan, ReconstructOptions options, std::size_t& at_once) {
+  const auto picked = picked_motion(scan.path());
+  if (!picked) return pass_on(picked);
+  options.picked = *picked;
   if (scan.manifest().source != "stereo") return Reconstruction(options);
   auto calibration = scan.load_calibration();
   if (!calibration) return pass_on(calibration);
@@ -90,6 +94,9 @@ Result<Model> reconstruct(const ScanFolder& scan, const ReconstructOptions& opti
     if (auto done = reconstruction->finish_pose(pose, context); !done) return pass_on(done, scan.path().string());
   }
   auto model = reconstruction->finish(identity_of(scan.manifest()), context);
+  // Where they cannot be kept, in a folder that is only read, the message still lists them.
+  if (const auto choices = reconstruction->choices(); !choices.empty())
+    std::ignore = write_choices(scan.path(), choices);
   if (!model) return pass_on(model, scan.path().string());
   return model;
 }

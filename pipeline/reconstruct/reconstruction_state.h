@@ -69,6 +69,7 @@ struct Reconstruction::State {
   std::optional<Rectification> rectification;
   std::vector<PoseState> poses;
   std::vector<Disagreement> disagreements;
+  std::vector<PoseChoice> choices;  ///< of the search that ended `ambiguous`
   std::optional<Prepared> prepared;
   StageLog log;
 
@@ -90,10 +91,12 @@ struct Reconstruction::State {
   bool undo_motions(std::size_t pose, const RegistrationOptions& priors);
   bool leave_out_misfits(std::size_t pose);
   Result<void> finish_pose(std::size_t pose, const Context& context);
+  [[nodiscard]] Mesh live_pose(std::size_t pose) const;
   std::vector<RestSuggestion> suggest_rests(std::size_t pose, const Mesh& live_pose);
   /// Of one pose, of two (find_pose.cpp) and of more (find_poses.cpp).
   Result<FoundPoses> find_poses(Report& report, const Context& context);
   Result<FoundPoses> find_second_pose(const PoseOptions& pose_options, Report& report, const Context& context);
+  void keep_choices(const std::vector<Candidate>& fitting);
   Result<FoundPoses> find_many_poses(const PoseOptions& pose_options, Report& report, const Context& context);
   Result<FoundPoses> choose_turn(const PoseEstimate& estimate, Report& report, const Context& context);
   Result<void> choose_turns(const PlacedPoses& placed, FoundPoses& found, const Context& context);

@@ -261,7 +261,10 @@ void Report::add_pose(std::span<const View> views, const RegistrationReport& reg
                                {"partial_model", volume_json(partial)}});
 }
 
-void Report::add_estimate(const PoseEstimate& estimate) { (*json_)["pose_estimate"] = estimate_json(estimate); }
+void Report::add_estimate(const PoseEstimate& estimate) {
+  (*json_)["pose_estimate"] = estimate_json(estimate);
+  if (estimate.is_picked) (*json_)["pose_estimate"]["picked"] = true;
+}
 
 void Report::add_turn(const PoseEstimate& estimate, const ColourDecision* colours) {
   json turn = {{"decided_by", "nothing"},

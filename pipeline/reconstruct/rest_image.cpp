@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <opencv2/core.hpp>
 #include <utility>
 
 #include "core/image_codec.h"
@@ -15,8 +16,9 @@ using Rgb = std::array<std::uint8_t, 3>;
 constexpr Rgb kUnseen = {255, 150, 30};
 constexpr Rgb kTable = {74, 88, 104};
 const cv::Vec3b kBackground(28, 23, 18);  // BGR, of the page's images
-constexpr double kDistanceMm = 700.0;     // of the eye; far enough that lines hardly converge
-constexpr double kRoom = 1.12;            // around the object in the image
+constexpr const char* kNoLooks = "image of a rest: the mesh lacks views, normals or colours";
+constexpr double kDistanceMm = 700.0;  // of the eye; far enough that lines hardly converge
+constexpr double kRoom = 1.12;         // around the object in the image
 constexpr int kTableCorners = 96;
 constexpr float kTableGapMm = 0.2F;  // below the object, so that neither shows through the other
 
@@ -27,9 +29,8 @@ Rgb shaded(const Rgb& colour, double light) {
 }
 
 /// On the table, its box around the axis.
-Mesh lying(const Mesh& partial, const NextRest& next) {
-  Mesh mesh = partial;
-  const Eigen::Matrix3f turn = next.turn.toRotationMatrix().cast<float>();
+Mesh lying(Mesh mesh, const Eigen::Quaterniond& rest_from_pose) {
+  const Eigen::Matrix3f turn = rest_from_pose.toRotationMatrix().cast<float>();
   Eigen::AlignedBox3f box;
   for (Eigen::Vector3f& v : mesh.vertices) box.extend(v = turn * v);
   const Eigen::Vector3f onto(-box.center().x(), -box.min().y(), -box.center().z());
@@ -86,15 +87,15 @@ Camera eye_on(const Mesh& object, const Calibration& calibration, const RestImag
   return eye;
 }
 
-}  // namespace
+bool has_looks(const Mesh& mesh) {
+  const std::size_t count = mesh.vertices.size();
+  return mesh.views.size() == count && mesh.normals.size() == count && mesh.colour.size() == count;
+}
 
-Result<std::string> draw_rest(const Mesh& partial, const NextRest& next, const Calibration& calibration,
-                              const RestImageOptions& options) {
-  const std::size_t count = partial.vertices.size();
-  if (partial.views.size() != count || partial.normals.size() != count || partial.colour.size() != count) {
-    return fail(ErrorCode::invalid_input, "image of a rest: the mesh lacks views, normals or colours");
-  }
-  Mesh scene = lying(partial, next);
+Result<cv::Mat> draw_on_table(const Mesh& mesh, const Eigen::Quaterniond& rest_from_pose,
+                              const Calibration& calibration, const RestImageOptions& options) {
+  if (!has_looks(mesh)) return fail(ErrorCode::invalid_input, kNoLooks);
+  Mesh scene = lying(mesh, rest_from_pose);
   const Camera eye = eye_on(scene, calibration, options);
   constexpr double kUnknownTableMm = 90.0;
   add_table(scene,
@@ -105,9 +106,53 @@ Result<std::string> draw_rest(const Mesh& partial, const NextRest& next, const C
       eye, Transform::Identity(),
       {.surface = Paint::vertex_colour, .supersample = options.supersample, .background = kBackground});
   if (!image) return pass_on(image);
-  const auto png = encode_png(image->image);
+  return image->image;
+}
+
+Result<std::string> to_png(const cv::Mat& image) {
+  const auto png = encode_png(image);
   if (!png) return pass_on(png);
   return std::string(reinterpret_cast<const char*>(png->data()), png->size());
+}
+
+/// The faces that were measured, moved.
+void add_measured(const Mesh& from, const Transform& motion, Mesh& to) {
+  const auto before = static_cast<std::uint32_t>(to.vertices.size());
+  for (std::size_t v = 0; v < from.vertices.size(); ++v) {
+    to.vertices.push_back((motion * from.vertices[v].cast<double>()).cast<float>());
+    to.normals.push_back((motion.linear() * from.normals[v].cast<double>()).cast<float>());
+  }
+  to.views.insert(to.views.end(), from.views.begin(), from.views.end());
+  to.colour.insert(to.colour.end(), from.colour.begin(), from.colour.end());
+  for (const auto& face : from.faces) {
+    if (std::ranges::any_of(face, [&](std::uint32_t v) { return from.views[v] == 0; })) continue;
+    to.faces.push_back({face[0] + before, face[1] + before, face[2] + before});
+  }
+}
+
+}  // namespace
+
+Result<std::string> draw_rest(const Mesh& partial, const NextRest& next, const Calibration& calibration,
+                              const RestImageOptions& options) {
+  const auto image = draw_on_table(partial, next.turn, calibration, options);
+  return image ? to_png(*image) : Result<std::string>(pass_on(image));
+}
+
+Result<std::string> draw_choice(const Mesh& pose1, const Mesh& pose2, const Transform& pose1_from_pose2,
+                                const Calibration& calibration) {
+  if (!has_looks(pose1) || !has_looks(pose2)) return fail(ErrorCode::invalid_input, kNoLooks);
+  Mesh both;
+  add_measured(pose1, Transform::Identity(), both);
+  add_measured(pose2, pose1_from_pose2, both);
+  constexpr RestImageOptions kHalf{.width = 320, .height = 320};
+  const Eigen::Quaterniond behind(Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitY()));
+  const auto from_front = draw_on_table(both, Eigen::Quaterniond::Identity(), calibration, kHalf);
+  if (!from_front) return pass_on(from_front);
+  const auto from_behind = draw_on_table(both, behind, calibration, kHalf);
+  if (!from_behind) return pass_on(from_behind);
+  cv::Mat image;
+  cv::hconcat(*from_front, *from_behind, image);
+  return to_png(image);
 }
 
 }  // namespace scanrig

@@ -39,6 +39,11 @@ struct RestImageOptions {
 Result<std::string> draw_rest(const Mesh& partial, const NextRest& next, const Calibration& calibration,
                               const RestImageOptions& options = {});
 
+/// The measured surface of both poses in one frame, from between the cameras and from the other side, as PNG. Both as
+/// `partial` of draw_rest(). Fails as that.
+Result<std::string> draw_choice(const Mesh& pose1, const Mesh& pose2, const Transform& pose1_from_pose2,
+                                const Calibration& calibration);
+
 /// `next_rest` of report.json: what was suggested, and on which of it the object was laid; docs/reference/report.md.
 nlohmann::json next_rest_json(std::span<const NextRest> suggested, const Transform& pose1_from_pose2);
 

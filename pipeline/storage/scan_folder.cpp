@@ -187,6 +187,17 @@ Result<void> ScanFolder::drop_views(std::size_t pose, std::string state) {
   return change_manifest(std::move(changed));
 }
 
+Result<void> ScanFolder::drop_pose(std::string state) {
+  if (manifest_.poses.empty() || manifest_.poses.back().complete) {
+    return fail(ErrorCode::invalid_input, "{}: its last pose is complete", path_.string());
+  }
+  Manifest changed = manifest_;
+  changed.poses.pop_back();
+  changed.state = std::move(state);
+  if (auto words = check_words(changed); !words) return words;
+  return change_manifest(std::move(changed));
+}
+
 Result<void> ScanFolder::add_movement_check(std::size_t pose, MovementCheckRecord record) {
   if (pose >= manifest_.poses.size()) return fail(ErrorCode::invalid_input, "{}: no pose {}", path_.string(), pose + 1);
   Manifest changed = manifest_;

@@ -49,6 +49,8 @@ class ScanFolder {
   Result<void> complete_pose(std::size_t pose, std::string state);
   /// Takes the views and movement checks of an incomplete pose off the manifest; `state` is the scan's from then on.
   Result<void> drop_views(std::size_t pose, std::string state);
+  /// Takes the last pose off the manifest; it is incomplete. `state` is the scan's from then on.
+  Result<void> drop_pose(std::string state);
   Result<void> add_movement_check(std::size_t pose, MovementCheckRecord record);
   Result<void> set_state(std::string state);
 

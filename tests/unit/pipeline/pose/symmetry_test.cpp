@@ -125,10 +125,44 @@ TEST(Symmetry, DoesNotHideThatBothEndsDiffer) {
       testing::together({testing::block({-20, 5, -20}, {20, 45, 20}), testing::ball({10, 45, 4}, 5),
                          testing::block({-14, 0, 6}, {-4, 6, 14}), testing::block({-14, 0, -14}, {-8, 6, -8}),
                          testing::block({12, 0, -4}, {18, 6, 4})});
-  const auto estimate =
-      testing::scan(both_ends, turn(33, Eigen::Vector3d::UnitY()) * turn(180, Eigen::Vector3d::UnitX())).estimate();
+  const PosedScan scan =
+      testing::scan(both_ends, turn(33, Eigen::Vector3d::UnitY()) * turn(180, Eigen::Vector3d::UnitX()));
+  std::vector<Candidate> fitting;
+  const auto estimate = estimate_pose({scan.solid1, scan.views1}, {scan.solid2, scan.views2}, {}, {}, fitting);
   ASSERT_FALSE(estimate) << describe(estimate->symmetry);
   EXPECT_EQ(estimate.error().code, ErrorCode::ambiguous) << estimate.error().message;
+
+  // A person sees which one is right, and any of them may be it.
+  ASSERT_GE(fitting.size(), 2U);
+  int right = 0;
+  for (const Candidate& candidate : fitting) {
+    PoseOptions options;
+    options.picked = candidate.pose1_from_pose2;
+    const auto picked = scan.estimate(options);
+    ASSERT_TRUE(picked) << picked.error().message;
+    EXPECT_TRUE(picked->is_picked);
+    EXPECT_TRUE(picked->pose1_from_pose2.isApprox(candidate.pose1_from_pose2, 1e-9));
+    const Eigen::Matrix3d off = scan.pose1_from_pose2.linear().transpose() * picked->pose1_from_pose2.linear();
+    right += rotation_angle(off) < to_radians(0.5) ? 1 : 0;
+  }
+  EXPECT_EQ(right, 1);
+  PoseOptions none_of_them;
+  none_of_them.picked = scan.pose1_from_pose2 * Eigen::AngleAxisd(to_radians(45), Eigen::Vector3d::UnitY());
+  EXPECT_EQ(scan.estimate(none_of_them).error().code, ErrorCode::ambiguous);
+}
+
+/// Where the measurements decide, no person does.
+TEST(Symmetry, APickDoesNotOverruleWhatIsMeasured) {
+  const Solid solid = testing::together({testing::block({-25, 0, -15}, {25, 30, 15}), testing::ball({18, 30, 6}, 9),
+                                         testing::block({-25, 0, 15}, {-10, 12, 24})});
+  const PosedScan scan = testing::scan(solid, kLaidDown);
+  PoseOptions options;
+  options.picked = scan.pose1_from_pose2 * Eigen::AngleAxisd(to_radians(180), Eigen::Vector3d::UnitY());
+  const auto estimate = scan.estimate(options);
+  ASSERT_TRUE(estimate) << estimate.error().message;
+  EXPECT_FALSE(estimate->is_picked);
+  EXPECT_LT(rotation_angle(estimate->pose1_from_pose2.linear().transpose() * scan.pose1_from_pose2.linear()),
+            to_radians(0.5));
 }
 
 TEST(Symmetry, IsSaidInOneSentence) {

@@ -126,6 +126,35 @@ TEST(RestImage, UpsideDownTheUnseenBaseIsOnTop) {
   EXPECT_LT(shares.mean_orange_row, shares.mean_red_row) << "above its sides";
 }
 
+/// Pose 2 is of a green box: as the choice joins them it stands on the red one, or in it.
+TEST(ChoiceImage, ShowsBothPosesWhereTheChoicePutsThemAndNothingUnmeasured) {
+  const Mesh red = red_box();
+  Mesh green = red;
+  for (auto& colour : green.colour) colour = {20, 200, 20};
+  const auto green_share = [&](double up_mm) {
+    Transform pose1_from_pose2 = Transform::Identity();
+    pose1_from_pose2.translation().y() = up_mm;
+    const auto png = draw_choice(red, green, pose1_from_pose2, rig());
+    EXPECT_TRUE(png) << png.error().message;
+    if (up_mm > 40) EXPECT_LT(shares_of(*png).orange, 0.003);  // lower, red and green sides coincide
+    const cv::Mat3b image = *decode_image(*png);
+    EXPECT_EQ(image.cols, 2 * image.rows);
+    for (const bool is_right : {false, true}) {
+      const cv::Mat3b half = image.colRange(is_right ? image.rows : 0, is_right ? image.cols : image.rows);
+      EXPECT_GT(cv::countNonZero(half.reshape(1) > 90), 0.01 * static_cast<double>(half.total()))
+          << "it is in the image";
+    }
+    int count = 0;
+    for (const cv::Vec3b& bgr : image) count += bgr[1] > 90 && bgr[2] < 60 ? 1 : 0;
+    return static_cast<double>(count) / static_cast<double>(image.total());
+  };
+  EXPECT_GT(green_share(50), 0.05);
+  EXPECT_LT(green_share(-3), 0.5 * green_share(50));
+  Mesh bare = red;
+  bare.colour.clear();
+  EXPECT_EQ(draw_choice(red, bare, Transform::Identity(), rig()).error().code, ErrorCode::invalid_input);
+}
+
 TEST(RestImage, AsItStandsTheBaseIsHidden) {
   const auto png = draw_rest(red_box(), lying_on({0, -1, 0}), rig());
   ASSERT_TRUE(png) << png.error().message;
