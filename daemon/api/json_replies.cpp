@@ -99,6 +99,18 @@ ordered_json suggestions_json(const std::vector<SuggestedRest>& suggestions) {
   return list;
 }
 
+ordered_json choices_json(const JobInfo& job) {
+  auto list = ordered_json::array();
+  for (const auto& one : job.choices) {
+    const auto number = list.size() + 1;
+    list.push_back({{"number", number},
+                    {"sentence", one.sentence},
+                    {"image", one.image},
+                    {"picked", static_cast<std::size_t>(job.picked) == number}});
+  }
+  return list;
+}
+
 }  // namespace
 
 ordered_json to_detailed_json(const JobInfo& job) {
@@ -124,6 +136,7 @@ ordered_json to_detailed_json(const JobInfo& job) {
   for (const auto& stage : job.stages) json["stages"].push_back({{"name", stage.name}, {"fraction", stage.fraction}});
   json["live"] = job.live;
   json["suggestions"] = suggestions_json(job.suggestions);
+  json["choices"] = choices_json(job);
   return json;
 }
 

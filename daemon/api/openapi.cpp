@@ -376,17 +376,23 @@ const char* const kSchemas = R"({
   "unseen_after": {"type": "number", "description": "share of all surface that would stay unseen"},
   "overlap": {"type": "number", "description": "share of the surface seen that both poses would see"},
   "image": {"type": "boolean", "description": "GET suggestions/{number} has one"}}},
+"Choice": {"type": "object", "required": ["number", "sentence", "image", "picked"], "additionalProperties": false, "properties": {
+  "number": {"type": "integer", "description": "from 1"},
+  "sentence": {"type": "string", "description": "how pose 2 would lie, and how well it fits"},
+  "image": {"type": "string", "description": "a file of the job: the part from the front and from behind; empty: not drawn"},
+  "picked": {"type": "boolean", "description": "by the operator"}}},
 "OpenApi": {"type": "object", "required": ["openapi", "paths"]}
 })";
 
 const char* const kJobDetail = R"({
-"description": "closures is the old name of movement_checks", "required": ["movement_checks", "closures", "stages", "live", "suggestions"],
+"description": "closures is the old name of movement_checks", "required": ["movement_checks", "closures", "stages", "live", "suggestions", "choices"],
 "properties": {
   "stored": {"type": "array", "description": null, "items": {"$ref": "#/components/schemas/StoredView"}},
   "movement_checks": {"type": "array", "items": {"$ref": "#/components/schemas/MovementCheck"}},
   "closures": {"type": "array", "items": {"$ref": "#/components/schemas/MovementCheck"}, "deprecated": true, "description": "old name of movement_checks"},
   "stages": {"type": "array", "items": {"$ref": "#/components/schemas/Stage"}},
   "live": {"type": "array", "items": {"type": "string"}, "description": "what the scan shows so far: files live/NAME.glb of the job, which never change"},
-  "suggestions": {"type": "array", "items": {"$ref": "#/components/schemas/Suggestion"}, "description": "how the part can lie in the next pose, best first, until the model is made; empty: not known"}}})";
+  "suggestions": {"type": "array", "items": {"$ref": "#/components/schemas/Suggestion"}, "description": "how the part can lie in the next pose, best first, until the model is made; empty: not known"},
+  "choices": {"type": "array", "items": {"$ref": "#/components/schemas/Choice"}, "description": "where pose 2 fits in several ways that give different surfaces: the operator picks one; best first"}}})";
 
 }  // namespace scanrig

@@ -28,10 +28,12 @@ void order(const ApiStation& station, const Values& values, Send send) {
 void ask(const ApiStation& station, const Values& values, What what, Send send) {
   const auto id = *values.text("id");
   if (!find_job(station, values)) return send(no_such_job());
-  station.loop.ask(
-      event::JobRequested{
-          .what = what, .job = id, .voxel_mm = values.number("voxel_mm"), .fusion = values.text("fusion").value_or("")},
-      reply_with(id, std::move(send)));
+  station.loop.ask(event::JobRequested{.what = what,
+                                       .job = id,
+                                       .voxel_mm = values.number("voxel_mm"),
+                                       .fusion = values.text("fusion").value_or(""),
+                                       .number = static_cast<int>(values.integer("number").value_or(0))},
+                   reply_with(id, std::move(send)));
 }
 
 Route job_route(Method method, std::string_view path, Role role, What what, std::string_view description,
@@ -110,6 +112,17 @@ std::vector<Route> order_routes() {
                 "The next Start continues this interrupted job."),
       job_route(Method::post, "/api/v1/jobs/{id}/first", Role::operating, What::to_front,
                 "The next Start starts this queued job."),
+      job_route(Method::post, "/api/v1/jobs/{id}/choose", Role::operating, What::choose,
+                "Of the ways in which pose 2 fits, that give different surfaces, this one is right: the model is made.",
+                {{.name = "number",
+                  .type = Type::integer,
+                  .description = "as the job's choices are numbered",
+                  .required = true,
+                  .min = 1,
+                  .max = 1000}}),
+      job_route(Method::post, "/api/v1/jobs/{id}/add-pose", Role::operating, What::add_pose,
+                "A finished scan gets another pose: the next Start scans it. Cancelled before it is whole, the scan is "
+                "as it was."),
       job_route(Method::post, "/api/v1/jobs/{id}/exported", Role::operating, What::set_exported,
                 "Marks the job exported; retention may delete it."),
       job_route(Method::post, "/api/v1/jobs/{id}/reprocess", Role::engineer, What::reprocess,

@@ -152,6 +152,10 @@ void add_job_commands(CLI::App& app, Chosen& chosen) {
   sub->add_option("--state", list->state, "only jobs in this state")
       ->check(CLI::IsMember(
           {"queued", "scanning", "waiting_for_flip", "reconstructing", "done", "failed", "interrupted", "cancelled"}));
+  auto* pick = sub->add_subcommand("choose", "ID choose N: which of the ways in which pose 2 fits is right");
+  pick->add_option("N", list->choice, "as `scanrig jobs ID` numbers them")->required()->check(CLI::Range(1, 1000));
+  auto* more = sub->add_subcommand("add-pose", "ID add-pose: the next Start scans another pose of this finished job");
+  more->callback([list] { list->add_pose = true; });
   const auto order = std::make_shared<QueueVerb>();
   sub = add_client(app, chosen, "queue", "queue scans and print the first one's id", order, queue);
   sub->add_option("--recipe", order->recipe, "one of the configuration's")->capture_default_str();

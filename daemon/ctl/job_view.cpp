@@ -120,6 +120,11 @@ std::vector<std::string> job_lines(const json& job) {
   for (const auto& stage : job.at("stages")) {
     lines.push_back(bar(text(stage, "name"), stage.at("fraction")));
   }
+  for (const auto& choice : job.value("choices", json::array())) {
+    lines.push_back(fmt::format("  choice {}{}: {}{}", choice.at("number").get<int>(),
+                                choice.at("picked").get<bool>() ? ", picked" : "", text(choice, "sentence"),
+                                text(choice, "image").empty() ? "" : ", " + text(choice, "image")));
+  }
   if (const auto model = text(job, "model"); !model.empty()) lines.push_back("  model " + model);
   return lines;
 }

@@ -64,6 +64,8 @@ struct JobsVerb {
   std::string id;  ///< empty: all jobs
   std::string state;
   int limit = 50;
+  int choice = 0;         ///< of the job's choices this one is right; 0: nothing is chosen
+  bool add_pose = false;  ///< the job is given another pose
 };
 ExitCode jobs(const Connection& connection, const JobsVerb& verb);
 ExitCode job_files(const Connection& connection, const std::string& id);

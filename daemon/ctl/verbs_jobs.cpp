@@ -57,7 +57,29 @@ ExitCode save(const Connection& connection, const std::string& target, const std
 
 }  // namespace
 
+namespace {
+
+ExitCode change_choice_or_poses(const Connection& connection, const JobsVerb& verb) {
+  if (verb.id.empty()) return report_error(ExitCode::usage, "name the job: scanrig jobs ID choose N");
+  const auto job = "/api/v1/jobs/" + segment(verb.id);
+  const auto answer = verb.add_pose ? send_request(connection.socket, "POST", job + "/add-pose", "{}")
+                                    : send_request(connection.socket, "POST", job + "/choose",
+                                                   nlohmann::json{{"number", verb.choice}}.dump());
+  if (!answer) return report_error(answer.error());
+  if (connection.json) {
+    print(*answer);
+  } else if (verb.add_pose) {
+    fmt::print("Lay the part another way and press Start: job {} is next.\n", verb.id);
+  } else {
+    fmt::print("The model of job {} is made with choice {}.\n", verb.id, verb.choice);
+  }
+  return ExitCode::ok;
+}
+
+}  // namespace
+
 ExitCode jobs(const Connection& connection, const JobsVerb& verb) {
+  if (verb.choice > 0 || verb.add_pose) return change_choice_or_poses(connection, verb);
   const auto answer = verb.id.empty() ? list(connection, verb)
                                       : send_request(connection.socket, "GET", "/api/v1/jobs/" + segment(verb.id));
   if (!answer) return report_error(answer.error());

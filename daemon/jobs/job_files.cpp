@@ -8,8 +8,10 @@
 #include <tuple>
 
 #include "core/files.h"
+#include "core/max_poses.h"
 #include "core/strict_json.h"
 #include "core/timestamp.h"
+#include "pipeline/storage/pose_choices.h"
 
 namespace scanrig {
 namespace {
@@ -22,6 +24,7 @@ constexpr const char* kCheck = "calibration_check.json";
 constexpr const char* kLive = "live";
 constexpr const char* kFailure = "failure.json";
 constexpr const char* kAttempt = "attempt.json";
+constexpr int kMaxScanPoses = static_cast<int>(kMaxPoses);
 constexpr int kJobVersion = 3;  ///< 1 had other names for some keys of the recipe, 2 no calibrations
 
 /// Part ids and messages come from outside and need not be UTF-8.
@@ -58,7 +61,8 @@ Recipe read_recipe(JsonObject object, int version) {
     const auto kind = object.one_of("kind", {"scan", "calibration", "check"});
     recipe.kind = static_cast<RecipeKind>(std::ranges::find(kRecipeKinds, kind) - kRecipeKinds.begin());
   }
-  recipe.poses = object.integer("poses", 1, recipe.is_calibration() ? static_cast<int>(calibration_plan().size()) : 2);
+  recipe.poses =
+      object.integer("poses", 1, recipe.is_calibration() ? static_cast<int>(calibration_plan().size()) : kMaxScanPoses);
   recipe.views = object.integer("views", 1, 360);
   recipe.flip_timeout = std::chrono::minutes(object.integer("flip_timeout_min", 1, 1440));
   recipe.flip_by_signal = object.flag(old_names ? "flip_by_line" : "flip_by_signal");  // old name
@@ -142,13 +146,11 @@ FolderSize measure_folder(const fs::path& folder) {
 }
 
 Result<void> write_job_file(const fs::path& job_folder, const JobFile& job) {
-  return write_json(job_folder / kJob, {{"format", "scanrig-job"},
-                                        {"version", kJobVersion},
-                                        {"part", job.part},
-                                        {"place", job.place},
-                                        {"exported", job.exported},
-                                        {"accepted", job.accepted},
-                                        {"recipe", to_json(job.recipe)}});
+  ordered_json json = {{"format", "scanrig-job"},      {"version", kJobVersion},   {"part", job.part},
+                       {"place", job.place},           {"exported", job.exported}, {"accepted", job.accepted},
+                       {"recipe", to_json(job.recipe)}};
+  if (job.whole_poses > 0) json["whole_poses"] = job.whole_poses;
+  return write_json(job_folder / kJob, json);
 }
 
 Result<JobFile> read_job_file(const fs::path& job_folder) {
@@ -161,6 +163,7 @@ Result<JobFile> read_job_file(const fs::path& job_folder) {
   job.exported = json->root().flag("exported");
   if (json->version() >= 3) job.accepted = json->root().flag("accepted");
   job.recipe = read_recipe(json->root().object("recipe"), json->version());
+  if (json->root().has("whole_poses")) job.whole_poses = json->root().integer("whole_poses", 1, kMaxScanPoses);
   if (const auto whole = json->finish(); !whole) return pass_on(whole);
   return job;
 }
@@ -258,6 +261,18 @@ std::vector<std::string> read_rig_remarks(const fs::path& report) {
   for (const auto& disagreement : member(json, "disagreements")) add(member(disagreement, "sentence"));
   add(member(member(json, "next_rest"), "sentence"));
   return remarks;
+}
+
+void take_choices(JobInfo& job) {
+  job.choices.clear();
+  job.picked = 0;
+  const auto stored = read_choices(job.folder);
+  if (!stored) return;
+  job.picked = stored->picked;
+  for (const auto& choice : stored->choices) {
+    const int number = static_cast<int>(job.choices.size()) + 1;
+    job.choices.push_back({choice.sentence, choice.has_image ? choice_image(number) : ""});
+  }
 }
 
 std::optional<Error> limit_violation(const fs::path& report, const Limits& limits) {

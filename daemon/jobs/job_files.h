@@ -37,6 +37,7 @@ struct JobFile {
   std::int64_t place = 0;
   bool exported = false;
   bool accepted = false;  ///< a calibration that became the rig's
+  int whole_poses = 0;    ///< of a scan that had all its views before it was given another pose; 0: it was not
 };
 /// Fails with `io`.
 Result<void> write_job_file(const std::filesystem::path& job_folder, const JobFile& job);
@@ -75,6 +76,9 @@ std::string last_check(const std::filesystem::path& root, const std::string& cal
 /// What report.json says of the rig, of single images, and of another rest than the suggested one, each sentence once;
 /// none where it cannot be read.
 std::vector<std::string> read_rig_remarks(const std::filesystem::path& report);
+
+/// The ways in which pose 2 fits, from the job's folder; none where they cannot be read.
+void take_choices(JobInfo& job);
 
 /// Why the model of report.json is beyond the limits; nothing when it is within, or without limits. An unreadable
 /// report never passes.

@@ -13,7 +13,7 @@
 namespace scanrig {
 namespace {
 
-constexpr int kLayout = 7;  ///< increase with every change below
+constexpr int kLayout = 8;  ///< increase with every change below
 
 nlohmann::json to_json(const std::optional<Error>& error) {
   if (!error) return nullptr;
@@ -45,6 +45,12 @@ nlohmann::json views_of(const JobInfo& job) {
   return views;
 }
 
+nlohmann::json choices_of(const JobInfo& job) {
+  nlohmann::json choices = nlohmann::json::array();
+  for (const auto& c : job.choices) choices.push_back({c.sentence, c.image});
+  return choices;
+}
+
 nlohmann::json movement_checks_of(const JobInfo& job) {
   nlohmann::json movement_checks = nlohmann::json::array();
   for (const auto& c : job.movement_checks) {
@@ -64,6 +70,8 @@ void read(const nlohmann::json& j, JobInfo& job) {
   job.model = j.at("model");
   job.report = j.at("report");
   job.remarks = j.at("remarks").get<std::vector<std::string>>();
+  for (const auto& c : j.at("choices")) job.choices.push_back({c.at(0), c.at(1)});
+  job.picked = j.at("picked");
   job.config_sha256 = j.at("config_sha256").get<std::vector<std::string>>();
   for (const auto& v : j.at("stored")) {
     job.stored.push_back({v.at(0), v.at(1), v.at(2), errors_from(v.at(3)), v.at(4), v.at(5)});
@@ -100,7 +108,8 @@ void set_text(sqlite3_stmt* statement, int parameter, const std::string& value) 
 /// Differs when a file with the job's state has been written since, or the record has changed.
 std::string stamp(const fs::path& folder, const std::string& record) {
   std::string stamp;
-  for (const char* name : {"scan.json", "job.json", "failure.json", "attempt.json", "model/report.json"}) {
+  for (const char* name :
+       {"scan.json", "job.json", "failure.json", "attempt.json", "model/report.json", "choices/choices.json"}) {
     struct stat file {};
     if (::stat((folder / name).c_str(), &file) != 0) file = {};
     stamp += fmt::format("{}.{}.{}.{};", file.st_ino, file.st_size, file.st_mtim.tv_sec, file.st_mtim.tv_nsec);
@@ -122,6 +131,8 @@ std::string to_record(const JobInfo& job) {
                             {"model", job.model},
                             {"report", job.report},
                             {"remarks", job.remarks},
+                            {"choices", choices_of(job)},
+                            {"picked", job.picked},
                             {"config_sha256", job.config_sha256},
                             {"stored", views_of(job)},
                             {"movement_checks", movement_checks_of(job)}};

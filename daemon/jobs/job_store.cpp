@@ -74,9 +74,12 @@ Result<JobInfo> read_folder(const fs::path& folder, const ScanFolder& scan) {
     job.calibration = read_calibration_report(report_file(folder));
   } else {
     job.remarks = read_rig_remarks(report_file(folder));
+    take_choices(job);
   }
   if (job.calibration) job.calibration->is_accepted = order->accepted;
   take_views(job, scan.manifest());
+  // Of one that was given another pose, and not yet queued for that.
+  if (scan.manifest().state == "scanned" && job.complete > 0) job.recipe.poses = job.complete;
   const auto facts = facts_of(job, scan.manifest().state);
   return with_state_of_folder(std::move(job), facts);
 }

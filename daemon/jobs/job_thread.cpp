@@ -16,8 +16,6 @@
 namespace scanrig {
 namespace {
 
-using What = event::JobRequested::What;
-
 /// A person looks first at images without a match: they are kept beside the views.
 Result<void> keep_images(const ScanFolder& scan, int pose, std::size_t number, const RawView& again) {
   const auto folder = scan.path() / scan.manifest().poses[static_cast<std::size_t>(pose)].name;
@@ -194,99 +192,6 @@ Result<void> JobThread::begin(const JobInfo& job) {
   const auto& poses = scan_->manifest().poses;
   const int stored = current < poses.size() ? static_cast<int>(poses[current].views.size()) : 0;
   post_event_(event::JobStarted{job.id, job.complete, stored});
-  return {};
-}
-
-void JobThread::handle(const action::MoveJob& task) { answer(task.request_id, move(task), task.job); }
-
-Result<void> JobThread::move(const action::MoveJob& task) {
-  auto job = store_.read(task.job);
-  if (!job) return pass_on(job);
-  if (task.resume && !is_resumable(*job)) {
-    return fail(ErrorCode::refused, "job {} is {} and cannot be resumed: order a new one", task.job,
-                to_string(job->state));
-  }
-  if (task.resume && has_views(*job) && !job->recipe.is_calibration()) {
-    if (auto same = store_.check_job_cameras(task.job); !same) return same;
-  }
-  auto order = read_job_file(job->folder);
-  if (!order) return pass_on(order);
-  order->place = task.place;
-  if (auto written = write_job_file(job->folder, *order); !written) return written;
-  if (task.resume) {
-    auto scan = ScanFolder::open(job->folder);
-    if (!scan) return pass_on(scan);
-    if (auto queued = scan->set_state("queued"); !queued) return queued;
-  }
-  tell_known(task.job);
-  return {};
-}
-
-void JobThread::handle(const action::RunJobRequest& task) {
-  answer(task.asked.request_id, keep(task.asked), task.asked.job);
-}
-
-Result<void> JobThread::keep(const event::JobRequested& asked) {
-  auto job = store_.read(asked.job);
-  if (!job) return pass_on(job);
-  if (asked.what == What::cancel) return cancel(*job);
-  if (job->state == JobState::reconstructing || reconstruction_.has(asked.job)) {
-    return fail(ErrorCode::busy, "job {} is being reconstructed: wait for its end, or cancel it", asked.job);
-  }
-  if (asked.what == What::reprocess) return reprocess(std::move(*job), asked);
-  auto order = read_job_file(job->folder);
-  if (!order) return pass_on(order);
-  if (asked.what == What::accept) {
-    auto accepted = store_.accept_calibration(*job);
-    if (accepted) tell_known(asked.job);
-    return accepted;
-  }
-  order->exported = true;
-  if (auto written = write_job_file(job->folder, *order); !written) return written;
-  tell_known(asked.job);
-  return {};
-}
-
-/// Its evidence stays, and a scan with all its views can be reconstructed later.
-Result<void> JobThread::cancel(const JobInfo& job) {
-  if (job.state == JobState::queued || job.state == JobState::interrupted) {
-    auto scan = ScanFolder::open(job.folder);
-    if (!scan) return pass_on(scan);
-    if (auto ended = scan->set_state("cancelled"); !ended) return ended;
-  } else if (!reconstruction_.cancel(job.id)) {
-    return fail(ErrorCode::refused,
-                "job {} is {}: only what is queued, interrupted or being reconstructed can be cancelled", job.id,
-                to_string(job.state));
-  }
-  if (auto noted = write_failure(job.folder, {ErrorCode::stopped, "cancelled on request"}); !noted) {
-    // No thread works on it any more, and no other thread reports that.
-    if (job.state != JobState::reconstructing) tell_known(job.id);
-    if (job.state == JobState::reconstructing) post_event_(event::ReconstructionFailed{job.id, noted.error()});
-    return noted;
-  }
-  tell_known(job.id);
-  return {};
-}
-
-/// The images are all it needs; an older model stays until the new one is complete.
-Result<void> JobThread::reprocess(JobInfo job, const event::JobRequested& asked) {
-  if (job.complete < job.recipe.poses) {
-    return fail(ErrorCode::refused, "job {} has only {} of {} poses: there is nothing to make a model of", asked.job,
-                job.complete, job.recipe.poses);
-  }
-  forget_attempts(job.folder);
-  remove_failure(job.folder);
-  job.state = JobState::reconstructing;
-  job.quarantined = false;
-  job.error.reset();
-  job.passed.reset();
-  if (job.calibration) {  // one that is solved again is another one
-    if (auto anew = set_accepted(job.folder, false); !anew) return anew;
-    job.calibration.reset();
-  }
-  const auto known = std::make_shared<const JobInfo>(std::move(job));
-  post_event_(event::JobUpdated{known});  // before any report of the reconstruction
-  reconstruction_.rebuild(known->id, known->folder, known->recipe, {asked.voxel_mm, asked.fusion});
   return {};
 }
 

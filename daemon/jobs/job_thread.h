@@ -63,10 +63,14 @@ class JobThread {
   void set_aside(const std::string& id, const Error& why);
   Result<void> begin(const JobInfo& job);
   Result<void> move(const action::MoveJob& task);
+  Result<void> add_pose(const JobInfo& job, std::int64_t place);
+  Result<JobInfo> without_failed_pose(JobInfo job);
+  Result<void> take_pose_back(const JobInfo& job, JobFile order);
   Result<void> cancel(const JobInfo& job);
   Result<void> keep(const event::JobRequested& asked);
   Result<void> finish_pose(const action::FinishPose& task);
   Result<MovementCheck> judge(const TakenView& again);
+  Result<void> choose(JobInfo job, const event::JobRequested& asked);
   Result<void> reprocess(JobInfo job, const event::JobRequested& asked);
   [[nodiscard]] bool storing() const { return scan_ && !broken_; }
   void give_up(const std::string& job, const Error& why);

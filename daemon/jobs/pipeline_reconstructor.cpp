@@ -1,5 +1,6 @@
 #include "daemon/jobs/executors.h"
 
+#include <tuple>
 #include <utility>
 
 #include "pipeline/model_io/model_files.h"
@@ -44,10 +45,16 @@ class PipelineReconstructor final : public Reconstructor {
     }
     return all;
   }
-  Result<void> prepare(const Context& context) override { return reconstruction_.prepare(context); }
+  Result<void> prepare(const Context& context) override {
+    auto done = reconstruction_.prepare(context);
+    // A disk that refuses them refuses what the job needs, too; the message lists them.
+    if (const auto choices = reconstruction_.choices(); !choices.empty()) std::ignore = write_choices(scan_, choices);
+    return done;
+  }
   Result<void> finish(const std::filesystem::path& folder, const Context& context) override {
     const auto scan = ScanFolder::open(scan_);  // now that it is complete
     if (!scan) return pass_on(scan);
+    if (auto prepared = prepare(context); !prepared) return prepared;
     const auto model = reconstruction_.finish(identity_of(scan->manifest()), context);
     if (!model) return pass_on(model);
     return write_model(*model, folder, threads_);
@@ -76,6 +83,9 @@ ReconstructorFactory pipeline_reconstructor(ReconstructOptions options, std::uin
     changed.voxel_mm = task.changes.voxel_mm.value_or(options.voxel_mm);
     if (!task.changes.fusion.empty()) changed.fusion = task.changes.fusion;
     changed.memory_bytes = memory_bytes;
+    const auto picked = picked_motion(task.folder);
+    if (!picked) return pass_on(picked);
+    changed.picked = *picked;
     auto fits = check_memory(task.calibration, task.views, changed.voxel_mm, memory_bytes);
     if (!fits) return pass_on(fits);
     return std::make_unique<PipelineReconstructor>(Reconstruction(task.calibration, changed), task.folder,

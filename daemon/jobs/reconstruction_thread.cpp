@@ -374,8 +374,10 @@ Result<event::ModelReady> ReconstructionThread::make_model() {
 void ReconstructionThread::check(const Result<void>& done) {
   if (done) return;
   current_->error = done.error();
-  if (!current_->stop.stop_requested())
-    post_event_(event::ReconstructionFailed{current_->job, done.error(), current_->quarantined});
+  if (current_->stop.stop_requested()) return;
+  JobInfo choices{.folder = current_->folder};
+  if (done.error().code == ErrorCode::ambiguous) take_choices(choices);
+  post_event_(event::ReconstructionFailed{current_->job, done.error(), current_->quarantined, choices.choices});
 }
 
 void ReconstructionThread::tell_progress(std::string stage, double fraction) {

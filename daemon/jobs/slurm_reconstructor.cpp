@@ -96,6 +96,7 @@ class SlurmReconstructor final : public Reconstructor {
       }
       forget_attempts(folder_);  // the daemon may die now: the work is not in it
       const auto came = follow(context);
+      if (!came) places_.fetch_choices(*submission_);
       if (!came) return pass_on(came);
       if (*came == Came::model) return places_.take_model(*submission_, folder);
       if (auto again = count_lost(); !again) return again;

@@ -7,6 +7,7 @@
 #include "core/files.h"
 #include "core/strict_json.h"
 #include "daemon/jobs/node_run.h"
+#include "pipeline/storage/pose_choices.h"
 
 namespace scanrig {
 namespace {
@@ -17,10 +18,10 @@ constexpr const char* kSubmission = "slurm.json";
 constexpr const char* kRuns = "slurm";
 constexpr const char* kStagedScan = "scan";
 
-/// What a reconstruction reads of a scan's folder: its manifest, its calibration and its poses.
+/// What a reconstruction reads of a scan's folder: its manifest, its calibration, its poses, and what a person picked.
 bool is_needed(const fs::path& entry) {
   const auto name = entry.filename().string();
-  return name == "scan.json" || name == "calibration.json" || name.starts_with("pose");
+  return name == "scan.json" || name == "calibration.json" || name.starts_with("pose") || name == choices_folder();
 }
 
 Result<void> copy_scan(const fs::path& scan, const fs::path& to) {
@@ -104,6 +105,16 @@ Result<void> SlurmPlaces::take_model(const SlurmSubmission& submission, const fs
   std::error_code ignored;
   if (!taken) fs::remove_all(prepared, ignored);
   return taken;
+}
+
+void SlurmPlaces::fetch_choices(const SlurmSubmission& submission) const {
+  const auto found = scan_for_node(submission) / choices_folder();
+  std::error_code ignored;
+  if (stage_.empty() || !fs::exists(found, ignored)) return;
+  const auto prepared = scan_ / ("." + choices_folder() + ".new");
+  auto fetched = copy_synced(found, prepared);
+  if (fetched) fetched = replace_folder(prepared, scan_ / choices_folder());
+  if (!fetched) fs::remove_all(prepared, ignored);
 }
 
 void SlurmPlaces::remove_run(const SlurmSubmission& submission) const {

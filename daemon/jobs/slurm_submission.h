@@ -38,6 +38,9 @@ class SlurmPlaces {
   [[nodiscard]] Result<void> prepare(const SlurmSubmission& submission) const;
   /// Puts the run's model, whole and synced, in the place of `model`. Fails with `io`.
   [[nodiscard]] Result<void> take_model(const SlurmSubmission& submission, const std::filesystem::path& model) const;
+  /// Copies from the stage in how many ways pose 2 fits, where the run has found several. What cannot be copied is
+  /// left.
+  void fetch_choices(const SlurmSubmission& submission) const;
   /// Removes the run's folder: a job that starts later ends at once.
   void remove_run(const SlurmSubmission& submission) const;
   /// Removes slurm.json, too. Durable.

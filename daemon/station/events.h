@@ -148,12 +148,15 @@ struct JobRequested {
     set_exported,  ///< retention may delete it
     bundle,        ///< packed into the file `path`, for support
     accept,        ///< a calibration that is solved becomes the rig's
+    choose,        ///< of the ways in which pose 2 fits, `number` is right; then as reprocess
+    add_pose,      ///< a scan with all its views gets another pose; the next Start scans it
   };
   What what;
   std::string job;
   std::string path{};                ///< bundle: absolute, .tar.gz, must not exist
   std::optional<double> voxel_mm{};  ///< reprocess
   std::string fusion{};              ///< reprocess: `evidence`, `paper`; empty: as configured
+  int number = 0;                    ///< choose: from 1
   RequestId request_id = 0;
 };
 /// The request `request_id` has been done, or why not.
@@ -251,7 +254,8 @@ struct RestsSuggested {
 struct ReconstructionFailed {
   std::string job;
   Error error;
-  bool quarantined = false;  ///< it was not tried
+  bool quarantined = false;          ///< it was not tried
+  std::vector<JobChoice> choices{};  ///< for the operator, where one of them would have ended it well
 };
 struct ModelReady {
   std::string job, model, report;          ///< paths of the files
@@ -340,7 +344,12 @@ struct StartJob {
 struct MoveJob {
   std::string job;
   std::int64_t place;
-  bool resume;  ///< an interrupted job is queued again
+  enum class How {
+    queued,    ///< as it is
+    resumed,   ///< an interrupted job is queued again
+    one_more,  ///< a whole scan is queued for another pose
+  };
+  How how;
   RequestId request_id;
 };
 /// All other requested actions on a job that is not active.

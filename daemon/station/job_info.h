@@ -122,6 +122,13 @@ struct SuggestedRest {
   bool operator==(const SuggestedRest&) const = default;
 };
 
+/// One of several ways in which pose 2 fits, that give different surfaces; docs/reference/scan-folder.md.
+struct JobChoice {
+  std::string sentence{};
+  std::string image{};  ///< its file in the job's folder; empty: not drawn
+  bool operator==(const JobChoice&) const = default;
+};
+
 /// Name of its image among the live files of a job; `number` from 1.
 inline std::string rest_image(int number) { return fmt::format("rest{}.png", number); }
 
@@ -144,6 +151,8 @@ struct JobInfo {
   std::optional<CalibrationOutcome> calibration{};  ///< of a calibration that is solved
   std::vector<std::string> live{};                  ///< meshes of what its scan shows so far, event::LiveMeshes
   std::vector<SuggestedRest> suggestions{};         ///< for the next pose, best first
+  std::vector<JobChoice> choices{};                 ///< for the operator, where pose 2 fits in several ways
+  int picked = 0;                                   ///< of these, from 1; 0: none
   std::string repeated{};              ///< why the views of the current placement were dropped; empty: they were not
   std::optional<Error> error{};        ///< why it failed, was interrupted or cancelled; or did not pass
   std::vector<std::string> remarks{};  ///< done: sentences on the rig, as its watch found it

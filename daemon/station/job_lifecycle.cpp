@@ -108,6 +108,7 @@ std::optional<JobEnd> update(JobTable& table, const Event& event) {
             change(e.job, [&](JobInfo& job) {
               job.error = e.error;
               job.quarantined = e.quarantined;
+              if (!e.choices.empty()) job.choices = e.choices;
               if (job.state == JobState::reconstructing) job.state = JobState::failed;
             });
           },

@@ -257,6 +257,9 @@ OperatorMessage when_queued(const JobInfo& job) {
     return {job.recipe.is_check() ? "Check of the calibration queued." : "Calibration queued.",
             views_of_pose(job) > 0 ? "Do not move the board. Press Start." : how_to_place(placement)};
   }
+  if (job.complete > 0 && views_of_pose(job) == 0) {
+    return {sentence, "When first in the queue, put its part on the table, turned over. Press Start."};
+  }
   if (job.recipe.start_on_part) {
     return {sentence, "When first in the queue, load the part. Start begins the series."};
   }
@@ -272,6 +275,9 @@ std::string making_model(const JobInfo& job) {
 OperatorMessage when_failed(const JobInfo& job) {
   const auto sentence = fmt::format("Failed: {}.", why(job));
   if (job.quarantined) return {sentence, "Send a bundle to support or reprocess."};
+  if (job.error && job.error->code == ErrorCode::ambiguous && !job.choices.empty()) {
+    return {sentence, "Choose the image that is right, or add a pose that decides."};
+  }
   const bool images_are_good = job.error && job.complete == job.recipe.poses && job.error->code != ErrorCode::moved &&
                                job.error->code != ErrorCode::same_rest;
   return {sentence, images_are_good ? "Reprocess with other options, or scan the part again." : "Scan the part again."};
@@ -356,7 +362,8 @@ OperatorMessage describe(const JobInfo& job) {
                 "Check the model."};
       }
       return {fmt::format("Model outside the recipe's limits: {}.", why(job)),
-              fmt::format("Check the model. Scan the part again or change the limits of recipe {}.", job.recipe.name)};
+              fmt::format("Check the model. Add a pose, scan the part again, or change the limits of recipe {}.",
+                          job.recipe.name)};
     case JobState::failed: return when_failed(job);
     case JobState::interrupted: return when_interrupted(job);
     case JobState::cancelled: return {fmt::format("Cancelled: {}.", why(job)), "Scan the part again if needed."};

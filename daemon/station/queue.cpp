@@ -78,13 +78,18 @@ void ask_job(StepBuilder& m, const event::JobRequested& asked) {
     return m.refuse(ErrorCode::busy, "Job {} is active: wait or press Stop.", asked.job);
   }
   const bool queued = find(s.queue, asked.job) != s.queue.end();
+  const bool goes_first = asked.what == What::to_front || asked.what == What::resume || asked.what == What::add_pose;
   const bool for_waiting = asked.what == What::to_front || asked.what == What::cancel;
   if (asked.what == What::to_front && !queued) {
     return m.refuse(ErrorCode::refused, "Job {} is not queued.", asked.job);
   }
   if (queued && !for_waiting) return m.refuse(ErrorCode::refused, "Job {} is queued: cancel it first.", asked.job);
-  if (asked.what == What::to_front || asked.what == What::resume) {
-    return m.act(action::MoveJob{asked.job, first_place(s) - 1, asked.what == What::resume, asked.request_id});
+  if (goes_first) {
+    using How = action::MoveJob::How;
+    const How how = asked.what == What::resume     ? How::resumed
+                    : asked.what == What::add_pose ? How::one_more
+                                                   : How::queued;
+    return m.act(action::MoveJob{asked.job, first_place(s) - 1, how, asked.request_id});
   }
   m.act(action::RunJobRequest{asked});
 }

@@ -101,6 +101,8 @@ WITH_SERVICE = (
     Step("scanrig queue --recipe night --part LOT-4711 --repeat 40"),
     Step("scanrig jobs"),
     Step("scanrig jobs ID"),
+    Step("scanrig jobs ID choose N", code=6),  # there is nothing to choose
+    Step("scanrig jobs ID add-pose", code=6),  # it is queued
     Step("scanrig first ID"),
     Step("scanrig start", setup=True),
     Step("scanrig stop"),
@@ -177,7 +179,7 @@ class Bench:
 
     def run(self, step):
         """What is wrong with a step, or None."""
-        values = {"ID": self.id, "FILE": "example.toml"}
+        values = {"ID": self.id, "FILE": "example.toml", "N": "1"}
         program, *words = [values.get(word, word) for word in step.text.split()]
         command = [self.binaries / program, *words, *step.more]
         limit = time.monotonic() + STEP_LIMIT_S

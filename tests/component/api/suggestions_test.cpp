@@ -61,5 +61,19 @@ TEST_F(SuggestionsOfTheApi, TheyAreGoneWithTheReconstruction) {
   EXPECT_EQ(job_with(0)["suggestions"].size(), 0U);
 }
 
+TEST_F(SuggestionsOfTheApi, TheWaysInWhichPose2FitsAreListedWithTheirPictures) {
+  serve();
+  EXPECT_TRUE(get("/jobs/old").json()["choices"].empty());
+  station->loop.post(event::ReconstructionFailed{
+      "old", {ErrorCode::ambiguous, "several motions fit"}, false, {{"as it lies", "choices/choice1.png"}, {"over"}}});
+  json job;
+  for (int tries = 0; tries < 1000 && job["choices"].size() != 2; ++tries) job = get("/jobs/old").json();
+  EXPECT_EQ(job["choices"][0], json::parse(R"({"number": 1, "sentence": "as it lies", "image": "choices/choice1.png",
+                                               "picked": false})"));
+  EXPECT_EQ(job["choices"][1]["image"], "");
+  const auto document = get("/openapi.json").json();
+  EXPECT_TRUE(json_schema::fits(job, document["components"]["schemas"]["JobDetail"], document));
+}
+
 }  // namespace
 }  // namespace scanrig

@@ -30,11 +30,13 @@ enum class Step {
   resume,
   cancel,
   reprocess_with_model,
-  reprocess_without_model
+  reprocess_without_model,
+  add_pose
 };
 using History = std::vector<Step>;
 
-/// Jobs of two poses of one view, through the real threads and folders. The test is the control loop.
+/// Jobs of two poses of one view, some of which are given a third, through the real threads and folders. The test is
+/// the control loop.
 class JobHistory : public scan_samples::FolderTest, public testing::WithParamInterface<Limits> {
  protected:
   void SetUp() override {
@@ -93,6 +95,7 @@ class JobHistory : public scan_samples::FolderTest, public testing::WithParamInt
       close(table_, task);
     }
     post<event::JobClosed>(task);
+    wait_for_reconstruction();
   }
   void finish(bool model) {
     {
@@ -100,8 +103,9 @@ class JobHistory : public scan_samples::FolderTest, public testing::WithParamInt
       log_.answer_to_finish = model ? Result<void>() : fail(ErrorCode::degenerate, "nothing seen");
     }
     const int pose = told().complete;
-    const action::FinishPose task{id_, pose, pose == 1};
-    if (pose == 1) {
+    const bool is_last = pose + 1 == told().recipe.poses;
+    const action::FinishPose task{id_, pose, is_last};
+    if (is_last) {
       post<event::ModelReady, event::ReconstructionFailed>(task);
     } else {
       post<event::PoseStored>(task);
@@ -112,7 +116,7 @@ class JobHistory : public scan_samples::FolderTest, public testing::WithParamInt
   /// A failure is reported before its reconstruction has ended.
   void wait_for_reconstruction() {
     const auto deadline = Deadline::after(clock_, kAmple);
-    while (told().complete == 2 && reconstruction_->has(id_)) {
+    while ((is_final(told().state) || told().complete == told().recipe.poses) && reconstruction_->has(id_)) {
       ASSERT_FALSE(deadline.expired(clock_));
       clock_.sleep_for(std::chrono::milliseconds(1));
     }
@@ -142,7 +146,8 @@ class JobHistory : public scan_samples::FolderTest, public testing::WithParamInt
       case Step::turn_over: turned_ = true; return jobs_->post(action::ResumeJob{id_});
       case Step::interrupt: return close_as(JobState::interrupted, {ErrorCode::stopped, "Stop was pressed"});
       case Step::fail: return close_as(JobState::failed, {ErrorCode::moved, "something moved"});
-      case Step::resume: return post<event::RequestDone>(action::MoveJob{id_, -1, true, 1});
+      case Step::resume: return post<event::RequestDone>(action::MoveJob{id_, -1, action::MoveJob::How::resumed, 1});
+      case Step::add_pose: return post<event::RequestDone>(action::MoveJob{id_, -1, action::MoveJob::How::one_more, 1});
       case Step::cancel:
         return post<event::RequestDone>(action::RunJobRequest{{.what = What::cancel, .job = id_, .request_id = 1}});
       case Step::reprocess_with_model: return reprocess(true);
@@ -168,7 +173,8 @@ class JobHistory : public scan_samples::FolderTest, public testing::WithParamInt
         return is_resumable(job) ? std::vector{Step::resume, Step::cancel} : std::vector{Step::cancel};
       case JobState::done:
       case JobState::failed:
-        if (job.complete == 2) return {Step::reprocess_with_model, Step::reprocess_without_model};
+        if (job.complete == 3) return {Step::reprocess_with_model};  // as of two poses
+        if (job.complete == 2) return {Step::reprocess_with_model, Step::reprocess_without_model, Step::add_pose};
         return {};
       default: return {};
     }
@@ -202,6 +208,7 @@ class JobHistory : public scan_samples::FolderTest, public testing::WithParamInt
     expect("state", to_string(read->state), to_string(expected.state));
     expect("resumable", is_resumable(*read), is_resumable(expected));
     expect("complete", read->complete, expected.complete);
+    expect("poses", read->recipe.poses, expected.recipe.poses);
     expect("views", read->stored.size(), expected.stored.size());
     expect("checks", read->movement_checks.size(), expected.movement_checks.size());
     expect("model", read->model, expected.model);
@@ -247,7 +254,7 @@ TEST_P(JobHistory, WhatIsReadBackIsWhatWasReported) {
       open.back().push_back(step);
     }
   }
-  EXPECT_GT(seen.size(), 25u);
+  EXPECT_GT(seen.size(), 40u);
   for (const char* const state :
        {"queued", "scanning", "waiting_for_flip", "done", "failed", "interrupted", "cancelled"}) {
     EXPECT_THAT(seen, testing::Contains(testing::StartsWith(state)));

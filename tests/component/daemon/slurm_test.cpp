@@ -341,6 +341,17 @@ TEST_F(Slurm, AStageIsForNodesWithoutTheFolderOfJobs) {
   expect_nothing_left();
 }
 
+TEST_F(Slurm, WhatANodeFoundSeveralWaysToFitComesBackFromTheStage) {
+  options.stage = folder_ / "stage";
+  fs::create_directories(options.stage);
+  on_node("mkdir $2/choices; echo found > $2/choices/choices.json; exit 7\n");
+  EXPECT_FALSE(finish());
+  EXPECT_EQ(read_file(scan_ / "choices" / "choices.json").value_or("none"), "found\n");
+  on_node("test -e $2/choices/choices.json || exit 3\n" + std::string(kMakes));
+  EXPECT_TRUE(finish()) << "the node reads what was picked";
+  EXPECT_TRUE(fs::is_empty(options.stage));
+}
+
 /// The whole daemon with such a cluster.
 class DaemonWithSlurm : public Daemon {};
 

@@ -145,11 +145,16 @@ TEST_F(Queue, JobsAreMovedResumedAndKept) {
   ask(What::to_front, "b");
   ASSERT_NE(asked_for<action::MoveJob>(), nullptr);
   EXPECT_EQ(asked_for<action::MoveJob>()->place, 2);
-  EXPECT_FALSE(asked_for<action::MoveJob>()->resume);
+  using How = action::MoveJob::How;
+  EXPECT_EQ(asked_for<action::MoveJob>()->how, How::queued);
   ask(What::resume, "old");
   ASSERT_NE(asked_for<action::MoveJob>(), nullptr);
-  EXPECT_TRUE(asked_for<action::MoveJob>()->resume);
-  for (const auto what : {What::cancel, What::remove, What::reprocess, What::set_exported, What::bundle}) {
+  EXPECT_EQ(asked_for<action::MoveJob>()->how, How::resumed);
+  ask(What::add_pose, "old");
+  EXPECT_EQ(asked_for<action::MoveJob>()->how, How::one_more);
+  EXPECT_EQ(asked_for<action::MoveJob>()->place, 2) << "the next Start scans it";
+  for (const auto what :
+       {What::cancel, What::remove, What::reprocess, What::set_exported, What::bundle, What::choose}) {
     ask(what, "old");
     EXPECT_NE(asked_for<action::RunJobRequest>(), nullptr);
   }

@@ -72,6 +72,13 @@ export interface Suggestion {
   image: boolean;
 }
 
+export interface Choice {
+  number: number; // from 1
+  sentence: string;
+  image: string; // a file of the job; empty: none
+  picked: boolean;
+}
+
 export interface Job {
   id: string;
   state: JobState;
@@ -94,6 +101,7 @@ export interface Job {
   error: Problem | null;
   stages: { name: string; fraction: number }[];
   live: string[]; // meshes of what the scan shows so far
+  choices: Choice[]; // ways in which pose 2 fits, of which a person picks one
   suggestions: Suggestion[]; // how the part can lie in the next pose, best first
 }
 

@@ -6,10 +6,18 @@ import type { Job, Recipe } from "../api/types.ts";
 import { Order } from "../parts/Order.tsx";
 import { go } from "../screens.ts";
 import { words } from "../words.ts";
+import { Choices } from "./Choices.tsx";
 import { chosen, type Filter } from "./filter.ts";
 import { JobLine } from "./JobLine.tsx";
 
+const MAX_POSES = 8;
 const PAGE = 50; // of a long list; the rest on demand
+
+/// A scan with all its views.
+function canGrow(job: Job): boolean {
+  const isWhole = (job.state === "done" || job.state === "failed") && job.stored.length === job.all_views;
+  return job.kind === "scan" && isWhole && !job.quarantined && job.poses < MAX_POSES;
+}
 
 function Orders({ job }: { job: Job }) {
   const path = `/jobs/${encodeURIComponent(job.id)}`;
@@ -39,6 +47,11 @@ function Orders({ job }: { job: Job }) {
       {job.kind === "scan" && (job.state === "done" || job.state === "failed") && (
         <Order needs="engineer" send={() => order(`${path}/reprocess`)}>
           {words.reprocess}
+        </Order>
+      )}
+      {canGrow(job) && (
+        <Order needs="operator" send={() => order(`${path}/add-pose`)}>
+          {words.addPose}
         </Order>
       )}
       {!ended && (
@@ -134,6 +147,7 @@ export function Jobs() {
           {list.slice(0, shown.value).map((job) => (
             <li key={job.id} class="card">
               <JobLine job={job} />
+              {(job.state === "failed" || job.state === "done") && job.choices.length > 0 && <Choices job={job} />}
               <Orders job={job} />
             </li>
           ))}
