@@ -2,18 +2,17 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <array>
+#include <cmath>
 #include <map>
+#include <utility>
 
 namespace scanrig {
 namespace {
 
 using ViewOfPose = std::pair<std::size_t, int>;
+using ViewPair = std::pair<ViewOfPose, ViewOfPose>;
 
-void add_pull(const JointScore& score, Eigen::VectorXd& sum) {
-  sum.segment<6>(6 * static_cast<Eigen::Index>(score.pose2)) += score.pull;
-  sum.segment<6>(6 * static_cast<Eigen::Index>(score.pose1)) -= score.pull;
-}
+constexpr double kMaxShare = 0.9;  // of what is known of a direction that one view may take with it
 
 template <class Value>
 Eigen::MatrixXd with_values(const Eigen::MatrixXd& matrix, const Value& value) {
@@ -21,43 +20,98 @@ Eigen::MatrixXd with_values(const Eigen::MatrixXd& matrix, const Value& value) {
   return solver.eigenvectors() * solver.eigenvalues().unaryExpr(value).asDiagonal() * solver.eigenvectors().transpose();
 }
 
-/// Outer products of the sums by view, less those by pair of views; of all poses, the first one too.
-Eigen::MatrixXd spread_of(std::span<const JointScore> scores, Eigen::Index size) {
-  std::map<ViewOfPose, Eigen::VectorXd> by_view;
-  std::map<std::pair<ViewOfPose, ViewOfPose>, Eigen::VectorXd> by_pair;
-  for (const JointScore& score : scores) {
-    const ViewOfPose first(score.pose1, score.view1), second(score.pose2, score.view2);
-    for (const ViewOfPose& view : {first, second}) {
-      add_pull(score, by_view.try_emplace(view, Eigen::VectorXd::Zero(size)).first->second);
-    }
-    add_pull(score, by_pair.try_emplace({first, second}, Eigen::VectorXd::Zero(size)).first->second);
+/// What the correspondences of one pair of views say of the motion between their poses.
+struct PairSums {
+  Eigen::Matrix<double, 6, 1> pull = Eigen::Matrix<double, 6, 1>::Zero();
+  Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
+};
+
+std::map<ViewPair, PairSums> by_pair(std::span<const JointScore> scores) {
+  std::map<ViewPair, PairSums> pairs;
+  for (const auto& [score, pose1, pose2] : scores) {
+    PairSums& sums = pairs[{{pose1, score.view1}, {pose2, score.view2}}];
+    sums.pull += score.weight * score.residual * score.lever;
+    sums.information.noalias() += score.weight * score.lever * score.lever.transpose();
   }
-  std::map<std::size_t, double> views;
-  for (const auto& [view, sum] : by_view) views[view.first] += 1.0;
-  Eigen::MatrixXd spread = Eigen::MatrixXd::Zero(size, size);
-  for (const auto& [view, sum] : by_view) {
-    const double count = views[view.first];
-    if (count > 1.0) spread.noalias() += count / (count - 1.0) * sum * sum.transpose();
+  return pairs;
+}
+
+/// The same of all poses, the first one too.
+struct GroupSums {
+  Eigen::VectorXd pull;
+  Eigen::MatrixXd information;
+
+  explicit GroupSums(Eigen::Index size)
+      : pull(Eigen::VectorXd::Zero(size)), information(Eigen::MatrixXd::Zero(size, size)) {}
+  void add(const ViewPair& views, const PairSums& sums) {
+    const auto first = static_cast<Eigen::Index>(6 * views.first.first);
+    const auto second = static_cast<Eigen::Index>(6 * views.second.first);
+    pull.segment<6>(second) += sums.pull;
+    pull.segment<6>(first) -= sums.pull;
+    information.block<6, 6>(first, first) += sums.information;
+    information.block<6, 6>(second, second) += sums.information;
+    information.block<6, 6>(first, second) -= sums.information;
+    information.block<6, 6>(second, first) -= sums.information;
   }
-  const double pairs = static_cast<double>(by_pair.size());
-  for (const auto& [pair, sum] : by_pair) {
-    if (pairs > 1.0) spread.noalias() -= pairs / (pairs - 1.0) * sum * sum.transpose();
+};
+
+/// Finds the motions without a group, in coordinates that are `scale` times as small.
+class LeaveOut {
+ public:
+  LeaveOut(const Eigen::VectorXd& scale, const Eigen::MatrixXd& scaled_information)
+      : scale_(scale),
+        root_(with_values(scaled_information, [](double e) { return 1.0 / std::sqrt(std::max(e, 1e-9)); })) {}
+
+  /// Outer product of how far they are then from where they are.
+  [[nodiscard]] Eigen::MatrixXd operator()(const GroupSums& group) const {
+    const Eigen::Index size = scale_.size();  // the first pose stays
+    const Eigen::MatrixXd information =
+        scale_.asDiagonal() * group.information.bottomRightCorner(size, size) * scale_.asDiagonal();
+    const Eigen::VectorXd pull = scale_.cwiseProduct(group.pull.tail(size));
+    const Eigen::MatrixXd without =
+        with_values(root_ * information * root_, [](double e) { return 1.0 / (1.0 - std::min(e, kMaxShare)); });
+    const Eigen::VectorXd moved = root_ * (without * (root_ * pull));
+    return moved * moved.transpose();
   }
-  return spread;
+
+ private:
+  Eigen::VectorXd scale_;
+  Eigen::MatrixXd root_;  ///< of the inverse of the information
+};
+
+/// Scatter without each view, less that without each pair of views.
+Eigen::MatrixXd scatter_of(const std::map<ViewPair, PairSums>& pairs, const LeaveOut& leave_out, Eigen::Index size) {
+  std::map<ViewOfPose, GroupSums> views;
+  for (const auto& [pair, sums] : pairs) {
+    for (const ViewOfPose& view : {pair.first, pair.second})
+      views.try_emplace(view, size).first->second.add(pair, sums);
+  }
+  std::map<std::size_t, double> count;
+  for (const auto& [view, sums] : views) count[view.first] += 1.0;
+  Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(size - 6, size - 6);
+  for (const auto& [view, sums] : views) {
+    const double of_pose = count[view.first];
+    scatter += (of_pose - 1.0) / of_pose * leave_out(sums);
+  }
+  const double all = static_cast<double>(pairs.size());
+  for (const auto& [pair, sums] : pairs) {
+    GroupSums alone(size);
+    alone.add(pair, sums);
+    scatter -= (all - 1.0) / all * leave_out(alone);
+  }
+  return scatter;
 }
 
 }  // namespace
 
 Eigen::MatrixXd joint_covariance(const Eigen::MatrixXd& information, std::span<const JointScore> scores) {
-  const Eigen::Index size = information.rows();
   // Rotations and translations have other units: each coordinate is scaled by its own information.
   const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
   const Eigen::MatrixXd inverse = with_values(scaled, [](double e) { return 1.0 / std::max(e, 1e-9); });
-  const Eigen::MatrixXd spread = spread_of(scores, size + 6).bottomRightCorner(size, size);
-  const Eigen::MatrixXd scaled_spread = scale.asDiagonal() * spread * scale.asDiagonal();
-  const Eigen::MatrixXd positive = with_values(scaled_spread, [](double e) { return std::max(e, 0.0); });
-  return scale.asDiagonal() * (inverse + inverse * positive * inverse) * scale.asDiagonal();
+  const Eigen::MatrixXd scatter = scatter_of(by_pair(scores), LeaveOut(scale, scaled), information.rows() + 6);
+  const Eigen::MatrixXd positive = with_values(scatter, [](double e) { return std::max(e, 0.0); });
+  return scale.asDiagonal() * (inverse + positive) * scale.asDiagonal();
 }
 
 }  // namespace scanrig

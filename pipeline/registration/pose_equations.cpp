@@ -90,9 +90,8 @@ MotionEquations motion_equations(const PoseCorrespondences& found, const RefineO
     Vector6 j;
     j << (c.moving - e.centre).cross(c.normal), c.normal;
     e.normal.noalias() += w * j * j.transpose();
-    const Vector6 pull = w * c.distance * j;
-    e.right -= pull;
-    if (scores != nullptr) scores->push_back({pull, c.view1, c.view2});
+    e.right -= w * c.distance * j;
+    if (scores != nullptr) scores->push_back({j, w, c.distance, c.view1, c.view2});
   }
   return e;
 }

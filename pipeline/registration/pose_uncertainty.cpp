@@ -15,7 +15,7 @@ using Matrix6 = Eigen::Matrix<double, 6, 6>;
 Matrix6 motion_covariance(const Matrix6& information, std::span<const MotionScore> scores) {
   std::vector<JointScore> joint;
   joint.reserve(scores.size());
-  for (const MotionScore& s : scores) joint.push_back({s.pull, 0, 1, s.view1, s.view2});
+  for (const MotionScore& s : scores) joint.push_back({.of_link = s});
   return joint_covariance(information, joint);
 }
 

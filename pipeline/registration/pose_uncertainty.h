@@ -9,16 +9,19 @@ namespace scanrig {
 
 /// What one correspondence says of a motion.
 struct MotionScore {
-  Eigen::Matrix<double, 6, 1> pull =
-      Eigen::Matrix<double, 6, 1>::Zero();  ///< its part of the right-hand side, 0 in sum
-  int view1 = 0, view2 = 0;                 ///< of pose 1 and pose 2
+  Eigen::Matrix<double, 6, 1> lever = Eigen::Matrix<double, 6, 1>::Zero();  ///< derivative of its residual
+  double weight = 0.0;       ///< its part of the normal matrix is weight * lever * lever^T
+  double residual = 0.0;     ///< weight * residual * lever is 0 in sum
+  int view1 = 0, view2 = 0;  ///< of pose 1 and pose 2
 };
 
 /// Covariance of a motion found by weighted least squares, `information` its normal matrix, from how much the views
-/// disagree: errors within one view are alike (calibration, angle, matching), those of different views are not. Scores
-/// are summed by view of pose 1 and by view of pose 2, and pairs that both sums hold are taken out once [Cameron,
-/// Gelbach and Miller 2011, two-way clustering]. What would be left with independent errors is added; with one view in
-/// a pose, that alone. Directions that the surfaces leave open have a very large variance.
+/// disagree: errors within one view are alike (calibration, angle, matching), those of different views are not. The
+/// motion is found again without each view of pose 1, without each of pose 2, and without each pair, whose scatter both
+/// others hold and which is taken out once [Cameron, Gelbach and Miller 2011, two-way clustering; MacKinnon, Nielsen
+/// and Webb 2023, the jackknife by clusters]: where few views hold a direction, their residuals are small because the
+/// motion has followed them. What would be left with independent errors is added; with one view in a pose, that alone.
+/// Directions that the surfaces leave open have a very large variance.
 Eigen::Matrix<double, 6, 6> motion_covariance(const Eigen::Matrix<double, 6, 6>& information,
                                               std::span<const MotionScore> scores);
 

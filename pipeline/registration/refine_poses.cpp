@@ -101,8 +101,9 @@ JointEquations joint_equations(const Adjustment& a, const Eigen::Vector3d& centr
     joint.normal.block<6, 6>(second, first) -= normal;
     joint.right.segment<6>(second) += right;
     joint.right.segment<6>(first) -= right;
-    for (const MotionScore& score : of_link) {
-      scores->push_back({m.transpose() * score.pull, tie.link.pose1, tie.link.pose2, score.view1, score.view2});
+    for (MotionScore& score : of_link) {
+      score.lever = m.transpose() * score.lever;
+      scores->push_back({score, tie.link.pose1, tie.link.pose2});
     }
   }
   return joint;

@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
+#include <array>
 #include <random>
+#include <vector>
 
 #include "core/units.h"
 
@@ -55,6 +58,69 @@ TEST(PoseUncertainty, AWrongAxisSpreadsTheMotionAsPredicted) {
 TEST(PoseUncertainty, NothingOfAMotionThatIsNone) {
   const auto none = axis_covariance(Transform::Identity(), {1.0, 50.0, 2.0}, {to_radians(0.01), 0.02});
   EXPECT_LT(none.norm(), 1e-20);
+}
+
+std::vector<MotionScore> scores_of_weight(std::vector<MotionScore> scores, double weight) {
+  for (MotionScore& s : scores) s.weight *= weight;
+  return scores;
+}
+
+/// Points of a body of revolution, of which only views 0 and 1 of either pose show a handle, which holds its turn.
+std::vector<MotionScore> turned_body(std::mt19937& random) {
+  std::uniform_real_distribution<double> any(-1.0, 1.0);
+  std::vector<MotionScore> scores;
+  for (int view1 = 0; view1 < 8; ++view1) {
+    for (int view2 = 0; view2 < 8; ++view2) {
+      if (std::min((view1 - view2 + 8) % 8, (view2 - view1 + 8) % 8) > 1) continue;
+      for (int k = 0; k < 40; ++k) {
+        const double azimuth = to_radians(45.0 * view1 + 30.0 * any(random)), slope = 0.7 * any(random);
+        const Eigen::Vector3d out(std::sin(azimuth), 0.0, std::cos(azimuth));
+        Eigen::Vector3d point = 30.0 * out + 40.0 * any(random) * Eigen::Vector3d::UnitY();
+        Eigen::Vector3d normal = (out + slope * Eigen::Vector3d::UnitY()).normalized();
+        if (k < 4 && view1 < 2 && view2 < 2) {
+          point = 50.0 * out;
+          normal = Eigen::Vector3d::UnitY().cross(out);
+        }
+        MotionScore score{.weight = 1.0, .view1 = view1, .view2 = view2};
+        score.lever << point.cross(normal), normal;
+        scores.push_back(score);
+      }
+    }
+  }
+  return scores;
+}
+
+/// What the views have wrong in common, each of its own, moves the motion as far as their disagreement predicts.
+TEST(PoseUncertainty, TheTurnThatOneHandleHoldsIsNoSurerThanTheViewsThatShowIt) {
+  constexpr int kDraws = 300;
+  std::mt19937 random(11);
+  std::normal_distribution<double> normal;
+  Vector6 true_variance = Vector6::Zero(), predicted = Vector6::Zero();
+  for (int draw = 0; draw < kDraws; ++draw) {
+    std::vector<MotionScore> scores = turned_body(random);
+    std::array<std::array<Vector6, 8>, 2> wrong;
+    for (auto& pose : wrong) {
+      for (Vector6& view : pose) {
+        for (int i = 0; i < 6; ++i) view[i] = (i < 3 ? 2e-4 : 0.01) * normal(random);
+      }
+    }
+    Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
+    Vector6 right = Vector6::Zero();
+    for (MotionScore& s : scores) {
+      const auto view1 = static_cast<std::size_t>(s.view1), view2 = static_cast<std::size_t>(s.view2);
+      s.residual = s.lever.dot(wrong[0][view1] - wrong[1][view2]) + 0.005 * normal(random);
+      information += s.weight * s.lever * s.lever.transpose();
+      right -= s.weight * s.residual * s.lever;
+    }
+    const Vector6 motion = information.ldlt().solve(right);
+    for (MotionScore& s : scores) s.residual += s.lever.dot(motion);
+    true_variance += motion.cwiseAbs2() / kDraws;
+    predicted += motion_covariance(information * 4e4, scores_of_weight(scores, 4e4)).diagonal() / kDraws;
+  }
+  for (int i = 0; i < 6; ++i) {
+    EXPECT_GT(predicted[i], 0.8 * true_variance[i]) << i;
+    EXPECT_LT(predicted[i], 3.0 * true_variance[i]) << i;
+  }
 }
 
 }  // namespace
