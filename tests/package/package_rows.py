@@ -14,7 +14,7 @@ GROUPS = "dialout gpio plugdev scanrig video"
 SMALL = "--object /run/packages/part.obj --height-mm 50 --scale 0.12 --voxel-mm 5 --operator helper"
 SHORT_JOB = "--views 6 --clock virtual"
 ENDLESS_JOB = "--views 72 --clock real"  # outlasts an upgrade however slow the machine
-JOB_S, RECOVERY_S, INSTALL_S = 300, 60, 300
+JOB_S, RECOVERY_S, INSTALL_S = 300, 180, 300
 
 
 def expect(true, what):
