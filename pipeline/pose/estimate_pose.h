@@ -46,7 +46,7 @@ struct PoseOptions {
   double same_deg = 10.0;             ///< hypotheses closer than this are one
   double same_rest_tilt_deg = 5.0;    ///< a motion that tilts the object less than this has not turned it over
   double min_overlap = 0.06;          ///< confirmed share of both surfaces
-  double max_contradicted = 0.25;     ///< contradicted share of what was judged
+  double max_contradicted = 0.1;      ///< contradicted share of what was judged
   double max_median = 0.006;          ///< median distance as a share of the object's size
   double rival_share = 0.7;           ///< a rival confirms at least this share of what the best one confirms
   double same_shift = 0.05;           ///< hypotheses closer than this share of the object's size are one

@@ -9,8 +9,9 @@
 namespace scanrig {
 namespace {
 
-constexpr std::size_t kMaxMotionsPerPair = 6;  ///< that fit; more decide nothing
-constexpr int kJudgedLevel = 1;                ///< of the range pyramid, as of the search's verdict
+constexpr std::size_t kMaxMotionsPerPair = 6;   ///< that fit; more decide nothing
+constexpr int kJudgedLevel = 1;                 ///< of the range pyramid, as of the search's verdict
+constexpr double kMaxContradictedApart = 0.25;  ///< of what is confirmed, where nothing could be aligned
 
 /// The judging round of the search.
 const SearchRound& verdict_round(const PoseOptions& options) { return options.rounds.back(); }
@@ -128,7 +129,7 @@ PairVerdict PairSearch::judge_anew(std::size_t pose1, std::size_t pose2, const T
   const Checked checked = check(pose1, pose2, pose1_from_pose2);
   const double spread = checked.median_mm > 0.0 ? 1.4826 * checked.median_mm : 0.0;
   const Agreement agreement = count_agreement(checked.checks, spread, options_.agreement);
-  const double allowed = options_.max_contradicted * std::max(agreement.confirmed, options_.min_overlap);
+  const double allowed = kMaxContradictedApart * std::max(agreement.confirmed, options_.min_overlap);
   return verdict(agreement.contradicted <= allowed ? Kind::apart : Kind::contradicts, agreement);
 }
 
