@@ -156,6 +156,7 @@ void add_job_commands(CLI::App& app, Chosen& chosen) {
   pick->add_option("N", list->choice, "as `scanrig jobs ID` numbers them")->required()->check(CLI::Range(1, 1000));
   auto* more = sub->add_subcommand("add-pose", "ID add-pose: the next Start scans another pose of this finished job");
   more->callback([list] { list->add_pose = true; });
+  for (auto* change : {pick, more}) change->fallthrough();  // --socket and --json may stand behind it
   const auto order = std::make_shared<QueueVerb>();
   sub = add_client(app, chosen, "queue", "queue scans and print the first one's id", order, queue);
   sub->add_option("--recipe", order->recipe, "one of the configuration's")->capture_default_str();

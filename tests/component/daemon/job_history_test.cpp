@@ -45,7 +45,7 @@ class JobHistory : public scan_samples::FolderTest, public testing::WithParamInt
     auto opened = JobStore::open({.root = folder_ / "jobs", .calibration_file = folder_ / "calibration.json"});
     ASSERT_TRUE(opened) << opened.error().message;
     store_.emplace(std::move(*opened));
-    const auto post_event = [this](Event event) { report(event); };
+    const auto post_event = [this](const Event& event) { report(event); };
     reconstruction_.emplace(
         clock_,
         [this](const auto&) -> Result<std::unique_ptr<Reconstructor>> {

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <numbers>
 
+#include "core/max_poses.h"
 #include "core/parallel.h"
 #include "core/statistics.h"
 #include "pipeline/mesh/self_intersection.h"
