@@ -86,26 +86,35 @@ class Manual:
         return self.known[path]
 
     def verb(self, command):
-        """The program and verbs that a command begins with."""
-        path = (command.program,)
-        for word in command.words[1:]:
-            if word not in self.verbs(path):
+        """The program and verbs that a command begins with, and its other words.
+
+        What a verb is about may stand before the verbs below it: `scanrig jobs ID choose N`.
+        """
+        path, words = (command.program,), list(command.words[1:])
+        while words:
+            if words[0] in self.verbs(path):
+                path = (*path, words.pop(0))
+            elif len(words) > 1 and self.is_about_one(path) and words[1] in self.verbs(path):
+                words.pop(0)
+            else:
                 break
-            path = (*path, word)
-        return path
+        return path, words
+
+    def is_about_one(self, path):
+        return re.search(r"^Positionals:", self.help(path), re.MULTILINE) is not None
 
     def names_a_verb(self, command):
         """A sentence about `scanrig queue` orders nothing."""
-        return command.in_text and len(self.verb(command)) == len(command.words)
+        return command.in_text and not self.verb(command)[1]
 
     def problem(self, command):
         """What the program does not have of a command, or None."""
-        path = self.verb(command)
-        who, word = " ".join(path), next(iter(command.words[len(path):]), "-")
+        path, words = self.verb(command)
+        who, word = " ".join(path), next(iter(words), "-")
         help_text = self.help(path)
         if not help_text:
             return f"{who} has no --help"
-        if self.verbs(path) and not word.startswith("-"):
+        if self.verbs(path) and not word.startswith("-") and not self.is_about_one(path):
             return f"{who} has no verb {word}"
         choices = re.search(r"^ +[A-Z]+ TEXT:\{([\w,]+)\} REQUIRED", help_text, re.MULTILINE)
         if choices and word not in choices[1].split(","):
