@@ -48,7 +48,7 @@ SampleCheck check_sample(const PoseObservations& observations, int level, const 
                          const AgreementOptions& options) {
   SampleCheck best;
   double best_facing = options.min_facing;
-  if (sample.point.y() < -2.0 * reach_mm) return kFreeSpace;  // inside the table
+  if (options.has_table && sample.point.y() < -2.0 * reach_mm) return kFreeSpace;  // inside the table
   const RangeLevel& images = observations.measured->images[level];
   const std::size_t enough = std::min(options.witnesses, (images.size() + 2) / 3);
   std::size_t witnesses = 0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -30,6 +31,7 @@ struct AgreementOptions {
   double tolerance = 4.0;        ///< standard deviations off the surface that contradict
   double wide_tolerance = 12.0;  ///< the same, for small features that are distinct from the noise of edges
   double separable = 4.0;        ///< standard deviations of McNemar's test
+  bool has_table = true;         ///< y = 0 is a table: surface far below it is in free space
 };
 
 /// The observations of a pose: its measured surface and its views' silhouettes.
@@ -55,6 +57,8 @@ struct Agreement {
   double free_space = 0.0;    ///< the part of `contradicted` that lies in free space
   double median_mm = 0.0;     ///< of the distances to the surface; NaN without any
   [[nodiscard]] double score() const { return confirmed - 2.0 * contradicted; }
+  /// Of what was judged.
+  [[nodiscard]] double contradicted_share() const { return contradicted / std::max(confirmed + contradicted, 1e-9); }
 };
 
 /// Counts with `options.tolerance`.

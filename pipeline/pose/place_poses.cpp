@@ -12,8 +12,6 @@ namespace {
 constexpr double kMinConfirmedUnsearched = 0.12;  ///< twice what a search needs
 constexpr double kSurplusContradicted = 0.01;     ///< more than in the pairs that it follows from
 
-double contradicted_share(const Agreement& a) { return a.contradicted / std::max(a.confirmed + a.contradicted, 1e-9); }
-
 /// The largest share of contradiction in a pair's own motion, of pairs that were searched and are in the set.
 double worst_own(const PairSearch& search, const PoseSet& set) {
   double worst = 0.0;
@@ -21,7 +19,7 @@ double worst_own(const PairSearch& search, const PoseSet& set) {
     for (std::size_t b = a + 1; b < set.model_from_pose.size(); ++b) {
       const SearchedPair* pair = set.model_from_pose[a] && set.model_from_pose[b] ? search.searched(a, b) : nullptr;
       if (pair != nullptr && !pair->fitting.empty()) {
-        worst = std::max(worst, contradicted_share(pair->fitting.front().agreement));
+        worst = std::max(worst, pair->fitting.front().agreement.contradicted_share());
       }
     }
   }

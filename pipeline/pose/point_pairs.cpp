@@ -43,78 +43,6 @@ double turn_of(const Transform& local, const Eigen::Vector3d& p) {
   return std::atan2(q.z(), q.y());
 }
 
-/// All pairs of a surface, sorted by key.
-struct PairTable {
-  struct Entry {
-    std::uint32_t reference;
-    float turn;
-  };
-  std::vector<std::uint32_t> begin;  ///< per key; one more at the end
-  std::vector<Entry> entries;
-  std::vector<Transform> local;
-};
-
-PairTable make_table(std::span<const SurfacePoint> surface, double size_mm, const PointPairOptions& options) {
-  const int keys_used = options.distance_steps * options.angle_steps * options.angle_steps * options.angle_steps;
-  const std::size_t count = surface.size();
-  PairTable table;
-  table.local.resize(count);
-  std::vector<std::int32_t> keys(count * count, -1);
-  parallel_for(count, [&](std::size_t i) {
-    table.local[i] = local_from_surface(surface[i]);
-    for (std::size_t j = 0; j < count; ++j) keys[i * count + j] = key_of(surface[i], surface[j], size_mm, options);
-  });
-  table.begin.assign(keys_used + 1, 0);
-  for (const std::int32_t key : keys) {
-    if (key >= 0) ++table.begin[key + 1];
-  }
-  for (int k = 0; k < keys_used; ++k) table.begin[k + 1] += table.begin[k];
-  table.entries.resize(table.begin[keys_used]);
-  std::vector<std::uint32_t> next(table.begin.begin(), table.begin.end() - 1);
-  for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t j = 0; j < count; ++j) {
-      const std::int32_t key = keys[i * count + j];
-      if (key < 0) continue;
-      const auto turn = static_cast<float>(turn_of(table.local[i], surface[j].point));
-      table.entries[next[key]++] = {static_cast<std::uint32_t>(i), turn};
-    }
-  }
-  return table;
-}
-
-/// The motions with most votes of the pairs that start at one point of surface 2.
-std::vector<Vote> votes_of(const PairTable& table, std::span<const SurfacePoint> surface2, std::size_t reference,
-                           double size_mm, const PointPairOptions& options) {
-  const int turn_steps = options.turn_steps;
-  constexpr double kTwoPi = 2.0 * std::numbers::pi;
-  const Transform local2 = local_from_surface(surface2[reference]);
-  std::vector<float> votes(table.local.size() * turn_steps, 0.0F);
-  for (const SurfacePoint& other : surface2) {
-    const int key = key_of(surface2[reference], other, size_mm, options);
-    if (key < 0) continue;
-    const double turn2 = turn_of(local2, other.point);
-    // A common key (flat faces have them) carries little information: its votes count less, and a part of its pairs is
-    // enough.
-    const std::uint32_t alike = table.begin[key + 1] - table.begin[key];
-    const float weight = 1.0F / std::sqrt(static_cast<float>(alike) + 1.0F);
-    for (std::uint32_t e = table.begin[key]; e < table.begin[key + 1]; e += 1 + alike / options.max_alike) {
-      const double turn = (table.entries[e].turn - turn2) / kTwoPi;
-      const int step = static_cast<int>((turn - std::floor(turn)) * turn_steps) % turn_steps;
-      votes[table.entries[e].reference * turn_steps + step] += weight;
-    }
-  }
-  std::vector<Vote> peaks;
-  for (std::size_t peak = 0; peak < options.peaks; ++peak) {
-    const auto best = std::max_element(votes.begin(), votes.end());
-    const auto cell = static_cast<std::size_t>(best - votes.begin());
-    const double turn = kTwoPi * (static_cast<double>(cell % turn_steps) + 0.5) / turn_steps;
-    const Eigen::AngleAxisd about_normal(turn, Eigen::Vector3d::UnitX());
-    peaks.push_back({table.local[cell / turn_steps].inverse() * about_normal * local2, *best});
-    *best = 0.0F;
-  }
-  return peaks;
-}
-
 bool alike(const Transform& a, const Transform& b, const Eigen::Vector3d& middle, double size_mm,
            const PointPairOptions& options) {
   return rotation_angle(a.linear().transpose() * b.linear()) < to_radians(options.same_deg) &&
@@ -123,14 +51,70 @@ bool alike(const Transform& a, const Transform& b, const Eigen::Vector3d& middle
 
 }  // namespace
 
-std::vector<Vote> vote_by_point_pairs(std::span<const SurfacePoint> surface1, std::span<const SurfacePoint> surface2,
-                                      double size_mm, int max_motions, const PointPairOptions& options) {
-  if (surface1.empty() || surface2.empty()) return {};
-  const PairTable table = make_table(surface1, size_mm, options);
-  const std::size_t stride = std::max<std::size_t>(1, surface2.size() / options.references);
+PointPairTable::PointPairTable(std::span<const SurfacePoint> surface1, double size_mm, const PointPairOptions& options)
+    : options_(options), size_mm_(size_mm) {
+  const int keys_used = options.distance_steps * options.angle_steps * options.angle_steps * options.angle_steps;
+  const std::size_t count = surface1.size();
+  local_.resize(count);
+  std::vector<std::int32_t> keys(count * count, -1);
+  parallel_for(count, [&](std::size_t i) {
+    local_[i] = local_from_surface(surface1[i]);
+    for (std::size_t j = 0; j < count; ++j) keys[i * count + j] = key_of(surface1[i], surface1[j], size_mm, options);
+  });
+  begin_.assign(keys_used + 1, 0);
+  for (const std::int32_t key : keys) {
+    if (key >= 0) ++begin_[key + 1];
+  }
+  for (int k = 0; k < keys_used; ++k) begin_[k + 1] += begin_[k];
+  entries_.resize(begin_[keys_used]);
+  std::vector<std::uint32_t> next(begin_.begin(), begin_.end() - 1);
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t j = 0; j < count; ++j) {
+      const std::int32_t key = keys[i * count + j];
+      if (key < 0) continue;
+      const auto turn = static_cast<float>(turn_of(local_[i], surface1[j].point));
+      entries_[next[key]++] = {static_cast<std::uint32_t>(i), turn};
+    }
+  }
+}
+
+/// The motions with most votes of the pairs that start at one point of surface 2.
+std::vector<Vote> PointPairTable::votes_of(std::span<const SurfacePoint> surface2, std::size_t reference) const {
+  const int turn_steps = options_.turn_steps;
+  constexpr double kTwoPi = 2.0 * std::numbers::pi;
+  const Transform local2 = local_from_surface(surface2[reference]);
+  std::vector<float> votes(local_.size() * turn_steps, 0.0F);
+  for (const SurfacePoint& other : surface2) {
+    const int key = key_of(surface2[reference], other, size_mm_, options_);
+    if (key < 0) continue;
+    const double turn2 = turn_of(local2, other.point);
+    // A common key (flat faces have them) carries little information: its votes count less, and a part of its pairs is
+    // enough.
+    const std::uint32_t alike = begin_[key + 1] - begin_[key];
+    const float weight = 1.0F / std::sqrt(static_cast<float>(alike) + 1.0F);
+    for (std::uint32_t e = begin_[key]; e < begin_[key + 1]; e += 1 + alike / options_.max_alike) {
+      const double turn = (entries_[e].turn - turn2) / kTwoPi;
+      const int step = static_cast<int>((turn - std::floor(turn)) * turn_steps) % turn_steps;
+      votes[entries_[e].reference * turn_steps + step] += weight;
+    }
+  }
+  std::vector<Vote> peaks;
+  for (std::size_t peak = 0; peak < options_.peaks; ++peak) {
+    const auto best = std::max_element(votes.begin(), votes.end());
+    const auto cell = static_cast<std::size_t>(best - votes.begin());
+    const double turn = kTwoPi * (static_cast<double>(cell % turn_steps) + 0.5) / turn_steps;
+    const Eigen::AngleAxisd about_normal(turn, Eigen::Vector3d::UnitX());
+    peaks.push_back({local_[cell / turn_steps].inverse() * about_normal * local2, *best});
+    *best = 0.0F;
+  }
+  return peaks;
+}
+
+std::vector<Vote> PointPairTable::vote(std::span<const SurfacePoint> surface2, int max_motions) const {
+  if (local_.empty() || surface2.empty()) return {};
+  const std::size_t stride = std::max<std::size_t>(1, surface2.size() / options_.references);
   std::vector<std::vector<Vote>> parts((surface2.size() + stride - 1) / stride);
-  parallel_for(parts.size(),
-               [&](std::size_t k) { parts[k] = votes_of(table, surface2, k * stride, size_mm, options); });
+  parallel_for(parts.size(), [&](std::size_t k) { parts[k] = votes_of(surface2, k * stride); });
 
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const SurfacePoint& p : surface2) middle += p.point / static_cast<double>(surface2.size());
@@ -141,18 +125,25 @@ std::vector<Vote> vote_by_point_pairs(std::span<const SurfacePoint> surface1, st
   parallel_for(all.size(), [&](std::size_t i) {
     summed[i].votes = 0.0;
     for (const Vote& v : all) {
-      if (alike(all[i].pose1_from_pose2, v.pose1_from_pose2, middle, size_mm, options)) summed[i].votes += v.votes;
+      if (alike(all[i].pose1_from_pose2, v.pose1_from_pose2, middle, size_mm_, options_)) summed[i].votes += v.votes;
     }
   });
   std::stable_sort(summed.begin(), summed.end(), [](const Vote& a, const Vote& b) { return a.votes > b.votes; });
   std::vector<Vote> chosen;
   for (const Vote& v : summed) {
     if (chosen.size() == static_cast<std::size_t>(max_motions)) break;
-    const bool is_known = std::ranges::any_of(
-        chosen, [&](const Vote& c) { return alike(c.pose1_from_pose2, v.pose1_from_pose2, middle, size_mm, options); });
+    const bool is_known = std::ranges::any_of(chosen, [&](const Vote& c) {
+      return alike(c.pose1_from_pose2, v.pose1_from_pose2, middle, size_mm_, options_);
+    });
     if (!is_known) chosen.push_back(v);
   }
   return chosen;
+}
+
+std::vector<Vote> vote_by_point_pairs(std::span<const SurfacePoint> surface1, std::span<const SurfacePoint> surface2,
+                                      double size_mm, int max_motions, const PointPairOptions& options) {
+  if (surface1.empty() || surface2.empty()) return {};
+  return PointPairTable(surface1, size_mm, options).vote(surface2, max_motions);
 }
 
 }  // namespace scanrig

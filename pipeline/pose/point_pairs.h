@@ -30,9 +30,32 @@ struct PointPairOptions {
   double same_shift = 0.06;       ///< ... this share of the object's size are one
 };
 
-/// Global search without rests: oriented point pairs (distance and three angles) of surface 1 in a table; pairs of
-/// surface 2 look theirs up and vote for the motion that carries one onto the other [Drost, Ulrich, Navab, Ilic 2010].
-/// Returns the motions with most votes, best first, at most `max_motions`, distinct by `same_deg` or `same_shift`.
+/// All pairs of oriented points (distance and three angles) of one surface in a table, to be compared with any number
+/// of other surfaces [Drost, Ulrich, Navab, Ilic 2010]. Threads: vote() may be called from several.
+class PointPairTable {
+ public:
+  /// `size_mm` of the object gives distances their scale: tables and surfaces that are compared have one.
+  PointPairTable(std::span<const SurfacePoint> surface1, double size_mm, const PointPairOptions& options = {});
+
+  /// Pairs of surface 2 look theirs up and vote for the motion that carries one onto the other. Returns the motions
+  /// with most votes, best first, at most `max_motions`, distinct by `same_deg` or `same_shift`.
+  [[nodiscard]] std::vector<Vote> vote(std::span<const SurfacePoint> surface2, int max_motions) const;
+
+ private:
+  struct Entry {
+    std::uint32_t reference;
+    float turn;
+  };
+  [[nodiscard]] std::vector<Vote> votes_of(std::span<const SurfacePoint> surface2, std::size_t reference) const;
+
+  PointPairOptions options_;
+  double size_mm_;
+  std::vector<std::uint32_t> begin_;  ///< per key; one more at the end
+  std::vector<Entry> entries_;
+  std::vector<Transform> local_;  ///< from the surface's frame: each point at the origin, its normal along x
+};
+
+/// The same for two surfaces that are compared once: a global search without rests.
 std::vector<Vote> vote_by_point_pairs(std::span<const SurfacePoint> surface1, std::span<const SurfacePoint> surface2,
                                       double size_mm, int max_motions, const PointPairOptions& options = {});
 
