@@ -14,11 +14,17 @@ namespace {
 constexpr double kMaxDisputed = 0.05;
 constexpr int kRounds = 3;  ///< of registration, while it shows that views stand elsewhere
 
+/// Imported views: table angles that are all the same are none, and the views have no order.
+RegistrationOptions options_of_imported(std::span<const View> views) {
+  const auto is_turned = [&](const View& view) { return view.angle_rad != views.front().angle_rad; };
+  return std::ranges::any_of(views, is_turned) ? RegistrationOptions::imported() : RegistrationOptions::placed();
+}
+
 }  // namespace
 
 Result<void> Reconstruction::State::align_views(std::size_t pose, const Context& context) {
   PoseState& state = poses[pose];
-  const auto priors = calibration ? registration_options(*calibration) : RegistrationOptions::imported();
+  const auto priors = calibration ? registration_options(*calibration) : options_of_imported(state.views);
   // Before registration, which would spread a motion over the views around; and after it, where the axis is mended.
   undo_motions(pose, priors);
   for (int round = 0; round < kRounds; ++round) {

@@ -39,12 +39,13 @@ struct Match {
 };
 using Matches = std::vector<Match>;
 
+/// `reach` 0: all.
 std::vector<Pairing> ring_pairings(int views, int reach) {
   std::vector<Pairing> pairings;
   for (int i = 0; i < views; ++i) {
     for (int j = 0; j < views; ++j) {
       const int apart = std::abs(i - j);
-      if (i != j && std::min(apart, views - apart) <= reach) pairings.push_back({i, j});
+      if (i != j && (reach == 0 || std::min(apart, views - apart) <= reach)) pairings.push_back({i, j});
     }
   }
   return pairings;
@@ -84,6 +85,21 @@ class Solver {
     images_ = &images;
     samples_.resize(images.size());
     parallel_for(images.size(), [&](std::size_t v) { samples_[v] = sample_image(images[v], samples); });
+  }
+
+  /// Without a ring: leaves out the pairs that share almost nothing, in `matches`, too.
+  void leave_out_apart(std::vector<Matches>& matches) {
+    if (options_.neighbours > 0) return;
+    std::vector<Pairing> pairings;
+    std::vector<Matches> shared;
+    for (std::size_t k = 0; k < matches.size(); ++k) {
+      const auto points = static_cast<double>(samples_[pairings_[k].source].size());
+      if (static_cast<double>(matches[k].size()) < options_.min_shared_share * points) continue;
+      pairings.push_back(pairings_[k]);
+      shared.push_back(std::move(matches[k]));
+    }
+    pairings_ = std::move(pairings);
+    matches = std::move(shared);
   }
 
   [[nodiscard]] std::vector<Matches> match_all(double capture_mm) const {
@@ -327,6 +343,12 @@ RegistrationOptions RegistrationOptions::imported() {
   return options;
 }
 
+RegistrationOptions RegistrationOptions::placed() {
+  RegistrationOptions options = imported();
+  options.neighbours = 0;
+  return options;
+}
+
 Result<RegistrationReport> register_views(std::span<View> views, const RegistrationOptions& options,
                                           const Context& context) {
   if (auto ok = check(views, options.min_shared); !ok) return pass_on(ok);
@@ -334,13 +356,14 @@ Result<RegistrationReport> register_views(std::span<View> views, const Registrat
   Solver solver(views, options);
   const auto pyramid = range_pyramid(views, options.levels);
   solver.use_level(pyramid[0], options.samples);
-  const auto before = solver.match_all(options.capture_mm);
+  auto before = solver.match_all(options.capture_mm);
   if (views.size() > 1 && largest(before) < options.min_shared) {
     return fail(ErrorCode::no_overlap,
                 "registration: no two neighbouring views share {} points within {} mm; check the "
                 "table angles and the calibration",
                 options.min_shared, options.capture_mm);
   }
+  solver.leave_out_apart(before);
   solver.describe(before, false, report);
   report.angle_leverage = Solver::leverage(before);
   report.angle_observable = report.angle_leverage >= options.min_leverage;

@@ -19,7 +19,9 @@ struct RegistrationOptions {
   double pair_bias_mm = 0.01;          ///< error of two views' mean distance that more points do not average away
   double capture_mm = 1.0;             ///< farthest distance between corresponding surfaces at the start
   double min_facing = 0.5;             ///< cosine of incidence below which a point is not used: stereo is biased there
-  int neighbours = 2;                  ///< views up to this many places away around the ring are compared
+  int neighbours = 2;                  ///< views up to this many places away around the ring are compared; 0: every
+                                       ///< two views that share `min_shared_share`, where there is no ring
+  double min_shared_share = 0.05;      ///< of a view's points, for that
   int samples = 20000;                 ///< points per view at the finest level, a quarter of it at each coarser one
   int levels = 3;
   int max_iterations = 12;       ///< maximum Gauss-Newton steps per level
@@ -32,6 +34,8 @@ struct RegistrationOptions {
 
   /// For imported range scans whose views were placed elsewhere, to a millimetre and half a degree.
   static RegistrationOptions imported();
+  /// The same for views that no turntable turned.
+  static RegistrationOptions placed();
 };
 
 /// Correction of one view and its fit to its neighbours afterwards.

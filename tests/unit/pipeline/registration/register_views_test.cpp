@@ -107,6 +107,22 @@ TEST(RegisterViews, PlacesImportedScansThatAreAMillimetreOff) {
   EXPECT_NEAR(report->median_after_mm, 0.02, 0.01);
 }
 
+TEST(RegisterViews, ComparesAllViewsThatShareSurfaceWhereThereIsNoRing) {
+  std::vector<View> views = clean_views();
+  disturb(views, 0.08, 0.08);
+  std::vector<View> mixed, truth;
+  for (const std::size_t v : {0, 3, 6, 1, 4, 7, 2, 5}) {
+    mixed.push_back(views[v]);
+    mixed.back().angle_rad = 0.0;
+    truth.push_back(clean_views()[v]);
+  }
+  const double before = inconsistency_mm(mixed, truth);
+  const auto report = register_views(mixed, RegistrationOptions::placed(), no_context());
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_LT(inconsistency_mm(mixed, truth), 0.3 * before);
+  for (const ViewFit& fit : report->views) EXPECT_GT(fit.overlap, 0.1) << "view " << fit.index;
+}
+
 TEST(RegisterViews, FindsAShiftedTurntableAxis) {
   auto views = clean_views();
   const auto truth = views;
