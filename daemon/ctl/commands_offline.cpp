@@ -166,6 +166,19 @@ void add_acceptance(CLI::App& app, Chosen& chosen) {
   }
 }
 
+void add_import_meshes(CLI::App& import, Chosen& chosen) {
+  const auto verb = std::make_shared<ImportMeshesVerb>();
+  auto* sub = import.add_subcommand("meshes", "partial scans in unknown positions: finds how they fit together");
+  sub->alias("ply");
+  sub->add_option("SCANS", verb->scans, "one file per scan: PLY range grid, or mesh (PLY, OBJ, STL, GLB)")->required();
+  sub->add_option("--out", verb->out, "the scan folder to make")->required();
+  sub->add_option("--unit", verb->unit, "of the files' lengths (default: m for range grids, mm for meshes)")
+      ->check(CLI::IsMember({"mm", "cm", "m", "in"}));
+  sub->add_option("--threads", verb->threads, "threads; 0: all of the machine's")->check(CLI::Range(0, 1024));
+  sub->add_flag("--json", verb->json, "print JSON");
+  sub->callback([&chosen, verb] { chosen = [verb] { return import_meshes(*verb); }; });
+}
+
 void add_import(CLI::App& app, Chosen& chosen) {
   const auto verb = std::make_shared<ImportVerb>();
   auto* sub = app.add_subcommand("import", "make a scan folder from other people's data");
@@ -178,6 +191,7 @@ void add_import(CLI::App& app, Chosen& chosen) {
   stanford->add_option("--out", verb->out, "the scan folder to make")->required();
   stanford->add_flag("--json", verb->json, "print JSON");
   stanford->callback([&chosen, verb] { chosen = [verb] { return import_stanford(*verb); }; });
+  add_import_meshes(*sub, chosen);
 }
 
 void add_convert(CLI::App& app, Chosen& chosen) {

@@ -218,6 +218,16 @@ struct ImportVerb {
 };
 ExitCode import_stanford(const ImportVerb& verb);
 
+struct ImportMeshesVerb {
+  std::vector<std::filesystem::path> scans;
+  std::filesystem::path out;
+  std::string unit;  ///< "mm", "cm", "m", "in"; empty: m for range grids, mm for meshes
+  int threads = 0;   ///< 0: all of the machine's
+  bool json = false;
+};
+/// Prints the scan folder, then a sentence per scan that was left out.
+ExitCode import_meshes(const ImportMeshesVerb& verb);
+
 struct CheckConfigVerb {
   std::filesystem::path file = "/etc/scanrig/rig.toml";
   std::filesystem::path drives;  ///< empty: the daemon's own places

@@ -8,6 +8,7 @@
 
 #include "config/rig_config.h"
 #include "core/catch_exceptions.h"
+#include "core/parallel.h"
 #include "core/signal_stop.h"
 #include "core/timestamp.h"
 #include "daemon/api/access.h"
@@ -16,6 +17,7 @@
 #include "pipeline/deviation/references.h"
 #include "pipeline/evaluate/evaluate.h"
 #include "pipeline/evaluate/frame_height.h"
+#include "pipeline/importers/import_meshes.h"
 #include "pipeline/importers/import_stanford.h"
 
 namespace scanrig::ctl {
@@ -108,6 +110,47 @@ ExitCode import_stanford(const ImportVerb& verb) {
   } else {
     fmt::print("{}\n", verb.out.string());
   }
+  return ExitCode::ok;
+}
+
+namespace {
+
+double mm_of(const std::string& unit) {
+  return unit == "mm" ? 1.0 : unit == "cm" ? 10.0 : unit == "m" ? 1000.0 : unit == "in" ? 25.4 : 0.0;
+}
+
+void print_import(const ImportMeshesVerb& verb, const MeshImport& import) {
+  if (!verb.json) {
+    fmt::print("{}\n{} of {} scans joined, {:.3f} mm apart (median)\n", verb.out.string(), import.used.size(),
+               import.used.size() + import.left_out.size(), import.median_mm);
+    for (const auto& out : import.left_out) fmt::print("{}\n", out.sentence);
+    return;
+  }
+  auto used = nlohmann::ordered_json::array(), left_out = used;
+  for (const auto& one : import.used) used.push_back({{"view", one.view}, {"file", one.file}});
+  for (const auto& one : import.left_out) left_out.push_back({{"file", one.file}, {"sentence", one.sentence}});
+  fmt::print("{}\n",
+             nlohmann::ordered_json{
+                 {"scan", verb.out}, {"views", used}, {"left_out", left_out}, {"median_mm", import.median_mm}}
+                 .dump());
+}
+
+}  // namespace
+
+ExitCode import_meshes(const ImportMeshesVerb& verb) {
+  const SignalStop stop;
+  StageBars bars(stderr, ::isatty(::fileno(stderr)) == 1);
+  const auto progress = [&](std::string_view stage, double fraction) { bars.update(std::string(stage), fraction); };
+  const auto import = catch_exceptions("the import", [&] {
+    Result<MeshImport> done;
+    with_threads(verb.threads, [&] {
+      done = scanrig::import_meshes(verb.scans, verb.out, {.unit_mm = mm_of(verb.unit)}, {stop.token(), progress});
+    });
+    return done;
+  });
+  bars.end(import.has_value());
+  if (!import) return report_error(import.error());
+  print_import(verb, *import);
   return ExitCode::ok;
 }
 

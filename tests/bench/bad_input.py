@@ -171,6 +171,12 @@ def config_cases(desk, config):
     conf = desk.file("scans.conf", "bmesh gone.ply 0 0 0 0 0 0 1\n")
     yield "one missing range scan", *verdict(desk, BAD_INPUT, "gone.ply", "scanrig", "import", "stanford",
                                                      "--pose", conf, "--out", target)
+    points = desk.file("points.ply", "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\n"
+                                     "property float z\nend_header\n0 0 0\n")
+    letter = desk.file("letter.ply", "Dear Sir or Madam\n")
+    for what, files, word in (("one scan alone", [points], "can be joined"), ("points without faces", [points, points], "no faces"),
+                              ("a letter as a scan", [letter, points], "not a PLY file")):
+        yield f"{what} to be joined", *verdict(desk, BAD_INPUT, word, "scanrig", "import", "meshes", *files, "--out", target)
 
 
 def instrument_cases(desk, config):

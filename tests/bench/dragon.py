@@ -20,6 +20,21 @@ def measure(bench):
     if alone:
         bench.note(f"standing: {100 * alone['measured_share']:.0f} % of the model measured, p95 {alone['p95_mm']:.3f} mm")
         bench.at_most("dragon, standing, measured area to the merged mesh, median", 0.4, alone["median_mm"], "mm")
+    without_positions(bench, data)
+
+
+def without_positions(bench, data):
+    """All scans as files without any position: joined by what they show."""
+    scan = bench.out / "dragon-unknown"
+    shutil.rmtree(scan, ignore_errors=True)
+    files = sorted(data.glob("stand/*.ply")) + sorted(data.glob("side/*.ply"))
+    done = bench.run([bench.bin / "scanrig", "import", "meshes", *files, "--out", scan, "--json"], timeout=900)
+    if done.returncode != 0:
+        bench.line("dragon, scans in unknown positions", "exit 0", f"{done.returncode}: {done.stderr.strip()[-200:]}", False)
+        return
+    found = json.loads(done.stdout)
+    bench.at_most(f"dragon, {len(files)} scans in unknown positions, left out", 0, len(found["left_out"]), "scans")
+    bench.at_most("dragon, the same, surfaces of two scans apart, median", 0.1, found["median_mm"], "mm")
 
 
 def figures(bench, name, data, confs):

@@ -29,6 +29,14 @@ TEST_F(Programs, EndWithTheDocumentedCodeAndOneSentence) {
   EXPECT_EQ(scanrig({"import", "stanford", "--pose", folder_ / "nowhere.conf", "--out", folder_ / "scan"}), 3);
   EXPECT_THAT(output, HasSubstr("nowhere.conf"));
   EXPECT_FALSE(std::filesystem::exists(folder_ / "scan"));
+  for (const char* verb : {"meshes", "ply"}) {
+    EXPECT_EQ(scanrig({"import", verb, folder_ / "nowhere.ply", folder_ / "gone.ply", "--out", folder_ / "scan"}), 3);
+    EXPECT_THAT(output, HasSubstr("nowhere.ply"));
+    EXPECT_EQ(sentences(), 1);
+  }
+  EXPECT_EQ(scanrig({"import", "meshes", folder_ / "nowhere.ply", "--out", folder_ / "scan"}), 3);
+  EXPECT_THAT(output, HasSubstr("2 to 100 can be joined"));
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "scan"));
   EXPECT_EQ(scanrig({"acceptance", "sphere", "--diameter", "25", folder_ / "nowhere"}), 3);
   EXPECT_THAT(output, HasSubstr("nowhere"));
   EXPECT_EQ(sentences(), 1);
