@@ -99,12 +99,13 @@ void ViewPairs::narrow(std::size_t view1, std::size_t view2, int level, double r
   }
   std::ranges::sort(order);
   std::vector<ViewFitCheck> kept;
-  for (const auto& [rank, i] : order) {
+  for (const auto& ranked : order) {
     if (kept.size() == keep) break;
+    ViewFitCheck& candidate = field[ranked.second];
     const bool is_known = std::ranges::any_of(kept, [&](const ViewFitCheck& k) {
-      return alike(k.view1_from_view2, field[i].view1_from_view2, graph_options_);
+      return alike(k.view1_from_view2, candidate.view1_from_view2, graph_options_);
     });
-    if (!is_known) kept.push_back(std::move(field[i]));
+    if (!is_known) kept.push_back(std::move(candidate));
   }
   field = std::move(kept);
 }

@@ -13,7 +13,7 @@
 namespace scanrig::scan_samples {
 
 /// A folder of its own for each test, removed afterwards.
-class FolderTest : public testing::Test {
+class FolderTest : public ::testing::Test {
  protected:
   std::filesystem::path folder_ = own_folder();
   void SetUp() override {
