@@ -12,7 +12,7 @@
 /// Where single views of one object lie, when nothing is known about that.
 namespace scanrig {
 
-/// Most views that are placed: every two of them are compared.
+/// Maximum number of views that are placed: every two of them are compared.
 inline constexpr std::size_t kMaxUnknownViews = 100;
 
 struct PlaceViewsOptions {

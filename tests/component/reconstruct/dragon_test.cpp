@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -13,14 +12,10 @@
 #include "pipeline/reconstruct/reconstruct.h"
 #include "tests/bench/real_data/dragon_measure.h"
 #include "tests/own_folder.h"
+#include "tests/shared_data.h"
 
 namespace scanrig {
 namespace {
-
-std::filesystem::path shared_data() {
-  const char* given = std::getenv("SCANRIG_SHARED_DATA");
-  return given != nullptr ? given : std::filesystem::path(SCANRIG_SOURCE_DIR) / "../shared/data";
-}
 
 Transform pose2_of(const Model& model) {
   std::optional<Error> fault;

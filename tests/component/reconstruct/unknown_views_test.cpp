@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <vector>
@@ -13,16 +12,10 @@
 #include "pipeline/importers/stanford_files.h"
 #include "pipeline/reconstruct/reconstruct.h"
 #include "tests/own_folder.h"
+#include "tests/shared_data.h"
 
 namespace scanrig {
 namespace {
-
-std::filesystem::path scans_of_dragon() {
-  const char* given = std::getenv("SCANRIG_SHARED_DATA");
-  const std::filesystem::path data =
-      given != nullptr ? given : std::filesystem::path(SCANRIG_SOURCE_DIR) / "../shared/data";
-  return data / "stanford_dragon";
-}
 
 /// Fewer than all, for time.
 std::vector<PlacedScan> some_of(const std::vector<PlacedScan>& scans, std::size_t first, std::size_t count) {
@@ -68,7 +61,7 @@ class UnknownViewsOfDragon : public ::testing::Test {
     return motions;
   }
 
-  std::filesystem::path data_ = scans_of_dragon();
+  std::filesystem::path data_ = shared_data() / "stanford_dragon";
   std::filesystem::path folder_;
 };
 

@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <opencv2/calib3d.hpp>
@@ -8,16 +7,12 @@
 #include "core/files.h"
 #include "core/image_codec.h"
 #include "pipeline/calibration/corners/find_board.h"
+#include "tests/shared_data.h"
 
 namespace scanrig::testing {
 namespace {
 
-std::filesystem::path stereo_pairs() {
-  const char* set = std::getenv("SCANRIG_SHARED_DATA");
-  const auto shared =
-      set != nullptr ? std::filesystem::path(set) : std::filesystem::path(SCANRIG_SOURCE_DIR) / "../shared/data";
-  return shared / "opencv_stereo_calib";
-}
+std::filesystem::path stereo_pairs() { return shared_data() / "opencv_stereo_calib"; }
 
 Board bouguets_board() {
   Board board;

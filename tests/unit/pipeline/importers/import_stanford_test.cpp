@@ -4,10 +4,10 @@
 
 #include <Eigen/Dense>
 #include <cmath>
-#include <cstdlib>
 #include <numbers>
 
 #include "core/units.h"
+#include "tests/shared_data.h"
 #include "tests/unit/pipeline/storage/scan_samples.h"
 
 namespace scanrig {
@@ -167,11 +167,6 @@ TEST_F(ImportStanfordTest, DefectsOfTheFilesAreNamed) {
   expect_refused(conf, ErrorCode::unsupported, "ball_24.ply");
   std::filesystem::remove(folder_ / "ball_24.ply");
   expect_refused(conf, ErrorCode::not_found, "ball_24.ply");
-}
-
-std::filesystem::path shared_data() {
-  const char* set = std::getenv("SCANRIG_SHARED_DATA");
-  return set ? std::filesystem::path(set) : std::filesystem::path(SCANRIG_SOURCE_DIR) / ".." / "shared" / "data";
 }
 
 // Stanford's dragon: 15 scans upright, 6 lying. Neighbouring scans must lie on one surface to their own noise.

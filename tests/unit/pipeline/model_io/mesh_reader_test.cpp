@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
 #include <random>
 
 #include "pipeline/model_io/model_files.h"
+#include "tests/shared_data.h"
 
 namespace scanrig {
 namespace {
@@ -23,11 +23,6 @@ const std::string kSquare =
     "property double z\nproperty float red\nproperty float green\nproperty float blue\nproperty int odd\n"
     "element face 1\nproperty uchar flags\nproperty list uchar uint vertex_index\nelement edge 1\nproperty int a\n"
     "end_header\n0 0 0 1 0 0 7\n1 0 0 0 1 0 7\n1 1 0 0 0 1 7\n0 1 0 0.5 2 -1 7\n9 4 0 1 2 3\n5\n";
-
-fs::path shared_data() {
-  const char* place = std::getenv("SCANRIG_SHARED_DATA");
-  return place != nullptr ? fs::path(place) : fs::path(SCANRIG_SOURCE_DIR) / "../shared/data";
-}
 
 std::string message_of(const Result<Mesh>& mesh) {
   EXPECT_FALSE(mesh);

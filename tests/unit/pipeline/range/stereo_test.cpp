@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
 #include <cstring>
 #include <opencv2/core.hpp>
 #include <string>
@@ -12,6 +11,7 @@
 #include "core/units.h"
 #include "pipeline/range/window_match.h"
 #include "tests/bench/real_data/d415_measure.h"
+#include "tests/shared_data.h"
 #include "tests/unit/pipeline/range/range_error.h"
 #include "tests/unit/pipeline/range/two_cameras.h"
 
@@ -242,9 +242,7 @@ TEST(Stereo, RefusesInconsistentInputs) {
 }
 
 TEST(Stereo, MeasuresTheSheetOfARealDotPair) {
-  const char* shared = std::getenv("SCANRIG_SHARED_DATA");
-  const std::filesystem::path folder =
-      std::filesystem::path(shared != nullptr ? shared : SCANRIG_SOURCE_DIR "/../shared/data") / "d415_ir_pair";
+  const std::filesystem::path folder = shared_data() / "d415_ir_pair";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is missing";
   const auto result = bench::measure_d415(folder);
   ASSERT_TRUE(result) << result.error().message;

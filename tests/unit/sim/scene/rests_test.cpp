@@ -3,12 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
-#include <cstdlib>
 #include <filesystem>
 
 #include "core/units.h"
 #include "sim/scene/figurine.h"
 #include "sim/scene/polygonise.h"
+#include "tests/shared_data.h"
 #include "tests/unit/sim/scene/shapes.h"
 
 namespace scanrig::sim {
@@ -117,9 +117,7 @@ TEST(Placements, OfAnObjectLargerThanTheWorkingVolumeAreRefused) {
 }
 
 TEST(Placements, OfScannedObjectsFitAtHundredMillimetres) {
-  const char* given = std::getenv("SCANRIG_SHARED_DATA");
-  const std::filesystem::path meshes =
-      std::filesystem::path(given ? given : SCANRIG_SOURCE_DIR "/../shared/data") / "meshes";
+  const std::filesystem::path meshes = shared_data() / "meshes";
   if (!std::filesystem::exists(meshes)) GTEST_SKIP() << meshes << " is missing";
   for (const char* file : {"spot/spot_triangulated.obj", "igea_tri.ply", "ycb_banana/textured_simple_reoriented.obj"}) {
     const auto object = load_object(meshes / file, 100.0);

@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -9,16 +8,13 @@
 #include <numbers>
 
 #include "pipeline/calibration/solve/solve_calibration.h"
+#include "tests/shared_data.h"
 
 namespace scanrig {
 namespace {
 
 /// Corner lists of a real chessboard on a real turntable, two placements, one camera.
-std::filesystem::path folder() {
-  const char* shared = std::getenv("SCANRIG_SHARED_DATA");
-  return std::filesystem::path(shared != nullptr ? shared : SCANRIG_SOURCE_DIR "/../shared/data") /
-         "turntable_chessboard";
-}
+std::filesystem::path folder() { return shared_data() / "turntable_chessboard"; }
 
 /// The corner lists by table angle, whichever of the placement's two files holds them.
 nlohmann::json corner_lists(int placement) {
