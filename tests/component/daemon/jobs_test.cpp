@@ -3,8 +3,7 @@
 #include <array>
 
 #include "core/files.h"
-#include "pipeline/storage/pose_choices.h"
-#include "tests/component/daemon/daemon_under_test.h"
+#include "tests/component/daemon/jobs_under_test.h"
 
 namespace scanrig {
 namespace {
@@ -14,58 +13,6 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::IsEmpty;
 using What = event::JobRequested::What;
-
-/// Jobs that are ordered, interrupted, resumed, kept: over fake devices, with real folders.
-class Jobs : public Daemon {
- protected:
-  void restart() {
-    shut_down();
-    boot();
-    get_ready();
-  }
-  Result<std::string> ask_for(What what, const std::string& id) {
-    return ask(event::JobRequested{.what = what, .job = id});
-  }
-  /// Interrupts a scan of three views per pose by the e-stop, in the exposure after `views` of its first pose.
-  std::string interrupted_after(int views) {
-    rig.line.fires_before = 2 * views;
-    rig.line.at_fire = [this] {
-      rig.panel.set(&PanelInputs::estop_ok, false);
-      clock_waits_for([this] { return loop->snapshot()->machine == MachineState::error; });
-    };
-    rig.panel.press(&PanelInputs::start);
-    EXPECT_TRUE(wait_fault());
-    rig.panel.set(&PanelInputs::estop_ok, true);
-    const auto id = newest()->id;
-    EXPECT_TRUE(wait_state(id, JobState::interrupted));
-    rig.panel.press(&PanelInputs::reset);
-    EXPECT_TRUE(wait_ready());
-    return id;
-  }
-  void finish(const std::string& id) {
-    rig.panel.press(&PanelInputs::start);
-    ASSERT_TRUE(wait_flip());
-    rig.panel.press(&PanelInputs::start);
-    EXPECT_TRUE(wait_state(id, JobState::done));
-  }
-  /// The ids of two jobs that have their models.
-  std::array<std::string, 2> two_models() {
-    boot();
-    get_ready();
-    std::array<std::string, 2> ids;
-    for (auto& id : ids) {
-      scan_both_poses();
-      id = newest()->id;
-      EXPECT_TRUE(wait_state(id, JobState::done));
-      EXPECT_TRUE(wait_ready());
-    }
-    return ids;
-  }
-  void look_at(int scene) {
-    const std::lock_guard guard(rig.line.mutex);
-    rig.line.scene = scene;
-  }
-};
 
 TEST_F(Jobs, AnOrderIsAFolderBeforeItIsAnswered) {
   options.recipes["small"] = {.name = "small", .poses = 1, .views = 3};
@@ -118,111 +65,6 @@ TEST_F(Jobs, AReconstructionCanBeCancelledAndTheModelBeMadeLater) {
   EXPECT_EQ(ask_for(What::cancel, id).error().code, ErrorCode::refused) << "it has ended";
   restart();
   EXPECT_EQ(job(id)->state, JobState::done);
-}
-
-TEST_F(Jobs, AFinishedScanIsGivenAnotherPose) {
-  boot();
-  get_ready();
-  scan_both_poses();
-  const auto id = newest()->id;
-  ASSERT_TRUE(wait_state(id, JobState::done));
-  ASSERT_TRUE(wait_ready());
-  const auto queued = ask(JobOrder{.part = "another"});
-  ASSERT_TRUE(ask_for(What::add_pose, id));
-  EXPECT_EQ(job(id)->state, JobState::queued);
-  EXPECT_EQ(job(id)->recipe.poses, 3);
-  EXPECT_THAT(loop->snapshot()->queue, ElementsAre(id, *queued)) << "what lies on the table next";
-  EXPECT_TRUE(fs::exists(folder_ / "jobs" / id / "model/model.glb")) << "the old model stays meanwhile";
-  EXPECT_EQ(ask_for(What::add_pose, id).error().code, ErrorCode::refused);
-  restart();
-  EXPECT_EQ(job(id)->state, JobState::queued);
-
-  const auto views = job(id)->stored.size();
-  rig.panel.press(&PanelInputs::start);
-  ASSERT_TRUE(wait_state(id, JobState::done));
-  EXPECT_EQ(job(id)->complete, 3);
-  EXPECT_EQ(job(id)->stored.size(), views + 3) << "only the third pose was scanned";
-  const auto scan = ScanFolder::open(folder_ / "jobs" / id);
-  ASSERT_TRUE(scan);
-  EXPECT_EQ(scan->manifest().poses.size(), 3U);
-}
-
-TEST_F(Jobs, AScanWhoseOtherPoseIsCancelledIsAsItWas) {
-  boot();
-  get_ready();
-  scan_both_poses();
-  const auto id = newest()->id;
-  ASSERT_TRUE(wait_state(id, JobState::done));
-  ASSERT_TRUE(wait_ready());
-  const auto before = *job(id);
-  ASSERT_TRUE(ask_for(What::add_pose, id));
-  ASSERT_TRUE(ask_for(What::cancel, id));
-  EXPECT_EQ(job(id)->state, JobState::done);
-  EXPECT_EQ(job(id)->recipe, before.recipe);
-  EXPECT_EQ(job(id)->model, before.model);
-
-  // Once more, with a view of it taken.
-  ASSERT_TRUE(ask_for(What::add_pose, id));
-  EXPECT_EQ(interrupted_after(1), id);
-  EXPECT_EQ(job(id)->stored.size(), before.stored.size() + 1);
-  ASSERT_TRUE(ask_for(What::cancel, id));
-  EXPECT_EQ(job(id)->state, JobState::done);
-  EXPECT_EQ(job(id)->stored.size(), before.stored.size());
-  EXPECT_FALSE(job(id)->error);
-  restart();
-  EXPECT_EQ(job(id)->state, JobState::done);
-  EXPECT_EQ(job(id)->recipe, before.recipe);
-  ASSERT_TRUE(ask_for(What::reprocess, id));
-  EXPECT_TRUE(wait_state(id, JobState::done));
-}
-
-TEST_F(Jobs, OnlyAFinishedScanIsGivenAnotherPose) {
-  boot();
-  get_ready();
-  const auto id = interrupted_after(1);
-  const auto refused = ask_for(What::add_pose, id);
-  ASSERT_FALSE(refused);
-  EXPECT_THAT(refused.error().message, HasSubstr("0 of 2 poses: only a finished scan can be given another pose"));
-  EXPECT_EQ(ask_for(What::choose, id).error().code, ErrorCode::refused);
-  EXPECT_EQ(job(id)->state, JobState::interrupted);
-  EXPECT_EQ(job(id)->recipe.poses, 2);
-}
-
-/// Pose 2 fits in two ways: the operator picks one, and every later model is of that.
-TEST_F(Jobs, OfTheWaysInWhichPose2FitsOneIsPicked) {
-  const auto find_two_ways = [this] {
-    const fs::path folder = newest()->folder;
-    if (const auto known = read_choices(folder); known && known->picked > 0) return;
-    ASSERT_TRUE(write_choices(folder, std::array{PoseChoice{.sentence = "as it lies", .png = "an image"},
-                                                 PoseChoice{.sentence = "end for end"}}));
-    const std::lock_guard guard(log.mutex);
-    log.answer_to_finish = fail(ErrorCode::ambiguous, "several motions fit");
-  };
-  log.at_finish = find_two_ways;
-  boot();
-  get_ready();
-  scan_both_poses();
-  const auto id = newest()->id;
-  ASSERT_TRUE(wait_state(id, JobState::failed));
-  const std::vector<JobChoice> both = {{"as it lies", "choices/choice1.png"}, {"end for end", ""}};
-  EXPECT_EQ(job(id)->choices, both);
-  restart();
-  EXPECT_EQ(job(id)->choices, both);
-  EXPECT_EQ(job(id)->picked, 0);
-
-  const auto pick = [&](int number) {
-    return ask(event::JobRequested{.what = What::choose, .job = id, .number = number});
-  };
-  EXPECT_EQ(pick(3).error().code, ErrorCode::invalid_input);
-  EXPECT_EQ(pick(0).error().code, ErrorCode::invalid_input);
-  EXPECT_EQ(job(id)->state, JobState::failed);
-  log.answer_to_finish = {};
-  ASSERT_TRUE(pick(2));
-  ASSERT_TRUE(wait_state(id, JobState::done));
-  EXPECT_EQ(job(id)->picked, 2);
-  EXPECT_EQ(read_choices(job(id)->folder)->picked, 2);
-  restart();
-  EXPECT_EQ(job(id)->picked, 2);
 }
 
 TEST_F(Jobs, AReconstructionWhoseCancellingCannotBeNotedDoesNotStandStill) {
