@@ -33,9 +33,10 @@ std::string scan_of_ball(const Eigen::Vector3d& centre) {
   const int cols = 120, rows = 90;
   std::string points, cells;
   int count = 0;
+  const int middle = cols / 2;
   for (int row = 0; row < rows; ++row) {
     for (int col = 0; col < cols; ++col) {
-      const Eigen::Vector3d start(0.577 * (col - cols / 2), 0.71 * row + 40.0, 0.0);
+      const Eigen::Vector3d start(0.577 * (col - middle), 0.71 * row + 40.0, 0.0);
       const double along = (centre - start).dot(ray);
       const double off = (centre - start - along * ray).norm();
       if (off > 0.97 * kRadius) {
