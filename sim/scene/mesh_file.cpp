@@ -5,10 +5,10 @@
 #include <cmath>
 #include <cstring>
 #include <numeric>
-#include <opencv2/imgcodecs.hpp>
 #include <sstream>
 
 #include "core/files.h"
+#include "sim/scene/texture_image.h"
 
 namespace scanrig::sim {
 namespace {
@@ -62,7 +62,7 @@ std::array<int, 2> obj_corner(std::string_view word, std::size_t positions, std:
 
 /// The image of an OBJ's material, or the one beside it with the name <name>_texture.png (and <stem>_texture.png for a
 /// name with a suffix after an underscore).
-cv::Mat obj_image(const fs::path& file, const std::string& library) {
+Result<cv::Mat> obj_image(const fs::path& file, const std::string& library) {
   std::string name;
   if (!library.empty()) {
     if (const auto text = read_file(file.parent_path() / library)) {
@@ -75,10 +75,14 @@ cv::Mat obj_image(const fs::path& file, const std::string& library) {
   const std::string stem = file.stem().string();
   for (const std::string& candidate : {name, stem + "_texture.png", stem.substr(0, stem.find('_')) + "_texture.png"}) {
     if (candidate.empty() || !fs::exists(file.parent_path() / candidate)) continue;
-    cv::Mat image = cv::imread((file.parent_path() / candidate).string(), cv::IMREAD_COLOR);
-    if (!image.empty()) return image;
+    const auto bytes = read_file(file.parent_path() / candidate);
+    if (!bytes) return pass_on(bytes);
+    auto image = decode_texture(*bytes);
+    if (image) return image;
+    return fail(ErrorCode::invalid_input, "object {}: its texture {}: {}", file.string(), candidate,
+                image.error().message);
   }
-  return {};
+  return cv::Mat();
 }
 
 struct PlyProperty {
@@ -233,7 +237,11 @@ Result<MeshFile> read_obj(const fs::path& file) {
       out.corners.push_back(at);
     }
   });
-  if (textured) out.image = obj_image(file, library);
+  if (textured) {
+    auto image = obj_image(file, library);
+    if (!image) return pass_on(image);
+    out.image = std::move(*image);
+  }
   if (out.image.empty()) out.corners.clear();
   return out;
 }

@@ -1,17 +1,21 @@
+#include <fmt/format.h>
 #include <tiny_gltf.h>
 
 #include <Eigen/Geometry>
-#include <opencv2/imgcodecs.hpp>
+#include <span>
+#include <stdexcept>
 
 #include "core/files.h"
+#include "core/image_codec.h"
 #include "sim/scene/mesh_file.h"
+#include "sim/scene/texture_image.h"
 
 namespace scanrig::sim {
 namespace {
 
 using Eigen::Affine3d;
 
-/// Keeps the encoded bytes; only the image that is used is decoded, by OpenCV.
+/// Keeps the encoded bytes; only the image that is used is decoded.
 bool keep_bytes(tinygltf::Image* image, int, std::string*, std::string*, int, int, const unsigned char* bytes, int size,
                 void*) {
   image->image.assign(bytes, bytes + size);
@@ -87,9 +91,11 @@ void add_primitive(const tinygltf::Model& model, const tinygltf::Primitive& prim
   }
   if (!textured || primitive.material < 0 || !out.image.empty()) return;
   const int texture = model.materials.at(primitive.material).pbrMetallicRoughness.baseColorTexture.index;
-  if (texture >= 0) {
-    out.image = cv::imdecode(model.images.at(model.textures.at(texture).source).image, cv::IMREAD_COLOR);
-  }
+  if (texture < 0) return;
+  const auto& encoded = model.images.at(model.textures.at(texture).source).image;
+  const auto image = decode_texture(as_text(std::as_bytes(std::span(encoded))));
+  if (!image) throw std::runtime_error(fmt::format("texture: {}", image.error().message));
+  out.image = *image;
 }
 
 void add_node(const tinygltf::Model& model, int index, const Affine3d& parent, MeshFile& out, int depth = 0) {

@@ -83,6 +83,25 @@ TEST_F(ObjectFile, TakesTheTextureBesideIt) {
   EXPECT_GT(high.x(), high.y());
 }
 
+TEST_F(ObjectFile, TakesTexturesOfAnyDepth) {
+  const auto file = write("cup.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.1 0.1\nvt 0.9 0.1\nvt 0.1 0.9\nf 1/1 2/2 3/3\n");
+  const std::array<cv::Mat, 3> images = {cv::Mat(8, 8, CV_16UC3, cv::Scalar(40 * 257, 200 * 257, 40 * 257)),
+                                         cv::Mat(8, 8, CV_8UC4, cv::Scalar(40, 200, 40, 0)),
+                                         cv::Mat(8, 8, CV_8UC1, cv::Scalar(200))};
+  for (const cv::Mat& image : images) {
+    cv::imwrite((folder_ / "cup_texture.png").string(), image);
+    const auto object = load_object(file, 10.0);
+    ASSERT_TRUE(object) << object.error().message;
+    EXPECT_NEAR(object->colour->albedo({{0, 0, 0}, 0, 0.3, 0.3, 0.01}).y(), 0.62F, 0.005F);
+  }
+}
+
+TEST_F(ObjectFile, WithATextureThatCannotBeReadIsRefused) {
+  write("cup_texture.png", "not an image");
+  expect_refused(write("cup.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.1 0.1\nvt 0.9 0.1\nvt 0.1 0.9\nf 1/1 2/2 3/3\n"),
+                 ErrorCode::invalid_input, "cup_texture.png");
+}
+
 TEST_F(ObjectFile, InGlbIsReadWithItsNodes) {
   // One triangle, its node shifted and doubled; a GLB written by hand.
   const float positions[9] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
@@ -149,7 +168,8 @@ TEST(SolidColours, HaveContrastEverywhere) {
       const Eigen::Vector3d corner(3.0 * (patch % 7), 5.0 * (patch % 5), 2.0 * patch);
       double sum = 0.0, squares = 0.0;
       for (int i = 0; i < 400; ++i) {
-        const Eigen::Vector3d p = corner + 0.15 * Eigen::Vector3d(i % 20, i / 20, 0.0);
+        const int column = i % 20, row = i / 20;
+        const Eigen::Vector3d p = corner + 0.15 * Eigen::Vector3d(column, row, 0.0);
         const double value = colour.albedo({p, 0, 0, 0, 0.15}).y();
         sum += value / 400, squares += value * value / 400;
       }
