@@ -40,10 +40,14 @@ Scene::Scene(Object object, std::vector<Transform> placements, const SceneOption
       placements_(std::move(placements)),
       rig_(make_rig(options.rig, options.profile.effects, options.image_scale)),
       rays_(object_.mesh),
-      dots_(options.image_scale),
       cameras_(both_cameras(options.profile, options.image_scale)),
       lights_(placements_.size()),
       bounces_(placements_.size()) {}
+
+const DotPattern& Scene::dots() {
+  if (!dots_) dots_ = std::make_unique<DotPattern>(options_.image_scale);
+  return *dots_;
+}
 
 const RoomLight& Scene::light_of(int pose) {
   auto& light = lights_[pose];
@@ -80,7 +84,7 @@ View Scene::look(int pose, double angle, double minutes) {
   const Placed placed{object_, rays_, light_of(pose), added.handling.moved(placements_[pose]), rig_.rim_dots};
   std::optional<BounceLight> bounce;
   if (effects.interreflection > 0.0) {
-    const Lamp lamp(rig.projector, dots_, effects, added.handling.finger);
+    const Lamp lamp(rig.projector, dots(), effects, added.handling.finger);
     added.bounce = &bounce.emplace(bounces_of(pose), object_, rays_, lamp, Transform(rot_y(angle)));
   }
   std::optional<ScreenLight> screen;
@@ -90,7 +94,7 @@ View Scene::look(int pose, double angle, double minutes) {
   const auto seen_by = [&](const Eye& eye, int camera) {
     const std::uint64_t sampling = mix(static_cast<std::uint64_t>(pose), std::bit_cast<std::uint64_t>(angle), camera);
     if (!effects.is_none()) added.rays = &rays_of(camera);
-    Radiance light = render(placed, eye, rig.projector, dots_, angle, sampling, added);
+    Radiance light = render(placed, eye, rig.projector, dots(), angle, sampling, added);
     if (added.handling.overexposed > 0.0) {
       light.pattern *= 1.0 + added.handling.overexposed;
       light.plain *= 1.0 + added.handling.overexposed;

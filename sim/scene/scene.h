@@ -82,6 +82,7 @@ class Scene {
   [[nodiscard]] Transform true_placement(int pose) const;
 
  private:
+  const DotPattern& dots();
   const RoomLight& light_of(int pose);
   const BouncePaths& bounces_of(int pose);
   const RayMap& rays_of(int camera);
@@ -92,8 +93,8 @@ class Scene {
   std::vector<Transform> placements_;
   DrawnRig rig_;
   RayCaster rays_;
-  DotPattern dots_;
   std::array<CameraModel, 2> cameras_;
+  std::unique_ptr<DotPattern> dots_;                   // made at the first look
   std::vector<std::unique_ptr<RoomLight>> lights_;     // made when a pose is first seen
   std::vector<std::unique_ptr<BouncePaths>> bounces_;  // likewise
   std::array<std::unique_ptr<RayMap>, 2> ray_maps_;

@@ -36,6 +36,29 @@ std::vector<Vector3d> spread_directions(int count) {
   return directions;
 }
 
+/// Directions with their nearest common axis; none is farther from it than `chord`, both of length 1.
+struct Cone {
+  Vector3d axis;
+  std::vector<Vector3d> directions;
+  double chord = 0.0;
+};
+
+/// The same for every mesh.
+const std::vector<Cone>& cones_all_around() {
+  static const std::vector<Cone> all = [] {
+    std::vector<Cone> cones;
+    for (const auto& axis : spread_directions(1000)) cones.push_back({axis, {}, 0.0});
+    for (const auto& d : spread_directions(20000)) {
+      const auto farther = [&d](const Cone& a, const Cone& b) { return d.dot(a.axis) < d.dot(b.axis); };
+      Cone& nearest = *std::ranges::max_element(cones, farther);
+      nearest.directions.push_back(d);
+      nearest.chord = std::max(nearest.chord, (nearest.axis - d).norm());
+    }
+    return cones;
+  }();
+  return all;
+}
+
 bool contains(const Circle& circle, const Vector2d& p) { return (p - circle.centre).norm() <= circle.radius + 1e-9; }
 
 /// Welzl's algorithm, iterative form.
@@ -105,33 +128,26 @@ std::vector<Vector3d> vertex_normals(const TriangleMesh& mesh) {
 }
 
 std::vector<Vector3d> extreme_vertices(const std::vector<Vector3d>& vertices) {
-  // A few directions first: the farthest vertex in a direction near one of them is nearly farthest in that one, by at
-  // most the size of the mesh times the angle between the two. Only such vertices are tested again.
-  const auto cones = spread_directions(1000), directions = spread_directions(20000);
+  // A cone's axis first: the farthest vertex in a direction near it is nearly farthest along it, by at most the size of
+  // the mesh times the angle between the two. Only such vertices are tested again.
   Vector3d middle = Vector3d::Zero();
   for (const auto& v : vertices) middle += v / static_cast<double>(vertices.size());
   double reach = 0.0;
   for (const auto& v : vertices) reach = std::max(reach, (v - middle).norm());
-  std::vector<std::vector<Vector3d>> members(cones.size());
-  for (const auto& d : directions) {
-    const auto farther = [&d](const Vector3d& a, const Vector3d& b) { return d.dot(a) < d.dot(b); };
-    members[std::max_element(cones.begin(), cones.end(), farther) - cones.begin()].push_back(d);
-  }
+  const std::vector<Cone>& cones = cones_all_around();
   using Columns = Eigen::Matrix<float, Eigen::Dynamic, 3>;
   Columns all(vertices.size(), 3);
   for (std::size_t v = 0; v < vertices.size(); ++v) all.row(v) = (vertices[v] - middle).cast<float>();
   std::vector<std::vector<int>> best(cones.size());
   parallel_for(cones.size(), [&](std::size_t c) {
-    double chord = 0.0;
-    for (const auto& d : members[c]) chord = std::max(chord, (cones[c] - d).norm());
-    const Eigen::VectorXf along = all * cones[c].cast<float>();
-    const float threshold = along.maxCoeff() - static_cast<float>(2.0 * reach * chord);
+    const Eigen::VectorXf along = all * cones[c].axis.cast<float>();
+    const float threshold = along.maxCoeff() - static_cast<float>(2.0 * reach * cones[c].chord);
     std::vector<int> near;
     for (int v = 0; v < along.size(); ++v) {
       if (along[v] >= threshold) near.push_back(v);
     }
     const Columns candidates = all(near, Eigen::all);
-    for (const auto& d : members[c]) {
+    for (const auto& d : cones[c].directions) {
       Eigen::Index farthest = 0;
       (candidates * d.cast<float>()).maxCoeff(&farthest);
       best[c].push_back(near[farthest]);

@@ -15,7 +15,7 @@ SMALL = "--object /run/packages/part.obj --height-mm 50 --scale 0.12 --voxel-mm 
 SHORT_JOB = "--views 6 --clock virtual"
 # Outlasts an upgrade however slow the machine, and leaves it the processor: a real rig's cameras take none of it.
 ENDLESS_JOB = "--views 72 --clock real --background-cameras"
-LOW_PRIORITY = "Nice=19"
+LOW_PRIORITY = "CPUWeight=idle"  # Nice= does not count between this unit and others: the unit has a weight
 JOB_S, RECOVERY_S, INSTALL_S = 300, 180, 300
 
 
