@@ -119,7 +119,9 @@ class Suite:
 
 
 def in_machines(bench, suites):
-    """All at once, a core each; the kernel and what makes Debian a test machine were made before."""
+    """All at once, a core each. The kernel, the bare Debians and what makes them test machines were made before."""
+    for suite in suites:
+        package_machine.bare_debian(suite.name)
     cached, _ = image.prepare(ROOT / "build" / "hil", [bench.bin / name for name in station.PROGRAMS])
     system, _ = image.prepare_system(cached)
     begun = time.monotonic()

@@ -1,12 +1,14 @@
 """The virtual machine's disks, made without root mounts and kept under build/hil until their sources change.
 
 base.sqfs   Debian: systemd, udev and the packages that the installed programs' libraries are in
-kernel/     Debian's kernel, the modules that the scenario needs, gpio-sim built from the same kernel's source
+linux       Debian's kernel, uncompressed: the emulated processor would take seconds for that
+kernel/     the modules that the scenario needs, gpio-sim built from the same kernel's source
 initrd      busybox: mounts system.sqfs over base.sqfs and a tmpfs over both
 system-*/   what turns Debian into this machine: system.sqfs of tests/hil/guest and the modules, and the machine booted
 app.sqfs    what `cmake --install` installs; made anew every time
 """
 import hashlib
+import lzma
 import os
 import pathlib
 import platform
@@ -23,6 +25,9 @@ INITRD_MODULES = ["virtio_pci", "virtio_blk", "squashfs", "overlay", "ext4", "vi
 MODULES = INITRD_MODULES + ["vivid", "vhci_hcd", "usbhid", "ftdi_sio", "xhci_pci", "virtio_net", "veth", "configfs",
                             "gpio_sim", "v4l2loopback"]
 APP_SIZE = 64 << 20
+# They look for what this machine does not have, at every reload of systemd: a quarter of a second each.
+NO_GENERATORS = ["cryptsetup", "getty", "gpt-auto", "hibernate-resume", "integritysetup", "rc-local", "run", "ssh",
+                 "system-update", "sysv", "tpm2", "veritysetup"]
 SQUASH = ["-comp", "lz4", "-noappend", "-no-progress", "-quiet", "-all-root"]
 
 
@@ -96,12 +101,18 @@ def build_gpio_sim(folder, version):
     return build_module(build, version, "gpio-sim", ["gpio-sim-main.c", "irq_sim.c"])
 
 
+def uncompressed(kernel):
+    """The ELF file in a bzImage, or that as it is where it is not compressed with xz."""
+    start = kernel.find(b"\xfd7zXZ\0")
+    return kernel if start < 0 else lzma.LZMADecompressor().decompress(kernel[start:])
+
+
 def make_kernel(folder, version):
     """Modules of the initrd, each after those it needs."""
     package = folder / "package"
     run("apt-get", "download", "-qq", f"linux-image-{version}", cwd=folder)
     run("dpkg-deb", "-x", next(folder.glob("linux-image-*.deb")), package)
-    shutil.copy(package / "boot" / f"vmlinuz-{version}", folder / "vmlinuz")
+    (folder / "linux").write_bytes(uncompressed((package / "boot" / f"vmlinuz-{version}").read_bytes()))
     modules = package / "lib" / "modules" / version
     for build in (build_gpio_sim, build_v4l2loopback):
         shutil.copy(build(folder, version), modules / "kernel")
@@ -155,7 +166,8 @@ def make_app(tree, target):
 def prepare_system(cached):
     """Folder with system.sqfs, made if missing; and whether the machine booted with it has been kept."""
     parts = sorted(file for file in [*(HERE / "guest").rglob("*"), HERE / "machine.py"] if file.is_file())
-    recipe = [run("qemu-system-x86_64", "--version"), *(f"{file.relative_to(HERE)} {file.read_text()}" for file in parts)]
+    recipe = [run("qemu-system-x86_64", "--version"), *NO_GENERATORS,
+              *(f"{file.relative_to(HERE)} {file.read_text()}" for file in parts)]
     done = cached / f"system-{key_of(recipe)}"
     if not done.is_dir():
         for old in cached.glob("system-*"):
@@ -164,6 +176,10 @@ def prepare_system(cached):
         shutil.rmtree(making, ignore_errors=True)
         shutil.copytree(HERE / "guest", making / "tree", symlinks=True)
         shutil.copytree(cached / "kernel", making / "tree" / "usr", dirs_exist_ok=True)  # /lib is a link to usr/lib
+        masks = making / "tree" / "etc" / "systemd" / "system-generators"
+        masks.mkdir(parents=True)
+        for name in NO_GENERATORS:
+            (masks / f"systemd-{name}-generator").symlink_to("/dev/null")
         run("mksquashfs", making / "tree", making / "system.sqfs", *SQUASH)
         shutil.rmtree(making / "tree")
         making.rename(done)
@@ -175,7 +191,7 @@ def key_of(recipe):
 
 
 def prepare(cache, programs):
-    """Folder with base.sqfs, vmlinuz, initrd and kernel/, made if missing; and whether it was."""
+    """Folder with base.sqfs, linux, initrd and kernel/, made if missing; and whether it was."""
     version = kernel_version()
     packages = SYSTEM_PACKAGES + library_packages(programs)
     recipe = [version, *packages, pathlib.Path(__file__).read_text(), (HERE / "initrd_init.sh").read_text()]

@@ -1,5 +1,4 @@
 """One QEMU machine: software emulation, Debian's kernel, systemd, and a way to run commands in it."""
-import base64
 import json
 import os
 import pathlib
@@ -39,8 +38,19 @@ class Wire:
             raise Gone(f"the machine hung up: {problem}") from problem
 
     def receive(self, timeout):
+        """The next line."""
+        self.fill(lambda: b"\n" in self.pending, timeout)
+        line, self.pending = self.pending.split(b"\n", 1)
+        return line.decode()
+
+    def receive_bytes(self, count, timeout):
+        self.fill(lambda: len(self.pending) >= count, timeout)
+        received, self.pending = self.pending[:count], self.pending[count:]
+        return received
+
+    def fill(self, enough, timeout):
         end = time.monotonic() + timeout
-        while b"\n" not in self.pending:
+        while not enough():
             self.peer.settimeout(max(0.01, end - time.monotonic()))
             try:
                 part = self.peer.recv(65536)
@@ -51,8 +61,6 @@ class Wire:
             if not part:
                 raise Gone("the machine hung up")
             self.pending += part
-        line, self.pending = self.pending.split(b"\n", 1)
-        return line.decode()
 
     def close(self):
         for end in (self.peer, self.listener):
@@ -68,7 +76,7 @@ def free_port():
 
 class Machine:
     """`folder` keeps its disk, its sockets and its console output. `system`: system.sqfs, and in the folder above
-    vmlinuz, initrd, base.sqfs. `kept`: output of keep(), to start from; None to boot. `turntable_port`: serial port
+    linux, initrd, base.sqfs. `kept`: output of keep(), to start from; None to boot. `turntable_port`: serial port
     of the host, for a USB serial adapter; None: no adapter can be plugged in."""
 
     def __init__(self, folder, system, app, turntable_port, kept=None, cores=2):
@@ -88,7 +96,7 @@ class Machine:
         command = [
             "qemu-system-x86_64", "-accel", "tcg,thread=multi", "-machine", "q35", "-cpu", "Nehalem", "-smp", cores,
             "-m", 2048, "-nodefaults", "-no-user-config", "-display", "none", "-no-reboot",
-            "-kernel", cached / "vmlinuz", "-initrd", cached / "initrd",
+            "-kernel", cached / "linux", "-initrd", cached / "initrd",
             "-append", "console=ttyS0 quiet panic=-1 net.ifnames=0 mitigations=off "
             "systemd.show_status=0 systemd.log_target=journal "
             "systemd.unit=hil.target systemd.mask=e2scrub_reap.service systemd.mask=getty.target",
@@ -183,9 +191,9 @@ class Machine:
 
     def call(self, command, timeout=COMMAND_S):
         """Exit code and output of a shell command in the machine."""
-        self.agent.send(base64.b64encode(command.encode()).decode())
-        code, _, output = self.agent.receive(timeout).partition(" ")
-        return int(code), base64.b64decode(output).decode(errors="replace")
+        self.agent.send(command.replace("\\", "\\\\").replace("\n", "\\n"))
+        code, size = self.agent.receive(timeout).split()
+        return int(code), self.agent.receive_bytes(int(size), timeout).decode(errors="replace")
 
     def do(self, command, timeout=COMMAND_S):
         code, output = self.call(command, timeout)

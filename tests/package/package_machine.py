@@ -1,11 +1,14 @@
 """A bare Debian with nothing but the packages' dependencies, started in the virtual machine of tests/hil.
 
-The Debian is made in a folder. There apt installs the packages with all that they depend on; then they are purged, and
-what remains is the machine's first disk. The packages themselves are on its last disk, mounted at /run/packages.
+The bare Debian is kept under build/bare. In a copy apt installs the packages with all that they depend on; then they
+are purged, and what remains is the machine's first disk. The packages themselves are on its last disk, mounted at
+/run/packages.
 """
+import contextlib
 import pathlib
 import shutil
 import sys
+import tempfile
 
 HERE = pathlib.Path(__file__).resolve().parent
 for folder in ("hil", "bench"):
@@ -16,6 +19,7 @@ import machine  # noqa: E402
 
 SUPPORT = ["systemd-sysv", "udev", "kmod", "dbus", "iproute2", "curl"]
 INSTALL_S, SQUASH_S = 600, 300
+BARE = HERE.parent.parent / "build" / "bare"
 APT = "apt-get install -y -qq --no-install-recommends"
 # This machine does not outlive the test. Its disk is a squashfs, under a file system in memory.
 UNSAFE_IO = "echo force-unsafe-io >/etc/dpkg/dpkg.cfg.d/test"
@@ -38,15 +42,36 @@ class Installed:
         self.left = left  # files with the project's name after the purge
 
 
+def bare_debian(suite):
+    """A tar of Debian's smallest set of packages and systemd, made if there is none."""
+    tar = BARE / f"{suite}.tar"
+    if not tar.is_file():
+        BARE.mkdir(parents=True, exist_ok=True)
+        making = BARE / f"{suite}.part.tar"
+        image.run("mmdebstrap", "--quiet", "--variant=minbase", f"--include={','.join(SUPPORT)}", suite, making,
+                  bare_machine.archive())
+        making.rename(tar)
+    return tar
+
+
+@contextlib.contextmanager
+def unpacked(tar):
+    with tempfile.TemporaryDirectory(prefix="scanrig-bare-") as folder:
+        root = pathlib.Path(folder)
+        image.run("tar", "-xpf", tar, "-C", root)
+        shutil.copy("/etc/resolv.conf", root / "etc/resolv.conf")
+        yield root
+
+
 def make_disk(suite, packages, target):
     """Writes the disk `target` of a Debian `suite` on which `packages` can be installed without a network."""
-    with bare_machine.bare_machine(suite) as root:
+    with unpacked(bare_debian(suite)) as root:
         (root / "packages").mkdir()
         (root / "packages").chmod(0o755)
         for package in packages:
             shutil.copy(package, root / "packages")
         done, seconds = bare_machine.run_inside(
-            root, f"{UNSAFE_IO} && apt-get update -qq && {APT} {' '.join(SUPPORT)} >/dev/null && "
+            root, f"{UNSAFE_IO} && apt-get update -qq && "
             f"DEBIAN_FRONTEND=noninteractive {APT} /packages/*.deb >/tmp/log 2>&1 || {{ tail -5 /tmp/log; exit 1; }}; "
             "dpkg-query -W -f '${Package} ${Version} ${db:Status-Status} ' 'scanrig*'", INSTALL_S)
         purged, _ = bare_machine.run_inside(
@@ -60,7 +85,7 @@ def lay_out(cached, system, disk, folder):
     """Place of the machine's files as machine.Machine expects them; the kernel is that of tests/hil."""
     place = folder / "boot"
     place.mkdir()
-    for name in ("vmlinuz", "initrd"):
+    for name in ("linux", "initrd"):
         (place / name).symlink_to(cached / name)
     disk.rename(place / "base.sqfs")
     (place / "system").mkdir()

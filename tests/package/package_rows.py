@@ -39,10 +39,14 @@ def said(text):
     return " ".join(line for line in text.splitlines() if line.startswith("scanrig") or "rig.toml" in line)
 
 
-def install(machine, packages, *options):
+def install(machine, packages):
     """Output of an installation with apt, without a network."""
-    command = f"DEBIAN_FRONTEND=noninteractive apt-get install -y -q {' '.join(options)} {packages} 2>&1"
-    return machine.do(command, INSTALL_S)
+    return machine.do(f"DEBIAN_FRONTEND=noninteractive apt-get install -y -q {packages} 2>&1", INSTALL_S)
+
+
+def install_again(machine, packages):
+    """Output of an installation with dpkg, where apt would find nothing to add."""
+    return machine.do(f"dpkg -i {packages} 2>&1", INSTALL_S)
 
 
 def active(machine, unit):
@@ -127,8 +131,8 @@ def whole_job(machine):
 
 def refused_config(machine):
     machine.do(f"sed 's/^gear_ratio.*/gear_ratio = 0/' /usr/share/scanrig/rigs/example.toml >{CONFIG}")
-    words = install(machine, f"{OLD}/scanrig_*.deb", "--reinstall")
-    expect("gear_ratio" in words and "not started with" in words, f"apt said: {words[-300:]}")
+    words = install_again(machine, f"{OLD}/scanrig_*.deb")
+    expect("gear_ratio" in words and "not started with" in words, f"dpkg said: {words[-300:]}")
     expect(active(machine, "scanrigd.service") == "inactive", "the service runs with an invalid rig.toml")
     return said(words)
 
@@ -136,7 +140,7 @@ def refused_config(machine):
 def started(machine):
     """With a valid rig.toml the package starts the service: the real one, whose devices are missing here."""
     machine.do(f"install -m 0644 /usr/share/scanrig/rigs/example.toml {CONFIG}")
-    install(machine, f"{OLD}/scanrig_*.deb", "--reinstall")
+    install_again(machine, f"{OLD}/scanrig_*.deb")
     wait("active", lambda: active(machine, "scanrigd.service") == "active", RECOVERY_S)
     words = wait("answering", lambda: machine.call("scanrig status")[1].strip(), RECOVERY_S)
     return "active; " + " ".join(words.splitlines()[0].split())
@@ -199,7 +203,7 @@ def purged(machine):
 
 
 def purged_with_jobs(machine):
-    install(machine, f"{OLD}/*.deb")
+    install_again(machine, f"{OLD}/*.deb")
     machine.do("SCANRIG_PURGE_JOBS=yes dpkg -P scanrig-sim scanrig 2>&1", INSTALL_S)
     expect(machine.call("test -e /var/lib/scanrig")[0] != 0, "/var/lib/scanrig is still there")
     return "no /var/lib/scanrig"
