@@ -43,7 +43,8 @@ bool outside_silhouette(const Silhouette& silhouette, const Eigen::Vector3d& p, 
          min_outside_px;
 }
 
-/// Checks a point and its normal against `observations`, both in that pose's frame.
+}  // namespace
+
 SampleCheck check_sample(const PoseObservations& observations, int level, const SurfacePoint& sample, double reach_mm,
                          const AgreementOptions& options) {
   SampleCheck best;
@@ -77,8 +78,6 @@ SampleCheck check_sample(const PoseObservations& observations, int level, const 
   }
   return best;
 }
-
-}  // namespace
 
 bool contradicts(const SampleCheck& check, double spread_mm, double tolerance) {
   if (check.kind == SampleCheck::Kind::free_space) return true;

@@ -40,6 +40,10 @@ struct PoseObservations {
   std::span<const View> views;
 };
 
+/// Check of a point of another pose, carried into this pose's frame. `reach_mm`: as of check_samples().
+SampleCheck check_sample(const PoseObservations& observations, int level, const SurfacePoint& sample, double reach_mm,
+                         const AgreementOptions& options);
+
 /// Checks of all samples of pose 2, then all of pose 1, on one level, nothing trimmed. `reach_mm`: farther in front of
 /// a measured surface is free space, farther behind it is unknown.
 std::vector<SampleCheck> check_samples(const PoseObservations& pose1, const PoseObservations& pose2,

@@ -32,7 +32,9 @@ int key_of(const SurfacePoint& a, const SurfacePoint& b, double size_mm, const P
 /// The frame of an oriented point: itself at the origin, its normal along x.
 Transform local_from_surface(const SurfacePoint& p) {
   Transform t = Transform::Identity();
-  t.linear() = Eigen::Quaterniond::FromTwoVectors(p.normal, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(p.normal, Eigen::Vector3d::UnitX());
+  if (std::abs(turn.squaredNorm() - 1.0) > 1e-9) turn.normalize();  // digits cancel for a normal close to -x
+  t.linear() = turn.toRotationMatrix();
   t.translation() = -t.linear() * p.point;
   return t;
 }

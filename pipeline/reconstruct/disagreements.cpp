@@ -106,6 +106,26 @@ Disagreement of_pose(std::size_t pose, std::string sentence) {
           .sentence = std::move(sentence)};
 }
 
+Disagreement of_fixture(std::size_t pose, const Fixture& fixture, bool is_expected) {
+  const char* advice = is_expected ? "" : " Poses fit better without contact: write fixture = true into its recipe.";
+  return {.pose = pose,
+          .what = "fixture",
+          .action = "left out",
+          .amount = fixture.height_mm,
+          .unit = "mm",
+          .sentence = fmt::format("In pose {} the object stood on a fixture {:.1f} mm high, which is left out of the "
+                                  "model.{}",
+                                  pose + 1, fixture.height_mm, advice)};
+}
+
+Disagreement of_single_pose_on_fixture() {
+  return {
+      .what = "fixture",
+      .action = "kept",
+      .unit = "mm",
+      .sentence = "The scan has one pose, so its fixture is part of the model: scan a second pose to leave it out."};
+}
+
 Disagreement of_photo(std::size_t pose, int view, std::size_t camera, const ContradictedPhoto& photo) {
   Disagreement result{.pose = pose,
                       .view = view,

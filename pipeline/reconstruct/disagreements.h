@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/pose/fixtures.h"
 #include "pipeline/registration/moved_views.h"
 #include "pipeline/texture/texture.h"
 #include "pipeline/volume/silhouette_votes.h"
@@ -17,7 +18,7 @@ struct Disagreement {
   std::size_t pose = 0;
   int view = 0;
   std::string camera{};    ///< `left`, `right`; empty: of the view
-  std::string what{};      ///< `silhouette`, `photograph`, `object moved`, `view`, `pose`
+  std::string what{};      ///< `silhouette`, `photograph`, `object moved`, `view`, `pose`, `fixture`
   std::string action{};    ///< `part left out`, `left out`, `corrected`, `kept`
   double amount = 0.0;     ///< in `unit`
   std::string unit{};      ///< `share` of the object's area in the image, or `mm`
@@ -34,6 +35,10 @@ Disagreement of_motion(std::size_t pose, const View& view, const ObjectMotion& m
 Disagreement of_misfit(std::size_t pose, const View& view, double residual_mm);
 /// The pose was left out.
 Disagreement of_pose(std::size_t pose, std::string sentence);
+/// What held the object in the pose was left out. `is_expected`: the recipe has a fixture.
+Disagreement of_fixture(std::size_t pose, const Fixture& fixture, bool is_expected);
+/// A fixture cannot be told from the object in a scan of one pose.
+Disagreement of_single_pose_on_fixture();
 Disagreement of_photo(std::size_t pose, int view, std::size_t camera, const ContradictedPhoto& photo);
 
 nlohmann::json disagreements_json(std::span<const Disagreement> disagreements);

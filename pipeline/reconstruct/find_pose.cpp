@@ -10,7 +10,6 @@
 #include "pipeline/registration/register_views.h"
 
 namespace scanrig {
-namespace {
 
 Result<PoseOptions> pose_options_of(const std::string& rests) {
   PoseOptions options;
@@ -23,8 +22,6 @@ Result<PoseOptions> pose_options_of(const std::string& rests) {
   }
   return options;
 }
-
-}  // namespace
 
 std::vector<Contact> carried(std::vector<Contact> contacts, const Transform& element) {
   for (Contact& contact : contacts) {
@@ -43,14 +40,10 @@ RefineOptions Reconstruction::State::refine_options() const {
   return refinement;
 }
 
-Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_poses(Report& report, const Context& context) {
-  if (poses.size() < 2) return FoundPoses{.model_from_pose = {Transform::Identity()}};
-  const StageLog::Timer timer(log, "pose");
-  auto pose_options = pose_options_of(options.rests);
-  if (!pose_options) return pass_on(pose_options);
-  pose_options->picked = options.picked;
-  return poses.size() == 2 ? find_second_pose(*pose_options, report, context)
-                           : find_many_poses(*pose_options, report, context);
+Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_touching(const PoseOptions& pose_options,
+                                                                               Report& report, const Context& context) {
+  return poses.size() == 2 ? find_second_pose(pose_options, report, context)
+                           : find_many_poses(pose_options, report, context);
 }
 
 Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_second_pose(const PoseOptions& pose_options,
@@ -79,6 +72,7 @@ Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_second_pos
   if (!refined) return pass_on(refined, "pose 2 in pose 1");
   report.add_refinement(*refined);
   found.model_from_pose[1] = refined->pose1_from_pose2;
+  found.seen_empty = estimate->best.agreement.free_space;
   return found;
 }
 
@@ -117,8 +111,10 @@ Result<Reconstruction::State::FoundPoses> Reconstruction::State::choose_turn(con
               "scan pose 2 again");
 }
 
-/// The next pose's table angles are this one's: the recipe is the same.
+/// Nothing of an object on a fixture: what it stands on is no rest of its own. The next pose's table angles are this
+/// one's: the recipe is the same.
 std::vector<RestSuggestion> Reconstruction::State::suggest_rests(std::size_t pose, const Mesh& live_pose) {
+  if (options.fixture) return {};
   const StageLog::Timer timer(log, "next rest");
   PoseState& state = poses[pose];
   const Calibration& rig = state.watch ? state.watch->calibration() : *calibration;

@@ -103,6 +103,9 @@ Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_many_poses
   const auto refined = refine_poses(views, starts, links, refine_options(), context);
   if (!refined) return pass_on(refined);
   for (std::size_t i = 0; i < kept.size(); ++i) found.model_from_pose[kept[i]] = refined->model_from_pose[i];
+  for (const PosePair& pair : placed->pairs) {
+    if (pair.pose1_from_pose2) found.seen_empty = std::max(found.seen_empty, pair.judged.contradicted);
+  }
   report.add_placed(*placed, kept, links, *refined, found.layers);
   return found;
 }

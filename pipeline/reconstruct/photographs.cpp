@@ -94,11 +94,17 @@ Result<void> Reconstruction::State::add_photos(const ScanFolder* scan, std::size
         poses[pose].watch ? poses[pose].watch->left_from_turntable() : rectification->left_from_turntable;
     const Transform turntable_from_pose = left_from_turntable.inverse() * poses[pose].views[v].range.camera_from_pose;
     const Transform turntable_from_model = turntable_from_pose * pose_from_model;
+    std::vector<Eigen::Vector3f> in_front;
+    if (v < poses[pose].in_front.size()) {
+      const Eigen::Isometry3f model_from_pose(pose_from_model.inverse().matrix().cast<float>());
+      for (const Eigen::Vector3f& point : poses[pose].in_front[v]) in_front.emplace_back(model_from_pose * point);
+    }
     const Calibration& cameras = poses[pose].watch ? poses[pose].watch->calibration() : *calibration;
     for (std::size_t camera = 0; camera < 2; ++camera) {
       auto kept = photo(scan, pose, v, camera);
       if (!kept) return pass_on(kept);
       photos.push_back({camera == 0 ? cameras.left : cameras.right, turntable_from_model, kept->pixels, kept->first});
+      photos.back().in_front = in_front;
     }
   }
   return {};

@@ -34,6 +34,9 @@ struct ReconstructOptions {
   /// `refine`: the rig is compared with its calibration, which is refined where it has moved and refused where it has
   /// moved too far; `report`: compared alone; `off`. Only for calibrations of known quality.
   std::string watch = "refine";
+  /// The object stands on putty, pins or a magnet: poses are found without contact with the table, and what only one
+  /// pose shows below the object is left out. Without it this is tried where poses do not fit together with contact.
+  bool fixture = false;
   double partial_voxel_mm = 0.8;      ///< minimum for partial models: they only serve the search for the pose
   std::optional<Transform> picked{};  ///< pose1_from_pose2 as a person picked it, where several fit; pose_choices.h
   /// Of this process, at its peak: what needs more is done part by part, with the same bits; memory.h.

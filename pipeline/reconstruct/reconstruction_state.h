@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/pose/fixtures.h"
 #include "pipeline/pose/place_poses.h"
 #include "pipeline/range/compact_range.h"
 #include "pipeline/range/rectification.h"
@@ -28,6 +29,9 @@ namespace scanrig {
 /// The contacts of a symmetric part after `element`, a motion that carries it onto itself.
 std::vector<Contact> carried(std::vector<Contact> contacts, const Transform& element);
 
+/// Fails with `invalid_input`: neither "hull" nor "egi".
+Result<PoseOptions> pose_options_of(const std::string& rests);
+
 /// What a Reconstruction holds. reconstruct.cpp has its stages, judge_pose.cpp what they say of single images,
 /// photographs.cpp where these are.
 struct Reconstruction::State {
@@ -44,7 +48,9 @@ struct Reconstruction::State {
     std::vector<CompactRange> full;  ///< then their range images as measured; else empty
     std::vector<PlainPair> plain;    ///< one per view; empty for range scans and grey sensors
     std::vector<GreyPair> pattern;   ///< likewise
-    std::optional<RigWatch> watch;   ///< none: range scans, or switched off
+    /// Of each view, points of its fixture in the pose's frame; empty: none.
+    std::vector<std::vector<Eigen::Vector3f>> in_front;
+    std::optional<RigWatch> watch;  ///< none: range scans, or switched off
     RegistrationReport registration;
     Surface partial;
     std::vector<NextRest> suggested;  ///< to the operator, for the next pose
@@ -55,6 +61,7 @@ struct Reconstruction::State {
   struct FoundPoses {
     std::vector<std::optional<Transform>> model_from_pose{};  ///< nothing: left out. The first that is kept: identity
     bool layers = false;
+    double seen_empty = 0.0;  ///< largest share of two poses' surface that the other pose looked through, or more
   };
 
   /// What finish() needs of the finished poses alone.
@@ -69,7 +76,8 @@ struct Reconstruction::State {
   std::optional<Rectification> rectification;
   std::vector<PoseState> poses;
   std::vector<Disagreement> disagreements;
-  std::vector<PoseChoice> choices;  ///< of the search that ended `ambiguous`
+  std::vector<PoseChoice> choices;               ///< of the search that ended `ambiguous`
+  std::vector<std::optional<Fixture>> fixtures;  ///< of each pose, taken out of its views; empty: not looked for
   std::optional<Prepared> prepared;
   StageLog log;
 
@@ -93,8 +101,16 @@ struct Reconstruction::State {
   Result<void> finish_pose(std::size_t pose, const Context& context);
   [[nodiscard]] Mesh live_pose(std::size_t pose) const;
   std::vector<RestSuggestion> suggest_rests(std::size_t pose, const Mesh& live_pose);
-  /// Of one pose, of two (find_pose.cpp) and of more (find_poses.cpp).
+  /// Of one pose, of two (find_pose.cpp) and of more (find_poses.cpp), with fixtures or without (find_on_fixtures.cpp).
   Result<FoundPoses> find_poses(Report& report, const Context& context);
+  Result<FoundPoses> find_touching(const PoseOptions& pose_options, Report& report, const Context& context);
+  Result<FoundPoses> find_on_fixtures(const PoseOptions& pose_options, const FoundPoses* sketch, Report& report,
+                                      const Context& context);
+  bool shows_fixture(const FoundPoses& found);
+  void remove_fixtures(std::span<const std::optional<Transform>> model_from_pose);
+  void remove_fixtures_in_full();
+  void drop_fixtures();
+  void note_fixtures(Report& report);
   Result<FoundPoses> find_second_pose(const PoseOptions& pose_options, Report& report, const Context& context);
   void keep_choices(const std::vector<Candidate>& fitting);
   Result<FoundPoses> find_many_poses(const PoseOptions& pose_options, Report& report, const Context& context);

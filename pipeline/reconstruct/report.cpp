@@ -233,8 +233,10 @@ Report::Report(const ReconstructOptions& options, const std::optional<Calibratio
   report["software"] = {{"name", "scanrig"}, {"version", kVersion}, {"compiler", kCompiler}};
   report["calibration_sha256"] = calibration ? calibration->sha256 : "";
   report["options"] = {{"voxel_mm", options.voxel_mm}, {"fusion", options.fusion}, {"rests", options.rests},
-                       {"texture", options.texture},   {"watch", options.watch},   {"threads", options.threads}};
+                       {"texture", options.texture},   {"watch", options.watch},   {"threads", options.threads},
+                       {"fixture", options.fixture}};
   report["poses"] = json::array();
+  report["fixtures"] = json::array();
 }
 
 void Report::add_identity(const ScanIdentity& identity) {
@@ -245,7 +247,9 @@ void Report::add_identity(const ScanIdentity& identity) {
 }
 
 Report::~Report() = default;
+Report::Report(const Report& other) : json_(std::make_unique<json>(*other.json_)) {}
 Report::Report(Report&&) noexcept = default;
+Report& Report::operator=(Report&&) noexcept = default;
 
 void Report::add_pose(std::span<const View> views, const RegistrationReport& registration, const VolumeReport& partial,
                       const RigWatch* watch) {
@@ -319,6 +323,16 @@ void Report::add_placed(const PlacedPoses& placed, std::span<const std::size_t> 
   (*json_)["pose_refinement"] = {{"residual_median_mm", number(refined.median_mm)},
                                  {"residual_rms_mm", number(refined.rms_mm)},
                                  {"poses", of_poses}};
+}
+
+void Report::add_fixtures(std::span<const std::optional<Fixture>> of_pose) {
+  for (std::size_t pose = 0; pose < of_pose.size(); ++pose) {
+    if (!of_pose[pose]) continue;
+    (*json_)["fixtures"].push_back({{"pose", pose},
+                                    {"area_mm2", of_pose[pose]->area_mm2},
+                                    {"height_mm", of_pose[pose]->height_mm},
+                                    {"centre_mm", vector_json(of_pose[pose]->centre)}});
+  }
 }
 
 void Report::add_next_rest(std::span<const NextRest> suggested, const Transform& pose1_from_pose2) {

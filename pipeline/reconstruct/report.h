@@ -6,6 +6,7 @@
 #include <span>
 
 #include "pipeline/pose/estimate_pose.h"
+#include "pipeline/pose/fixtures.h"
 #include "pipeline/pose/place_poses.h"
 #include "pipeline/reconstruct/disagreements.h"
 #include "pipeline/reconstruct/reconstruct.h"
@@ -26,7 +27,9 @@ class Report {
  public:
   Report(const ReconstructOptions& options, const std::optional<Calibration>& calibration);
   ~Report();
+  Report(const Report& other);
   Report(Report&&) noexcept;
+  Report& operator=(Report&&) noexcept;
 
   void add_identity(const ScanIdentity& identity);
 
@@ -40,6 +43,8 @@ class Report {
   /// Of three poses or more. `kept`: poses of the model; `links` count among these.
   void add_placed(const PlacedPoses& placed, std::span<const std::size_t> kept, std::span<const PoseLink> links,
                   const RefinedPoses& refined, bool layers);
+  /// One per pose, where it has one.
+  void add_fixtures(std::span<const std::optional<Fixture>> of_pose);
   /// `suggested`: to the operator after pose 1; nothing is added where it is empty.
   void add_next_rest(std::span<const NextRest> suggested, const Transform& pose1_from_pose2);
   void add_surface(const Mesh& mesh, const VolumeReport& volume);

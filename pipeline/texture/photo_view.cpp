@@ -85,6 +85,23 @@ PhotoView::PhotoView(const Photo& photo, const Mesh& mesh, const TextureOptions&
   if (seen_.window.empty()) return;
   cut_at_border();
   find_edges();
+  if (!photo.in_front.empty()) hide_behind(photo.in_front);
+}
+
+/// The places lie a pixel or a few apart.
+void PhotoView::hide_behind(const std::vector<Eigen::Vector3f>& in_front) {
+  constexpr int kAroundPx = 4;
+  cv::Mat1b kept(seen_.window.size(), uchar{255});
+  for (const Eigen::Vector3f& place : in_front) {
+    const Eigen::Vector3d p = camera_from_model_ * place.cast<double>();
+    if (p.z() <= 0.0) continue;
+    const Eigen::Vector2d pixel = photo_->camera.projection.project(p);
+    const cv::Point at(static_cast<int>(std::lround(pixel.x())), static_cast<int>(std::lround(pixel.y())));
+    const cv::Rect around(at - seen_.window.tl() - cv::Point(kAroundPx, kAroundPx),
+                          cv::Size(2 * kAroundPx + 1, 2 * kAroundPx + 1));
+    kept(around & cv::Rect({0, 0}, kept.size())) = uchar{0};
+  }
+  fade_out_towards(kept);
 }
 
 /// What the photo's border cuts off ends in an edge, towards which colours fade out.
@@ -128,6 +145,10 @@ void PhotoView::leave_out(const cv::Mat1b& mask) {
       if (at.inside({0, 0, mask.cols, mask.rows}) && mask(at) != 0) kept(y, x) = 0;
     }
   }
+  fade_out_towards(kept);
+}
+
+void PhotoView::fade_out_towards(const cv::Mat1b& kept) {
   cv::Mat1f away;
   cv::distanceTransform(kept, away, cv::DIST_L2, cv::DIST_MASK_5);
   edge_px_away_ = cv::min(edge_px_away_, away);

@@ -46,6 +46,8 @@ class PhotoView {
  private:
   void cut_at_border();
   void find_edges();
+  void fade_out_towards(const cv::Mat1b& kept);
+  void hide_behind(const std::vector<Eigen::Vector3f>& in_front);
 
   const Photo* photo_;
   DistortionTable distortion_;

@@ -25,6 +25,8 @@ struct Photo {
   /// Photos of one layer are blended; where one of a lower layer shows the surface, those of higher ones are not used.
   /// For photos of which it is not known how they lie to the others.
   int layer = 0;
+  /// Places, model frame, of what stood before the object and is not of the mesh: no colour is taken there.
+  std::vector<Eigen::Vector3f> in_front{};
 };
 
 /// Cutting of the surface into charts.

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "pipeline/pose/estimate_pose.h"
+
+/// Putty, pins or a magnet between table and object: measured with the object in one pose, gone in another.
+namespace scanrig {
+
+struct FixtureOptions {
+  double cell = 0.01;            ///< width of the cells in which surface is judged, as a share of the object's size
+  double reach = 0.003;          ///< share of the object's size: surface nearer to another pose's is not gone there
+  double spread = 0.0005;        ///< share of the object's size: error of that pose beside sigma
+  int gap_cells = 3;             ///< gone surface across a gap of so many cells is one fixture
+  int grown_cells = 8;           ///< how far from gone surface a fixture reaches where no other pose judges
+  double foot = 0.04;            ///< share of the object's size: a fixture begins within this height of the table
+  double min_height_mm = 2.0;    ///< lower ones are the table's reflection in the object's foot
+  double min_area_mm2 = 10.0;    ///< smaller ones are not named
+  AgreementOptions agreement{};  ///< of the checks
+};
+
+/// What held the object in one pose. In that pose's frame, mm.
+struct Fixture {
+  double area_mm2 = 0.0;                             ///< of its measured surface
+  double height_mm = 0.0;                            ///< above the table
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< of that surface
+  double cell_mm = 0.0;                              ///< width of a cell
+  std::vector<std::uint64_t> cells{};                ///< that its surface takes, and one around; sorted keys
+  [[nodiscard]] bool holds(const Eigen::Vector3d& point) const;
+};
+
+/// A pose and its place in the model; nothing: it is left out, and neither has a fixture nor shows one.
+struct PlacedPose {
+  std::span<const View> views;
+  std::optional<Transform> model_from_pose;
+};
+
+/// The fixture of each pose, nothing where it has none: surface that another pose looked through, connected from the
+/// table up. Surface that no other pose judges belongs to the fixture or to the object by what it is connected with,
+/// whichever is nearer. What is seen as it is in all poses that look there is object, even if it is putty that was
+/// turned over with it. Same bits for any number of threads.
+std::vector<std::optional<Fixture>> find_fixtures(std::span<const PlacedPose> poses,
+                                                  const FixtureOptions& options = {});
+
+/// Makes the fixture's pixels unmeasured; they do not become background. The matrices are copied before. Returns the
+/// points that were measured there, in the pose's frame.
+std::vector<Eigen::Vector3f> remove_fixture(const Fixture& fixture, RangeImage& range);
+
+/// For an object on a fixture: contact with the table is no tangent plane. `is_removed`: the fixtures' surface is gone;
+/// else the verdict forgives the part of the surface that a fixture may be.
+PoseOptions options_for_fixtures(PoseOptions options, bool is_removed);
+
+}  // namespace scanrig
