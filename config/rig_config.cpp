@@ -93,6 +93,7 @@ void read_recipe(Section& s, const RigConfig& rig, RecipeConfig& recipe) {
   if (s.has("start")) {
     s.choice<Start>("start", recipe.start, {{"button", Start::button}, {"part_present", Start::part_present}});
   }
+  if (s.has("fixture")) s.flag("fixture", recipe.fixture);
   if (s.has("limits")) s.section("limits", [&](Section& limits) { read_limits(limits, recipe); });
   if (recipe.flip == Flip::signal) {
     if (!rig.panel.inputs.contains("flipped")) s.report("flip", "\"signal\" needs the input flipped in [panel]");

@@ -129,6 +129,7 @@ struct RecipeConfig {
   std::chrono::minutes flip_timeout{30};
   Flip flip = Flip::button;     ///< `signal` needs the panel's `flipped` input
   Start start = Start::button;  ///< `part_present` needs the panel's input of that name
+  bool fixture = false;         ///< parts stand on putty, pins or a magnet
   std::optional<double> min_measured_share;
   std::optional<double> max_residual_mm;
 };

@@ -30,6 +30,8 @@ void add_reconstruct(CLI::App& app, Chosen& chosen) {
   sub->add_option("--fusion", verb->options.fusion, "how poses are integrated")
       ->check(CLI::IsMember({"evidence", "paper"}));
   sub->add_option("--rests", verb->options.rests, "how rests are found")->check(CLI::IsMember({"hull", "egi"}));
+  sub->add_flag("--fixture", verb->options.fixture,
+                "the part stood on putty, pins or a magnet: find poses without contact, leave the fixture out");
   sub->add_flag("!--no-texture", verb->options.texture, "shape only");
   sub->add_option("--watch", verb->options.watch,
                   "what to do when the rig has moved since its calibration: refine (or refuse), report, off")

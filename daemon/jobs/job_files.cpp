@@ -48,6 +48,7 @@ ordered_json to_json(const Recipe& recipe) {
           {"flip_timeout_min", recipe.flip_timeout.count()},
           {"flip_by_signal", recipe.flip_by_signal},
           {"start_on_part", recipe.start_on_part},
+          {"fixture", recipe.fixture},
           {"limits", limits}};
 }
 
@@ -67,6 +68,7 @@ Recipe read_recipe(JsonObject object, int version) {
   recipe.flip_timeout = std::chrono::minutes(object.integer("flip_timeout_min", 1, 1440));
   recipe.flip_by_signal = object.flag(old_names ? "flip_by_line" : "flip_by_signal");  // old name
   recipe.start_on_part = object.flag("start_on_part");
+  if (object.has("fixture")) recipe.fixture = object.flag("fixture");  // earlier jobs have none
   JsonObject limits = object.object("limits");
   if (limits.has(min_share)) recipe.limits.min_measured_share = limits.number(min_share, 0, 1);
   if (limits.has(max_residual)) recipe.limits.max_residual_mm = limits.number(max_residual, 0, 1000);

@@ -82,6 +82,7 @@ ReconstructorFactory pipeline_reconstructor(ReconstructOptions options, std::uin
     auto changed = options;
     changed.voxel_mm = task.changes.voxel_mm.value_or(options.voxel_mm);
     if (!task.changes.fusion.empty()) changed.fusion = task.changes.fusion;
+    changed.fixture = task.fixture;
     changed.memory_bytes = memory_bytes;
     const auto picked = picked_motion(task.folder);
     if (!picked) return pass_on(picked);

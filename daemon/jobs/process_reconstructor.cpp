@@ -14,8 +14,8 @@ namespace fs = std::filesystem;
 
 class ProcessReconstructor final : public Reconstructor {
  public:
-  ProcessReconstructor(ProcessExecutorOptions options, fs::path folder, ReconstructionChanges changes)
-      : options_(std::move(options)), folder_(std::move(folder)), changes_(std::move(changes)) {}
+  ProcessReconstructor(ProcessExecutorOptions options, const ReconstructionTask& task)
+      : options_(std::move(options)), folder_(task.folder), fixture_(task.fixture), changes_(task.changes) {}
 
   Result<void> add_view(std::size_t, const RawView&, const ViewRecord&, const Context&) override { return {}; }
   Result<void> finish_pose(std::size_t, const Context&) override { return {}; }
@@ -48,12 +48,14 @@ class ProcessReconstructor final : public Reconstructor {
         .limit = options_.limit,
         .memory_bytes = options_.memory_bytes,
         .on_line = [&lines](std::string_view line) { lines(line); }};
+    if (fixture_) command.words.emplace_back("--fixture");
     if (!changes_.fusion.empty()) command.words.insert(command.words.end(), {"--fusion", changes_.fusion});
     return command;
   }
 
   ProcessExecutorOptions options_;
   fs::path folder_;
+  bool fixture_;
   ReconstructionChanges changes_;
 };
 
@@ -63,7 +65,7 @@ ReconstructorFactory process_reconstructor(ProcessExecutorOptions options) {
   std::error_code ignored;
   if (options.program.empty()) options.program = fs::read_symlink("/proc/self/exe", ignored).parent_path() / "scanrig";
   return [options = std::move(options)](const ReconstructionTask& task) -> Result<std::unique_ptr<Reconstructor>> {
-    return std::make_unique<ProcessReconstructor>(options, task.folder, task.changes);
+    return std::make_unique<ProcessReconstructor>(options, task);
   };
 }
 

@@ -178,6 +178,7 @@ Result<std::unique_ptr<Reconstructor>> ReconstructionThread::make_reconstructor(
   return factory_({.calibration = *calibration,
                    .folder = message.folder,
                    .views = recipe.all_views(),
+                   .fixture = recipe.fixture,
                    .changes = message.changes,
                    .is_ending = [this] { return ending_.load(); }});
 }

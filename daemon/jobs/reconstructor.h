@@ -55,6 +55,7 @@ struct ReconstructionTask {
   const Calibration& calibration;
   std::filesystem::path folder;  ///< of the job
   int views = 0;                 ///< of all poses, once they exist
+  bool fixture = false;          ///< of the recipe: parts stand on putty, pins or a magnet
   ReconstructionChanges changes{};
   /// True once the daemon ends: work outside of its process then continues although a stop is requested.
   std::function<bool()> is_ending = [] { return false; };

@@ -47,6 +47,7 @@ class SlurmReconstructor final : public Reconstructor {
   SlurmReconstructor(SlurmExecutorOptions options, const ReconstructionTask& task, std::unique_ptr<Reconstructor> local)
       : options_(std::move(options)),
         folder_(std::filesystem::absolute(task.folder)),
+        fixture_(task.fixture),
         changes_(task.changes),
         is_ending_(task.is_ending),
         local_(std::move(local)),
@@ -170,6 +171,7 @@ class SlurmReconstructor final : public Reconstructor {
         "--voxel-mm",   fmt::format("{}", changes_.voxel_mm.value_or(options_.local.voxel_mm)),
         "--threads",    fmt::format("{}", options_.cores),
         "--memory-gib", fmt::format("{}", static_cast<double>(options_.local.memory_bytes) / (1U << 30))};
+    if (fixture_) words.emplace_back("--fixture");
     if (!changes_.fusion.empty()) words.insert(words.end(), {"--fusion", changes_.fusion});
     const auto run = places_.run(*submission_), file = run / "job.sh";
     std::ofstream script(file);
@@ -297,6 +299,7 @@ class SlurmReconstructor final : public Reconstructor {
 
   SlurmExecutorOptions options_;
   std::filesystem::path folder_;
+  bool fixture_;
   ReconstructionChanges changes_;
   std::function<bool()> is_ending_;
   std::unique_ptr<Reconstructor> local_;

@@ -35,6 +35,7 @@ Recipe recipe_from(const std::string& name, const config::RecipeConfig& config) 
           .flip_timeout = config.flip_timeout,
           .flip_by_signal = config.flip == config::RecipeConfig::Flip::signal,
           .start_on_part = config.start == config::RecipeConfig::Start::part_present,
+          .fixture = config.fixture,
           .limits = {config.min_measured_share, config.max_residual_mm}};
 }
 

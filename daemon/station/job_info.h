@@ -38,6 +38,7 @@ struct Recipe {
   std::chrono::minutes flip_timeout{30};  ///< then the job is parked and the rig is free
   bool flip_by_signal = false;            ///< the panel's `flipped` input reports that the object was turned over
   bool start_on_part = false;             ///< the queue continues when `part_present` falls and rises again
+  bool fixture = false;                   ///< the part stands on putty, pins or a magnet
   Limits limits{};
   RecipeKind kind = RecipeKind::scan;
   bool operator==(const Recipe&) const = default;

@@ -34,6 +34,7 @@ poses = 2
 flip_timeout_min = 2
 flip = "signal"
 start = "part_present"
+fixture = true
 limits = { min_measured_share = 0.9, max_residual_mm = 0.05 }
 )";
 };
@@ -44,6 +45,7 @@ TEST_F(RecipeConfigTest, ARecipeMayLeaveEverythingButTheScanToTheButton) {
   const auto& recipe = rig->recipes.at("default");
   EXPECT_EQ(recipe.flip, RecipeConfig::Flip::button);
   EXPECT_EQ(recipe.start, RecipeConfig::Start::button);
+  EXPECT_FALSE(recipe.fixture);
   EXPECT_FALSE(recipe.min_measured_share);
   EXPECT_FALSE(rig->quiet_hours);
   EXPECT_FALSE(rig->webhook);
@@ -97,6 +99,7 @@ TEST_F(RecipeConfigTest, ALineHasSignalsAndLimits) {
   EXPECT_EQ(recipe.views, 6);
   EXPECT_EQ(recipe.flip, RecipeConfig::Flip::signal);
   EXPECT_EQ(recipe.start, RecipeConfig::Start::part_present);
+  EXPECT_TRUE(recipe.fixture);
   EXPECT_EQ(recipe.min_measured_share, 0.9);
   EXPECT_EQ(recipe.max_residual_mm, 0.05);
 }

@@ -173,6 +173,7 @@ TEST_F(JobStoreTest, AnOrderOfVersion1IsRead) {
                 "start_on_part": false, "limits": { "least_measured_share": 0.9, "most_residual_mm": 0.05 } } })"));
   const auto recipe = recovered(store, "job").recipe;  // the keys above have their old names
   EXPECT_TRUE(recipe.flip_by_signal);
+  EXPECT_FALSE(recipe.fixture);
   EXPECT_EQ(recipe.limits, (Limits{.min_measured_share = 0.9, .max_residual_mm = 0.05}));
 }
 
@@ -199,9 +200,10 @@ TEST_F(JobStoreTest, ACalibrationKeepsItsKindAndThatItWasAccepted) {
 
 TEST_F(JobStoreTest, AQueuedJobKeepsItsOrderAndItsPlace) {
   const auto store = open();
-  const JobFile order{.recipe = {.name = "small", .poses = 1, .views = 5, .limits = {.min_measured_share = 0.9}},
-                      .part = "4711",
-                      .place = 7};
+  const JobFile order{
+      .recipe = {.name = "small", .poses = 1, .views = 5, .fixture = true, .limits = {.min_measured_share = 0.9}},
+      .part = "4711",
+      .place = 7};
   ASSERT_TRUE(store.create("job", order));
   const auto job = recovered(store, "job");
   EXPECT_EQ(job.state, JobState::queued);

@@ -36,5 +36,10 @@ TEST(ReconstructOptions, TheWatchIsOneOfThree) {
   EXPECT_FALSE(takes("--watch sometimes"));
 }
 
+TEST(ReconstructOptions, AFixtureIsAFlag) {
+  EXPECT_TRUE(takes("--fixture"));
+  EXPECT_FALSE(takes("--fixture=putty"));
+}
+
 }  // namespace
 }  // namespace scanrig::ctl

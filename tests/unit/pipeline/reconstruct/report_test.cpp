@@ -50,5 +50,23 @@ TEST(Report, NamesEveryImageThatTheOthersContradict) {
   EXPECT_EQ(json[3]["action"], "left out");
 }
 
+TEST(Report, NamesTheFixtureOfEachPoseThatHasOne) {
+  Report report({.fixture = true}, std::nullopt);
+  const Fixture fixture{.area_mm2 = 310.0, .height_mm = 12.25, .centre = {1.0, 6.0, -2.0}};
+  report.add_fixtures(std::vector<std::optional<Fixture>>{std::nullopt, fixture});
+  report.add_disagreements(std::vector{of_fixture(1, fixture, true), of_fixture(1, fixture, false)});
+  const auto json = report.finished({});
+  EXPECT_EQ(json["options"]["fixture"], true);
+  ASSERT_EQ(json["fixtures"].size(), 1U);
+  EXPECT_EQ(json["fixtures"][0]["pose"], 1);
+  EXPECT_EQ(json["fixtures"][0]["area_mm2"], 310.0);
+  EXPECT_EQ(json["fixtures"][0]["height_mm"], 12.25);
+  EXPECT_EQ(json["fixtures"][0]["centre_mm"], nlohmann::json::array({1.0, 6.0, -2.0}));
+  const std::string sentence = json["disagreements"][0]["sentence"];
+  EXPECT_EQ(sentence, "In pose 2 the object stood on a fixture 12.2 mm high, which is left out of the model.");
+  EXPECT_EQ(json["disagreements"][1]["sentence"],
+            sentence + " Poses fit better without contact: write fixture = true into its recipe.");
+}
+
 }  // namespace
 }  // namespace scanrig
