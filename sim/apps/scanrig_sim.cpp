@@ -2,7 +2,9 @@
 #include <condition_variable>
 #include <cstdio>
 #include <functional>
+#include <map>
 #include <mutex>
+#include <string>
 
 #include "core/signal_stop.h"
 #include "sim/apps/rig_control.h"
@@ -39,6 +41,11 @@ void add_scene(CLI::App& app, sim::SceneOptions& scene) {
   app.add_option("--seed", scene.seed, "Placements, noise and table errors")->capture_default_str();
   app.add_option("--scale", scene.image_scale, "Resolution, as a share of 1280x960")->capture_default_str();
   app.add_flag("--same-rest", scene.same_rest_twice, "The operator does not turn the object over");
+  app.add_option("--fixture", scene.fixture, "The object leans on putty or pins in every pose")
+      ->transform(CLI::CheckedTransformer(
+          std::map<std::string, sim::FixtureKind>{
+              {"none", sim::FixtureKind::none}, {"putty", sim::FixtureKind::putty}, {"pins", sim::FixtureKind::pins}},
+          CLI::ignore_case));
   app.add_flag("--any-size", scene.any_size, "Put the object down although it is too large");
   app.add_flag("!--no-noise", scene.noise, "Leave the sensors' noise out");
 }

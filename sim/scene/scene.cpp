@@ -31,7 +31,21 @@ Result<std::unique_ptr<Scene>> Scene::create(const SceneOptions& options) {
                                        : draw_placements(object->mesh, options.seed, options.poses,
                                                          options.same_rest_twice, options.any_size);
   if (!placements) return pass_on(placements, object->name);
-  return std::make_unique<Scene>(std::move(*object), std::move(*placements), options);
+  auto scene = std::make_unique<Scene>(std::move(*object), std::move(*placements), options);
+  if (auto held = scene->put_on_fixtures(); !held) return pass_on(held, scene->object().name);
+  return scene;
+}
+
+Result<void> Scene::put_on_fixtures() {
+  if (options_.fixture == FixtureKind::none) return {};
+  for (std::size_t pose = 0; pose < placements_.size(); ++pose) {
+    const std::uint64_t seed = mix(options_.seed, pose);
+    auto held = hold(object_.mesh, rays_, placements_[pose], options_.fixture, seed);
+    if (!held) return pass_on(held);
+    placements_[pose] = held->table_from_object;
+    held_.push_back(std::make_unique<Standing>(with_fixture(object_, held->fixture)));
+  }
+  return {};
 }
 
 Scene::Scene(Object object, std::vector<Transform> placements, const SceneOptions& options)
@@ -51,13 +65,15 @@ const DotPattern& Scene::dots() {
 
 const RoomLight& Scene::light_of(int pose) {
   auto& light = lights_[pose];
-  if (!light) light = std::make_unique<RoomLight>(object_, rays_, placements_[pose], options_.profile.screen);
+  if (!light)
+    light = std::make_unique<RoomLight>(object_in(pose), rays_in(pose), placements_[pose], options_.profile.screen);
   return *light;
 }
 
 const BouncePaths& Scene::bounces_of(int pose) {
   auto& paths = bounces_[pose];
-  if (!paths) paths = std::make_unique<BouncePaths>(object_, rays_, placements_[pose], options_.profile.screen);
+  if (!paths)
+    paths = std::make_unique<BouncePaths>(object_in(pose), rays_in(pose), placements_[pose], options_.profile.screen);
   return *paths;
 }
 
@@ -81,15 +97,17 @@ View Scene::look(int pose, double angle, double minutes) {
                                                     : Handling::of_view(effects, options_.seed, options_.views, pose,
                                                                         to_degrees(angle)),
                     .colour = options_.profile.screen};
-  const Placed placed{object_, rays_, light_of(pose), added.handling.moved(placements_[pose]), rig_.rim_dots};
+  const Object& object = object_in(pose);
+  const RayCaster& rays = rays_in(pose);
+  const Placed placed{object, rays, light_of(pose), added.handling.moved(placements_[pose]), rig_.rim_dots};
   std::optional<BounceLight> bounce;
   if (effects.interreflection > 0.0) {
     const Lamp lamp(rig.projector, dots(), effects, added.handling.finger);
-    added.bounce = &bounce.emplace(bounces_of(pose), object_, rays_, lamp, Transform(rot_y(angle)));
+    added.bounce = &bounce.emplace(bounces_of(pose), object, rays, lamp, Transform(rot_y(angle)));
   }
   std::optional<ScreenLight> screen;
   if (effects.folds > 0.0 || effects.screen_shadow > 0.0) {
-    added.screen = &screen.emplace(effects, object_, rays_, light_of(pose), rot_y(angle) * placements_[pose]);
+    added.screen = &screen.emplace(effects, object, rays, light_of(pose), rot_y(angle) * placements_[pose]);
   }
   const auto seen_by = [&](const Eye& eye, int camera) {
     const std::uint64_t sampling = mix(static_cast<std::uint64_t>(pose), std::bit_cast<std::uint64_t>(angle), camera);

@@ -8,6 +8,7 @@
 
 #include "core/result.h"
 #include "sim/scene/camera_model.h"
+#include "sim/scene/fixture.h"
 #include "sim/scene/object.h"
 #include "sim/scene/optics.h"
 #include "sim/scene/renderer.h"
@@ -23,6 +24,7 @@ struct SceneOptions {
   double image_scale = 1.0;
   bool same_rest_twice = false;  ///< every pose is the first rest, only turned and moved
   bool any_size = false;         ///< put it down although it is larger than the working volume, as an operator can
+  FixtureKind fixture = FixtureKind::none;  ///< every pose leans on one; the truth is the object alone
   bool noise = true;
   std::optional<RigVariation> rig = std::nullopt;  ///< a drawn rig; nothing: the default rig, without any error
   ChosenProfile profile{};                         ///< as declared: profile 1
@@ -54,7 +56,7 @@ class Scene {
  public:
   static constexpr std::uint64_t kFirstPreview = std::uint64_t{1} << 32;
 
-  /// Fails as load_object, draw_placements and Materials::named, and with `out_of_range` (image_scale outside its
+  /// Fails as load_object, draw_placements, hold and Materials::named, and with `out_of_range` (image_scale outside its
   /// limits, poses below 1).
   static Result<std::unique_ptr<Scene>> create(const SceneOptions& options);
   /// For tests: a given object in given placements.
@@ -82,6 +84,15 @@ class Scene {
   [[nodiscard]] Transform true_placement(int pose) const;
 
  private:
+  /// What stands on the table.
+  struct Standing {
+    Object object;
+    RayCaster rays;
+    explicit Standing(Object o) : object(std::move(o)), rays(object.mesh) {}
+  };
+  Result<void> put_on_fixtures();
+  [[nodiscard]] const Object& object_in(int pose) const { return held_.empty() ? object_ : held_[pose]->object; }
+  [[nodiscard]] const RayCaster& rays_in(int pose) const { return held_.empty() ? rays_ : held_[pose]->rays; }
   const DotPattern& dots();
   const RoomLight& light_of(int pose);
   const BouncePaths& bounces_of(int pose);
@@ -93,6 +104,7 @@ class Scene {
   std::vector<Transform> placements_;
   DrawnRig rig_;
   RayCaster rays_;
+  std::vector<std::unique_ptr<Standing>> held_;  ///< of each pose; empty: no fixtures
   std::array<CameraModel, 2> cameras_;
   std::unique_ptr<DotPattern> dots_;                   // made at the first look
   std::vector<std::unique_ptr<RoomLight>> lights_;     // made when a pose is first seen
