@@ -13,7 +13,9 @@ namespace {
 constexpr double kForgivenContradicted = 0.5;  ///< share of what was judged, while fixtures are part of the surface
 constexpr double kMaxFixtureHeight = 0.5;      ///< share of the pose's: what is higher is another object, not held
 constexpr double kMaxFixtureArea = 0.4;        ///< share of the pose's surface: likewise
-constexpr int kFixturePointPairMotions = 80;   ///< they are the only proposals
+constexpr int kFixtureFirst = 2;  ///< unjudged surface is the fixture's up to this many times as far from it as from
+                                  ///< the object: what is lost of the object is less than what stays of a pin
+constexpr int kFixturePointPairMotions = 200;  ///< they are the only proposals
 
 using CellKey = std::uint64_t;
 
@@ -121,17 +123,13 @@ std::vector<std::size_t> gone_from_table(const JudgedSurface& surface, double fo
   return all;
 }
 
-/// The fixture's cells, and those of unjudged surface that is nearer to it than to the object along the surface.
+/// The fixture's cells, and those of unjudged surface that is nearer to it than to the object along the surface, or not
+/// much farther.
 std::vector<std::size_t> grown(const JudgedSurface& surface, std::vector<std::size_t> fixture,
                                const FixtureOptions& options) {
   enum class Owner : std::uint8_t { open, held, object };
   std::vector<Owner> owner(surface.size(), Owner::open);
-  double top = 0.0;
-  for (const std::size_t i : fixture) {
-    owner[i] = Owner::held;
-    top = std::max(top, surface.point(i).y());
-  }
-  top += 2.0 * surface.cell_mm();
+  for (const std::size_t i : fixture) owner[i] = Owner::held;
   std::vector<std::size_t> of_fixture = fixture, of_object;
   for (std::size_t i = 0; i < surface.size(); ++i) {
     if (owner[i] != Owner::open || surface.seen(i) == Seen::unknown) continue;
@@ -141,8 +139,8 @@ std::vector<std::size_t> grown(const JudgedSurface& surface, std::vector<std::si
   const auto spread = [&](std::vector<std::size_t>& front, Owner who) {
     std::vector<std::size_t> next;
     for (const std::size_t i : front) {
-      surface.for_each_near(i, 1, [&](std::size_t j) {
-        if (owner[j] != Owner::open || (who == Owner::held && surface.point(j).y() > top)) return;
+      surface.for_each_near(i, 2, [&](std::size_t j) {
+        if (owner[j] != Owner::open) return;
         owner[j] = who;
         next.push_back(j);
       });
@@ -152,7 +150,7 @@ std::vector<std::size_t> grown(const JudgedSurface& surface, std::vector<std::si
   for (int step = 0; step < options.grown_cells && !of_fixture.empty(); ++step) {
     spread(of_fixture, Owner::held);
     fixture.insert(fixture.end(), of_fixture.begin(), of_fixture.end());
-    spread(of_object, Owner::object);
+    if (step % kFixtureFirst == kFixtureFirst - 1) spread(of_object, Owner::object);
   }
   return fixture;
 }
@@ -245,6 +243,10 @@ std::vector<Eigen::Vector3f> remove_fixture(const Fixture& fixture, RangeImage& 
 PoseOptions options_for_fixtures(PoseOptions options, bool is_removed) {
   options.stable_tangent_planes = false;
   options.point_pair_motions = std::max(options.point_pair_motions, kFixturePointPairMotions);
+  options.voting.references = 500;
+  options.voting.peaks = 6;
+  options.rounds[0].keep = 200;
+  options.rounds[1].keep = 32;
   if (!is_removed) options.max_contradicted = std::max(options.max_contradicted, kForgivenContradicted);
   return options;
 }

@@ -28,7 +28,7 @@ LONG = {
     "real-rig": {"effects", "sizes"},
     "fast": {"slurm", "large"},
     "end-to-end": {"bare_machine"},
-    "pose": {"poses"},
+    "pose": {"poses", "fixture"},
 }
 
 
