@@ -5,14 +5,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pipeline/evaluate/evaluate.h"
 #include "pipeline/mesh/surface_index.h"
 #include "pipeline/reconstruct/reconstruct.h"
 #include "pipeline/volume/integrate.h"
-#include "pipeline/pose/estimate_pose.h"
-#include "pipeline/registration/register_views.h"
-#include "pipeline/registration/refine_pose.h"
-#include <iostream>
 #include "tests/unit/pipeline/pose/held_solids.h"
 
 namespace scanrig {
@@ -154,39 +149,6 @@ TEST_P(OnFixtures, PosesAreFoundAndNothingOfTheFixtureIsLeft) {
   ASSERT_TRUE(model) << model.error().message;
   const PoseError error = pose_error(*model, poses, 1);
   const Mesh &mesh = model->mesh.mesh, ideal = ideal_model(scans, poses);
-  if (error.mm > 0.01) {
-    auto r = *model->report;
-    for (auto& pose : r["poses"]) {
-      for (auto& v : pose["views"]) fmt::print("{}\n", v.dump());
-      pose.erase("views");
-      fmt::print("POSE {}\n", pose.dump());
-    }
-    r["pose_estimate"].erase("alternatives");
-    fmt::print("{}\n{}\n{}\n", r["pose_estimate"].dump(), r["pose_refinement"].dump(), r["fixtures"].dump());
-    const Transform off = transform_in(r["pose1_from_pose2"]) * placed(poses, 1).inverse();
-    fmt::print("off {} {} {}\n", off.translation().x(), off.translation().y(), off.translation().z());
-  }
-  {
-    int printed = 0, n[2][2] = {};
-    const auto ci = SurfaceIndex::create(ideal);
-    for (const auto& face : mesh.faces) {
-      const Eigen::Vector3d at = ((mesh.vertices[face[0]] + mesh.vertices[face[1]] + mesh.vertices[face[2]]) / 3.0F).cast<double>();
-      if (poses[0].object(at) < 0.4) continue;
-      for (std::size_t p = 0; p < poses.size(); ++p) {
-        const Eigen::Vector3d there = poses[p].pose_from_object * poses[0].pose_from_object.inverse() * at;
-        if (!poses[p].fixture || poses[p].fixture(there) > 0.25) continue;
-        const bool m = mesh.views[face[0]] > 0 && mesh.views[face[1]] > 0 && mesh.views[face[2]] > 0;
-        const double d = ci->nearest(at, 6.0).distance;
-        ++n[m][d > 2 * kVoxelMm];
-        if (d > kVoxelMm && printed++ % 12 == 0) fmt::print("pose {} measured {} at ({:.1f} {:.1f} {:.1f}) object {:.2f} fixture {:.2f} ideal {:.2f}\n", p, m, there.x(), there.y(), there.z(), poses[0].object(at), poses[p].fixture(there), d);
-      }
-    }
-    fmt::print("closed near ideal {} closed else {} measured near {} measured else {}\n", n[0][0], n[0][1], n[1][0], n[1][1]);
-    auto r = *model->report;
-    fmt::print("{}\n{}\n{}\n", r["fixtures"].dump(), r["pose_refinement"]["uncertainty"]["translation_mm"].dump(), r["pose_refinement"]["residual_rms_mm"].dump());
-    fmt::print("best {} {} {}\n", r["pose_estimate"]["chosen"]["confirmed"].dump(), r["pose_estimate"]["chosen"]["contradicted"].dump(), r["pose_estimate"]["symmetry"].dump());
-    for (auto& a : r["pose_estimate"]["alternatives"]) fmt::print("alt {} {} {} sep {} {}\n", a["confirmed"].dump(), a["contradicted"].dump(), a["angle_to_best_deg"].dump(), a["separable"].dump(), to_degrees(rotation_angle(transform_in(a["pose1_from_pose2"]).linear().transpose() * placed(poses, 1).linear())));
-  }
   EXPECT_LT(error.deg, 0.015);
   EXPECT_LT(error.mm, 0.015);
   EXPECT_EQ(fixture_faces(mesh, ideal, poses), 0U);
@@ -196,8 +158,6 @@ TEST_P(OnFixtures, PosesAreFoundAndNothingOfTheFixtureIsLeft) {
   EXPECT_EQ(fixtures[0]["pose"], 0);
   EXPECT_GT(fixtures[0]["area_mm2"], 50.0);
   EXPECT_GT(fixtures[0]["height_mm"], 5.0);
-  fmt::print("{:.4f} deg, {:.4f} mm, {} faces, {:.2f} % lost, {:.0f} mm2\n", error.deg, error.mm,
-             fixture_faces(mesh, ideal, poses), 100.0 * lost_share(mesh, ideal), fixtures[0]["area_mm2"].get<double>());
 }
 
 INSTANTIATE_TEST_SUITE_P(TenObjects, OnFixtures, ::testing::Range(0, 10));
@@ -225,7 +185,6 @@ TEST(Fixtures, OfThreePosesAreFound) {
   const Scans scans = scans_of(poses);
   const auto model = model_of(scans, true);
   ASSERT_TRUE(model) << model.error().message;
-  fmt::print("{}\n{}\n{}\n", (*model->report)["pose_graph"].dump(), (*model->report)["pose_refinement"].dump(), (*model->report)["fixtures"].dump());
   for (const std::size_t p : {1U, 2U}) {
     EXPECT_LT(pose_error(*model, poses, p).deg, 0.015) << p;
     EXPECT_LT(pose_error(*model, poses, p).mm, 0.015) << p;
