@@ -10,7 +10,8 @@
 namespace scanrig {
 namespace {
 
-constexpr double kForgivenContradicted = 0.5;  ///< share of what was judged, while fixtures are part of the surface
+constexpr double kWholeContradicted = 0.5;     ///< share of what was judged, while fixtures are part of the surface
+constexpr double kRemainsContradicted = 0.25;  ///< the same after what a sketched motion tells of them was removed
 constexpr double kMaxFixtureHeight = 0.5;      ///< share of the pose's: what is higher is another object, not held
 constexpr double kMaxFixtureArea = 0.4;        ///< share of the pose's surface: likewise
 constexpr int kFixtureFirst = 2;  ///< unjudged surface is the fixture's up to this many times as far from it as from
@@ -240,14 +241,16 @@ std::vector<Eigen::Vector3f> remove_fixture(const Fixture& fixture, RangeImage& 
   return removed;
 }
 
-PoseOptions options_for_fixtures(PoseOptions options, bool is_removed) {
+PoseOptions options_for_fixtures(PoseOptions options, FixtureSurface surface) {
   options.stable_tangent_planes = false;
   options.point_pair_motions = std::max(options.point_pair_motions, kFixturePointPairMotions);
   options.voting.references = 500;
   options.voting.peaks = 6;
   options.rounds[0].keep = 200;
   options.rounds[1].keep = 32;
-  if (!is_removed) options.max_contradicted = std::max(options.max_contradicted, kForgivenContradicted);
+  if (surface == FixtureSurface::gone) return options;
+  const double forgiven = surface == FixtureSurface::whole ? kWholeContradicted : kRemainsContradicted;
+  options.max_contradicted = std::max(options.max_contradicted, forgiven);
   return options;
 }
 

@@ -50,8 +50,11 @@ std::vector<std::optional<Fixture>> find_fixtures(std::span<const PlacedPose> po
 /// points that were measured there, in the pose's frame.
 std::vector<Eigen::Vector3f> remove_fixture(const Fixture& fixture, RangeImage& range);
 
-/// For an object on a fixture: contact with the table is no tangent plane. `is_removed`: the fixtures' surface is gone;
-/// else the verdict forgives the part of the surface that a fixture may be.
-PoseOptions options_for_fixtures(PoseOptions options, bool is_removed);
+/// How much of the fixtures' surface is still measured.
+enum class FixtureSurface : std::uint8_t { whole, remains, gone };
+
+/// For an object on a fixture: contact with the table is no tangent plane, and the verdict forgives the part of the
+/// surface that may be the fixture's.
+PoseOptions options_for_fixtures(PoseOptions options, FixtureSurface surface);
 
 }  // namespace scanrig

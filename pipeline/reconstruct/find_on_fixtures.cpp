@@ -76,28 +76,31 @@ bool Reconstruction::State::shows_fixture(const FoundPoses& found) {
   return any_fixture(find_fixtures(placed));
 }
 
-/// As find_touching(), without contact. Twice: fixtures hide what they are until it is known how the object was turned
-/// over. `sketch`: that, if it is known already. A failure leaves the views as they were.
+/// As find_touching(), without contact. Fixtures hide what they are until it is known how the object was turned over,
+/// so that is sketched twice, with their surface and without most of it. `sketch`: the first, if it is known already. A
+/// failure leaves the views as they were.
 Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_on_fixtures(const PoseOptions& pose_options,
                                                                                   const FoundPoses* sketch,
                                                                                   Report& report,
                                                                                   const Context& context) {
   std::vector<std::vector<View>> measured;  // share their pixels
-  std::vector<PoseInput> inputs;
-  for (const PoseState& pose : poses) {
-    measured.push_back(pose.views);
-    inputs.push_back({.solid = pose.partial.mesh, .views = pose.views});
-  }
-  if (sketch != nullptr) {
-    remove_fixtures(sketch->model_from_pose);
-  } else {
-    const auto sketched = sketch_poses(inputs, options_for_fixtures(pose_options, false), context);
+  for (const PoseState& pose : poses) measured.push_back(pose.views);
+  const auto restore = [&] {
+    for (std::size_t p = 0; p < poses.size(); ++p) poses[p].views = measured[p];
+    drop_fixtures();
+  };
+  if (sketch != nullptr) remove_fixtures(sketch->model_from_pose);
+  for (const FixtureSurface surface : {FixtureSurface::whole, FixtureSurface::remains}) {
+    if (surface == FixtureSurface::whole && sketch != nullptr) continue;
+    std::vector<PoseInput> inputs;
+    for (const PoseState& pose : poses) inputs.push_back({.solid = pose.partial.mesh, .views = pose.views});
+    const auto sketched = sketch_poses(inputs, options_for_fixtures(pose_options, surface), context);
+    restore();
     if (!sketched) return pass_on(sketched);
     remove_fixtures(*sketched);
   }
-  auto found = find_touching(options_for_fixtures(pose_options, true), report, context);
-  for (std::size_t p = 0; p < poses.size(); ++p) poses[p].views = measured[p];
-  drop_fixtures();
+  auto found = find_touching(options_for_fixtures(pose_options, FixtureSurface::gone), report, context);
+  restore();
   if (found) remove_fixtures(found->model_from_pose);
   return found;
 }
