@@ -123,7 +123,7 @@ void settle(std::vector<Hypothesis>& field, const Scene& scene, const PoseOption
   const auto rivals = std::stable_partition(field.begin() + 1, field.end(), [&](const Hypothesis& h) {
     return is_rival(h.candidate, field[0].candidate, options);
   });
-  if (rivals - field.begin() < 2) return;
+  if (rivals - field.begin() < 2 && fits(field[0].candidate.agreement, scene.size_mm, options)) return;
   std::vector<Hypothesis> finalists(std::make_move_iterator(field.begin()), std::make_move_iterator(rivals));
   std::vector<Hypothesis> others(std::make_move_iterator(rivals), std::make_move_iterator(field.end()));
   SearchRound round = options.last_round;

@@ -38,7 +38,8 @@ void narrow(std::vector<Hypothesis>& field, const Scene& scene, const PoseOption
 /// Judges all with one tolerance, the spread of the best fitting hypothesis that covers enough; the best comes first.
 void judge(std::vector<Hypothesis>& field, const PoseOptions& options);
 
-/// Refines the candidates that are not yet separable at full resolution; the others stay behind these finalists.
+/// Refines the candidates that are not yet separable at full resolution, and a best one that would be refused as it is;
+/// the others stay behind these finalists.
 void settle(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options);
 
 double apart_deg(const Candidate& a, const Candidate& b);
