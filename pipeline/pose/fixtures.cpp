@@ -14,8 +14,6 @@ constexpr double kWholeContradicted = 0.5;     ///< share of what was judged, wh
 constexpr double kRemainsContradicted = 0.25;  ///< the same after what a sketched motion tells of them was removed
 constexpr double kMaxFixtureHeight = 0.5;      ///< share of the pose's: what is higher is another object, not held
 constexpr double kMaxFixtureArea = 0.4;        ///< share of the pose's surface: likewise
-constexpr int kFixtureFirst = 2;  ///< unjudged surface is the fixture's up to this many times as far from it as from
-                                  ///< the object: what is lost of the object is less than what stays of a pin
 constexpr int kFixturePointPairMotions = 200;  ///< they are the only proposals
 
 using CellKey = std::uint64_t;
@@ -124,45 +122,34 @@ std::vector<std::size_t> gone_from_table(const JudgedSurface& surface, double fo
   return all;
 }
 
-/// The fixture's cells, and those of unjudged surface that is nearer to it than to the object along the surface, or not
-/// much farther.
+/// The fixture's cells, and those of unjudged surface around them.
 std::vector<std::size_t> grown(const JudgedSurface& surface, std::vector<std::size_t> fixture,
                                const FixtureOptions& options) {
-  enum class Owner : std::uint8_t { open, held, object };
-  std::vector<Owner> owner(surface.size(), Owner::open);
-  for (const std::size_t i : fixture) owner[i] = Owner::held;
-  std::vector<std::size_t> of_fixture = fixture, of_object;
-  for (std::size_t i = 0; i < surface.size(); ++i) {
-    if (owner[i] != Owner::open || surface.seen(i) == Seen::unknown) continue;
-    owner[i] = Owner::object;
-    of_object.push_back(i);
-  }
-  const auto spread = [&](std::vector<std::size_t>& front, Owner who) {
+  std::vector<bool> is_held(surface.size(), false);
+  for (const std::size_t i : fixture) is_held[i] = true;
+  std::vector<std::size_t> front = fixture;
+  for (int step = 0; step < options.grown_steps; ++step) {
     std::vector<std::size_t> next;
     for (const std::size_t i : front) {
       surface.for_each_near(i, 2, [&](std::size_t j) {
-        if (owner[j] != Owner::open) return;
-        owner[j] = who;
+        if (is_held[j] || surface.seen(j) != Seen::unknown) return;
+        is_held[j] = true;
         next.push_back(j);
       });
     }
+    fixture.insert(fixture.end(), next.begin(), next.end());
     front = std::move(next);
-  };
-  for (int step = 0; step < options.grown_cells && !of_fixture.empty(); ++step) {
-    spread(of_fixture, Owner::held);
-    fixture.insert(fixture.end(), of_fixture.begin(), of_fixture.end());
-    if (step % kFixtureFirst == kFixtureFirst - 1) spread(of_object, Owner::object);
   }
   return fixture;
 }
 
-Fixture fixture_of(const JudgedSurface& surface, std::span<const std::size_t> cells) {
+Fixture fixture_of(const JudgedSurface& surface, std::span<const std::size_t> gone, const FixtureOptions& options) {
   Fixture fixture{.cell_mm = surface.cell_mm()};
-  for (const std::size_t i : cells) {
+  for (const std::size_t i : gone) fixture.height_mm = std::max(fixture.height_mm, surface.point(i).y());
+  for (const std::size_t i : grown(surface, {gone.begin(), gone.end()}, options)) {
     const double area = surface.area_mm2(i);
     fixture.area_mm2 += area;
     fixture.centre += area * surface.point(i);
-    fixture.height_mm = std::max(fixture.height_mm, surface.point(i).y());
     Eigen::Vector3i d;
     for (d.z() = -1; d.z() <= 1; ++d.z()) {
       for (d.y() = -1; d.y() <= 1; ++d.y()) {
@@ -172,8 +159,7 @@ Fixture fixture_of(const JudgedSurface& surface, std::span<const std::size_t> ce
   }
   fixture.centre /= fixture.area_mm2;
   std::ranges::sort(fixture.cells);
-  const auto doubled = std::ranges::unique(fixture.cells);
-  fixture.cells.erase(doubled.begin(), doubled.end());
+  fixture.cells.erase(std::unique(fixture.cells.begin(), fixture.cells.end()), fixture.cells.end());
   return fixture;
 }
 
@@ -213,9 +199,9 @@ std::vector<std::optional<Fixture>> find_fixtures(std::span<const PlacedPose> po
     std::vector<Seen> seen(points.size());
     for_each_in_blocks(points.size(), [&](std::size_t i) { seen[i] = seen_by(others, points[i], size_mm, options); });
     const JudgedSurface surface(std::move(points), std::move(seen), options.cell * size_mm);
-    auto gone = gone_from_table(surface, options.foot * size_mm, options);
+    const auto gone = gone_from_table(surface, options.foot * size_mm, options);
     if (gone.empty()) continue;
-    Fixture fixture = fixture_of(surface, grown(surface, std::move(gone), options));
+    Fixture fixture = fixture_of(surface, gone, options);
     if (can_be_one(fixture, surface)) fixtures[p] = std::move(fixture);
   }
   return fixtures;

@@ -16,7 +16,8 @@ struct FixtureOptions {
   double reach = 0.003;          ///< share of the object's size: surface nearer to another pose's is not gone there
   double spread = 0.0005;        ///< share of the object's size: error of that pose beside sigma
   int gap_cells = 3;             ///< gone surface across a gap of so many cells is one fixture
-  int grown_cells = 5;           ///< how far from gone surface a fixture reaches where no other pose judges
+  int grown_steps = 2;           ///< of two cells: how far a fixture reaches beyond gone surface where no other pose
+                                 ///< judges
   double foot = 0.04;            ///< share of the object's size: a fixture begins within this height of the table
   double min_height_mm = 2.0;    ///< lower ones are the table's reflection in the object's foot
   double min_area_mm2 = 10.0;    ///< smaller ones are not named
@@ -26,7 +27,7 @@ struct FixtureOptions {
 /// What held the object in one pose. In that pose's frame, mm.
 struct Fixture {
   double area_mm2 = 0.0;                             ///< of its measured surface
-  double height_mm = 0.0;                            ///< above the table
+  double height_mm = 0.0;                            ///< of what another pose looked through, above the table
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< of that surface
   double cell_mm = 0.0;                              ///< width of a cell
   std::vector<std::uint64_t> cells{};                ///< that its surface takes, and one around; sorted keys
@@ -40,9 +41,8 @@ struct PlacedPose {
 };
 
 /// The fixture of each pose, nothing where it has none: surface that another pose looked through, connected from the
-/// table up. Surface that no other pose judges belongs to the fixture or to the object by what it is connected with,
-/// whichever is nearer. What is seen as it is in all poses that look there is object, even if it is putty that was
-/// turned over with it. Same bits for any number of threads.
+/// table up, with what is next to it and no other pose judges. What is seen as it is in all poses that look there is
+/// object, even if it is putty that was turned over with it. Same bits for any number of threads.
 std::vector<std::optional<Fixture>> find_fixtures(std::span<const PlacedPose> poses,
                                                   const FixtureOptions& options = {});
 

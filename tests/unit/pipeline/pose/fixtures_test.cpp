@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <opencv2/core.hpp>
+
 #include "tests/unit/pipeline/pose/held_solids.h"
 #include "tests/unit/pipeline/pose/posed_scan.h"
 
