@@ -25,14 +25,7 @@ class CalibrationJob : public CalibratedRig {
   std::string sentence() { return loop->snapshot()->sentence; }
   /// The e-stop ends the view after `exposures` more; then it is released, and the rig is ready again.
   void estop_after(int exposures) {
-    rig.line.fires_before = exposures;
-    rig.line.at_fire = [this] {
-      rig.panel.set(&PanelInputs::estop_ok, false);
-      clock_waits_for([this] { return loop->snapshot()->machine == MachineState::error; });
-    };
-    rig.panel.press(&PanelInputs::start);
-    ASSERT_TRUE(wait_fault());
-    rig.panel.set(&PanelInputs::estop_ok, true);
+    start_until_estop(exposures);
     rig.panel.press(&PanelInputs::reset);
     ASSERT_TRUE(wait_ready());
   }

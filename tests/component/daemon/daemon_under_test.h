@@ -56,6 +56,17 @@ class Daemon : public scan_samples::FolderTest {
   bool wait_halted() {
     return rig.panel.wait_for_lamps([](const auto& l) { return l.amber && !l.busy && !l.start_lamp; });
   }
+  /// Presses Start; the e-stop ends the exposure after `exposures` more, then it is released.
+  void start_until_estop(int exposures) {
+    rig.line.fires_before = exposures;
+    rig.line.at_fire = [this] {
+      rig.panel.set(&PanelInputs::estop_ok, false);
+      clock_waits_for([this] { return loop->snapshot()->machine == MachineState::error; });
+    };
+    rig.panel.press(&PanelInputs::start);
+    EXPECT_TRUE(wait_fault());
+    rig.panel.set(&PanelInputs::estop_ok, true);
+  }
   bool wait_fault() {
     return rig.panel.wait_for_lamps([](const auto& l) { return l.red && !l.busy; });
   }

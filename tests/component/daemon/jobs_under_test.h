@@ -22,14 +22,7 @@ class Jobs : public Daemon {
   }
   /// Interrupts a scan of three views per pose by the e-stop, in the exposure after `views` of its first pose.
   std::string interrupted_after(int views) {
-    rig.line.fires_before = 2 * views;
-    rig.line.at_fire = [this] {
-      rig.panel.set(&PanelInputs::estop_ok, false);
-      clock_waits_for([this] { return loop->snapshot()->machine == MachineState::error; });
-    };
-    rig.panel.press(&PanelInputs::start);
-    EXPECT_TRUE(wait_fault());
-    rig.panel.set(&PanelInputs::estop_ok, true);
+    start_until_estop(2 * views);
     const auto id = newest()->id;
     EXPECT_TRUE(wait_state(id, JobState::interrupted));
     rig.panel.press(&PanelInputs::reset);

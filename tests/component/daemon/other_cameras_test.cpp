@@ -48,14 +48,7 @@ class OtherCameras : public Daemon {
   }
   /// A scan of three views per pose, interrupted by the e-stop after one.
   std::string interrupted() {
-    rig.line.fires_before = 2;
-    rig.line.at_fire = [this] {
-      rig.panel.set(&PanelInputs::estop_ok, false);
-      clock_waits_for([this] { return loop->snapshot()->machine == MachineState::error; });
-    };
-    rig.panel.press(&PanelInputs::start);
-    EXPECT_TRUE(wait_fault());
-    rig.panel.set(&PanelInputs::estop_ok, true);
+    start_until_estop(2);
     const auto id = newest()->id;
     EXPECT_TRUE(wait_state(id, JobState::interrupted));
     return id;
