@@ -107,13 +107,13 @@ Disagreement of_pose(std::size_t pose, std::string sentence) {
 }
 
 Disagreement of_fixture(std::size_t pose, const Fixture& fixture, bool is_expected) {
-  const char* advice = is_expected ? "" : " Poses fit better without contact: write fixture = true into its recipe.";
+  const char* advice = is_expected ? "" : " Write fixture = true into its recipe: then this is expected.";
   return {.pose = pose,
           .what = "fixture",
           .action = "left out",
           .amount = fixture.height_mm,
           .unit = "mm",
-          .sentence = fmt::format("In pose {} the object stood on a fixture {:.1f} mm high, which is left out of the "
+          .sentence = fmt::format("In pose {} the part stood on a fixture {:.1f} mm high, which is left out of the "
                                   "model.{}",
                                   pose + 1, fixture.height_mm, advice)};
 }

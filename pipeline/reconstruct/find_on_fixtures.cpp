@@ -19,7 +19,7 @@ bool any_fixture(std::span<const std::optional<Fixture>> fixtures) {
 }
 
 /// Failures of a search that a fixture explains: it contradicts, or leaves motions that fit as badly.
-bool may_be_a_fixtures(ErrorCode code) { return code == ErrorCode::no_overlap || code == ErrorCode::ambiguous; }
+bool fixture_may_explain(ErrorCode code) { return code == ErrorCode::no_overlap || code == ErrorCode::ambiguous; }
 
 /// Where the poses lie while their fixtures are part of the surface; two as the search has them first, fit they or not
 /// in one way alone.
@@ -124,7 +124,7 @@ Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_poses(Repo
   const auto before = disagreements;
   Report with_contact = report;
   auto found = find_touching(*pose_options, with_contact, context);
-  if (found ? shows_fixture(*found) : may_be_a_fixtures(found.error().code)) {
+  if (found ? shows_fixture(*found) : fixture_may_explain(found.error().code)) {
     const auto after = std::exchange(disagreements, before);
     const auto with_contact_fit = choices;
     Report without_contact = report;

@@ -174,7 +174,7 @@ TEST(Fixtures, AreFoundWithoutTheKeyAndTheRemarkAsksForIt) {
   EXPECT_EQ(remark["what"], "fixture");
   EXPECT_EQ(remark["action"], "left out");
   EXPECT_THAT(remark["sentence"].get<std::string>(),
-              ::testing::AllOf(::testing::HasSubstr("In pose 1 the object stood on a fixture"),
+              ::testing::AllOf(::testing::HasSubstr("In pose 1 the part stood on a fixture"),
                                ::testing::HasSubstr("fixture = true")));
 }
 

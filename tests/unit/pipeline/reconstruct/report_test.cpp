@@ -63,9 +63,9 @@ TEST(Report, NamesTheFixtureOfEachPoseThatHasOne) {
   EXPECT_EQ(json["fixtures"][0]["height_mm"], 12.25);
   EXPECT_EQ(json["fixtures"][0]["centre_mm"], nlohmann::json::array({1.0, 6.0, -2.0}));
   const std::string sentence = json["disagreements"][0]["sentence"];
-  EXPECT_EQ(sentence, "In pose 2 the object stood on a fixture 12.2 mm high, which is left out of the model.");
+  EXPECT_EQ(sentence, "In pose 2 the part stood on a fixture 12.2 mm high, which is left out of the model.");
   EXPECT_EQ(json["disagreements"][1]["sentence"],
-            sentence + " Poses fit better without contact: write fixture = true into its recipe.");
+            sentence + " Write fixture = true into its recipe: then this is expected.");
 }
 
 }  // namespace
