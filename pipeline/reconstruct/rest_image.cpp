@@ -102,9 +102,11 @@ Result<cv::Mat> draw_on_table(const Mesh& mesh, const Eigen::Quaterniond& rest_f
             static_cast<float>(calibration.table_radius_mm > 0.0 ? calibration.table_radius_mm : kUnknownTableMm));
   const auto renderer = MeshRenderer::create({.mesh = std::move(scene), .corner_uv = {}, .atlas = {}});
   if (!renderer) return pass_on(renderer);
-  const auto image = renderer->render(
-      eye, Transform::Identity(),
-      {.surface = Paint::vertex_colour, .supersample = options.supersample, .background = kBackground});
+  const auto image = renderer->render(eye, Transform::Identity(),
+                                      {.surface = Paint::vertex_colour,
+                                       .supersample = options.supersample,
+                                       .smooth_edges_only = true,
+                                       .background = kBackground});
   if (!image) return pass_on(image);
   return image->image;
 }

@@ -42,6 +42,33 @@ cv::Vec3b to_linear_bytes(const Eigen::Vector3f& linear) {
   return bytes;
 }
 
+/// A neighbour to the right, left, below or above has clearly another colour.
+bool is_at_edge(const cv::Mat3b& image, int y, int x) {
+  constexpr int kLevels = 12;
+  const cv::Vec3b& here = image(y, x);
+  const auto differs = [&](int row, int column) {
+    if (row < 0 || column < 0 || row >= image.rows || column >= image.cols) return false;
+    const cv::Vec3b& there = image(row, column);
+    return std::abs(here[0] - there[0]) > kLevels || std::abs(here[1] - there[1]) > kLevels ||
+           std::abs(here[2] - there[2]) > kLevels;
+  };
+  return differs(y, x + 1) || differs(y, x - 1) || differs(y + 1, x) || differs(y - 1, x);
+}
+
+Result<void> check(const TexturedMesh& mesh, const RenderOptions& options) {
+  if (options.supersample < 1 || options.supersample > 16) {
+    return fail(ErrorCode::invalid_input, "render: {} x {} rays per pixel; choose 1 to 16", options.supersample,
+                options.supersample);
+  }
+  if (options.surface == Paint::texture && (mesh.atlas.empty() || mesh.corner_uv.size() != mesh.mesh.faces.size())) {
+    return fail(ErrorCode::invalid_input, "render: the mesh has no texture");
+  }
+  if (options.surface == Paint::vertex_colour && mesh.mesh.colour.size() != mesh.mesh.vertices.size()) {
+    return fail(ErrorCode::invalid_input, "render: the mesh has no vertex colours");
+  }
+  return {};
+}
+
 }  // namespace
 
 MeshRenderer::MeshRenderer(TexturedMesh mesh, SurfaceIndex scene) : mesh_(std::move(mesh)), scene_(std::move(scene)) {}
@@ -76,17 +103,7 @@ Eigen::Vector3f MeshRenderer::normal(const SurfaceIndex::Hit& hit) const {
 
 Result<Rendering> MeshRenderer::render(const Camera& camera, const Transform& turntable_from_model,
                                        const RenderOptions& options) const {
-  if (options.supersample < 1 || options.supersample > 16) {
-    return fail(ErrorCode::invalid_input, "render: {} x {} rays per pixel; choose 1 to 16", options.supersample,
-                options.supersample);
-  }
-  if (options.surface == Paint::texture && (mesh_.atlas.empty() || mesh_.corner_uv.size() != mesh_.mesh.faces.size())) {
-    return fail(ErrorCode::invalid_input, "render: the mesh has no texture");
-  }
-  if (options.surface == Paint::vertex_colour && mesh_.mesh.colour.size() != mesh_.mesh.vertices.size()) {
-    return fail(ErrorCode::invalid_input, "render: the mesh has no vertex colours");
-  }
-
+  if (const auto drawable = check(mesh_, options); !drawable) return pass_on(drawable);
   const Transform camera_from_model = camera.camera_from_turntable * turntable_from_model;
   const Eigen::Vector3d centre = camera_from_model.inverse().translation();
   const Eigen::Vector3f background =
@@ -109,22 +126,33 @@ Result<Rendering> MeshRenderer::render(const Camera& camera, const Transform& tu
     const Eigen::Vector3d ray = camera_from_model.linear().transpose() * camera.ray({u, v});
     return std::pair(scene_.first_hit(centre, ray), ray);
   };
-  const int n = options.supersample;
+  const auto to_bytes = [&](const Eigen::Vector3f& linear) {
+    return options.as_photo ? to_linear_bytes(linear) : to_srgb(linear);
+  };
   parallel_for(static_cast<std::size_t>(size.height), [&](std::size_t row) {
     const int y = static_cast<int>(row);
     for (int x = 0; x < size.width; ++x) {
-      if (const auto [hit, ray] = cast(x, y); hit) {
-        out.depth(y, x) = static_cast<float>(hit->distance);
-        out.mask(y, x) = 255;
-      }
+      const auto [hit, ray] = cast(x, y);
+      out.image(y, x) = to_bytes(hit ? shade(*hit, ray) : background);
+      if (!hit) continue;
+      out.depth(y, x) = static_cast<float>(hit->distance);
+      out.mask(y, x) = 255;
+    }
+  });
+  const int n = options.supersample;
+  if (n == 1) return out;
+  const cv::Mat3b once = options.smooth_edges_only ? out.image.clone() : cv::Mat3b();
+  parallel_for(static_cast<std::size_t>(size.height), [&](std::size_t row) {
+    const int y = static_cast<int>(row);
+    for (int x = 0; x < size.width; ++x) {
+      if (options.smooth_edges_only && !is_at_edge(once, y, x)) continue;
       Eigen::Vector3f sum = Eigen::Vector3f::Zero();
       for (int k = 0; k < n * n; ++k) {
         const int column = k % n, line = k / n;
         const auto [hit, ray] = cast(x + (column + 0.5) / n - 0.5, y + (line + 0.5) / n - 0.5);
         sum += hit ? shade(*hit, ray) : background;
       }
-      sum /= static_cast<float>(n * n);
-      out.image(y, x) = options.as_photo ? to_linear_bytes(sum) : to_srgb(sum);
+      out.image(y, x) = to_bytes(sum / static_cast<float>(n * n));
     }
   });
   return out;

@@ -27,6 +27,8 @@ struct Exposure {
 struct RenderOptions {
   Paint surface = Paint::texture;
   int supersample = 1;  ///< n x n rays per pixel, their light averaged
+  /// Only where a neighbour has another colour; any other pixel takes the ray through its centre.
+  bool smooth_edges_only = false;
   cv::Vec3b background{0, 0, 0};
   /// Present: the image is linear light under the rig's lamps, for comparison with a photo. Absent: sRGB, unlit.
   std::optional<Exposure> as_photo = std::nullopt;

@@ -45,6 +45,34 @@ TEST(RenderTest, aTexelIsSeenExactlyAtItsPlaceOnTheSurface) {
   EXPECT_NEAR(moments.m01 / moments.m00, wanted.y(), 0.05);
 }
 
+TEST(RenderTest, onlyEdgesAreSmoothedIfAsked) {
+  PaintedScene scene;
+  scene.balls = {{{3.0, 45.0, -2.0}, 35.0}};
+  const auto renderer = MeshRenderer::create({scene.mesh(0.5), {}, {}});
+  ASSERT_TRUE(renderer);
+  const auto draw = [&](int supersample, bool edges_only) {
+    return renderer
+        ->render(rig_camera(0.0, 0.4, 0.2), Transform::Identity(),
+                 {.surface = Paint::grey, .supersample = supersample, .smooth_edges_only = edges_only})
+        ->image;
+  };
+  const cv::Mat3b once = draw(1, false), smooth = draw(3, false), edges = draw(3, true);
+  int at_edge = 0, elsewhere = 0;
+  for (int y = 0; y < once.rows; ++y) {
+    for (int x = 0; x < once.cols; ++x) {
+      if (edges(y, x) != once(y, x)) {
+        ++at_edge;
+        EXPECT_EQ(edges(y, x), smooth(y, x));
+      } else {
+        EXPECT_LE(cv::norm(smooth(y, x), once(y, x), cv::NORM_INF), 12.0) << "a visible step at " << x << ", " << y;
+        ++elsewhere;
+      }
+    }
+  }
+  EXPECT_GT(at_edge, 30);
+  EXPECT_GT(elsewhere, 20 * at_edge);
+}
+
 TEST(RenderTest, depthIsTheDistanceAlongTheCamerasAxis) {
   PaintedScene scene;
   scene.balls = {{{3.0, 45.0, -2.0}, 35.0}};
