@@ -22,19 +22,19 @@ struct Screen {
 
 float light_of(const cv::Vec3f& colour) { return colour[0] + colour[1] + colour[2]; }
 
-/// Share of the screen's chroma in a pixel: 0 grey, 1 the screen.
-class ScreenKey {
+/// Whether a pixel has less than a share of the screen's chroma: 0 is grey, 1 the screen.
+class LessThanScreen {
  public:
-  explicit ScreenKey(const Screen& screen)
-      : channel_(screen.channel), scale_(1.0f / static_cast<float>(screen.share - 1.0 / 3.0)) {}
-  float operator()(const cv::Vec3f& colour) const {
+  LessThanScreen(const Screen& screen, double share)
+      : channel_(screen.channel), limit_(static_cast<float>(1.0 / 3.0 + share * (screen.share - 1.0 / 3.0))) {}
+  bool operator()(const cv::Vec3f& colour) const {
     // Dark pixels are drawn towards grey by less than one grey level per channel.
-    return ((colour[channel_] + 1.0f) / (light_of(colour) + 3.0f) - 1.0f / 3.0f) * scale_;
+    return colour[channel_] + 1.0f < limit_ * (light_of(colour) + 3.0f);
   }
 
  private:
   int channel_;
-  float scale_;
+  float limit_;  ///< of the channel's share of the light
 };
 
 float median_of(std::vector<float>& values) {
@@ -106,12 +106,12 @@ cv::Mat3f smoothed(const cv::Mat& image) {
 
 /// The brightness up to which the pattern image's chroma is noise. Plain light shows the screen at the border; where
 /// the pattern image has another chroma there, it is dark and noisy, for the projector does not reach everywhere.
-float noise_level(const cv::Mat3f& pattern, const ScreenKey& key, const cv::Mat1b& object,
+float noise_level(const cv::Mat3f& pattern, const LessThanScreen& is_object, const cv::Mat1b& object,
                   const BlueScreenOptions& options) {
   std::vector<float> wrong;
   for_border(pattern.size(), options.border_px, [&](int x, int y) {
     const float light = light_of(pattern(y, x));
-    const bool is_lit = key(pattern(y, x)) < static_cast<float>(options.lit_key) && light > options.dark_level;
+    const bool is_lit = is_object(pattern(y, x)) && light > options.dark_level;
     if (is_lit && object(y, x) == 0) wrong.push_back(light);
   });
   if (wrong.empty()) return options.dark_level;
@@ -122,15 +122,16 @@ float noise_level(const cv::Mat3f& pattern, const ScreenKey& key, const cv::Mat1
 
 /// What the projector lights and what has not the screen's chroma then, gaps of the pattern included. Less than that at
 /// its edge, where pixels are mixed. `object`: what has another chroma than the screen in plain light.
-cv::Mat1b lit_object(const cv::Mat3f& smooth, const ScreenKey& key, const cv::Mat1b& object,
+cv::Mat1b lit_object(const cv::Mat3f& smooth, const Screen& screen, const cv::Mat1b& object,
                      const BlueScreenOptions& options) {
-  const float dark = noise_level(smooth, key, object, options);
+  const LessThanScreen is_object(screen, options.lit_key);
+  const float dark = noise_level(smooth, is_object, object, options);
   cv::Mat1b lit(smooth.size());
   for (int y = 0; y < lit.rows; ++y) {
     const cv::Vec3f* colour = smooth[y];
     uchar* out = lit[y];
     for (int x = 0; x < lit.cols; ++x) {
-      const bool is_lit = (key(colour[x]) < static_cast<float>(options.lit_key)) & (light_of(colour[x]) > dark);
+      const bool is_lit = is_object(colour[x]) & (light_of(colour[x]) > dark);
       out[x] = is_lit ? 255 : 0;
     }
   }
@@ -235,16 +236,14 @@ Result<cv::Mat1f> blue_screen_outline(const cv::Mat& image, const cv::Mat& patte
                 "check that the blue or green screen is in place",
                 100.0 * screen_colour.share);
   }
-  const ScreenKey key(screen_colour);
+  const LessThanScreen is_object(screen_colour, options.object_key);
   cv::Mat1b object(smooth.size());
   for (int y = 0; y < object.rows; ++y) {
     const cv::Vec3f* colour = smooth[y];
     uchar* out = object[y];
-    for (int x = 0; x < object.cols; ++x) {
-      out[x] = static_cast<double>(key(colour[x])) < options.object_key ? 255 : 0;
-    }
+    for (int x = 0; x < object.cols; ++x) out[x] = is_object(colour[x]) ? 255 : 0;
   }
-  if (!pattern.empty()) object |= lit_object(smoothed(pattern), key, object, options);
+  if (!pattern.empty()) object |= lit_object(smoothed(pattern), screen_colour, object, options);
   const int largest = remove_small_parts(
       object, 8, [&](int part) { return std::max<double>(options.min_hole_px, options.min_part_share * part); });
   if (largest < options.min_hole_px) {

@@ -101,16 +101,19 @@ cv::Mat1f contour_distance(const cv::Mat1f& field) {
 cv::Mat1f distance_beyond(const cv::Mat1f& outside_px, const cv::Rect& box) {
   cv::Mat1f larger(box.size());
   const int last_u = outside_px.cols - 1, last_v = outside_px.rows - 1;
+  const int begin = std::clamp(-box.x, 0, larger.cols), end = std::clamp(outside_px.cols - box.x, begin, larger.cols);
   for (int y = 0; y < larger.rows; ++y) {
     const int v = y + box.y, inner_v = std::clamp(v, 0, last_v);
-    const float down = static_cast<float>(v - inner_v);
-    const float* inner = outside_px[inner_v];
+    const float down = std::abs(static_cast<float>(v - inner_v));
+    const float* inner = outside_px[inner_v] + box.x;
     float* out = larger[y];
-    for (int x = 0; x < larger.cols; ++x) {
-      const int u = x + box.x, inner_u = std::clamp(u, 0, last_u);
-      const float right = static_cast<float>(u - inner_u);
-      out[x] = inner[inner_u] + std::sqrt(right * right + down * down);
-    }
+    const auto beside = [&](int x, int inner_u) {
+      const float right = static_cast<float>(x + box.x - inner_u);
+      out[x] = outside_px(inner_v, inner_u) + std::sqrt(right * right + down * down);
+    };
+    for (int x = 0; x < begin; ++x) beside(x, 0);
+    for (int x = begin; x < end; ++x) out[x] = inner[x] + down;
+    for (int x = end; x < larger.cols; ++x) beside(x, last_u);
   }
   return larger;
 }
