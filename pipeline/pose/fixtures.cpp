@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kWholeContradicted = 0.5;     ///< share of what was judged, while fixtures are part of the surface
 constexpr double kRemainsContradicted = 0.25;  ///< the same after what a sketched motion tells of them was removed
-constexpr double kMaxFixtureHeight = 0.5;      ///< share of the pose's: what is higher is another object, not held
+constexpr double kMaxFixtureHeight = 0.8;      ///< share of the pose's: what is higher is another object, not held
 constexpr double kMaxFixtureArea = 0.4;        ///< share of the pose's surface: likewise
 constexpr int kFixturePointPairMotions = 200;  ///< they are the only proposals
 

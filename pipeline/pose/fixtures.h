@@ -12,16 +12,16 @@
 namespace scanrig {
 
 struct FixtureOptions {
-  double cell = 0.01;            ///< width of the cells in which surface is judged, as a share of the object's size
-  double reach = 0.003;          ///< share of the object's size: surface nearer to another pose's is not gone there
-  double spread = 0.0005;        ///< share of the object's size: error of that pose beside sigma
-  int gap_cells = 3;             ///< gone surface across a gap of so many cells is one fixture
-  int grown_steps = 2;           ///< of two cells: how far a fixture reaches beyond gone surface where no other pose
-                                 ///< judges
-  double foot = 0.04;            ///< share of the object's size: a fixture begins within this height of the table
-  double min_height_mm = 2.0;    ///< lower ones are the table's reflection in the object's foot
-  double min_area_mm2 = 10.0;    ///< smaller ones are not named
-  AgreementOptions agreement{};  ///< of the checks
+  double cell = 0.01;          ///< width of the cells in which surface is judged, as a share of the object's size
+  double reach = 0.003;        ///< share of the object's size: surface nearer to another pose's is not gone there
+  double spread = 0.0005;      ///< share of the object's size: error of that pose beside sigma
+  int gap_cells = 3;           ///< gone surface across a gap of so many cells is one fixture
+  int grown_steps = 2;         ///< of two cells: how far a fixture reaches beyond gone surface where no other pose
+                               ///< judges
+  double foot = 0.04;          ///< share of the object's size: a fixture begins within this height of the table
+  double min_height_mm = 2.0;  ///< lower ones are the table's reflection in the object's foot
+  double min_area_mm2 = 10.0;  ///< smaller ones are not named
+  AgreementOptions agreement{.witnesses = 2};  ///< of the checks
 };
 
 /// What held the object in one pose. In that pose's frame, mm.

@@ -103,6 +103,18 @@ TEST(Fixtures, ThreePinsAreOneFixture) {
   }
 }
 
+/// It meets a leaning side far up.
+TEST(Fixtures, APinMayBeHigherThanHalfOfTheObject) {
+  HeldScan scan = on_putty();
+  constexpr double kHigh = 45.0;
+  const testing::Solid with_pin =
+      testing::together({scan.poses[0].all(), testing::upright_cylinder({0, 0, 34}, 3, kHigh)});
+  scan.views[0] = testing::turn_around(testing::bounded(with_pin, {0, 35, 0}, 75), 8, kPoseRig, 1);
+  const auto found = find_fixtures(scan.placed());
+  ASSERT_TRUE(found[0]);
+  EXPECT_NEAR(found[0]->height_mm, kHigh, 3.0);
+}
+
 TEST(Fixtures, AreNoneUnderAnObjectOnTheTable) {
   for (const auto& fixture : find_fixtures(held_scan(Holder::none, Holder::none).placed())) EXPECT_FALSE(fixture);
 }
