@@ -30,6 +30,21 @@ Result<void> decide(const std::vector<Hypothesis>& field, const Scene& scene, co
   return {};
 }
 
+/// What the rounds have left: searched for again where even the best contradicts, and turned where little holds a turn.
+/// Then verdicts weigh contradictions more, in `options`.
+void reconsider(std::vector<Hypothesis>& field, const PoseInput& pose1, const PoseInput& pose2, Scene& scene,
+                PoseOptions& options) {
+  if (field.empty()) return;
+  judge(field, options);
+  if (field[0].candidate.agreement.contradicted_share() > options.doubtful_contradicted) {
+    options.last_round.against = std::max(options.last_round.against, options.doubtful_against);
+    search_wider(field, pose1, pose2, options, scene);
+    judge(field, options);
+  }
+  const double condition = field[0].condition;
+  if (condition > options.weak_condition && condition < options.free_condition) turn_finely(field, scene, options);
+}
+
 Result<void> not_turned_over(const Transform& motion) {
   return fail(ErrorCode::same_rest,
               "pose estimation: the object was not turned over between the two poses, it only turned "
@@ -93,6 +108,13 @@ Result<void> resolve_rivals(std::vector<Hypothesis>& field, const PoseInput& pos
 
 }  // namespace
 
+RefineOptions after_search() {
+  RefineOptions options;
+  options.levels = 2;
+  options.capture = 0.02;
+  return options;
+}
+
 bool fits(const Agreement& t, double size_mm, const PoseOptions& options) {
   return t.confirmed >= options.min_overlap &&
          t.contradicted <= options.max_contradicted * (t.confirmed + t.contradicted) &&
@@ -124,7 +146,9 @@ Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose
     if (round.iterations == 0) estimate.refined = static_cast<int>(field.size());
     context.report("pose", static_cast<double>(++rounds_done) / static_cast<double>(options.rounds.size()));
   }
-  settle(field, *scene, options);
+  PoseOptions strict = options;
+  reconsider(field, pose1, pose2, *scene, strict);
+  settle(field, *scene, strict);
   if (auto ok = decide(field, *scene, options); !ok) return pass_on(ok);
   fitting = {field[0].candidate};
   for (const Candidate* rival : rivals_of(field, options)) fitting.push_back(*rival);

@@ -34,6 +34,9 @@ struct SearchRound {
   double reach;      ///< of the checks, as a share of the object's size
   std::size_t keep;  ///< best hypotheses that are kept
   double apart_deg;  ///< minimum angle between them
+  /// Weight of a contradiction beside a confirmation. The better aligned, the more it tells: of a part that is nearly
+  /// symmetric a wrong motion may confirm three times as much surface as the right one.
+  double against;
 };
 
 struct PoseOptions {
@@ -41,24 +44,28 @@ struct PoseOptions {
   Rests rests = Rests::hull;
   StableRestOptions stable;
   RestPairOptions pairs;
-  bool stable_tangent_planes = true;  ///< the paper's way
-  bool point_pairs = true;            ///< global search without rests, for an object on putty or pins
-  double same_deg = 10.0;             ///< hypotheses closer than this are one
-  double same_rest_tilt_deg = 5.0;    ///< a motion that tilts the object less than this has not turned it over
-  double min_overlap = 0.06;          ///< confirmed share of both surfaces
-  double max_contradicted = 0.1;      ///< contradicted share of what was judged
-  double max_median = 0.006;          ///< median distance as a share of the object's size
-  double rival_share = 0.7;           ///< a rival confirms at least this share of what the best one confirms
-  double same_shift = 0.05;           ///< hypotheses closer than this share of the object's size are one
+  bool stable_tangent_planes = true;     ///< the paper's way
+  bool point_pairs = true;               ///< global search without rests, for an object on putty or pins
+  double same_deg = 10.0;                ///< hypotheses closer than this are one
+  double same_rest_tilt_deg = 5.0;       ///< a motion that tilts the object less than this has not turned it over
+  double min_overlap = 0.06;             ///< confirmed share of both surfaces
+  double max_contradicted = 0.1;         ///< contradicted share of what was judged
+  double doubtful_contradicted = 0.065;  ///< a best motion beyond this share is searched for again, more widely
+  double doubtful_against = 7.0;         ///< `against` of the verdicts then
+  double weak_condition = 3e3;           ///< a best motion beyond this is turned about its weakest axis, ...
+  double free_condition = 2e5;           ///< ... unless the shape leaves that turn or slide open
+  double max_median = 0.006;             ///< median distance as a share of the object's size
+  double rival_share = 0.7;              ///< a rival confirms at least this share of what the best one confirms
+  double same_shift = 0.05;              ///< hypotheses closer than this share of the object's size are one
 
   int levels = 4;                ///< of the range pyramid; the last has some 300 samples per pose
   std::size_t min_samples = 50;  ///< of a pose's measured surface on the second last level
   int point_pair_motions = 40;   ///< hypotheses from point pairs
-  std::array<SearchRound, 4> rounds = {{{3, 0, 0.00, 0.050, 120, 4.0},   // as proposed
-                                        {3, 10, 0.10, 0.040, 16, 5.0},   // coarse
-                                        {2, 15, 0.05, 0.025, 8, 5.0},    // middle
-                                        {1, 15, 0.02, 0.015, 8, 5.0}}};  // verdict
-  SearchRound last_round = {0, 10, 0.01, 0.015, 0, 0.0};  ///< for rivals; keeps all that are `same_deg` apart
+  std::array<SearchRound, 4> rounds = {{{3, 0, 0.00, 0.050, 120, 4.0, 1.0},   // as proposed
+                                        {3, 10, 0.10, 0.040, 16, 5.0, 1.0},   // coarse
+                                        {2, 15, 0.05, 0.025, 8, 5.0, 1.0},    // middle
+                                        {1, 15, 0.02, 0.015, 8, 5.0, 1.0}}};  // verdict
+  SearchRound last_round = {0, 10, 0.01, 0.015, 0, 0.0, 2.0};  ///< for rivals; keeps all that are `same_deg` apart
   AgreementOptions agreement;
   PointPairOptions voting;
   SymmetryOptions symmetry;
@@ -116,6 +123,10 @@ Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose
 /// they are an answer: other poses may decide between them.
 Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose2, const PoseOptions& options,
                                    const Context& context, std::vector<Candidate>& fitting);
+
+/// For the refinement of a motion that was found by a search, so a fraction of a degree off: coarser levels would lose
+/// a turn that a small part of the object alone holds.
+RefineOptions after_search();
 
 /// Whether two poses that agree so much fit together. `size_mm`: of the object.
 bool fits(const Agreement& agreement, double size_mm, const PoseOptions& options);

@@ -1,5 +1,6 @@
 #include "pipeline/pose/pose_search.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -17,13 +18,27 @@ bool alike(const Transform& a, const Transform& b, const Scene& scene, double de
 }
 
 /// Confirmations fade with the distance: a ranking for motions that are still degrees off.
-double soft_score(const std::vector<SampleCheck>& sample_checks, double reach_mm) {
+double soft_score(const std::vector<SampleCheck>& sample_checks, double reach_mm, double against) {
   double sum = 0.0;
   for (const SampleCheck& t : sample_checks) {
-    if (t.kind == SampleCheck::Kind::free_space) sum -= 1.0;
+    if (t.kind == SampleCheck::Kind::free_space) sum -= against;
     if (t.kind == SampleCheck::Kind::surface) sum += 1.0 - std::abs(t.distance_mm) / reach_mm;
   }
   return sum / static_cast<double>(std::max<std::size_t>(sample_checks.size(), 1));
+}
+
+/// The turn that the surfaces' correspondences hold least.
+FreeTurn weakest_turn(const RefinedPose& aligned) {
+  using Matrix6 = Eigen::Matrix<double, 6, 6>;
+  const double trace = aligned.information.trace();
+  if (!(trace > 0.0)) return {};
+  const Matrix6 covariance = (aligned.information + 1e-9 * trace * Matrix6::Identity()).inverse();
+  const PrincipalSigmas turns = principal_sigmas(covariance.topLeftCorner<3, 3>());
+  const Eigen::Vector3d axis = turns.directions.col(0);
+  // The motion of the centre that goes with the turn says where the axis is.
+  Eigen::Vector3d slide = covariance.bottomLeftCorner<3, 3>() * axis / (turns.sigma[0] * turns.sigma[0]);
+  slide -= axis * axis.dot(slide);
+  return {axis, aligned.centre + axis.cross(slide)};
 }
 
 /// Patches that contradict `second` and not `first`.
@@ -77,11 +92,12 @@ void narrow(std::vector<Hypothesis>& field, const Scene& scene, const PoseOption
                                         round.capture * scene.size_mm, refine);
       h.candidate.pose1_from_pose2 = aligned.pose1_from_pose2;
       h.condition = aligned.condition;
+      h.weakest = weakest_turn(aligned);
     }
     const double reach = round.reach * scene.size_mm;
     h.sample_checks = check_samples(scene.observations1, scene.observations2, h.candidate.pose1_from_pose2, round.level,
                                     reach, options.agreement);
-    h.score = soft_score(h.sample_checks, reach);
+    h.score = soft_score(h.sample_checks, reach, round.against);
   });
   std::stable_sort(field.begin(), field.end(),
                    [](const Hypothesis& a, const Hypothesis& b) { return a.score > b.score; });
@@ -105,8 +121,9 @@ void judge(std::vector<Hypothesis>& field, const PoseOptions& options) {
     if (loose.confirmed > options.min_overlap) spread = std::min(spread, 1.4826 * loose.median_mm);
   }
   for (Hypothesis& h : field) h.candidate.agreement = count_agreement(h.sample_checks, spread, options.agreement);
-  std::stable_sort(field.begin(), field.end(), [](const Hypothesis& a, const Hypothesis& b) {
-    return a.candidate.agreement.score() > b.candidate.agreement.score();
+  const double against = options.last_round.against;
+  std::stable_sort(field.begin(), field.end(), [against](const Hypothesis& a, const Hypothesis& b) {
+    return a.candidate.agreement.score(against) > b.candidate.agreement.score(against);
   });
   for (Hypothesis& h : field) {
     const AgreementGap with_best = compare(field[0].sample_checks, h.sample_checks, spread, options.agreement);

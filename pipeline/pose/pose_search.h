@@ -13,6 +13,7 @@ struct Hypothesis {
   std::vector<SampleCheck> sample_checks;
   double score = 0.0;
   double condition = 0.0;
+  FreeTurn weakest{};  ///< the turn that the shared surface holds least
 };
 
 /// Inputs of the search from both poses.
@@ -37,6 +38,16 @@ void narrow(std::vector<Hypothesis>& field, const Scene& scene, const PoseOption
 
 /// Judges all with one tolerance, the spread of the best fitting hypothesis that covers enough; the best comes first.
 void judge(std::vector<Hypothesis>& field, const PoseOptions& options);
+
+/// For a best one that is judged and that still contradicts more than a right one does: proposes all turns of the best
+/// ones about the axes that are held least as well, and keeps more of all in each round. Of the whole field the best
+/// distinct ones are kept.
+void search_wider(std::vector<Hypothesis>& field, const PoseInput& pose1, const PoseInput& pose2,
+                  const PoseOptions& options, Scene& scene);
+
+/// The best one again from some degrees to either side about the axis that is held least: a small part that alone holds
+/// a turn is missed from far.
+void turn_finely(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options);
 
 /// Refines the candidates that are not yet separable at full resolution, and a best one that would be refused as it is;
 /// the others stay behind these finalists.

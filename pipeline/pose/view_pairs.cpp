@@ -27,7 +27,7 @@ double ranking(const std::vector<SampleCheck>& checks, double reach_mm) {
 }
 
 /// Confirmed surface, less what contradicts: Kruskal's order.
-double quality(const Agreement& a) { return std::max(a.score(), 0.0); }
+double quality(const Agreement& a) { return std::max(a.score(2.0), 0.0); }
 
 /// How far single pixels lie off the line between their neighbours in a row: noise, and relief as fine as that.
 double roughness_mm(const RangeImage& image) {

@@ -32,7 +32,7 @@ std::vector<Contact> carried(std::vector<Contact> contacts, const Transform& ele
 }
 
 RefineOptions Reconstruction::State::refine_options() const {
-  RefineOptions refinement;
+  RefineOptions refinement = after_search();
   if (calibration) {
     const RegistrationOptions known = registration_options(*calibration);
     refinement.axis = {to_radians(known.axis_tilt_sigma_deg), known.axis_shift_sigma_mm};

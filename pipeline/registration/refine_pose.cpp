@@ -89,7 +89,7 @@ Result<RefinedPose> refine_pose(std::span<const View> views1, std::span<const Vi
   }
   RefinedPose refined;
   Transform start = pose1_from_pose2;
-  double capture = options.capture_mm;
+  double capture = std::min(options.capture_mm, options.capture * pose1.size_mm);
   for (int level = options.levels - 1; level >= 0; --level) {
     if (context.stopped()) return fail(ErrorCode::stopped, "pose refinement: stopped");
     refined = align(pose1, pose2, start, level, capture, options);

@@ -26,6 +26,7 @@ struct FreeTurn {
 
 struct RefineOptions {
   double capture_mm = 12.0;  ///< farthest distance between corresponding surfaces at the start
+  double capture = 1.0;      ///< the same as a share of the object's size; the lesser of both holds
   double keep = 0.8;         ///< share of the correspondences that is used, the closest ones
   int levels = 3;
   int max_iterations = 25;  ///< maximum Gauss-Newton steps per level

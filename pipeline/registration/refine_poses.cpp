@@ -210,7 +210,8 @@ Result<RefinedPoses> refine_poses(std::span<const std::span<const View>> poses,
     a.arm += 0.5 * a.measured.back().size_mm / static_cast<double>(poses.size());
   }
   for (const PoseLink& link : links) {
-    Tie& tie = a.ties.emplace_back(Tie{.link = link, .options = options, .capture = options.capture_mm});
+    Tie& tie = a.ties.emplace_back(
+        Tie{.link = link, .options = options, .capture = std::min(options.capture_mm, 2.0 * options.capture * a.arm)});
     tie.options.contacts = link.contacts;
     tie.options.held = link.held;
   }

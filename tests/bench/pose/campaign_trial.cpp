@@ -279,7 +279,7 @@ void find_pose(const Truth& truth, const ScannedPose& one, const ScannedPose& tw
                           {"of", to_string(estimate->symmetry.of)},
                           {"fold", estimate->symmetry.fold}};
   }
-  RefineOptions refinement;
+  RefineOptions refinement = after_search();
   refinement.contacts = estimate->best.contacts;
   refinement.held = estimate->symmetry.free_turns();
   const RegistrationOptions known = registration_options(rig.calibration);
