@@ -60,7 +60,9 @@ struct Agreement {
   double contradicted = 0.0;  ///< in free space, or off the surface by more than its tolerance
   double free_space = 0.0;    ///< the part of `contradicted` that lies in free space
   double median_mm = 0.0;     ///< of the distances to the surface; NaN without any
-  [[nodiscard]] double score(double against) const { return confirmed - against * contradicted; }
+  [[nodiscard]] double score(double contradiction_weight) const {
+    return confirmed - contradiction_weight * contradicted;
+  }
   /// Of what was judged.
   [[nodiscard]] double contradicted_share() const { return contradicted / std::max(confirmed + contradicted, 1e-9); }
 };

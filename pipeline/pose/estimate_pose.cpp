@@ -36,8 +36,9 @@ void reconsider(std::vector<Hypothesis>& field, const PoseInput& pose1, const Po
                 PoseOptions& options) {
   if (field.empty()) return;
   judge(field, options);
-  if (field[0].candidate.agreement.contradicted_share() > options.doubtful_contradicted) {
-    options.last_round.against = std::max(options.last_round.against, options.doubtful_against);
+  if (field[0].candidate.agreement.contradicted_share() > options.search_again_contradicted) {
+    options.last_round.contradiction_weight =
+        std::max(options.last_round.contradiction_weight, options.search_again_weight);
     search_wider(field, pose1, pose2, options, scene);
     judge(field, options);
   }

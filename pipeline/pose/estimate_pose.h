@@ -34,9 +34,9 @@ struct SearchRound {
   double reach;      ///< of the checks, as a share of the object's size
   std::size_t keep;  ///< best hypotheses that are kept
   double apart_deg;  ///< minimum angle between them
-  /// Weight of a contradiction beside a confirmation. The better aligned, the more it tells: of a part that is nearly
-  /// symmetric a wrong motion may confirm three times as much surface as the right one.
-  double against;
+  /// A contradiction counts as much as so many confirmations. The better aligned, the more it tells: of a part that is
+  /// nearly symmetric a wrong motion may confirm three times as much surface as the right one.
+  double contradiction_weight;
 };
 
 struct PoseOptions {
@@ -44,19 +44,19 @@ struct PoseOptions {
   Rests rests = Rests::hull;
   StableRestOptions stable;
   RestPairOptions pairs;
-  bool stable_tangent_planes = true;     ///< the paper's way
-  bool point_pairs = true;               ///< global search without rests, for an object on putty or pins
-  double same_deg = 10.0;                ///< hypotheses closer than this are one
-  double same_rest_tilt_deg = 5.0;       ///< a motion that tilts the object less than this has not turned it over
-  double min_overlap = 0.06;             ///< confirmed share of both surfaces
-  double max_contradicted = 0.1;         ///< contradicted share of what was judged
-  double doubtful_contradicted = 0.065;  ///< a best motion beyond this share is searched for again, more widely
-  double doubtful_against = 7.0;         ///< `against` of the verdicts then
-  double weak_condition = 3e3;           ///< a best motion beyond this is turned about its weakest axis, ...
-  double free_condition = 2e5;           ///< ... unless the shape leaves that turn or slide open
-  double max_median = 0.006;             ///< median distance as a share of the object's size
-  double rival_share = 0.7;              ///< a rival confirms at least this share of what the best one confirms
-  double same_shift = 0.05;              ///< hypotheses closer than this share of the object's size are one
+  bool stable_tangent_planes = true;         ///< the paper's way
+  bool point_pairs = true;                   ///< global search without rests, for an object on putty or pins
+  double same_deg = 10.0;                    ///< hypotheses closer than this are one
+  double same_rest_tilt_deg = 5.0;           ///< a motion that tilts the object less than this has not turned it over
+  double min_overlap = 0.06;                 ///< confirmed share of both surfaces
+  double max_contradicted = 0.1;             ///< contradicted share of what was judged
+  double search_again_contradicted = 0.065;  ///< a best motion beyond this share is searched for again, more widely
+  double search_again_weight = 7.0;          ///< `contradiction_weight` of the verdicts then
+  double weak_condition = 3e3;               ///< a best motion beyond this is turned about its weakest axis, ...
+  double free_condition = 2e5;               ///< ... unless the shape leaves that turn or slide open
+  double max_median = 0.006;                 ///< median distance as a share of the object's size
+  double rival_share = 0.7;                  ///< a rival confirms at least this share of what the best one confirms
+  double same_shift = 0.05;                  ///< hypotheses closer than this share of the object's size are one
 
   int levels = 4;                ///< of the range pyramid; the last has some 300 samples per pose
   std::size_t min_samples = 50;  ///< of a pose's measured surface on the second last level

@@ -235,7 +235,7 @@ PoseOptions options_for_fixtures(PoseOptions options, FixtureSurface surface) {
   options.rounds[0].keep = 200;
   options.rounds[1].keep = 32;
   // What is left of a fixture contradicts a right motion, and would decide a turn that little else holds.
-  options.doubtful_contradicted = 1.0;
+  options.search_again_contradicted = 1.0;
   options.weak_condition = options.free_condition;
   if (surface == FixtureSurface::gone) return options;
   const double forgiven = surface == FixtureSurface::whole ? kWholeContradicted : kRemainsContradicted;

@@ -18,10 +18,10 @@ bool alike(const Transform& a, const Transform& b, const Scene& scene, double de
 }
 
 /// Confirmations fade with the distance: a ranking for motions that are still degrees off.
-double soft_score(const std::vector<SampleCheck>& sample_checks, double reach_mm, double against) {
+double soft_score(const std::vector<SampleCheck>& sample_checks, double reach_mm, double weight) {
   double sum = 0.0;
   for (const SampleCheck& t : sample_checks) {
-    if (t.kind == SampleCheck::Kind::free_space) sum -= against;
+    if (t.kind == SampleCheck::Kind::free_space) sum -= weight;
     if (t.kind == SampleCheck::Kind::surface) sum += 1.0 - std::abs(t.distance_mm) / reach_mm;
   }
   return sum / static_cast<double>(std::max<std::size_t>(sample_checks.size(), 1));
@@ -97,7 +97,7 @@ void narrow(std::vector<Hypothesis>& field, const Scene& scene, const PoseOption
     const double reach = round.reach * scene.size_mm;
     h.sample_checks = check_samples(scene.observations1, scene.observations2, h.candidate.pose1_from_pose2, round.level,
                                     reach, options.agreement);
-    h.score = soft_score(h.sample_checks, reach, round.against);
+    h.score = soft_score(h.sample_checks, reach, round.contradiction_weight);
   });
   std::stable_sort(field.begin(), field.end(),
                    [](const Hypothesis& a, const Hypothesis& b) { return a.score > b.score; });
@@ -121,9 +121,9 @@ void judge(std::vector<Hypothesis>& field, const PoseOptions& options) {
     if (loose.confirmed > options.min_overlap) spread = std::min(spread, 1.4826 * loose.median_mm);
   }
   for (Hypothesis& h : field) h.candidate.agreement = count_agreement(h.sample_checks, spread, options.agreement);
-  const double against = options.last_round.against;
-  std::stable_sort(field.begin(), field.end(), [against](const Hypothesis& a, const Hypothesis& b) {
-    return a.candidate.agreement.score(against) > b.candidate.agreement.score(against);
+  const double weight = options.last_round.contradiction_weight;
+  std::stable_sort(field.begin(), field.end(), [weight](const Hypothesis& a, const Hypothesis& b) {
+    return a.candidate.agreement.score(weight) > b.candidate.agreement.score(weight);
   });
   for (Hypothesis& h : field) {
     const AgreementGap with_best = compare(field[0].sample_checks, h.sample_checks, spread, options.agreement);

@@ -51,7 +51,7 @@ void search_wider(std::vector<Hypothesis>& field, const PoseInput& pose1, const 
   field.insert(field.end(), std::make_move_iterator(proposed->begin()), std::make_move_iterator(proposed->end()));
   SearchRound verdict = options.rounds.back();
   verdict.iterations = 0;
-  verdict.against = options.last_round.against;
+  verdict.contradiction_weight = options.last_round.contradiction_weight;
   narrow(field, scene, options, verdict);
 }
 
@@ -65,9 +65,9 @@ void turn_finely(std::vector<Hypothesis>& field, const Scene& scene, const PoseO
   std::vector<Hypothesis> all = {field[0]};
   all.insert(all.end(), std::make_move_iterator(turns.begin()), std::make_move_iterator(turns.end()));
   judge(all, options);
-  const double against = options.last_round.against;
-  const double best = all[0].candidate.agreement.score(against);
-  if (best > field[0].candidate.agreement.score(against) + kGain) field[0] = std::move(all[0]);
+  const double weight = options.last_round.contradiction_weight;
+  const double best = all[0].candidate.agreement.score(weight);
+  if (best > field[0].candidate.agreement.score(weight) + kGain) field[0] = std::move(all[0]);
 }
 
 }  // namespace scanrig

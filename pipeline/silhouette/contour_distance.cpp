@@ -105,14 +105,14 @@ cv::Mat1f distance_beyond(const cv::Mat1f& outside_px, const cv::Rect& box) {
   for (int y = 0; y < larger.rows; ++y) {
     const int v = y + box.y, inner_v = std::clamp(v, 0, last_v);
     const float down = std::abs(static_cast<float>(v - inner_v));
-    const float* inner = outside_px[inner_v] + box.x;
+    const float* inner = outside_px[inner_v];
     float* out = larger[y];
     const auto beside = [&](int x, int inner_u) {
       const float right = static_cast<float>(x + box.x - inner_u);
-      out[x] = outside_px(inner_v, inner_u) + std::sqrt(right * right + down * down);
+      out[x] = inner[inner_u] + std::sqrt(right * right + down * down);
     };
     for (int x = 0; x < begin; ++x) beside(x, 0);
-    for (int x = begin; x < end; ++x) out[x] = inner[x] + down;
+    for (int x = begin; x < end; ++x) out[x] = inner[x + box.x] + down;
     for (int x = end; x < larger.cols; ++x) beside(x, last_u);
   }
   return larger;
