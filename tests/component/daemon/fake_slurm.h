@@ -46,10 +46,11 @@ echo $tasks > jobs/$id/tasks
 echo RUNNING > jobs/$id/state
 if [ -e blind ]; then echo 66 > jobs/$id/exit; echo FAILED > jobs/$id/state; echo $id; exit; fi
 setsid sh -c "
+echo \$\$ > jobs/$id/pid
 for task in \$(seq 0 $tasks); do SLURM_ARRAY_TASK_ID=\$task sh jobs/$id/script; code=\$?; done > jobs/$id/out 2>&1
 echo \$code > jobs/$id/exit
 if [ \$code = 0 ]; then echo COMPLETED > jobs/$id/state; else echo FAILED > jobs/$id/state; fi" > /dev/null 2>&1 &
-echo $! > jobs/$id/pid
+while [ ! -s jobs/$id/pid ]; do sleep 0.01; done
 if [ -e deaf ]; then rm deaf; exec sleep 600; fi
 echo $id
 )sh");
