@@ -30,20 +30,16 @@ Result<void> decide(const std::vector<Hypothesis>& field, const Scene& scene, co
   return {};
 }
 
-/// What the rounds have left: searched for again where even the best contradicts, and turned where little holds a turn.
-/// Then verdicts weigh contradictions more, in `options`.
-void reconsider(std::vector<Hypothesis>& field, const PoseInput& pose1, const PoseInput& pose2, Scene& scene,
-                PoseOptions& options) {
+/// The verdict on what the rounds have left; searched for again where even the best contradicts.
+void conclude(std::vector<Hypothesis>& field, const PoseInput& pose1, const PoseInput& pose2, Scene& scene,
+              const PoseOptions& options) {
   if (field.empty()) return;
   judge(field, options);
-  if (field[0].candidate.agreement.contradicted_share() > options.search_again_contradicted) {
-    options.last_round.contradiction_weight =
-        std::max(options.last_round.contradiction_weight, options.search_again_weight);
-    search_wider(field, pose1, pose2, options, scene);
-    judge(field, options);
-  }
-  const double condition = field[0].condition;
-  if (condition > options.weak_condition && condition < options.free_condition) turn_finely(field, scene, options);
+  if (field[0].condition > options.weak_condition) search_turns(field, scene, options);
+  settle(field, scene, options);
+  if (field[0].candidate.agreement.contradicted_share() <= options.search_again_contradicted) return;
+  search_wider(field, pose1, pose2, options, scene);
+  settle(field, scene, options);
 }
 
 Result<void> not_turned_over(const Transform& motion) {
@@ -113,6 +109,8 @@ RefineOptions after_search() {
   RefineOptions options;
   options.levels = 2;
   options.capture = 0.02;
+  options.keep = 1.0;
+  options.robust_scales = 10.0;
   return options;
 }
 
@@ -147,9 +145,7 @@ Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose
     if (round.iterations == 0) estimate.refined = static_cast<int>(field.size());
     context.report("pose", static_cast<double>(++rounds_done) / static_cast<double>(options.rounds.size()));
   }
-  PoseOptions strict = options;
-  reconsider(field, pose1, pose2, *scene, strict);
-  settle(field, *scene, strict);
+  conclude(field, pose1, pose2, *scene, options);
   if (auto ok = decide(field, *scene, options); !ok) return pass_on(ok);
   fitting = {field[0].candidate};
   for (const Candidate* rival : rivals_of(field, options)) fitting.push_back(*rival);

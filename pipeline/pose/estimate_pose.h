@@ -50,10 +50,8 @@ struct PoseOptions {
   double same_rest_tilt_deg = 5.0;           ///< a motion that tilts the object less than this has not turned it over
   double min_overlap = 0.06;                 ///< confirmed share of both surfaces
   double max_contradicted = 0.1;             ///< contradicted share of what was judged
-  double search_again_contradicted = 0.065;  ///< a best motion beyond this share is searched for again, more widely
-  double search_again_weight = 7.0;          ///< `contradiction_weight` of the verdicts then
-  double weak_condition = 3e3;               ///< a best motion beyond this is turned about its weakest axis, ...
-  double free_condition = 2e5;               ///< ... unless the shape leaves that turn or slide open
+  double search_again_contradicted = 0.012;  ///< a best motion beyond this share is searched for again, more widely
+  double weak_condition = 3e3;               ///< a motion beyond this is tried along what is held least
   double max_median = 0.006;                 ///< median distance as a share of the object's size
   double rival_share = 0.7;                  ///< a rival confirms at least this share of what the best one confirms
   double same_shift = 0.05;                  ///< hypotheses closer than this share of the object's size are one
@@ -65,7 +63,7 @@ struct PoseOptions {
                                         {3, 10, 0.10, 0.040, 16, 5.0, 1.0},   // coarse
                                         {2, 15, 0.05, 0.025, 8, 5.0, 1.0},    // middle
                                         {1, 15, 0.02, 0.015, 8, 5.0, 1.0}}};  // verdict
-  SearchRound last_round = {0, 10, 0.01, 0.015, 0, 0.0, 2.0};  ///< for rivals; keeps all that are `same_deg` apart
+  SearchRound last_round = {0, 10, 0.01, 0.015, 0, 0.0, 7.0};  ///< for rivals; keeps all that are `same_deg` apart
   AgreementOptions agreement;
   PointPairOptions voting;
   SymmetryOptions symmetry;
@@ -124,8 +122,8 @@ Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose
 Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose2, const PoseOptions& options,
                                    const Context& context, std::vector<Candidate>& fitting);
 
-/// For the refinement of a motion that was found by a search, so a fraction of a degree off: coarser levels would lose
-/// a turn that a small part of the object alone holds.
+/// For the refinement of a motion that was found by a search, so a fraction of a degree off: coarser levels, trimming
+/// and narrow robust weights would lose a turn that a small part of the object alone holds.
 RefineOptions after_search();
 
 /// Whether two poses that agree so much fit together. `size_mm`: of the object.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <unordered_map>
 #include <utility>
 
@@ -10,6 +11,7 @@
 namespace scanrig {
 namespace {
 
+constexpr double kContradictionWeight = 2.0;
 constexpr double kWholeContradicted = 0.5;     ///< share of what was judged, while fixtures are part of the surface
 constexpr double kRemainsContradicted = 0.25;  ///< the same after what a sketched motion tells of them was removed
 constexpr double kMaxFixtureHeight = 0.8;      ///< share of the pose's: what is higher is another object, not held
@@ -236,7 +238,8 @@ PoseOptions options_for_fixtures(PoseOptions options, FixtureSurface surface) {
   options.rounds[1].keep = 32;
   // What is left of a fixture contradicts a right motion, and would decide a turn that little else holds.
   options.search_again_contradicted = 1.0;
-  options.weak_condition = options.free_condition;
+  options.weak_condition = std::numeric_limits<double>::infinity();
+  options.last_round.contradiction_weight = kContradictionWeight;
   if (surface == FixtureSurface::gone) return options;
   const double forgiven = surface == FixtureSurface::whole ? kWholeContradicted : kRemainsContradicted;
   options.max_contradicted = std::max(options.max_contradicted, forgiven);

@@ -10,7 +10,6 @@ namespace scanrig {
 namespace {
 
 constexpr std::size_t kMaxMotionsPerPair = 6;   ///< that fit; more decide nothing
-constexpr int kJudgedLevel = 1;                 ///< of the range pyramid, as of the search's verdict
 constexpr double kMaxContradictedApart = 0.25;  ///< of what is confirmed, where nothing could be aligned
 
 /// The judging round of the search.
@@ -71,20 +70,20 @@ std::vector<PairMotion> PairSearch::motions(bool with_symmetric) const {
   return all;
 }
 
-Transform PairSearch::aligned(std::size_t pose1, std::size_t pose2, const Transform& motion) const {
-  const SearchRound& round = verdict_round(options_);
+Transform PairSearch::aligned(std::size_t pose1, std::size_t pose2, const Transform& motion,
+                              const SearchRound& round) const {
   RefineOptions refine;
   refine.max_iterations = round.iterations;
-  return align(measured_[pose1], measured_[pose2], motion, kJudgedLevel, round.capture * size_mm_, refine)
+  return align(measured_[pose1], measured_[pose2], motion, round.level, round.capture * size_mm_, refine)
       .pose1_from_pose2;
 }
 
-PairSearch::Checked PairSearch::check(std::size_t pose1, std::size_t pose2, const Transform& motion) const {
+PairSearch::Checked PairSearch::check(std::size_t pose1, std::size_t pose2, const Transform& motion,
+                                      const SearchRound& round) const {
   const PoseObservations first{&measured_[pose1], poses_[pose1].views};
   const PoseObservations second{&measured_[pose2], poses_[pose2].views};
   Checked result;
-  result.checks =
-      check_samples(first, second, motion, kJudgedLevel, verdict_round(options_).reach * size_mm_, options_.agreement);
+  result.checks = check_samples(first, second, motion, round.level, round.reach * size_mm_, options_.agreement);
   result.median_mm =
       count_agreement(result.checks, std::numeric_limits<double>::infinity(), options_.agreement).median_mm;
   return result;
@@ -94,7 +93,7 @@ PairSearch::Checked PairSearch::check(std::size_t pose1, std::size_t pose2, cons
 bool PairSearch::is_told_apart(const SearchedPair& pair, std::size_t pose1, std::size_t pose2,
                                const Checked& checked) const {
   for (const Candidate& own : pair.fitting) {
-    const Checked best = check(pose1, pose2, own.pose1_from_pose2);
+    const Checked best = check(pose1, pose2, own.pose1_from_pose2, verdict_round(options_));
     const double spread = 1.4826 * std::min(best.median_mm, checked.median_mm);
     if (!compare(best.checks, checked.checks, spread, options_.agreement).separable) return false;
   }
@@ -109,6 +108,12 @@ PairVerdict PairSearch::judge(std::size_t pose1, std::size_t pose2, const Transf
   return judged_.emplace_back(Judged{pair, pose1_from_pose2, judge_anew(pose1, pose2, pose1_from_pose2)}).verdict;
 }
 
+double PairSearch::contradicted_finely(std::size_t pose1, std::size_t pose2, const Transform& pose1_from_pose2) const {
+  const Transform near = aligned(pose1, pose2, pose1_from_pose2, options_.last_round);
+  const Checked checked = check(pose1, pose2, near, options_.last_round);
+  return count_agreement(checked.checks, 1.4826 * checked.median_mm, options_.agreement).contradicted_share();
+}
+
 PairVerdict PairSearch::judge_anew(std::size_t pose1, std::size_t pose2, const Transform& pose1_from_pose2) const {
   using Kind = PairVerdict::Kind;
   const auto verdict = [&](Kind kind, const Agreement& a) { return PairVerdict{kind, a.confirmed, a.contradicted}; };
@@ -116,9 +121,9 @@ PairVerdict PairSearch::judge_anew(std::size_t pose1, std::size_t pose2, const T
   for (const Candidate& own : pair != nullptr ? std::span(pair->fitting) : std::span<const Candidate>()) {
     if (alike(own.pose1_from_pose2, pose1_from_pose2, graph_options_)) return verdict(Kind::agrees, own.agreement);
   }
-  const Transform near = aligned(pose1, pose2, pose1_from_pose2);
+  const Transform near = aligned(pose1, pose2, pose1_from_pose2, verdict_round(options_));
   if (alike(near, pose1_from_pose2, graph_options_)) {
-    const Checked checked = check(pose1, pose2, near);
+    const Checked checked = check(pose1, pose2, near, verdict_round(options_));
     const Agreement agreement = count_agreement(checked.checks, 1.4826 * checked.median_mm, options_.agreement);
     if (fits(agreement, size_mm_, options_)) {
       const bool is_other = pair != nullptr && is_told_apart(*pair, pose1, pose2, checked);
@@ -126,7 +131,7 @@ PairVerdict PairSearch::judge_anew(std::size_t pose1, std::size_t pose2, const T
     }
   }
   // Nothing to align by: where they stand as the other pairs say.
-  const Checked checked = check(pose1, pose2, pose1_from_pose2);
+  const Checked checked = check(pose1, pose2, pose1_from_pose2, verdict_round(options_));
   const double spread = checked.median_mm > 0.0 ? 1.4826 * checked.median_mm : 0.0;
   const Agreement agreement = count_agreement(checked.checks, spread, options_.agreement);
   const double allowed = kMaxContradictedApart * std::max(agreement.confirmed, options_.min_overlap);

@@ -32,6 +32,9 @@ class PairSearch {
   /// What both poses' range images say, after alignment near the motion. A pair that was searched prefers its own
   /// motion: one that it can tell from that contradicts.
   PairVerdict judge(std::size_t pose1, std::size_t pose2, const Transform& pose1_from_pose2);
+  /// Share of what is judged at full resolution, after alignment near the motion.
+  [[nodiscard]] double contradicted_finely(std::size_t pose1, std::size_t pose2,
+                                           const Transform& pose1_from_pose2) const;
 
   [[nodiscard]] const PoseGraphOptions& graph_options() const { return graph_options_; }
 
@@ -45,8 +48,10 @@ class PairSearch {
     std::vector<SampleCheck> checks;
     double median_mm = 0.0;
   };
-  [[nodiscard]] Checked check(std::size_t pose1, std::size_t pose2, const Transform& motion) const;
-  [[nodiscard]] Transform aligned(std::size_t pose1, std::size_t pose2, const Transform& motion) const;
+  [[nodiscard]] Checked check(std::size_t pose1, std::size_t pose2, const Transform& motion,
+                              const SearchRound& round) const;
+  [[nodiscard]] Transform aligned(std::size_t pose1, std::size_t pose2, const Transform& motion,
+                                  const SearchRound& round) const;
   [[nodiscard]] bool is_told_apart(const SearchedPair& pair, std::size_t pose1, std::size_t pose2,
                                    const Checked& checked) const;
   [[nodiscard]] PairVerdict judge_anew(std::size_t pose1, std::size_t pose2, const Transform& pose1_from_pose2) const;

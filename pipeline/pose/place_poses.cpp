@@ -30,9 +30,10 @@ double worst_own(const PairSearch& search, const PoseSet& set) {
 bool follows(PairSearch& search, const PoseSet& set, std::size_t a, std::size_t b) {
   if (!set.model_from_pose[a] || !set.model_from_pose[b]) return false;
   const PairVerdict judged = search.judge(a, b, set.motion(a, b));
+  if (judged.kind != PairVerdict::Kind::agrees || judged.confirmed < kMinConfirmedUnsearched) return false;
   const double share = judged.contradicted / std::max(judged.confirmed + judged.contradicted, 1e-9);
-  return judged.kind == PairVerdict::Kind::agrees && judged.confirmed >= kMinConfirmedUnsearched &&
-         share <= worst_own(search, set) + kSurplusContradicted;
+  const double allowed = worst_own(search, set) + kSurplusContradicted;
+  return share <= allowed || search.contradicted_finely(a, b, set.motion(a, b)) <= allowed;
 }
 
 Result<PoseSet> best_set(PairSearch& search, std::size_t poses) {

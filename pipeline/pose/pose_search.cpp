@@ -1,5 +1,6 @@
 #include "pipeline/pose/pose_search.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -39,6 +40,14 @@ FreeTurn weakest_turn(const RefinedPose& aligned) {
   Eigen::Vector3d slide = covariance.bottomLeftCorner<3, 3>() * axis / (turns.sigma[0] * turns.sigma[0]);
   slide -= axis * axis.dot(slide);
   return {axis, aligned.centre + axis.cross(slide)};
+}
+
+/// Turn and slide that the correspondences hold least, for 1 mm at `arm_mm` from the centre.
+Eigen::Matrix<double, 6, 1> loosest_motion(const RefinedPose& aligned, double arm_mm) {
+  Eigen::Matrix<double, 6, 1> arc;
+  arc << Eigen::Vector3d::Constant(1.0 / arm_mm), Eigen::Vector3d::Ones();
+  const Eigen::Matrix<double, 6, 6> scaled = arc.asDiagonal() * aligned.information * arc.asDiagonal();
+  return arc.asDiagonal() * Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>>(scaled).eigenvectors().col(0);
 }
 
 /// Patches that contradict `second` and not `first`.
@@ -93,6 +102,8 @@ void narrow(std::vector<Hypothesis>& field, const Scene& scene, const PoseOption
       h.candidate.pose1_from_pose2 = aligned.pose1_from_pose2;
       h.condition = aligned.condition;
       h.weakest = weakest_turn(aligned);
+      h.loosest = loosest_motion(aligned, 0.5 * scene.size_mm);
+      h.centre = aligned.centre;
     }
     const double reach = round.reach * scene.size_mm;
     h.sample_checks = check_samples(scene.observations1, scene.observations2, h.candidate.pose1_from_pose2, round.level,
@@ -101,12 +112,16 @@ void narrow(std::vector<Hypothesis>& field, const Scene& scene, const PoseOption
   });
   std::stable_sort(field.begin(), field.end(),
                    [](const Hypothesis& a, const Hypothesis& b) { return a.score > b.score; });
+  keep_distinct(field, scene, options, round.keep, round.apart_deg);
+}
+
+void keep_distinct(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options, std::size_t count,
+                   double apart_deg) {
   std::vector<Hypothesis> kept;
   for (Hypothesis& h : field) {
-    if (kept.size() == round.keep) break;
+    if (kept.size() == count) break;
     const bool is_known = std::ranges::any_of(kept, [&](const Hypothesis& k) {
-      return alike(k.candidate.pose1_from_pose2, h.candidate.pose1_from_pose2, scene, round.apart_deg,
-                   options.same_shift);
+      return alike(k.candidate.pose1_from_pose2, h.candidate.pose1_from_pose2, scene, apart_deg, options.same_shift);
     });
     if (!is_known) kept.push_back(std::move(h));
   }
@@ -137,17 +152,24 @@ void judge(std::vector<Hypothesis>& field, const PoseOptions& options) {
 void settle(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options) {
   if (field.empty()) return;
   judge(field, options);
+  vary_loosest(field, scene, options, options.rounds.back());
+  judge(field, options);
   const auto rivals = std::stable_partition(field.begin() + 1, field.end(), [&](const Hypothesis& h) {
     return is_rival(h.candidate, field[0].candidate, options);
   });
-  if (rivals - field.begin() < 2 && fits(field[0].candidate.agreement, scene.size_mm, options)) return;
+  if (rivals - field.begin() < 2 &&
+      field[0].candidate.agreement.contradicted_share() <= options.search_again_contradicted &&
+      fits(field[0].candidate.agreement, scene.size_mm, options)) {
+    return;
+  }
   std::vector<Hypothesis> finalists(std::make_move_iterator(field.begin()), std::make_move_iterator(rivals));
   std::vector<Hypothesis> others(std::make_move_iterator(rivals), std::make_move_iterator(field.end()));
   SearchRound round = options.last_round;
   round.keep = finalists.size();
-  round.apart_deg = options.same_deg;
   narrow(finalists, scene, options, round);
+  vary_loosest(finalists, scene, options, round);
   judge(finalists, options);
+  keep_distinct(finalists, scene, options, finalists.size(), options.same_deg);
   separate_by_patches(finalists, scene, options);
   field = std::move(finalists);
   field.insert(field.end(), std::make_move_iterator(others.begin()), std::make_move_iterator(others.end()));

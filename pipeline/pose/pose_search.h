@@ -14,6 +14,9 @@ struct Hypothesis {
   double score = 0.0;
   double condition = 0.0;
   FreeTurn weakest{};  ///< the turn that the shared surface holds least
+  /// The motion that it holds least: turn (rad) about `centre` and slide for 1 mm at the object's outside.
+  Eigen::Matrix<double, 6, 1> loosest = Eigen::Matrix<double, 6, 1>::Zero();
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
 };
 
 /// Inputs of the search from both poses.
@@ -36,18 +39,27 @@ Result<std::vector<Hypothesis>> propose(const PoseInput& pose1, const PoseInput&
 /// Aligns and checks all; the best distinct ones are kept.
 void narrow(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options, const SearchRound& round);
 
+/// The first ones of a sorted field that are `apart_deg` or some way from one another.
+void keep_distinct(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options, std::size_t count,
+                   double apart_deg);
+
 /// Judges all with one tolerance, the spread of the best fitting hypothesis that covers enough; the best comes first.
 void judge(std::vector<Hypothesis>& field, const PoseOptions& options);
 
-/// For a best one that is judged and that still contradicts more than a right one does: proposes all turns of the best
-/// ones about the axes that are held least as well, and keeps more of all in each round. Of the whole field the best
-/// distinct ones are kept.
+/// For a best one that is judged and held badly: adds its turns about the axis that is held least. The best distinct
+/// ones are kept.
+void search_turns(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options);
+
+/// For a best one that is judged and that still contradicts more than a right one does: proposes anew, keeps more in
+/// each round, and adds turns of the best ones. Of the whole field the best distinct ones are kept.
 void search_wider(std::vector<Hypothesis>& field, const PoseInput& pose1, const PoseInput& pose2,
                   const PoseOptions& options, Scene& scene);
 
-/// The best one again from some degrees to either side about the axis that is held least: a small part that alone holds
-/// a turn is missed from far.
-void turn_finely(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options);
+/// Moves the best ones, where they are held badly, along what the shared surface holds least to where they contradict
+/// least: alignment loses a turn that a small part alone holds, and slides along upright sides. `judged`: the round
+/// that checked them.
+void vary_loosest(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options,
+                  const SearchRound& judged);
 
 /// Refines the candidates that are not yet separable at full resolution, and a best one that would be refused as it is;
 /// the others stay behind these finalists.

@@ -1,8 +1,12 @@
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iterator>
+#include <limits>
 #include <utility>
 
+#include "core/parallel.h"
+#include "core/transform.h"
 #include "core/units.h"
 #include "pipeline/pose/pose_search.h"
 
@@ -10,9 +14,11 @@ namespace scanrig {
 namespace {
 
 constexpr double kTurnStepDeg = 5.0;  ///< of the turns about the axis that the shared surface holds least
-constexpr int kVaried = 2;            ///< best hypotheses that are turned
-constexpr std::array kFineTurnsDeg = {-6.0, -4.0, -2.5, -1.5, -0.7, 0.7, 1.5, 2.5, 4.0, 6.0};
-constexpr double kGain = 0.004;  ///< of the score; less is chance
+constexpr std::size_t kTurned = 2;    ///< best hypotheses that are turned
+constexpr std::size_t kTurnsKept = 24;
+constexpr std::size_t kVariedFinely = 6;  ///< best hypotheses that are moved along what is held least
+constexpr std::array kFineSteps = {0.05, 0.035, 0.02, 0.012, 0.006, 0.003, 0.0015};  ///< shares of the object's size
+constexpr double kGain = 0.002;                                                      ///< of the score; less is chance
 
 /// They keep more than those of the first search.
 constexpr std::array<SearchRound, 4> kWideRounds = {{{3, 0, 0.00, 0.050, 300, 4.0, 3.0},
@@ -29,45 +35,114 @@ Hypothesis turned(const Hypothesis& from, const Eigen::Vector3d& axis, double de
   return h;
 }
 
-/// All turns about the axis that is held least, either way up.
-void add_turns(const Hypothesis& from, std::vector<Hypothesis>& field) {
-  const Eigen::Vector3d& axis = from.weakest.axis;
-  const Eigen::Vector3d across = axis.unitOrthogonal();
-  for (double degrees = 0.0; degrees < 359.0; degrees += kTurnStepDeg) {
-    if (degrees > 0.0) field.push_back(turned(from, axis, degrees));
-    field.push_back(turned(from, Eigen::AngleAxisd(to_radians(0.5 * degrees), axis) * across, 180.0));
+/// All with the same checks; the best distinct ones come first and are kept.
+void join(std::vector<Hypothesis>& field, std::vector<Hypothesis> more, const Scene& scene,
+          const PoseOptions& options) {
+  field.insert(field.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
+  SearchRound verdict = options.rounds.back();
+  verdict.iterations = 0;
+  verdict.keep = field.size();
+  verdict.apart_deg = 0.0;
+  narrow(field, scene, options, verdict);
+  judge(field, options);
+  keep_distinct(field, scene, options, options.rounds.back().keep, options.rounds.back().apart_deg);
+}
+
+/// The first ones and the same end for end, aligned.
+std::vector<Hypothesis> both_ways(const std::vector<Hypothesis>& field, std::size_t count, const Scene& scene,
+                                  const PoseOptions& options) {
+  std::vector<Hypothesis> bases;
+  for (std::size_t i = 0; i < std::min(count, field.size()); ++i) {
+    bases.push_back(field[i]);
+    bases.push_back(turned(field[i], field[i].weakest.axis.unitOrthogonal(), 180.0));
   }
+  for (SearchRound round : kWideRounds) {
+    if (round.iterations == 0) continue;
+    round.keep = bases.size();
+    narrow(bases, scene, options, round);
+  }
+  return bases;
+}
+
+/// All turns of the first ones about the axis that is held least, either way up. Each is judged before it is aligned:
+/// but for the turn it is so already, and a turn is told by what contradicts it.
+std::vector<Hypothesis> turns_of(const std::vector<Hypothesis>& field, std::size_t count, const Scene& scene,
+                                 const PoseOptions& options) {
+  std::vector<Hypothesis> turns;
+  for (const Hypothesis& base : both_ways(field, count, scene, options)) {
+    for (double degrees = 0.0; degrees < 359.0; degrees += kTurnStepDeg) {
+      turns.push_back(turned(base, base.weakest.axis, degrees));
+    }
+  }
+  SearchRound round = options.rounds.back();
+  round.apart_deg = 0.0;
+  round.keep = turns.size();
+  round.iterations = 0;
+  narrow(turns, scene, options, round);
+  judge(turns, options);
+  turns.resize(std::min(kTurnsKept, turns.size()));
+  round.iterations = options.rounds.back().iterations;
+  narrow(turns, scene, options, round);
+  return turns;
+}
+
+/// Along what is held least, by so many millimetres at the object's outside.
+Transform moved(const Hypothesis& from, double distance_mm) {
+  const Eigen::Translation3d to_centre(from.centre);
+  return to_centre * small_motion(distance_mm * from.loosest.head<3>(), distance_mm * from.loosest.tail<3>()) *
+         to_centre.inverse() * from.candidate.pose1_from_pose2;
+}
+
+/// Moves it to where it is contradicted least, from far to near.
+void vary(Hypothesis& h, const Scene& scene, const PoseOptions& options, const SearchRound& judged) {
+  const double reach = judged.reach * scene.size_mm;
+  double spread = std::numeric_limits<double>::infinity();
+  const auto score_at = [&](double distance_mm) {
+    const auto checks = check_samples(scene.observations1, scene.observations2, moved(h, distance_mm), judged.level,
+                                      reach, options.agreement);
+    if (std::isinf(spread)) spread = 1.4826 * count_agreement(checks, spread, options.agreement).median_mm;
+    return count_agreement(checks, spread, options.agreement).score(options.last_round.contradiction_weight);
+  };
+  const double start = score_at(0.0);
+  double best = start, best_mm = 0.0;
+  for (const double step : kFineSteps) {
+    if (step > judged.capture) continue;
+    const double from_mm = best_mm;
+    for (const double distance_mm : {from_mm - step * scene.size_mm, from_mm + step * scene.size_mm}) {
+      const double score = score_at(distance_mm);
+      if (score <= best) continue;
+      best = score;
+      best_mm = distance_mm;
+    }
+  }
+  if (best < start + kGain) return;
+  h.candidate.pose1_from_pose2 = moved(h, best_mm);
+  h.sample_checks = check_samples(scene.observations1, scene.observations2, h.candidate.pose1_from_pose2, judged.level,
+                                  reach, options.agreement);
 }
 
 }  // namespace
+
+void search_turns(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options) {
+  join(field, turns_of(field, 1, scene, options), scene, options);
+}
 
 void search_wider(std::vector<Hypothesis>& field, const PoseInput& pose1, const PoseInput& pose2,
                   const PoseOptions& options, Scene& scene) {
   PoseEstimate counts;
   auto proposed = propose(pose1, pose2, options, scene, counts);
   if (!proposed) return;
-  for (std::size_t i = 0; i < std::min<std::size_t>(kVaried, field.size()); ++i) add_turns(field[i], *proposed);
   for (const SearchRound& round : kWideRounds) narrow(*proposed, scene, options, round);
-  field.insert(field.end(), std::make_move_iterator(proposed->begin()), std::make_move_iterator(proposed->end()));
-  SearchRound verdict = options.rounds.back();
-  verdict.iterations = 0;
-  verdict.contradiction_weight = options.last_round.contradiction_weight;
-  narrow(field, scene, options, verdict);
+  auto turns = turns_of(field, kTurned, scene, options);
+  proposed->insert(proposed->end(), std::make_move_iterator(turns.begin()), std::make_move_iterator(turns.end()));
+  join(field, std::move(*proposed), scene, options);
 }
 
-void turn_finely(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options) {
-  std::vector<Hypothesis> turns;
-  for (const double degrees : kFineTurnsDeg) turns.push_back(turned(field[0], field[0].weakest.axis, degrees));
-  SearchRound round = options.rounds.back();
-  round.apart_deg = 0.0;
-  round.keep = turns.size();
-  narrow(turns, scene, options, round);
-  std::vector<Hypothesis> all = {field[0]};
-  all.insert(all.end(), std::make_move_iterator(turns.begin()), std::make_move_iterator(turns.end()));
-  judge(all, options);
-  const double weight = options.last_round.contradiction_weight;
-  const double best = all[0].candidate.agreement.score(weight);
-  if (best > field[0].candidate.agreement.score(weight) + kGain) field[0] = std::move(all[0]);
+void vary_loosest(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options,
+                  const SearchRound& judged) {
+  parallel_for(std::min(kVariedFinely, field.size()), [&](std::size_t i) {
+    if (field[i].condition > options.weak_condition) vary(field[i], scene, options, judged);
+  });
 }
 
 }  // namespace scanrig

@@ -119,14 +119,29 @@ TEST(Symmetry, OfACupThatStandsTwiceDoesNot) {
   EXPECT_EQ(estimate.error().code, ErrorCode::same_rest) << estimate.error().message;
 }
 
-/// What is on top is seen in pose 1 alone, what is below in pose 2 alone, and the sides that both see fit four ways.
-TEST(Symmetry, DoesNotHideThatBothEndsDiffer) {
-  const Solid both_ends =
+const Eigen::Matrix3d kUpsideDown = turn(33, Eigen::Vector3d::UnitY()) * turn(180, Eigen::Vector3d::UnitX());
+
+/// The sides fit four ways, and nothing holds their height: only at the right one do the feet and the ball, which one
+/// pose sees each, fit into what the other pose looked through.
+TEST(Symmetry, OfTheSidesIsBrokenByEndsThatOnePoseSeesEach) {
+  const PosedScan scan = testing::scan(
       testing::together({testing::block({-20, 5, -20}, {20, 45, 20}), testing::ball({10, 45, 4}, 5),
                          testing::block({-14, 0, 6}, {-4, 6, 14}), testing::block({-14, 0, -14}, {-8, 6, -8}),
-                         testing::block({12, 0, -4}, {18, 6, 4})});
-  const PosedScan scan =
-      testing::scan(both_ends, turn(33, Eigen::Vector3d::UnitY()) * turn(180, Eigen::Vector3d::UnitX()));
+                         testing::block({12, 0, -4}, {18, 6, 4})}),
+      kUpsideDown);
+  const auto estimate = scan.estimate();
+  ASSERT_TRUE(estimate) << estimate.error().message;
+  EXPECT_LT(rotation_angle(estimate->pose1_from_pose2.linear().transpose() * scan.pose1_from_pose2.linear()),
+            to_radians(0.1));
+}
+
+/// Dents on top are seen in pose 1 alone, those below in pose 2 alone, and the sides that both see fit four ways.
+TEST(Symmetry, DoesNotHideThatBothEndsDiffer) {
+  const Solid block = testing::block({-20, 0, -20}, {20, 40, 20});
+  const Solid dents = testing::together({testing::ball({8, 44, 4}, 11), testing::block({-16, -1, 2}, {-2, 7, 16}),
+                                         testing::block({-14, -1, -14}, {-8, 5, -8})});
+  const Solid both_ends = [=](const Eigen::Vector3d& p) { return std::max(block(p), -dents(p)); };
+  const PosedScan scan = testing::scan(both_ends, kUpsideDown);
   std::vector<Candidate> fitting;
   const auto estimate = estimate_pose({scan.solid1, scan.views1}, {scan.solid2, scan.views2}, {}, {}, fitting);
   ASSERT_FALSE(estimate) << describe(estimate->symmetry);
