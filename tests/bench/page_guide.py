@@ -347,7 +347,8 @@ OPERATE = {
 }
 # In their order: the guide, what a person or this file does there, sections that have other tests.
 GUIDES = (("install.md", INSTALL, ()), ("calibrate.md", CALIBRATE, ("When something goes wrong", "Does it still hold?")),
-          ("operate.md", OPERATE, ("The queue",)))
+          ("operate.md", OPERATE,
+           ("The queue", "When pose 2 fits in several ways", "Another pose for a finished scan")))
 
 
 def walk(bench, packages):

@@ -83,7 +83,7 @@ async function job(browser, station) {
   await see(page, "FLIP", 120_000);
   await until("it may be pressed", () => page.getByRole("button", { name: "START", exact: true }).isEnabled());
   await press(page, "START");
-  await until("the model is in the making", () => jobOf(station)?.state === "reconstructing", 120_000);
+  await until("the model is in the making", () => jobOf(station)?.state === "reconstructing", 400_000);
   answers.push(...(await pressed(page)));
   await until("the job has ended", () => ["done", "failed"].includes(jobOf(station)?.state), 400_000);
   await sleep(500);
