@@ -17,10 +17,22 @@ std::string describe(const Candidate& c) {
                      100.0 * c.agreement.confirmed, 100.0 * c.agreement.contradicted);
 }
 
-Result<void> decide(const std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options) {
+/// Whether the surfaces agree, hold the motion well, and leave no other: then what speaks against it is images alone. A
+/// dark part that mirrors the screen is taken for background in several views of one pose.
+bool is_denied_by_images_alone(const std::vector<Hypothesis>& field, const PoseOptions& options) {
+  const Agreement& best = field[0].candidate.agreement;
+  const double by_surface = (best.contradicted - best.free_space) / std::max(best.confirmed, 1e-9);
+  return field[0].condition < options.weak_condition && by_surface < options.search_again_contradicted &&
+         rivals_of(field, options).empty();
+}
+
+Result<void> decide(const std::vector<Hypothesis>& field, const Scene& scene, PoseOptions options) {
   if (field.empty())
     return fail(ErrorCode::no_overlap, "pose estimation: no motion between the poses could be proposed");
   const Candidate& best = field[0].candidate;
+  if (is_denied_by_images_alone(field, options)) {
+    options.max_contradicted = std::max(options.max_contradicted, options.max_denied_by_images);
+  }
   if (!fits(best.agreement, scene.size_mm, options)) {
     return fail(ErrorCode::no_overlap,
                 "pose estimation: the two poses do not fit together; the best of {} tried: {}. "

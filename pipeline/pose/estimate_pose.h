@@ -50,6 +50,7 @@ struct PoseOptions {
   double same_rest_tilt_deg = 5.0;           ///< a motion that tilts the object less than this has not turned it over
   double min_overlap = 0.06;                 ///< confirmed share of both surfaces
   double max_contradicted = 0.1;             ///< contradicted share of what was judged
+  double max_denied_by_images = 0.25;        ///< the same, if it is free space alone and nothing else leaves a doubt
   double search_again_contradicted = 0.012;  ///< a best motion beyond this share is searched for again, more widely
   double weak_condition = 3e3;               ///< a motion beyond this is tried along what is held least
   double max_median = 0.006;                 ///< median distance as a share of the object's size

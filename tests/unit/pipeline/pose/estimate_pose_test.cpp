@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/unit/pipeline/pose/posed_scan.h"
 
 namespace scanrig {
@@ -13,6 +15,8 @@ using testing::Solid;
 using testing::turn;
 
 const Eigen::Matrix3d kOnItsSide = turn(40, Eigen::Vector3d::UnitY()) * turn(90, Eigen::Vector3d::UnitZ());
+
+constexpr double kDarkFootMm = 14.0;
 
 const PosedScan& workpiece_on_its_side() {
   static const PosedScan s = scan(testing::workpiece(), kOnItsSide);
@@ -106,6 +110,28 @@ TEST(EstimatePose, TakesNoSingleViewsWordForFreeSpace) {
   expect_found(s.estimate(), s);
   PoseOptions credulous;
   credulous.agreement.witnesses = 1;
+  expect_error(s.estimate(credulous), ErrorCode::no_overlap);
+}
+
+/// The same in every view of one pose: the foot of the object is dark.
+TEST(EstimatePose, TakesSurfacesThatAgreeForMoreThanImagesThatDeny) {
+  PosedScan s = workpiece_on_its_side();
+  for (View& view : s.views1) {
+    const Transform pose_from_camera = view.range.camera_from_pose.inverse();
+    for (int v = 0; v < view.range.depth.rows; ++v) {
+      for (int u = 0; u < view.range.depth.cols; ++u) {
+        const float depth = view.range.depth(v, u);
+        if (std::isnan(depth) || (pose_from_camera * view.range.projection.unproject(u, v, depth)).y() > kDarkFootMm) {
+          continue;
+        }
+        view.range.depth(v, u) = view.range.sigma(v, u) = kUnmeasured;
+        view.range.background(v, u) = 255;
+      }
+    }
+  }
+  expect_found(s.estimate(), s);
+  PoseOptions credulous;
+  credulous.max_denied_by_images = 0.0;
   expect_error(s.estimate(credulous), ErrorCode::no_overlap);
 }
 
