@@ -95,7 +95,7 @@ TEST(EstimatePose, DecidesByASmallFeatureWhereTheRestIsSymmetric) {
 
 /// As a dark part does that mirrors the screen: in every view another strip of the object is taken for background.
 TEST(EstimatePose, TakesNoSingleViewsWordForFreeSpace) {
-  PosedScan s = workpiece_on_its_side();
+  PosedScan s = scan(testing::workpiece(), kOnItsSide);  // copies would share their images
   constexpr int kStrip = 14;
   for (std::vector<View>* views : {&s.views1, &s.views2}) {
     for (std::size_t i = 0; i < views->size(); ++i) {
@@ -115,7 +115,7 @@ TEST(EstimatePose, TakesNoSingleViewsWordForFreeSpace) {
 
 /// The same in every view of one pose: the foot of the object is dark.
 TEST(EstimatePose, TakesSurfacesThatAgreeForMoreThanImagesThatDeny) {
-  PosedScan s = workpiece_on_its_side();
+  PosedScan s = scan(testing::workpiece(), kOnItsSide);
   for (View& view : s.views1) {
     const Transform pose_from_camera = view.range.camera_from_pose.inverse();
     for (int v = 0; v < view.range.depth.rows; ++v) {
