@@ -61,8 +61,8 @@ void search_wider(std::vector<Hypothesis>& field, const PoseInput& pose1, const 
 void vary_loosest(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options,
                   const SearchRound& judged);
 
-/// Refines the candidates that are not yet separable at full resolution, and a best one that would be refused as it is;
-/// the others stay behind these finalists.
+/// Refines the candidates that are not yet separable at full resolution, and a best one that would be refused or
+/// searched for again as it is; the others stay behind these finalists. vary_loosest() moves those that are held badly.
 void settle(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options);
 
 double apart_deg(const Candidate& a, const Candidate& b);
