@@ -1,10 +1,10 @@
 // Figures of the page: node bars.mjs BIN. One line of JSON each: {what, limit, value, unit}; value null: not measured.
-import { get } from "node:http";
+import { Worker } from "node:worker_threads";
 import { Browser, Station, press, sleep, until } from "./browser.mjs";
-import { ask, jobOf, open, ready, see } from "./steps.mjs";
+import { ask, jobOf, open, see } from "./steps.mjs";
 
 const RIG = ["--operator", "none", "--scale", "0.5", "--views", "4", "--voxel-mm", "0.5"];
-const ENDED = ["done", "failed"]; // nobody turns the part over: its poses do not fit, and that may be told at once
+const JOB_RIG = ["--operator", "helper", "--scale", "0.5", "--views", "4", "--voxel-mm", "0.5", "--background-cameras"];
 const PAGES = 8;
 const PRESSES = 200;
 const JOBS = 200;
@@ -17,25 +17,15 @@ const share = (values, of) => [...values].sort((a, b) => a - b)[Math.min(values.
 /** The daemon's events as another client hears them, each with the time of its arrival. */
 function hear(station) {
   const heard = [];
-  let text = "";
-  const stream = get({ socketPath: station.socket, path: "/api/v1/events", headers: { Host: "localhost" } }, (reply) =>
-    reply.on("data", (chunk) => {
-      text += chunk;
-      for (let end = text.indexOf("\n\n"); end >= 0; end = text.indexOf("\n\n")) {
-        const name = /^event: (.*)$/m.exec(text.slice(0, end))?.[1];
-        const data = /^data: (.*)$/m.exec(text.slice(0, end))?.[1];
-        if (name && data) heard.push({ name, data: JSON.parse(data), at: Date.now() });
-        text = text.slice(end + 2);
-      }
-    }),
-  ).on("error", () => {});
-  return { heard, close: () => stream.destroy() };
+  const thread = new Worker(new URL("./hear.mjs", import.meta.url), { workerData: station.socket });
+  thread.on("message", (event) => heard.push(event));
+  return { heard, close: () => thread.terminate() };
 }
 
 /** Notes in the page when a sentence and a mesh were painted, and its long tasks. */
 const WATCH = `
   window.painted = []; window.tasks = [];
-  new PerformanceObserver((list) => list.getEntries().forEach((one) => tasks.push(one.duration))).observe({ type: "longtask", buffered: true });
+  new PerformanceObserver((list) => list.getEntries().forEach((one) => tasks.push(one.duration))).observe({ type: "longtask" });
   new MutationObserver(() => requestAnimationFrame(() => {
     const sentence = document.querySelector(".sentence")?.textContent;
     if (sentence && painted.at(-1)?.sentence !== sentence) painted.push({ sentence, at: Date.now() });
@@ -66,7 +56,7 @@ const pressed = (page) =>
     return times;
   }, PRESSES / 2);
 
-/** A whole job with eight pages open: answers, paint, patches, tasks. */
+/** A whole job with eight pages open, whose part somebody turns over: answers, paint, patches, tasks. */
 async function job(browser, station) {
   const page = await open(browser, station, { expected: /409/ });
   await page.evaluate(WATCH);
@@ -76,17 +66,15 @@ async function job(browser, station) {
     await others.at(-1).keyboard.press("2"); // one model drawn by this machine's processor is enough
   }
   await page.bringToFront(); // a page behind others paints rarely
-  await ready(page);
+  await see(page, "READY", 40_000); // the operator at the rig presses Reset
   const events = hear(station);
+  await page.evaluate(() => tasks.splice(0)); // of the job alone
   await press(page, "START");
   await until("a view is stored", () => jobOf(station)?.stored.length > 0, 60_000);
   const answers = await pressed(page);
-  await see(page, "FLIP", 120_000);
-  await until("it may be pressed", () => page.getByRole("button", { name: "START", exact: true }).isEnabled());
-  await press(page, "START");
-  await until("the model is in the making", () => ["reconstructing", ...ENDED].includes(jobOf(station)?.state), 120_000);
+  await until("the model is in the making", () => jobOf(station)?.state === "reconstructing", 240_000);
   answers.push(...(await pressed(page)));
-  await until("the job has ended", () => ENDED.includes(jobOf(station)?.state), 400_000);
+  await until("the job is done", () => jobOf(station)?.state === "done", 400_000);
   await sleep(500);
   events.close();
   const { painted, tasks } = await page.evaluate(() => ({ painted, tasks }));
@@ -213,7 +201,7 @@ const parts = { firstSentence, job, loss, heap, acquisition };
 const browser = new Browser();
 await browser.start();
 for (const name of names.length ? names : Object.keys(parts)) {
-  const station = new Station(bin, name === "job" ? [...RIG, "--background-cameras"] : RIG);
+  const station = new Station(bin, name === "job" ? JOB_RIG : RIG);
   await station.start();
   try {
     await parts[name](browser, station);
