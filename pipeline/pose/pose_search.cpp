@@ -13,6 +13,8 @@
 namespace scanrig {
 namespace {
 
+constexpr std::size_t kNeighbours = 2;  ///< of a best one that is held badly, refined at full resolution
+
 bool alike(const Transform& a, const Transform& b, const Scene& scene, double degrees, double shift) {
   return rotation_angle(a.linear().transpose() * b.linear()) < to_radians(degrees) &&
          (a * scene.middle2 - b * scene.middle2).norm() < shift * scene.size_mm;
@@ -86,6 +88,24 @@ void separate_by_patches(std::vector<Hypothesis>& finalists, const Scene& scene,
   for (Hypothesis& h : finalists) h.candidate.angle_to_best_deg = apart_deg(h.candidate, finalists[0].candidate);
 }
 
+/// The best, its rivals, and where the surface holds it badly the next best ones beside it: on a coarser level a wrong
+/// turn may contradict as little as the right one. `others`: what is left.
+std::vector<Hypothesis> take_finalists(std::vector<Hypothesis>& field, const PoseOptions& options,
+                                       std::vector<Hypothesis>& others) {
+  const Candidate best = field[0].candidate;
+  std::size_t neighbours = field[0].condition > options.weak_condition ? kNeighbours : 0;
+  std::vector<Hypothesis> finalists;
+  for (Hypothesis& h : field) {
+    bool is_finalist = finalists.empty() || is_rival(h.candidate, best, options);
+    if (!is_finalist && neighbours > 0 && h.candidate.angle_to_best_deg <= options.same_deg && !h.candidate.separable) {
+      is_finalist = true;
+      --neighbours;
+    }
+    (is_finalist ? finalists : others).push_back(std::move(h));
+  }
+  return finalists;
+}
+
 }  // namespace
 
 void narrow(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options, const SearchRound& round) {
@@ -154,16 +174,15 @@ void settle(std::vector<Hypothesis>& field, const Scene& scene, const PoseOption
   judge(field, options);
   vary_loosest(field, scene, options, options.rounds.back());
   judge(field, options);
-  const auto rivals = std::stable_partition(field.begin() + 1, field.end(), [&](const Hypothesis& h) {
-    return is_rival(h.candidate, field[0].candidate, options);
-  });
-  if (rivals - field.begin() < 2 &&
-      field[0].candidate.agreement.contradicted_share() <= options.search_again_contradicted &&
-      fits(field[0].candidate.agreement, scene.size_mm, options)) {
+  std::vector<Hypothesis> others;
+  std::vector<Hypothesis> finalists = take_finalists(field, options, others);
+  if (finalists.size() < 2 &&
+      finalists[0].candidate.agreement.contradicted_share() <= options.search_again_contradicted &&
+      fits(finalists[0].candidate.agreement, scene.size_mm, options)) {
+    field = std::move(finalists);
+    field.insert(field.end(), std::make_move_iterator(others.begin()), std::make_move_iterator(others.end()));
     return;
   }
-  std::vector<Hypothesis> finalists(std::make_move_iterator(field.begin()), std::make_move_iterator(rivals));
-  std::vector<Hypothesis> others(std::make_move_iterator(rivals), std::make_move_iterator(field.end()));
   SearchRound round = options.last_round;
   round.keep = finalists.size();
   narrow(finalists, scene, options, round);
