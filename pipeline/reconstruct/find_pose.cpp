@@ -36,6 +36,7 @@ RefineOptions Reconstruction::State::refine_options() const {
   if (calibration) {
     const RegistrationOptions known = registration_options(*calibration);
     refinement.axis = {to_radians(known.axis_tilt_sigma_deg), known.axis_shift_sigma_mm};
+    refinement.calibration = calibration_modes(*calibration, rectification->left_from_turntable);
   }
   return refinement;
 }

@@ -2,11 +2,13 @@
 
 #include <fmt/ranges.h>
 
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <opencv2/core.hpp>
 
 #include "core/parallel.h"
 #include "pipeline/calibration/corners/rim_dots.h"
+#include "pipeline/calibration/watch/rig_effects.h"
 
 namespace scanrig {
 namespace {
@@ -117,6 +119,22 @@ RegistrationOptions registration_options(const Calibration& calibration) {
   options.axis_tilt_sigma_deg = std::hypot(options.axis_tilt_sigma_deg, sigma.tilt_deg);
   options.axis_shift_sigma_mm = std::hypot(options.axis_shift_sigma_mm, sigma.shift_mm);
   return options;
+}
+
+CalibrationModes calibration_modes(const Calibration& calibration, const Transform& left_from_turntable) {
+  if (!calibration.quality) return {};
+  const Eigen::MatrixXd& covariance = calibration.quality->cameras;
+  const Eigen::VectorXd sigma =
+      covariance.diagonal().cwiseMax(1e-300).cwiseSqrt();  // each unknown has a unit of its own
+  const Eigen::VectorXd scale = sigma.cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scale.asDiagonal() * covariance * scale.asDiagonal());
+  const Eigen::VectorXd spread = solver.eigenvalues().cwiseMax(0.0).cwiseSqrt();
+  const Eigen::MatrixXd root = sigma.asDiagonal() * solver.eigenvectors() * spread.asDiagonal();
+  return [=](const Transform& camera_from_pose, const Eigen::Vector3d& point) -> Eigen::Matrix3Xd {
+    const Transform pose_from_turntable = camera_from_pose.inverse() * left_from_turntable;
+    const Eigen::Vector3d in_turntable = pose_from_turntable.inverse() * point;
+    return pose_from_turntable.linear() * (point_by_cameras(calibration, in_turntable) * root);
+  };
 }
 
 }  // namespace scanrig

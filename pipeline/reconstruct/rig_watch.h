@@ -8,6 +8,7 @@
 #include "pipeline/calibration/watch/watch.h"
 #include "pipeline/range/range_image.h"
 #include "pipeline/range/retriangulate.h"
+#include "pipeline/registration/pose_uncertainty.h"
 #include "pipeline/registration/register_views.h"
 #include "pipeline/storage/images.h"
 
@@ -57,5 +58,9 @@ class RigWatch {
 /// Registration's uncertainties: how well the calibration knows the axis, beside what axes drift by. A calibration of
 /// unknown quality: drift alone.
 RegistrationOptions registration_options(const Calibration& calibration);
+
+/// What the calibration's covariance lets expect of points of range images whose frame is `left_from_turntable`; empty
+/// without one. Keeps a copy of the calibration.
+CalibrationModes calibration_modes(const Calibration& calibration, const Transform& left_from_turntable);
 
 }  // namespace scanrig

@@ -1,7 +1,9 @@
 #include "pipeline/registration/joint_uncertainty.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <utility>
@@ -11,8 +13,10 @@ namespace {
 
 using ViewOfPose = std::pair<std::size_t, int>;
 using ViewPair = std::pair<ViewOfPose, ViewOfPose>;
+using Place = std::array<int, 3>;
 
-constexpr double kMaxShare = 0.9;  // of what is known of a direction that one view may take with it
+constexpr double kMaxShare = 0.9;    // of what is known of a direction that one view or place may take with it
+constexpr double kPlaceWidth = 0.1;  // of the shared surface's size: what small features are as wide as
 
 template <class Value>
 Eigen::MatrixXd with_values(const Eigen::MatrixXd& matrix, const Value& value) {
@@ -20,20 +24,41 @@ Eigen::MatrixXd with_values(const Eigen::MatrixXd& matrix, const Value& value) {
   return solver.eigenvectors() * solver.eigenvalues().unaryExpr(value).asDiagonal() * solver.eigenvectors().transpose();
 }
 
-/// What the correspondences of one pair of views say of the motion between their poses.
+/// What the correspondences of one pair of views say of the motion between their poses, all of them or at one place.
 struct PairSums {
   Eigen::Matrix<double, 6, 1> pull = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
+
+  void add(const PairSums& other) {
+    pull += other.pull;
+    information += other.information;
+  }
 };
 
-std::map<ViewPair, PairSums> by_pair(std::span<const JointScore> scores) {
-  std::map<ViewPair, PairSums> pairs;
+/// Width of a place.
+double place_width(std::span<const JointScore> scores) {
+  Eigen::AlignedBox3d box;
+  for (const JointScore& score : scores) box.extend(score.of_link.point);
+  return std::max(kPlaceWidth * box.diagonal().norm(), 1e-9);
+}
+
+using PlacedPairs = std::map<std::pair<Place, ViewPair>, PairSums>;
+
+PlacedPairs by_place_and_pair(std::span<const JointScore> scores) {
+  const double width = place_width(scores);
+  PlacedPairs all;
   for (const auto& [score, pose1, pose2] : scores) {
-    PairSums& sums = pairs[{{pose1, score.view1}, {pose2, score.view2}}];
+    const Eigen::Array3i cell = (score.point.array() / width).floor().cast<int>();
+    PairSums& sums = all[{{cell[0], cell[1], cell[2]}, {{pose1, score.view1}, {pose2, score.view2}}}];
     sums.pull += score.weight * score.residual * score.lever;
     sums.information.noalias() += score.weight * score.lever * score.lever.transpose();
   }
-  return pairs;
+  return all;
+}
+
+void add_pull(Eigen::VectorXd& pull, const ViewPair& views, const PairSums& sums) {
+  pull.segment<6>(static_cast<Eigen::Index>(6 * views.second.first)) += sums.pull;
+  pull.segment<6>(static_cast<Eigen::Index>(6 * views.first.first)) -= sums.pull;
 }
 
 /// The same of all poses, the first one too.
@@ -46,8 +71,7 @@ struct GroupSums {
   void add(const ViewPair& views, const PairSums& sums) {
     const auto first = static_cast<Eigen::Index>(6 * views.first.first);
     const auto second = static_cast<Eigen::Index>(6 * views.second.first);
-    pull.segment<6>(second) += sums.pull;
-    pull.segment<6>(first) -= sums.pull;
+    add_pull(pull, views, sums);
     information.block<6, 6>(first, first) += sums.information;
     information.block<6, 6>(second, second) += sums.information;
     information.block<6, 6>(first, second) -= sums.information;
@@ -73,6 +97,11 @@ class LeaveOut {
     const Eigen::VectorXd moved = root_ * (without * (root_ * pull));
     return moved * moved.transpose();
   }
+  /// The same of a group so small that the others hold every direction, by its pull.
+  [[nodiscard]] Eigen::MatrixXd of_small(const Eigen::VectorXd& pull) const {
+    const Eigen::VectorXd moved = root_ * (root_ * scale_.cwiseProduct(pull.tail(scale_.size())));
+    return moved * moved.transpose();
+  }
 
  private:
   Eigen::VectorXd scale_;
@@ -80,7 +109,9 @@ class LeaveOut {
 };
 
 /// Scatter without each view, less that without each pair of views.
-Eigen::MatrixXd scatter_of(const std::map<ViewPair, PairSums>& pairs, const LeaveOut& leave_out, Eigen::Index size) {
+Eigen::MatrixXd scatter_of_views(const PlacedPairs& placed, const LeaveOut& leave_out, Eigen::Index size) {
+  std::map<ViewPair, PairSums> pairs;
+  for (const auto& [where, sums] : placed) pairs[where.second].add(sums);
   std::map<ViewOfPose, GroupSums> views;
   for (const auto& [pair, sums] : pairs) {
     for (const ViewOfPose& view : {pair.first, pair.second})
@@ -102,6 +133,28 @@ Eigen::MatrixXd scatter_of(const std::map<ViewPair, PairSums>& pairs, const Leav
   return scatter;
 }
 
+/// Scatter without each place, less what that of the views holds already: what each view has wrong at a place.
+Eigen::MatrixXd scatter_of_places(const PlacedPairs& placed, const LeaveOut& leave_out, Eigen::Index size) {
+  std::map<Place, GroupSums> places;
+  std::map<std::pair<Place, ViewOfPose>, Eigen::VectorXd> views;
+  Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(size - 6, size - 6);
+  for (const auto& [where, sums] : placed) {
+    const auto& [place, pair] = where;
+    places.try_emplace(place, size).first->second.add(pair, sums);
+    Eigen::VectorXd alone = Eigen::VectorXd::Zero(size);
+    add_pull(alone, pair, sums);
+    scatter += leave_out.of_small(alone);  // in that of both views
+    for (const ViewOfPose& view : {pair.first, pair.second}) {
+      auto [at, is_new] = views.try_emplace(std::pair(place, view));
+      if (is_new) at->second = Eigen::VectorXd::Zero(size);
+      add_pull(at->second, pair, sums);
+    }
+  }
+  for (const auto& [where, pull] : views) scatter -= leave_out.of_small(pull);
+  for (const auto& [place, sums] : places) scatter += leave_out(sums);
+  return scatter;
+}
+
 }  // namespace
 
 Eigen::MatrixXd joint_covariance(const Eigen::MatrixXd& information, std::span<const JointScore> scores) {
@@ -109,9 +162,14 @@ Eigen::MatrixXd joint_covariance(const Eigen::MatrixXd& information, std::span<c
   const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * information * scale.asDiagonal();
   const Eigen::MatrixXd inverse = with_values(scaled, [](double e) { return 1.0 / std::max(e, 1e-9); });
-  const Eigen::MatrixXd scatter = scatter_of(by_pair(scores), LeaveOut(scale, scaled), information.rows() + 6);
-  const Eigen::MatrixXd positive = with_values(scatter, [](double e) { return std::max(e, 0.0); });
-  return scale.asDiagonal() * (inverse + positive) * scale.asDiagonal();
+  const PlacedPairs placed = by_place_and_pair(scores);
+  const LeaveOut leave_out(scale, scaled);
+  Eigen::MatrixXd covariance = inverse;
+  for (const auto& scatter_of : {scatter_of_views, scatter_of_places}) {
+    const Eigen::MatrixXd scatter = scatter_of(placed, leave_out, information.rows() + 6);
+    covariance += with_values(scatter, [](double e) { return std::max(e, 0.0); });
+  }
+  return scale.asDiagonal() * covariance * scale.asDiagonal();
 }
 
 }  // namespace scanrig

@@ -16,7 +16,7 @@ struct JointScore {
 };
 
 /// Of the motions of all poses but the first, six coordinates each; `information` is their normal matrix. They are
-/// found again without each view and without each pair of views. Sources and what is taken for independent:
+/// found again without each view, each pair of views and each place. Sources and what is taken for independent:
 /// motion_covariance(), which is this of two poses.
 Eigen::MatrixXd joint_covariance(const Eigen::MatrixXd& information, std::span<const JointScore> scores);
 

@@ -55,6 +55,13 @@ PoseCorrespondences find_one_way(const std::vector<SurfacePoint>& samples, const
 
 }  // namespace
 
+PairOfViews views_of(const MeasuredPose& pose1, const MeasuredPose& pose2) {
+  PairOfViews views;
+  for (const RangeImage& image : pose1.images.front()) views.pose1.push_back(image.camera_from_pose);
+  for (const RangeImage& image : pose2.images.front()) views.pose2.push_back(image.camera_from_pose);
+  return views;
+}
+
 PoseCorrespondences find_both_ways(const MeasuredPose& pose1, const MeasuredPose& pose2,
                                    const Transform& pose1_from_pose2, int level, double capture_mm,
                                    const RefineOptions& options) {
@@ -91,7 +98,7 @@ MotionEquations motion_equations(const PoseCorrespondences& found, const RefineO
     j << (c.moving - e.centre).cross(c.normal), c.normal;
     e.normal.noalias() += w * j * j.transpose();
     e.right -= w * c.distance * j;
-    if (scores != nullptr) scores->push_back({j, w, c.distance, c.view1, c.view2});
+    if (scores != nullptr) scores->push_back({j, w, c.distance, c.view1, c.view2, c.moving});
   }
   return e;
 }

@@ -25,6 +25,9 @@ struct PoseCorrespondences {
   std::size_t samples_seen = 0;
 };
 
+/// Where they stand.
+PairOfViews views_of(const MeasuredPose& pose1, const MeasuredPose& pose2);
+
 /// Samples of either pose on the other's range images.
 PoseCorrespondences find_both_ways(const MeasuredPose& pose1, const MeasuredPose& pose2,
                                    const Transform& pose1_from_pose2, int level, double capture_mm,

@@ -1,6 +1,8 @@
 #include "pipeline/registration/pose_uncertainty.h"
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cstddef>
 #include <vector>
 
 #include "pipeline/registration/joint_uncertainty.h"
@@ -9,6 +11,8 @@ namespace scanrig {
 namespace {
 
 using Matrix6 = Eigen::Matrix<double, 6, 6>;
+
+constexpr std::size_t kBentPoints = 3000;  // tell how a wrong calibration pulls: it bends surface smoothly
 
 }  // namespace
 
@@ -34,6 +38,38 @@ Matrix6 axis_covariance(const Transform& pose1_from_pose2, const Eigen::Vector3d
     column += 2;
   }
   return by_axis * by_axis.transpose();
+}
+
+Eigen::Matrix<double, 6, Eigen::Dynamic> pull_of_calibration(std::span<const MotionScore> scores,
+                                                             const PairOfViews& views,
+                                                             const Transform& pose1_from_pose2,
+                                                             const CalibrationModes& modes) {
+  Eigen::Matrix<double, 6, Eigen::Dynamic> pull(6, 0);
+  if (!modes) return pull;
+  const std::size_t stride = std::max<std::size_t>(scores.size() / kBentPoints, 1);
+  const Transform pose2_from_pose1 = pose1_from_pose2.inverse();
+  for (std::size_t i = 0; i < scores.size(); i += stride) {
+    const MotionScore& s = scores[i];
+    const Eigen::Matrix3Xd apart =
+        pose1_from_pose2.linear() * modes(views.pose2[static_cast<std::size_t>(s.view2)], pose2_from_pose1 * s.point) -
+        modes(views.pose1[static_cast<std::size_t>(s.view1)], s.point);
+    if (pull.cols() == 0) pull.setZero(6, apart.cols());
+    const double weight = s.weight * static_cast<double>(stride);
+    pull += weight * s.lever * (s.lever.tail<3>().transpose() * apart);  // the lever ends with the normal
+  }
+  return pull;
+}
+
+Eigen::MatrixXd covariance_of_pull(const Eigen::MatrixXd& information, const Eigen::MatrixXd& pull) {
+  constexpr double kOpen = 1e-9;  // of the information in its own scale: less leaves a motion open
+  const Eigen::VectorXd scale = information.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scale.asDiagonal() * information * scale.asDiagonal());
+  const Eigen::VectorXd inverse = solver.eigenvalues().unaryExpr([](double e) { return e > kOpen ? 1.0 / e : 0.0; });
+  const Eigen::MatrixXd& directions = solver.eigenvectors();
+  const Eigen::MatrixXd moved =
+      scale.asDiagonal() *
+      (directions * (inverse.asDiagonal() * (directions.transpose() * (scale.asDiagonal() * pull))));
+  return moved * moved.transpose();
 }
 
 PrincipalSigmas principal_sigmas(const Eigen::Matrix3d& covariance) {

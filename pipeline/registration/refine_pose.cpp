@@ -69,8 +69,9 @@ RefinedPose align(const MeasuredPose& pose1, const MeasuredPose& pose2, const Tr
   result.correspondences = static_cast<int>(found.all.size());
   result.information = e.normal;
   if (level == 0) {
-    result.covariance =
-        motion_covariance(e.normal, scores) + axis_covariance(result.pose1_from_pose2, e.centre, options.axis);
+    const auto pull = pull_of_calibration(scores, views_of(pose1, pose2), result.pose1_from_pose2, options.calibration);
+    result.covariance = motion_covariance(e.normal, scores) + covariance_of_pull(e.normal, pull) +
+                        axis_covariance(result.pose1_from_pose2, e.centre, options.axis);
   }
   result.centre = e.centre;
   result.condition = condition_of(e.normal, arm);

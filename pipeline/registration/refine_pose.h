@@ -41,6 +41,7 @@ struct RefineOptions {
   double capture_medians = 8.0;          ///< the capture distance shrinks to this many median residuals ...
   double min_capture = 0.005;            ///< ... but not below this share of the object's size
   AxisUncertainty axis = {};             ///< of the turntable; nothing for poses that were placed by hand
+  CalibrationModes calibration = {};     ///< of the cameras; nothing for range images of other origin
   double settled_mm = 1e-4;              ///< motion of the surface that ends the iteration on the finest level
   double coarse_settled_mm = 5e-3;       ///< the same on the other levels
 };

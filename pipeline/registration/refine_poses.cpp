@@ -79,15 +79,21 @@ struct JointEquations {
   Eigen::VectorXd right;
 };
 
-JointEquations joint_equations(const Adjustment& a, const Eigen::Vector3d& centre, bool is_bare,
-                               std::vector<JointScore>* scores) {
+/// What tells how well all poses are known.
+struct JointEvidence {
+  std::vector<JointScore> scores;
+  Eigen::MatrixXd calibration_pull;  ///< of all poses, the first included; see pull_of_calibration()
+};
+
+/// With `evidence` of the surfaces alone: without contacts and held turns.
+JointEquations joint_equations(const Adjustment& a, const Eigen::Vector3d& centre, JointEvidence* evidence) {
   const auto size = static_cast<Eigen::Index>(6 * a.measured.size());
   JointEquations joint{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size)};
   for (const Tie& tie : a.ties) {
     std::vector<MotionScore> of_link;
-    MotionEquations e = motion_equations(tie.found, tie.options, scores != nullptr ? &of_link : nullptr);
+    MotionEquations e = motion_equations(tie.found, tie.options, evidence != nullptr ? &of_link : nullptr);
     const Matrix6 m = to_link(a.model_from_pose[tie.link.pose1], e.centre, centre);
-    if (!is_bare) {
+    if (evidence == nullptr) {
       add_contacts(tie.options, relative(a, tie.link), e);
       hold_turns(tie.options, e);
     }
@@ -101,9 +107,17 @@ JointEquations joint_equations(const Adjustment& a, const Eigen::Vector3d& centr
     joint.normal.block<6, 6>(second, first) -= normal;
     joint.right.segment<6>(second) += right;
     joint.right.segment<6>(first) -= right;
+    if (evidence == nullptr) continue;
+    const MeasuredPose &pose1 = a.measured[tie.link.pose1], &pose2 = a.measured[tie.link.pose2];
+    const Eigen::MatrixXd pull = m.transpose() * pull_of_calibration(of_link, views_of(pose1, pose2),
+                                                                     relative(a, tie.link), tie.options.calibration);
+    if (evidence->calibration_pull.size() == 0) evidence->calibration_pull.setZero(size, pull.cols());
+    evidence->calibration_pull.middleRows<6>(second) += pull;
+    evidence->calibration_pull.middleRows<6>(first) -= pull;
     for (MotionScore& score : of_link) {
       score.lever = m.transpose() * score.lever;
-      scores->push_back({score, tie.link.pose1, tie.link.pose2});
+      score.point = a.model_from_pose[tie.link.pose1] * score.point;
+      evidence->scores.push_back({score, tie.link.pose1, tie.link.pose2});
     }
   }
   return joint;
@@ -112,7 +126,7 @@ JointEquations joint_equations(const Adjustment& a, const Eigen::Vector3d& centr
 /// One Gauss-Newton step; returns how far it moved any pose's surface at most, mm.
 double step(Adjustment& a) {
   const Eigen::Vector3d centre = centre_of(a);
-  const JointEquations joint = joint_equations(a, centre, false, nullptr);
+  const JointEquations joint = joint_equations(a, centre, nullptr);
   const Eigen::Index size = joint.right.size() - 6;
   Eigen::MatrixXd normal = joint.normal.bottomRightCorner(size, size);
   for (Eigen::Index first = 0; first < size; first += 6) {
@@ -162,11 +176,13 @@ void describe_fit(const Adjustment& a, RefinedPoses& result) {
 }
 
 void describe_uncertainty(const Adjustment& a, const RefineOptions& options, RefinedPoses& result) {
-  std::vector<JointScore> scores;
+  JointEvidence evidence;
   result.centre = centre_of(a);
-  const JointEquations joint = joint_equations(a, result.centre, true, &scores);
+  const JointEquations joint = joint_equations(a, result.centre, &evidence);
   const Eigen::Index size = joint.right.size() - 6;
-  const Eigen::MatrixXd covariance = joint_covariance(joint.normal.bottomRightCorner(size, size), scores);
+  const Eigen::MatrixXd information = joint.normal.bottomRightCorner(size, size);
+  const Eigen::MatrixXd covariance = joint_covariance(information, evidence.scores) +
+                                     covariance_of_pull(information, evidence.calibration_pull.bottomRows(size));
   result.covariance.push_back(Matrix6::Zero());
   for (std::size_t pose = 1; pose < a.measured.size(); ++pose) {
     const auto at = static_cast<Eigen::Index>(6 * (pose - 1));

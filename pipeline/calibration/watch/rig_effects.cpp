@@ -14,8 +14,6 @@ constexpr double kRadiusMm = 55.0;
 constexpr double kMinHeightMm = 2.0, kMaxHeightMm = 112.0;
 constexpr int kLensUnknowns = 9, kCameraUnknowns = 15;
 
-using Response = Eigen::Matrix<double, 3, 2 * kCameraUnknowns>;
-
 void move(Camera& camera, const Eigen::Matrix<double, 6, 1>& change) {
   Transform& pose = camera.camera_from_turntable;
   pose.linear() = small_motion(change.head<3>(), Eigen::Vector3d::Zero()).linear() * pose.linear();
@@ -94,6 +92,15 @@ PixelByPose pixel_by_pose(const Camera& camera, const Eigen::Vector3d& point) {
   return by;
 }
 
+Eigen::Matrix<double, 3, 2 * kCameraUnknowns> point_by_cameras(const Calibration& calibration,
+                                                               const Eigen::Vector3d& point) {
+  const auto by_pixels = point_by_pixels(calibration, point);
+  Eigen::Matrix<double, 3, 2 * kCameraUnknowns> by;
+  by << by_pixels.leftCols<2>() * pixel_by_camera(calibration.left, point),
+      by_pixels.rightCols<2>() * pixel_by_camera(calibration.right, point);
+  return by;
+}
+
 std::vector<Eigen::Vector3d> working_points(const Calibration& calibration) {
   constexpr int kLevels = 5, kSteps = 8;
   std::vector<Eigen::Vector3d> points;
@@ -144,13 +151,9 @@ AxisSigma axis_sigma(const Calibration& calibration, const CalibrationQuality& q
   Eigen::Matrix<double, 7, 7> normal = Eigen::Matrix<double, 7, 7>::Zero();
   Eigen::Matrix<double, 7, 2 * kCameraUnknowns> sum = Eigen::Matrix<double, 7, 2 * kCameraUnknowns>::Zero();
   for (const Eigen::Vector3d& point : working_points(calibration)) {
-    const auto by_pixels = point_by_pixels(calibration, point);
-    Response response;
-    response << by_pixels.leftCols<2>() * pixel_by_camera(calibration.left, point),
-        by_pixels.rightCols<2>() * pixel_by_camera(calibration.right, point);
     const auto modes = modes_at(point);
     normal += modes.transpose() * modes;
-    sum += modes.transpose() * response;
+    sum += modes.transpose() * point_by_cameras(calibration, point);
   }
   const Eigen::MatrixXd fit = normal.ldlt().solve(sum);
   const Eigen::MatrixXd covariance = fit * quality.cameras * fit.transpose();

@@ -22,6 +22,10 @@ Calibration moved(const Calibration& calibration, const PoseChange& change);
 Eigen::Matrix<double, 2, 3> pixel_by_point(const Camera& camera, const Eigen::Vector3d& point);
 PixelByPose pixel_by_pose(const Camera& camera, const Eigen::Vector3d& point);
 
+/// Derivative of a triangulated point (turntable frame, mm) by both cameras' unknowns, left first, as in
+/// CalibrationQuality::cameras: how far it is put elsewhere, but for the sign.
+Eigen::Matrix<double, 3, 30> point_by_cameras(const Calibration& calibration, const Eigen::Vector3d& point);
+
 /// Points that fill the working volume, turntable frame, mm; those that both cameras see.
 std::vector<Eigen::Vector3d> working_points(const Calibration& calibration);
 

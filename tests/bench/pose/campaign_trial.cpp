@@ -284,6 +284,7 @@ void find_pose(const Truth& truth, const ScannedPose& one, const ScannedPose& tw
   refinement.held = estimate->symmetry.free_turns();
   const RegistrationOptions known = registration_options(rig.calibration);
   refinement.axis = {to_radians(known.axis_tilt_sigma_deg), known.axis_shift_sigma_mm};
+  refinement.calibration = calibration_modes(rig.calibration, rig.calibration.left.camera_from_turntable);
   clock.seconds();
   const auto refined = refine_pose(one.views, two.views, estimate->pose1_from_pose2, refinement, {});
   result["refine_s"] = clock.seconds();

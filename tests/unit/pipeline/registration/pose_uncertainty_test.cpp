@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <array>
+#include <cmath>
 #include <random>
 #include <vector>
 
@@ -81,7 +82,7 @@ std::vector<MotionScore> turned_body(std::mt19937& random) {
           point = 50.0 * out;
           normal = Eigen::Vector3d::UnitY().cross(out);
         }
-        MotionScore score{.weight = 1.0, .view1 = view1, .view2 = view2};
+        MotionScore score{.weight = 1.0, .view1 = view1, .view2 = view2, .point = point};
         score.lever << point.cross(normal), normal;
         scores.push_back(score);
       }
@@ -90,37 +91,120 @@ std::vector<MotionScore> turned_body(std::mt19937& random) {
   return scores;
 }
 
-/// What the views have wrong in common, each of its own, moves the motion as far as their disagreement predicts.
-TEST(PoseUncertainty, TheTurnThatOneHandleHoldsIsNoSurerThanTheViewsThatShowIt) {
+/// Variances of the motion's coordinates, true ones and as predicted, where `wrong` says what is wrong in common with
+/// the residual of a score, anew for each draw.
+struct Variances {
+  Vector6 truth = Vector6::Zero(), predicted = Vector6::Zero();
+};
+template <class DrawWrong>
+Variances of_turned_body(DrawWrong draw_wrong) {
   constexpr int kDraws = 300;
   std::mt19937 random(11);
   std::normal_distribution<double> normal;
-  Vector6 true_variance = Vector6::Zero(), predicted = Vector6::Zero();
+  Variances variances;
   for (int draw = 0; draw < kDraws; ++draw) {
     std::vector<MotionScore> scores = turned_body(random);
+    const auto wrong = draw_wrong(random);
+    Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
+    Vector6 right = Vector6::Zero();
+    for (MotionScore& s : scores) {
+      s.residual = wrong(s) + 0.005 * normal(random);
+      information += s.weight * s.lever * s.lever.transpose();
+      right -= s.weight * s.residual * s.lever;
+    }
+    const Vector6 motion = information.ldlt().solve(right);
+    for (MotionScore& s : scores) s.residual += s.lever.dot(motion);
+    variances.truth += motion.cwiseAbs2() / kDraws;
+    variances.predicted += motion_covariance(information * 4e4, scores_of_weight(scores, 4e4)).diagonal() / kDraws;
+  }
+  return variances;
+}
+
+/// What the views have wrong in common, each of its own, moves the motion as far as their disagreement predicts.
+TEST(PoseUncertainty, TheTurnThatOneHandleHoldsIsNoSurerThanTheViewsThatShowIt) {
+  const auto [truth, predicted] = of_turned_body([](std::mt19937& random) {
+    std::normal_distribution<double> normal;
     std::array<std::array<Vector6, 8>, 2> wrong;
     for (auto& pose : wrong) {
       for (Vector6& view : pose) {
         for (int i = 0; i < 6; ++i) view[i] = (i < 3 ? 2e-4 : 0.01) * normal(random);
       }
     }
-    Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
-    Vector6 right = Vector6::Zero();
-    for (MotionScore& s : scores) {
-      const auto view1 = static_cast<std::size_t>(s.view1), view2 = static_cast<std::size_t>(s.view2);
-      s.residual = s.lever.dot(wrong[0][view1] - wrong[1][view2]) + 0.005 * normal(random);
-      information += s.weight * s.lever * s.lever.transpose();
-      right -= s.weight * s.residual * s.lever;
-    }
-    const Vector6 motion = information.ldlt().solve(right);
-    for (MotionScore& s : scores) s.residual += s.lever.dot(motion);
-    true_variance += motion.cwiseAbs2() / kDraws;
-    predicted += motion_covariance(information * 4e4, scores_of_weight(scores, 4e4)).diagonal() / kDraws;
-  }
+    return [wrong](const MotionScore& s) {
+      return s.lever.dot(wrong[0][static_cast<std::size_t>(s.view1)] - wrong[1][static_cast<std::size_t>(s.view2)]);
+    };
+  });
   for (int i = 0; i < 6; ++i) {
-    EXPECT_GT(predicted[i], 0.8 * true_variance[i]) << i;
-    EXPECT_LT(predicted[i], 3.0 * true_variance[i]) << i;
+    EXPECT_GT(predicted[i], 0.8 * truth[i]) << i;
+    EXPECT_LT(predicted[i], 3.0 * truth[i]) << i;
   }
+}
+
+/// What all views have wrong at one place of the surface, as at a cut's edge, is nothing that they disagree about.
+TEST(PoseUncertainty, TheTurnThatOneHandleHoldsIsNoSurerThanItsSurface) {
+  const auto [truth, predicted] = of_turned_body([](std::mt19937& random) {
+    return [draw = static_cast<int>(random() % 1000000)](const MotionScore& s) {
+      constexpr double kPlaceMm = 9.0;
+      const Eigen::Array3i cell = (s.point.array() / kPlaceMm).round().cast<int>();
+      std::seed_seq of_place{draw, cell[0], cell[1], cell[2]};
+      std::mt19937 at_place(of_place);
+      return 0.02 * std::normal_distribution<double>()(at_place);
+    };
+  });
+  for (int i = 0; i < 6; ++i) {
+    EXPECT_GT(predicted[i], 0.5 * truth[i]) << i;
+    EXPECT_LT(predicted[i], 3.0 * truth[i]) << i;
+  }
+}
+
+/// Depths that a wrong camera makes longer towards the sides of its images.
+Eigen::Matrix3Xd bent_depths(const Transform& camera_from_pose, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d p = camera_from_pose * point;
+  Eigen::Matrix3Xd in_camera = Eigen::Matrix3Xd::Zero(3, 2);
+  in_camera(2, 0) = 0.02 * p.x() / 50.0;
+  in_camera(2, 1) = 0.03 * p.y() * p.y() / 2500.0;
+  return camera_from_pose.linear().transpose() * in_camera;
+}
+
+TEST(PoseUncertainty, AWrongCalibrationSpreadsTheMotionAsPredicted) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  const std::vector<MotionScore> scores = turned_body(random);
+  PairOfViews views;
+  for (int view = 0; view < 8; ++view) {
+    Transform camera_from_pose = rot_y(to_radians(45.0 * view));
+    camera_from_pose.pretranslate(Eigen::Vector3d(0.0, -10.0, 600.0));
+    views.pose1.push_back(camera_from_pose);
+    views.pose2.push_back(camera_from_pose);
+  }
+  Transform pose1_from_pose2 = Transform::Identity();
+  pose1_from_pose2.linear() = Eigen::AngleAxisd(2.0, Eigen::Vector3d(1.0, 0.2, 0.4).normalized()).toRotationMatrix();
+  Vector6 true_variance = Vector6::Zero();
+  Eigen::Matrix<double, 6, 6> information = Eigen::Matrix<double, 6, 6>::Zero();
+  for (const MotionScore& s : scores) information += s.weight * s.lever * s.lever.transpose();
+  constexpr int kDraws = 2000;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const Eigen::Vector2d wrong(normal(random), normal(random));
+    Vector6 right = Vector6::Zero();
+    for (const MotionScore& s : scores) {
+      const auto view1 = static_cast<std::size_t>(s.view1), view2 = static_cast<std::size_t>(s.view2);
+      const Eigen::Vector3d moved =
+          pose1_from_pose2.linear() * bent_depths(views.pose2[view2], pose1_from_pose2.inverse() * s.point) * wrong;
+      const Eigen::Vector3d apart = moved - bent_depths(views.pose1[view1], s.point) * wrong;
+      right -= s.weight * s.lever.tail<3>().dot(apart) * s.lever;
+    }
+    true_variance += Vector6(information.ldlt().solve(right)).cwiseAbs2() / kDraws;
+  }
+  const auto pull = pull_of_calibration(scores, views, pose1_from_pose2, bent_depths);
+  const Eigen::MatrixXd predicted = covariance_of_pull(information, pull);
+  for (int i = 0; i < 6; ++i) EXPECT_NEAR(predicted(i, i), true_variance[i], 0.15 * true_variance[i]) << i;
+  EXPECT_GT(predicted(1, 1), 0.0);
+}
+
+TEST(PoseUncertainty, ACalibrationThatDoesNotSayHowSureItIsAddsNothing) {
+  std::mt19937 random(5);
+  const auto pull = pull_of_calibration(turned_body(random), {}, Transform::Identity(), {});
+  EXPECT_EQ(covariance_of_pull(Eigen::Matrix<double, 6, 6>::Identity(), pull).norm(), 0.0);
 }
 
 }  // namespace

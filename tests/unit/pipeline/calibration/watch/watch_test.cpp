@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/units.h"
+#include "pipeline/calibration/watch/rig_effects.h"
 #include "tests/unit/pipeline/calibration/watch/watched_rig.h"
 
 namespace scanrig {
@@ -237,6 +238,34 @@ TEST(AxisSigma, IsThatOfTheCalibrationsCovariance) {
   scale.segment<3>(27) = rig.calibration().right.camera_from_turntable.translation();
   quality.cameras = 9e-6 * scale * scale.transpose();
   EXPECT_LT(axis_sigma(rig.calibration(), quality).shift_mm, 1e-3);
+}
+
+TEST(PointByCameras, FollowsATableThatBothCamerasSeeElsewhere) {
+  WatchedRig rig({});
+  const Calibration& calibration = rig.calibration();
+  const Eigen::Vector3d point(20.0, 40.0, -10.0), shift(0.1, -0.2, 0.05), turn(1e-3, 2e-3, -5e-4);
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(30);
+  for (int c = 0; c < 2; ++c) {
+    const Eigen::Matrix3d rotation = (c == 0 ? calibration.left : calibration.right).camera_from_turntable.linear();
+    change.segment<3>(15 * c + 9) = rotation * turn;
+    change.segment<3>(15 * c + 12) = rotation * shift;
+  }
+  const Eigen::Vector3d moved = point_by_cameras(calibration, point) * change;
+  EXPECT_LT((moved - (shift + turn.cross(point))).norm(), 1e-6) << moved.transpose();
+}
+
+TEST(PointByCameras, APixelOfOneCameraAloneMovesAlongItsDisparity) {
+  WatchedRig rig({});
+  const Calibration& calibration = rig.calibration();
+  const Eigen::Vector3d point(20.0, 40.0, -10.0);
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(30);
+  change[15 + 2] = 0.1;  // cx of the right camera
+  Calibration other = calibration;
+  other.right.projection.cx += 0.1;
+  const Eigen::Vector3d at = point - point_by_cameras(calibration, point) * change;
+  EXPECT_GT((at - point).norm(), 0.01);
+  EXPECT_LT((other.left.project(at) - calibration.left.project(point)).norm(), 0.01);
+  EXPECT_LT((other.right.project(at) - calibration.right.project(point)).norm(), 0.01);
 }
 
 }  // namespace
