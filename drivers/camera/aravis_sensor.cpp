@@ -70,6 +70,16 @@ void forget(gpointer lost, GClosure*) {
   std::ignore = (*last)->load();  // the signal's thread finishes with it before this point
 }
 
+/// The library tells a loss on the device's own heartbeat thread, which holds a reference meanwhile. Were that the last
+/// one, the thread would free the device and wait for itself, which ends the program.
+void free_by_this_thread(GRef<ArvDevice> device) {
+  constexpr int kTries = 1000;
+  constexpr gulong kTryUs = 1000;
+  g_signal_handlers_disconnect_matched(device.get(), G_SIGNAL_MATCH_FUNC, 0, 0, nullptr,
+                                       reinterpret_cast<gpointer>(&on_control_lost), nullptr);
+  for (int i = 0; i < kTries && g_atomic_int_get(&G_OBJECT(device.get())->ref_count) > 1; ++i) g_usleep(kTryUs);
+}
+
 /// The name of the device with this serial number, or nothing.
 std::optional<std::string> find_by_serial(const std::string& serial) {
   arv_update_device_list();
@@ -224,8 +234,10 @@ Result<void> AravisSensor::let_go(Deadline deadline) {
                gone = std::move(gone)]() mutable {
     // A camera that has replied after all is stopped: an exposure still to come is cancelled.
     if (pending.valid() && pending.get()) arv_camera_stop_acquisition(camera.get(), nullptr);
+    GRef<ArvDevice> device(ARV_DEVICE(g_object_ref(arv_camera_get_device(camera.get()))));
     stream.reset();
     camera.reset();
+    free_by_this_thread(std::move(device));
     gone.set_value();
   }).detach();
   return {};
