@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <optional>
 
 #include "core/parallel.h"
 #include "core/statistics.h"
@@ -43,40 +45,81 @@ bool outside_silhouette(const Silhouette& silhouette, const Eigen::Vector3d& p, 
          min_outside_px;
 }
 
+/// A point of another pose, carried into the frame of `observations`.
+struct CarriedSample {
+  const PoseObservations& observations;
+  int level;
+  const SurfacePoint& sample;
+  double reach_mm;
+  const AgreementOptions& options;
+
+  [[nodiscard]] const RangeLevel& images() const { return observations.measured->images[level]; }
+  /// Whether view `v` saw that nothing is there.
+  [[nodiscard]] bool is_empty_in(std::size_t v) const {
+    const View& view = observations.views[v];
+    const RangeImage& image = images()[v];
+    const Eigen::Vector3d p = image.camera_from_pose * sample.point;
+    if (!is_behind(image, p) &&
+        looked_through(image, view.range.background, 1 << level, p, reach_mm, options.clear_px)) {
+      return true;
+    }
+    return std::ranges::any_of(view.silhouettes, [&](const Silhouette& s) {
+      return outside_silhouette(s, sample.point, options.silhouette_px);
+    });
+  }
+  /// Whether enough views did.
+  [[nodiscard]] bool is_in_free_space() const {
+    const std::size_t count = images().size();
+    const std::size_t enough = std::min(options.witnesses, (count + 2) / 3);
+    std::size_t witnesses = 0;
+    for (std::size_t v = 0; v < count && witnesses + count - v >= enough; ++v) {
+      if (is_empty_in(v) && ++witnesses >= enough) return true;
+    }
+    return false;
+  }
+  [[nodiscard]] double facing(std::size_t v) const {
+    return -images()[v].camera_from_pose.linear().row(2).dot(sample.normal);
+  }
+  /// What view `v` measured next to it.
+  [[nodiscard]] std::optional<SampleCheck> surface_in(std::size_t v) const {
+    const RangeImage& image = images()[v];
+    const Eigen::Vector3d p = image.camera_from_pose * sample.point;
+    if (is_behind(image, p)) return std::nullopt;
+    const auto plane = tangent_plane_near(image, p);
+    if (!plane || plane->normal.dot(image.camera_from_pose.linear() * sample.normal) < options.min_agreement)
+      return std::nullopt;
+    const double distance = plane->normal.dot(p - plane->point);
+    if (std::abs(distance) > reach_mm) return std::nullopt;
+    return SampleCheck{SampleCheck::Kind::surface, static_cast<float>(distance),
+                       static_cast<float>(std::hypot(plane->sigma, sample.sigma))};
+  }
+
+ private:
+  static bool is_behind(const RangeImage& image, const Eigen::Vector3d& p) {
+    return image.projection.kind == Projection::Kind::pinhole && p.z() <= 0.0;
+  }
+};
+
 }  // namespace
 
 SampleCheck check_sample(const PoseObservations& observations, int level, const SurfacePoint& sample, double reach_mm,
                          const AgreementOptions& options) {
-  SampleCheck best;
-  double best_facing = options.min_facing;
   if (options.has_table && sample.point.y() < -2.0 * reach_mm) return kFreeSpace;  // inside the table
-  const RangeLevel& images = observations.measured->images[level];
-  const std::size_t enough = std::min(options.witnesses, (images.size() + 2) / 3);
-  std::size_t witnesses = 0;
-  for (std::size_t v = 0; v < images.size(); ++v) {
-    const View& view = observations.views[v];
-    const Eigen::Vector3d p = images[v].camera_from_pose * sample.point;
-    const bool behind = images[v].projection.kind == Projection::Kind::pinhole && p.z() <= 0.0;
-    const bool is_outside = std::any_of(view.silhouettes.begin(), view.silhouettes.end(), [&](const Silhouette& s) {
-      return outside_silhouette(s, sample.point, options.silhouette_px);
-    });
-    if (is_outside ||
-        (!behind && looked_through(images[v], view.range.background, 1 << level, p, reach_mm, options.clear_px))) {
-      if (++witnesses >= enough) return kFreeSpace;
-      continue;
+  const CarriedSample carried{observations, level, sample, reach_mm, options};
+  if (carried.is_in_free_space()) return kFreeSpace;
+  // The view that faces it best says where the surface is; the next one if that did not measure there.
+  double below = std::numeric_limits<double>::infinity();
+  while (true) {
+    std::optional<std::size_t> next;
+    for (std::size_t v = 0; v < carried.images().size(); ++v) {
+      const double facing = carried.facing(v);
+      if (facing < below && facing >= (next ? carried.facing(*next) : options.min_facing)) next = v;
     }
-    if (behind) continue;
-    const Eigen::Vector3d normal = images[v].camera_from_pose.linear() * sample.normal;
-    if (-normal.z() < best_facing) continue;
-    const auto plane = tangent_plane_near(images[v], p);
-    if (!plane || plane->normal.dot(normal) < options.min_agreement) continue;
-    const double distance = plane->normal.dot(p - plane->point);
-    if (std::abs(distance) > reach_mm) continue;
-    best_facing = -normal.z();
-    best = {SampleCheck::Kind::surface, static_cast<float>(distance),
-            static_cast<float>(std::hypot(plane->sigma, sample.sigma))};
+    if (!next) return {};
+    below = carried.facing(*next);
+    if (carried.is_empty_in(*next)) continue;
+    if (const auto surface = carried.surface_in(*next)) return *surface;
   }
-  return best;
 }
 
 bool contradicts(const SampleCheck& check, double spread_mm, double tolerance) {

@@ -1,7 +1,5 @@
 #include "pipeline/pose/pose_search.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -18,38 +16,6 @@ constexpr std::size_t kNeighbours = 2;  ///< of a best one that is held badly, r
 bool alike(const Transform& a, const Transform& b, const Scene& scene, double degrees, double shift) {
   return rotation_angle(a.linear().transpose() * b.linear()) < to_radians(degrees) &&
          (a * scene.middle2 - b * scene.middle2).norm() < shift * scene.size_mm;
-}
-
-/// Confirmations fade with the distance: a ranking for motions that are still degrees off.
-double soft_score(const std::vector<SampleCheck>& sample_checks, double reach_mm, double weight) {
-  double sum = 0.0;
-  for (const SampleCheck& t : sample_checks) {
-    if (t.kind == SampleCheck::Kind::free_space) sum -= weight;
-    if (t.kind == SampleCheck::Kind::surface) sum += 1.0 - std::abs(t.distance_mm) / reach_mm;
-  }
-  return sum / static_cast<double>(std::max<std::size_t>(sample_checks.size(), 1));
-}
-
-/// The turn that the surfaces' correspondences hold least.
-FreeTurn weakest_turn(const RefinedPose& aligned) {
-  using Matrix6 = Eigen::Matrix<double, 6, 6>;
-  const double trace = aligned.information.trace();
-  if (!(trace > 0.0)) return {};
-  const Matrix6 covariance = (aligned.information + 1e-9 * trace * Matrix6::Identity()).inverse();
-  const PrincipalSigmas turns = principal_sigmas(covariance.topLeftCorner<3, 3>());
-  const Eigen::Vector3d axis = turns.directions.col(0);
-  // The motion of the centre that goes with the turn says where the axis is.
-  Eigen::Vector3d slide = covariance.bottomLeftCorner<3, 3>() * axis / (turns.sigma[0] * turns.sigma[0]);
-  slide -= axis * axis.dot(slide);
-  return {axis, aligned.centre + axis.cross(slide)};
-}
-
-/// Turn and slide that the correspondences hold least, for 1 mm at `arm_mm` from the centre.
-Eigen::Matrix<double, 6, 1> loosest_motion(const RefinedPose& aligned, double arm_mm) {
-  Eigen::Matrix<double, 6, 1> arc;
-  arc << Eigen::Vector3d::Constant(1.0 / arm_mm), Eigen::Vector3d::Ones();
-  const Eigen::Matrix<double, 6, 6> scaled = arc.asDiagonal() * aligned.information * arc.asDiagonal();
-  return arc.asDiagonal() * Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>>(scaled).eigenvectors().col(0);
 }
 
 /// Patches that contradict `second` and not `first`.
@@ -108,33 +74,6 @@ std::vector<Hypothesis> take_finalists(std::vector<Hypothesis>& field, const Pos
 
 }  // namespace
 
-void narrow(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options, const SearchRound& round) {
-  parallel_for(field.size(), [&](std::size_t i) {
-    Hypothesis& h = field[i];
-    if (round.iterations > 0) {
-      RefineOptions refine;
-      refine.max_iterations = round.iterations;
-      h.candidate.contacts =
-          contacts_for(h.candidate.pose1_from_pose2, scene.pairs, scene.solid2.properties, options.pairs);
-      refine.contacts = h.candidate.contacts;
-      const RefinedPose aligned = align(scene.measured1, scene.measured2, h.candidate.pose1_from_pose2, round.level,
-                                        round.capture * scene.size_mm, refine);
-      h.candidate.pose1_from_pose2 = aligned.pose1_from_pose2;
-      h.condition = aligned.condition;
-      h.weakest = weakest_turn(aligned);
-      h.loosest = loosest_motion(aligned, 0.5 * scene.size_mm);
-      h.centre = aligned.centre;
-    }
-    const double reach = round.reach * scene.size_mm;
-    h.sample_checks = check_samples(scene.observations1, scene.observations2, h.candidate.pose1_from_pose2, round.level,
-                                    reach, options.agreement);
-    h.score = soft_score(h.sample_checks, reach, round.contradiction_weight);
-  });
-  std::stable_sort(field.begin(), field.end(),
-                   [](const Hypothesis& a, const Hypothesis& b) { return a.score > b.score; });
-  keep_distinct(field, scene, options, round.keep, round.apart_deg);
-}
-
 void keep_distinct(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options, std::size_t count,
                    double apart_deg) {
   std::vector<Hypothesis> kept;
@@ -172,7 +111,7 @@ void judge(std::vector<Hypothesis>& field, const PoseOptions& options) {
 void settle(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options) {
   if (field.empty()) return;
   judge(field, options);
-  vary_loosest(field, scene, options, options.rounds.back());
+  vary_weakest(field, scene, options, options.rounds.back());
   judge(field, options);
   std::vector<Hypothesis> others;
   std::vector<Hypothesis> finalists = take_finalists(field, options, others);
@@ -186,7 +125,7 @@ void settle(std::vector<Hypothesis>& field, const Scene& scene, const PoseOption
   SearchRound round = options.last_round;
   round.keep = finalists.size();
   narrow(finalists, scene, options, round);
-  vary_loosest(finalists, scene, options, round);
+  vary_weakest(finalists, scene, options, round);
   judge(finalists, options);
   keep_distinct(finalists, scene, options, finalists.size(), options.same_deg);
   separate_by_patches(finalists, scene, options);

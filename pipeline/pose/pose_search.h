@@ -13,9 +13,9 @@ struct Hypothesis {
   std::vector<SampleCheck> sample_checks;
   double score = 0.0;
   double condition = 0.0;
-  FreeTurn weakest{};  ///< the turn that the shared surface holds least
+  FreeTurn weakest_turn{};  ///< the turn that the shared surface holds least
   /// The motion that it holds least: turn (rad) about `centre` and slide for 1 mm at the object's outside.
-  Eigen::Matrix<double, 6, 1> loosest = Eigen::Matrix<double, 6, 1>::Zero();
+  Eigen::Matrix<double, 6, 1> weakest_motion = Eigen::Matrix<double, 6, 1>::Zero();
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
 };
 
@@ -58,11 +58,11 @@ void search_wider(std::vector<Hypothesis>& field, const PoseInput& pose1, const 
 /// Moves the best ones, where they are held badly, along what the shared surface holds least to where they contradict
 /// least: alignment loses a turn that a small part alone holds, and slides along upright sides. `judged`: the round
 /// that checked them.
-void vary_loosest(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options,
+void vary_weakest(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options,
                   const SearchRound& judged);
 
 /// Refines the candidates that are not yet separable at full resolution, and a best one that would be refused or
-/// searched for again as it is; the others stay behind these finalists. vary_loosest() moves those that are held badly.
+/// searched for again as it is; the others stay behind these finalists. vary_weakest() moves those that are held badly.
 void settle(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options);
 
 double apart_deg(const Candidate& a, const Candidate& b);

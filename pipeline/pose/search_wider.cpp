@@ -15,8 +15,9 @@ namespace {
 
 constexpr double kTurnStepDeg = 5.0;      ///< of the turns about the axis that the shared surface holds least
 constexpr std::size_t kTurned = 2;        ///< best hypotheses that are turned
-constexpr std::size_t kTurnsKept = 24;    ///< of all that were judged; these are aligned
-constexpr std::size_t kVariedFinely = 6;  ///< best hypotheses that are moved along what is held least
+constexpr std::size_t kTurnsJudged = 72;  ///< of all on a coarser level
+constexpr std::size_t kTurnsKept = 24;    ///< of those that were judged; these are aligned
+constexpr std::size_t kVariedFinely = 6;  ///< best badly held hypotheses that are moved along what is held least
 constexpr std::array kFineSteps = {0.05, 0.035, 0.02, 0.012, 0.006, 0.003, 0.0015};  ///< shares of the object's size
 constexpr double kGain = 0.002;                                                      ///< of the score; less is chance
 
@@ -27,7 +28,7 @@ constexpr std::array<SearchRound, 4> kWideRounds = {{{3, 0, 0.00, 0.050, 300, 4.
                                                      {1, 15, 0.02, 0.015, 12, 3.0, 7.0}}};
 
 Hypothesis turned(const Hypothesis& from, const Eigen::Vector3d& axis, double degrees) {
-  const Eigen::Translation3d there(from.weakest.point);
+  const Eigen::Translation3d there(from.weakest_turn.point);
   Hypothesis h;
   h.candidate.generator = from.candidate.generator;
   h.candidate.pose1_from_pose2 =
@@ -35,16 +36,21 @@ Hypothesis turned(const Hypothesis& from, const Eigen::Vector3d& axis, double de
   return h;
 }
 
+/// Not aligned; all are kept, the best first.
+void judge_as_they_are(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options,
+                       SearchRound round) {
+  round.iterations = 0;
+  round.keep = field.size();
+  round.apart_deg = 0.0;
+  narrow(field, scene, options, round);
+  judge(field, options);
+}
+
 /// All with the same checks; the best distinct ones come first and are kept.
 void join(std::vector<Hypothesis>& field, std::vector<Hypothesis> more, const Scene& scene,
           const PoseOptions& options) {
   field.insert(field.end(), std::make_move_iterator(more.begin()), std::make_move_iterator(more.end()));
-  SearchRound verdict = options.rounds.back();
-  verdict.iterations = 0;
-  verdict.keep = field.size();
-  verdict.apart_deg = 0.0;
-  narrow(field, scene, options, verdict);
-  judge(field, options);
+  judge_as_they_are(field, scene, options, options.rounds.back());
   keep_distinct(field, scene, options, options.rounds.back().keep, options.rounds.back().apart_deg);
 }
 
@@ -54,7 +60,7 @@ std::vector<Hypothesis> both_ways(const std::vector<Hypothesis>& field, std::siz
   std::vector<Hypothesis> bases;
   for (std::size_t i = 0; i < std::min(count, field.size()); ++i) {
     bases.push_back(field[i]);
-    bases.push_back(turned(field[i], field[i].weakest.axis.unitOrthogonal(), 180.0));
+    bases.push_back(turned(field[i], field[i].weakest_turn.axis.unitOrthogonal(), 180.0));
   }
   for (SearchRound round : kWideRounds) {
     if (round.iterations == 0) continue;
@@ -71,17 +77,16 @@ std::vector<Hypothesis> turns_of(const std::vector<Hypothesis>& field, std::size
   std::vector<Hypothesis> turns;
   for (const Hypothesis& base : both_ways(field, count, scene, options)) {
     for (double degrees = 0.0; degrees < 359.0; degrees += kTurnStepDeg) {
-      turns.push_back(turned(base, base.weakest.axis, degrees));
+      turns.push_back(turned(base, base.weakest_turn.axis, degrees));
     }
+  }
+  for (const auto& [round, kept] : {std::pair(options.rounds[2], kTurnsJudged), {options.rounds[3], kTurnsKept}}) {
+    judge_as_they_are(turns, scene, options, round);
+    turns.resize(std::min(kept, turns.size()));
   }
   SearchRound round = options.rounds.back();
   round.apart_deg = 0.0;
   round.keep = turns.size();
-  round.iterations = 0;
-  narrow(turns, scene, options, round);
-  judge(turns, options);
-  turns.resize(std::min(kTurnsKept, turns.size()));
-  round.iterations = options.rounds.back().iterations;
   narrow(turns, scene, options, round);
   return turns;
 }
@@ -89,7 +94,8 @@ std::vector<Hypothesis> turns_of(const std::vector<Hypothesis>& field, std::size
 /// Along what is held least, by so many millimetres at the object's outside.
 Transform moved(const Hypothesis& from, double distance_mm) {
   const Eigen::Translation3d to_centre(from.centre);
-  return to_centre * small_motion(distance_mm * from.loosest.head<3>(), distance_mm * from.loosest.tail<3>()) *
+  return to_centre *
+         small_motion(distance_mm * from.weakest_motion.head<3>(), distance_mm * from.weakest_motion.tail<3>()) *
          to_centre.inverse() * from.candidate.pose1_from_pose2;
 }
 
@@ -138,11 +144,13 @@ void search_wider(std::vector<Hypothesis>& field, const PoseInput& pose1, const 
   join(field, std::move(*proposed), scene, options);
 }
 
-void vary_loosest(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options,
+void vary_weakest(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options,
                   const SearchRound& judged) {
-  parallel_for(std::min(kVariedFinely, field.size()), [&](std::size_t i) {
-    if (field[i].condition > options.weak_condition) vary(field[i], scene, options, judged);
-  });
+  std::vector<Hypothesis*> held_badly;
+  for (Hypothesis& h : field) {
+    if (h.condition > options.weak_condition && held_badly.size() < kVariedFinely) held_badly.push_back(&h);
+  }
+  parallel_for(held_badly.size(), [&](std::size_t i) { vary(*held_badly[i], scene, options, judged); });
 }
 
 }  // namespace scanrig

@@ -59,8 +59,9 @@ RefinedPose align(const MeasuredPose& pose1, const MeasuredPose& pose2, const Tr
       break;
   }
   if (found.all.size() < options.min_correspondences) return {.pose1_from_pose2 = initial};
+  const bool wants_covariance = level == 0 && options.wants_covariance;
   std::vector<MotionScore> scores;
-  const MotionEquations e = motion_equations(found, options, level == 0 ? &scores : nullptr);
+  const MotionEquations e = motion_equations(found, options, wants_covariance ? &scores : nullptr);
   const std::vector<double> distances = distances_found(found);
   result.median_mm = quantile(distances, 0.5);
   result.rms_mm = root_mean_square(distances);
@@ -68,7 +69,7 @@ RefinedPose align(const MeasuredPose& pose1, const MeasuredPose& pose2, const Tr
                    static_cast<double>(pose1.samples[level].size() + pose2.samples[level].size());
   result.correspondences = static_cast<int>(found.all.size());
   result.information = e.normal;
-  if (level == 0) {
+  if (wants_covariance) {
     const auto pull = pull_of_calibration(scores, views_of(pose1, pose2), result.pose1_from_pose2, options.calibration);
     result.covariance = motion_covariance(e.normal, scores) + covariance_of_pull(e.normal, pull) +
                         axis_covariance(result.pose1_from_pose2, e.centre, options.axis);
@@ -81,10 +82,15 @@ RefinedPose align(const MeasuredPose& pose1, const MeasuredPose& pose2, const Tr
 Result<RefinedPose> refine_pose(std::span<const View> views1, std::span<const View> views2,
                                 const Transform& pose1_from_pose2, const RefineOptions& options,
                                 const Context& context) {
-  const MeasuredPose pose1 = measured_pose(views1, options.levels);
-  const MeasuredPose pose2 = measured_pose(views2, options.levels);
+  return refine_pose(measured_pose(views1, options.levels), measured_pose(views2, options.levels), pose1_from_pose2,
+                     options, context);
+}
+
+Result<RefinedPose> refine_pose(const MeasuredPose& pose1, const MeasuredPose& pose2, const Transform& pose1_from_pose2,
+                                const RefineOptions& options, const Context& context) {
+  const auto coarsest = static_cast<std::size_t>(options.levels - 1);
   for (const MeasuredPose* pose : {&pose1, &pose2}) {
-    if (pose->samples.back().size() < options.min_correspondences) {
+    if (pose->samples[coarsest].size() < options.min_correspondences) {
       return fail(ErrorCode::degenerate, "pose refinement: pose {} has no measured surface", pose == &pose1 ? 1 : 2);
     }
   }

@@ -42,6 +42,7 @@ struct RefineOptions {
   double min_capture = 0.005;            ///< ... but not below this share of the object's size
   AxisUncertainty axis = {};             ///< of the turntable; nothing for poses that were placed by hand
   CalibrationModes calibration = {};     ///< of the cameras; nothing for range images of other origin
+  bool wants_covariance = true;          ///< how well the motion is known, which a search need not know
   double settled_mm = 1e-4;              ///< motion of the surface that ends the iteration on the finest level
   double coarse_settled_mm = 5e-3;       ///< the same on the other levels
 };
@@ -86,5 +87,9 @@ RefinedPose align(const MeasuredPose& pose1, const MeasuredPose& pose2, const Tr
 Result<RefinedPose> refine_pose(std::span<const View> pose1, std::span<const View> pose2,
                                 const Transform& pose1_from_pose2, const RefineOptions& options,
                                 const Context& context);
+
+/// The same of poses that are measured already, on `options.levels` levels or more.
+Result<RefinedPose> refine_pose(const MeasuredPose& pose1, const MeasuredPose& pose2, const Transform& pose1_from_pose2,
+                                const RefineOptions& options, const Context& context);
 
 }  // namespace scanrig
