@@ -215,7 +215,7 @@ const char* const kSchemas = R"({
   "stored": {"type": "integer", "description": "views that survive a power cut"},
   "model": {"type": "string", "description": "path of the model; empty until it is there"},
   "report": {"type": "string"},
-  "remarks": {"type": "array", "items": {"type": "string"}, "description": "done: that the rig has moved since its calibration, images that the others contradict"},
+  "remarks": {"type": "array", "items": {"type": "string"}, "description": "done: that the rig has moved since its calibration, images that the others contradict, a symmetric part, a pose that is known badly"},
   "config_sha256": {"type": "array", "items": {"type": "string"},
     "description": "SHA-256 of each rig.toml that its views were taken under; of a rig without one none"},
   "error": {"$ref": "#/components/schemas/MaybeProblem"}}},

@@ -247,7 +247,7 @@ std::string last_check(const fs::path& root, const std::string& calibration_sha2
   return json->finish() && is_of_this ? date : "";
 }
 
-std::vector<std::string> read_rig_remarks(const fs::path& report) {
+std::vector<std::string> read_remarks(const fs::path& report) {
   const auto text = read_file(report);
   const auto json = text ? nlohmann::json::parse(*text, nullptr, false) : nlohmann::json();
   std::vector<std::string> remarks;
@@ -261,6 +261,10 @@ std::vector<std::string> read_rig_remarks(const fs::path& report) {
     for (const auto& sentence : member(member(pose, "watch"), "sentences")) add(sentence);
   }
   for (const auto& disagreement : member(json, "disagreements")) add(member(disagreement, "sentence"));
+  add(member(member(member(json, "pose_estimate"), "turn"), "sentence"));
+  const auto refinement = member(json, "pose_refinement");
+  add(member(refinement, "sentence"));
+  for (const auto& pose : member(refinement, "poses")) add(member(pose, "sentence"));
   add(member(member(json, "next_rest"), "sentence"));
   return remarks;
 }

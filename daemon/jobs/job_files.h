@@ -73,9 +73,9 @@ Result<void> note_check(const std::filesystem::path& root, const std::string& ca
 /// ISO 8601; empty: this calibration was not checked, or the record cannot be read.
 std::string last_check(const std::filesystem::path& root, const std::string& calibration_sha256);
 
-/// What report.json says of the rig, of single images, and of another rest than the suggested one, each sentence once;
-/// none where it cannot be read.
-std::vector<std::string> read_rig_remarks(const std::filesystem::path& report);
+/// What report.json says of the rig, of single images, of a symmetric part, of a pose that is known badly, and of
+/// another rest than the suggested one, each sentence once; none where it cannot be read.
+std::vector<std::string> read_remarks(const std::filesystem::path& report);
 
 /// The ways in which pose 2 fits, from the job's folder; none where they cannot be read.
 void take_choices(JobInfo& job);

@@ -73,7 +73,7 @@ Result<JobInfo> read_folder(const fs::path& folder, const ScanFolder& scan) {
   if (job.recipe.is_calibration()) {
     job.calibration = read_calibration_report(report_file(folder));
   } else {
-    job.remarks = read_rig_remarks(report_file(folder));
+    job.remarks = read_remarks(report_file(folder));
     take_choices(job);
   }
   if (job.calibration) job.calibration->is_accepted = order->accepted;

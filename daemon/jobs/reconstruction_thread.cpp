@@ -368,7 +368,7 @@ Result<event::ModelReady> ReconstructionThread::make_model() {
                              report,
                              limit_violation(report, recipe.limits),
                              recipe.is_calibration() ? read_calibration_report(report) : std::nullopt,
-                             recipe.is_calibration() ? std::vector<std::string>() : read_rig_remarks(report)};
+                             recipe.is_calibration() ? std::vector<std::string>() : read_remarks(report)};
   });
 }
 

@@ -156,7 +156,7 @@ struct JobInfo {
   int picked = 0;                                   ///< of these, from 1; 0: none
   std::string repeated{};              ///< why the views of the current placement were dropped; empty: they were not
   std::optional<Error> error{};        ///< why it failed, was interrupted or cancelled; or did not pass
-  std::vector<std::string> remarks{};  ///< done: sentences on the rig, as its watch found it
+  std::vector<std::string> remarks{};  ///< done: what its report says to a person
   std::string model{};                 ///< path of the model file, once it exists
   std::string report{};
 };

@@ -50,8 +50,10 @@ Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_touching(c
 Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_second_pose(const PoseOptions& pose_options,
                                                                                   Report& report,
                                                                                   const Context& context) {
-  const PoseInput first{.solid = poses[0].partial.mesh, .views = poses[0].views};
-  const PoseInput second{.solid = poses[1].partial.mesh, .views = poses[1].views};
+  const MeasuredPose measured1 = measured_pose(poses[0].views, pose_options.levels);
+  const MeasuredPose measured2 = measured_pose(poses[1].views, pose_options.levels);
+  const PoseInput first{.solid = poses[0].partial.mesh, .views = poses[0].views, .measured = &measured1};
+  const PoseInput second{.solid = poses[1].partial.mesh, .views = poses[1].views, .measured = &measured2};
   std::vector<Candidate> fitting;
   const auto estimate = estimate_pose(first, second, pose_options, context, fitting);
   if (!estimate && estimate.error().code == ErrorCode::ambiguous) keep_choices(fitting);
@@ -69,9 +71,9 @@ Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_second_pos
     const Transform element = *found.model_from_pose[1] * estimate->pose1_from_pose2.inverse();
     refinement.contacts = carried(std::move(refinement.contacts), element);
   }
-  const auto refined = refine_pose(poses[0].views, poses[1].views, *found.model_from_pose[1], refinement, context);
+  const auto refined = refine_pose(measured1, measured2, *found.model_from_pose[1], refinement, context);
   if (!refined) return pass_on(refined, "pose 2 in pose 1");
-  report.add_refinement(*refined);
+  report.add_refinement(*refined, !refinement.held.empty());
   found.model_from_pose[1] = refined->pose1_from_pose2;
   found.seen_empty = estimate->best.agreement.free_space;
   return found;

@@ -11,6 +11,7 @@
 #include "core/version.h"
 #include "pipeline/mesh/solid_properties.h"
 #include "pipeline/mesh/topology.h"
+#include "pipeline/reconstruct/pose_sentences.h"
 #include "pipeline/registration/pose_uncertainty.h"
 
 namespace scanrig {
@@ -195,17 +196,6 @@ json pair_json(const PosePair& pair) {
           {"message", pair.message.empty() ? json() : json(pair.message)}};
 }
 
-/// Without a full stop.
-std::string turn_sentence(const PoseEstimate& estimate, const ColourDecision* colours) {
-  const char* how = "; nothing shows which of its turns it made";
-  if (colours != nullptr && colours->is_decided) how = "; its colours show how it was turned";
-  if (colours != nullptr && !colours->is_decided) {
-    how = "; nothing shows how it was turned, so each place has the colours of one pose alone";
-  }
-  const bool is_assumed = estimate.turned_over_is_assumed && !(colours != nullptr && colours->is_decided);
-  return describe(estimate.symmetry) + how + (is_assumed ? "; it is taken for turned over" : "");
-}
-
 /// Of three coordinates: standard deviations, the weakest first, and its direction.
 json sigma_json(const Eigen::Matrix3d& covariance, double unit) {
   const PrincipalSigmas found = principal_sigmas(covariance);
@@ -222,6 +212,9 @@ json uncertainty_json(const Eigen::Vector3d& centre, const Eigen::Matrix<double,
           {"translation_mm", sigma_json(covariance.bottomRightCorner<3, 3>(), 1.0)},
           {"covariance", rows}};
 }
+
+/// Null without one.
+json sentence_json(const std::string& sentence) { return sentence.empty() ? json() : json(sentence); }
 
 }  // namespace
 
@@ -288,22 +281,26 @@ void Report::add_turn(const PoseEstimate& estimate, const ColourDecision* colour
   (*json_)["pose_estimate"]["turn"] = turn;
 }
 
-void Report::add_refinement(const RefinedPose& refined) {
+void Report::add_refinement(const RefinedPose& refined, bool is_turn_open) {
   (*json_)["pose1_from_pose2"] = transform_json(refined.pose1_from_pose2);
   (*json_)["pose_refinement"] = {{"residual_median_mm", number(refined.median_mm)},
                                  {"residual_rms_mm", number(refined.rms_mm)},
                                  {"overlap", refined.overlap},
                                  {"correspondences", refined.correspondences},
                                  {"condition", number(refined.condition)},
-                                 {"uncertainty", uncertainty_json(refined.centre, refined.covariance)}};
+                                 {"uncertainty", uncertainty_json(refined.centre, refined.covariance)},
+                                 {"sentence", sentence_json(weakness_sentence(1, refined.covariance, is_turn_open))}};
 }
 
 void Report::add_placed(const PlacedPoses& placed, std::span<const std::size_t> kept, std::span<const PoseLink> links,
                         const RefinedPoses& refined, bool layers) {
   json of_poses = json::array(), pairs = json::array(), left_out = json::array();
+  const bool is_turn_open = std::ranges::any_of(links, [](const PoseLink& link) { return !link.held.empty(); });
   for (std::size_t i = 1; i < kept.size(); ++i) {
     (*json_)[fmt::format("pose{}_from_pose{}", kept[0] + 1, kept[i] + 1)] = transform_json(refined.model_from_pose[i]);
-    of_poses.push_back({{"pose", kept[i]}, {"uncertainty", uncertainty_json(refined.centre, refined.covariance[i])}});
+    of_poses.push_back({{"pose", kept[i]},
+                        {"uncertainty", uncertainty_json(refined.centre, refined.covariance[i])},
+                        {"sentence", sentence_json(weakness_sentence(kept[i], refined.covariance[i], is_turn_open))}});
   }
   for (const PosePair& pair : placed.pairs) pairs.push_back(pair_json(pair));
   for (std::size_t i = 0; i < links.size(); ++i) {

@@ -39,7 +39,8 @@ class Report {
   void add_estimate(const PoseEstimate& estimate);
   /// After add_estimate(), of a part with a symmetry. `colours`: null without photographs.
   void add_turn(const PoseEstimate& estimate, const ColourDecision* colours);
-  void add_refinement(const RefinedPose& refined);
+  /// `is_turn_open`: a turn that changes nothing of the part was held.
+  void add_refinement(const RefinedPose& refined, bool is_turn_open);
   /// Of three poses or more. `kept`: poses of the model; `links` count among these.
   void add_placed(const PlacedPoses& placed, std::span<const std::size_t> kept, std::span<const PoseLink> links,
                   const RefinedPoses& refined, bool layers);

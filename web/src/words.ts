@@ -81,6 +81,18 @@ export const words = {
         }`
       : `${one.mm.toFixed(3)} mm ± ${one.expanded_uncertainty_mm.toFixed(3)} mm (k = 2)`,
   facts: "Facts",
+  figures: {
+    surface: "Surface",
+    surfaceIs: (mm2: number, share: number) => `${(mm2 / 100).toFixed(1)} cm², ${(100 * share).toFixed(1)} % measured`,
+    volume: "Volume",
+    volumeIs: (mm3: number) => `${(mm3 / 1000).toFixed(2)} cm³`,
+    views: "Views",
+    viewsAgree: (mm: number) => `agree to ${mm.toFixed(3)} mm (median)`,
+    pose: (number: number) => `Pose ${number}`,
+    poseIs: (deg: number, mm: number) =>
+      `known to ${deg.toFixed(4)}° and ${mm.toFixed(4)} mm where it is held least (k = 1)`,
+    turnIsOpen: (mm: number) => `known to ${mm.toFixed(4)} mm where it is held least (k = 1); any turn fits`,
+  },
   passed: "within the limits",
   below: "outside the limits",
   loginTitle: "Log in",

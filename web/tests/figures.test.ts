@@ -1,5 +1,6 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
+import { figuresOf } from "../src/model/report.ts";
 import { topFor } from "../src/model/scale.ts";
 import { exposureOf, sharpnessOf } from "../src/service/sharpness.ts";
 import { deviationColour, isOutside } from "../src/view3d/colourings.ts";
@@ -73,4 +74,39 @@ test("a deviation is blue inside, white on the reference, orange outside, grey w
 
 test("the scale holds 95 % of the vertices", () => {
   assert.deepEqual([0.01, 0.05, 0.051, 0.9, 80].map(topFor), [0.05, 0.05, 0.1, 1, 5]);
+});
+
+test("what the report says of a model, pose by pose", () => {
+  const known = (deg: number, mm: number) => ({
+    rotation_deg: { sigma: [deg, 0.001, 0.001] },
+    translation_mm: { sigma: [mm, 0.001, 0.001] },
+  });
+  const two = figuresOf({
+    poses: [{ residual_median_mm: 0.011 }, { residual_median_mm: 0.0134 }],
+    pose_refinement: { uncertainty: known(0.0043, 0.0069) },
+    mesh: { area_mm2: 12345, measured_share: 0.9973, volume_mm3: 45678 },
+  });
+  assert.deepEqual(
+    two.map(({ name, text }) => `${name}: ${text}`),
+    [
+      "Surface: 123.5 cm², 99.7 % measured",
+      "Volume: 45.68 cm³",
+      "Views: agree to 0.013 mm (median)",
+      "Pose 2: known to 0.0043° and 0.0069 mm where it is held least (k = 1)",
+    ],
+  );
+  const three = figuresOf({
+    pose_refinement: {
+      poses: [
+        { pose: 1, uncertainty: known(0.01, 0.02) },
+        { pose: 2, uncertainty: known(40, 0.02) },
+      ],
+    },
+  });
+  assert.deepEqual(
+    three.map(({ name }) => name),
+    ["Pose 2", "Pose 3"],
+  );
+  assert.match(three[1]?.text ?? "", /any turn fits/);
+  assert.deepEqual(figuresOf({}), []);
 });

@@ -14,7 +14,7 @@ class Remarks : public scan_samples::FolderTest {
   [[nodiscard]] std::vector<std::string> remarks_of(const std::string& report) const {
     const auto file = folder_ / "report.json";
     EXPECT_TRUE(write_file_atomically(file, report));
-    return read_rig_remarks(file);
+    return read_remarks(file);
   }
 };
 
@@ -23,6 +23,15 @@ TEST_F(Remarks, ARestThatWasNotSuggestedIsOne) {
               ElementsAre("Laid on another rest."));
   EXPECT_THAT(remarks_of(R"({"next_rest": {"taken": 1, "sentence": null}})"), ElementsAre());
   EXPECT_THAT(remarks_of(R"({})"), ElementsAre());
+}
+
+TEST_F(Remarks, ASymmetricPartIsNamedAndAPoseThatIsKnownBadly) {
+  EXPECT_THAT(remarks_of(R"({"pose_estimate": {"turn": {"sentence": "The part is round."}},
+                            "pose_refinement": {"sentence": "A turn is open."}})"),
+              ElementsAre("The part is round.", "A turn is open."));
+  EXPECT_THAT(remarks_of(R"({"pose_refinement": {"poses": [{"pose": 1, "sentence": null},
+                                                           {"pose": 2, "sentence": "Pose 3 is loose."}]}})"),
+              ElementsAre("Pose 3 is loose."));
 }
 
 TEST_F(Remarks, EachSentenceComesOnce) {

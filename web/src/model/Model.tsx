@@ -7,6 +7,7 @@ import { JobLine } from "../jobs/JobLine.tsx";
 import { go } from "../screens.ts";
 import { bytes, words } from "../words.ts";
 import { Canvas } from "./Canvas.tsx";
+import { Figures } from "./Figures.tsx";
 import { modelFile } from "./file.ts";
 
 function Files({ job, list }: { job: string; list: FileList }) {
@@ -68,6 +69,7 @@ export function Model({ id }: { id: string }) {
         <section class="card">
           <h2>{words.facts}</h2>
           <JobLine job={job} />
+          <Figures job={id} model={job.model} />
         </section>
         {list.value && <Files job={id} list={list.value} />}
       </div>
