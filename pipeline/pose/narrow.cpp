@@ -54,7 +54,7 @@ void check(Hypothesis& h, const Scene& scene, const PoseOptions& options, const 
 }
 
 /// A motion that comes to lie on a table is aligned again with that contact: of a box that was turned upside down the
-/// edges, which are measured worst, would hold the height.
+/// edges, which are measured worst, would hold the height. Leaves the contacts used in `refine`.
 RefinedPose align_with_contacts(const Hypothesis& start, const Scene& scene, const PoseOptions& options,
                                 const SearchRound& round, RefineOptions& refine) {
   const auto contacts_at = [&](const Transform& motion) {

@@ -15,8 +15,8 @@ namespace {
 
 constexpr double kTurnStepDeg = 5.0;      ///< of the turns about the axis that the shared surface holds least
 constexpr std::size_t kTurned = 2;        ///< best hypotheses that are turned
-constexpr std::size_t kTurnsJudged = 72;  ///< of all on a coarser level
-constexpr std::size_t kTurnsKept = 24;    ///< of those that were judged; these are aligned
+constexpr std::size_t kTurnsJudged = 72;  ///< best of all on a coarser level
+constexpr std::size_t kTurnsKept = 24;    ///< best of these; they are aligned
 constexpr std::size_t kVariedFinely = 6;  ///< best badly held hypotheses that are moved along what is held least
 constexpr std::array kFineSteps = {0.05, 0.035, 0.02, 0.012, 0.006, 0.003, 0.0015};  ///< shares of the object's size
 constexpr double kGain = 0.002;                                                      ///< of the score; less is chance

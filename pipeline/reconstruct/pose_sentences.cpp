@@ -22,17 +22,18 @@ std::string sentence_of(std::string text) {
   return text + ".";
 }
 
-std::string direction_of(const Eigen::Vector3d& direction) {
+/// As the part stood in pose 1.
+std::string axis_of(const Eigen::Vector3d& direction) {
   const double tilt_deg = to_degrees(std::acos(std::min(std::abs(direction.y()), 1.0)));
-  if (tilt_deg < kUprightDeg) return "pose 1's vertical";
-  if (tilt_deg > 90.0 - kUprightDeg) return "a horizontal of pose 1";
-  return fmt::format("an axis {:.0f} deg from pose 1's vertical", tilt_deg);
+  if (tilt_deg < kUprightDeg) return "the axis that was vertical in pose 1";
+  if (tilt_deg > 90.0 - kUprightDeg) return "an axis that was horizontal in pose 1";
+  return fmt::format("an axis {:.0f} deg from the vertical of pose 1", tilt_deg);
 }
 
 }  // namespace
 
 std::string turn_sentence(const PoseEstimate& estimate, const ColourDecision* colours) {
-  const char* how = "; nothing shows which of its turns it made";
+  const char* how = "; nothing shows how it was turned";
   if (colours != nullptr && colours->is_decided) how = "; its colours show how it was turned";
   if (colours != nullptr && !colours->is_decided) {
     how = "; nothing shows how it was turned, so each place has the colours of one pose alone";
@@ -48,11 +49,11 @@ std::string weakness_sentence(std::size_t pose, const Eigen::Matrix<double, 6, 6
   const double slide_mm = slides.sigma[0];
   if (turn_deg <= kWellKnownDeg && slide_mm <= kWellKnownMm) return "";
   const bool is_turn = turn_deg / kWellKnownDeg > slide_mm / kWellKnownMm;
-  const std::string along = direction_of((is_turn ? turns : slides).directions.col(0));
-  return is_turn ? fmt::format("The turn of pose {} about {} is known to {:.2f} deg only: add a pose that decides it.",
-                               pose + 1, along, turn_deg)
-                 : fmt::format("The place of pose {} along {} is known to {:.2f} mm only: add a pose that decides it.",
-                               pose + 1, along, slide_mm);
+  const std::string axis = axis_of((is_turn ? turns : slides).directions.col(0));
+  return is_turn ? fmt::format("Pose {} may be turned by {:.2f} deg (1 sigma) about {}: add a pose to make sure.",
+                               pose + 1, turn_deg, axis)
+                 : fmt::format("Pose {} may be off by {:.2f} mm (1 sigma) along {}: add a pose to make sure.", pose + 1,
+                               slide_mm, axis);
 }
 
 }  // namespace scanrig

@@ -289,6 +289,7 @@ void Report::add_refinement(const RefinedPose& refined, bool is_turn_open) {
                                  {"correspondences", refined.correspondences},
                                  {"condition", number(refined.condition)},
                                  {"uncertainty", uncertainty_json(refined.centre, refined.covariance)},
+                                 {"turn_is_open", is_turn_open},
                                  {"sentence", sentence_json(weakness_sentence(1, refined.covariance, is_turn_open))}};
 }
 
@@ -319,6 +320,7 @@ void Report::add_placed(const PlacedPoses& placed, std::span<const std::size_t> 
                             {"left_out", left_out},     {"colours_of_one_pose_each", layers}};
   (*json_)["pose_refinement"] = {{"residual_median_mm", number(refined.median_mm)},
                                  {"residual_rms_mm", number(refined.rms_mm)},
+                                 {"turn_is_open", is_turn_open},
                                  {"poses", of_poses}};
 }
 

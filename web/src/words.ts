@@ -90,8 +90,9 @@ export const words = {
     viewsAgree: (mm: number) => `agree to ${mm.toFixed(3)} mm (median)`,
     pose: (number: number) => `Pose ${number}`,
     poseIs: (deg: number, mm: number) =>
-      `known to ${deg.toFixed(4)}° and ${mm.toFixed(4)} mm where it is held least (k = 1)`,
-    turnIsOpen: (mm: number) => `known to ${mm.toFixed(4)} mm where it is held least (k = 1); any turn fits`,
+      `± ${deg.toFixed(4)}° and ± ${mm.toFixed(4)} mm in the least certain direction (k = 1)`,
+    turnIsOpen: (mm: number) =>
+      `± ${mm.toFixed(4)} mm in the least certain direction (k = 1), any turn of its symmetry`,
   },
   passed: "within the limits",
   below: "outside the limits",

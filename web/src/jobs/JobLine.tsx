@@ -13,11 +13,13 @@ export function JobLine({ job }: { job: Job }) {
         </p>
         <p>{job.sentence}</p>
         <p class="dim">{job.next_action}</p>
-        {job.remarks.map((remark) => (
-          <p key={remark} class="dim">
-            {remark}
-          </p>
-        ))}
+        {job.remarks
+          .filter((remark) => !job.sentence.includes(remark))
+          .map((remark) => (
+            <p key={remark} class="dim">
+              {remark}
+            </p>
+          ))}
       </div>
     </div>
   );

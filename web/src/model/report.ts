@@ -8,7 +8,11 @@ interface Uncertainty {
 
 export interface Report {
   poses?: { residual_median_mm: number | null }[];
-  pose_refinement?: { uncertainty?: Uncertainty; poses?: { pose: number; uncertainty: Uncertainty }[] };
+  pose_refinement?: {
+    turn_is_open?: boolean; // the part has a turn that changes nothing
+    uncertainty?: Uncertainty;
+    poses?: { pose: number; uncertainty: Uncertainty }[];
+  };
   mesh?: { area_mm2: number; measured_share: number; volume_mm3?: number | null };
 }
 
@@ -17,14 +21,12 @@ export interface Figure {
   text: string;
 }
 
-const OPEN_DEG = 5; // a turn that is known no better changes nothing of the part
-
-function poseFigure(pose: number, known: Uncertainty): Figure {
+function poseFigure(pose: number, known: Uncertainty, isTurnOpen = false): Figure {
   const deg = known.rotation_deg.sigma[0] ?? 0;
   const mm = known.translation_mm.sigma[0] ?? 0;
   return {
     name: words.figures.pose(pose + 1),
-    text: deg > OPEN_DEG ? words.figures.turnIsOpen(mm) : words.figures.poseIs(deg, mm),
+    text: isTurnOpen ? words.figures.turnIsOpen(mm) : words.figures.poseIs(deg, mm),
   };
 }
 
@@ -39,7 +41,9 @@ export function figuresOf(report: Report): Figure[] {
   if (residuals.length > 0) {
     figures.push({ name: words.figures.views, text: words.figures.viewsAgree(Math.max(...residuals)) });
   }
-  if (refinement?.uncertainty) figures.push(poseFigure(1, refinement.uncertainty));
-  for (const { pose, uncertainty } of refinement?.poses ?? []) figures.push(poseFigure(pose, uncertainty));
+  if (refinement?.uncertainty) figures.push(poseFigure(1, refinement.uncertainty, refinement.turn_is_open));
+  for (const { pose, uncertainty } of refinement?.poses ?? []) {
+    figures.push(poseFigure(pose, uncertainty, refinement?.turn_is_open));
+  }
   return figures;
 }

@@ -27,12 +27,15 @@ TEST(PoseSentences, SayNothingOfAPoseThatIsKnownWell) {
 
 TEST(PoseSentences, NameTheDirectionThatIsKnownLeast) {
   EXPECT_EQ(weakness_sentence(1, known_to(kUp, 0.09, kAcross, 0.02), false),
-            "The turn of pose 2 about pose 1's vertical is known to 0.09 deg only: add a pose that decides it.");
-  EXPECT_EQ(weakness_sentence(2, known_to((kUp + kAcross).normalized(), 0.3, kAcross, 0.02), false),
-            "The turn of pose 3 about an axis 45 deg from pose 1's vertical is known to 0.30 deg only: add a pose that "
-            "decides it.");
-  EXPECT_EQ(weakness_sentence(1, known_to(kUp, 0.06, kAcross, 0.2), false),
-            "The place of pose 2 along a horizontal of pose 1 is known to 0.20 mm only: add a pose that decides it.");
+            "Pose 2 may be turned by 0.09 deg (1 sigma) about the axis that was vertical in pose 1: add a pose to make "
+            "sure.");
+  EXPECT_EQ(
+      weakness_sentence(2, known_to((kUp + kAcross).normalized(), 0.3, kAcross, 0.02), false),
+      "Pose 3 may be turned by 0.30 deg (1 sigma) about an axis 45 deg from the vertical of pose 1: add a pose to make "
+      "sure.");
+  EXPECT_EQ(
+      weakness_sentence(1, known_to(kUp, 0.06, kAcross, 0.2), false),
+      "Pose 2 may be off by 0.20 mm (1 sigma) along an axis that was horizontal in pose 1: add a pose to make sure.");
 }
 
 TEST(PoseSentences, DoNotNameATurnThatChangesNothing) {
@@ -44,7 +47,7 @@ TEST(PoseSentences, SayHowThePartIsSymmetricAndWhatDecided) {
   PoseEstimate estimate;
   estimate.symmetry.group = Symmetry::Group::axial;
   EXPECT_EQ(turn_sentence(estimate, nullptr),
-            "The part is the same after every turn about one axis; nothing shows which of its turns it made.");
+            "The part is the same after every turn about one axis; nothing shows how it was turned.");
   ColourDecision colours;
   colours.is_decided = true;
   EXPECT_EQ(turn_sentence(estimate, &colours),
