@@ -40,12 +40,14 @@ struct PoseObservations {
   std::span<const View> views;
 };
 
-/// Check of a point of another pose, carried into this pose's frame. `reach_mm`: as of check_samples().
+/// Check of a point of another pose, carried into this pose's frame, by images of `level`. `reach_mm`: as of
+/// check_samples().
 SampleCheck check_sample(const PoseObservations& observations, int level, const SurfacePoint& sample, double reach_mm,
                          const AgreementOptions& options);
 
-/// Checks of all samples of pose 2, then all of pose 1, on one level, nothing trimmed. `reach_mm`: farther in front of
-/// a measured surface is free space, farther behind it is unknown.
+/// Checks of all samples of pose 2, then all of pose 1, of one level, nothing trimmed. Images of the next finer level
+/// judge them: what is thin, such as a handle, is lost in an average. `reach_mm`: farther in front of a measured
+/// surface is free space, farther behind it is unknown.
 std::vector<SampleCheck> check_samples(const PoseObservations& pose1, const PoseObservations& pose2,
                                        const Transform& pose1_from_pose2, int level, double reach_mm,
                                        const AgreementOptions& options);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "tests/unit/pipeline/pose/posed_scan.h"
+#include "tests/unit/pipeline/pose/turned_solids.h"
 
 namespace scanrig {
 namespace {
@@ -94,6 +95,14 @@ TEST(EstimatePose, DecidesByASmallFeatureWhereTheRestIsSymmetric) {
 }
 
 /// As a dark part does that mirrors the screen: in every view another strip of the object is taken for background.
+/// Its wall slides along its axis: rim, foot and handle hold it, which are a small part of what both poses see.
+TEST(EstimatePose, HoldsAMugAlongItsAxis) {
+  const Solid wall = testing::lathed({{0, 0}, {19, 0}, {22, 54}, {18, 54}, {15, 6}, {0, 6}});
+  const PosedScan scan = testing::scan(testing::together({wall, testing::ring({24, 28, 0}, 11, 2.5)}),
+                                       turn(40, Eigen::Vector3d::UnitY()) * turn(80, Eigen::Vector3d::UnitX()));
+  expect_found(scan.estimate(), scan);
+}
+
 TEST(EstimatePose, TakesNoSingleViewsWordForFreeSpace) {
   PosedScan s = scan(testing::workpiece(), kOnItsSide);  // copies would share their images
   constexpr int kStrip = 14;
