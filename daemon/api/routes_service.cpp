@@ -20,6 +20,7 @@ ordered_json problems_of(const Snapshot& snapshot, const ServiceStatus& facts) {
   for (const auto& device : snapshot.devices) {
     if (device.problem) problems.push_back(to_json(*device.problem));
   }
+  if (snapshot.calibration_problem) problems.push_back(to_json(*snapshot.calibration_problem));
   if (snapshot.may_be_moving) problems.push_back(to_json(Error{ErrorCode::timeout, snapshot.cause}));
   if (facts.tokens_problem) problems.push_back(to_json(*facts.tokens_problem));
   return problems;

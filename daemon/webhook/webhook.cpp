@@ -103,14 +103,17 @@ bool is_bad(const JobInfo& job) {
          (job.state == JobState::done && job.passed == false);
 }
 
-std::string news_of(const JobInfo& job) {
-  const nlohmann::ordered_json json = {{"event", "job"},
-                                       {"job", job.id},
-                                       {"part", job.part},
-                                       {"state", to_string(job.state)},
-                                       {"code", job.error ? to_string(job.error->code) : ""},
-                                       {"message", job.error ? job.error->message : ""}};
+std::string to_text(const nlohmann::ordered_json& json) {
   return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
+std::string news_of(const JobInfo& job) {
+  return to_text({{"event", "job"},
+                  {"job", job.id},
+                  {"part", job.part},
+                  {"state", to_string(job.state)},
+                  {"code", job.error ? to_string(job.error->code) : ""},
+                  {"message", job.error ? job.error->message : ""}});
 }
 
 }  // namespace
@@ -146,18 +149,21 @@ Result<void> http_post(const HttpAddress& address, const std::string& json, std:
 }
 
 std::vector<std::string> alerts(const Snapshot& before, const Snapshot& now) {
-  std::vector<std::string> log_entries;
+  std::vector<std::string> messages;
   for (const auto& [id, job] : now.jobs) {
     const auto was = before.jobs.find(id);
     const bool known = was != before.jobs.end() && (was->second == job || is_bad(*was->second));
-    if (is_bad(*job) && !known) log_entries.push_back(news_of(*job));
+    if (is_bad(*job) && !known) messages.push_back(news_of(*job));
   }
   if (now.machine == MachineState::error && before.machine != MachineState::error) {
-    const nlohmann::ordered_json json = {
-        {"event", "machine"}, {"state", to_string(now.machine)}, {"message", now.cause}};
-    log_entries.push_back(json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace));
+    messages.push_back(to_text({{"event", "machine"}, {"state", to_string(now.machine)}, {"message", now.cause}}));
   }
-  return log_entries;
+  const auto &old = before.calibration_problem, &problem = now.calibration_problem;
+  if (problem && (!old || old->message != problem->message)) {
+    messages.push_back(
+        to_text({{"event", "calibration"}, {"code", to_string(problem->code)}, {"message", problem->message}}));
+  }
+  return messages;
 }
 
 Webhook::Webhook(Clock& clock, HttpAddress address)

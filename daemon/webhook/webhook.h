@@ -25,8 +25,8 @@ struct HttpAddress {
 Result<void> http_post(const HttpAddress& address, const std::string& json, std::chrono::milliseconds limit,
                        const std::stop_token& stop = {});
 
-/// Messages for the change between two snapshots, as JSON: a job that failed, was interrupted or did not pass, and a
-/// fault of the machine.
+/// Messages for the change between two snapshots, as JSON: a job that failed, was interrupted or did not pass, a fault
+/// of the machine, and a calibration that refuses the next scan.
 std::vector<std::string> alerts(const Snapshot& before, const Snapshot& now);
 
 /// Reports failures to one address over HTTP; tries three times, then drops the message. A client that must not miss

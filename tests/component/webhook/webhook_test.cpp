@@ -114,6 +114,18 @@ TEST(BadNews, IsAFaultOfTheMachine) {
   EXPECT_THAT(log_entries, ElementsAre(HasSubstr("The guard was opened.")));
 }
 
+TEST(BadNews, IsACalibrationThatRefusesTheNextScan) {
+  const auto refusing = [](const std::string& why) {
+    Snapshot snapshot = with({});
+    snapshot.calibration_problem = Error{ErrorCode::not_found, why};
+    return snapshot;
+  };
+  EXPECT_THAT(alerts(with({}), refusing("other cameras")),
+              ElementsAre(R"({"event":"calibration","code":"not_found","message":"other cameras"})"));
+  EXPECT_THAT(alerts(refusing("other cameras"), refusing("other cameras")), IsEmpty());
+  EXPECT_THAT(alerts(refusing("other cameras"), with({})), IsEmpty());
+}
+
 TEST(HttpPost, SendsJson) {
   Listener listener;
   auto request = listener.answer("HTTP/1.1 204 No Content\r\n\r\n");

@@ -161,6 +161,15 @@ TEST_F(Api, TooLowARoleIsToldWhichIsNeeded) {
   EXPECT_EQ(ask("POST", "/api/v1/stop", "", Role::viewer).first, 200u) << "any role may stop";
 }
 
+TEST_F(Api, HealthNamesACalibrationThatRefuses) {
+  station.loop.post(event::CalibrationChecked{.problem = Error{ErrorCode::not_found, "there is no calibration"}});
+  nlohmann::json health;
+  while ((health = ask("GET", "/api/v1/health").second)["ok"] == true) {
+  }
+  EXPECT_EQ(health["problems"][0]["code"], "not_found");
+  EXPECT_EQ(health["problems"][0]["message"], "there is no calibration");
+}
+
 TEST_F(Api, HealthNamesEveryProblem) {
   station.loop.post(event::DevicesChecked{{{"camera", Error{ErrorCode::timeout, "no reply"}}}});
   nlohmann::json health;
