@@ -273,7 +273,8 @@ ExitCode board(const BoardVerb& verb) {
   if (auto written = write_file_atomically(verb.out, *pdf); !written) return report_error(written.error());
   fmt::print(
       "{}\nPrint it at 100 % and compare its length marks: {}\n"
-      "Then measure its first row from the first to the last inner corner, {:g} mm as ordered: that is its length.\n",
+      "Then measure its first row from the first to the last inner corner, {:g} mm as ordered: that is its length.\n"
+      "Write it into rig.toml, length_mm under [calibration], or give it with scanrig calibrate DIR --length.\n",
       verb.out.string(), board_check_line(*wanted), first_row_length(*wanted, 0.0, 0.0).nominal_mm);
   return ExitCode::ok;
 }

@@ -97,12 +97,10 @@ Result<void> resolve_rivals(std::vector<Hypothesis>& field, const PoseInput& pos
     return {};
   }
   if (!symmetry && !is_all_left) {
-    std::string others;
-    for (const Candidate* c : rivals) others += fmt::format("; {}", describe(*c));
     return fail(ErrorCode::ambiguous,
-                "pose estimation: the part is too symmetric, several motions fit that give different shapes: {}{}. "
-                "Choose the right one, add a pose that decides, or scan again with a mark of clay",
-                describe(field[0].candidate), others);
+                "pose estimation: the part is too symmetric, {} motions fit that give different shapes; the best two: "
+                "{}; {}. Choose the right one, add a pose that decides, or scan again with a mark of clay",
+                all.size(), describe(*all[0]), describe(*all[1]));
   }
   if (left != all.end()) {
     const Transform motion = (*left)->pose1_from_pose2;

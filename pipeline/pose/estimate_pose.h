@@ -114,7 +114,7 @@ struct PoseEstimate {
 /// Several motions that fit and give the same surface, within what sigma and sampling tell, are one answer with a
 /// symmetry. Fails with `not_closed` and `degenerate` (no valid solid or measured surface), `no_overlap` (no hypothesis
 /// fits), `same_rest` (the object was not turned over), `ambiguous` (several motions fit that give different surfaces;
-/// the message lists them), `stopped`.
+/// the message has the best two), `stopped`.
 Result<PoseEstimate> estimate_pose(const PoseInput& pose1, const PoseInput& pose2, const PoseOptions& options,
                                    const Context& context);
 

@@ -32,7 +32,7 @@ Result<std::vector<std::optional<Transform>>> sketch_poses(std::span<const PoseI
   }
   std::vector<Candidate> fitting;
   const auto estimate = estimate_pose(inputs[0], inputs[1], options, context, fitting);
-  if (!estimate && fitting.empty()) return pass_on(estimate, "pose 2 in pose 1");
+  if (!estimate && fitting.empty()) return pass_on(estimate);
   return std::vector<std::optional<Transform>>{Transform::Identity(), fitting.front().pose1_from_pose2};
 }
 

@@ -57,7 +57,7 @@ Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_second_pos
   std::vector<Candidate> fitting;
   const auto estimate = estimate_pose(first, second, pose_options, context, fitting);
   if (!estimate && estimate.error().code == ErrorCode::ambiguous) keep_choices(fitting);
-  if (!estimate) return pass_on(estimate, "pose 2 in pose 1");
+  if (!estimate) return pass_on(estimate);
   report.add_estimate(*estimate);
   FoundPoses found{.model_from_pose = {Transform::Identity(), estimate->pose1_from_pose2}};
   RefineOptions refinement = refine_options();
@@ -65,14 +65,14 @@ Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_second_pos
   refinement.held = estimate->symmetry.free_turns();
   if (estimate->symmetry.group != Symmetry::Group::none) {
     auto chosen = choose_turn(*estimate, report, context);
-    if (!chosen) return pass_on(chosen, "pose 2 in pose 1");
+    if (!chosen) return pass_on(chosen);
     found = *chosen;
     // The symmetry carries the planes that the part touches to other planes that it touches.
     const Transform element = *found.model_from_pose[1] * estimate->pose1_from_pose2.inverse();
     refinement.contacts = carried(std::move(refinement.contacts), element);
   }
   const auto refined = refine_pose(measured1, measured2, *found.model_from_pose[1], refinement, context);
-  if (!refined) return pass_on(refined, "pose 2 in pose 1");
+  if (!refined) return pass_on(refined);
   report.add_refinement(*refined, !refinement.held.empty());
   found.model_from_pose[1] = refined->pose1_from_pose2;
   found.seen_empty = estimate->best.agreement.free_space;
