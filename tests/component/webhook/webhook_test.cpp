@@ -42,7 +42,7 @@ class Listener {
     address.sin_family = AF_INET;
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     socklen_t size = sizeof address;
-    ::bind(socket_, reinterpret_cast<sockaddr*>(&address), size);
+    EXPECT_EQ(::bind(socket_, reinterpret_cast<sockaddr*>(&address), size), 0);
     ::getsockname(socket_, reinterpret_cast<sockaddr*>(&address), &size);
     port = std::to_string(ntohs(address.sin_port));
     ::listen(socket_, 4);
