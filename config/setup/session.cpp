@@ -148,8 +148,8 @@ Result<void> Session::Impl::start(const std::string& by, std::initializer_list<P
   if (by != key || key.empty()) return tl::unexpected(not_yours());
   if (std::ranges::find(from, state.phase) == from.end()) {
     const bool is_working = state.phase == Phase::working;
-    return fail(ErrorCode::refused, "setup: not now: it is {}; {}", to_string(state.phase),
-                is_working ? "wait until it is through, or end it" : "reload the page for the step that comes next");
+    return fail(ErrorCode::refused, "setup: not now; {}",
+                is_working ? "wait until it has finished, or end it" : "reload the page for the next step");
   }
   state.phase = Phase::working;
   state.told.clear();

@@ -274,7 +274,7 @@ ExitCode board(const BoardVerb& verb) {
   fmt::print(
       "{}\nPrint it at 100 % and compare its length marks: {}\n"
       "Then measure its first row from the first to the last inner corner, {:g} mm as ordered: that is its length.\n"
-      "Write it into rig.toml, length_mm under [calibration], or give it with scanrig calibrate DIR --length.\n",
+      "Write it into rig.toml as length_mm under [calibration], or pass it to scanrig calibrate DIR --length.\n",
       verb.out.string(), board_check_line(*wanted), first_row_length(*wanted, 0.0, 0.0).nominal_mm);
   return ExitCode::ok;
 }

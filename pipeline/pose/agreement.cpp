@@ -133,7 +133,7 @@ std::vector<SampleCheck> check_samples(const PoseObservations& pose1, const Pose
                                        const AgreementOptions& options) {
   const auto& samples2 = pose2.measured->samples[level];
   const auto& samples1 = pose1.measured->samples[level];
-  const int judges = std::max(level - 1, 0);
+  const int image_level = std::max(level - 1, 0);
   std::vector<SampleCheck> sample_checks(samples2.size() + samples1.size());
   const Transform pose2_from_pose1 = pose1_from_pose2.inverse();
   parallel_for((sample_checks.size() + kBlock - 1) / kBlock, [&](std::size_t b) {
@@ -143,7 +143,7 @@ std::vector<SampleCheck> check_samples(const PoseObservations& pose1, const Pose
       SurfacePoint sample = of_pose2 ? samples2[i] : samples1[i - samples2.size()];
       sample.point = motion * sample.point;
       sample.normal = motion.linear() * sample.normal;
-      sample_checks[i] = check_sample(of_pose2 ? pose1 : pose2, judges, sample, reach_mm, options);
+      sample_checks[i] = check_sample(of_pose2 ? pose1 : pose2, image_level, sample, reach_mm, options);
     }
   });
   return sample_checks;

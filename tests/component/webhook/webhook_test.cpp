@@ -94,10 +94,10 @@ Snapshot with(JobTable jobs, MachineState machine = MachineState::ready) {
 TEST(BadNews, IsAJobThatFailsIsInterruptedOrDoesNotPass) {
   const auto before = with({{"a", job("a", JobState::scanning)}});
   for (const auto state : {JobState::failed, JobState::interrupted}) {
-    const auto log_entries = alerts(before, with({{"a", job("a", state)}}));
-    ASSERT_EQ(log_entries.size(), 1u);
-    EXPECT_THAT(log_entries[0], HasSubstr(R"("job":"a","part":"4711")"));
-    EXPECT_THAT(log_entries[0], HasSubstr(R"("code":"moved","message":"it \"moved\"")"));
+    const auto messages = alerts(before, with({{"a", job("a", state)}}));
+    ASSERT_EQ(messages.size(), 1u);
+    EXPECT_THAT(messages[0], HasSubstr(R"("job":"a","part":"4711")"));
+    EXPECT_THAT(messages[0], HasSubstr(R"("code":"moved","message":"it \"moved\"")"));
   }
   EXPECT_EQ(alerts(before, with({{"a", job("a", JobState::done, false)}})).size(), 1u);
   EXPECT_THAT(alerts(before, with({{"a", job("a", JobState::done, true)}})), IsEmpty());
@@ -110,8 +110,8 @@ TEST(BadNews, IsToldOnce) {
 }
 
 TEST(BadNews, IsAFaultOfTheMachine) {
-  const auto log_entries = alerts(with({}), with({}, MachineState::error));
-  EXPECT_THAT(log_entries, ElementsAre(HasSubstr("The guard was opened.")));
+  const auto messages = alerts(with({}), with({}, MachineState::error));
+  EXPECT_THAT(messages, ElementsAre(HasSubstr("The guard was opened.")));
 }
 
 TEST(BadNews, IsACalibrationThatRefusesTheNextScan) {

@@ -94,7 +94,6 @@ TEST(EstimatePose, DecidesByASmallFeatureWhereTheRestIsSymmetric) {
   expect_found(s.estimate(), s);
 }
 
-/// As a dark part does that mirrors the screen: in every view another strip of the object is taken for background.
 /// Its wall slides along its axis: rim, foot and handle hold it, which are a small part of what both poses see.
 TEST(EstimatePose, HoldsAMugAlongItsAxis) {
   const Solid wall = testing::lathed({{0, 0}, {19, 0}, {22, 54}, {18, 54}, {15, 6}, {0, 6}});
@@ -103,6 +102,7 @@ TEST(EstimatePose, HoldsAMugAlongItsAxis) {
   expect_found(scan.estimate(), scan);
 }
 
+/// As a dark part does that mirrors the screen: in every view another strip of the object is taken for background.
 TEST(EstimatePose, TakesNoSingleViewsWordForFreeSpace) {
   PosedScan s = scan(testing::workpiece(), kOnItsSide);  // copies would share their images
   constexpr int kStrip = 14;
