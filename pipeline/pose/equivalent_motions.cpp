@@ -1,6 +1,7 @@
 #include "pipeline/pose/equivalent_motions.h"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -69,6 +70,41 @@ std::vector<Transform> equivalent_motions(const Symmetry& symmetry, const Transf
   return motions;
 }
 
+/// Samples of one pose as a motion carries them into the frame of another, that hide from it: on its table, where what
+/// holds a turn end for end leaves the height open by `reach`; or on a side, lower than anything that it measured.
+class Hidden {
+ public:
+  Hidden(const std::vector<SurfacePoint>& samples, const std::vector<SurfacePoint>& others, double reach, double flat)
+      : samples_(samples),
+        lowest_(std::min(lowest(others, Transform::Identity()), 2.0 * reach)),
+        reach_(reach),
+        flat_(flat) {}
+
+  /// A flag per sample.
+  [[nodiscard]] std::vector<char> after(const Transform& motion) const {
+    const double table = std::clamp(lowest(samples_, motion), 0.0, reach_);
+    std::vector<char> hidden;
+    for (const SurfacePoint& sample : samples_) {
+      const double height = (motion * sample.point).y();
+      const bool is_side = std::abs((motion.linear() * sample.normal).y()) < kSideSlope;
+      hidden.push_back(height < table + flat_ || (is_side && height < lowest_ + flat_) ? 1 : 0);
+    }
+    return hidden;
+  }
+
+ private:
+  static constexpr double kSideSlope = 0.5;
+
+  static double lowest(const std::vector<SurfacePoint>& samples, const Transform& motion) {
+    double low = std::numeric_limits<double>::infinity();
+    for (const SurfacePoint& sample : samples) low = std::min(low, (motion * sample.point).y());
+    return low;
+  }
+
+  const std::vector<SurfacePoint>& samples_;
+  double lowest_, reach_, flat_;
+};
+
 }  // namespace
 
 std::optional<Symmetry> symmetry_of(const Hypothesis& best, std::span<const Candidate* const> rivals,
@@ -108,6 +144,7 @@ bool may_be_turned_over(const Transform& not_turned, const Symmetry& symmetry, c
   };
   const auto& samples2 = scene.measured2.samples[static_cast<std::size_t>(level)];
   const auto& samples1 = scene.measured1.samples[static_cast<std::size_t>(level)];
+  const Hidden of_pose2(samples2, samples1, reach, flat), of_pose1(samples1, samples2, reach, flat);
   const auto reference = check(not_turned);
   std::vector<char> is_explained(reference.size(), 0);
   bool is_possible = false;
@@ -115,11 +152,10 @@ bool may_be_turned_over(const Transform& not_turned, const Symmetry& symmetry, c
     if (!turns_over(motion, options)) continue;
     is_possible = true;
     const auto checks = check(motion);
-    const Transform back = motion.inverse();
+    const auto hidden2 = of_pose2.after(motion), hidden1 = of_pose1.after(motion.inverse());
     for (std::size_t i = 0; i < checks.size(); ++i) {
-      const bool of_pose2 = i < samples2.size();
-      const Eigen::Vector3d moved = of_pose2 ? motion * samples2[i].point : back * samples1[i - samples2.size()].point;
-      if (checks[i].kind != SampleCheck::Kind::unknown || moved.y() < flat) is_explained[i] = 1;
+      const bool is_hidden = i < samples2.size() ? hidden2[i] != 0 : hidden1[i - samples2.size()] != 0;
+      if (is_hidden || checks[i].kind != SampleCheck::Kind::unknown) is_explained[i] = 1;
     }
   }
   std::size_t unexplained = 0;

@@ -1,7 +1,9 @@
 #include "pipeline/pose/estimate_pose.h"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "core/units.h"
 #include "pipeline/pose/equivalent_motions.h"
@@ -80,6 +82,21 @@ bool take_picked(std::vector<Hypothesis>& field, const PoseOptions& options) {
   return true;
 }
 
+/// Where all that is left only turns the object on the table: the rivals, and motions that turn it over and contradict
+/// nothing. These may confirm less than a rival must, for they show less surface twice.
+std::vector<const Candidate*> with_hidden_turns(const std::vector<Hypothesis>& field,
+                                                std::vector<const Candidate*> rivals, const PoseOptions& options) {
+  for (const Hypothesis& h : field) {
+    const Candidate& c = h.candidate;
+    if (turns_over(c.pose1_from_pose2, options) && !c.separable && c.angle_to_best_deg > options.same_deg &&
+        c.agreement.confirmed >= options.min_overlap &&
+        c.agreement.contradicted_share() <= options.search_again_contradicted) {
+      rivals.push_back(&c);
+    }
+  }
+  return rivals;
+}
+
 /// Rivals that give the same surface are one answer; others are `ambiguous`.
 Result<void> resolve_rivals(std::vector<Hypothesis>& field, const PoseInput& pose1, const PoseInput& pose2,
                             const Scene& scene, const PoseOptions& options, PoseEstimate& estimate) {
@@ -91,7 +108,11 @@ Result<void> resolve_rivals(std::vector<Hypothesis>& field, const PoseInput& pos
   const bool is_all_left =
       std::ranges::none_of(all, [&](const Candidate* c) { return turns_over(c->pose1_from_pose2, options); });
   if (rivals.empty()) return is_all_left ? not_turned_over(field[0].candidate.pose1_from_pose2) : Result<void>{};
-  auto symmetry = symmetry_of(field[0], rivals, pose1, pose2, scene, options);
+  std::optional<Symmetry> symmetry;
+  if (is_all_left) {
+    symmetry = symmetry_of(field[0], with_hidden_turns(field, rivals, options), pose1, pose2, scene, options);
+  }
+  if (!symmetry) symmetry = symmetry_of(field[0], rivals, pose1, pose2, scene, options);
   if (!symmetry && take_picked(field, options)) {
     estimate.is_picked = true;
     return {};

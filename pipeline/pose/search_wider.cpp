@@ -99,15 +99,20 @@ Transform moved(const Hypothesis& from, double distance_mm) {
          to_centre.inverse() * from.candidate.pose1_from_pose2;
 }
 
-/// Moves it to where it is contradicted least, from far to near.
+/// Moves it to where it is contradicted least, from far to near. What it confirms beyond what it did is no gain: poses
+/// that both lost the foot of upright sides would be moved apart until their sides cover one another.
 void vary(Hypothesis& h, const Scene& scene, const PoseOptions& options, const SearchRound& judged) {
   const double reach = judged.reach * scene.size_mm;
-  double spread = std::numeric_limits<double>::infinity();
+  double spread = std::numeric_limits<double>::infinity(), confirmed = 1.0;
   const auto score_at = [&](double distance_mm) {
     const auto checks = check_samples(scene.observations1, scene.observations2, moved(h, distance_mm), judged.level,
                                       reach, options.agreement);
-    if (std::isinf(spread)) spread = 1.4826 * count_agreement(checks, spread, options.agreement).median_mm;
-    return count_agreement(checks, spread, options.agreement).score(options.last_round.contradiction_weight);
+    const bool is_first = std::isinf(spread);
+    if (is_first) spread = 1.4826 * count_agreement(checks, spread, options.agreement).median_mm;
+    Agreement agreement = count_agreement(checks, spread, options.agreement);
+    if (is_first) confirmed = agreement.confirmed;
+    agreement.confirmed = std::min(agreement.confirmed, confirmed);
+    return agreement.score(options.last_round.contradiction_weight);
   };
   const double start = score_at(0.0);
   double best = start, best_mm = 0.0;

@@ -2,7 +2,7 @@
 stage, of the turntable's angles and of a calibration that is off by its own covariance.
 
 Half of the trials run beside the other half, each on one thread. SCANRIG_CAMPAIGN_SEED draws other trials than the
-bench's own, SCANRIG_CAMPAIGN_TRIALS another number. All trials are written to out/bench/campaign.jsonl.
+bench's own, SCANRIG_CAMPAIGN_TRIALS another number.
 """
 import concurrent.futures
 import json
@@ -28,16 +28,15 @@ def meshes(bench):
     return [file for file in found if file]
 
 
-def played(bench):
-    """All trials, in their order."""
-    count = int(os.environ.get("SCANRIG_CAMPAIGN_TRIALS", bench.pick(TRIALS, TRIALS, QUICK_TRIALS)))
+def played(bench, series, count, generators_every=0):
+    """All trials of a series, in their order; also written to out/bench/campaign_SERIES.jsonl."""
     seed, files = os.environ.get("SCANRIG_CAMPAIGN_SEED", SEED), meshes(bench)
 
     def batch(first):
         if bench.seconds_left() <= 0:
             return []
         size = min(BATCH, count - first)
-        ran = bench.run([bench.bin / "bench_campaign", seed, first, size, GENERATORS_EVERY, *files], 3600)
+        ran = bench.run([bench.bin / "bench_campaign", series, seed, first, size, generators_every, *files], 3600)
         trials = [json.loads(line) for line in ran.stdout.splitlines() if line.endswith("}")]
         if ran.returncode != 0:
             trials.append({"trial": first, "verdict": f"exit code {ran.returncode}", "message": ran.stderr[-200:]})
@@ -45,9 +44,9 @@ def played(bench):
 
     with concurrent.futures.ThreadPoolExecutor(max(1, min(2, bench.cores))) as pool:
         trials = [trial for some in pool.map(batch, range(0, count, BATCH)) for trial in some]
-    (bench.out / "campaign.jsonl").write_text("".join(json.dumps(trial) + "\n" for trial in trials))
+    (bench.out / f"campaign_{series}.jsonl").write_text("".join(json.dumps(trial) + "\n" for trial in trials))
     if len(trials) < count:
-        bench.line("trials", f"{count}", f"{len(trials)}", False)
+        bench.line(f"trials of {series}", f"{count}", f"{len(trials)}", False)
     return trials
 
 
@@ -112,7 +111,8 @@ def generators(bench, trials):
 
 
 def measure(bench, scratch):
-    trials = played(bench)
+    count = int(os.environ.get("SCANRIG_CAMPAIGN_TRIALS", bench.pick(TRIALS, TRIALS, QUICK_TRIALS)))
+    trials = played(bench, "flips", count, GENERATORS_EVERY)
     if not trials:
         return bench.line("trials", "some", "none", False)
     models = verdicts(bench, trials)

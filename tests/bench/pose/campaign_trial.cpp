@@ -7,7 +7,6 @@
 #include <optional>
 #include <utility>
 
-#include "core/statistics.h"
 #include "core/units.h"
 #include "pipeline/mesh/surface_samples.h"
 #include "pipeline/pose/estimate_pose.h"
@@ -17,6 +16,7 @@
 #include "pipeline/registration/refine_pose.h"
 #include "pipeline/volume/integrate.h"
 #include "pipeline/volume/silhouette_votes.h"
+#include "tests/bench/pose/campaign_judge.h"
 
 namespace scanrig::campaign {
 namespace {
@@ -28,8 +28,9 @@ constexpr double kPartialVoxelMm = 0.8;  // as a reconstruction takes for partia
 constexpr int kRegistrationRounds = 3;   // the same
 constexpr double kUpsideDownDeg = 20.0;
 constexpr double kOtherRestDeg = 15.0;  // rests nearer than this are one
-constexpr double kJitterMm = 4.0;       // of the place on the table
-constexpr std::size_t kOverlapSamples = 600, kTruthSamples = 3000;
+constexpr double kSameRestDeg = 0.01;
+constexpr double kJitterMm = 4.0;  // of the place on the table
+constexpr std::size_t kOverlapSamples = 600;
 constexpr int kDraws = 24;      // of rests, until their overlap is enough
 constexpr double kHitMm = 1.0;  // farthest that a found pose may put the surface elsewhere
 
@@ -49,23 +50,6 @@ class Clock {
   }
   double begun_ = read();
 };
-
-struct Truth {
-  const Mesh& mesh;
-  const SurfaceIndex& surface;
-  SolidProperties properties;
-  std::vector<StableRest> rests;
-  std::vector<SurfaceSample> samples;
-  Transform pose1_from_object, pose2_from_object;
-
-  [[nodiscard]] Transform pose1_from_pose2() const { return pose1_from_object * pose2_from_object.inverse(); }
-};
-
-std::vector<SurfaceSample> samples_of(const Mesh& mesh, std::size_t count) {
-  std::vector<std::uint32_t> faces(mesh.faces.size());
-  for (std::uint32_t f = 0; f < faces.size(); ++f) faces[f] = f;
-  return sample_surface(mesh, faces, count);
-}
 
 Transform placed_on(const StableRest& rest, const Truth& truth, Chance& chance) {
   Transform pose = Transform::Identity();
@@ -98,14 +82,23 @@ double overlap_of(const Truth& truth, const Calibration& rig) {
   return both / std::max(std::min(one, two), 1.0);
 }
 
+/// Whether rests so far apart are what the trial asks for.
+bool is_flip(Flip flip, double angle_deg) {
+  switch (flip) {
+    case Flip::none: return angle_deg < kSameRestDeg;
+    case Flip::any: return angle_deg > kOtherRestDeg;
+    case Flip::beside: return angle_deg > kOtherRestDeg && angle_deg <= 180.0 - kUpsideDownDeg;
+    case Flip::upside_down: return angle_deg > 180.0 - kUpsideDownDeg;
+  }
+  return false;
+}
+
 /// Draws two rests and places the object on them; the overlap, or nothing where there are no such rests.
 std::optional<double> place(Truth& truth, const Rig& rig, const TrialOptions& options, Chance& chance) {
   std::vector<std::pair<std::size_t, std::size_t>> pairs;
   for (std::size_t i = 0; i < truth.rests.size(); ++i) {
     for (std::size_t k = 0; k < truth.rests.size(); ++k) {
-      const double angle = apart(truth.rests[i], truth.rests[k]);
-      const bool is_opposite = angle > 180.0 - kUpsideDownDeg;
-      if (angle > kOtherRestDeg && is_opposite == options.is_upside_down) pairs.emplace_back(i, k);
+      if (is_flip(options.flip, apart(truth.rests[i], truth.rests[k]))) pairs.emplace_back(i, k);
     }
   }
   for (int draw = 0; draw < kDraws && !pairs.empty(); ++draw) {
@@ -164,83 +157,6 @@ Result<ScannedPose> finish(Scan scan, const Calibration& calibration) {
   return pose;
 }
 
-/// How far a motion puts pose 2's surface from the true one: quantiles and the largest distance, mm.
-struct SurfaceError {
-  double median_mm = 0.0, p95_mm = 0.0, max_mm = 0.0;
-};
-
-SurfaceError surface_error(const Truth& truth, const Transform& pose1_from_pose2) {
-  const Transform object_from_object = truth.pose1_from_object.inverse() * pose1_from_pose2 * truth.pose2_from_object;
-  std::vector<double> distances;
-  for (const SurfaceSample& sample : truth.samples) {
-    distances.push_back(truth.surface.nearest(object_from_object * sample.point).distance);
-  }
-  return {quantile(distances, 0.5), quantile(distances, 0.95), quantile(distances, 1.0)};
-}
-
-/// Error of each principal coordinate, weakest first, and its own sigma.
-json by_direction(const Vector3d& error, const Eigen::Matrix3d& covariance, double unit) {
-  const PrincipalSigmas principal = principal_sigmas(covariance);
-  json all = json::array();
-  for (int k = 0; k < 3; ++k) {
-    all.push_back({{"error", unit * principal.directions.col(k).dot(error)}, {"sigma", unit * principal.sigma[k]}});
-  }
-  return all;
-}
-
-/// Where the registered views put a pose's surface, from where it is: a table that is higher than its calibration says
-/// carries both poses alike, and is no error of the motion between them.
-Transform as_measured(const ScannedPose& pose) {
-  std::vector<std::pair<Vector3d, Vector3d>> pairs;  // true, as measured
-  for (const View& view : pose.views) {
-    const Transform pose_from_camera = view.range.camera_from_pose.inverse();
-    for (const Mark& mark : pose.marks) {
-      if (mark.view == view.index) pairs.emplace_back(mark.in_pose, pose_from_camera * mark.in_camera);
-    }
-  }
-  Eigen::Matrix3Xd real(3, pairs.size()), measured(3, pairs.size());
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    real.col(static_cast<Eigen::Index>(i)) = pairs[i].first;
-    measured.col(static_cast<Eigen::Index>(i)) = pairs[i].second;
-  }
-  Transform fitted = Transform::Identity();
-  fitted.matrix() = Eigen::umeyama(real, measured, false);
-  return fitted;
-}
-
-json judged(const Truth& truth, const ScannedPose& one, const ScannedPose& two, const RefinedPose& refined,
-            bool is_symmetric) {
-  const Transform right = as_measured(one) * truth.pose1_from_pose2() * as_measured(two).inverse();
-  const Transform off = refined.pose1_from_pose2 * right.inverse();
-  const Transform off_table = refined.pose1_from_pose2 * truth.pose1_from_pose2().inverse();
-  const Eigen::AngleAxisd turn(off.linear());
-  const Vector3d rotation = turn.angle() * turn.axis(), shift = off * refined.centre - refined.centre;
-  const SurfaceError surface = surface_error(truth, refined.pose1_from_pose2);
-  const Vector3d middle = truth.pose1_from_object * truth.properties.centre_of_mass;
-  json result = {{"rotation_deg", to_degrees(turn.angle())},
-                 {"translation_mm", (off * middle - middle).norm()},
-                 {"surface_mm", {surface.median_mm, surface.p95_mm, surface.max_mm}},
-                 {"on_table", {to_degrees(rotation_angle(off_table.linear())), (off_table * middle - middle).norm()}},
-                 {"condition", refined.condition},
-                 {"median_mm", refined.median_mm},
-                 {"refined_overlap", refined.overlap}};
-  if (is_symmetric) return result;
-  result["rotation"] = by_direction(rotation, refined.covariance.topLeftCorner<3, 3>(), to_degrees(1.0));
-  result["translation"] = by_direction(shift, refined.covariance.bottomRightCorner<3, 3>(), 1.0);
-  return result;
-}
-
-json of_candidate(const Truth& truth, const Candidate& c) {
-  return {{"generator", c.generator},
-          {"confirmed", c.agreement.confirmed},
-          {"contradicted", c.agreement.contradicted},
-          {"median_mm", c.agreement.median_mm},
-          {"separable", c.separable},
-          {"off_deg",
-           to_degrees(rotation_angle(c.pose1_from_pose2.linear().transpose() * truth.pose1_from_pose2().linear()))},
-          {"surface_max_mm", surface_error(truth, c.pose1_from_pose2).max_mm}};
-}
-
 /// Whether one generator alone leads to the pose.
 bool finds(const Truth& truth, const PoseInput& pose1, const PoseInput& pose2, const PoseOptions& options) {
   const auto estimate = estimate_pose(pose1, pose2, options, {});
@@ -271,8 +187,8 @@ void find_pose(const Truth& truth, const ScannedPose& one, const ScannedPose& tw
     return;
   }
   result["generator"] = estimate->best.generator;
-  result["best"] = of_candidate(truth, estimate->best);
-  for (const Candidate& c : estimate->alternatives) result["alternatives"].push_back(of_candidate(truth, c));
+  result["best"] = judged(truth, estimate->best);
+  for (const Candidate& c : estimate->alternatives) result["alternatives"].push_back(judged(truth, c));
   const bool is_symmetric = estimate->symmetry.group != Symmetry::Group::none;
   if (is_symmetric) {
     result["symmetry"] = {{"group", to_string(estimate->symmetry.group)},
@@ -294,7 +210,8 @@ void find_pose(const Truth& truth, const ScannedPose& one, const ScannedPose& tw
     return;
   }
   result["verdict"] = "model";
-  result.update(judged(truth, one, two, *refined, is_symmetric));
+  result.update(
+      judged(truth, as_measured(one.views, one.marks), as_measured(two.views, two.marks), *refined, is_symmetric));
 }
 
 json registration_json(const ScannedPose& pose) {
@@ -308,32 +225,37 @@ json registration_json(const ScannedPose& pose) {
           {"axis_shift_mm", pose.registration.axis_shift_mm}};
 }
 
+/// Another object on a rest of its own.
+Result<Scan> scan_another(const DrawnObject& object, const Rig& rig, Chance& chance) {
+  const auto truth = truth_of(object.mesh);
+  if (!truth) return pass_on(truth);
+  if (truth->rests.empty()) return fail(ErrorCode::degenerate, "another object without rests");
+  const auto& rest = truth->rests[static_cast<std::size_t>(chance.among(static_cast<int>(truth->rests.size())))];
+  return scan({object.mesh, truth->surface, placed_on(rest, *truth, chance)}, rig, {}, chance);
+}
+
 }  // namespace
 
 Result<json> run_trial(const DrawnObject& object, const TrialOptions& options, Chance& chance) {
   Clock clock;
-  const auto surface = SurfaceIndex::create(object.mesh);
-  if (!surface) return pass_on(surface);
-  const auto properties = solid_properties(object.mesh);
-  if (!properties) return pass_on(properties);
-  Truth truth{object.mesh, *surface, *properties, {}, samples_of(object.mesh, kTruthSamples), {}, {}};
-  StableRestOptions exact;
-  exact.dilation_mm = exact.dilation = 0.0;
-  auto rests = rests_on_hull(object.mesh, *properties, 0.0, exact);
-  if (!rests) return pass_on(rests);
-  truth.rests = std::move(rests->rests);
+  auto truth = truth_of(object.mesh);
+  if (!truth) return pass_on(truth);
   const Rig rig = draw_rig(chance);
-  const auto overlap = place(truth, rig, options, chance);
+  const auto overlap = place(*truth, rig, options, chance);
   if (!overlap) return fail(ErrorCode::degenerate, "an object without such rests");
 
-  Scan scan1 = scan({object.mesh, *surface, truth.pose1_from_object}, rig, {}, chance);
-  Scan scan2 = scan({object.mesh, *surface, truth.pose2_from_object}, rig, {}, chance);
+  Scan scan1 = scan({object.mesh, truth->surface, truth->pose1_from_object}, rig, {}, chance);
+  auto scan2 = options.another
+                   ? scan_another(*options.another, rig, chance)
+                   : Result<Scan>(scan({object.mesh, truth->surface, truth->pose2_from_object}, rig, {}, chance));
+  if (!scan2) return pass_on(scan2);
   json result = {{"object", object.name},
-                 {"upside_down", options.is_upside_down},
-                 {"turned_deg", to_degrees(rotation_angle(truth.pose1_from_pose2().linear()))},
+                 {"upside_down", options.flip == Flip::upside_down},
+                 {"turned_deg", to_degrees(rotation_angle(truth->pose1_from_pose2().linear()))},
                  {"overlap", *overlap},
                  {"scan_s", clock.seconds()}};
-  const auto one = finish(std::move(scan1), rig.calibration), two = finish(std::move(scan2), rig.calibration);
+  if (options.another) result["another"] = options.another->name;
+  const auto one = finish(std::move(scan1), rig.calibration), two = finish(std::move(*scan2), rig.calibration);
   if (!one || !two) {
     const Error& error = one ? two.error() : one.error();
     result["verdict"] = to_string(error.code);
@@ -343,7 +265,7 @@ Result<json> run_trial(const DrawnObject& object, const TrialOptions& options, C
   result["registered"] = {registration_json(*one), registration_json(*two)};
   result["registration_s"] = one->registration_s + two->registration_s;
   result["partial_s"] = one->partial_s + two->partial_s;
-  find_pose(truth, *one, *two, rig, options.tries_generators, result);
+  find_pose(*truth, *one, *two, rig, options.tries_generators, result);
   return result;
 }
 

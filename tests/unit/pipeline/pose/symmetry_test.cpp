@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "tests/unit/pipeline/pose/posed_scan.h"
 #include "tests/unit/pipeline/pose/turned_solids.h"
@@ -120,6 +122,46 @@ TEST(Symmetry, OfACupThatStandsTwiceDoesNot) {
 }
 
 const Eigen::Matrix3d kUpsideDown = turn(33, Eigen::Vector3d::UnitY()) * turn(180, Eigen::Vector3d::UnitX());
+
+/// What is lost where the object stands on the table, as beside every edge.
+void lose_foot(std::vector<View>& views, double height_mm) {
+  for (View& view : views) {
+    RangeImage& range = view.range;
+    const Transform pose_from_camera = range.camera_from_pose.inverse();
+    for (int row = 0; row < range.depth.rows; ++row) {
+      for (int column = 0; column < range.depth.cols; ++column) {
+        float& depth = range.depth(row, column);
+        if (std::isnan(depth)) continue;
+        const Eigen::Vector3d point = pose_from_camera * range.projection.unproject(column, row, depth);
+        if (point.y() < height_mm) depth = std::numeric_limits<float>::quiet_NaN();
+      }
+    }
+  }
+}
+
+/// One end lies on the table in either pose, so no surface holds the height of the turn end for end.
+TEST(Symmetry, OfAPrismUpsideDownIsNoReasonToTakeItForLeftAsItStood) {
+  const Solid prism = testing::prism(3, 20, 40);
+  PosedScan scan = testing::scan(prism, kUpsideDown);
+  lose_foot(scan.views1, 2.5);
+  lose_foot(scan.views2, 2.5);
+  const auto estimate = scan.estimate();
+  expect_model(estimate, scan, prism, Group::dihedral, 3, 6);
+  ASSERT_TRUE(estimate);
+  EXPECT_TRUE(turns_over(estimate->pose1_from_pose2));
+}
+
+/// Rolled from one face onto the next it shows one long face less than if it had been left: that alone is no reason.
+TEST(Symmetry, OfAPrismThatWasRolledIsNoReasonToTakeItForLeftAsItStood) {
+  Transform lying_from_upright(Eigen::Translation3d(-30, 16, 0));
+  lying_from_upright.linear() = turn(-90, Eigen::Vector3d::UnitZ());
+  const Solid lying = testing::moved(testing::prism(3, 16, 60), lying_from_upright);
+  const PosedScan scan = testing::scan(lying, turn(25, Eigen::Vector3d::UnitY()) * turn(120, Eigen::Vector3d::UnitX()));
+  const auto estimate = scan.estimate();
+  expect_model(estimate, scan, lying, Group::dihedral, 3, 6);
+  ASSERT_TRUE(estimate);
+  EXPECT_TRUE(turns_over(estimate->pose1_from_pose2));
+}
 
 /// The sides fit four ways, and nothing holds their height: only at the right one do the feet and the ball, which one
 /// pose sees each, fit into what the other pose looked through.
