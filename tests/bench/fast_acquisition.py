@@ -20,7 +20,7 @@ OPTIONS = ("--cameras", "gige", "--poses", "2", "--profile", "laboratory", "--vo
 FULL = {"views": 16, "scale": 1.0, "edges": 60}
 SAMPLED = {"views": 8, "scale": 1.0, "edges": 20}
 QUICK = {"views": 4, "scale": 0.25, "edges": 2}
-JOB_LIMIT_S, EDGES_LIMIT_S, LIMIT_S = 300, 120, 1500
+JOB_LIMIT_S, EDGES_LIMIT_S, LIMIT_S = 300, 180, 1500
 SLOWER_LIMIT_PERCENT, STOP_LIMIT_MS = 1.0, 20
 
 
