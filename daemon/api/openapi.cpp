@@ -372,7 +372,7 @@ const char* const kSchemas = R"({
   "number": {"type": "integer", "description": "from 1"},
   "sentence": {"type": "string", "description": "for the operator: how to lay it down, and what that shows"},
   "doubt": {"type": "string", "description": "why its pose may not be found; empty: it can be"},
-  "gain": {"type": "number", "description": "share of the unseen surface that it would show"},
+  "gain": {"type": "number", "description": "share of the unseen surface that it is expected to show"},
   "unseen_after": {"type": "number", "description": "share of all surface that would stay unseen"},
   "overlap": {"type": "number", "description": "share of the surface seen that both poses would see"},
   "image": {"type": "boolean", "description": "GET suggestions/{number} has one"}}},

@@ -117,7 +117,7 @@ struct CalibrationOutcome {
 struct SuggestedRest {
   std::string sentence{};                    ///< "Lay it on its back: shows 81 % of what is unseen."
   std::string doubt{};                       ///< why its pose may not be found; empty: it can be
-  double gain = 0.0;                         ///< share of the unseen surface that it would show
+  double gain = 0.0;                         ///< share of the unseen surface that it is expected to show
   double unseen_after = 0.0, overlap = 0.0;  ///< shares as in docs/reference/report.md
   bool has_image = false;                    ///< live/restN.png of the job, N from 1
   bool operator==(const SuggestedRest&) const = default;

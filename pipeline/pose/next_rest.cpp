@@ -90,20 +90,24 @@ void judge_outlook(NextRest& next, const NextRestOptions& options) {
   }
 }
 
-NextRest predicted(const StableRest& rest, const Samples& samples, const std::vector<std::uint8_t>& seen) {
+/// `views`: how many see each sample.
+NextRest predicted(const StableRest& rest, const Samples& samples, const std::vector<std::uint8_t>& views,
+                   const NextRestOptions& options) {
   NextRest next{.rest = rest};
-  std::size_t gained = 0, both = 0;
+  double gain = 0.0;
+  std::size_t both = 0;
   std::vector<const SurfaceSample*> shared;
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    if (seen[i] == 0) continue;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    if (views[i] == 0) continue;
     if (i < samples.unseen) {
-      ++gained;
+      const bool is_on_table = samples.all[i].point.y() < options.on_table_mm;
+      gain += 1.0 - std::pow(1.0 - (is_on_table ? options.chance_on_table : options.chance_of_a_view), views[i]);
     } else {
       ++both;
       shared.push_back(&samples.all[i]);
     }
   }
-  const auto gain = static_cast<double>(gained), unseen = static_cast<double>(samples.unseen);
+  const auto unseen = static_cast<double>(samples.unseen);
   const auto measured = static_cast<double>(samples.all.size() - samples.unseen);
   if (samples.unseen > 0) next.gain = gain / unseen;
   next.unseen_after = (unseen - gain) * samples.share_of_unseen;
@@ -143,8 +147,8 @@ Result<NextRests> next_rests(const Mesh& partial, std::span<const double> angles
     if (is_present || rest.margin_mm < options.min_margin_mm) continue;
     const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(rest.normal, down);
     const Transform placed = placed_on(rest, turn, properties->centre_of_mass);
-    NextRest next =
-        predicted(rest, samples, seen_by_rig(samples.all, *surface, placed, angles_rad, eyes, options.sight));
+    NextRest next = predicted(rest, samples,
+                              views_that_see(samples.all, *surface, placed, angles_rad, eyes, options.sight), options);
     next.turn = turn;
     judge_outlook(next, options);
     found.rests.push_back(next);

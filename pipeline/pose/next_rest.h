@@ -21,19 +21,23 @@ enum class PoseOutlook {
 struct NextRestOptions {
   StableRestOptions stable;
   SightOptions sight;
-  std::size_t samples = 3000;    ///< of the unseen surface, and of the measured one
+  std::size_t samples = 3000;  ///< of the unseen surface, and of the measured one
+  /// That a view shows the object itself where it shows the surface that bounds it: the object may lie deeper, and
+  /// other parts of it hide it. So the more views, the surer. What stands on the table is where the table is.
+  double chance_of_a_view = 0.5, chance_on_table = 0.9;
+  double on_table_mm = 1.0;      ///< unseen surface that is lower than this bounds what stands on the table
   double same_rest_deg = 15.0;   ///< a rest nearer to the present one is that
   double min_margin_mm = 0.0;    ///< between the centre of mass and the support's edge: else it tips over
   double min_overlap = 0.15;     ///< twice the least share that `estimate_pose` confirms, and some
   double min_stiffness = 0.004;  ///< see NextRest::stiffness
 };
 
-/// One other stable rest of an object, with what a scan on it would bring. Shares are of areas of the partial model,
-/// whose unseen part bounds the object: the object itself may lie deeper, and show less.
+/// One other stable rest of an object, with what a scan on it is expected to bring. Shares are of areas of the partial
+/// model, whose unseen part bounds the object.
 struct NextRest {
   StableRest rest;                                           ///< the pose's frame: its normal would point down
   Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();  ///< the shortest one from the present rest onto this one
-  double gain = 0.0;                                         ///< share of the unseen surface that it would show
+  double gain = 0.0;          ///< share of the unseen surface that it is expected to show
   double unseen_after = 0.0;  ///< share of all surface that neither pose would have shown
   double overlap = 0.0;       ///< share of what the two poses see that both do, counted in either
   /// The least eigenvalue of the point-to-plane normal matrix over the surface seen in both, over their mean; turns are

@@ -48,9 +48,9 @@ RigEyes rig_eyes(const Calibration& calibration) {
   return {calibration.left, calibration.right, middle + kProjectorAboveMm * Eigen::Vector3d::UnitY()};
 }
 
-std::vector<std::uint8_t> seen_by_rig(std::span<const SurfaceSample> samples, const SurfaceIndex& surface,
-                                      const Transform& turntable_from_solid, std::span<const double> angles_rad,
-                                      const RigEyes& eyes, const SightOptions& options) {
+std::vector<std::uint8_t> views_that_see(std::span<const SurfaceSample> samples, const SurfaceIndex& surface,
+                                         const Transform& turntable_from_solid, std::span<const double> angles_rad,
+                                         const RigEyes& eyes, const SightOptions& options) {
   std::vector<Sighting> views;
   for (const double angle : angles_rad) {
     const Transform placed = rot_y(angle) * turntable_from_solid;
@@ -62,8 +62,8 @@ std::vector<std::uint8_t> seen_by_rig(std::span<const SurfaceSample> samples, co
     const std::size_t end = std::min(samples.size(), (task + 1) * kSamplesPerTask);
     for (std::size_t i = task * kSamplesPerTask; i < end; ++i) {
       if ((turntable_from_solid * samples[i].point).y() < options.min_height_mm) continue;
-      seen[i] = std::ranges::any_of(
-          views, [&](const Sighting& view) { return is_seen(samples[i], view, surface, eyes, options); });
+      seen[i] = static_cast<std::uint8_t>(std::ranges::count_if(
+          views, [&](const Sighting& view) { return is_seen(samples[i], view, surface, eyes, options); }));
     }
   });
   return seen;

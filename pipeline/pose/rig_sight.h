@@ -29,11 +29,11 @@ struct SightOptions {
   double lift_mm = 0.2;             ///< a ray starts this far off the surface: what the facets of a mesh may be off
 };
 
-/// Which of the samples of a solid's surface the rig measures in one of the views at these table angles, 1 or 0 each.
+/// In how many of the views at these table angles the rig measures each sample of a solid's surface.
 /// By ray casting against the solid and its plane y = 0. `samples` and `surface` are in the solid's frame.
 /// Threads: spread over the current arena, same result for any number.
-std::vector<std::uint8_t> seen_by_rig(std::span<const SurfaceSample> samples, const SurfaceIndex& surface,
-                                      const Transform& turntable_from_solid, std::span<const double> angles_rad,
-                                      const RigEyes& eyes, const SightOptions& options = {});
+std::vector<std::uint8_t> views_that_see(std::span<const SurfaceSample> samples, const SurfaceIndex& surface,
+                                         const Transform& turntable_from_solid, std::span<const double> angles_rad,
+                                         const RigEyes& eyes, const SightOptions& options = {});
 
 }  // namespace scanrig

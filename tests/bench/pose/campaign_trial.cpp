@@ -71,13 +71,13 @@ double overlap_of(const Truth& truth, const Calibration& rig) {
   for (int view = 0; view < 8; ++view) angles.push_back(to_radians(45.0 * view));
   const auto samples = samples_of(truth.mesh, kOverlapSamples);
   const RigEyes eyes = rig_eyes(rig);
-  const auto seen1 = seen_by_rig(samples, truth.surface, truth.pose1_from_object, angles, eyes);
-  const auto seen2 = seen_by_rig(samples, truth.surface, truth.pose2_from_object, angles, eyes);
+  const auto seen1 = views_that_see(samples, truth.surface, truth.pose1_from_object, angles, eyes);
+  const auto seen2 = views_that_see(samples, truth.surface, truth.pose2_from_object, angles, eyes);
   double one = 0, two = 0, both = 0;
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    one += seen1[i];
-    two += seen2[i];
-    both += seen1[i] & seen2[i];
+    one += seen1[i] != 0;
+    two += seen2[i] != 0;
+    both += seen1[i] != 0 && seen2[i] != 0;
   }
   return both / std::max(std::min(one, two), 1.0);
 }

@@ -75,6 +75,19 @@ TEST(NextRest, ABoxShowsItsBaseOnEveryOtherFace) {
   }
 }
 
+/// Were it not known that it stands on the table. A side is shown to two or three of eight views, the top to all.
+TEST(NextRest, WhatMoreViewsWouldShowIsSurer) {
+  NextRestOptions options;
+  options.chance_on_table = options.chance_of_a_view;
+  const auto found = rests_of(partial(kBox, above_the_base), options);
+  const NextRest *upside_down = on(found, Eigen::Vector3d::UnitY()), *on_side = on(found, Eigen::Vector3d::UnitX());
+  ASSERT_NE(upside_down, nullptr);
+  ASSERT_NE(on_side, nullptr);
+  EXPECT_GT(upside_down->gain, 0.8);
+  EXPECT_LT(on_side->gain, upside_down->gain - 0.1);
+  EXPECT_GT(on_side->gain, 0.5);
+}
+
 TEST(NextRest, ThePresentRestIsNoOther) {
   const auto found = rests_of(partial(kBox, above_the_base));
   EXPECT_EQ(on(found, -Eigen::Vector3d::UnitY()), nullptr);
@@ -147,8 +160,11 @@ bool in_the_pit(const Eigen::Vector3f& v) {
 }
 
 TEST(NextRest, WhatItsOwnWallsHideIsNotPromised) {
+  NextRestOptions exact;  // the unseen surface is the object's own
+  exact.chance_of_a_view = 1.0;
   const auto found = rests_of(partial(
-      kPit, [](const auto& v) { return !in_the_pit(v); }, 2.0));
+                                  kPit, [](const auto& v) { return !in_the_pit(v); }, 2.0),
+                              exact);
   const NextRest* next = on(found, Eigen::Vector3d::UnitY());
   ASSERT_NE(next, nullptr);
   Transform over = Transform::Identity();
