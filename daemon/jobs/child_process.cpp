@@ -13,6 +13,8 @@
 #include <tuple>
 #include <utility>
 
+#include "core/priority.h"
+
 namespace scanrig {
 namespace {
 
@@ -73,7 +75,7 @@ void give_up_first() {
   ::dup2(out, STDOUT_FILENO);
   ::dup2(error, STDERR_FILENO);
   ::close_range(3, ~0U, 0);
-  ::setpriority(PRIO_PROCESS, 0, 10);
+  lower_priority();
   give_up_first();
   if (command.memory_bytes) set_limit(RLIMIT_DATA, *command.memory_bytes);
   set_limit(RLIMIT_CORE, 0);

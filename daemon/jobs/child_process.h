@@ -27,9 +27,9 @@ struct ChildEnd {
   std::string last_words;  ///< the last line of its standard error
 };
 
-/// Runs a program at nice +10, first in line for the kernel's OOM killer, to its end. It dies with this process and is
-/// killed on `stop` or when the limit passes. It inherits only the two outputs. Fails with `io`
-/// (cannot be started), `stopped`, `timeout`.
+/// Runs a program at low priority, first in line for the kernel's OOM killer, to its end. It dies with this process
+/// and is killed on `stop` or when the limit passes. It inherits only the two outputs. Fails with `io` (cannot be
+/// started), `stopped`, `timeout`.
 Result<ChildEnd> run_child(const ChildCommand& command, const std::stop_token& stop);
 
 }  // namespace scanrig

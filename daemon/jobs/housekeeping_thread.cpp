@@ -1,8 +1,6 @@
 #include "daemon/jobs/housekeeping_thread.h"
 
-#include <sys/resource.h>
 #include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <system_error>
@@ -10,6 +8,7 @@
 #include <utility>
 
 #include "core/catch_exceptions.h"
+#include "core/priority.h"
 #include "daemon/jobs/bundle.h"
 #include "daemon/runtime/actor.h"
 
@@ -51,7 +50,7 @@ HousekeepingThread::~HousekeepingThread() {
 }
 
 void HousekeepingThread::run() {
-  ::setpriority(PRIO_PROCESS, static_cast<id_t>(::gettid()), 10);
+  lower_priority();
   while (auto message = inbox_.take()) {
     if (stop_.stop_requested()) continue;
     std::visit([this](const auto& m) { handle(m); }, *message);

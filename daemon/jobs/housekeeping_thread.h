@@ -14,7 +14,7 @@
 
 namespace scanrig {
 
-/// Longer work on ended jobs only: deleting, bundling, retention; at nice +10.
+/// Longer work on ended jobs only: deleting, bundling, retention; at low priority.
 class HousekeepingThread {
  public:
   /// `jobs`: the station's present list; called from this thread. A folder alone does not show who works in it.

@@ -21,7 +21,7 @@
 
 namespace scanrig {
 
-/// Makes models, one job after the other, while the rig continues; at nice +10, so that acquisition comes first.
+/// Makes models, one job after the other, while the rig continues; at low priority, so that acquisition comes first.
 /// Work on a job ends with its first error; no exception leaves the thread. A job with all its views
 /// is marked on disk before its reconstruction and until that ends. A mark found at the next start means that the
 /// daemon died in it.

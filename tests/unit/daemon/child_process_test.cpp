@@ -2,8 +2,12 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <csignal>
+#include <string>
 #include <thread>
+
+#include "core/priority.h"
 
 namespace scanrig {
 namespace {
@@ -29,6 +33,19 @@ TEST(Child, IsTheFirstThatTheKernelEndsWhenMemoryRunsOut) {
   command.on_line = [&](std::string_view line) { lines.emplace_back(line); };
   ASSERT_TRUE(run_child(command, {}));
   EXPECT_THAT(lines, ElementsAre("500"));
+}
+
+/// Also beside a parent that gives way already: its own value is not raised.
+TEST(Child, GivesWayToWhatMovesTheRig) {
+  std::vector<std::string> lines;
+  auto command = shell("nice");
+  command.on_line = [&](std::string_view line) { lines.emplace_back(line); };
+  std::thread([&] {
+    lower_priority_to(17);
+    ASSERT_TRUE(run_child(command, {}));
+  }).join();
+  ASSERT_TRUE(run_child(command, {}));
+  EXPECT_THAT(lines, ElementsAre(std::to_string(std::max(niceness(), 17)), std::to_string(std::max(niceness(), 15))));
 }
 
 TEST(Child, SaysWhichSignalEndedIt) {
