@@ -1,5 +1,6 @@
 #include "tests/bench/pose/campaign_symmetric.h"
 
+#include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 #include <cstdint>
