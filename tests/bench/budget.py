@@ -16,7 +16,7 @@ MINUTES = {
     "real-rig": {"realism": 2, "calibration": 4, "materials": 8, "disturbed": 4, "acceptance": 4, "characterise": 1,
                  "contradicted": 8, "screens": 2, "topology": 4, "rows": 3, "faint": 1, "edges": 3, "pairs": 1},
     "fast": {"view": 3, "scan": 8, "peers": 6, "scaling": 9, "live": 8, "acquisition": 6, "idle": 2},
-    "pose": {"campaign": 32, "symmetric": 4, "guided_flip": 9},
+    "pose": {"campaign": 32, "symmetric": 6, "guided_flip": 7},
     "end-to-end": {"models": 14, "render": 1, "same_model": 4, "dragon": 8, "rim": 1, "bad_input": 4, "sigkill": 4},
 }
 LONG = {
