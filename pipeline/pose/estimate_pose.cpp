@@ -84,8 +84,8 @@ bool take_picked(std::vector<Hypothesis>& field, const PoseOptions& options) {
 
 /// Where all that is left only turns the object on the table: the rivals, and motions that turn it over and contradict
 /// nothing. These may confirm less than a rival must, for they show less surface twice.
-std::vector<const Candidate*> with_hidden_turns(const std::vector<Hypothesis>& field,
-                                                std::vector<const Candidate*> rivals, const PoseOptions& options) {
+std::vector<const Candidate*> with_turned_over(const std::vector<Hypothesis>& field,
+                                               std::vector<const Candidate*> rivals, const PoseOptions& options) {
   for (const Hypothesis& h : field) {
     const Candidate& c = h.candidate;
     if (turns_over(c.pose1_from_pose2, options) && !c.separable && c.angle_to_best_deg > options.same_deg &&
@@ -110,7 +110,7 @@ Result<void> resolve_rivals(std::vector<Hypothesis>& field, const PoseInput& pos
   if (rivals.empty()) return is_all_left ? not_turned_over(field[0].candidate.pose1_from_pose2) : Result<void>{};
   std::optional<Symmetry> symmetry;
   if (is_all_left) {
-    symmetry = symmetry_of(field[0], with_hidden_turns(field, rivals, options), pose1, pose2, scene, options);
+    symmetry = symmetry_of(field[0], with_turned_over(field, rivals, options), pose1, pose2, scene, options);
   }
   if (!symmetry) symmetry = symmetry_of(field[0], rivals, pose1, pose2, scene, options);
   if (!symmetry && take_picked(field, options)) {

@@ -57,16 +57,16 @@ std::vector<std::uint8_t> views_that_see(std::span<const SurfaceSample> samples,
     const Transform back = placed.inverse();
     views.push_back({placed, {back * centre_of(eyes.left), back * centre_of(eyes.right), back * eyes.projector}});
   }
-  std::vector<std::uint8_t> seen(samples.size(), 0);
+  std::vector<std::uint8_t> counts(samples.size(), 0);
   parallel_for((samples.size() + kSamplesPerTask - 1) / kSamplesPerTask, [&](std::size_t task) {
     const std::size_t end = std::min(samples.size(), (task + 1) * kSamplesPerTask);
     for (std::size_t i = task * kSamplesPerTask; i < end; ++i) {
       if ((turntable_from_solid * samples[i].point).y() < options.min_height_mm) continue;
-      seen[i] = static_cast<std::uint8_t>(std::ranges::count_if(
+      counts[i] = static_cast<std::uint8_t>(std::ranges::count_if(
           views, [&](const Sighting& view) { return is_seen(samples[i], view, surface, eyes, options); }));
     }
   });
-  return seen;
+  return counts;
 }
 
 }  // namespace scanrig
