@@ -2,11 +2,8 @@
 #include <array>
 #include <cmath>
 #include <iterator>
-#include <limits>
 #include <utility>
 
-#include "core/parallel.h"
-#include "core/transform.h"
 #include "core/units.h"
 #include "pipeline/pose/pose_search.h"
 
@@ -17,9 +14,6 @@ constexpr double kTurnStepDeg = 5.0;      ///< of the turns about the axis that 
 constexpr std::size_t kTurned = 2;        ///< best hypotheses that are turned
 constexpr std::size_t kTurnsJudged = 72;  ///< best of all on a coarser level
 constexpr std::size_t kTurnsKept = 24;    ///< best of these; they are aligned
-constexpr std::size_t kVariedFinely = 6;  ///< best badly held hypotheses that are moved along what is held least
-constexpr std::array kFineSteps = {0.05, 0.035, 0.02, 0.012, 0.006, 0.003, 0.0015};  ///< shares of the object's size
-constexpr double kGain = 0.002;                                                      ///< of the score; less is chance
 
 /// They keep more than those of the first search.
 constexpr std::array<SearchRound, 4> kWideRounds = {{{3, 0, 0.00, 0.050, 300, 4.0, 3.0},
@@ -91,47 +85,6 @@ std::vector<Hypothesis> turns_of(const std::vector<Hypothesis>& field, std::size
   return turns;
 }
 
-/// Along what is held least, by so many millimetres at the object's outside.
-Transform moved(const Hypothesis& from, double distance_mm) {
-  const Eigen::Translation3d to_centre(from.centre);
-  return to_centre *
-         small_motion(distance_mm * from.weakest_motion.head<3>(), distance_mm * from.weakest_motion.tail<3>()) *
-         to_centre.inverse() * from.candidate.pose1_from_pose2;
-}
-
-/// Moves it to where it is contradicted least, from far to near. What it confirms beyond what it did is no gain: poses
-/// that both lost the foot of upright sides would be moved apart until their sides cover one another.
-void vary(Hypothesis& h, const Scene& scene, const PoseOptions& options, const SearchRound& judged) {
-  const double reach = judged.reach * scene.size_mm;
-  double spread = std::numeric_limits<double>::infinity(), confirmed = 1.0;
-  const auto score_at = [&](double distance_mm) {
-    const auto checks = check_samples(scene.observations1, scene.observations2, moved(h, distance_mm), judged.level,
-                                      reach, options.agreement);
-    const bool is_first = std::isinf(spread);
-    if (is_first) spread = 1.4826 * count_agreement(checks, spread, options.agreement).median_mm;
-    Agreement agreement = count_agreement(checks, spread, options.agreement);
-    if (is_first) confirmed = agreement.confirmed;
-    agreement.confirmed = std::min(agreement.confirmed, confirmed);
-    return agreement.score(options.last_round.contradiction_weight);
-  };
-  const double start = score_at(0.0);
-  double best = start, best_mm = 0.0;
-  for (const double step : kFineSteps) {
-    if (step > judged.capture) continue;
-    const double from_mm = best_mm;
-    for (const double distance_mm : {from_mm - step * scene.size_mm, from_mm + step * scene.size_mm}) {
-      const double score = score_at(distance_mm);
-      if (score <= best) continue;
-      best = score;
-      best_mm = distance_mm;
-    }
-  }
-  if (best < start + kGain) return;
-  h.candidate.pose1_from_pose2 = moved(h, best_mm);
-  h.sample_checks = check_samples(scene.observations1, scene.observations2, h.candidate.pose1_from_pose2, judged.level,
-                                  reach, options.agreement);
-}
-
 }  // namespace
 
 void search_turns(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options) {
@@ -147,15 +100,6 @@ void search_wider(std::vector<Hypothesis>& field, const PoseInput& pose1, const 
   auto turns = turns_of(field, kTurned, scene, options);
   proposed->insert(proposed->end(), std::make_move_iterator(turns.begin()), std::make_move_iterator(turns.end()));
   join(field, std::move(*proposed), scene, options);
-}
-
-void vary_weakest(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options,
-                  const SearchRound& judged) {
-  std::vector<Hypothesis*> held_badly;
-  for (Hypothesis& h : field) {
-    if (h.condition > options.weak_condition && held_badly.size() < kVariedFinely) held_badly.push_back(&h);
-  }
-  parallel_for(held_badly.size(), [&](std::size_t i) { vary(*held_badly[i], scene, options, judged); });
 }
 
 }  // namespace scanrig
