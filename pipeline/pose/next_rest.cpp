@@ -90,6 +90,18 @@ void judge_outlook(NextRest& next, const NextRestOptions& options) {
   }
 }
 
+/// How many views see each sample; of measured surface one is enough.
+std::vector<std::uint8_t> views_of(const Samples& samples, const SurfaceIndex& surface, const Transform& placed,
+                                   std::span<const double> angles_rad, const RigEyes& eyes,
+                                   const SightOptions& options) {
+  const std::span<const SurfaceSample> all = samples.all;
+  auto views = views_that_see(all.first(samples.unseen), surface, placed, angles_rad, eyes, options);
+  const auto of_measured =
+      views_that_see(all.subspan(samples.unseen), surface, placed, angles_rad, eyes, options, /*enough=*/1);
+  views.insert(views.end(), of_measured.begin(), of_measured.end());
+  return views;
+}
+
 /// `views`: how many see each sample.
 NextRest predicted(const StableRest& rest, const Samples& samples, const std::vector<std::uint8_t>& views,
                    const NextRestOptions& options) {
@@ -147,8 +159,8 @@ Result<NextRests> next_rests(const Mesh& partial, std::span<const double> angles
     if (is_present || rest.margin_mm < options.min_margin_mm) continue;
     const Eigen::Quaterniond turn = Eigen::Quaterniond::FromTwoVectors(rest.normal, down);
     const Transform placed = placed_on(rest, turn, properties->centre_of_mass);
-    NextRest next = predicted(rest, samples,
-                              views_that_see(samples.all, *surface, placed, angles_rad, eyes, options.sight), options);
+    NextRest next =
+        predicted(rest, samples, views_of(samples, *surface, placed, angles_rad, eyes, options.sight), options);
     next.turn = turn;
     judge_outlook(next, options);
     found.rests.push_back(next);

@@ -50,7 +50,7 @@ RigEyes rig_eyes(const Calibration& calibration) {
 
 std::vector<std::uint8_t> views_that_see(std::span<const SurfaceSample> samples, const SurfaceIndex& surface,
                                          const Transform& turntable_from_solid, std::span<const double> angles_rad,
-                                         const RigEyes& eyes, const SightOptions& options) {
+                                         const RigEyes& eyes, const SightOptions& options, std::uint8_t enough) {
   std::vector<Sighting> views;
   for (const double angle : angles_rad) {
     const Transform placed = rot_y(angle) * turntable_from_solid;
@@ -62,8 +62,10 @@ std::vector<std::uint8_t> views_that_see(std::span<const SurfaceSample> samples,
     const std::size_t end = std::min(samples.size(), (task + 1) * kSamplesPerTask);
     for (std::size_t i = task * kSamplesPerTask; i < end; ++i) {
       if ((turntable_from_solid * samples[i].point).y() < options.min_height_mm) continue;
-      counts[i] = static_cast<std::uint8_t>(std::ranges::count_if(
-          views, [&](const Sighting& view) { return is_seen(samples[i], view, surface, eyes, options); }));
+      for (const Sighting& view : views) {
+        if (counts[i] == enough) break;
+        if (is_seen(samples[i], view, surface, eyes, options)) ++counts[i];
+      }
     }
   });
   return counts;

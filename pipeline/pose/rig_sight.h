@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -29,11 +30,12 @@ struct SightOptions {
   double lift_mm = 0.2;             ///< a ray starts this far off the surface: what the facets of a mesh may be off
 };
 
-/// In how many of the views at these table angles the rig measures each sample of a solid's surface.
-/// By ray casting against the solid and its plane y = 0. `samples` and `surface` are in the solid's frame.
+/// In how many of the views at these table angles the rig measures each sample of a solid's surface, counted to
+/// `enough`. By ray casting against the solid and its plane y = 0. `samples` and `surface` are in the solid's frame.
 /// Threads: spread over the current arena, same result for any number.
 std::vector<std::uint8_t> views_that_see(std::span<const SurfaceSample> samples, const SurfaceIndex& surface,
                                          const Transform& turntable_from_solid, std::span<const double> angles_rad,
-                                         const RigEyes& eyes, const SightOptions& options = {});
+                                         const RigEyes& eyes, const SightOptions& options = {},
+                                         std::uint8_t enough = std::numeric_limits<std::uint8_t>::max());
 
 }  // namespace scanrig
