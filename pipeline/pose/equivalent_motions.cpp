@@ -87,13 +87,13 @@ class Hidden {
     for (const SurfacePoint& sample : samples_) {
       const double height = (motion * sample.point).y();
       const bool is_side = std::abs((motion.linear() * sample.normal).y()) < kSideSlope;
-      hidden.push_back(height < table + flat_ || (is_side && height < lowest_ + flat_) ? 1 : 0);
+      hidden.push_back(height < table + flat_ || (is_side && height < lowest_ + reach_) ? 1 : 0);
     }
     return hidden;
   }
 
  private:
-  static constexpr double kSideSlope = 0.5;
+  static constexpr double kSideSlope = 0.7;
 
   static double lowest(const std::vector<SurfacePoint>& samples, const Transform& motion) {
     double low = std::numeric_limits<double>::infinity();

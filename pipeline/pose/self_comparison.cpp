@@ -1,6 +1,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "pipeline/pose/symmetry.h"
@@ -27,6 +28,16 @@ SelfComparison::SelfComparison(std::vector<View> views, int levels, double sprea
   }
   focus_ = across.ldlt().solve(right);
   middle_ /= static_cast<double>(std::max<std::size_t>(samples.size(), 1));
+}
+
+Eigen::Vector3d SelfComparison::halfway(const Eigen::Vector3d& axis, const Eigen::Vector3d& point) const {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const SurfacePoint& sample : measured_.samples[static_cast<std::size_t>(options_.level)]) {
+    const double along = axis.dot(sample.point - point);
+    low = std::min(low, along);
+    high = std::max(high, along);
+  }
+  return point + 0.5 * (low + high) * axis;
 }
 
 std::optional<Transform> SelfComparison::symmetric_near(const Transform& motion, std::span<const FreeTurn> held) const {

@@ -130,7 +130,7 @@ std::optional<Transform> GroupSearch::end_for_end(const Turn& turn) const {
     const Eigen::Vector3d moved = elements_[i].linear() * turn.axis;
     if (moved.dot(turn.axis) < -0.9) return elements_[i];
   }
-  const Eigen::Vector3d on_axis = turn.point + turn.axis * turn.axis.dot(surface_.middle() - turn.point);
+  const Eigen::Vector3d on_axis = surface_.halfway(turn.axis, turn.point);
   const FreeTurn held{turn.axis, turn.point};
   return surface_.symmetric_near(turned_about(turn.axis.unitOrthogonal(), on_axis, std::numbers::pi), {&held, 1});
 }
@@ -184,7 +184,7 @@ void GroupSearch::try_perpendicular_turns() {
   const auto all = axes();
   if (all.size() != 1) return;
   const Turn& main = all[0];
-  const Eigen::Vector3d on_axis = main.point + main.axis * main.axis.dot(surface_.middle() - main.point);
+  const Eigen::Vector3d on_axis = surface_.halfway(main.axis, main.point);
   const Eigen::Vector3d across = main.axis.unitOrthogonal();
   const double range_deg = 180.0 / fold_of(main.axis);
   const int steps = std::max(1, static_cast<int>(range_deg / 5.0));

@@ -59,6 +59,8 @@ class SelfComparison {
   [[nodiscard]] std::optional<Transform> symmetric_near(const Transform& motion,
                                                         std::span<const FreeTurn> held = {}) const;
   [[nodiscard]] const Eigen::Vector3d& middle() const { return middle_; }
+  /// The point of this line halfway between the ends of the surface along it: where a turn end for end has its axis.
+  [[nodiscard]] Eigen::Vector3d halfway(const Eigen::Vector3d& axis, const Eigen::Vector3d& point) const;
   /// The point nearest to all normals: the centre of a ball.
   [[nodiscard]] const Eigen::Vector3d& focus() const { return focus_; }
 
