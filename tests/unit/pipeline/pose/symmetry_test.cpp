@@ -151,6 +151,22 @@ TEST(Symmetry, OfAPrismUpsideDownIsNoReasonToTakeItForLeftAsItStood) {
   EXPECT_TRUE(turns_over(estimate->pose1_from_pose2));
 }
 
+/// So many turns on the table fit that they fill the field: the turn end for end is found by symmetry.
+TEST(Symmetry, OfAPrismOfEightUpsideDownIsNoReasonToTakeItForLeftAsItStood) {
+  const Solid prism = testing::prism(8, 20, 50);
+  PosedScan scan = testing::scan(prism, kUpsideDown);
+  lose_foot(scan.views1, 1.0);
+  lose_foot(scan.views2, 1.0);
+  const auto estimate = scan.estimate();
+  expect_model(estimate, scan, prism, Group::dihedral, 8, 16);
+}
+
+TEST(Symmetry, OfACylinderUpsideDownIsNoReasonToTakeItForLeftAsItStood) {
+  const Solid cylinder = testing::upright_cylinder({0, 0, 0}, 20, 50);
+  const PosedScan scan = testing::scan(cylinder, kUpsideDown);
+  expect_model(scan.estimate(), scan, cylinder, Group::axial, 0, 0);
+}
+
 /// Rolled from one face onto the next it shows one long face less than if it had been left: that alone is no reason.
 TEST(Symmetry, OfAPrismThatWasRolledIsNoReasonToTakeItForLeftAsItStood) {
   Transform lying_from_upright(Eigen::Translation3d(-30, 16, 0));
