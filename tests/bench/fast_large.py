@@ -39,9 +39,9 @@ def measure(bench, scratch):
     runs = [integrated(bench, width, views, voxel_mm, gib) for gib in GIB]
     for gib, run in zip(GIB, runs):
         bench.at_most(f"{name}, within {gib} GiB: peak memory", 1024 * gib, run["peak_mib"], "MiB", digits=0)
-        bench.at_most(f"{name}, within {gib} GiB: integration", MINUTES, run["seconds"] / 60, "min")
-        bench.line(f"{name}, within {gib} GiB: what it made", "reported",
-                   f"{run['vertices']} vertices in {run['places']} places", True)
+        bench.line(f"{name}, within {gib} GiB: integration", "reported",
+                   f"{run['seconds'] / 60:.1f} min in {run['places']} places, {run['vertices']} vertices", True)
+    bench.at_most(f"{name}, within {GIB[0]} GiB: minutes", MINUTES, runs[0]["seconds"] / 60, digits=1)
     bench.at_most("a compact view: bytes a measured pixel, masks included", 9.0, runs[0]["bytes_per_pixel"], digits=2)
     same = len({run["hash"] for run in runs}) == 1
     bench.line(f"bits within {GIB[0]} and {GIB[1]} GiB", "equal", "equal" if same else "differ", same)
