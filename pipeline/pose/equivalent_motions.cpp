@@ -71,7 +71,8 @@ std::vector<Transform> equivalent_motions(const Symmetry& symmetry, const Transf
 }
 
 /// Samples of one pose as a motion carries them into the frame of another, that hide from it: on its table, where what
-/// holds a turn end for end leaves the height open by `reach`; or on a side, lower than anything that it measured.
+/// holds a turn end for end leaves the height open by `reach`; or on a side, not higher than that above the lowest that
+/// it measured.
 class Hidden {
  public:
   Hidden(const std::vector<SurfacePoint>& samples, const std::vector<SurfacePoint>& others, double reach, double flat)

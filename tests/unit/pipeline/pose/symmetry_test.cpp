@@ -139,26 +139,23 @@ void lose_foot(std::vector<View>& views, double height_mm) {
   }
 }
 
-/// One end lies on the table in either pose, so no surface holds the height of the turn end for end.
-TEST(Symmetry, OfAPrismUpsideDownIsNoReasonToTakeItForLeftAsItStood) {
-  const Solid prism = testing::prism(3, 20, 40);
+void expect_prism_turned_upside_down(int sides, double height_mm, double lost_foot_mm) {
+  const Solid prism = testing::prism(sides, 20, height_mm);
   PosedScan scan = testing::scan(prism, kUpsideDown);
-  lose_foot(scan.views1, 2.5);
-  lose_foot(scan.views2, 2.5);
+  lose_foot(scan.views1, lost_foot_mm);
+  lose_foot(scan.views2, lost_foot_mm);
   const auto estimate = scan.estimate();
-  expect_model(estimate, scan, prism, Group::dihedral, 3, 6);
+  expect_model(estimate, scan, prism, Group::dihedral, sides, 2 * static_cast<std::size_t>(sides));
   ASSERT_TRUE(estimate);
   EXPECT_TRUE(turns_over(estimate->pose1_from_pose2));
 }
 
+/// One end lies on the table in either pose, so no surface holds the height of the turn end for end.
+TEST(Symmetry, OfAPrismUpsideDownIsNoReasonToTakeItForLeftAsItStood) { expect_prism_turned_upside_down(3, 40, 2.5); }
+
 /// So many turns on the table fit that they fill the field: the turn end for end is found by symmetry.
 TEST(Symmetry, OfAPrismOfEightUpsideDownIsNoReasonToTakeItForLeftAsItStood) {
-  const Solid prism = testing::prism(8, 20, 50);
-  PosedScan scan = testing::scan(prism, kUpsideDown);
-  lose_foot(scan.views1, 1.0);
-  lose_foot(scan.views2, 1.0);
-  const auto estimate = scan.estimate();
-  expect_model(estimate, scan, prism, Group::dihedral, 8, 16);
+  expect_prism_turned_upside_down(8, 50, 1.0);
 }
 
 TEST(Symmetry, OfACylinderUpsideDownIsNoReasonToTakeItForLeftAsItStood) {
