@@ -11,6 +11,7 @@
 namespace scanrig {
 namespace {
 
+constexpr double kCleanShare = 0.5;     ///< of what the best one confirms, that one that contradicts little must
 constexpr std::size_t kNeighbours = 2;  ///< of a best one that is held badly, refined at full resolution
 
 bool alike(const Transform& a, const Transform& b, const Scene& scene, double degrees, double shift) {
@@ -52,6 +53,19 @@ void separate_by_patches(std::vector<Hypothesis>& finalists, const Scene& scene,
   std::rotate(finalists.begin(), finalists.begin() + static_cast<std::ptrdiff_t>(best),
               finalists.begin() + static_cast<std::ptrdiff_t>(best) + 1);
   for (Hypothesis& h : finalists) h.candidate.angle_to_best_deg = apart_deg(h.candidate, finalists[0].candidate);
+}
+
+/// Where the best one contradicts more than a right one does, those that do not come before it, unless they confirm
+/// far less: a wrong motion may confirm more than its contradictions are counted for.
+void clean_first(std::vector<Hypothesis>& field, const PoseOptions& options) {
+  if (field.empty()) return;
+  const double enough = std::max(options.min_overlap, kCleanShare * field[0].candidate.agreement.confirmed);
+  const auto is_clean = [&](const Hypothesis& h) {
+    const Agreement& agreement = h.candidate.agreement;
+    return agreement.contradicted_share() <= options.search_again_contradicted && agreement.confirmed >= enough;
+  };
+  if (is_clean(field[0])) return;
+  std::stable_partition(field.begin(), field.end(), is_clean);
 }
 
 /// The best, its rivals, and where the surface holds it badly the next best ones beside it: on a coarser level a wrong
@@ -99,6 +113,7 @@ void judge(std::vector<Hypothesis>& field, const PoseOptions& options) {
   std::stable_sort(field.begin(), field.end(), [weight](const Hypothesis& a, const Hypothesis& b) {
     return a.candidate.agreement.score(weight) > b.candidate.agreement.score(weight);
   });
+  clean_first(field, options);
   for (Hypothesis& h : field) {
     const AgreementGap with_best = compare(field[0].sample_checks, h.sample_checks, spread, options.agreement);
     Candidate& c = h.candidate;
