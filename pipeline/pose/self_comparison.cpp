@@ -28,6 +28,12 @@ SelfComparison::SelfComparison(std::vector<View> views, int levels, double sprea
   }
   focus_ = across.ldlt().solve(right);
   middle_ /= static_cast<double>(std::max<std::size_t>(samples.size(), 1));
+  far_off_as_it_is_ = far_off(checks_of(Transform::Identity()));
+}
+
+std::vector<SampleCheck> SelfComparison::checks_of(const Transform& motion) const {
+  const PoseObservations self{&measured_, views_};
+  return check_samples(self, self, motion, options_.level, options_.reach * measured_.size_mm, agreement_);
 }
 
 Eigen::Vector3d SelfComparison::halfway(const Eigen::Vector3d& axis, const Eigen::Vector3d& point) const {
@@ -40,6 +46,12 @@ Eigen::Vector3d SelfComparison::halfway(const Eigen::Vector3d& axis, const Eigen
   return point + 0.5 * (low + high) * axis;
 }
 
+double SelfComparison::far_off(const std::vector<SampleCheck>& checks) const {
+  AgreementOptions wide = agreement_;
+  wide.tolerance = wide.wide_tolerance;
+  return count_agreement(checks, spread_mm_, wide).contradicted_share();
+}
+
 std::optional<Transform> SelfComparison::symmetric_near(const Transform& motion, std::span<const FreeTurn> held) const {
   RefineOptions refine;
   refine.max_iterations = options_.iterations;
@@ -48,9 +60,9 @@ std::optional<Transform> SelfComparison::symmetric_near(const Transform& motion,
       align(measured_, measured_, motion, options_.level, options_.capture * measured_.size_mm, refine);
   if (aligned.iterations == 0) return std::nullopt;
   const Transform& found = aligned.pose1_from_pose2;
-  const PoseObservations self{&measured_, views_};
-  const auto checks = check_samples(self, self, found, options_.level, options_.reach * measured_.size_mm, agreement_);
+  const auto checks = checks_of(found);
   if (count_agreement(checks, spread_mm_, agreement_).confirmed < options_.min_confirmed) return std::nullopt;
+  if (far_off(checks) > far_off_as_it_is_ + options_.max_far_off) return std::nullopt;
   const auto misfits = patch_misfits(patches_, checks, spread_mm_, patch_spread_mm_, agreement_, options_.patches);
   std::size_t judged = 0, contradicted = 0;
   for (const double misfit : misfits) {

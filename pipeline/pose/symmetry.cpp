@@ -66,6 +66,7 @@ class GroupSearch {
     return true;
   }
   void close();
+  [[nodiscard]] bool is_closed() const;
   [[nodiscard]] std::vector<Turn> axes() const;
   [[nodiscard]] bool is_axial(const Turn& turn) const;
   [[nodiscard]] bool is_ball(const Turn& turn) const;
@@ -110,6 +111,12 @@ void GroupSearch::close() {
       add(elements_[k] * elements_[i]);
     }
   }
+}
+
+bool GroupSearch::is_closed() const {
+  return std::ranges::all_of(elements_, [&](const Transform& a) {
+    return std::ranges::all_of(elements_, [&](const Transform& b) { return holds(a * b); });
+  });
 }
 
 /// Turns that no finite group of `max_fold` has in common.
@@ -270,6 +277,7 @@ std::optional<Symmetry> GroupSearch::find(std::span<const Transform> motions) {
   close();
   try_finer_turns();
   try_perpendicular_turns();
+  if (!is_closed()) return std::nullopt;  // turns by any angles, and yet not free: no group has them
   return finite();
 }
 

@@ -44,6 +44,7 @@ struct SymmetryOptions {
   std::size_t max_elements = 60;
   double max_misfits = 0.004;   ///< share of the judged patches that may contradict: single ones beside edges
   std::size_t min_misfits = 3;  ///< so many must contradict
+  double max_far_off = 0.002;   ///< far_off(), beyond that of the surface where it is: features below a patch
   PatchOptions patches;
 };
 
@@ -65,11 +66,16 @@ class SelfComparison {
   [[nodiscard]] const Eigen::Vector3d& focus() const { return focus_; }
 
  private:
+  [[nodiscard]] std::vector<SampleCheck> checks_of(const Transform& motion) const;
+  /// Share of what was judged that contradicts by `AgreementOptions::wide_tolerance`: not what edges do.
+  [[nodiscard]] double far_off(const std::vector<SampleCheck>& checks) const;
+
   std::vector<View> views_;
   MeasuredPose measured_;
   Patches patches_;
   Eigen::Vector3d middle_ = Eigen::Vector3d::Zero(), focus_ = Eigen::Vector3d::Zero();
   double spread_mm_, patch_spread_mm_;
+  double far_off_as_it_is_ = 0.0;
   AgreementOptions agreement_;
   SymmetryOptions options_;
 };

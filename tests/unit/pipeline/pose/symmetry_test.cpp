@@ -107,6 +107,32 @@ TEST(Symmetry, IsNotClaimedOfABoxWithALowBump) {
   EXPECT_LT(surface_error(scan, bumped, estimate->pose1_from_pose2), 0.12);
 }
 
+/// Too small for three patches, but wherever it is not, a view looked through it.
+TEST(Symmetry, IsNotClaimedOfACylinderWithALug) {
+  const Solid lug = testing::together({testing::upright_cylinder({0, 0, 0}, 16, 36), testing::ball({17, 18, 0}, 3.3)});
+  const PosedScan scan = testing::scan(lug, kLaidDown);
+  const SelfComparison one_pose(scan.views1, 3, 0.02, 0.005, {}, {});
+  for (const double degrees : {30.0, 90.0, 180.0}) {
+    Transform about_the_axis = Transform::Identity();
+    about_the_axis.linear() = turn(degrees, Eigen::Vector3d::UnitY());
+    EXPECT_FALSE(one_pose.symmetric_near(about_the_axis)) << degrees;
+  }
+}
+
+/// What one side of a cylinder shows fits after small turns by any angle. These are no group, and the other side is not
+/// known to be like it.
+TEST(Symmetry, IsNotClaimedOfACylinderSeenFromOneSide) {
+  PosedScan scan = testing::scan(testing::upright_cylinder({0, 0, 0}, 20, 50), kLaidDown);
+  scan.views1.resize(2);
+  const SelfComparison one_side(scan.views1, 3, 0.02, 0.005, {}, {});
+  std::vector<Transform> turns;
+  for (const double degrees : {25.0, 41.0}) {
+    turns.push_back(Transform(turn(degrees, Eigen::Vector3d::UnitY())));
+    EXPECT_TRUE(one_side.symmetric_near(turns.back()));
+  }
+  EXPECT_FALSE(find_symmetry(one_side, turns, {}));
+}
+
 TEST(Symmetry, OfABottleThatOnlyTurnedOnTheTableIsNoReasonToTakeItForTurnedOver) {
   const auto estimate = testing::scan(testing::bottle(), kTurnedOnTheTable).estimate();
   ASSERT_FALSE(estimate);
