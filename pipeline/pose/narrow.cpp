@@ -26,20 +26,6 @@ double soft_score(const std::vector<SampleCheck>& sample_checks, double reach_mm
   return sum / static_cast<double>(std::max<std::size_t>(sample_checks.size(), 1));
 }
 
-/// The turn that the surfaces' correspondences hold least.
-FreeTurn weakest_turn_of(const RefinedPose& aligned) {
-  using Matrix6 = Eigen::Matrix<double, 6, 6>;
-  const double trace = aligned.information.trace();
-  if (!(trace > 0.0)) return {};
-  const Matrix6 covariance = (aligned.information + 1e-9 * trace * Matrix6::Identity()).inverse();
-  const PrincipalSigmas turns = principal_sigmas(covariance.topLeftCorner<3, 3>());
-  const Eigen::Vector3d axis = turns.directions.col(0);
-  // The motion of the centre that goes with the turn says where the axis is.
-  Eigen::Vector3d slide = covariance.bottomLeftCorner<3, 3>() * axis / (turns.sigma[0] * turns.sigma[0]);
-  slide -= axis * axis.dot(slide);
-  return {axis, aligned.centre + axis.cross(slide)};
-}
-
 /// Turn and slide that the correspondences hold least, for 1 mm at `arm_mm` from the centre.
 Eigen::Matrix<double, 6, 1> weakest_motion_of(const RefinedPose& aligned, double arm_mm) {
   Eigen::Matrix<double, 6, 1> arc;
@@ -123,6 +109,19 @@ Hypothesis aligned_both_ways(const Hypothesis& start, const Scene& scene, const 
 }
 
 }  // namespace
+
+FreeTurn weakest_turn_of(const RefinedPose& aligned) {
+  using Matrix6 = Eigen::Matrix<double, 6, 6>;
+  const double trace = aligned.information.trace();
+  if (!(trace > 0.0)) return {};
+  const Matrix6 covariance = (aligned.information + 1e-9 * trace * Matrix6::Identity()).inverse();
+  const PrincipalSigmas turns = principal_sigmas(covariance.topLeftCorner<3, 3>());
+  const Eigen::Vector3d axis = turns.directions.col(0);
+  // The motion of the centre that goes with the turn says where the axis is.
+  Eigen::Vector3d slide = covariance.bottomLeftCorner<3, 3>() * axis / (turns.sigma[0] * turns.sigma[0]);
+  slide -= axis * axis.dot(slide);
+  return {axis, aligned.centre + axis.cross(slide)};
+}
 
 void narrow(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options, const SearchRound& round) {
   parallel_for(field.size(), [&](std::size_t i) {

@@ -65,6 +65,9 @@ void vary_weakest(std::vector<Hypothesis>& field, const Scene& scene, const Pose
 /// searched for again as it is; the others stay behind these finalists. vary_weakest() moves those that are held badly.
 void settle(std::vector<Hypothesis>& field, const Scene& scene, const PoseOptions& options);
 
+/// The turn that the surfaces' correspondences hold least.
+FreeTurn weakest_turn_of(const RefinedPose& aligned);
+
 double apart_deg(const Candidate& a, const Candidate& b);
 /// Degrees between the vertical of pose 2 and that of pose 1.
 double tilt_deg(const Transform& pose1_from_pose2);

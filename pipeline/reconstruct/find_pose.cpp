@@ -4,6 +4,7 @@
 #include "core/units.h"
 #include "pipeline/pose/estimate_pose.h"
 #include "pipeline/pose/next_rest.h"
+#include "pipeline/pose/refine_found.h"
 #include "pipeline/reconstruct/reconstruction_state.h"
 #include "pipeline/reconstruct/report.h"
 #include "pipeline/registration/refine_pose.h"
@@ -71,7 +72,8 @@ Result<Reconstruction::State::FoundPoses> Reconstruction::State::find_second_pos
     const Transform element = *found.model_from_pose[1] * estimate->pose1_from_pose2.inverse();
     refinement.contacts = carried(std::move(refinement.contacts), element);
   }
-  const auto refined = refine_pose(measured1, measured2, *found.model_from_pose[1], refinement, context);
+  const auto refined = refine_found({&measured1, poses[0].views}, {&measured2, poses[1].views},
+                                    *found.model_from_pose[1], refinement, pose_options, context);
   if (!refined) return pass_on(refined);
   report.add_refinement(*refined, !refinement.held.empty());
   found.model_from_pose[1] = refined->pose1_from_pose2;

@@ -103,12 +103,19 @@ MotionEquations motion_equations(const PoseCorrespondences& found, const RefineO
   return e;
 }
 
+/// What holds a height only: edges that rest on a table leave the turns to the surfaces.
 void add_contacts(const RefineOptions& options, const Transform& pose1_from_pose2, MotionEquations& e) {
-  const double w = options.contact_share * e.normal.bottomRightCorner<3, 3>().trace();
+  const Eigen::Matrix3d surfaces = e.normal.bottomRightCorner<3, 3>();
   for (const Contact& c : options.contacts) {
-    const double distance = c.normal_in_pose1.dot(pose1_from_pose2 * c.point_in_pose2) - c.offset_mm;
-    e.normal.bottomRightCorner<3, 3>() += w * c.normal_in_pose1 * c.normal_in_pose1.transpose();
-    e.right.tail<3>() -= w * distance * c.normal_in_pose1;
+    const double facing_so = c.normal_in_pose1.dot(surfaces * c.normal_in_pose1) / surfaces.trace();
+    const double flat_share = c.is_flat ? options.flat_contact_share - facing_so : 0.0;
+    const double w = std::max(options.contact_share, flat_share) * surfaces.trace();
+    const Eigen::Vector3d point = pose1_from_pose2 * c.point_in_pose2;
+    Vector6 j = Vector6::Zero();
+    j.tail<3>() = c.normal_in_pose1;
+    if (c.is_flat) j.head<3>() = (point - e.centre).cross(c.normal_in_pose1);
+    e.normal += w * j * j.transpose();
+    e.right -= w * (c.normal_in_pose1.dot(point) - c.offset_mm) * j;
   }
 }
 

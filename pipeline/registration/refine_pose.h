@@ -16,6 +16,7 @@ struct Contact {
   Eigen::Vector3d point_in_pose2 = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal_in_pose1 = Eigen::Vector3d::Zero();  ///< unit
   double offset_mm = 0.0;                                     ///< normal.x = offset
+  bool is_flat = false;                                       ///< of flat, measured surface: it outweighs edges
 };
 
 /// A turn of pose 2 that changes no surface, of a body of revolution: noise would let it drift. Pose 1's frame.
@@ -37,7 +38,8 @@ struct RefineOptions {
   std::size_t min_correspondences = 30;  ///< fewer are no overlap
   double min_overlap = 0.02;             ///< share of both surfaces
   double robust_scales = 3.0;            ///< scale of the robust weight, in standard deviations of the residuals
-  double contact_share = 1e-3;           ///< weight of the contacts against the surfaces': negligible beside them
+  double contact_share = 3e-5;           ///< weight of the contacts against the surfaces': negligible beside them
+  double flat_contact_share = 0.05;      ///< the same of flat ones, less the share of the surfaces that face so
   double capture_medians = 8.0;          ///< the capture distance shrinks to this many median residuals ...
   double min_capture = 0.005;            ///< ... but not below this share of the object's size
   AxisUncertainty axis = {};             ///< of the turntable; nothing for poses that were placed by hand

@@ -10,6 +10,7 @@
 #include "core/units.h"
 #include "pipeline/mesh/surface_samples.h"
 #include "pipeline/pose/estimate_pose.h"
+#include "pipeline/pose/refine_found.h"
 #include "pipeline/pose/rig_sight.h"
 #include "pipeline/reconstruct/rig_watch.h"
 #include "pipeline/registration/moved_views.h"
@@ -202,7 +203,9 @@ void find_pose(const Truth& truth, const ScannedPose& one, const ScannedPose& tw
   refinement.axis = {to_radians(known.axis_tilt_sigma_deg), known.axis_shift_sigma_mm};
   refinement.calibration = calibration_modes(rig.calibration, rig.calibration.left.camera_from_turntable);
   clock.seconds();
-  const auto refined = refine_pose(one.views, two.views, estimate->pose1_from_pose2, refinement, {});
+  const MeasuredPose measured1 = measured_pose(one.views), measured2 = measured_pose(two.views);
+  const auto refined =
+      refine_found({&measured1, one.views}, {&measured2, two.views}, estimate->pose1_from_pose2, refinement, {}, {});
   result["refine_s"] = clock.seconds();
   if (!refined) {
     result["verdict"] = to_string(refined.error().code);

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "pipeline/registration/pose_equations.h"
 #include "pipeline/registration/pose_uncertainty.h"
 #include "tests/unit/pipeline/registration/analytic_views.h"
 
@@ -64,6 +65,24 @@ TEST(RefinePose, ReportsTheCertaintyOfTheMotion) {
   const PrincipalSigmas turn = principal_sigmas(turned->covariance.topLeftCorner<3, 3>());
   EXPECT_GT(turn.sigma[0], 30.0 * turn.sigma[1]);
   EXPECT_GT(std::abs(turn.directions.col(0).y()), 0.99);
+}
+
+/// Weight that a contact on the table gets beside surfaces of which `facing_up` do so, as a share of theirs.
+double contact_weight(double facing_up, bool is_flat) {
+  RefineOptions options;
+  options.contacts = {{.normal_in_pose1 = Eigen::Vector3d::UnitY(), .is_flat = is_flat}};
+  MotionEquations e;
+  e.normal.diagonal().tail<3>() = Eigen::Vector3d(1.0 - facing_up, facing_up, 0.0);
+  add_contacts(options, Transform::Identity(), e);
+  return e.normal(4, 4) - facing_up;
+}
+
+TEST(RefinePose, FlatContactsMakeUpForSurfaceThatIsMissing) {
+  const double slight = RefineOptions{}.contact_share;
+  EXPECT_NEAR(contact_weight(0.0, false), slight, 1e-9);
+  EXPECT_NEAR(contact_weight(0.0, true), 0.05, 1e-9);
+  EXPECT_NEAR(contact_weight(0.03, true), 0.02, 1e-9);
+  EXPECT_NEAR(contact_weight(0.4, true), slight, 1e-9);  // surfaces that were measured by both hold it better
 }
 
 /// Largest component of the motion's error in its own sigma, over the principal directions.
