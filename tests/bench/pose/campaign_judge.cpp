@@ -80,11 +80,14 @@ json judged(const Truth& truth, const Transform& measured_from_true1, const Tran
   const Transform off_table = refined.pose1_from_pose2 * truth.pose1_from_pose2().inverse();
   const Eigen::AngleAxisd turn(off.linear());
   const Vector3d rotation = turn.angle() * turn.axis(), shift = off * refined.centre - refined.centre;
-  const SurfaceError surface = surface_error(truth, refined.pose1_from_pose2);
+  const SurfaceError surface =
+      surface_error(truth, measured_from_true1.inverse() * refined.pose1_from_pose2 * measured_from_true2);
+  const SurfaceError on_table = surface_error(truth, refined.pose1_from_pose2);
   const Vector3d middle = truth.pose1_from_object * truth.properties.centre_of_mass;
   json result = {{"rotation_deg", to_degrees(turn.angle())},
                  {"translation_mm", (off * middle - middle).norm()},
                  {"surface_mm", {surface.median_mm, surface.p95_mm, surface.max_mm}},
+                 {"surface_on_table_mm", {on_table.median_mm, on_table.p95_mm, on_table.max_mm}},
                  {"on_table", {to_degrees(rotation_angle(off_table.linear())), (off_table * middle - middle).norm()}},
                  {"condition", refined.condition},
                  {"median_mm", refined.median_mm},
