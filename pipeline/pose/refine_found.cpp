@@ -9,8 +9,9 @@ namespace scanrig {
 
 Result<RefinedPose> refine_found(const PoseObservations& pose1, const PoseObservations& pose2, const Transform& found,
                                  RefineOptions refinement, const PoseOptions& options, const Context& context) {
-  if (auto flat = flat_contacts(*pose1.measured, *pose2.measured, found); !flat.empty()) {
-    refinement.contacts = std::move(flat);
+  if (options.stable_tangent_planes) {  // not on a fixture
+    auto flat = flat_contacts(*pose1.measured, *pose2.measured, found);
+    if (!flat.empty()) refinement.contacts = std::move(flat);
   }
   auto refined = refine_pose(*pose1.measured, *pose2.measured, found, refinement, context);
   if (!refined) return refined;

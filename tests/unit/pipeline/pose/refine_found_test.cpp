@@ -53,6 +53,20 @@ TEST(FlatContacts, AreNothingThatIsRoundOrThatStandsOnSomethingElse) {
   EXPECT_EQ(contact_distances(on_a_foot, on_a_foot.pose1_from_pose2).size(), 1U);  // of the other pose's table
 }
 
+/// Putty lifts it in pose 2, so its flat top is near pose 2's table and yet not on it.
+TEST(RefineFound, TakesNothingForATableOnAFixture) {
+  const PosedScan scan = testing::scan(testing::block({-30, 0, -20}, {30, 30, 20}), kUpsideDown, 0.6);
+  const MeasuredPose measured1 = measured_pose(scan.views1), measured2 = measured_pose(scan.views2);
+  const auto height = [&](bool on_fixture) {
+    PoseOptions options;
+    options.stable_tangent_planes = !on_fixture;
+    const auto refined = refine_found({&measured1, scan.views1}, {&measured2, scan.views2}, scan.pose1_from_pose2,
+                                      after_search(), options, {});
+    return refined ? refined->pose1_from_pose2.translation().y() : std::nan("");
+  };
+  EXPECT_GT(std::abs(height(false) - height(true)), 0.1);
+}
+
 /// A cylinder with a bump, whose roundness errs by 0.05 mm, not alike in both poses: what most of it fits best is not
 /// how it was turned.
 Solid out_of_round(double phase_deg) {
