@@ -13,7 +13,7 @@ namespace {
 constexpr double kReach = 0.015;         // of the object's size
 constexpr double kFacing = 0.9976;       // cosine to the vertical: 4 deg
 constexpr double kNearlyFacing = 0.978;  // 12 deg
-constexpr double kMinFacing = 0.7;       // share of what faces nearly so, of which a cylinder has a third
+constexpr double kFlatShare = 0.7;       // of what faces nearly so; a cylinder has a third
 constexpr double kFlatMm = 0.15;         // half the height of what counts as one plane
 constexpr std::size_t kMinFlat = 100;    // samples, of some 20000
 constexpr double kMaxBelow = 0.001;      // share of the samples that may be lower
@@ -33,7 +33,7 @@ std::optional<Eigen::Vector3d> lowest_flat(const std::vector<SurfacePoint>& samp
     facing.push_back(point);
     heights.push_back(point.y());
   }
-  const bool is_round = static_cast<double>(facing.size()) < kMinFacing * static_cast<double>(nearly);
+  const bool is_round = static_cast<double>(facing.size()) < kFlatShare * static_cast<double>(nearly);
   if (is_round || facing.size() < kMinFlat) return std::nullopt;
   const double lowest = quantile(std::move(heights), 0.05);
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();

@@ -28,7 +28,7 @@ SelfComparison::SelfComparison(std::vector<View> views, int levels, double sprea
   }
   focus_ = across.ldlt().solve(right);
   middle_ /= static_cast<double>(std::max<std::size_t>(samples.size(), 1));
-  far_off_as_it_is_ = far_off(checks_of(Transform::Identity()));
+  far_off_unmoved_ = far_off(checks_of(Transform::Identity()));
 }
 
 std::vector<SampleCheck> SelfComparison::checks_of(const Transform& motion) const {
@@ -62,7 +62,7 @@ std::optional<Transform> SelfComparison::symmetric_near(const Transform& motion,
   const Transform& found = aligned.pose1_from_pose2;
   const auto checks = checks_of(found);
   if (count_agreement(checks, spread_mm_, agreement_).confirmed < options_.min_confirmed) return std::nullopt;
-  if (far_off(checks) > far_off_as_it_is_ + options_.max_far_off) return std::nullopt;
+  if (far_off(checks) > far_off_unmoved_ + options_.max_far_off) return std::nullopt;
   const auto misfits = patch_misfits(patches_, checks, spread_mm_, patch_spread_mm_, agreement_, options_.patches);
   std::size_t judged = 0, contradicted = 0;
   for (const double misfit : misfits) {

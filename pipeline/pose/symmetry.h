@@ -75,7 +75,7 @@ class SelfComparison {
   Patches patches_;
   Eigen::Vector3d middle_ = Eigen::Vector3d::Zero(), focus_ = Eigen::Vector3d::Zero();
   double spread_mm_, patch_spread_mm_;
-  double far_off_as_it_is_ = 0.0;
+  double far_off_unmoved_ = 0.0;
   AgreementOptions agreement_;
   SymmetryOptions options_;
 };
