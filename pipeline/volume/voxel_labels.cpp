@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <bit>
-#include <numeric>
 #include <unordered_set>
 #include <utility>
 
 #include "core/parallel.h"
+#include "pipeline/volume/voxel_runs.h"
 
 namespace scanrig {
 namespace {
@@ -69,50 +69,46 @@ int components_around(std::uint32_t members, bool inside) {
   return count;
 }
 
+/// Does a row of a block, along x, lie in one of its sides?
+bool is_at_side(const Eigen::Vector3i& voxel) {
+  const int y = voxel.y() % kBlockSide, z = voxel.z() % kBlockSide;
+  return y == 0 || z == 0 || y == kBlockSide - 1 || z == kBlockSide - 1;
+}
+
+/// The stored blocks and one more on each side.
+struct BlockRange {
+  Eigen::Vector3i low, size;
+
+  explicit BlockRange(const BlockGrid& grid) : low(grid.size()), size(Eigen::Vector3i::Zero()) {
+    Eigen::Vector3i high = Eigen::Vector3i::Zero();
+    for (const auto& block : grid.blocks()) {
+      low = low.cwiseMin(block.index);
+      high = high.cwiseMax(block.index);
+    }
+    low.array() -= 1;
+    size = (high - low).array() + 2;
+  }
+};
+
 }  // namespace
 
-VoxelLabels::VoxelLabels(const BlockGrid& grid) {
-  Eigen::Vector3i low = grid.size(), high = Eigen::Vector3i::Zero();
-  for (const auto& block : grid.blocks()) {
-    low = low.cwiseMin(block.index);
-    high = high.cwiseMax(block.index);
-  }
-  first_ = kBlockSide * low - Eigen::Vector3i::Ones();
-  size_ = kBlockSide * (high - low + Eigen::Vector3i::Ones()) + Eigen::Vector3i::Constant(2);
-  flags_.assign(static_cast<std::size_t>(size_.x()) * size_.y() * size_.z(), 0);
-  const Eigen::Vector3i blocks = high - low + Eigen::Vector3i::Ones();
-  parallel_for(static_cast<std::size_t>(blocks.z()), [&](std::size_t layer) {
+VoxelLabels::VoxelLabels(const BlockGrid& grid)
+    : first_(kBlockSide * BlockRange(grid).low), flags_(BlockRange(grid).size) {
+  const Eigen::Vector3i low = first_ / kBlockSide, size = flags_.blocks();
+  parallel_for(static_cast<std::size_t>(size.z()), [&](std::size_t layer) {
     Eigen::Vector3i b(0, 0, static_cast<int>(layer));
-    for (b.y() = 0; b.y() < blocks.y(); ++b.y()) {
-      for (b.x() = 0; b.x() < blocks.x(); ++b.x()) {
+    for (b.y() = 0; b.y() < size.y(); ++b.y()) {
+      for (b.x() = 0; b.x() < size.x(); ++b.x()) {
+        const bool is_rim = (b.array() == 0).any() || (b.array() == size.array() - 1).any();
+        flags_.fill_block(flags_.block_at(b), Flag{is_rim ? kRim : grid.all_inside(low + b) ? kInside : Flag{}});
         const auto* block = grid.find(low + b);
-        if (block == nullptr && !grid.all_inside(low + b)) continue;
-        const Eigen::Vector3i corner = kBlockSide * b + Eigen::Vector3i::Ones();
-        for (int n = 0; n < BlockGrid::kNodes; ++n) {
-          const Eigen::Vector3i p =
-              corner + Eigen::Vector3i(n % kBlockSide, n / kBlockSide % kBlockSide, n / (kBlockSide * kBlockSide));
-          if (block == nullptr || block->distance[n] < 0.0F) flags_[step(p.x(), p.y(), p.z())] = kInside;
+        for (int n = 0; block != nullptr && n < BlockGrid::kNodes; ++n) {
+          const Eigen::Vector3i in_block(n % kBlockSide, n / kBlockSide % kBlockSide, n / (kBlockSide * kBlockSide));
+          if (block->distance[n] < 0.0F) flags_.set_bits(flags_.index(kBlockSide * b + in_block), kInside);
         }
       }
     }
   });
-  mark_rim();
-}
-
-Eigen::Vector3i VoxelLabels::node(std::size_t i) const {
-  const auto width = static_cast<std::size_t>(size_.x()), height = static_cast<std::size_t>(size_.y());
-  return first_ + Eigen::Vector3i(static_cast<int>(i % width), static_cast<int>(i / width % height),
-                                  static_cast<int>(i / (width * height)));
-}
-
-void VoxelLabels::mark_rim() {
-  const Eigen::Vector3i last = size_ - Eigen::Vector3i::Ones();
-  for (int z = 0; z <= last.z(); ++z) {
-    for (int y = 0; y <= last.y(); ++y) {
-      const bool whole = z == 0 || z == last.z() || y == 0 || y == last.y();
-      for (int x = 0; x <= last.x(); x += whole ? 1 : last.x()) flags_[step(x, y, z)] |= kRim;
-    }
-  }
 }
 
 std::array<std::ptrdiff_t, 6> VoxelLabels::faces() const {
@@ -126,7 +122,7 @@ void VoxelLabels::for_each_stored(const BlockGrid& grid, const Body& body) const
       const Eigen::Vector3i p =
           kBlockSide * block.index - first_ +
           Eigen::Vector3i(n % kBlockSide, n / kBlockSide % kBlockSide, n / (kBlockSide * kBlockSide));
-      body(static_cast<std::size_t>(step(p.x(), p.y(), p.z())), block, n);
+      body(flags_.index(p), block, n);
     }
   }
 }
@@ -140,6 +136,7 @@ void VoxelLabels::doubt_unmeasured(const BlockGrid& grid, float reach_mm) {
     return block != nullptr &&
            block->support[BlockGrid::Block::node(local.x(), local.y(), local.z())] == Support::measured;
   };
+  flags_.clear_bits_everywhere(kDoubtful);
   std::vector<std::size_t> certain, doubtful;
   for_each_stored(grid, [&](std::size_t i, const BlockGrid::Block& block, int n) {
     bool surface = false, measured = false;  // both ends of a cut edge must be
@@ -152,113 +149,88 @@ void VoxelLabels::doubt_unmeasured(const BlockGrid& grid, float reach_mm) {
     const bool is_open = !has(i, kInside) && block.support[n] == Support::free;
     if (surface || is_open) (measured || is_open ? certain : doubtful).push_back(i);
   });
-  std::vector<std::uint8_t> reached(flags_.size());
-  for (const auto i : certain) reached[i] = 1;
-  for (const auto i : doubtful) reached[i] = 2;
+  for (const auto i : certain) flags_.set_bits(i, kReached);
+  for (const auto i : doubtful) flags_.set_bits(i, kReached | kDoubtful);
   const int depth = static_cast<int>(reach_mm / grid.voxel());
   for (int layer = 0; layer < depth && !doubtful.empty(); ++layer) {
-    for (auto* front : {&certain, &doubtful}) *front = next_layer(*front, reached);
+    for (auto* front : {&certain, &doubtful}) *front = next_layer(*front);
+    if (layer % kBlockSide == 0) flags_.release_pages();
   }
-  for (std::size_t i = 0; i < flags_.size(); ++i) {
-    flags_[i] &= static_cast<std::uint8_t>(~kDoubtful);
-    if (reached[i] == 2 && !on_rim(i)) flags_[i] |= kDoubtful;
-  }
+  flags_.clear_bits_everywhere(kReached);
 }
 
 /// The opening of solid and space [Serra 1982]: what a core, `layers` below the surface, reaches in as many steps.
 void VoxelLabels::doubt_thin(const BlockGrid& grid, int layers) {
-  constexpr std::uint8_t kShallow = 1, kThick = 2;
   const auto faces = this->faces();
-  for (auto& flags : flags_) flags &= static_cast<std::uint8_t>(~kDoubtful);
-  std::vector<std::uint8_t> reached(flags_.size());
+  flags_.clear_bits_everywhere(kDoubtful);
   std::vector<std::size_t> front, shallow;
   for_each_stored(grid, [&](std::size_t i, const BlockGrid::Block&, int) {
     const bool surface = std::any_of(faces.begin(), faces.end(),
                                      [&](std::ptrdiff_t face) { return has(i + face, kInside) != has(i, kInside); });
     if (surface) front.push_back(i);
   });
-  for (const auto i : front) reached[i] = kShallow;
+  for (const auto i : front) flags_.set_bits(i, kReached);
   for (int layer = 0; layer < layers; ++layer) {
     shallow.insert(shallow.end(), front.begin(), front.end());
-    front = next_layer(front, reached);
+    front = next_layer(front);
   }
-  for (const auto i : front) reached[i] = kThick;
+  for (const auto i : front) flags_.set_bits(i, kThick);
   for (int layer = 0; layer < layers; ++layer) {
     std::vector<std::size_t> next;
     for (const auto i : front) {
-      if (on_rim(i)) continue;
       for (const auto face : faces) {
         const std::size_t j = i + face;
-        if (reached[j] != kShallow || has(j, kInside) != has(i, kInside)) continue;
-        reached[j] = kThick;
+        if (!has(j, kReached) || has(j, kThick) || has(j, kInside) != has(i, kInside)) continue;
+        flags_.set_bits(j, kThick);
         next.push_back(j);
       }
     }
     front = std::move(next);
   }
   for (const auto i : shallow) {
-    if (reached[i] == kShallow && !on_rim(i)) flags_[i] |= kDoubtful;
+    if (!has(i, kThick)) flags_.set_bits(i, kDoubtful);
   }
   for_each_stored(grid, [&](std::size_t i, const BlockGrid::Block& block, int n) {
-    if (!has(i, kInside) && block.support[n] == Support::free) flags_[i] &= static_cast<std::uint8_t>(~kDoubtful);
+    if (!has(i, kInside) && block.support[n] == Support::free) flags_.clear_bits(i, kDoubtful);
   });
+  flags_.clear_bits_everywhere(kReached | kThick);
 }
 
-/// Neighbours of `front` through faces, of its own kind, that were not reached; they take its mark.
-std::vector<std::size_t> VoxelLabels::next_layer(const std::vector<std::size_t>& front,
-                                                 std::vector<std::uint8_t>& reached) const {
+/// Neighbours of `front` through faces, of its own kind, that were not reached; they are as doubtful as it is. The rim
+/// is never reached.
+std::vector<std::size_t> VoxelLabels::next_layer(const std::vector<std::size_t>& front) {
   std::vector<std::size_t> next;
   for (const auto i : front) {
-    if (on_rim(i)) continue;
+    const bool is_inside = has(i, kInside);
+    const auto mark = static_cast<std::uint8_t>(kReached | (flags_.at(i) & kDoubtful));
     for (const auto face : faces()) {
       const std::size_t j = i + face;
-      if (reached[j] != 0 || has(j, kInside) != has(i, kInside)) continue;
-      reached[j] = reached[i];
+      if (has(j, kReached) || has(j, kInside) != is_inside || on_rim(j)) continue;
+      flags_.set_bits(j, mark);
       next.push_back(j);
     }
   }
   return next;
 }
 
-/// Certain voxels of a set as runs along x, joined into components through their faces.
-VoxelLabels::Runs VoxelLabels::certain_runs(bool inside) const {
-  Runs result;
-  std::vector<std::size_t> row_start;  // first run of each row
-  const auto width = static_cast<std::size_t>(size_.x());
-  const auto wanted = [&](std::size_t i) { return is_in(i, inside) && !has(i, kDoubtful); };
-  for (std::size_t row = 0; row < flags_.size(); row += width) {
-    row_start.push_back(result.runs.size());
-    for (std::size_t i = row; i < row + width; ++i) {
-      if (!wanted(i)) continue;
-      const std::size_t first = i;
-      while (i + 1 < row + width && wanted(i + 1)) ++i;
-      result.runs.push_back({first, i});
-    }
-  }
-  row_start.push_back(result.runs.size());
-  result.root.resize(result.runs.size());
-  std::iota(result.root.begin(), result.root.end(), 0U);
-  const auto find = [&](std::uint32_t r) {
-    while (result.root[r] != r) r = result.root[r] = result.root[result.root[r]];
-    return r;
+/// Blocks of certain voxels, all of the set, amid 26 such blocks: nothing of it that touches them is elsewhere.
+std::vector<bool> VoxelLabels::buried_blocks(bool inside) const {
+  const Eigen::Vector3i size = flags_.blocks();
+  const auto is_whole = [&](const Eigen::Vector3i& b) {
+    const auto common = flags_.common(flags_.block_at(b));
+    return common && is_certain(*common, inside);
   };
-  const auto join_rows = [&](std::size_t row, std::size_t other) {  // `other` comes before `row`
-    const std::size_t shift = (row - other) * width;
-    std::size_t b = row_start[other];
-    for (std::size_t a = row_start[row]; a < row_start[row + 1]; ++a) {
-      while (b < row_start[other + 1] && result.runs[b].last + shift < result.runs[a].first) ++b;
-      for (std::size_t c = b; c < row_start[other + 1] && result.runs[c].first + shift <= result.runs[a].last; ++c) {
-        const std::uint32_t x = find(static_cast<std::uint32_t>(a)), y = find(static_cast<std::uint32_t>(c));
-        result.root[std::max(x, y)] = std::min(x, y);
+  std::vector<bool> result(flags_.block_count());
+  Eigen::Vector3i b;
+  for (b.z() = 1; b.z() < size.z() - 1; ++b.z()) {
+    for (b.y() = 1; b.y() < size.y() - 1; ++b.y()) {
+      for (b.x() = 1; b.x() < size.x() - 1; ++b.x()) {
+        const auto& around = neighbourhood().offset;
+        result[flags_.block_at(b)] =
+            is_whole(b) && std::ranges::all_of(around, [&](const Eigen::Vector3i& to) { return is_whole(b + to); });
       }
     }
-  };
-  const auto height = static_cast<std::size_t>(size_.y());
-  for (std::size_t row = 0; row + 1 < row_start.size(); ++row) {
-    if (row % height != 0) join_rows(row, row - 1);
-    if (row >= height) join_rows(row, row - height);
   }
-  for (std::uint32_t r = 0; r < result.root.size(); ++r) result.root[r] = find(r);
   return result;
 }
 
@@ -270,46 +242,50 @@ std::vector<std::size_t> VoxelLabels::grow(bool inside) {
   for (std::size_t k = 0; k < 26; ++k) {
     if ((touching_it(inside) >> k & 1U) != 0) touching.push_back(steps[k]);
   }
-  for (auto& flags : flags_) flags &= static_cast<std::uint8_t>(~(kGrown | kQueued));
+  flags_.clear_bits_everywhere(kGrown | kQueued);
 
-  const Runs certain = certain_runs(inside);
-  std::vector<std::size_t> voxels(certain.runs.size());
-  for (std::size_t r = 0; r < voxels.size(); ++r) {
-    voxels[certain.root[r]] += certain.runs[r].last - certain.runs[r].first + 1;
-  }
-  if (voxels.empty()) return {};
+  const VoxelRuns certain(flags_, [&](std::uint8_t flags) { return is_certain(flags, inside); });
+  if (certain.empty()) return {};
+  const std::vector<bool> is_buried = buried_blocks(inside);
 
   std::vector<std::size_t> queue;
   const auto queue_around = [&](std::size_t i) {
     if (on_rim(i)) return;
     for (const auto to : touching) {
       const std::size_t j = i + to;
-      if (!is_in(j, inside) || has(j, kGrown) || has(j, kQueued) || on_rim(j)) continue;
-      flags_[j] |= kQueued;
+      const std::uint8_t flags = flags_.at(j);
+      if (((flags & kInside) != 0) != inside || (flags & (kGrown | kQueued | kRim)) != 0) continue;
+      flags_.set_bits(j, kQueued);
       queue.push_back(j);
     }
   };
-  const auto add_component = [&](std::uint32_t root) {
-    for (std::size_t r = root; r < certain.runs.size(); ++r) {
-      if (certain.root[r] != root) continue;
-      for (std::size_t i = certain.runs[r].first; i <= certain.runs[r].last; ++i) flags_[i] |= kGrown;
-    }
-    for (std::size_t r = root; r < certain.runs.size(); ++r) {
-      if (certain.root[r] != root) continue;
-      for (std::size_t i = certain.runs[r].first; i <= certain.runs[r].last; ++i) queue_around(i);
-    }
+  const auto add_component = [&](std::uint32_t component) {
+    certain.for_each_part(component, [&](std::size_t first, std::size_t last) {
+      const std::size_t block = flags_.block_of(first);
+      if (const auto common = flags_.common(block)) {  // all of it is of this component
+        flags_.fill_block(block, *common | kGrown);
+        return;
+      }
+      for (std::size_t i = first; i <= last; ++i) flags_.set_bits(i, kGrown);
+    });
+    certain.for_each_part(component, [&](std::size_t first, std::size_t last) {
+      const std::size_t block = flags_.block_of(first);
+      if (is_buried[block]) return;
+      // Inside a block of one value a row has neighbours elsewhere at its ends only.
+      const bool is_enclosed = flags_.common(block) && !is_at_side(flags_.voxel(first));
+      const std::size_t stride = is_enclosed ? std::max<std::size_t>(last - first, 1) : 1;
+      for (std::size_t i = first; i <= last; i += stride) queue_around(i);
+    });
   };
-  add_component(static_cast<std::uint32_t>(std::max_element(voxels.begin(), voxels.end()) - voxels.begin()));
+  add_component(certain.largest());
 
   std::vector<std::size_t> blocked;
   for (std::size_t next = 0; next < queue.size(); ++next) {
     const std::size_t i = queue[next];
-    flags_[i] &= static_cast<std::uint8_t>(~kQueued);
+    flags_.clear_bits(i, kQueued);
     if (has(i, kGrown)) continue;
     if (!has(i, kDoubtful)) {  // the first contact with another certain component takes all of it
-      const auto run = std::upper_bound(certain.runs.begin(), certain.runs.end(), i,
-                                        [](std::size_t index, const Run& r) { return index < r.first; });
-      add_component(certain.root[static_cast<std::size_t>(run - certain.runs.begin()) - 1]);
+      add_component(certain.component_of(i));
       continue;
     }
     std::uint32_t grown = 0;
@@ -318,7 +294,7 @@ std::vector<std::size_t> VoxelLabels::grow(bool inside) {
       blocked.push_back(i);  // looked at again when a neighbour is added
       continue;
     }
-    flags_[i] |= kGrown;
+    flags_.set_bits(i, kGrown);
     queue_around(i);
   }
   std::sort(blocked.begin(), blocked.end());

@@ -7,13 +7,22 @@
 #include <vector>
 
 #include "pipeline/volume/block_grid.h"
+#include "pipeline/volume/voxel_bytes.h"
 
 namespace scanrig {
 
-/// One byte per voxel over the stored blocks and the space between them, with a rim of outside voxels.
+/// Flags of each voxel over the stored blocks and the space between them, with a rim of outside blocks.
 class VoxelLabels {
  public:
-  enum Flag : std::uint8_t { kInside = 1, kDoubtful = 2, kGrown = 4, kQueued = 8, kRim = 16 };
+  enum Flag : std::uint8_t {
+    kInside = 1,
+    kDoubtful = 2,
+    kGrown = 4,
+    kQueued = 8,
+    kRim = 16,
+    kReached = 32,
+    kThick = 64
+  };
 
   /// Nothing is doubtful.
   explicit VoxelLabels(const BlockGrid& grid);
@@ -24,16 +33,12 @@ class VoxelLabels {
   /// Solid and space that are not more than 2 `layers` of voxels thick; space that a view looked through is certain.
   void doubt_thin(const BlockGrid& grid, int layers);
 
-  [[nodiscard]] std::uint8_t at(std::size_t i) const { return flags_[i]; }
-  [[nodiscard]] bool has(std::size_t i, Flag flag) const { return (flags_[i] & flag) != 0; }
-  [[nodiscard]] std::size_t count() const { return flags_.size(); }
-  [[nodiscard]] Eigen::Vector3i node(std::size_t i) const;  ///< of the grid
+  [[nodiscard]] bool has(std::size_t i, Flag flag) const { return (flags_.at(i) & flag) != 0; }
+  [[nodiscard]] Eigen::Vector3i node(std::size_t i) const { return first_ + flags_.voxel(i); }  ///< of the grid
   [[nodiscard]] bool on_rim(std::size_t i) const { return has(i, kRim); }
 
   /// Distances, in voxels, from index to index along the axes.
-  [[nodiscard]] std::ptrdiff_t step(int dx, int dy, int dz) const {
-    return (static_cast<std::ptrdiff_t>(dz) * size_.y() + dy) * size_.x() + dx;
-  }
+  [[nodiscard]] std::ptrdiff_t step(int dx, int dy, int dz) const { return flags_.step(dx, dy, dz); }
 
   /// Grows the set of inside (or outside) voxels from its certain ones; returns the voxels that would have closed a
   /// loop, in the order of their indices.
@@ -43,26 +48,18 @@ class VoxelLabels {
   [[nodiscard]] bool closes_short_loop(std::size_t blocked, bool inside, int longest) const;
 
  private:
-  struct Run {
-    std::size_t first, last;  ///< indices along x, both included
-  };
-  struct Runs {
-    std::vector<Run> runs;
-    std::vector<std::uint32_t> root;  ///< of each run's component
-  };
-  void mark_rim();
   /// `body(i, block, n)`: of each voxel of the stored blocks.
   template <class Body>
   void for_each_stored(const BlockGrid& grid, const Body& body) const;
   [[nodiscard]] std::array<std::ptrdiff_t, 6> faces() const;
-  [[nodiscard]] std::vector<std::size_t> next_layer(const std::vector<std::size_t>& front,
-                                                    std::vector<std::uint8_t>& reached) const;
-  [[nodiscard]] Runs certain_runs(bool inside) const;
-  [[nodiscard]] bool is_in(std::size_t i, bool inside) const { return has(i, kInside) == inside; }
+  std::vector<std::size_t> next_layer(const std::vector<std::size_t>& front);
+  [[nodiscard]] std::vector<bool> buried_blocks(bool inside) const;
+  [[nodiscard]] static bool is_certain(std::uint8_t flags, bool inside) {
+    return ((flags & kInside) != 0) == inside && (flags & kDoubtful) == 0;
+  }
 
   Eigen::Vector3i first_;  ///< node of the first voxel
-  Eigen::Vector3i size_;
-  std::vector<std::uint8_t> flags_;
+  VoxelBytes flags_;
 };
 
 }  // namespace scanrig
