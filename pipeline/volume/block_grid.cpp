@@ -235,7 +235,7 @@ BlockGrid::Block& BlockGrid::store(const Eigen::Vector3i& block, float band_mm) 
   return blocks_[static_cast<std::size_t>(slot)];
 }
 
-void BlockGrid::set(const Eigen::Vector3i& node, float distance, float band_mm) {
+float BlockGrid::set(const Eigen::Vector3i& node, float distance, float band_mm) {
   const auto block_of = [](const Eigen::Vector3i& n) {
     return n.unaryExpr([](int c) { return c / kBlockSide; }).eval();
   };
@@ -244,7 +244,14 @@ void BlockGrid::set(const Eigen::Vector3i& node, float distance, float band_mm) 
     if (contains(other)) store(other, band_mm);
   }
   const Eigen::Vector3i local = node - kBlockSide * block_of(node);
-  store(block_of(node), band_mm).distance[Block::node(local.x(), local.y(), local.z())] = distance;
+  return std::exchange(store(block_of(node), band_mm).distance[Block::node(local.x(), local.y(), local.z())], distance);
+}
+
+void BlockGrid::forget_blocks_after(std::size_t count) {
+  for (std::size_t i = count; i < blocks_.size(); ++i) {
+    slot_[linear(blocks_[i].index)] = blocks_[i].distance[0] < 0.0F ? kInside : kOutside;
+  }
+  blocks_.resize(count);
 }
 
 }  // namespace scanrig

@@ -37,8 +37,11 @@ class BlockGrid {
   /// surface from block to block until it is closed. Fails with `out_of_range`, `stopped`.
   Result<void> fill(Field& field, const std::vector<Eigen::Vector3f>& seeds, const Context& context);
 
-  /// Gives one node a distance; stores its block and the blocks it touches if they are missing.
-  void set(const Eigen::Vector3i& node, float distance, float band_mm);
+  /// Gives one node a distance and returns the one it had; stores its block and the blocks it touches if they are
+  /// missing.
+  float set(const Eigen::Vector3i& node, float distance, float band_mm);
+  /// No longer stores those blocks that were stored after the first `count`, each all inside or all outside again.
+  void forget_blocks_after(std::size_t count);
 
   [[nodiscard]] const std::vector<Block>& blocks() const { return blocks_; }
   [[nodiscard]] std::vector<Block>& blocks() { return blocks_; }

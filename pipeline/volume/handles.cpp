@@ -35,48 +35,64 @@ std::vector<std::size_t> small_films(const VoxelLabels& labels, const std::vecto
   return result;
 }
 
+std::vector<Eigen::Vector3i> nodes_of(const VoxelLabels& labels, const std::vector<std::size_t>& voxels) {
+  std::vector<Eigen::Vector3i> nodes;
+  nodes.reserve(voxels.size());
+  for (const auto i : voxels) nodes.push_back(labels.node(i));
+  return nodes;
+}
+
+/// Those of films that nothing measured supports.
+std::vector<Eigen::Vector3i> unmeasured_films(const BlockGrid& grid, bool cutting, const VolumeOptions& options) {
+  VoxelLabels labels(grid);
+  labels.doubt_unmeasured(grid, options.doubt_reach_mm);
+  const std::vector<std::size_t> films = labels.grow(/*inside=*/cutting);
+  const auto max_voxels = static_cast<std::size_t>(std::pow(options.max_filled_mm / grid.voxel(), 2.0F));
+  return nodes_of(labels, cutting ? films : small_films(labels, films, max_voxels));
+}
+
+/// Those of films below the resolution, measured or not.
+std::vector<Eigen::Vector3i> thin_films(const BlockGrid& grid, bool cutting, const VolumeOptions& options) {
+  VoxelLabels labels(grid);
+  labels.doubt_thin(grid, options.thin_layers);
+  std::vector<std::size_t> films = labels.grow(/*inside=*/cutting);
+  std::erase_if(films, [&](std::size_t i) { return !labels.closes_short_loop(i, cutting, options.short_loop); });
+  return nodes_of(labels, films);
+}
+
 /// Flips voxels; the change is kept if it leaves fewer handles.
-std::size_t flip_if_better(BlockGrid& grid, Mesh& surface, const VoxelLabels& labels,
-                           const std::vector<std::size_t>& voxels, float distance, float band_mm, long& genus) {
-  if (voxels.empty()) return 0;
-  BlockGrid changed = grid;
-  for (const auto i : voxels) changed.set(labels.node(i), distance, band_mm);
-  Mesh all = extract_surface(changed);
+std::size_t flip_if_better(BlockGrid& grid, Mesh& surface, const std::vector<Eigen::Vector3i>& nodes, float distance,
+                           float band_mm, long& genus) {
+  if (nodes.empty()) return 0;
+  const std::size_t blocks = grid.blocks().size();
+  std::vector<float> before;
+  before.reserve(nodes.size());
+  for (const auto& node : nodes) before.push_back(grid.set(node, distance, band_mm));
+  Mesh all = extract_surface(grid);
   const long after = genus_of_closed(largest_component(all));
-  if (after >= genus) return 0;
+  if (after >= genus) {
+    for (std::size_t i = 0; i < nodes.size(); ++i) grid.set(nodes[i], before[i], band_mm);
+    grid.forget_blocks_after(blocks);
+    return 0;
+  }
   genus = after;
-  grid = std::move(changed);
   surface = std::move(all);
-  return voxels.size();
+  return nodes.size();
 }
 
 }  // namespace
 
 HandleRepair repair_handles(BlockGrid& grid, Mesh& surface, long genus, float band_mm, const VolumeOptions& options) {
   HandleRepair result{0, 0, genus};
-  const auto flip = [&](const VoxelLabels& labels, const std::vector<std::size_t>& voxels, bool cutting) {
-    const float shallow = 0.5F * grid.voxel();  // a flipped voxel's distance: the film is about a voxel thick
-    const std::size_t flipped =
-        flip_if_better(grid, surface, labels, voxels, cutting ? shallow : -shallow, band_mm, result.genus);
-    (cutting ? result.cut : result.filled) += flipped;
-  };
   // Cut first: space that no view saw may be empty, space that a view saw through is.
-  for (const bool cutting : {true, false}) {
-    if (result.genus <= 0) return result;
-    VoxelLabels labels(grid);
-    labels.doubt_unmeasured(grid, options.doubt_reach_mm);
-    std::vector<std::size_t> films = labels.grow(/*inside=*/cutting);
-    const auto max_voxels = static_cast<std::size_t>(std::pow(options.max_filled_mm / grid.voxel(), 2.0F));
-    if (!cutting) films = small_films(labels, films, max_voxels);
-    flip(labels, films, cutting);
-  }
-  for (const bool cutting : {true, false}) {
-    if (result.genus <= 0) return result;
-    VoxelLabels labels(grid);
-    labels.doubt_thin(grid, options.thin_layers);
-    std::vector<std::size_t> films = labels.grow(/*inside=*/cutting);
-    std::erase_if(films, [&](std::size_t i) { return !labels.closes_short_loop(i, cutting, options.short_loop); });
-    flip(labels, films, cutting);
+  for (const auto films : {unmeasured_films, thin_films}) {
+    for (const bool cutting : {true, false}) {
+      if (result.genus <= 0) return result;
+      const float shallow = 0.5F * grid.voxel();  // a flipped voxel's distance: the film is about a voxel thick
+      const std::size_t flipped = flip_if_better(grid, surface, films(grid, cutting, options),
+                                                 cutting ? shallow : -shallow, band_mm, result.genus);
+      (cutting ? result.cut : result.filled) += flipped;
+    }
   }
   return result;
 }

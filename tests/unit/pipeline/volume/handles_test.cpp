@@ -66,6 +66,22 @@ TEST(Handles, AThinOneWithAShortLoopIsCutAlthoughMeasured) {
 
 TEST(Handles, AThinOneWithALongLoopStays) { EXPECT_EQ(repaired(corner_bridge(12, 2)).genus, 1); }
 
+TEST(Handles, AGridWhoseNodeIsSetBackIsAsItWas) {
+  BlockGrid grid = grid_of(posts, Support::measured);
+  const std::size_t blocks = grid.blocks().size();
+  const std::vector<BlockGrid::Block> before = grid.blocks();
+  const Eigen::Vector3i far(kCubeSide + 12, 20, 20);
+  const float distance = grid.set(far, -1.0F, kBandMm);
+  EXPECT_EQ(distance, kBandMm);
+  EXPECT_GT(grid.blocks().size(), blocks);
+  EXPECT_EQ(grid.set(far, distance, kBandMm), -1.0F);
+  grid.forget_blocks_after(blocks);
+  ASSERT_EQ(grid.blocks().size(), blocks);
+  EXPECT_EQ(grid.find(far / kBlockSide), nullptr);
+  EXPECT_FALSE(grid.all_inside(far / kBlockSide));
+  for (std::size_t i = 0; i < blocks; ++i) EXPECT_EQ(grid.blocks()[i].distance, before[i].distance);
+}
+
 TEST(Handles, AThickOneWithAShortLoopStays) { EXPECT_EQ(repaired(corner_bridge(3, 7)).genus, 1); }
 
 /// A beam from post to post, 3 voxels thick, `width` above the slab.
