@@ -27,6 +27,13 @@ struct RangeImage {
   bool background_is_whole = true;  ///< else pixels that are neither measured nor background may be either
 };
 
+/// What is left says where the view stands.
+inline void release_matrices(RangeImage& range) {
+  range.depth = range.sigma = cv::Mat1f();
+  range.normal = cv::Mat3f();
+  range.background = cv::Mat1b();
+}
+
 /// One table angle of one pose, for registration and volume.
 struct View {
   int index = 0;

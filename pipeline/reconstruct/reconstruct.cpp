@@ -161,21 +161,24 @@ Result<Surface> Reconstruction::State::surface(const FoundPoses& found, const Co
     parallel_for(pose.full.size(), [&](std::size_t v) { follow_thinned(pose.full[v], pose.views[v].range, step()); });
     posed.push_back({.views = pose.views, .model_from_pose = *found.model_from_pose[p], .full = pose.full});
   }
-  return integrate(posed,
-                   {.voxel_mm = options.voxel_mm,
-                    .fusion = *fusion,
-                    .table_without_silhouettes = calibration.has_value(),
-                    .memory_bytes = prepared_bytes()},
-                   context);
+  VolumeOptions volume{
+      .voxel_mm = options.voxel_mm, .fusion = *fusion, .table_without_silhouettes = calibration.has_value()};
+  if (step() > 1) {  // the images in full tell all but the band
+    volume.band_mm = evidence_band(posed, volume);
+    for (PoseState& pose : poses) {
+      for (View& view : pose.views) release_matrices(view.range);
+    }
+    give_memory_back();
+  }
+  volume.memory_bytes = prepared_bytes();
+  return integrate(posed, volume, context);
 }
 
 /// Colouring needs the photographs and where the views stand.
 void Reconstruction::State::release_range_images() {
   for (PoseState& pose : poses) {
     for (View& view : pose.views) {
-      view.range.depth = view.range.sigma = cv::Mat1f();
-      view.range.normal = cv::Mat3f();
-      view.range.background = cv::Mat1b();
+      release_matrices(view.range);
       if (!reads_again()) view.silhouettes.clear();  // else they say what is wanted of the photographs
     }
     pose.full = std::vector<CompactRange>();

@@ -69,22 +69,6 @@ Result<void> check(std::span<const PosedViews> poses, const VolumeOptions& optio
   return {};
 }
 
-/// Half width of the zone of evidence. Coarser range images have the same sigmas.
-double band(std::span<const PosedViews> poses, const VolumeOptions& options) {
-  if (options.band_mm > 0.0) return options.band_mm;
-  std::vector<float> sigmas;
-  for (const auto& pose : poses) {
-    for (const auto& view : pose.views) {
-      std::copy_if(view.range.sigma.begin(), view.range.sigma.end(), std::back_inserter(sigmas),
-                   [](float sigma) { return !std::isnan(sigma); });
-    }
-  }
-  if (sigmas.empty()) return options.band_voxels * options.voxel_mm;
-  const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
-  std::nth_element(sigmas.begin(), middle, sigmas.end());
-  return std::max(options.band_voxels * options.voxel_mm, options.band_sigmas * *middle);
-}
-
 bool has_silhouettes(const PosedViews& pose) {
   return std::any_of(pose.views.begin(), pose.views.end(), [](const View& v) { return !v.silhouettes.empty(); });
 }
@@ -128,6 +112,7 @@ Result<Mesh> extract(Field& field, const Eigen::AlignedBox3f& box, const std::ve
   if (mesh.faces.empty()) return fail(ErrorCode::degenerate, "volume: the surface encloses nothing");
   report.genus = report.genus_before_repair = genus_of_closed(mesh);
   if (options.repair_handles && report.genus > 0) {
+    mesh = Mesh();  // which would add to the peak
     const HandleRepair repair = repair_handles(grid, all, report.genus, field.band(), options);
     report.voxels_cut = repair.cut;
     report.voxels_filled = repair.filled;
@@ -141,11 +126,26 @@ Result<Mesh> extract(Field& field, const Eigen::AlignedBox3f& box, const std::ve
 
 }  // namespace
 
+double evidence_band(std::span<const PosedViews> poses, const VolumeOptions& options) {
+  if (options.band_mm > 0.0) return options.band_mm;
+  std::vector<float> sigmas;
+  for (const auto& pose : poses) {
+    for (const auto& view : pose.views) {
+      std::copy_if(view.range.sigma.begin(), view.range.sigma.end(), std::back_inserter(sigmas),
+                   [](float sigma) { return !std::isnan(sigma); });
+    }
+  }
+  if (sigmas.empty()) return options.band_voxels * options.voxel_mm;
+  const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
+  std::nth_element(sigmas.begin(), middle, sigmas.end());
+  return std::max(options.band_voxels * options.voxel_mm, options.band_sigmas * *middle);
+}
+
 Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions& options, const Context& context) {
   if (auto ok = check(poses, options); !ok) return pass_on(ok);
   Surface result;
   VolumeReport& report = result.report;
-  report.band_mm = band(poses, options);
+  report.band_mm = evidence_band(poses, options);
   context.report("volume", 0.0);
   PreparedViews prepared = prepare_views(poses, options, report.band_mm);
   if (prepared.seeds.empty()) return fail(ErrorCode::degenerate, "volume: no view measured any surface");

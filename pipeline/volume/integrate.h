@@ -86,6 +86,10 @@ struct Surface {
   VolumeReport report;
 };
 
+/// Half width of the zone around a surface in which it is evidence, mm, from the sigmas of the views' own range images:
+/// for `VolumeOptions::band_mm`, where these are released before the integration of those in full.
+double evidence_band(std::span<const PosedViews> poses, const VolumeOptions& options = {});
+
 /// The closed surface of the object from the range images and silhouettes of one pose (a partial model) or more (the
 /// complete one) [Park and Subbarao 2002, sections 2 and 4]. The mesh is one watertight component in the model's frame
 /// (mm), with normals, `views` and `sigma`; same bits for any number of threads.

@@ -14,8 +14,14 @@ struct MadeView {
   std::optional<RangeSampler> sampler;
   std::vector<Eigen::Vector3f> seeds;
   Eigen::AlignedBox3f box;
-  std::vector<float> weights;
+  std::vector<float> weights;  ///< of one point in `Strides::weights`
+  std::size_t points = 0;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+};
+
+/// One point in so many.
+struct Strides {
+  std::size_t seeds, weights;
 };
 
 RangeSampler::PartSource part_of(const PosedViews& pose, std::size_t v) {
@@ -30,31 +36,31 @@ RangeSampler::PartSource part_of(const PosedViews& pose, std::size_t v) {
   };
 }
 
-std::uintmax_t bytes_of(const PosedViews& pose, std::size_t v) {
+std::uintmax_t pixels_of(const PosedViews& pose, std::size_t v) {
   const Projection& p = pose.full.empty() ? pose.views[v].range.projection : pose.full[v].header().projection;
-  return std::uintmax_t{RangeSampler::kBytesPerPixel} * static_cast<std::uintmax_t>(p.width) *
-         static_cast<std::uintmax_t>(p.height);
+  return static_cast<std::uintmax_t>(p.width) * static_cast<std::uintmax_t>(p.height);
 }
 
-MadeView make_one(const PosedViews& pose, std::size_t v, const VolumeOptions& options, double band_mm) {
+MadeView make_one(const PosedViews& pose, std::size_t v, const VolumeOptions& options, const Strides& strides,
+                  double band_mm) {
   MadeView made;
   const RangeImage expanded = pose.full.empty() ? RangeImage() : pose.full[v].whole();
   made.sampler.emplace(pose.full.empty() ? pose.views[v].range : expanded, pose.model_from_pose, band_mm,
                        options.voxel_mm, options.sampler);
-  std::size_t count = 0;
   for (const auto& pixel : made.sampler->surface()) {
     made.box.extend(pixel.point);
-    if (count++ % options.seed_stride == 0) made.seeds.push_back(pixel.point);
-    made.weights.push_back(pixel.weight);
+    if (made.points % strides.seeds == 0) made.seeds.push_back(pixel.point);
+    if (made.points % strides.weights == 0) made.weights.push_back(pixel.weight);
     made.sum += pixel.point.cast<double>();
+    ++made.points;
   }
   return made;
 }
 
-SurfaceStatistics statistics_of(std::vector<float>& weights, const Eigen::Vector3d& sum) {
+SurfaceStatistics statistics_of(std::vector<float>& weights, const Eigen::Vector3d& sum, std::size_t points) {
   SurfaceStatistics result;
   if (weights.empty()) return result;
-  result.centre = sum / static_cast<double>(weights.size());
+  result.centre = sum / static_cast<double>(points);
   const auto middle = weights.begin() + static_cast<std::ptrdiff_t>(weights.size() / 2);
   std::nth_element(weights.begin(), middle, weights.end());
   result.median_weight = *middle;
@@ -79,17 +85,21 @@ std::uintmax_t bytes_for(const PreparedViews& prepared, const Bricks& bricks, fl
 }  // namespace
 
 PreparedViews prepare_views(std::span<const PosedViews> poses, const VolumeOptions& options, double band_mm) {
-  constexpr std::uintmax_t kWhilePrepared = 3;  // times what a prepared view keeps
+  constexpr std::uintmax_t kWhilePrepared = 3;            // times what a prepared view keeps
+  constexpr std::uintmax_t kEnoughWeights = 1ULL << 24U;  // for their median
   PreparedViews result;
-  std::uintmax_t all_bytes = 0, largest = 1;
+  std::uintmax_t pixels = 0, largest = 1;
   for (const auto& pose : poses) {
     for (std::size_t v = 0; v < pose.views.size(); ++v) {
-      all_bytes += bytes_of(pose, v);
-      largest = std::max(largest, bytes_of(pose, v));
+      pixels += pixels_of(pose, v);
+      largest = std::max(largest, pixels_of(pose, v));
     }
   }
-  result.are_held = all_bytes <= options.memory_bytes;
+  largest *= RangeSampler::kBytesPerPixel;
+  result.are_held = pixels * RangeSampler::kBytesPerPixel <= options.memory_bytes;
+  const Strides strides{options.seed_stride, static_cast<std::size_t>(pixels / kEnoughWeights + 1)};
   std::vector<float> weights;
+  std::size_t points = 0;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const auto& pose : poses) {
     auto& views = result.views_of_pose.emplace_back();
@@ -101,7 +111,7 @@ PreparedViews prepare_views(std::span<const PosedViews> poses, const VolumeOptio
     for (std::size_t first = 0; first < count; first += at_once) {
       std::vector<MadeView> made(std::min(at_once, count - first));
       parallel_for(made.size(), [&](std::size_t i) {
-        made[i] = make_one(pose, first + i, options, band_mm);
+        made[i] = make_one(pose, first + i, options, strides, band_mm);
         if (!result.are_held) made[i].sampler->release();
       });
       for (std::size_t i = 0; i < made.size(); ++i) {
@@ -109,11 +119,13 @@ PreparedViews prepare_views(std::span<const PosedViews> poses, const VolumeOptio
         result.box.extend(made[i].box);
         result.seeds.insert(result.seeds.end(), made[i].seeds.begin(), made[i].seeds.end());
         weights.insert(weights.end(), made[i].weights.begin(), made[i].weights.end());
+        points += made[i].points;
         sum += made[i].sum;
+        made[i] = {};
       }
     }
   }
-  result.statistics = statistics_of(weights, sum);
+  result.statistics = statistics_of(weights, sum, points);
   return result;
 }
 

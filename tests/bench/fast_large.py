@@ -41,6 +41,7 @@ def measure(bench, scratch):
         bench.at_most(f"{name}, within {gib} GiB: peak memory", 1024 * gib, run["peak_mib"], "MiB", digits=0)
         bench.line(f"{name}, within {gib} GiB: integration", "reported",
                    f"{run['seconds'] / 60:.1f} min in {run['places']} places, {run['vertices']} vertices", True)
+    bench.line(f"{name}: handles of an object with one", "1", str(runs[0]["genus"]), runs[0]["genus"] == 1)
     bench.at_most(f"{name}, within {GIB[0]} GiB: minutes", MINUTES, runs[0]["seconds"] / 60, digits=1)
     bench.at_most("a compact view: bytes a measured pixel, masks included", 9.0, runs[0]["bytes_per_pixel"], digits=2)
     same = len({run["hash"] for run in runs}) == 1
