@@ -27,7 +27,7 @@ struct RangeImage {
   bool background_is_whole = true;  ///< else pixels that are neither measured nor background may be either
 };
 
-/// What is left says where the view stands.
+/// Frees depth, sigma, normal and background; what is left says where the view stands.
 inline void release_matrices(RangeImage& range) {
   range.depth = range.sigma = cv::Mat1f();
   range.normal = cv::Mat3f();
