@@ -81,6 +81,21 @@ std::size_t count_split_vertices(const Mesh& mesh, const std::vector<Edge>& edge
   return static_cast<std::size_t>(std::count(fan_count.begin(), fan_count.end(), 2));
 }
 
+/// A flag per face: of the component that encloses the largest volume.
+std::vector<bool> largest_faces(const Mesh& mesh) {
+  const Components parts = components(mesh);
+  std::vector<double> volume(parts.count);
+  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
+    const auto& [a, b, c] = mesh.faces[f];
+    volume[parts.of_face[f]] +=
+        mesh.vertices[a].cast<double>().dot(mesh.vertices[b].cast<double>().cross(mesh.vertices[c].cast<double>()));
+  }
+  const auto largest = static_cast<std::uint32_t>(std::max_element(volume.begin(), volume.end()) - volume.begin());
+  std::vector<bool> keep(mesh.faces.size());
+  for (std::size_t f = 0; f < keep.size(); ++f) keep[f] = parts.of_face[f] == largest;
+  return keep;
+}
+
 }  // namespace
 
 Components components(const Mesh& mesh) {
@@ -125,16 +140,6 @@ Topology topology(const Mesh& mesh) {
   return result;
 }
 
-long genus_of_closed(const Mesh& mesh) {
-  std::vector<bool> used(mesh.vertices.size());
-  for (const auto& f : mesh.faces) {
-    for (const auto v : f) used[v] = true;
-  }
-  const auto vertices = static_cast<long>(std::count(used.begin(), used.end(), true));
-  const auto faces = static_cast<long>(mesh.faces.size());
-  return static_cast<long>(components(mesh).count) - (vertices - faces / 2) / 2;  // three edges for two faces
-}
-
 Mesh kept_faces(const Mesh& mesh, const std::vector<bool>& keep) {
   std::vector<std::uint32_t> new_index(mesh.vertices.size(), 0);
   for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
@@ -142,7 +147,10 @@ Mesh kept_faces(const Mesh& mesh, const std::vector<bool>& keep) {
       for (const auto v : mesh.faces[f]) new_index[v] = 1;
     }
   }
+  const auto kept = static_cast<std::size_t>(std::ranges::count(new_index, 1U));
   Mesh result;
+  result.vertices.reserve(kept);
+  result.faces.reserve(static_cast<std::size_t>(std::ranges::count(keep, true)));
   const auto copy = [](const auto& from, auto& to, std::size_t i) {
     if (!from.empty()) to.push_back(from[i]);
   };
@@ -183,19 +191,19 @@ Mesh joined_vertices(const Mesh& mesh) {
   return joined;
 }
 
-Mesh largest_component(const Mesh& mesh) {
-  const Components parts = components(mesh);
-  if (parts.count <= 1) return mesh;
-  std::vector<double> volume(parts.count);
-  for (std::size_t f = 0; f < mesh.faces.size(); ++f) {
-    const auto& [a, b, c] = mesh.faces[f];
-    volume[parts.of_face[f]] +=
-        mesh.vertices[a].cast<double>().dot(mesh.vertices[b].cast<double>().cross(mesh.vertices[c].cast<double>()));
+long genus_of_largest(const Mesh& mesh) {
+  if (mesh.faces.empty()) return 0;
+  const std::vector<bool> keep = largest_faces(mesh);
+  std::vector<bool> used(mesh.vertices.size());
+  for (std::size_t f = 0; f < keep.size(); ++f) {
+    if (!keep[f]) continue;
+    for (const auto v : mesh.faces[f]) used[v] = true;
   }
-  const auto largest = static_cast<std::uint32_t>(std::max_element(volume.begin(), volume.end()) - volume.begin());
-  std::vector<bool> keep(mesh.faces.size());
-  for (std::size_t f = 0; f < keep.size(); ++f) keep[f] = parts.of_face[f] == largest;
-  return kept_faces(mesh, keep);
+  const auto vertices = static_cast<long>(std::ranges::count(used, true));
+  const auto faces = static_cast<long>(std::ranges::count(keep, true));
+  return 1 - (vertices - faces / 2) / 2;  // three edges for two faces
 }
+
+Mesh largest_component(const Mesh& mesh) { return kept_faces(mesh, largest_faces(mesh)); }
 
 }  // namespace scanrig

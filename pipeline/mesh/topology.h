@@ -27,8 +27,9 @@ struct Topology {
 
 Topology topology(const Mesh& mesh);
 
-/// Handles over all components of a mesh that is known to be watertight, as every extracted surface is.
-long genus_of_closed(const Mesh& mesh);
+/// Handles of the largest_component() of a mesh that is known to be watertight, as every extracted surface is; 0 of an
+/// empty one.
+long genus_of_largest(const Mesh& mesh);
 
 /// Component number of every face; components are numbered by their first face.
 struct Components {

@@ -134,7 +134,7 @@ Result<void> Reconstruction::State::finish_pose(std::size_t pose, const Context&
                             .denoise = std::nullopt,
                             .table_without_silhouettes = calibration.has_value(),
                             .untangle = false,
-                            .memory_bytes = prepared_bytes()},
+                            .memory_bytes = bytes_left()},
                            context);
   if (!partial) return pass_on(partial, fmt::format("pose {}", pose + 1));
   state.partial = std::move(*partial);
@@ -144,10 +144,9 @@ Result<void> Reconstruction::State::finish_pose(std::size_t pose, const Context&
   return {};
 }
 
-/// Half of what is left: blocks and mesh want the rest.
-std::uintmax_t Reconstruction::State::prepared_bytes() const {
+std::uintmax_t Reconstruction::State::bytes_left() const {
   return options.memory_bytes == std::numeric_limits<std::uintmax_t>::max() ? options.memory_bytes
-                                                                            : memory_left(options.memory_bytes) / 2;
+                                                                            : memory_left(options.memory_bytes);
 }
 
 Result<Surface> Reconstruction::State::surface(const FoundPoses& found, const Context& context) {
@@ -170,7 +169,7 @@ Result<Surface> Reconstruction::State::surface(const FoundPoses& found, const Co
     }
     give_memory_back();
   }
-  volume.memory_bytes = prepared_bytes();
+  volume.memory_bytes = bytes_left();
   return integrate(posed, volume, context);
 }
 

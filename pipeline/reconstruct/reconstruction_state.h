@@ -117,7 +117,7 @@ struct Reconstruction::State {
   Result<FoundPoses> choose_turn(const PoseEstimate& estimate, Report& report, const Context& context);
   Result<void> choose_turns(const PlacedPoses& placed, FoundPoses& found, const Context& context);
   [[nodiscard]] RefineOptions refine_options() const;
-  [[nodiscard]] std::uintmax_t prepared_bytes() const;
+  [[nodiscard]] std::uintmax_t bytes_left() const;
   Result<Surface> surface(const FoundPoses& found, const Context& context);
   void set_view(PoseState& pose, std::size_t v, View view) const;
   void crop_photos(PoseState& pose) const;

@@ -170,7 +170,6 @@ void BlockGrid::follow(std::vector<Eigen::Vector3i> wanted, const Bricks& bricks
                        std::vector<std::vector<Eigen::Vector3i>>& queue) {
   while (!wanted.empty() && blocks_.size() + wanted.size() <= kMaxBlocks && !context.stopped()) {
     const std::size_t first = blocks_.size();
-    if (first + wanted.size() > blocks_.capacity()) blocks_.reserve((first + wanted.size()) * 5 / 4);
     blocks_.resize(first + wanted.size());
     parallel_for(wanted.size(), [&](std::size_t i) {
       blocks_[first + i].index = wanted[i];
@@ -190,7 +189,7 @@ void BlockGrid::follow(std::vector<Eigen::Vector3i> wanted, const Bricks& bricks
   queue[brick].insert(queue[brick].end(), wanted.begin(), wanted.end());  // of a grid that is full
 }
 
-Result<void> BlockGrid::fill(Field& field, const std::vector<Eigen::Vector3f>& seeds, const Context& context) {
+Result<void> BlockGrid::fill(Field& field, std::vector<Eigen::Vector3f> seeds, const Context& context) {
   if (size_.cast<double>().prod() > kMaxBlocksInBox) {
     return fail(ErrorCode::out_of_range, "volume: {} x {} x {} blocks of 8 voxels exceed the limit; use larger voxels",
                 size_.x(), size_.y(), size_.z());
@@ -204,6 +203,7 @@ Result<void> BlockGrid::fill(Field& field, const std::vector<Eigen::Vector3f>& s
     is_queued[linear(block)] = true;
     queue[bricks.of(position(kBlockSide * block))].push_back(block);
   }
+  seeds = {};  // many, of large images
   const auto is_waiting = [](const auto& blocks) { return !blocks.empty(); };
   while (std::ranges::any_of(queue, is_waiting)) {
     for (std::size_t brick = 0; brick < queue.size(); ++brick) {

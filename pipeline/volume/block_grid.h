@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <deque>
 #include <optional>
 #include <vector>
 
@@ -35,7 +36,7 @@ class BlockGrid {
 
   /// Stores the blocks around `seeds` and wherever the sign of `field` changes from block to block, then follows the
   /// surface from block to block until it is closed. Fails with `out_of_range`, `stopped`.
-  Result<void> fill(Field& field, const std::vector<Eigen::Vector3f>& seeds, const Context& context);
+  Result<void> fill(Field& field, std::vector<Eigen::Vector3f> seeds, const Context& context);
 
   /// Gives one node a distance and returns the one it had; stores its block and the blocks it touches if they are
   /// missing.
@@ -43,8 +44,8 @@ class BlockGrid {
   /// No longer stores those blocks that were stored after the first `count`, each all inside or all outside again.
   void forget_blocks_after(std::size_t count);
 
-  [[nodiscard]] const std::vector<Block>& blocks() const { return blocks_; }
-  [[nodiscard]] std::vector<Block>& blocks() { return blocks_; }
+  [[nodiscard]] const std::deque<Block>& blocks() const { return blocks_; }
+  [[nodiscard]] std::deque<Block>& blocks() { return blocks_; }
   [[nodiscard]] const Eigen::Vector3i& size() const { return size_; }  ///< in blocks
   [[nodiscard]] float voxel() const { return voxel_; }
   [[nodiscard]] Eigen::Vector3f position(const Eigen::Vector3i& node) const {
@@ -52,6 +53,10 @@ class BlockGrid {
   }
   /// The stored block, or null; also null outside the grid.
   [[nodiscard]] const Block* find(const Eigen::Vector3i& block) const;
+  /// Place of a stored block in blocks().
+  [[nodiscard]] std::size_t place(const Eigen::Vector3i& block) const {
+    return static_cast<std::size_t>(slot_[linear(block)]);
+  }
   /// Of a block that is not stored. Outside the grid everything is outside.
   [[nodiscard]] bool all_inside(const Eigen::Vector3i& block) const;
 
@@ -77,7 +82,7 @@ class BlockGrid {
   float voxel_;
   Eigen::Vector3i size_;
   std::vector<std::int32_t> slot_;  ///< one per block: its place in blocks_, or its kind
-  std::vector<Block> blocks_;
+  std::deque<Block> blocks_;        ///< gigabytes, that a vector would copy to grow
 };
 
 }  // namespace scanrig

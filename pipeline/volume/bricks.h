@@ -12,6 +12,7 @@ class Bricks {
  public:
   Bricks(const Eigen::AlignedBox3f& box, int per_axis) : box_(box), per_axis_(per_axis) {}
 
+  [[nodiscard]] const Eigen::AlignedBox3f& whole() const { return box_; }
   [[nodiscard]] std::size_t count() const { return static_cast<std::size_t>(per_axis_) * per_axis_ * per_axis_; }
   /// A point outside of the box belongs to the brick that is nearest, roughly.
   [[nodiscard]] std::size_t of(const Eigen::Vector3f& point) const {

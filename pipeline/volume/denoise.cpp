@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "core/parallel_blocks.h"
@@ -28,11 +29,11 @@ std::vector<Beyond> beyond_quadratics(const VertexNeighbours& around, const Mesh
   std::vector<Placed> placed(count);
   for (std::size_t v = 0; v < count; ++v) placed[v] << mesh.vertices[v], is_measured(mesh, v) ? 1.0F : 0.0F;
   std::vector<Beyond> result(count);
-  std::vector<Placed> once = around.smoothed(placed, rounds);
+  std::vector<Placed> once = around.smoothed(std::move(placed), rounds);
   for (std::size_t k = 0; k < kScales; ++k, rounds *= 2) {
     std::vector<Placed> twice = around.smoothed(once, rounds);
     for_each_in_blocks(count, [&](std::size_t v) {
-      result[v].height_mm[k] = (placed[v] - 2.0F * once[v] + twice[v]).head<3>().dot(normals[v]);
+      result[v].height_mm[k] = (mesh.vertices[v] - 2.0F * once[v].head<3>() + twice[v].head<3>()).dot(normals[v]);
       result[v].measured = twice[v].w();
     });
     once = std::move(twice);

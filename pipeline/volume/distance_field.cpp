@@ -43,11 +43,11 @@ Scatter scatter_of(const std::vector<WeightedDistance>& views) {
 }  // namespace
 
 Field::Field(std::vector<std::vector<FieldView>> views_of_pose, const SurfaceStatistics& statistics,
-             const std::vector<Transform>& model_from_pose, Hull hull, Bricks bricks, const VolumeOptions& options,
-             double band_mm)
+             const std::vector<Transform>& model_from_pose, Hull hull, const Eigen::AlignedBox3f& box,
+             const VolumeOptions& options, double band_mm)
     : views_of_pose_(std::move(views_of_pose)),
       hull_(std::move(hull)),
-      bricks_(std::move(bricks)),
+      bricks_(box, 1),
       room_mm_(kBrickRoom * static_cast<float>(options.voxel_mm)),
       fusion_(options.fusion),
       images_per_outside_(options.images_per_outside),
@@ -58,6 +58,36 @@ Field::Field(std::vector<std::vector<FieldView>> views_of_pose, const SurfaceSta
       free_weight_(statistics.median_weight),
       centre_(statistics.centre) {
   for (const auto& transform : model_from_pose) pose_from_model_.push_back(transform.inverse());
+  const auto beyond = Eigen::Vector3f::Constant(2.0F * room_mm_);  // as the grid covers more than the box
+  bricks_ = Bricks({box.min() - beyond, box.max() + beyond}, 1);
+}
+
+/// Of a brick and the room around it.
+Eigen::AlignedBox3f Field::box_of(const Bricks& bricks, std::size_t brick) const {
+  const auto room = Eigen::Vector3f::Constant(room_mm_);
+  const Eigen::AlignedBox3f bare = bricks.box(brick);
+  return {bare.min() - room, bare.max() + room};
+}
+
+/// Of the fullest brick, all views together.
+std::uintmax_t Field::bytes_in(const Bricks& bricks) const {
+  std::uintmax_t fullest = 0;
+  for (std::size_t brick = 0; brick < bricks.count(); ++brick) {
+    const Eigen::AlignedBox3f box = box_of(bricks, brick);
+    std::uintmax_t pixels = 0;
+    for (const auto& views : views_of_pose_) {
+      for (const auto& view : views) pixels += static_cast<std::uintmax_t>(view.sampler.area_for(box).area());
+    }
+    fullest = std::max(fullest, pixels * RangeSampler::kBytesPerPixel);
+  }
+  return fullest;
+}
+
+void Field::divide(std::uintmax_t bytes, int max_per_axis) {
+  int per_axis = 2;
+  while (per_axis < max_per_axis && bytes_in(Bricks(bricks_.whole(), per_axis)) > bytes) ++per_axis;
+  bricks_ = Bricks(bricks_.whole(), per_axis);
+  release();
 }
 
 void Field::focus(std::size_t brick) {
@@ -67,8 +97,7 @@ void Field::focus(std::size_t brick) {
   for (auto& views : views_of_pose_) {
     for (auto& view : views) all.push_back(&view);
   }
-  const auto room = Eigen::Vector3f::Constant(room_mm_);
-  const Eigen::AlignedBox3f bare = bricks_.box(brick), box(bare.min() - room, bare.max() + room);
+  const Eigen::AlignedBox3f box = box_of(bricks_, brick);
   parallel_for(all.size(), [&](std::size_t i) { all[i]->sampler.focus(box, all[i]->part); });
   focused_ = brick;
 }

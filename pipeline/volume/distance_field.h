@@ -64,13 +64,15 @@ struct SurfaceStatistics {
 /// no other thread may use meanwhile. The values are the same.
 class Field {
  public:
-  /// `views_of_pose`: pose after pose; with one brick they hold all their pixels. `bricks` of the space around all
-  /// points that are evaluated.
+  /// `views_of_pose`: pose after pose; they hold all their pixels. `box` around all points that are evaluated.
   Field(std::vector<std::vector<FieldView>> views_of_pose, const SurfaceStatistics& statistics,
-        const std::vector<Transform>& model_from_pose, Hull hull, Bricks bricks, const VolumeOptions& options,
-        double band_mm);
+        const std::vector<Transform>& model_from_pose, Hull hull, const Eigen::AlignedBox3f& box,
+        const VolumeOptions& options, double band_mm);
 
   [[nodiscard]] const Bricks& bricks() const { return bricks_; }
+  /// From now on no pixels are held but those of a brick in focus: as few bricks as keep them within `bytes`, at most
+  /// so many along an axis.
+  void divide(std::uintmax_t bytes, int max_per_axis);
   /// Prepares for points within `kBrickRoom` voxels of a brick.
   void focus(std::size_t brick);
   /// Lets the pixels go until the next focus(), where there is one.
@@ -112,6 +114,8 @@ class Field {
  private:
   [[nodiscard]] FieldValue from_evidence(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;
   [[nodiscard]] FieldValue from_class_table(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood) const;
+  [[nodiscard]] Eigen::AlignedBox3f box_of(const Bricks& bricks, std::size_t brick) const;
+  [[nodiscard]] std::uintmax_t bytes_in(const Bricks& bricks) const;
   [[nodiscard]] float bounds(const Eigen::Vector3f& point, const Neighbourhood& neighbourhood,
                              std::size_t views_behind) const;
 

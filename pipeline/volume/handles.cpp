@@ -69,7 +69,7 @@ std::size_t flip_if_better(BlockGrid& grid, Mesh& surface, const std::vector<Eig
   before.reserve(nodes.size());
   for (const auto& node : nodes) before.push_back(grid.set(node, distance, band_mm));
   Mesh all = extract_surface(grid);
-  const long after = genus_of_closed(largest_component(all));
+  const long after = genus_of_largest(all);
   if (after >= genus) {
     for (std::size_t i = 0; i < nodes.size(); ++i) grid.set(nodes[i], before[i], band_mm);
     grid.forget_blocks_after(blocks);

@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "core/heap.h"
 #include "core/max_poses.h"
 #include "core/parallel.h"
 #include "pipeline/mesh/topology.h"
@@ -98,30 +99,27 @@ void count_classes(std::size_t poses, const BlockGrid& grid, VolumeReport& repor
 }
 
 /// The field's zero set, closed and repaired: its largest component.
-Result<Mesh> extract(Field& field, const Eigen::AlignedBox3f& box, const std::vector<Eigen::Vector3f>& seeds,
+Result<Mesh> extract(Field& field, const Eigen::AlignedBox3f& box, std::vector<Eigen::Vector3f> seeds,
                      const VolumeOptions& options, VolumeReport& report, const Context& context) {
   BlockGrid grid(box, static_cast<float>(options.voxel_mm));
-  if (auto ok = grid.fill(field, seeds, context); !ok) return pass_on(ok);
+  if (auto ok = grid.fill(field, std::move(seeds), context); !ok) return pass_on(ok);
   field.release();
   report.active_voxels = grid.blocks().size() * BlockGrid::kNodes;
   relax_unmeasured(grid, field.band(), options.relax_rounds);
   context.report("volume", 0.7);
 
   Mesh all = extract_surface(grid);
-  Mesh mesh = largest_component(all);
-  if (mesh.faces.empty()) return fail(ErrorCode::degenerate, "volume: the surface encloses nothing");
-  report.genus = report.genus_before_repair = genus_of_closed(mesh);
+  if (all.faces.empty()) return fail(ErrorCode::degenerate, "volume: the surface encloses nothing");
+  report.genus = report.genus_before_repair = genus_of_largest(all);
   if (options.repair_handles && report.genus > 0) {
-    mesh = Mesh();  // which would add to the peak
     const HandleRepair repair = repair_handles(grid, all, report.genus, field.band(), options);
     report.voxels_cut = repair.cut;
     report.voxels_filled = repair.filled;
     report.genus = repair.genus;
-    mesh = largest_component(all);
   }
   report.dropped_components = components(all).count - 1;
   count_classes(field.poses(), grid, report);
-  return mesh;
+  return largest_component(all);
 }
 
 }  // namespace
@@ -156,14 +154,15 @@ Result<Surface> integrate(std::span<const PosedViews> poses, const VolumeOptions
     const auto room = Eigen::Vector3f::Constant(static_cast<float>(options.hull_room_mm));
     box = {box.min() - room, box.max() + room};
   }
-  const Bricks bricks = bricks_for(prepared, box, options);
-  report.bricks = bricks.count();
   auto field = std::make_unique<Field>(std::move(prepared.views_of_pose), prepared.statistics, prepared.model_from_pose,
-                                       make_hull(poses, options, box), bricks, options, report.band_mm);
+                                       make_hull(poses, options, box), box, options, report.band_mm);
+  if (!prepared.are_held) field->divide(options.memory_bytes / 2, options.max_bricks_per_axis);
+  report.bricks = field->bricks().count();
   context.report("volume", 0.2);
-  auto extracted = extract(*field, box, prepared.seeds, options, report, context);
+  auto extracted = extract(*field, box, std::move(prepared.seeds), options, report, context);
   if (!extracted) return pass_on(extracted);
   result.mesh = std::move(*extracted);
+  give_memory_back();  // of the blocks
   finish_surface(std::move(field), options, result.mesh);
   report.closed_vertices = static_cast<std::size_t>(std::count(result.mesh.views.begin(), result.mesh.views.end(), 0));
   report.measured_vertices = result.mesh.vertices.size() - report.closed_vertices;

@@ -58,8 +58,9 @@ struct VolumeOptions {
   bool table_without_silhouettes = false;  ///< bound a pose by its plane y = 0 even if it has no silhouettes
   bool repair_handles = true;              ///< remove handles and tunnels that no measurement supports
   bool untangle = true;                    ///< no face of the surface crosses another
-  /// For range images prepared for sampling. What needs more is done place by place, with the same bits; the floor is
-  /// what one of `max_bricks_per_axis`^3 places needs, and one view.
+  /// For what is made here, beside what the caller holds. Range images prepared for sampling take at most half of it:
+  /// what needs more is done place by place, with the same bits. The floor is blocks and mesh, what one of
+  /// `max_bricks_per_axis`^3 places needs, and one view.
   std::uintmax_t memory_bytes = std::numeric_limits<std::uintmax_t>::max();
   int max_bricks_per_axis = 12;
 };

@@ -120,12 +120,14 @@ void for_each_node(int side, const Body& body) {
 /// A block and the seven that follow it; a block that is not stored is null.
 struct Octet {
   std::array<const BlockGrid::Block*, 8> block;
-  std::array<float, 8> constant;  ///< distance in the blocks that are not stored
+  std::array<std::size_t, 8> place;  ///< of the stored blocks in the grid's
+  std::array<float, 8> constant;     ///< distance in the blocks that are not stored
 
   Octet(const BlockGrid& grid, const Eigen::Vector3i& first) {
     for (int i = 0; i < 8; ++i) {
       const Eigen::Vector3i index = first + Eigen::Vector3i(i & 1, i >> 1 & 1, i >> 2 & 1);
       block[i] = grid.find(index);
+      place[i] = block[i] == nullptr ? 0 : grid.place(index);
       constant[i] = grid.all_inside(index) ? -1.0F : 1.0F;
     }
   }
@@ -195,8 +197,7 @@ std::vector<Mesh::Face> cell_faces(const Numbering& numbering, const Eigen::Vect
   const auto vertex = [&](const Eigen::Vector3i& cell, int edge) {
     const int start = edge_start(edge);
     const Eigen::Vector3i n = cell + Eigen::Vector3i(start & 1, start >> 1 & 1, start >> 2 & 1);
-    const auto* owner = octet.block[Octet::which(n)];
-    const auto slot = static_cast<std::size_t>(owner - numbering.grid.blocks().data());
+    const std::size_t slot = octet.place[Octet::which(n)];
     const int local = node(n.unaryExpr([](int c) { return c % kBlockSide; }));
     return numbering.first[slot] + numbering.vertices[slot].number(3 * local + edge / 4);
   };

@@ -4,7 +4,6 @@
 #include <optional>
 
 #include "core/parallel.h"
-#include "pipeline/volume/block_grid.h"
 
 namespace scanrig {
 namespace {
@@ -67,26 +66,12 @@ SurfaceStatistics statistics_of(std::vector<float>& weights, const Eigen::Vector
   return result;
 }
 
-/// Of the fullest brick, all views together.
-std::uintmax_t bytes_for(const PreparedViews& prepared, const Bricks& bricks, float room_mm) {
-  std::uintmax_t fullest = 0;
-  for (std::size_t brick = 0; brick < bricks.count(); ++brick) {
-    Eigen::AlignedBox3f box = bricks.box(brick);
-    box = {box.min() - Eigen::Vector3f::Constant(room_mm), box.max() + Eigen::Vector3f::Constant(room_mm)};
-    std::uintmax_t pixels = 0;
-    for (const auto& views : prepared.views_of_pose) {
-      for (const auto& view : views) pixels += static_cast<std::uintmax_t>(view.sampler.area_for(box).area());
-    }
-    fullest = std::max(fullest, pixels * RangeSampler::kBytesPerPixel);
-  }
-  return fullest;
-}
-
 }  // namespace
 
 PreparedViews prepare_views(std::span<const PosedViews> poses, const VolumeOptions& options, double band_mm) {
   constexpr std::uintmax_t kWhilePrepared = 3;            // times what a prepared view keeps
   constexpr std::uintmax_t kEnoughWeights = 1ULL << 24U;  // for their median
+  const std::uintmax_t bytes = options.memory_bytes / 2;
   PreparedViews result;
   std::uintmax_t pixels = 0, largest = 1;
   for (const auto& pose : poses) {
@@ -96,7 +81,7 @@ PreparedViews prepare_views(std::span<const PosedViews> poses, const VolumeOptio
     }
   }
   largest *= RangeSampler::kBytesPerPixel;
-  result.are_held = pixels * RangeSampler::kBytesPerPixel <= options.memory_bytes;
+  result.are_held = pixels * RangeSampler::kBytesPerPixel <= bytes;
   const Strides strides{options.seed_stride, static_cast<std::size_t>(pixels / kEnoughWeights + 1)};
   std::vector<float> weights;
   std::size_t points = 0;
@@ -105,9 +90,10 @@ PreparedViews prepare_views(std::span<const PosedViews> poses, const VolumeOptio
     auto& views = result.views_of_pose.emplace_back();
     result.model_from_pose.push_back(pose.model_from_pose);
     const std::size_t count = pose.views.size();
-    const std::size_t at_once = result.are_held ? count
-                                                : static_cast<std::size_t>(std::clamp<std::uintmax_t>(
-                                                      options.memory_bytes / (kWhilePrepared * largest), 1, count));
+    const std::size_t at_once =
+        result.are_held
+            ? count
+            : static_cast<std::size_t>(std::clamp<std::uintmax_t>(bytes / (kWhilePrepared * largest), 1, count));
     for (std::size_t first = 0; first < count; first += at_once) {
       std::vector<MadeView> made(std::min(at_once, count - first));
       parallel_for(made.size(), [&](std::size_t i) {
@@ -127,20 +113,6 @@ PreparedViews prepare_views(std::span<const PosedViews> poses, const VolumeOptio
   }
   result.statistics = statistics_of(weights, sum, points);
   return result;
-}
-
-Bricks bricks_for(const PreparedViews& prepared, const Eigen::AlignedBox3f& box, const VolumeOptions& options) {
-  if (prepared.are_held) return {box, 1};
-  const auto voxel_mm = static_cast<float>(options.voxel_mm);
-  const auto blocks = Eigen::Vector3f::Constant(3.0F * kBlockSide * voxel_mm);  // as the grid covers more than the box
-  const Eigen::AlignedBox3f around(box.min() - blocks, box.max() + blocks);
-  for (int per_axis = 2;; ++per_axis) {
-    const Bricks bricks(around, per_axis);
-    if (per_axis >= options.max_bricks_per_axis ||
-        bytes_for(prepared, bricks, Field::kBrickRoom * voxel_mm) <= options.memory_bytes) {
-      return bricks;
-    }
-  }
 }
 
 }  // namespace scanrig

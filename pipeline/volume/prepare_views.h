@@ -18,11 +18,8 @@ struct PreparedViews {
   bool are_held = true;  ///< all pixels of all views
 };
 
-/// `poses` must outlive the result. Where all pixels of all views need more than `options.memory_bytes` they are looked
-/// at view by view, and let go.
+/// `poses` must outlive the result. Where all pixels of all views need more than half of `options.memory_bytes` they
+/// are looked at view by view, and let go.
 PreparedViews prepare_views(std::span<const PosedViews> poses, const VolumeOptions& options, double band_mm);
-
-/// As few bricks of `box`, and room around it, as that memory allows; one where all pixels are held.
-Bricks bricks_for(const PreparedViews& prepared, const Eigen::AlignedBox3f& box, const VolumeOptions& options);
 
 }  // namespace scanrig

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <deque>
 #include <vector>
 
 #include "core/parallel.h"
@@ -77,7 +78,7 @@ bool has_unmeasured(const Block& block) {
 }  // namespace
 
 void relax_unmeasured(BlockGrid& grid, float band_mm, int rounds) {
-  std::vector<Block>& blocks = grid.blocks();
+  std::deque<Block>& blocks = grid.blocks();
   std::vector<std::size_t> changing;
   for (std::size_t i = 0; i < blocks.size(); ++i) {
     if (has_unmeasured(blocks[i])) changing.push_back(i);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "core/parallel_blocks.h"
 #include "pipeline/mesh/solid_properties.h"
@@ -31,6 +32,13 @@ void smooth_unmeasured(const VertexNeighbours& around, float voxel_mm, int round
   }
 }
 
+/// Beside the range images: the mesh, what is kept of each vertex, and in which brick it belongs.
+std::uintmax_t bytes_while_settled(const Mesh& mesh) {
+  constexpr std::uintmax_t kOfVertex = 3 * sizeof(Eigen::Vector3f) + sizeof(Scatter) + sizeof(float) + 1;
+  constexpr std::uintmax_t kWhereItBelongs = 2 * sizeof(std::uint32_t);  // a vector that may have grown
+  return mesh.vertices.size() * (kOfVertex + kWhereItBelongs) + mesh.faces.size() * sizeof(Mesh::Face);
+}
+
 /// One step along the measured normal; `views` and `sigma` where the vertex ends on measured surface.
 void settle_vertex(const Field& field, const VolumeOptions& options, const Eigen::Vector3f& outward, Mesh& mesh,
                    std::vector<Scatter>& scatter, std::size_t v) {
@@ -48,10 +56,29 @@ void settle_vertex(const Field& field, const VolumeOptions& options, const Eigen
   scatter[v] = evidence.scatter;
 }
 
+/// All vertices, each where the views let it stand; how much the views of each scatter.
+std::vector<Scatter> settle(Field& field, const VolumeOptions& options, const std::vector<Eigen::Vector3f>& extracted,
+                            Mesh& mesh) {
+  const std::size_t count = extracted.size();
+  mesh.views.assign(count, 0);
+  mesh.sigma.assign(count, std::numeric_limits<float>::quiet_NaN());
+  const std::vector<Eigen::Vector3f> outward = vertex_normals(mesh);
+  std::vector<Scatter> scatter(count);
+  if (field.bricks().count() > 1) {
+    const std::uintmax_t taken = bytes_while_settled(mesh);
+    const std::uintmax_t left = options.memory_bytes - std::min(taken, options.memory_bytes);
+    field.divide(std::min(left, options.memory_bytes / 2), options.max_bricks_per_axis);
+  }
+  field.for_each_in_bricks(
+      count, [&](std::size_t v) { return extracted[v]; },
+      [&](std::size_t v) { settle_vertex(field, options, outward[v], mesh, scatter, v); });
+  return scatter;
+}
+
 /// Where the views around scatter more than their sigmas let expect, sigma is larger by that [the Birge ratio].
-void widen_by_scatter(const VertexNeighbours& around, int rounds, const std::vector<Scatter>& scatter, Mesh& mesh) {
+void widen_by_scatter(const VertexNeighbours& around, int rounds, std::vector<Scatter> scatter, Mesh& mesh) {
   constexpr float kTooFew = 1e-3F;  // views around, after the smoothing
-  const std::vector<Scatter> mean = around.smoothed(scatter, rounds);
+  const std::vector<Scatter> mean = around.smoothed(std::move(scatter), rounds);
   for (std::size_t v = 0; v < mesh.sigma.size(); ++v) {
     if (mean[v].count > kTooFew) mesh.sigma[v] *= std::max(1.0F, mean[v].sum / mean[v].count);
   }
@@ -60,20 +87,16 @@ void widen_by_scatter(const VertexNeighbours& around, int rounds, const std::vec
 }  // namespace
 
 void finish_surface(std::unique_ptr<Field> field, const VolumeOptions& options, Mesh& mesh) {
-  const std::size_t count = mesh.vertices.size();
-  mesh.views.assign(count, 0);
-  mesh.sigma.assign(count, std::numeric_limits<float>::quiet_NaN());
-  const std::vector<Eigen::Vector3f> outward = vertex_normals(mesh), extracted = mesh.vertices;
-  const VertexNeighbours around(mesh);
-  std::vector<Scatter> scatter(count);
-  field->for_each_in_bricks(
-      count, [&](std::size_t v) { return extracted[v]; },
-      [&](std::size_t v) { settle_vertex(*field, options, outward[v], mesh, scatter, v); });
+  const std::vector<Eigen::Vector3f> extracted = mesh.vertices;
+  std::vector<Scatter> scatter = settle(*field, options, extracted, mesh);
   const float window_mm = field->window_mm();
   field.reset();  // much memory, of which the rest needs nothing
-  widen_by_scatter(around, options.scatter_rounds, scatter, mesh);
-  if (options.denoise) denoise(around, *options.denoise, window_mm, mesh);
-  smooth_unmeasured(around, static_cast<float>(options.voxel_mm), options.smoothing_rounds, mesh);
+  {
+    const VertexNeighbours around(mesh);
+    widen_by_scatter(around, options.scatter_rounds, std::move(scatter), mesh);
+    if (options.denoise) denoise(around, *options.denoise, window_mm, mesh);
+    smooth_unmeasured(around, static_cast<float>(options.voxel_mm), options.smoothing_rounds, mesh);
+  }
   if (options.untangle) untangle(extracted, mesh);
   mesh.normals = vertex_normals(mesh);
 }

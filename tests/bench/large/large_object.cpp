@@ -145,7 +145,7 @@ int main(int argc, char** argv) {
   options.band_mm = evidence_band({&posed, 1}, options);
   for (View& view : thin) release_matrices(view.range);
   give_memory_back();
-  if (gib > 0.0) options.memory_bytes = memory_left(static_cast<std::uintmax_t>(gib * (1U << 30))) / 2;
+  if (gib > 0.0) options.memory_bytes = memory_left(static_cast<std::uintmax_t>(gib * (1U << 30)));
   const double kept_mib = peak_mib();
   const auto start = std::chrono::steady_clock::now();
   const auto surface = integrate({&posed, 1}, options);

@@ -108,6 +108,8 @@ TEST(LargestComponent, KeepsTheBodyAndItsAttributesAndDropsBitsAndCavities) {
   EXPECT_EQ(kept.vertices.size(), 24U * 12U);
   EXPECT_EQ(kept.views.at(0), 7);
   EXPECT_EQ(topology(kept).genus(), 1);
+  EXPECT_EQ(genus_of_largest(mesh), 1);
+  EXPECT_EQ(genus_of_largest({}), 0);
 }
 
 TEST(SolidProperties, TetrahedronHasItsTextbookVolumeAndCentre) {
