@@ -1,5 +1,8 @@
-"""Closed meshes with shapes that the built-in figurine does not have, written as PLY. Units are the shape's own."""
+"""Closed meshes with shapes that the built-in figurine does not have, written as PLY (units are the shape's own), and
+those of other people."""
 import math
+
+FOUND_ELSEWHERE = ("meshes/igea_tri.ply", "meshes/spot", "meshes/ycb_banana")
 
 
 def write_ply(file, vertices, faces):
@@ -89,3 +92,15 @@ def unit(v):
 
 def cross(a, b):
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def found_elsewhere(bench):
+    """Files by name, of the data that are there."""
+    def mesh_of(found):
+        if found.is_file():
+            return found
+        return next((file for ending in ("*.obj", "*.ply") for file in sorted(found.rglob(ending))), None)
+
+    found = {path.split("/")[-1]: mesh_of(bench.data / path)
+             for path in FOUND_ELSEWHERE if bench.data and (bench.data / path).exists()}
+    return {name: file for name, file in found.items() if file}

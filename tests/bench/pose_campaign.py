@@ -8,29 +8,19 @@ import concurrent.futures
 import json
 import os
 
+import mesh_shapes
+
 TRIALS, QUICK_TRIALS, SEED = 400, 12, 3301
 GENERATORS_EVERY = 4
 BATCH = 4  # trials of one process: what is not begun when the time is over is not begun
-FOUND_ELSEWHERE = ("meshes/igea_tri.ply", "meshes/spot", "meshes/ycb_banana")
 WRONG_MM = 0.25  # farthest that pose 2's surface may be put elsewhere
 MAX_WITHOUT, MAX_MEDIAN_DEG, MAX_MEDIAN_MM, MIN_EGI, MAX_S = 0.01, 0.01, 0.01, 0.9, 2.0
 WITHIN = ((2, 0.95), (4, 0.999))
 
 
-def mesh_of(found):
-    if found.is_file():
-        return found
-    return next((file for ending in ("*.obj", "*.ply") for file in sorted(found.rglob(ending))), None)
-
-
-def meshes(bench):
-    found = [mesh_of(bench.data / path) for path in FOUND_ELSEWHERE if bench.data and (bench.data / path).exists()]
-    return [file for file in found if file]
-
-
 def played(bench, series, count, generators_every=0):
     """All trials of a series, in their order; also written to out/bench/campaign_SERIES.jsonl."""
-    seed, files = os.environ.get("SCANRIG_CAMPAIGN_SEED", SEED), meshes(bench)
+    seed, files = os.environ.get("SCANRIG_CAMPAIGN_SEED", SEED), list(mesh_shapes.found_elsewhere(bench).values())
 
     def batch(first):
         if bench.seconds_left() <= 0:

@@ -12,7 +12,6 @@ MIN_CORRELATION, MAX_ERROR, MIN_BETTER = 0.9, 0.05, 0.3
 OBJECTS, RANDOM_ONES, SEED = 30, 16, 33
 NAMED = ("plate with 0 holes", "plate with 2 holes", "plate with 5 holes", "cup with 1 handles", "cup with 2 handles",
          "ring")
-FOUND_ELSEWHERE = ("meshes/igea_tri.ply", "meshes/spot", "meshes/ycb_banana")
 SIZES_MM = (80, 95, 110)
 RESTS_PER_OBJECT = 6
 
@@ -38,12 +37,6 @@ def random_objects():
     return [(f"blocks {n}", pierced_objects.mesh_of_cells(random_cells(chance))) for n in range(1, RANDOM_ONES + 1)]
 
 
-def mesh_of(found):
-    if found.is_file():
-        return found
-    return next((file for ending in ("*.obj", "*.ply") for file in sorted(found.rglob(ending))), None)
-
-
 def objects(bench, folder):
     """Name, file, and the number of the rest on which it begins; objects of two rests begin on either."""
     shapes = [(name, pierced_objects.write(folder / f"{name.replace(' ', '_')}.ply", mesh))
@@ -51,10 +44,7 @@ def objects(bench, folder):
     shapes += [(name, pierced_objects.write(folder / f"{name.replace(' ', '_')}.ply", mesh))
                for name, mesh in random_objects()]
     shapes += [("knot", mesh_shapes.knot(folder / "knot.ply")), ("pawn", mesh_shapes.pawn(folder / "pawn.ply"))]
-    for path in FOUND_ELSEWHERE:
-        file = mesh_of(bench.data / path) if bench.data and (bench.data / path).exists() else None
-        if file:
-            shapes.append((path.split("/")[-1], file))
+    shapes += mesh_shapes.found_elsewhere(bench).items()
     again = [(f"{name}, otherwise", file, 1) for name, file in reversed(shapes)]
     return ([(name, file, 0) for name, file in shapes] + again)[:OBJECTS]
 
