@@ -48,12 +48,12 @@ class VoxelLabels {
   [[nodiscard]] bool closes_short_loop(std::size_t blocked, bool inside, int longest) const;
 
  private:
+  class Growth;
   /// `body(i, block, n)`: of each voxel of the stored blocks.
   template <class Body>
   void for_each_stored(const BlockGrid& grid, const Body& body) const;
   [[nodiscard]] std::array<std::ptrdiff_t, 6> faces() const;
   std::vector<std::size_t> next_layer(const std::vector<std::size_t>& front);
-  [[nodiscard]] std::vector<bool> buried_blocks(bool inside) const;
   [[nodiscard]] static bool is_certain(std::uint8_t flags, bool inside) {
     return ((flags & kInside) != 0) == inside && (flags & kDoubtful) == 0;
   }
