@@ -28,7 +28,7 @@ VertexNeighbours::VertexNeighbours(const Mesh& mesh) : first_(mesh.vertices.size
   }
   first_.back() = kept;
   list_.resize(kept);
-  list_.shrink_to_fit();  // half
+  list_.shrink_to_fit();  // doubles took half of it
 }
 
 int VertexNeighbours::rounds_for(const Mesh& mesh, float width_mm) const {
